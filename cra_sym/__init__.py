@@ -1,0 +1,37 @@
+"""Symbolic-numeric dynamics and stability of a flexible Cartesian robotic arm.
+
+The public names below load on first use, so importing the package costs next to nothing: no derivation runs, and
+neither SymPy nor matplotlib is imported.
+"""
+
+from importlib import import_module
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "Arm": "arm.parameters",
+    "equation": "arm.equations",
+    "equations": "arm.equations",
+    "natural_frequencies": "arm.analysis",
+    "frequency_parameters": "arm.analysis",
+    "mode_shapes": "arm.analysis",
+    "modal_parameters": "arm.analysis",
+    "Model": "model",
+    "kernel": "kernels",
+}
+
+__all__ = ["__version__", *_HOME]
+
+
+def __getattr__(name):
+    try:
+        module = import_module(f"cra_sym.{_HOME[name]}")
+    except KeyError:
+        raise AttributeError(f"module 'cra_sym' has no attribute {name!r}") from None
+    value = getattr(module, name)
+    globals()[name] = value
+    return value
+
+
+def __dir__():
+    return sorted(__all__)

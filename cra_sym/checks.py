@@ -1,0 +1,85 @@
+"""Argument checks shared by every room: each error names the field, the value and what is allowed."""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+import numpy as np
+
+__all__ = ["count", "real_array", "broadcastable"]
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def real_array(
+    name: str,
+    value: Any,
+    *,
+    low: float = -np.inf,
+    high: float = np.inf,
+    open_low: bool = False,
+    allow_infinite: bool = False,
+) -> np.ndarray:
+    """Return ``value`` as a float64 array, or raise an error that names the field.
+
+    Parameters
+    ----------
+    name : str
+        Field name used in the error.
+    value : array_like
+        Real numbers; strings, booleans, complex numbers and ragged sequences are refused.
+    low, high : float
+        Inclusive bounds (``open_low`` excludes ``low`` itself).
+    allow_infinite : bool
+        Whether infinity within the bounds is a value.
+
+    Raises
+    ------
+    TypeError
+        If ``value`` does not hold real numbers.
+    ValueError
+        If an element is NaN or out of bounds.
+    """
+    bracket = "(" if open_low else "["
+    allowed = f"real numbers in {bracket}{low:g}, {high:g}{']' if allow_infinite or np.isfinite(high) else ')'}"
+    try:
+        raw = np.asarray(value)
+    except (ValueError, TypeError):
+        raise TypeError(f"{name} = {_shown(value)}: allowed are {allowed}") from None
+    if raw.dtype.kind not in "iuf":
+        raise TypeError(f"{name} = {_shown(value)}: allowed are {allowed}")
+    array = raw.astype(np.float64)
+    good = (array > low if open_low else array >= low) & (array <= high)  # NaN fails both
+    if not allow_infinite:
+        good &= np.isfinite(array)
+    if not good.all():
+        raise ValueError(f"{name} = {_shown(array[~good].flat[0].item())}: allowed are {allowed}")
+    return array
+
+
+def count(name: str, value: Any, *, low: int = 1, high: int | None = None) -> int:
+    """Return ``value`` as an int within ``[low, high]``, or raise an error that names the field."""
+    allowed = f"an integer of at least {low}" if high is None else f"an integer from {low} to {high}"
+    if isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"{name} = {_shown(value)}: allowed is {allowed}")
+    try:
+        number = operator.index(value)
+    except TypeError:
+        kind = ValueError if isinstance(value, (float, np.floating)) else TypeError
+        raise kind(f"{name} = {_shown(value)}: allowed is {allowed}") from None
+    if number < low or (high is not None and number > high):
+        raise ValueError(f"{name} = {number}: allowed is {allowed}")
+    return number
+
+
+def broadcastable(**arrays: np.ndarray) -> tuple[int, ...]:
+    """Return the common shape of the named arrays, or raise an error that names those that do not fit."""
+    try:
+        return np.broadcast_shapes(*(np.shape(a) for a in arrays.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {np.shape(a)}" for name, a in arrays.items() if np.ndim(a))
+        raise ValueError(f"shapes do not broadcast together: {shapes}") from None

@@ -1,0 +1,1 @@
+"""The compiler: SymPy expression to fast, picklable, broadcasting NumPy or Numba function."""
