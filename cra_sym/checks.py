@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["count", "real_array", "broadcastable"]
+__all__ = ["broadcastable", "count", "real_array"]
 
 
 def _shown(value: Any) -> str:
@@ -23,6 +23,7 @@ def real_array(
     high: float = np.inf,
     open_low: bool = False,
     allow_infinite: bool = False,
+    allowed: str | None = None,
 ) -> np.ndarray:
     """Return ``value`` as a float64 array, or raise an error that names the field.
 
@@ -36,6 +37,8 @@ def real_array(
         Inclusive bounds (``open_low`` excludes ``low`` itself).
     allow_infinite : bool
         Whether infinity within the bounds is a value.
+    allowed : str, optional
+        What the error says is allowed; written from the bounds if not given.
 
     Raises
     ------
@@ -45,7 +48,9 @@ def real_array(
         If an element is NaN or out of bounds.
     """
     bracket = "(" if open_low else "["
-    allowed = f"real numbers in {bracket}{low:g}, {high:g}{']' if allow_infinite or np.isfinite(high) else ')'}"
+    allowed = (
+        allowed or f"real numbers in {bracket}{low:g}, {high:g}{']' if allow_infinite or np.isfinite(high) else ')'}"
+    )
     try:
         raw = np.asarray(value)
     except (ValueError, TypeError):
