@@ -114,6 +114,7 @@ _TABLE: dict[str, list[tuple]] = {
         ("omega_j", r"\omega_{j}", "rad/s", "natural angular frequency of mode j", _NONNEGATIVE),
         ("omega", r"\omega", "rad/s", "angular frequency", _NONNEGATIVE),
         ("f_i", "f_{i}", "Hz", "natural frequency of mode i", _NONNEGATIVE),
+        ("zeta", r"\zeta", "1", "damping ratio that every mode has", _NONNEGATIVE),
         ("zeta_i", r"\zeta_{i}", "1", "damping ratio of mode i (0 in the paper)", _NONNEGATIVE),
         ("beta", r"\beta", "rad/m", "wave number, beta^4 = rho A omega^2 / (E I_z)", _NONNEGATIVE),
         ("lamda", r"\lambda", "1", "frequency parameter beta L", _NONNEGATIVE),

@@ -1,1 +1,38 @@
+"""One function a figure: it takes data or an arm and an optional ``ax`` and returns the Figure. No global state."""
 
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["FIGURES", "STYLE", "draw"]
+
+FIGURES = {
+    "fig01": "cra_sym.figures.robot:figure_1",
+    "fig02": "cra_sym.figures.robot:figure_2",
+}
+"""Name of a figure -> the function that draws it; called with no arguments, it draws the paper's case."""
+
+STYLE = str(files(__name__) / "style.mplstyle")
+"""The one style: ``with plt.style.context(STYLE): ...``."""
+
+
+def draw(name: str) -> Figure:
+    """Draw one figure of ``FIGURES`` in the house style.
+
+    Raises
+    ------
+    ValueError
+        If there is no such figure.
+    """
+    if name not in FIGURES:
+        raise ValueError(f"figure = {name!r}: allowed are {', '.join(FIGURES)}")
+    from matplotlib import style
+
+    module, function = FIGURES[name].split(":")
+    with style.context(STYLE):
+        return getattr(import_module(module), function)()

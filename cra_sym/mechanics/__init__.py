@@ -1,1 +1,1 @@
-"""Symbolic engines: Hamilton's principle, separation, Ritz, multiple scales. They know beams and strings, never the arm."""
+"""Symbolic engines: Hamilton's principle, separation, Ritz, multiple scales; beams and strings, never the arm."""

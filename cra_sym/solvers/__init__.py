@@ -1,1 +1,1 @@
-
+"""Numbers only: complete spectra, responses, Floquet; never SymPy."""

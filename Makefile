@@ -1,0 +1,40 @@
+# Each target sets up .venv on its first run: Python 3.11 to 3.14 and make are all it needs.
+# Settings, as in "make reproduce OUTPUT=results": PYTHON, OUTPUT, JOBS, ARGS (passed on to pytest).
+
+OUTPUT ?= output
+JOBS ?= 2
+CANDIDATES = "$(PYTHON)" python3 python3.14 python3.13 python3.12 python3.11
+SUPPORTED = import sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))
+RUN = .venv/bin/python
+NOTEBOOKS = --nbval --nbval-current-env --nbval-sanitize-with tests/notebooks/sanitize.cfg notebooks
+
+.PHONY: reproduce test lab notebooks lint clean
+
+reproduce: .venv/.ready
+	$(RUN) -m cra_sym reproduce --output "$(OUTPUT)"
+
+test: .venv/.ready
+	$(RUN) -m pytest -n $(JOBS) --dist loadfile tests cra_sym README.md $(NOTEBOOKS) $(ARGS)
+
+lab: .venv/.ready
+	$(RUN) -m jupyterlab notebooks/00_overview.ipynb
+
+notebooks: .venv/.ready
+	$(RUN) -m cra_sym.report.notebooks notebooks
+
+lint: .venv/.ready
+	$(RUN) -m ruff check .
+	$(RUN) -m ruff format --check .
+	$(RUN) -m mypy
+
+clean:
+	rm -rf .venv
+
+.venv/.ready: requirements.txt pyproject.toml
+	@for python in $(CANDIDATES); do \
+	    if "$$python" -c '$(SUPPORTED)' 2>/dev/null; then \
+	        echo "Setting up .venv with $$python"; "$$python" -m venv .venv; exit; \
+	    fi; \
+	done; echo "Python 3.11 to 3.14 is needed and was not found: set PYTHON to one, as in make PYTHON=/path/to/python3.12 ..." >&2; exit 1
+	$(RUN) -m pip install --quiet --disable-pip-version-check -r requirements.txt
+	@touch .venv/.ready

@@ -1,0 +1,163 @@
+"""The command line: ``python -m cra_sym COMMAND``. Each command is one row of a table and one function."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+from cra_sym.files import OutputError
+
+__all__ = ["main"]
+
+Options = argparse.Namespace
+
+
+class UsageError(ValueError):
+    """A value given on the command line that is not allowed."""
+
+
+@contextmanager
+def _reading_input() -> Iterator[None]:
+    """Turn the package's complaints about a value into a usage error."""
+    try:
+        yield
+    except (ValueError, TypeError) as error:
+        raise UsageError(str(error)) from error
+
+
+class Command(NamedTuple):
+    """A command: what it does in a line, the options it adds to its parser, and the function that runs it."""
+
+    summary: str
+    options: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[Options], None]
+
+
+def _add_output(parser: argparse.ArgumentParser, default: str) -> None:
+    parser.add_argument(
+        "--output", metavar="DIR", type=Path, default=Path(default), help="folder to make (%(default)s)"
+    )
+
+
+def _reproduce_options(parser: argparse.ArgumentParser) -> None:
+    _add_output(parser, "output")
+    parser.add_argument("--notebooks", metavar="DIR", type=Path, help="folder of the notebooks (that of the checkout)")
+
+
+def _reproduce(options: Options) -> None:
+    from cra_sym.report import reproduce
+
+    print(reproduce(options.output, notebooks=options.notebooks))
+
+
+def _figures_options(parser: argparse.ArgumentParser) -> None:
+    from cra_sym.figures import FIGURES
+
+    _add_output(parser, "figures")
+    parser.add_argument("--only", nargs="+", choices=sorted(FIGURES), metavar="FIG", help=f"of {', '.join(FIGURES)}")
+
+
+def _figures(options: Options) -> None:
+    from cra_sym.files import staged_directory
+    from cra_sym.report.pictures import save_figures
+
+    with staged_directory(options.output) as folder:
+        made = save_figures(folder, options.only)
+    print("\n".join(str(options.output / path.name) for path in made))
+
+
+def _arm_options(parser: argparse.ArgumentParser) -> None:
+    """One option a field of ``Arm``, its meaning and unit read from the nomenclature."""
+    from cra_sym.arm.parameters import Arm
+    from cra_sym.symbols import nomenclature
+
+    rows = {row.name: row for row in nomenclature()}
+    nominal = Arm.nominal()
+    group = parser.add_argument_group("the arm (SI units; inf is a stiffness too; the nominal value is the default)")
+    for field in dataclasses.fields(Arm):
+        row = rows[field.name]
+        unit = f", {row.unit}" if row.unit != "1" else ""
+        text = f"{row.meaning}{unit} ({getattr(nominal, field.name):g})"
+        group.add_argument(f"--{field.name.replace('_', '-')}", type=float, metavar=row.unit, help=text)
+
+
+def _chosen_arm(options: Options):
+    from cra_sym.arm.parameters import Arm
+
+    given = {f.name: getattr(options, f.name) for f in dataclasses.fields(Arm)}
+    return Arm.nominal().replace(**{name: value for name, value in given.items() if value is not None})
+
+
+def _frequencies_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--modes", type=int, default=3, metavar="N", help="number of modes (%(default)s)")
+    form = parser.add_mutually_exclusive_group()
+    form.add_argument("--json", action="store_true", help="print JSON")
+    form.add_argument("--csv", action="store_true", help="print comma-separated values")
+    _arm_options(parser)
+
+
+def _frequencies(options: Options) -> None:
+    from cra_sym import modal_parameters
+    from cra_sym.report.tables import Table
+
+    with _reading_input():
+        modal = modal_parameters(_chosen_arm(options), modes=options.modes)
+    table = Table(
+        "Natural frequencies",
+        ("mode", "frequency / Hz", "angular frequency / (rad/s)", "lambda"),
+        [(n, *row) for n, row in enumerate(zip(modal.frequency, modal.omega, modal.lam, strict=True), 1)],
+    )
+    if options.json:
+        print(json.dumps({name: getattr(modal, name).tolist() for name in ("frequency", "omega", "lam")}))
+    else:
+        print(table.csv() if options.csv else table.text(), end="")
+
+
+COMMANDS = {
+    "reproduce": Command("run every notebook; write them, figures, tables and report", _reproduce_options, _reproduce),
+    "figures": Command("draw the figures as PNG and SVG", _figures_options, _figures),
+    "frequencies": Command("natural frequencies of an arm", _frequencies_options, _frequencies),
+}
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose complaint is one line."""
+
+    def error(self, message: str) -> None:  # type: ignore[override]
+        self.exit(2, f"{self.prog}: {message}\n")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; return 0, or 2 after one line on standard error about what was wrong with the input."""
+    import cra_sym
+
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    parser = _Parser(
+        prog="python -m cra_sym", description="Dynamics and stability of a flexible Cartesian robotic arm."
+    )
+    parser.add_argument("--version", action="version", version=f"cra_sym {cra_sym.__version__}")
+    commands = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND", required=True)
+    for name, command in COMMANDS.items():
+        sub = commands.add_parser(
+            name, help=command.summary, description=f"{command.summary[0].upper()}{command.summary[1:]}."
+        )
+        if name in arguments:  # options are looked up in the package: only those of the command that runs
+            command.options(sub)
+        sub.set_defaults(run=command.run)
+    options = parser.parse_args(arguments)
+    try:
+        options.run(options)
+    except (UsageError, OutputError, FileNotFoundError) as error:
+        print(f"{parser.prog} {options.command}: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,122 @@
+"""Run the notebooks, keep what they show and nothing of the machine that ran them.
+
+``python -m cra_sym.report.notebooks notebooks`` re-executes every notebook of a folder (or the files named) in place.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tqdm import tqdm
+
+from cra_sym.files import write_text
+
+if TYPE_CHECKING:
+    from nbformat import NotebookNode
+
+__all__ = ["NotebookError", "execute", "find_notebooks", "refresh"]
+
+_KERNEL = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"}
+
+
+class NotebookError(RuntimeError):
+    """A notebook that did not run to its end; the message names it and shows the failing cell."""
+
+
+def find_notebooks(folder: str | Path | None = None) -> list[Path]:
+    """Return the notebooks in reading order, by default those that lie beside the package.
+
+    Raises
+    ------
+    FileNotFoundError
+        If the folder holds none.
+    """
+    folder = Path(__file__).resolve().parents[2] / "notebooks" if folder is None else Path(folder)
+    found = sorted(folder.glob("*.ipynb"))
+    if not found:
+        raise FileNotFoundError(f"notebooks = {str(folder)!r}: holds no notebook; give the folder of a source checkout")
+    return found
+
+
+def _normalise(notebook: NotebookNode) -> None:
+    """Keep kernel name and language; drop times, versions and widths."""
+    notebook.metadata = {"kernelspec": _KERNEL, "language_info": {"name": "python"}}
+    for number, cell in enumerate(notebook.cells, 1):
+        cell.id = f"cell-{number:02d}"
+        cell.metadata = {"tags": cell.metadata.tags} if cell.metadata.get("tags") else {}
+        for output in cell.get("outputs", []):
+            if "metadata" in output:
+                output.metadata = {}
+
+
+def execute(path: str | Path, progress: tqdm[Any] | None = None, timeout: int = 600) -> NotebookNode:
+    """Execute one notebook in a fresh kernel of this Python, in its own folder, and return it with its outputs.
+
+    Parameters
+    ----------
+    path : path
+        The notebook; the file itself is left as it is.
+    progress : tqdm, optional
+        Advanced by one for each code cell.
+    timeout : int
+        Seconds allowed for one cell.
+
+    Raises
+    ------
+    NotebookError
+        If a cell raises or takes too long.
+    """
+    import nbformat
+    from jupyter_client import AsyncKernelManager
+    from jupyter_client.kernelspec import KernelSpecManager
+    from nbclient import NotebookClient
+    from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernelError
+
+    path = Path(path)
+    notebook = nbformat.read(path, as_version=4)
+    # No kernel directories: of the kernels called python3, only that of the running Python is meant.
+    manager = AsyncKernelManager(kernel_name="python3", kernel_spec_manager=KernelSpecManager(kernel_dirs=[]))
+    client = NotebookClient(
+        notebook,
+        km=manager,
+        timeout=timeout,
+        record_timing=False,
+        coalesce_streams=True,
+        resources={"metadata": {"path": str(path.parent)}},
+        on_cell_executed=lambda **_: progress.update() if progress is not None else None,
+    )
+    try:
+        client.execute()
+    except (CellExecutionError, CellTimeoutError, DeadKernelError) as error:
+        raise NotebookError(f"{path.name} did not run: {error}") from None
+    _normalise(notebook)
+    return notebook
+
+
+def cells_to_run(paths: Iterable[Path]) -> int:
+    """Count the code cells of some notebooks: the length of a progress bar over them."""
+    import nbformat
+
+    return sum(
+        cell.cell_type == "code" and bool(cell.source.strip())
+        for path in paths
+        for cell in nbformat.read(path, as_version=4).cells
+    )
+
+
+def refresh(paths: Sequence[Path]) -> None:
+    """Execute notebooks one after the other and store their outputs in place; a failing one keeps its file."""
+    import nbformat
+
+    with tqdm(total=cells_to_run(paths), unit="cell", disable=None) as progress:
+        for path in paths:
+            progress.set_description(path.stem)
+            write_text(path, nbformat.writes(execute(path, progress)) + "\n")
+
+
+if __name__ == "__main__":
+    given = [Path(argument) for argument in sys.argv[1:]]
+    refresh([path for place in given for path in (find_notebooks(place) if place.is_dir() else [place])])

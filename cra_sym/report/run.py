@@ -1,0 +1,73 @@
+"""``make reproduce``: every notebook, figure and table into one folder, and a word on what was made."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from tqdm import tqdm
+
+from cra_sym.files import staged_directory, write_text
+from cra_sym.report.notebooks import cells_to_run, execute, find_notebooks
+from cra_sym.report.pictures import save_figures
+from cra_sym.report.tables import TABLES
+
+__all__ = ["reproduce"]
+
+
+def reproduce(output: str | Path, notebooks: str | Path | None = None) -> str:
+    """Run every notebook and write them, the figures and the tables to one folder.
+
+    Parameters
+    ----------
+    output : path
+        Folder to make. An earlier output there is replaced as a whole at the very end; anything else is refused first.
+    notebooks : path, optional
+        Folder of the notebooks, by default that of the source checkout. They are executed on copies' terms: the files
+        themselves stay as they are.
+
+    Returns
+    -------
+    str
+        What was made, a few lines to print.
+
+    Raises
+    ------
+    cra_sym.files.OutputError
+        If the folder cannot be written, before any work.
+    cra_sym.report.notebooks.NotebookError
+        If a notebook does not run to its end; nothing is left behind.
+    """
+    sources = find_notebooks(notebooks)
+    with staged_directory(output) as folder:
+        _run_notebooks(sources, folder / "notebooks")
+        save_figures(folder / "figures")
+        _write_tables(folder / "tables")
+        made = [path for path in folder.rglob("*") if path.is_file()]
+        listing = _listing(folder, made)
+    return f"{listing}\n\nEverything is in {Path(output)}"
+
+
+def _run_notebooks(sources: list[Path], folder: Path) -> None:
+    import nbformat
+
+    folder.mkdir()
+    with tqdm(total=cells_to_run(sources), unit="cell", disable=None) as progress:
+        for path in sources:
+            progress.set_description(path.stem)
+            write_text(folder / path.name, nbformat.writes(execute(path, progress)) + "\n")
+
+
+def _write_tables(folder: Path) -> None:
+    folder.mkdir()
+    for name, make in tqdm(TABLES.items(), unit="table", disable=None):
+        table = make()
+        write_text(folder / f"{name}.csv", table.csv())
+        write_text(folder / f"{name}.md", table.markdown())
+
+
+def _listing(folder: Path, made: Iterable[Path]) -> str:
+    """One line a file: its path and size, folder by folder."""
+    rows = sorted((path.relative_to(folder).as_posix(), path.stat().st_size) for path in made)
+    width = max(len(name) for name, _ in rows)
+    return "\n".join(f"{name:<{width}}  {size / 1000:8.1f} kB" for name, size in rows)

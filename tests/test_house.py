@@ -1,0 +1,178 @@
+"""The house rules: who may import whom, how large a module may be, what the public face and the documents promise."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import cra_sym
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "cra_sym"
+MODULES = sorted(PACKAGE.rglob("*.py"))
+# From the ground up. A room imports from the floors below; rooms of the ground floor know only the symbols.
+FLOORS = [
+    {"symbols", "mechanics", "kernels", "solvers"},
+    {"model"},
+    {"arm"},
+    {"sweep", "export", "figures"},
+    {"claims"},
+    {"report"},
+    {"__main__"},
+]
+OPEN_TO_ALL = {"checks", "files"}  # argument checks and safe writing: they import nothing of the house
+RANK = {room: rank for rank, floor in enumerate(FLOORS) for room in floor}
+
+
+def name_of(module: Path) -> str:
+    return module.relative_to(ROOT).as_posix()
+
+
+def imported(module: Path) -> set[str]:
+    """Absolute dotted names of everything a module imports, at its top or inside functions."""
+    package = list(module.relative_to(ROOT).parts[:-1])
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            origin = ".".join(base + ([node.module] if node.module else []))
+            names.update(f"{origin}.{alias.name}" for alias in node.names)
+    return names
+
+
+def trespasses(module: Path) -> list[str]:
+    """Imports of ``module`` that lead upwards or across the ground floor."""
+    home = module.relative_to(PACKAGE).parts[0].removesuffix(".py")
+    if home == "__init__":
+        return []
+    bad = []
+    for name in imported(module):
+        parts = name.split(".")
+        room = parts[1] if parts[0] == "cra_sym" and len(parts) > 1 else None
+        if room is None or room == home or room in OPEN_TO_ALL or room not in RANK:
+            continue
+        across = RANK[room] == RANK.get(home, -1) == 0 and room != "symbols"
+        if across or RANK[room] > RANK.get(home, -1):
+            bad.append(name)
+    return bad
+
+
+@pytest.mark.parametrize("module", MODULES, ids=name_of)
+def test_imports_lead_downwards(module):
+    assert trespasses(module) == []
+
+
+def test_every_room_has_a_floor():
+    rooms = {path.name.removesuffix(".py") for path in PACKAGE.iterdir() if path.suffix == ".py" or path.is_dir()}
+    assert rooms - {"__init__", "__pycache__"} <= set(RANK) | OPEN_TO_ALL
+
+
+def test_the_import_rule_sees_a_trespass(tmp_path, monkeypatch):
+    planted = tmp_path / "cra_sym" / "solvers" / "planted.py"
+    planted.parent.mkdir(parents=True)
+    planted.write_text(
+        "def f():\n    from ..mechanics import hamilton\n    from cra_sym import figures, checks, symbols\n"
+    )
+    monkeypatch.setitem(globals(), "ROOT", tmp_path)
+    monkeypatch.setitem(globals(), "PACKAGE", tmp_path / "cra_sym")
+    assert sorted(trespasses(planted)) == ["cra_sym.figures", "cra_sym.mechanics.hamilton"]
+
+
+@pytest.mark.parametrize("module", [m for m in MODULES if m.parent.name == "solvers"], ids=name_of)
+def test_solvers_know_numbers_only(module):
+    assert not [name for name in imported(module) if name.split(".")[0] == "sympy"]
+
+
+@pytest.mark.parametrize("module", MODULES, ids=name_of)
+def test_module_reads_in_one_sitting(module):
+    assert len(module.read_text(encoding="utf-8").splitlines()) <= 450
+
+
+@pytest.mark.parametrize("module", MODULES, ids=name_of)
+def test_no_text_is_evaluated(module):
+    """No eval, no exec outside the kernel store, and SymPy never parses a string it is handed."""
+    for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
+        if not isinstance(node, ast.Call):
+            continue
+        called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        bare = isinstance(node.func, ast.Name)
+        assert not (bare and called == "eval"), node.lineno
+        assert not (bare and called == "exec") or module.parent.name == "kernels", node.lineno
+        assert called not in {"parse_expr", "parse_latex"}, node.lineno
+        if called == "sympify":
+            strict = [k.value for k in node.keywords if k.arg == "strict"]
+            assert strict and getattr(strict[0], "value", False) is True, (
+                f"sympify(..., strict=True), line {node.lineno}"
+            )
+
+
+@pytest.mark.parametrize("module", MODULES, ids=name_of)
+def test_public_things_are_documented(module):
+    tree = ast.parse(module.read_text(encoding="utf-8"))
+    assert ast.get_docstring(tree), "module docstring"
+    for node in tree.body:
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and not node.name.startswith("_"):
+            assert ast.get_docstring(node), node.name
+
+
+def tracked_texts() -> list[Path]:
+    kinds = {".py", ".pyi", ".md", ".ipynb", ".txt", ".toml", ".cfg", ".cff", ".mplstyle", ".jinja", ".css"}
+    folders = [ROOT / name for name in ("cra_sym", "notebooks", "tests", ".ci")]
+    files = [path for folder in folders for path in folder.rglob("*")] + list(ROOT.iterdir())
+    hidden = {".ipynb_checkpoints", "__pycache__"}
+    return sorted(
+        p
+        for p in files
+        if p.is_file() and (p.suffix in kinds or p.name in {"Makefile", "run"}) and not hidden & {*p.parts}
+    )
+
+
+@pytest.mark.parametrize("path", tracked_texts(), ids=name_of)
+def test_no_path_of_a_machine(path):
+    machine = re.compile(r"(?<![\w.$~<>}])/(?:home|root|Users|work|tmp|opt|var)/\w|[A-Z]:\\\\?Users|\bfile:///")
+    found = machine.search(path.read_text(encoding="utf-8"))
+    assert found is None, found
+
+
+def test_import_is_cheap():
+    """Importing the package loads no derivation, no plotting and no solver; nor does importing any room's name."""
+    heavy = "{'sympy', 'matplotlib', 'scipy', 'numba'}"
+    code = f"import sys, cra_sym; dir(cra_sym); print(sorted({heavy} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True).stdout == "[]\n"
+
+
+@pytest.mark.parametrize("name", sorted(cra_sym._HOME))
+def test_public_name_has_a_home(name):
+    home = import_module(f"cra_sym.{cra_sym._HOME[name]}")
+    assert getattr(cra_sym, name) is getattr(home, name)
+    assert getattr(home, name).__doc__
+
+
+def test_stub_tells_the_same_names():
+    homes = {}
+    for node in ast.parse((PACKAGE / "__init__.pyi").read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom) and node.level:
+            assert all(alias.asname == alias.name for alias in node.names), "import A as A makes a stub name public"
+            homes.update({alias.name: node.module for alias in node.names})
+    assert homes == cra_sym._HOME
+
+
+def test_readme_commands_exist():
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"(?:^|`)make ([a-z]+)", readme, re.M))
+    assert {"reproduce", "test", "lab", "notebooks"} <= named <= targets
+
+
+def test_readme_links_lead_somewhere():
+    for document in ("README.md", "CONTRIBUTING.md"):
+        links = re.findall(r"\]\((?!https?:|#)([^)#]+)", (ROOT / document).read_text(encoding="utf-8"))
+        assert [link for link in links if not (ROOT / link).exists()] == []
