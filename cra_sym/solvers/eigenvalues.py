@@ -1,0 +1,195 @@
+"""Every natural frequency of a dynamic stiffness: brackets from the exact count, Newton on one eigenvalue of K.
+
+Damped problems have complex eigenvalues and no count: given starting guesses are refined together, so that no two end
+on one root, but completeness is not promised.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .rayleigh import ritz_values
+from .stiffness import DynamicStiffness, Evaluation, form
+
+__all__ = ["lowest", "refine"]
+
+_NOISE = 512 * np.finfo(float).eps
+_SWEEPS = 200
+
+
+def lowest(problem: DynamicStiffness, modes: int) -> np.ndarray:
+    """Return the ``modes`` smallest squared frequencies of every row: ascending, complete, double roots twice.
+
+    Parameters
+    ----------
+    problem : DynamicStiffness
+        Real and symmetric, with z = omega^2.
+    modes : int
+
+    Returns
+    -------
+    ndarray, shape (rows, modes)
+        omega^2; rigid-body motions count as exact zeros.
+
+    Raises
+    ------
+    ValueError
+        If the structure is statically unstable (has buckled), or has fewer natural frequencies than asked for.
+
+    Notes
+    -----
+    Roots that come near the rounding of the static stiffness (soft joints, heavy tips) are replaced by the Ritz values
+    of their own shapes; what remains below 1e-26 of the first elastic bound is a rigid-body zero.
+    """
+    rows = len(problem.length)
+    every = np.arange(rows)
+    static = problem.evaluate(np.zeros(rows), every)
+    rigid = _rigid_count(static)
+    wanted = np.arange(1, modes + 1)
+    low, below = np.zeros((rows, modes)), np.repeat(rigid[:, None], modes, axis=1)
+    high, above, guess, bounds = _upper_bounds(problem, static, modes)
+    open_ = wanted > rigid[:, None]
+    result, noise = np.zeros((rows, modes)), np.full((rows, modes), np.inf)
+    for sweep in range(_SWEEPS):
+        row, mode = np.nonzero(open_)
+        if not row.size:
+            return _polish_low(problem, np.sort(result, axis=1), noise, bounds)
+        z = _next_point(guess[row, mode], low[row, mode], high[row, mode], below[row, mode], above[row, mode], mode + 1)
+        here = problem.evaluate(z, row)
+        value, step, count, noise[row, mode] = _newton(here, mode + 1)
+        _tighten(low, high, below, above, row, z, count, wanted)
+        target = z + step
+        relative = np.abs(step) / np.maximum(np.abs(target), np.finfo(float).tiny)
+        settled = (relative < 1e-10) | (np.abs(step) <= 16.0 * noise[row, mode]) | ((relative < 1e-7) & (sweep > 60))
+        narrow = high[row, mode] - low[row, mode] <= 4 * np.finfo(float).eps * high[row, mode]
+        result[row, mode] = np.where(settled & value, target, 0.5 * (low[row, mode] + high[row, mode]))
+        open_[row, mode] = ~((settled & value) | narrow)
+        trusted = value & ((sweep % 3 != 2) | (relative < 1e-3))
+        guess[row, mode] = np.where(trusted, target, np.nan)
+    raise ArithmeticError("the search for natural frequencies did not settle")
+
+
+def _polish_low(problem: DynamicStiffness, z: np.ndarray, noise: np.ndarray, bounds: np.ndarray) -> np.ndarray:
+    """Replace the roots that are close to rounding, the first few of a row, by Ritz values of their shapes."""
+    last = bounds.shape[1] - 1
+    drowned = np.cumprod(noise > 1e-14 * z, axis=1).sum(axis=1)
+    for number in np.unique(drowned[drowned > 0]):
+        rows = np.nonzero(drowned == number)[0]
+        value = ritz_values(problem.take(rows), z[rows, :number])
+        z[rows, :number] = np.where(value > 1e-26 * bounds[rows, None, min(number, last)], value, 0.0)
+    return z
+
+
+def _rigid_count(static: Evaluation) -> np.ndarray:
+    """Return how many rigid-body motions each row has; refuse a structure that has buckled."""
+    if static.matrix.shape[-1] == 0:
+        return np.zeros(len(static.matrix), dtype=int)
+    value, vector = np.linalg.eigh(static.matrix)
+    size = np.einsum("rij,rik,rkj->rj", np.abs(vector), np.abs(static.matrix), np.abs(vector))
+    unstable = static.fixed_count + (value < -_NOISE * size).sum(axis=1)
+    if unstable.any():
+        number, sets = int(unstable.max()), len(unstable)
+        where = f", in {np.count_nonzero(unstable)} of {sets} parameter sets" if sets > 1 else ""
+        plural = "s" if number > 1 else ""
+        raise ValueError(f"the structure has buckled: {number} unstable mode{plural} (omega^2 < 0){where}")
+    return (np.abs(value) <= _NOISE * size).sum(axis=1)
+
+
+def _upper_bounds(problem: DynamicStiffness, static: Evaluation, modes: int):
+    """Return, for every mode, a z with that many frequencies below it, the count there and a guess; then all bounds.
+
+    Static deflections are admissible motions: their Rayleigh-Ritz values bound the lowest frequencies from above.
+    """
+    rows = len(static.matrix)
+    mass, frame = np.linalg.eigh(-static.derivative)
+    whitener = frame / np.sqrt(np.maximum(mass, 1e-14 * mass.max(axis=1, keepdims=True)))[:, None, :]
+    bounds = np.linalg.eigvalsh(np.swapaxes(whitener, -1, -2) @ static.matrix @ whitener)
+    guess = np.full((rows, modes), np.nan)
+    shared = min(modes, bounds.shape[1])
+    guess[:, :shared] = bounds[:, :shared]
+    high, above = np.full((rows, modes), np.inf), np.zeros((rows, modes), dtype=int)
+    z = np.maximum(bounds[:, 0], 1e-12 * bounds[:, -1]) * (1.0 + 1e-9)
+    pending = np.arange(rows)
+    for _ in range(400):
+        count = problem.evaluate(z[pending], pending).count
+        reached = (np.arange(1, modes + 1) <= count[:, None]) & np.isinf(high[pending])
+        high[pending], above[pending] = (
+            np.where(reached, z[pending, None], high[pending]),
+            np.where(reached, count[:, None], above[pending]),
+        )
+        pending = pending[np.isinf(high[pending, -1])]
+        if not pending.size:
+            return high, above, guess, bounds
+        z[pending] *= 4.0
+    raise ValueError(f"modes = {modes}: the model has only {int(above.max())} natural frequencies")
+
+
+def _next_point(guess, low, high, below, above, mode):
+    """Take the guess if it lies inside the bracket, else split the bracket in proportion to the counts at its ends."""
+    share = (mode - below - 0.5) / np.maximum(above - below, 1)
+    split = (np.sqrt(low) + share * (np.sqrt(high) - np.sqrt(low))) ** 2
+    return np.where((guess > low) & (guess < high), guess, split)
+
+
+def _newton(here: Evaluation, mode: np.ndarray):
+    """Return whether the eigenvalue of K that vanishes at a mode exists, the Newton step on it, the count, rounding."""
+    value, vector = np.linalg.eigh(here.matrix)
+    count = here.fixed_count + (value < 0.0).sum(axis=1)
+    index = mode - 1 - here.fixed_count
+    exists = (index >= 0) & (index < value.shape[1])
+    pick = np.clip(index, 0, value.shape[1] - 1)[:, None]
+    u = np.take_along_axis(vector, pick[:, None, :], axis=2)[..., 0]
+    slope = form(u, here.derivative)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        step = -np.take_along_axis(value, pick, axis=1)[:, 0] / slope
+        noise = -np.finfo(float).eps * form(np.abs(u), np.abs(here.matrix)) / slope
+    exists &= np.isfinite(step)
+    return exists, np.where(exists, step, 0.0), count, noise
+
+
+def _tighten(low, high, below, above, row, z, count, wanted) -> None:
+    """Use the count at every visited point for all modes of its row (in place)."""
+    order = np.argsort(row, kind="stable")
+    turn = np.arange(len(row)) - np.searchsorted(row[order], row[order])
+    for k in range(int(turn.max()) + 1):
+        now = order[turn == k]
+        r, point, found = row[now], z[now, None], count[now, None]
+        is_high = (found >= wanted) & (point < high[r])
+        is_low = (found < wanted) & (point > low[r])
+        high[r], above[r] = np.where(is_high, point, high[r]), np.where(is_high, found, above[r])
+        low[r], below[r] = np.where(is_low, point, low[r]), np.where(is_low, found, below[r])
+
+
+def refine(problem: DynamicStiffness, guesses: np.ndarray, *, tolerance: float = 1e-12) -> np.ndarray:
+    """Refine complex eigenvalues of a damped problem, all modes of a row at once (Ehrlich-Aberth on exact F'/F).
+
+    Parameters
+    ----------
+    problem : DynamicStiffness
+        Coefficients analytic in the complex parameter s.
+    guesses : ndarray of complex, shape (rows, modes)
+
+    Returns
+    -------
+    ndarray of complex, shape (rows, modes)
+        Roots of the characteristic function; nan where the iteration did not settle.
+    """
+    s = np.array(guesses, dtype=complex)
+    rows, modes = s.shape
+    row = np.repeat(np.arange(rows), modes)
+    moving = np.isfinite(s)
+    off = ~np.eye(modes, dtype=bool)
+    for _ in range(60):
+        at = moving.ravel()
+        if not at.any():
+            break
+        slope = np.zeros((rows, modes), dtype=complex)
+        slope.ravel()[at] = problem.evaluate(s.ravel()[at], row[at]).logarithmic_derivative
+        with np.errstate(divide="ignore", invalid="ignore"):
+            gap = s[:, :, None] - s[:, None, :]
+            repulsion = np.where(off & (gap != 0.0), 1.0 / np.where(gap == 0.0, 1.0, gap), 0.0).sum(axis=2)
+            step = np.where(moving, 1.0 / (slope - repulsion), 0.0)
+        step = np.where(np.isfinite(step), step, 0.0)
+        s -= step
+        moving &= np.abs(step) > tolerance * np.abs(s)
+    return np.where(moving, np.nan, s)

@@ -1,0 +1,273 @@
+"""Exact dynamic stiffness of any linear one-dimensional continuum, and every natural frequency it has.
+
+The spatial problem is a first-order system ``y' = A(z) y`` with ``z = omega^2`` (or any analytic parameter, such as a
+complex Laplace variable), ``y = (q, w, P, r)``: displacements, lumped coordinates (constant in x), the natural forces
+conjugate to q, and the force gathered by each coordinate. A piece so short that ``exp(A h)`` is harmless is doubled by
+eliminating its middle displacements, so no large exponential and no choice of basis functions is ever needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+__all__ = ["Coefficients", "DynamicStiffness", "Evaluation", "Tree"]
+
+GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
+"""Share of the left part. The golden ratio keeps the dividing node away from the nodes of every mode."""
+
+TERMS = 22
+"""Taylor terms of ``exp(A h)``: with a spectral radius of at most one the remainder is below 1/22!."""
+
+_EPS = np.finfo(float).eps
+
+
+@dataclass(frozen=True)
+class Tree:
+    """What back-substitution needs: the middle ``-X (q0, w, qh)`` at every level, and ``-P0 = W (q0, w, qh)``."""
+
+    levels: np.ndarray
+    scale: np.ndarray
+    start: np.ndarray
+    middles: list[np.ndarray]
+    system: np.ndarray
+    piece: np.ndarray
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Condensed matrices of the whole problem at given parameters.
+
+    Attributes
+    ----------
+    matrix, derivative : ndarray, shape (rows, f, f)
+        K on the free coordinates in balanced units, and its derivative by the parameter.
+    fixed_count : ndarray of int, shape (rows,)
+        Natural frequencies below z with every retained coordinate held (J0 of Wittrick and Williams).
+    unit : ndarray, shape (rows, f)
+        Free coordinates = ``unit`` times the balanced ones.
+    poles : ndarray, shape (rows,)
+        Logarithmic derivative of everything that was eliminated on the way: the poles of the determinant of K.
+    """
+
+    matrix: np.ndarray
+    derivative: np.ndarray
+    fixed_count: np.ndarray
+    unit: np.ndarray
+    poles: np.ndarray
+    tree: Tree | None = None
+
+    @property
+    def count(self) -> np.ndarray:
+        """Exact number of natural frequencies below z (Wittrick and Williams 1971)."""
+        return self.fixed_count + negatives(self.matrix)
+
+    @property
+    def logarithmic_derivative(self) -> np.ndarray:
+        """F'/F of the entire function F whose zeros are the eigenvalues: det K with all its poles removed."""
+        return self.poles + np.trace(_inverse(self.matrix) @ self.derivative, axis1=-2, axis2=-1)
+
+
+Coefficients = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+"""``(z, rows) -> (matrix, its derivative by z)``, both of shape (len(z), size, size)."""
+
+
+@dataclass(frozen=True)
+class DynamicStiffness:
+    """Exact dynamic stiffness of a spatial problem, batched over rows (parameter sets).
+
+    Parameters
+    ----------
+    system : callable
+        ``system(z, rows) -> (A, dA/dz)``, each (len(z), 2(n + m), 2(n + m)), in the order (q, w, P, r) where P is the
+        derivative of potential minus kinetic energy density by q', and r' the same by w.
+    boundary : callable
+        ``boundary(z, rows) -> (B, dB/dz)``, each (len(z), 2 n + m, 2 n + m): what the ends and the lumped terms add to
+        the dynamic stiffness, in the order (q(0), w, q(L)).
+    length : ndarray, shape (rows,)
+    displacements, coordinates : int
+        n and m.
+    free : ndarray, shape (2 n + m, f) or (rows, 2 n + m, f), optional
+        Columns span the motions that the essential conditions allow. Default: everything is free.
+    """
+
+    system: Coefficients
+    boundary: Coefficients
+    length: np.ndarray
+    displacements: int
+    coordinates: int = 0
+    free: np.ndarray | None = None
+
+    def take(self, rows: np.ndarray) -> DynamicStiffness:
+        """Return the problem of some of the parameter sets."""
+        return replace(
+            self,
+            system=lambda z, index: self.system(z, rows[index]),
+            boundary=lambda z, index: self.boundary(z, rows[index]),
+            length=self.length[rows],
+            free=self.free[rows] if self.free is not None and self.free.ndim == 3 else self.free,
+        )
+
+    def evaluate(self, z: np.ndarray, rows: np.ndarray, *, keep_tree: bool = False) -> Evaluation:
+        """Condense the whole domain at ``z[i]`` for the parameter sets ``rows[i]``."""
+        n, m = self.displacements, self.coordinates
+        system, system_slope = self.system(z, rows)
+        parts = self.length[rows] * np.array([[GOLDEN], [1.0 - GOLDEN]])
+        levels = _levels(system, parts[0])
+        piece = parts / 2.0**levels
+        transfer, transfer_slope = _transfer(system, system_slope, piece)
+        matrix, slope, start, growth = _short_piece(transfer, transfer_slope, n, m)
+        growth = growth * 2.0**levels
+
+        diagonal = np.arange(n)
+        scale = 1.0 / np.sqrt(
+            np.abs(matrix[..., diagonal, diagonal] + matrix[..., n + m :, n + m :][..., diagonal, diagonal])
+        )
+        scale = np.broadcast_to(scale.min(axis=0), scale.shape)
+        unit = np.concatenate([scale, np.ones((*scale.shape[:-1], m)), scale], axis=-1)
+        matrix, slope = _rescale(matrix, unit), _rescale(slope, unit)
+
+        symmetric = not np.iscomplexobj(matrix)
+        fixed = np.zeros(parts.shape, dtype=int)
+        middles = []
+        for level in range(int(levels.max(initial=0)), 0, -1):
+            on = levels >= level
+            joined = _join(matrix[:, on], slope[:, on], n, m)
+            matrix[:, on], slope[:, on], middle, eliminated, trace = joined
+            if symmetric:
+                fixed[:, on] = 2 * fixed[:, on] + negatives(eliminated)
+            growth[:, on] += trace * 2.0 ** (level - 1)
+            if keep_tree:
+                middles.append(np.zeros((2, *on.shape, *middle.shape[-2:]), dtype=middle.dtype))
+                middles[-1][:, on] = middle
+        tree = Tree(levels, unit[0], start, middles, system, piece) if keep_tree else None
+        return self._assemble(z, rows, matrix, slope, unit[0], fixed.sum(axis=0), growth.sum(axis=0), tree)
+
+    def _assemble(self, z, rows, matrix, slope, unit, fixed, growth, tree) -> Evaluation:
+        """Join the two parts at a node that stays, add the ends, keep the free coordinates, balance."""
+        n, m = self.displacements, self.coordinates
+        size = 2 * n + m
+        left = np.r_[0 : n + m, size : size + n]
+        right = np.r_[size : size + n, n : n + m, n + m : size]
+        total = np.zeros((len(z), size + n, size + n), dtype=matrix.dtype)
+        total_slope = np.zeros_like(total)
+        edge, edge_slope = self.boundary(z, rows)
+        for target, ends, parts in ((total, edge, matrix), (total_slope, edge_slope, slope)):
+            target[:, :size, :size] = _rescale(np.asarray(ends, dtype=matrix.dtype), unit)
+            target[:, left[:, None], left] += parts[0]
+            target[:, right[:, None], right] += parts[1]
+        free = np.eye(size) if self.free is None else self.free
+        free = free[rows] if free.ndim == 3 else free
+        basis = np.zeros((len(z), size + n, free.shape[-1] + n))
+        basis[:, :size, : free.shape[-1]] = free / unit[..., None]
+        basis[:, size:, free.shape[-1] :] = np.eye(n)
+        length = np.sqrt((basis**2).sum(axis=1))
+        basis /= length[:, None, :]
+        total, total_slope = (np.swapaxes(basis, -1, -2) @ a @ basis for a in (total, total_slope))
+        heavy = np.sqrt(np.maximum(np.abs(np.diagonal(total, axis1=-2, axis2=-1)), 1.0))
+        total, total_slope = _rescale(total, 1.0 / heavy), _rescale(total_slope, 1.0 / heavy)
+        return Evaluation(total, total_slope, fixed, basis / heavy[:, None, :], growth, tree)
+
+
+def negatives(matrix: np.ndarray) -> np.ndarray:
+    """Return the number of negative eigenvalues of each symmetric matrix of a stack."""
+    return (np.linalg.eigvalsh(matrix) < 0.0).sum(axis=-1)
+
+
+def _levels(system: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """Return how often to halve, so that every exponent of the longer part is at most one on a piece.
+
+    A scalar equation with exponents lambda has no clamped-clamped frequency below z on a piece shorter than
+    pi / max |Im lambda| (Polya's disconjugacy), so a piece this short starts the count at zero with a margin of three.
+    """
+    radius = np.abs(np.linalg.eigvals(system)).max(axis=-1, initial=0.0)
+    return np.ceil(np.log2(np.maximum(radius * length, 1.0))).astype(int)
+
+
+def _transfer(system: np.ndarray, slope: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return ``exp(A h)`` and its derivative by the parameter: their Taylor series, exact to rounding for short h.
+
+    The parts share the powers of A: the terms of the right part are those of the left one times a constant.
+    """
+    a, da = system * piece[0][:, None, None], slope * piece[0][:, None, None]
+    term, term_slope = np.broadcast_to(np.eye(a.shape[-1], dtype=a.dtype), a.shape), np.zeros_like(a)
+    total, total_slope = np.stack([term, term]), np.zeros((2, *a.shape), dtype=a.dtype)
+    ratio = (1.0 - GOLDEN) / GOLDEN
+    for j in range(1, TERMS + 1):
+        term_slope = (da @ term + a @ term_slope) / j
+        term = a @ term / j
+        for sums, addend in ((total, term), (total_slope, term_slope)):
+            sums[0] += addend
+            sums[1] += ratio**j * addend
+    return total, total_slope
+
+
+def _short_piece(t: np.ndarray, dt: np.ndarray, n: int, m: int):
+    """Return K, K', W and tr(T_qP^-1 T_qP') of one piece from its transfer matrix, in the order (q0, w, qh)."""
+    flexible = _inverse(t[..., :n, n + m : 2 * n + m])
+    flexible_slope = -flexible @ dt[..., :n, n + m : 2 * n + m] @ flexible
+    u = np.concatenate([t[..., :n, : n + m], np.broadcast_to(-np.eye(n), (*t.shape[:-2], n, n))], axis=-1)
+    du = np.concatenate([dt[..., :n, : n + m], np.zeros((*t.shape[:-2], n, n))], axis=-1)
+    start, start_slope = flexible @ u, flexible @ du + flexible_slope @ u
+    matrix = np.zeros((*t.shape[:-2], 2 * n + m, 2 * n + m), dtype=t.dtype)
+    slope = np.zeros_like(matrix)
+    force = np.r_[n + m : 2 * (n + m)]
+    by_force, dby_force = t[..., force, n + m : 2 * n + m], dt[..., force, n + m : 2 * n + m]
+    rows = np.r_[n + m : 2 * n + m, n : n + m]
+    matrix[..., :n, :], slope[..., :n, :] = start, start_slope
+    matrix[..., rows, : n + m] = t[..., force, : n + m]
+    slope[..., rows, : n + m] = dt[..., force, : n + m]
+    matrix[..., rows, :] -= by_force @ start
+    slope[..., rows, :] -= dby_force @ start + by_force @ start_slope
+    growth = -np.trace(flexible_slope @ t[..., :n, n + m : 2 * n + m], axis1=-2, axis2=-1)
+    return _symmetric(matrix), _symmetric(slope), start, growth
+
+
+def _join(k: np.ndarray, dk: np.ndarray, n: int, m: int):
+    """Join each piece to a copy of itself; return K, K', X, the eliminated matrix, and tr(K_mm^-1 K_mm')."""
+    a, b = slice(0, n), slice(n + m, 2 * n + m)
+    w = slice(n, n + m)
+
+    def blocks(k):
+        outer = np.zeros_like(k)
+        outer[..., a, a], outer[..., b, b], outer[..., w, w] = k[..., a, a], k[..., b, b], 2.0 * k[..., w, w]
+        outer[..., a, w], outer[..., w, a] = k[..., a, w], k[..., w, a]
+        outer[..., b, w], outer[..., w, b] = k[..., b, w], k[..., w, b]
+        across = np.concatenate([k[..., b, a], k[..., b, w] + k[..., a, w], k[..., a, b]], axis=-1)
+        back = np.concatenate([k[..., a, b], k[..., w, b] + k[..., w, a], k[..., b, a]], axis=-2)
+        return outer, across, back, k[..., b, b] + k[..., a, a]
+
+    outer, across, back, middle = blocks(k)
+    d_outer, d_across, d_back, d_middle = blocks(dk)
+    inverse = _inverse(middle)
+    x, y = inverse @ across, back @ inverse
+    joined = outer - back @ x
+    d_joined = d_outer - d_back @ x - y @ (d_across - d_middle @ x)
+    trace = np.trace(inverse @ d_middle, axis1=-2, axis2=-1)
+    return _symmetric(joined), _symmetric(d_joined), x, middle, trace
+
+
+def form(u: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """Return the quadratic form ``u' A u`` of each member of a stack."""
+    return (u * (matrix @ u[..., None])[..., 0]).sum(axis=-1)
+
+
+def _rescale(matrix: np.ndarray, unit: np.ndarray) -> np.ndarray:
+    return unit[..., :, None] * matrix * unit[..., None, :]
+
+
+def _symmetric(matrix: np.ndarray) -> np.ndarray:
+    """Remove the rounding asymmetry (a complex matrix of a damped model need not be symmetric)."""
+    return matrix if np.iscomplexobj(matrix) else 0.5 * (matrix + np.swapaxes(matrix, -1, -2))
+
+
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    """Invert a stack; if a pole is hit to the last bit, move off it by some rounding errors."""
+    try:
+        return np.linalg.inv(matrix)
+    except np.linalg.LinAlgError:
+        size = np.abs(matrix).max(axis=(-2, -1), keepdims=True, initial=0.0)
+        shift = np.diag(1.0 + np.arange(matrix.shape[-1]) / 7.0)
+        return np.linalg.inv(matrix + 8.0 * _EPS * np.where(size > 0.0, size, 1.0) * shift)

@@ -1,0 +1,233 @@
+"""The generic dynamic stiffness against closed forms, high precision and independent determinants."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+from scipy.integrate import simpson
+
+from cra_sym.solvers.eigenvalues import lowest, refine
+from cra_sym.solvers.shapes import mode_states
+from cra_sym.solvers.stiffness import DynamicStiffness
+
+PINNED = np.eye(4)[:, [1, 3]]
+CLAMPED_FREE = np.eye(4)[:, 2:]
+FREE = None
+
+
+def constant(a0, a1, *, length=1.0, displacements, coordinates=0, free=None, ends0=None, ends1=None):
+    """A(z) = a0 + z a1 and B(z) = ends0 + z ends1; arrays may have a leading row axis."""
+    size = 2 * displacements + coordinates
+    a0, a1 = np.asarray(a0, float), np.asarray(a1, float)
+    ends0 = np.zeros((size, size)) if ends0 is None else ends0
+    ends1 = np.zeros((size, size)) if ends1 is None else ends1
+
+    def affine(base, slope):
+        def coefficients(z, rows):
+            b, s = (m[rows] if m.ndim == 3 else np.broadcast_to(m, (len(z), *m.shape)) for m in (base, slope))
+            return b + z[:, None, None] * s, s
+
+        return coefficients
+
+    rows = max((m.shape[0] for m in (ends0, ends1, a0) if m.ndim == 3), default=1)
+    lengths = np.broadcast_to(float(length), (rows,))
+    return DynamicStiffness(affine(a0, a1), affine(ends0, ends1), lengths, displacements, coordinates, free)
+
+
+def beam(bending=1.0, mass=1.0, tension=0.0, foundation=0.0, **options):
+    """q = (v, v'), P = (N v' - EI v''', EI v'')."""
+    a0, a1 = np.zeros((4, 4)), np.zeros((4, 4))
+    a0[0, 1], a0[1, 3], a0[2, 0], a0[3, 1], a0[3, 2] = 1.0, 1.0 / bending, foundation, tension, -1.0
+    a1[2, 0] = -mass
+    return constant(a0, a1, displacements=2, **options)
+
+
+def timoshenko(bending, shear, mass, inertia, **options):
+    a0, a1 = np.zeros((4, 4)), np.zeros((4, 4))
+    a0[0, 1], a0[0, 2], a0[1, 3], a0[3, 2] = 1.0, 1.0 / shear, 1.0 / bending, -1.0
+    a1[2, 0], a1[3, 1] = -mass, -inertia
+    return constant(a0, a1, displacements=2, **options)
+
+
+def joint_arm(k_t, k_r, tip):
+    k_t, k_r, tip = (np.atleast_1d(np.asarray(a, float)) for a in np.broadcast_arrays(k_t, k_r, tip))
+    ends0, ends1 = np.zeros((2, len(k_t), 4, 4))
+    ends0[:, 0, 0], ends0[:, 1, 1], ends1[:, 2, 2] = k_t, k_r, -tip
+    return beam(ends0=ends0, ends1=ends1)
+
+
+def test_clamped_free_beam_300_modes():
+    lam = lowest(beam(free=CLAMPED_FREE), 300)[0] ** 0.25
+    with mp.workdps(40):
+        exact = [
+            mp.findroot(lambda l: mp.cos(l) + mp.sech(l), (i + mpf(1) / 2) * mp.pi if i else 1.875) for i in range(300)
+        ]
+    np.testing.assert_allclose(lam, np.array(exact, dtype=float), rtol=2e-13)
+
+
+@pytest.mark.parametrize("free", [FREE, np.zeros((4, 0))], ids=["free-free", "clamped-clamped"])
+def test_equal_elastic_spectra_and_rigid_zeros(free):
+    lam = lowest(beam(free=free), 30)[0] ** 0.25
+    rigid = 2 if free is None else 0
+    assert (lam[:rigid] == 0.0).all()
+    with mp.workdps(40):
+        exact = [mp.findroot(lambda l: mp.cos(l) - mp.sech(l), (i + mpf(3) / 2) * mp.pi) for i in range(30 - rigid)]
+    np.testing.assert_allclose(lam[rigid:], np.array(exact, dtype=float), rtol=1e-12)
+
+
+def test_count_equals_closed_form_everywhere():
+    lam = np.random.default_rng(0).uniform(0.5, 400.0, 500)
+    count = beam(free=PINNED).evaluate(lam**4, np.zeros(500, dtype=int)).count
+    np.testing.assert_array_equal(count, np.floor(lam / np.pi))
+
+
+@pytest.mark.parametrize("thickness", [0.3, 0.05, 0.005])
+def test_timoshenko_across_the_cut_off(thickness):
+    """Pinned ends: both branches are closed form, and one mode is pure shear at the cut-off frequency itself."""
+    inertia = thickness**2 / 12
+    shear = 1.0 / inertia / 3.1
+    n = np.arange(1, 120) * np.pi
+    half = 0.5 * (shear * n**2 + (n**2 + shear) / inertia)
+    product = shear * n**4 / inertia
+    upper = half + np.sqrt(half**2 - product)
+    exact = np.sort(np.r_[shear / inertia, upper, product / upper])[:80]
+    z = lowest(timoshenko(1.0, shear, 1.0, inertia, free=PINNED), 80)[0]
+    np.testing.assert_allclose(z, exact, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("bending", "tension", "rtol"), [(1e-6, 1.0, 1e-8), (1e-3, 1.0, 1e-10), (1.0, -9.8, 1e-11)])
+def test_axial_force(bending, tension, rtol):
+    k = np.arange(1, 51) * np.pi
+    z = lowest(beam(bending, tension=tension, free=PINNED), 50)[0]
+    np.testing.assert_allclose(z, bending * k**4 + tension * k**2, rtol=rtol)
+
+
+@pytest.mark.parametrize(("load", "number"), [(1.01, 1), (4.1, 2), (9.1, 3), (110.0, 10)])
+def test_buckled_structure_is_refused(load, number):
+    with pytest.raises(ValueError, match=f"buckled: {number} unstable mode"):
+        lowest(beam(tension=-load * np.pi**2, free=PINNED), 3)
+
+
+def test_foundation():
+    k = np.arange(1, 21) * np.pi
+    np.testing.assert_allclose(lowest(beam(foundation=1e4, free=PINNED), 20)[0], k**4 + 1e4, rtol=1e-12)
+
+
+def test_double_roots_are_counted_twice_and_get_orthogonal_shapes():
+    a0, a1 = np.zeros((4, 4)), np.zeros((4, 4))
+    a0[0, 2] = a0[1, 3] = 1.0
+    a1[2, 0] = a1[3, 1] = -1.0
+    strings = constant(a0, a1, displacements=2, free=np.zeros((4, 0)))
+    z = lowest(strings, 10)
+    np.testing.assert_allclose(z[0], np.repeat((np.arange(1, 6) * np.pi) ** 2, 2), rtol=1e-12)
+    x = np.linspace(0.0, 1.0, 2001)
+    u = mode_states(strings, z, x[None])[0, :, :, :2]
+    gram = simpson(np.einsum("isa,jsa->ijs", u, u), x=x)
+    np.testing.assert_allclose(gram, np.eye(10), atol=1e-10)
+
+
+def frequency_function(lam, k_t, k_r, mu):
+    """The paper's determinant, written independently of the package."""
+    s, c, S, C = mp.sin(lam), mp.cos(lam), mp.sinh(lam), mp.cosh(lam)
+    return (
+        -(lam**5) * mu * (s * C - c * S)
+        + 2 * lam**4 * k_r * mu * c * C
+        + lam**4 * (c * C - 1)
+        + lam**3 * k_r * (s * C + c * S)
+        + 2 * lam**2 * k_t * mu * s * S
+        + lam * k_r * k_t * mu * (s * C - c * S)
+        + lam * k_t * (s * C - c * S)
+        - k_r * k_t * (c * C + 1)
+    )
+
+
+def test_random_joints_over_28_decades_against_50_digits():
+    rng = np.random.default_rng(1)
+    k_t, k_r = 10 ** rng.uniform(-16, 12, (2, 25))
+    mu = 10 ** rng.uniform(-3, 6, 25)
+    z = lowest(joint_arm(k_t, k_r, mu), 4)
+    with mp.workdps(50):
+        for row in range(25):
+            parameters = [mpf(float(a[row])) for a in (k_t, k_r, mu)]
+            for value in z[row]:
+                lam = start = mpf(float(value)) ** 0.25
+                assert lam > 0
+                for _ in range(8):
+                    nudge = lam * mpf(10) ** -20
+                    here = frequency_function(lam, *parameters)
+                    lam -= here * nudge / (frequency_function(lam + nudge, *parameters) - here)
+                assert abs(lam / start - 1) < 1e-12
+
+
+def test_rigid_body_modes_of_soft_and_absent_springs():
+    z = lowest(joint_arm([0.0, 1e-14, 0.0, 1e-14], [0.0, 0.0, 1e-10, 1e-9], 0.0), 3)
+    np.testing.assert_array_equal((z == 0.0).sum(axis=1), [2, 1, 1, 0])
+    np.testing.assert_allclose(z[1:, 1], [4e-14, 1.2e-9, 1.20000300e-8], rtol=1e-7)
+
+
+def test_lumped_coordinate_is_the_same_as_a_mass_at_the_root():
+    """y = w + v with v clamped at the root, and the base w carrying a mass, against y with an end mass."""
+    base = 0.7
+    a0, a1 = np.zeros((6, 6)), np.zeros((6, 6))  # (v, v', w, P_v, P_v', r)
+    a0[0, 1], a0[1, 4], a0[4, 3] = 1.0, 1.0, -1.0
+    a1[3, [0, 2]] = a1[5, [0, 2]] = -1.0
+    ends1 = np.zeros((5, 5))
+    ends1[2, 2] = -base
+    relative = constant(a0, a1, displacements=2, coordinates=1, ends1=ends1, free=np.eye(5)[:, 2:])
+    absolute_end = np.zeros((4, 4))
+    absolute_end[0, 0] = -base
+    absolute = beam(ends1=absolute_end, free=np.eye(4)[:, [0, 2, 3]])
+    z = lowest(relative, 8)
+    np.testing.assert_allclose(z, lowest(absolute, 8), rtol=1e-11)
+    assert z[0, 0] == 0.0 and z[0, 1] > 0.0
+    x = np.array([[0.0, 0.3, 1.0]])
+    moving = mode_states(relative, z, x)[0]
+    still = mode_states(absolute, z, x)[0]
+    np.testing.assert_allclose(np.abs(moving[..., 0] + moving[..., 2]), np.abs(still[..., 0]), atol=1e-10)
+
+
+def test_a_massless_beam_has_only_the_modes_of_its_masses():
+    ends1 = np.zeros((4, 4))
+    ends1[2, 2] = -2.0
+    arm = beam(mass=0.0, ends1=ends1, free=CLAMPED_FREE)
+    np.testing.assert_allclose(lowest(arm, 1), [[1.5]], rtol=1e-12)
+    with pytest.raises(ValueError, match="modes = 2: the model has only 1 natural"):
+        lowest(arm, 2)
+
+
+def test_mode_shapes_are_orthonormal_and_satisfy_the_equation():
+    arm = beam(free=CLAMPED_FREE)
+    z = lowest(arm, 20)
+    x = np.linspace(0.0, 1.0, 4001)
+    state = mode_states(arm, z, x[None])[0]
+    v = state[:, :, 0]
+    np.testing.assert_allclose(simpson(v[:, None] * v[None], x=x), np.eye(20), atol=1e-8)
+    np.testing.assert_allclose(np.abs(v[:, -1]), 2.0, rtol=1e-10)
+    np.testing.assert_allclose(state[:, 0, :2], 0.0, atol=1e-10)
+    np.testing.assert_allclose(state[:, -1, 2:] / z[0, :, None] ** 0.75, 0.0, atol=1e-9)
+    fourth = mode_states(arm, z, x[None], derivative=4)[0, :, :, 0]
+    np.testing.assert_allclose(fourth / z[0, :, None], v, atol=1e-10)
+
+
+@pytest.mark.parametrize("damper", [0.3, 0.9, 5.0])
+def test_string_with_a_damper_at_its_end(damper):
+    """sinh(s) + c cosh(s) = 0: every eigenvalue has the same real part."""
+
+    def system(s, rows):
+        a, da = np.zeros((2, len(s), 2, 2), dtype=complex)
+        a[:, 0, 1], a[:, 1, 0], da[:, 1, 0] = 1.0, s**2, 2.0 * s
+        return a, da
+
+    def boundary(s, rows):
+        b, db = np.zeros((2, len(s), 2, 2), dtype=complex)
+        b[:, 1, 1], db[:, 1, 1] = damper * s, damper
+        return b, db
+
+    string = DynamicStiffness(system, boundary, np.ones(1), 1, 0, np.eye(2)[:, 1:])
+    k = np.arange(5) + 0.5 if damper < 1 else np.arange(1, 6)
+    exact = -0.5 * np.log(abs((damper + 1) / (damper - 1))) + 1j * np.pi * k
+    found = refine(string, (1.02j * np.pi * k - 0.1)[None])
+    np.testing.assert_allclose(found[0], exact, rtol=1e-12)
+    shape = mode_states(string, found, np.array([[0.25, 1.0]]))[0, :, :, 0]
+    np.testing.assert_allclose(shape[:, 0] / shape[:, 1], np.sinh(0.25 * exact) / np.sinh(exact), rtol=1e-10)
