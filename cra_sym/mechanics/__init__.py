@@ -1,1 +1,7 @@
-"""Symbolic engines: Hamilton's principle, separation, Ritz, multiple scales; beams and strings, never the arm."""
+"""Symbolic engines: Hamilton's principle, separation, Ritz, multiple scales; they know beams, never the arm."""
+
+from cra_sym.mechanics.hamilton import BoundaryCondition, HamiltonResult, hamilton
+from cra_sym.mechanics.jets import HamiltonError
+from cra_sym.mechanics.steps import Step, compact_latex
+
+__all__ = ["BoundaryCondition", "HamiltonError", "HamiltonResult", "Step", "compact_latex", "hamilton"]

@@ -1,0 +1,180 @@
+"""Generalised forces of a variation, integrated by parts: field equations, end conditions and lumped equations."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from sympy import Add, Eq, Equality, Expr, Integral, S
+
+from cra_sym.mechanics.jets import END_NAMES, End, Jet, JetSpace
+from cra_sym.mechanics.steps import compact_latex, variation_of
+from cra_sym.mechanics.variation import Forces, Variation, lagrange_forces
+
+__all__ = ["BoundaryCondition", "GeneralisedForces", "varied_form"]
+
+
+class BoundaryCondition(Equality):
+    """An equation at one end; equal to, and usable as, the plain ``Eq`` of its two sides.
+
+    Attributes
+    ----------
+    end : {'left', 'right'}
+    variation : Expr
+        The variation it belongs to, for example ``δv`` or its slope, evaluated at the end.
+    displacement : Expr
+        The end displacement that is varied.
+    kind : {'natural', 'essential'}
+        A natural condition follows from the variation being arbitrary, an essential one forbids it.
+    """
+
+    end: End
+    variation: Expr
+    displacement: Expr
+    kind: Literal["natural", "essential"]
+
+    def __new__(  # type: ignore[override]
+        cls, lhs: Expr, rhs: Expr, end: End, variation: Expr, displacement: Expr, kind: str = "natural"
+    ) -> BoundaryCondition:
+        made = super().__new__(cls, lhs, rhs, evaluate=False)
+        made.end, made.variation, made.displacement, made.kind = end, variation, displacement, kind
+        return made
+
+    @property
+    def _tags(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in ("end", "variation", "displacement", "kind")}
+
+    @property
+    def func(self) -> Any:  # keeps the tags when SymPy rebuilds the equation
+        return functools.partial(type(self), **self._tags)
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        return (*self.args, *self._tags.values())
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Equality) and self.args == other.args
+
+    def __hash__(self) -> int:
+        return hash(Eq(*self.args, evaluate=False))
+
+    def _repr_latex_(self) -> str:
+        return rf"$\displaystyle {compact_latex(Eq(*self.args, evaluate=False))}$"
+
+
+@dataclass(frozen=True)
+class GeneralisedForces:
+    """Generalised forces after integration by parts in time: conservative or applied, inside or at the ends."""
+
+    variation: Variation
+    inside: Forces
+    inside_applied: Forces
+    ends: Forces
+    ends_applied: Forces
+
+    @classmethod
+    def of(cls, variation: Variation) -> GeneralisedForces:
+        space = variation.space
+        applied: tuple[Forces, Forces] = ({}, {})
+        for force, jet, everywhere in variation.applied:
+            target = applied[0 if everywhere else 1]
+            target[jet] = target.get(jet, S.Zero) + force
+        inside, ends = lagrange_forces(space, variation.density), lagrange_forces(space, variation.ends)
+        return cls(variation, inside, applied[0], ends, applied[1])
+
+    def by_parts(self, forces: Forces, number: int, lowest: int = 0) -> Expr:
+        """Return sum_{a >= lowest} (-D_x)^(a - lowest) of the forces on the a-th x derivative of one unknown."""
+        space = self.variation.space
+        total: Expr = S.Zero
+        for order in range(max((jet.space for jet in forces if jet.unknown == number), default=-1), lowest - 1, -1):
+            total = forces.get(Jet(number, order, 0, None), S.Zero) - space.d_x(total)
+        return total
+
+    def field_equation(self, number: int) -> Eq:
+        """Collect the factor of the variation of one field in the interval."""
+        write = self.variation.space.write
+        applied = self.by_parts(self.inside_applied, number)
+        return Eq(write(-self.by_parts(self.inside, number)), write(applied), evaluate=False)
+
+    def boundary_force(self, number: int, order: int) -> Expr:
+        """Return the factor of the variation of the order-th derivative in the boundary term [...]_0^L."""
+        both = (self.by_parts(forces, number, order + 1) for forces in (self.inside, self.inside_applied))
+        return Add(*both)
+
+    def end_force(self, displacement: Jet) -> Expr:
+        """Return the factor of an end displacement from the end terms alone."""
+        return self.ends.get(displacement, S.Zero) + self.ends_applied.get(displacement, S.Zero)
+
+    def end_factor(self, displacement: Jet) -> Expr:
+        """Return the whole factor of the variation of an end displacement."""
+        return self.end_force(displacement) + self.boundary_factors[displacement]
+
+    def reaction(self, displacement: Jet) -> Expr:
+        """Return the work-equivalent share, on this displacement, of the forces at the eliminated displacements."""
+        shares = self.variation.elimination.shares(displacement)
+        return Add(*(factor * self.end_factor(pivot) for pivot, factor in shares))
+
+    def boundary_conditions(self) -> tuple[BoundaryCondition, ...]:
+        """Collect the factor of each end displacement, or the essential condition that forbids its variation."""
+        return tuple(map(self._condition, self.boundary_factors))
+
+    def interior_factors(self) -> Forces:
+        """Return the factor of every variation in the interval, coordinates included."""
+        numbers = range(len(self.variation.space.unknowns))
+        return {
+            Jet(n, 0, 0, None): self.by_parts(self.inside, n) + self.by_parts(self.inside_applied, n) for n in numbers
+        }
+
+    @functools.cached_property
+    def boundary_factors(self) -> Forces:
+        """Factor of every end displacement that integration by parts leaves, end terms apart; left before right."""
+        factors: Forces = {}
+        for end, sign in zip(END_NAMES, (-1, 1), strict=True):
+            for number, top in enumerate(self.variation.orders):
+                for order in range(top):
+                    force = self.variation.space.at(end, self.boundary_force(number, order))
+                    factors[Jet(number, order, 0, end)] = sign * force
+        return factors
+
+    def _condition(self, displacement: Jet) -> BoundaryCondition:
+        space, end = self.variation.space, displacement.place
+        assert end is not None
+        form = space.form(displacement)
+        tags = (end, varied_form(space, displacement), form)
+        fixed = self.variation.elimination.value(displacement)
+        if fixed is not None:
+            return BoundaryCondition(form, space.write(fixed), *tags, "essential")
+        # T - U has -EI/2 (v^(m))^2: this sign leaves the elastic coefficient of the left-hand side positive
+        sign = (-1) ** (self.variation.orders[displacement.unknown] - displacement.space)
+        side = sign if end == "right" else -sign
+        outer = self.end_force(displacement) + self.reaction(displacement)
+        inner = self.boundary_factors[displacement]
+        return BoundaryCondition(space.write(side * inner), space.write(-side * outer), *tags)
+
+    def coordinate_equation(self, number: int, reactions: bool = True) -> Eq:
+        """Collect the factor of the variation of one lumped coordinate."""
+        jet, zero = Jet(number, 0, 0, None), S.Zero
+        lumped = self._integrated(self.ends.get(jet, zero), self.inside.get(jet, zero), -1)
+        work = self.ends_applied.get(jet, zero) + (self.reaction(jet) if reactions else zero)
+        return Eq(lumped, self._integrated(work, self.inside_applied.get(jet, zero)), evaluate=False)
+
+    def _integrated(self, lumped: Expr, per_length: Expr, sign: int = 1) -> Expr:
+        """Add to a lumped force the integral of one per length (times the length where it does not vary along x)."""
+        space = self.variation.space
+        a, b = space.ends["left"], space.ends["right"]
+        still = per_length.xreplace(
+            {space.symbol(j): S.Zero for j in space.jets(per_length) if space.is_field(j.unknown)}
+        )
+        if still.has(space.x):
+            still = S.Zero
+        varying = space.write(sign * (per_length - still))
+        integral = Integral(varying, (space.x, a, b)) if varying != 0 else S.Zero
+        return space.write(sign * (lumped + (b - a) * still)) + integral
+
+
+def varied_form(space: JetSpace, displacement: Jet) -> Expr:
+    """Return the variation of a jet as a derivative of ``δv``, evaluated if it belongs to an end."""
+    delta = variation_of(space.unknowns[displacement.unknown])
+    for variable, order in ((space.x, displacement.space), (space.t, displacement.time)):
+        delta = delta.diff(variable, order) if order else delta
+    return delta if displacement.place is None else delta.subs(space.x, space.ends[displacement.place])

@@ -1,0 +1,216 @@
+"""Hamilton's principle for fields on an interval and lumped coordinates, with the steps of the derivation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sympy import Add, Basic, Eq, Expr, Integral, S, Symbol
+from sympy.core.function import AppliedUndef
+
+from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces, varied_form
+from cra_sym.mechanics.jets import HamiltonError, Jet, JetSpace
+from cra_sym.mechanics.steps import Step, compact_latex
+from cra_sym.mechanics.variation import Variation, VirtualWork, vary
+
+__all__ = ["BoundaryCondition", "HamiltonError", "HamiltonResult", "hamilton"]
+
+
+@dataclass(frozen=True)
+class HamiltonResult:
+    """Equations of motion with everything they were derived from.
+
+    Attributes
+    ----------
+    field_equations : tuple of Eq
+        One for each field: inertial and elastic forces = virtual work of the applied ones.
+    boundary_conditions : tuple of BoundaryCondition
+        Left end before right end, fields in order, displacement before slope.
+    coordinate_equations : tuple of Eq
+        One for each lumped coordinate.
+    steps : tuple of Step
+    variation : Variation
+        The same in jet symbols.
+    """
+
+    field_equations: tuple[Eq, ...]
+    boundary_conditions: tuple[BoundaryCondition, ...]
+    coordinate_equations: tuple[Eq, ...]
+    steps: tuple[Step, ...]
+    density: Expr
+    left: Expr
+    right: Expr
+    fields: tuple[AppliedUndef, ...]
+    coordinates: tuple[AppliedUndef, ...]
+    x: Symbol
+    t: Symbol
+    domain: tuple[Expr, Expr]
+    virtual_work: tuple[VirtualWork, ...]
+    essential: tuple[Expr, ...]
+    variation: Variation
+
+    @property
+    def equations(self) -> tuple[Eq, ...]:
+        """All equations: fields, ends, coordinates."""
+        return (*self.field_equations, *self.boundary_conditions, *self.coordinate_equations)
+
+    def _repr_latex_(self) -> str:
+        return rf"$\displaystyle {compact_latex(self.equations, (self.x.name, self.t.name))}$"
+
+
+def hamilton(
+    density: Expr,
+    *,
+    fields: Sequence[AppliedUndef],
+    coordinates: Sequence[AppliedUndef] = (),
+    x: Symbol,
+    domain: tuple[Any, Any],
+    t: Symbol,
+    left: Expr | None = None,
+    right: Expr | None = None,
+    virtual_work: Sequence[VirtualWork] | None = None,
+    essential: Sequence[Expr] | None = None,
+    prescribed: Sequence[AppliedUndef] = (),
+) -> HamiltonResult:
+    r"""Derive equations of motion and boundary conditions from :math:`\delta\int L\,dt + \int\delta W\,dt = 0`.
+
+    Parameters
+    ----------
+    density : Expr
+        Lagrangian density (kinetic minus potential energy per length) in the fields, the coordinates and their
+        derivatives of any order; coefficients may depend on x.
+    fields, coordinates : sequence of applied undefined functions
+        ``v(x, t)`` and ``w(t)``: what is varied.
+    x, t : Symbol
+        Position and time.
+    domain : (left, right)
+        End coordinates.
+    left, right : Expr, optional
+        Lagrangian terms of each end. ``v(x, t)`` and its derivatives are understood at that end; evaluated forms
+        such as ``v.subs(x, 0)`` or ``v.diff(x).subs(x, 0)`` are accepted too.
+    virtual_work : sequence of (generalised force, displacement, place), optional
+        Place is 'left', 'right', 'domain' (force per length) or None (a coordinate, or evaluated forms). A damper is
+        ``(-c*v.diff(t), v, 'left')``, Kelvin-Voigt damping ``(-c*v.diff(x, 2, t), v.diff(x, 2), 'domain')``.
+    essential : sequence of Expr, optional
+        Linear combinations of end displacements (and coordinates) that vanish, in evaluated form.
+    prescribed : sequence of applied undefined functions, optional
+        Known functions of x and t that occur with derivatives.
+
+    Returns
+    -------
+    HamiltonResult
+
+    Raises
+    ------
+    HamiltonError
+        A ValueError that names the term and why it cannot be treated.
+
+    Examples
+    --------
+    >>> from sympy import Function, symbols
+    >>> x, t, T, rho, l, k = symbols("x t T rho l k")
+    >>> y = Function("y")(x, t)
+    >>> string = hamilton(rho*y.diff(t)**2/2 - T*y.diff(x)**2/2, fields=[y], x=x, domain=(0, l), t=t, left=-k*y**2/2)
+    >>> string.field_equations[0].lhs == rho*y.diff(t, 2) - T*y.diff(x, 2)
+    True
+    >>> string.boundary_conditions[0]
+    Eq(T*Subs(Derivative(y(x, t), x), x, 0), k*y(0, t))
+    >>> string.boundary_conditions[0].end, string.boundary_conditions[0].variation
+    ('left', δy(0, t))
+    """
+    space = JetSpace(fields, coordinates, x, t, domain, prescribed)
+    left, right = _optional(left), _optional(right)
+    virtual_work, essential = tuple(virtual_work or ()), tuple(essential or ())
+    variation = vary(space, density, {"left": left, "right": right}, virtual_work, essential)
+    forces = GeneralisedForces.of(variation)
+    field_equations = tuple(forces.field_equation(number) for number in range(len(space.fields)))
+    boundary_conditions = forces.boundary_conditions()
+    numbers = range(len(space.fields), len(space.unknowns))
+    coordinate_equations = tuple(forces.coordinate_equation(number) for number in numbers)
+    return HamiltonResult(
+        field_equations,
+        boundary_conditions,
+        coordinate_equations,
+        _narrate(variation, forces, (*field_equations, *boundary_conditions, *coordinate_equations)),
+        density,
+        left,
+        right,
+        space.fields,
+        space.coordinates,
+        x,
+        t,
+        (space.ends["left"], space.ends["right"]),
+        virtual_work,
+        essential,
+        variation,
+    )
+
+
+def _optional(expression: Expr | None) -> Any:
+    return S.Zero if expression is None else expression
+
+
+# ---------------------------------------------------------------------------------------------------- the steps
+
+_STEPS = (
+    ("Lagrangian", "The Lagrangian density, integrated over the interval, with the Lagrangian terms of the two ends."),
+    (
+        "Variation",
+        "The variation of the Lagrangian plus the virtual work of the applied forces; over time it adds up to zero.",
+    ),
+    (
+        "Integration by parts in time",
+        "Time derivatives leave the variations, which vanish at the first and last instant.",
+    ),
+    ("Integration by parts in x", "Space derivatives leave the variations and produce terms at the two ends."),
+    (
+        "Collected terms",
+        "The factors of each variation: fields in the interval, displacements at the ends, coordinates.",
+    ),
+    ("Equations", "Variations that no essential condition forbids are arbitrary, so each factor vanishes."),
+)
+
+
+def _narrate(variation: Variation, forces: GeneralisedForces, equations: tuple[Basic, ...]) -> tuple[Step, ...]:
+    space = variation.space
+    interval = (space.x, space.ends["left"], space.ends["right"])
+
+    def work(pairs: Iterable[tuple[Jet, Expr]]) -> Expr:
+        return Add(*(space.write(force) * varied_form(space, jet) for jet, force in pairs))
+
+    def over(integrand: Expr) -> Expr:
+        return Integral(integrand, interval) if integrand != 0 else S.Zero
+
+    def momenta(lagrangian: Expr) -> list[tuple[Jet, Expr]]:
+        return [(jet, lagrangian.diff(space.symbol(jet))) for jet in space.jets(lagrangian)]
+
+    applied, ends_applied = forces.inside_applied.items(), forces.ends_applied.items()
+    varied = over(work([*momenta(variation.density), *applied])) + work([*momenta(variation.ends), *ends_applied])
+    end_work = work([*forces.ends.items(), *ends_applied])
+    in_time = over(work([*forces.inside.items(), *applied])) + end_work
+    inside, boundary = forces.interior_factors(), forces.boundary_factors
+    in_space = over(work(inside.items())) + work(boundary.items()) + end_work
+    collected = over(work((jet, force) for jet, force in inside.items() if space.is_field(jet.unknown))) + Add(
+        work((jet, forces.end_factor(jet)) for jet in boundary),
+        *(
+            (equation.rhs - equation.lhs) * varied_form(space, Jet(number, 0, 0, None))
+            for number in range(len(space.fields), len(space.unknowns))
+            for equation in [forces.coordinate_equation(number, reactions=False)]
+        ),
+    )
+    expressions = (
+        over(space.restore(variation.density)) + space.restore(variation.ends),
+        varied,
+        in_time,
+        in_space,
+        collected,
+        equations,
+    )
+    variables = (space.x.name, space.t.name)
+    return tuple(
+        Step(name, statement, expression, before, "first variation of the action on polynomial test motions", variables)
+        for (name, statement), expression, before in zip(
+            _STEPS, expressions, [(), *((name,) for name, _ in _STEPS[:-1])], strict=True
+        )
+    )

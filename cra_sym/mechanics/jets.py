@@ -1,0 +1,369 @@
+"""Jet variables: each derivative of an unknown, in the interval or at an end, is one symbol while a variation is taken.
+
+Coefficients then differentiate as plain expressions, and the total derivatives D_x and D_t are one chain rule.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, Literal, NamedTuple
+
+from sympy import (
+    Abs,
+    Add,
+    Basic,
+    DiracDelta,
+    Dummy,
+    Expr,
+    Heaviside,
+    Integral,
+    Max,
+    Min,
+    Mul,
+    Piecewise,
+    S,
+    Subs,
+    Sum,
+    Symbol,
+    arg,
+    ceiling,
+    conjugate,
+    expand,
+    floor,
+    im,
+    preorder_traversal,
+    re,
+    sign,
+    sympify,
+)
+from sympy.core.function import AppliedUndef, Derivative, UndefinedFunction
+
+__all__ = ["END_NAMES", "End", "HamiltonError", "Jet", "JetSpace", "grouped"]
+
+End = Literal["left", "right"]
+END_NAMES: tuple[End, End] = ("left", "right")
+_SINGULAR = (DiracDelta,)
+_NOT_SMOOTH = (Abs, sign, Max, Min, Piecewise, Heaviside, floor, ceiling, re, im, arg, conjugate)
+_NOT_LOCAL = (Integral, Sum)
+
+
+class HamiltonError(ValueError):
+    """A Lagrangian that cannot be treated; the message names the term and the reason."""
+
+
+class Jet(NamedTuple):
+    """Derivative of unknown number ``unknown`` to the orders ``space`` and ``time``; place None is the interval."""
+
+    unknown: int
+    space: int
+    time: int
+    place: End | None
+
+
+class JetSpace:
+    """Reads expressions in v(x, t) into jet symbols and writes them back.
+
+    Parameters
+    ----------
+    fields, coordinates : sequence of applied undefined functions
+        ``v(x, t)`` and ``w(t)``; unknown number k is ``(*fields, *coordinates)[k]``.
+    x, t : Symbol
+        Independent variables.
+    domain : (Expr, Expr)
+        Coordinates of the left and the right end.
+    prescribed : sequence of applied undefined functions
+        Known functions of x and t, not varied. Known functions of x or t alone need no declaration.
+    """
+
+    def __init__(
+        self,
+        fields: Sequence[AppliedUndef],
+        coordinates: Sequence[AppliedUndef],
+        x: Symbol,
+        t: Symbol,
+        domain: tuple[Expr, Expr],
+        prescribed: Sequence[AppliedUndef] = (),
+    ) -> None:
+        self.fields, self.coordinates, self.x, self.t = tuple(fields), tuple(coordinates), x, t
+        self._check_symbols()
+        self.unknowns = (*self.fields, *self.coordinates)
+        ends = tuple(sympify(end, strict=True) for end in domain)
+        if len(ends) != 2 or ends[0] == ends[1] or any(end.has(x, t) for end in ends):
+            raise HamiltonError(f"domain = {domain}: allowed are two different end coordinates free of {x} and {t}")
+        self.ends: dict[End, Expr] = dict(zip(END_NAMES, ends, strict=True))
+        self.known = {function.func for function in prescribed}
+        self._heads = {unknown.func: number for number, unknown in enumerate(self.unknowns)}
+        if len(self._heads) != len(self.unknowns):
+            raise HamiltonError(f"fields and coordinates {self.unknowns}: each may be named once only")
+        self._symbols: dict[Jet, Dummy] = {}
+        self._jets: dict[Dummy, Jet] = {}
+
+    def _check_symbols(self) -> None:
+        for name, value in (("x", self.x), ("t", self.t)):
+            if not isinstance(value, Symbol):
+                raise TypeError(f"{name} = {value!r}: allowed is a SymPy symbol")
+        kinds = (("fields", self.fields, {self.x, self.t}), ("coordinates", self.coordinates, {self.t}))
+        for name, functions, allowed in kinds:
+            for function in functions:
+                if not isinstance(function, AppliedUndef):
+                    raise TypeError(
+                        f"{name}: {function!r}: allowed is an undefined function of {allowed}, such as v(x, t)"
+                    )
+                if set(function.args) != allowed or len(function.args) != len(allowed):
+                    raise HamiltonError(
+                        f"{name}: {function} must be a function of exactly {', '.join(sorted(map(str, allowed)))}"
+                        " (the same symbols, with the same assumptions, as x and t)"
+                    )
+
+    # ---------------------------------------------------------------------------------------------- symbols
+
+    def symbol(self, jet: Jet) -> Dummy:
+        """Return the symbol that stands for a jet."""
+        if jet not in self._symbols:
+            marks = "x" * jet.space + "t" * jet.time
+            made = Dummy(f"{self.unknowns[jet.unknown].func.__name__}_{marks}{jet.place or ''}")
+            self._symbols[jet], self._jets[made] = made, jet
+        return self._symbols[jet]
+
+    def jets(self, *expressions: Expr) -> list[Jet]:
+        """Return the jets in the expressions, in a stable order."""
+        found = {self._jets[s] for e in expressions for s in e.free_symbols if s in self._jets}
+        return sorted(found, key=lambda jet: (jet.unknown, jet.place or "", jet.space, jet.time))
+
+    def is_field(self, unknown: int) -> bool:
+        """Tell a field from a lumped coordinate."""
+        return unknown < len(self.fields)
+
+    # ---------------------------------------------------------------------------------------------- calculus
+
+    def d_t(self, expression: Expr) -> Expr:
+        """Total time derivative."""
+        chain = (
+            expression.diff(self.symbol(j)) * self.symbol(j._replace(time=j.time + 1)) for j in self.jets(expression)
+        )
+        return Add(expression.diff(self.t), *chain)
+
+    def d_x(self, expression: Expr) -> Expr:
+        """Total x derivative of an expression in the interval."""
+        chain = (
+            expression.diff(self.symbol(j)) * self.symbol(j._replace(space=j.space + 1))
+            for j in self.jets(expression)
+            if self.is_field(j.unknown)
+        )
+        return Add(expression.diff(self.x), *chain)
+
+    def at(self, end: End, expression: Expr) -> Expr:
+        """Take an expression in the interval to one end."""
+        moved = {
+            self.symbol(j): self.symbol(j._replace(place=end))
+            for j in self.jets(expression)
+            if self.is_field(j.unknown)
+        }
+        value = expression.xreplace(moved).subs(self.x, self.ends[end])
+        if value.has(S.ComplexInfinity, S.NaN, S.Infinity):
+            raise HamiltonError(f"{self.write(expression)} has no value at the {end} end {self.x} = {self.ends[end]}")
+        return value
+
+    # ---------------------------------------------------------------------------------------------- writing
+
+    def form(self, jet: Jet) -> Expr:
+        """Return the derivative a jet stands for, evaluated if it belongs to an end."""
+        function = self.unknowns[jet.unknown]
+        orders = [(v, n) for v, n in ((self.x, jet.space), (self.t, jet.time)) if n]
+        derivative = function.diff(*orders) if orders else function
+        return derivative if jet.place is None else derivative.subs(self.x, self.ends[jet.place])
+
+    def restore(self, expression: Expr) -> Expr:
+        """Return the expression in derivatives again, otherwise as it is."""
+        return expression.xreplace({self.symbol(jet): self.form(jet) for jet in self.jets(expression)})
+
+    def write(self, expression: Expr) -> Expr:
+        """Return the expression in derivatives again, linear terms grouped by their coefficient."""
+        given = {node: Dummy() for node in _maximal(expression, lambda n: _is_function(n) and n.has(self.t))}
+        named = expression.xreplace(given)
+        variables = [*(self.symbol(jet) for jet in self.jets(named)), *given.values()]
+        back = {symbol: node for node, symbol in given.items()}
+        return self.restore(grouped(named, variables).xreplace(back))
+
+    # ---------------------------------------------------------------------------------------------- reading
+
+    def read(self, expression: Any, place: End | Literal["domain", "ends"], label: str) -> Expr:
+        """Return ``expression`` in jet symbols.
+
+        Parameters
+        ----------
+        expression : Expr
+            In the unknowns and their derivatives.
+        place : {'domain', 'left', 'right', 'ends'}
+            Where unevaluated ``v(x, t)`` is meant; at 'ends' only evaluated forms such as ``v(0, t)`` are accepted.
+        label : str
+            Names the expression in errors.
+
+        Raises
+        ------
+        HamiltonError
+            Names the term and the reason.
+        """
+        if isinstance(expression, str):
+            raise TypeError(f"{label} = {expression!r}: allowed is a SymPy expression, not text")
+        expression = sympify(expression, strict=True)
+        if not isinstance(expression, Expr):
+            raise TypeError(f"{label} = {expression}: allowed is a scalar SymPy expression")
+        return Add(*(self._read_term(term, place, label) for term in Add.make_args(expression)))
+
+    def _read_term(self, term: Expr, place: Any, label: str) -> Expr:
+        try:
+            self._check_strangers(term)
+            read = self._convert(term, place)
+        except HamiltonError as error:
+            raise HamiltonError(f"{label}, term {term}: {error}") from None
+        if place in END_NAMES:
+            read = read.subs(self.x, self.ends[place])
+        elif place == "ends" and read.has(self.x):
+            raise HamiltonError(f"{label}, term {term}: say at which end {self.x} is meant")
+        return read
+
+    def _check_strangers(self, term: Expr) -> None:
+        for own in (self.x, self.t):
+            for symbol in term.free_symbols:
+                if symbol.name == own.name and symbol != own:  # type: ignore[attr-defined]
+                    raise HamiltonError(f"the symbol {symbol} here differs from {own} in its assumptions")
+        if term.has(S.ComplexInfinity, S.NaN, S.Infinity, S.NegativeInfinity):
+            raise HamiltonError("it is not finite")
+
+    def _mentions(self, node: Basic) -> bool:
+        return any(function.func in self._heads for function in node.atoms(AppliedUndef))
+
+    def _convert(self, node: Basic, place: Any) -> Any:
+        if isinstance(node, AppliedUndef):
+            return self._convert_function(node, place)
+        if isinstance(node, Derivative):
+            return self._convert_derivative(node, place)
+        if isinstance(node, _SINGULAR) and node.has(self.x):
+            raise HamiltonError(f"{node} acts at an interior point; split the interval or use an end term")
+        if not node.has(AppliedUndef):
+            return node
+        if isinstance(node, Subs):
+            return self._convert_subs(node, place)
+        if self._mentions(node):
+            if isinstance(node, _NOT_LOCAL):
+                raise HamiltonError(f"{node} is not local: a density may not hold an integral or a sum over an unknown")
+            if isinstance(node, _NOT_SMOOTH):
+                raise HamiltonError(f"{node} is not differentiable in the unknowns, so it has no variation")
+        if isinstance(node, UndefinedFunction) or not node.args:
+            return node
+        return node.func(*(self._convert(argument, place) for argument in node.args))
+
+    def _convert_function(self, function: AppliedUndef, place: Any) -> Expr:
+        if any(self._mentions(argument) for argument in function.args):
+            raise HamiltonError(f"{function} is an unspecified function of an unknown: its variation is not known")
+        if function.func not in self._heads:
+            return function
+        return self._jet(function, {}, place)
+
+    def _convert_derivative(self, derivative: Derivative, place: Any) -> Expr:
+        function = derivative.expr
+        if not isinstance(function, AppliedUndef):
+            done = derivative.doit()
+            if done == derivative:
+                raise HamiltonError(f"{derivative} cannot be carried out")
+            return self._convert(done, place)
+        if function.func in self._heads:
+            return self._jet(function, dict(derivative.variable_count), place)
+        if function.has(self.x) and function.has(self.t) and function.func not in self.known:
+            raise HamiltonError(
+                f"{derivative}: {function} is not one of the fields {list(map(str, self.fields))};"
+                " list it in fields, or in prescribed if it is known"
+            )
+        return derivative
+
+    def _convert_subs(self, subs: Subs, place: Any) -> Expr:
+        inner = subs.expr
+        for variable, point in zip(subs.variables, subs.point, strict=True):
+            inner = inner.xreplace({variable: self.x})
+            if not self._mentions(inner):
+                return subs
+            if point == self.x:
+                continue
+            return self._convert(inner, self._end_at(point, place, subs))
+        return self._convert(inner, place)
+
+    def _end_at(self, point: Expr, place: Any, node: Basic) -> End:
+        for end, coordinate in self.ends.items():
+            if point == coordinate and place != "domain":
+                return end
+        where = " or ".join(f"{self.x} = {coordinate}" for coordinate in self.ends.values())
+        if place == "domain":
+            raise HamiltonError(
+                f"{node} is a value at the point {self.x} = {point}: a density is local; use left or right"
+            )
+        raise HamiltonError(f"{node} is a value at {self.x} = {point}, which is not an end ({where})")
+
+    def _jet(self, function: AppliedUndef, orders: dict[Symbol, int], place: Any) -> Expr:
+        number = self._heads[function.func]
+        own = self.unknowns[number]
+        if len(function.args) != len(own.args):
+            raise HamiltonError(f"{function} should be written {own}")
+        where: End | None = None if place == "domain" else place
+        for argument, variable in zip(function.args, own.args, strict=True):
+            if argument == variable:
+                continue
+            if variable == self.t:
+                raise HamiltonError(f"{function} is not local in time: allowed is {own}")
+            where = self._end_at(argument, place, function)
+        if not self.is_field(number):
+            where = None
+        elif where == "ends":  # type: ignore[comparison-overlap]
+            raise HamiltonError(f"{function} is not evaluated at an end: write {function}.subs({self.x}, ...)")
+        space, time = orders.pop(self.x, 0), orders.pop(self.t, 0)
+        if where in END_NAMES:
+            space += orders.pop(self.ends[where], 0)  # v.diff(x).subs(x, L) is Derivative(v(L, t), L) in SymPy
+        if orders or not all(getattr(n, "is_Integer", True) for n in (space, time)):
+            raise HamiltonError(f"a derivative of {function} by {list(orders)} has no meaning here")
+        return self.symbol(Jet(number, int(space), int(time), where))
+
+
+def _is_function(node: Basic) -> bool:
+    return isinstance(node, (AppliedUndef, Subs)) or (
+        isinstance(node, Derivative) and isinstance(node.expr, AppliedUndef)
+    )
+
+
+def _maximal(expression: Expr, wanted: Any) -> list[Basic]:
+    """Return the outermost nodes that satisfy ``wanted``."""
+    found: dict[Basic, None] = {}
+    walk = preorder_traversal(expression)
+    for node in walk:
+        if wanted(node):
+            found[node] = None
+            walk.skip()
+    return list(found)
+
+
+def grouped(expression: Expr, variables: Iterable[Symbol]) -> Expr:
+    """Write ``a*y + a*z + b*y`` as ``a*(y + z) + b*y`` for the given variables, without expanding coefficients.
+
+    Terms that are not linear in the variables are expanded first.
+    """
+    variables = list(variables)
+    coefficients = {v: expression.diff(v) for v in variables}
+    if any(c.has(*variables) for c in coefficients.values() if variables):
+        pairs = [term.as_independent(*variables, as_Add=False) for term in Add.make_args(expand(expression))]
+    else:
+        pairs = [(c, v) for v, c in coefficients.items()]
+        pairs.append((expression.xreplace(dict.fromkeys(variables, S.Zero)), S.One))
+    groups: dict[Expr, list[Expr]] = {}
+    for coefficient, variable in pairs:
+        if expand(coefficient) == 0:
+            continue
+        if -coefficient in groups:
+            groups[-coefficient].append(-variable)
+        else:
+            groups.setdefault(coefficient, []).append(variable)
+    return Add(*(_signed(coefficient, Add(*members)) for coefficient, members in groups.items()))
+
+
+def _signed(coefficient: Expr, factor: Expr) -> Expr:
+    if coefficient.is_Add and coefficient.could_extract_minus_sign():
+        return Mul(S.NegativeOne, -coefficient, factor)
+    return Mul(coefficient, factor)

@@ -1,0 +1,134 @@
+"""A derivation as a chain of frozen steps, each of which shows itself as LaTeX in subscript notation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from sympy import Basic, Derivative, Function, Subs, Symbol
+from sympy.core.function import AppliedUndef
+from sympy.printing.latex import LatexPrinter
+
+__all__ = ["Step", "compact_latex", "variation_of"]
+
+_DELTA = "δ"
+
+
+def variation_of(unknown: AppliedUndef) -> AppliedUndef:
+    """Return the variation ``δv(x, t)`` of the unknown ``v(x, t)``."""
+    return Function(_DELTA + unknown.func.__name__)(*unknown.args)
+
+
+class _CompactPrinter(LatexPrinter):
+    r"""Writes derivatives of functions as subscripts (``v_{xx}``) or dots, values at an end as ``v_{x}(0,t)``."""
+
+    def __init__(self, variables: tuple[str, str]) -> None:
+        super().__init__()
+        self._variables = variables
+
+    def _own(self, argument: Basic) -> bool:
+        return isinstance(argument, Symbol) and argument.name in self._variables
+
+    def _head(self, function: AppliedUndef) -> str:
+        name = function.func.__name__
+        delta = r"\delta " if name.startswith(_DELTA) else ""
+        return delta + self._print(Symbol(name.removeprefix(_DELTA)))
+
+    def _place(self, arguments: Iterable[Basic]) -> str:
+        """Return the arguments where they say something: a value at an end, or a coefficient that varies along x."""
+        arguments = tuple(arguments)
+        if all(map(self._own, arguments)) and self._variables[1] in map(str, arguments):
+            return ""
+        return "(" + ",".join(map(self._print, arguments)) + ")"
+
+    def _print_Function(self, expr: Any, exp: str | None = None) -> str:
+        if not isinstance(expr, AppliedUndef):
+            return super()._print_Function(expr, exp)
+        return self._head(expr) + self._place(expr.args) + (f"^{{{exp}}}" if exp else "")
+
+    def _derivative(self, derivative: Derivative, arguments: Iterable[Basic]) -> str:
+        function = derivative.expr
+        head, place = self._head(function), self._place(arguments)
+        space, time = self._variables
+        counts = {time: 0, space: 0}
+        for variable, count in derivative.variable_count:
+            counts[time if variable.name == time else space] += int(count)
+        if not counts[space] and len(function.args) == 1 and counts[time] <= 3:
+            return rf"\{'d' * counts[time]}ot{{{head}}}" + place
+        marks = self._print(Symbol(space)) * counts[space] + self._print(Symbol(time)) * counts[time]
+        return (rf"{{{head}}}_{{,{marks}}}" if "_" in head else rf"{head}_{{{marks}}}") + place
+
+    def _print_Derivative(self, expr: Derivative) -> str:
+        if isinstance(expr.expr, AppliedUndef):
+            return self._derivative(expr, expr.expr.args)
+        return super()._print_Derivative(expr)
+
+    def _print_Subs(self, subs: Subs) -> str:
+        inner = subs.expr
+        if isinstance(inner, Derivative) and isinstance(inner.expr, AppliedUndef):
+            point = dict(zip(subs.variables, subs.point, strict=True))
+            return self._derivative(inner, (point.get(argument, argument) for argument in inner.expr.args))
+        return super()._print_Subs(subs)
+
+    def parenthesize(self, item: Any, *args: Any, **kwargs: Any) -> str:
+        if isinstance(item, (Derivative, Subs)) and isinstance(item.expr, (AppliedUndef, Derivative)):
+            return self._print(item)
+        return super().parenthesize(item, *args, **kwargs)
+
+
+def compact_latex(expression: Any, variables: tuple[str, str] = ("x", "t")) -> str:
+    r"""Return LaTeX with derivatives as subscripts; a tuple becomes lines.
+
+    Parameters
+    ----------
+    expression : Basic or iterable of Basic
+    variables : (str, str)
+        Names of the position and of the time.
+
+    Examples
+    --------
+    >>> from sympy import Function, symbols
+    >>> x, t, L = symbols("x t L")
+    >>> v, w = Function("v")(x, t), Function("w")(t)
+    >>> print(compact_latex(v.diff(x, 2) + w.diff(t) + v.diff(x).subs(x, L)))
+    v_{x}(L,t) + v_{xx} + \dot{w}
+    """
+    printer = _CompactPrinter(variables)
+    if isinstance(expression, Iterable) and not isinstance(expression, Basic):
+        return r"\begin{gathered}" + r" \\ ".join(map(printer.doprint, expression)) + r"\end{gathered}"
+    return printer.doprint(expression)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of a derivation.
+
+    Attributes
+    ----------
+    name : str
+        Short title.
+    statement : str
+        What was done and why it is allowed, one sentence.
+    expression : Basic or tuple of Basic
+        What came out.
+    derived_from : tuple of str
+        Names of the steps it rests on; empty for what was given.
+    check : str
+        How it is checked by another route.
+    variables : (str, str)
+        Names of position and time, for the notation.
+    """
+
+    name: str
+    statement: str
+    expression: Any
+    derived_from: tuple[str, ...] = ()
+    check: str = ""
+    variables: tuple[str, str] = ("x", "t")
+
+    def _repr_latex_(self) -> str:
+        return rf"$\displaystyle {compact_latex(self.expression, self.variables)}$"
+
+    def _repr_markdown_(self) -> str:
+        return f"**{self.name}.** {self.statement}\n\n$$ {compact_latex(self.expression, self.variables)} $$"

@@ -1,0 +1,123 @@
+"""First variation of an action: what is given, read into jet symbols, with its end terms and virtual work checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from sympy import Add, Expr, S
+
+from cra_sym.mechanics.constraints import Elimination, eliminate
+from cra_sym.mechanics.jets import END_NAMES, End, HamiltonError, Jet, JetSpace
+
+__all__ = ["Forces", "Variation", "VirtualWork", "lagrange_forces", "vary"]
+
+VirtualWork = tuple[Expr, Expr, Literal["left", "right", "domain"] | None]
+Forces = dict[Jet, Expr]
+
+
+@dataclass(frozen=True)
+class Variation:
+    """The first variation of the action in jet symbols; `separate` and `ritz` start from here.
+
+    Attributes
+    ----------
+    space : JetSpace
+    density, ends : Expr
+        Lagrangian density, and the sum of the Lagrangian terms of both ends.
+    applied : tuple of (Expr, Jet, bool)
+        Non-conservative generalised force, the displacement (a jet without time derivative) it works on, and whether it
+        is a force per length.
+    orders : tuple of int
+        Highest x derivative of each field: as many displacements exist at each end.
+    elimination : Elimination
+        End displacements fixed by the essential conditions.
+    """
+
+    space: JetSpace
+    density: Expr
+    ends: Expr
+    applied: tuple[tuple[Expr, Jet, bool], ...]
+    orders: tuple[int, ...]
+    elimination: Elimination
+
+
+def vary(
+    space: JetSpace,
+    density: Expr,
+    ends: Mapping[End, Expr],
+    virtual_work: Sequence[VirtualWork],
+    essential: Sequence[Expr],
+) -> Variation:
+    """Read what is given into jet symbols and check that every end term can do work."""
+    inside = space.read(density, "domain", "density")
+    terms = {end: space.read(ends[end], end, f"{end} end") for end in END_NAMES}
+    applied = tuple(work for triple in virtual_work for work in _read_work(space, triple))
+    varied = [*space.jets(inside), *(jet for _, jet, everywhere in applied if everywhere)]
+    orders = tuple(
+        max((jet.space for jet in varied if jet.unknown == number), default=0) for number in range(len(space.fields))
+    )
+    for number, field in enumerate(space.fields):
+        if not any(jet.unknown == number for jet in varied):
+            raise HamiltonError(f"fields: {field} does not occur in the density {density}")
+    elimination = eliminate(space, essential, orders)
+    for end in END_NAMES:
+        for term in Add.make_args(terms[end]):
+            _check_end_term(space, f"{end} end, term {space.write(term)}", space.jets(term), orders)
+            elimination.check_effective(term, f"{end} end")
+    for force, jet, everywhere in applied:
+        if not everywhere:
+            label = f"virtual work of {space.write(force)} on {space.form(jet)}"
+            _check_end_term(space, label, [jet], orders)
+            elimination.check_effective(space.symbol(jet), label)
+    return Variation(space, inside, terms["left"] + terms["right"], applied, orders, elimination)
+
+
+def _check_end_term(space: JetSpace, label: str, jets: Sequence[Jet], orders: Sequence[int]) -> None:
+    """Refuse end terms in a derivative the density does not control: it is no displacement of that end."""
+    for jet in jets:
+        if jet.place is not None and jet.space >= orders[jet.unknown]:
+            field = space.unknowns[jet.unknown]
+            raise HamiltonError(
+                f"{label}: {space.form(jet)} is not a displacement of that end,"
+                f" since the density has x derivatives of {field} up to order {orders[jet.unknown]} only"
+            )
+
+
+def _read_work(space: JetSpace, triple: VirtualWork) -> list[tuple[Expr, Jet, bool]]:
+    """Return (force, displacement jet, whether it is a force per length) for one virtual work triple."""
+    try:
+        force, displacement, place = triple
+    except (TypeError, ValueError):
+        raise HamiltonError(f"virtual_work: {triple} is not a triple (force, displacement, place)") from None
+    if place not in (*END_NAMES, "domain", None):
+        raise HamiltonError(f"virtual_work: place = {place!r}: allowed are 'left', 'right', 'domain' and None")
+    where = "ends" if place is None else place
+    label = f"virtual work of {force} on {displacement}"
+    moved = space.read(displacement, where, label)  # type: ignore[arg-type]
+    places = {jet.place for jet in space.jets(moved)} - {None}
+    if where == "ends" and len(places) == 1:
+        where = places.pop()
+    pushed = space.read(force, where, label)  # type: ignore[arg-type]
+    works = []
+    for jet in space.jets(moved):
+        factor = moved.diff(space.symbol(jet))
+        if jet.time or space.jets(factor):
+            raise HamiltonError(f"{label}: the displacement must be linear and free of time derivatives")
+        works.append((factor * pushed, jet, place == "domain"))
+    if not works:
+        raise HamiltonError(f"{label}: the displacement holds no field and no coordinate")
+    return works
+
+
+def lagrange_forces(space: JetSpace, lagrangian: Expr) -> Forces:
+    """Return sum_b (-d/dt)^b dL/du_b for each displacement u: integration by parts in time."""
+    forces: Forces = {}
+    for jet in space.jets(lagrangian):
+        term = lagrangian.diff(space.symbol(jet))
+        for _ in range(jet.time):
+            term = -space.d_t(term)
+        displacement = jet._replace(time=0)
+        forces[displacement] = forces.get(displacement, S.Zero) + term
+    return forces
