@@ -1,0 +1,191 @@
+"""The callable that a SymPy expression becomes: source and arguments in, arrays out."""
+
+from __future__ import annotations
+
+import hashlib
+import linecache
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+__all__ = ["Kernel", "kernel"]
+
+_BLOCK = 8192  # elements whose temporaries stay in the processor's second-level cache
+_BACKENDS = (None, "numpy", "numba")
+
+
+class Kernel:
+    """A function of broadcasting arrays, generated from a SymPy expression.
+
+    It is its source: two kernels with the same source, arguments and backend are equal, and a pickled kernel rebuilds
+    itself from these three without SymPy. Arithmetic is that of IEEE 754 without warnings: 1/0 is inf.
+
+    Parameters
+    ----------
+    source : str
+        Module text made by :func:`kernel`.
+    arguments : tuple of str
+        Names of the arguments in calling order.
+    backend : {None, 'numpy', 'numba'}
+        What evaluates; None chooses by size.
+    """
+
+    def __init__(self, source: str, arguments: tuple[str, ...], backend: str | None = None) -> None:
+        if backend not in _BACKENDS:
+            raise ValueError(f"backend = {backend!r}: allowed are None, 'numpy' and 'numba'")
+        self._source, self._arguments, self.backend = source, tuple(arguments), backend
+
+    @property
+    def source(self) -> str:
+        """The generated module text."""
+        return self._source
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """Names of the arguments in calling order."""
+        return self._arguments
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of source, arguments and backend."""
+        return hashlib.sha256(repr((self.source, self.arguments, self.backend)).encode()).hexdigest()
+
+    @cached_property
+    def _module(self) -> dict[str, Any]:
+        filename = f"<cra_sym kernel {self.digest[:16]}>"
+        linecache.cache[filename] = (len(self.source), None, self.source.splitlines(True), filename)
+        namespace: dict[str, Any] = {}
+        exec(compile(self.source, filename, "exec"), namespace)
+        return namespace
+
+    def __call__(self, *values: Any) -> Any:
+        """Evaluate for real or complex numbers or arrays that broadcast together.
+
+        Returns
+        -------
+        float, ndarray, tuple or dict
+            What the expression was; every array has the common shape of the values, a matrix adds its axes at the end.
+
+        Raises
+        ------
+        TypeError
+            If the number of values is wrong or a value is not numeric.
+        ValueError
+            If the shapes do not broadcast together.
+        """
+        if len(values) != len(self.arguments):
+            wanted = ", ".join(self.arguments)
+            raise TypeError(f"{len(values)} values given, {len(self.arguments)} expected: ({wanted})")
+        arrays = [_numeric(name, value) for name, value in zip(self.arguments, values, strict=True)]
+        shape = _common_shape(self.arguments, arrays)
+        with np.errstate(all="ignore"):
+            flat = self._evaluated(arrays, shape)
+        return _arranged(self._module["LAYOUT"], iter(flat))
+
+    def _evaluated(self, arrays: list[np.ndarray], shape: tuple[int, ...]) -> list[np.ndarray]:
+        function: Callable[..., Any] = self._module["evaluate"]
+        whole = [a.shape == shape for a in arrays]
+        size = int(np.prod(shape))
+        if size <= _BLOCK or not all(w or a.ndim == 0 for w, a in zip(whole, arrays, strict=True)):
+            return [_filled(value, shape) for value in _tuple(function(*arrays))]
+        lanes = [a.reshape(-1) if w else a for w, a in zip(whole, arrays, strict=True)]
+        outputs: list[np.ndarray] = []
+        for start in range(0, size, _BLOCK):
+            block = slice(start, start + _BLOCK)
+            results = _tuple(function(*(a[block] if w else a for w, a in zip(whole, lanes, strict=True))))
+            if not outputs:
+                outputs = [np.empty(size, np.result_type(r, np.float64)) for r in results]
+            for output, result in zip(outputs, results, strict=True):
+                output[block] = result
+        return [output.reshape(shape) for output in outputs]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Kernel, (self.source, self.arguments, self.backend)
+
+    def __eq__(self, other: object) -> bool:
+        return self.digest == other.digest if isinstance(other, Kernel) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def __repr__(self) -> str:
+        return f"<Kernel ({', '.join(self.arguments)}) {self.digest[:12]}>"
+
+
+def kernel(expression: Any, arguments: Any, *, backend: str | None = None) -> Kernel:
+    """Turn a SymPy expression into a fast, picklable function of broadcasting arrays.
+
+    Parameters
+    ----------
+    expression : Expr, Matrix, sequence or dict of them
+        Evaluated as it stands: common subexpressions are shared, nothing is expanded or simplified.
+    arguments : sequence of Symbol
+        Every free symbol of the expression, in calling order; further symbols only take part in broadcasting.
+    backend : {None, 'numpy', 'numba'}
+        None evaluates small inputs with NumPy and compiles for large ones if Numba is there.
+
+    Returns
+    -------
+    Kernel
+
+    Raises
+    ------
+    TypeError
+        If an argument is not a symbol.
+    ValueError
+        If a free symbol is missing among the arguments, an argument comes twice, or the expression holds what NumPy
+        cannot evaluate.
+
+    Examples
+    --------
+    >>> from sympy import cos, symbols
+    >>> x, a = symbols("x a")
+    >>> f = kernel(a * cos(x) ** 2, (x, a))
+    >>> float(f(0.0, 3))
+    3.0
+    >>> f([[0.0], [1.0]], [1, 2, 3]).shape
+    (2, 3)
+    """
+    from cra_sym.kernels.source import check_arguments, module_source  # SymPy is loaded here, not at import
+
+    symbols = check_arguments(arguments)
+    return Kernel(module_source(expression, symbols), tuple(s.name for s in symbols), backend)
+
+
+def _numeric(name: str, value: Any) -> np.ndarray:
+    array = np.asarray(value)
+    if array.dtype.kind not in "iufc":
+        raise TypeError(f"{name}: real or complex numbers are allowed, not {array.dtype}")
+    return array.astype(np.result_type(array.dtype, np.float64), copy=False)
+
+
+def _common_shape(names: tuple[str, ...], arrays: list[np.ndarray]) -> tuple[int, ...]:
+    try:
+        return np.broadcast_shapes(*(a.shape for a in arrays))
+    except ValueError:
+        shapes = ", ".join(f"{n} {a.shape}" for n, a in zip(names, arrays, strict=True) if a.ndim)
+        raise ValueError(f"shapes do not broadcast together: {shapes}") from None
+
+
+def _tuple(result: Any) -> tuple[Any, ...]:
+    return result if isinstance(result, tuple) else (result,)
+
+
+def _filled(value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Return an array of its own memory: a constant, or an output that is one of the inputs, shares nothing."""
+    output = np.empty(shape, np.result_type(value, np.float64))
+    output[...] = value
+    return output
+
+
+def _arranged(layout: Any, values: Iterator[np.ndarray]) -> Any:
+    if isinstance(layout, dict):
+        return {name: _arranged(part, values) for name, part in layout.items()}
+    if isinstance(layout, list):
+        return tuple(_arranged(part, values) for part in layout)
+    if layout == ():
+        return next(values)[()]
+    entries = [next(values) for _ in range(int(np.prod(layout)))]
+    return np.stack(entries, axis=-1).reshape(entries[0].shape + layout)

@@ -1,0 +1,101 @@
+"""Kernels of the package's own derivations: derived once on a machine, then read from the store without SymPy."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from functools import cache
+from importlib import import_module, metadata
+from pathlib import Path
+from typing import Any
+
+from cra_sym.kernels import store
+from cra_sym.kernels.callables import Kernel, kernel
+
+__all__ = ["derived_kernel"]
+
+_PACKAGE = Path(__file__).resolve().parent.parent
+_DERIVING = ("symbols.py", "model.py", "checks.py", "mechanics", "kernels", "arm")
+
+
+class _DerivedKernel(Kernel):
+    """A kernel that knows where it is derived, and finds its source on first use."""
+
+    def __init__(self, path: str, backend: str | None) -> None:
+        super().__init__("", (), backend)
+        self.path = path
+
+    @property
+    def source(self) -> str:
+        if not self._source:
+            self._source, self._arguments = _source_of(self.path)
+        return self._source
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        return self._arguments if self.source else ()
+
+    def __repr__(self) -> str:
+        return f"<Kernel of {self.path}>"
+
+
+def derived_kernel(path: str, *, backend: str | None = None) -> Kernel:
+    """Return the kernel of a derivation of this package, to be derived when it is first needed.
+
+    Creating it costs nothing. On first use its source comes from the user's store, or else from the derivation, whose
+    result is then stored for other processes. The key is a hash over the package's deriving sources and the versions of
+    SymPy, NumPy, SciPy, Numba and Python: a change in any of them derives anew.
+
+    Parameters
+    ----------
+    path : str
+        ``"cra_sym.room.module:function"``. The function takes nothing and returns ``(expression, arguments)``
+        as :func:`cra_sym.kernels.kernel` wants them.
+    backend : {None, 'numpy', 'numba'}
+        As in :func:`cra_sym.kernels.kernel`.
+
+    Raises
+    ------
+    ValueError
+        If the path is not of that form or leads out of the package.
+    """
+    module, colon, function = path.partition(":")
+    if not (colon and function.isidentifier() and module.startswith("cra_sym.")):
+        raise ValueError(f"path = {path!r}: allowed is 'cra_sym.room.module:function'")
+    return _DerivedKernel(path, backend)
+
+
+@cache
+def _source_of(path: str) -> tuple[str, tuple[str, ...]]:
+    key = f"{path} {fingerprint()}"
+    content = store.load(key)
+    if content is None:
+        module, _, function = path.partition(":")
+        made = kernel(*getattr(import_module(module), function)())
+        content = json.dumps([made.source, made.arguments]).encode()
+        store.save(key, content)
+    source, arguments = json.loads(content)
+    return source, tuple(arguments)
+
+
+@cache
+def fingerprint() -> str:
+    """Return the hash of everything a derivation depends on, without importing any of it."""
+    digest = hashlib.sha256()
+    for name in _DERIVING:
+        path = _PACKAGE / name
+        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path] * path.is_file():
+            content = file.read_bytes()
+            digest.update(f"{file.relative_to(_PACKAGE).as_posix()} {len(content)}\n".encode() + content)
+    digest.update(platform.python_implementation().encode() + platform.python_version().encode())
+    for package in ("sympy", "numpy", "scipy", "numba"):
+        digest.update(f"{package} {_version(package)}\n".encode())
+    return digest.hexdigest()
+
+
+def _version(package: str) -> Any:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None

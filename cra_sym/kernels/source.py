@@ -1,0 +1,218 @@
+"""SymPy expressions as Python source: one text that NumPy evaluates on arrays and Numba compiles for scalars."""
+
+from __future__ import annotations
+
+import builtins
+import keyword
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from scipy import special
+from sympy.printing.codeprinter import PrintMethodNotImplementedError
+from sympy.printing.numpy import NumPyPrinter, SciPyPrinter
+from sympy.printing.precedence import PRECEDENCE
+
+__all__ = ["check_arguments", "module_source"]
+
+Layout = Any  # (): one expression; (2, 2): a matrix; [layouts]: a sequence; {name: layout}: a mapping
+
+_LONGEST_CHAIN = 64  # integer powers up to this become products
+
+
+class _Printer(SciPyPrinter):
+    """SciPy's printer with names of our choosing, and conditions as operators and ``where``: they serve scalars too."""
+
+    _print_Pi = NumPyPrinter._print_Pi
+
+    def __init__(self, names: Mapping[sp.Symbol, str]) -> None:
+        super().__init__({"fully_qualified_modules": False, "allow_unknown_functions": False})
+        self.names = names
+
+    def _print_Symbol(self, expr: sp.Symbol) -> str:
+        return self.names[expr]
+
+    _print_Dummy = _print_Symbol
+
+    def _print_Integer(self, expr: sp.Integer) -> str:
+        return str(expr) if abs(expr) < 2**31 else repr(float(expr))
+
+    def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:
+        base = self.parenthesize(expr.base, PRECEDENCE["Pow"])
+        if expr.exp == 2 and expr.base.is_Symbol:
+            return f"{base}*{base}"
+        if expr.exp == -1:
+            return f"1.0/{base}"
+        return super()._print_Pow(expr, rational)
+
+    def _print_Piecewise(self, expr: sp.Piecewise) -> str:
+        *branches, (last, condition) = expr.args
+        text = self._print(last) if condition == True else self._where(last, condition, "nan")  # noqa: E712
+        for value, condition in reversed(branches):
+            text = self._where(value, condition, text)
+        return text
+
+    def _where(self, value: sp.Expr, condition: Any, otherwise: str) -> str:
+        self._module_format("numpy.where")
+        if otherwise == "nan":
+            self._module_format("numpy.nan")
+        return f"where({self._print(condition)}, {self._print(value)}, {otherwise})"
+
+    def _print_ITE(self, expr: Any) -> str:
+        return self._print_Piecewise(sp.Piecewise((expr.args[1], expr.args[0]), (expr.args[2], True)))
+
+    def _print_Relational(self, expr: Any) -> str:
+        return f"({self._print(expr.lhs)} {expr.rel_op} {self._print(expr.rhs)})"
+
+    def _print_And(self, expr: Any) -> str:
+        return f"({' & '.join(map(self._print, expr.args))})"
+
+    def _print_Or(self, expr: Any) -> str:
+        return f"({' | '.join(map(self._print, expr.args))})"
+
+    def _print_Not(self, expr: Any) -> str:
+        return f"({self._print(expr.args[0])} == False)"
+
+    def _print_Max(self, expr: Any) -> str:
+        return self._pairwise("maximum", expr.args)
+
+    def _print_Min(self, expr: Any) -> str:
+        return self._pairwise("minimum", expr.args)
+
+    def _pairwise(self, function: str, terms: Sequence[sp.Expr]) -> str:
+        self._module_format(f"numpy.{function}")
+        text = self._print(terms[-1])
+        for term in reversed(terms[:-1]):
+            text = f"{function}({self._print(term)}, {text})"
+        return text
+
+
+def check_arguments(arguments: Any) -> tuple[sp.Symbol, ...]:
+    """Return the arguments as a tuple of distinct symbols.
+
+    Raises
+    ------
+    TypeError
+        If an argument is not a symbol: a function such as w(t) has to be replaced by a symbol first.
+    ValueError
+        If a symbol comes twice.
+    """
+    if isinstance(arguments, sp.Symbol):
+        return (arguments,)
+    if not isinstance(arguments, Iterable) or isinstance(arguments, str):
+        raise TypeError(f"arguments = {arguments!r}: allowed is a sequence of SymPy symbols")
+    symbols = tuple(arguments)
+    for symbol in symbols:
+        if not isinstance(symbol, sp.Symbol):
+            raise TypeError(f"argument {symbol!s}: allowed are SymPy symbols; substitute one for it in the expression")
+    twice = {s.name for k, s in enumerate(symbols) if s in symbols[:k]}
+    if twice:
+        raise ValueError(f"arguments come twice: {', '.join(sorted(twice))}")
+    return symbols
+
+
+def module_source(expression: Any, arguments: Sequence[sp.Symbol], name: str = "evaluate") -> str:
+    """Return the text of a module: imports, the constants ARGUMENTS and LAYOUT, and the function ``name``.
+
+    Common subexpressions are computed once over all outputs; nothing is expanded. A single expression is returned as it
+    is, everything else as one flat tuple whose shape LAYOUT records.
+    """
+    symbols = check_arguments(arguments)
+    layout, outputs = _flatten(expression)
+    found = set().union(*(e.free_symbols | e.atoms(sp.Symbol) for e in outputs))
+    missing = sorted(str(s) for s in found - set(symbols))
+    if missing:
+        raise ValueError(f"symbols of the expression that are not arguments: {', '.join(missing)}")
+    names: dict[sp.Symbol, str] = {}
+    for symbol in symbols:
+        _christen(symbol, names)
+    replacements, outputs = sp.cse(outputs, symbols=sp.numbered_symbols("x", cls=sp.Dummy), list=True)
+    steps, outputs = _without_powers(replacements, outputs)
+    for number, (symbol, _) in enumerate(steps):
+        _christen(symbol, names, f"x{number}")
+    printer = _Printer(names)
+    lines = [f"{names[symbol]} = {_printed(printer, value)}" for symbol, value in steps]
+    results = [_printed(printer, value) for value in outputs]
+    lines.append(f"return {results[0]}" if layout == () else f"return ({''.join(text + ', ' for text in results)})")
+    imports = [f"from {m} import {', '.join(sorted(n))}\n" for m, n in sorted(printer.module_imports.items())]
+    signature = ", ".join(names[s] for s in symbols)
+    body = "\n    ".join(lines)
+    constants = f"ARGUMENTS = {tuple(s.name for s in symbols)!r}\nLAYOUT = {layout!r}\n"
+    return f"{''.join(imports)}\n{constants}\n\ndef {name}({signature}):\n    {body}\n"
+
+
+def _flatten(expression: Any) -> tuple[Layout, list[sp.Expr]]:
+    if isinstance(expression, Mapping):
+        parts = {str(key): _flatten(value) for key, value in expression.items()}
+        return {key: layout for key, (layout, _) in parts.items()}, [e for _, es in parts.values() for e in es]
+    if isinstance(expression, (sp.MatrixBase, sp.NDimArray)):
+        return tuple(map(int, expression.shape)), [sp.sympify(e, strict=True) for e in sp.flatten(expression)]
+    if isinstance(expression, (list, tuple, sp.Tuple)):
+        sequence = [_flatten(value) for value in expression]
+        return [layout for layout, _ in sequence], [e for _, es in sequence for e in es]
+    if isinstance(expression, (int, float, complex, np.number)) and not isinstance(expression, bool):
+        expression = sp.sympify(expression, strict=True)
+    if not isinstance(expression, sp.Expr):
+        raise TypeError(
+            f"expression = {expression!r}: allowed are SymPy expressions, matrices, sequences or dicts of them"
+        )
+    return (), [expression]
+
+
+def _christen(symbol: sp.Symbol, names: dict[sp.Symbol, str], wish: str | None = None) -> None:
+    """Give ``symbol`` an identifier of its own: Python's, NumPy's and SciPy's names stay what they are."""
+    base = wish or re.sub(r"[^0-9A-Za-z_]", "_", symbol.name)
+    base = base if re.match(r"[A-Za-z]", base) else f"s{base}"
+    taken = set(names.values())
+    while base in taken or keyword.iskeyword(base) or any(hasattr(m, base) for m in (builtins, np, special)):
+        base += "_"
+    names[symbol] = base
+
+
+def _printed(printer: _Printer, expression: sp.Expr) -> str:
+    try:
+        return str(printer.doprint(expression))
+    except (PrintMethodNotImplementedError, KeyError, ValueError, NotImplementedError):
+        kinds = sorted({e.func.__name__ for e in sp.preorder_traversal(expression) if not e.is_Atom})
+        raise ValueError(f"no NumPy function for an expression made of {', '.join(kinds)}") from None
+
+
+def _without_powers(
+    replacements: Sequence[tuple[sp.Symbol, sp.Expr]], outputs: Sequence[sp.Expr]
+) -> tuple[list[tuple[sp.Symbol, sp.Expr]], list[sp.Expr]]:
+    """Turn integer powers into products by repeated squaring, sharing every intermediate power."""
+    steps: list[tuple[sp.Symbol, sp.Expr]] = []
+    known: dict[tuple[sp.Expr, int], sp.Symbol] = {}
+
+    def power(base: sp.Expr, exponent: int) -> sp.Expr:
+        if exponent == 1 and base.is_Symbol:
+            return base
+        if (base, exponent) not in known:
+            if exponent == 1:
+                value = base
+            elif exponent % 2:
+                value = power(base, exponent - 1) * power(base, 1)
+            else:
+                value = power(base, exponent // 2) ** 2
+            known[base, exponent] = sp.Dummy("x")
+            steps.append((known[base, exponent], value))
+        return known[base, exponent]
+
+    def rewrite(expression: sp.Expr) -> sp.Expr:
+        if expression.is_Atom:
+            return expression
+        terms = [rewrite(term) for term in expression.args]
+        if expression.is_Pow and expression.exp.is_Integer and 1 < abs(expression.exp) <= _LONGEST_CHAIN:
+            product = power(terms[0], abs(int(expression.exp)))
+            return product if expression.exp > 0 else 1 / product
+        if terms == list(expression.args):
+            return expression
+        keep = {"evaluate": False} if expression.is_Add or expression.is_Mul or expression.is_Pow else {}
+        return expression.func(*terms, **keep)
+
+    for symbol, value in replacements:
+        value = rewrite(value)
+        steps.append((symbol, value))
+    return steps, [rewrite(value) for value in outputs]

@@ -1,0 +1,97 @@
+"""Derived kernels: lazy, stored, and never stale."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+
+import pytest
+
+from cra_sym.kernels import derived, derived_kernel, store
+
+DERIVATION = "cra_sym.test_derivation:beat"
+PLANT = """
+import sys, types
+module = types.ModuleType("cra_sym.test_derivation")
+def beat():
+    import sympy as sp
+    x, a = sp.symbols("x a")
+    print("derived")
+    return {"beat": sp.cos(x) * sp.cos(a * x), "power": x**5}, (x, a)
+module.beat = beat
+sys.modules["cra_sym.test_derivation"] = module
+"""
+CALL = f"""
+import sys
+from cra_sym.kernels import derived_kernel
+f = derived_kernel("{DERIVATION}")
+assert not {{"sympy", "numba"}} & set(sys.modules)
+values = f(0.5, [1.0, 2.0])
+print({{name: value.tolist() for name, value in values.items()}}, f.arguments, "sympy" in sys.modules)
+"""
+
+
+@pytest.fixture
+def private(tmp_path, monkeypatch):
+    """Give this process, and those it starts, a cache directory of their own."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(store, "directory", lambda: tmp_path / "cra_sym")
+    return tmp_path / "cra_sym"
+
+
+def run(code):
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.splitlines()
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="the subprocess finds its cache by XDG_CACHE_HOME")
+def test_second_process_derives_nothing_and_never_loads_sympy(private):
+    first, second = run(PLANT + CALL), run(PLANT + CALL)
+    assert first[0] == "derived" and first[1].endswith("True")
+    assert len(second) == 1 and second[0].endswith("('x', 'a') False")
+    assert first[1].split(" (")[0] == second[0].split(" (")[0]
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="the subprocess finds its cache by XDG_CACHE_HOME")
+def test_two_processes_at_once_agree(private):
+    started = [subprocess.Popen([sys.executable, "-c", PLANT + CALL], stdout=-1, text=True) for _ in range(2)]
+    outputs = [process.communicate(timeout=120)[0].splitlines()[-1].split(" (")[0] for process in started]
+    assert outputs[0] == outputs[1]
+    assert [file.suffix for file in private.iterdir()] == [""]
+
+
+def test_importing_loads_neither_sympy_nor_numba():
+    assert run("import sys, cra_sym.kernels; print({'sympy', 'numba'} & set(sys.modules))") == ["set()"]
+
+
+def test_fingerprint_follows_sources_and_versions(monkeypatch, tmp_path):
+    before = derived.fingerprint()
+    derived.fingerprint.cache_clear()
+    monkeypatch.setattr(derived.metadata, "version", lambda package: "0")
+    assert derived.fingerprint() != before
+    derived.fingerprint.cache_clear()
+    monkeypatch.undo()
+    assert derived.fingerprint() == before
+    derived.fingerprint.cache_clear()
+    (tmp_path / "model.py").write_text("changed = True\n")
+    monkeypatch.setattr(derived, "_PACKAGE", tmp_path)
+    assert derived.fingerprint() != before
+    derived.fingerprint.cache_clear()
+
+
+def test_a_derived_kernel_pickles_as_what_it_is(private, monkeypatch):
+    namespace = {}
+    exec(PLANT, namespace)
+    f = derived_kernel(DERIVATION)
+    assert "beat" in repr(f)
+    copy = pickle.loads(pickle.dumps(f))
+    assert copy == f and copy.arguments == ("x", "a")
+    del sys.modules["cra_sym.test_derivation"]
+    assert os.listdir(private)
+
+
+@pytest.mark.parametrize("path", ["os:system", "cra_sym.arm", "cra_sym.arm:a b", "sympy.x:cos"])
+def test_only_derivations_of_the_package(path):
+    with pytest.raises(ValueError, match="allowed is"):
+        derived_kernel(path)
