@@ -2,6 +2,16 @@
 
 from cra_sym.mechanics.hamilton import BoundaryCondition, HamiltonResult, hamilton
 from cra_sym.mechanics.jets import HamiltonError
+from cra_sym.mechanics.state_form import StateForm, state_form
 from cra_sym.mechanics.steps import Step, compact_latex
 
-__all__ = ["BoundaryCondition", "HamiltonError", "HamiltonResult", "Step", "compact_latex", "hamilton"]
+__all__ = [
+    "BoundaryCondition",
+    "HamiltonError",
+    "HamiltonResult",
+    "StateForm",
+    "Step",
+    "compact_latex",
+    "hamilton",
+    "state_form",
+]

@@ -96,9 +96,9 @@ def _read_work(space: JetSpace, triple: VirtualWork) -> list[tuple[Expr, Jet, bo
     where = "ends" if place is None else place
     label = f"virtual work of {force} on {displacement}"
     moved = space.read(displacement, where, label)  # type: ignore[arg-type]
-    places = {jet.place for jet in space.jets(moved)} - {None}
-    if where == "ends" and len(places) == 1:
-        where = places.pop()
+    ends = {jet.place for jet in space.jets(moved) if jet.place is not None}
+    if where == "ends" and len(ends) == 1:
+        where = ends.pop()
     pushed = space.read(force, where, label)  # type: ignore[arg-type]
     works = []
     for jet in space.jets(moved):
