@@ -1,0 +1,114 @@
+"""The arm's characteristic function as numbers: derived kernels behind the interface of the generic solver."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cra_sym.kernels import derived_kernel
+from cra_sym.solvers.spectrum import spectrum
+
+__all__ = ["ArmCharacteristic", "frequency_parameters", "pair"]
+
+NEAR = 5.0  # characteristic.NEAR; a test holds the two together
+
+_COEFFICIENTS, _DERIVATIVES, _POWER_SERIES, _BASIS, _BASIS_NEAR, _CHAIN = (
+    derived_kernel(f"cra_sym.arm.characteristic:{name}")
+    for name in ("coefficients", "derivatives", "power_series", "basis", "basis_near", "chain")
+)
+
+
+def pair(value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return ``(value, 1) / (1 + value)``, which is (1, 0) for infinity."""
+    complement = 1 / (1 + value)
+    with np.errstate(invalid="ignore"):
+        return np.where(np.isinf(value), 1.0, value / (1 + value)), complement
+
+
+class ArmCharacteristic:
+    """Characteristic functions of arms, one in each lane, for `cra_sym.solvers.spectrum`.
+
+    Parameters
+    ----------
+    kappa_t, kappa_r, mu, iota : ndarray, shape (lanes,)
+        Dimensionless stiffnesses in [0, inf] and inertias in [0, inf).
+    """
+
+    def __init__(self, kappa_t: np.ndarray, kappa_r: np.ndarray, mu: np.ndarray, iota: np.ndarray) -> None:
+        self._parameters = np.array([x for value in (kappa_t, kappa_r, mu, iota) for x in pair(value)])
+        self._coefficients = np.array(_COEFFICIENTS(*self._parameters))
+        self.zeros = (kappa_t == 0).astype(np.int64) + (kappa_r == 0)
+
+    def count(self, z: float | np.ndarray, lanes: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """Return the exact number of zeros below z, rigid-body zeros included."""
+        parameters = self._parameters[:, lanes]
+        lam, unit, p, q, r, s = _basis(np.asarray(z, dtype=np.float64))
+        both_pinned, sprung, massive, translating, rotating = _CHAIN(*parameters, z, unit, p, q, r, s)
+        number = np.floor(lam / np.pi).astype(np.int64)
+        number = _with_parity(both_pinned, number, np.where(lam / np.pi - number < 0.5, -1, 1))
+        number = _with_parity(sprung, number, -1)
+        for value in (massive, translating, rotating):
+            number = _with_parity(value, number, 1)
+        return number
+
+    def evaluate(self, z: np.ndarray, lanes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the determinant and its derivatives by z, scaled; rigid-body zeros divided out for small z."""
+        near = z < NEAR
+        if not near.any():
+            return self._evaluate_far(z, lanes)
+        if near.all():
+            return self._evaluate_near(z, lanes)
+        result = np.empty((3, z.size))
+        result[:, near] = self._evaluate_near(z[near], lanes[near])
+        result[:, ~near] = self._evaluate_far(z[~near], lanes[~near])
+        return result[0], result[1], result[2]
+
+    def _evaluate_far(self, z: np.ndarray, lanes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        _, *basis = _basis_far(z)
+        value, first, second = _DERIVATIVES(*self._coefficients[:, lanes], z, *basis)
+        return value, first / z, second / z**2
+
+    def _evaluate_near(self, z: np.ndarray, lanes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        powers = np.array(_POWER_SERIES(*self._coefficients[:, lanes]))
+        for multiplicity in (1, 2):
+            shifted = self.zeros[lanes] >= multiplicity
+            powers[:-1, shifted], powers[-1, shifted] = powers[1:, shifted], 0.0
+        value, first, second = powers[-1], np.zeros_like(z), np.zeros_like(z)
+        for power in powers[-2::-1]:
+            second = second * z + first
+            first = first * z + value
+            value = value * z + power
+        return value, first, 2 * second
+
+
+def _with_parity(value: np.ndarray, number: np.ndarray, change: int | np.ndarray) -> np.ndarray:
+    """Return the number, changed where the sign of the value is not that of ``(-1)**number``."""
+    return np.where((value > 0) == (number % 2 == 0), number, number + change)
+
+
+def _basis_far(z: np.ndarray) -> tuple[np.ndarray, ...]:
+    lam = np.sqrt(np.sqrt(z))
+    return lam, *_BASIS(lam, np.exp(-lam))
+
+
+def _basis(z: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return lambda and the basis, scaled, for any z."""
+    lam = np.sqrt(np.sqrt(z))
+    near = _BASIS_NEAR(np.minimum(z, NEAR))
+    return lam, *(np.where(z < NEAR, a, b) for a, b in zip(near, _BASIS(lam, np.exp(-lam)), strict=True))
+
+
+def frequency_parameters(
+    kappa_t: np.ndarray, kappa_r: np.ndarray, mu: np.ndarray, iota: np.ndarray, *, modes: int
+) -> np.ndarray:
+    """Return lambda of the first modes for checked arrays of one shape; the mode axis is last."""
+    shape = kappa_t.shape
+    lanes = [value.reshape(-1) for value in (kappa_t, kappa_r, mu, iota)]
+    result = np.empty((lanes[0].size, modes))
+    # the count grows by one in each interval of length pi, up to the four steps of the chain; the points keep
+    # away from multiples of pi / 4, where the zeros of the limiting arms gather
+    grid = ((np.arange(modes + 2) + 0.125) * np.pi) ** 4
+    block = max(1, 32768 // (modes + 4))
+    for start in range(0, len(result), block):
+        part = slice(start, start + block)
+        result[part] = np.sqrt(np.sqrt(spectrum(ArmCharacteristic(*(x[part] for x in lanes)), modes, grid)))
+    return result.reshape(*shape, modes)
