@@ -16,6 +16,7 @@ _HOME = {
     "frequency_parameters": "arm.analysis",
     "mode_shapes": "arm.analysis",
     "modal_parameters": "arm.analysis",
+    "certify": "arm.certification",
     "Model": "model",
     "kernel": "kernels",
 }

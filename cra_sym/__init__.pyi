@@ -2,6 +2,7 @@ from .arm.analysis import frequency_parameters as frequency_parameters
 from .arm.analysis import modal_parameters as modal_parameters
 from .arm.analysis import mode_shapes as mode_shapes
 from .arm.analysis import natural_frequencies as natural_frequencies
+from .arm.certification import certify as certify
 from .arm.equations import equation as equation
 from .arm.equations import equations as equations
 from .arm.parameters import Arm as Arm

@@ -18,7 +18,17 @@ import sympy as sp
 
 from cra_sym.symbols import symbol
 
-__all__ = ["NEAR", "basis", "basis_near", "chain", "coefficients", "derivatives", "determinant", "power_series"]
+__all__ = [
+    "NEAR",
+    "basis",
+    "basis_near",
+    "chain",
+    "coefficients",
+    "derivatives",
+    "determinant",
+    "power_series",
+    "products",
+]
 
 Derivation = tuple[tuple[sp.Expr, ...], tuple[sp.Symbol, ...]]
 
@@ -145,6 +155,11 @@ def basis() -> Derivation:
     expressions = {unit: decay, **{x: product.subs(scaled) for x, product in _PRODUCTS.items()}}
     expressions[p] += decay - 1  # the constant in it is scaled too
     return tuple(expressions.values()), (b, decay)
+
+
+def products() -> Derivation:
+    """Return the four functions through lambda, its circular and its hyperbolic functions."""
+    return tuple(_PRODUCTS.values()), (b, _cos, _sin, _cosh, _sinh)
 
 
 def basis_near() -> Derivation:

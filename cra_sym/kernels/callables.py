@@ -60,6 +60,11 @@ class Kernel:
         exec(compile(self.source, filename, "exec"), namespace)
         return namespace
 
+    @property
+    def function(self) -> Callable[..., Any]:
+        """The generated function itself: no checks, no broadcasting, any objects that have the arithmetic."""
+        return self._module["evaluate"]
+
     def __call__(self, *values: Any) -> Any:
         """Evaluate for real or complex numbers or arrays that broadcast together.
 
@@ -85,7 +90,7 @@ class Kernel:
         return _arranged(self._module["LAYOUT"], iter(flat))
 
     def _evaluated(self, arrays: list[np.ndarray], shape: tuple[int, ...]) -> list[np.ndarray]:
-        function: Callable[..., Any] = self._module["evaluate"]
+        function = self.function
         whole = [a.shape == shape for a in arrays]
         size = int(np.prod(shape))
         if size <= _BLOCK or not all(w or a.ndim == 0 for w, a in zip(whole, arrays, strict=True)):
