@@ -1,0 +1,267 @@
+"""Displacement, energies and the Lagrangian of the arm: equations (1)-(7)."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, NamedTuple
+
+from sympy import Eq, Expr, Integral, Rational
+
+from cra_sym.arm.equations import checks, numbered
+from cra_sym.arm.evaluation import at, evaluate, put
+from cra_sym.arm.modal_sum import ModalSum
+from cra_sym.arm.shooting import integrate, sample, shoot
+from cra_sym.symbols import Dimension, dimension, symbol
+
+__all__ = ["ArmLagrangian", "lagrangian", "single_mode"]
+
+x, t, w, v, y, L = (symbol(name) for name in ("x", "t", "w", "v", "y", "L"))
+E, I_z, rho, A, b, h = (symbol(name) for name in ("E", "I_z", "rho", "A", "b", "h"))
+m_b, m_e, J_e, k_t, k_r = (symbol(name) for name in ("m_b", "m_e", "J_e", "k_t", "k_r"))
+phi_i, phi_j, q_i, q_j = (symbol(name) for name in ("phi_i", "phi_j", "q_i", "q_j"))
+
+HALF = Rational(1, 2)
+ENERGY = Dimension(2, 1, -2)
+
+
+class ArmLagrangian(NamedTuple):
+    """The arm's Lagrangian in the pieces that :func:`cra_sym.mechanics.hamilton` and :class:`cra_sym.Model` take."""
+
+    density: Expr
+    left: Expr
+    right: Expr
+
+    def total(self) -> Expr:
+        """Return the Lagrangian as one expression: the density integrated, the end terms evaluated at their ends."""
+        return Integral(self.density, (x, 0, L)) + at(self.left, 0) + at(self.right, L)
+
+
+# Displacement (1)-(2) -------------------------------------------------------------------------------------------
+
+
+@numbered(1, "displacement", "definition")
+def displacement() -> Eq:
+    """The manipulator rides on the base: what an observer at rest sees is the base's motion plus the elastic part."""
+    return Eq(y, w + v)
+
+
+@checks(1)
+def _() -> bool:
+    """Both sides are lengths; an arm that does not deform moves as its base."""
+    return dimension(displacement()) == Dimension(m=1) and displacement().rhs.subs(v, 0) == w
+
+
+@numbered(2, "separation of variables", "assumption")
+def separation() -> Eq:
+    """The elastic displacement is a sum of shapes, each scaled by a coordinate of its own."""
+    return Eq(v, ModalSum(phi_i * q_i))
+
+
+@checks(2)
+def _() -> bool:
+    """Both sides are lengths; one term is separable, v v_xt = v_x v_t, and a sum of two is not."""
+    one, two = separation().rhs.members("i"), separation().rhs.members("i", "j")
+
+    def coupling(shape: Expr) -> Expr:
+        return (shape * shape.diff(x, t) - shape.diff(x) * shape.diff(t)).expand()
+
+    return dimension(separation()) == Dimension(m=1) and coupling(one) == 0 and coupling(two) != 0
+
+
+def single_mode(expression: Expr, shape: Expr = phi_i * q_i) -> Expr:
+    """Return ``expression`` with the elastic displacement v replaced by ``shape``, at the ends too."""
+    return put(expression, {v: shape})
+
+
+# Energies (3)-(4) -----------------------------------------------------------------------------------------------
+
+
+def _kinetic() -> ArmLagrangian:
+    speed = displacement().rhs.diff(t)
+    base = HALF * m_b * w.diff(t) ** 2
+    tip = HALF * m_e * speed**2 + HALF * J_e * v.diff(x, t) ** 2
+    return ArmLagrangian(HALF * rho * A * speed**2, base, tip)
+
+
+def _potential(joint: bool) -> ArmLagrangian:
+    springs = HALF * k_t * v**2 + HALF * k_r * v.diff(x) ** 2
+    return ArmLagrangian(HALF * E * I_z * v.diff(x, 2) ** 2, springs if joint else springs * 0, springs * 0)
+
+
+@numbered(3, "kinetic energy", "definition", (1,))
+def kinetic_energy() -> Eq:
+    """Base, end-effector (with the rotary inertia J_e, which the paper leaves out) and manipulator."""
+    return Eq(symbol("T"), _kinetic().total())
+
+
+@checks(3)
+def _() -> bool:
+    """An energy; an arm that does not deform has the kinetic energy of one mass."""
+    rigid = single_mode(kinetic_energy().rhs, x * 0).doit()
+    mass = m_b + m_e + rho * A * L
+    return dimension(kinetic_energy()) == ENERGY and (rigid - mass * w.diff(t) ** 2 / 2).expand() == 0
+
+
+@numbered(4, "potential energy", "definition")
+def potential_energy() -> tuple[Eq, Eq]:
+    """First what the paper's words name, the bent manipulator alone; then with the two springs of the joint, without
+    which the generalised stiffness (6) would contradict the natural frequency (30)."""
+    return Eq(symbol("U_b"), _potential(False).total()), Eq(symbol("U"), _potential(True).total())
+
+
+@checks(4)
+def _() -> bool:
+    """Energies; a straight arm stores energy in the joint alone, and a clamped one makes both forms equal."""
+    beam, full = (equation.rhs for equation in potential_energy())
+    give, turn = symbol("C_1") * L, symbol("C_2")
+    straight = [single_mode(energy, give + turn * x).doit() for energy in (beam, full)]
+    clamped = [single_mode(energy, x**2 / L).doit() for energy in (beam, full)]
+    springs = (k_t * give**2 + k_r * turn**2) / 2
+    return (
+        all(dimension(equation) == ENERGY for equation in potential_energy())
+        and straight[0] == 0
+        and (straight[1] - springs).expand() == 0
+        and clamped[0] == clamped[1] != 0
+    )
+
+
+# Modal energies (5)-(6) -----------------------------------------------------------------------------------------
+
+
+def inner_mass(first: Expr, second: Expr) -> Expr:
+    """Inner product of two shapes with the masses of manipulator and end-effector."""
+    tip = m_e * first * second + J_e * first.diff(x) * second.diff(x)
+    return Integral(rho * A * first * second, (x, 0, L)) + at(tip, L)
+
+
+def inner_stiffness(first: Expr, second: Expr, joint: bool = True) -> Expr:
+    """Inner product of two shapes with the stiffness of manipulator and, unless switched off, joint."""
+    root = k_t * first * second + k_r * first.diff(x) * second.diff(x)
+    return Integral(E * I_z * first.diff(x, 2) * second.diff(x, 2), (x, 0, L)) + (at(root, 0) if joint else 0)
+
+
+@numbered(6, "generalised mass, stiffness, participation", "definition", (2,))
+def generalised() -> tuple[Eq, Eq, Eq]:
+    """Mass and stiffness of a mode, and how strongly the base's acceleration drives it."""
+    return (
+        Eq(symbol("M_i"), inner_mass(phi_i, phi_i)),
+        Eq(symbol("K_i"), inner_stiffness(phi_i, phi_i)),
+        Eq(symbol("Gamma_i"), Integral(rho * A * phi_i, (x, 0, L)) + at(m_e * phi_i, L)),
+    )
+
+
+@checks(6)
+def _() -> bool:
+    """Dimensions; a shape that only translates has the arm's mass, twice, and the translational spring."""
+    mass, stiffness, participation = (put(e.rhs, {phi_i: x**0}) for e in generalised())
+    moving = rho * A * L + m_e
+    return (
+        [dimension(e) for e in generalised()] == [Dimension(kg=1), Dimension(kg=1, s=-2), Dimension(kg=1)]
+        and (mass.doit() - moving).expand() == 0
+        and (participation.doit() - moving).expand() == 0
+        and stiffness.doit() == k_t
+    )
+
+
+def _quadratic_form(energy: Expr, variables: list[Expr]) -> dict[tuple[Expr, Expr], Expr]:
+    """Second derivatives of an energy with respect to generalised coordinates or velocities."""
+    names = [symbol("C_1"), symbol("C_2"), symbol("C_3")][: len(variables)]
+    plain = energy.subs(dict(zip(variables, names, strict=True)))
+    pairs = [(row, column) for row in range(len(names)) for column in range(row, len(names))]
+    return {(variables[r], variables[c]): plain.diff(names[r]).diff(names[c]).doit(integrals=False) for r, c in pairs}
+
+
+def _modal(energy: Expr, variables: list[Expr], named: dict[Expr, Expr]) -> Expr:
+    """Write a quadratic energy of the modes i and j as a sum over all modes, with its coefficients named."""
+    form = {pair: tidy(value).subs(named) for pair, value in _quadratic_form(energy, variables).items()}
+    total = energy * 0
+    for (first, second), value in form.items():
+        factor = HALF if first == second else 1
+        if {first, second} <= {q_i, q_i.diff(t), w.diff(t)}:
+            term = factor * value * first * second
+            total += term if {first, second} == {w.diff(t)} else ModalSum(term)
+        elif first.has(q_i) and second.has(q_j) and value != 0:
+            raise ArithmeticError(f"modes i and j do not decouple: {value}")
+    return total
+
+
+def tidy(value: Expr) -> Expr:
+    """Return the integrals of ``value`` with one common integrand shape: expanded, constants inside."""
+    return value.expand().replace(lambda e: isinstance(e, Integral), lambda e: Integral(e.function.expand(), *e.limits))
+
+
+@numbered(5, "modal energies", "derived", (2, 3, 4, 6, "16c"))
+def modal_energies() -> tuple[Eq, Eq]:
+    """(2) put into (3) and (4): orthogonality leaves no product of two modes."""
+    from cra_sym.arm.orthogonality import orthogonality
+
+    two = separation().rhs.members("i", "j")
+    named = {tidy(e.rhs): e.lhs for e in generalised()} | {tidy(e.lhs): e.rhs for e in orthogonality()}
+    kinetic = _modal(single_mode(kinetic_energy().rhs, two), [q_i.diff(t), q_j.diff(t), w.diff(t)], named)
+    potential = _modal(single_mode(potential_energy()[1].rhs, two), [q_i, q_j], named)
+    return Eq(symbol("T"), kinetic.doit()), Eq(symbol("U"), potential)
+
+
+@checks(5)
+def _() -> bool:
+    """Numbers: the energies of a random arm moving in three modes found by shooting, by quadrature of (3) and (4)."""
+    values = sample(5)
+    shapes, length = shoot(values), values["L"]
+    q, q_dot, w_dot = [0.3, -0.5, 0.2], [0.7, 0.4, -0.6], 0.9
+
+    def elastic(place, amplitudes, derivative=0):
+        return sum(a * shape(place, derivative) for a, shape in zip(amplitudes, shapes, strict=True))
+
+    line_mass, bending = values["rho"] * values["A"], values["E"] * values["I_z"]
+    kinetic = (
+        values["m_b"] * w_dot**2
+        + values["m_e"] * (w_dot + elastic(length, q_dot)) ** 2
+        + values["J_e"] * elastic(length, q_dot, 1) ** 2
+        + integrate(lambda place: line_mass * (w_dot + elastic(place, q_dot)) ** 2, length)
+    ) / 2
+    potential = (
+        values["k_t"] * elastic(0.0, q) ** 2
+        + values["k_r"] * elastic(0.0, q, 1) ** 2
+        + integrate(lambda place: bending * elastic(place, q, 2) ** 2, length)
+    ) / 2
+    found = [0.0, 0.0]
+    for k, e in enumerate(modal_energies()):
+        sums = list(e.rhs.atoms(ModalSum))
+        rest = e.rhs.subs({s: 0 for s in sums})
+        found[k] += float(rest.subs(w.diff(t), w_dot).subs({symbol(name): value for name, value in values.items()}))
+        for s in sums:
+            for shape, now, rate in zip(shapes, q, q_dot, strict=True):
+                numbers = {q_i.diff(t): rate, w.diff(t): w_dot, q_i: now}
+                found[k] += float(s.function.subs(numbers).subs(modal_numbers(values, shape)))
+    return abs(found[0] / kinetic - 1) < 1e-10 and abs(found[1] / potential - 1) < 1e-10
+
+
+def modal_numbers(values: dict[str, float], shape: Any) -> dict[Expr, float]:
+    """Return M_i, K_i and Gamma_i of a mode found by shooting: (6) by quadrature."""
+    return {e.lhs: evaluate(e.rhs, values, {phi_i: shape}) for e in generalised()}
+
+
+# Lagrangian (7) -------------------------------------------------------------------------------------------------
+
+
+@cache
+def lagrangian(*, joint: bool = True) -> ArmLagrangian:
+    """Return T - U of (3) and (4) as density, root terms and tip terms; ``joint=False`` leaves the springs out."""
+    return ArmLagrangian(*(T - U for T, U in zip(_kinetic(), _potential(joint), strict=True)))
+
+
+@numbered(7, "Lagrangian", "definition", (3, 4))
+def lagrangian_function() -> Eq:
+    """Kinetic minus potential energy, the springs of the joint included."""
+    return Eq(symbol("Lcal"), lagrangian().total())
+
+
+@checks(7)
+def _() -> bool:
+    """An energy; equal to the difference of (3) and (4) on a shape that moves and bends everywhere."""
+    shape = (x**3 / L**2 + x + L) * symbol("psi") * t / symbol("T_0")
+    whole, T, U = (
+        single_mode(e.rhs, shape).doit().expand()
+        for e in (lagrangian_function(), kinetic_energy(), potential_energy()[1])
+    )
+    return dimension(lagrangian_function()) == ENERGY and (whole - T + U).expand() == 0 and U != 0 != T

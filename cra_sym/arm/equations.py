@@ -1,0 +1,170 @@
+"""The paper's numbered equations: one registry, filled by the sections' modules, each equation built on first use.
+
+A section's module writes one small function an equation and one a check::
+
+    @numbered(1, "displacement", "definition")
+    def displacement():
+        '''The statement, in words.'''
+        return Eq(y, w + v)
+
+    @checks(1)
+    def _():
+        '''The independent route, in words.'''
+        return dimension(displacement()) == dimension("y")
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import import_module
+from typing import Any, Literal
+
+__all__ = ["Equation", "checks", "equation", "equations", "numbered"]
+
+Number = int | str
+Kind = Literal["definition", "assumption", "derived"]
+
+#: Section of the package that builds each equation; a new section adds a line here.
+_HOMES: dict[str, range] = {
+    "cra_sym.arm.energy": range(1, 8),
+    "cra_sym.arm.motion": range(8, 14),
+    "cra_sym.arm.joint": range(14, 17),
+    "cra_sym.arm.orthogonality": range(16, 17),
+    "cra_sym.arm.modes": range(17, 27),
+    "cra_sym.arm.limits": range(27, 31),
+}
+
+_EQUATIONS: dict[Number, Equation] = {}
+_ROUTES: dict[Number, Callable[[], Any]] = {}
+
+
+@dataclass(frozen=True)
+class Equation:
+    """One numbered equation of the paper.
+
+    Attributes
+    ----------
+    number : int or str
+        The paper's number; a letter marks a companion the paper does not have, such as ``"11a"``.
+    title, statement : str
+        What the equation is, in a few words and in a sentence.
+    kind : {"definition", "assumption", "derived"}
+    derived_from : tuple
+        Numbers of the equations this one rests upon.
+    source : str
+        Where it is built, ``"module:function"``.
+    """
+
+    number: Number
+    title: str
+    kind: Kind
+    derived_from: tuple[Number, ...]
+    statement: str
+    source: str
+    _build: Callable[[], Any] = field(repr=False, compare=False)
+
+    @property
+    def expression(self) -> Any:
+        """The SymPy equation, or a tuple of them; derived on first use."""
+        return self._build()
+
+    @property
+    def checked_by(self) -> str:
+        """The independent route :meth:`check` takes, in words."""
+        return _text(_route(self.number))
+
+    def check(self) -> bool:
+        """Tell whether the independent route confirms the equation."""
+        return bool(_route(self.number)())
+
+    def _repr_latex_(self) -> str:
+        from cra_sym.mechanics.steps import compact_latex
+
+        return rf"$\displaystyle {compact_latex(self.expression)} \qquad ({self.number})$"
+
+
+def _text(function: Callable) -> str:
+    return " ".join((inspect.getdoc(function) or "").split())
+
+
+def _route(number: Number) -> Callable[[], Any]:
+    if number not in _ROUTES:
+        raise NotImplementedError(f"equation ({number}) has no check")
+    return _ROUTES[number]
+
+
+def numbered(number: Number, title: str, kind: Kind, derived_from: tuple[Number, ...] = ()) -> Callable:
+    """Register the decorated function, whose docstring is the statement, as the builder of an equation."""
+
+    def register(function: Callable[[], Any]) -> Callable[[], Any]:
+        source = f"{function.__module__}:{function.__qualname__}"
+        if number in _EQUATIONS and _EQUATIONS[number].source != source:
+            raise ValueError(f"equation ({number}) is already built by {_EQUATIONS[number].source}")
+        build = cache(function)
+        _EQUATIONS[number] = Equation(number, title, kind, derived_from, _text(function), source, build)
+        return build
+
+    return register
+
+
+def checks(number: Number) -> Callable:
+    """Register the decorated function, whose docstring names the route, as the check of an equation."""
+
+    def register(function: Callable[[], Any]) -> Callable[[], Any]:
+        _ROUTES[number] = function
+        return function
+
+    return register
+
+
+def _order(number: Number) -> tuple[int, str]:
+    text = str(number)
+    digits = text.rstrip("abcdefghijklmnopqrstuvwxyz")
+    return int(digits), text[len(digits) :]
+
+
+def equation(number: Number) -> Equation:
+    """Return the paper's equation ``number``, such as ``23``, or a companion such as ``"11a"``.
+
+    Raises
+    ------
+    TypeError
+        If ``number`` is neither an integer nor a string.
+    ValueError
+        If there is no such equation.
+
+    Examples
+    --------
+    >>> from cra_sym import equation
+    >>> equation(1).expression
+    Eq(y(x, t), v(x, t) + w(t))
+    >>> equation(1).kind, equation(5).derived_from
+    ('definition', (2, 3, 4, 6, '16c'))
+    """
+    if isinstance(number, bool) or not isinstance(number, int | str):
+        raise TypeError(f"number = {number!r}: allowed are integers, or strings such as '11a'")
+    if isinstance(number, str) and number.isdecimal():
+        number = int(number)
+    if number not in _EQUATIONS:
+        _load()
+    try:
+        return _EQUATIONS[number]
+    except KeyError:
+        companions = [key for key in _EQUATIONS if isinstance(key, str)]
+        whole = [key for key in _EQUATIONS if isinstance(key, int)]
+        also = f", and {', '.join(map(repr, sorted(companions, key=_order)))}" if companions else ""
+        raise ValueError(f"number = {number!r}: allowed are {min(whole)} to {max(whole)}{also}") from None
+
+
+def equations(*, companions: bool = False) -> tuple[Equation, ...]:
+    """Return all equations in the paper's order; with ``companions``, also those the paper does not number."""
+    _load()
+    return tuple(_EQUATIONS[key] for key in sorted(_EQUATIONS, key=_order) if companions or isinstance(key, int))
+
+
+def _load() -> None:
+    for module in _HOMES:
+        import_module(module)

@@ -1,0 +1,148 @@
+"""The rigid joint as a limit, the textbook cantilever, and frequencies in hertz: equations (27)-(30)."""
+
+from __future__ import annotations
+
+import numpy as np
+from sympy import Eq, Expr, Pow, cancel, limit, oo, pi, solve
+
+from cra_sym.arm.energy import HALF, L, modal_numbers, phi_i
+from cra_sym.arm.equations import checks, numbered
+from cra_sym.arm.modes import (
+    C_1,
+    VALUES,
+    basis,
+    beta,
+    by_power,
+    c_r,
+    c_t,
+    circular_ratio,
+    frequency_function,
+    frequency_polynomial,
+    group_numbers,
+    iota,
+    kappa_r,
+    kappa_t,
+    lamda,
+    mode_form,
+    mode_shape,
+    mu,
+    omega_i,
+    r_2,
+    s_r,
+    s_t,
+    shapes_agree,
+)
+from cra_sym.arm.shooting import sample, shoot
+from cra_sym.symbols import Dimension, dimension, symbol
+
+__all__ = ["cantilever_frequency", "cantilever_shape", "natural_frequency", "rigid_joint"]
+
+
+def _finite(expression: Expr) -> Expr:
+    """Write the pairs (s, c) as (kappa, 1), a common factor of each stiffness aside."""
+    return expression.subs({s_t: kappa_t, c_t: 1, s_r: kappa_r, c_r: 1})
+
+
+def _rigid_limit(expression: Expr) -> Expr:
+    """Return the limit of infinite kappa_t, then infinite kappa_r."""
+    return limit(limit(expression, kappa_t, oo), kappa_r, oo)
+
+
+def _take_rigid(expression: Expr) -> Expr:
+    placed = expression.subs({value: name for name, value in VALUES.items()})
+    return _rigid_limit(cancel(_finite(placed))).subs(VALUES)
+
+
+@numbered(27, "rigid joint with end-effector", "derived", (23, 25, 26))
+def rigid_joint() -> tuple[Eq, Eq, Eq]:
+    """Both stiffnesses to infinity: frequency equation, shape and ratio. Nothing in (23) is lost on the way: divided by
+    kappa_t kappa_r it has this finite limit."""
+    frequency = _rigid_limit((_finite(frequency_polynomial()) / (kappa_t * kappa_r)).expand())
+    shape = mode_shape().rhs / C_1
+    parts = [_gather_rigid(shape.coeff(r_2, power)) for power in (0, 1)]
+    return (
+        Eq(by_power(frequency).subs(VALUES), 0),
+        Eq(phi_i, C_1 * (parts[0] + r_2 * parts[1])),
+        Eq(r_2, _take_rigid(circular_ratio().rhs)),
+    )
+
+
+def _gather_rigid(shape: Expr) -> Expr:
+    expanded = shape.expand()
+    return sum(_rigid_limit(_finite(expanded.coeff(function))) * function for function in basis())
+
+
+@numbered(28, "rigid joint, no end-effector: mode shape", "derived", (27,))
+def cantilever_shape() -> tuple[Eq, Eq]:
+    """The end-effector's inertia to zero in the shape of (27)."""
+    _, shape, ratio = rigid_joint()
+    return shape, Eq(r_2, _bare(ratio.rhs))
+
+
+@numbered(29, "rigid joint, no end-effector: frequency equation", "derived", (27,))
+def cantilever_frequency() -> Eq:
+    """The end-effector's inertia to zero in the frequency equation of (27): the textbook cantilever."""
+    return Eq(_bare(rigid_joint()[0].lhs), 0)
+
+
+def _bare(expression: Expr) -> Expr:
+    return limit(limit(expression, mu, 0), iota, 0)
+
+
+_RIGID = {"k_t": 1e12, "k_r": 1e12}
+
+
+@checks(27)
+def _() -> bool:
+    """Numbers: modes found by shooting for a very stiff joint; and the other way of being rigid, (s, c) = (1, 0) in
+    (23), gives the same equation exactly."""
+    frequency, shape, ratio = rigid_joint()
+    other = frequency_function()[0].subs({s_t: 1, c_t: 0, s_r: 1, c_r: 0})
+    values = sample(27) | _RIGID
+    residuals = [float(frequency.lhs.subs(group_numbers(values, mode.beta))) for mode in shoot(values)]
+    small = all(abs(residual) < 1e-5 for residual in residuals)
+    return (frequency.lhs - other).expand() == 0 and small and shapes_agree((27,), shape.rhs, ratio.rhs, **_RIGID)
+
+
+@checks(28)
+def _() -> bool:
+    """Numbers: modes found by shooting for a very stiff joint and no end-effector."""
+    shape, ratio = cantilever_shape()
+    return shapes_agree((28,), shape.rhs, ratio.rhs, **_RIGID, m_e=0.0, J_e=0.0)
+
+
+@checks(29)
+def _() -> bool:
+    """Numbers: its roots are those found by shooting for a very stiff joint and no end-effector."""
+    values = sample(29) | _RIGID | {"m_e": 0.0, "J_e": 0.0}
+    function = cantilever_frequency().lhs
+    for mode in shoot(values):
+        place = mode.beta * values["L"]
+        step = float((function / function.diff(lamda)).subs(lamda, place))
+        if abs(step) > 1e-8:
+            return False
+    return True
+
+
+@numbered(30, "natural frequency", "derived", (17,))
+def natural_frequency() -> Eq:
+    """The wave number of (17) turned into a frequency in hertz."""
+    wave = mode_form()[1].subs(beta, lamda / L)
+    (square,) = solve(wave, omega_i**2)
+    speed = Pow(square * L**4 / lamda**4, HALF, evaluate=False)
+    return Eq(symbol("f_i"), lamda**2 / (2 * pi * L**2) * speed)
+
+
+@checks(30)
+def _() -> bool:
+    """Dimensions; and numbers: the frequency of modes of a random arm, from the energies of shapes found by shooting
+    (Rayleigh's quotient)."""
+    values = sample(30)
+    names = {symbol(name): value for name, value in values.items()}
+    for mode in shoot(values):
+        energy = modal_numbers(values, mode)
+        rayleigh = np.sqrt(energy[symbol("K_i")] / energy[symbol("M_i")]) / (2 * np.pi)
+        found = float(natural_frequency().rhs.subs(lamda, mode.beta * values["L"]).subs(names))
+        if abs(found / rayleigh - 1) > 1e-8:
+            return False
+    return dimension(natural_frequency()) == Dimension(s=-1)

@@ -1,0 +1,428 @@
+"""Mode shapes and the frequency equation, for every stiffness from zero to infinity: equations (17)-(26)."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from sympy import (
+    Eq,
+    Expr,
+    I,
+    MatMul,
+    Matrix,
+    Poly,
+    Symbol,
+    cancel,
+    cos,
+    cosh,
+    exp,
+    roots,
+    sin,
+    sinh,
+    solve,
+    sqrt,
+    symbols,
+    zeros,
+)
+
+from cra_sym.arm.energy import A, E, I_z, J_e, L, k_r, k_t, m_e, phi_i, rho, x
+from cra_sym.arm.equations import checks, numbered
+from cra_sym.arm.evaluation import put
+from cra_sym.arm.joint import mode_conditions
+from cra_sym.arm.motion import mode_field_equation
+from cra_sym.arm.shooting import sample, shoot
+from cra_sym.symbols import symbol
+
+__all__ = ["coefficients", "frequency_function", "reduced_matrix", "root_matrix", "tip_matrix"]
+
+omega_i, beta, lamda, Delta, r_2 = (symbol(n) for n in ("omega_i", "beta", "lamda", "Delta", "r_2"))
+kappa_t, kappa_r, mu, iota = (symbol(name) for name in ("kappa_t", "kappa_r", "mu", "iota"))
+s_t, c_t, s_r, c_r = (symbol(name) for name in ("s_t", "c_t", "s_r", "c_r"))
+coefficients = C_1, C_2, C_3, C_4 = tuple(symbol(f"C_{k}") for k in (1, 2, 3, 4))
+
+#: Placeholders for cos, sin, cosh, sinh of lamda: polynomials in these are decided exactly.
+_CIRCULAR = _c, _s, _ch, _sh = symbols("c s C S")
+VALUES = {_c: cos(lamda), _s: sin(lamda), _ch: cosh(lamda), _sh: sinh(lamda)}
+
+
+# General solution (17) ------------------------------------------------------------------------------------------
+
+
+@cache
+def basis() -> tuple[Expr, ...]:
+    """Return four real solutions of the field equation of a mode, from the roots of its characteristic polynomial."""
+    r = Symbol("r")
+    balance = put(mode_field_equation().lhs, {phi_i: exp(r * x)}) / exp(r * x)
+    quartic = Poly(balance.subs(omega_i, beta**2 * sqrt(E * I_z / (rho * A))).expand(), r)
+    circular: list[Expr] = []
+    hyperbolic: list[Expr] = []
+    for root in roots(quartic):
+        if root in (beta, I * beta):
+            pair = (cosh(beta * x), sinh(beta * x)) if root == beta else (cos(beta * x), sin(beta * x))
+            (hyperbolic if root == beta else circular).extend(pair)
+    return (*circular, *hyperbolic)
+
+
+@numbered(17, "form of the mode shape", "derived", ("10b",))
+def mode_form() -> tuple[Eq, Eq]:
+    """The field equation of a mode has four exponential solutions, here in real form; the boundary conditions
+    determine the coefficients."""
+    shape = sum(coefficient * function for coefficient, function in zip(coefficients, basis(), strict=True))
+    (square,) = solve(mode_field_equation().lhs.subs(phi_i.diff(x, 4), beta**4 * phi_i) / phi_i, beta**4)
+    return Eq(phi_i, shape), Eq(beta**4, square)
+
+
+@checks(17)
+def _() -> bool:
+    """It satisfies the field equation and its four functions are independent; and numbers: modes of a random arm found
+    by shooting with power series are combinations of them."""
+    shape, wave = mode_form()
+    residual = put(mode_field_equation().lhs, {phi_i: shape.rhs}).subs(omega_i, sqrt(solve(wave, omega_i**2)[0]))
+    wronskian = Matrix(4, 4, lambda row, column: basis()[column].diff(x, row)).subs(x, 0).det()
+    places = np.linspace(0.0, 1.0, 30)
+    for mode in shoot(sample(17)):
+        table = np.array([[float(f.subs({beta: mode.beta, x: p})) for f in basis()] for p in places])
+        gap = np.linalg.lstsq(table, mode(places), rcond=None)[1]
+        if gap[0] > 1e-20 * np.sum(mode(places) ** 2):
+            return False
+    return residual.expand() == 0 and wronskian.expand() != 0
+
+
+# Boundary conditions as linear systems (18)-(19) ----------------------------------------------------------------
+
+
+def dimensionless(expression: Expr) -> Expr:
+    """Write an expression in lamda = beta L and the dimensionless groups."""
+    bending = E * I_z
+    groups = {
+        omega_i: beta**2 * sqrt(bending / (rho * A)),
+        k_t: kappa_t * bending / L**3,
+        k_r: kappa_r * bending / L,
+        m_e: mu * rho * A * L,
+        J_e: iota * rho * A * L**3,
+    }
+    return expression.subs(groups).subs(beta, lamda / L)
+
+
+@cache
+def _rows() -> tuple[Matrix, ...]:
+    """Coefficients of C_1..C_4 in the four conditions on a mode, in the order of (16), with placeholders."""
+    shape, rows = mode_form()[0].rhs, []
+    names = {value: name for name, value in VALUES.items()}
+    for condition, power in zip(mode_conditions(), (3, 2, 3, 2), strict=True):
+        balance = dimensionless(put(condition.lhs - condition.rhs, {phi_i: shape})) * L**power / (E * I_z)
+        entries = [balance.subs(names).expand().coeff(coefficient) for coefficient in coefficients]
+        common = lamda ** min(Poly(entry, lamda).monoms()[-1][0] for entry in entries if entry != 0)
+        rows.append(Matrix([[(entry / common).expand() for entry in entries]]))
+    return tuple(rows)
+
+
+def _weighted(row: Matrix, stiffness: Symbol, spring: Symbol, compliance: Symbol) -> Matrix:
+    """Write a row linear in a stiffness so that (spring, compliance) = (1, 0) is the rigid joint, (0, 1) no joint."""
+    return row.applyfunc(lambda e: (spring * e.coeff(stiffness, 1) + compliance * e.coeff(stiffness, 0)).expand())
+
+
+def root_matrix() -> Matrix:
+    """Return the 2 x 4 matrix of force and moment at the root, homogeneous in (s_t, c_t) and in (s_r, c_r)."""
+    force, moment, *_ = _rows()
+    return Matrix.vstack(_weighted(force, kappa_t, s_t, c_t), _weighted(moment, kappa_r, s_r, c_r))
+
+
+def tip_matrix() -> Matrix:
+    """Return the 2 x 4 matrix of force and moment at the tip."""
+    return _tip().subs(VALUES)
+
+
+def _tip() -> Matrix:
+    return Matrix.vstack(*_rows()[2:])
+
+
+def _system(matrix: Matrix, unknowns: Matrix) -> Eq:
+    return Eq(MatMul(matrix, unknowns), zeros(2, 1), evaluate=False)
+
+
+@numbered(18, "root system", "derived", ("16a", 17))
+def root_system() -> Eq:
+    """(17) in the conditions at the joint. Each stiffness is written as the pair (s, c) = (kappa, 1) / (1 + kappa), so
+    that a rigid joint (1, 0) and no joint (0, 1) are ordinary values."""
+    return _system(root_matrix(), Matrix(coefficients))
+
+
+@numbered(19, "tip system", "derived", ("16a", 17))
+def tip_system() -> Eq:
+    """(17) in the conditions at the end-effector."""
+    return _system(tip_matrix(), Matrix(coefficients))
+
+
+def group_numbers(values: dict[str, float], mode_beta: float) -> dict[Expr, float]:
+    """Return lamda and the dimensionless groups of an arm with a finite joint."""
+    bending, mass, length = values["E"] * values["I_z"], values["rho"] * values["A"] * values["L"], values["L"]
+    stiff_t, stiff_r = values["k_t"] * length**3 / bending, values["k_r"] * length / bending
+    weights = {
+        s_t: stiff_t / (1 + stiff_t),
+        c_t: 1 / (1 + stiff_t),
+        s_r: stiff_r / (1 + stiff_r),
+        c_r: 1 / (1 + stiff_r),
+    }
+    return weights | {
+        lamda: mode_beta * length,
+        kappa_t: stiff_t,
+        kappa_r: stiff_r,
+        mu: values["m_e"] / mass,
+        iota: values["J_e"] / (mass * length**2),
+    }
+
+
+def _shot_coefficients(mode) -> Matrix:
+    """Return C_1..C_4 of a mode found by shooting, from its values and derivatives at the root."""
+    a, b, c, d = (mode.start[k] / mode.beta**k for k in range(4))
+    return Matrix([(a - c) / 2, (b - d) / 2, (a + c) / 2, (b + d) / 2])
+
+
+def _annihilates(matrix: Matrix, seed: int) -> bool:
+    """Tell whether the matrix applied to the coefficients of modes found by shooting gives zero, and not otherwise."""
+    values = sample(seed)
+    for mode in shoot(values):
+        found = np.array(_shot_coefficients(mode), dtype=float)[: matrix.cols]
+        for factor, expected in ((1.0, True), (1.03, False)):
+            numeric = np.array(matrix.subs(group_numbers(values, factor * mode.beta)), dtype=float)
+            residual = np.abs(numeric @ found) / (np.abs(numeric) @ np.abs(found))
+            if (residual.max() < 1e-8) != expected:
+                return False
+    return True
+
+
+@checks(18)
+def _() -> bool:
+    """Numbers: the coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
+    return _annihilates(root_matrix(), 18)
+
+
+@checks(19)
+def _() -> bool:
+    """Numbers: the coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
+    return _annihilates(tip_matrix(), 19)
+
+
+# Elimination and the frequency equation (20)-(23) ---------------------------------------------------------------
+
+
+def _reduced(expression: Expr) -> Expr:
+    """Return a polynomial in the placeholders in normal form: s^2 = 1 - c^2 and S^2 = C^2 - 1."""
+    remainder = expression.expand()
+    for name, square in ((_s, 1 - _c**2), (_sh, _ch**2 - 1)):
+        polynomial = Poly(remainder, name)
+        remainder = sum(
+            (coefficient * square ** (power // 2) * name ** (power % 2)).expand()
+            for (power,), coefficient in polynomial.terms()
+        )
+    return remainder
+
+
+@cache
+def _elimination() -> tuple[Matrix, Expr]:
+    """Return (D, d): the 2 x 2 system for C_1, C_2 times d, free of denominators."""
+    root, tip = root_matrix(), _tip()
+    determinant = root[:, 2:].det().expand()
+    return (determinant * tip[:, :2] - tip[:, 2:] * root[:, 2:].adjugate() * root[:, :2]).applyfunc(
+        _reduced
+    ), determinant
+
+
+def reduced_matrix() -> Matrix:
+    """Return the 2 x 2 matrix of the system for C_1 and C_2, free of denominators."""
+    return _elimination()[0].subs(VALUES)
+
+
+_entries = Matrix(2, 2, [symbol(name) for name in ("d_11", "d_12", "d_21", "d_22")])
+
+
+@numbered(20, "reduced system", "derived", (18, 19))
+def reduced_system() -> Eq:
+    """(18) gives C_3 and C_4, (19) multiplied by the determinant of that step leaves two equations for C_1 and C_2. The
+    determinant vanishes, and the step is empty, for a pinned and for a sliding root only."""
+    return _system(_entries, Matrix(coefficients[:2]))
+
+
+@checks(20)
+def _() -> bool:
+    """Numbers: the coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
+    return _annihilates(_entries.subs(_named_entries()), 20)
+
+
+def _named_entries() -> dict[Expr, Expr]:
+    return {e.lhs: e.rhs for e in reduced_coefficients()}
+
+
+@numbered(21, "its coefficients", "derived", (18, 19, 20))
+def reduced_coefficients() -> tuple[Eq, ...]:
+    """What the elimination leaves, with the joint as (s_t, c_t), (s_r, c_r) and the end-effector as mu, iota."""
+    return tuple(Eq(name, value) for name, value in zip(_entries, reduced_matrix(), strict=True))
+
+
+@checks(21)
+def _() -> bool:
+    """Numbers: Gaussian elimination of (18) and (19) with random values."""
+    rng = np.random.default_rng(21)
+    names = (lamda, s_t, c_t, s_r, c_r, mu, iota)
+    values = dict(zip(names, rng.uniform(0.3, 2.0, len(names)), strict=True))
+    root, tip = (np.array(m.subs(values), dtype=float) for m in (root_matrix(), tip_matrix()))
+    left = tip[:, :2] - tip[:, 2:] @ np.linalg.solve(root[:, 2:], root[:, :2])
+    found = np.array([float(e.rhs.subs(values)) for e in reduced_coefficients()]).reshape(2, 2)
+    return bool(np.allclose(found, np.linalg.det(root[:, 2:]) * left, rtol=1e-10))
+
+
+@numbered(22, "determinant", "derived", (20,))
+def determinant() -> Eq:
+    """A mode is a solution that is not zero: the determinant of the reduced system vanishes."""
+    return Eq(_entries.det(), 0)
+
+
+@checks(22)
+def _() -> bool:
+    """The determinant of (18) and (19) together, all four coefficients at once, times that of the elimination."""
+    matrix, factor = _elimination()
+    whole = Matrix.vstack(root_matrix(), _tip()).det(method="berkowitz")
+    named = dict(zip(_entries, matrix, strict=True))
+    return _reduced(determinant().lhs.subs(named) - factor * whole) == 0
+
+
+@cache
+def frequency_polynomial() -> Expr:
+    """Return the determinant with the factor of the elimination and powers of lamda divided out."""
+    matrix, factor = _elimination()
+    named = dict(zip(_entries, matrix, strict=True))
+    quotient = cancel(_reduced(determinant().lhs.subs(named)) / factor).expand()
+    lowest = min(power for (power,), _ in Poly(quotient, lamda).terms())
+    polynomial = (quotient / (2 * lamda**lowest)).expand()
+    return (
+        polynomial
+        if polynomial.subs({s_t: 1, c_t: 0, s_r: 1, c_r: 0, lamda: 1, mu: 0}).coeff(_c * _ch) > 0
+        else -polynomial
+    )
+
+
+def frequency_function() -> tuple[Expr, tuple[Symbol, ...]]:
+    """Return Delta and its arguments (lamda, s_t, c_t, s_r, c_r, mu, iota)."""
+    return frequency_polynomial().subs(VALUES), (lamda, s_t, c_t, s_r, c_r, mu, iota)
+
+
+@numbered(23, "frequency equation", "derived", (21, 22))
+def frequency_equation() -> Eq:
+    """The determinant expanded; its factors that never vanish are divided out, so that a rigid joint without
+    end-effector leaves 1 + cos(lamda) cosh(lamda)."""
+    return Eq(collect_stiffness(frequency_polynomial()).subs(VALUES), 0)
+
+
+def collect_stiffness(polynomial: Expr) -> Expr:
+    """Return the polynomial grouped by the four products of (s_t, c_t) with (s_r, c_r)."""
+    pairs = [a * b for a in (s_t, c_t) for b in (s_r, c_r)]
+    generators = Poly(polynomial, s_t, c_t, s_r, c_r)
+    return sum(pair * by_power(generators.coeff_monomial(pair)) for pair in pairs)
+
+
+def by_power(coefficient: Expr) -> Expr:
+    """Return a polynomial grouped by powers of lamda, mu and iota."""
+    terms = Poly(coefficient, lamda, mu, iota).terms()
+    return sum((value.factor() * lamda**a * mu**b * iota**c for (a, b, c), value in terms), start=lamda * 0)
+
+
+@checks(23)
+def _() -> bool:
+    """Numbers: it changes sign at every frequency parameter of random arms found by shooting and nowhere between."""
+    function, arguments = frequency_function()
+    for seed in (23, 24):
+        values = sample(seed)
+        shapes = shoot(values)
+        found = [mode.beta * values["L"] for mode in shapes]
+        numbers = group_numbers(values, 1.0)
+        numeric = function.subs({name: numbers[name] for name in arguments[1:]})
+        places = [0.1, *(place for root in found for place in (root * (1 - 1e-9), root * (1 + 1e-9)))]
+        signs = [float(numeric.subs(lamda, place)) > 0 for place in places]
+        if signs != [k // 2 % 2 == 0 for k in range(len(places))]:
+            return False
+    return True
+
+
+# Mode shape (24)-(26) -------------------------------------------------------------------------------------------
+
+
+@numbered(24, "coefficient ratios", "derived", (18,))
+def coefficient_ratios() -> tuple[Eq, Eq]:
+    """The root system solved for the hyperbolic coefficients."""
+    root = root_matrix()
+    solved = -root[:, 2:].adjugate() * root[:, :2] * Matrix(coefficients[:2]) / root[:, 2:].det()
+    return tuple(
+        Eq(name, sum(cancel(value.expand().coeff(c)) * c for c in (C_1, C_2)))
+        for name, value in zip((C_3, C_4), solved.applyfunc(cancel), strict=True)
+    )
+
+
+@checks(24)
+def _() -> bool:
+    """Numbers: the coefficients of modes of a random arm found by shooting; by hand, a rigid joint mirrors C_1, C_2."""
+    values = sample(26)
+    for mode in shoot(values):
+        known = dict(zip(coefficients, _shot_coefficients(mode), strict=True))
+        numbers = group_numbers(values, mode.beta)
+        for e in coefficient_ratios():
+            if abs(float(e.rhs.subs(numbers).subs(known)) - known[e.lhs]) > 1e-8 * max(map(abs, known.values())):
+                return False
+    rigid = {s_t: 1, c_t: 0, s_r: 1, c_r: 0}
+    return [e.rhs.subs(rigid) for e in coefficient_ratios()] == [-C_1, -C_2]
+
+
+@numbered(25, "mode shape", "derived", (17, 24))
+def mode_shape() -> Eq:
+    """(24) in (17), with C_2 / C_1 = r_2; the scale C_1 stays free."""
+    shape = mode_form()[0].rhs.subs({e.lhs: e.rhs for e in coefficient_ratios()}).subs(C_2, r_2 * C_1)
+    inside = (shape / C_1).expand()
+    plain, second = inside.coeff(r_2, 0), inside.coeff(r_2, 1)
+    return Eq(phi_i, C_1 * (_gather(plain) + r_2 * _gather(second)))
+
+
+def _gather(shape: Expr) -> Expr:
+    return sum(cancel(shape.coeff(function)) * function for function in basis())
+
+
+@numbered(26, "ratio of the circular coefficients", "derived", (20, 21))
+def circular_ratio() -> Eq:
+    """The first row of the reduced system, which the second repeats at a natural frequency."""
+    first, second = reduced_matrix()[0, :]
+    return Eq(r_2, -first / second)
+
+
+@checks(25)
+def _() -> bool:
+    """Numbers: with (26), the shape of modes of random arms found by shooting, along the whole manipulator."""
+    return shapes_agree((25, 27), mode_shape().rhs, circular_ratio().rhs)
+
+
+@checks(26)
+def _() -> bool:
+    """Numbers: the ratio of modes of a random arm found by shooting, and the second row of the reduced system."""
+    values = sample(28)
+    for mode in shoot(values):
+        numbers = group_numbers(values, mode.beta)
+        known = _shot_coefficients(mode)
+        third, fourth = reduced_matrix().subs(numbers)[1, :]
+        found, expected = float(circular_ratio().rhs.subs(numbers)), float(known[1] / known[0])
+        if max(abs(found - expected), abs(-third / fourth - expected)) > 1e-7 * abs(expected):
+            return False
+    return True
+
+
+def shapes_agree(seeds: tuple[int, ...], shape: Expr, ratio: Expr, **joint: float) -> bool:
+    """Compare a derived shape with modes found by shooting, scaled alike at the tip."""
+    for seed in seeds:
+        values = sample(seed) | joint
+        for mode in shoot(values):
+            numbers = group_numbers(values, mode.beta) | {C_1: 1.0, beta: mode.beta}
+            numeric = shape.subs(r_2, ratio).subs(numbers)
+            places = np.linspace(0.0, values["L"], 9)
+            found = np.array([float(numeric.subs(x, place)) for place in places])
+            expected = mode(places)
+            if not np.allclose(found / found[-1], expected / expected[-1], atol=1e-6):
+                return False
+    return True

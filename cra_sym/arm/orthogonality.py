@@ -1,0 +1,118 @@
+"""Orthogonality of the modes with the end-effector's inertia, and K_i = omega_i^2 M_i: companions of (16)."""
+
+from __future__ import annotations
+
+from sympy import Eq, Expr, Integral, solve
+
+from cra_sym.arm.energy import E, I_z, L, inner_mass, inner_stiffness, modal_numbers, phi_i, phi_j, x
+from cra_sym.arm.equations import checks, numbered
+from cra_sym.arm.evaluation import at, evaluate
+from cra_sym.arm.joint import mode_conditions
+from cra_sym.arm.modal_sum import member
+from cra_sym.arm.shooting import sample, shoot
+from cra_sym.symbols import symbol
+
+__all__ = ["orthogonality", "stiffness_identity"]
+
+omega_i, omega_j, M_i, K_i, K_b = (symbol(name) for name in ("omega_i", "omega_j", "M_i", "K_i", "K_b"))
+
+
+@numbered("16b", "stiffness and mass of two modes", "derived", (6, "10b", "16a"))
+def stiffness_identity() -> tuple[Eq, Eq]:
+    """Integrating by parts twice moves two derivatives from mode j to mode i, where the field equation and the four
+    end conditions replace them: the stiffness product is omega_i^2 times the mass product, springs, tip mass and
+    rotary inertia included; for i = j it is K_i = omega_i^2 M_i."""
+    from cra_sym.arm.motion import mode_field_equation
+
+    by_parts = phi_i.diff(x, 2) * phi_j.diff(x) - phi_i.diff(x, 3) * phi_j
+    if (by_parts.diff(x) + phi_i.diff(x, 4) * phi_j - phi_i.diff(x, 2) * phi_j.diff(x, 2)).expand() != 0:
+        raise ArithmeticError("integration by parts went wrong")
+    (fourth,) = solve(mode_field_equation(), phi_i.diff(x, 4))
+    interior = Integral((E * I_z * fourth * phi_j).expand(), (x, 0, L))
+    ends = E * I_z * (at(by_parts, L) - at(by_parts, 0))
+    for condition in mode_conditions():
+        ends = ends.subs(condition.lhs / (E * I_z), condition.rhs / (E * I_z))
+    springs = inner_stiffness(phi_i, phi_j) - Integral(E * I_z * phi_i.diff(x, 2) * phi_j.diff(x, 2), (x, 0, L))
+    mass = inner_mass(phi_i, phi_j)
+    integral = mass.atoms(Integral).pop()
+    rest = interior + ends + springs - omega_i**2 * mass
+    if (
+        rest.subs(interior, omega_i**2 * integral).expand() != 0
+        or (interior.function - omega_i**2 * integral.function).expand()
+    ):
+        raise ArithmeticError(f"stiffness and mass products differ by {rest}")
+    return Eq(inner_stiffness(phi_i, phi_j), omega_i**2 * mass), Eq(K_i, omega_i**2 * M_i)
+
+
+@checks("16b")
+def _() -> bool:
+    """Numbers: both products of all pairs of modes of a random arm, found by shooting, by quadrature."""
+    values = sample(161)
+    shapes = shoot(values)
+    pair, single = stiffness_identity()
+    for first in shapes:
+        numbers = modal_numbers(values, first) | {omega_i: first.omega}
+        if abs((single.lhs / single.rhs).subs(numbers) - 1) > 1e-8:
+            return False
+        for second in shapes:
+            sides = (
+                evaluate(side, values | {"omega_i": first.omega}, {phi_i: first, phi_j: second}) for side in pair.args
+            )
+            scale = first.omega**2 * numbers[M_i]
+            if abs(next(sides) - next(sides)) > 1e-7 * scale:
+                return False
+    return True
+
+
+@numbered("16c", "orthogonality", "derived", ("16b",))
+def orthogonality() -> tuple[Eq, Eq]:
+    """Exchange i and j in the identity and subtract: (omega_i^2 - omega_j^2) times the mass product is zero, so for
+    different frequencies both products vanish."""
+    identity, _ = stiffness_identity()
+    swapped = Eq(*(_swap(side) for side in identity.args))
+    difference = (identity.lhs - swapped.lhs) - (identity.rhs - swapped.rhs)
+    mass = inner_mass(phi_i, phi_j)
+    if (difference + (omega_i**2 - omega_j**2) * mass).expand() != 0:
+        raise ArithmeticError(f"the products are not symmetric: {difference}")
+    return Eq(mass, 0), Eq(inner_stiffness(phi_i, phi_j), 0)
+
+
+def _swap(expression: Expr) -> Expr:
+    """Exchange the modes i and j."""
+    aside = expression.replace(phi_j.func, symbol("eta").func).xreplace({omega_j: symbol("omega")})
+    return member(aside, "j").replace(symbol("eta").func, phi_i.func).xreplace({symbol("omega"): omega_i})
+
+
+@checks("16c")
+def _() -> bool:
+    """Numbers: both products of different modes of a random arm vanish; without the end-effector they would not."""
+    values = sample(163)
+    first, second, third = shoot(values)
+    for pair in ((first, second), (first, third), (second, third)):
+        modes = dict(zip((phi_i, phi_j), pair, strict=True))
+        for product in (e.lhs for e in orthogonality()):
+            beam = sum(evaluate(integral, values, modes) for integral in product.atoms(Integral))
+            if abs(evaluate(product, values, modes)) > 1e-8 * abs(beam):
+                return False
+    return True
+
+
+@numbered("16d", "what the manipulator's energy alone would give", "derived", (4, 6, "16b"))
+def stiffness_of_manipulator_alone() -> Eq:
+    """The paper's (4) without the springs leaves their share out of the generalised stiffness: K_b / M_i is not
+    omega_i^2 unless the joint is rigid or the mode does not move it."""
+    springs = inner_stiffness(phi_i, phi_i) - inner_stiffness(phi_i, phi_i, joint=False)
+    return Eq(K_b, stiffness_identity()[1].rhs - springs)
+
+
+@checks("16d")
+def _() -> bool:
+    """Numbers: the strain energy of modes found by shooting; it falls short of omega_i^2 M_i by the springs' share."""
+    values, alone = sample(164), stiffness_of_manipulator_alone().rhs
+    for mode in shoot(values):
+        strain = evaluate(inner_stiffness(phi_i, phi_i, joint=False), values, {phi_i: mode})
+        numbers = modal_numbers(values, mode) | {omega_i: mode.omega}
+        predicted = evaluate(alone.subs(numbers), values, {phi_i: mode})
+        if abs(strain / predicted - 1) > 1e-8 or strain / (mode.omega**2 * numbers[M_i]) > 0.999:
+            return False
+    return True
