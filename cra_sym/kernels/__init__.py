@@ -2,5 +2,6 @@
 
 from cra_sym.kernels.callables import Kernel, kernel
 from cra_sym.kernels.derived import derived_kernel
+from cra_sym.kernels.specialise import compiled, has_compiler
 
-__all__ = ["Kernel", "derived_kernel", "kernel"]
+__all__ = ["Kernel", "compiled", "derived_kernel", "has_compiler", "kernel"]

@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from cra_sym.kernels import derived, derived_kernel, store
+from cra_sym.kernels import derived, derived_kernel
 
 DERIVATION = "cra_sym.test_derivation:beat"
 PLANT = """
@@ -31,14 +31,6 @@ assert not {{"sympy", "numba"}} & set(sys.modules)
 values = f(0.5, [1.0, 2.0])
 print({{name: value.tolist() for name, value in values.items()}}, f.arguments, "sympy" in sys.modules)
 """
-
-
-@pytest.fixture
-def private(tmp_path, monkeypatch):
-    """Give this process, and those it starts, a cache directory of their own."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(store, "directory", lambda: tmp_path / "cra_sym")
-    return tmp_path / "cra_sym"
 
 
 def run(code):

@@ -15,12 +15,6 @@ posix = pytest.mark.skipif(os.name != "posix", reason="POSIX permissions")
 
 
 @pytest.fixture
-def private(tmp_path, monkeypatch):
-    monkeypatch.setattr(store, "directory", lambda: tmp_path / "cra_sym")
-    return tmp_path / "cra_sym"
-
-
-@pytest.fixture
 def entry(private):
     assert store.save("key", b"content\nof two lines")
     (path,) = private.iterdir()

@@ -1,0 +1,182 @@
+"""Numba templates specialised with generated functions: one module of text, compiled once on a machine and then loaded.
+
+Numba's own file cache overlooks changes of inlined helpers, trusts time stamps and unpickles whatever lies beside the
+source. Here everything that is compiled is one text, its hash is the key, and machine code goes through the private
+store.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import linecache
+import os
+import pickle
+import sys
+from collections.abc import Mapping
+from functools import cache
+from importlib import metadata, util
+from pathlib import Path
+from types import FunctionType, ModuleType, SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+from cra_sym.kernels import store
+
+if TYPE_CHECKING:
+    from cra_sym.kernels.callables import Kernel
+
+__all__ = ["compiled", "has_compiler"]
+
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
+_INLINED = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, **_OPTIONS}
+_ELEMENTARY = Path(__file__).with_name("elementary.py")
+_WHERE = "def where(condition, value, otherwise):\n    return value if condition else otherwise\n"
+
+
+def has_compiler() -> bool:
+    """Return whether Numba is there and not switched off by NUMBA_DISABLE_JIT."""
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+        return False
+    if "numba" in sys.modules:
+        return sys.modules["numba"] is not None
+    return util.find_spec("numba") is not None
+
+
+def compiled(template: str, kernels: Mapping[str, Kernel], *, elementary: bool = True) -> SimpleNamespace:
+    """Specialise the text of a module with kernels, and compile its functions.
+
+    The template is plain Python that Numba understands, without decorators. It calls each kernel by its name in
+    ``kernels`` with scalars (the result is a scalar for one expression, else a flat tuple), and may call ``sin``,
+    ``cos`` and ``exp``, the branch-free functions of :mod:`cra_sym.kernels.elementary`. Everything is inlined, so that
+    a simple loop over lanes becomes SIMD code; LLVM gives up on that where a loop would need more than eight checks for
+    overlapping arrays (arrays written times arrays read): then let it write to parts of one local array. Functions with
+    a leading underscore are helpers, all others are entries: an entry is compiled, or loaded from the store, when it is
+    first called with new types. It releases the interpreter lock, so threads scale.
+
+    Parameters
+    ----------
+    template : str
+        Module text.
+    kernels : dict of str to Kernel
+        The functions the template takes as given.
+    elementary : bool
+        Whether sin, cos and exp are the branch-free ones (sin and cos are nan beyond 1e6) or the platform's.
+
+    Returns
+    -------
+    SimpleNamespace
+        The entries by name.
+
+    Raises
+    ------
+    ImportError
+        If Numba is missing; :func:`has_compiler` tells.
+    ValueError
+        If a kernel uses functions that Numba cannot compile.
+
+    Examples
+    --------
+    >>> import numpy as np, sympy as sp
+    >>> from cra_sym.kernels import compiled, kernel
+    >>> x, a = sp.symbols("x a")
+    >>> template = '''
+    ... def fill(out, x, a):
+    ...     for lane in range(out.size):
+    ...         out[lane] = wave(x[lane], a)
+    ... '''
+    >>> entries = compiled(template, {"wave": kernel(a * sp.sin(x) + sp.cos(x), (x, a))})
+    >>> out = np.empty(3)
+    >>> entries.fill(out, np.zeros(3), 2.0)
+    >>> out
+    array([1., 1., 1.])
+    """
+    return _entries(_prelude(kernels, elementary), template)
+
+
+def _prelude(kernels: Mapping[str, Kernel], elementary: bool) -> str:
+    """Return the text that goes before a template: imports, elementary functions, kernels."""
+    imports, bodies = set(), []
+    for name, kernel in kernels.items():
+        head, _, body = kernel.source.partition("\n\n\ndef evaluate(")
+        lines = [line for line in head.splitlines() if line.startswith("from ")]
+        if not all(line.startswith("from numpy import ") for line in lines):
+            raise ValueError(f"{name} needs {'; '.join(lines)}: Numba compiles NumPy's functions only")
+        imports.update(lines)
+        bodies.append(f"def {name}({body}")
+    own = _ELEMENTARY.read_text(encoding="utf-8") if elementary else ""
+    return "\n\n".join(["\n".join(sorted(imports)), own, _WHERE, *bodies])
+
+
+@cache
+def _entries(prelude: str, template: str) -> SimpleNamespace:
+    if not has_compiler():
+        raise ImportError("compiling needs numba: pip install numba")
+    import numba
+
+    digest = hashlib.sha256(repr((prelude, template, _OPTIONS)).encode()).hexdigest()
+    module = ModuleType(f"cra_sym_compiled_{digest[:32]}")
+    sys.modules[module.__name__] = module  # where stored machine code looks for its constants
+    namespace = module.__dict__
+    helpers = _functions(prelude, f"<prelude {digest[:16]}>", namespace)
+    entries = _functions(template, f"<template {digest[:16]}>", namespace)
+    for name, function in (helpers | entries).items():
+        if name in entries and not name.startswith("_"):
+            namespace[name] = numba.njit(**_OPTIONS)(function)
+            namespace[name]._cache = _StoredCode(digest, name)
+        else:
+            namespace[name] = numba.njit(**_INLINED)(function)
+    return SimpleNamespace(**{name: namespace[name] for name in entries if not name.startswith("_")})
+
+
+def _functions(text: str, filename: str, namespace: dict[str, Any]) -> dict[str, FunctionType]:
+    """Run the text in the namespace and return the functions it defines."""
+    linecache.cache[filename] = (len(text), None, text.splitlines(True), filename)
+    exec(compile(text, filename, "exec"), namespace)
+    return {
+        name: value
+        for name, value in namespace.items()
+        if isinstance(value, FunctionType) and value.__code__.co_filename == filename
+    }
+
+
+class _StoredCode:
+    """What a Numba dispatcher asks for machine code; the answers come from the private store, checked byte for byte."""
+
+    cache_path = None
+
+    def __init__(self, digest: str, name: str) -> None:
+        self._digest, self._name, self._bar = digest, name, None
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        from numba.core.compiler import CompileResult
+        from tqdm import tqdm
+
+        target.refresh()
+        content = store.load(self._key(signature, target.codegen()))
+        if content is not None:
+            try:
+                return CompileResult._rebuild(target, *pickle.loads(content))
+            except Exception:  # whatever is wrong with code this process did not make: make it anew
+                pass
+        self._bar = tqdm(total=0, desc=f"compiling {self._name}", bar_format="{desc}", leave=False, disable=None)
+        return None
+
+    def save_overload(self, signature: Any, result: Any) -> None:
+        from numba.core.serialize import dumps
+
+        if self._bar is not None:
+            self._bar.close()
+        if not result.lifted and not result.library.has_dynamic_globals:
+            store.save(self._key(signature, result.library.codegen), dumps(result._reduce()))
+
+    def _key(self, signature: Any, codegen: Any) -> str:
+        versions = [metadata.version(package) for package in ("numba", "llvmlite", "numpy")]
+        return repr((self._digest, self._name, str(signature), codegen.magic_tuple(), sys.version, versions))
+
+    def enable(self) -> None:
+        """Do nothing: the store is always asked."""
+
+    def disable(self) -> None:
+        """Do nothing: the store is always asked."""
+
+    def flush(self) -> None:
+        """Do nothing: a changed text has another key."""

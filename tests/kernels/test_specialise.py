@@ -1,0 +1,126 @@
+"""Templates specialised with kernels: values, the store of machine code, Numba's absence."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from cra_sym.kernels import compiled, has_compiler, kernel, specialise
+
+pytestmark = pytest.mark.skipif(not has_compiler(), reason="Numba is an option")
+
+x, a = sp.symbols("x a")
+
+# A template is plain text: here a Newton iteration on blocks of 64 lanes, for a function and a slope made elsewhere.
+NEWTON = '''
+import numpy as np
+
+_LANES = 64
+
+
+def _improved(x, a):
+    value, slope = value_and_slope(x, a)
+    return x - value / slope
+
+
+def roots(out, start, a):
+    """Write the root next to ``start`` for every ``a``."""
+    x = np.empty(_LANES)
+    for first in range(0, out.size, _LANES):
+        count = min(_LANES, out.size - first)
+        x[:count] = start[first : first + count]
+        for _ in range(6):
+            for lane in range(count):
+                x[lane] = _improved(x[lane], a[first + lane])
+        out[first : first + count] = x[:count]
+'''
+
+
+def kepler():
+    equation = x - a * sp.sin(x) - 1
+    return kernel((equation, equation.diff(x)), (x, a))
+
+
+@pytest.fixture(scope="module")
+def newton():
+    return compiled(NEWTON, {"value_and_slope": kepler()})
+
+
+def test_a_template_solves_what_the_kernel_states(newton):
+    eccentricity = np.linspace(0, 0.7, 200)
+    out = np.empty_like(eccentricity)
+    newton.roots(out, np.full_like(out, 1.5), eccentricity)
+    np.testing.assert_allclose(out - eccentricity * np.sin(out), 1, rtol=0, atol=1e-15)
+
+
+def test_the_same_text_is_compiled_once(newton):
+    assert compiled(NEWTON, {"value_and_slope": kepler()}) is newton
+    assert not hasattr(newton, "_improved") and not hasattr(newton, "sin")
+
+
+def test_threads_share_an_entry(newton):
+    eccentricity = np.linspace(0, 0.7, 4000)
+    out = np.empty_like(eccentricity)
+    start = np.full_like(out, 1.5)
+    with ThreadPoolExecutor(2) as pool:
+        halves = [slice(0, 2000), slice(2000, 4000)]
+        list(pool.map(lambda part: newton.roots(out[part], start[part], eccentricity[part]), halves))
+    np.testing.assert_allclose(out - eccentricity * np.sin(out), 1, rtol=0, atol=1e-15)
+
+
+def test_division_by_zero_follows_ieee():
+    entries = compiled("def at(x):\n    return f(x)\n", {"f": kernel(1 / x, (x,))})
+    assert entries.at(0.0) == np.inf
+
+
+def test_what_numba_cannot_compile_is_refused():
+    with pytest.raises(ValueError, match=r"f needs from scipy\.special import erf"):
+        compiled("def at(x):\n    return f(x)\n", {"f": kernel(sp.erf(x), (x,))})
+
+
+PROCESS = """
+from cra_sym.kernels import Kernel, compiled, specialise
+import numba.core.dispatcher as dispatcher
+f = Kernel("from numpy import cos\\n\\n\\ndef evaluate(x):\\n    return cos(x)\\n", ("x",))
+entries = compiled("def at(x):\\n    return f(x)\\n", {"f": f})
+print(entries.at(0.5), sum(entries.at.stats.cache_misses.values()), sum(entries.at.stats.cache_hits.values()))
+"""
+
+
+def run(code=PROCESS):
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="the subprocess finds its cache by XDG_CACHE_HOME")
+def test_machine_code_is_loaded_by_the_next_process_and_never_trusted_when_damaged(private):
+    first, second = run(), run()
+    assert first[1:] == ["1", "0"] and second[1:] == ["0", "1"]
+    (entry,) = private.iterdir()
+    good = entry.read_bytes()
+    entry.write_bytes(good[:-1] + bytes([good[-1] ^ 1]))
+    assert run() == first
+    assert len(entry.read_bytes()) == len(good)
+    entry.chmod(0o666)
+    assert run() == first
+    assert float(first[0]) == pytest.approx(np.cos(0.5), rel=1e-15)
+
+
+def test_code_that_is_no_code_is_compiled_anew(private, monkeypatch):
+    monkeypatch.setattr(specialise.store, "load", lambda key: b"not a pickle")
+    entries = compiled("def twice(x):\n    return 2 * f(x)\n", {"f": kernel(x, (x,))})
+    assert entries.twice(3.0) == 6
+
+
+def test_without_numba_there_is_a_clear_error(monkeypatch):
+    monkeypatch.setitem(sys.modules, "numba", None)
+    assert not has_compiler()
+    with pytest.raises(ImportError, match="numba"):
+        compiled("def absent(x):\n    return f(x)\n", {"f": kernel(x, (x,))})
+    monkeypatch.undo()
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    assert not has_compiler()
