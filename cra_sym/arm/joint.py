@@ -121,11 +121,13 @@ def _() -> bool:
 @numbered("16a", "boundary conditions of a mode", "derived", (2, 16))
 def mode_conditions() -> tuple[Eq, Eq, Eq, Eq]:
     """(2) in (16), the base at rest: in free vibration each coordinate obeys q'' = -omega^2 q and cancels."""
-    conditions = []
-    for e in boundary_conditions():
-        still = single_mode(e.subs(w, 0).doit())
-        conditions.append(Eq(*(free_vibration(side) for side in still.args)))
-    return tuple(conditions)
+    return tuple(in_one_mode(e) for e in boundary_conditions())
+
+
+def in_one_mode(equation: Eq) -> Eq:
+    """Return an equation in v for one freely vibrating mode: an equation in phi_i."""
+    left, right = (single_mode(side.subs(w, 0).doit()) for side in equation.args)
+    return Eq(free_vibration(left), free_vibration(right), evaluate=False)
 
 
 def free_vibration(expression: Expr) -> Expr:

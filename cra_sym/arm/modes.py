@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cache
 
 import numpy as np
@@ -105,17 +106,21 @@ def dimensionless(expression: Expr) -> Expr:
     return expression.subs(groups).subs(beta, lamda / L)
 
 
-@cache
-def _rows() -> tuple[Matrix, ...]:
-    """Coefficients of C_1..C_4 in the four conditions on a mode, in the order of (16), with placeholders."""
+def rows_of(conditions: Iterable[Eq]) -> tuple[Matrix, ...]:
+    """Return the coefficients of C_1..C_4 in conditions on a mode in the order of (16), with placeholders."""
     shape, rows = mode_form()[0].rhs, []
     names = {value: name for name, value in VALUES.items()}
-    for condition, power in zip(mode_conditions(), (3, 2, 3, 2), strict=True):
+    for condition, power in zip(conditions, (3, 2, 3, 2), strict=True):
         balance = dimensionless(put(condition.lhs - condition.rhs, {phi_i: shape})) * L**power / (E * I_z)
         entries = [balance.subs(names).expand().coeff(coefficient) for coefficient in coefficients]
         common = lamda ** min(Poly(entry, lamda).monoms()[-1][0] for entry in entries if entry != 0)
         rows.append(Matrix([[(entry / common).expand() for entry in entries]]))
     return tuple(rows)
+
+
+@cache
+def _rows() -> tuple[Matrix, ...]:
+    return rows_of(mode_conditions())
 
 
 def _weighted(row: Matrix, stiffness: Symbol, spring: Symbol, compliance: Symbol) -> Matrix:
@@ -125,7 +130,11 @@ def _weighted(row: Matrix, stiffness: Symbol, spring: Symbol, compliance: Symbol
 
 def root_matrix() -> Matrix:
     """Return the 2 x 4 matrix of force and moment at the root, homogeneous in (s_t, c_t) and in (s_r, c_r)."""
-    force, moment, *_ = _rows()
+    return weighted_root(*_rows()[:2])
+
+
+def weighted_root(force: Matrix, moment: Matrix) -> Matrix:
+    """Return the two root conditions homogeneous in (s_t, c_t) and in (s_r, c_r)."""
     return Matrix.vstack(_weighted(force, kappa_t, s_t, c_t), _weighted(moment, kappa_r, s_r, c_r))
 
 
@@ -208,7 +217,7 @@ def _() -> bool:
 # Elimination and the frequency equation (20)-(23) ---------------------------------------------------------------
 
 
-def _reduced(expression: Expr) -> Expr:
+def reduced(expression: Expr) -> Expr:
     """Return a polynomial in the placeholders in normal form: s^2 = 1 - c^2 and S^2 = C^2 - 1."""
     remainder = expression.expand()
     for name, square in ((_s, 1 - _c**2), (_sh, _ch**2 - 1)):
@@ -226,7 +235,7 @@ def _elimination() -> tuple[Matrix, Expr]:
     root, tip = root_matrix(), _tip()
     determinant = root[:, 2:].det().expand()
     return (determinant * tip[:, :2] - tip[:, 2:] * root[:, 2:].adjugate() * root[:, :2]).applyfunc(
-        _reduced
+        reduced
     ), determinant
 
 
@@ -285,7 +294,7 @@ def _() -> bool:
     matrix, factor = _elimination()
     whole = Matrix.vstack(root_matrix(), _tip()).det(method="berkowitz")
     named = dict(zip(_entries, matrix, strict=True))
-    return _reduced(determinant().lhs.subs(named) - factor * whole) == 0
+    return reduced(determinant().lhs.subs(named) - factor * whole) == 0
 
 
 @cache
@@ -293,14 +302,15 @@ def frequency_polynomial() -> Expr:
     """Return the determinant with the factor of the elimination and powers of lamda divided out."""
     matrix, factor = _elimination()
     named = dict(zip(_entries, matrix, strict=True))
-    quotient = cancel(_reduced(determinant().lhs.subs(named)) / factor).expand()
-    lowest = min(power for (power,), _ in Poly(quotient, lamda).terms())
-    polynomial = (quotient / (2 * lamda**lowest)).expand()
-    return (
-        polynomial
-        if polynomial.subs({s_t: 1, c_t: 0, s_r: 1, c_r: 0, lamda: 1, mu: 0}).coeff(_c * _ch) > 0
-        else -polynomial
-    )
+    return normalised(cancel(reduced(determinant().lhs.subs(named)) / factor).expand())
+
+
+def normalised(polynomial: Expr) -> Expr:
+    """Divide a determinant by its power of lamda and by the number that leaves 1 + c C for the bare cantilever."""
+    lowest = min(power for (power,), _ in Poly(polynomial, lamda).terms())
+    rigid = {s_t: 1, c_t: 0, s_r: 1, c_r: 0, mu: 0, iota: 0}
+    unit = (polynomial / lamda**lowest).expand().subs(rigid).subs({_c: 0})
+    return (polynomial / (unit * lamda**lowest)).expand()
 
 
 def frequency_function() -> tuple[Expr, tuple[Symbol, ...]]:

@@ -14,6 +14,9 @@ __all__ = ["FIGURES", "STYLE", "draw"]
 FIGURES = {
     "fig01": "cra_sym.figures.robot:figure_1",
     "fig02": "cra_sym.figures.robot:figure_2",
+    "fig03": "cra_sym.figures.modes:figure_3",
+    "fig04": "cra_sym.figures.modes:figure_4",
+    "mode_shapes": "cra_sym.figures.modes:figure_mode_shapes",
 }
 """Name of a figure -> the function that draws it; called with no arguments, it draws the paper's case."""
 
