@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import linecache
+import math
 from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+
+from cra_sym.kernels import lanes
 
 __all__ = ["Kernel", "kernel"]
 
@@ -65,6 +68,11 @@ class Kernel:
         """The generated function itself: no checks, no broadcasting, any objects that have the arithmetic."""
         return self._module["evaluate"]
 
+    @property
+    def layout(self) -> Any:
+        """What the outputs form: () one number, (2, 2) a matrix, a list or dict of such."""
+        return self._module["LAYOUT"]
+
     def __call__(self, *values: Any) -> Any:
         """Evaluate for real or complex numbers or arrays that broadcast together.
 
@@ -87,24 +95,15 @@ class Kernel:
         shape = _common_shape(self.arguments, arrays)
         with np.errstate(all="ignore"):
             flat = self._evaluated(arrays, shape)
-        return _arranged(self._module["LAYOUT"], iter(flat))
+        return _arranged(self.layout, iter(flat))
 
     def _evaluated(self, arrays: list[np.ndarray], shape: tuple[int, ...]) -> list[np.ndarray]:
-        function = self.function
-        whole = [a.shape == shape for a in arrays]
-        size = int(np.prod(shape))
-        if size <= _BLOCK or not all(w or a.ndim == 0 for w, a in zip(whole, arrays, strict=True)):
-            return [_filled(value, shape) for value in _tuple(function(*arrays))]
-        lanes = [a.reshape(-1) if w else a for w, a in zip(whole, arrays, strict=True)]
-        outputs: list[np.ndarray] = []
-        for start in range(0, size, _BLOCK):
-            block = slice(start, start + _BLOCK)
-            results = _tuple(function(*(a[block] if w else a for w, a in zip(whole, lanes, strict=True))))
-            if not outputs:
-                outputs = [np.empty(size, np.result_type(r, np.float64)) for r in results]
-            for output, result in zip(outputs, results, strict=True):
-                output[block] = result
-        return [output.reshape(shape) for output in outputs]
+        size, leaves = math.prod(shape), _leaves(self.layout)
+        if leaves and lanes.suits(self, arrays, size):
+            return lanes.evaluated(self, arrays, shape, leaves)
+        if size > _BLOCK and all(a.shape == shape or a.ndim == 0 for a in arrays):
+            return _in_blocks(self.function, arrays, shape)
+        return [_filled(value, shape) for value in _tuple(self.function(*arrays))]
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Kernel, (self.source, self.arguments, self.backend)
@@ -185,6 +184,20 @@ def _filled(value: Any, shape: tuple[int, ...]) -> np.ndarray:
     return output
 
 
+def _in_blocks(function: Callable[..., Any], arrays: list[np.ndarray], shape: tuple[int, ...]) -> list[np.ndarray]:
+    """Evaluate block by block, so that temporaries stay close to the processor."""
+    size = math.prod(shape)
+    flat = [a.reshape(-1) if a.ndim else a for a in arrays]
+    outputs: list[np.ndarray] = []
+    for start in range(0, size, _BLOCK):
+        block = slice(start, start + _BLOCK)
+        results = _tuple(function(*(a[block] if a.ndim else a for a in flat)))
+        outputs = outputs or [np.empty(size, np.result_type(result, np.float64)) for result in results]
+        for output, result in zip(outputs, results, strict=True):
+            output[block] = result
+    return [output.reshape(shape) for output in outputs]
+
+
 def _arranged(layout: Any, values: Iterator[np.ndarray]) -> Any:
     if isinstance(layout, dict):
         return {name: _arranged(part, values) for name, part in layout.items()}
@@ -192,5 +205,11 @@ def _arranged(layout: Any, values: Iterator[np.ndarray]) -> Any:
         return tuple(_arranged(part, values) for part in layout)
     if layout == ():
         return next(values)[()]
-    entries = [next(values) for _ in range(int(np.prod(layout)))]
+    entries = [next(values) for _ in range(math.prod(layout))]
     return np.stack(entries, axis=-1).reshape(entries[0].shape + layout)
+
+
+def _leaves(layout: Any) -> int:
+    if isinstance(layout, (dict, list)):
+        return sum(map(_leaves, layout.values() if isinstance(layout, dict) else layout))
+    return math.prod(layout)

@@ -47,10 +47,9 @@ def compiled(template: str, kernels: Mapping[str, Kernel], *, elementary: bool =
     The template is plain Python that Numba understands, without decorators. It calls each kernel by its name in
     ``kernels`` with scalars (the result is a scalar for one expression, else a flat tuple), and may call ``sin``,
     ``cos`` and ``exp``, the branch-free functions of :mod:`cra_sym.kernels.elementary`. Everything is inlined, so that
-    a simple loop over lanes becomes SIMD code; LLVM gives up on that where a loop would need more than eight checks for
-    overlapping arrays (arrays written times arrays read): then let it write to parts of one local array. Functions with
-    a leading underscore are helpers, all others are entries: an entry is compiled, or loaded from the store, when it is
-    first called with new types. It releases the interpreter lock, so threads scale.
+    a simple loop over the lanes of contiguous arrays becomes SIMD code. Functions with a leading underscore are
+    helpers, all others are entries: an entry is compiled, or loaded from the store, when it is first called with new
+    types. It releases the interpreter lock, so threads scale.
 
     Parameters
     ----------
