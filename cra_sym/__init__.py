@@ -18,6 +18,7 @@ _HOME = {
     "modal_parameters": "arm.analysis",
     "certify": "arm.certification",
     "Model": "model",
+    "sweep": "studies",
     "kernel": "kernels",
 }
 

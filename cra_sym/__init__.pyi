@@ -8,5 +8,6 @@ from .arm.equations import equations as equations
 from .arm.parameters import Arm as Arm
 from .kernels import kernel as kernel
 from .model import Model as Model
+from .studies import sweep as sweep
 
 __version__: str

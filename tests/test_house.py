@@ -21,7 +21,7 @@ FLOORS = [
     {"symbols", "mechanics", "kernels", "solvers"},
     {"model"},
     {"arm"},
-    {"sweep", "export", "figures"},
+    {"studies", "codegen", "figures"},
     {"claims"},
     {"report"},
     {"__main__"},

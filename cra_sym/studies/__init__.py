@@ -1,0 +1,78 @@
+"""Labelled parameter studies: a quantity of the arm over its parameters, in memory, lazily, or into a store."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from cra_sym import checks
+from cra_sym.arm.parameters import Arm
+from cra_sym.extras import require
+from cra_sym.studies.quantities import QUANTITIES, Quantity
+from cra_sym.studies.study import make_study
+
+__all__ = ["QUANTITIES", "Quantity", "sweep"]
+
+_CHUNKS = 64
+
+
+def sweep(
+    arm: Arm,
+    quantity: str | Callable[..., Any] = "natural_frequencies",
+    *,
+    chunks: int | None = None,
+    store: str | Path | None = None,
+    client: Any = None,
+    **parameters: Any,
+) -> Any:
+    """Evaluate a quantity over the product of parameter axes.
+
+    Parameters
+    ----------
+    arm : Arm
+        Holds every parameter that is not swept; its fields are numbers.
+    quantity : str or callable
+        A key of `QUANTITIES`, or ``f(arm, **options)`` that broadcasts over ``arm.shape`` and may add axes at the end.
+    chunks : int, optional
+        Longest piece of each axis. Given, the dataset is lazy (Dask); with ``store`` it sizes the regions, 64 if left.
+    store : path, optional
+        A Zarr directory, written region by region while the sweep runs. A sweep that was stopped goes on where it was:
+        a region is in the store as a whole or not at all, and what is there is not computed again.
+    client : dask.distributed.Client, optional
+        Where the regions of a store are computed; its workers write them, so the store must be in their reach.
+    **parameters
+        Fields of `Arm`: a one-dimensional array is an axis, a number replaces the arm's. Anything else is an option of
+        the quantity (``modes``, ``motion``, ``excitation``, ...); options that broadcast with the arm (``epsilon``,
+        ``angular_frequency``) may be axes too.
+
+    Returns
+    -------
+    xarray.Dataset
+        One variable named like the quantity, a named dimension and coordinate for each axis, units in the attributes.
+
+    Raises
+    ------
+    MissingExtraError
+        If xarray, or Dask or Zarr where they are asked for, is not installed (extra ``scale``).
+    TypeError, ValueError
+        If a parameter is unknown or out of range, an axis is not one-dimensional, or the store holds another sweep.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> study = sweep(Arm.nominal(), "natural_frequencies", k_t=[1e3, 1e4, np.inf], m_e=[0.0, 0.005], modes=2)
+    >>> dict(study.sizes)
+    {'k_t': 3, 'm_e': 2, 'mode': 2}
+    >>> study.natural_frequencies.attrs["units"]
+    'Hz'
+    """
+    require("xarray", "scale")
+    study = make_study(arm, quantity, parameters)
+    if chunks is not None:
+        checks.count("chunks", chunks)
+    if store is not None:
+        from cra_sym.studies.store import sweep_into
+
+        return sweep_into(study, Path(store), chunks or _CHUNKS, client)
+    return study.dataset(study.evaluate() if chunks is None else study.lazy(chunks))

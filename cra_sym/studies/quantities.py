@@ -1,0 +1,127 @@
+"""What can be swept: each quantity with its unit, meaning and the axes it adds."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+import cra_sym as cra
+from cra_sym.arm.parameters import Arm
+
+__all__ = ["ARM_FIELDS", "QUANTITIES", "Quantity", "named_quantity"]
+
+ARM_FIELDS = tuple(entry.name for entry in fields(Arm))
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Something of an arm that can be swept.
+
+    Attributes
+    ----------
+    name, unit, meaning : str
+        Name and attributes of the variable.
+    function : callable
+        ``function(arm, **options)``, an array of shape ``(*arm.shape, *dims)``.
+    dims : tuple of str
+        Names of the axes the function adds; ``'mode'`` counts from 1.
+    axes : mapping of str to str
+        Options that broadcast with the arm and may therefore be axes too, with their units.
+    """
+
+    name: str
+    function: Callable[..., Any]
+    unit: str
+    meaning: str
+    dims: tuple[str, ...] = ()
+    axes: Mapping[str, str] = field(default_factory=dict)
+
+    def check_options(self, given: list[str]) -> None:
+        """Raise a TypeError that names an option the function does not take, or one that it needs."""
+        parameters = list(inspect.signature(self.function).parameters.values())[1:]
+        if any(p.kind is p.VAR_KEYWORD for p in parameters):
+            return
+        allowed = [p.name for p in parameters]
+        for key in given:
+            if key not in allowed:
+                names = ", ".join([*ARM_FIELDS, *allowed])
+                raise TypeError(f"{key!r} is no parameter of {self.name}: allowed are {names}")
+        for p in parameters:
+            if p.default is p.empty and p.name not in given:
+                raise TypeError(f"{self.name} needs the option {p.name}")
+
+
+def _natural_frequencies(arm: Arm, *, modes: int = 3) -> Any:
+    return cra.natural_frequencies(arm, modes=modes)
+
+
+def _sensitivity(name: str, arm: Arm, *, modes: int = 3) -> Any:
+    return getattr(cra.sensitivities(arm, modes=modes), name)
+
+
+def _peak_response(arm: Arm, *, motion: Any, t: Any, modes: int = 5) -> Any:
+    return np.max(np.abs(cra.tip_response(arm, motion, t, modes=modes)), axis=-1)
+
+
+def _residual_vibration(arm: Arm, *, motion: Any, modes: int = 5) -> Any:
+    return cra.residual_vibration(arm, motion, modes=modes)
+
+
+def _boundary_width(
+    arm: Arm, *, excitation: Any, epsilon: Any, resonance: tuple[int, int], order: int = 1, modes: int = 3
+) -> Any:
+    lower, upper = cra.stability_boundary(arm, excitation, epsilon, resonance=resonance, order=order, modes=modes)
+    return upper - lower
+
+
+def _growth_rate(arm: Arm, *, excitation: Any, angular_frequency: Any, epsilon: Any, modes: int = 3) -> Any:
+    return cra.growth_rate(arm, excitation, angular_frequency, epsilon, modes=modes)
+
+
+_FREQUENCIES = "of the natural frequencies"
+QUANTITIES: Mapping[str, Quantity] = {
+    quantity.name: quantity
+    for quantity in (
+        Quantity("natural_frequencies", _natural_frequencies, "Hz", "natural frequencies", ("mode",)),
+        *(
+            Quantity(name, partial(_sensitivity, name), unit, f"{kind} {_FREQUENCIES} to {spring}", ("mode",))
+            for name, unit, kind, spring in (
+                ("df_dk_t", "Hz m/N", "sensitivity", "k_t"),
+                ("df_dk_r", "Hz rad/(N m)", "sensitivity", "k_r"),
+                ("log_k_t", "1", "logarithmic sensitivity", "k_t"),
+                ("log_k_r", "1", "logarithmic sensitivity", "k_r"),
+            )
+        ),
+        Quantity("peak_response", _peak_response, "m", "largest elastic tip displacement at the times t"),
+        Quantity("residual_vibration", _residual_vibration, "m", "peak tip amplitude after the stop"),
+        Quantity(
+            "boundary_width",
+            _boundary_width,
+            "rad/s",
+            "width of the instability region by multiple scales",
+            axes={"epsilon": "1"},
+        ),
+        Quantity(
+            "growth_rate",
+            _growth_rate,
+            "1/s",
+            "growth rate by Floquet theory",
+            axes={"angular_frequency": "rad/s", "epsilon": "1"},
+        ),
+    )
+}
+
+
+def named_quantity(quantity: str | Callable[..., Any]) -> Quantity:
+    """Return an entry of `QUANTITIES`, or a function of an arm as a quantity."""
+    if callable(quantity):
+        name = getattr(quantity, "__name__", type(quantity).__name__)
+        return Quantity(name, quantity, "", (inspect.getdoc(quantity) or name).splitlines()[0])
+    if quantity not in QUANTITIES:
+        raise ValueError(f"quantity = {quantity!r}: allowed are {', '.join(QUANTITIES)}, or a function of an arm")
+    return QUANTITIES[quantity]
