@@ -2,6 +2,7 @@
 
 from cra_sym.mechanics.hamilton import BoundaryCondition, HamiltonResult, hamilton
 from cra_sym.mechanics.jets import HamiltonError
+from cra_sym.mechanics.separation import Modal, separate
 from cra_sym.mechanics.state_form import StateForm, state_form
 from cra_sym.mechanics.steps import Step, compact_latex
 
@@ -9,9 +10,11 @@ __all__ = [
     "BoundaryCondition",
     "HamiltonError",
     "HamiltonResult",
+    "Modal",
     "StateForm",
     "Step",
     "compact_latex",
     "hamilton",
+    "separate",
     "state_form",
 ]

@@ -92,9 +92,12 @@ class GeneralisedForces:
 
     def field_equation(self, number: int) -> Eq:
         """Collect the factor of the variation of one field in the interval."""
-        write = self.variation.space.write
-        applied = self.by_parts(self.inside_applied, number)
-        return Eq(write(-self.by_parts(self.inside, number)), write(applied), evaluate=False)
+        left, right = map(self.variation.space.write, self.field_sides(number))
+        return Eq(left, right, evaluate=False)
+
+    def field_sides(self, number: int) -> tuple[Expr, Expr]:
+        """Return inertial and elastic forces, and applied ones, per length in jet symbols."""
+        return -self.by_parts(self.inside, number), self.by_parts(self.inside_applied, number)
 
     def boundary_force(self, number: int, order: int) -> Expr:
         """Return the factor of the variation of the order-th derivative in the boundary term [...]_0^L."""
@@ -139,17 +142,20 @@ class GeneralisedForces:
     def _condition(self, displacement: Jet) -> BoundaryCondition:
         space, end = self.variation.space, displacement.place
         assert end is not None
-        form = space.form(displacement)
-        tags = (end, varied_form(space, displacement), form)
+        kind = "natural" if self.variation.elimination.value(displacement) is None else "essential"
+        left, right = map(space.write, self.condition_sides(displacement))
+        return BoundaryCondition(left, right, end, varied_form(space, displacement), space.form(displacement), kind)
+
+    def condition_sides(self, displacement: Jet) -> tuple[Expr, Expr]:
+        """Return both sides of the condition of one end displacement, in jet symbols."""
         fixed = self.variation.elimination.value(displacement)
         if fixed is not None:
-            return BoundaryCondition(form, space.write(fixed), *tags, "essential")
+            return self.variation.space.symbol(displacement), fixed
         # T - U has -EI/2 (v^(m))^2: this sign leaves the elastic coefficient of the left-hand side positive
         sign = (-1) ** (self.variation.orders[displacement.unknown] - displacement.space)
-        side = sign if end == "right" else -sign
+        side = sign if displacement.place == "right" else -sign
         outer = self.end_force(displacement) + self.reaction(displacement)
-        inner = self.boundary_factors[displacement]
-        return BoundaryCondition(space.write(side * inner), space.write(-side * outer), *tags)
+        return side * self.boundary_factors[displacement], -side * outer
 
     def coordinate_equation(self, number: int, reactions: bool = True) -> Eq:
         """Collect the factor of the variation of one lumped coordinate."""

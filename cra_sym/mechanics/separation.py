@@ -1,0 +1,289 @@
+"""Separation of variables: spatial problem, general solution, characteristic matrix and function, mode shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+from sympy import (
+    Add,
+    Eq,
+    Expr,
+    Function,
+    Matrix,
+    Mul,
+    S,
+    Symbol,
+    cancel,
+    factor_list,
+    fraction,
+)
+
+from cra_sym.mechanics.basis import Basis
+from cra_sym.mechanics.determinants import cofactors, collected, determinant, divided, primitive_rows, without_content
+from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces, varied_form
+from cra_sym.mechanics.hamilton import HamiltonResult
+from cra_sym.mechanics.jets import HamiltonError, Jet, grouped
+from cra_sym.mechanics.solution import GeneralSolution, Names
+from cra_sym.mechanics.steps import Step
+from cra_sym.mechanics.weak import WeakForm, weak_form
+
+__all__ = ["Modal", "SpatialProblem", "separate"]
+
+
+@dataclass(frozen=True)
+class SpatialProblem:
+    """Homogeneous problem of the amplitudes in ``v(x, t) = phi(x) e^(i omega t)``, or ``phi(x) e^(s t)`` with damping.
+
+    Attributes
+    ----------
+    field_equations : tuple of Eq
+    boundary_conditions : tuple of BoundaryCondition
+    amplitudes : tuple of Expr
+        ``phi(x)`` of each field, then the amplitude of each lumped coordinate.
+    frequency : Symbol
+        omega, or s if ``damped``.
+    damped : bool
+    left_out : tuple of Expr
+        Prescribed motions and forces, which do not enter: generalised forces per length and at ends.
+    """
+
+    field_equations: tuple[Eq, ...]
+    boundary_conditions: tuple[BoundaryCondition, ...]
+    amplitudes: tuple[Expr, ...]
+    frequency: Symbol
+    damped: bool
+    left_out: tuple[Expr, ...]
+
+
+@dataclass(frozen=True)
+class Modal:
+    """Modes of a problem with constant coefficients in closed form.
+
+    Attributes
+    ----------
+    spatial_problem : SpatialProblem
+    basis : Basis
+        General solution; its ``values`` symbols stand for the functions at the right end.
+    characteristic_matrix : Matrix
+        Rows: conditions of the left end, lumped coordinates, conditions of the right end. Columns: constants of the
+        basis, amplitudes of the coordinates. Polynomial in the basis ``values``.
+    characteristic_polynomial : Expr
+        Its determinant over that of the initial state, so that its zeros are the eigenvalues and nothing else, without
+        factors that depend on no wave number; in the basis ``values``.
+    scale : Expr
+        ``det(characteristic_matrix) = scale * characteristic_polynomial``.
+    still : Matrix
+        Constant displacement of each field (rows) for a unit amplitude of each coordinate (columns).
+    position : Expr
+        x from the left end.
+    """
+
+    spatial_problem: SpatialProblem
+    basis: Basis
+    characteristic_matrix: Matrix
+    characteristic_polynomial: Expr
+    scale: Expr
+    still: Matrix
+
+    @property
+    def frequency(self) -> Symbol:
+        """Angular frequency omega, or s with damping."""
+        return self.spatial_problem.frequency
+
+    @property
+    def characteristic_function(self) -> Expr:
+        """The characteristic polynomial with the functions it stands for: zero at every eigenvalue."""
+        return self.characteristic_polynomial.xreplace(self.basis.values)
+
+    def null_vector(self, row: int = -1) -> tuple[Expr, ...]:
+        """Return constants that satisfy every condition but one: the cofactors of a row of the characteristic matrix.
+
+        At an eigenvalue the condition left out holds as well. The default leaves out the last one, of the right end.
+        The vector vanishes only if two solutions satisfy all others, which for a string or a beam with separate
+        conditions at its ends would be a repeated frequency of the problem with the last displacement held.
+        """
+        matrix, basis = self.characteristic_matrix, self.basis
+        variables = [*basis.values, *basis.wave_numbers, self.frequency]
+        return tuple(cofactors(matrix, row % matrix.rows, basis.relations, variables))
+
+    @cached_property
+    def coefficients(self) -> tuple[Expr, ...]:
+        """Constants of the mode shape and amplitudes of the coordinates, up to a factor, in the basis ``values``."""
+        return self.null_vector()
+
+    @property
+    def mode_shapes(self) -> tuple[Expr, ...]:
+        """Shape of each field as a function of x at an eigenvalue."""
+        row = Matrix([self.basis.functions])
+        constants = Matrix(self.coefficients[: len(self.basis.functions)])
+        moved = self.still * Matrix(self.still.cols, 1, self.coefficients[len(self.basis.functions) :])
+        shapes = (
+            Add(*(row * field * constants)) + still for field, still in zip(self.basis.fields, moved, strict=True)
+        )
+        return tuple(shape.xreplace(self.basis.values) for shape in shapes)
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """Steps from the separated equations to the mode shapes."""
+        problem = self.spatial_problem
+        names = ("Spatial problem", "General solution", "Characteristic equation", "Modes")
+        motion = r"e^{s t}" if problem.damped else r"e^{i \omega t}"
+        return (
+            Step(
+                names[0], f"All unknowns move as ${motion}$.", (*problem.field_equations, *problem.boundary_conditions)
+            ),
+            Step(
+                names[1],
+                "Functions that span the solutions.",
+                (self.basis.dispersion, *self.basis.functions),
+                names[:1],
+            ),
+            Step(
+                names[2],
+                "The conditions have a solution other than zero.",
+                Eq(self.characteristic_function, 0, evaluate=False),
+                names[:2],
+                "the exact dynamic stiffness and the Ritz matrices",
+            ),
+            Step(
+                names[3], "The solution, up to its amplitude.", self.mode_shapes, names[1:3], "the boundary conditions"
+            ),
+        )
+
+
+def separate(
+    result: HamiltonResult,
+    *,
+    parameters: Mapping[Symbol, Expr] | None = None,
+    basis: Literal["hyperbolic", "decaying"] = "hyperbolic",
+    frequency: Symbol | None = None,
+) -> Modal:
+    r"""Separate variables in the homogeneous linear problem and solve it in closed form.
+
+    Parameters
+    ----------
+    result : HamiltonResult
+    parameters : dict of Symbol to Expr, optional
+        Parameters in terms of others, for example dimensionless groups. A stiffness from 0 to infinity is the ratio
+        ``k: EI/L**3 * s/c`` of two finite numbers: denominators are cleared row by row, so both limits are ordinary.
+    basis : {'hyperbolic', 'decaying'}
+        For beams: ``cosh, sinh``, or ``exp(-beta x), exp(-beta (L - x))``, which stay bounded at any frequency.
+    frequency : Symbol, optional
+        Symbol for omega (or s).
+
+    Returns
+    -------
+    Modal
+
+    Raises
+    ------
+    HamiltonError
+        If the Lagrangian is not quadratic, its coefficients vary along x (`ritz` treats these), or the characteristic
+        equation has a root that is repeated at every frequency.
+
+    Examples
+    --------
+    >>> from sympy import Function, symbols
+    >>> from cra_sym.mechanics import hamilton
+    >>> x, t, T, rho, l, k, kappa = symbols("x t T rho l k kappa")
+    >>> y = Function("y")(x, t)
+    >>> string = hamilton(rho*y.diff(t)**2/2 - T*y.diff(x)**2/2, fields=[y], x=x, domain=(0, l), t=t,
+    ...                   right=-k*y**2/2, essential=[y.subs(x, 0)])
+    >>> modal = separate(string, parameters={k: kappa*T/l})
+    >>> modal.characteristic_function
+    (kappa*sin(lambda) + lambda*cos(lambda))/lambda
+    >>> modal.mode_shapes
+    (sin(lambda*x/l),)
+    """
+    weak = weak_form(result.variation)
+    if not weak.uniform:
+        raise HamiltonError(f"separate: {_varying(weak)} varies along {result.x}, so there is no closed form; use ritz")
+    given = (result.density, result.left, result.right, *result.essential)
+    names = Names([*given, *(force for force, _, _ in result.virtual_work)])
+    frequency = frequency or names("omega" if weak.even else "s")
+    spatial = _spatial_problem(weak, frequency)
+    solution = GeneralSolution(weak, frequency, basis, names)
+    matrix, start = solution.conditions(), solution.initial_state()
+    known = {**solution.known, **(parameters or {})}
+    rows, contents = primitive_rows(matrix.subs(known))
+    characteristic, scale = _characteristic(contents, rows, start.subs(known), solution.basis, frequency)
+    return Modal(spatial, solution.basis, rows, characteristic, scale, solution.still.subs(known))
+
+
+def _varying(weak: WeakForm) -> Expr:
+    x = weak.variation.space.x
+    return next(value for entry in weak.inside.values() for value in entry.values() if value.has(x))
+
+
+# ------------------------------------------------------------------------------------------------ the spatial problem
+
+
+def _spatial_problem(weak: WeakForm, frequency: Symbol) -> SpatialProblem:
+    space, forces = weak.variation.space, GeneralisedForces.of(weak.variation)
+    s = frequency if not weak.even else S.ImaginaryUnit * frequency
+    heads = {
+        number: Symbol(f"a_{unknown.func.__name__}")
+        if not space.is_field(number)
+        else Function("phi" if len(space.fields) == 1 else f"phi_{unknown.func.__name__}")(space.x)
+        for number, unknown in enumerate(space.unknowns)
+    }
+
+    def form(jet: Jet) -> Expr:
+        amplitude = heads[jet.unknown]
+        derivative = amplitude.diff(space.x, jet.space) if jet.space else amplitude
+        return derivative if jet.place is None else derivative.subs(space.x, space.ends[jet.place])
+
+    def amplitude(expression: Expr) -> Expr:
+        jets = space.jets(expression)
+        symbols = {jet._replace(time=0): space.symbol(jet._replace(time=0)) for jet in jets}
+        total = Add(*(expression.diff(space.symbol(j)) * s**j.time * symbols[j._replace(time=0)] for j in jets))
+        return grouped(total, symbols.values()).xreplace({symbol: form(jet) for jet, symbol in symbols.items()})
+
+    fields = []
+    for number in range(len(space.fields)):
+        inner, applied = forces.field_sides(number)
+        fields.append(Eq(amplitude(inner - applied), 0, evaluate=False))
+    conditions = []
+    for jet in forces.boundary_factors:
+        assert jet.place is not None
+        kind = "natural" if weak.variation.elimination.value(jet) is None else "essential"
+        left, right = map(amplitude, forces.condition_sides(jet))
+        conditions.append(BoundaryCondition(left, right, jet.place, varied_form(space, jet), form(jet), kind))
+    loads = [*weak.inside_load.values(), *weak.end_load.values(), *weak.variation.elimination.offsets.values()]
+    left_out = tuple(space.write(load) for load in loads if load != 0)
+    return SpatialProblem(tuple(fields), tuple(conditions), tuple(heads.values()), frequency, not weak.even, left_out)
+
+
+# ------------------------------------------------------------------------------------------------ the determinant
+
+
+def _characteristic(
+    contents: Sequence[Expr], rows: Matrix, start: Matrix, basis: Basis, frequency: Symbol
+) -> tuple[Expr, Expr]:
+    """Return the determinant over that of the initial state, and the scale by which that of the rows is larger.
+
+    Where the basis degenerates both determinants vanish; that drops out of the ratio.
+    """
+    element = determinant(rows, basis.relations)
+    if not element:
+        raise HamiltonError("separate: the conditions do not determine the solution")
+    start_rows, start_contents = primitive_rows(start)
+    initial = determinant(start_rows, basis.relations).as_expr()
+    rates = {*basis.wave_numbers, frequency}
+    numerator, denominator = (
+        _part(side, rates) for side in fraction(cancel(Mul(*contents) / Mul(*start_contents, initial)))
+    )
+    variables = [*basis.values, *rates]
+    core, factor = without_content(element, variables)
+    quotient, left_over = divided(core, denominator)
+    polynomial = collected(quotient, variables) * numerator / left_over
+    return polynomial, factor * denominator / (numerator * left_over)
+
+
+def _part(polynomial: Expr, variables: set[Symbol]) -> Expr:
+    """Return the product of those factors of a polynomial that hold one of the variables."""
+    _, factors = factor_list(polynomial)
+    return Mul(*(base**power for base, power in factors if base.free_symbols & variables))
