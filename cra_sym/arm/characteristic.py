@@ -116,14 +116,17 @@ def coefficients() -> Derivation:
 def derivatives() -> Derivation:
     """Return the determinant D, z D' and z^2 D'' (scaled alike) from its coefficients, z and the scaled basis."""
     names, _, monomials = zip(*_monomials(), strict=True)
-    value = sum(name * monomial for name, monomial in zip(names, monomials, strict=True))
-    first = sp.expand(theta(value)) / 4
-    second = sp.expand(theta(first)) / 4 - first
-
-    def structured(expression: sp.Expr) -> sp.Expr:
-        return sp.collect(sp.expand(expression), BASIS, lambda polynomial: sp.horner(polynomial, z))
-
-    return (structured(value), structured(first), structured(second)), (*names, z, *BASIS)
+    value = sp.Poly(sum(name * monomial for name, monomial in zip(names, monomials, strict=True)), *BASIS)
+    terms = [(value.coeff_monomial(x), x) for x in BASIS]
+    result: list[sp.Expr] = [sp.Integer(0)] * 3
+    for polynomial, x in terms:
+        factor = [sp.horner(z**n * polynomial.diff(z, n), z) for n in range(3)]
+        once = theta(x) / 4
+        function = [x, once, sp.expand(theta(once) / 4 - once)]  # x, z x' and z^2 x''
+        result[0] += factor[0] * function[0]
+        result[1] += factor[0] * function[1] + factor[1] * function[0]
+        result[2] += factor[0] * function[2] + 2 * factor[1] * function[1] + factor[2] * function[0]
+    return tuple(result), (*names, z, *BASIS)
 
 
 def power_series() -> Derivation:

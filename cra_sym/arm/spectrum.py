@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from cra_sym.kernels import derived_kernel
-from cra_sym.solvers.spectrum import spectrum
+from cra_sym.solvers.spectrum import Lanes, spectrum
 
 __all__ = ["ArmCharacteristic", "frequency_parameters", "pair"]
 
@@ -38,40 +40,46 @@ class ArmCharacteristic:
         self._coefficients = np.array(_COEFFICIENTS(*self._parameters))
         self.zeros = (kappa_t == 0).astype(np.int64) + (kappa_r == 0)
 
-    def count(self, z: float | np.ndarray, lanes: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """Return the exact number of zeros below z, rigid-body zeros included."""
-        parameters = self._parameters[:, lanes]
-        lam, unit, p, q, r, s = _basis(np.asarray(z, dtype=np.float64))
-        both_pinned, sprung, massive, translating, rotating = _CHAIN(*parameters, z, unit, p, q, r, s)
+    @cached_property
+    def _power_series(self) -> np.ndarray:
+        """Coefficients of the power series in z with the zeros at z = 0 divided out, shape (terms, lanes)."""
+        powers = np.array(_POWER_SERIES(*self._coefficients))
+        for multiplicity in (1, 2):
+            shifted = self.zeros >= multiplicity
+            powers[:-1, shifted], powers[-1, shifted] = powers[1:, shifted], 0.0
+        return powers
+
+    def count(self, z: float | np.ndarray, lanes: Lanes) -> tuple[np.ndarray, np.ndarray]:
+        """Return the exact number of zeros below z, rigid-body zeros included, and the scaled determinant."""
+        lam, *basis = _basis(np.asarray(z, dtype=np.float64))
+        both_pinned, sprung, massive, translating, rotating = _CHAIN(*self._parameters[:, lanes], z, *basis)
         number = np.floor(lam / np.pi).astype(np.int64)
         number = _with_parity(both_pinned, number, np.where(lam / np.pi - number < 0.5, -1, 1))
         number = _with_parity(sprung, number, -1)
         for value in (massive, translating, rotating):
             number = _with_parity(value, number, 1)
-        return number
+        return number, rotating
 
-    def evaluate(self, z: np.ndarray, lanes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def evaluate(self, z: np.ndarray, lanes: Lanes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the determinant and its derivatives by z, scaled; rigid-body zeros divided out for small z."""
         near = z < NEAR
         if not near.any():
             return self._evaluate_far(z, lanes)
         if near.all():
             return self._evaluate_near(z, lanes)
+        lanes = np.arange(len(self.zeros))[lanes]
         result = np.empty((3, z.size))
         result[:, near] = self._evaluate_near(z[near], lanes[near])
         result[:, ~near] = self._evaluate_far(z[~near], lanes[~near])
         return result[0], result[1], result[2]
 
-    def _evaluate_far(self, z: np.ndarray, lanes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _evaluate_far(self, z: np.ndarray, lanes: Lanes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         _, *basis = _basis_far(z)
         value, first, second = _DERIVATIVES(*self._coefficients[:, lanes], z, *basis)
         return value, first / z, second / z**2
 
-    def _evaluate_near(self, z: np.ndarray, lanes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        powers = np.array(_POWER_SERIES(*self._coefficients[:, lanes]))
-        for multiplicity in (1, 2):
-            shifted = self.zeros[lanes] >= multiplicity
-            powers[:-1, shifted], powers[-1, shifted] = powers[1:, shifted], 0.0
+    def _evaluate_near(self, z: np.ndarray, lanes: Lanes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        powers = self._power_series[:, lanes]
         value, first, second = powers[-1], np.zeros_like(z), np.zeros_like(z)
         for power in powers[-2::-1]:
             second = second * z + first
@@ -104,11 +112,8 @@ def frequency_parameters(
     shape = kappa_t.shape
     lanes = [value.reshape(-1) for value in (kappa_t, kappa_r, mu, iota)]
     result = np.empty((lanes[0].size, modes))
-    # the count grows by one in each interval of length pi, up to the four steps of the chain; the points keep
-    # away from multiples of pi / 4, where the zeros of the limiting arms gather
-    grid = ((np.arange(modes + 2) + 0.125) * np.pi) ** 4
     block = max(1, 32768 // (modes + 4))
     for start in range(0, len(result), block):
         part = slice(start, start + block)
-        result[part] = np.sqrt(np.sqrt(spectrum(ArmCharacteristic(*(x[part] for x in lanes)), modes, grid)))
+        result[part] = np.sqrt(np.sqrt(spectrum(ArmCharacteristic(*(x[part] for x in lanes)), modes)))
     return result.reshape(*shape, modes)

@@ -1,7 +1,8 @@
 """Complete spectra: the first zeros of an entire function with real zeros only, none missed and none doubled.
 
-An exact count says how many zeros lie below any point; Ostrowski's square-root step then climbs from a point between
-two zeros to either of them, monotonically and at cubic order, without ever passing it.
+An exact count says how many zeros lie below any point; Ostrowski's square-root step then climbs from a point next to
+a zero to that zero, at cubic order and without ever passing it. The functions are those of beams: in z = lambda^4, with
+zeros about pi apart in lambda.
 """
 
 from __future__ import annotations
@@ -10,13 +11,14 @@ from typing import Protocol
 
 import numpy as np
 
-__all__ = ["Characteristic", "spectrum"]
+__all__ = ["Characteristic", "Lanes", "spectrum"]
 
-_LARGEST_NUMBER_OF_STEPS = 80
+Lanes = np.ndarray | slice
+_MOST_STEPS = 80
 
 
 class Characteristic(Protocol):
-    """A family of characteristic functions, one in each lane, entire in z and with zeros z >= 0 only.
+    """A family of characteristic functions, one in each lane, entire in z, with zeros z >= 0 only.
 
     Attributes
     ----------
@@ -26,10 +28,13 @@ class Characteristic(Protocol):
 
     zeros: np.ndarray
 
-    def count(self, z: float | np.ndarray, lanes: np.ndarray | slice) -> np.ndarray:
-        """Return the number of zeros below z, those at 0 included, in the lanes asked for."""
+    def count(self, z: float | np.ndarray, lanes: Lanes) -> tuple[np.ndarray, np.ndarray]:
+        """Return the number of zeros below z, those at 0 included, and the function, in the lanes asked for.
 
-    def evaluate(self, z: np.ndarray, lanes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        The function's scale depends on z only, and is such that its size grows moderately with z.
+        """
+
+    def evaluate(self, z: np.ndarray, lanes: Lanes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the function and its first two derivatives by z, all multiplied by one positive factor.
 
         The sign of the function is that of (-1)**N, N the number of zeros below z. Up to some z the zeros at 0 may
@@ -37,7 +42,7 @@ class Characteristic(Protocol):
         """
 
 
-def spectrum(characteristic: Characteristic, modes: int, grid: np.ndarray) -> np.ndarray:
+def spectrum(characteristic: Characteristic, modes: int, offset: float = 1 / 16) -> np.ndarray:
     """Return the first zeros of every lane.
 
     Parameters
@@ -46,9 +51,9 @@ def spectrum(characteristic: Characteristic, modes: int, grid: np.ndarray) -> np
         The functions and their counts.
     modes : int
         How many zeros, multiplicity included.
-    grid : ndarray
-        Ascending positive z where zeros are counted first; at least ``modes`` zeros must lie below the last. The finer
-        it separates the zeros, the less is left to do.
+    offset : float
+        Zeros are counted where lambda is ``(k / 2 + offset) pi``, k = 0, 1, ...; best a value that keeps away from
+        where zeros gather.
 
     Returns
     -------
@@ -58,25 +63,35 @@ def spectrum(characteristic: Characteristic, modes: int, grid: np.ndarray) -> np
     Raises
     ------
     ArithmeticError
-        If too few zeros lie below the end of the grid, or a zero is not reached: the function is not of this kind.
+        If a zero is not reached: the function is not of this kind.
     """
     lanes = len(characteristic.zeros)
-    counts = np.array([characteristic.zeros, *(characteristic.count(z, slice(None)) for z in grid)], dtype=np.int64)
-    if lanes and counts[-1].min() < modes:
-        raise ArithmeticError(f"{counts[-1].min()} zeros lie below the end of the grid, {modes} are wanted")
+    points, counts, values = _counted(characteristic, modes, offset)
     number, lane = (index.ravel() for index in np.indices((modes, lanes)))
     right = _first_point_with(counts, modes)[number, lane]
     z = np.zeros(modes * lanes)
     wanted = np.flatnonzero(number >= characteristic.zeros[lane])
     number, lane, right = number[wanted], lane[wanted], right[wanted]
-    points = np.array([0.0, *grid])
-    bracket = points[right - 1], points[right], counts[right - 1, lane], counts[right, lane]
-    z[wanted] = _polished(characteristic, number, lane, _start(characteristic, number, lane, *bracket))
+    start = _start(characteristic, number, lane, right, points, counts, values)
+    z[wanted] = _climbed(characteristic, number, lane, start)
     return z.reshape(modes, lanes).T
 
 
+def _counted(characteristic: Characteristic, modes: int, offset: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return points lambda, up to one with enough zeros below it, the counts there and the functions."""
+    points, counts, values = [0.0], [characteristic.zeros], [np.full(len(characteristic.zeros), np.nan)]
+    while counts[-1].min(initial=modes) < modes:
+        if len(points) > 2 * modes + 40:
+            raise ArithmeticError(f"{counts[-1].min()} zeros lie below lambda = {points[-1]:g}, {modes} are wanted")
+        points.append(np.pi * ((len(points) - 1) / 2 + offset))
+        number, value = characteristic.count(points[-1] ** 4, slice(None))
+        counts.append(number)
+        values.append(value)
+    return np.array(points), np.array(counts), np.array(values)
+
+
 def _first_point_with(counts: np.ndarray, modes: int) -> np.ndarray:
-    """Return, for each number of zeros and each lane, the first grid point that has more than so many below it."""
+    """Return, for each number of zeros and each lane, the index of the first point that has more than so many below."""
     lanes = np.arange(counts.shape[1])
     points = np.zeros((modes + 1, counts.shape[1]), dtype=np.int64)
     for row in counts:
@@ -88,42 +103,83 @@ def _start(
     characteristic: Characteristic,
     number: np.ndarray,
     lane: np.ndarray,
+    right: np.ndarray,
+    points: np.ndarray,
+    counts: np.ndarray,
+    values: np.ndarray,
+) -> np.ndarray:
+    """Return points next to the wanted zeros: with ``number`` zeros below, or one more."""
+    low, high = points[right - 1] ** 4, points[right] ** 4
+    below, above = counts[right - 1, lane], counts[right, lane]
+    _separate(characteristic, number, lane, low, high, below, above)
+    first = number == characteristic.zeros[lane]
+    alone = ~first & (below == number) & (above == number + 1) & (right > 1)
+    z = np.where(below == number, low, high)
+    z[first] = _from_zero(characteristic, lane[first], high[first])
+    z[alone] = _by_phase(lane[alone], right[alone], points, values) ** 4
+    return z
+
+
+def _separate(
+    characteristic: Characteristic,
+    number: np.ndarray,
+    lane: np.ndarray,
     low: np.ndarray,
     high: np.ndarray,
-    count_low: np.ndarray,
-    count_high: np.ndarray,
-) -> np.ndarray:
-    """Return points with the wanted zero next to them: ``number`` zeros below, or one more."""
-    low, high, count_low, count_high = low.copy(), high.copy(), count_low.copy(), count_high.copy()
-    between = np.flatnonzero((count_low < number) & (number + 1 < count_high))
-    while between.size:
-        middle = np.where(low[between] > 0, np.sqrt(low[between] * high[between]), high[between] / 16)
-        counted = np.asarray(characteristic.count(middle, lane[between]))
-        below = counted <= number[between]
-        low[between[below]], count_low[between[below]] = middle[below], counted[below]
-        high[between[~below]], count_high[between[~below]] = middle[~below], counted[~below]
-        between = between[(count_low[between] < number[between]) & (number[between] + 1 < count_high[between])]
-    alone = (count_low == number) & (count_high == number + 1) & (low > 0)
-    middle = (np.sqrt(np.sqrt(low)) + np.sqrt(np.sqrt(high))) ** 4 / 16
-    return np.where(alone, middle, np.where(count_low == number, low, high))
+    below: np.ndarray,
+    above: np.ndarray,
+) -> None:
+    """Shrink, in place, brackets with other zeros on both sides of the wanted one until one side has none."""
+    crowded = np.flatnonzero((below < number) & (number + 1 < above))
+    while crowded.size:
+        middle = np.where(low[crowded] > 0, np.sqrt(low[crowded] * high[crowded]), high[crowded] / 16)
+        counted, _ = characteristic.count(middle, lane[crowded])
+        left = counted <= number[crowded]
+        low[crowded[left]], below[crowded[left]] = middle[left], counted[left]
+        high[crowded[~left]], above[crowded[~left]] = middle[~left], counted[~left]
+        crowded = crowded[(below[crowded] < number[crowded]) & (number[crowded] + 1 < above[crowded])]
 
 
-def _polished(characteristic: Characteristic, number: np.ndarray, lane: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Climb to the zeros from points next to them."""
+def _from_zero(characteristic: Characteristic, lane: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Return the lower bound of the first positive zero that the first step from z = 0 gives; it is close."""
+    value, slope, curvature = characteristic.evaluate(np.zeros(lane.size), lane)
+    return np.minimum(_step(value, slope, curvature), high)
+
+
+def _by_phase(lane: np.ndarray, right: np.ndarray, points: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return lambda of zeros that are alone in their intervals, from a sinusoid of growing amplitude.
+
+    Neighbouring points are a quarter of a period apart, so that two values in a row give amplitude and phase.
+    """
+    before, left, here = (values[right - shift, lane] for shift in (2, 1, 0))
+    growth = np.hypot(left, here) / np.hypot(before, left)  # nan next to the first point: no growth then
+    after = values[np.minimum(right + 1, len(values) - 1), lane]
+    growth *= np.where(right + 1 < len(values), np.hypot(here, after) / np.hypot(left, here), growth)
+    growth = np.where(growth > 0, np.sqrt(growth), 1.0)
+    turn = np.arctan2(np.abs(left) * growth, np.abs(here)) / (np.pi / 2)
+    return points[right - 1] + turn * (points[right] - points[right - 1])
+
+
+def _step(value: np.ndarray, slope: np.ndarray, curvature: np.ndarray) -> np.ndarray:
+    """Return Ostrowski's step, which is the root of one over the sum of (z - zero)^-2: no zero is nearer."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        step = np.abs(value) / np.sqrt(slope * slope - value * curvature)
+    return np.where(value == 0, 0.0, step)
+
+
+def _climbed(characteristic: Characteristic, number: np.ndarray, lane: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Climb, in place, to the zeros from points next to them."""
     active = np.arange(z.size)
     previous = np.zeros(z.size)  # the step before, none at first
     even = number % 2 == 0
-    for _ in range(_LARGEST_NUMBER_OF_STEPS):
+    for _ in range(_MOST_STEPS):
         if not active.size:
             return z
         value, slope, curvature = characteristic.evaluate(z[active], lane[active])
-        ascent = slope * slope - value * curvature  # positive between zeros, by a sum over all zeros
-        with np.errstate(invalid="ignore", divide="ignore"):
-            step = np.abs(value) / np.sqrt(ascent)
-        step[value == 0] = 0.0
+        step = _step(value, slope, curvature)
         z[active] += np.where((value > 0) == even[active], step, -step)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             remaining = step * (step / previous[active]) ** 3  # the order is three
         previous[active] = step
-        active = active[~((remaining <= 1e-17 * z[active]) | (step <= 4e-16 * z[active]))]
+        active = active[~((remaining <= 1e-16 * z[active]) | (step <= 4e-16 * z[active]))]
     raise ArithmeticError(f"{active.size} zeros were not reached")
