@@ -181,5 +181,5 @@ def _climbed(characteristic: Characteristic, number: np.ndarray, lane: np.ndarra
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             remaining = step * (step / previous[active]) ** 3  # the order is three
         previous[active] = step
-        active = active[~((remaining <= 1e-16 * z[active]) | (step <= 4e-16 * z[active]))]
+        active = active[~((remaining <= 1e-16 * z[active]) | (step <= 1e-13 * z[active]))]
     raise ArithmeticError(f"{active.size} zeros were not reached")
