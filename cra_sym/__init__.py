@@ -5,7 +5,9 @@ neither SymPy nor matplotlib is imported.
 """
 
 from importlib import import_module
+from time import time
 
+_LOADED = time()  # a derivation is stored only if no source is younger
 __version__ = "0.1.0"
 
 _HOME = {

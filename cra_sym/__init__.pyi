@@ -11,3 +11,4 @@ from .model import Model as Model
 from .studies import sweep as sweep
 
 __version__: str
+_LOADED: float

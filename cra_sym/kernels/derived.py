@@ -10,6 +10,7 @@ from importlib import import_module, metadata
 from pathlib import Path
 from typing import Any
 
+import cra_sym
 from cra_sym.kernels import store
 from cra_sym.kernels.callables import Kernel, kernel
 
@@ -68,26 +69,42 @@ def derived_kernel(path: str, *, backend: str | None = None) -> Kernel:
 
 @cache
 def _source_of(path: str) -> tuple[str, tuple[str, ...]]:
+    storable = _sources_are_what_runs()
     key = f"{path} {fingerprint()}"
-    content = store.load(key)
+    content = store.load(key) if storable else None
     if content is None:
         module, _, function = path.partition(":")
         made = kernel(*getattr(import_module(module), function)())
         content = json.dumps([made.source, made.arguments]).encode()
-        store.save(key, content)
+        if storable and _sources_are_what_runs():
+            store.save(key, content)
     source, arguments = json.loads(content)
     return source, tuple(arguments)
+
+
+def _sources() -> list[Path]:
+    paths = [_PACKAGE / name for name in _DERIVING]
+    return [
+        file for path in paths for file in (sorted(path.rglob("*.py")) if path.is_dir() else [path]) if file.is_file()
+    ]
+
+
+def _sources_are_what_runs() -> bool:
+    """Return whether the files on disk are the code in memory: there are some, and none is younger than the process's.
+
+    Otherwise the result of old code could be stored under the hash of new files.
+    """
+    files = _sources()
+    return bool(files) and all(file.stat().st_mtime <= cra_sym._LOADED for file in files)
 
 
 @cache
 def fingerprint() -> str:
     """Return the hash of everything a derivation depends on, without importing any of it."""
     digest = hashlib.sha256()
-    for name in _DERIVING:
-        path = _PACKAGE / name
-        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path] * path.is_file():
-            content = file.read_bytes()
-            digest.update(f"{file.relative_to(_PACKAGE).as_posix()} {len(content)}\n".encode() + content)
+    for file in _sources():
+        content = file.read_bytes()
+        digest.update(f"{file.relative_to(_PACKAGE).as_posix()} {len(content)}\n".encode() + content)
     digest.update(platform.python_implementation().encode() + platform.python_version().encode())
     for package in ("sympy", "numpy", "scipy", "numba"):
         digest.update(f"{package} {_version(package)}\n".encode())

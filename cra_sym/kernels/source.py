@@ -185,6 +185,7 @@ def _without_powers(
     """Turn integer powers into products by repeated squaring, sharing every intermediate power."""
     steps: list[tuple[sp.Symbol, sp.Expr]] = []
     known: dict[tuple[sp.Expr, int], sp.Symbol] = {}
+    aliases: dict[sp.Expr, sp.Expr] = {}
 
     def power(base: sp.Expr, exponent: int) -> sp.Expr:
         if exponent == 1 and base.is_Symbol:
@@ -202,7 +203,7 @@ def _without_powers(
 
     def rewrite(expression: sp.Expr) -> sp.Expr:
         if expression.is_Atom:
-            return expression
+            return aliases.get(expression, expression)
         terms = [rewrite(term) for term in expression.args]
         if expression.is_Pow and expression.exp.is_Integer and 1 < abs(expression.exp) <= _LONGEST_CHAIN:
             product = power(terms[0], abs(int(expression.exp)))
@@ -214,5 +215,8 @@ def _without_powers(
 
     for symbol, value in replacements:
         value = rewrite(value)
-        steps.append((symbol, value))
+        if value.is_Symbol:
+            aliases[symbol] = value
+        else:
+            steps.append((symbol, value))
     return steps, [rewrite(value) for value in outputs]

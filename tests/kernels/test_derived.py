@@ -72,6 +72,22 @@ def test_fingerprint_follows_sources_and_versions(monkeypatch, tmp_path):
     derived.fingerprint.cache_clear()
 
 
+def test_sources_edited_since_loading_are_not_vouched_for(private, monkeypatch, tmp_path):
+    assert derived._sources_are_what_runs()
+    (tmp_path / "model.py").write_text("edited = True\n")
+    os.utime(tmp_path / "model.py", (2e9, 4e9))
+    monkeypatch.setattr(derived, "_PACKAGE", tmp_path)
+    assert not derived._sources_are_what_runs()
+    namespace = {}
+    exec(PLANT, namespace)
+    assert derived_kernel(DERIVATION)(0.5, 1.0)["power"] == 0.5**5
+    assert not private.exists()
+    (tmp_path / "model.py").unlink()
+    assert not derived._sources_are_what_runs()  # a package without its sources
+    derived._source_of.cache_clear()
+    derived.fingerprint.cache_clear()
+
+
 def test_a_derived_kernel_pickles_as_what_it_is(private, monkeypatch):
     namespace = {}
     exec(PLANT, namespace)
