@@ -2,6 +2,7 @@
 
 from cra_sym.mechanics.hamilton import BoundaryCondition, HamiltonResult, hamilton
 from cra_sym.mechanics.jets import HamiltonError
+from cra_sym.mechanics.ritz import RitzMatrices, ritz
 from cra_sym.mechanics.separation import Modal, separate
 from cra_sym.mechanics.state_form import StateForm, state_form
 from cra_sym.mechanics.steps import Step, compact_latex
@@ -11,10 +12,12 @@ __all__ = [
     "HamiltonError",
     "HamiltonResult",
     "Modal",
+    "RitzMatrices",
     "StateForm",
     "Step",
     "compact_latex",
     "hamilton",
+    "ritz",
     "separate",
     "state_form",
 ]

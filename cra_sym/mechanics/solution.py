@@ -2,30 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Literal
 
 from sympy import Add, Expr, Matrix, S, Symbol, zeros
 
 from cra_sym.mechanics.basis import general_solution
 from cra_sym.mechanics.jets import HamiltonError, Jet
+from cra_sym.mechanics.names import Names
 from cra_sym.mechanics.state_form import end_displacements
 from cra_sym.mechanics.weak import WeakForm, polynomial
 
-__all__ = ["GeneralSolution", "Names"]
-
-
-class Names:
-    """Makes symbols whose names the given expressions do not use."""
-
-    def __init__(self, expressions: Iterable[Expr]) -> None:
-        self._used = {symbol.name for expression in expressions for symbol in S(expression).free_symbols}
-
-    def __call__(self, name: str) -> Symbol:
-        """Return a symbol of that name, with underscores appended if it is in use."""
-        while name in self._used:
-            name += "_"
-        return Symbol(name)
+__all__ = ["GeneralSolution"]
 
 
 class GeneralSolution:
