@@ -217,7 +217,8 @@ def __dir__() -> list[str]:
 
 
 @cache
-def _unit_dimension(unit: str) -> Dimension:
+def unit_dimension(unit: str) -> Dimension:
+    """Return the dimension of a unit such as ``N m/rad``."""
     above, _, below = unit.partition("/")
     total = Dimension()
     for part, sign in ((above, 1), (below, -1)):
@@ -243,7 +244,7 @@ def dimension(quantity: Any, given: Mapping[Any, Dimension] | None = None) -> Di
         If terms of different dimension are added, compared, or put into a function such as ``sin``.
     """
     if isinstance(quantity, str):
-        return _unit_dimension(row(quantity).unit)
+        return unit_dimension(row(quantity).unit)
     return _expression_dimension(quantity, given or {})
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from sympy import Expr, Matrix, S, Symbol, eye, zeros
 from sympy.core.function import AppliedUndef
+from sympy.core.symbol import uniquely_named_symbol
 
 from cra_sym.mechanics.equations import GeneralisedForces
 from cra_sym.mechanics.hamilton import HamiltonResult
@@ -91,7 +92,8 @@ def state_form(result: HamiltonResult) -> StateForm:
     [1]]))
     """
     weak = weak_form(result.variation)
-    parameter = Symbol("z") if weak.even else Symbol("s")
+    given = (value for form in (weak.inside, weak.ends) for entry in form.values() for value in entry.values())
+    parameter = uniquely_named_symbol("z" if weak.even else "s", [*given, *result.essential, *result.domain])
     section, _, _ = weak.fields()
     space, forces = result.variation.space, GeneralisedForces.of(result.variation)
     return StateForm(

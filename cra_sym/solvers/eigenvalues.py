@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .rayleigh import ritz_values
+from .rayleigh import quotients, ritz_values
 from .stiffness import DynamicStiffness, Evaluation, form
 
 __all__ = ["lowest", "refine"]
@@ -53,7 +53,7 @@ def lowest(problem: DynamicStiffness, modes: int) -> np.ndarray:
     for sweep in range(_SWEEPS):
         row, mode = np.nonzero(open_)
         if not row.size:
-            return _polish_low(problem, np.sort(result, axis=1), noise, bounds)
+            return _polish(problem, np.sort(result, axis=1), noise, bounds)
         z = _next_point(guess[row, mode], low[row, mode], high[row, mode], below[row, mode], above[row, mode], mode + 1)
         here = problem.evaluate(z, row)
         value, step, count, noise[row, mode] = _newton(here, mode + 1)
@@ -69,8 +69,10 @@ def lowest(problem: DynamicStiffness, modes: int) -> np.ndarray:
     raise ArithmeticError("the search for natural frequencies did not settle")
 
 
-def _polish_low(problem: DynamicStiffness, z: np.ndarray, noise: np.ndarray, bounds: np.ndarray) -> np.ndarray:
+def _polish(problem: DynamicStiffness, z: np.ndarray, noise: np.ndarray, bounds: np.ndarray) -> np.ndarray:
     """Replace the roots that are close to rounding, the first few of a row, by Ritz values of their shapes."""
+    if not problem.uniform:
+        z = quotients(problem, z)
     last = bounds.shape[1] - 1
     drowned = np.cumprod(noise > 1e-14 * z, axis=1).sum(axis=1)
     for number in np.unique(drowned[drowned > 0]):
@@ -86,13 +88,14 @@ def _rigid_count(static: Evaluation) -> np.ndarray:
         return np.zeros(len(static.matrix), dtype=int)
     value, vector = np.linalg.eigh(static.matrix)
     size = np.einsum("rij,rik,rkj->rj", np.abs(vector), np.abs(static.matrix), np.abs(vector))
-    unstable = static.fixed_count + (value < -_NOISE * size).sum(axis=1)
+    rounding = _NOISE * size + 4.0 * np.finfo(float).eps * np.abs(static.matrix).max(axis=(1, 2))[:, None]
+    unstable = static.fixed_count + (value < -rounding).sum(axis=1)
     if unstable.any():
         number, sets = int(unstable.max()), len(unstable)
         where = f", in {np.count_nonzero(unstable)} of {sets} parameter sets" if sets > 1 else ""
         plural = "s" if number > 1 else ""
         raise ValueError(f"the structure has buckled: {number} unstable mode{plural} (omega^2 < 0){where}")
-    return (np.abs(value) <= _NOISE * size).sum(axis=1)
+    return (np.abs(value) <= rounding).sum(axis=1)
 
 
 def _upper_bounds(problem: DynamicStiffness, static: Evaluation, modes: int):

@@ -11,7 +11,7 @@ import numpy as np
 from .shapes import mode_states
 from .stiffness import DynamicStiffness
 
-__all__ = ["ritz_values"]
+__all__ = ["quotients", "ritz_values"]
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 
@@ -34,29 +34,34 @@ def ritz_values(problem: DynamicStiffness, z: np.ndarray) -> np.ndarray:
     return np.linalg.eigvalsh(frame @ strain @ np.swapaxes(frame, -1, -2))
 
 
+def quotients(problem: DynamicStiffness, z: np.ndarray) -> np.ndarray:
+    """Return strain over kinetic energy of each mode: an error of the shape enters squared."""
+    strain, kinetic = _energies(problem, z)
+    return np.diagonal(strain, axis1=1, axis2=2) / np.diagonal(kinetic, axis1=1, axis2=2)
+
+
 def _energies(problem: DynamicStiffness, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the matrices of strain and kinetic energy of the modes, integrated panel by panel."""
     n, m = problem.displacements, problem.coordinates
     every = np.arange(len(z))
     reference = z[:, -1]
-    system, slope = problem.system(reference, every)
-    radius = np.abs(np.linalg.eigvals(system)).max(initial=0.0, axis=-1) * problem.length
-    panels = int(np.ceil(radius.max())) + 1
-    fraction = ((np.arange(panels)[:, None] + 0.5 * (1.0 + _POINTS)) / panels).ravel()
-    stations = problem.length[:, None] * np.concatenate([[0.0], fraction, [1.0]])
-    weight = problem.length[:, None] * np.tile(0.5 * _WEIGHTS / panels, panels)
-    state = mode_states(problem, z, stations)
-    inner = state[:, :, 1:-1]
-    strain_density, kinetic_density = _energy_densities(system, slope, reference, n, m)
+    system, _ = problem.system(reference, every, np.array([[0.0, 0.5, 1.0]]))
+    radius = np.abs(np.linalg.eigvals(system)).max(initial=0.0) * problem.length.max()
+    panels = int(np.ceil(radius)) + (1 if problem.uniform else 12)
+    share = ((np.arange(panels)[:, None] + 0.5 * (1.0 + _POINTS)) / panels).ravel()
+    state = mode_states(problem, z, np.broadcast_to(np.r_[0.0, share, 1.0], (len(z), len(share) + 2)))
+    inner = (
+        state[:, :, 1:-1]
+        * np.sqrt(problem.length[:, None] * np.tile(0.5 * _WEIGHTS / panels, panels))[:, None, :, None]
+    )
+    densities = _energy_densities(*problem.system(reference, every, share[None]), reference, n, m)
     end, end_slope = problem.boundary(reference, every)
+    lumped = end - reference[:, None, None] * end_slope, -end_slope
     edge = np.concatenate([state[:, :, 0, : n + m], state[:, :, -1, :n]], axis=-1)
     strain, kinetic = (
-        np.einsum("rs,risa,rab,rjsb->rij", weight, inner, density, inner, optimize=True)
-        + np.einsum("ria,rab,rjb->rij", edge, ends, edge)
-        for density, ends in (
-            (strain_density, end - reference[:, None, None] * end_slope),
-            (kinetic_density, -end_slope),
-        )
+        (inner[:, :, None] * (density[:, None, None] @ inner[:, None, ..., None])[..., 0]).sum(axis=(-2, -1))
+        + edge @ ends @ np.swapaxes(edge, -1, -2)
+        for density, ends in zip(densities, lumped, strict=True)
     )
     return strain, kinetic
 
@@ -66,13 +71,13 @@ def _energy_densities(system, slope, z, n: int, m: int) -> tuple[np.ndarray, np.
 
     With H = P q' - (U - z T) and A = [[H_P], [-H_q]]: T = dH/dz, and U = P H_P - H + z T.
     """
-    force = slice(n + m, 2 * n + m)
-    stiff = np.zeros((len(z), 2 * n + m, 2 * n + m))
+    motion, force = slice(0, n + m), slice(n + m, 2 * n + m)
+    stiff = np.zeros((*system.shape[:2], 2 * n + m, 2 * n + m))
     inertia = np.zeros_like(stiff)
-    inertia[:, : n + m, : n + m] = -slope[:, n + m :, : n + m]
-    inertia[:, force, force] = slope[:, :n, force]
-    inertia[:, force, : n + m] = slope[:, :n, : n + m]
-    inertia[:, : n + m, force] = np.swapaxes(slope[:, :n, : n + m], -1, -2)
-    stiff[:, : n + m, : n + m] = system[:, n + m :, : n + m]
-    stiff[:, force, force] = system[:, :n, force]
-    return stiff + z[:, None, None] * inertia, inertia
+    inertia[..., motion, motion] = -slope[..., n + m :, motion]
+    inertia[..., force, force] = slope[..., :n, force]
+    inertia[..., force, motion] = slope[..., :n, motion]
+    inertia[..., motion, force] = np.swapaxes(slope[..., :n, motion], -1, -2)
+    stiff[..., motion, motion] = system[..., n + m :, motion]
+    stiff[..., force, force] = system[..., :n, force]
+    return stiff + z[:, None, None, None] * inertia, inertia

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from .stiffness import TERMS, DynamicStiffness, Evaluation, Tree
+from .stiffness import GOLDEN, TERMS, DynamicStiffness, Evaluation, Tree, form
 
 __all__ = ["mode_states"]
 
 
-def mode_states(problem: DynamicStiffness, z: np.ndarray, x: np.ndarray, derivative: int = 0) -> np.ndarray:
-    """Return the state (q, w, P) of every mode at the stations x, mass-normalised.
+def mode_states(problem: DynamicStiffness, z: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Return the state (q, w, P) of every mode at the stations, mass-normalised.
 
     Parameters
     ----------
     problem : DynamicStiffness
     z : ndarray, shape (rows, modes)
         Roots, from `lowest` or `refine`. Equal roots get independent, mass-orthogonal shapes.
-    x : ndarray, shape (rows, stations)
-        Distance from the left end, within the length.
-    derivative : int
-        Order of the derivative by x.
+    share : ndarray, shape (rows, stations)
+        Distance from the left end in lengths, 0 to 1.
 
     Returns
     -------
@@ -35,10 +33,11 @@ def mode_states(problem: DynamicStiffness, z: np.ndarray, x: np.ndarray, derivat
     assert here.tree is not None
     u = _null_vectors(here, place, rows, modes)
     nodal = np.einsum("rij,rj->ri", here.unit, u)
-    state = np.empty((rows * modes, x.shape[1], 2 * problem.displacements + problem.coordinates), dtype=u.dtype)
+    state = np.empty((rows * modes, share.shape[1], 2 * problem.displacements + problem.coordinates), dtype=u.dtype)
     for level in np.unique(here.tree.levels):
         member = np.nonzero(here.tree.levels == level)[0]
-        state[member] = _spread(problem, here.tree, nodal[member], member, int(level), x[row[member]], derivative)
+        start = _spread(problem, here.tree, nodal[member], member, int(level))
+        state[member] = _carry(problem, z.ravel()[member], row[member], start, int(level), share[row[member]])
     return state.reshape(rows, modes, *state.shape[1:])
 
 
@@ -67,49 +66,46 @@ def _null_vectors(here: Evaluation, place: np.ndarray, rows: int, modes: int) ->
     for i in range(modes):
         for back in range(1, int(place[:, i].max(initial=0)) + 1):
             tied = (place[:, i] >= back)[:, None]
-            overlap = np.einsum("ri,rij,rj->r", u[:, i - back], mass[:, i], u[:, i])[:, None]
+            overlap = (u[:, i - back] * (mass[:, i] @ u[:, i, :, None])[..., 0]).sum(axis=1)[:, None]
             u[:, i] -= np.where(tied, overlap * u[:, i - back], 0.0)
-        u[:, i] /= np.sqrt(np.einsum("ri,rij,rj->r", u[:, i], mass[:, i], u[:, i]))[:, None]
+        u[:, i] /= np.sqrt(form(u[:, i], mass[:, i]))[:, None]
     return u.reshape(rows * modes, -1)
 
 
-def _spread(problem: DynamicStiffness, tree: Tree, nodal, member, level: int, x, derivative: int) -> np.ndarray:
-    """Back-substitute to all nodes of the given members, then transfer the state to the stations."""
+def _spread(problem: DynamicStiffness, tree: Tree, nodal, member, level: int) -> np.ndarray:
+    """Back-substitute to all nodes; return the state at the left of every piece, (part, member, piece, state)."""
     n, m = problem.displacements, problem.coordinates
     left, w = nodal[:, :n], nodal[:, n : n + m]
     right, middle = nodal[:, n + m : 2 * n + m], nodal[:, 2 * n + m :]
     nodes = np.stack([np.stack([left, middle], axis=1), np.stack([middle, right], axis=1)])
     for step in range(level):
-        x_matrix = tree.middles[len(tree.middles) - 1 - step][:, member]
-        start, end = nodes[:, :, :-1], nodes[:, :, 1:]
-        lumped = np.broadcast_to(w[None, :, None], (*start.shape[:-1], m))
-        halves = -np.einsum("prij,prkj->prki", x_matrix, np.concatenate([start, lumped, end], axis=-1))
-        finer = np.empty((2, len(member), 2 * start.shape[2] + 1, n), dtype=halves.dtype)
-        finer[:, :, ::2], finer[:, :, 1::2] = nodes, halves
+        elimination = tree.middles[len(tree.middles) - 1 - step][:, member]
+        ends = _with_lumped(nodes[:, :, :-1], w, nodes[:, :, 1:])
+        finer = np.empty((2, len(member), 2 * nodes.shape[2] - 1, n), dtype=nodal.dtype)
+        finer[:, :, ::2], finer[:, :, 1::2] = nodes, -(elimination @ ends[..., None])[..., 0]
         nodes = finer
-    scale = tree.scale[member][None, :, None, :n]
-    lumped = np.broadcast_to(w[None, :, None], (*nodes[:, :, :-1].shape[:-1], m))
-    ends = np.concatenate([nodes[:, :, :-1] * scale, lumped, nodes[:, :, 1:] * scale], axis=-1)
-    force = -np.einsum("prij,prkj->prki", tree.start[:, member], ends)
-    gathered = np.zeros((*force.shape[:-1], m))
-    start_state = np.concatenate([ends[..., : n + m], force, gathered], axis=-1)
-    return _transfer_to(tree, member, start_state, x, derivative)[..., : 2 * n + m]
+    nodes = nodes * tree.scale[member][None, :, None, :n]
+    ends = _with_lumped(nodes[:, :, :-1], w, nodes[:, :, 1:])
+    force = -(tree.start[:, member] @ ends[..., None])[..., 0]
+    return np.concatenate([ends[..., : n + m], force, np.zeros((*force.shape[:-1], m))], axis=-1)
 
 
-def _transfer_to(tree: Tree, member, start_state, x, derivative: int) -> np.ndarray:
-    """Carry the state from the node left of each station to the station by the Taylor series of ``exp(A xi)``."""
-    boundary = tree.piece[0, member] * 2.0 ** tree.levels[member]
-    part = (x > boundary[:, None]).astype(int)
-    inside = x - np.where(part, boundary[:, None], 0.0)
-    piece = tree.piece[part, member[:, None]]
-    index = np.clip((inside / piece).astype(int), 0, start_state.shape[2] - 1)
-    xi = (inside - index * piece)[..., None]
-    state = start_state[part, np.arange(len(member))[:, None], index]
-    system = tree.system[member]
-    for _ in range(derivative):
-        state = np.einsum("rij,rsj->rsi", system, state)
-    total, term = state.copy(), state
+def _with_lumped(start: np.ndarray, w: np.ndarray, end: np.ndarray) -> np.ndarray:
+    lumped = np.broadcast_to(w[None, :, None], (*start.shape[:-1], w.shape[-1]))
+    return np.concatenate([start, lumped, end], axis=-1)
+
+
+def _carry(problem: DynamicStiffness, z, row, start, level: int, share) -> np.ndarray:
+    """Carry the state from the node left of each station to the station by the Taylor series of ``exp(Omega)``."""
+    n, m = problem.displacements, problem.coordinates
+    part = (share > GOLDEN).astype(int)
+    origin = np.where(part, GOLDEN, 0.0)
+    piece = np.where(part, 1.0 - GOLDEN, GOLDEN) / 2.0**level
+    index = np.clip(((share - origin) / piece).astype(int), 0, start.shape[2] - 1)
+    node = origin + index * piece
+    exponent, _ = problem.exponent(z, row, node, share - node)
+    total = term = start[part, np.arange(len(row))[:, None], index][..., None]
     for j in range(1, TERMS + 1):
-        term = np.einsum("rij,rsj->rsi", system, term) * (xi / j)
+        term = exponent @ term / j
         total = total + term
-    return total
+    return total[..., : 2 * n + m, 0]

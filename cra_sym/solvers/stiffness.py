@@ -1,15 +1,17 @@
-"""Exact dynamic stiffness of any linear one-dimensional continuum, and every natural frequency it has.
+"""Exact dynamic stiffness of any linear one-dimensional continuum, with the count of its natural frequencies.
 
-The spatial problem is a first-order system ``y' = A(z) y`` with ``z = omega^2`` (or any analytic parameter, such as a
+The spatial problem is a first-order system ``y' = A y`` with ``z = omega^2`` (or any analytic parameter, such as a
 complex Laplace variable), ``y = (q, w, P, r)``: displacements, lumped coordinates (constant in x), the natural forces
-conjugate to q, and the force gathered by each coordinate. A piece so short that ``exp(A h)`` is harmless is doubled by
-eliminating its middle displacements, so no large exponential and no choice of basis functions is ever needed.
+conjugate to q, and the force gathered by each coordinate. A piece so short that its ``exp`` is harmless is joined to
+its neighbour by eliminating the displacements between them, and so on: no large exponential and no choice of basis
+functions is ever needed. If A is constant along x, all pieces are alike and joining is doubling.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -21,19 +23,25 @@ GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 TERMS = 22
 """Taylor terms of ``exp(A h)``: with a spectral radius of at most one the remainder is below 1/22!."""
 
+_GAUSS = 0.5 + np.array([-1.0, 0.0, 1.0]) * np.sqrt(15.0) / 10.0
+
+Dual = tuple[np.ndarray, np.ndarray]
+"""A stack of matrices and its derivative by the parameter."""
+
 _EPS = np.finfo(float).eps
 
 
 @dataclass(frozen=True)
 class Tree:
-    """What back-substitution needs: the middle ``-X (q0, w, qh)`` at every level, and ``-P0 = W (q0, w, qh)``."""
+    """What back-substitution needs: the middle ``-X (q0, w, qh)`` at every level, and ``-P0 = W (q0, w, qh)``.
+
+    Arrays lead with (part, row, piece); all pieces of a uniform part are alike and stored once.
+    """
 
     levels: np.ndarray
     scale: np.ndarray
     start: np.ndarray
     middles: list[np.ndarray]
-    system: np.ndarray
-    piece: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -70,8 +78,8 @@ class Evaluation:
         return self.poles + np.trace(_inverse(self.matrix) @ self.derivative, axis1=-2, axis2=-1)
 
 
-Coefficients = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
-"""``(z, rows) -> (matrix, its derivative by z)``, both of shape (len(z), size, size)."""
+Coefficients = Callable[..., Dual]
+"""A matrix and its derivative by z, one of each for every entry of z (and station)."""
 
 
 @dataclass(frozen=True)
@@ -81,8 +89,10 @@ class DynamicStiffness:
     Parameters
     ----------
     system : callable
-        ``system(z, rows) -> (A, dA/dz)``, each (len(z), 2(n + m), 2(n + m)), in the order (q, w, P, r) where P is the
-        derivative of potential minus kinetic energy density by q', and r' the same by w.
+        ``system(z, rows, share) -> (A, dA/dz)`` at the stations ``share * length``, where ``share`` has the shape
+        (len(z), stations) or (1, stations); each (len(z), stations, 2(n + m), 2(n + m)), in the order (q, w, P, r)
+        where P is the derivative of potential minus kinetic energy density by q', and r' the same by w. A uniform
+        system may return one station for all.
     boundary : callable
         ``boundary(z, rows) -> (B, dB/dz)``, each (len(z), 2 n + m, 2 n + m): what the ends and the lumped terms add to
         the dynamic stiffness, in the order (q(0), w, q(L)).
@@ -91,6 +101,11 @@ class DynamicStiffness:
         n and m.
     free : ndarray, shape (2 n + m, f) or (rows, 2 n + m, f), optional
         Columns span the motions that the essential conditions allow. Default: everything is free.
+    uniform : bool
+        Whether A is constant along x. Then the result is exact to rounding; otherwise each piece is a sixth-order
+        Magnus step, ``2**halvings`` or more to a part.
+    halvings : int
+        Least number of times a part that is not uniform is halved.
     """
 
     system: Coefficients
@@ -99,12 +114,14 @@ class DynamicStiffness:
     displacements: int
     coordinates: int = 0
     free: np.ndarray | None = None
+    uniform: bool = True
+    halvings: int = 6
 
     def take(self, rows: np.ndarray) -> DynamicStiffness:
         """Return the problem of some of the parameter sets."""
         return replace(
             self,
-            system=lambda z, index: self.system(z, rows[index]),
+            system=lambda z, index, share: self.system(z, rows[index], share),
             boundary=lambda z, index: self.boundary(z, rows[index]),
             length=self.length[rows],
             free=self.free[rows] if self.free is not None and self.free.ndim == 3 else self.free,
@@ -113,37 +130,79 @@ class DynamicStiffness:
     def evaluate(self, z: np.ndarray, rows: np.ndarray, *, keep_tree: bool = False) -> Evaluation:
         """Condense the whole domain at ``z[i]`` for the parameter sets ``rows[i]``."""
         n, m = self.displacements, self.coordinates
-        system, system_slope = self.system(z, rows)
-        parts = self.length[rows] * np.array([[GOLDEN], [1.0 - GOLDEN]])
-        levels = _levels(system, parts[0])
-        piece = parts / 2.0**levels
-        transfer, transfer_slope = _transfer(system, system_slope, piece)
-        matrix, slope, start, growth = _short_piece(transfer, transfer_slope, n, m)
-        growth = growth * 2.0**levels
-
-        diagonal = np.arange(n)
-        scale = 1.0 / np.sqrt(
-            np.abs(matrix[..., diagonal, diagonal] + matrix[..., n + m :, n + m :][..., diagonal, diagonal])
-        )
-        scale = np.broadcast_to(scale.min(axis=0), scale.shape)
-        unit = np.concatenate([scale, np.ones((*scale.shape[:-1], m)), scale], axis=-1)
-        matrix, slope = _rescale(matrix, unit), _rescale(slope, unit)
+        levels = self._levels(z, rows)
+        matrix, slope, start, growth = _short_piece(*self._transfer(z, rows, levels), n, m)
+        ends = np.diagonal(matrix, axis1=-2, axis2=-1)
+        scale = 1.0 / np.sqrt(np.abs(ends[..., :n] + ends[..., n + m :])).max(axis=(0, 2))
+        unit = np.concatenate([scale, np.ones((len(z), m)), scale], axis=-1)
+        matrix, slope = (_rescale(a, unit[:, None]) for a in (matrix, slope))
 
         symmetric = not np.iscomplexobj(matrix)
-        fixed = np.zeros(parts.shape, dtype=int)
-        middles = []
+        fixed = np.zeros(growth.shape, dtype=int)
+        growth = growth * 2.0 ** levels[:, None] if self.uniform else growth
+        poles, middles = growth.sum(axis=(0, 2)), []
         for level in range(int(levels.max(initial=0)), 0, -1):
             on = levels >= level
-            joined = _join(matrix[:, on], slope[:, on], n, m)
-            matrix[:, on], slope[:, on], middle, eliminated, trace = joined
-            if symmetric:
-                fixed[:, on] = 2 * fixed[:, on] + negatives(eliminated)
-            growth[:, on] += trace * 2.0 ** (level - 1)
+            if self.uniform:
+                pairs = [(a[:, on], a[:, on]) for a in (matrix, slope, fixed)]
+            else:
+                pairs = [(a[:, :, 0::2], a[:, :, 1::2]) for a in (matrix, slope, fixed)]
+            joined, joined_slope, middle, eliminated, trace = _join(*pairs[0], *pairs[1], n, m)
+            count = sum(pairs[2]) + (negatives(eliminated) if symmetric else 0)
+            if self.uniform:
+                matrix[:, on], slope[:, on], fixed[:, on] = joined, joined_slope, count
+            else:
+                matrix, slope, fixed = joined, joined_slope, count
+            poles[on] += trace.sum(axis=(0, 2)) * (2.0 ** (level - 1) if self.uniform else 1.0)
             if keep_tree:
-                middles.append(np.zeros((2, *on.shape, *middle.shape[-2:]), dtype=middle.dtype))
+                middles.append(np.zeros((2, *on.shape, *middle.shape[2:]), dtype=middle.dtype))
                 middles[-1][:, on] = middle
-        tree = Tree(levels, unit[0], start, middles, system, piece) if keep_tree else None
-        return self._assemble(z, rows, matrix, slope, unit[0], fixed.sum(axis=0), growth.sum(axis=0), tree)
+        tree = Tree(levels, unit, start, middles) if keep_tree else None
+        return self._assemble(z, rows, matrix[:, :, 0], slope[:, :, 0], unit, fixed.sum(axis=(0, 2)), poles, tree)
+
+    def _levels(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Return how often to halve, so that every exponent of the longer part is at most one on a piece.
+
+        A scalar equation with exponents lambda has no clamped-clamped frequency below z on a piece shorter than
+        pi / max |Im lambda| (Polya's disconjugacy), so a piece this short starts the count at zero with a margin of
+        three.
+        """
+        share = np.linspace(0.0, 1.0, 1 if self.uniform else 17)[None]
+        system, _ = self.system(z, rows, share)
+        radius = np.abs(np.linalg.eigvals(system)).max(axis=(-2, -1), initial=0.0)
+        levels = np.ceil(np.log2(np.maximum(radius * self.length[rows] * GOLDEN, 1.0))).astype(int)
+        return levels if self.uniform else np.full_like(levels, max(self.halvings, levels.max(initial=0) + 2))
+
+    def _transfer(self, z: np.ndarray, rows: np.ndarray, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the transfer matrices of all pieces and their derivatives, (part, row, piece, ...)."""
+        pieces = 2.0 ** levels[:, None]
+        if self.uniform:
+            share = np.array([GOLDEN, 1.0 - GOLDEN])[:, None, None] / pieces
+            start = np.zeros_like(share)
+        else:
+            number = 2 ** int(levels.max(initial=0))
+            share = np.repeat(np.array([GOLDEN, 1.0 - GOLDEN])[:, None, None] / number, number, axis=2)
+            start = np.arange(number) * share + np.array([0.0, GOLDEN])[:, None, None]
+        parts = [exponential(*self.exponent(z, rows, start[part], share[part])) for part in (0, 1)]
+        return np.stack([t for t, _ in parts]), np.stack([dt for _, dt in parts])
+
+    def exponent(self, z: np.ndarray, rows: np.ndarray, start: np.ndarray, share: np.ndarray) -> Dual:
+        """Return Omega of the transfer ``exp(Omega)`` over each step, from ``start`` on ``share`` of the length.
+
+        Uniform: A h. Otherwise the sixth-order Magnus expansion on three Gauss points (Blanes, Casas, Oteo and Ros,
+        Physics Reports 470, 2009), which keeps the Hamiltonian structure, so that the stiffness stays symmetric.
+        """
+        width = (self.length[rows][:, None] * share)[..., None, None]
+        if self.uniform:
+            return tuple(a * width for a in self.system(z, rows, start))  # type: ignore[return-value]
+        first, second, third = (self.system(z, rows, start + share * point) for point in _GAUSS)
+        b1 = _combine((width, second))
+        b2 = _combine((width * np.sqrt(15.0) / 3.0, third), (-width * np.sqrt(15.0) / 3.0, first))
+        b3 = _combine((width * 10.0 / 3.0, third), (-width * 20.0 / 3.0, second), (width * 10.0 / 3.0, first))
+        c1 = _commutator(b1, b2)
+        c2 = _combine((-1.0 / 60.0, _commutator(b1, _combine((2.0, b3), (1.0, c1)))))
+        inner = _commutator(_combine((-20.0, b1), (-1.0, b3), (1.0, c1)), _combine((1.0, b2), (1.0, c2)))
+        return _combine((1.0, b1), (1.0 / 12.0, b3), (1.0 / 240.0, inner))
 
     def _assemble(self, z, rows, matrix, slope, unit, fixed, growth, tree) -> Evaluation:
         """Join the two parts at a node that stays, add the ends, keep the free coordinates, balance."""
@@ -176,31 +235,25 @@ def negatives(matrix: np.ndarray) -> np.ndarray:
     return (np.linalg.eigvalsh(matrix) < 0.0).sum(axis=-1)
 
 
-def _levels(system: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """Return how often to halve, so that every exponent of the longer part is at most one on a piece.
-
-    A scalar equation with exponents lambda has no clamped-clamped frequency below z on a piece shorter than
-    pi / max |Im lambda| (Polya's disconjugacy), so a piece this short starts the count at zero with a margin of three.
-    """
-    radius = np.abs(np.linalg.eigvals(system)).max(axis=-1, initial=0.0)
-    return np.ceil(np.log2(np.maximum(radius * length, 1.0))).astype(int)
+def _combine(*terms: tuple[Any, Dual]) -> Dual:
+    return sum(c * a for c, (a, _) in terms), sum(c * da for c, (_, da) in terms)  # type: ignore[return-value]
 
 
-def _transfer(system: np.ndarray, slope: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return ``exp(A h)`` and its derivative by the parameter: their Taylor series, exact to rounding for short h.
+def _commutator(first: Dual, second: Dual) -> Dual:
+    (a, da), (b, db) = first, second
+    return a @ b - b @ a, da @ b + a @ db - db @ a - b @ da
 
-    The parts share the powers of A: the terms of the right part are those of the left one times a constant.
-    """
-    a, da = system * piece[0][:, None, None], slope * piece[0][:, None, None]
-    term, term_slope = np.broadcast_to(np.eye(a.shape[-1], dtype=a.dtype), a.shape), np.zeros_like(a)
-    total, total_slope = np.stack([term, term]), np.zeros((2, *a.shape), dtype=a.dtype)
-    ratio = (1.0 - GOLDEN) / GOLDEN
+
+def exponential(a: np.ndarray, da: np.ndarray) -> Dual:
+    """Return ``exp(a)`` and its derivative: their Taylor series, exact to rounding for a short piece."""
+    term = np.broadcast_to(np.eye(a.shape[-1], dtype=a.dtype), a.shape)
+    term_slope = np.zeros_like(a)
+    total, total_slope = term.copy(), term_slope.copy()
     for j in range(1, TERMS + 1):
         term_slope = (da @ term + a @ term_slope) / j
         term = a @ term / j
-        for sums, addend in ((total, term), (total_slope, term_slope)):
-            sums[0] += addend
-            sums[1] += ratio**j * addend
+        total += term
+        total_slope += term_slope
     return total, total_slope
 
 
@@ -225,22 +278,22 @@ def _short_piece(t: np.ndarray, dt: np.ndarray, n: int, m: int):
     return _symmetric(matrix), _symmetric(slope), start, growth
 
 
-def _join(k: np.ndarray, dk: np.ndarray, n: int, m: int):
-    """Join each piece to a copy of itself; return K, K', X, the eliminated matrix, and tr(K_mm^-1 K_mm')."""
+def _join(left, right, left_slope, right_slope, n: int, m: int):
+    """Join each piece to its right neighbour; return K, K', X, the eliminated matrix, and tr(K_mm^-1 K_mm')."""
     a, b = slice(0, n), slice(n + m, 2 * n + m)
     w = slice(n, n + m)
 
-    def blocks(k):
+    def blocks(k, h):
         outer = np.zeros_like(k)
-        outer[..., a, a], outer[..., b, b], outer[..., w, w] = k[..., a, a], k[..., b, b], 2.0 * k[..., w, w]
+        outer[..., a, a], outer[..., b, b], outer[..., w, w] = k[..., a, a], h[..., b, b], k[..., w, w] + h[..., w, w]
         outer[..., a, w], outer[..., w, a] = k[..., a, w], k[..., w, a]
-        outer[..., b, w], outer[..., w, b] = k[..., b, w], k[..., w, b]
-        across = np.concatenate([k[..., b, a], k[..., b, w] + k[..., a, w], k[..., a, b]], axis=-1)
-        back = np.concatenate([k[..., a, b], k[..., w, b] + k[..., w, a], k[..., b, a]], axis=-2)
-        return outer, across, back, k[..., b, b] + k[..., a, a]
+        outer[..., b, w], outer[..., w, b] = h[..., b, w], h[..., w, b]
+        across = np.concatenate([k[..., b, a], k[..., b, w] + h[..., a, w], h[..., a, b]], axis=-1)
+        back = np.concatenate([k[..., a, b], k[..., w, b] + h[..., w, a], h[..., b, a]], axis=-2)
+        return outer, across, back, k[..., b, b] + h[..., a, a]
 
-    outer, across, back, middle = blocks(k)
-    d_outer, d_across, d_back, d_middle = blocks(dk)
+    outer, across, back, middle = blocks(left, right)
+    d_outer, d_across, d_back, d_middle = blocks(left_slope, right_slope)
     inverse = _inverse(middle)
     x, y = inverse @ across, back @ inverse
     joined = outer - back @ x

@@ -1,0 +1,301 @@
+"""One object from any quadratic Lagrangian to its equations, complete spectrum, mode shapes and kernels."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from sympy import Derivative, Expr, S, Symbol, sympify
+from sympy.core.function import AppliedUndef
+
+from cra_sym.checks import count, real_array
+from cra_sym.kernels import Kernel, kernel
+from cra_sym.mechanics import HamiltonResult, Modal, StateForm, hamilton, separate, state_form
+from cra_sym.model.modes import Modes
+from cra_sym.model.spatial import SpatialProblem
+from cra_sym.model.units import check_dimensions
+from cra_sym.model.values import Values
+from cra_sym.solvers.eigenvalues import lowest
+from cra_sym.solvers.shapes import mode_states
+
+__all__ = ["Model"]
+
+_TAU = 2.0 * np.pi
+
+
+class Model:
+    r"""A one-dimensional continuum defined by its Lagrangian.
+
+    Parameters
+    ----------
+    density : Expr
+        Lagrangian density: kinetic minus potential energy per length.
+    fields : sequence of applied undefined functions
+        ``v(x, t)``, as many as are needed.
+    x, t : Symbol
+    domain : (left, right)
+        End coordinates.
+    left, right : Expr, optional
+        Lagrangian of each end, in ``v(x, t)`` and its derivatives, understood at that end. Nothing means a free end.
+    essential : sequence of Expr, optional
+        What vanishes at an end, such as ``v.subs(x, 0)``.
+    coordinates : sequence of applied undefined functions, optional
+        Lumped coordinates ``w(t)``.
+    virtual_work : sequence of (force, displacement, place), optional
+        Non-conservative forces; place is 'left', 'right' or 'domain'.
+    units : mapping, optional
+        Units of symbols that are not those of ``cra_sym.symbols``, such as ``{c: "N s/m"}``. Every term whose symbols
+        all have a known unit must be an energy (per length in the density).
+
+    Raises
+    ------
+    ValueError
+        Names the term that cannot be treated, or whose dimension is wrong.
+
+    Notes
+    -----
+    Values are given as a mapping from symbols, or their names, to numbers or arrays that broadcast together; the
+    batch axes come first in every result. The stiffness of a spring at an end may be ``inf``.
+
+    Examples
+    --------
+    A string with an end mass and a spring:
+
+    >>> from sympy import Function, symbols
+    >>> x, t, T, rho, l, m, k = symbols("x t T rho l m k")
+    >>> y = Function("y")(x, t)
+    >>> string = Model(rho*y.diff(t)**2/2 - T*y.diff(x)**2/2, fields=[y], x=x, domain=(0, l), t=t,
+    ...                left=-k*y**2/2, right=m*y.diff(t)**2/2)
+    >>> string.natural_frequencies({T: 1, rho: 1, l: 1, m: 0, k: float("inf")}, modes=3)
+    array([0.25, 0.75, 1.25])
+    """
+
+    def __init__(
+        self,
+        density: Expr,
+        *,
+        fields: Sequence[AppliedUndef],
+        x: Symbol,
+        domain: tuple[Any, Any],
+        t: Symbol,
+        left: Expr | None = None,
+        right: Expr | None = None,
+        essential: Sequence[Expr] = (),
+        coordinates: Sequence[AppliedUndef] = (),
+        virtual_work: Sequence[tuple[Expr, Expr, Any]] | None = None,
+        units: Mapping[Any, str] | None = None,
+    ) -> None:
+        self._options: dict[str, Any] = {
+            "fields": tuple(fields),
+            "coordinates": tuple(coordinates),
+            "x": x,
+            "domain": tuple(domain),
+            "t": t,
+            "left": left,
+            "right": right,
+            "essential": tuple(essential or ()),
+        }
+        self._density = density
+        self._virtual_work = tuple(virtual_work or ())
+        self.equations: HamiltonResult = hamilton(density, virtual_work=self._virtual_work, **self._options)
+        """Equations of motion, boundary conditions and the steps that led there."""
+        given = ((f"{end} end", self._options[end]) for end in ("left", "right"))
+        ends = {label: sympify(term, strict=True) for label, term in given if term is not None}
+        check_dimensions(sympify(density, strict=True), ends, units or {})
+        self.symbols: tuple[Symbol, ...] = self._parameters()
+        """The parameters: every symbol but x and t, by name."""
+
+    def __repr__(self) -> str:
+        unknowns = ", ".join(map(str, (*self.equations.fields, *self.equations.coordinates)))
+        return f"<Model of {unknowns} with parameters {', '.join(s.name for s in self.symbols) or 'none'}>"
+
+    def _repr_latex_(self) -> str:
+        return self.equations._repr_latex_()
+
+    def _parameters(self) -> tuple[Symbol, ...]:
+        given = [self._density, *self._options["domain"], *self._options["essential"]]
+        given += [self._options[end] for end in ("left", "right") if self._options[end] is not None]
+        given += [part for force, displacement, _ in self._virtual_work for part in (force, displacement)]
+        expressions = [sympify(part, strict=True) for part in given]
+        own = {self._options["x"], self._options["t"]}
+        known = {f.func for f in (*self.equations.fields, *self.equations.coordinates)}
+        for function in {f for e in expressions for f in e.atoms(AppliedUndef) if f.func not in known}:
+            if own <= function.free_symbols:
+                raise ValueError(f"{function} is not one of the fields {list(map(str, self.equations.fields))}")
+        found = sorted({s for e in expressions for s in e.free_symbols} - own, key=lambda s: (s.name, str(s)))
+        for first, second in itertools.pairwise(found):
+            if first.name == second.name:
+                raise ValueError(f"two different symbols are named {first.name}: their assumptions differ")
+        return tuple(found)
+
+    # ------------------------------------------------------------------------------------------------- symbolic
+
+    @cached_property
+    def state_form(self) -> StateForm:
+        """The spatial problem as a first-order system, virtual work included."""
+        return state_form(self.equations)
+
+    @cached_property
+    def _conservative(self) -> StateForm:
+        """The same without the forces that are odd in time (dampers)."""
+        if not self.state_form.damped:
+            form = self.state_form
+        else:
+            form = state_form(hamilton(self._density, virtual_work=self._undamped_work(), **self._options))
+        problem = _asymmetry(form)
+        if problem:
+            raise ValueError(f"natural frequencies need conservative forces, and {problem}; use eigenvalues")
+        return form
+
+    def _undamped_work(self) -> tuple[tuple[Expr, Expr, Any], ...]:
+        t = self._options["t"]
+
+        def still(force: Expr) -> Expr:
+            terms = sympify(force, strict=True).expand().as_ordered_terms()
+            return sum((term for term in terms if not _odd_in_time(term, t)), S.Zero)
+
+        kept = ((still(force), displacement, place) for force, displacement, place in self._virtual_work)
+        return tuple(work for work in kept if work[0] != 0)
+
+    @cached_property
+    def _spatial(self) -> SpatialProblem:
+        return SpatialProblem(self._conservative, self.symbols, sympify(self._options["domain"][0], strict=True))
+
+    def separate(self, **options: Any) -> Modal:
+        """Separate the variables: characteristic matrix and function, mode shapes, in closed form."""
+        return separate(self.equations, **options)
+
+    def kernel(self) -> Kernel:
+        """Return the characteristic function as a fast function of the angular frequency and the parameters.
+
+        Its first argument is omega (s of a damped model), then come `symbols`. With more than one wave number, give
+        omega as a complex number: below the cut-off one of them is imaginary.
+
+        Raises
+        ------
+        ValueError
+            If the wave numbers have no closed form, or the coefficients vary along x.
+        """
+        modal = self.separate()
+        waves = modal.basis.wave_numbers
+        if None in waves.values():
+            raise ValueError(f"the wave numbers have no closed form, only {modal.basis.dispersion}")
+        return kernel(modal.characteristic_function.xreplace(waves), (modal.frequency, *self.symbols))
+
+    # ------------------------------------------------------------------------------------------------- spectrum
+
+    def natural_frequencies(self, values: Mapping[Any, Any], modes: int = 3) -> np.ndarray:
+        """Return the natural frequencies in Hz: ascending, complete, rigid-body motions as zeros.
+
+        Dampers are left out: these are the frequencies of the conservative structure (see `eigenvalues`).
+
+        Parameters
+        ----------
+        values : mapping
+        modes : int
+
+        Returns
+        -------
+        ndarray, shape (..., modes)
+
+        Raises
+        ------
+        ValueError
+            If a value is missing, unknown or not allowed; if the structure has buckled under its static load; if it
+            has fewer natural frequencies.
+        """
+        modes = count("modes", modes)
+        given = Values.read(self.symbols, values)
+        squares = np.empty((given.columns.shape[1], modes))
+        for rows, _, problem in self._spatial.problems(given):
+            squares[rows] = lowest(problem, modes)
+        return (np.sqrt(squares) / _TAU).reshape(*given.shape, modes)
+
+    def mode_shapes(
+        self,
+        values: Mapping[Any, Any],
+        x_values: Any,
+        modes: int = 3,
+        *,
+        field: AppliedUndef | None = None,
+        derivative: int = 0,
+    ) -> np.ndarray:
+        """Return mass-normalised mode shapes of one field; positive at the right end.
+
+        Parameters
+        ----------
+        values : mapping
+        x_values : array_like, shape (stations,)
+            Within the domain.
+        modes : int
+        field : applied undefined function, optional
+            Default: the first.
+        derivative : int
+            Order of the derivative by x.
+
+        Returns
+        -------
+        ndarray, shape (..., modes, stations)
+        """
+        modes, derivative = count("modes", modes), count("derivative", derivative, low=0)
+        wanted = self.equations.fields[0] if field is None else field
+        if wanted not in self.equations.fields:
+            raise ValueError(f"field = {field}: allowed are {', '.join(map(str, self.equations.fields))}")
+        given = Values.read(self.symbols, values)
+        x = np.atleast_1d(real_array("x_values", x_values))
+        place = self._conservative.displacements.index(wanted)
+        shapes = np.empty((given.columns.shape[1], modes, len(x)))
+        for rows, left, problem in self._spatial.problems(given):
+            share = (x - left[:, None]) / problem.length[:, None]
+            if (share < -1e-12).any() or (share > 1.0 + 1e-12).any():
+                raise ValueError(f"x_values = {x_values}: allowed is the domain {self._options['domain']}")
+            z = lowest(problem, modes)
+            state = mode_states(problem, z, np.concatenate([np.clip(share, 0.0, 1.0), np.ones((len(rows), 1))], axis=1))
+            sign = _tip_sign(state[:, :, -1, : problem.displacements])
+            row = self._spatial.derivative_row(place, derivative, z, x, given.take(rows))
+            shapes[rows] = sign * (row * state[:, :, :-1]).sum(axis=-1)
+        return shapes.reshape(*given.shape, modes, len(x))
+
+    def modal_parameters(self, values: Mapping[Any, Any], modes: int = 3) -> Modes:
+        """Return frequencies with the mass-normalised displacements and natural forces of both ends."""
+        modes = count("modes", modes)
+        given = Values.read(self.symbols, values)
+        n, m = len(self._conservative.displacements), len(self._conservative.coordinates)
+        omega = np.empty((given.columns.shape[1], modes))
+        ends = np.empty((len(omega), modes, 2, 2 * n + m))
+        for rows, _, problem in self._spatial.problems(given):
+            z = lowest(problem, modes)
+            state = mode_states(problem, z, np.tile([0.0, 1.0], (len(rows), 1)))
+            omega[rows], ends[rows] = np.sqrt(z), state * _tip_sign(state[:, :, 1, :n])[..., None]
+        ends = ends.reshape(*given.shape, modes, 2, 2 * n + m)
+        q, w, p = ends[..., :n], ends[..., 0, n : n + m], ends[..., n + m :]
+        return Modes(omega.reshape(*given.shape, modes), q[..., 0, :], q[..., 1, :], p[..., 0, :], p[..., 1, :], w)
+
+
+def _tip_sign(tip: np.ndarray) -> np.ndarray:
+    """Return the sign that makes the first tip displacement which is not zero positive, shape (..., 1)."""
+    scale = np.abs(tip).max(axis=-2, keepdims=True)
+    moving = np.abs(tip) > 1e-7 * np.where(scale > 0.0, scale, 1.0)
+    first = np.take_along_axis(tip, moving.argmax(axis=-1)[..., None], axis=-1)
+    return np.where(first < 0.0, -1.0, 1.0)
+
+
+def _odd_in_time(term: Expr, t: Symbol) -> bool:
+    """Tell whether a force term changes sign when time runs backwards."""
+    orders = (number for node in term.atoms(Derivative) for symbol, number in node.variable_count if symbol == t)
+    return sum(orders) % 2 == 1
+
+
+def _asymmetry(form: StateForm) -> str:
+    """Return what keeps the problem from being symmetric, or an empty text."""
+    if form.damped:
+        return "the Lagrangian has terms of first order in time"
+    half = form.system.rows // 2
+    a, b, c, d = (form.system[i : i + half, j : j + half] for i in (0, half) for j in (0, half))
+    pairs = ((b, b.T), (c, c.T), (d, -a.T), (form.boundary, form.boundary.T))
+    if all(entry.expand() == 0 for left, right in pairs for entry in left - right):
+        return ""
+    return "the virtual work has forces that follow the motion"
