@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+import os
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache, cached_property
+from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
-from cra_sym.kernels import derived_kernel
+from cra_sym.kernels import compiled, derived_kernel, has_compiler
 from cra_sym.solvers.spectrum import Lanes, spectrum
 
 __all__ = ["ArmCharacteristic", "frequency_parameters", "pair"]
@@ -105,15 +109,62 @@ def _basis(z: np.ndarray) -> tuple[np.ndarray, ...]:
     return lam, *(np.where(z < NEAR, a, b) for a, b in zip(near, _BASIS(lam, np.exp(-lam)), strict=True))
 
 
+COMPILE_FROM = 300_000
+"""Roots in one call from where on loading or compiling machine code costs less than it saves."""
+_ROOTS_PER_THREAD = 30_000
+
+
 def frequency_parameters(
-    kappa_t: np.ndarray, kappa_r: np.ndarray, mu: np.ndarray, iota: np.ndarray, *, modes: int
+    kappa_t: np.ndarray,
+    kappa_r: np.ndarray,
+    mu: np.ndarray,
+    iota: np.ndarray,
+    *,
+    modes: int,
+    compile: bool | None = None,
+    threads: int | None = None,
 ) -> np.ndarray:
-    """Return lambda of the first modes for checked arrays of one shape; the mode axis is last."""
+    """Return lambda of the first modes for checked arrays of one shape; the mode axis is last.
+
+    Both paths take the same steps. The compiled one is taken where it saves more than loading it costs, unless
+    ``compile`` says otherwise; ``threads`` are then as many as there are processors and work for.
+    """
     shape = kappa_t.shape
-    lanes = [value.reshape(-1) for value in (kappa_t, kappa_r, mu, iota)]
-    result = np.empty((lanes[0].size, modes))
-    block = max(1, 32768 // (modes + 4))
-    for start in range(0, len(result), block):
-        part = slice(start, start + block)
-        result[part] = np.sqrt(np.sqrt(spectrum(ArmCharacteristic(*(x[part] for x in lanes)), modes)))
+    groups = [np.ascontiguousarray(value).reshape(-1) for value in (kappa_t, kappa_r, mu, iota)]
+    result = np.empty((groups[0].size, modes))
+    if compile is None:
+        compile = result.size >= COMPILE_FROM and has_compiler()
+    share = max(32768 // (modes + 4), 1)
+    if compile:
+        threads = threads or _processors()
+        share = max(-(-len(result) // threads), _ROOTS_PER_THREAD // modes, 1)
+    parts = [slice(start, start + share) for start in range(0, len(result), share)]
+    fill = _fill_compiled if compile else _fill
+    with ThreadPoolExecutor(threads if compile else 1) as pool:
+        list(pool.map(lambda part: fill(result[part], *(x[part] for x in groups)), parts))
     return result.reshape(*shape, modes)
+
+
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _fill(result: np.ndarray, *groups: np.ndarray) -> None:
+    """Fill in a part of the result, vectorised by NumPy."""
+    result[...] = np.sqrt(np.sqrt(spectrum(ArmCharacteristic(*groups), result.shape[1])))
+
+
+def _fill_compiled(result: np.ndarray, *groups: np.ndarray) -> int:
+    """Fill in a part of the result; return the number of evaluations of the determinant."""
+    evaluations = np.zeros(1, dtype=np.int64)
+    if not _template().frequency_parameters(result, evaluations, *groups):
+        raise ArithmeticError("a zero was not reached")
+    return int(evaluations[0])
+
+
+@cache
+def _template() -> Any:
+    text = files("cra_sym.solvers").joinpath("spectrum_lanes.py").read_text(encoding="utf-8")
+    names = "coefficients", "power_series", "basis", "basis_near", "chain", "derivatives"
+    kernels = _COEFFICIENTS, _POWER_SERIES, _BASIS, _BASIS_NEAR, _CHAIN, _DERIVATIVES
+    return compiled(text, dict(zip(names, kernels, strict=True)))

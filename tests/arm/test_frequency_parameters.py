@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from scipy.linalg import eigh
 
 from cra_sym import frequency_parameters
+from cra_sym.arm import spectrum
+from cra_sym.kernels import has_compiler
 
 _spec = importlib.util.spec_from_file_location("reference", Path(__file__).with_name("reference.py"))
 reference = importlib.util.module_from_spec(_spec)
@@ -197,3 +199,35 @@ def test_broadcasting():
 def test_bad_input(arguments, error, message):
     with pytest.raises(error, match=message):
         frequency_parameters(*arguments)
+
+
+@pytest.mark.skipif(not has_compiler(), reason="Numba is an option")
+@pytest.mark.parametrize("modes", [1, 3, 12])
+def test_compiled_and_numpy_paths_agree(modes):
+    arms = random_arms(4, 1500)
+    one, two = (spectrum.frequency_parameters(*arms, modes=modes, compile=c, threads=2) for c in (True, False))
+    assert ((one == 0) == (two == 0)).all()
+    np.testing.assert_allclose(one, two, rtol=2e-15)
+
+
+@pytest.mark.skipif(not has_compiler(), reason="Numba is an option")
+def test_every_digit_of_the_compiled_path():
+    arms = random_arms(6, 40)
+    lam = spectrum.frequency_parameters(*arms, modes=4, compile=True)
+    assert reference.relative_errors(lam, *arms).max() < 1e-15
+    high = spectrum.frequency_parameters(*(x[:3] for x in arms), modes=1000, compile=True)[:, [300, 999]]
+    assert reference.relative_errors(high, *(x[:3] for x in arms)).max() < 1e-15
+
+
+def test_the_path_is_chosen_by_size(monkeypatch):
+    calls = []
+    monkeypatch.setattr(spectrum, "_fill_compiled", lambda result, *groups: calls.append("compiled"))
+    monkeypatch.setattr(spectrum, "_fill", lambda result, *groups: calls.append("numpy"))
+    monkeypatch.setattr(spectrum, "has_compiler", lambda: True)
+    frequency_parameters(np.ones(10), 1.0, 0.0)
+    assert set(calls) == {"numpy"}
+    frequency_parameters(np.ones(spectrum.COMPILE_FROM), 1.0, 0.0, modes=1)
+    assert calls[-1] == "compiled"
+    monkeypatch.setattr(spectrum, "has_compiler", lambda: False)
+    frequency_parameters(np.ones(spectrum.COMPILE_FROM), 1.0, 0.0, modes=1)
+    assert calls[-1] == "numpy"
