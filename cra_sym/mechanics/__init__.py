@@ -2,6 +2,7 @@
 
 from cra_sym.mechanics.hamilton import BoundaryCondition, HamiltonResult, hamilton
 from cra_sym.mechanics.jets import HamiltonError
+from cra_sym.mechanics.multiple_scales import MultipleScales, multiple_scales
 from cra_sym.mechanics.ritz import RitzMatrices, ritz
 from cra_sym.mechanics.separation import Modal, separate
 from cra_sym.mechanics.state_form import StateForm, state_form
@@ -12,11 +13,13 @@ __all__ = [
     "HamiltonError",
     "HamiltonResult",
     "Modal",
+    "MultipleScales",
     "RitzMatrices",
     "StateForm",
     "Step",
     "compact_latex",
     "hamilton",
+    "multiple_scales",
     "ritz",
     "separate",
     "state_form",

@@ -1,0 +1,265 @@
+r"""Floquet theory for :math:`\ddot q + 2C\dot q + (\Omega^2 + \sum_r g_r(t) P_r)\,q = 0`, many systems at once.
+
+The excitation is :math:`g_r = \epsilon\cos\varpi t / (1 + \lambda_r\epsilon\cos\varpi t)`; with :math:`\lambda_r = 0`
+it is the plain cosine. Between kicks of the excitation every mode moves exactly (damped oscillation in closed form),
+so the step follows the excitation, not the highest mode. The kicks sit at the nodes of Gauss and Legendre; the middle
+one also carries the commutator that makes the composition of fourth order (Laskar and Robutel, 2001). The result is
+symmetric in time, and symplectic without damping.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+
+__all__ = ["Oscillators", "floquet_exponents", "growth_rate", "monodromy"]
+
+_NODES, KICKS = (0.5 * np.array(row) for row in np.polynomial.legendre.leggauss(3))
+_NODES = _NODES + 0.5
+DRIFTS = np.diff([0.0, *_NODES, 1.0])
+#: Weight of the nested commutator in one step: what the quadrature misses of the double integral of |s - t|.
+COMMUTATOR = float(1.0 / 3.0 - KICKS @ np.abs(_NODES[:, None] - _NODES) @ KICKS) / 2
+_BLOCK = 512  # systems propagated together, small enough for the cache
+_COMPILED_FROM = 20000  # systems from which the compiled path pays for loading it
+
+
+@dataclass(frozen=True)
+class Oscillators:
+    """A flat batch of periodically excited systems, the batch axis last.
+
+    Attributes
+    ----------
+    omega, decay : ndarray, shape (N, points)
+        Natural frequencies and decay rates c_i = zeta_i omega_i, rad/s and 1/s.
+    coupling : ndarray, shape (R, N, N, points) or (R, N, N, 1)
+        The matrices P_r.
+    compliance : ndarray, shape (R, points)
+        lambda_r.
+    epsilon, period : ndarray, shape (points,)
+    """
+
+    omega: np.ndarray
+    decay: np.ndarray
+    coupling: np.ndarray
+    compliance: np.ndarray
+    epsilon: np.ndarray
+    period: np.ndarray
+
+    @classmethod
+    def of(
+        cls, omega: Any, coupling: Any, angular_frequency: Any, epsilon: Any, decay: Any = 0.0, compliance: Any = 0.0
+    ) -> tuple[Oscillators, tuple[int, ...]]:
+        """Return the batch and its shape.
+
+        Parameters
+        ----------
+        omega, decay : array_like, shape (..., N)
+        coupling : array_like, shape (..., R, N, N)
+        compliance : array_like, shape (..., R)
+        angular_frequency, epsilon : array_like, shape (...)
+            Excitation frequency varpi, rad/s, positive; epsilon.
+        """
+        omega, coupling = np.asarray(omega, dtype=float), np.asarray(coupling, dtype=float)
+        modes, terms = omega.shape[-1], coupling.shape[-3]
+        decay = np.broadcast_to(decay, np.broadcast_shapes(np.shape(decay), (modes,)))
+        compliance = np.broadcast_to(compliance, np.broadcast_shapes(np.shape(compliance), (terms,)))
+        frequency, epsilon = np.asarray(angular_frequency, dtype=float), np.asarray(epsilon, dtype=float)
+        shape = np.broadcast_shapes(
+            omega.shape[:-1],
+            coupling.shape[:-3],
+            decay.shape[:-1],
+            compliance.shape[:-1],
+            frequency.shape,
+            epsilon.shape,
+        )
+        shared = coupling.size == terms * modes * modes
+        matrices = coupling.reshape(terms, modes, modes, 1) if shared else _flat(coupling, shape, 3)
+        batch = cls(
+            _flat(omega, shape, 1),
+            _flat(decay, shape, 1),
+            matrices,
+            _flat(compliance, shape, 1),
+            _flat(epsilon, shape, 0),
+            2 * np.pi / _flat(frequency, shape, 0),
+        )
+        return batch, shape
+
+    @property
+    def conservative(self) -> bool:
+        """Whether all systems are undamped with symmetric couplings."""
+        return not self.decay.any() and bool(np.array_equal(self.coupling, self.coupling.swapaxes(1, 2)))
+
+    def steps(self, tolerance: float) -> np.ndarray:
+        """Return the number of steps a period for each system, even, for a relative error of about ``tolerance``."""
+        strength = np.sqrt(self.epsilon * np.abs(self.coupling).sum(axis=(0, 2)).max(axis=0))
+        fastest = np.maximum(self.omega.max(axis=0), 2.0 * strength) + 2 * np.pi / self.period
+        angle = self.period * fastest
+        steps = 0.6 * angle * (angle * 1e-6 / tolerance) ** 0.25  # the method is of fourth order
+        return 2 * np.ceil(np.maximum(steps, 8) / 2).astype(np.int64)
+
+    def take(self, index: np.ndarray) -> Oscillators:
+        """Return some of the systems."""
+        shared = self.coupling.shape[-1] == 1
+        return Oscillators(
+            self.omega[:, index],
+            self.decay[:, index],
+            self.coupling if shared else self.coupling[..., index],
+            self.compliance[:, index],
+            self.epsilon[index],
+            self.period[index],
+        )
+
+
+def _flat(array: np.ndarray, shape: tuple[int, ...], own: int) -> np.ndarray:
+    """Broadcast, flatten the batch axes and put them last."""
+    tail = array.shape[array.ndim - own :]
+    flat = np.broadcast_to(array, shape + tail).reshape(-1, *tail)
+    return np.ascontiguousarray(np.moveaxis(flat, 0, -1))
+
+
+def drift_matrix(omega: np.ndarray, decay: np.ndarray, h: np.ndarray) -> np.ndarray:
+    """Return the exact propagator of free damped modes over the time h, shape (2, 2, N, points)."""
+    square = omega**2 - decay**2
+    root = np.sqrt(np.abs(square)) * h
+    swinging = square >= 0
+    small = root < 1e-4
+    ratio = np.where(swinging, np.sin(root), np.sinh(root)) / np.where(small, 1.0, root)
+    ratio = np.where(small, 1.0 - np.where(swinging, 1.0, -1.0) * root**2 / 6, ratio) * h
+    fall = np.exp(-decay * h)
+    level = np.where(swinging, np.cos(root), np.cosh(root))
+    return fall * np.array([[level + decay * ratio, ratio], [-(omega**2) * ratio, level - decay * ratio]])
+
+
+def _propagate(part: Oscillators, steps: int, share: float, compiled: bool) -> np.ndarray:
+    """Return the map over a share of the period, shape (2N, 2N, points), in equal numbers of steps."""
+    modes, points = part.omega.shape
+    h = part.period * share / steps
+    around, between, joined = (drift_matrix(part.omega, part.decay, a * h) for a in (*DRIFTS[:2], 2 * DRIFTS[0]))
+    drifts = np.stack([around, between, between, joined])  # before each kick; last: between two steps
+    times = np.arange(steps)[:, None] + _NODES
+    swings = np.cos(2 * np.pi * share / steps * times)
+    state = np.broadcast_to(np.eye(2 * modes)[:, :, None], (2 * modes, 2 * modes, points)).copy()
+    if compiled:
+        from ._floquet_compiled import kick_and_drift
+
+        coupling = np.ascontiguousarray(np.broadcast_to(part.coupling, (*part.coupling.shape[:3], points)))
+        kick_and_drift(drifts, h, KICKS, COMMUTATOR, swings, coupling, part.compliance, part.epsilon, state)
+    else:
+        _kick_and_drift(drifts[:, :, :, :, None], h, swings, part, state)
+    return state
+
+
+def _kick_and_drift(
+    drifts: np.ndarray, h: np.ndarray, swings: np.ndarray, part: Oscillators, state: np.ndarray
+) -> None:
+    """Propagate the states in place: the compiled loop's counterpart in NumPy."""
+    q, p = state[: len(state) // 2], state[len(state) // 2 :]
+    for step, row in enumerate(swings):
+        for stage, cosine in enumerate(row):
+            _drift(drifts[-1 if stage == 0 and step > 0 else stage], q, p)
+            swing = part.epsilon * cosine
+            weights = swing / (1.0 + part.compliance * swing)
+            force = _force(part.coupling, weights, q)
+            p -= KICKS[stage] * h * force
+            if stage == 1:
+                p += COMMUTATOR * h**3 * _force(part.coupling, weights, force)
+    _drift(drifts[0], q, p)
+
+
+def _drift(m: np.ndarray, q: np.ndarray, p: np.ndarray) -> None:
+    moved = m[0, 0] * q
+    moved += m[0, 1] * p
+    p *= m[1, 1]
+    p += m[1, 0] * q
+    q[:] = moved
+
+
+def _force(coupling: np.ndarray, weights: np.ndarray, q: np.ndarray) -> np.ndarray:
+    if coupling.shape[-1] == 1:
+        return sum(
+            g * (m[..., 0] @ q.reshape(len(q), -1)).reshape(q.shape) for m, g in zip(coupling, weights, strict=True)
+        )
+    return sum(np.einsum("ijp,jkp->ikp", g * m, q) for m, g in zip(coupling, weights, strict=True))
+
+
+def _maps(batch: Oscillators, share: float, tolerance: float, backend: str) -> np.ndarray:
+    """Return the maps over a share of the period, shape (points, 2N, 2N)."""
+    size, points = 2 * len(batch.omega), batch.period.size
+    compiled = _use_compiled(backend, points)
+    steps = np.ceil(batch.steps(tolerance) * share).astype(np.int64)
+    out = np.empty((points, size, size))
+    order = np.argsort(steps, kind="stable")
+    for start in range(0, points, _BLOCK):
+        block = order[start : start + _BLOCK]
+        state = _propagate(batch.take(block), int(steps[block[-1]]), share, compiled)
+        out[block] = np.moveaxis(state, -1, 0)
+    return out
+
+
+def _use_compiled(backend: str, points: int) -> bool:
+    if backend not in ("auto", "numpy", "numba"):
+        raise ValueError(f"backend = {backend!r}: allowed are 'auto', 'numpy' and 'numba'")
+    installed = _installed("numba")
+    if backend == "numba" and not installed:
+        raise ValueError("backend = 'numba': Numba is not installed; allowed are 'auto' and 'numpy'")
+    return backend == "numba" or (backend == "auto" and installed and points >= _COMPILED_FROM)
+
+
+def _installed(package: str) -> bool:
+    try:
+        return find_spec(package) is not None
+    except ValueError:  # blocked on purpose
+        return False
+
+
+def monodromy(*system: Any, tolerance: float = 1e-8, backend: str = "auto", **more: Any) -> np.ndarray:
+    """Return the monodromy matrices of (q, dq/dt), shape (..., 2N, 2N); arguments of :class:`Oscillators`."""
+    batch, shape = Oscillators.of(*system, **more)
+    maps = _maps(batch, 1.0, tolerance, backend)
+    return maps.reshape(*shape, *maps.shape[1:])
+
+
+def _half_period_cosines(batch: Oscillators, tolerance: float, backend: str) -> np.ndarray:
+    r"""Return :math:`d^T a + b^T c`, whose eigenvalues are :math:`(\rho + 1/\rho)/2`, shape (points, N, N).
+
+    The excitation is even in time, so the second half of the period is the first one mirrored; a, b, c, d are the
+    blocks of the half-period map.
+    """
+    maps = _maps(batch, 0.5, tolerance, backend)
+    n = maps.shape[-1] // 2
+    a, b, c, d = maps[:, :n, :n], maps[:, :n, n:], maps[:, n:, :n], maps[:, n:, n:]
+    return d.swapaxes(1, 2) @ a + b.swapaxes(1, 2) @ c
+
+
+def floquet_exponents(*system: Any, tolerance: float = 1e-8, backend: str = "auto", **more: Any) -> np.ndarray:
+    """Return all Floquet exponents, shape (..., 2N), largest real part first; arguments of :class:`Oscillators`.
+
+    Their imaginary parts are fixed up to multiples of the excitation frequency and given between -1/2 and 1/2 of it.
+    """
+    batch, shape = Oscillators.of(*system, **more)
+    period = batch.period[:, None]
+    if batch.conservative:
+        cosines = np.linalg.eigvals(_half_period_cosines(batch, tolerance, backend)).astype(complex)
+        half = np.arccosh(cosines) / period
+        exponents = np.concatenate([half, -half], axis=-1)
+    else:
+        maps = _maps(batch, 1.0, tolerance, backend)
+        exponents = np.log(np.linalg.eigvals(maps).astype(complex)) / period
+    order = np.lexsort((exponents.imag, -np.round(exponents.real * period, 9)), axis=-1)
+    exponents = np.take_along_axis(exponents, order, axis=-1)
+    return exponents.reshape(*shape, exponents.shape[-1])
+
+
+def growth_rate(*system: Any, tolerance: float = 1e-8, backend: str = "auto", **more: Any) -> np.ndarray:
+    """Return max(0, largest real part of the exponents), shape (...); arguments of :class:`Oscillators`."""
+    batch, shape = Oscillators.of(*system, **more)
+    if batch.conservative:
+        cosines = np.linalg.eigvals(_half_period_cosines(batch, tolerance, backend)).astype(complex)
+        rates = np.arccosh(cosines).real.max(axis=-1) / batch.period
+    else:
+        multipliers = np.linalg.eigvals(_maps(batch, 1.0, tolerance, backend))
+        rates = np.log(np.abs(multipliers).max(axis=-1)) / batch.period
+    return np.maximum(rates, 0.0).reshape(shape)

@@ -1,0 +1,167 @@
+"""Floquet multipliers: against Hill's determinant, Mathieu's characteristic values and general integration."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import linear_sum_assignment
+from scipy.special import mathieu_a, mathieu_b
+
+from cra_sym.solvers import floquet
+from cra_sym.solvers.hill import hill_exponents
+
+
+def random_system(seed: int):
+    rng = np.random.default_rng(seed)
+    modes = int(rng.integers(1, 5))
+    coupling = 3.0 * rng.normal(size=(modes, modes))
+    if seed % 2:
+        coupling = coupling + coupling.T
+    decay = rng.uniform(0.0, 0.1, modes) * (seed % 3 > 0)
+    return np.sort(rng.uniform(1.0, 10.0, modes)), coupling, rng.uniform(1.5, 25.0), rng.uniform(0.0, 0.5), decay
+
+
+def multipliers_apart(first, second):
+    distance = np.abs(first[:, None] - second)
+    return distance[linear_sum_assignment(distance)].max()
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_exponents_are_hills(seed):
+    omega, coupling, varpi, epsilon, decay = random_system(seed)
+    period = 2 * np.pi / varpi
+    hill = np.exp(period * hill_exponents(omega, coupling, varpi, epsilon, decay, harmonics=30))
+    mine = np.exp(period * floquet.floquet_exponents(omega, coupling[None], varpi, epsilon, decay, tolerance=1e-13))
+    assert multipliers_apart(mine, hill) < 1e-11 * np.abs(hill).max()
+
+
+def test_mathieu_edges():
+    """On Mathieu's characteristic curves a multiplier is +1 or -1: periodic solutions exist."""
+    q = np.linspace(0.2, 3.0, 8)
+    for order in range(1, 4):
+        for curve in (mathieu_a, mathieu_b):
+            a = curve(order, q)
+            good = a > 0
+            exponents = floquet.floquet_exponents(
+                np.sqrt(a[good])[:, None], np.array([[[1.0]]]), 2.0, 2 * q[good], tolerance=1e-13
+            )
+            cosine = np.cosh(exponents * np.pi).real
+            assert np.allclose(cosine, (-1) ** order, atol=1e-9)
+
+
+def test_monodromy_is_that_of_a_general_integrator():
+    omega, coupling, varpi, epsilon, decay = random_system(4)
+    modes = omega.size
+
+    def slope(t, y):
+        q, p = y.reshape(2, modes, 2 * modes)
+        stiffness = np.diag(omega**2) + epsilon * np.cos(varpi * t) * coupling
+        return np.concatenate([p, -stiffness @ q - 2 * decay[:, None] * p]).ravel()
+
+    end = solve_ivp(slope, (0, 2 * np.pi / varpi), np.eye(2 * modes).ravel(), method="DOP853", rtol=1e-12, atol=1e-13)
+    assert np.allclose(
+        floquet.monodromy(omega, coupling[None], varpi, epsilon, decay, tolerance=1e-12),
+        end.y[:, -1].reshape(2 * modes, -1),
+        atol=1e-9,
+    )
+
+
+def test_compliance_is_a_spring_in_series():
+    """g = eps cos / (1 + lambda eps cos) against a general integrator, with two terms."""
+    omega = np.array([1.0, 2.3])
+    terms = np.array([[[0.5, 0.2], [0.2, 0.1]], [[0.3, -0.4], [-0.4, 0.9]]])
+    soft, varpi, epsilon = np.array([0.6, 0.2]), 2.1, 0.4
+
+    def slope(t, y):
+        q, p = y.reshape(2, 2, 4)
+        swing = epsilon * np.cos(varpi * t)
+        stiffness = np.diag(omega**2) + np.tensordot(swing / (1 + soft * swing), terms, 1)
+        return np.concatenate([p, -stiffness @ q]).ravel()
+
+    end = solve_ivp(slope, (0, 2 * np.pi / varpi), np.eye(4).ravel(), method="DOP853", rtol=1e-12, atol=1e-13)
+    mine = floquet.monodromy(omega, terms, varpi, epsilon, compliance=soft, tolerance=1e-12)
+    assert np.allclose(mine, end.y[:, -1].reshape(4, 4), atol=1e-9)
+
+
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-7, 1e-9])
+def test_error_is_what_was_asked_for(tolerance):
+    omega, coupling = np.array([3.47, 20.9, 52.8]), np.outer([0.3, 6.5, 29.3], [0.3, 6.5, 29.3])[None]
+    varpi, epsilon = np.array([7.0, 41.7, 105.0])[:, None], np.array([0.05, 0.3])
+    scale = np.r_[np.ones(3), omega]
+    exact = floquet.monodromy(omega, coupling, varpi, epsilon, tolerance=1e-13)
+    error = floquet.monodromy(omega, coupling, varpi, epsilon, tolerance=tolerance) - exact
+    assert np.abs(error / scale[:, None] * scale).max() < 10 * tolerance
+
+
+def test_multipliers_come_in_reciprocal_pairs():
+    omega, coupling = np.array([1.0, 2.2, 3.9]), np.array([[[1.0, 0.5, 0.2], [0.5, -0.7, 0.1], [0.2, 0.1, 1.3]]])
+    exponents = floquet.floquet_exponents(omega, coupling, np.linspace(0.5, 9.0, 40), 0.6)
+    assert np.allclose(np.sort(exponents.real), np.sort(-exponents.real), atol=1e-12)
+    maps = floquet.monodromy(omega, coupling, np.linspace(0.5, 9.0, 40), 0.6)
+    unit = np.block([[np.zeros((3, 3)), np.eye(3)], [-np.eye(3), np.zeros((3, 3))]])
+    assert np.allclose(maps.swapaxes(1, 2) @ unit @ maps, unit, atol=1e-9)
+
+
+def test_damping_loses_phase_volume():
+    """Liouville: the multipliers' product is exp(-2 sum c T)."""
+    omega, coupling, varpi, epsilon, decay = random_system(5)
+    exponents = floquet.floquet_exponents(omega, coupling[None], varpi, epsilon, decay)
+    assert exponents.sum().real == pytest.approx(-2 * decay.sum(), rel=1e-9)
+
+
+def test_no_excitation_no_growth():
+    omega = np.array([0.0, 1.0, 2.0])
+    rates = floquet.growth_rate(omega, np.ones((1, 3, 3)), np.linspace(0.3, 5.0, 30), 0.0)
+    assert np.all(rates < 1e-6)  # a rigid mode's double multiplier 1 is known to half the digits
+    damped = floquet.growth_rate(omega[1:], np.ones((1, 2, 2)), np.linspace(0.3, 5.0, 30), 0.0, decay=0.01)
+    assert np.all(damped == 0.0)
+
+
+def test_batch_equals_loop():
+    rng = np.random.default_rng(7)
+    omega = np.sort(rng.uniform(1, 5, (4, 1, 2)), axis=-1)
+    coupling = rng.normal(size=(4, 1, 1, 2, 2))
+    varpi, epsilon = rng.uniform(2, 8, 5), rng.uniform(0, 0.5, (4, 5))
+    for function in (floquet.growth_rate, floquet.floquet_exponents):
+        batch = function(omega, coupling, varpi, epsilon)
+        for i, j in np.ndindex(4, 5):
+            assert np.allclose(batch[i, j], function(omega[i, 0], coupling[i, 0], varpi[j], epsilon[i, j]), atol=1e-10)
+
+
+@pytest.mark.parametrize("decay", [0.0, 0.02])
+def test_compiled_path_is_the_numpy_path(decay):
+    omega, coupling = np.array([1.0, 2.2]), np.array([[[1.0, 0.5], [0.5, -0.7]], [[0.1, 0.0], [0.0, 0.2]]])
+    given = (omega, coupling, np.linspace(0.7, 6.0, 70)[:, None], np.linspace(0.0, 0.6, 3), decay, [0.1, 0.3])
+    plain = floquet.monodromy(*given, backend="numpy")
+    assert np.allclose(floquet.monodromy(*given, backend="numba"), plain, rtol=1e-11, atol=1e-11)
+
+
+def test_works_without_numba():
+    code = (
+        "import sys; sys.modules['numba'] = None\n"
+        "import numpy as np\n"
+        "from cra_sym.solvers import floquet\n"
+        "r = floquet.growth_rate([1.0], [[[1.0]]], np.linspace(1.9, 2.1, 2500), 0.1)\n"
+        "print(r.max() > 0.02, 'sympy' in sys.modules)\n"
+        "try: floquet.growth_rate([1.0], [[[1.0]]], 2.0, 0.1, backend='numba')\n"
+        "except ValueError as error: print(error)\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.splitlines() == [
+        "True False",
+        "backend = 'numba': Numba is not installed; allowed are 'auto' and 'numpy'",
+    ]
+
+
+def test_unknown_backend():
+    with pytest.raises(ValueError, match="backend = 'fortran'"):
+        floquet.growth_rate([1.0], [[[1.0]]], 2.0, 0.1, backend="fortran")
+
+
+def test_too_few_harmonics_are_refused():
+    with pytest.raises(ValueError, match="harmonics"):
+        hill_exponents([1.0, 30.0], np.eye(2), 0.9, 0.1, harmonics=3)
