@@ -2,10 +2,14 @@ from .arm.analysis import frequency_parameters as frequency_parameters
 from .arm.analysis import modal_parameters as modal_parameters
 from .arm.analysis import mode_shapes as mode_shapes
 from .arm.analysis import natural_frequencies as natural_frequencies
+from .arm.base_motion import BaseMotion as BaseMotion
 from .arm.certification import certify as certify
 from .arm.equations import equation as equation
 from .arm.equations import equations as equations
 from .arm.parameters import Arm as Arm
+from .arm.response import residual_vibration as residual_vibration
+from .arm.response import response as response
+from .arm.response import tip_response as tip_response
 from .kernels import kernel as kernel
 from .model import Model as Model
 from .studies import sweep as sweep

@@ -1,0 +1,346 @@
+"""Motions of the driving base, (33): mean motion, harmonic disturbances, sampled records and point-to-point moves."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cra_sym.checks import broadcastable, real_array
+from cra_sym.solvers.modal_response import pick, segment
+
+__all__ = ["BaseMotion", "Harmonic", "Piecewise"]
+
+Array = np.ndarray
+
+
+class Harmonic(NamedTuple):
+    """Disturbance ``amplitude * sin(angular_frequency * t + phase)``; the arrays, of one shape, are a batch."""
+
+    amplitude: Array
+    angular_frequency: Array
+    phase: Array
+
+    def kinematics(self, t: Array) -> tuple[Array, Array, Array]:
+        """Return displacement, velocity and acceleration at the times ``t``, which become the last axis."""
+        B, varpi, psi = (value[..., None] for value in self)
+        sine, cosine = np.sin(varpi * t + psi), np.cos(varpi * t + psi)
+        return B * sine, B * varpi * cosine, -B * varpi**2 * sine
+
+    @property
+    def duration(self) -> Array:
+        """Time after which the acceleration vanishes, s."""
+        return np.where(self.amplitude * self.angular_frequency == 0, 0.0, np.inf)
+
+
+class Piecewise(NamedTuple):
+    """Acceleration ``acceleration[k] + jerk[k] (t - knots[k])`` from knot k to the next, the last one for ever.
+
+    Shapes: ``velocity`` (...), ``acceleration`` and ``jerk`` (..., K), ``knots`` (K) or (..., K). Up to the first
+    knot the base keeps ``velocity``.
+    """
+
+    velocity: Array
+    knots: Array
+    acceleration: Array
+    jerk: Array
+
+    def kinematics(self, t: Array) -> tuple[Array, Array, Array]:
+        """Return displacement, velocity and acceleration at the times ``t``, which become the last axis."""
+        span, v_0 = np.diff(self.knots), self.velocity[..., None]
+        a, j = self.acceleration, self.jerk
+        v = np.cumsum(_after(v_0, (a[..., :-1] + j[..., :-1] * span / 2) * span), -1)
+        steps = (v[..., :-1] + (a[..., :-1] / 2 + j[..., :-1] * span / 6) * span) * span
+        w = np.cumsum(_after(v_0 * self.knots[..., :1], steps), -1)
+        k = segment(self.knots, t)
+        knot, w, v, a, j = (pick(values, k, w.shape[:-1]) for values in (self.knots, w, v, a, j))
+        tau = np.maximum(t - knot, 0.0)
+        moving, coast = np.where(k < 0, 0.0, 1.0), np.minimum(t - knot, 0.0)
+        return (
+            w + v_0 * coast + (v + (a / 2 + j * tau / 6) * tau) * tau,
+            v + (a + j * tau / 2) * tau,
+            (a + j * tau) * moving,
+        )
+
+    @property
+    def duration(self) -> Array:
+        """Time after which the acceleration vanishes, s."""
+        rests = (self.acceleration[..., -1] == 0) & (self.jerk[..., -1] == 0)
+        moves = np.any((self.acceleration != 0) | (self.jerk != 0), axis=-1)
+        return np.where(rests, np.where(moves, self.knots[..., -1], 0.0), np.inf)
+
+
+Term = Harmonic | Piecewise
+
+
+class BaseMotion:
+    """Transverse motion of the driving base, w = v t + a t^2 / 2 + B sin(varpi t + psi) from t = 0 on, equation (33).
+
+    Motions are added with ``+`` and scaled with ``*``; an array in any field always means a batch, never a sum.
+
+    Parameters
+    ----------
+    velocity : float or ndarray
+        Mean velocity v, m/s. A velocity at t = 0 is an impulse to an arm that was at rest.
+    acceleration : float or ndarray
+        Mean acceleration a, m/s2.
+    amplitude, angular_frequency, phase : float or ndarray
+        Disturbance: B in m, varpi in rad/s (not negative), psi in rad.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a field is not made of finite real numbers, varpi is negative, or the arrays do not broadcast together.
+
+    Examples
+    --------
+    >>> motion = BaseMotion(velocity=0.1) + BaseMotion(amplitude=1e-3, angular_frequency=10.0)
+    >>> round(float(motion.velocity(0.0)), 6)
+    0.11
+    >>> BaseMotion.trapezoid(0.5, v_max=0.5, a_max=1.0).duration
+    1.5
+    """
+
+    terms: tuple[Term, ...]
+
+    def __init__(
+        self,
+        velocity: Any = 0.0,
+        acceleration: Any = 0.0,
+        amplitude: Any = 0.0,
+        angular_frequency: Any = 0.0,
+        phase: Any = 0.0,
+    ) -> None:
+        v, a = real_array("velocity", velocity), real_array("acceleration", acceleration)
+        B, psi = real_array("amplitude", amplitude), real_array("phase", phase)
+        varpi = real_array("angular_frequency", angular_frequency, low=0.0)
+        broadcastable(velocity=v, acceleration=a, amplitude=B, angular_frequency=varpi, phase=psi)
+        v, a = np.broadcast_arrays(v, a)
+        terms: list[Term] = []
+        if np.any(v) or np.any(a):
+            terms.append(Piecewise(v, np.zeros(1), a[..., None], np.zeros_like(a)[..., None]))
+        if np.any(B):
+            terms.append(Harmonic(*np.broadcast_arrays(B, varpi, psi)))
+        shape = np.broadcast_shapes(v.shape, B.shape, varpi.shape, psi.shape)
+        self._set(terms, shape)
+
+    def _set(self, terms: Any, shape: tuple[int, ...]) -> BaseMotion:
+        self.terms, self.shape = tuple(terms), shape
+        return self
+
+    @classmethod
+    def _of(cls, terms: Any, shape: tuple[int, ...]) -> BaseMotion:
+        return cls.__new__(cls)._set(terms, shape)
+
+    @classmethod
+    def sampled(cls, t: Any, acceleration: Any, velocity: Any = 0.0) -> BaseMotion:
+        """Return the motion of a sampled acceleration, linear between the samples and zero outside the record.
+
+        Parameters
+        ----------
+        t : array_like, shape (T,)
+            Uniform increasing times from 0 or later, s; at least two.
+        acceleration : array_like, shape (..., T)
+            Samples, m/s2; leading axes are a batch.
+        velocity : float or ndarray
+            Velocity at t = 0, m/s.
+
+        Raises
+        ------
+        ValueError
+            If the times are not sorted, not uniform or negative, or the shapes do not fit.
+        """
+        times, a = real_array("t", t, low=0.0), real_array("acceleration", acceleration)
+        v = real_array("velocity", velocity)
+        if times.ndim != 1 or times.size < 2:
+            raise ValueError(f"t has shape {times.shape}: allowed is one axis of at least two sample times")
+        if a.ndim == 0 or a.shape[-1] != times.size:
+            raise ValueError(f"acceleration has shape {a.shape}: its last axis must have the {times.size} sample times")
+        span = np.diff(times)
+        if not np.all(span > 0):
+            at = int(np.argmin(span > 0))
+            raise ValueError(f"t[{at + 1}] = {times[at + 1]:g} after {times[at]:g}: sample times must increase")
+        step = (times[-1] - times[0]) / span.size
+        off = np.abs(times - (times[0] + step * np.arange(times.size)))
+        if np.any(off > 1e-6 * step):
+            at = int(np.argmax(off))
+            raise ValueError(f"t[{at}] = {times[at]:g}: sample times must be uniform, {step:g} s apart")
+        shape = broadcastable(acceleration=a[..., 0], velocity=v)
+        slope = np.concatenate([np.diff(a) / span, np.zeros_like(a[..., :1])], -1)
+        level = np.concatenate([a[..., :-1], np.zeros_like(a[..., :1])], -1)
+        return cls._of([Piecewise(v, times, level, slope)], shape)
+
+    @classmethod
+    def trapezoid(cls, distance: Any, v_max: Any, a_max: Any, duration: Any = None) -> BaseMotion:
+        """Return the point-to-point move of trapezoidal velocity: the fastest within its limits, or one of given
+        duration.
+
+        Parameters
+        ----------
+        distance : float or ndarray
+            Way, m; negative moves backwards.
+        v_max, a_max : float or ndarray
+            Limits of velocity (may be infinite), m/s, and acceleration, m/s2; positive.
+        duration : float or ndarray, optional
+            Time of the move, s: the fastest move is slowed down uniformly to take that long.
+
+        Raises
+        ------
+        ValueError
+            If the move cannot be made in that time; the error names the limits in the way.
+        """
+        return cls.s_curve(distance, v_max, a_max, np.inf, duration)
+
+    @classmethod
+    def s_curve(cls, distance: Any, v_max: Any, a_max: Any, j_max: Any, duration: Any = None) -> BaseMotion:
+        """Return the point-to-point move of jerk-limited (S-curve) velocity; as :meth:`trapezoid`, with a limit of
+        jerk.
+
+        Parameters
+        ----------
+        distance, v_max, a_max, duration
+            As in :meth:`trapezoid`.
+        j_max : float or ndarray
+            Limit of jerk, m/s3; positive, infinite for a trapezoid.
+        """
+        limit: dict[str, Any] = {"low": 0.0, "open_low": True}
+        d, a_max = real_array("distance", distance), real_array("a_max", a_max, **limit)
+        v_max = real_array("v_max", v_max, allow_infinite=True, **limit)
+        j_max = real_array("j_max", j_max, allow_infinite=True, **limit)
+        wanted = None if duration is None else real_array("duration", duration, **limit)
+        shapes = {"distance": d, "v_max": v_max, "a_max": a_max, "j_max": j_max}
+        shape = broadcastable(**shapes, **({} if wanted is None else {"duration": wanted}))
+        t_j, t_a, t_v = (np.broadcast_to(value, shape) for value in _fastest(np.abs(d), v_max, a_max, j_max))
+        peak = _quotient(d, (t_j + t_a) * (2 * t_j + t_a + t_v))
+        if wanted is not None:
+            least = 2 * (2 * t_j + t_a) + t_v
+            _feasible(wanted, least, {"v_max": t_v > 0, "a_max": (t_a > 0) | np.isinf(j_max), "j_max": t_j > 0})
+            stretch = np.where(least > 0, wanted / np.where(least > 0, least, 1.0), 1.0)
+            t_j, t_a, t_v, peak = t_j * stretch, t_a * stretch, t_v * stretch, peak / stretch**2
+        spans = np.stack([t_j, t_a, t_j, t_v, t_j, t_a, t_j], -1)
+        knots = np.concatenate([np.zeros((*shape, 1)), np.cumsum(spans, -1)], -1)
+        level = peak[..., None] * np.array([0, 1, 1, 0, 0, -1, -1, 0])
+        jerk = _quotient(peak, t_j)[..., None] * np.array([1, 0, -1, 0, -1, 0, 1, 0])
+        return cls._of([Piecewise(np.zeros(shape), knots, level, jerk)], shape)
+
+    def shaped(self, amplitudes: Any, times: Any) -> BaseMotion:
+        """Return the motion convolved with impulses: scaled copies of it, each delayed by its time.
+
+        Parameters
+        ----------
+        amplitudes, times : array_like, shape (..., impulses)
+            As :func:`cra_sym.input_shaper` gives them; times in s, not negative. Leading axes are a batch.
+
+        Raises
+        ------
+        ValueError
+            If the motion holds a harmonic, or does not start from rest.
+        """
+        A, delays = real_array("amplitudes", amplitudes), real_array("times", times, low=0.0)
+        if A.ndim == 0 or A.shape[-1:] != delays.shape[-1:]:
+            raise ValueError(f"amplitudes {A.shape} and times {delays.shape}: allowed is one time an impulse")
+        if not all(isinstance(term, Piecewise) and not np.any(term.velocity) for term in self.terms):
+            raise ValueError("only a motion that starts from rest and has no harmonic can be shaped")
+        shape = broadcastable(motion=np.empty(self.shape), amplitudes=A[..., 0], times=delays[..., 0])
+        copies = []
+        for i in range(A.shape[-1]):
+            for term in self.terms:
+                assert isinstance(term, Piecewise)
+                scale = A[..., i, None]
+                copies.append(
+                    Piecewise(
+                        term.velocity, term.knots + delays[..., i, None], term.acceleration * scale, term.jerk * scale
+                    )
+                )
+        return self._of(copies, shape)
+
+    def __add__(self, other: Any) -> BaseMotion:
+        """Superpose two motions; batches broadcast."""
+        if not isinstance(other, BaseMotion):
+            return NotImplemented
+        shape = broadcastable(left=np.empty(self.shape), right=np.empty(other.shape))
+        return self._of(self.terms + other.terms, shape)
+
+    def __mul__(self, factor: Any) -> BaseMotion:
+        """Scale the motion by real factors; an array is a batch."""
+        scale = real_array("factor", factor)
+        shape = broadcastable(motion=np.empty(self.shape), factor=scale)
+        terms: list[Term] = []
+        for term in self.terms:
+            if isinstance(term, Harmonic):
+                terms.append(Harmonic(*np.broadcast_arrays(term.amplitude * scale, *term[1:])))
+            else:
+                v, k = scale[..., None], term.knots
+                terms.append(Piecewise(term.velocity * scale, k, term.acceleration * v, term.jerk * v))
+        return self._of(terms, shape)
+
+    __rmul__ = __mul__
+
+    def kinematics(self, t: Any) -> tuple[Any, Any, Any]:
+        """Return displacement (m), velocity (m/s) and acceleration (m/s2) of the base at times ``t`` >= 0, shape
+        (..., t)."""
+        times = real_array("t", t, low=0.0)
+        if times.ndim > 1:
+            raise ValueError(f"t has shape {times.shape}: allowed are a number or one axis of times")
+        total = [np.zeros((*self.shape, times.size)) for _ in range(3)]
+        for term in self.terms:
+            for i, part in enumerate(term.kinematics(np.atleast_1d(times))):
+                total[i] = total[i] + part
+        w, v, a = (value if times.ndim else value[..., 0] for value in total)
+        return w, v, a
+
+    def displacement(self, t: Any) -> Any:
+        """Return w(t), m."""
+        return self.kinematics(t)[0]
+
+    def velocity(self, t: Any) -> Any:
+        """Return w'(t), m/s, to the right of a jump."""
+        return self.kinematics(t)[1]
+
+    def acceleration(self, t: Any) -> Any:
+        """Return w''(t), m/s2, to the right of a jump."""
+        return self.kinematics(t)[2]
+
+    @property
+    def duration(self) -> Any:
+        """Time after which the base does not accelerate any more, s; infinite if it always does."""
+        longest = np.zeros(self.shape)
+        for term in self.terms:
+            longest = np.maximum(longest, term.duration)
+        return longest if longest.ndim else float(longest)
+
+    def __repr__(self) -> str:
+        kinds = ", ".join(type(term).__name__.lower() for term in self.terms) or "at rest"
+        return f"<BaseMotion of shape {self.shape}: {kinds}>"
+
+
+def _after(first: Array, rest: Array) -> Array:
+    shape = np.broadcast_shapes(first.shape[:-1], rest.shape[:-1])
+    return np.concatenate([np.broadcast_to(first, (*shape, 1)), np.broadcast_to(rest, (*shape, rest.shape[-1]))], -1)
+
+
+def _quotient(above: Array, below: Array) -> Array:
+    """Return above / below, 0 where below is 0."""
+    return np.where(below > 0, above / np.where(below > 0, below, 1.0), 0.0)
+
+
+def _fastest(d: Array, v: Array, a: Array, j: Array) -> tuple[Array, Array, Array]:
+    """Return the times of a jerk phase, of constant acceleration and of constant velocity in the fastest move."""
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        ramp = a / j
+        full = np.where(np.isinf(v), np.inf, np.maximum(v / a, np.sqrt(v / j)))  # t_j + t_a at full speed
+        cruises = d > v * (full + np.minimum(ramp, np.sqrt(v / j)))
+        t_j = np.where(cruises, np.minimum(ramp, np.sqrt(v / j)), np.minimum(ramp, np.cbrt(d / (2 * j))))
+        short = np.sqrt(ramp**2 / 4 + d / a) - ramp / 2  # t_j + t_a of a move that never reaches full speed
+        t_a = np.maximum(np.where(cruises, full, short) - t_j, 0.0)
+        t_v = np.where(cruises, d / v - (full + t_j), 0.0)
+    return t_j, np.where(t_j < ramp, 0.0, t_a), t_v
+
+
+def _feasible(wanted: Array, least: Array, reached: dict[str, Array]) -> None:
+    short = np.broadcast_to(wanted < least * (1 - 1e-12), least.shape)
+    if short.any():
+        at = np.unravel_index(int(np.argmax(short)), short.shape)
+        limits = " and ".join(name for name, hit in reached.items() if np.broadcast_to(hit, least.shape)[at])
+        time = np.broadcast_to(wanted, least.shape)[at]
+        raise ValueError(f"duration = {time:g}: the move takes at least {least[at]:g} s within its limit {limits}")

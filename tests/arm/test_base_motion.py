@@ -1,0 +1,134 @@
+"""Base motions: kinematics, limits of point-to-point moves, sampled records, sums, and every bad input named."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cra_sym.arm.base_motion import BaseMotion
+
+
+def test_mean_motion_and_disturbance_follow_equation_33():
+    motion = BaseMotion(0.1, 0.3, 1e-3, 10.0, 0.4)
+    t = np.linspace(0, 2, 7)
+    w, v, a = motion.kinematics(t)
+    assert w == pytest.approx(0.1 * t + 0.15 * t**2 + 1e-3 * np.sin(10 * t + 0.4))
+    assert v == pytest.approx(0.1 + 0.3 * t + 1e-2 * np.cos(10 * t + 0.4))
+    assert a == pytest.approx(0.3 - 0.1 * np.sin(10 * t + 0.4))
+
+
+def test_a_sum_is_a_superposition_and_an_array_is_a_batch():
+    first, second = BaseMotion(velocity=0.1), BaseMotion(amplitude=[1e-3, 2e-3], angular_frequency=10.0)
+    total = 2.0 * (first + second)
+    assert total.shape == (2,)
+    assert total.displacement(0.3) == pytest.approx(2 * (first.displacement(0.3) + second.displacement(0.3)))
+    assert total.velocity([0.0, 1.0]).shape == (2, 2)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.floats(1e-3, 5.0),
+    st.floats(1e-2, 5.0) | st.just(np.inf),
+    st.floats(1e-2, 50.0),
+    st.floats(1e-1, 1e4) | st.just(np.inf),
+)
+def test_moves_keep_their_limits_reach_their_place_and_stop(distance, v_max, a_max, j_max):
+    move = BaseMotion.s_curve(-distance, v_max, a_max, j_max)
+    t = np.linspace(0.0, move.duration, 4001)
+    w, v, a = move.kinematics(t)
+    # the last samples sit on the last knot, where rounding decides on which side of a jump of acceleration they are
+    assert w[-1] == pytest.approx(-distance, rel=1e-9)
+    assert abs(v[-1]) < 1e-9 * np.abs(v).max()
+    assert np.abs(v).max() <= v_max * (1 + 1e-9)
+    assert np.abs(a).max() <= a_max * (1 + 1e-9)
+    if np.isfinite(j_max):
+        assert np.abs(np.diff(a)).max() <= j_max * t[1] * (1 + 1e-6)
+    assert (move.velocity(2 * move.duration), move.acceleration(2 * move.duration)) == (pytest.approx(0, abs=1e-9), 0)
+
+
+def test_the_fastest_move_is_the_classical_one():
+    assert BaseMotion.trapezoid(0.5, v_max=np.inf, a_max=2.0).duration == pytest.approx(2 * np.sqrt(0.5 / 2.0))
+    assert BaseMotion.trapezoid(0.5, v_max=0.5, a_max=1.0).duration == pytest.approx(0.5 / 0.5 + 0.5 / 1.0)
+    # v/j and a/j: distance / v + v / a + a / j
+    assert BaseMotion.s_curve(2.0, 0.5, 1.0, 4.0).duration == pytest.approx(2.0 / 0.5 + 0.5 / 1.0 + 1.0 / 4.0)
+    # too short for any limit but jerk: four equal phases
+    assert BaseMotion.s_curve(1e-3, 10.0, 10.0, 2.0).duration == pytest.approx(4 * np.cbrt(1e-3 / 4.0))
+
+
+def test_a_given_duration_slows_the_move_down_uniformly():
+    fast, slow = BaseMotion.s_curve(0.5, 0.5, 1.0, 10.0), BaseMotion.s_curve(0.5, 0.5, 1.0, 10.0, duration=3.2)
+    assert slow.duration == pytest.approx(3.2)
+    t = np.linspace(0, fast.duration, 11)
+    assert slow.displacement(t * 3.2 / fast.duration) == pytest.approx(fast.displacement(t))
+
+
+def test_batched_moves_are_single_moves():
+    durations = np.array([1.6, 2.0, 4.0])
+    batch = BaseMotion.s_curve(0.5, 0.5, 1.0, 100.0, duration=durations)
+    t = np.linspace(0, 5, 50)
+    for row, duration in zip(batch.displacement(t), durations, strict=True):
+        assert row == pytest.approx(BaseMotion.s_curve(0.5, 0.5, 1.0, 100.0, duration=duration).displacement(t))
+
+
+@pytest.mark.parametrize(
+    ("limits", "named"),
+    [((0.5, 100.0, 1e6), "v_max"), ((100.0, 1.0, 1e6), "a_max"), ((100.0, 100.0, 1.0), "j_max")],
+)
+def test_an_infeasible_move_names_the_limit(limits, named):
+    least = BaseMotion.s_curve(0.5, *limits).duration
+    with pytest.raises(ValueError, match=f"duration = .*at least .*{named}"):
+        BaseMotion.s_curve(0.5, *limits, duration=0.9 * least)
+    BaseMotion.s_curve(0.5, *limits, duration=least)
+
+
+def test_sampled_acceleration_is_linear_between_samples():
+    t = np.linspace(0.5, 2.5, 5)
+    motion = BaseMotion.sampled(t, [0.0, 1.0, 0.0, -1.0, 0.0], velocity=0.2)
+    assert motion.acceleration([0.0, 0.75, 1.0, 2.0, 9.0]) == pytest.approx([0, 0.5, 1, -1, 0])
+    assert motion.velocity([0.0, 1.5, 9.0]) == pytest.approx([0.2, 0.7, 0.2])
+    assert motion.displacement(0.5) == pytest.approx(0.1)
+    assert motion.duration == 2.5
+
+
+def test_shaping_convolves_with_impulses():
+    move = BaseMotion.trapezoid(1.0, 1.0, 2.0)
+    shaped = move.shaped([0.25, 0.75], [0.0, 0.4])
+    t = np.linspace(0.4, 3, 20)
+    assert shaped.displacement(t) == pytest.approx(0.25 * move.displacement(t) + 0.75 * move.displacement(t - 0.4))
+    assert shaped.duration == pytest.approx(move.duration + 0.4)
+    with pytest.raises(ValueError, match="from rest"):
+        BaseMotion(velocity=0.1).shaped([1.0], [0.0])
+
+
+def test_duration_is_when_the_acceleration_ends():
+    assert BaseMotion().duration == 0.0
+    assert BaseMotion(velocity=1.0).duration == 0.0
+    assert BaseMotion(acceleration=[0.0, 1.0]).duration.tolist() == [0.0, np.inf]
+    assert (BaseMotion.trapezoid(1, 1, 1) + BaseMotion(amplitude=1e-3, angular_frequency=3.0)).duration == np.inf
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: BaseMotion(velocity="fast"), TypeError, "velocity"),
+        (lambda: BaseMotion(amplitude=np.nan), ValueError, "amplitude"),
+        (lambda: BaseMotion(angular_frequency=-1.0), ValueError, "angular_frequency = -1"),
+        (lambda: BaseMotion(velocity=[1, 2], amplitude=[1, 2, 3]), ValueError, r"velocity \(2,\), amplitude \(3,\)"),
+        (lambda: BaseMotion.sampled([0, 2, 1], [0, 0, 0]), ValueError, r"t\[2\] = 1 after 2: .*increase"),
+        (lambda: BaseMotion.sampled([0, 1, 3], [0, 0, 0]), ValueError, "uniform"),
+        (lambda: BaseMotion.sampled([0, 1], [0, 0, 0]), ValueError, r"acceleration has shape \(3,\)"),
+        (lambda: BaseMotion.sampled([1.0], [0.0]), ValueError, "at least two"),
+        (lambda: BaseMotion.sampled([-1, 0], [0, 0]), ValueError, "t = -1"),
+        (lambda: BaseMotion.trapezoid(1, 0.0, 1), ValueError, "v_max = 0"),
+        (lambda: BaseMotion.trapezoid(1, 1, np.inf), ValueError, "a_max = inf"),
+        (lambda: BaseMotion.trapezoid(1, 1, 1, duration=-2.0), ValueError, "duration = -2"),
+        (lambda: BaseMotion.s_curve([1, 2], [1, 2, 3], 1, 1), ValueError, "broadcast"),
+        (lambda: BaseMotion().displacement(-0.1), ValueError, "t = -0.1"),
+        (lambda: BaseMotion().displacement([[0.1]]), ValueError, "one axis"),
+        (lambda: BaseMotion.trapezoid(1, 1, 1).shaped([0.5, 0.5], [0.1]), ValueError, "one time an impulse"),
+        (lambda: BaseMotion() + 1.0, TypeError, "unsupported"),
+    ],
+)
+def test_bad_input_is_named(make, error, words):
+    with pytest.raises(error, match=words):
+        make()
