@@ -98,9 +98,11 @@ class Kernel:
         return _arranged(self.layout, iter(flat))
 
     def _evaluated(self, arrays: list[np.ndarray], shape: tuple[int, ...]) -> list[np.ndarray]:
-        size, leaves = math.prod(shape), _leaves(self.layout)
-        if leaves and lanes.suits(self, arrays, size):
-            return lanes.evaluated(self, arrays, shape, leaves)
+        size = math.prod(shape)
+        if lanes.suits(self, arrays, size) and self.layout not in ([], {}):
+            outputs = lanes.evaluated(self, arrays, shape, _leaves(self.layout))
+            if outputs is not None:
+                return outputs
         if size > _BLOCK and all(a.shape == shape or a.ndim == 0 for a in arrays):
             return _in_blocks(self.function, arrays, shape)
         return [_filled(value, shape) for value in _tuple(self.function(*arrays))]
@@ -160,6 +162,8 @@ def kernel(expression: Any, arguments: Any, *, backend: str | None = None) -> Ke
 
 def _numeric(name: str, value: Any) -> np.ndarray:
     array = np.asarray(value)
+    if array.dtype == np.float64:
+        return array
     if array.dtype.kind not in "iufc":
         raise TypeError(f"{name}: real or complex numbers are allowed, not {array.dtype}")
     return array.astype(np.result_type(array.dtype, np.float64), copy=False)

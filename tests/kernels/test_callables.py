@@ -92,6 +92,35 @@ def test_any_symbol_name_will_do(name):
     assert f(0.5, 1) == pytest.approx(0.5 * np.cos(0.5) + 1.5**2 + np.exp(1.5**2), rel=1e-15)
 
 
+def test_any_key_will_do():
+    key = "a'\n\"; print(1)\n\n\ndef evaluate("
+    assert kernel({key: x}, (x,))(2) == {key: 2.0}
+
+
+FUNCTIONS = [
+    *(f(x) for f in (sp.tan, sp.asin, sp.acos, sp.atan, sp.sinh, sp.cosh, sp.tanh, sp.asinh, sp.atanh, sp.log)),
+    *(f(x) for f in (sp.sqrt, sp.cbrt, sp.sec, sp.cot, sp.csc, sp.coth, sp.sech, sp.sinc, sp.re)),
+    *(f(x) for f in (sp.erf, sp.erfc, sp.gamma, sp.loggamma, sp.factorial, sp.Si)),
+    *(f(x, a) for f in (sp.atan2, sp.Max, sp.Min)),
+    *(sp.besselj(1, x), sp.acosh(x + 1), sp.log(x, 2), sp.sign(x - a), sp.Abs(x - a), sp.Heaviside(x - a)),
+    *(x**a, x**-3, x**100, x ** sp.Rational(-3, 2), sp.root(x, 5), sp.exp(x) ** a, sp.I * x),
+    *(
+        sp.pi * sp.E * sp.GoldenRatio * x,
+        x / 3,
+        sp.Rational(10**30, 3) * x,
+        sp.Integer(2) ** 70 * x,
+        sp.Float("0.1", 30),
+    ),
+    sp.Piecewise((sp.cos(x), sp.Or(a < x, x > 2)), (2, sp.Not(sp.Ne(a, 1))), (3, True)),
+]
+
+
+@pytest.mark.parametrize("expression", FUNCTIONS, ids=str)
+def test_every_kind_of_expression(expression):
+    exact = complex(expression.evalf(25, subs={x: 0.3, a: 0.7}))
+    assert kernel(expression, (x, a))(0.3, 0.7) == pytest.approx(exact, rel=2e-14)
+
+
 def test_symbols_that_share_a_name_stay_apart():
     p = sp.Symbol("x", positive=True)
     assert kernel(x - 2 * p, (x, p))(5, 1) == 3
@@ -111,6 +140,11 @@ def test_refusals_name_the_culprit():
         kernel(sp.MatrixSymbol("M", 2, 2)[0, 1] * x, (x,))
     with pytest.raises(ValueError, match="not arguments: a"):
         kernel(sp.Integral(sp.exp(a**2), (a, 0, x)), (x,))
+    for expression in (sp.Sum(x**a, (a, 0, 3)), sp.Derivative(sp.sin(x), x), sp.Subs(x**2, x, a), sp.DiracDelta(x)):
+        with pytest.raises(ValueError, match="no NumPy function"):
+            kernel(expression, (x, a))
+    with pytest.raises(ValueError, match="out of the range"):
+        kernel(10**400 * x, (x,))
     with pytest.raises(TypeError, match="arguments"):
         kernel(x, "x")
     with pytest.raises(TypeError, match="__import__"):

@@ -60,7 +60,7 @@ def test_importing_loads_neither_sympy_nor_numba():
 def test_fingerprint_follows_sources_and_versions(monkeypatch, tmp_path):
     before = derived.fingerprint()
     derived.fingerprint.cache_clear()
-    monkeypatch.setattr(derived.metadata, "version", lambda package: "0")
+    monkeypatch.setattr("importlib.metadata.version", lambda package: "0")
     assert derived.fingerprint() != before
     derived.fingerprint.cache_clear()
     monkeypatch.undo()

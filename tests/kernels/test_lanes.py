@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from cra_sym.kernels import has_compiler, kernel, lanes
+from cra_sym.kernels import Kernel, has_compiler, kernel, lanes
 
 x, a = sp.symbols("x a")
 numba_only = pytest.mark.skipif(not has_compiler(), reason="Numba is an option")
@@ -76,6 +76,12 @@ def test_what_is_not_for_numba_goes_to_numpy(odd):
     values = np.array([0.25, 4.0]) if odd.has(sp.erf, sp.I) else np.array([0.25 + 1j, 4.0])
     got = [kernel(odd, (x,), backend=backend)(values) for backend in ("numba", "numpy")]
     np.testing.assert_array_equal(*got)
+
+
+def test_what_numba_refuses_goes_to_numpy():
+    source = "from numpy import sort_complex\n\nARGUMENTS = ('x',)\nLAYOUT = ()\n\n\ndef evaluate(x):\n"
+    f = Kernel(f"{source}    return sort_complex(x).real\n", ("x",), "numba")
+    np.testing.assert_array_equal(f([2.0, 1.0]), [1.0, 2.0])
 
 
 @numba_only

@@ -85,7 +85,6 @@ def test_what_numba_cannot_compile_is_refused():
 
 PROCESS = """
 from cra_sym.kernels import Kernel, compiled, specialise
-import numba.core.dispatcher as dispatcher
 f = Kernel("from numpy import cos\\n\\n\\ndef evaluate(x):\\n    return cos(x)\\n", ("x",))
 entries = compiled("def at(x):\\n    return f(x)\\n", {"f": f})
 print(entries.at(0.5), sum(entries.at.stats.cache_misses.values()), sum(entries.at.stats.cache_hits.values()))
@@ -105,8 +104,6 @@ def test_machine_code_is_loaded_by_the_next_process_and_never_trusted_when_damag
     entry.write_bytes(good[:-1] + bytes([good[-1] ^ 1]))
     assert run() == first
     assert len(entry.read_bytes()) == len(good)
-    entry.chmod(0o666)
-    assert run() == first
     assert float(first[0]) == pytest.approx(np.cos(0.5), rel=1e-15)
 
 
