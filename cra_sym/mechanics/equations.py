@@ -27,23 +27,35 @@ class BoundaryCondition(Equality):
         The end displacement that is varied.
     kind : {'natural', 'essential'}
         A natural condition follows from the variation being arbitrary, an essential one forbids it.
+    variables : (str, str)
+        Names of position and time, for the notation.
     """
 
     end: End
     variation: Expr
     displacement: Expr
     kind: Literal["natural", "essential"]
+    variables: tuple[str, str]
 
     def __new__(  # type: ignore[override]
-        cls, lhs: Expr, rhs: Expr, end: End, variation: Expr, displacement: Expr, kind: str = "natural"
+        cls,
+        lhs: Expr,
+        rhs: Expr,
+        end: End,
+        variation: Expr,
+        displacement: Expr,
+        kind: str = "natural",
+        variables: tuple[str, str] = ("x", "t"),
     ) -> BoundaryCondition:
         made = super().__new__(cls, lhs, rhs, evaluate=False)
         made.end, made.variation, made.displacement, made.kind = end, variation, displacement, kind
+        made.variables = variables
         return made
 
     @property
     def _tags(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in ("end", "variation", "displacement", "kind")}
+        names = ("end", "variation", "displacement", "kind", "variables")
+        return {name: getattr(self, name) for name in names}
 
     @property
     def func(self) -> Any:  # keeps the tags when SymPy rebuilds the equation
@@ -59,7 +71,7 @@ class BoundaryCondition(Equality):
         return hash(Eq(*self.args, evaluate=False))
 
     def _repr_latex_(self) -> str:
-        return rf"$\displaystyle {compact_latex(Eq(*self.args, evaluate=False))}$"
+        return rf"$\displaystyle {compact_latex(Eq(*self.args, evaluate=False), self.variables)}$"
 
 
 @dataclass(frozen=True)
@@ -142,9 +154,14 @@ class GeneralisedForces:
     def _condition(self, displacement: Jet) -> BoundaryCondition:
         space, end = self.variation.space, displacement.place
         assert end is not None
-        kind = "natural" if self.variation.elimination.value(displacement) is None else "essential"
         left, right = map(space.write, self.condition_sides(displacement))
-        return BoundaryCondition(left, right, end, varied_form(space, displacement), space.form(displacement), kind)
+        return BoundaryCondition(left, right, end, *self.tags(displacement))
+
+    def tags(self, displacement: Jet) -> tuple[Expr, Expr, str, tuple[str, str]]:
+        """Return what a condition tells besides its end: variation, displacement, kind and notation."""
+        space = self.variation.space
+        kind = "natural" if self.variation.elimination.value(displacement) is None else "essential"
+        return varied_form(space, displacement), space.form(displacement), kind, space.names
 
     def condition_sides(self, displacement: Jet) -> tuple[Expr, Expr]:
         """Return both sides of the condition of one end displacement, in jet symbols."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from sympy import Add, Basic, Eq, Expr, Integral, S, Symbol
@@ -29,15 +30,13 @@ class HamiltonResult:
         Left end before right end, fields in order, displacement before slope.
     coordinate_equations : tuple of Eq
         One for each lumped coordinate.
-    steps : tuple of Step
     variation : Variation
-        The same in jet symbols.
+        What was varied, in jet symbols.
     """
 
     field_equations: tuple[Eq, ...]
     boundary_conditions: tuple[BoundaryCondition, ...]
     coordinate_equations: tuple[Eq, ...]
-    steps: tuple[Step, ...]
     density: Expr
     left: Expr
     right: Expr
@@ -48,15 +47,20 @@ class HamiltonResult:
     domain: tuple[Expr, Expr]
     virtual_work: tuple[VirtualWork, ...]
     essential: tuple[Expr, ...]
-    variation: Variation
+    variation: Variation = field(repr=False, compare=False)
 
     @property
     def equations(self) -> tuple[Eq, ...]:
         """All equations: fields, ends, coordinates."""
         return (*self.field_equations, *self.boundary_conditions, *self.coordinate_equations)
 
+    @cached_property
+    def steps(self) -> tuple[Step, ...]:
+        """The derivation: variation, integration by parts, collected terms, equations."""
+        return _narrate(self.variation, self.equations)
+
     def _repr_latex_(self) -> str:
-        return rf"$\displaystyle {compact_latex(self.equations, (self.x.name, self.t.name))}$"
+        return rf"$\displaystyle {compact_latex(self.equations, self.variation.space.names)}$"
 
 
 def hamilton(
@@ -132,7 +136,6 @@ def hamilton(
         field_equations,
         boundary_conditions,
         coordinate_equations,
-        _narrate(variation, forces, (*field_equations, *boundary_conditions, *coordinate_equations)),
         density,
         left,
         right,
@@ -172,8 +175,8 @@ _STEPS = (
 )
 
 
-def _narrate(variation: Variation, forces: GeneralisedForces, equations: tuple[Basic, ...]) -> tuple[Step, ...]:
-    space = variation.space
+def _narrate(variation: Variation, equations: tuple[Basic, ...]) -> tuple[Step, ...]:
+    space, forces = variation.space, GeneralisedForces.of(variation)
     interval = (space.x, space.ends["left"], space.ends["right"])
 
     def work(pairs: Iterable[tuple[Jet, Expr]]) -> Expr:
@@ -207,9 +210,10 @@ def _narrate(variation: Variation, forces: GeneralisedForces, equations: tuple[B
         collected,
         equations,
     )
-    variables = (space.x.name, space.t.name)
     return tuple(
-        Step(name, statement, expression, before, "first variation of the action on polynomial test motions", variables)
+        Step(
+            name, statement, expression, before, "first variation of the action on polynomial test motions", space.names
+        )
         for (name, statement), expression, before in zip(
             _STEPS, expressions, [(), *((name,) for name, _ in _STEPS[:-1])], strict=True
         )

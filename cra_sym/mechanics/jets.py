@@ -130,6 +130,11 @@ class JetSpace:
         found = {self._jets[s] for e in expressions for s in e.free_symbols if s in self._jets}
         return sorted(found, key=lambda jet: (jet.unknown, jet.place or "", jet.space, jet.time))
 
+    @property
+    def names(self) -> tuple[str, str]:
+        """Names of position and time."""
+        return self.x.name, self.t.name
+
     def is_field(self, unknown: int) -> bool:
         """Tell a field from a lumped coordinate."""
         return unknown < len(self.fields)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
@@ -26,7 +26,7 @@ _DIGITS = 30
 
 @dataclass(frozen=True)
 class RitzMatrices:
-    r"""Ritz matrices of :math:`M \ddot q + C \dot q + K q = 0` on equal Hermite elements, symbolic in the parameters.
+    r"""Ritz matrices of :math:`M \ddot q + C \dot q + K q = f` on equal Hermite elements, symbolic in the parameters.
 
     Unknowns: node by node every field with its slope (and the second derivative, if third ones occur in the density),
     then the lumped coordinates. To assemble numbers, evaluate the element matrices for ``element_length`` and each
@@ -38,12 +38,15 @@ class RitzMatrices:
     elements : int
     element_stiffness, element_damping, element_mass : Matrix
         In ``element_length`` and, where coefficients vary along x, ``element_start``.
+    element_load : Matrix, shape (unknowns of an element, 1)
+        From prescribed motions and applied forces.
     element_length, element_start : Symbol
         Length of an element and position of its left node.
     connectivity : tuple of tuple of int
         Unknowns of each element, in the order of the element matrices.
     end_stiffness, end_damping, end_mass : dict of (int, int) to Expr
         End terms and lumped coordinates, by unknown.
+    end_load : dict of int to Expr
     restraint : tuple of dict of int to Expr
         Each unknown in terms of the free ones, from the essential conditions: ``q[i] = sum factor * free[j]``.
     labels : tuple of Expr
@@ -56,12 +59,14 @@ class RitzMatrices:
     element_stiffness: Matrix
     element_damping: Matrix
     element_mass: Matrix
+    element_load: Matrix
     element_length: Symbol
     element_start: Symbol
     connectivity: tuple[tuple[int, ...], ...]
     end_stiffness: Entries
     end_damping: Entries
     end_mass: Entries
+    end_load: dict[int, Expr]
     restraint: tuple[dict[int, Expr], ...]
     labels: tuple[Expr, ...]
     start: Expr
@@ -87,11 +92,28 @@ class RitzMatrices:
         """M on the free unknowns."""
         return self._assembled(self.element_mass, self.end_mass)
 
-    def _assembled(self, element: Matrix, ends: Entries) -> SparseMatrix:
+    @property
+    def load(self) -> Matrix:
+        """f on the free unknowns, in the prescribed motions and applied forces."""
+        total = zeros(self.free, 1)
+        for unknowns, place in self._places():
+            for p, value in zip(unknowns, self.element_load.subs(place), strict=True):
+                for i, factor in self.restraint[p].items():
+                    total[i] += factor * value
+        for p, value in self.end_load.items():
+            for i, factor in self.restraint[p].items():
+                total[i] += factor * value
+        return total
+
+    def _places(self) -> Iterator[tuple[tuple[int, ...], dict[Symbol, Expr]]]:
+        """Yield the unknowns of each element with its length and position."""
         step = self.length / self.elements
-        total: Entries = dict(ends)
         for number, unknowns in enumerate(self.connectivity):
-            place = {self.element_length: step, self.element_start: self.start + number * step}
+            yield unknowns, {self.element_length: step, self.element_start: self.start + number * step}
+
+    def _assembled(self, element: Matrix, ends: Entries) -> SparseMatrix:
+        total: Entries = dict(ends)
+        for unknowns, place in self._places():
             local = element.subs(place)
             for (i, p), (j, q) in product(enumerate(unknowns), repeat=2):
                 if local[i, j] != 0:
@@ -123,7 +145,8 @@ def ritz(problem: HamiltonResult | Expr, *, elements: int, **arguments: Any) -> 
     Raises
     ------
     HamiltonError
-        If the Lagrangian is not quadratic or holds more than two time derivatives.
+        If the Lagrangian is not quadratic or holds more than two time derivatives, or an essential condition prescribes
+        a motion that varies in time: take the displacement relative to it instead.
 
     Examples
     --------
@@ -166,6 +189,10 @@ class _Mesh:
         self.weak, self.elements = weak, elements
         if max(weak.powers, default=0) > 2:
             raise HamiltonError("ritz: more than two time derivatives; there is no mass matrix")
+        for jet, offset in weak.variation.elimination.offsets.items():
+            if offset != 0:
+                place = weak.variation.space.form(jet)
+                raise HamiltonError(f"ritz: {place} = {offset} is prescribed; take the displacement relative to it")
         self.space = weak.variation.space
         self.step, self.begin = names("h"), names("x_e")
         self.sizes = [max(order, 2) for order in weak.variation.orders]
@@ -198,12 +225,14 @@ class _Mesh:
             element[0],
             element[1],
             element[2],
+            self._load(),
             self.step,
             self.begin,
             tuple((*span, *tail) for span in spans),
             ends[0],
             ends[1],
             ends[2],
+            {self.index(jet): value for jet, value in self.weak.end_load.items()},
             self._restraint(),
             labels,
             start,
@@ -238,6 +267,14 @@ class _Mesh:
                 total[i, j] += scale * moments(a[0] * b[0])
         return total
 
+    def _load(self) -> Matrix:
+        total = zeros(2 * self.width + len(self.lumped), 1)
+        for jet, value in self.weak.inside_load.items():
+            moments = self._moments(value)
+            for i, (polynomial, power) in self._shapes(jet).items():
+                total[i] += self.step ** (power + 1) * moments(polynomial)
+        return total
+
     def _shapes(self, jet: Jet) -> Mapping[int, tuple[Poly, int]]:
         """Return, by unknown of the element, a derivative of its shape on (0, 1) and the power of h that scales it."""
         if jet in self.lumped:
@@ -249,7 +286,7 @@ class _Mesh:
             shapes[node * self.width + offset + order] = (polynomial.diff((0, jet.space)), order - jet.space)
         return shapes
 
-    def _moments(self, coefficient: Expr) -> Any:
+    def _moments(self, coefficient: Expr) -> Callable[[Poly], Expr]:
         """Return the linear functional ``polynomial -> integral of coefficient * polynomial over (0, 1)``."""
         xi = Symbol("xi")
         moved = coefficient.subs(self.space.x, self.begin + self.step * xi)

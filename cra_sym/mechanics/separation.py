@@ -23,7 +23,7 @@ from sympy import (
 
 from cra_sym.mechanics.basis import Basis
 from cra_sym.mechanics.determinants import cofactors, collected, determinant, divided, primitive_rows, without_content
-from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces, varied_form
+from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces
 from cra_sym.mechanics.hamilton import HamiltonResult
 from cra_sym.mechanics.jets import HamiltonError, Jet, grouped
 from cra_sym.mechanics.names import Names, given_expressions
@@ -132,26 +132,19 @@ class Modal:
         problem = self.spatial_problem
         names = ("Spatial problem", "General solution", "Characteristic equation", "Modes")
         motion = r"e^{s t}" if problem.damped else r"e^{i \omega t}"
-        return (
-            Step(
-                names[0], f"All unknowns move as ${motion}$.", (*problem.field_equations, *problem.boundary_conditions)
-            ),
-            Step(
-                names[1],
-                "Functions that span the solutions.",
-                (self.basis.dispersion, *self.basis.functions),
-                names[:1],
-            ),
-            Step(
-                names[2],
-                "The conditions have a solution other than zero.",
-                Eq(self.characteristic_function, 0, evaluate=False),
-                names[:2],
-                "the exact dynamic stiffness and the Ritz matrices",
-            ),
-            Step(
-                names[3], "The solution, up to its amplitude.", self.mode_shapes, names[1:3], "the boundary conditions"
-            ),
+        equations = (*problem.field_equations, *problem.boundary_conditions)
+        solutions = (self.basis.dispersion, *self.basis.functions)
+        condition = Eq(self.characteristic_function, 0, evaluate=False)
+        described = (
+            (names[0], f"All unknowns move as ${motion}$.", equations, ("Equations",), "insertion"),
+            (names[1], "Functions that span the solutions.", solutions, names[:1], "insertion"),
+            (names[2], "The conditions have a solution other than zero.", condition, names[:2], "dynamic stiffness"),
+            (names[3], "The solution, up to its amplitude.", self.mode_shapes, names[1:3], "boundary conditions"),
+        )
+        variables = problem.boundary_conditions[0].variables
+        return tuple(
+            Step(name, statement, expression, origin, check, variables)
+            for name, statement, expression, origin, check in described
         )
 
 
@@ -171,7 +164,8 @@ def separate(
         Parameters in terms of others, for example dimensionless groups. A stiffness from 0 to infinity is the ratio
         ``k: EI/L**3 * s/c`` of two finite numbers: denominators are cleared row by row, so both limits are ordinary.
     basis : {'hyperbolic', 'decaying'}
-        For beams: ``cosh, sinh``, or ``exp(-beta x), exp(-beta (L - x))``, which stay bounded at any frequency.
+        For beams with one wave number: ``cosh, sinh``, or ``exp(-beta x), exp(-beta (L - x))``, which stay bounded at
+        any frequency. Others always get cosh and sinh; `state_form` is the exact form to evaluate at high frequencies.
     frequency : Symbol, optional
         Symbol for omega (or s).
 
@@ -249,9 +243,9 @@ def _spatial_problem(weak: WeakForm, frequency: Symbol) -> SpatialProblem:
     conditions = []
     for jet in forces.boundary_factors:
         assert jet.place is not None
-        kind = "natural" if weak.variation.elimination.value(jet) is None else "essential"
         left, right = map(amplitude, forces.condition_sides(jet))
-        conditions.append(BoundaryCondition(left, right, jet.place, varied_form(space, jet), form(jet), kind))
+        variation, _, kind, names = forces.tags(jet)
+        conditions.append(BoundaryCondition(left, right, jet.place, variation, form(jet), kind, names))
     loads = [*weak.inside_load.values(), *weak.end_load.values(), *weak.variation.elimination.offsets.values()]
     left_out = tuple(space.write(load) for load in loads if load != 0)
     return SpatialProblem(tuple(fields), tuple(conditions), tuple(heads.values()), frequency, not weak.even, left_out)

@@ -162,6 +162,20 @@ def test_damping_of_a_uniformly_damped_string():
     assert abs(first) == pytest.approx(np.pi * np.sqrt(1.5), rel=1e-6)
 
 
+def test_loads_of_a_prescribed_base_and_of_forces():
+    # a uniform acceleration loads the beam as a uniform force; the static deflection of the tip is q L^4 / (8 B)
+    F = Function("F")(t)
+    found = matrices(
+        m * (v.diff(t) + w.diff(t)) ** 2 / 2 - B * v.diff(x, 2) ** 2 / 2,
+        2,
+        essential=CLAMPED,
+        virtual_work=[(F, v, "right"), (F * x, v, "domain")],
+    )
+    deflection = Matrix(found.stiffness).LUsolve(found.load)[-2].expand()
+    assert deflection.coeff(w.diff(t, 2)) == -m * L**4 / (8 * B)
+    assert deflection.coeff(F) == L**3 / (3 * B) + 11 * L**5 / (120 * B)
+
+
 def test_gyroscopic_forces_are_skew():
     found = matrices(m * (v.diff(t) + 2 * v.diff(x)) ** 2 / 2 - T * v.diff(x) ** 2 / 2, 2, essential=[v.subs(x, 0)])
     damping = Matrix(found.damping)
@@ -181,6 +195,8 @@ def test_errors_name_what_is_wrong():
         matrices(STRING - v**4, 2)
     with pytest.raises(HamiltonError, match="two time derivatives"):
         matrices(STRING + m * v.diff(t, 2) ** 2, 2)
+    with pytest.raises(HamiltonError, match="relative"):
+        matrices(STRING, 2, essential=[v.subs(x, 0) - w])
     with pytest.raises(ValueError, match="elements"):
         matrices(STRING, 0)
     with pytest.raises(ValueError, match="elements"):
