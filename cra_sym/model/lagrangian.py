@@ -13,12 +13,13 @@ from sympy.core.function import AppliedUndef
 
 from cra_sym.checks import count, real_array
 from cra_sym.kernels import Kernel, kernel
-from cra_sym.mechanics import HamiltonResult, Modal, StateForm, hamilton, separate, state_form
+from cra_sym.mechanics import HamiltonResult, Modal, StateForm, hamilton, ritz, separate, state_form
+from cra_sym.model.galerkin import Ritz
 from cra_sym.model.modes import Modes
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.units import check_dimensions
 from cra_sym.model.values import Values
-from cra_sym.solvers.eigenvalues import lowest
+from cra_sym.solvers.eigenvalues import lowest, refine
 from cra_sym.solvers.shapes import mode_states
 
 __all__ = ["Model"]
@@ -161,12 +162,24 @@ class Model:
         return tuple(work for work in kept if work[0] != 0)
 
     @cached_property
+    def _damped(self) -> SpatialProblem:
+        return SpatialProblem(self.state_form, self.symbols, self._left)
+
+    @property
+    def _left(self) -> Expr:
+        return sympify(self._options["domain"][0], strict=True)
+
+    @cached_property
     def _spatial(self) -> SpatialProblem:
-        return SpatialProblem(self._conservative, self.symbols, sympify(self._options["domain"][0], strict=True))
+        return SpatialProblem(self._conservative, self.symbols, self._left)
 
     def separate(self, **options: Any) -> Modal:
         """Separate the variables: characteristic matrix and function, mode shapes, in closed form."""
         return separate(self.equations, **options)
+
+    def ritz(self, elements: int) -> Ritz:
+        """Return the same Lagrangian on Hermite elements: frequencies from above, coefficients may vary along x."""
+        return Ritz(ritz(self.equations, elements=elements), self.symbols)
 
     def kernel(self) -> Kernel:
         """Return the characteristic function as a fast function of the angular frequency and the parameters.
@@ -213,6 +226,50 @@ class Model:
         for rows, _, problem in self._spatial.problems(given):
             squares[rows] = lowest(problem, modes)
         return (np.sqrt(squares) / _TAU).reshape(*given.shape, modes)
+
+    def eigenvalues(self, values: Mapping[Any, Any], modes: int = 3, *, oscillating: bool = True) -> np.ndarray:
+        """Return complex eigenvalues s (rad/s) of motions ``exp(s t)``, dampers included, one of each conjugate pair.
+
+        They are guessed by the Ritz matrices and refined on the exact problem. That none is missing is promised only
+        without dampers, where ``s = i omega``.
+
+        Parameters
+        ----------
+        values : mapping
+        modes : int
+        oscillating : bool
+            Leave out real eigenvalues, of motions that decay without oscillating: Kelvin-Voigt damping has infinitely
+            many, which crowd at minus one over the retardation time.
+
+        Returns
+        -------
+        ndarray of complex, shape (..., modes)
+            By ascending modulus.
+
+        Raises
+        ------
+        ArithmeticError
+            If a refinement does not settle.
+        """
+        modes = count("modes", modes)
+        if not self.state_form.damped and not _asymmetry(self.state_form):
+            return 1j * _TAU * self.natural_frequencies(values, modes)
+        given = Values.read(self.symbols, values)
+        guesses = self.ritz(2 * modes + 10).eigenvalues(values, modes, oscillating=oscillating).reshape(-1, modes)
+        roots = np.empty_like(guesses)
+        for rows, _, problem in self._damped.problems(given):
+            squared = not self.state_form.damped
+            found = refine(problem, -(guesses[rows] ** 2) if squared else guesses[rows])
+            if np.isnan(found).any():
+                raise ArithmeticError("eigenvalues: the refinement of a Ritz value did not settle; ask for fewer modes")
+            found = np.sqrt(-found) if squared else found
+            roots[rows] = np.take_along_axis(found, np.argsort(np.abs(found), axis=1, kind="stable"), axis=1)
+        return roots.reshape(*given.shape, modes)
+
+    def damping_ratios(self, values: Mapping[Any, Any], modes: int = 3) -> np.ndarray:
+        """Return ``-Re s / |s|`` of the `eigenvalues`, zero for a rigid motion, shape (..., modes)."""
+        s = self.eigenvalues(values, modes)
+        return -s.real / np.where(s == 0.0, 1.0, np.abs(s))
 
     def mode_shapes(
         self,

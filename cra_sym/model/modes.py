@@ -6,28 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Damped", "Modes"]
-
-
-@dataclass(frozen=True, eq=False)
-class Damped:
-    """Complex eigenvalues s of motions ``exp(s t)``, mode axis last, by ascending ``|s|``.
-
-    Refined roots of the exact characteristic function; that none is missing is not promised.
-    """
-
-    eigenvalues: np.ndarray
-
-    @property
-    def damping_ratio(self) -> np.ndarray:
-        """``-Re s / |s|``."""
-        size = np.abs(self.eigenvalues)
-        return -self.eigenvalues.real / np.where(size > 0.0, size, 1.0)
-
-    @property
-    def frequency(self) -> np.ndarray:
-        """``|Im s| / (2 pi)``, of the decaying oscillation, in Hz."""
-        return np.abs(self.eigenvalues.imag) / (2.0 * np.pi)
+__all__ = ["Modes"]
 
 
 @dataclass(frozen=True, eq=False)

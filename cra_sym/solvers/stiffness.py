@@ -148,7 +148,9 @@ class DynamicStiffness:
             else:
                 pairs = [(a[:, :, 0::2], a[:, :, 1::2]) for a in (matrix, slope, fixed)]
             joined, joined_slope, middle, eliminated, trace = _join(*pairs[0], *pairs[1], n, m)
-            count = sum(pairs[2]) + (negatives(eliminated) if symmetric else 0)
+            count = pairs[2][0] + pairs[2][1]
+            if symmetric:
+                count = count + negatives(eliminated)
             if self.uniform:
                 matrix[:, on], slope[:, on], fixed[:, on] = joined, joined_slope, count
             else:
