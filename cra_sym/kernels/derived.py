@@ -73,13 +73,20 @@ def _source_of(path: str) -> tuple[str, tuple[str, ...]]:
     key = f"{path} {fingerprint()}"
     content = store.load(key) if storable else None
     if content is None:
-        module, _, function = path.partition(":")
-        made = kernel(*getattr(import_module(module), function)())
+        made = _derived(path)
         content = json.dumps([made.source, made.arguments]).encode()
         if storable and _sources_are_what_runs():
             store.save(key, content)
     source, arguments = json.loads(content)
     return source, tuple(arguments)
+
+
+def _derived(path: str) -> Kernel:
+    from tqdm import tqdm
+
+    module, _, function = path.partition(":")
+    with tqdm(total=0, desc=f"deriving {path}, once", bar_format="{desc}", leave=False, disable=None):
+        return kernel(*getattr(import_module(module), function)())
 
 
 def _sources() -> list[Path]:

@@ -156,7 +156,7 @@ class _StoredCode:
                 return CompileResult._rebuild(target, *pickle.loads(content))
             except Exception:  # whatever is wrong with code this process did not make: make it anew
                 pass
-        self._bar = tqdm(total=0, desc=f"compiling {self._name}", bar_format="{desc}", leave=False, disable=None)
+        self._bar = tqdm(total=0, desc=f"compiling {self._name}, once", bar_format="{desc}", leave=False, disable=None)
         return None
 
     def save_overload(self, signature: Any, result: Any) -> None:

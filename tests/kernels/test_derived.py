@@ -34,7 +34,9 @@ print({{name: value.tolist() for name, value in values.items()}}, f.arguments, "
 
 
 def run(code):
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.splitlines()
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr == ""  # progress is for terminals
+    return done.stdout.splitlines()
 
 
 @pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="the subprocess finds its cache by XDG_CACHE_HOME")

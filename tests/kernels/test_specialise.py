@@ -92,7 +92,9 @@ print(entries.at(0.5), sum(entries.at.stats.cache_misses.values()), sum(entries.
 
 
 def run(code=PROCESS):
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr == ""  # progress is for terminals
+    return done.stdout.split()
 
 
 @pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="the subprocess finds its cache by XDG_CACHE_HOME")
