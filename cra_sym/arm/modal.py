@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
-from cra_sym.arm.spectrum import pair
-from cra_sym.kernels import derived_kernel
+from cra_sym.arm.spectrum import in_parts, pair, wants_compiler
+from cra_sym.kernels import compiled, derived_kernel
 
 __all__ = ["NEAR", "Modes", "modes_of"]
 
@@ -57,58 +60,79 @@ class Modes:
         return result
 
 
-def modes_of(kappa_t: np.ndarray, kappa_r: np.ndarray, mu: np.ndarray, iota: np.ndarray, *, lam: np.ndarray) -> Modes:
+def modes_of(
+    kappa_t: np.ndarray,
+    kappa_r: np.ndarray,
+    mu: np.ndarray,
+    iota: np.ndarray,
+    *,
+    lam: np.ndarray,
+    compile: bool | None = None,
+    threads: int | None = None,
+) -> Modes:
     """Return the modes of arms, given all their first frequency parameters.
 
     Parameters
     ----------
     kappa_t, kappa_r, mu, iota : ndarray, shape (...)
     lam : ndarray, shape (..., modes)
+    compile, threads
+        As in `cra_sym.arm.spectrum.frequency_parameters`.
     """
-    values = [np.broadcast_to(value[..., None], lam.shape).ravel() for value in (kappa_t, kappa_r, mu, iota)]
-    pairs = np.array([x for value in values for x in pair(value)])
-    flat = lam.ravel()
-    alpha, beta, tip, waves, mass, participation = (
-        np.zeros((*lead, flat.size)) for lead in ((), (), (4,), (4,), (), ())
-    )
-    near = flat**4 < NEAR
-    alpha[near], beta[near], tip[:, near] = _near(pairs[:, near], flat[near])
-    alpha[~near], beta[~near], tip[:, ~near], waves[:, ~near] = _far(pairs[:, ~near], flat[~near])
-    _rigid(alpha, beta, tip, (kappa_t == 0) & (kappa_r == 0), lam.shape, values[2])
+    groups = [np.ascontiguousarray(value).reshape(-1) for value in (kappa_t, kappa_r, mu, iota)]
+    modes = lam.shape[-1]
+    rows, table = lam.reshape(-1, modes), np.empty((13, lam.size))
+    compile = wants_compiler(lam.size, compile)
+    fill = _template().fill if compile else _fill
+
+    def fill_part(part: slice) -> None:
+        columns = table[:, part.start * modes : part.stop * modes]
+        fill(columns, rows[part].reshape(-1), modes, *(x[part] for x in groups))
+
+    in_parts(fill_part, len(rows), modes, threads=threads if compile else None, compiled=compile)
+    parts = table[:4], table[4:6], table[6:10], table[10:12], table[12]
+    return Modes(lam, *(x.reshape(*x.shape[:-1], *lam.shape) for x in parts))
+
+
+def _fill(table: np.ndarray, lam: np.ndarray, modes: int, *groups: np.ndarray) -> None:
+    """Fill the rows of the table: root (4), tip (2), waves (4), strain (2) and participation of every mode."""
+    kappa_t, kappa_r, mu, iota = (np.repeat(value, modes) for value in groups)
+    pairs = np.array([x for value in (kappa_t, kappa_r, mu, iota) for x in pair(value)])
+    alpha, beta, tip, waves = np.zeros(lam.size), np.zeros(lam.size), np.zeros((4, lam.size)), np.zeros((4, lam.size))
+    near = lam**4 < NEAR
+    alpha[near], beta[near], tip[:, near] = _near(pairs[:, near], lam[near])
+    alpha[~near], beta[~near], tip[:, ~near], waves[:, ~near] = _far(pairs[:, ~near], lam[~near])
+    _rigid(alpha, beta, tip, modes, kappa_t + kappa_r == 0, mu)
     s_t, c_t, s_r, c_r = pairs[:4]
-    z = flat**4
     root = np.array([c_t * alpha, c_r * beta, s_r * beta, -s_t * alpha])
-    displacement, slope = _tip_state(tip, values[2], values[3], flat)
-    invariant = np.where(
-        near,
-        root[2] ** 2 - 2 * root[1] * root[3] + z * root[0] ** 2,
-        2 * z * (waves[0] ** 2 + waves[1] ** 2 + 4 * waves[2] * waves[3] * np.exp(-flat)),
-    )
-    rigid = z == 0
+    displacement, slope = _tip_state(tip, mu, iota, lam)
+    invariant = _invariant(near, root, waves, lam)
     with np.errstate(divide="ignore", invalid="ignore"):
-        (mass,) = _MASS(*pairs[:4], alpha, beta, z, invariant, displacement, slope, values[2], values[3])
-        participation = -root[3] / z  # the joint's force is what moves the arm
-    a, s = root[0], root[1]
-    mass = np.where(rigid, a * a + a * s + s * s / 3 + values[2] * (a + s) ** 2 + values[3] * s * s, mass)
-    participation = np.where(rigid, a + s / 2 + values[2] * (a + s), participation)
-    scale = np.where(displacement < 0, -1.0, 1.0) / np.sqrt(mass)
-    strain = np.array([np.sqrt(s_t * c_t) * alpha, np.sqrt(s_r * c_r) * beta])
-    parts = (
-        flat,
-        root * scale,
-        np.array([displacement, slope]) * scale,
-        waves * scale,
-        strain * scale,
-        participation * scale,
-    )
-    return Modes(*(x.reshape(*x.shape[:-1], *lam.shape) + 0.0 for x in parts))  # -0.0 becomes 0.0
+        (mass,) = _MASS.function(*pairs[:4], alpha, beta, lam**4, invariant, displacement, slope, mu, iota)
+        participation = -root[3] / lam**4  # the joint's force is what moves the arm
+    a, s, rigid = root[0], root[1], lam == 0
+    mass = np.where(rigid, a * a + a * s + s * s / 3 + mu * (a + s) ** 2 + iota * s * s, mass)
+    participation = np.where(rigid, a + s / 2 + mu * (a + s), participation)
+    table[:4], table[4], table[5], table[6:10] = root, displacement, slope, waves
+    table[10], table[11], table[12] = np.sqrt(s_t * c_t) * alpha, np.sqrt(s_r * c_r) * beta, participation
+    table *= np.where(displacement < 0, -1.0, 1.0) / np.sqrt(mass)
+    table += 0.0  # -0.0 becomes 0.0
+
+
+def _invariant(near: np.ndarray, root: np.ndarray, waves: np.ndarray, lam: np.ndarray) -> np.ndarray:
+    """Return what `shapes.generalised_mass` says is the same at every point, from what describes the shape best."""
+    from_root = root[2] ** 2 - 2 * root[1] * root[3] + lam**4 * root[0] ** 2
+    from_waves = 2 * lam**4 * (waves[0] ** 2 + waves[1] ** 2 + 4 * waves[2] * waves[3] * np.exp(-lam))
+    return np.where(near, from_root, from_waves)
 
 
 def _near(pairs: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the amplitudes and the tip's state, from whichever tip condition cancels less."""
     z = lam**4
-    krylov = _POLYNOMIALS(np.ones_like(z), z)
-    rows = np.array(_TIP_ROWS(*pairs, z, *krylov)).reshape(2, 2, 2, -1)  # condition, amplitude, (entry, magnitude)
+    krylov = _POLYNOMIALS.function(np.ones_like(z), z)
+    rows = np.array(_TIP_ROWS.function(*pairs, z, *krylov)).reshape(
+        2, 2, 2, -1
+    )  # condition, amplitude, (entry, magnitude)
     entry, magnitude = rows[:, :, 0], rows[:, :, 1]
     with np.errstate(divide="ignore", invalid="ignore"):
         loss = np.where(magnitude > 0, magnitude / np.abs(entry), 1.0).max(axis=1)
@@ -116,29 +140,26 @@ def _near(pairs: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
     row = np.where(loss[0] <= loss[1], entry[0], entry[1])
     row /= np.maximum(np.abs(row).max(axis=0), np.finfo(float).tiny)
     alpha, beta = row[1], -row[0]
-    return alpha, beta, np.array(_TIP_NEAR(*pairs[:4], alpha, beta, z, *krylov))
+    return alpha, beta, np.array(_TIP_NEAR.function(*pairs[:4], alpha, beta, z, *krylov))
 
 
 def _far(pairs: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the amplitudes, the tip's state and the wave amplitudes."""
     waving = lam, np.cos(lam), np.sin(lam), np.exp(-lam)
-    alpha, beta, *waves = _AMPLITUDES_FAR(*pairs, *waving)
+    alpha, beta, *waves = _AMPLITUDES_FAR.function(*pairs, *waving)
     scale = np.sqrt(waves[0] ** 2 + waves[1] ** 2)
     alpha, beta, *waves = (x / scale for x in (alpha, beta, *waves))
-    return alpha, beta, np.array(_TIP_FAR(*waves, *waving)), np.array(waves)
+    return alpha, beta, np.array(_TIP_FAR.function(*waves, *waving)), np.array(waves)
 
 
-def _rigid(
-    alpha: np.ndarray, beta: np.ndarray, tip: np.ndarray, free: np.ndarray, shape: tuple[int, ...], mu: np.ndarray
-) -> None:
+def _rigid(alpha: np.ndarray, beta: np.ndarray, tip: np.ndarray, modes: int, free: np.ndarray, mu: np.ndarray) -> None:
     """Fill in the two-fold rigid-body mode of a free arm: translation, and rotation about the centre of mass."""
-    for mode in range(min(2, shape[-1])):
-        here = np.zeros(shape, dtype=bool)
-        here[free, mode] = True
-        here = here.ravel()
-        alpha[here] = -(0.5 + mu[here]) / (1 + mu[here]) if mode else 1.0
-        beta[here] = mode
-        tip[0, here], tip[1, here] = alpha[here] + beta[here], beta[here]
+    number = np.arange(alpha.size) % modes
+    one, two = free & (number == 0), free & (number == 1)
+    alpha[one], beta[one] = 1.0, 0.0
+    alpha[two], beta[two] = -(0.5 + mu[two]) / (1 + mu[two]), 1.0
+    rigid = one | two
+    tip[0, rigid], tip[1, rigid] = alpha[rigid] + beta[rigid], beta[rigid]
 
 
 def _tip_state(tip: np.ndarray, mu: np.ndarray, iota: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -152,9 +173,17 @@ def _tip_state(tip: np.ndarray, mu: np.ndarray, iota: np.ndarray, lam: np.ndarra
 
 def _near_shape(root: np.ndarray, lam: np.ndarray, xi: np.ndarray, derivative: int) -> np.ndarray:
     z = lam**4
-    solutions = _POLYNOMIALS(xi, z)
+    solutions = _POLYNOMIALS.function(xi, z)
     return sum(root[j] * z ** ((derivative - j + 3) // 4) * solutions[(j - derivative) % 4] for j in range(4))
 
 
 def _far_shape(waves: np.ndarray, lam: np.ndarray, xi: np.ndarray, derivative: int) -> np.ndarray:
-    return _SHAPE_FAR(*waves, lam, xi)[derivative]
+    return _SHAPE_FAR.function(*waves, lam, xi)[derivative]
+
+
+@cache
+def _template() -> Any:
+    text = files("cra_sym.arm").joinpath("modal_lanes.py").read_text(encoding="utf-8")
+    names = "polynomials", "tip_rows", "tip_near", "amplitudes_far", "tip_far", "generalised_mass"
+    kernels = _POLYNOMIALS, _TIP_ROWS, _TIP_NEAR, _AMPLITUDES_FAR, _TIP_FAR, _MASS
+    return compiled(text, dict(zip(names, kernels, strict=True)))

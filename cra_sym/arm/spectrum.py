@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, cached_property
 from importlib.resources import files
@@ -41,13 +42,13 @@ class ArmCharacteristic:
 
     def __init__(self, kappa_t: np.ndarray, kappa_r: np.ndarray, mu: np.ndarray, iota: np.ndarray) -> None:
         self._parameters = np.array([x for value in (kappa_t, kappa_r, mu, iota) for x in pair(value)])
-        self._coefficients = np.array(_COEFFICIENTS(*self._parameters))
+        self._coefficients = np.array(_COEFFICIENTS.function(*self._parameters))
         self.zeros = (kappa_t == 0).astype(np.int64) + (kappa_r == 0)
 
     @cached_property
     def _power_series(self) -> np.ndarray:
         """Coefficients of the power series in z with the zeros at z = 0 divided out, shape (terms, lanes)."""
-        powers = np.array(_POWER_SERIES(*self._coefficients))
+        powers = np.array(_POWER_SERIES.function(*self._coefficients))
         for multiplicity in (1, 2):
             shifted = self.zeros >= multiplicity
             powers[:-1, shifted], powers[-1, shifted] = powers[1:, shifted], 0.0
@@ -56,7 +57,7 @@ class ArmCharacteristic:
     def count(self, z: float | np.ndarray, lanes: Lanes) -> tuple[np.ndarray, np.ndarray]:
         """Return the exact number of zeros below z, rigid-body zeros included, and the scaled determinant."""
         lam, *basis = _basis(np.asarray(z, dtype=np.float64))
-        both_pinned, sprung, massive, translating, rotating = _CHAIN(*self._parameters[:, lanes], z, *basis)
+        both_pinned, sprung, massive, translating, rotating = _CHAIN.function(*self._parameters[:, lanes], z, *basis)
         number = np.floor(lam / np.pi).astype(np.int64)
         number = _with_parity(both_pinned, number, np.where(lam / np.pi - number < 0.5, -1, 1))
         number = _with_parity(sprung, number, -1)
@@ -79,7 +80,7 @@ class ArmCharacteristic:
 
     def _evaluate_far(self, z: np.ndarray, lanes: Lanes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         _, *basis = _basis_far(z)
-        value, first, second = _DERIVATIVES(*self._coefficients[:, lanes], z, *basis)
+        value, first, second = _DERIVATIVES.function(*self._coefficients[:, lanes], z, *basis)
         return value, first / z, second / z**2
 
     def _evaluate_near(self, z: np.ndarray, lanes: Lanes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -99,19 +100,20 @@ def _with_parity(value: np.ndarray, number: np.ndarray, change: int | np.ndarray
 
 def _basis_far(z: np.ndarray) -> tuple[np.ndarray, ...]:
     lam = np.sqrt(np.sqrt(z))
-    return lam, *_BASIS(lam, np.exp(-lam))
+    return lam, *_BASIS.function(lam, np.exp(-lam))
 
 
 def _basis(z: np.ndarray) -> tuple[np.ndarray, ...]:
     """Return lambda and the basis, scaled, for any z."""
     lam = np.sqrt(np.sqrt(z))
-    near = _BASIS_NEAR(np.minimum(z, NEAR))
-    return lam, *(np.where(z < NEAR, a, b) for a, b in zip(near, _BASIS(lam, np.exp(-lam)), strict=True))
+    near = _BASIS_NEAR.function(np.minimum(z, NEAR))
+    return lam, *(np.where(z < NEAR, a, b) for a, b in zip(near, _BASIS.function(lam, np.exp(-lam)), strict=True))
 
 
 COMPILE_FROM = 300_000
 """Roots in one call from where on loading or compiling machine code costs less than it saves."""
 _ROOTS_PER_THREAD = 30_000
+_BLOCK = 32_768  # points and roots whose temporaries stay in the processor's cache
 
 
 def frequency_parameters(
@@ -132,17 +134,32 @@ def frequency_parameters(
     shape = kappa_t.shape
     groups = [np.ascontiguousarray(value).reshape(-1) for value in (kappa_t, kappa_r, mu, iota)]
     result = np.empty((groups[0].size, modes))
-    if compile is None:
-        compile = result.size >= COMPILE_FROM and has_compiler()
-    share = max(32768 // (modes + 4), 1)
-    if compile:
-        threads = threads or _processors()
-        share = max(-(-len(result) // threads), _ROOTS_PER_THREAD // modes, 1)
-    parts = [slice(start, start + share) for start in range(0, len(result), share)]
+    compile = wants_compiler(result.size, compile)
     fill = _fill_compiled if compile else _fill
-    with ThreadPoolExecutor(threads if compile else 1) as pool:
-        list(pool.map(lambda part: fill(result[part], *(x[part] for x in groups)), parts))
+
+    def fill_part(part: slice) -> None:
+        fill(result[part], *(x[part] for x in groups))
+
+    in_parts(fill_part, len(result), modes, threads=threads, compiled=compile)
     return result.reshape(*shape, modes)
+
+
+def wants_compiler(roots: int, compile: bool | None) -> bool:
+    """Return whether the compiled path is to be taken: where it pays, if nothing is said."""
+    return roots >= COMPILE_FROM and has_compiler() if compile is None else compile
+
+
+def in_parts(fill: Callable[[slice], Any], lanes: int, modes: int, *, threads: int | None, compiled: bool) -> None:
+    """Call ``fill`` for all lanes, part by part: in threads if compiled, else in blocks that fit the cache."""
+    threads = (threads or _processors()) if compiled else 1
+    share = max(-(-lanes // threads), _ROOTS_PER_THREAD // modes, 1) if compiled else max(_BLOCK // (modes + 4), 1)
+    parts = [slice(start, min(start + share, lanes)) for start in range(0, lanes, share)]
+    if threads == 1 or len(parts) <= 1:
+        for part in parts:
+            fill(part)
+    else:
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(fill, parts))
 
 
 def _processors() -> int:

@@ -7,6 +7,7 @@ from numpy.polynomial.legendre import leggauss
 
 import cra_sym as cra
 from cra_sym.arm import characteristic, modal, shapes, spectrum
+from cra_sym.kernels import has_compiler
 
 NOMINAL = cra.Arm.nominal()
 MODES = 6
@@ -226,3 +227,16 @@ def test_ranges_of_the_numbers_are_those_of_the_derivation():
 def test_bad_input(call, error, message):
     with pytest.raises(error, match=message):
         call()
+
+
+@pytest.mark.skipif(not has_compiler(), reason="Numba is an option")
+def test_compiled_and_numpy_paths_agree(arm):
+    groups = [np.broadcast_to(x, arm.shape) for x in (arm.kappa_t, arm.kappa_r, arm.mu, arm.iota)]
+    lam = cra.frequency_parameters(*groups, modes=MODES)
+    one, two = (modal.modes_of(*groups, lam=lam, compile=c, threads=2) for c in (True, False))
+    xi = np.linspace(0, 1, 9)
+    for order in range(4):
+        size = np.maximum(lam[..., None], 1) ** order
+        np.testing.assert_allclose(one.shape(xi, order) / size, two.shape(xi, order) / size, atol=1e-13)
+    for name in ("root", "strain", "participation"):
+        np.testing.assert_allclose(getattr(one, name), getattr(two, name), rtol=1e-11, atol=1e-14)
