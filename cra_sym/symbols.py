@@ -299,6 +299,9 @@ class Nomenclature(tuple[Row, ...]):
 
     __slots__ = ()
 
+    def __repr__(self) -> str:
+        return f"nomenclature of {len(self)} symbols"
+
     def _cells(self) -> list[tuple[str, str, str, str, str]]:
         return [(r.group, _head(r), r.name, r.unit, r.meaning) for r in self]
 

@@ -42,7 +42,7 @@ _EQUATIONS: dict[Number, Equation] = {}
 _ROUTES: dict[Number, Callable[[], Any]] = {}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Equation:
     """One numbered equation of the paper.
 
@@ -65,7 +65,7 @@ class Equation:
     derived_from: tuple[Number, ...]
     statement: str
     source: str
-    _build: Callable[[], Any] = field(repr=False, compare=False)
+    _build: Callable[[], Any] = field(compare=False)
 
     @property
     def expression(self) -> Any:
@@ -81,10 +81,38 @@ class Equation:
         """Tell whether the independent route confirms the equation."""
         return bool(_route(self.number)())
 
-    def _repr_latex_(self) -> str:
-        from cra_sym.mechanics.steps import compact_latex
+    def __repr__(self) -> str:
+        return f"Equation ({self.number}), {self.title}"
 
-        return rf"$\displaystyle {compact_latex(self.expression)} \qquad ({self.number})$"
+    def _formula(self) -> str:
+        parts = self.expression if isinstance(self.expression, tuple) else (self.expression,)
+        body = r" \\[4pt] ".join(map(_typeset, parts))
+        return rf"\begin{{gathered}} {body} \end{{gathered}} \qquad ({self.number})"
+
+    def _repr_latex_(self) -> str:
+        return rf"$\displaystyle {self._formula()}$"
+
+    def _repr_markdown_(self) -> str:
+        sources = ", ".join(f"({number})" for number in self.derived_from)
+        origin = f"{self.kind} from {sources}" if sources else self.kind
+        return f"**({self.number}) {self.title}**, {origin}. {self.statement}\n\n$${self._formula()}$$"
+
+
+def _typeset(part: Any, width: int = 260) -> str:
+    """Return the LaTeX of an equation; a long sum is broken, one term a line."""
+    from sympy import Add
+
+    from cra_sym.mechanics.steps import compact_latex
+
+    whole = compact_latex(part)
+    longest = max(part.args, key=lambda side: len(compact_latex(side)), default=part)
+    if len(whole) < width or not isinstance(longest, Add):
+        return whole
+    terms = [compact_latex(term) for term in longest.as_ordered_terms()]
+    lines = r" \\ &".join([terms[0], *(term if term.startswith("-") else f"+ {term}" for term in terms[1:])])
+    left, right = part.args
+    head, tail = ("", f" = {compact_latex(right)}") if longest is left else (f"{compact_latex(left)} = ", "")
+    return rf"\begin{{aligned}} {head}&{lines}{tail} \end{{aligned}}"
 
 
 def _text(function: Callable) -> str:
@@ -140,6 +168,8 @@ def equation(number: Number) -> Equation:
     Examples
     --------
     >>> from cra_sym import equation
+    >>> equation(1)
+    Equation (1), displacement
     >>> equation(1).expression
     Eq(y(x, t), v(x, t) + w(t))
     >>> equation(1).kind, equation(5).derived_from

@@ -120,7 +120,7 @@ def _() -> bool:
 
 @numbered("16a", "boundary conditions of a mode", "derived", (2, 16))
 def mode_conditions() -> tuple[Eq, Eq, Eq, Eq]:
-    """(2) in (16), the base at rest: in free vibration each coordinate obeys q'' = -omega^2 q and cancels."""
+    """(2) in (16), the base at rest: in free vibration each coordinate obeys q'' = -ω² q and cancels."""
     return tuple(in_one_mode(e) for e in boundary_conditions())
 
 

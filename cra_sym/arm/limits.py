@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from sympy import Eq, Expr, Pow, cancel, limit, oo, pi, solve
+from sympy import Eq, Expr, Mul, Pow, cancel, limit, oo, pi, solve
 
 from cra_sym.arm.energy import HALF, L, modal_numbers, phi_i
 from cra_sym.arm.equations import checks, numbered
@@ -56,7 +56,7 @@ def _take_rigid(expression: Expr) -> Expr:
 @numbered(27, "rigid joint with end-effector", "derived", (23, 25, 26))
 def rigid_joint() -> tuple[Eq, Eq, Eq]:
     """Both stiffnesses to infinity: frequency equation, shape and ratio. Nothing in (23) is lost on the way: divided by
-    kappa_t kappa_r it has this finite limit."""
+    κ_t κ_r it has this finite limit."""
     frequency = _rigid_limit((_finite(frequency_polynomial()) / (kappa_t * kappa_r)).expand())
     shape = mode_shape().rhs / C_1
     parts = [_gather_rigid(shape.coeff(r_2, power)) for power in (0, 1)]
@@ -130,7 +130,7 @@ def natural_frequency() -> Eq:
     wave = mode_form()[1].subs(beta, lamda / L)
     (square,) = solve(wave, omega_i**2)
     speed = Pow(square * L**4 / lamda**4, HALF, evaluate=False)
-    return Eq(symbol("f_i"), lamda**2 / (2 * pi * L**2) * speed)
+    return Eq(symbol("f_i"), Mul(lamda**2 / (2 * pi * L**2), speed, evaluate=False), evaluate=False)
 
 
 @checks(30)

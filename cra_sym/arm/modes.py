@@ -153,7 +153,7 @@ def _system(matrix: Matrix, unknowns: Matrix) -> Eq:
 
 @numbered(18, "root system", "derived", ("16a", 17))
 def root_system() -> Eq:
-    """(17) in the conditions at the joint. Each stiffness is written as the pair (s, c) = (kappa, 1) / (1 + kappa), so
+    """(17) in the conditions at the joint. Each stiffness is written as the pair (s, c) = (κ, 1) / (1 + κ), so
     that a rigid joint (1, 0) and no joint (0, 1) are ordinary values."""
     return _system(root_matrix(), Matrix(coefficients))
 
@@ -266,8 +266,9 @@ def _named_entries() -> dict[Expr, Expr]:
 
 @numbered(21, "its coefficients", "derived", (18, 19, 20))
 def reduced_coefficients() -> tuple[Eq, ...]:
-    """What the elimination leaves, with the joint as (s_t, c_t), (s_r, c_r) and the end-effector as mu, iota."""
-    return tuple(Eq(name, value) for name, value in zip(_entries, reduced_matrix(), strict=True))
+    """What the elimination leaves, with the joint as (s_t, c_t), (s_r, c_r) and the end-effector as μ, ι."""
+    grouped = (collect_stiffness(value).subs(VALUES) for value in _elimination()[0])
+    return tuple(Eq(name, value) for name, value in zip(_entries, grouped, strict=True))
 
 
 @checks(21)
@@ -321,7 +322,7 @@ def frequency_function() -> tuple[Expr, tuple[Symbol, ...]]:
 @numbered(23, "frequency equation", "derived", (21, 22))
 def frequency_equation() -> Eq:
     """The determinant expanded; its factors that never vanish are divided out, so that a rigid joint without
-    end-effector leaves 1 + cos(lamda) cosh(lamda)."""
+    end-effector leaves 1 + cos λ cosh λ."""
     return Eq(collect_stiffness(frequency_polynomial()).subs(VALUES), 0)
 
 

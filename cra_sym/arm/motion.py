@@ -187,7 +187,7 @@ def _() -> bool:
 
 @numbered("10b", "field equation of a mode", "derived", (2, "10a"))
 def mode_field_equation() -> Eq:
-    """(2) in the field equation, the base at rest: each coordinate swings with q'' = -omega^2 q and cancels."""
+    """(2) in the field equation, the base at rest: each coordinate swings with q'' = -ω² q and cancels."""
     field = field_and_base()[0].lhs.subs(w, 0).doit()
     return Eq(free_vibration(single_mode(field).expand()), 0)
 
@@ -227,7 +227,7 @@ def base_free_body() -> Eq:
 @checks("10c")
 def _() -> bool:
     """Written down from the free body of the base; and numbers: both forms agree on modes of a random arm found by
-    shooting, omega_i^2 Gamma_i = k_t phi_i(0)."""
+    shooting, ω_i² Γ_i = k_t φ_i(0)."""
     drawn = m_b * w.diff(t, 2) - k_t * at(v, 0) - F
     values = sample(103)
     gaps = [
@@ -294,8 +294,8 @@ def _homogeneous(displacement: Expr, velocity: Expr) -> Expr:
 
 @numbered(12, "Duhamel's integral", "derived", (11,))
 def duhamel() -> Eq:
-    """Undamped: the free motion from the initial values, and one free motion for each impulse -Gamma_i w'' / M_i that
-    the base has given since. With omega_i = 0, sin(omega_i t) / omega_i is t."""
+    """Undamped: the free motion from the initial values, and one free motion for each impulse -Γ_i w'' / M_i that
+    the base has given since. With ω_i = 0, sin(ω_i t) / ω_i is t."""
     impulse = _homogeneous(S.Zero, S.One)
     start, rate = symbol("C_1"), symbol("C_2")
     free = _homogeneous(start, rate).subs({start: q_i.subs(t, 0), rate: q_i.diff(t).subs(t, 0)})

@@ -20,8 +20,8 @@ omega_i, omega_j, M_i, K_i, K_b = (symbol(name) for name in ("omega_i", "omega_j
 @numbered("16b", "stiffness and mass of two modes", "derived", (6, "10b", "16a"))
 def stiffness_identity() -> tuple[Eq, Eq]:
     """Integrating by parts twice moves two derivatives from mode j to mode i, where the field equation and the four
-    end conditions replace them: the stiffness product is omega_i^2 times the mass product, springs, tip mass and
-    rotary inertia included; for i = j it is K_i = omega_i^2 M_i."""
+    end conditions replace them: the stiffness product is ω_i² times the mass product, springs, tip mass and
+    rotary inertia included; for i = j it is K_i = ω_i² M_i."""
     from cra_sym.arm.motion import mode_field_equation
 
     by_parts = phi_i.diff(x, 2) * phi_j.diff(x) - phi_i.diff(x, 3) * phi_j
@@ -66,7 +66,7 @@ def _() -> bool:
 
 @numbered("16c", "orthogonality", "derived", ("16b",))
 def orthogonality() -> tuple[Eq, Eq]:
-    """Exchange i and j in the identity and subtract: (omega_i^2 - omega_j^2) times the mass product is zero, so for
+    """Exchange i and j in the identity and subtract: (ω_i² - ω_j²) times the mass product is zero, so for
     different frequencies both products vanish."""
     identity, _ = stiffness_identity()
     swapped = Eq(*(_swap(side) for side in identity.args))
@@ -100,14 +100,14 @@ def _() -> bool:
 @numbered("16d", "what the manipulator's energy alone would give", "derived", (4, 6, "16b"))
 def stiffness_of_manipulator_alone() -> Eq:
     """The paper's (4) without the springs leaves their share out of the generalised stiffness: K_b / M_i is not
-    omega_i^2 unless the joint is rigid or the mode does not move it."""
+    ω_i² unless the joint is rigid or the mode does not move it."""
     springs = inner_stiffness(phi_i, phi_i) - inner_stiffness(phi_i, phi_i, joint=False)
     return Eq(K_b, stiffness_identity()[1].rhs - springs)
 
 
 @checks("16d")
 def _() -> bool:
-    """Numbers: the strain energy of modes found by shooting; it falls short of omega_i^2 M_i by the springs' share."""
+    """Numbers: the strain energy of modes found by shooting; it falls short of ω_i² M_i by the springs' share."""
     values, alone = sample(164), stiffness_of_manipulator_alone().rhs
     for mode in shoot(values):
         strain = evaluate(inner_stiffness(phi_i, phi_i, joint=False), values, {phi_i: mode})

@@ -17,6 +17,7 @@ FIGURES = {
     "fig03": "cra_sym.figures.modes:figure_3",
     "fig04": "cra_sym.figures.modes:figure_4",
     "mode_shapes": "cra_sym.figures.modes:figure_mode_shapes",
+    "derivation": "cra_sym.figures.derivation:figure_derivation",
 }
 """Name of a figure -> the function that draws it; called with no arguments, it draws the paper's case."""
 
