@@ -16,6 +16,7 @@ from functools import cache
 
 import sympy as sp
 
+from cra_sym.arm.modes import root_matrix, tip_matrix
 from cra_sym.symbols import symbol
 
 __all__ = [
@@ -36,7 +37,8 @@ NEAR = 5
 """Below this z power series are used, above it scaled exponentials."""
 
 b, z = symbol("lamda"), sp.Symbol("z", nonnegative=True)
-PAIRS = {name: sp.symbols(f"s_{name} c_{name}", nonnegative=True) for name in ("t", "r", "mu", "iota")}
+PAIRS = {name: (symbol(f"s_{name}"), symbol(f"c_{name}")) for name in ("t", "r")}
+PAIRS |= {name: sp.symbols(f"s_{name} c_{name}", nonnegative=True) for name in ("mu", "iota")}
 (s_t, c_t), (s_r, c_r), (s_mu, c_mu), (s_iota, c_iota) = PAIRS.values()
 PARAMETERS = tuple(x for pair in PAIRS.values() for x in pair)
 
@@ -51,6 +53,37 @@ _PRODUCTS = {  # the four functions through their placeholders
 }
 
 
+def derivatives_of(functions: tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr]) -> sp.Matrix:
+    """Return cos, sin, cosh, sinh of lambda xi (columns) and their first three derivatives by xi (rows)."""
+    rotation = sp.Matrix([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1], [0, 0, 1, 0]])
+    return sp.Matrix.vstack(*(b**order * (rotation**order * sp.Matrix(functions)).T for order in range(4)))
+
+
+@cache
+def conditions() -> tuple[sp.Matrix, sp.Matrix]:
+    """Return the systems (18) and (19) as conditions on phi and its first three derivatives: force and moment.
+
+    Columns: derivatives 0 to 3 at the root, at the tip. Each row is homogeneous in its pair.
+    """
+    names = {"mu": symbol("mu"), "iota": symbol("iota")}
+    at_zero = {f(b): value for f, value in ((sp.cos, 1), (sp.sin, 0), (sp.cosh, 1), (sp.sinh, 0))}
+    table = derivatives_of((sp.Integer(1), sp.Integer(0), sp.Integer(1), sp.Integer(0)))
+
+    def on_derivatives(row: sp.Matrix) -> sp.Matrix:
+        entries = [sp.cancel(entry) for entry in row.subs(at_zero) * table.inv()]
+        common = sp.lcm([sp.denom(entry) for entry in entries])
+        return sp.Matrix([[sp.cancel(entry * common) for entry in entries]])
+
+    def weighted(row: sp.Matrix, name: str) -> sp.Matrix:
+        value, complement = PAIRS[name]
+        return row.applyfunc(lambda e: value * e.coeff(names[name], 1) + complement * e.coeff(names[name], 0))
+
+    root, tip = root_matrix(), tip_matrix()
+    force, moment = (on_derivatives(root.row(i)) for i in range(2))
+    tip_force, tip_moment = (weighted(on_derivatives(tip.row(i)), name) for i, name in enumerate(("mu", "iota")))
+    return sp.Matrix.vstack(force, moment), sp.Matrix.vstack(tip_force, tip_moment)
+
+
 @cache
 def determinant() -> sp.Expr:
     """Return the characteristic determinant, linear in `BASIS` with coefficients polynomial in z and `PARAMETERS`.
@@ -58,20 +91,10 @@ def determinant() -> sp.Expr:
     Its zeros in z, with their multiplicity, are the fourth powers of the frequency parameters, rigid-body zeros
     included. Its sign is that of ``(-1)^N``, N the number of zeros below z.
     """
-    functions = sp.Matrix([_cos, _sin, _cosh, _sinh])
-    derivative = sp.Matrix([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1], [0, 0, 1, 0]])
-    at_root = dict(zip(functions, (1, 0, 1, 0), strict=True))
-
-    def row(order: int) -> sp.Matrix:
-        return b**order * (derivative**order * functions).T
-
-    matrix = sp.Matrix.vstack(
-        (c_t * row(3) + s_t * row(0)).subs(at_root),
-        (c_r * row(2) - s_r * row(1)).subs(at_root),
-        c_iota * row(2) - s_iota * b**4 * row(1),
-        c_mu * row(3) + s_mu * b**4 * row(0),
-    )
-    return in_basis(matrix.det(method="berkowitz"))
+    root, tip = conditions()
+    at_root = derivatives_of((sp.Integer(1), sp.Integer(0), sp.Integer(1), sp.Integer(0)))
+    at_tip = derivatives_of((_cos, _sin, _cosh, _sinh))
+    return in_basis(sp.Matrix.vstack(root * at_root, tip * at_tip).det(method="berkowitz"))
 
 
 def in_basis(expression: sp.Expr) -> sp.Expr:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from cra_sym.arm.characteristic import PARAMETERS, Derivation, b, c_iota, c_mu, c_r, c_t, s_iota, s_mu, s_r, s_t, z
+from cra_sym.arm.characteristic import PAIRS, PARAMETERS, Derivation, b, c_r, c_t, conditions, s_r, s_t, z
 from cra_sym.symbols import symbol
 
 __all__ = ["NEAR", "amplitudes_far", "generalised_mass", "polynomials", "shape_far", "tip_far", "tip_near", "tip_rows"]
@@ -20,7 +20,13 @@ NEAR = 25
 
 alpha, beta = sp.symbols("alpha beta", real=True)
 xi = symbol("xi")
-ROOT = (c_t * alpha, c_r * beta, s_r * beta, -s_t * alpha)  # phi and its derivatives at the root
+_FORCE, _MOMENT = (conditions()[0].row(i) for i in range(2))
+ROOT = (
+    _FORCE[3] * alpha,
+    _MOMENT[2] * beta,
+    -_MOMENT[1] * beta,
+    -_FORCE[0] * alpha,
+)  # what meets the root's conditions
 KRYLOV = k0, k1, k2, k3 = sp.symbols("k0:4", positive=True)  # the solutions with one unit derivative at the root
 WAVES = A, B, C, D = sp.symbols("A B C D", real=True)  # cos b xi, sin b xi, exp(-b xi), exp(-b (1 - xi))
 _cos, _sin, decay = sp.symbols("cos sin decay", real=True)
@@ -43,9 +49,15 @@ def _near(derivative: int) -> sp.Expr:
     return sum((state * image for state, image in zip(ROOT, images, strict=True)), sp.Integer(0))
 
 
-def _conditions(tip: list[sp.Expr]) -> tuple[sp.Expr, sp.Expr]:
-    """Return what has to vanish at the tip: moment and shear against the end-effector's inertias."""
-    return c_iota * tip[2] - s_iota * z * tip[1], c_mu * tip[3] + s_mu * z * tip[0]
+def _tip_rows(weights: dict[sp.Symbol, sp.Expr]) -> list[sp.Matrix]:
+    """Return the tip's conditions on phi and its derivatives, force and moment, in z and with some symbols replaced."""
+    rows = conditions()[1].subs(weights).subs(b, z ** sp.Rational(1, 4))
+    return [rows.row(0), rows.row(1)]
+
+
+def _conditions(tip: list[sp.Expr]) -> list[sp.Expr]:
+    """Return what has to vanish at the tip, given phi and its derivatives there: force and moment."""
+    return [sp.expand((row * sp.Matrix(tip))[0]) for row in _tip_rows({})]
 
 
 def tip_rows() -> Derivation:
@@ -53,7 +65,7 @@ def tip_rows() -> Derivation:
     entries = []
     for condition in _conditions([_near(j) for j in range(4)]):
         for amplitude in (alpha, beta):
-            entry = sp.expand(condition).coeff(amplitude)
+            entry = condition.coeff(amplitude)
             entries += [entry, sum(abs(term) for term in sp.Add.make_args(entry))]
     return tuple(entries), (*PARAMETERS, z, *KRYLOV)
 
@@ -86,7 +98,7 @@ def amplitudes_far() -> Derivation:
     """
     growing, waves = _far_amplitudes()
     tip = [_waves(j, _cos, _sin, decay, sp.Integer(1)) for j in range(4)]
-    shear = sp.expand(_conditions(tip)[1].subs(z, b**4) / b**3)
+    shear = sp.expand((conditions()[1] * sp.Matrix(tip))[0] / b**3)
     held = -shear.subs(D, 0).subs(waves) / shear.coeff(D)  # D from the shear, in (alpha, beta)
     remainder = growing - decay * held
     ratio = {alpha: sp.diff(remainder, beta), beta: -sp.diff(remainder, alpha)}
@@ -112,7 +124,9 @@ def generalised_mass() -> Derivation:
     ends the boundary conditions turn the products into squares: nothing cancels.
     """
     invariant, tip, slope, mu, iota = sp.symbols("invariant tip slope mu iota", real=True)
-    phi = (tip, slope, iota * z * slope, -mu * z * tip)  # at the tip, by its two conditions
+    (s_mu, c_mu), (s_iota, c_iota) = PAIRS["mu"], PAIRS["iota"]
+    force, moment = _tip_rows({s_mu: mu, c_mu: 1, s_iota: iota, c_iota: 1})
+    phi = (tip, slope, -moment[1] * slope / moment[2], -force[0] * tip / force[3])  # at the tip, by its two conditions
     bracket = [3 * end[0] * end[3] - end[1] * end[2] for end in (ROOT, phi)]
     square = sp.expand((invariant + bracket[1] - bracket[0]) / (4 * z))
     mass = sp.expand(square + mu * tip**2 + iota * slope**2)

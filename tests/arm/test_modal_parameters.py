@@ -1,5 +1,9 @@
 """Mode shapes and modal quantities: orthonormality by quadrature, boundary conditions, limits, units, bad input."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -240,3 +244,14 @@ def test_compiled_and_numpy_paths_agree(arm):
         np.testing.assert_allclose(one.shape(xi, order) / size, two.shape(xi, order) / size, atol=1e-13)
     for name in ("root", "strain", "participation"):
         np.testing.assert_allclose(getattr(one, name), getattr(two, name), rtol=1e-11, atol=1e-14)
+
+
+def test_numbers_need_no_sympy_once_derived(tmp_path):
+    code = (
+        "import sys, cra_sym as cra; arm = cra.Arm.nominal(); cra.modal_parameters(arm).axial; "
+        "cra.mode_shapes(arm, 0.5); print('sympy' in sys.modules, 'numba' in sys.modules)"
+    )
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "LOCALAPPDATA": str(tmp_path), "HOME": str(tmp_path)}
+    run = lambda: subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)  # noqa: E731
+    assert run().stdout.split() == ["True", "False"]
+    assert run().stdout.split() == ["False", "False"]
