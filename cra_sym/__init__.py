@@ -22,6 +22,8 @@ _HOME = {
     "response": "arm.response",
     "tip_response": "arm.response",
     "residual_vibration": "arm.response",
+    "state_space": "arm.state_space",
+    "frequency_response": "arm.frequency_response",
     "certify": "arm.certification",
     "Model": "model",
     "sweep": "studies",
