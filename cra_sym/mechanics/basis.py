@@ -32,7 +32,7 @@ from sympy import (
 
 from cra_sym.mechanics.jets import HamiltonError
 
-__all__ = ["Basis", "general_solution"]
+__all__ = ["Basis", "Naming", "general_solution"]
 
 Naming = Callable[[str], Symbol]
 

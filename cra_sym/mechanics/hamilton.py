@@ -9,6 +9,7 @@ from typing import Any
 
 from sympy import Add, Basic, Eq, Expr, Integral, S, Symbol
 from sympy.core.function import AppliedUndef
+from sympy.core.symbol import uniquely_named_symbol
 
 from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces, varied_form
 from cra_sym.mechanics.jets import HamiltonError, Jet, JetSpace
@@ -53,6 +54,12 @@ class HamiltonResult:
     def equations(self) -> tuple[Eq, ...]:
         """All equations: fields, ends, coordinates."""
         return (*self.field_equations, *self.boundary_conditions, *self.coordinate_equations)
+
+    def unused_symbol(self, name: str, *others: Expr) -> Symbol:
+        """Return a symbol of this name, changed if what was given (or ``others``) holds one that looks the same."""
+        forces = (force for force, _, _ in self.virtual_work)
+        given = (self.density, self.left, self.right, *self.domain, *self.essential, *forces, *others)
+        return uniquely_named_symbol(name, [S(expression) for expression in given])
 
     @cached_property
     def steps(self) -> tuple[Step, ...]:

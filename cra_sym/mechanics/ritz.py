@@ -8,13 +8,12 @@ from functools import lru_cache
 from itertools import product
 from typing import Any
 
-from sympy import Expr, Matrix, Poly, Rational, S, SparseMatrix, Symbol, zeros
+from sympy import Dummy, Expr, Matrix, Poly, Rational, S, SparseMatrix, Symbol, zeros
 from sympy.integrals.quadrature import gauss_legendre
 
 from cra_sym import checks
 from cra_sym.mechanics.hamilton import HamiltonResult, hamilton
 from cra_sym.mechanics.jets import HamiltonError, Jet
-from cra_sym.mechanics.names import Names, given_expressions
 from cra_sym.mechanics.weak import Bilinear, WeakForm, weak_form
 
 __all__ = ["RitzMatrices", "hermite", "ritz"]
@@ -162,7 +161,7 @@ def ritz(problem: HamiltonResult | Expr, *, elements: int, **arguments: Any) -> 
     """
     count = checks.count("elements", elements)
     result = problem if isinstance(problem, HamiltonResult) else hamilton(problem, **arguments)
-    return _Mesh(weak_form(result.variation), count, Names(given_expressions(result))).matrices()
+    return _Mesh(weak_form(result.variation), count, result.unused_symbol("h"), result.unused_symbol("x_e")).matrices()
 
 
 @lru_cache
@@ -185,7 +184,7 @@ def hermite(size: int) -> tuple[Poly, ...]:
 class _Mesh:
     """Numbering of the unknowns and integrals over one element."""
 
-    def __init__(self, weak: WeakForm, elements: int, names: Names) -> None:
+    def __init__(self, weak: WeakForm, elements: int, step: Symbol, begin: Symbol) -> None:
         self.weak, self.elements = weak, elements
         if max(weak.powers, default=0) > 2:
             raise HamiltonError("ritz: more than two time derivatives; there is no mass matrix")
@@ -194,7 +193,7 @@ class _Mesh:
                 place = weak.variation.space.form(jet)
                 raise HamiltonError(f"ritz: {place} = {offset} is prescribed; take the displacement relative to it")
         self.space = weak.variation.space
-        self.step, self.begin = names("h"), names("x_e")
+        self.step, self.begin = step, begin
         self.sizes = [max(order, 2) for order in weak.variation.orders]
         self.offsets = [sum(self.sizes[:number]) for number in range(len(self.sizes) + 1)]
         self.lumped = weak.fields()[2]
@@ -288,7 +287,7 @@ class _Mesh:
 
     def _moments(self, coefficient: Expr) -> Callable[[Poly], Expr]:
         """Return the linear functional ``polynomial -> integral of coefficient * polynomial over (0, 1)``."""
-        xi = Symbol("xi")
+        xi = Dummy("xi")
         moved = coefficient.subs(self.space.x, self.begin + self.step * xi)
         if coefficient.is_polynomial(self.space.x):
             terms = Poly(moved, xi).terms() if moved.has(xi) else [((0,), moved)]

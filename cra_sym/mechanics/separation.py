@@ -26,7 +26,6 @@ from cra_sym.mechanics.determinants import cofactors, collected, determinant, di
 from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces
 from cra_sym.mechanics.hamilton import HamiltonResult
 from cra_sym.mechanics.jets import HamiltonError, Jet, grouped
-from cra_sym.mechanics.names import Names, given_expressions
 from cra_sym.mechanics.solution import GeneralSolution
 from cra_sym.mechanics.steps import Step
 from cra_sym.mechanics.weak import WeakForm, weak_form
@@ -196,7 +195,11 @@ def separate(
     weak = weak_form(result.variation)
     if not weak.uniform:
         raise HamiltonError(f"separate: {_varying(weak)} varies along {result.x}, so there is no closed form; use ritz")
-    names = Names([*given_expressions(result), *(parameters or {}).values()])
+    others = tuple((parameters or {}).values())
+
+    def names(name: str) -> Symbol:
+        return result.unused_symbol(name, *others)
+
     frequency = frequency or names("omega" if weak.even else "s")
     spatial = _spatial_problem(weak, frequency)
     solution = GeneralSolution(weak, frequency, basis, names)

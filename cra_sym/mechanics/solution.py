@@ -6,9 +6,8 @@ from typing import Literal
 
 from sympy import Add, Expr, Matrix, S, Symbol, zeros
 
-from cra_sym.mechanics.basis import general_solution
+from cra_sym.mechanics.basis import Naming, general_solution
 from cra_sym.mechanics.jets import HamiltonError, Jet
-from cra_sym.mechanics.names import Names
 from cra_sym.mechanics.state_form import end_displacements
 from cra_sym.mechanics.weak import WeakForm, polynomial
 
@@ -26,11 +25,12 @@ class GeneralSolution:
         omega, or s if odd powers of s occur.
     kind : {'hyperbolic', 'decaying'}
         See `general_solution`.
-    names : Names
+    names : callable
+        Makes a symbol that is not in use.
     """
 
     def __init__(
-        self, weak: WeakForm, frequency: Symbol, kind: Literal["hyperbolic", "decaying"], names: Names
+        self, weak: WeakForm, frequency: Symbol, kind: Literal["hyperbolic", "decaying"], names: Naming
     ) -> None:
         self.weak = weak
         self.parameter = frequency**2 if weak.even else frequency

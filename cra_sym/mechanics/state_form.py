@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from sympy import Expr, Matrix, S, Symbol, eye, zeros
 from sympy.core.function import AppliedUndef
-from sympy.core.symbol import uniquely_named_symbol
 
 from cra_sym.mechanics.equations import GeneralisedForces
 from cra_sym.mechanics.hamilton import HamiltonResult
@@ -92,8 +91,7 @@ def state_form(result: HamiltonResult) -> StateForm:
     [1]]))
     """
     weak = weak_form(result.variation)
-    given = (value for form in (weak.inside, weak.ends) for entry in form.values() for value in entry.values())
-    parameter = uniquely_named_symbol("z" if weak.even else "s", [*given, *result.essential, *result.domain])
+    parameter = result.unused_symbol("z" if weak.even else "s")
     section, _, _ = weak.fields()
     space, forces = result.variation.space, GeneralisedForces.of(result.variation)
     return StateForm(

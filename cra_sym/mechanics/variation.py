@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from sympy import Add, Expr, S
+from sympy import Add, Expr, S, expand_mul
 
 from cra_sym.mechanics.constraints import Elimination, eliminate
 from cra_sym.mechanics.jets import END_NAMES, End, HamiltonError, Jet, JetSpace
@@ -63,7 +63,7 @@ def vary(
             raise HamiltonError(f"fields: {field} does not occur in the density {density}")
     elimination = eliminate(space, essential, orders)
     for end in END_NAMES:
-        for term in Add.make_args(terms[end]):
+        for term in Add.make_args(expand_mul(terms[end])):
             _check_end_term(space, f"{end} end, term {space.write(term)}", space.jets(term), orders)
             elimination.check_effective(term, f"{end} end")
     for force, jet, everywhere in applied:

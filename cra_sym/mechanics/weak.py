@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from sympy import Add, Expr, S, Symbol, expand
+from sympy import Add, Dummy, Expr, S, expand
 
 from cra_sym.mechanics.jets import HamiltonError, Jet, JetSpace
 from cra_sym.mechanics.variation import Variation
@@ -77,6 +77,7 @@ def weak_form(variation: Variation) -> WeakForm:
         form, load = (inside, inside_load) if per_length else (ends, end_load)
         label = f"virtual work on {space.form(displacement)}"
         for jet, factor in _linear(space, force, label):
+            _check_order(variation, jet, factor, label)
             _accumulate(form, displacement, jet, -factor)
         still = force.xreplace({space.symbol(jet): S.Zero for jet in space.jets(force)})
         load[displacement] = load.get(displacement, S.Zero) + still
@@ -115,9 +116,19 @@ def _linear(space: JetSpace, force: Expr, label: str, origin: Expr | None = None
     return [(jet, expand(factor) if space.jets(factor) else factor) for jet, factor in factors]
 
 
+def _check_order(variation: Variation, jet: Jet, factor: Expr, label: str) -> None:
+    """Refuse an applied force that depends on a derivative of higher order than the energy does."""
+    space = variation.space
+    if space.is_field(jet.unknown) and jet.space > variation.orders[jet.unknown] - (jet.place is not None):
+        raise HamiltonError(
+            f"{label}: {space.restore(factor * space.symbol(jet))} is a force that depends on an internal force,"
+            " so it has no weak form; write its work on a derivative of the displacement"
+        )
+
+
 def _offending(space: JetSpace, expression: Expr, degree: int) -> Expr:
     """Return the first term of higher degree in the unknowns than ``degree``."""
-    scale = Symbol("scale")
+    scale = Dummy()
     scaled = {space.symbol(jet): scale * space.symbol(jet) for jet in space.jets(expression)}
     terms = Add.make_args(expand(expression))
     found = (term for term in terms if expand(term.xreplace(scaled).diff(scale, degree + 1)) != 0)

@@ -388,6 +388,7 @@ def test_a_density_it_cannot_treat_names_the_term(density, words):
         ({"left": -k_t * v.diff(x, 2) ** 2}, "not a displacement of that end"),
         ({"left": -k_t * at(v, 2 * L) ** 2}, "not an end"),
         ({"left": -k_t * v**2 / 2, "essential": [at(v, 0)]}, r"k_t\*v\(0, t\)\*\*2/2.*does no work"),
+        ({"left": -(k_t * v**2 + k_r * v.diff(x) ** 2) / 2, "essential": [at(v, 0)]}, r"k_t\*v.*does no work"),
         ({"virtual_work": [(F, at(v, 0), None)], "essential": [at(v, 0)]}, "does no work"),
         ({"virtual_work": [(F, v, None)]}, "not evaluated at an end"),
         ({"virtual_work": [(F, v)]}, "triple"),

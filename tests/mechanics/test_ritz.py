@@ -190,6 +190,16 @@ def test_third_derivatives_take_quintic_elements():
     assert rank == 3  # quadratics are free of strain
 
 
+def test_a_parameter_may_have_any_name():
+    xi, h, x_e = symbols("xi h x_e")
+    found = matrices(xi * v.diff(t) ** 2 / 2 - (h + x_e * x) * v.diff(x) ** 2 / 2, 1)
+    values = {found.element_length: 2, found.element_start: 0, h: 3, x_e: 5, xi: 7}
+    shape = Matrix([1, 0, 1, 0])  # rigid motion
+    assert (shape.T * found.element_mass * shape)[0].subs(values) == 14
+    ramp = Matrix([0, 1, found.element_length, 1])  # v = x
+    assert (ramp.T * found.element_stiffness * ramp)[0].subs(values) == 16
+
+
 def test_errors_name_what_is_wrong():
     with pytest.raises(HamiltonError, match="nonlinear"):
         matrices(STRING - v**4, 2)

@@ -289,8 +289,7 @@ def test_what_has_no_closed_form_says_so(density, words):
 def test_names_in_use_are_left_alone():
     lam, omega = symbols("lambda omega")
     modal = separate(derive(lam * v.diff(t) ** 2 / 2 - omega * v.diff(x) ** 2 / 2, essential=[v.subs(x, 0)]))
-    assert {number.name for number in modal.basis.wave_numbers} == {"lambda_"}
-    assert modal.frequency.name == "omega_"
+    assert not {lam, omega} & {modal.frequency, *modal.basis.wave_numbers}
 
 
 def test_steps_read_from_the_equations_to_the_modes():

@@ -122,6 +122,19 @@ def test_damping_makes_the_parameter_s():
     assert form.system[2, 0] == m * s**2
 
 
+@pytest.mark.parametrize("work", [(-c * v.diff(x, 2), v, "left"), (-c * v.diff(x, 4, t), v, "domain")])
+def test_forces_that_depend_on_internal_forces_have_no_weak_form(work):
+    result = derive(BEAM, virtual_work=[work])
+    assert len(result.boundary_conditions) == 4
+    with pytest.raises(HamiltonError, match="internal force"):
+        state_form(result)
+
+
+def test_the_parameter_gets_a_name_that_is_free():
+    z = symbols("z")
+    assert state_form(derive(z * v.diff(t) ** 2 / 2 - T * v.diff(x) ** 2 / 2)).parameter != z
+
+
 def test_variable_coefficients_stay_in_the_system():
     form = state_form(derive(m * v.diff(t) ** 2 / 2 - T * (1 - x / L) * v.diff(x) ** 2 / 2))
     assert not form.uniform
