@@ -1,0 +1,64 @@
+"""Model against model: what a thicker beam theory and a damper in the joint change."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib import style
+from matplotlib.figure import Figure
+
+from cra_sym.figures import STYLE
+
+__all__ = ["figure_damped_joint", "figure_slenderness"]
+
+
+def figure_slenderness(slenderness: Any, thin: Any, thick: Any, *, axes: Any = None) -> Figure:
+    """Draw the frequencies of a thin and of a thick beam theory, in Hz and as their ratio.
+
+    Parameters
+    ----------
+    slenderness : array_like, shape (n,)
+        Length over thickness.
+    thin, thick : array_like, shape (n, modes)
+        Natural frequencies in Hz after Euler-Bernoulli and after Timoshenko.
+    axes : pair of Axes, optional
+    """
+    slenderness, thin, thick = (np.asarray(a, dtype=float) for a in (slenderness, thin, thick))
+    with style.context(STYLE):
+        left, right = Figure(figsize=(8.6, 3.9), layout="constrained").subplots(1, 2) if axes is None else axes
+        for mode in range(thick.shape[1]):
+            look: dict[str, Any] = {"color": f"C{mode}"}
+            left.loglog(slenderness, thick[:, mode], linestyle="-", label=f"$f_{mode + 1}$", **look)
+            left.loglog(slenderness, thin[:, mode], linestyle=":", linewidth=1.2, **look)
+            right.semilogx(slenderness, thick[:, mode] / thin[:, mode], label=f"$f_{mode + 1}$")
+        left.set_ylabel("natural frequency / Hz")
+        left.set_title("Timoshenko (solid), Euler-Bernoulli (dotted)")
+        right.set_ylabel("Timoshenko / Euler-Bernoulli")
+        right.set_title("a stout arm is softer, high modes most")
+        right.axhline(1.0, color="0.75", linewidth=0.8, linestyle="-")
+        for ax in (left, right):
+            ax.set_xlabel("slenderness $L/h$")
+            ax.legend()
+    return right.figure
+
+
+def figure_damped_joint(damper: Any, ratio: Any, *, ax: Any = None) -> Figure:
+    """Draw modal damping ratios against the coefficient of a viscous damper in the joint.
+
+    Parameters
+    ----------
+    damper : array_like, shape (n,)
+        N s/m.
+    ratio : array_like, shape (n, modes)
+    ax : Axes, optional
+    """
+    with style.context(STYLE):
+        ax = Figure(figsize=(6.4, 3.9), layout="constrained").subplots() if ax is None else ax
+        for mode, values in enumerate(np.asarray(ratio, dtype=float).T):
+            ax.loglog(damper, values, label=f"mode {mode + 1}")
+        ax.set_xlabel("damper in the joint $c_j$ / (N s/m)")
+        ax.set_ylabel("damping ratio $\\zeta$")
+        ax.set_title("Too weak dissipates little, too strong holds the joint still")
+        ax.legend()
+    return ax.figure
