@@ -115,8 +115,12 @@ def _start(
     first = number == characteristic.zeros[lane]
     alone = ~first & (below == number) & (above == number + 1) & (right > 1)
     z = np.where(below == number, low, high)
-    z[first] = _from_zero(characteristic, lane[first], high[first])
     z[alone] = _by_phase(lane[alone], right[alone], points, values) ** 4
+    z[first] = _from_zero(characteristic, lane[first], high[first])
+    second = np.flatnonzero((number == characteristic.zeros[lane] + 1) & (right < 3) & (above == number + 1))
+    guess = _second_from_zero(characteristic, lane[second])
+    inside = (low[second] < guess) & (guess < high[second])
+    z[second[inside]] = guess[inside]
     return z
 
 
@@ -144,6 +148,14 @@ def _from_zero(characteristic: Characteristic, lane: np.ndarray, high: np.ndarra
     """Return the lower bound of the first positive zero that the first step from z = 0 gives; it is close."""
     value, slope, curvature = characteristic.evaluate(np.zeros(lane.size), lane)
     return np.minimum(_step(value, slope, curvature), high)
+
+
+def _second_from_zero(characteristic: Characteristic, lane: np.ndarray) -> np.ndarray:
+    """Return the larger zero of the function's first three terms at z = 0, nan where it is not well apart."""
+    value, slope, curvature = characteristic.evaluate(np.zeros(lane.size), lane)
+    discriminant = slope * slope - 2 * value * curvature
+    apart = np.where(discriminant > 0.1 * slope * slope, discriminant, np.nan)
+    return (np.abs(slope) + np.sqrt(apart)) / np.abs(curvature)
 
 
 def _by_phase(lane: np.ndarray, right: np.ndarray, points: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -181,5 +193,5 @@ def _climbed(characteristic: Characteristic, number: np.ndarray, lane: np.ndarra
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             remaining = step * (step / previous[active]) ** 3  # the order is three
         previous[active] = step
-        active = active[~((remaining <= 1e-16 * z[active]) | (step <= 1e-13 * z[active]))]
+        active = active[~((remaining <= 1e-15 * z[active]) | (step <= 1e-13 * z[active]))]
     raise ArithmeticError(f"{active.size} zeros were not reached")

@@ -131,6 +131,8 @@ def _start(z, number, right, counts, values, tables, pairs, h, zeros, last, size
         below, above, low, high = counts[k - 1, lane], counts[k, lane], tables[k - 1, 1], tables[k, 1]
         if number == zeros[lane]:
             z[lane] = min(abs(h[0, lane]) / np.sqrt(h[1, lane] ** 2 - 2.0 * h[0, lane] * h[2, lane]), high)
+        elif number == zeros[lane] + 1 and k < 3 and above == number + 1 and _second(h, lane, low, high) > 0.0:
+            z[lane] = _second(h, lane, low, high)
         elif below == number and above == number + 1 and k > 1:
             z[lane] = _by_phase(lane, k, tables, values, last)
         else:
@@ -144,6 +146,14 @@ def _start(z, number, right, counts, values, tables, pairs, h, zeros, last, size
                 else:
                     high, above = middle, counted
             z[lane] = low if below == number else high
+
+
+def _second(h, lane, low, high):
+    """Return the larger zero of the first three terms of the power series if it is apart from the other, else 0."""
+    square = h[1, lane] ** 2
+    discriminant = square - 4.0 * h[0, lane] * h[2, lane]
+    z = (abs(h[1, lane]) + np.sqrt(max(discriminant, 0.0))) / (2.0 * abs(h[2, lane]))
+    return z if discriminant > 0.1 * square and low < z < high else 0.0
 
 
 def _by_phase(lane, k, tables, values, last):
@@ -226,4 +236,4 @@ def _climb(z, previous, fresh, ahead, active, evaluations, number, zeros, k, h, 
 
 def _there(step, previous, z):
     ratio = step / previous
-    return step * ratio * ratio * ratio <= 1e-16 * z or step <= 1e-13 * z
+    return step * ratio * ratio * ratio <= 1e-15 * z or step <= 1e-13 * z
