@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from sympy import Derivative, Expr, S, Symbol, sympify
@@ -14,6 +14,7 @@ from sympy.core.function import AppliedUndef
 from cra_sym.checks import count, real_array
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics import HamiltonResult, Modal, StateForm, hamilton, ritz, separate, state_form
+from cra_sym.model.forced import driven_displacement, steady_states
 from cra_sym.model.galerkin import Ritz
 from cra_sym.model.modes import Modes
 from cra_sym.model.spatial import SpatialProblem
@@ -21,6 +22,7 @@ from cra_sym.model.units import check_dimensions
 from cra_sym.model.values import Values
 from cra_sym.solvers.eigenvalues import lowest, refine
 from cra_sym.solvers.shapes import mode_states
+from cra_sym.solvers.stiffness import DynamicStiffness
 
 __all__ = ["Model"]
 
@@ -298,23 +300,75 @@ class Model:
         ndarray, shape (..., modes, stations)
         """
         modes, derivative = count("modes", modes), count("derivative", derivative, low=0)
-        wanted = self.equations.fields[0] if field is None else field
-        if wanted not in self.equations.fields:
-            raise ValueError(f"field = {field}: allowed are {', '.join(map(str, self.equations.fields))}")
-        given = Values.read(self.symbols, values)
+        wanted, given = self._field(field), Values.read(self.symbols, values)
         x = np.atleast_1d(real_array("x_values", x_values))
         place = self._conservative.displacements.index(wanted)
         shapes = np.empty((given.columns.shape[1], modes, len(x)))
         for rows, left, problem in self._spatial.problems(given):
-            share = (x - left[:, None]) / problem.length[:, None]
-            if (share < -1e-12).any() or (share > 1.0 + 1e-12).any():
-                raise ValueError(f"x_values = {x_values}: allowed is the domain {self._options['domain']}")
-            z = lowest(problem, modes)
-            state = mode_states(problem, z, np.concatenate([np.clip(share, 0.0, 1.0), np.ones((len(rows), 1))], axis=1))
+            z, share = lowest(problem, modes), self._shares(x, left, problem)
+            state = mode_states(problem, z, np.concatenate([share, np.ones((len(rows), 1))], axis=1))
             sign = _tip_sign(state[:, :, -1, : problem.displacements])
             row = self._spatial.derivative_row(place, derivative, z, x, given.take(rows))
             shapes[rows] = sign * (row * state[:, :, :-1]).sum(axis=-1)
         return shapes.reshape(*given.shape, modes, len(x))
+
+    def frequency_response(
+        self,
+        values: Mapping[Any, Any],
+        angular_frequency: Any,
+        x_values: Any,
+        *,
+        drive: Expr,
+        kind: Literal["force", "motion"] = "force",
+        field: AppliedUndef | None = None,
+    ) -> np.ndarray:
+        """Return the exact complex amplitude of a field for harmonic driving ``exp(i omega t)``, dampers included.
+
+        Parameters
+        ----------
+        values : mapping
+        angular_frequency : array_like, shape (n,)
+            rad/s.
+        x_values : array_like, shape (stations,)
+        drive : Expr
+            A displacement of an end, such as ``v.subs(x, L)``, or a lumped coordinate.
+        kind : {'force', 'motion'}
+            A generalised force of one unit on that displacement, or one unit of motion of it.
+        field : applied undefined function, optional
+            Default: the first.
+
+        Returns
+        -------
+        ndarray of complex, shape (..., n, stations)
+        """
+        if kind not in ("force", "motion"):
+            raise ValueError(f"kind = {kind!r}: allowed are 'force' and 'motion'")
+        form, given = self.state_form, Values.read(self.symbols, values)
+        place = form.displacements.index(self._field(field))
+        driven = driven_displacement(form, drive, self.equations.domain)
+        omega = np.atleast_1d(real_array("angular_frequency", angular_frequency))
+        x = np.atleast_1d(real_array("x_values", x_values))
+        found = np.empty((given.columns.shape[1], len(omega), len(x)), dtype=complex)
+        for rows, left, problem in self._damped.problems(given):
+            row = np.repeat(np.arange(len(rows)), len(omega))
+            parameter = np.tile(1j * omega if form.damped else omega**2, len(rows))
+            share = self._shares(x, left, problem)[row]
+            state = steady_states(problem, parameter, row, share, driven, kind)
+            found[rows] = state[..., place].reshape(len(rows), len(omega), len(x))
+        return found.reshape(*given.shape, len(omega), len(x))
+
+    def _field(self, field: AppliedUndef | None) -> AppliedUndef:
+        wanted = self.equations.fields[0] if field is None else field
+        if wanted not in self.equations.fields:
+            raise ValueError(f"field = {field}: allowed are {', '.join(map(str, self.equations.fields))}")
+        return wanted
+
+    def _shares(self, x: np.ndarray, left: np.ndarray, problem: DynamicStiffness) -> np.ndarray:
+        """Return the positions as shares of the length, shape (rows, stations)."""
+        share = (x - left[:, None]) / problem.length[:, None]
+        if (share < -1e-12).any() or (share > 1.0 + 1e-12).any():
+            raise ValueError(f"x_values = {x}: allowed is the domain {self.equations.domain}")
+        return np.clip(share, 0.0, 1.0)
 
     def modal_parameters(self, values: Mapping[Any, Any], modes: int = 3) -> Modes:
         """Return frequencies with the mass-normalised displacements and natural forces of both ends."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from .stiffness import GOLDEN, TERMS, DynamicStiffness, Evaluation, Tree, form
 
-__all__ = ["mode_states"]
+__all__ = ["mode_states", "states"]
 
 
 def mode_states(problem: DynamicStiffness, z: np.ndarray, share: np.ndarray) -> np.ndarray:
@@ -30,15 +30,31 @@ def mode_states(problem: DynamicStiffness, z: np.ndarray, share: np.ndarray) -> 
     row = np.repeat(np.arange(rows), modes)
     place, z = _clusters(z)
     here = problem.evaluate(z.ravel(), row, keep_tree=True)
-    assert here.tree is not None
     u = _null_vectors(here, place, rows, modes)
-    nodal = np.einsum("rij,rj->ri", here.unit, u)
-    state = np.empty((rows * modes, share.shape[1], 2 * problem.displacements + problem.coordinates), dtype=u.dtype)
+    state = states(problem, here, u, z.ravel(), row, share[row])
+    return state.reshape(rows, modes, *state.shape[1:])
+
+
+def states(
+    problem: DynamicStiffness, here: Evaluation, u: np.ndarray, z: np.ndarray, row: np.ndarray, share: np.ndarray
+) -> np.ndarray:
+    """Return the state (q, w, P) at the stations for free coordinates ``u`` of an evaluation that kept its tree.
+
+    Parameters
+    ----------
+    here : Evaluation
+        Of ``problem`` at ``z`` and ``row``.
+    u : ndarray, shape (len(z), f)
+    share : ndarray, shape (len(z), stations)
+    """
+    assert here.tree is not None
+    nodal = (here.unit @ u[..., None])[..., 0]
+    state = np.empty((len(z), share.shape[1], 2 * problem.displacements + problem.coordinates), dtype=u.dtype)
     for level in np.unique(here.tree.levels):
         member = np.nonzero(here.tree.levels == level)[0]
         start = _spread(problem, here.tree, nodal[member], member, int(level))
-        state[member] = _carry(problem, z.ravel()[member], row[member], start, int(level), share[row[member]])
-    return state.reshape(rows, modes, *state.shape[1:])
+        state[member] = _carry(problem, z[member], row[member], start, int(level), share[member])
+    return state
 
 
 def _clusters(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -72,6 +72,10 @@ class Evaluation:
         """Exact number of natural frequencies below z (Wittrick and Williams 1971)."""
         return self.fixed_count + negatives(self.matrix)
 
+    def solve(self, load: np.ndarray) -> np.ndarray:
+        """Return the free coordinates that a load on them, shape (rows, f), moves."""
+        return (_inverse(self.matrix) @ load[..., None])[..., 0]
+
     @property
     def logarithmic_derivative(self) -> np.ndarray:
         """F'/F of the entire function F whose zeros are the eigenvalues: det K with all its poles removed."""
