@@ -18,34 +18,25 @@ from cra_sym.arm.analysis import frequency_parameters
 from cra_sym.arm.parameters import Arm
 from cra_sym.kernels import derived_kernel
 
-__all__ = ["characteristic", "flipped_conditions", "flipped_frequencies"]
+__all__ = ["characteristic", "flipped", "flipped_frequencies"]
 
 
 @cache
-def flipped_conditions() -> tuple[Any, ...]:
-    """Return the four end conditions of Hamilton's principle with the rotational spring's energy sign flipped."""
+def flipped() -> Any:
+    """Return Hamilton's principle carried out with the sign of the rotational spring's energy flipped."""
     from cra_sym.arm.energy import L, k_r, lagrangian, t, v, w, x
     from cra_sym.mechanics import hamilton
 
     density, left, right = lagrangian()
-    spring = left.coeff(k_r) * k_r
-    result = hamilton(
-        density, fields=[v], prescribed=[w], x=x, domain=(0, L), t=t, left=left - 2 * spring, right=right
-    )  # fmt: skip
-    return result.boundary_conditions
+    wrong = left - 2 * k_r * left.coeff(k_r)
+    return hamilton(density, fields=[v], prescribed=[w], x=x, domain=(0, L), t=t, left=wrong, right=right)
 
 
 def characteristic() -> tuple[Any, tuple[Any, ...]]:
     """Return the frequency function of the flipped arm and its arguments (lamda, s_t, c_t, s_r, c_r, mu, iota)."""
-    from sympy import Matrix
+    from cra_sym.arm.modes import frequency_function, separated
 
-    from cra_sym.arm import modes
-    from cra_sym.arm.joint import in_one_mode
-
-    force, moment, *tip = modes.rows_of(map(in_one_mode, flipped_conditions()))
-    matrix = Matrix.vstack(modes.weighted_root(force, moment), *tip)
-    determinant = modes.reduced(matrix.det(method="berkowitz"))
-    return modes.normalised(determinant).subs(modes.VALUES), modes.frequency_function()[1]
+    return separated(flipped()), frequency_function()[1]
 
 
 _function = derived_kernel("cra_sym.arm.flipped:characteristic")

@@ -7,6 +7,7 @@ from sympy import Eq, Expr, Mul, Pow, cancel, limit, oo, pi, solve
 
 from cra_sym.arm.energy import HALF, L, modal_numbers, phi_i
 from cra_sym.arm.equations import checks, numbered
+from cra_sym.arm.evaluation import group_numbers, shapes_agree
 from cra_sym.arm.modes import (
     C_1,
     VALUES,
@@ -18,7 +19,6 @@ from cra_sym.arm.modes import (
     circular_ratio,
     frequency_function,
     frequency_polynomial,
-    group_numbers,
     iota,
     kappa_r,
     kappa_t,
@@ -30,7 +30,6 @@ from cra_sym.arm.modes import (
     r_2,
     s_r,
     s_t,
-    shapes_agree,
 )
 from cra_sym.arm.shooting import sample, shoot
 from cra_sym.symbols import Dimension, dimension, symbol
@@ -86,7 +85,9 @@ def cantilever_frequency() -> Eq:
 
 
 def _bare(expression: Expr) -> Expr:
-    return limit(limit(expression, mu, 0), iota, 0)
+    """Return the limit of no mass, then no rotary inertia, at the tip."""
+    placed = expression.subs({value: name for name, value in VALUES.items()})
+    return limit(limit(placed, mu, 0), iota, 0).subs(VALUES)
 
 
 _RIGID = {"k_t": 1e12, "k_r": 1e12}

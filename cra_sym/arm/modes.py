@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import cache
 
 import numpy as np
@@ -29,10 +28,11 @@ from sympy import (
 
 from cra_sym.arm.energy import A, E, I_z, J_e, L, k_r, k_t, m_e, phi_i, rho, x
 from cra_sym.arm.equations import checks, numbered
-from cra_sym.arm.evaluation import put
+from cra_sym.arm.evaluation import group_numbers, put, shapes_agree, shot_coefficients
 from cra_sym.arm.joint import mode_conditions
-from cra_sym.arm.motion import mode_field_equation
+from cra_sym.arm.motion import dynamics, mode_field_equation
 from cra_sym.arm.shooting import sample, shoot
+from cra_sym.mechanics import HamiltonResult, separate
 from cra_sym.symbols import symbol
 
 __all__ = ["coefficients", "frequency_function", "reduced_matrix", "root_matrix", "tip_matrix"]
@@ -106,21 +106,17 @@ def dimensionless(expression: Expr) -> Expr:
     return expression.subs(groups).subs(beta, lamda / L)
 
 
-def rows_of(conditions: Iterable[Eq]) -> tuple[Matrix, ...]:
-    """Return the coefficients of C_1..C_4 in conditions on a mode in the order of (16), with placeholders."""
+@cache
+def _rows() -> tuple[Matrix, ...]:
+    """Return the coefficients of C_1..C_4 in the four conditions on a mode in the order of (16), with placeholders."""
     shape, rows = mode_form()[0].rhs, []
     names = {value: name for name, value in VALUES.items()}
-    for condition, power in zip(conditions, (3, 2, 3, 2), strict=True):
+    for condition, power in zip(mode_conditions(), (3, 2, 3, 2), strict=True):
         balance = dimensionless(put(condition.lhs - condition.rhs, {phi_i: shape})) * L**power / (E * I_z)
         entries = [balance.subs(names).expand().coeff(coefficient) for coefficient in coefficients]
         common = lamda ** min(Poly(entry, lamda).monoms()[-1][0] for entry in entries if entry != 0)
         rows.append(Matrix([[(entry / common).expand() for entry in entries]]))
     return tuple(rows)
-
-
-@cache
-def _rows() -> tuple[Matrix, ...]:
-    return rows_of(mode_conditions())
 
 
 def _weighted(row: Matrix, stiffness: Symbol, spring: Symbol, compliance: Symbol) -> Matrix:
@@ -130,11 +126,7 @@ def _weighted(row: Matrix, stiffness: Symbol, spring: Symbol, compliance: Symbol
 
 def root_matrix() -> Matrix:
     """Return the 2 x 4 matrix of force and moment at the root, homogeneous in (s_t, c_t) and in (s_r, c_r)."""
-    return weighted_root(*_rows()[:2])
-
-
-def weighted_root(force: Matrix, moment: Matrix) -> Matrix:
-    """Return the two root conditions homogeneous in (s_t, c_t) and in (s_r, c_r)."""
+    force, moment, *_ = _rows()
     return Matrix.vstack(_weighted(force, kappa_t, s_t, c_t), _weighted(moment, kappa_r, s_r, c_r))
 
 
@@ -164,36 +156,11 @@ def tip_system() -> Eq:
     return _system(tip_matrix(), Matrix(coefficients))
 
 
-def group_numbers(values: dict[str, float], mode_beta: float) -> dict[Expr, float]:
-    """Return lamda and the dimensionless groups of an arm with a finite joint."""
-    bending, mass, length = values["E"] * values["I_z"], values["rho"] * values["A"] * values["L"], values["L"]
-    stiff_t, stiff_r = values["k_t"] * length**3 / bending, values["k_r"] * length / bending
-    weights = {
-        s_t: stiff_t / (1 + stiff_t),
-        c_t: 1 / (1 + stiff_t),
-        s_r: stiff_r / (1 + stiff_r),
-        c_r: 1 / (1 + stiff_r),
-    }
-    return weights | {
-        lamda: mode_beta * length,
-        kappa_t: stiff_t,
-        kappa_r: stiff_r,
-        mu: values["m_e"] / mass,
-        iota: values["J_e"] / (mass * length**2),
-    }
-
-
-def _shot_coefficients(mode) -> Matrix:
-    """Return C_1..C_4 of a mode found by shooting, from its values and derivatives at the root."""
-    a, b, c, d = (mode.start[k] / mode.beta**k for k in range(4))
-    return Matrix([(a - c) / 2, (b - d) / 2, (a + c) / 2, (b + d) / 2])
-
-
 def _annihilates(matrix: Matrix, seed: int) -> bool:
     """Tell whether the matrix applied to the coefficients of modes found by shooting gives zero, and not otherwise."""
     values = sample(seed)
     for mode in shoot(values):
-        found = np.array(_shot_coefficients(mode), dtype=float)[: matrix.cols]
+        found = np.array(shot_coefficients(mode), dtype=float)[: matrix.cols]
         for factor, expected in ((1.0, True), (1.03, False)):
             numeric = np.array(matrix.subs(group_numbers(values, factor * mode.beta)), dtype=float)
             residual = np.abs(numeric @ found) / (np.abs(numeric) @ np.abs(found))
@@ -217,7 +184,7 @@ def _() -> bool:
 # Elimination and the frequency equation (20)-(23) ---------------------------------------------------------------
 
 
-def reduced(expression: Expr) -> Expr:
+def _reduced(expression: Expr) -> Expr:
     """Return a polynomial in the placeholders in normal form: s^2 = 1 - c^2 and S^2 = C^2 - 1."""
     remainder = expression.expand()
     for name, square in ((_s, 1 - _c**2), (_sh, _ch**2 - 1)):
@@ -235,7 +202,7 @@ def _elimination() -> tuple[Matrix, Expr]:
     root, tip = root_matrix(), _tip()
     determinant = root[:, 2:].det().expand()
     return (determinant * tip[:, :2] - tip[:, 2:] * root[:, 2:].adjugate() * root[:, :2]).applyfunc(
-        reduced
+        _reduced
     ), determinant
 
 
@@ -295,19 +262,15 @@ def _() -> bool:
     matrix, factor = _elimination()
     whole = Matrix.vstack(root_matrix(), _tip()).det(method="berkowitz")
     named = dict(zip(_entries, matrix, strict=True))
-    return reduced(determinant().lhs.subs(named) - factor * whole) == 0
+    return _reduced(determinant().lhs.subs(named) - factor * whole) == 0
 
 
 @cache
 def frequency_polynomial() -> Expr:
-    """Return the determinant with the factor of the elimination and powers of lamda divided out."""
+    """Return the determinant, divided so as to leave 1 + c C for the bare cantilever."""
     matrix, factor = _elimination()
     named = dict(zip(_entries, matrix, strict=True))
-    return normalised(cancel(reduced(determinant().lhs.subs(named)) / factor).expand())
-
-
-def normalised(polynomial: Expr) -> Expr:
-    """Divide a determinant by its power of lamda and by the number that leaves 1 + c C for the bare cantilever."""
+    polynomial = cancel(_reduced(determinant().lhs.subs(named)) / factor).expand()
     lowest = min(power for (power,), _ in Poly(polynomial, lamda).terms())
     rigid = {s_t: 1, c_t: 0, s_r: 1, c_r: 0, mu: 0, iota: 0}
     unit = (polynomial / lamda**lowest).expand().subs(rigid).subs({_c: 0})
@@ -339,10 +302,26 @@ def by_power(coefficient: Expr) -> Expr:
     return sum((value.factor() * lamda**a * mu**b * iota**c for (a, b, c), value in terms), start=lamda * 0)
 
 
+def separated(result: HamiltonResult) -> Expr:
+    """Return the characteristic function that :func:`cra_sym.mechanics.separate` finds, in the table's symbols."""
+    groups = {
+        k_t: E * I_z / L**3 * s_t / c_t,
+        k_r: E * I_z / L * s_r / c_r,
+        m_e: mu * rho * A * L,
+        J_e: iota * rho * A * L**3,
+    }
+    modal = separate(result, parameters=groups)
+    (wave,) = modal.basis.wave_numbers
+    return modal.characteristic_function.subs(wave, lamda)
+
+
 @checks(23)
 def _() -> bool:
-    """Numbers: it changes sign at every frequency parameter of random arms found by shooting and nowhere between."""
+    """The four conditions of Hamilton's principle in one determinant; and numbers: it changes sign at every frequency
+    parameter of random arms found by shooting and nowhere between."""
     function, arguments = frequency_function()
+    if (separated(dynamics(driven=False)) - frequency_equation().lhs).expand() != 0:
+        return False
     for seed in (23, 24):
         values = sample(seed)
         shapes = shoot(values)
@@ -375,7 +354,7 @@ def _() -> bool:
     """Numbers: the coefficients of modes of a random arm found by shooting; by hand, a rigid joint mirrors C_1, C_2."""
     values = sample(26)
     for mode in shoot(values):
-        known = dict(zip(coefficients, _shot_coefficients(mode), strict=True))
+        known = dict(zip(coefficients, shot_coefficients(mode), strict=True))
         numbers = group_numbers(values, mode.beta)
         for e in coefficient_ratios():
             if abs(float(e.rhs.subs(numbers).subs(known)) - known[e.lhs]) > 1e-8 * max(map(abs, known.values())):
@@ -416,24 +395,9 @@ def _() -> bool:
     values = sample(28)
     for mode in shoot(values):
         numbers = group_numbers(values, mode.beta)
-        known = _shot_coefficients(mode)
+        known = shot_coefficients(mode)
         third, fourth = reduced_matrix().subs(numbers)[1, :]
         found, expected = float(circular_ratio().rhs.subs(numbers)), float(known[1] / known[0])
         if max(abs(found - expected), abs(-third / fourth - expected)) > 1e-7 * abs(expected):
             return False
-    return True
-
-
-def shapes_agree(seeds: tuple[int, ...], shape: Expr, ratio: Expr, **joint: float) -> bool:
-    """Compare a derived shape with modes found by shooting, scaled alike at the tip."""
-    for seed in seeds:
-        values = sample(seed) | joint
-        for mode in shoot(values):
-            numbers = group_numbers(values, mode.beta) | {C_1: 1.0, beta: mode.beta}
-            numeric = shape.subs(r_2, ratio).subs(numbers)
-            places = np.linspace(0.0, values["L"], 9)
-            found = np.array([float(numeric.subs(x, place)) for place in places])
-            expected = mode(places)
-            if not np.allclose(found / found[-1], expected / expected[-1], atol=1e-6):
-                return False
     return True

@@ -8,7 +8,7 @@ import cra_sym as cra
 from cra_sym import symbols as s
 from cra_sym.arm import modes
 from cra_sym.arm.energy import potential_energy, single_mode
-from cra_sym.arm.flipped import characteristic, flipped_conditions, flipped_frequencies
+from cra_sym.arm.flipped import characteristic, flipped, flipped_frequencies
 from cra_sym.arm.motion import natural_conditions
 
 ARM = cra.Arm.nominal()
@@ -16,26 +16,27 @@ K_R = np.logspace(2, 6, 41)
 
 
 def test_only_the_sign_of_the_rotational_condition_differs():
-    for ours, theirs in zip(natural_conditions(), flipped_conditions(), strict=True):
+    for ours, theirs in zip(natural_conditions(), flipped().boundary_conditions, strict=True):
         assert ours.lhs == theirs.lhs
         expected = -ours.rhs if ours.has(s.k_r) else ours.rhs
         assert (theirs.rhs - expected).expand() == 0
 
 
 def test_flipping_the_sign_is_a_negative_stiffness():
-    flipped, _ = characteristic()
+    function, _ = characteristic()
     derived, _ = modes.frequency_function()
-    assert (flipped - derived.subs(s.c_r, -s.c_r)).expand() == 0
+    negative = derived.subs(s.c_r, -s.c_r)
+    assert 0 in ((function - negative).expand(), (function + negative).expand())
 
 
 def test_frequencies_rise_as_the_joint_softens_where_the_true_ones_fall():
-    flipped, derived = flipped_frequencies(ARM.replace(k_r=K_R)), cra.natural_frequencies(ARM.replace(k_r=K_R))
+    rising, derived = flipped_frequencies(ARM.replace(k_r=K_R)), cra.natural_frequencies(ARM.replace(k_r=K_R))
     rigid = cra.natural_frequencies(ARM)
-    assert np.all(np.diff(flipped, axis=0) < 0) and np.all(np.diff(derived, axis=0) > 0)
-    assert np.all(flipped > rigid) and np.all(derived < rigid)
+    assert np.all(np.diff(rising, axis=0) < 0) and np.all(np.diff(derived, axis=0) > 0)
+    assert np.all(rising > rigid) and np.all(derived < rigid)
     kappa = ARM.replace(k_r=K_R[-1]).kappa_r
     np.testing.assert_allclose(1 - derived[-1] / rigid, 2 / kappa, rtol=0.02)
-    np.testing.assert_allclose(flipped[-1] / rigid - 1, 2 / kappa, rtol=0.02)
+    np.testing.assert_allclose(rising[-1] / rigid - 1, 2 / kappa, rtol=0.02)
 
 
 def test_rigid_limit_is_the_same():

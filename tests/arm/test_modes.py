@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 from scipy.optimize import brentq
 from sympy import cos, cosh, lambdify, limit, oo, pi, sin, sinh, sqrt, tan, tanh
 
 from cra_sym import symbols as s
 from cra_sym.arm import modes
 from cra_sym.arm.equations import equation
+from cra_sym.arm.motion import dynamics
+from cra_sym.mechanics import ritz
 
 RIGID_T, RIGID_R = {s.s_t: 1, s.c_t: 0}, {s.s_r: 1, s.c_r: 0}
 FREE_T, FREE_R = {s.s_t: 0, s.c_t: 1}, {s.s_r: 0, s.c_r: 1}
@@ -110,3 +113,22 @@ def test_mode_shape_satisfies_all_four_conditions_for_random_parameters():
             vector = np.array([*weights, *hyperbolic])
             matrix = np.array(modes.root_matrix().col_join(modes.tip_matrix()).subs(values), dtype=float)
             assert np.max(np.abs(matrix @ vector) / (np.abs(matrix) @ np.abs(vector))) < 1e-9
+
+
+def test_ritz_on_finite_elements_gives_the_same_frequencies():
+    """The same Lagrangian, no determinant and no mode form: Hermite elements."""
+    values = {s.L: 0.9, s.E: 1.3, s.I_z: 1.1, s.rho: 0.8, s.A: 0.7, s.m_e: 0.1, s.J_e: 0.004, s.k_t: 60.0, s.k_r: 4.0}
+    matrices = ritz(dynamics(driven=False), elements=10)
+    stiffness, mass = (np.array(m.subs(values), dtype=float) for m in (matrices.stiffness, matrices.mass))
+    upper = np.sqrt(eigh(stiffness, mass, eigvals_only=True)[:3]) / (2 * np.pi)
+    groups = {s.iota: values[s.J_e], s.mu: values[s.m_e], s.kappa_t: values[s.k_t], s.kappa_r: values[s.k_r]}
+    line, bending, length = values[s.rho] * values[s.A], values[s.E] * values[s.I_z], values[s.L]
+    scale = {s.iota: line * length**3, s.mu: line * length, s.kappa_t: bending / length**3, s.kappa_r: bending / length}
+    groups = {name: value / scale[name] for name, value in groups.items()}
+    finite = {s.s_t: groups[s.kappa_t], s.c_t: 1, s.s_r: groups[s.kappa_r], s.c_r: 1}
+    function = lambdify(s.lamda, frequency(finite, groups))
+    hertz = lambdify(s.lamda, equation(30).expression.rhs.subs(values))
+    for found in upper:
+        near = brentq(lambda place, found=found: hertz(place) - found, 0.1, 20.0)
+        root = brentq(function, near * (1 - 1e-3), near * (1 + 1e-6))
+        assert hertz(root) == pytest.approx(found, rel=2e-5)
