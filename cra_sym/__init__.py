@@ -24,6 +24,7 @@ _HOME = {
     "residual_vibration": "arm.response",
     "state_space": "arm.state_space",
     "frequency_response": "arm.frequency_response",
+    "sensitivities": "arm.sensitivity",
     "certify": "arm.certification",
     "Model": "model",
     "sweep": "studies",

@@ -11,6 +11,7 @@ from .arm.parameters import Arm as Arm
 from .arm.response import residual_vibration as residual_vibration
 from .arm.response import response as response
 from .arm.response import tip_response as tip_response
+from .arm.sensitivity import sensitivities as sensitivities
 from .arm.state_space import state_space as state_space
 from .kernels import kernel as kernel
 from .model import Model as Model

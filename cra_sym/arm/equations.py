@@ -35,6 +35,7 @@ _HOMES: dict[str, range] = {
     "cra_sym.arm.orthogonality": range(16, 17),
     "cra_sym.arm.modes": range(17, 27),
     "cra_sym.arm.limits": range(27, 31),
+    "cra_sym.arm.implicit": range(31, 33),
     "cra_sym.arm.driven": range(33, 35),
 }
 

@@ -1,0 +1,128 @@
+"""Sensitivities by implicit differentiation of the frequency equation: equations (31) and (32)."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import sympy as sp
+
+from cra_sym.arm.energy import modal_numbers
+from cra_sym.arm.equations import checks, numbered
+from cra_sym.arm.limits import natural_frequency
+from cra_sym.arm.modes import frequency_function, group_numbers
+from cra_sym.arm.shooting import sample, shoot
+from cra_sym.symbols import symbol
+
+__all__ = ["frequency_sensitivities", "group_exponents", "implicit_derivatives", "sensitivity_function"]
+
+lamda, L, E, I_z = (symbol(name) for name in ("lamda", "L", "E", "I_z"))
+_PAIRS = {name: tuple(symbol(f"{letter}_{name}") for letter in ("s", "c")) for name in ("t", "r")}
+
+
+@numbered(31, "sensitivity function", "derived", (23,))
+def sensitivity_function() -> sp.Eq:
+    """Along a root of the frequency equation Delta(lamda, kappa) = 0 stays zero as a stiffness changes: its total
+    derivative vanishes."""
+    kappa = symbol("kappa_t")
+    slope = sp.idiff(sp.Function("Delta")(lamda, kappa), lamda, kappa)
+    return sp.Eq(sp.Function("lamda")(kappa).diff(kappa), slope)
+
+
+@checks(31)
+def _() -> bool:
+    """A curve known in closed form: on the unit circle the slope of the ordinate is minus abscissa over ordinate."""
+    kappa = symbol("kappa_t")
+    circle = sp.Lambda((lamda, kappa), lamda**2 + kappa**2 - 1)
+    found = sensitivity_function().rhs.replace(sp.Function("Delta"), circle).doit()
+    return (found.subs(lamda, sp.sqrt(1 - kappa**2)) - sp.sqrt(1 - kappa**2).diff(kappa)).equals(0)
+
+
+@cache
+def implicit_derivatives() -> dict[str, sp.Expr]:
+    """Return how lambda follows each group: for a stiffness its derivative by kappa is this times c^2.
+
+    The chain rule over the pair (s, c) = (kappa, 1) / (1 + kappa), d s / d kappa = c^2 = -d c / d kappa, keeps zero and
+    infinite stiffness ordinary.
+    """
+    function, _ = frequency_function()
+    slope = function.diff(lamda)
+    parts = {f"kappa_{name}": function.diff(s) - function.diff(c) for name, (s, c) in _PAIRS.items()}
+    parts |= {name: function.diff(symbol(name)) for name in ("mu", "iota")}
+    return {name: -part / slope for name, part in parts.items()}
+
+
+@numbered(32, "sensitivities of the frequencies", "derived", (23, 30, 31))
+def frequency_sensitivities() -> tuple[sp.Eq, sp.Eq]:
+    """(31) for the two stiffnesses, turned into hertz per N/m and hertz per N m/rad by (30); f_i is proportional to the
+    square of lamda. Raw sensitivities have different units: only logarithmic ones can be compared."""
+    hertz = natural_frequency().rhs
+    equations = []
+    for name, power in (("t", 3), ("r", 1)):
+        k, (_, c) = symbol(f"k_{name}"), _PAIRS[name]
+        rate = implicit_derivatives()[f"kappa_{name}"] * c**2 * L**power / (E * I_z)
+        frequency = sp.Function("f_i")(symbol("k_t"), symbol("k_r"))
+        equations.append(sp.Eq(frequency.diff(k), hertz.diff(lamda) * rate))
+    return equations[0], equations[1]
+
+
+@checks(32)
+def _() -> bool:
+    """Another principle: first-order perturbation. The square of omega_i changes by phi_i(0)^2 / M_i per k_t and by
+    phi_i'(0)^2 / M_i per k_r, for modes of a random arm found by shooting."""
+    values = sample(32)
+    numbers = {symbol(name): value for name, value in values.items()}
+    for mode in shoot(values):
+        groups = group_numbers(values, mode.beta)
+        mass = modal_numbers(values, mode)[symbol("M_i")]
+        for e, order in zip(frequency_sensitivities(), (0, 1), strict=True):
+            found = float(e.rhs.subs(groups).subs(numbers))
+            expected = mode(0.0, order) ** 2 / mass / (8 * np.pi**2 * mode.omega / (2 * np.pi))
+            if abs(found / expected - 1) > 1e-6:
+                return False
+    return True
+
+
+def implicit_kernel() -> tuple[dict[str, sp.Expr], tuple[sp.Symbol, ...]]:
+    """Return the implicit derivatives with scaled exponentials, and their arguments, as the kernel wants them."""
+    _, arguments = frequency_function()
+    decay = sp.exp(-lamda)
+    scaled = {sp.cosh(lamda): (1 + decay**2) / 2, sp.sinh(lamda): (1 - decay**2) / 2}
+
+    def ratio(expression: sp.Expr) -> sp.Expr:
+        above, below = sp.fraction(expression)
+        return _scaled(above, scaled, decay) / _scaled(below, scaled, decay)
+
+    return {name: ratio(expression) for name, expression in implicit_derivatives().items()}, arguments
+
+
+def _scaled(expression: sp.Expr, scaled: dict[sp.Expr, sp.Expr], decay: sp.Expr) -> sp.Expr:
+    """Multiply an expression linear in cosh and sinh by exp(-lamda)."""
+    expanded = expression.expand()
+    grown = sum(expanded.coeff(function) * value for function, value in scaled.items())
+    return grown + decay * expanded.subs(dict.fromkeys(scaled, 0))
+
+
+def group_exponents() -> tuple[dict[str, sp.Expr], tuple[sp.Symbol, ...]]:
+    """Return d ln omega^2 / d ln p for the parameters that enter several groups, from the shares of energy in a mode.
+
+    The shares are d ln omega^2 / d ln kappa_t and d ln kappa_r, and minus those by mu and iota: of the two springs in
+    the strain energy and of the end-effector's mass and rotary inertia in the kinetic energy. The rest is the chain
+    rule.
+    """
+    b, h, rho, m_e, J_e = (symbol(name) for name in ("b", "h", "rho", "m_e", "J_e"))
+    k_t, k_r, A = symbol("k_t"), symbol("k_r"), b * h
+    bending, line = E * b * h**3 / 12, rho * A
+    groups = {k_t * L**3 / bending: 1, k_r * L / bending: 1, m_e / (line * L): -1, J_e / (line * L**3): -1}
+    shares = sp.symbols("share_t share_r share_m share_j", nonnegative=True)
+
+    def logarithmic(expression: sp.Expr, p: sp.Symbol) -> sp.Expr:
+        return sp.cancel(expression.diff(p) * p / expression)
+
+    exponents = {}
+    for p in (L, b, h, E, rho):
+        total = logarithmic(bending / (line * L**4), p)
+        for share, (group, sign) in zip(shares, groups.items(), strict=True):
+            total += sign * share * logarithmic(group, p)
+        exponents[p.name] = total
+    return exponents, shares
