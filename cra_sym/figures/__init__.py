@@ -13,7 +13,7 @@ __all__ = ["FIGURES", "STYLE", "draw"]
 
 FIGURES = {
     "fig01": "cra_sym.figures.robot:figure_1",
-    "fig02": "cra_sym.figures.robot:figure_2",
+    "fig02": "cra_sym.figures.joint:figure_2",
     "fig03": "cra_sym.figures.modes:figure_3",
     "fig04": "cra_sym.figures.modes:figure_4",
     "mode_shapes": "cra_sym.figures.modes:figure_mode_shapes",

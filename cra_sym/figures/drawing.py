@@ -1,0 +1,37 @@
+"""What the drawings share: an empty canvas, colours, and an arm bent as its first mode bends."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cra_sym.arm.analysis import mode_shapes
+from cra_sym.arm.parameters import Arm
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["BLUE", "INK", "ORANGE", "canvas", "deflection"]
+
+INK, BLUE, ORANGE = "#222222", "#0072B2", "#D55E00"
+
+
+def canvas(ax: Axes | None, figsize: tuple[float, float]) -> Axes:
+    """Return ``ax``, or the axes of a new figure, without frame and with equal scales."""
+    if ax is None:
+        from matplotlib.figure import Figure
+
+        ax = Figure(figsize=figsize).add_subplot()
+    ax.set_aspect("equal")
+    ax.set_axis_off()
+    return ax
+
+
+def deflection(arm: Arm | None, xi: np.ndarray) -> np.ndarray:
+    """First mode shape of ``arm`` at ``xi = x / L``, 1 at the tip; by default of an arm whose joint gives visibly."""
+    if arm is None:
+        nominal = Arm.nominal()
+        arm = nominal.replace(k_t=20 * nominal.EI / nominal.L**3, k_r=5 * nominal.EI / nominal.L)
+    shape = mode_shapes(arm, xi * arm.L, modes=1)[0]
+    return shape / shape[-1]

@@ -1,0 +1,59 @@
+"""The runner: executes in place, stores no trace of the machine, and says which cell failed."""
+
+import nbformat
+import pytest
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+
+from cra_sym.report.notebooks import NotebookError, cells_to_run, execute, find_notebooks, refresh
+
+
+@pytest.fixture
+def notebook(tmp_path):
+    def make(*sources, name="trial run.ipynb"):
+        cells = [new_markdown_cell("# Trial"), *map(new_code_cell, sources)]
+        path = tmp_path / name
+        nbformat.write(new_notebook(cells=cells, metadata={"author": "somebody"}), path)
+        return path
+
+    return make
+
+
+def test_outputs_are_stored_without_a_trace(notebook):
+    path = notebook("from pathlib import Path\nPath.cwd().name", "print('a')\nprint('b')", "assert True")
+    refresh([path])
+    first = path.read_text()
+    made = nbformat.read(path, as_version=4)
+    assert made.metadata == {
+        "kernelspec": {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"},
+        "language_info": {"name": "python"},
+    }
+    assert [cell.get("execution_count") for cell in made.cells] == [None, 1, 2, 3]
+    assert made.cells[1].outputs[0].data["text/plain"] == repr(path.parent.name)
+    assert [output.text for output in made.cells[2].outputs] == ["a\nb\n"]
+    assert not any(cell.metadata for cell in made.cells)
+    refresh([path])
+    assert path.read_text() == first
+
+
+def test_a_failing_cell_is_shown_and_the_file_kept(notebook):
+    path = notebook("x = 1", "raise RuntimeError('no such arm')")
+    before = path.read_bytes()
+    with pytest.raises(NotebookError, match=r"(?s)trial run\.ipynb.*no such arm"):
+        refresh([path])
+    assert path.read_bytes() == before
+
+
+def test_the_file_itself_is_left_alone(notebook):
+    path = notebook("1 + 1")
+    before = path.read_bytes()
+    assert execute(path).cells[1].outputs[0].data["text/plain"] == "2"
+    assert path.read_bytes() == before
+
+
+def test_notebooks_are_found_in_reading_order(notebook, tmp_path):
+    notebook("1", name="01_b.ipynb")
+    notebook("1", "2", name="00_a.ipynb")
+    assert [path.name for path in find_notebooks(tmp_path)] == ["00_a.ipynb", "01_b.ipynb"]
+    assert cells_to_run(find_notebooks(tmp_path)) == 3
+    with pytest.raises(FileNotFoundError, match="nowhere"):
+        find_notebooks(tmp_path / "nowhere")
