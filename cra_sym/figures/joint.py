@@ -110,11 +110,11 @@ def _lines_and_measures(ax: Axes, x: np.ndarray, v: np.ndarray, slope: float) ->
     _measure(ax, (x[j], _DATUM), (x[j], v[j] - 0.08), "", INK)
     ax.text(x[j] + 0.12, 0.5 * _DATUM, r"$y(x,t) = w + v$", fontsize=12, va="center")
     _measure(ax, (0.62, 0.0), (0.62, v[0]), r"$v(0,t)$", BLUE)
-    end = 2.9
+    end = 2.6
     _line(ax, (0.0, v[0]), (end, v[0]), linewidth=0.8)
     _line(ax, (0.0, v[0]), (end, v[0] + slope * end), linewidth=0.8)
-    ax.add_patch(Arc((0.0, v[0]), 5.2, 5.2, theta1=0, theta2=np.degrees(np.arctan(slope)), color=BLUE, linewidth=1.2))
-    ax.text(2.75, v[0] + 0.5 * slope * 2.6 - 0.05, r"$v_x(0,t)$", color=BLUE, fontsize=12, va="center")
+    ax.add_patch(Arc((0.0, v[0]), 4.9, 4.9, theta1=0, theta2=np.degrees(np.arctan(slope)), color=BLUE, linewidth=1.2))
+    ax.text(2.7, v[0] + 0.5 * slope * 2.5, r"$v_x(0,t)$", color=BLUE, fontsize=12, va="center")
     _measure(ax, (-0.2, _DATUM - 0.55), (1.5, _DATUM - 0.55), "")
     ax.text(1.62, _DATUM - 0.55, r"$x$", fontsize=12, va="center")
     _line(ax, (0.0, _DATUM - 0.68), (0.0, _DATUM - 0.42), INK)

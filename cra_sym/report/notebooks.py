@@ -89,7 +89,7 @@ def execute(path: str | Path, progress: tqdm[Any] | None = None, timeout: int = 
         on_cell_executed=lambda **_: progress.update() if progress is not None else None,
     )
     try:
-        client.execute()
+        client.execute(cleanup_kc=True)  # it ends the kernels of its own managers only, unless told
     except (CellExecutionError, CellTimeoutError, DeadKernelError) as error:
         raise NotebookError(f"{path.name} did not run: {error}") from None
     _normalise(notebook)
