@@ -109,9 +109,9 @@ def mode_shapes(arm: Arm, x: Any, modes: int = 3, derivative: int = 0) -> np.nda
         raise ValueError(f"x has shape {points.shape}: allowed are a number or a row of points")
     if points.size and points.max() > np.min(arm.L):
         raise ValueError(f"x = {points.max():g}: allowed are points in [0, L], L = {np.min(arm.L):g}")
-    length = _column(arm, arm.L)[..., None]
+    length = _column(arm.L, 2)
     shapes = _modes(arm, modes).shape(np.atleast_1d(points) / length, derivative)
-    shapes = shapes / (np.sqrt(_column(arm, arm.rhoA)[..., None] * length) * length**derivative)
+    shapes = shapes / (np.sqrt(_column(arm.rhoA, 2) * length) * length**derivative)
     return shapes if points.ndim else shapes[..., 0]
 
 
@@ -161,18 +161,24 @@ class ModalParameters:
         return self._joint_matrix(1)
 
     def _joint_matrix(self, spring: int) -> np.ndarray:
-        root_energy = self._modes.strain[spring] * _column(self._arm, self._arm.angular_frequency_scale)
+        root_energy = self._modes.strain[spring] * _column(self._arm.angular_frequency_scale)
         return root_energy[..., :, None] * root_energy[..., None, :]
 
     @cached_property
     def axial(self) -> np.ndarray:
         """Matrix of int (rho A (L - x) + m_e) phi_i' phi_j' dx, 1/m."""
-        number = int(np.ceil(self.lam.max(initial=0.0))) + 24  # more than enough for the products of two modes
-        nodes, weights = np.polynomial.legendre.leggauss(number)
-        xi, weights = (1 + nodes) / 2, weights / 2
-        slopes = self._modes.shape(xi, 1)
-        load = (1 - xi + _column(self._arm, self._arm.mu)) * weights
-        return np.einsum("...ik,...k,...jk->...ij", slopes, load, slopes) / _column(self._arm, self._arm.L)[..., None]
+        modes = self.lam.shape[-1]
+        nodes, weights = np.polynomial.legendre.leggauss(int(np.ceil(self.lam.max(initial=0.0))) + 24)
+        xi, weights = (1 + nodes) / 2, weights / 2  # more nodes than the product of two modes needs
+        mu = np.broadcast_to(self._arm.mu, self._arm.shape).reshape(-1, 1)
+        result = np.empty((len(mu), modes, modes))
+        share = max(1_000_000 // (modes * xi.size), 1)  # bounds the memory
+        for start in range(0, len(mu), share):
+            part = slice(start, start + share)
+            slopes = self._modes.lanes(part).shape(xi, 1)
+            load = (1 - xi + mu[part, None]) * weights
+            result[part] = (slopes * load) @ slopes.transpose(0, 2, 1)
+        return result.reshape(*self.lam.shape, modes) / _column(self._arm.L, 2)
 
 
 def modal_parameters(arm: Arm, modes: int = 3) -> ModalParameters:
@@ -196,20 +202,21 @@ def modal_parameters(arm: Arm, modes: int = 3) -> ModalParameters:
     """
     dimensionless = _modes(arm, modes)
     omega = _angular_frequencies(arm, dimensionless.lam)
-    length, rhoA, EI = (_column(arm, value) for value in (arm.L, arm.rhoA, arm.EI))
+    length, rhoA, EI = (_column(value) for value in (arm.L, arm.rhoA, arm.EI))
     unit = 1 / np.sqrt(rhoA * length)  # of a mass-normalised shape, kg^-1/2
-    root = [value * unit / length**order for order, value in enumerate(dimensionless.root)]
+    factors = unit, unit / length, EI * unit / length**2, EI * unit / length**3
+    root = [value * factor for value, factor in zip(dimensionless.root, factors, strict=True)]
     return ModalParameters(
         omega=omega,
         frequency=omega / (2 * np.pi),
         lam=dimensionless.lam,
-        participation=dimensionless.participation / unit,
+        participation=dimensionless.participation * (1 / unit),
         root_displacement=root[0],
         root_slope=root[1],
-        root_moment=EI * root[2],
-        root_shear=EI * root[3],
+        root_moment=root[2],
+        root_shear=root[3],
         tip_displacement=dimensionless.tip[0] * unit,
-        tip_slope=dimensionless.tip[1] * unit / length,
+        tip_slope=dimensionless.tip[1] * (unit / length),
         _arm=arm,
         _modes=dimensionless,
     )
@@ -231,9 +238,9 @@ def _modes(arm: Arm, modes: int) -> Modes:
 
 
 def _angular_frequencies(arm: Arm, lam: np.ndarray) -> np.ndarray:
-    return _column(arm, arm.angular_frequency_scale) * lam**2
+    return _column(arm.angular_frequency_scale) * lam**2
 
 
-def _column(arm: Arm, value: float | np.ndarray) -> np.ndarray:
-    """Return a parameter with a last axis of length one, for the modes."""
-    return np.broadcast_to(value, arm.shape)[..., None]
+def _column(value: float | np.ndarray, axes: int = 1) -> float | np.ndarray:
+    """Return a parameter with last axes of length one, for modes and points; numbers stay numbers."""
+    return value[(..., *(None,) * axes)] if isinstance(value, np.ndarray) else value

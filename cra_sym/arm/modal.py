@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -48,6 +48,12 @@ class Modes:
     waves: np.ndarray
     strain: np.ndarray
     participation: np.ndarray
+
+    def lanes(self, part: slice) -> Modes:
+        """Return some of the arms, the batch axes taken as one."""
+        modes = self.lam.shape[-1]
+        values = (getattr(self, field.name) for field in fields(self))
+        return Modes(*(x.reshape(*x.shape[: x.ndim - self.lam.ndim], -1, modes)[..., part, :] for x in values))
 
     def shape(self, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
         """Return a derivative of every shape by xi at points that broadcast on a new last axis."""

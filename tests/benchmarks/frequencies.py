@@ -18,6 +18,7 @@ import numpy as np
 from scipy.optimize import brentq, elementwise
 
 import cra_sym
+from cra_sym import Arm, modal_parameters, natural_frequencies
 from cra_sym.arm import spectrum
 
 MODES = 3
@@ -94,6 +95,14 @@ def measured(size: int) -> dict[str, tuple[float, float]]:
         "cra_sym, NumPy": (some, lambda part: ours(part, compile=False)),
         "cra_sym, compiled, 1 thread": (slice(None), lambda part: ours(part, compile=True, threads=1)),
         f"cra_sym, compiled, {threads} threads": (slice(None), lambda part: ours(part, compile=True, threads=threads)),
+    }
+    arm = Arm.nominal()
+    mass = arm.rhoA * arm.L
+    bending = arm.EI
+    batch = arm.replace(k_t=arms[0] * bending / arm.L**3, k_r=arms[1] * bending / arm.L, m_e=arms[2] * mass)
+    runs |= {
+        "cra_sym, natural_frequencies": (slice(None), lambda part: natural_frequencies(batch)),
+        "cra_sym, modal_parameters": (slice(None), lambda part: modal_parameters(batch)),
     }
     table = {}
     for name, (part, function) in runs.items():
