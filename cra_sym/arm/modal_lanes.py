@@ -1,6 +1,6 @@
 # ruff: noqa: F821
 # mypy: ignore-errors
-"""Template of the compiled twin of `cra_sym.arm.modal`: the same steps, one mode at a time.
+"""Template of the compiled twin of `cra_sym.arm.modal`: the same steps, in blocks of modes.
 
 This text is specialised by `cra_sym.kernels.compiled` with the functions it leaves open, the kernels of `modal`.
 """
@@ -8,54 +8,72 @@ This text is specialised by `cra_sym.kernels.compiled` with the functions it lea
 import numpy as np
 
 _NEAR = 25.0
+_BLOCK = 256
 
 
 def fill(table, lam, modes, kappa_t, kappa_r, mu, iota):
     """Fill the rows of ``table``: root (4), tip (2), waves (4), strain (2) and participation of every mode."""
-    w = np.empty(13)
-    for index in range(lam.size):
-        lane = index // modes
-        _mode(w, lam[index], index - lane * modes, kappa_t[lane], kappa_r[lane], mu[lane], iota[lane])
+    arm, w, state = np.empty((5, _BLOCK)), np.empty((13, _BLOCK)), np.empty(13)
+    for first in range(0, lam.size, _BLOCK):
+        size = min(_BLOCK, lam.size - first)
+        for i in range(size):
+            lane = (first + i) // modes
+            arm[0, i], arm[1, i], arm[2, i], arm[3, i] = kappa_t[lane], kappa_r[lane], mu[lane], iota[lane]
+            arm[4, i] = lam[first + i]
+        for i in range(size):
+            _far(w, i, max(arm[4, i], 2.0), arm[0, i], arm[1, i], arm[2, i], arm[3, i])
+        for i in range(size):
+            if arm[4, i] * arm[4, i] * arm[4, i] * arm[4, i] < _NEAR:
+                number = (first + i) % modes
+                _near(state, arm[4, i], number, arm[0, i], arm[1, i], arm[2, i], arm[3, i])
+                for row in range(13):
+                    w[row, i] = state[row]
         for row in range(13):
-            table[row, index] = w[row] + 0.0
+            for i in range(size):
+                table[row, first + i] = w[row, i] + 0.0
 
 
-def _mode(w, lam, number, kappa_t, kappa_r, mu, iota):
-    s_t, c_t = 1.0 if kappa_t == np.inf else kappa_t / (1.0 + kappa_t), 1.0 / (1.0 + kappa_t)
-    s_r, c_r = 1.0 if kappa_r == np.inf else kappa_r / (1.0 + kappa_r), 1.0 / (1.0 + kappa_r)
-    s_mu, c_mu, s_iota, c_iota = mu / (1.0 + mu), 1.0 / (1.0 + mu), iota / (1.0 + iota), 1.0 / (1.0 + iota)
+def _pair(kappa):
+    return 1.0 if kappa == np.inf else kappa / (1.0 + kappa), 1.0 / (1.0 + kappa)
+
+
+def _far(w, i, lam, kappa_t, kappa_r, mu, iota):
+    (s_t, c_t), (s_r, c_r), (s_mu, c_mu), (s_iota, c_iota) = _pair(kappa_t), _pair(kappa_r), _pair(mu), _pair(iota)
+    cosine, sine, decay, z = cos(lam), sin(lam), exp(-lam), lam * lam * lam * lam
+    alpha, beta, a, b, c, d = amplitudes_far(s_t, c_t, s_r, c_r, s_mu, c_mu, s_iota, c_iota, lam, cosine, sine, decay)
+    tip, slope, moment, shear = tip_far(a, b, c, d, lam, cosine, sine, decay)
+    tip = -shear / (mu * z) if mu * z > 1.0 + lam * lam * lam else tip
+    slope = moment / (iota * z) if iota * z > 1.0 + lam else slope
+    invariant = 2.0 * z * (a * a + b * b + 4.0 * c * d * decay)
+    mass = generalised_mass(s_t, c_t, s_r, c_r, alpha, beta, z, invariant, tip, slope, mu, iota)[0]
+    scale = (-1.0 if tip < 0.0 else 1.0) / np.sqrt(mass)
+    alpha, beta = alpha * scale, beta * scale
+    w[0, i], w[1, i], w[2, i], w[3, i] = c_t * alpha, c_r * beta, s_r * beta, -s_t * alpha
+    w[4, i], w[5, i] = tip * scale, slope * scale
+    w[6, i], w[7, i], w[8, i], w[9, i] = a * scale, b * scale, c * scale, d * scale
+    w[10, i], w[11, i], w[12, i] = np.sqrt(s_t * c_t) * alpha, np.sqrt(s_r * c_r) * beta, s_t * alpha / z
+
+
+def _near(w, lam, number, kappa_t, kappa_r, mu, iota):
+    (s_t, c_t), (s_r, c_r), (s_mu, c_mu), (s_iota, c_iota) = _pair(kappa_t), _pair(kappa_r), _pair(mu), _pair(iota)
     z = lam * lam * lam * lam
-    a, b, c, d, invariant = 0.0, 0.0, 0.0, 0.0, 0.0
-    if z >= _NEAR:
-        cosine, sine, decay = cos(lam), sin(lam), exp(-lam)
-        alpha, beta, a, b, c, d = amplitudes_far(
-            s_t, c_t, s_r, c_r, s_mu, c_mu, s_iota, c_iota, lam, cosine, sine, decay
-        )
-        scale = 1.0 / np.sqrt(a * a + b * b)
-        alpha, beta, a, b, c, d = alpha * scale, beta * scale, a * scale, b * scale, c * scale, d * scale
-        tip, slope, moment, shear = tip_far(a, b, c, d, lam, cosine, sine, decay)
-        invariant = 2.0 * z * (a * a + b * b + 4.0 * c * d * decay)
+    k0, k1, k2, k3 = polynomials(1.0, z)
+    if z == 0.0 and kappa_t == 0.0 and kappa_r == 0.0:
+        alpha, beta = (1.0, 0.0) if number == 0 else (-(0.5 + mu) / (1.0 + mu), 1.0)
     else:
-        k0, k1, k2, k3 = polynomials(1.0, z)
-        if z == 0.0 and kappa_t == 0.0 and kappa_r == 0.0:
-            alpha, beta = (1.0, 0.0) if number == 0 else (-(0.5 + mu) / (1.0 + mu), 1.0)
-        else:
-            alpha, beta = _amplitudes_near(tip_rows(s_t, c_t, s_r, c_r, s_mu, c_mu, s_iota, c_iota, z, k0, k1, k2, k3))
-        tip, slope, moment, shear = tip_near(s_t, c_t, s_r, c_r, alpha, beta, z, k0, k1, k2, k3)
+        alpha, beta = _amplitudes_near(tip_rows(s_t, c_t, s_r, c_r, s_mu, c_mu, s_iota, c_iota, z, k0, k1, k2, k3))
+    tip, slope, moment, shear = tip_near(s_t, c_t, s_r, c_r, alpha, beta, z, k0, k1, k2, k3)
     w[0], w[1], w[2], w[3] = c_t * alpha, c_r * beta, s_r * beta, -s_t * alpha
-    if z < _NEAR:
-        invariant = w[2] * w[2] - 2.0 * w[1] * w[3] + z * w[0] * w[0]
-    if mu * z > 1.0 + lam * lam * lam:
-        tip = -shear / (mu * z)
-    if iota * z > 1.0 + lam:
-        slope = moment / (iota * z)
+    tip = -shear / (mu * z) if mu * z > 1.0 + lam * lam * lam else tip
+    slope = moment / (iota * z) if iota * z > 1.0 + lam else slope
+    invariant = w[2] * w[2] - 2.0 * w[1] * w[3] + z * w[0] * w[0]
     if z > 0.0:
         mass = generalised_mass(s_t, c_t, s_r, c_r, alpha, beta, z, invariant, tip, slope, mu, iota)[0]
         w[12] = -w[3] / z
     else:
         mass = w[0] * w[0] + w[0] * w[1] + w[1] * w[1] / 3.0 + mu * (w[0] + w[1]) ** 2 + iota * w[1] * w[1]
         w[12] = w[0] + w[1] / 2.0 + mu * (w[0] + w[1])
-    w[4], w[5], w[6], w[7], w[8], w[9] = tip, slope, a, b, c, d
+    w[4], w[5], w[6], w[7], w[8], w[9] = tip, slope, 0.0, 0.0, 0.0, 0.0
     w[10], w[11] = np.sqrt(s_t * c_t) * alpha, np.sqrt(s_r * c_r) * beta
     scale = (-1.0 if tip < 0.0 else 1.0) / np.sqrt(mass)
     for row in range(13):
