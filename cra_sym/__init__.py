@@ -25,6 +25,8 @@ _HOME = {
     "state_space": "arm.state_space",
     "frequency_response": "arm.frequency_response",
     "sensitivities": "arm.sensitivity",
+    "identify_joint": "arm.identification",
+    "input_shaper": "arm.shaping",
     "certify": "arm.certification",
     "Model": "model",
     "sweep": "studies",

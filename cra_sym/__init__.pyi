@@ -7,11 +7,13 @@ from .arm.certification import certify as certify
 from .arm.equations import equation as equation
 from .arm.equations import equations as equations
 from .arm.frequency_response import frequency_response as frequency_response
+from .arm.identification import identify_joint as identify_joint
 from .arm.parameters import Arm as Arm
 from .arm.response import residual_vibration as residual_vibration
 from .arm.response import response as response
 from .arm.response import tip_response as tip_response
 from .arm.sensitivity import sensitivities as sensitivities
+from .arm.shaping import input_shaper as input_shaper
 from .arm.state_space import state_space as state_space
 from .kernels import kernel as kernel
 from .model import Model as Model

@@ -1,0 +1,90 @@
+"""Identification: recovery, exact gradients, covariance against repeated noisy measurements, and honest warnings."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import cra_sym as cra
+from cra_sym import Arm
+from cra_sym.arm.identification import IdentifiabilityWarning, _gradient
+
+NOMINAL = Arm.nominal()
+
+
+@pytest.mark.parametrize("joint", [(2e3, 40.0), (50.0, 1e3), (1e4, 5.0), (20.0, 0.3)])
+def test_exact_frequencies_give_the_joint_back(joint):
+    k_t, k_r = joint
+    estimate = cra.identify_joint(NOMINAL, cra.natural_frequencies(NOMINAL.replace(k_t=k_t, k_r=k_r), 4), 1e-3)
+    assert (estimate.k_t, estimate.k_r) == (pytest.approx(k_t, rel=1e-9), pytest.approx(k_r, rel=1e-9))
+    assert estimate.identifiable and np.abs(estimate.residuals).max() < 1e-6
+
+
+def test_the_gradient_is_exact():
+    def at(place):
+        kappa = 1 / np.expm1(place)
+        return NOMINAL.replace(k_t=kappa[0] * NOMINAL.EI / NOMINAL.L**3, k_r=kappa[1] * NOMINAL.EI / NOMINAL.L)
+
+    for place in (np.array([2e-3, 0.1]), np.array([1.5, 3.0])):
+        found = _gradient(at(place), 4)
+        for i, direction in enumerate(np.eye(2) * 1e-6 * place):
+            slope = cra.natural_frequencies(at(place + direction), 4) - cra.natural_frequencies(
+                at(place - direction), 4
+            )
+            assert found[:, i] == pytest.approx(slope / (2 * direction[i]), rel=1e-6)
+
+
+def test_the_covariance_is_that_of_repeated_measurements():
+    true = NOMINAL.replace(k_t=2e3, k_r=40.0)
+    exact, sigma = cra.natural_frequencies(true, 4), np.array([0.002, 0.01, 0.02, 0.05])
+    rng = np.random.default_rng(11)
+    estimates = [cra.identify_joint(NOMINAL, exact + sigma * rng.normal(size=4), sigma) for _ in range(60)]
+    found = np.array([(e.k_t, e.k_r) for e in estimates])
+    covariance = cra.identify_joint(NOMINAL, exact, sigma).covariance
+    assert np.std(found, axis=0) == pytest.approx(np.sqrt(np.diag(covariance)), rel=0.3)
+    assert np.mean([np.sum(e.residuals**2) for e in estimates]) == pytest.approx(2.0, rel=0.4)  # 4 data, 2 unknowns
+
+
+def test_one_frequency_tells_only_a_combination():
+    with pytest.warns(IdentifiabilityWarning, match="do not tell k_t and k_r apart: what they tell is 1/k_t"):
+        estimate = cra.identify_joint(NOMINAL, [2.3], 0.01)
+    assert not estimate.identifiable
+    assert np.isinf(estimate.covariance).all()
+    assert estimate.frequencies == pytest.approx([2.3])
+
+
+def test_a_stiff_joint_measured_roughly_is_only_bounded():
+    true = NOMINAL.replace(k_t=1e4, k_r=1e4)
+    with pytest.warns(IdentifiabilityWarning, match="k_t is told to .*; k_r is only known to exceed"):
+        estimate = cra.identify_joint(NOMINAL, cra.natural_frequencies(true), 0.05)
+    assert estimate.log_standard_deviation[0] < 0.2 < np.log(2) < estimate.log_standard_deviation[1]
+
+
+def test_a_rigid_joint_is_found_rigid_with_finite_compliance_covariance():
+    with pytest.warns(IdentifiabilityWarning, match="only known to exceed"):
+        estimate = cra.identify_joint(NOMINAL, cra.natural_frequencies(NOMINAL), 0.01)
+    assert estimate.k_t > 1e9 and estimate.k_r > 1e9
+    assert np.isfinite(estimate.compliance_covariance).all()
+
+
+def test_enough_precise_data_do_not_warn():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cra.identify_joint(NOMINAL, cra.natural_frequencies(NOMINAL.replace(k_t=1e4, k_r=1e3), 5), 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "words"),
+    [
+        ({"measured_frequencies": [15.0, 2.4]}, ValueError, "must ascend"),
+        ({"measured_frequencies": [0.0, 2.4]}, ValueError, "measured_frequencies = 0"),
+        ({"measured_frequencies": 2.4}, ValueError, "one axis"),
+        ({"measured_frequencies": ["f"]}, TypeError, "measured_frequencies"),
+        ({"uncertainty": 0.0}, ValueError, "uncertainty = 0"),
+        ({"uncertainty": [0.1, 0.1, 0.1]}, ValueError, "broadcast"),
+        ({"arm": NOMINAL.replace(L=[1.0, 2.0])}, ValueError, "single arm"),
+    ],
+)
+def test_bad_input_is_named(arguments, error, words):
+    with pytest.raises(error, match=words):
+        cra.identify_joint(**({"arm": NOMINAL, "measured_frequencies": [2.4, 15.0], "uncertainty": 0.1} | arguments))
