@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from cra_sym.arm.analysis import natural_frequencies
 from cra_sym.arm.parameters import Arm
-from cra_sym.arm.sensitivity import sensitivities
+from cra_sym.arm.sensitivity import Sensitivities, sensitivities
 from cra_sym.checks import broadcastable, real_array
 
 __all__ = ["IdentifiabilityWarning", "JointEstimate", "identify_joint"]
@@ -99,25 +100,25 @@ def identify_joint(arm: Arm, measured_frequencies: Any, uncertainty: Any) -> Joi
 
     measured, sigma = _checked(arm, measured_frequencies, uncertainty)
     units = np.array([arm.EI / arm.L**3, arm.EI / arm.L])
-    modes = measured.size
 
-    def with_joint(place: np.ndarray) -> Arm:
-        k_t, k_r = _stiffness(place) * units
-        return arm.replace(k_t=float(k_t), k_r=float(k_r))
+    @cache
+    def at(*place: float) -> tuple[Arm, Sensitivities]:
+        k_t, k_r = _stiffness(np.array(place)) * units
+        joined = arm.replace(k_t=float(k_t), k_r=float(k_r))
+        return joined, sensitivities(joined, measured.size)
 
     def misfit(place: np.ndarray) -> np.ndarray:
-        return (natural_frequencies(with_joint(place), modes) - measured) / sigma
+        return (at(*place)[1].frequency - measured) / sigma
 
     def gradient(place: np.ndarray) -> np.ndarray:
-        return _gradient(with_joint(place), modes) / sigma[:, None]
+        return _gradient(*at(*place)) / sigma[:, None]
 
     fits = [
         least_squares(misfit, start, gradient, bounds=(0.0, 40.0), xtol=1e-14, ftol=1e-14, gtol=1e-14, x_scale="jac")
         for start in _starts(arm, units, measured, sigma)
     ]
     best = min(fits, key=lambda fit: fit.cost)
-    place = np.where(best.x < 1e-12, 0.0, best.x)
-    return _estimate(with_joint(place), measured, sigma)
+    return _estimate(*at(*np.where(best.x < 1e-12, 0.0, best.x)), measured, sigma)
 
 
 def _checked(arm: Arm, measured_frequencies: Any, uncertainty: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -142,16 +143,14 @@ def _stiffness(place: np.ndarray) -> np.ndarray:
         return 1 / np.expm1(place)
 
 
-def _gradient(arm: Arm, modes: int) -> np.ndarray:
+def _gradient(arm: Arm, found: Sensitivities) -> np.ndarray:
     """Return the derivatives of the frequencies by ln(1 + 1/kappa_t) and ln(1 + 1/kappa_r), shape (modes, 2)."""
-    found = sensitivities(arm, modes)
-    f = natural_frequencies(arm, modes)
     columns = []
     for kappa, unit, by_c, log in (
         (arm.kappa_t, arm.EI / arm.L**3, found.df_dc_t, found.log_k_t),
         (arm.kappa_r, arm.EI / arm.L, found.df_dc_r, found.log_k_r),
     ):
-        columns.append(by_c / unit * (1 + 1 / kappa) if kappa > 1 else -f * log * (1 + kappa))
+        columns.append(by_c / unit * (1 + 1 / kappa) if kappa > 1 else -found.frequency * log * (1 + kappa))
     return np.stack(columns, -1)
 
 
@@ -164,8 +163,8 @@ def _starts(arm: Arm, units: np.ndarray, measured: np.ndarray, sigma: np.ndarray
     return [np.log1p(1 / _STARTS[[i, j]]) for i, j in zip(*best, strict=True)]
 
 
-def _estimate(arm: Arm, measured: np.ndarray, sigma: np.ndarray) -> JointEstimate:
-    fitted, found = natural_frequencies(arm, measured.size), sensitivities(arm, measured.size)
+def _estimate(arm: Arm, found: Sensitivities, measured: np.ndarray, sigma: np.ndarray) -> JointEstimate:
+    fitted = found.frequency
     stiffness = np.array([arm.k_t, arm.k_r])
     jacobian = np.stack([found.df_dc_t, found.df_dc_r], -1) / sigma[:, None]
     spread = _covariance(jacobian)

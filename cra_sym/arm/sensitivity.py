@@ -34,6 +34,8 @@ class Sensitivities:
 
     Attributes
     ----------
+    frequency : ndarray
+        f, Hz.
     df_dk_t, df_dk_r : ndarray
         Hz per N/m and Hz per N m/rad.
     df_dc_t, df_dc_r : ndarray
@@ -44,6 +46,7 @@ class Sensitivities:
         d ln f / d ln p.
     """
 
+    frequency: np.ndarray
     df_dk_t: np.ndarray
     df_dk_r: np.ndarray
     df_dc_t: np.ndarray
@@ -156,4 +159,4 @@ def _assembled(arm: Arm, f: np.ndarray, *by_square: np.ndarray) -> Sensitivities
         np.where(still, 0.0, f * log / _column(arm, getattr(arm, name)))
         for name, log in zip(exponents, logs[4:], strict=True)
     ]
-    return Sensitivities(*raws, *rest, *logs)
+    return Sensitivities(f, *raws, *rest, *logs)
