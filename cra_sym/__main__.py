@@ -9,9 +9,12 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cra_sym.files import OutputError
+
+if TYPE_CHECKING:
+    from cra_sym.arm.parameters import Arm
 
 __all__ = ["main"]
 
@@ -87,14 +90,14 @@ def _arm_options(parser: argparse.ArgumentParser) -> None:
         group.add_argument(f"--{field.name.replace('_', '-')}", type=float, metavar=row.unit, help=text)
 
 
-def _chosen_arm(options: Options):
+def _chosen_arm(options: Options) -> Arm:
     from cra_sym.arm.parameters import Arm
 
     given = {f.name: getattr(options, f.name) for f in dataclasses.fields(Arm)}
     return Arm.nominal().replace(**{name: value for name, value in given.items() if value is not None})
 
 
-def _frequencies_options(parser: argparse.ArgumentParser) -> None:
+def _modes_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--modes", type=int, default=3, metavar="N", help="number of modes (%(default)s)")
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="print JSON")
@@ -102,27 +105,45 @@ def _frequencies_options(parser: argparse.ArgumentParser) -> None:
     _arm_options(parser)
 
 
+def _print_modes(options: Options, title: str, columns: dict[str, Any], digits: int = 6) -> None:
+    """Print one row a mode, in the form asked for."""
+    from cra_sym.report.tables import Table
+
+    if options.json:
+        print(json.dumps({head.partition(" / ")[0]: values.tolist() for head, values in columns.items()}))
+        return
+    rows = [(n, *map(float, row)) for n, row in enumerate(zip(*columns.values(), strict=True), 1)]
+    table = Table(title, ("mode", *columns), rows, digits)
+    print(table.csv() if options.csv else table.text(), end="")
+
+
 def _frequencies(options: Options) -> None:
     from cra_sym import modal_parameters
-    from cra_sym.report.tables import Table
 
     with _reading_input():
         modal = modal_parameters(_chosen_arm(options), modes=options.modes)
-    table = Table(
-        "Natural frequencies",
-        ("mode", "frequency / Hz", "angular frequency / (rad/s)", "lambda"),
-        [(n, *row) for n, row in enumerate(zip(modal.frequency, modal.omega, modal.lam, strict=True), 1)],
-    )
-    if options.json:
-        print(json.dumps({name: getattr(modal, name).tolist() for name in ("frequency", "omega", "lam")}))
-    else:
-        print(table.csv() if options.csv else table.text(), end="")
+    columns = {"frequency / Hz": modal.frequency, "omega / (rad/s)": modal.omega, "lambda": modal.lam}
+    _print_modes(options, "Natural frequencies", columns)
+
+
+def _certify(options: Options) -> None:
+    from cra_sym import certify
+
+    with _reading_input():
+        proof = certify(_chosen_arm(options), modes=options.modes)
+    if not proof.complete:
+        raise UsageError("nothing is proved for this arm: its parameters are too extreme for the certificate")
+    columns = {"lower / Hz": proof.lower, "upper / Hz": proof.upper}
+    _print_modes(options, "Certified natural frequencies", columns, digits=17)
+    if not (options.json or options.csv):
+        print("Proved: each frequency lies between its bounds, and none is missed.")
 
 
 COMMANDS = {
     "reproduce": Command("run every notebook; write them, figures, tables and report", _reproduce_options, _reproduce),
     "figures": Command("draw the figures as PNG and SVG", _figures_options, _figures),
-    "frequencies": Command("natural frequencies of an arm", _frequencies_options, _frequencies),
+    "frequencies": Command("natural frequencies of an arm", _modes_options, _frequencies),
+    "certify": Command("natural frequencies with a proof that none is missed", _modes_options, _certify),
 }
 
 
@@ -134,8 +155,13 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; return 0, or 2 after one line on standard error about what was wrong with the input."""
+    """Run one command; return its exit code.
+
+    0 is success, 2 one line on standard error about what was wrong with the input, 1 a notebook that did not run.
+    """
     import cra_sym
+    from cra_sym.extras import MissingExtraError
+    from cra_sym.report.notebooks import NotebookError
 
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     parser = _Parser(
@@ -153,9 +179,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         options.run(options)
-    except (UsageError, OutputError, FileNotFoundError) as error:
+    except (UsageError, OutputError, FileNotFoundError, MissingExtraError, NotebookError) as error:
         print(f"{parser.prog} {options.command}: {error}", file=sys.stderr)
-        return 2
+        return 1 if isinstance(error, NotebookError) else 2
     return 0
 
 

@@ -26,11 +26,7 @@ FLOORS = [
     {"report"},
     {"__main__"},
 ]
-OPEN_TO_ALL = {
-    "checks",
-    "extras",
-    "files",
-}  # argument checks, optional libraries, safe writing: they import nothing of the house
+OPEN_TO_ALL = {"checks", "extras", "files"}  # argument checks, optional libraries, safe writing: none imports a room
 RANK = {room: rank for rank, floor in enumerate(FLOORS) for room in floor}
 
 

@@ -4,8 +4,10 @@ import csv
 import io
 import json
 
+import nbformat
 import numpy as np
 import pytest
+from nbformat.v4 import new_code_cell, new_notebook
 
 import cra_sym as cra
 from cra_sym.__main__ import COMMANDS, main
@@ -45,6 +47,26 @@ def test_table_and_csv_agree_with_the_published_frequencies(capsys):
     assert main(["frequencies", "--m-e", "0"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == ["mode", "1", "2", "3"]
+
+
+def test_certified_bounds_enclose_the_frequencies(capsys):
+    assert main(["certify", "--k-t", "1e4", "--json"]) == 0
+    proof = json.loads(capsys.readouterr().out)
+    found = cra.natural_frequencies(cra.Arm.nominal().replace(k_t=1e4))
+    np.testing.assert_allclose([proof["lower"], proof["upper"]], [found, found], rtol=1e-13)
+    assert np.all(np.less_equal(proof["lower"], proof["upper"]))
+    assert main(["certify", "--k-t", "1e4"]) == 0
+    assert "none is missed" in capsys.readouterr().out
+
+
+def test_a_notebook_that_fails_is_no_usage_error(tmp_path, capsys):
+    (tmp_path / "book").mkdir()
+    cells = [new_code_cell("1 / 0")]
+    nbformat.write(new_notebook(cells=cells), tmp_path / "book" / "00_trial.ipynb")
+    out = tmp_path / "out"
+    assert main(["reproduce", "--notebooks", str(tmp_path / "book"), "--output", str(out)]) == 1
+    assert "ZeroDivisionError" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["book"]
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from cra_sym.arm.analysis import mode_shapes
 from cra_sym.arm.parameters import Arm
@@ -17,15 +18,13 @@ __all__ = ["BLUE", "INK", "ORANGE", "canvas", "deflection"]
 INK, BLUE, ORANGE = "#222222", "#0072B2", "#D55E00"
 
 
-def canvas(ax: Axes | None, figsize: tuple[float, float]) -> Axes:
-    """Return ``ax``, or the axes of a new figure, without frame and with equal scales."""
+def canvas(ax: Axes | None, figsize: tuple[float, float]) -> tuple[Figure, Axes]:
+    """Return ``ax``, or the axes of a new figure, without frame and with equal scales, after its figure."""
     if ax is None:
-        from matplotlib.figure import Figure
-
         ax = Figure(figsize=figsize).add_subplot()
     ax.set_aspect("equal")
     ax.set_axis_off()
-    return ax
+    return cast(Figure, ax.figure), ax
 
 
 def deflection(arm: Arm | None, xi: np.ndarray) -> np.ndarray:

@@ -41,8 +41,8 @@ def _coil(ax: Axes, x: float, bottom: float, top: float) -> None:
     across[[0, -1]] = 0.0
     lead = 0.16 * (top - bottom)
     along = bottom + lead + (top - bottom - 2 * lead) * turns
-    style = {"color": _GREEN, "linewidth": 1.8, "solid_joinstyle": "round", "linestyle": "-", "zorder": 6}
-    ax.plot(x + np.r_[0, across, 0], np.r_[bottom, along, top], **style)
+    points = x + np.r_[0, across, 0], np.r_[bottom, along, top]
+    ax.plot(*points, color=_GREEN, linewidth=1.8, solid_joinstyle="round", linestyle="-", zorder=6)
 
 
 def _spiral(ax: Axes, centre, slope: float) -> None:
@@ -133,7 +133,7 @@ def figure_2(arm: Arm | None = None, ax: Axes | None = None) -> Figure:
     ax : Axes, optional
         Where to draw; by default a new figure.
     """
-    ax = canvas(ax, figsize=(8.0, 4.4))
+    figure, ax = canvas(ax, figsize=(8.0, 4.4))
     xi = np.linspace(0.0, 1.0, 400)
     x, v = _LENGTH * xi, 2.7 * deflection(arm, xi)
     slope = float(v[1] - v[0]) / float(x[1] - x[0])
@@ -142,4 +142,4 @@ def figure_2(arm: Arm | None = None, ax: Axes | None = None) -> Figure:
     _manipulator(ax, x, v)
     _lines_and_measures(ax, x, v, slope)
     ax.autoscale_view()
-    return ax.figure
+    return figure

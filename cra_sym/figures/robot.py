@@ -27,6 +27,12 @@ def _paper(points) -> np.ndarray:
     return np.asarray(points, dtype=float) @ _TO_PAPER
 
 
+def _at(point, offset=(0.0, 0.0)) -> tuple[float, float]:
+    """Place on paper of one point (x, w, z), moved by ``offset``."""
+    across, up = _paper(point) + offset
+    return float(across), float(up)
+
+
 def _tint(colour: str, factor: float) -> np.ndarray:
     from matplotlib.colors import to_rgb
 
@@ -53,17 +59,17 @@ def _box(ax: Axes, x, w, z, colour: str, zorder: float) -> None:
 
 def _arrow(ax: Axes, middle, along, text: str, offset, colour: str = ORANGE) -> None:
     """Draw a double arrow through ``middle`` with its name beside it."""
-    start, end = _paper(np.subtract(middle, along)), _paper(np.add(middle, along))
+    start, end = _at(np.subtract(middle, along)), _at(np.add(middle, along))
     shape = {"arrowstyle": "<|-|>", "color": colour, "linewidth": 1.6, "mutation_scale": 12, "shrinkA": 0, "shrinkB": 0}
     ax.annotate("", end, start, arrowprops=shape, zorder=30)
-    ax.text(*(_paper(middle) + offset), text, color=colour, fontsize=12, ha="center", va="center", zorder=30)
+    ax.text(*_at(middle, offset), text, color=colour, fontsize=12, ha="center", va="center", zorder=30)
 
 
 def _label(ax: Axes, point, place, text: str) -> None:
     """Name a part, with a thin line to a point (x, w, z) of it."""
     line = {"arrowstyle": "-", "color": INK, "linewidth": 0.7, "shrinkA": 3, "shrinkB": 0}
-    ax.annotate(text, _paper(point), place, arrowprops=line, ha="center", va="center", fontsize=10.5, zorder=40)
-    ax.plot(*_paper(point), "o", color=INK, markersize=2.6, zorder=40)
+    ax.annotate(text, _at(point), place, arrowprops=line, ha="center", va="center", fontsize=10.5, zorder=40)
+    ax.plot(*_at(point), "o", color=INK, markersize=2.6, zorder=40)
 
 
 def _guide(ax: Axes) -> None:
@@ -112,7 +118,7 @@ def figure_1(arm: Arm | None = None, ax: Axes | None = None) -> Figure:
     ax : Axes, optional
         Where to draw; by default a new figure.
     """
-    ax = canvas(ax, figsize=(7.6, 4.6))
+    figure, ax = canvas(ax, figsize=(7.6, 4.6))
     xi = np.linspace(0.0, 1.0, 80)
     bend = 1.25 * deflection(arm, xi)
     x = _ROOT + _LENGTH * xi
@@ -130,4 +136,4 @@ def figure_1(arm: Arm | None = None, ax: Axes | None = None) -> Figure:
     _label(ax, (x[-1] + 0.36, bend[-1] + 0.1, 0.95), (6.1, -3.1), "end-effector $m_e$")
     _label(ax, (0.55, -2.4, 0.2), (3.4, 2.1), "guide")
     ax.autoscale_view()
-    return ax.figure
+    return figure

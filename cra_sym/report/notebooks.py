@@ -74,6 +74,7 @@ def execute(path: str | Path, progress: tqdm[Any] | None = None, timeout: int = 
     from jupyter_client.kernelspec import KernelSpecManager
     from nbclient import NotebookClient
     from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernelError
+    from nbconvert.filters import strip_ansi
 
     path = Path(path)
     notebook = nbformat.read(path, as_version=4)
@@ -83,6 +84,7 @@ def execute(path: str | Path, progress: tqdm[Any] | None = None, timeout: int = 
         notebook,
         km=manager,
         timeout=timeout,
+        extra_arguments=["--log-level=40"],  # the kernel's errors, not its advice
         record_timing=False,
         coalesce_streams=True,
         resources={"metadata": {"path": str(path.parent)}},
@@ -91,7 +93,7 @@ def execute(path: str | Path, progress: tqdm[Any] | None = None, timeout: int = 
     try:
         client.execute(cleanup_kc=True)  # it ends the kernels of its own managers only, unless told
     except (CellExecutionError, CellTimeoutError, DeadKernelError) as error:
-        raise NotebookError(f"{path.name} did not run: {error}") from None
+        raise NotebookError(f"{path.name} did not run: {strip_ansi(str(error))}") from None
     _normalise(notebook)
     return notebook
 

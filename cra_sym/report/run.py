@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterable
 from pathlib import Path
 
 from tqdm import tqdm
 
 from cra_sym.files import staged_directory, write_text
-from cra_sym.report.notebooks import cells_to_run, execute, find_notebooks
+from cra_sym.report.notebooks import find_notebooks, refresh
 from cra_sym.report.pictures import save_figures
 from cra_sym.report.tables import TABLES
 
@@ -23,8 +24,7 @@ def reproduce(output: str | Path, notebooks: str | Path | None = None) -> str:
     output : path
         Folder to make. An earlier output there is replaced as a whole at the very end; anything else is refused first.
     notebooks : path, optional
-        Folder of the notebooks, by default that of the source checkout. They are executed on copies' terms: the files
-        themselves stay as they are.
+        Folder of the notebooks, by default that of the source checkout. Copies are executed; the folder stays as it is.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def reproduce(output: str | Path, notebooks: str | Path | None = None) -> str:
     """
     sources = find_notebooks(notebooks)
     with staged_directory(output) as folder:
-        _run_notebooks(sources, folder / "notebooks")
+        _run_notebooks(sources[0].parent, folder / "notebooks")
         save_figures(folder / "figures")
         _write_tables(folder / "tables")
         made = [path for path in folder.rglob("*") if path.is_file()]
@@ -48,14 +48,9 @@ def reproduce(output: str | Path, notebooks: str | Path | None = None) -> str:
     return f"{listing}\n\nEverything is in {Path(output)}"
 
 
-def _run_notebooks(sources: list[Path], folder: Path) -> None:
-    import nbformat
-
-    folder.mkdir()
-    with tqdm(total=cells_to_run(sources), unit="cell", disable=None) as progress:
-        for path in sources:
-            progress.set_description(path.stem)
-            write_text(folder / path.name, nbformat.writes(execute(path, progress)) + "\n")
+def _run_notebooks(source: Path, folder: Path) -> None:
+    shutil.copytree(source, folder, ignore=shutil.ignore_patterns(".*"))
+    refresh(find_notebooks(folder))
 
 
 def _write_tables(folder: Path) -> None:

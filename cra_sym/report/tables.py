@@ -11,13 +11,9 @@ from typing import Any
 __all__ = ["TABLES", "Table"]
 
 
-def _shown(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
 @dataclass(frozen=True)
 class Table:
-    """A title, column heads with their units, and rows of numbers and text.
+    """A title, column heads with their units, and rows of numbers and text; people are shown ``digits`` digits.
 
     >>> print(Table("Squares", ("n", "square / 1"), [(2, 4.0)]).text(), end="")
     n  square / 1
@@ -27,6 +23,10 @@ class Table:
     title: str
     columns: tuple[str, ...]
     rows: Sequence[tuple[Any, ...]]
+    digits: int = 6
+
+    def _shown(self, value: Any) -> str:
+        return f"{value:.{self.digits}g}" if isinstance(value, float) else str(value)
 
     def csv(self) -> str:
         """Comma-separated values, numbers in full precision."""
@@ -37,14 +37,14 @@ class Table:
         return buffer.getvalue()
 
     def markdown(self) -> str:
-        """A Markdown table under its title, numbers to six digits."""
-        cells = [self.columns, ["---"] * len(self.columns), *([_shown(v) for v in row] for row in self.rows)]
+        """A Markdown table under its title."""
+        cells = [self.columns, ["---"] * len(self.columns), *([self._shown(v) for v in row] for row in self.rows)]
         body = "\n".join("| " + " | ".join(str(c).replace("|", r"\|") for c in row) + " |" for row in cells)
         return f"# {self.title}\n\n{body}\n"
 
     def text(self) -> str:
         """Aligned columns for a terminal: numbers to the right, text to the left."""
-        cells = [list(self.columns), *([_shown(v) for v in row] for row in self.rows)]
+        cells = [list(self.columns), *([self._shown(v) for v in row] for row in self.rows)]
         widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
         numeric = [all(isinstance(v, (int, float)) for v in column) for column in zip(*self.rows, strict=True)]
         lines = (
