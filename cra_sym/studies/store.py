@@ -92,7 +92,8 @@ def _is_there(stored: Any, path: Path, region: Region) -> bool:
 def _written(study: Study, path: Path, regions: list[Region], client: Any) -> Iterator[None]:
     if client is None:
         for region in regions:
-            yield _write(study, path, region)
+            _write(study, path, region)
+            yield
         return
     distributed = require("distributed", "scale")
     shared = client.scatter(study, broadcast=True) if regions else None
