@@ -39,7 +39,7 @@ def lowest(problem: DynamicStiffness, modes: int) -> np.ndarray:
     Notes
     -----
     Roots that come near the rounding of the static stiffness (soft joints, heavy tips) are replaced by the Ritz values
-    of their own shapes; what remains below 1e-26 of the first elastic bound is a rigid-body zero.
+    of their own shapes; what remains below 1e-24 of the first elastic bound is a rigid-body zero.
     """
     rows = len(problem.length)
     every = np.arange(rows)
@@ -77,8 +77,9 @@ def _polish(problem: DynamicStiffness, z: np.ndarray, noise: np.ndarray, bounds:
     drowned = np.cumprod(noise > 1e-14 * z, axis=1).sum(axis=1)
     for number in np.unique(drowned[drowned > 0]):
         rows = np.nonzero(drowned == number)[0]
-        value = ritz_values(problem.take(rows), z[rows, :number])
-        z[rows, :number] = np.where(value > 1e-26 * bounds[rows, None, min(number, last)], value, 0.0)
+        almost_rigid = np.cumprod(noise[rows, :number] > 1e-3 * z[rows, :number], axis=1).sum(axis=1)
+        value = ritz_values(problem.take(rows), z[rows, :number], almost_rigid)
+        z[rows, :number] = np.where(value > 1e-24 * bounds[rows, None, min(number, last)], value, 0.0)
     return z
 
 

@@ -16,7 +16,7 @@ def mode_states(problem: DynamicStiffness, z: np.ndarray, share: np.ndarray) -> 
     ----------
     problem : DynamicStiffness
     z : ndarray, shape (rows, modes)
-        Roots, from `lowest` or `refine`. Equal roots get independent, mass-orthogonal shapes.
+        Roots: all of the lowest, as `lowest` gives them, or those of `refine`. Equal ones get independent shapes.
     share : ndarray, shape (rows, stations)
         Distance from the left end in lengths, 0 to 1.
 
@@ -75,8 +75,11 @@ def _null_vectors(here: Evaluation, place: np.ndarray, rows: int, modes: int) ->
         size = np.abs(np.einsum("rij,rj->ri", here.unit, vector)).max(axis=1, keepdims=True)
         return vector / size
     value, vector = np.linalg.eigh(here.matrix)
-    order = np.argsort(np.abs(value), axis=1)
-    u = np.take_along_axis(vector, order[np.arange(len(pick)), pick][:, None, None], axis=2)[..., 0]
+    order = np.argsort(np.abs(value), axis=1)[np.arange(len(pick)), pick]
+    # K has as many negative eigenvalues as modes lie below: the next one is this mode's, however close its neighbours
+    number = np.clip(np.tile(np.arange(modes), rows) - here.fixed_count, 0, value.shape[1] - 1)
+    vanishing = np.abs(np.take_along_axis(value, number[:, None], axis=1)[:, 0]) < 1e-6
+    u = np.take_along_axis(vector, np.where(vanishing, number, order)[:, None, None], axis=2)[..., 0]
     u = u.reshape(rows, modes, -1)
     mass = -here.derivative.reshape(rows, modes, *here.derivative.shape[1:])
     for i in range(modes):

@@ -235,3 +235,18 @@ def test_string_with_a_damper_at_its_end(damper):
     np.testing.assert_allclose(found[0], exact, rtol=1e-12)
     shape = mode_states(string, found, np.array([[0.25, 1.0]]))[0, :, :, 0]
     np.testing.assert_allclose(shape[:, 0] / shape[:, 1], np.sinh(0.25 * exact) / np.sinh(exact), rtol=1e-10)
+
+
+def test_two_rigid_motions_are_exact_zeros_whatever_their_masses():
+    """A heavy base beside a light beam, nothing between them: both translate, and rounding must not look like a spring."""
+    a0, a1 = np.zeros((6, 6)), np.zeros((6, 6))  # (v, v', w, P_v, P_v', r), v seen from the base w
+    a0[0, 1], a0[1, 4], a0[4, 3] = 1.0, 1 / 170.0, -1.0
+    a1[3, [0, 2]] = a1[5, [0, 2]] = -0.017
+    ends1 = np.zeros((5, 5))
+    ends1[2, 2] = -82.0
+    free = np.eye(5)[:, [0, 2, 3, 4]]  # the root may slide, not turn
+    z = lowest(constant(a0, a1, length=1.6, displacements=2, coordinates=1, ends1=ends1, free=free), 4)[0]
+    np.testing.assert_array_equal(z[:2], 0.0)
+    with mp.workdps(30):
+        exact = mp.findroot(lambda l: mp.tan(l) + mp.tanh(l), 2.365) ** 4 * 170 / mpf("0.017") / mpf("1.6") ** 4
+    np.testing.assert_allclose(z[2], float(exact), rtol=1e-10)
