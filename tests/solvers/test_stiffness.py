@@ -238,7 +238,7 @@ def test_string_with_a_damper_at_its_end(damper):
 
 
 def test_two_rigid_motions_are_exact_zeros_whatever_their_masses():
-    """A heavy base beside a light beam, nothing between them: both translate, and rounding must not look like a spring."""
+    """A heavy base beside a light beam, nothing between: both translate, and rounding must not look like a spring."""
     a0, a1 = np.zeros((6, 6)), np.zeros((6, 6))  # (v, v', w, P_v, P_v', r), v seen from the base w
     a0[0, 1], a0[1, 4], a0[4, 3] = 1.0, 1 / 170.0, -1.0
     a1[3, [0, 2]] = a1[5, [0, 2]] = -0.017
