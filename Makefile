@@ -21,6 +21,7 @@ lab: .venv/.ready
 
 notebooks: .venv/.ready
 	$(RUN) -m cra_sym.report.notebooks notebooks
+	$(RUN) -m cra_sym.report.pictures notebooks/images
 
 lint: .venv/.ready
 	$(RUN) -m ruff check .
@@ -28,13 +29,13 @@ lint: .venv/.ready
 	$(RUN) -m mypy
 
 clean:
-	rm -rf .venv
+	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 .venv/.ready: requirements.txt pyproject.toml
 	@for python in $(CANDIDATES); do \
 	    if "$$python" -c '$(SUPPORTED)' 2>/dev/null; then \
-	        echo "Setting up .venv with $$python"; "$$python" -m venv .venv; exit; \
+	        echo "Setting up .venv with $$python (once; takes a few minutes)"; "$$python" -m venv .venv; exit; \
 	    fi; \
 	done; echo "Python 3.11 to 3.14 is needed and was not found: set PYTHON to one, as in make PYTHON=/path/to/python3.12 ..." >&2; exit 1
-	$(RUN) -m pip install --quiet --disable-pip-version-check -r requirements.txt
+	$(RUN) -m pip install --quiet --no-compile --disable-pip-version-check -r requirements.txt
 	@touch .venv/.ready

@@ -54,7 +54,7 @@ def _reproduce_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _reproduce(options: Options) -> None:
-    from cra_sym.report import reproduce
+    from cra_sym.report.run import reproduce
 
     print(reproduce(options.output, notebooks=options.notebooks))
 

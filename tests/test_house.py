@@ -176,3 +176,17 @@ def test_readme_links_lead_somewhere():
     for document in ("README.md", "CONTRIBUTING.md"):
         links = re.findall(r"\]\((?!https?:|#)([^)#]+)", (ROOT / document).read_text(encoding="utf-8"))
         assert [link for link in links if not (ROOT / link).exists()] == []
+
+
+def test_readme_tells_where_each_equation_lives():
+    rows = re.findall(
+        r"^\| \((\d+)\)-\((\d+)\) .*?`(arm/\w+)\.py`", (ROOT / "README.md").read_text(encoding="utf-8"), re.M
+    )
+    told = {n: home.replace("/", ".") for first, last, home in rows for n in range(int(first), int(last) + 1)}
+    assert told == {e.number: e.source.partition(":")[0].removeprefix("cra_sym.") for e in cra_sym.equations()}
+
+
+def test_readme_pictures_are_small():
+    pictures = re.findall(r"!\[[^]]+\]\(([^)]+)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
+    assert len(pictures) == 2
+    assert all((ROOT / picture).stat().st_size < 200_000 for picture in pictures)

@@ -1,9 +1,14 @@
-"""Draw the figures into a folder, each as PNG to look at and SVG to print."""
+"""Draw the figures into a folder, each as PNG to look at and SVG to print.
+
+``python -m cra_sym.report.pictures notebooks/images`` redraws the SVG files that lie there.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 from tqdm import tqdm
 
@@ -11,8 +16,10 @@ from cra_sym.figures import FIGURES, draw
 
 __all__ = ["save_figures"]
 
+_OPTIONS: dict[str, dict[str, Any]] = {"png": {"dpi": 200}, "svg": {"metadata": {"Date": None}}}
 
-def save_figures(folder: Path, names: Iterable[str] | None = None) -> list[Path]:
+
+def save_figures(folder: Path, names: Iterable[str] | None = None, kinds: Sequence[str] = ("png", "svg")) -> list[Path]:
     """Draw the named figures, by default all, and return the files made.
 
     The files depend on the figures alone: no date, and SVG identifiers that are the same in each run.
@@ -26,7 +33,12 @@ def save_figures(folder: Path, names: Iterable[str] | None = None) -> list[Path]
         figure = draw(name)
         FigureCanvasAgg(figure)
         with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "path"}):
-            for kind, options in (("png", {"dpi": 200}), ("svg", {"metadata": {"Date": None}})):
+            for kind in kinds:
                 made.append(folder / f"{name}.{kind}")
-                figure.savefig(made[-1], format=kind, **options)
+                figure.savefig(made[-1], format=kind, **_OPTIONS[kind])
     return made
+
+
+if __name__ == "__main__":
+    place = Path(sys.argv[1])
+    save_figures(place, [path.stem for path in place.glob("*.svg")], kinds=["svg"])
