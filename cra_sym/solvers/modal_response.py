@@ -233,7 +233,8 @@ def _grid_response(osc: Oscillators, cause: Steady, start: float, step: float, c
     length = int(np.ceil(np.sqrt(count)))
     blocks = -(-count // length)
     states = _state_table(osc, cause, start + step * length * np.arange(blocks), step * length)
-    out = np.matmul(states[..., None, :, :], _row_table(osc, cause, step, length, derivative))
+    rows = _row_table(osc, cause, step, length, derivative)
+    out = np.matmul(states[..., None, :, :], np.swapaxes(rows, -1, -2))
     return out.reshape(*out.shape[:-2], -1)[..., :count]
 
 
@@ -246,42 +247,46 @@ def _state_table(osc: Oscillators, cause: Steady, times: Array, step: float) -> 
     n, size = state[0].shape[-1], len(harmonics)
     table = np.empty((*state[0].shape[:-1], times.size, 2 * n + 1 + 2 * size))
     table[..., 2 * n] = a
-    for block, t in enumerate(times):
-        phasors = [f.phasor(t) for f in harmonics]
+    phasors = [f.phasor(times[0]) for f in harmonics]
+    turns = [np.exp(1j * f.varpi * step) for f in harmonics]
+    for block in range(times.size):
         row = table[..., block, :]
         row[..., :n], row[..., n : 2 * n] = state
         for column, phasor in enumerate(phasors, start=2 * n + 1):
             row[..., column], row[..., column + size] = phasor[..., 0].imag, phasor[..., 0].real
         state = _advance(osc, shift, state, a, 0.0, phasors)
+        phasors = [phasor * turn for phasor, turn in zip(phasors, turns, strict=True)]
     return table
 
 
 def _row_table(osc: Oscillators, cause: Steady, step: float, length: int, derivative: int) -> Array:
-    """Return what each entry of a state contributes to the output ``step * arange(length)`` later, (..., R, columns,
-    length).
+    """Return what each entry of a state contributes to the output ``step * arange(length)`` later.
 
-    A row y(tau) = r_q q + r_u q' + ... is shifted by substituting the shifted state into it.
+    The shape is (..., R, length, columns). A row y(tau) = r_q q + r_u q' + ... is shifted by substituting the shifted state into it.
     """
     osc = _widened(osc, -2)
     harmonics = [Harmonics(*_with_axis(f, -2)) for f in cause.harmonics]
     shift = _shift(osc, step, harmonics)
     turns = [np.exp(1j * f.varpi[..., 0] * step) for f in harmonics]
+    back = osc.omega**2 * shift.h
+    kick, push = osc.gamma * shift.step, osc.gamma * shift.h
+    pulls = [(osc.gamma * H, osc.gamma * dH) for H, dH in zip(shift.harmonic, shift.slope, strict=True)]
     r_q, r_u, r_a = _output_row(osc, derivative)
     r_f = [-r_a + 0j] * len(harmonics)
     n, size = r_q.shape[-1], len(harmonics)
     shape = np.broadcast_shapes(r_q.shape, shift.p.shape, *(H.shape for H in shift.harmonic))[:-1]
-    table = np.empty((*shape, 2 * n + 1 + 2 * size, length))
+    table = np.empty((*shape, length, 2 * n + 1 + 2 * size))
     for j in range(length):
-        entry = table[..., j]
+        entry = table[..., j, :]
         entry[..., :n], entry[..., n : 2 * n], entry[..., 2 * n] = r_q, r_u, r_a
         for column, value in enumerate(r_f, start=2 * n + 1):
             entry[..., column], entry[..., column + size] = value.real, value.imag
-        r_a = r_a - np.sum(osc.gamma * (r_q * shift.step + r_u * shift.h), -1)
+        r_a = r_a - np.einsum("...n,...n->...", r_q, kick) - np.einsum("...n,...n->...", r_u, push)
         r_f = [
-            value * turn + np.sum(osc.gamma * (r_q * H + r_u * dH), -1)
-            for value, turn, H, dH in zip(r_f, turns, shift.harmonic, shift.slope, strict=True)
+            value * turn + np.einsum("...n,...n->...", r_q, H) + np.einsum("...n,...n->...", r_u, dH)
+            for value, turn, (H, dH) in zip(r_f, turns, pulls, strict=True)
         ]
-        r_q, r_u = r_q * shift.p - r_u * osc.omega**2 * shift.h, r_q * shift.h + r_u * shift.g
+        r_q, r_u = r_q * shift.p - r_u * back, r_q * shift.h + r_u * shift.g
     return table
 
 

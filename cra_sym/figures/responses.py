@@ -1,0 +1,192 @@
+"""Responses of the tip to the base's motion (Figs. 6 to 10); the scenario stands in every figure."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cra_sym.arm.base_motion import BaseMotion
+from cra_sym.arm.parameters import Arm
+from cra_sym.arm.response import tip_response
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["figure_6", "figure_7", "figure_8", "figure_9", "figure_10"]
+
+#: The assumed scenario: the paper's values are lost.
+AMPLITUDE, RATE, VELOCITY, ACCELERATIONS, SOFT = 1e-3, 10.0, 0.1, (0.1, 0.2, 0.3), 1e3
+_TIME = np.linspace(0.0, 2.0, 1601)
+_GREY: dict[str, Any] = {"color": "0.45", "linestyle": (0, (4, 2)), "linewidth": 1.2}
+_FROM_REST = "from rest in the inertial frame, undamped, 5 modes"
+_TIP = "tip displacement $v(L,t)$ / mm"
+_ERROR = "error: with minus without disturbance / mm"
+
+
+def _tip(arm: Arm, t: np.ndarray, disturbed: bool = True, rate: float = RATE, phase: float = 0.0, **mean: Any) -> Any:
+    """Return the tip's displacement in mm."""
+    motion = BaseMotion(**mean, amplitude=AMPLITUDE * disturbed, angular_frequency=rate, phase=phase)
+    return 1e3 * tip_response(arm, motion, t)
+
+
+def _panels(axes: Any, rows: int, columns: int, size: tuple[float, float], **options: Any) -> np.ndarray:
+    if axes is not None:
+        return np.asarray(axes).reshape(rows, columns)
+    return Figure(figsize=size, layout="constrained").subplots(rows, columns, squeeze=False, **options)
+
+
+def _finish(panels: np.ndarray, scenario: str) -> Figure:
+    figure = panels.flat[0].figure
+    for ax in panels[-1]:
+        ax.set_xlabel("time $t$ / s")
+    figure.supxlabel(scenario, fontsize=8, color="0.35")
+    return figure
+
+
+def _peak(ax: Axes, t: np.ndarray, v: np.ndarray, color: Any) -> float:
+    """Mark the largest deflection and return it."""
+    k = int(np.argmax(np.abs(v)))
+    ax.plot(t[k], v[k], "o", color=color, markersize=5, markerfacecolor="white", zorder=3)
+    return float(abs(v[k]))
+
+
+def figure_6(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+    """Draw the tip's response to a mean velocity and to a mean acceleration, without and with the disturbance.
+
+    The phase of the disturbance, which the paper does not tell, decides on the first: one row each for 0 and pi.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        By default the nominal one.
+    axes : 2 x 2 array of Axes, optional
+    """
+    arm, t = arm or Arm.nominal(), _TIME
+    panels = _panels(axes, 2, 2, (8.6, 6.2), sharex=True, sharey="col")
+    cases = (("mean velocity 0.1 m/s", {"velocity": VELOCITY}), ("mean acceleration 0.1 m/s²", {"acceleration": 0.1}))
+    for ax, (title, _) in zip(panels[0], cases, strict=True):
+        ax.set_title(f"Fig. 6  {title}" if ax is panels[0, 0] else title, pad=36)
+    for row, (phase, name) in zip(panels, ((0.0, "0"), (np.pi, r"\pi")), strict=True):
+        for ax, (_, mean) in zip(row, cases, strict=True):
+            plain, moved = (_tip(arm, t, disturbed, phase=phase, **mean) for disturbed in (False, True))
+            (with_line,) = ax.plot(t, moved, color="C0", linestyle="-", zorder=2)
+            (without,) = ax.plot(t, plain, **_GREY, zorder=2.5)
+            peaks = _peak(ax, t, moved, "C0"), _peak(ax, t, plain, "0.45")
+            labels = [
+                f"{word} disturbance, peak {p:.2f} mm" for word, p in zip(("with", "without"), peaks, strict=True)
+            ]
+            ax.legend([with_line, without], labels, loc="lower left", bbox_to_anchor=(0.0, 0.98), borderaxespad=0)
+            ax.text(0.99, 1.03, rf"$\psi={name}$", transform=ax.transAxes, ha="right", va="bottom")
+        row[0].set_ylabel(_TIP)
+    return _finish(panels, f"nominal arm, $B$ = 1 mm, $\\varpi$ = 10 rad/s, {_FROM_REST}")
+
+
+def _against_rigid(axes: Any, arm: Arm | None, quantity: Any, label: str, title: str) -> Figure:
+    arm, t = arm or Arm.nominal(), _TIME
+    panels = _panels(axes, 1, 2, (8.6, 3.9), sharex=True, sharey=True)
+    joints = ((np.inf, "rigid joint", "C0", "-"), (SOFT, "$k_t$ = 1000 N/m", "C1", "--"))
+    for ax, rate in zip(panels[0], (RATE, 2 * RATE), strict=True):
+        for k_t, name, color, style in joints:
+            v = quantity(arm.replace(k_t=k_t), t, rate)
+            peak = _peak(ax, t, v, color)
+            ax.plot(t, v, color=color, linestyle=style, label=f"{name}, peak {peak:.2f} mm")
+        ax.legend(loc="lower left", bbox_to_anchor=(0.0, 0.98), borderaxespad=0)
+        ax.text(0.99, 1.03, rf"$\varpi={rate:g}$ rad/s", transform=ax.transAxes, ha="right", va="bottom")
+    panels[0, 0].set_title(title, pad=36)
+    panels[0, 0].set_ylabel(label)
+    return _finish(panels, f"nominal arm, mean acceleration 0.1 m/s², $B$ = 1 mm, $\\psi$ = 0, {_FROM_REST}")
+
+
+def figure_7(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+    """Draw the tip's response with a joint of finite translational stiffness against a rigid one.
+
+    Two frequencies of the disturbance, below and above the first natural frequency: on it depends what a softer joint
+    does.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        By default the nominal one.
+    axes : pair of Axes, optional
+    """
+
+    def response(joined: Arm, t: np.ndarray, rate: float) -> Any:
+        return _tip(joined, t, rate=rate, acceleration=0.1)
+
+    return _against_rigid(axes, arm, response, _TIP, "Fig. 7  A softer joint: smaller peak at 20 rad/s, not at 10")
+
+
+def figure_8(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+    """Draw what the disturbance adds to the responses of Fig. 7.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        By default the nominal one.
+    axes : pair of Axes, optional
+    """
+
+    def error(joined: Arm, t: np.ndarray, rate: float) -> Any:
+        return _tip(joined, t, rate=rate, acceleration=0.1) - _tip(joined, t, disturbed=False, acceleration=0.1)
+
+    return _against_rigid(axes, arm, error, _ERROR, "Fig. 8  It suppresses the disturbance at 20 rad/s, not at 10")
+
+
+def figure_9(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+    """Draw the tip's response to three mean accelerations, with and without the disturbance.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        By default the nominal one.
+    axes : pair of Axes, optional
+    """
+    arm, t = arm or Arm.nominal(), _TIME
+    panels = _panels(axes, 1, 2, (8.6, 3.9), sharex=True, sharey=True)
+    for ax, disturbed, word in zip(panels[0], (True, False), ("with", "without"), strict=True):
+        for a in ACCELERATIONS:
+            v = _tip(arm, t, disturbed, acceleration=a)
+            (line,) = ax.plot(t, v)
+            line.set_label(f"{a:g} m/s², peak {_peak(ax, t, v, line.get_color()):.2f} mm")
+        ax.legend(loc="lower left", bbox_to_anchor=(0.0, 0.98), borderaxespad=0)
+        ax.text(0.99, 1.03, f"{word} disturbance", transform=ax.transAxes, ha="right", va="bottom")
+    panels[0, 0].set_title("Fig. 9  Peaks grow with the mean acceleration", pad=52)
+    panels[0, 0].set_ylabel(_TIP)
+    return _finish(panels, f"nominal arm, $B$ = 1 mm, $\\varpi$ = 10 rad/s, $\\psi$ = 0, {_FROM_REST}")
+
+
+def figure_10(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+    """Draw the error caused by the disturbance for three mean accelerations: of the response, and of its peak.
+
+    By superposition the first does not depend on the acceleration at all; the second never grows with it.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        By default the nominal one.
+    axes : pair of Axes, optional
+    """
+    arm, t = arm or Arm.nominal(), _TIME
+    panels = _panels(axes, 1, 2, (8.6, 3.9))
+    left, right = panels[0]
+    for a, width in zip(ACCELERATIONS, (5.0, 3.0, 1.2), strict=True):
+        error = _tip(arm, t, acceleration=a) - _tip(arm, t, disturbed=False, acceleration=a)
+        left.plot(t, error, linewidth=width, label=f"{a:g} m/s²")
+    left.legend(loc="lower left", ncols=3, bbox_to_anchor=(0.0, 0.98), borderaxespad=0)
+    left.set_title("Fig. 10  Error of the response: one curve", pad=22)
+    left.set_ylabel(_ERROR)
+    levels = np.linspace(0.0, 1.0, 101)
+    plain = np.abs(_tip(arm, t, disturbed=False, acceleration=levels)).max(-1)
+    for phase, name in ((0.0, "0"), (np.pi / 2, r"\pi/2"), (np.pi, r"\pi")):
+        moved = np.abs(_tip(arm, t, acceleration=levels, phase=phase)).max(-1)
+        right.plot(levels, moved - plain, label=rf"$\psi={name}$")
+    for value in ACCELERATIONS:
+        right.axvline(value, color="0.75", linewidth=0.8, zorder=0)
+    right.legend(loc="lower left", ncols=3, bbox_to_anchor=(0.0, 0.98), borderaxespad=0)
+    right.set_title("Error of the peak: never grows", pad=22)
+    right.set_ylabel("peak with minus peak without / mm")
+    figure = _finish(panels, f"nominal arm, $B$ = 1 mm, $\\varpi$ = 10 rad/s, {_FROM_REST}; 0 to 2 s")
+    right.set_xlabel("mean acceleration / (m/s²)")
+    return figure

@@ -1,0 +1,65 @@
+"""Sensitivities of the frequencies to the two stiffnesses of the joint (Fig. 5): raw as in the paper, and compared."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cra_sym.arm.parameters import Arm
+from cra_sym.arm.sensitivity import sensitivities
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["figure_5"]
+
+_MARKED = {"k_t": (1e5, 1e4, 1e3), "k_r": (1e4, 1e3, 1e2)}
+_UNITS = {"k_t": "N/m", "k_r": "N m/rad"}
+_NAMES = {"k_t": "translational stiffness $k_t$ / (N/m)", "k_r": "rotational stiffness $k_r$ / (N m/rad)"}
+
+
+def figure_5(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+    """Draw the sensitivities of f1, f2, f3 to k_t and to k_r, each with the other spring as the arm has it.
+
+    Upper row: raw, in different units, so that the two panels cannot be compared. Lower row: logarithmic, on one scale.
+    Circles mark the stiffnesses that the paper's series are taken to be.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        By default the nominal one, whose joint is rigid.
+    axes : 2 x 2 array of Axes, optional
+    """
+    arm = arm or Arm.nominal()
+    if axes is None:
+        figure = Figure(figsize=(8.6, 6.4), layout="constrained")
+        axes = figure.subplots(2, 2, sharex="col")
+        axes[1, 1].sharey(axes[1, 0])
+    (raw_t, raw_r), (log_t, log_r) = np.asarray(axes)
+    for name, raw, log, low in (("k_t", raw_t, log_t, 0), ("k_r", raw_r, log_r, -1)):
+        stiffness = np.logspace(low, 6, 281)
+        _curves(raw, arm, name, stiffness, f"df_d{name}")
+        _curves(log, arm, name, stiffness, f"log_{name}")
+        raw.set_yscale("log")
+        raw.set_ylabel(f"$\\partial f/\\partial {name}$ / (Hz per {_UNITS[name]})")
+        log.set_ylabel(f"$\\partial\\ln f/\\partial\\ln {name}$")
+        log.set_xlabel(_NAMES[name])
+        log.set_ylim(-0.02, 0.56)
+        log.axhline(0.5, color="0.45", linestyle=(0, (4, 2)), linewidth=0.9)
+    raw_t.set_title("Fig. 5  Raw: units differ, not comparable")
+    raw_r.set_title("other spring rigid, $m_e$ = 1 g" if arm == Arm.nominal() else "", fontweight="normal")
+    log_t.set_title("Logarithmic: share of the strain energy, halved")
+    where: dict[str, Any] = {"transform": log_t.get_yaxis_transform(), "ha": "right", "va": "bottom"}
+    log_t.text(0.98, 0.503, "all strain energy in the spring", fontsize=8, color="0.35", **where)
+    raw_t.legend(loc="lower left")
+    return raw_t.figure
+
+
+def _curves(ax: Axes, arm: Arm, name: str, stiffness: np.ndarray, quantity: str) -> None:
+    found = getattr(sensitivities(arm.replace(**{name: stiffness})), quantity)
+    marked = getattr(sensitivities(arm.replace(**{name: _MARKED[name]})), quantity)
+    for mode in range(3):
+        (line,) = ax.semilogx(stiffness, found[:, mode], label=f"mode {mode + 1}")
+        ax.plot(_MARKED[name], marked[:, mode], "o", color=line.get_color(), markersize=4.5, markerfacecolor="white")

@@ -1,0 +1,133 @@
+"""What an engineer plots beyond the paper: frequency responses, residual vibration after a move, input shaping."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+from cra_sym.arm.analysis import modal_parameters, mode_shapes
+from cra_sym.arm.base_motion import BaseMotion, Piecewise
+from cra_sym.arm.frequency_response import frequency_response
+from cra_sym.arm.parameters import Arm
+from cra_sym.arm.response import residual_vibration, tip_response
+from cra_sym.arm.shaping import input_shaper
+
+__all__ = ["figure_frequency_response", "figure_input_shaping", "figure_residual_vibration"]
+
+_LOOSE = {"k_t": 1e3, "k_r": 1e2}
+_LIMITS = {"distance": 0.5, "v_max": 1.0, "a_max": 4.0, "j_max": 40.0}  # m, m/s, m/s2, m/s3
+_MOVE = "0.5 m S-curve, at most 1 m/s, 4 m/s², 40 m/s³"
+
+
+def _panels(axes: Any, columns: int, **options: Any) -> np.ndarray:
+    if axes is not None:
+        return np.atleast_1d(np.asarray(axes))
+    return Figure(figsize=(8.6, 3.9), layout="constrained").subplots(1, columns, squeeze=False, **options)[0]
+
+
+def _caption(panels: np.ndarray, scenario: str) -> Figure:
+    figure = panels[0].figure
+    figure.supxlabel(scenario, fontsize=8, color="0.35")
+    return figure
+
+
+def figure_frequency_response(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+    """Draw the exact frequency response of tip and joint, and what keeping a few modes makes of it.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        By default the nominal one with a stiff but elastic joint and 1 % of damping.
+    axes : pair of Axes, optional
+    """
+    arm = arm or Arm.nominal().replace(k_t=1e5, k_r=1e3, zeta=0.01)
+    panels = _panels(axes, 2, sharex=True)
+    Omega = np.geomspace(2.0, 600.0, 1500)
+    titles = ("Tip: few modes are enough", "Joint: modes converge slowly")
+    for ax, x, title in zip(panels, (float(arm.L), 0.0), titles, strict=True):
+        ax.loglog(Omega, np.abs(frequency_response(arm, Omega, x)), label="exact", color="0.25", linestyle="-")
+        for modes in (3, 12):
+            ax.loglog(Omega, np.abs(_series(arm, Omega, x, modes)), label=f"{modes} modes", linewidth=1.3,
+                      linestyle=("--", ":")[modes > 3], color=("C1", "C2")[modes > 3])  # fmt: skip
+        ax.set_title(title)
+        ax.set_xlabel(r"frequency of the base $\Omega$ / (rad/s)")
+    panels[0].set_ylabel("elastic displacement per base acceleration / s²")
+    panels[0].legend(loc="lower left")
+    return _caption(panels, f"$k_t$ = {arm.k_t:g} N/m, $k_r$ = {arm.k_r:g} N m/rad, $\\zeta$ = {arm.zeta:g}")
+
+
+def _series(arm: Arm, Omega: np.ndarray, x: float, modes: int) -> np.ndarray:
+    p = modal_parameters(arm, modes)
+    stiffness = p.omega**2 + 2j * arm.zeta * p.omega * Omega[:, None] - Omega[:, None] ** 2
+    return -(p.participation * mode_shapes(arm, x, modes) / stiffness).sum(-1)
+
+
+def figure_residual_vibration(arm: Arm | None = None, *, ax: Any = None) -> Figure:
+    """Draw the vibration left after a move over the time the move takes and the joint's translational stiffness.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        By default the nominal one.
+    ax : Axes, optional
+    """
+    arm = arm or Arm.nominal()
+    (panel,) = _panels(None if ax is None else [ax], 1)
+    k_t, fastest = np.geomspace(10.0, 1e5, 161), BaseMotion.s_curve(**_LIMITS).duration
+    duration = np.linspace(fastest, 2.6, 281)
+    left = residual_vibration(arm.replace(k_t=k_t[:, None]), BaseMotion.s_curve(**_LIMITS, duration=duration))
+    mesh = panel.pcolormesh(duration, k_t, 1e3 * left, norm=LogNorm(1e-2, 1e2), shading="gouraud", rasterized=True)
+    panel.set_yscale("log")
+    panel.figure.colorbar(mesh, ax=panel, label="residual tip amplitude / mm", extend="both")
+    period, move = 1 / modal_parameters(arm.replace(k_t=k_t), 1).frequency[:, 0], BaseMotion.s_curve(**_LIMITS)
+    (profile,) = move.terms
+    assert isinstance(profile, Piecewise)
+    braking = float(profile.knots[4]) / fastest  # from the start to the braking, as a fraction of the move
+    for number in (1, 2, 3):
+        panel.plot(number * period / braking, k_t, color="white", linestyle=(0, (1, 2)), linewidth=1.0)
+    panel.set_xlim(duration[0], duration[-1])
+    panel.set_xlabel("time the move takes / s")
+    panel.set_ylabel("translational stiffness $k_t$ / (N/m)")
+    panel.set_title("Residual vibration: dark valleys are move times in tune with the joint")
+    panel.grid(False)
+    dotted = "dotted: braking 1, 2, 3 periods of mode 1 after the start"
+    return _caption(np.array([panel]), f"{_MOVE}, slowed down; {dotted}; undamped")
+
+
+def figure_input_shaping(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+    """Draw a move shaped for the computed modes against an S-curve of the same duration, and with a joint wrongly
+    known.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        The arm the shapers are made for, by default the nominal one with an elastic joint and 1 % of damping.
+    axes : pair of Axes, optional
+    """
+    arm = arm or Arm.nominal().replace(**_LOOSE, zeta=0.01)
+    left, right = panels = _panels(axes, 2)
+    t, k_t = np.linspace(0, 2.5, 1601), np.geomspace(0.1, 10.0, 201) * arm.k_t
+    for name, move in shaped_moves(arm).items():
+        left.plot(t, 1e3 * tip_response(arm, move, t), label=f"{name}, {move.duration:.2f} s", linewidth=1.4)
+        right.loglog(k_t / arm.k_t, 1e3 * residual_vibration(arm.replace(k_t=k_t), move), linewidth=1.4)
+    left.legend(loc="lower left", bbox_to_anchor=(0.0, 0.98), ncols=2, borderaxespad=0, fontsize=8)
+    left.set_title("Input shaping from the computed modes", pad=36)
+    left.set_xlabel("time $t$ / s")
+    left.set_ylabel("tip displacement $v(L,t)$ / mm")
+    right.axvline(1.0, color="0.6", linewidth=0.8)
+    right.set_title("with a joint other than assumed", pad=36, fontweight="normal")
+    right.set_xlabel("true $k_t$ / assumed $k_t$")
+    right.set_ylabel("residual tip amplitude / mm")
+    assumed = f"assumed $k_t$ = {arm.k_t:g} N/m, $k_r$ = {arm.k_r:g} N m/rad, $\\zeta$ = {arm.zeta:g}"
+    return _caption(panels, f"{_MOVE}; {assumed}")
+
+
+def shaped_moves(arm: Arm) -> dict[str, BaseMotion]:
+    """Return the fastest S-curve, the same shaped for mode 1 (ZV, ZVD), and an S-curve as slow as the ZVD move."""
+    omega = modal_parameters(arm, 1).omega[0]
+    fast = BaseMotion.s_curve(**_LIMITS)
+    zv, zvd = (fast.shaped(*input_shaper(omega, arm.zeta, order)) for order in (1, 2))
+    return {"S-curve": fast, "ZV": zv, "ZVD": zvd, "slow S-curve": BaseMotion.s_curve(**_LIMITS, duration=zvd.duration)}
