@@ -139,8 +139,25 @@ def _certify(options: Options) -> None:
         print("Proved: each frequency lies between its bounds, and none is missed.")
 
 
+def _claims_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("id", nargs="*", metavar="ID", help="claims to judge, such as C03 (all)")
+    parser.add_argument("--json", action="store_true", help="print JSON, evidence included")
+    _arm_options(parser)
+
+
+def _claims(options: Options) -> None:
+    from cra_sym.claims import claim, claims
+    from cra_sym.claims.table import verdict_text
+
+    with _reading_input():
+        arm = _chosen_arm(options)
+        verdicts = [claim(id, arm) for id in options.id] if options.id else claims(arm)
+    print(json.dumps([v.as_dict() for v in verdicts], indent=1) if options.json else verdict_text(verdicts))
+
+
 COMMANDS = {
     "reproduce": Command("run every notebook; write them, figures, tables and report", _reproduce_options, _reproduce),
+    "claims": Command("judge the paper's claims", _claims_options, _claims),
     "figures": Command("draw the figures as PNG and SVG", _figures_options, _figures),
     "frequencies": Command("natural frequencies of an arm", _modes_options, _frequencies),
     "certify": Command("natural frequencies with a proof that none is missed", _modes_options, _certify),

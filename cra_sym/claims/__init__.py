@@ -1,0 +1,22 @@
+"""The paper's claims, each with a verdict the package computes: what holds, where, what does not, and what would."""
+
+from cra_sym.claims.family import ArmFamily, provenance_family
+from cra_sym.claims.ledger import OUTCOMES, THEMES, Finding, Quantity, Verdict, claim, claims, outcome
+from cra_sym.claims.pictures import figure_claims, figure_family
+from cra_sym.claims.setting import Setting
+
+__all__ = [
+    "OUTCOMES",
+    "THEMES",
+    "ArmFamily",
+    "Finding",
+    "Quantity",
+    "Setting",
+    "Verdict",
+    "claim",
+    "claims",
+    "figure_claims",
+    "figure_family",
+    "outcome",
+    "provenance_family",
+]

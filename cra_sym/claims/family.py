@@ -1,0 +1,121 @@
+"""What the three published frequencies determine, one number, and what they cannot: a family of arms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from cra_sym.arm.analysis import frequency_parameters, natural_frequencies
+from cra_sym.arm.parameters import Arm
+from cra_sym.checks import real_array
+from cra_sym.claims.setting import Setting
+
+__all__ = ["MATERIALS", "ArmFamily", "common_scale", "provenance_family"]
+
+MATERIALS: Mapping[str, tuple[float, float]] = MappingProxyType(
+    {
+        "carbon fibre": (140e9, 1600.0),
+        "aluminium": (68.9e9, 2700.0),
+        "steel": (210e9, 7850.0),
+        "acrylic": (3.2e9, 1190.0),
+    }
+)
+"""Young's modulus (Pa) and density (kg/m3) from handbooks: examples, none is the paper's."""
+
+
+def common_scale(frequencies: Any, rounding: float = 0.0005) -> tuple[float, float, np.ndarray]:
+    """Return the interval of sqrt(EI / rho A) / L^2 that rounded frequencies of a clamped bare arm agree upon.
+
+    Parameters
+    ----------
+    frequencies : array_like, shape (modes,)
+        Hz.
+    rounding : float
+        Half a unit of the last digit, Hz.
+
+    Returns
+    -------
+    low, high : float
+        rad/s; low > high if they agree upon none.
+    by_mode : ndarray, shape (modes, 2)
+        The interval of each frequency.
+
+    Examples
+    --------
+    >>> low, high, _ = common_scale([2.448, 15.339, 42.950])
+    >>> print(f"{low:.5f} {high:.5f}")
+    4.37394 4.37404
+    """
+    f = real_array("frequencies", frequencies, low=0.0, open_low=True)
+    lam = frequency_parameters(np.inf, np.inf, 0.0, modes=f.size)
+    by_mode = 2 * np.pi * (f[:, None] + [-rounding, rounding]) / lam[:, None] ** 2
+    return float(by_mode[:, 0].max()), float(by_mode[:, 1].min()), by_mode
+
+
+@dataclass(frozen=True)
+class ArmFamily:
+    """Arms of different size and material with the same natural frequencies.
+
+    Attributes
+    ----------
+    materials : tuple of str
+    length : ndarray, shape (K,)
+        m.
+    thickness : ndarray, shape (materials, K)
+        m; the width cancels.
+    frequencies : ndarray, shape (materials, K, modes)
+        Hz, computed, of the clamped arm without end-effector.
+    published : ndarray, shape (modes,)
+        Hz.
+    mass, stiffness : ndarray, shape (materials, K)
+        Mass rho A L (kg) and tip stiffness 3 EI / L^3 (N/m) of a strip as wide as the nominal one: these do differ.
+    """
+
+    materials: tuple[str, ...]
+    length: np.ndarray
+    thickness: np.ndarray
+    frequencies: np.ndarray
+    published: np.ndarray
+    mass: np.ndarray
+    stiffness: np.ndarray
+
+
+def provenance_family(
+    frequencies: Any = None, length: Any = None, materials: Mapping[str, tuple[float, float]] = MATERIALS
+) -> ArmFamily:
+    """Return arms that the published frequencies cannot tell apart.
+
+    Parameters
+    ----------
+    frequencies : array_like, optional
+        Published frequencies of the clamped arm, Hz.
+    length : array_like, optional
+        Lengths, m, by default 0.3 to 2.
+    materials : mapping
+        Name to Young's modulus and density.
+
+    Returns
+    -------
+    ArmFamily
+
+    Raises
+    ------
+    ValueError
+        If no clamped uniform arm has these frequencies.
+    """
+    published = np.array(Setting.frequencies if frequencies is None else frequencies, dtype=float)
+    low, high, _ = common_scale(published)
+    if low > high:
+        raise ValueError(f"frequencies = {published.tolist()}: those of no clamped uniform arm")
+    length = np.linspace(0.3, 2.0, 35) if length is None else real_array("length", length, low=0.0, open_low=True)
+    modulus, density = (np.array([row[k] for row in materials.values()])[:, None] for k in (0, 1))
+    thickness = (low + high) / 2 * length**2 * np.sqrt(12 * density / modulus)
+    bare = Arm.nominal().replace(m_e=0.0, J_e=0.0, k_t=np.inf, k_r=np.inf)
+    arms = bare.replace(L=length, h=thickness, E=modulus, rho=density)
+    found = natural_frequencies(arms, modes=published.size)
+    mass, stiffness = arms.rhoA * arms.L, 3 * arms.EI / arms.L**3
+    return ArmFamily(tuple(materials), length, thickness, found, published, np.asarray(mass), np.asarray(stiffness))

@@ -1,0 +1,389 @@
+"""Claims on natural frequencies and on what they follow from: C01-C04, C18 and C21."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cra_sym.arm.analysis import frequency_parameters, modal_parameters, mode_shapes, natural_frequencies
+from cra_sym.arm.flipped import flipped_frequencies
+from cra_sym.arm.parameters import Arm
+from cra_sym.claims.family import common_scale
+from cra_sym.claims.ledger import Finding, Quantity, Verdict, claimed, outcome, pictured
+from cra_sym.claims.pictures import PALETTE, STYLES, by_mode, note, stiffness_axis
+from cra_sym.claims.setting import Setting
+from cra_sym.claims.words import listed, number, percent, span
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_MODES = np.arange(1, 4)
+
+
+@claimed(
+    "C01",
+    "modes",
+    "Section 4",
+    "the rigid joint's frequencies",
+    "for the ideal fixed restraint, the natural frequencies of the flexible manipulator can be calculated as 2.448 Hz, "
+    "15.339 Hz, and 42.950 Hz",
+)
+def _(setting: Setting) -> Finding:
+    published = np.array(setting.frequencies)
+    bare = setting.rigid.replace(m_e=0.0, J_e=0.0)
+    found = natural_frequencies(bare, modes=published.size)
+    low, high, offered = common_scale(published)
+    scale = float(bare.angular_frequency_scale)
+    evidence = {
+        "published": Quantity(published, "Hz", "printed frequencies, rounded to 1 mHz, by mode"),
+        "computed": Quantity(found, "Hz", "of the arm without end-effector on a rigid joint, by mode"),
+        "scale": Quantity(scale, "rad/s", "sqrt(EI / rho A) / L^2 of this arm"),
+        "scale_allowed": Quantity(np.array([low, high]), "rad/s", "interval all printed frequencies agree with"),
+        "scale_by_mode": Quantity(offered, "rad/s", "interval of each printed frequency: mode, (low, high)"),
+    }
+    if low > high:
+        sentence = (
+            f"No clamped uniform beam has these frequencies: mode by mode they ask for different values of "
+            f"sqrt(EI/rho A)/L^2, from {number(offered.max(), 6)} down to {number(offered.min(), 6)} rad/s."
+        )
+        return Finding("contradicted", sentence, evidence)
+    same = f"sqrt(EI/rho A)/L^2 between {number(low, 6)} and {number(high, 6)} rad/s"
+    if low <= scale <= high:
+        sentence = (
+            f"{listed(found, lambda f: f'{f:.3f}')} Hz come out, every printed digit. The three numbers are those of a "
+            f"clamped uniform beam whatever it is made of, and all agree with {same}: that one number is all they tell."
+        )
+        return Finding("holds", sentence, evidence)
+    sentence = (
+        f"The three printed numbers are those of a clamped uniform beam with {same}; this arm has "
+        f"{number(scale, 6)} rad/s and {listed(found, lambda f: f'{f:.3f}')} Hz."
+    )
+    return Finding("holds where", sentence, evidence)
+
+
+@pictured("C01")
+def _(verdict: Verdict, ax: Axes) -> None:
+    centre = verdict["scale_allowed"].mean()
+    for mode, (low, high) in enumerate(verdict["scale_by_mode"], 1):
+        ax.plot([1e6 * (low / centre - 1), 1e6 * (high / centre - 1)], [mode, mode], "-", color=PALETTE[mode - 1], lw=5)
+        ax.annotate(f"{verdict['published'][mode - 1]:.3f} Hz", (0, mode), xytext=(0, 7), textcoords="offset points",
+                    ha="center", fontsize=8.5)  # fmt: skip
+    ax.axvspan(*(1e6 * (verdict["scale_allowed"] / centre - 1)), color="0.88", lw=0)
+    offset = 1e6 * (float(verdict["scale"]) / centre - 1)
+    if abs(offset) < 500:
+        ax.axvline(offset, color="0.2", lw=1, ls="-")
+    ax.set_yticks([1, 2, 3], ["$f_1$", "$f_2$", "$f_3$"])
+    ax.set_ylim(3.6, 0.3)
+    ax.set_xlabel(f"$\\sqrt{{EI/\\rho A}}/L^2$: parts per million from {centre:.5f} rad/s")
+    note(ax, "bars: what each printed digit allows; line: this arm", "lower left")
+
+
+@claimed(
+    "C02",
+    "modes",
+    "Section 4, Fig. 3",
+    "$f_1$ to $f_3$ fall with $k_t$",
+    "with the decreasing of tensional restraint stiffness, the first three natural frequencies obviously decrease and "
+    "are small compared to the ideal fixed restraint",
+)
+def _(setting: Setting) -> Finding:
+    k_t = np.logspace(6, 0, 61)
+    k_r = np.array([np.inf, *setting.k_r])
+    masses = np.array(setting.masses)
+    grid = setting.arm.replace(k_t=k_t, k_r=k_r[:, None], m_e=masses[:, None, None])
+    found = natural_frequencies(grid)
+    ideal = natural_frequencies(grid.replace(k_t=np.inf, k_r=np.inf))
+    falls, below = np.diff(found, axis=-2) < 0, found < ideal
+    slope = modal_parameters(grid).root_displacement ** 2  # d omega^2 / d k_t
+    own = natural_frequencies(setting.arm.replace(k_t=k_t))
+    fixed = natural_frequencies(setting.rigid)
+    soft = natural_frequencies(setting.arm.replace(k_t=setting.soft_k_t)) / fixed
+    evidence = {
+        "k_t": Quantity(k_t, "N/m", "stiffness, stiff to soft"),
+        "frequency": Quantity(own, "Hz", "of this arm: k_t, mode"),
+        "rigid_frequency": Quantity(fixed, "Hz", "on the rigid joint, by mode"),
+        "falls": Quantity(falls, "1", "whether the next softer k_t lowers it: end-effector, k_r, k_t, mode"),
+        "slope": Quantity(slope, "kg^-1", "d omega^2 / d k_t = phi(0)^2: end-effector, k_r, k_t, mode"),
+    }
+    verdict = outcome(falls, below)
+    if verdict == "holds":
+        sentence = (
+            f"All three fall at every step from {number(k_t[0])} to {number(k_t[-1])} N/m, for {masses.size} "
+            f"end-effectors and {k_r.size} rotational stiffnesses; at {number(setting.soft_k_t)} N/m they are "
+            f"{listed(soft, percent)} of the rigid joint's. It is a theorem: d(omega_i^2)/dk_t = phi_i(0)^2."
+        )
+    else:
+        sentence = (
+            f"In {percent(falls.mean())} of the steps from {number(k_t[0])} to {number(k_t[-1])} N/m a softer joint "
+            f"lowers a frequency, in the others it does not."
+        )
+    return Finding(verdict, sentence, evidence)
+
+
+@pictured("C02")
+def _(verdict: Verdict, ax: Axes) -> None:
+    ax.axhline(1.0, color="0.45", lw=0.9, ls=(0, (4, 2)))
+    by_mode(ax, verdict["k_t"], verdict["frequency"] / verdict["rigid_frequency"])
+    stiffness_axis(ax, "k_t")
+    ax.set_ylabel("frequency / that of the rigid joint")
+
+
+def _fig_4(found: np.ndarray, rigid: np.ndarray, visible: float) -> tuple[np.ndarray, np.ndarray]:
+    """Tell where along k_r a reader sees f1 unchanged, and where he sees f2 and f3 risen, on one axis in hertz."""
+    axis = max(found.max(), rigid.max())
+    change = (found - rigid) / axis
+    return np.abs(change[:, 0]) <= visible, np.all(change[:, 1:] > visible, axis=-1)
+
+
+@claimed(
+    "C03",
+    "modes",
+    "Section 4, Fig. 4",
+    "$f_1$ flat, $f_2$ and $f_3$ rise as $k_r$ falls",
+    "with torsional restraint stiffness decrease, the first natural frequency presents no change, while the second and "
+    "third natural frequencies obviously increase",
+)
+def _(setting: Setting) -> Finding:
+    k_r = np.logspace(5, np.log10(min(setting.k_r)), 121)
+    arm = setting.arm.replace(k_r=k_r)
+    found, fixed = natural_frequencies(arm), natural_frequencies(setting.arm.replace(k_r=np.inf))
+    flipped = flipped_frequencies(arm)
+    flat, rises = _fig_4(found, fixed, setting.visible)
+    flat_flipped, rises_flipped = _fig_4(flipped, fixed, setting.visible)
+    as_printed = flat_flipped & rises_flipped
+    evidence = {
+        "k_r": Quantity(k_r, "N m/rad", "stiffness, stiff to soft"),
+        "frequency": Quantity(found, "Hz", "derived: k_r, mode"),
+        "flipped_frequency": Quantity(flipped, "Hz", "with the spring's sign flipped: k_r, mode"),
+        "rigid_frequency": Quantity(fixed, "Hz", "for infinite k_r, by mode"),
+        "region": Quantity(flat & rises, "1", "where Fig. 4 would look as the paper says, by k_r"),
+        "flipped_region": Quantity(as_printed, "1", "the same with the sign flipped, by k_r"),
+    }
+    verdict = outcome(flat & rises)
+    last, change = found[-1] / fixed - 1, np.diff(found, axis=0)
+    if verdict == "contradicted" and np.all(change < 0):
+        sentence = (
+            f"All three fall, by {listed(-last, percent)} at {number(k_r[-1])} N m/rad, near the rigid joint by the "
+            "same "
+            f"fraction 2/kappa_r. A softer spring cannot raise a frequency: d(omega_i^2)/dk_r = phi_i'(0)^2."
+        )
+    else:
+        sentence = (
+            f"On an axis in hertz f1 stays within {percent(setting.visible)} while f2 and f3 rise for k_r of "
+            f"{span(k_r, flat & rises, 'N m/rad')}; at {number(k_r[-1])} N m/rad they change by "
+            f"{listed(last, percent)}."
+        )
+    remedy = None
+    if as_printed.any() and not (flat & rises).any():
+        rise = flipped[-1] / fixed - 1
+        remedy = (
+            f"the sign of the rotational spring, EI v_xx(0) = -k_r v_x(0): all three rise, by {listed(rise, percent)}, "
+            f"and for k_r of {span(k_r, as_printed, 'N m/rad')} f1 moves by less than {percent(setting.visible)} of "
+            "an axis in "
+            f"hertz that shows f3, so that it looks flat. Such a joint {_energy_of_a_tilt()}"
+        )
+    return Finding(verdict, sentence, evidence, remedy)
+
+
+def _energy_of_a_tilt() -> str:
+    """Say how much energy the flipped joint holds when the straight arm is turned about it by one radian."""
+    from cra_sym.arm.energy import k_r, lagrangian, v, w, x
+    from cra_sym.arm.evaluation import at, put
+
+    _, left, _ = lagrangian()
+    flipped = 2 * left.coeff(k_r) * k_r - left
+    energy = at(put(flipped, {v: x, w: x * 0}), 0).doit()
+    folds = ": it would fold by itself" if energy.is_nonpositive else ""
+    return f"has the potential energy {energy} when turned by 1 rad{folds}"
+
+
+@pictured("C03")
+def _(verdict: Verdict, ax: Axes) -> None:
+    rigid = verdict["rigid_frequency"]
+    by_mode(ax, verdict["k_r"], verdict["frequency"] / rigid)
+    for mode in range(rigid.size):
+        ax.plot(verdict["k_r"], verdict["flipped_frequency"][:, mode] / rigid[mode], color=PALETTE[mode],
+                ls=STYLES[mode], lw=0.9)  # fmt: skip
+    ax.axhline(1.0, color="0.45", lw=0.9, ls=(0, (4, 2)))
+    stiffness_axis(ax, "k_r")
+    ax.set_ylabel("frequency / that of the rigid joint")
+    note(ax, "thin: spring's sign flipped", "upper right")
+
+
+@claimed(
+    "C04",
+    "modes",
+    "Section 4, (27)-(29)",
+    "infinite stiffness is the rigid joint",
+    "the mode shape equation and frequency equation ... consistent with the ideal rigid assumption ... the proposed "
+    "elastic restraint model can provide a whole restraint of the bolted joints",
+)
+def _(setting: Setting) -> Finding:
+    from sympy import cos, cosh
+
+    from cra_sym.arm.equations import equation
+    from cra_sym.symbols import symbol
+
+    lamda = symbol("lamda")
+    limits = np.array([equation(number).check() for number in (27, 28, 29)])
+    ratio = equation(29).expression.lhs / (1 + cos(lamda) * cosh(lamda))
+    textbook = bool(ratio.cancel().diff(lamda).equals(0))
+    kappa = np.logspace(2, 8, 25)
+    mu, iota = float(setting.arm.mu), float(setting.arm.iota)
+    fixed = frequency_parameters(np.inf, np.inf, mu, iota) ** 2
+    gaps = np.stack(
+        [
+            1 - frequency_parameters(kappa, np.inf, mu, iota) ** 2 / fixed,
+            1 - frequency_parameters(np.inf, kappa, mu, iota) ** 2 / fixed,
+        ]
+    )
+    order = -np.diff(np.log(np.abs(gaps[..., -9:, :])), axis=1) / np.log(kappa[1] / kappa[0])
+    reached = np.abs(order - 1) < 0.05
+    evidence = {
+        "kappa": Quantity(kappa, "1", "dimensionless stiffness of the one spring, the other one rigid"),
+        "gap": Quantity(gaps, "1", "shortfall of the frequency from the rigid joint's: spring (t, r), kappa, mode"),
+        "order": Quantity(order, "1", "power of 1/kappa with which it vanishes: spring, kappa, mode"),
+        "limits": Quantity(limits, "1", "whether (27), (28), (29) pass their checks"),
+        "textbook": Quantity(textbook, "1", "whether (29) is 1 + cos(lambda) cosh(lambda) = 0"),
+    }
+    verdict = outcome(limits, [textbook], reached)
+    if verdict == "holds":
+        sentence = (
+            "Symbolically: (23) divided by kappa_t kappa_r has the finite limit (27), which without end-effector is "
+            "1 + cos(lambda) cosh(lambda) = 0. Numerically the frequencies approach the rigid joint's from below as "
+            f"1/kappa, to {percent(gaps[..., -1, :].max())} at kappa = {number(kappa[-1])}."
+        )
+    else:
+        sentence = (
+            f"Of the limits (27), (28), (29) {int(limits.sum())} are confirmed, (29) is "
+            f"{'' if textbook else 'not '}the "
+            f"cantilever's equation, and {percent(reached.mean())} of the frequencies approach the rigid joint's as "
+            "1/kappa."
+        )
+    return Finding(verdict, sentence, evidence)
+
+
+@pictured("C04")
+def _(verdict: Verdict, ax: Axes) -> None:
+    for spring, (gap, style) in enumerate(zip(verdict["gap"], ("-", "--"), strict=True)):
+        for mode in range(gap.shape[-1]):
+            label = f"$f_{mode + 1}$" if spring == 0 else None
+            ax.loglog(verdict["kappa"], np.abs(gap[:, mode]), ls=style, color=PALETTE[mode], label=label)
+    ax.set_xlabel("$\\kappa_t$ (solid) or $\\kappa_r$ (dashed), the other infinite")
+    ax.set_ylabel("shortfall from the rigid joint")
+    ax.legend()
+
+
+@claimed(
+    "C18",
+    "modes",
+    "Section 3, (4) and (6)",
+    "the beam's energy alone gives $K_i$",
+    "the potential energy of the flexible CRA system mainly considers the elastic potential energy of the flexible "
+    "manipulator",
+)
+def _(setting: Setting) -> Finding:
+    k_t, k_r = np.logspace(6, 1, 41), np.logspace(5, 0, 41)
+    cases = [setting.rigid.replace(k_t=k_t), setting.rigid.replace(k_r=k_r)]
+    beam = np.stack([_beam_stiffness(arm) for arm in cases])
+    joint = np.stack([_joint_stiffness(arm) for arm in cases])
+    square = np.stack([modal_parameters(arm).omega ** 2 for arm in cases])
+    alone, whole = beam / square, (beam + joint) / square
+    clamped = _beam_stiffness(setting.rigid) / modal_parameters(setting.rigid).omega ** 2
+    agrees = np.abs(alone - 1) < 1e-9
+    evidence = {
+        "k_t": Quantity(k_t, "N/m", "translational stiffness, the rotational one infinite"),
+        "k_r": Quantity(k_r, "N m/rad", "rotational stiffness, the translational one infinite"),
+        "beam_only": Quantity(
+            alone, "1", "K_i / (M_i omega_i^2) with the beam's energy: spring (t, r), stiffness, mode"
+        ),
+        "with_springs": Quantity(whole, "1", "the same with the two springs' energy"),
+        "rigid": Quantity(clamped, "1", "the same on the rigid joint, by mode"),
+    }
+    verdict = outcome(agrees)
+    soft = _beam_stiffness(setting.rigid.replace(k_t=setting.soft_k_t))
+    soft = soft / modal_parameters(setting.rigid.replace(k_t=setting.soft_k_t)).omega ** 2
+    sentence = (
+        f"For an elastic joint K_i/M_i of (6) with the beam's energy alone falls short of omega_i^2 of (30): at k_t = "
+        f"{number(setting.soft_k_t)} N/m it is {listed(soft, percent)} of it. "
+        + ("It is exact only for the rigid joint." if np.allclose(clamped, 1, rtol=1e-9) else "")
+        if verdict == "contradicted"
+        else f"K_i/M_i of (6) equals omega_i^2 of (30) in {percent(agrees.mean())} of the cases."
+    )
+    remedy = None
+    if verdict != "holds" and np.allclose(whole, 1, rtol=1e-9):
+        remedy = (
+            "the springs' energy, k_t v(0)^2/2 + k_r v_x(0)^2/2, added to (4): then K_i = M_i omega_i^2 to "
+            f"{number(np.abs(whole - 1).max(), 1)} for every stiffness"
+        )
+    return Finding(verdict, sentence, evidence, remedy)
+
+
+def _beam_stiffness(arm: Arm) -> np.ndarray:
+    """Return the integral of EI phi''^2 for mass-normalised modes, by quadrature of the mode shapes."""
+    nodes, weights = np.polynomial.legendre.leggauss(32)
+    length = float(arm.L)
+    curvature = mode_shapes(arm, 0.5 * length * (nodes + 1), derivative=2)
+    return float(arm.EI) * 0.5 * length * (curvature**2 @ weights)
+
+
+def _joint_stiffness(arm: Arm) -> np.ndarray:
+    modal = modal_parameters(arm)
+    return np.diagonal(modal.stiffness_translation + modal.stiffness_rotation, axis1=-2, axis2=-1)
+
+
+@pictured("C18")
+def _(verdict: Verdict, ax: Axes) -> None:
+    by_mode(ax, verdict["k_t"], verdict["beam_only"][0])
+    ax.plot(verdict["k_t"], verdict["with_springs"][0].mean(-1), color="0.3", lw=1.0, ls="-")
+    note(ax, "grey: with the springs' energy", "lower left")
+    stiffness_axis(ax, "k_t")
+    ax.legend(fontsize=8.5, loc="center right")
+    ax.set_ylabel("$K_i / (M_i\\,\\omega_i^2)$")
+
+
+@claimed(
+    "C21",
+    "modes",
+    "Sections 3 and 4, (8) and (14)",
+    "two principles, one joint",
+    "Hamilton's variational principle ... the principle of virtual work is utilized [for the boundary conditions]",
+)
+def _(setting: Setting) -> Finding:
+    from cra_sym.arm.energy import L, lagrangian, t, v, w, x
+    from cra_sym.arm.joint import boundary_conditions
+    from cra_sym.mechanics import hamilton
+
+    agree = []
+    for joint in (True, False):
+        density, left, right = lagrangian(joint=joint)
+        result = hamilton(density, fields=[v], prescribed=[w], x=x, domain=(0, L), t=t, left=left, right=right)
+        found = [(e.lhs - e.rhs).expand() for e in result.boundary_conditions]
+        wanted = [(e.lhs - e.rhs).expand() for e in boundary_conditions()]
+        agree.append([any((a - s * b).expand() == 0 for b in found for s in (1, -1)) for a in wanted])
+    evidence = {
+        "with_springs": Quantity(agree[0], "1", "condition (16) met by Hamilton's principle with the springs in (4)"),
+        "beam_only": Quantity(agree[1], "1", "the same with the beam's energy alone"),
+    }
+    verdict = outcome(agree[0])
+    lost = 4 - sum(agree[1])
+    sentence = (
+        f"Virtual work (14) and Hamilton's principle (8) give {'the same four' if all(agree[0]) else 'different'} "
+        "boundary "
+        f"conditions once (4) holds the springs' energy; with the beam's energy alone {lost} of the four, those at the "
+        f"joint, come out as those of a free end."
+    )
+    return Finding(verdict, sentence, evidence)
+
+
+@pictured("C21")
+def _(verdict: Verdict, ax: Axes) -> None:
+    table = np.array([verdict["with_springs"], verdict["beam_only"]], dtype=float)
+    ax.imshow(table, cmap="cividis", vmin=-0.4, vmax=1.4, aspect="auto")
+    for (row, column), value in np.ndenumerate(table):
+        ax.text(column, row, "same" if value else "differs", ha="center", va="center", fontsize=8.5,
+                color="0.1" if value else "white")  # fmt: skip
+    ax.set_xticks(range(4), ["root\nforce", "root\nmoment", "tip\nforce", "tip\nmoment"])
+    ax.set_yticks([0, 1], ["with\nsprings", "beam\nalone"])
+    ax.grid(False)

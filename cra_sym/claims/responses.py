@@ -1,0 +1,274 @@
+"""Claims on what the disturbance does to the response: C07-C09, C22 and C23."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cra_sym.arm.frequency_response import frequency_response
+from cra_sym.claims.ledger import Finding, Quantity, Verdict, claimed, outcome, pictured
+from cra_sym.claims.motions import Plane, peak, tip
+from cra_sym.claims.pictures import PALETTE, note, region_map, stiffness_axis
+from cra_sym.claims.setting import Setting
+from cra_sym.claims.words import listed, number, percent, span
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_SHARES = np.array([0.2, 0.5, 1.0, 2.0, 5.0])  # of the nominal amplitude
+
+
+def _mm(value: float) -> str:
+    return number(1e3 * value)
+
+
+def _peak_claim(setting: Setting, lowers: bool, mean: dict[str, float], words: str) -> Finding:
+    """Judge whether the disturbance lowers, or raises, the peak, over its frequency, phase, amplitude and the start."""
+    sign = 1.0 if lowers else -1.0
+
+    def held(plane: Plane, amplitude: float | None = None) -> np.ndarray:
+        found, without = plane.peaks(amplitude, **mean)
+        return sign * (found - without) < 0
+
+    plane = Plane.of(setting)
+    found, without = plane.peaks(**mean)
+    ratio = sign * np.log(found / without)
+    shares = [held(plane, setting.amplitude * share).mean() for share in _SHARES]
+    on_base = Plane.of(setting, start="base")
+    found_base, without_base = on_base.peaks(**mean)
+    in_phase, opposite = (Plane.line(setting, psi=psi) for psi in (setting.phase, np.pi))
+    along_psi = Plane.line(setting, varpi=setting.angular_frequency)
+    nominal, against = (
+        float(Plane(setting, np.array([setting.angular_frequency]), np.array([psi])).peaks(**mean)[0][0, 0])
+        for psi in (setting.phase, np.pi)
+    )
+    degrees = np.degrees(along_psi.psi)
+    evidence = {
+        "varpi": Quantity(plane.varpi, "rad/s", "frequency of the disturbance"),
+        "psi": Quantity(np.degrees(plane.psi), "deg", "phase of the disturbance"),
+        "peak_with": Quantity(found, "m", "peak of |v(L, t)| with the disturbance: varpi, psi"),
+        "peak_without": Quantity(without, "m", "peak of |v(L, t)| without it"),
+        "log_ratio": Quantity(ratio, "1", "ln of the ratio of the peaks, negative where the claim holds: varpi, psi"),
+        "amplitude": Quantity(setting.amplitude * _SHARES, "m", "amplitudes of the disturbance"),
+        "share": Quantity(shares, "1", "share of the plane where the claim holds, by amplitude"),
+        "share_start_on_base": Quantity(
+            (sign * (found_base - without_base) < 0).mean(),
+            "1",
+            "the same if the arm starts at rest seen from the base",
+        ),
+        "peak_without_start_on_base": Quantity(without_base, "m", "peak without disturbance for that start"),
+    }
+    verb = "lowers" if lowers else "raises"
+    sentence = (
+        f"{words}, a disturbance of {_mm(setting.amplitude)} mm {verb} the peak in {percent((ratio < 0).mean())} of "
+        "the "
+        f"plane of frequency and phase. At {number(setting.angular_frequency)} rad/s it does for psi of "
+        f"{span(degrees, held(along_psi)[0], 'deg')}; at psi = {number(np.degrees(setting.phase))} deg for varpi of "
+        f"{span(in_phase.varpi, held(in_phase)[:, 0], 'rad/s')}, at 180 deg for "
+        f"{span(opposite.varpi, held(opposite)[:, 0], 'rad/s')}. "
+        f"Peaks at {number(setting.angular_frequency)} rad/s: {_mm(nominal)} mm (psi = "
+        f"{number(np.degrees(setting.phase))} deg) and "
+        f"{_mm(against)} mm (180 deg) against {_mm(without)} mm without."
+    )
+    if without_base < 1e-12 * without:
+        sentence += (
+            " If the arm already moves with the base at t = 0, a constant velocity alone makes no vibration at all."
+        )
+    return Finding(outcome(ratio < 0), sentence, evidence)
+
+
+def _plane_picture(verdict: Verdict, ax: Axes, label: str) -> None:
+    setting = verdict.setting
+    here = setting.angular_frequency, np.degrees(setting.phase) % 360
+    region_map(ax, verdict["varpi"], verdict["psi"], verdict["log_ratio"], ("varpi", "psi"), label, here)
+    ax.set_yticks(range(0, 361, 90))
+
+
+@claimed(
+    "C07",
+    "responses",
+    "Section 5.1, Fig. 6",
+    "at mean velocity a lower peak",
+    "for the system with average velocity, the vibration response amplitude with motion disturbance is smaller than "
+    "the "
+    "vibration response amplitude without motion disturbance",
+)
+def _(setting: Setting) -> Finding:
+    mean = {"velocity": setting.velocity}
+    return _peak_claim(setting, True, mean, f"With a mean velocity of {number(setting.velocity)} m/s")
+
+
+@claimed(
+    "C08",
+    "responses",
+    "Section 5.1, Fig. 6",
+    "at mean acceleration a higher peak",
+    "for the flexible CRA system with average acceleration, the vibration response amplitude with motion disturbance "
+    "is "
+    "larger than the vibration response amplitude without motion disturbance",
+)
+def _(setting: Setting) -> Finding:
+    mean = {"acceleration": setting.accelerations[0]}
+    return _peak_claim(setting, False, mean, f"With a mean acceleration of {number(setting.accelerations[0])} m/s2")
+
+
+@pictured("C07")
+def _(verdict: Verdict, ax: Axes) -> None:
+    _plane_picture(verdict, ax, "peak lowered")
+
+
+@pictured("C08")
+def _(verdict: Verdict, ax: Axes) -> None:
+    _plane_picture(verdict, ax, "peak raised")
+
+
+@claimed(
+    "C09",
+    "responses",
+    "Section 5.1, Fig. 6",
+    "it matters more when accelerating",
+    "the motion disturbance enhances the vibration of the end-effector especially for the accelerating operations",
+)
+def _(setting: Setting) -> Finding:
+    plane = Plane.of(setting)
+    means = [{"velocity": setting.velocity}, {"acceleration": setting.accelerations[0]}]
+    ratios = [found / without for found, without in (plane.peaks(**mean) for mean in means)]
+    ratio = np.log(ratios[0] / ratios[1])
+    errors = [tip(setting, setting.arm, mean | setting.disturbance) - tip(setting, setting.arm, mean) for mean in means]
+    gap = float(peak(errors[0] - errors[1]) / peak(errors[0]))
+    here = Plane(setting, np.array([setting.angular_frequency]), np.array([setting.phase]))
+    nominal = [float(found[0, 0] / without - 1) for found, without in (here.peaks(**mean) for mean in means)]
+    evidence = {
+        "varpi": Quantity(plane.varpi, "rad/s", "frequency of the disturbance"),
+        "psi": Quantity(np.degrees(plane.psi), "deg", "phase of the disturbance"),
+        "log_ratio": Quantity(
+            ratio, "1", "ln of the relative change of the peak, velocity over acceleration: varpi, psi"
+        ),
+        "nominal": Quantity(
+            nominal, "1", "relative change of the peak at the nominal disturbance: velocity, acceleration"
+        ),
+        "absolute_gap": Quantity(gap, "1", "largest difference of v with minus v without between the two, relative"),
+    }
+    same = "the same at every instant" if gap < 1e-9 else f"different by {percent(gap)}"
+    sentence = (
+        f"In millimetres, no: what the disturbance adds to v(L, t) is {same} in both operations, by superposition. "
+        "As a share "
+        f"of the peak it matters more when accelerating in {percent((ratio < 0).mean())} of the plane of frequency "
+        "and phase; "
+        f"for the nominal disturbance the peak changes by {listed(nominal, percent)} (velocity, acceleration)."
+    )
+    return Finding(outcome(ratio < 0), sentence, evidence)
+
+
+@pictured("C09")
+def _(verdict: Verdict, ax: Axes) -> None:
+    _plane_picture(verdict, ax, "changes more when accelerating")
+
+
+@claimed(
+    "C22",
+    "responses",
+    "Section 5.1, Fig. 6",
+    "the four printed peaks",
+    "amplitude with motion disturbance (... mm) is smaller than ... without (... mm); [under acceleration] with (... "
+    "mm) is "
+    "larger than ... without (... mm)",
+)
+def _(setting: Setting) -> Finding:
+    plane = Plane.of(setting)
+    means = [{"velocity": setting.velocity}, {"acceleration": setting.accelerations[0]}]
+    pairs = [plane.peaks(**mean) for mean in means]
+    here = Plane(setting, np.array([setting.angular_frequency]), np.array([setting.phase]))
+    computed = np.array(
+        [value for mean in means for value in (float(here.peaks(**mean)[0][0, 0]), here.peaks(**mean)[1])]
+    )
+    reach = np.array([[with_.min(), with_.max()] for with_, _ in pairs])
+    evidence = {
+        "computed": Quantity(computed, "m", "velocity with and without, acceleration with and without disturbance"),
+        "reach": Quantity(reach, "m", "least and largest peak over frequency and phase: velocity and acceleration"),
+        "varpi": Quantity(plane.varpi, "rad/s", "frequency of the disturbance"),
+        "over_phase": Quantity(
+            [[with_.min(1), with_.max(1)] for with_, _ in pairs], "m", "mean motion, (least, largest over phase), varpi"
+        ),
+        "without": Quantity(
+            [without for _, without in pairs], "m", "peak without disturbance: velocity and acceleration"
+        ),
+    }
+    ours = f"With the values assumed here they are {listed(computed, _mm)} mm"
+    if setting.peaks is None:
+        text = (
+            f"{ours}; over frequency and phase of the disturbance alone the model can give {_mm(reach[0, 0])} to "
+            f"{_mm(reach[0, 1])} mm for the mean velocity and {_mm(reach[1, 0])} to {_mm(reach[1, 1])} mm for the "
+            "mean acceleration."
+        )
+        missing = (
+            "the four amplitudes in mm, the mean velocity and acceleration, and B, varpi and psi of the disturbance"
+        )
+        return Finding("undecidable", text, evidence, missing=missing)
+    printed = np.array(setting.peaks)
+    near = np.abs(computed / printed - 1) < setting.visible
+    agree = f"{int(near.sum())} of 4 agree to {percent(setting.visible)}"
+    text = f"{ours}, where the paper prints {listed(printed, _mm)} mm: {agree}."
+    return Finding(outcome(near), text, evidence)
+
+
+@pictured("C22")
+def _(verdict: Verdict, ax: Axes) -> None:
+    for k, (band, without, name) in enumerate(
+        zip(verdict["over_phase"], verdict["without"], ("mean velocity", "mean acceleration"), strict=True)
+    ):
+        ax.fill_between(verdict["varpi"], *(1e3 * band), color=PALETTE[k], alpha=0.3, lw=0, label=name)
+        ax.axhline(1e3 * without, color=PALETTE[k], ls=("-", "--")[k], lw=1.2)
+    ax.set(xlabel="disturbance frequency $\\varpi$ / (rad/s)", ylabel="peak of $|v(L,t)|$ / mm", ylim=(0, None))
+    ax.set_xlim(verdict["varpi"][0], verdict["varpi"][-1])
+    ax.legend(fontsize=8, loc="upper left")
+    note(ax, "bands: any phase; lines: no disturbance", "lower right")
+
+
+@claimed(
+    "C23",
+    "responses",
+    "Section 5.1",
+    "$k_t$ is the main factor in the dynamics",
+    "the mode frequency is more sensitive to the tensional stiffness, which is the main factor that should be "
+    "significantly "
+    "considered in the dynamic analysis",
+)
+def _(setting: Setting) -> Finding:
+    k_t, k_r = np.logspace(1, 6, 81), np.logspace(0, 5, 81)
+
+    def give(**joint: np.ndarray) -> np.ndarray:
+        return -frequency_response(setting.rigid.replace(**joint), 0.0).real
+
+    beam = float(give())
+    by_t, by_r = give(k_t=k_t) - beam, give(k_r=k_r) - beam
+    ratio = np.log(by_r / by_t[:, None])
+    critical = float(by_t[-1] * k_t[-1] / (by_r[-1] * k_r[-1])) * float(setting.arm.L) ** 2
+    series = np.array(setting.k_t)[:, None] * float(setting.arm.L) ** 2 / np.array(setting.k_r) < critical
+    evidence = {
+        "k_t": Quantity(k_t, "N/m", "translational stiffness"),
+        "k_r": Quantity(k_r, "N m/rad", "rotational stiffness"),
+        "log_ratio": Quantity(ratio, "1", "ln of the tip's sag by k_r over that by k_t: k_t, k_r"),
+        "critical": Quantity(critical, "1", "k_t L^2 / k_r below which k_t adds more"),
+        "series": Quantity(series, "1", "the claim at the stiffnesses of Fig. 5: k_t, k_r"),
+    }
+    sentence = (
+        "Under a steady acceleration of the base the elastic joint adds to the sag of the tip, and k_t adds more "
+        "than k_r "
+        f"where k_t L^2/k_r < {number(critical)}: at {series.sum()} of the {series.size} pairs of Fig. 5. Which "
+        "spring matters "
+        f"depends on the joint, not on the kind of spring."
+    )
+    return Finding(outcome(ratio < 0), sentence, evidence)
+
+
+@pictured("C23")
+def _(verdict: Verdict, ax: Axes) -> None:
+    x, y = verdict["k_t"], verdict["k_r"]
+    ax.set(xscale="log", yscale="log")
+    region_map(ax, x, y, verdict["log_ratio"], ("k_t", "k_r"), "$k_t$ adds more sag")
+    ax.plot(*np.meshgrid(verdict.setting.k_t, verdict.setting.k_r), "o", color="0.2", ms=3, ls="")
+    stiffness_axis(ax, "k_t")
+    ax.set_xlim(x[0], x[-1])
+    ax.set_ylim(y[0], y[-1])

@@ -1,0 +1,180 @@
+"""Claims on how sensitive the frequencies are to the joint: C05, C06 and C20."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cra_sym.arm.analysis import modal_parameters, natural_frequencies
+from cra_sym.arm.sensitivity import sensitivities
+from cra_sym.claims.ledger import Finding, Quantity, Verdict, claimed, outcome, pictured
+from cra_sym.claims.pictures import PALETTE, STYLES, by_mode, note, stiffness_axis
+from cra_sym.claims.setting import Setting
+from cra_sym.claims.words import listed, number, percent
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@claimed(
+    "C05",
+    "modes",
+    "Section 4, Fig. 5",
+    "more sensitive to $k_t$ than to $k_r$",
+    "the mode frequencies are more sensitive to the tensional stiffness",
+)
+def _(setting: Setting) -> Finding:
+    k_t, k_r = np.logspace(1, 6, 81), np.logspace(0, 5, 81)
+    plane = sensitivities(setting.arm.replace(k_t=k_t[:, None], k_r=k_r))
+    region = plane.log_k_t > plane.log_k_r
+    series = sensitivities(setting.arm.replace(k_t=np.array(setting.k_t)[:, None], k_r=np.array(setting.k_r)))
+    at_series = series.log_k_t > series.log_k_r
+    raw = series.df_dk_t / series.df_dk_r
+    rigid = modal_parameters(setting.rigid)
+    critical = (rigid.root_shear / rigid.root_moment * float(setting.arm.L)) ** 2
+    evidence = {
+        "k_t": Quantity(k_t, "N/m", "translational stiffness"),
+        "k_r": Quantity(k_r, "N m/rad", "rotational stiffness"),
+        "region": Quantity(region, "1", "whether dln f/dln k_t > dln f/dln k_r: k_t, k_r, mode"),
+        "ratio": Quantity(plane.log_k_t / plane.log_k_r, "1", "of the logarithmic sensitivities: k_t, k_r, mode"),
+        "critical": Quantity(critical, "1", "k_t L^2 / k_r below which it holds near the rigid joint, by mode"),
+        "series": Quantity(at_series, "1", "the claim at the stiffnesses of Fig. 5: k_t, k_r, mode"),
+        "raw_ratio": Quantity(raw, "m^2", "df/dk_t over df/dk_r at the stiffnesses of Fig. 5: k_t, k_r, mode"),
+    }
+    unit = np.sqrt(raw)
+    sentence = (
+        "The raw slopes compare hertz per N/m with hertz per N m/rad: which is larger depends on the unit of "
+        "length, and "
+        f"in Fig. 5 turns over for units between {number(unit.min(), 2)} and {number(unit.max(), 2)} m. In relative "
+        "terms "
+        f"(dln f/dln k) it holds in {percent(region.mean())} of the plane, near the rigid joint for k_t L^2/k_r below "
+        f"{listed(critical)} (modes 1 to 3), and at {at_series.sum()} of the {at_series.size} points of Fig. 5."
+    )
+    return Finding(outcome(region), sentence, evidence)
+
+
+@pictured("C05")
+def _(verdict: Verdict, ax: Axes) -> None:
+    x, y, ratio = verdict["k_t"], verdict["k_r"], np.log(verdict["ratio"])
+    many = (ratio > 0).sum(-1)
+    ax.contourf(x, y, many.T, levels=[-0.5, 0.5, 1.5, 2.5, 3.5], colors=["#F4F4F4", "#DDEFE8", "#BFE3D6", "#96D1BC"])
+    for mode in range(ratio.shape[-1]):
+        ax.contour(x, y, ratio[..., mode].T, levels=[0], colors=[PALETTE[mode]], linestyles=[STYLES[mode]])
+        ax.plot([], [], color=PALETTE[mode], ls=STYLES[mode], label=f"mode {mode + 1}")
+    ax.plot(*np.meshgrid(verdict.setting.k_t, verdict.setting.k_r), "o", color="0.2", ms=3, ls="")
+    stiffness_axis(ax, "k_t")
+    stiffness_axis(ax, "k_r", "y")
+    ax.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+    ax.legend(loc="upper left", fontsize=8, facecolor="white", framealpha=0.8, frameon=True, edgecolor="none")
+    note(ax, "tint: it holds in 1, 2, 3 modes", "lower right")
+
+
+@claimed(
+    "C06",
+    "modes",
+    "Section 4, Fig. 5",
+    "only $k_t$ matters more when soft",
+    "with the decreasing of [the tensional stiffness], the sensitivity [to it] obviously enhances, while the "
+    "sensitivity to "
+    "[the torsional stiffness] presents tiny change",
+)
+def _(setting: Setting) -> Finding:
+    k_t, k_r = np.logspace(6, 0, 121), np.logspace(5, -1, 121)
+    by_t = sensitivities(setting.arm.replace(k_t=k_t))
+    by_r = sensitivities(setting.arm.replace(k_r=k_r))
+    grows = np.diff(by_t.df_dk_t, axis=0) > 0
+    series = sensitivities(setting.arm.replace(k_r=np.array(setting.k_r))).df_dk_r
+    # the other reading of the sentence: the sensitivity to k_r while k_t falls
+    other = sensitivities(setting.arm.replace(k_t=np.array(setting.k_t), k_r=setting.k_r[1])).df_dk_r
+    factor, factor_other = series[-1] / series[0], other[-1] / other[0]
+    tiny = np.abs(np.log(factor)) < np.log1p(10 * setting.visible)
+    tiny_other = np.abs(np.log(factor_other)) < np.log1p(10 * setting.visible)
+    turn = k_t[np.argmax(by_t.df_dk_t, axis=0)]
+    evidence = {
+        "k_t": Quantity(k_t, "N/m", "translational stiffness, stiff to soft"),
+        "k_r": Quantity(k_r, "N m/rad", "rotational stiffness, stiff to soft"),
+        "df_dk_t": Quantity(by_t.df_dk_t, "Hz m/N", "along k_t: k_t, mode"),
+        "df_dk_r": Quantity(by_r.df_dk_r, "Hz rad/(N m)", "along k_r: k_r, mode"),
+        "grows": Quantity(grows, "1", "whether the next softer k_t has the larger df/dk_t: k_t, mode"),
+        "turn": Quantity(turn, "N/m", "k_t at which df/dk_t is largest, by mode"),
+        "factor": Quantity(factor, "1", "df/dk_r from the first to the last k_r of Fig. 5, by mode"),
+        "factor_other": Quantity(factor_other, "1", "df/dk_r from the first to the last k_t of Fig. 5, by mode"),
+    }
+    ends = [f"down to {number(k)} N/m" if k > k_t[-1] else f"all the way to {number(k)} N/m" for k in turn]
+    sentence = (
+        f"df/dk_t grows as k_t falls {listed(ends, str)} (modes 1 to 3)"
+        f"{', and shrinks beyond' if (turn > k_t[-1]).any() else ''}. df/dk_r "
+        f"{'changes' if not tiny.all() else 'hardly changes'}: over the k_r of Fig. 5 by factors "
+        f"{listed(factor, _factor)}"
+        f"; read as k_t falls at fixed k_r, by {listed(factor_other, _factor)}."
+    )
+    axis = sensitivities(setting.arm.replace(k_t=np.array(setting.k_t))).df_dk_t.max()
+    unseen = k_r[np.all(by_r.df_dk_r < setting.visible * axis, axis=-1)]
+    verdict, remedy = outcome(grows, tiny | tiny_other), None
+    if not tiny.all() and unseen.size:
+        remedy = (
+            f"stiffer joints on one common axis: for k_r over {number(unseen.min())} N m/rad df/dk_r stays below "
+            f"{percent(setting.visible)} of an axis that shows df/dk_t, a tiny change to the eye"
+        )
+    return Finding(verdict, sentence, evidence, remedy)
+
+
+def _factor(value: float) -> str:
+    return number(value, 2)
+
+
+@pictured("C06")
+def _(verdict: Verdict, ax: Axes) -> None:
+    for mode in range(verdict["df_dk_t"].shape[-1]):
+        line = {"color": PALETTE[mode], "ls": STYLES[mode]}
+        ax.loglog(verdict["k_t"], verdict["df_dk_t"][:, mode], label=f"mode {mode + 1}", **line)
+        ax.loglog(verdict["k_r"], verdict["df_dk_r"][:, mode], lw=0.9, **line)
+    ax.set_xlabel("$k_t$ / (N/m), or $k_r$ / (N m/rad)")
+    ax.set_ylabel("$df/dk$ / Hz per SI unit")
+    ax.legend(fontsize=8, loc="lower left")
+    note(ax, "thick: $df/dk_t$; thin: $df/dk_r$", "upper right")
+
+
+@claimed(
+    "C20",
+    "modes",
+    "Section 4, Figs. 3 and 4",
+    "two springs, two mechanisms",
+    "the effect mechanisms of the tensional restraint stiffness and the torsional restraint stiffness are different",
+)
+def _(setting: Setting) -> Finding:
+    rigid = modal_parameters(setting.rigid)
+    length, bending = float(setting.arm.L), float(setting.arm.EI)
+    twice = 2 * bending * rigid.omega**2
+    drop_t, drop_r = rigid.root_shear**2 * length**3 / twice, rigid.root_moment**2 * length / twice
+    kappa = np.logspace(1, 6, 51)
+    soft = [setting.rigid.replace(k_t=kappa * bending / length**3), setting.rigid.replace(k_r=kappa * bending / length)]
+    drop = np.stack([1 - natural_frequencies(arm) / rigid.frequency for arm in soft])
+    spread_t, spread_r = drop_t.max() / drop_t.min() - 1, drop_r.max() / drop_r.min() - 1
+    differ = np.abs(drop_t / drop_r / (drop_t / drop_r)[0] - 1)[1:] > setting.visible
+    evidence = {
+        "kappa": Quantity(kappa, "1", "dimensionless stiffness of the one spring, the other one rigid"),
+        "drop": Quantity(drop, "1", "relative fall of the frequency: spring (t, r), kappa, mode"),
+        "coefficient_t": Quantity(drop_t, "1", "c in c / kappa_t, the fall near the rigid joint, by mode"),
+        "coefficient_r": Quantity(drop_r, "1", "c in c / kappa_r, the fall near the rigid joint, by mode"),
+    }
+    sentence = (
+        f"Near the rigid joint a frequency falls by the fraction c/kappa. For the rotational spring c is "
+        f"{listed(drop_r, lambda c: number(c, 4))}, within {percent(spread_r)} the same for every mode; for the "
+        f"translational one {listed(drop_t)}, which grows {number(1 + spread_t, 2)}-fold: k_r scales the spectrum, k_t "
+        f"bends it."
+    )
+    return Finding(outcome(differ), sentence, evidence)
+
+
+@pictured("C20")
+def _(verdict: Verdict, ax: Axes) -> None:
+    kappa = verdict["kappa"]
+    by_mode(ax, kappa, verdict["drop"][0] * kappa[:, None])
+    for mode, curve in enumerate((verdict["drop"][1] * kappa[:, None]).T):
+        ax.plot(kappa, curve, lw=0.9, color=PALETTE[mode], ls=STYLES[mode])
+    ax.set(xscale="log", yscale="log", xlabel="$\\kappa_t$ or $\\kappa_r$, the other infinite")
+    ax.set_ylabel("relative fall times $\\kappa$")
+    ax.set_xlim(kappa[0], kappa[-1])
+    note(ax, "thick: $k_t$; thin: $k_r$", "upper left")

@@ -1,0 +1,38 @@
+"""The ledger as text for a terminal."""
+
+from __future__ import annotations
+
+import shutil
+import textwrap
+from collections import Counter
+from collections.abc import Sequence
+
+from cra_sym.claims.ledger import OUTCOMES, Verdict
+from cra_sym.claims.pictures import MARKS
+
+__all__ = ["verdict_text"]
+
+
+def verdict_text(verdicts: Sequence[Verdict], width: int | None = None) -> str:
+    """Return the verdicts as paragraphs under their outcomes, and a count at the end.
+
+    Parameters
+    ----------
+    verdicts : sequence of Verdict
+    width : int, optional
+        Columns, by default those of the terminal, at most 110.
+    """
+    width = width or min(shutil.get_terminal_size((100, 24)).columns, 110)
+    lines: list[str] = []
+    for verdict in verdicts:
+        mark, _ = MARKS[verdict.outcome]
+        lines.append(f"{verdict.id}  {mark} {verdict.outcome.upper()}  ({verdict.source})")
+        parts = [("", f'"{verdict.claim}"'), ("", verdict.sentence)]
+        parts += [("Would reproduce the paper: ", verdict.remedy)] if verdict.remedy else []
+        parts += [("Missing: ", verdict.missing)] if verdict.missing else []
+        for head, text in parts:
+            lines += textwrap.wrap(head + text, width, initial_indent="     ", subsequent_indent="     ")
+        lines.append("")
+    counts = Counter(verdict.outcome for verdict in verdicts)
+    lines.append(", ".join(f"{counts[name]} {name}" for name in OUTCOMES if counts[name]))
+    return "\n".join(lines)

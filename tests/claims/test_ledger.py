@@ -1,0 +1,131 @@
+"""The ledger: complete, in words and data, cached, and no verdict typed in."""
+
+import ast
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import cra_sym as cra
+from cra_sym.__main__ import main
+from cra_sym.claims import OUTCOMES, THEMES, Setting, claim, claims, figure_claims, ledger, outcome
+from cra_sym.claims.words import listed, number, percent, span
+
+FOLDER = Path(ledger.__file__).parent
+IDS = ledger._load()
+
+
+@pytest.fixture(params=IDS)
+def verdict(request):
+    return claim(request.param)
+
+
+def test_the_claims_are_numbered_on():
+    assert list(IDS) == sorted(IDS) and {f"C{k:02d}" for k in range(1, 14)} <= set(IDS)
+    assert claims() == tuple(claim(id) for id in IDS)
+    assert {v.theme for v in claims()} <= set(THEMES)
+
+
+def test_a_verdict_says_what_and_why(verdict):
+    assert verdict.outcome in OUTCOMES
+    assert verdict.sentence.endswith(".") and any(c.isdigit() for c in verdict.sentence)
+    assert "  " not in verdict.sentence and "nan" not in verdict.sentence
+    assert verdict.evidence and all(q.unit and q.meaning for q in verdict.evidence.values())
+    assert all(np.asarray(q.values).dtype.kind in "fbi" for q in verdict.evidence.values())
+    assert (verdict.missing is not None) == (verdict.outcome == "undecidable")
+
+
+def test_where_is_a_region(verdict):
+    """What holds somewhere shows where: an array of truth values, or of signs, that takes both."""
+    if verdict.outcome != "holds where":
+        return
+    takes_both = [
+        0 < (q.values if q.values.dtype.kind == "b" else q.values < 0).mean() < 1
+        for q in verdict.evidence.values()
+        if q.values.size > 1
+    ]
+    assert any(takes_both)
+
+
+def test_a_contradiction_carries_a_remedy(verdict):
+    assert verdict.outcome != "contradicted" or verdict.remedy
+
+
+def test_no_outcome_is_typed():
+    """A claim's function may write 'undecidable', never a verdict: those come out of `outcome`."""
+    allowed = {"C01": {"holds", "holds where", "contradicted"}}
+    for path in FOLDER.glob("*.py"):
+        for call in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "Finding":
+                first = call.args[0]
+                if isinstance(first, ast.Constant):
+                    assert first.value == "undecidable" or (path.name == "modes.py" and first.value in allowed["C01"])
+
+
+def test_each_is_drawn_in_its_own_axes(verdict):
+    figure = Figure()
+    ax = figure.subplots()
+    assert verdict.draw(ax) is figure
+    assert figure.axes == [ax] and ax.has_data()
+    assert verdict.id in ax.get_title(loc="left") and (ax.get_xlabel() or ax.get_xticklabels())
+
+
+def test_a_theme_is_one_picture():
+    figure = figure_claims("modes", claims(theme="modes")[:4], columns=2)
+    assert [ax.get_title(loc="left")[2:5] for ax in figure.axes] == [v.id for v in claims(theme="modes")[:4]]
+
+
+def test_computed_once_and_for_each_arm():
+    assert claim("C01") is claim("C01", cra.Arm.nominal())
+    other = claim("C01", cra.Arm.nominal().replace(L=1.1))
+    assert other.outcome != claim("C01").outcome
+
+
+def test_outcomes():
+    assert outcome([True]) == "holds"
+    assert outcome([True, False], [True]) == "holds where"
+    assert outcome([True], [False, False]) == "contradicted"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "numbers", "message"),
+    [
+        (("C99",), {}, "allowed are C01"),
+        (("C01", 3.0), {}, "allowed is an Arm"),
+        (("C01", cra.Arm.nominal().replace(k_t=[1.0, 2.0])), {}, "allowed is one arm"),
+        (("C01",), {"speed": 1.0}, "no number of a setting"),
+        (("C01",), {"amplitude": -1.0}, "amplitude"),
+    ],
+)
+def test_bad_input_is_refused(arguments, numbers, message):
+    with pytest.raises((TypeError, ValueError), match=message):
+        claim(*arguments, **numbers)
+    with pytest.raises(ValueError, match="theme"):
+        claims(theme="colours")
+
+
+def test_every_number_has_a_provenance():
+    names = {entry.name for entry in dataclasses.fields(Setting)} - {"arm"}
+    assert set(Setting.provenance) == names
+    assert {kind for kind, _ in Setting.provenance.values()} <= {"published", "calibrated", "assumed", "lost"}
+
+
+def test_command_prints_the_table(capsys):
+    assert main(["claims", "C01", "C03"]) == 0
+    text = capsys.readouterr().out
+    assert "C01  ✓ HOLDS" in text and "C03  ✗ CONTRADICTED" in text and text.endswith("1 holds, 1 contradicted\n")
+    assert main(["claims", "C02", "--json", "--m-e", "0"]) == 0
+    (only,) = json.loads(capsys.readouterr().out)
+    assert only["outcome"] == "holds" and np.shape(only["evidence"]["frequency"]["values"]) == (61, 3)
+    assert main(["claims", "C77"]) == 2
+    assert "allowed are" in capsys.readouterr().err
+
+
+def test_words():
+    assert number(np.inf) == "infinite" and number(12345.6) == "12300" and number(1e-9) == "1e-9"
+    assert percent(0.5) == "50 %" and listed([1.0]) == "1"
+    assert span([1, 2, 3], [False] * 3) == "nowhere"
+    assert span([1, 2, 3], [True, False, True], "s") == "1 and 3 s"
