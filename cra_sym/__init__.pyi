@@ -6,6 +6,9 @@ from .arm.base_motion import BaseMotion as BaseMotion
 from .arm.certification import certify as certify
 from .arm.equations import equation as equation
 from .arm.equations import equations as equations
+from .arm.excitation import AxialBase as AxialBase
+from .arm.excitation import JointStiffness as JointStiffness
+from .arm.excitation import TransverseBase as TransverseBase
 from .arm.frequency_response import frequency_response as frequency_response
 from .arm.identification import identify_joint as identify_joint
 from .arm.parameters import Arm as Arm
@@ -14,6 +17,12 @@ from .arm.response import response as response
 from .arm.response import tip_response as tip_response
 from .arm.sensitivity import sensitivities as sensitivities
 from .arm.shaping import input_shaper as input_shaper
+from .arm.stability import AsymptoticWarning as AsymptoticWarning
+from .arm.stability import ResonanceWarning as ResonanceWarning
+from .arm.stability import floquet_exponents as floquet_exponents
+from .arm.stability import forced_width as forced_width
+from .arm.stability import growth_rate as growth_rate
+from .arm.stability import stability_boundary as stability_boundary
 from .arm.state_space import state_space as state_space
 from .kernels import kernel as kernel
 from .model import Model as Model

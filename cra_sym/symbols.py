@@ -158,6 +158,7 @@ _TABLE: dict[str, list[tuple]] = {
         ("w_1", "w_{1}", "m", "amplitude of the transverse fluctuation of the base"),
         ("u_0", "u_{0}", "m", "amplitude of the axial fluctuation of the base"),
         ("G_ij", "G_{ij}", "kg/m", "axial-inertia coupling of modes i and j"),
+        ("P_ij", "P_{ij}", "rad^2/s^2", "parametric coupling of modes i and j, for unit generalised masses"),
         ("P_nn", "P_{nn}", "rad^2/s^2", "parametric coupling of mode n with itself"),
         ("P_mn", "P_{mn}", "rad^2/s^2", "parametric coupling of mode m with mode n"),
         ("P_nm", "P_{nm}", "rad^2/s^2", "parametric coupling of mode n with mode m"),

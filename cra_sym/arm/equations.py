@@ -37,6 +37,8 @@ _HOMES: dict[str, range] = {
     "cra_sym.arm.limits": range(27, 31),
     "cra_sym.arm.implicit": range(31, 33),
     "cra_sym.arm.driven": range(33, 35),
+    "cra_sym.arm.excited": range(35, 37),
+    "cra_sym.arm.resonance": range(37, 50),
 }
 
 _EQUATIONS: dict[Number, Equation] = {}

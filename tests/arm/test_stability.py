@@ -1,0 +1,259 @@
+"""Stability of the arm: boundaries against Floquet theory, the excitations, warnings and refusals."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import cra_sym as cra
+from cra_sym.arm.residual import moments_of_all_modes, spring_vectors
+from cra_sym.solvers import floquet
+
+SOFT = cra.Arm.nominal()
+SOFT = SOFT.replace(k_t=1e3 * SOFT.EI / SOFT.L**3)  # kappa_t = 1000
+UNIT = SOFT.angular_frequency_scale
+JOINT, AXIAL = cra.JointStiffness(), cra.AxialBase(amplitude=0.01)
+
+
+def edges(arm, excitation, epsilon, resonance, modes, residual=False):
+    """Borders of a zone by Floquet theory: where growth sets in, from the middle of the zone outwards."""
+    lower, upper = cra.stability_boundary(arm, excitation, epsilon, resonance, order=2)
+    middle, half = (lower + upper) / 2, (upper - lower) / 2
+    found = []
+    for side in (-1, 1):
+        inside, outside = middle, middle + side * 1.6 * half
+        for _ in range(5):
+            grid = np.linspace(inside, outside, 21)
+            growing = cra.growth_rate(arm, excitation, grid, epsilon, modes, residual=residual) > 1e-5 * half
+            last = np.flatnonzero(~growing)[0]
+            inside, outside = grid[last - 1], grid[last]
+        found.append((inside + outside) / 2)
+    return np.array(found)
+
+
+# numbers known from elsewhere -----------------------------------------------------------------------------------
+
+
+def test_known_numbers_of_a_soft_joint():
+    modal = cra.modal_parameters(SOFT)
+    assert np.allclose(modal.omega / UNIT, [3.4744, 20.8543, 52.8408], rtol=1e-5)
+    assert np.allclose(np.diag(modal.stiffness_translation) / UNIT**2, [0.09056, 42.163, 856.99], rtol=1e-4)
+    centre = 2 * modal.omega[1]
+    first = np.array(cra.stability_boundary(SOFT, JOINT, 0.05, (2, 2)))
+    assert np.allclose((first - centre) / UNIT, [-0.0505, 0.0505], atol=5e-5)
+    three = edges(SOFT, JOINT, 0.05, (2, 2), 3)
+    assert np.allclose((three - centre) / UNIT, [-0.0500, 0.0510], atol=5e-5)
+    second = np.array(cra.stability_boundary(SOFT, JOINT, 0.05, (2, 2), order=2))
+    assert np.allclose((second - centre) / UNIT, [-0.0520, 0.0491], atol=5e-5)
+
+
+def test_three_modes_shift_the_second_zone_the_wrong_way():
+    """The statics of the modes left out put it right."""
+    centre = 2 * cra.modal_parameters(SOFT).omega[1]
+    shift = [edges(SOFT, JOINT, 0.05, (2, 2), 3, residual=residual).mean() - centre for residual in (False, True)]
+    truth = np.mean(cra.stability_boundary(SOFT, JOINT, 0.05, (2, 2), order=2)) - centre
+    assert shift[0] * truth < 0 < shift[1] * truth
+    assert abs(shift[1] - truth) < 0.35 * abs(truth)
+
+
+@pytest.mark.filterwarnings("ignore:resonance:cra_sym.AsymptoticWarning")
+@pytest.mark.parametrize(("excitation", "modes", "residual"), [(JOINT, 5, True), (cra.AxialBase(0.1), 7, False)])
+@pytest.mark.parametrize("resonance", [(2, 2), (1, 2)])
+def test_order_of_accuracy(excitation, modes, residual, resonance):
+    """Halving epsilon divides the error of the boundary by 4 at first order and by 8 at second."""
+    errors = {1: [], 2: []}
+    for epsilon in (0.08, 0.04):
+        truth = edges(SOFT, excitation, epsilon, resonance, modes, residual)
+        for order, found in errors.items():
+            sides = cra.stability_boundary(SOFT, excitation, epsilon, resonance, order=order)
+            found.append(np.abs(np.array(sides) - truth).max())
+    assert 3.4 < errors[1][0] / errors[1][1] < 4.6
+    assert errors[2][0] / errors[2][1] > 6.0
+    assert errors[2][1] < 0.2 * errors[1][1]
+
+
+def test_tongue_at_the_natural_frequency_is_of_second_order():
+    omega = cra.modal_parameters(SOFT).omega[1]
+    lower, upper = cra.stability_boundary(SOFT, JOINT, np.array([0.1, 0.2]), (2, 2), order=2, tongue=2)
+    assert (upper - lower)[1] / (upper - lower)[0] == pytest.approx(4.0)
+    assert np.all(np.abs((lower + upper) / 2 - omega) < 0.01 * omega)
+    inside, outside = (lower + upper) / 2, upper + (upper - lower)
+    grown = cra.growth_rate(SOFT, JOINT, np.array([inside, outside]), [0.1, 0.2], 6, residual=True)
+    assert np.all(grown[0] > 0.2 * (upper - lower)) and np.all(grown[1] < 1e-6)
+
+
+def test_damped_zone():
+    """Damping narrows a principal zone; of a sum it widens it, because it is unequal."""
+    damped = SOFT.replace(zeta=0.001)
+    for resonance, wider in (((2, 2), False), ((1, 2), True)):
+        truth = edges(damped, AXIAL, 0.3, resonance, 4)
+        sides = np.array(cra.stability_boundary(damped, AXIAL, 0.3, resonance, order=2))
+        assert np.abs(sides - truth).max() < 0.02 * np.ptp(truth)
+        assert (np.ptp(sides) > np.ptp(cra.stability_boundary(SOFT, AXIAL, 0.3, resonance))) == wider
+
+
+# statics of the modes left out ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("arm", [SOFT, SOFT.replace(k_r=30.0, J_e=1e-4), SOFT.replace(k_t=40.0, k_r=3.0, m_e=0.1)])
+def test_sums_over_all_modes(arm):
+    excitation = cra.JointStiffness(k_t=1.0, k_r=0.7)
+    modal = cra.modal_parameters(arm, 400)
+    coupling = excitation.coupling(modal, 1.0)
+    for row, target in ((0, 0), (0, 2), (1, 1)):
+        path = coupling[row] * coupling[:, target]
+        second, fourth = moments_of_all_modes(arm, modal, excitation, row, target)
+        assert np.sum(path / modal.omega**4) == pytest.approx(fourth, rel=1e-6)
+        assert np.sum(path / modal.omega**2) == pytest.approx(second, rel=1e-2)
+    springs = spring_vectors(modal)
+    assert np.allclose(springs[0][:, None] * springs[0], modal.stiffness_translation)
+    assert np.allclose(springs[1][:, None] * springs[1], modal.stiffness_rotation)
+
+
+def test_residual_flexibility_is_the_limit_of_many_modes():
+    excitation = cra.JointStiffness(k_t=1.0, k_r=0.5)
+    arm, varpi = SOFT.replace(k_r=50.0), 2.0 * cra.modal_parameters(SOFT.replace(k_r=50.0)).omega[0]
+    few, many = (
+        cra.floquet_exponents(arm, excitation, varpi, 0.5, modes, residual=residual)
+        for modes, residual in ((4, True), (16, False))
+    )
+    assert few[0].real == pytest.approx(many[0].real, rel=5e-3)
+    assert abs(few[0].imag) == pytest.approx(abs(many[0].imag), rel=1e-3)
+
+
+# shapes, limits, refusals ---------------------------------------------------------------------------------------
+
+
+def test_broadcasting_equals_looping():
+    masses, sizes = np.array([0.0, 0.001, 0.005]), np.array([[0.02], [0.1]])
+    batch = SOFT.replace(m_e=masses)
+    for excitation in (JOINT, AXIAL, cra.AxialBase(np.array([0.01, 0.02, 0.03]))):
+        together = np.array(cra.stability_boundary(batch, excitation, sizes, (1, 3), order=2))
+        growth = cra.growth_rate(batch, excitation, 40.0, sizes, 2)
+        assert together.shape == (2, 2, 3) and growth.shape == (2, 3)
+        for i, k in np.ndindex(2, 3):
+            one = excitation
+            if isinstance(excitation, cra.AxialBase) and excitation.shape:
+                one = cra.AxialBase(excitation.amplitude[k])
+            alone = SOFT.replace(m_e=masses[k])
+            assert np.allclose(
+                cra.stability_boundary(alone, one, sizes[i, 0], (1, 3), order=2), together[:, i, k], rtol=1e-12
+            )
+            assert cra.growth_rate(alone, one, 40.0, sizes[i, 0], 2) == pytest.approx(growth[i, k], abs=1e-9)
+
+
+def test_without_excitation_nothing_grows():
+    grid = np.linspace(5.0, 300.0, 50)
+    assert np.all(cra.growth_rate(SOFT, JOINT, grid, 0.0) < 1e-6)
+    assert np.all(cra.growth_rate(SOFT, cra.AxialBase(0.0), grid, 0.1) < 1e-6)
+    exponents = cra.floquet_exponents(SOFT.replace(zeta=0.02), JOINT, grid, 0.0)
+    assert np.allclose(exponents[:, 0].real, -0.02 * cra.modal_parameters(SOFT).omega[0], rtol=1e-6)
+    lower, upper = cra.stability_boundary(SOFT, JOINT, 0.0, (1, 2), order=2)
+    assert lower == upper == pytest.approx(cra.modal_parameters(SOFT).omega[:2].sum())
+
+
+def test_growth_is_that_of_the_written_out_system():
+    modal = cra.modal_parameters(SOFT, 4)
+    coupling = 0.01 * 90.0**2 * modal.axial
+    direct = floquet.growth_rate(modal.omega, coupling[None], 90.0, 0.4)
+    assert cra.growth_rate(SOFT, AXIAL, 90.0, 0.4, 4) == pytest.approx(direct, rel=1e-9, abs=1e-12)
+
+
+def test_both_order_conventions_of_a_resonance():
+    assert cra.stability_boundary(SOFT, JOINT, 0.1, (1, 3)) == pytest.approx(
+        cra.stability_boundary(SOFT, JOINT, 0.1, (3, 1))
+    )
+
+
+def test_difference_resonance_of_a_symmetric_coupling_is_none():
+    with pytest.warns(cra.ResonanceWarning, match="P is symmetric"):
+        sides = cra.stability_boundary(SOFT, JOINT, [0.1, 0.2], (2, -1))
+    assert np.isnan(sides).all()
+
+
+def test_rigid_joint_has_nothing_to_fluctuate():
+    with pytest.warns(cra.ResonanceWarning, match="does not couple"):
+        assert np.isnan(cra.stability_boundary(cra.Arm.nominal(), JOINT, 0.1, (1, 1))).all()
+    assert cra.growth_rate(cra.Arm.nominal(), JOINT, 30.0, 0.3) < 1e-6
+
+
+def test_rigid_body_mode_does_not_resonate():
+    with pytest.warns(cra.ResonanceWarning, match="rigid-body"):
+        assert np.isnan(cra.stability_boundary(SOFT.replace(k_r=0.0), JOINT, 0.1, (1, 1))).all()
+
+
+def test_damping_threshold_is_said():
+    damped = SOFT.replace(zeta=0.01)
+    with pytest.warns(cra.ResonanceWarning, match="1 of 2 parameter sets: epsilon is below the threshold"):
+        lower, upper = cra.stability_boundary(damped, cra.AxialBase(0.05), [1e-4, 0.3], (2, 2), order=2)
+    assert np.isnan(lower[0]) and lower[1] < upper[1]
+
+
+@pytest.mark.filterwarnings("ignore:resonance:cra_sym.AsymptoticWarning")
+def test_overlap_and_reach_are_said():
+    with pytest.warns(cra.AsymptoticWarning, match=r"overlaps that of resonance \(1, 3\)"):
+        cra.stability_boundary(SOFT, cra.AxialBase(0.05), 0.6, (2, 2))
+    with pytest.warns(cra.AsymptoticWarning, match="beyond the reach"):
+        cra.stability_boundary(SOFT, JOINT, 0.5, (1, 2))
+    with pytest.warns(cra.AsymptoticWarning, match="negative in part"):
+        cra.stability_boundary(SOFT, JOINT, 1.1, (1, 1))
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda: cra.stability_boundary(SOFT, cra.TransverseBase(0.01), 0.1), ValueError, "forced_width"),
+        (lambda: cra.growth_rate(SOFT, cra.TransverseBase(0.01), 3.0, 0.1), ValueError, "forced_width"),
+        (lambda: cra.floquet_exponents(SOFT, cra.TransverseBase(0.01), 3.0, 0.1), ValueError, "forced_width"),
+        (lambda: cra.forced_width(SOFT, JOINT), TypeError, "allowed is a TransverseBase"),
+        (lambda: cra.stability_boundary(SOFT, "joint", 0.1), TypeError, "excitation = 'joint'"),
+        (lambda: cra.stability_boundary(1.0, JOINT, 0.1), TypeError, "arm = 1.0"),
+        (lambda: cra.stability_boundary(SOFT, JOINT, -0.1), ValueError, "epsilon = -0.1"),
+        (lambda: cra.stability_boundary(SOFT, JOINT, np.nan), ValueError, "epsilon = nan"),
+        (lambda: cra.stability_boundary(SOFT, JOINT, 0.1, (1, 4)), ValueError, r"resonance = \(1, 4\)"),
+        (lambda: cra.stability_boundary(SOFT, JOINT, 0.1, (1, -1)), ValueError, "difference of a mode with itself"),
+        (lambda: cra.stability_boundary(SOFT, JOINT, 0.1, (0, 1)), ValueError, "resonance ="),
+        (lambda: cra.stability_boundary(SOFT, JOINT, 0.1, 2), ValueError, "resonance = 2"),
+        (lambda: cra.stability_boundary(SOFT, JOINT, 0.1, (1, 1), order=3), ValueError, "order = 3"),
+        (lambda: cra.stability_boundary(SOFT, JOINT, 0.1, (1, 1), tongue=2), ValueError, "appears at order 2"),
+        (lambda: cra.growth_rate(SOFT, JOINT, 0.0, 0.1), ValueError, "angular_frequency = 0"),
+        (lambda: cra.growth_rate(SOFT, AXIAL, 1.0, 0.1, residual=True), ValueError, "residual"),
+        (lambda: cra.growth_rate(SOFT, JOINT, [1.0, 2.0], [0.1, 0.2, 0.3]), ValueError, "broadcast"),
+        (lambda: cra.JointStiffness(k_t=-1.0), ValueError, "k_t = -1"),
+        (lambda: cra.AxialBase("1"), TypeError, "amplitude = '1'"),
+    ],
+)
+def test_bad_input_is_named(call, error, message):
+    with pytest.raises(error, match=message):
+        call()
+
+
+def test_forced_width_is_the_growth_of_the_tip():
+    modal = cra.modal_parameters(SOFT)
+    width = cra.forced_width(SOFT, cra.TransverseBase(0.002))
+    assert np.allclose(width, np.abs(modal.participation * modal.tip_displacement) * modal.omega * 0.002 / 2)
+    assert cra.forced_width(SOFT.replace(m_e=[0.0, 0.01]), cra.TransverseBase([[0.1], [0.2]])).shape == (2, 2, 3)
+
+
+def test_excitations_compare_hash_and_pickle():
+    for excitation in (JOINT, AXIAL, cra.TransverseBase(np.array([1.0, 2.0]))):
+        copy = pickle.loads(pickle.dumps(excitation))
+        assert copy == excitation and hash(copy) == hash(excitation)
+    assert cra.AxialBase(1.0) != cra.TransverseBase(1.0) and cra.AxialBase(1.0) != cra.AxialBase(2.0)
+
+
+def test_numbers_come_without_sympy_once_derived():
+    code = (
+        "import sys, cra_sym as cra\n"
+        "arm = cra.Arm.nominal().replace(k_t=1e4)\n"
+        "cra.stability_boundary(arm, cra.JointStiffness(), 0.1, (2, 2), order=2)\n"
+        "cra.growth_rate(arm, cra.JointStiffness(), 50.0, 0.1)\n"
+        "print('sympy' in sys.modules)\n"
+    )
+    for _ in range(2):
+        run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout == "False\n"
