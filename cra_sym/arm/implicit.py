@@ -22,10 +22,10 @@ _PAIRS = {name: tuple(symbol(f"{letter}_{name}") for letter in ("s", "c")) for n
 
 @numbered(31, "sensitivity function", "derived", (23,))
 def sensitivity_function() -> sp.Eq:
-    """Along a root of the frequency equation Delta(lamda, kappa) = 0 stays zero as a stiffness changes: its total
-    derivative vanishes."""
+    """Along a root λ(κ) the frequency equation Δ(λ, κ) = 0 stays satisfied as a stiffness changes: the total
+    derivative of Δ vanishes."""
     kappa = symbol("kappa_t")
-    slope = sp.idiff(sp.Function("Delta")(lamda, kappa), lamda, kappa)
+    slope = sp.idiff(sp.Function("Delta")(lamda, kappa), lamda, kappa).doit()
     return sp.Eq(sp.Function("lamda")(kappa).diff(kappa), slope)
 
 
@@ -55,7 +55,7 @@ def implicit_derivatives() -> dict[str, sp.Expr]:
 @numbered(32, "sensitivities of the frequencies", "derived", (23, 30, 31))
 def frequency_sensitivities() -> tuple[sp.Eq, sp.Eq]:
     """(31) for the two stiffnesses, turned into hertz per N/m and hertz per N m/rad by (30); f_i is proportional to the
-    square of lamda. Raw sensitivities have different units: only logarithmic ones can be compared."""
+    square of λ. Raw sensitivities have different units: only logarithmic ones can be compared."""
     hertz = natural_frequency().rhs
     equations = []
     for name, power in (("t", 3), ("r", 1)):
@@ -68,8 +68,8 @@ def frequency_sensitivities() -> tuple[sp.Eq, sp.Eq]:
 
 @checks(32)
 def _() -> bool:
-    """Another principle: first-order perturbation. The square of omega_i changes by phi_i(0)^2 / M_i per k_t and by
-    phi_i'(0)^2 / M_i per k_r, for modes of a random arm found by shooting."""
+    """Another principle: first-order perturbation. ω_i² changes by φ_i(0)² / M_i per k_t and by
+    φ_i'(0)² / M_i per k_r, for modes of a random arm found by shooting."""
     values = sample(32)
     numbers = {symbol(name): value for name, value in values.items()}
     for mode in shoot(values):

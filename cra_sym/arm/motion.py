@@ -41,7 +41,7 @@ M_i, K_i, Gamma_i, omega_i, zeta_i = (symbol(name) for name in ("M_i", "K_i", "G
 Lcal, t_1, t_2 = (symbol(name) for name in ("Lcal", "t_1", "t_2"))
 
 #: The virtual displacements as :func:`cra_sym.mechanics.hamilton` writes them.
-delta_v, delta_w, delta_L = Function("δv")(x, t), Function("δw")(t), Function("δL")(t)
+delta_v, delta_w, delta_L = Function("δv")(x, t), Function("δw")(t), Function("δLcal")(t)
 
 #: An arm whose parameters are different primes: exact arithmetic without symbols.
 _SOME_ARM = dict(zip(map(symbol, ("L", "E", "I_z", "rho", "A", "m_b", "m_e", "J_e", "k_t", "k_r")),
@@ -91,7 +91,7 @@ def _() -> bool:
 
         return (_action(values, motion(step), duration) - _action(values, motion(-step), duration)) / (2.0 * step)
 
-    known = {"δL": ENERGY, "δw": dimension("w")}
+    known = {"δLcal": ENERGY, "δw": dimension("w")}
     consistent = dimension(hamiltons_principle().lhs.function, known) == ENERGY
     return consistent and abs(slope(mode.omega)) < 1e-7 < 1e-3 < abs(slope(1.01 * mode.omega))
 

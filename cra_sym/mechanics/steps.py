@@ -21,7 +21,11 @@ def variation_of(unknown: AppliedUndef) -> AppliedUndef:
 
 
 class _CompactPrinter(LatexPrinter):
-    r"""Writes derivatives of functions as subscripts (``v_{xx}``) or dots, values at an end as ``v_{x}(0,t)``."""
+    r"""Writes derivatives as subscripts (``v_{xx}``), dots (``\dot{w}``) or primes (``\phi'(0)``), by their function.
+
+    A field ``v(x, t)`` takes subscripts, at an end too (``v_{x}(0,t)``); a function of time alone takes dots; any other
+    function of one argument takes primes. Derivatives by anything else are fractions.
+    """
 
     def __init__(self, variables: tuple[str, str]) -> None:
         super().__init__()
@@ -30,10 +34,11 @@ class _CompactPrinter(LatexPrinter):
     def _own(self, argument: Basic) -> bool:
         return isinstance(argument, Symbol) and argument.name in self._variables
 
-    def _head(self, function: AppliedUndef) -> str:
+    def _head(self, function: AppliedUndef) -> tuple[str, str]:
+        """Return the mark of a variation, or nothing, and the name."""
         name = function.func.__name__
         delta = r"\delta " if name.startswith(_DELTA) else ""
-        return delta + self._print(Symbol(name.removeprefix(_DELTA)))
+        return delta, self._print(Symbol(name.removeprefix(_DELTA)))
 
     def _place(self, arguments: Iterable[Basic]) -> str:
         """Return the arguments where they say something: a value at an end, or a coefficient that varies along x."""
@@ -45,36 +50,49 @@ class _CompactPrinter(LatexPrinter):
     def _print_Function(self, expr: Any, exp: str | None = None) -> str:
         if not isinstance(expr, AppliedUndef):
             return super()._print_Function(expr, exp)
-        return self._head(expr) + self._place(expr.args) + (f"^{{{exp}}}" if exp else "")
+        return "".join(self._head(expr)) + self._place(expr.args) + (f"^{{{exp}}}" if exp else "")
 
-    def _derivative(self, derivative: Derivative, arguments: Iterable[Basic]) -> str:
-        function = derivative.expr
-        head, place = self._head(function), self._place(arguments)
+    def _derivative(self, derivative: Derivative, arguments: Iterable[Basic]) -> str | None:
+        """Return the short form of a derivative of a function, taken at ``arguments``, or None if it has none."""
+        function, place = derivative.expr, self._place(arguments)
+        delta, name = self._head(function)
         space, time = self._variables
-        counts = {time: 0, space: 0}
-        for variable, count in derivative.variable_count:
-            counts[time if variable.name == time else space] += int(count)
-        if not counts[space] and len(function.args) == 1 and counts[time] <= 3:
-            return rf"\{'d' * counts[time]}ot{{{head}}}" + place
-        marks = self._print(Symbol(space)) * counts[space] + self._print(Symbol(time)) * counts[time]
-        return (rf"{{{head}}}_{{,{marks}}}" if "_" in head else rf"{head}_{{{marks}}}") + place
+        counts = {variable.name: int(count) for variable, count in derivative.variable_count}
+        in_time = counts.pop(time, 0)
+        in_space = sum(counts.values())
+        if len(function.args) == 1:
+            return delta + (_dotted(name, in_time) if in_time else _primed(name, in_space)) + place
+        if len(function.args) > 2 or time not in map(str, function.args):
+            return None
+        marks = self._print(Symbol(space)) * in_space + self._print(Symbol(time)) * in_time
+        return delta + (rf"{{{name}}}_{{,{marks}}}" if "_" in name else rf"{name}_{{{marks}}}") + place
 
     def _print_Derivative(self, expr: Derivative) -> str:
-        if isinstance(expr.expr, AppliedUndef):
-            return self._derivative(expr, expr.expr.args)
-        return super()._print_Derivative(expr)
+        short = self._derivative(expr, expr.expr.args) if isinstance(expr.expr, AppliedUndef) else None
+        return short or super()._print_Derivative(expr)
 
     def _print_Subs(self, subs: Subs) -> str:
         inner = subs.expr
         if isinstance(inner, Derivative) and isinstance(inner.expr, AppliedUndef):
             point = dict(zip(subs.variables, subs.point, strict=True))
-            return self._derivative(inner, (point.get(argument, argument) for argument in inner.expr.args))
+            short = self._derivative(inner, (point.get(argument, argument) for argument in inner.expr.args))
+            return short or super()._print_Subs(subs)
         return super()._print_Subs(subs)
 
     def parenthesize(self, item: Any, *args: Any, **kwargs: Any) -> str:
         if isinstance(item, (Derivative, Subs)) and isinstance(item.expr, (AppliedUndef, Derivative)):
             return self._print(item)
         return super().parenthesize(item, *args, **kwargs)
+
+
+def _dotted(name: str, order: int) -> str:
+    letter, underscore, index = name.partition("_")
+    mark = rf"\{'d' * order}ot{{{letter}}}" if order <= 3 else rf"{{{letter}^{{({order})}}}}"
+    return mark + underscore + index
+
+
+def _primed(name: str, order: int) -> str:
+    return name + ("'" * order if order <= 4 else f"^{{({order})}}")
 
 
 def compact_latex(expression: Any, variables: tuple[str, str] = ("x", "t")) -> str:

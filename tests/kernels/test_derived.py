@@ -68,23 +68,27 @@ def test_fingerprint_follows_sources_and_versions(monkeypatch, tmp_path):
     monkeypatch.undo()
     assert derived.fingerprint() == before
     derived.fingerprint.cache_clear()
-    (tmp_path / "model.py").write_text("changed = True\n")
+    (tmp_path / "symbols.py").write_text("changed = True\n")
     monkeypatch.setattr(derived, "_PACKAGE", tmp_path)
     assert derived.fingerprint() != before
     derived.fingerprint.cache_clear()
 
 
+def test_every_deriving_source_exists():
+    assert all((derived._PACKAGE / name).exists() for name in derived._DERIVING)
+
+
 def test_sources_edited_since_loading_are_not_vouched_for(private, monkeypatch, tmp_path):
     assert derived._sources_are_what_runs()
-    (tmp_path / "model.py").write_text("edited = True\n")
-    os.utime(tmp_path / "model.py", (2e9, 4e9))
+    (tmp_path / "symbols.py").write_text("edited = True\n")
+    os.utime(tmp_path / "symbols.py", (2e9, 4e9))
     monkeypatch.setattr(derived, "_PACKAGE", tmp_path)
     assert not derived._sources_are_what_runs()
     namespace = {}
     exec(PLANT, namespace)
     assert derived_kernel(DERIVATION)(0.5, 1.0)["power"] == 0.5**5
     assert not private.exists()
-    (tmp_path / "model.py").unlink()
+    (tmp_path / "symbols.py").unlink()
     assert not derived._sources_are_what_runs()  # a package without its sources
     derived._source_of.cache_clear()
     derived.fingerprint.cache_clear()

@@ -25,6 +25,7 @@ from sympy import (
 )
 
 from cra_sym.mechanics import HamiltonError, hamilton
+from cra_sym.mechanics.steps import compact_latex
 
 x, t = symbols("x t")
 L, rho, A, E, I, k_t, k_r, m_e, J_e, m_b = symbols("L rho A E I k_t k_r m_e J_e m_b")
@@ -461,3 +462,20 @@ def test_no_assumed_sign_is_used():
     result = hamilton(density, fields=[v], x=x, domain=(0, signed[L]), t=t, left=left, right=right)
     plain = hamilton(BEAM, fields=[v], x=x, domain=(0, L), t=t, left=left.xreplace(back), right=right.xreplace(back))
     assert tuple(equation.xreplace(back) for equation in result.equations) == plain.equations
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [
+        (w.diff(t, 2), r"\ddot{w}"),
+        (Function("w")(L).diff(L, 2), r"w''(L)"),  # as under Duhamel's integral
+        (Function("q_i")(t).diff(t).subs(t, 0), r"\dot{q}_{i}(0)"),
+        (Function("δw")(t).diff(t), r"\delta \dot{w}"),
+        (Function("phi_i")(x).diff(x).subs(x, L) ** 2, r"\phi_{i}'(L)^{2}"),
+        (Function("phi")(x).diff(x, 8), r"\phi^{(8)}(x)"),
+        (Function("v_1")(x, t).diff(x, t).subs(x, L), r"{v_{1}}_{,xt}(L,t)"),
+        (Function("Delta")(k_t, k_r).diff(k_r), r"\frac{\partial}{\partial k_{r}} \Delta(k_{t},k_{r})"),
+    ],
+)
+def test_no_derivative_is_shown_as_one_by_another_variable(expression, expected):
+    assert compact_latex(expression) == expected
