@@ -40,6 +40,7 @@ _HOME = {
     "Model": "model",
     "sweep": "studies",
     "kernel": "kernels",
+    "export": "codegen",
 }
 
 __all__ = ["__version__", *_HOME]

@@ -153,9 +153,23 @@ def _claims(options: Options) -> None:
         arm = _chosen_arm(options)
         verdicts = [claim(id, arm) for id in options.id] if options.id else claims(arm)
     print(json.dumps([v.as_dict() for v in verdicts], indent=1) if options.json else verdict_text(verdicts))
+def _export_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "language", choices=("c", "fortran", "python", "julia", "octave", "rust", "javascript"), metavar="LANGUAGE",
+        help="c, fortran, python, julia, octave, rust or javascript",
+    )  # fmt: skip
+    parser.add_argument("directory", metavar="DIR", type=Path, help="folder to make")
+    parser.add_argument("--force", action="store_true", help="write into a folder that is not empty")
+
+
+def _export(options: Options) -> None:
+    from cra_sym import export
+
+    print(export(options.language, options.directory, overwrite=options.force))
 
 
 COMMANDS = {
+    "export": Command("write the arm as tested source code of another language", _export_options, _export),
     "reproduce": Command("run every notebook; write them, figures, tables and report", _reproduce_options, _reproduce),
     "claims": Command("judge the paper's claims", _claims_options, _claims),
     "figures": Command("draw the figures as PNG and SVG", _figures_options, _figures),

@@ -7,6 +7,7 @@ import builtins
 import keyword
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -15,11 +16,13 @@ from scipy import special
 from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.numpy import NumPyPrinter, SciPyPrinter
 from sympy.printing.precedence import PRECEDENCE
+from sympy.simplify.cse_main import tree_cse
 
-__all__ = ["check_arguments", "module_source"]
+__all__ = ["check_arguments", "module_source", "shared_steps"]
 
 Layout = Any  # (): one expression; (2, 2): a matrix; [layouts]: a sequence; {name: layout}: a mapping
 
+_LARGEST = 20_000  # nodes up to which sums and products are searched for common parts
 _LONGEST_CHAIN = 64  # integer powers up to this become products
 
 
@@ -133,8 +136,7 @@ def module_source(expression: Any, arguments: Sequence[sp.Symbol]) -> str:
     names: dict[sp.Symbol, str] = {}
     for symbol in symbols:
         _christen(symbol, names)
-    replacements, outputs = sp.cse(outputs, symbols=sp.numbered_symbols("x", cls=sp.Dummy), list=True)
-    steps, outputs = _without_powers(replacements, outputs)
+    steps, outputs = shared_steps(outputs)
     for number, (symbol, _) in enumerate(steps):
         _christen(symbol, names, f"x{number}")
     printer = _Printer(names)
@@ -148,6 +150,17 @@ def module_source(expression: Any, arguments: Sequence[sp.Symbol]) -> str:
     text = f"{''.join(imports)}\n{constants}\n\ndef evaluate({signature}):\n    {body}\n"
     _check_names(text)
     return text
+
+
+def shared_steps(outputs: Sequence[sp.Expr]) -> tuple[list[tuple[sp.Symbol, sp.Expr]], list[sp.Expr]]:
+    """Share common subexpressions over all outputs and turn integer powers into products; nothing is expanded."""
+    names = sp.numbered_symbols("x", cls=sp.Dummy)
+    nodes = (node for value in outputs for node in sp.preorder_traversal(value))
+    if next(islice(nodes, _LARGEST, None), None) is not None:  # a nested recurrence: what repeats are its nodes
+        replacements, outputs = tree_cse(outputs, names)
+    else:
+        replacements, outputs = sp.cse(outputs, symbols=names, list=True)
+    return _without_powers(replacements, outputs)
 
 
 def _flatten(expression: Any) -> tuple[Layout, list[sp.Expr]]:

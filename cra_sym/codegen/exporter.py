@@ -1,0 +1,241 @@
+"""Export: generated functions put into the templates of a language, with reference vectors, and written as a whole."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import cra_sym
+from cra_sym.codegen.expressions import gauss_rule, modal_functions, spectrum_functions, stability_functions
+from cra_sym.codegen.languages import LANGUAGES, Language
+from cra_sym.codegen.program import Function
+from cra_sym.codegen.vectors import TOLERANCE, arm_checks, written
+from cra_sym.files import OutputError, staged_directory, write_text
+
+__all__ = ["Export", "export"]
+
+_FULL = ("c", "fortran", "python")
+
+
+@dataclass(frozen=True)
+class Export:
+    """What an export wrote.
+
+    Attributes
+    ----------
+    language : str
+    directory : Path
+    files : tuple of str
+        Paths inside the directory.
+    digest : str
+        SHA-256 of all files but the README, which carries it.
+    """
+
+    language: str
+    directory: Path
+    files: tuple[str, ...]
+    digest: str
+
+    def __repr__(self) -> str:
+        names = "\n".join(f"  {name}" for name in self.files)
+        return f"<Export to {LANGUAGES[self.language].title}, {self.digest[:12]}, in {self.directory}\n{names}>"
+
+
+def export(language: str, directory: str | Path, model: Any = None, overwrite: bool = False) -> Export:
+    """Write the arm, or a model of one's own, as tested source code without dependence on this package.
+
+    The folder holds source, build files, reference vectors made by this package's kernels, a self-test that compares
+    with them, and a README. The same input gives the same bytes.
+
+    Parameters
+    ----------
+    language : {'c', 'fortran', 'python', 'julia', 'octave', 'rust', 'javascript'}
+        The first three hold everything: characteristic function, frequencies, modes, sensitivities, responses, state
+        space and first-order stability. The others hold the characteristic function and the frequencies.
+    directory : path
+        Folder to make, with its parents.
+    model : Model, optional
+        Its characteristic function with the derivative by omega is exported instead of the arm.
+    overwrite : bool
+        Whether a folder that is not empty is written into. Files of the same name are replaced, those of an earlier
+        export that are no longer made are removed, all others stay.
+
+    Returns
+    -------
+    Export
+
+    Raises
+    ------
+    ValueError
+        If the language is unknown, the folder is not empty, or the model has no real closed form. Nothing is written.
+    """
+    if language not in LANGUAGES:
+        raise ValueError(f"language = {language!r}: allowed are {', '.join(LANGUAGES)}")
+    target = Path(os.path.abspath(directory))
+    _check_free(target, overwrite)
+    if model is None:
+        texts = _arm_texts(language)
+    else:
+        from cra_sym.codegen.user_model import model_texts
+
+        texts = model_texts(language, model)
+    digest = _digest(texts)
+    texts = {name: text.replace(_DIGEST, digest) for name, text in texts.items()}
+    _write(target, texts)
+    return Export(language, Path(directory), tuple(sorted(texts)), digest)
+
+
+_DIGEST = "@content-hash@"
+
+
+def _digest(texts: dict[str, str]) -> str:
+    digest = hashlib.sha256()
+    for name, text in sorted(texts.items()):
+        if name != "README.md":
+            digest.update(f"{name} {len(text.encode())}\n{text}".encode())
+    return digest.hexdigest()
+
+
+def _check_free(target: Path, overwrite: bool) -> None:
+    if not os.path.lexists(target):
+        return
+    if not target.is_dir():
+        raise OutputError(f"directory = {str(target)!r}: is not a directory")
+    if not overwrite and any(target.iterdir()):
+        raise OutputError(f"directory = {str(target)!r}: is not empty; overwrite=True (--force) writes into it")
+
+
+def _write(target: Path, texts: dict[str, str]) -> None:
+    """Write everything or nothing; into a folder that is not empty, file by file once all of them exist."""
+    if not target.is_dir() or not any(target.iterdir()):
+        with staged_directory(target) as folder:
+            for name, text in texts.items():
+                (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                write_text(folder / name, text)
+        return
+    manifest = target / "manifest.json"
+    try:
+        earlier = [str(name) for name in json.loads(manifest.read_text(encoding="utf-8"))["files"]]
+    except (OSError, ValueError, KeyError, TypeError):
+        earlier = []
+    with staged_directory(target.with_name(f".{target.name}-export")) as folder:
+        for name, text in texts.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            write_text(folder / name, text)
+        (folder / "manifest.json").write_text(json.dumps({"files": sorted(texts)}, indent=1) + "\n", encoding="utf-8")
+        for name in [*texts, "manifest.json"]:
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            os.replace(folder / name, target / name)
+    for name in set(earlier) - set(texts):
+        path = target / name
+        if path.is_file() and target in path.resolve().parents:
+            path.unlink()
+
+
+@cache
+def _environment() -> Any:
+    from jinja2 import Environment, StrictUndefined
+
+    return Environment(undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True)
+
+
+def rendered(folder: str, values: dict[str, Any]) -> dict[str, str]:
+    """Return the texts of all templates of a folder, by the name of the file to write."""
+    texts = {}
+    root = files("cra_sym.codegen").joinpath("templates", folder)
+    for path, text in sorted(_templates(root)):
+        texts[path.removesuffix(".jinja")] = _environment().from_string(text).render(values)
+    return texts
+
+
+def _templates(root: Any, prefix: str = "") -> list[tuple[str, str]]:
+    found = []
+    for entry in root.iterdir():
+        if entry.is_dir():
+            found += _templates(entry, f"{prefix}{entry.name}/")
+        elif entry.name.endswith(".jinja"):
+            found.append((prefix + entry.name, entry.read_text(encoding="utf-8")))
+    return found
+
+
+def common_values(language: Language) -> dict[str, Any]:
+    """Return what every template may use."""
+    licence = files("cra_sym.codegen").joinpath("templates", "LICENSE.txt").read_text(encoding="utf-8")
+    return {
+        "version": cra_sym.__version__,
+        "title": "cra_arm",
+        "language": language.title,
+        "digest": _DIGEST,
+        "tolerance": f"{TOLERANCE:g}",
+        "licence": licence,
+    }
+
+
+@cache
+def _reference(everything: bool) -> str:
+    return written(arm_checks(everything=everything), "a flexible Cartesian robotic arm")
+
+
+def _arm_texts(name: str) -> dict[str, str]:
+    language, everything = LANGUAGES[name], name in _FULL
+    values = common_values(language) | _spectrum_values(language)
+    if everything:
+        values |= _modal_values(language)
+    values["nomenclature"] = nomenclature_rows()
+    texts = rendered(name, values)
+    texts["reference.txt"] = _reference(everything)
+    texts["LICENSE"] = values["licence"]
+    return texts
+
+
+def _spectrum_values(language: Language) -> dict[str, Any]:
+    from cra_sym.arm.characteristic import NEAR
+
+    functions = spectrum_functions()
+    terms = next(f.size for f in functions if f.name == "power_series")
+    return {"spectrum_functions": _texts(language, functions), "near": NEAR, "terms": terms}
+
+
+def _modal_values(language: Language) -> dict[str, Any]:
+    from cra_sym.arm.shapes import NEAR
+
+    widths = stability_functions()
+    nodes, weights = gauss_rule()
+    return {
+        "modal_functions": _texts(language, (*modal_functions(), *widths)),
+        "near_shape": NEAR,
+        "nodes": [repr(x) for x in nodes],
+        "weights": [repr(x) for x in weights],
+        "call": caller({f.name: f for f in widths}),
+    }
+
+
+def caller(functions: dict[str, Function]) -> Callable[..., str]:
+    """Return what writes a call with arguments given by name, in the function's own order."""
+
+    def call(name: str, **given: str) -> str:
+        return f"{name}({', '.join(given[a.name] for a in functions[name].arguments)})"
+
+    return call
+
+
+def _texts(language: Language, functions: tuple[Function, ...]) -> str:
+    return "\n\n".join(language.function(f) for f in functions)
+
+
+def nomenclature_rows() -> list[tuple[str, str, str]]:
+    """Return name, unit and meaning of every field of the arm."""
+    from dataclasses import fields
+
+    from cra_sym.arm.parameters import Arm
+    from cra_sym.symbols import nomenclature
+
+    rows = {row.name: row for row in nomenclature()}
+    return [(f.name, rows[f.name].unit, rows[f.name].meaning) for f in fields(Arm)]

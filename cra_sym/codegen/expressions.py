@@ -1,0 +1,134 @@
+"""What is exported of the arm: the derivations behind the package's own kernels, with their arguments in rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import sympy as sp
+
+from cra_sym.arm import characteristic, duhamel, shapes
+from cra_sym.arm.characteristic import BASIS, PARAMETERS
+from cra_sym.codegen.complex_parts import complex_parts
+from cra_sym.codegen.program import Function, function, scalars
+from cra_sym.mechanics import multiple_scales
+from cra_sym.symbols import symbol
+
+__all__ = ["gauss_rule", "modal_functions", "spectrum_functions", "stability_functions"]
+
+_PAIRS = ("pairs", PARAMETERS)
+_BASIS = ("basis_row", BASIS)
+_KRYLOV = ("krylov", shapes.KRYLOV)
+_WAVES = ("waves", shapes.WAVES)
+
+
+def _row(prefix: str, arguments: Sequence[sp.Symbol]) -> tuple[str, list[sp.Symbol]]:
+    """Return the arguments k0, k1, ... as one row."""
+    return prefix, [s for s in arguments if s.name[:1] == prefix and s.name[1:].isdigit()]
+
+
+def _make(summary: str, derivation: Any, *arguments: Any) -> Function:
+    expression, names = derivation()
+    given = {s for _, symbols in arguments for s in ((symbols,) if isinstance(symbols, sp.Symbol) else symbols)}
+    rest = [s for s in names if s not in given]
+    signature = [*arguments, *scalars(rest)]
+    first = {s: i for i, s in enumerate(names)}
+    signature.sort(key=lambda pair: min(_first(pair[1], first)))
+    return function(derivation.__name__, summary, expression, signature)
+
+
+def _first(symbols: Any, order: dict[sp.Symbol, int]) -> list[int]:
+    members = (symbols,) if isinstance(symbols, sp.Symbol) else symbols
+    return [order[s] for s in members if s in order]
+
+
+@cache
+def spectrum_functions() -> tuple[Function, ...]:
+    """Return the functions behind the complete frequencies of the arm."""
+    k = _row("k", characteristic.derivatives()[1])
+    return (
+        _make("Coefficients of the characteristic determinant.", characteristic.coefficients, _PAIRS),
+        _make("Coefficients of its power series in z.", characteristic.power_series, k),
+        _make("Basis of the determinant at lambda, scaled by decay = exp(-lambda).", characteristic.basis),
+        _make("The same basis for small z, not scaled.", characteristic.basis_near),
+        _make("Determinants whose signs count the zeros below z.", characteristic.chain, _PAIRS, _BASIS),
+        _make("Determinant D, z D' and z^2 D'', scaled alike.", characteristic.derivatives, k, _BASIS),
+    )
+
+
+@cache
+def modal_functions() -> tuple[Function, ...]:
+    """Return the functions behind mode shapes, modal quantities and responses."""
+    circle = ("circle", shapes.tip_far()[1][-3:])  # cos, sin and decay at lambda
+    return (
+        _make("Solutions with one unit derivative at the root, for small z.", shapes.polynomials),
+        _make("Tip conditions: entries in (alpha, beta) and their magnitudes.", shapes.tip_rows, _PAIRS, _KRYLOV),
+        _make("Shape and derivatives at the tip, for small z.", shapes.tip_near, _PAIRS, _KRYLOV),
+        _make("alpha, beta and the wave amplitudes.", shapes.amplitudes_far, _PAIRS, circle),
+        _make("Shape and derivatives at the tip from the wave amplitudes.", shapes.tip_far, _WAVES, circle),
+        _make("Shape and its three derivatives at xi from the wave amplitudes.", shapes.shape_far, _WAVES),
+        _make("Modal mass over rho A L, for z > 0.", _mass, _PAIRS),
+        *_responses(),
+    )
+
+
+def _mass() -> Any:
+    (mass,), arguments = shapes.generalised_mass()
+    return mass, arguments
+
+
+_mass.__name__ = "modal_mass"
+
+
+def _responses() -> list[Function]:
+    """Return the closed forms of Duhamel's integral, in real numbers."""
+    t, omega, zeta, varpi = (symbol(name) for name in ("t", "omega_i", "zeta_i", "varpi"))
+    unit = duhamel.guarded_responses()
+    times = [("t", t), ("omega", omega), ("zeta", zeta)]
+    return [
+        function("free_response", "Answers to unit displacement and to unit velocity.", unit[:2], times),
+        function("mean_response", "Answers to a unit step and to a unit ramp.", unit[2:4], times),
+        function(
+            "harmonic_response",
+            "Real and imaginary part of the answer to exp(i varpi t).",
+            complex_parts(unit.harmonic),
+            [*times, ("varpi", varpi)],
+        ),
+    ]
+
+
+@cache
+def gauss_rule(points: int = 16) -> tuple[list[float], list[float]]:
+    """Return nodes and weights of Gauss's rule on [0, 1], correctly rounded."""
+    from sympy.integrals.quadrature import gauss_legendre
+
+    nodes, weights = gauss_legendre(points, 30)
+    return [float((1 + x) / 2) for x in nodes], [float(w / 2) for w in weights]
+
+
+@cache
+def stability_functions() -> tuple[Function, ...]:
+    """Return half the width of a zone of instability to first order, as multiple scales derive it."""
+    omega, coupling, damping = (sp.IndexedBase(name, real=True) for name in ("omega", "P", "zeta"))
+    m, n = (sp.Symbol(name, integer=True, positive=True) for name in "mn")
+    made = []
+    for kind, resonance in (("principal", (n, n)), ("sum", (m, n))):
+        for damped in (False, True):
+            border = multiple_scales(omega, coupling, resonance, order=1, damping=damping if damped else None).border
+            assert border is not None
+            width, arguments = _plain(border.half_width)
+            name = f"{'damped_' if damped else ''}{kind}_width"
+            summary = f"Half width of a {kind} resonance{', with damping c = zeta omega' if damped else ''}."
+            made.append(function(name, summary, width, scalars(arguments)))
+    return tuple(made)
+
+
+def _plain(expression: sp.Expr) -> tuple[sp.Expr, list[sp.Symbol]]:
+    """Return an expression with ``omega[n]`` as a symbol ``omega_n``, and its symbols by name."""
+    names = {
+        e: sp.Symbol(f"{e.base.label}_{''.join(map(str, e.indices))}", positive=e.base.label.name == "omega" or None)
+        for e in expression.atoms(sp.Indexed)
+    }
+    renamed = expression.xreplace(names)
+    return renamed, sorted(renamed.free_symbols, key=lambda s: s.name)

@@ -1,0 +1,159 @@
+"""How each language writes a function; the expressions in it come from the language's printer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from cra_sym.codegen.printers import PRINTERS, ScalarPrinter
+from cra_sym.codegen.program import Argument, Branch, Function
+
+__all__ = ["LANGUAGES", "Language"]
+
+
+@dataclass(frozen=True)
+class Language:
+    """A language: its printer, and the words around the expressions.
+
+    Attributes
+    ----------
+    name, title : str
+        Name in calls, and as it is written.
+    head : callable
+        From a function to the lines before its body.
+    step, output, result : str
+        Formats of an intermediate result, an entry of the result, and a result that is one number.
+    branch : tuple of str
+        Formats of the first, a further and the last condition, and the end.
+    tail : str
+        Last line of a function.
+    comment : str
+    """
+
+    name: str
+    title: str
+    head: Callable[[Function], list[str]]
+    step: str
+    output: str
+    result: str
+    branch: tuple[str, str, str, str]
+    tail: str
+    comment: str
+    indent: str = "    "
+
+    def function(self, function: Function) -> str:
+        """Return the text of a function."""
+        printer = PRINTERS[self.name](function.places)
+        lines = [f"{self.comment} {function.summary}", *self.head(function)]
+        if len(function.branches) == 1:
+            lines += self._body(function, function.branches[0], printer, self.indent)
+        else:
+            first, further, last, end = self.branch
+            for number, branch in enumerate(function.branches):
+                word = last if branch.condition is None else further if number else first
+                condition = "" if branch.condition is None else printer.doprint(branch.condition)
+                lines.append(printer.wrapped(word.format(condition), self.indent))
+                lines += self._body(function, branch, printer, 2 * self.indent)
+            lines += [f"{self.indent}{end}"] if end else []
+        kind = "function" if function.scalar else "subroutine"
+        return "\n".join(
+            [*lines, *([self.tail.replace("{name}", function.name).replace("{kind}", kind)] if self.tail else [])]
+        )
+
+    def _body(self, function: Function, branch: Branch, printer: ScalarPrinter, indent: str) -> list[str]:
+        lines = [
+            printer.wrapped(self.step.format(name=function.places[symbol].name, value=printer.doprint(value)), indent)
+            for symbol, value in branch.steps
+        ]
+        values = [printer.doprint(value) for value in branch.outputs]
+        if function.scalar:
+            return [*lines, printer.wrapped(self.result.format(value=values[0], name=function.name), indent)]
+        if "{values}" in self.output:
+            return [*lines, printer.wrapped(self.output.format(values=", ".join(values)), indent)]
+        return lines + [
+            printer.wrapped(self.output.format(index=i + printer.origin, value=value), indent)
+            for i, value in enumerate(values)
+        ]
+
+
+def _c_head(f: Function) -> list[str]:
+    def declared(a: Argument) -> str:
+        return f"const double {a.name}[{len(a.symbols)}]" if a.row else f"double {a.name}"
+
+    arguments = [declared(a) for a in f.arguments] + ([] if f.scalar else [f"double out[{f.size}]"])
+    start = f"static {'double' if f.scalar else 'void'} {f.name}("
+    text, width = start, len(start)
+    for i, argument in enumerate(arguments):
+        piece = argument + (", " if i < len(arguments) - 1 else ")")
+        if width + len(piece) > 100:
+            text, width = f"{text.rstrip()}\n{' ' * len(start)}", len(start)
+        text, width = text + piece, width + len(piece)
+    return [text, "{"]
+
+
+def _fortran_head(f: Function) -> list[str]:
+    names = [a.name for a in f.arguments]
+    kind = "function" if f.scalar else "subroutine"
+    result = " result(out)" if f.scalar else ""
+    lines = [f"  pure {kind} {f.name}({', '.join(names + ([] if f.scalar else ['out']))}){result}"]
+    for a in f.arguments:
+        lines.append(f"    real(dp), intent(in) :: {a.name}{f'({len(a.symbols)})' if a.row else ''}")
+    lines.append("    real(dp) :: out" if f.scalar else f"    real(dp), intent(out) :: out({f.size})")
+    variables = f.variables
+    for start in range(0, len(variables), 12):
+        lines.append(f"    real(dp) :: {', '.join(variables[start : start + 12])}")
+    return lines
+
+
+def _plain_head(text: str) -> Callable[[Function], list[str]]:
+    def head(f: Function) -> list[str]:
+        return [text.format(name=f.name, arguments=", ".join(a.name for a in f.arguments))]
+
+    return head
+
+
+def _rust_head(f: Function) -> list[str]:
+    arguments = ", ".join(f"{a.name}: {f'&[f64; {len(a.symbols)}]' if a.row else 'f64'}" for a in f.arguments)
+    return [f"fn {f.name}({arguments}) -> {'f64' if f.scalar else f'[f64; {f.size}]'} {{"]
+
+
+def _octave_head(f: Function) -> list[str]:
+    lines = _plain_head("function out = {name}({arguments})")(f)
+    return lines if f.scalar else [*lines, f"    out = zeros(1, {f.size});"]
+
+
+_BRACES = ("if ({}) {{", "}} else if ({}) {{", "}} else {{", "}")
+
+LANGUAGES = {
+    language.name: language
+    for language in (
+        Language(
+            "c", "C99", _c_head, "const double {name} = {value};", "out[{index}] = {value};", "return {value};",
+            _BRACES, "}", "//",
+        ),
+        Language(
+            "fortran", "Fortran 2008", _fortran_head, "{name} = {value}", "out({index}) = {value}", "out = {value}",
+            ("if ({}) then", "else if ({}) then", "else", "end if"), "  end {kind} {name}", "  !", indent="    ",
+        ),
+        Language(
+            "julia", "Julia", _plain_head("function {name}({arguments})"), "{name} = {value}", "return ({values},)",
+            "return {value}", ("if {}", "elseif {}", "else", "end"), "end", "#",
+        ),
+        Language(
+            "octave", "Octave", _octave_head, "{name} = {value};", "out({index}) = {value};", "out = {value};",
+            ("if ({})", "elseif ({})", "else", "end"), "end", "%",
+        ),
+        Language(
+            "rust", "Rust", _rust_head, "let {name}: f64 = {value};", "[{values}]", "{value}",
+            ("if {} {{", "}} else if {} {{", "}} else {{", "}"), "}", "///",
+        ),
+        Language(
+            "javascript", "JavaScript", _plain_head("function {name}({arguments}) {{"), "const {name} = {value};",
+            "return [{values}];", "return {value};", _BRACES, "}", "//",
+        ),
+        Language(
+            "python", "Python", _plain_head("def {name}({arguments}):"), "{name} = {value}", "return ({values})",
+            "return {value}", ("if {}:", "elif {}:", "else:", ""), "", "#",
+        ),
+    )
+}  # fmt: skip

@@ -1,0 +1,298 @@
+"""SymPy's code printers, one a language, made to agree: every number a double, every fraction one exact division."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import sympy as sp
+from sympy.printing.c import C99CodePrinter
+from sympy.printing.codeprinter import CodePrinter
+from sympy.printing.fortran import FCodePrinter
+from sympy.printing.jscode import JavascriptCodePrinter
+from sympy.printing.julia import JuliaCodePrinter
+from sympy.printing.octave import OctaveCodePrinter
+from sympy.printing.precedence import PRECEDENCE
+from sympy.printing.pycode import PythonCodePrinter
+from sympy.printing.rust import RustCodePrinter
+
+from cra_sym.codegen.program import Place
+
+__all__ = ["PRINTERS", "ScalarPrinter"]
+
+_SAME = "sqrt exp expm1 log log1p sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh floor".split()
+_EXACT = 2**53  # integers up to this are doubles
+
+
+class ScalarPrinter(CodePrinter):
+    """What the printers share: arithmetic of doubles, written so that no language reads it in another way.
+
+    Attributes
+    ----------
+    functions : dict
+        SymPy's name of a function to the language's.
+    entry : str
+        Format of an entry of a row, from ``name`` and ``index``.
+    origin : int
+        Index of the first entry.
+    """
+
+    functions: ClassVar[dict[str, str]] = {}
+    entry = "{name}[{index}]"
+    origin = 0
+    choice = "({condition} ? {value} : {otherwise})"
+    both, either, negation, unequal = "&&", "||", "!({})", "!="
+    power = "pow({base}, {exponent})"
+
+    def __init__(self, places: Mapping[sp.Symbol, Place]) -> None:
+        super().__init__()
+        self.places = places
+
+    def number(self, value: float) -> str:
+        """Return a literal that reads back as exactly this double."""
+        return repr(value)
+
+    def doprint(self, expression: Any) -> str:  # type: ignore[override]
+        """Return the expression as text on one line.
+
+        Raises
+        ------
+        ValueError
+            If it holds something the language has no word for.
+        """
+        return str(self._print(expression))
+
+    def _print(self, expr: Any, **kwargs: Any) -> str:
+        if isinstance(expr, sp.Function) and not isinstance(expr, sp.Piecewise):
+            return self._called(expr)
+        return str(super()._print(expr, **kwargs))
+
+    def _called(self, expr: Any) -> str:
+        name = type(expr).__name__
+        if name in ("Max", "Min"):
+            terms = [self._print(term) for term in expr.args]
+            text = terms[-1]
+            for term in reversed(terms[:-1]):
+                text = f"{self.functions[name]}({term}, {text})"
+            return text
+        if name == "log" and len(expr.args) == 2:
+            return self._print(sp.Mul(sp.log(expr.args[0]), 1 / sp.log(expr.args[1]), evaluate=False))
+        if name not in self.functions:
+            raise ValueError(f"{name} has no equivalent in {type(self).__name__.removesuffix('Printer')}")
+        return f"{self.functions[name]}({', '.join(self._print(term) for term in expr.args)})"
+
+    _print_Max = _print_Min = _called
+
+    def _print_Symbol(self, expr: sp.Symbol) -> str:
+        place = self.places[expr]
+        if place.entry is None:
+            return place.name
+        return self.entry.format(name=place.name, index=place.entry + self.origin)
+
+    _print_Dummy = _print_Symbol
+
+    def _print_Integer(self, expr: sp.Integer) -> str:
+        return self.number(_double(expr))
+
+    _print_Zero = _print_One = _print_NegativeOne = _print_Integer
+
+    def _print_Rational(self, expr: sp.Rational) -> str:
+        if max(abs(expr.p), expr.q) > _EXACT:
+            return self.number(_double(expr))
+        return f"{self.number(float(expr.p))}/{self.number(float(expr.q))}"
+
+    _print_Half = _print_Rational
+
+    def _print_Float(self, expr: sp.Float) -> str:
+        return self.number(_double(expr))
+
+    _print_NumberSymbol = _print_Float
+    _print_Pi = _print_Exp1 = _print_GoldenRatio = _print_EulerGamma = _print_Catalan = _print_Float
+
+    def _print_Mul(self, expr: sp.Mul) -> str:
+        return CodePrinter._print_Mul(self, expr)
+
+    def _print_Pow(self, expr: sp.Pow) -> str:
+        if expr.exp == -1:
+            return f"{self.number(1.0)}/{self.parenthesize(expr.base, PRECEDENCE['Pow'])}"
+        if abs(expr.exp) == sp.S.Half:
+            root = f"{self.functions['sqrt']}({self._print(expr.base)})"
+            return root if expr.exp > 0 else f"{self.number(1.0)}/{root}"
+        if expr.exp == 2 and expr.base.is_Symbol:
+            return f"{self._print(expr.base)}*{self._print(expr.base)}"
+        if expr.base == sp.E:
+            return f"{self.functions['exp']}({self._print(expr.exp)})"
+        return self._powered(expr)
+
+    def _powered(self, expr: sp.Pow) -> str:
+        return self.power.format(base=self._print(expr.base), exponent=self._print(expr.exp))
+
+    def _print_Piecewise(self, expr: sp.Piecewise) -> str:
+        if expr.args[-1].cond != sp.true:
+            raise ValueError(f"a Piecewise without a last case: {expr}")
+        text = self._print(expr.args[-1].expr)
+        for value, condition in reversed(expr.args[:-1]):
+            text = self.choice.format(condition=self._print(condition), value=self._print(value), otherwise=text)
+        return text
+
+    def _print_Relational(self, expr: Any) -> str:
+        operator = {"!=": self.unequal}.get(expr.rel_op, expr.rel_op)
+        return f"({self._print(expr.lhs)} {operator} {self._print(expr.rhs)})"
+
+    def _print_And(self, expr: Any) -> str:
+        return f"({f' {self.both} '.join(map(self._print, expr.args))})"
+
+    def _print_Or(self, expr: Any) -> str:
+        return f"({f' {self.either} '.join(map(self._print, expr.args))})"
+
+    def _print_Not(self, expr: Any) -> str:
+        return self.negation.format(self._print(expr.args[0]))
+
+    def wrapped(self, text: str, indent: str) -> str:
+        """Return a statement on as many lines as it needs."""
+        return "\n".join(
+            textwrap.wrap(text, 110, initial_indent=indent, subsequent_indent=f"{indent}    ", break_long_words=False)
+        )
+
+
+def _double(value: Any) -> float:
+    number = float(value)
+    if number in (float("inf"), float("-inf")):
+        raise ValueError("number out of the range of double precision")
+    return number
+
+
+class CPrinter(ScalarPrinter, C99CodePrinter):
+    """C99: the functions of math.h."""
+
+    functions: ClassVar = {n: n for n in _SAME} | {"Abs": "fabs", "ceiling": "ceil", "Max": "fmax", "Min": "fmin"}
+
+
+class FortranPrinter(ScalarPrinter, FCodePrinter):
+    """Fortran 2008: its intrinsic functions, and few helpers for those it lacks."""
+
+    functions: ClassVar = {n: n for n in _SAME} | {
+        "Abs": "abs",
+        "Max": "max",
+        "Min": "min",
+        "floor": "floor_real",
+        "ceiling": "-floor_real",
+    }
+    entry, origin = "{name}({index})", 1
+    choice = "merge({value}, {otherwise}, {condition})"
+    both, either, negation, unequal = ".and.", ".or.", "(.not. {})", "/="
+
+    def number(self, value: float) -> str:
+        mantissa, _, exponent = repr(value).partition("e")
+        return f"{mantissa}{'' if '.' in mantissa else '.0'}{f'e{exponent}' if exponent else ''}_dp"
+
+    def _called(self, expr: Any) -> str:
+        if isinstance(expr, sp.ceiling):
+            return f"(-floor_real(-({self._print(expr.args[0])})))"
+        return super()._called(expr)
+
+    _print_Max = _print_Min = _called
+
+    def _powered(self, expr: sp.Pow) -> str:
+        strength = PRECEDENCE["Pow"]
+        base, exponent = (self.parenthesize(x, strength) for x in expr.args)
+        if expr.args[1].could_extract_minus_sign():
+            exponent = f"({exponent})"
+        return f"{base if expr.base.is_Atom and not expr.base.is_negative else f'({base})'}**{exponent}"
+
+    def wrapped(self, text: str, indent: str) -> str:
+        spaced = re.sub(r"(?<=[\w)])(\*\*|\*|/)(?=[\w(])", r"\1 ", text) if len(indent + text) > 110 else text
+        lines = textwrap.wrap(
+            spaced, 110, initial_indent=indent, subsequent_indent=f"{indent}    ", break_long_words=False
+        )
+        return " &\n".join(lines)
+
+
+class JuliaPrinter(ScalarPrinter, JuliaCodePrinter):
+    """Julia: scalar arithmetic without broadcasting dots."""
+
+    functions: ClassVar = {n: n for n in _SAME} | {"Abs": "abs", "ceiling": "ceil", "Max": "max", "Min": "min"}
+    functions["atan2"] = "atan"
+    origin = 1
+    power = "({base})^({exponent})"
+
+
+class OctavePrinter(ScalarPrinter, OctaveCodePrinter):
+    """Octave and MATLAB: scalar arithmetic; a choice evaluates both sides and picks one."""
+
+    functions: ClassVar = {n: n for n in _SAME} | {"Abs": "abs", "ceiling": "ceil", "Max": "max", "Min": "min"}
+    entry, origin = "{name}({index})", 1
+    choice = "choose({condition}, {value}, {otherwise})"
+    unequal, negation = "~=", "(~{})"
+    power = "({base})^({exponent})"
+
+    def wrapped(self, text: str, indent: str) -> str:
+        lines = textwrap.wrap(
+            text, 100, initial_indent=indent, subsequent_indent=f"{indent}    ", break_long_words=False
+        )
+        return " ...\n".join(lines)
+
+
+class RustPrinter(ScalarPrinter, RustCodePrinter):
+    """Rust: functions of f64 in call syntax, where a literal needs no type of its own."""
+
+    functions: ClassVar = {n: f"f64::{n}" for n in _SAME} | {
+        "Abs": "f64::abs",
+        "ceiling": "f64::ceil",
+        "expm1": "f64::exp_m1",
+        "log": "f64::ln",
+        "log1p": "f64::ln_1p",
+        "Max": "f64::max",
+        "Min": "f64::min",
+    }
+    choice = "(if {condition} {{ {value} }} else {{ {otherwise} }})"
+    power = "f64::powf({base}, {exponent})"
+
+
+class JavaScriptPrinter(ScalarPrinter, JavascriptCodePrinter):
+    """JavaScript: the functions of Math."""
+
+    functions: ClassVar = {n: f"Math.{n}" for n in _SAME} | {
+        "Abs": "Math.abs",
+        "ceiling": "Math.ceil",
+        "Max": "Math.max",
+        "Min": "Math.min",
+    }
+    power = "Math.pow({base}, {exponent})"
+    unequal = "!=="
+
+    def _print_Relational(self, expr: Any) -> str:
+        return super()._print_Relational(expr).replace(" == ", " === ")
+
+
+class PythonPrinter(ScalarPrinter, PythonCodePrinter):
+    """Python: the functions of math."""
+
+    functions: ClassVar = {n: f"math.{n}" for n in _SAME} | {"Abs": "abs", "Max": "max", "Min": "min"}
+    functions |= {"floor": "math.floor", "ceiling": "math.ceil"}
+    choice = "({value} if {condition} else {otherwise})"
+    both, either, negation = "and", "or", "(not {})"
+    power = "math.pow({base}, {exponent})"
+
+    def wrapped(self, text: str, indent: str) -> str:
+        if len(indent + text) <= 110:
+            return indent + text
+        head, sign, value = text.partition(" = ")
+        start, value = (f"{head}{sign}(", value) if sign else ("return (", text.removeprefix("return "))
+        inner = textwrap.fill(
+            value, 110, initial_indent=f"{indent}    ", subsequent_indent=f"{indent}    ", break_long_words=False
+        )
+        return f"{indent}{start}\n{inner}\n{indent})"
+
+
+PRINTERS: dict[str, type[ScalarPrinter]] = {
+    "c": CPrinter,
+    "fortran": FortranPrinter,
+    "julia": JuliaPrinter,
+    "octave": OctavePrinter,
+    "rust": RustPrinter,
+    "javascript": JavaScriptPrinter,
+    "python": PythonPrinter,
+}

@@ -1,0 +1,180 @@
+"""Reference vectors: what the package's own kernels answer, for random and extreme arms, one line a check."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterable, Iterator
+from dataclasses import fields
+from importlib.metadata import version
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import cra_sym as cra
+from cra_sym.arm import state_space as state_space_module
+from cra_sym.arm.analysis import frequency_parameters, modal_parameters, mode_shapes, natural_frequencies
+from cra_sym.arm.parameters import Arm
+from cra_sym.arm.response import tip_response
+from cra_sym.arm.sensitivity import sensitivities
+from cra_sym.codegen.characteristic import characteristic
+
+__all__ = ["SEED", "TOLERANCE", "Check", "arm_checks", "extreme_arms", "random_arms", "written"]
+
+SEED = 20240229
+TOLERANCE = 1e-12
+FIELDS = tuple(field.name for field in fields(Arm))
+_STIFFNESSES = (0.0, 1e-9, 1e12, np.inf)
+
+
+class Check(NamedTuple):
+    """One line: a quantity, what goes in, what comes out, and the error allowed besides the relative one."""
+
+    quantity: str
+    inputs: tuple[float, ...]
+    outputs: tuple[float, ...]
+    absolute: float = 0.0
+
+    def line(self) -> str:
+        """Return quantity, absolute tolerance, the two counts, inputs and outputs, separated by blanks."""
+        numbers = [f"{self.absolute:.3e}", str(len(self.inputs)), str(len(self.outputs))]
+        numbers += [repr(float(x)) for x in (*self.inputs, *self.outputs)]
+        return " ".join([self.quantity, *numbers])
+
+
+def random_arms(count: int, seed: int = SEED) -> list[Arm]:
+    """Return arms with everything drawn at random, stiffnesses and inertias over many decades."""
+    rng = np.random.default_rng(seed)
+
+    def decades(low: float, high: float) -> float:
+        return float(f"{10 ** rng.uniform(low, high):.6g}")
+
+    made = []
+    for _ in range(count):
+        arm = Arm(
+            L=decades(-1, 1), b=decades(-3, -1), h=decades(-3.5, -2), E=decades(9, 11.5), rho=decades(2.5, 4),
+            m_b=decades(-1, 2), zeta=float(rng.choice([0.0, 0.0, 0.01, 0.3])),
+        )  # fmt: skip
+        stiff = float(arm.EI) / float(arm.L) ** 3
+        mass = float(arm.rhoA) * float(arm.L)
+        made.append(
+            arm.replace(
+                k_t=float(f"{stiff * decades(-3, 7):.6g}"),
+                k_r=float(f"{stiff * float(arm.L) ** 2 * decades(-3, 7):.6g}"),
+                m_e=float(f"{mass * decades(-3, 2):.6g}"),
+                J_e=float(rng.choice([0.0, float(f"{mass * float(arm.L) ** 2 * decades(-5, 0):.6g}")])),
+            )
+        )
+    return made
+
+
+def extreme_arms() -> list[Arm]:
+    """Return the nominal arm with stiffnesses of 0, 1e-9, 1e12 and infinity and tip masses from none to huge."""
+    nominal = Arm.nominal()
+    made = [nominal.replace(k_t=k_t, k_r=k_r) for k_t in _STIFFNESSES for k_r in _STIFFNESSES]
+    made += [nominal.replace(k_t=k, k_r=k, m_e=m) for k in (0.0, 50.0, np.inf) for m in (0.0, 1e6)]
+    made += [
+        nominal.replace(k_t=50.0, k_r=k, J_e=j, m_e=m) for k in (0.0, 5.0) for j in (1e-9, 1e3) for m in (0.0, 1.0)
+    ]
+    return made
+
+
+def arm_checks(*, everything: bool) -> Iterator[Check]:
+    """Yield the checks of an exported arm.
+
+    Parameters
+    ----------
+    everything : bool
+        Not only frequencies but also modes, sensitivities, responses, state space and stability.
+    """
+    arms = [Arm.nominal(), *extreme_arms(), *random_arms(24)]
+    for number, arm in enumerate(arms):
+        kappa_t, kappa_r, mu, iota = (float(x) for x in (arm.kappa_t, arm.kappa_r, arm.mu, arm.iota))
+        groups = kappa_t, kappa_r, mu, iota
+        yield Check("frequency_parameters", groups, _row(frequency_parameters(kappa_t, kappa_r, mu, iota, 6)))
+        yield Check("natural_frequencies", _numbers(arm), _row(natural_frequencies(arm, modes=4)))
+        for lam in (0.0, 0.7, 1.6, 4.0 + number / 7, 30.0):  # below and above the change to exponentials
+            for order, (value, scale) in enumerate(zip(*characteristic(kappa_t, kappa_r, mu, iota, lam), strict=True)):
+                yield Check("characteristic", (*groups, lam, order), (value,), TOLERANCE * scale)
+        if everything:
+            yield from _modal_checks(arm)
+            yield from _response_checks(arm)
+            yield from _system_checks(arm)
+
+
+def _row(values: Any) -> tuple[float, ...]:
+    return tuple(np.asarray(values, float).ravel().tolist())
+
+
+def _numbers(arm: Arm, *more: float) -> tuple[float, ...]:
+    return (*(float(getattr(arm, name)) for name in FIELDS), *map(float, more))
+
+
+def _check(quantity: str, inputs: tuple[float, ...], values: Any, loss: float = 0.0) -> Check:
+    row = _row(values)
+    return Check(quantity, inputs, row, TOLERANCE * loss * float(np.max(np.abs(row), initial=0.0)))
+
+
+_MODAL = (
+    "omega", "participation", "root_displacement", "root_slope", "root_moment", "root_shear", "tip_displacement",
+    "tip_slope",
+)  # fmt: skip
+
+
+def _modal_checks(arm: Arm) -> Iterator[Check]:
+    modal, count = modal_parameters(arm, 4), 4
+    for name in _MODAL:
+        yield _check(name, _numbers(arm), getattr(modal, name), float(name != "omega"))
+    places = np.linspace(0.0, 1.0, 9) * float(arm.L)
+    for derivative in range(4):
+        table = mode_shapes(arm, places, count, derivative)
+        absolute = TOLERANCE * float(np.max(np.abs(table)))
+        for k in (0, 3, 8):
+            yield Check("mode_shape", _numbers(arm, places[k], derivative), _row(table[:, k]), absolute)
+    if (modal.frequency > 0).all():
+        found = sensitivities(arm, count)
+        for name in ("df_dk_t", "df_dk_r", "log_k_t", "log_k_r"):
+            yield _check(name, _numbers(arm), getattr(found, name), 1.0)
+
+
+def _response_checks(arm: Arm) -> Iterator[Check]:
+    omega = float(modal_parameters(arm, 3).omega[2])
+    period = 2 * np.pi / omega
+    motions = [
+        (0.1, 0.0, 0.0, 0.0, 0.0),
+        (0.0, 0.2, 1e-3, 0.9 * omega, 0.3),
+        (0.05, -0.1, 1e-3, omega, np.pi),
+        (0.0, 0.0, 1e-3, 0.01 * omega, 1.0),
+    ]
+    for motion in motions:
+        base = cra.BaseMotion(*motion)
+        times = np.array([0.0, 1e-4, 0.03, 0.4, 7.3]) * period
+        values = np.asarray(tip_response(arm, base, times, modes=4))
+        scale = float(np.max(np.abs(values))) + float(np.max(np.abs(base.displacement(times))))
+        for t, value in zip(times, values, strict=True):
+            yield Check("tip_response", _numbers(arm, *motion, t), (float(value),), TOLERANCE * scale)
+
+
+def _system_checks(arm: Arm) -> Iterator[Check]:
+    modal = modal_parameters(arm, 3)
+    whole = arm.m_b + arm.m_e + arm.rhoA * arm.L
+    rest = whole - np.sum(modal.participation**2)
+    for name, kind in (("acceleration", "base_acceleration"), ("force", "drive_force")):
+        system = state_space_module.state_space(arm, 3, kind)  # type: ignore[arg-type]
+        loss = float(whole / rest) if name == "force" else 1.0  # the base alone moves what the modes leave of the mass
+        for part in "ABC":
+            yield _check(f"state_space_{name}_{part}", _numbers(arm), getattr(system, part), loss)
+    joint = 1.0 * modal.stiffness_translation + 0.5 * modal.stiffness_rotation
+    yield _check("excitation_joint", _numbers(arm, 1.0, 0.5), joint, 1.0)
+    yield _check("excitation_axial", _numbers(arm, 1e-3, 10.0), 1e-3 * 10.0**2 * modal.axial, 1.0)
+
+
+def written(checks: Iterable[Check], subject: str) -> str:
+    """Return the text of the reference file: provenance, then one line a check."""
+    made_by = f"cra_sym {cra.__version__}, Python {platform.python_version()}, NumPy {np.__version__}"
+    head = [
+        f"# Reference vectors of {subject}.",
+        f"# Made by the kernels of {made_by}, SymPy {version('sympy')}; random arms from seed {SEED}.",
+        "# A line: quantity, absolute tolerance, number of inputs, number of outputs, inputs, outputs. SI units.",
+        f"# Agreement is |got - expected| <= {TOLERANCE:g} |expected| + absolute tolerance.",
+    ]
+    return "\n".join([*head, *(check.line() for check in checks)]) + "\n"

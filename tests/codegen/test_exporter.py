@@ -1,0 +1,67 @@
+"""What an export writes and when it does not."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+import cra_sym as cra
+from cra_sym.codegen import exporter
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Exports with a short reference file: how they are written is all that matters here."""
+    monkeypatch.setattr(exporter, "_reference", lambda everything: "# nothing\n")
+
+
+def test_the_result_lists_what_was_written(short, tmp_path):
+    made = cra.export("c", tmp_path / "out")
+    assert {"cra_arm.h", "README.md", "Makefile", "reference.txt"} <= set(made.files)
+    assert "cra_arm.h" in repr(made)
+    assert made.digest in (tmp_path / "out" / "README.md").read_text()
+    assert {*made.files, "manifest.json"} == {p.name for p in (tmp_path / "out").iterdir()}
+
+
+def test_same_input_same_bytes(tmp_path):
+    code = (
+        "import sys; from cra_sym.codegen import exporter as e\n"
+        "e._reference = lambda everything: ''\nprint(e.export('c', sys.argv[1]).digest)"
+    )
+    digests = set()
+    for seed in ("1", "2"):
+        environment = os.environ | {"PYTHONHASHSEED": seed}
+        command = [sys.executable, "-c", code, str(tmp_path / seed)]
+        digests.add(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
+    assert len(digests) == 1
+
+
+def test_a_folder_with_content_is_left_alone(short, tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    with pytest.raises(ValueError, match="not empty"):
+        cra.export("c", tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["mine.txt"]
+    cra.export("c", tmp_path, overwrite=True)
+    assert (tmp_path / "mine.txt").read_text() == "mine" and (tmp_path / "cra_arm.h").exists()
+    cra.export("python", tmp_path, overwrite=True)
+    assert (tmp_path / "mine.txt").exists() and not (tmp_path / "cra_arm.h").exists()
+    assert not [p for p in tmp_path.parent.iterdir() if p.name.startswith(".")]
+
+
+def test_a_failed_export_leaves_nothing(tmp_path, monkeypatch):
+    def fail(everything):
+        raise ArithmeticError
+
+    monkeypatch.setattr(exporter, "_reference", fail)
+    with pytest.raises(ArithmeticError):
+        cra.export("c", tmp_path / "out")
+    assert not list(tmp_path.iterdir())
+
+
+def test_unknown_language_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"language = 'cobol': allowed are c, fortran"):
+        cra.export("cobol", tmp_path / "out")
+    assert not list(tmp_path.iterdir())
