@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import sympy as sp
+
 from cra_sym.codegen.printers import PRINTERS, ScalarPrinter
 from cra_sym.codegen.program import Argument, Branch, Function
 
@@ -61,6 +63,8 @@ class Language:
         )
 
     def _body(self, function: Function, branch: Branch, printer: ScalarPrinter, indent: str) -> list[str]:
+        everything = [*(value for _, value in branch.steps), *branch.outputs]
+        printer.guarded = any(value.has(sp.Piecewise) for value in everything)
         lines = [
             printer.wrapped(self.step.format(name=function.places[symbol].name, value=printer.doprint(value)), indent)
             for symbol, value in branch.steps

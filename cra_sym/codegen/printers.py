@@ -50,6 +50,8 @@ class ScalarPrinter(CodePrinter):
         super().__init__()
         self.places = places
 
+    guarded = False  # whether a quotient may be one that a later choice discards
+
     def number(self, value: float) -> str:
         """Return a literal that reads back as exactly this double."""
         return repr(value)
@@ -275,6 +277,14 @@ class PythonPrinter(ScalarPrinter, PythonCodePrinter):
     choice = "({value} if {condition} else {otherwise})"
     both, either, negation = "and", "or", "(not {})"
     power = "math.pow({base}, {exponent})"
+
+    def _print_Mul(self, expr: sp.Mul) -> str:
+        if not (self.guarded and any(f.is_Pow and f.exp == -1 for f in expr.args)):
+            return super()._print_Mul(expr)
+        return "*".join(self.parenthesize(factor, PRECEDENCE["Mul"]) for factor in expr.args)
+
+    def _print_Pow(self, expr: sp.Pow) -> str:
+        return f"inverse({self._print(expr.base)})" if self.guarded and expr.exp == -1 else super()._print_Pow(expr)
 
     def wrapped(self, text: str, indent: str) -> str:
         if len(indent + text) <= 110:

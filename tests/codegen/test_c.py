@@ -53,12 +53,14 @@ def test_no_memory_no_input_no_output(folder):
     symbols = [line.split() for line in run("nm", "libcra_arm.a", cwd=folder).splitlines()]
     wanted = {s[-1] for s in symbols if s[-2:-1] == ["U"]}
     assert wanted <= {"sqrt", "exp", "expm1", "sin", "cos", "sincos", "atan2", "cra_pair", "cra_groups_of",
-                      "cra_frequency_parameters", "_GLOBAL_OFFSET_TABLE_", "memset", "memcpy", "__stack_chk_fail"}  # fmt: skip
+                      "cra_frequency_parameters", "_GLOBAL_OFFSET_TABLE_", "memset", "memcpy", "memmove", "fmax", "fmin", "__stack_chk_fail"}  # fmt: skip
     assert not [s for s in symbols if s[-2:-1] and s[-2] in "BDCbd"]  # no variable
 
 
 class _Arm(ctypes.Structure):
-    _fields_ = [(name, ctypes.c_double) for name in ("L", "b", "h", "E", "rho", "m_b", "m_e", "J_e", "k_t", "k_r", "zeta")]
+    _fields_ = [
+        (name, ctypes.c_double) for name in ("L", "b", "h", "E", "rho", "m_b", "m_e", "J_e", "k_t", "k_r", "zeta")
+    ]
 
 
 @pytest.fixture(scope="module")
