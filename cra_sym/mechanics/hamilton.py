@@ -12,7 +12,7 @@ from sympy.core.function import AppliedUndef
 from sympy.core.symbol import uniquely_named_symbol
 
 from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces, varied_form
-from cra_sym.mechanics.jets import HamiltonError, Jet, JetSpace
+from cra_sym.mechanics.jets import HamiltonError, Jet, JetSpace, listed
 from cra_sym.mechanics.steps import Step, compact_latex
 from cra_sym.mechanics.variation import Variation, VirtualWork, vary
 
@@ -132,7 +132,8 @@ def hamilton(
     """
     space = JetSpace(fields, coordinates, x, t, domain, prescribed)
     left, right = _optional(left), _optional(right)
-    virtual_work, essential = tuple(virtual_work or ()), tuple(essential or ())
+    virtual_work = listed("virtual_work", () if virtual_work is None else virtual_work)
+    essential = listed("essential", () if essential is None else essential)
     variation = vary(space, density, {"left": left, "right": right}, virtual_work, essential)
     forces = GeneralisedForces.of(variation)
     field_equations = tuple(forces.field_equation(number) for number in range(len(space.fields)))

@@ -38,7 +38,7 @@ from sympy import (
 )
 from sympy.core.function import AppliedUndef, Derivative, UndefinedFunction
 
-__all__ = ["END_NAMES", "End", "HamiltonError", "Jet", "JetSpace", "grouped"]
+__all__ = ["END_NAMES", "End", "HamiltonError", "Jet", "JetSpace", "grouped", "listed"]
 
 End = Literal["left", "right"]
 END_NAMES: tuple[End, End] = ("left", "right")
@@ -49,6 +49,13 @@ _NOT_LOCAL = (Integral, Sum)
 
 class HamiltonError(ValueError):
     """A Lagrangian that cannot be treated; the message names the term and the reason."""
+
+
+def listed(name: str, values: Any) -> tuple[Any, ...]:
+    """Return ``values`` as a tuple, or raise an error that names the argument."""
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise TypeError(f"{name} = {values!r}: allowed is a sequence such as [{values}]")
+    return tuple(values)
 
 
 class Jet(NamedTuple):
@@ -84,14 +91,15 @@ class JetSpace:
         domain: tuple[Expr, Expr],
         prescribed: Sequence[AppliedUndef] = (),
     ) -> None:
-        self.fields, self.coordinates, self.x, self.t = tuple(fields), tuple(coordinates), x, t
+        self.fields, self.coordinates = listed("fields", fields), listed("coordinates", coordinates)
+        self.x, self.t = x, t
         self._check_symbols()
         self.unknowns = (*self.fields, *self.coordinates)
-        ends = tuple(sympify(end, strict=True) for end in domain)
+        ends = tuple(sympify(end, strict=True) for end in listed("domain", domain))
         if len(ends) != 2 or ends[0] == ends[1] or any(end.has(x, t) for end in ends):
             raise HamiltonError(f"domain = {domain}: allowed are two different end coordinates free of {x} and {t}")
         self.ends: dict[End, Expr] = dict(zip(END_NAMES, ends, strict=True))
-        self.known = {function.func for function in prescribed}
+        self.known = {function.func for function in listed("prescribed", prescribed)}
         self._heads = {unknown.func: number for number, unknown in enumerate(self.unknowns)}
         if len(self._heads) != len(self.unknowns):
             raise HamiltonError(f"fields and coordinates {self.unknowns}: each may be named once only")
@@ -209,8 +217,8 @@ class JetSpace:
         HamiltonError
             Names the term and the reason.
         """
-        if isinstance(expression, str):
-            raise TypeError(f"{label} = {expression!r}: allowed is a SymPy expression, not text")
+        if expression is None or isinstance(expression, str):
+            raise TypeError(f"{label} = {expression!r}: allowed is a SymPy expression")
         expression = sympify(expression, strict=True)
         if not isinstance(expression, Expr):
             raise TypeError(f"{label} = {expression}: allowed is a scalar SymPy expression")

@@ -39,13 +39,24 @@ class Ritz:
         Raises
         ------
         ValueError
-            If there are fewer unknowns than modes, or the structure has buckled.
+            If there are fewer unknowns than modes, a motion has no kinetic energy, the Lagrangian has gyroscopic terms
+            or the virtual work follower forces, or the structure has buckled.
+
+        Notes
+        -----
+        Dampers are left out. Rounding grows with the number of elements, the faster the higher the derivatives of the
+        density, and can then lift or lower the first frequencies: compare two meshes.
         """
         modes = count("modes", modes, high=self.matrices.free)
         given = Values.read(self.symbols, values)
         squares = np.empty((given.columns.shape[1], modes))
-        for row, stiffness, _, mass in self._numbers(given):
-            squares[row] = eigh(stiffness, mass, eigvals_only=True, subset_by_index=(0, modes - 1))
+        for row, stiffness, damping, mass in self._numbers(given):
+            if _asymmetric(damping) or _asymmetric(stiffness):
+                raise ValueError("natural frequencies need symmetric stiffness and damping; use eigenvalues")
+            try:
+                squares[row] = eigh(stiffness, mass, eigvals_only=True, subset_by_index=(0, modes - 1))
+            except np.linalg.LinAlgError:
+                raise ValueError("values: the kinetic energy is not positive for all motions of the elements") from None
             scale = np.trace(stiffness) / np.trace(mass)
             if squares[row, 0] < -1e-9 * scale:
                 raise ValueError(f"the structure has buckled: omega^2 = {squares[row, 0]:.6g} (rad/s)^2")
@@ -132,6 +143,10 @@ class Ritz:
             held[place] = value
         _, size, adjoint = np.linalg.svd(held @ restraint)
         return restraint @ adjoint[int((size > 1e-12 * size.max()).sum()) :].T
+
+
+def _asymmetric(matrix: np.ndarray) -> bool:
+    return bool(np.abs(matrix - matrix.T).max() > 1e-12 * np.abs(matrix).max())
 
 
 def _quadratic_eigenvalues(mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray) -> np.ndarray:

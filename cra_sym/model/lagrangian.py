@@ -14,6 +14,7 @@ from sympy.core.function import AppliedUndef
 from cra_sym.checks import count, real_array
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics import HamiltonResult, Modal, StateForm, hamilton, ritz, separate, state_form
+from cra_sym.mechanics.jets import listed
 from cra_sym.model.forced import driven_displacement, steady_states
 from cra_sym.model.galerkin import Ritz
 from cra_sym.model.modes import Modes
@@ -92,17 +93,17 @@ class Model:
         units: Mapping[Any, str] | None = None,
     ) -> None:
         self._options: dict[str, Any] = {
-            "fields": tuple(fields),
-            "coordinates": tuple(coordinates),
+            "fields": listed("fields", fields),
+            "coordinates": listed("coordinates", coordinates),
             "x": x,
-            "domain": tuple(domain),
+            "domain": listed("domain", domain),
             "t": t,
             "left": left,
             "right": right,
-            "essential": tuple(essential or ()),
+            "essential": listed("essential", () if essential is None else essential),
         }
         self._density = density
-        self._virtual_work = tuple(virtual_work or ())
+        self._virtual_work = listed("virtual_work", () if virtual_work is None else virtual_work)
         self.equations: HamiltonResult = hamilton(density, virtual_work=self._virtual_work, **self._options)
         """Equations of motion, boundary conditions and the steps that led there."""
         given = ((f"{end} end", self._options[end]) for end in ("left", "right"))

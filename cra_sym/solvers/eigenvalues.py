@@ -106,6 +106,8 @@ def _upper_bounds(problem: DynamicStiffness, static: Evaluation, modes: int):
     """
     rows = len(static.matrix)
     mass, frame = np.linalg.eigh(-static.derivative)
+    if (mass[:, 0] < -1e-6 * np.abs(mass).max(axis=1)).any():
+        raise ValueError("values: a static deflection has negative kinetic energy; allowed are masses of at least 0")
     whitener = frame / np.sqrt(np.maximum(mass, 1e-14 * mass.max(axis=1, keepdims=True)))[:, None, :]
     bounds = np.linalg.eigvalsh(np.swapaxes(whitener, -1, -2) @ static.matrix @ whitener)
     guess = np.full((rows, modes), np.nan)

@@ -414,6 +414,16 @@ def test_text_and_wrong_kinds_are_type_errors():
         hamilton(BEAM, fields=[Function("v")], x=x, domain=(0, L), t=t)
     with pytest.raises(TypeError, match="x = "):
         hamilton(BEAM, fields=[v], x=1, domain=(0, L), t=t)
+    with pytest.raises(TypeError, match="density = None"):
+        hamilton(None, fields=[v], x=x, domain=(0, L), t=t)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("fields", v), ("coordinates", w), ("domain", L), ("essential", at(v, 0)), ("virtual_work", F)]
+)
+def test_a_single_thing_for_a_sequence_is_named(name, value):
+    with pytest.raises(TypeError, match=f"{name} = .*allowed is a sequence"):
+        hamilton(BEAM, **{"fields": [v], "x": x, "domain": (0, L), "t": t, name: value})
 
 
 def test_smooth_nonlinear_functions_are_varied():

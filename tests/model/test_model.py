@@ -63,11 +63,32 @@ def test_values_by_symbol_or_by_name_and_broadcasting(arm):
         ({m_e: np.inf}, "m_e = inf: allowed only for a stiffness of an end"),
         ({k_t: -np.inf}, "k_t = -inf"),
         ({EI: 0.0}, "infinite"),
+        ({rhoA: -0.24, m_e: 0.0}, "negative kinetic energy"),
     ],
 )
 def test_values_that_are_refused(arm, change, message):
     with pytest.raises(ValueError, match=message):
         arm.natural_frequencies({**VALUES, **change})
+
+
+def test_elements_refuse_what_has_no_real_spectrum():
+    string = HALF * rhoA * v.diff(t) ** 2 - HALF * N * v.diff(x) ** 2
+    gyroscopic = model(string + c * v.diff(x) * v.diff(t), None, None, essential=[v.subs(x, 0), v.subs(x, L)])
+    with pytest.raises(ValueError, match="symmetric"):
+        gyroscopic.ritz(4).natural_frequencies({rhoA: 0.7, N: 2.0, c: 0.4, L: 1.3})
+    massless = model(-HALF * N * v.diff(x) ** 2, None, TIP, essential=[v.subs(x, 0)])
+    with pytest.raises(ValueError, match="kinetic energy is not positive"):
+        massless.ritz(4).natural_frequencies({N: 2.0, m_e: 0.3, L: 1.3})
+
+
+def test_waves_in_a_travelling_string_turn_with_it():
+    """Exact and elements: omega = n pi T / (L sqrt(c^2 + rho T)), from its two wave numbers."""
+    string = HALF * rhoA * v.diff(t) ** 2 - HALF * N * v.diff(x) ** 2
+    travelling = model(string + c * v.diff(x) * v.diff(t), None, None, essential=[v.subs(x, 0), v.subs(x, L)])
+    values = {rhoA: 0.7, N: 2.0, c: 0.4, L: 1.3}
+    expected = np.arange(1, 4) * np.pi * 2.0 / (1.3 * np.sqrt(0.4**2 + 0.7 * 2.0))
+    np.testing.assert_allclose(travelling.eigenvalues(values).imag, expected, rtol=1e-11)
+    np.testing.assert_allclose(travelling.ritz(16).eigenvalues(values).imag, expected, rtol=1e-5)
 
 
 def test_a_missing_value_is_named(arm):
