@@ -77,7 +77,9 @@ def natural_frequencies(arm: Arm, modes: int = 3) -> np.ndarray:
     >>> print(natural_frequencies(Arm.nominal().replace(m_e=0)).round(3))
     [ 2.448 15.339 42.95 ]
     """
-    return _angular_frequencies(arm, _lambda(arm, modes)) / (2 * np.pi)
+    frequency = _angular_frequencies(arm, _lambda(arm, modes))
+    frequency /= 2 * np.pi
+    return frequency
 
 
 def mode_shapes(arm: Arm, x: Any, modes: int = 3, derivative: int = 0) -> np.ndarray:
@@ -238,7 +240,9 @@ def _modes(arm: Arm, modes: int) -> Modes:
 
 
 def _angular_frequencies(arm: Arm, lam: np.ndarray) -> np.ndarray:
-    return _column(arm.angular_frequency_scale) * lam**2
+    omega = lam**2
+    omega *= _column(arm.angular_frequency_scale)  # in place: fresh memory costs more than the product
+    return omega
 
 
 def _column(value: float | np.ndarray, axes: int = 1) -> float | np.ndarray:

@@ -112,7 +112,8 @@ def _basis(z: np.ndarray) -> tuple[np.ndarray, ...]:
 
 COMPILE_FROM = 300_000
 """Roots in one call from where on loading or compiling machine code costs less than it saves."""
-_ROOTS_PER_THREAD = 30_000
+_ROOTS_PER_PART = 30_000  # that are worth handing out
+_PARTS_PER_THREAD = 8  # so that a thread on a busy processor keeps nobody waiting
 _BLOCK = 32_768  # points and roots whose temporaries stay in the processor's cache
 
 
@@ -152,7 +153,8 @@ def wants_compiler(roots: int, compile: bool | None) -> bool:
 def in_parts(fill: Callable[[slice], Any], lanes: int, modes: int, *, threads: int | None, compiled: bool) -> None:
     """Call ``fill`` for all lanes, part by part: in threads if compiled, else in blocks that fit the cache."""
     threads = (threads or _processors()) if compiled else 1
-    share = max(-(-lanes // threads), _ROOTS_PER_THREAD // modes, 1) if compiled else max(_BLOCK // (modes + 4), 1)
+    fair = -(-lanes // (threads if threads == 1 else _PARTS_PER_THREAD * threads))
+    share = max(fair, _ROOTS_PER_PART // modes, 1) if compiled else max(_BLOCK // (modes + 4), 1)
     parts = [slice(start, min(start + share, lanes)) for start in range(0, lanes, share)]
     if threads == 1 or len(parts) <= 1:
         for part in parts:

@@ -122,7 +122,7 @@ def _entries(prelude: str, template: str) -> SimpleNamespace:
             namespace[name] = numba.njit(**_OPTIONS)(function)
             namespace[name]._cache = _StoredCode(digest, name)
         else:
-            namespace[name] = numba.njit(**_INLINED)(function)
+            namespace[name] = numba.njit(pipeline_class=_helper_pipeline(), **_INLINED)(function)
     return SimpleNamespace(**{name: namespace[name] for name in entries if not name.startswith("_")})
 
 
@@ -135,6 +135,45 @@ def _functions(text: str, filename: str, namespace: dict[str, Any]) -> dict[str,
         for name, value in namespace.items()
         if isinstance(value, FunctionType) and value.__code__.co_filename == filename
     }
+
+
+@cache
+def _helper_pipeline() -> Any:
+    """Return the compiler of helpers: what is inlined is optimised once, where it ends up, and nowhere else."""
+    from numba.core.codegen import JITCodeLibrary
+    from numba.core.compiler import CompilerBase, DefaultPassBuilder
+    from numba.core.compiler_machinery import register_pass
+    from numba.core.typed_passes import NativeLowering
+
+    class Linked(JITCodeLibrary):
+        """Code to be linked into other code, never to be run on its own."""
+
+        def _optimize_final_module(self) -> None: ...
+
+        def _finalize_final_module(self) -> None:
+            self._finalized = True
+
+    @register_pass(mutates_CFG=True, analysis_only=False)
+    class Lowering(NativeLowering):
+        _name = "cra_sym_helper_lowering"
+
+        def run_pass(self, state: Any) -> bool:
+            state.library = Linked(state.targetctx.codegen(), state.func_id.func_qualname)
+            state.flags.no_compile = True
+            super().run_pass(state)
+            key: Any = [].append  # stands for the function that is never made: any built-in one, unlike all others
+            state.targetctx.insert_user_function(key, state["cr"].fndesc, [state.library])
+            state["cr"] = state["cr"]._replace(cfunc=key)
+            return True
+
+    class Pipeline(CompilerBase):
+        def define_pipelines(self) -> list[Any]:
+            manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
+            manager.passes = [(Lowering if p is NativeLowering else p, why) for p, why in manager.passes]
+            manager.finalize()
+            return [manager]
+
+    return Pipeline
 
 
 class _StoredCode:

@@ -197,14 +197,11 @@ def _step(z, k, h, lane):
 def _climb(z, previous, fresh, ahead, active, evaluations, number, zeros, k, h, size):
     """Climb to the zeros: twice with all lanes, then with those that are not there yet."""
     even = number & 1 == 0
-    for lane in range(size):
-        value, step = _step(z[lane], k, h, lane)
-        previous[lane] = step
-        fresh[lane] = z[lane] + (step if (value > 0) == even else -step)
-    for lane in range(size):
-        value, step = _step(fresh[lane], k, h, lane)
-        ahead[lane] = step
-        z[lane] = fresh[lane] + (step if (value > 0) == even else -step)
+    for _ in range(2):
+        for lane in range(size):
+            value, step = _step(z[lane], k, h, lane)
+            previous[lane], ahead[lane] = ahead[lane], step
+            z[lane] += step if (value > 0) == even else -step
     left = 0
     for lane in range(size):
         if number < zeros[lane]:
