@@ -1,4 +1,4 @@
-"""``make reproduce``: every notebook, figure and table into one folder, and a word on what was made."""
+"""``make reproduce``: every notebook, figure and table, and a report of them, in one folder."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from tqdm import tqdm
 
 from cra_sym.files import staged_directory, write_text
 from cra_sym.report.notebooks import find_notebooks, refresh
+from cra_sym.report.page import write_page
 from cra_sym.report.pictures import save_figures
 from cra_sym.report.tables import TABLES
 
@@ -17,7 +18,7 @@ __all__ = ["reproduce"]
 
 
 def reproduce(output: str | Path, notebooks: str | Path | None = None) -> str:
-    """Run every notebook and write them, the figures and the tables to one folder.
+    """Run every notebook and write them, the figures, the tables and the report to one folder.
 
     Parameters
     ----------
@@ -43,9 +44,10 @@ def reproduce(output: str | Path, notebooks: str | Path | None = None) -> str:
         _run_notebooks(sources[0].parent, folder / "notebooks")
         save_figures(folder / "figures")
         _write_tables(folder / "tables")
+        write_page(folder)
         made = [path for path in folder.rglob("*") if path.is_file()]
         listing = _listing(folder, made)
-    return f"{listing}\n\nEverything is in {Path(output)}"
+    return f"{listing}\n\nTo read everything, open {Path(output) / 'report.html'}"
 
 
 def _run_notebooks(source: Path, folder: Path) -> None:
