@@ -38,7 +38,7 @@ Outcome = Literal["holds", "holds where", "contradicted", "undecidable"]
 OUTCOMES: tuple[str, ...] = get_args(Outcome)
 THEMES = ("modes", "responses", "stability")
 
-_HOMES = ("modes", "sensitivity", "responses", "comparisons")
+_HOMES = ("modes", "sensitivity", "responses", "comparisons", "stability", "zones")
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,248 @@
+"""Claims on what makes the arm parametrically unstable, and near which frequencies: C14, C15 and C19."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cra_sym.arm.analysis import modal_parameters
+from cra_sym.arm.excitation import AxialBase, JointStiffness
+from cra_sym.arm.stability import AsymptoticWarning, growth_rate, stability_boundary
+from cra_sym.claims.ledger import Finding, Quantity, Verdict, claimed, outcome, pictured
+from cra_sym.claims.motions import tip
+from cra_sym.claims.pictures import PALETTE, STYLES, note
+from cra_sym.claims.setting import Setting
+from cra_sym.claims.words import listed, number, percent
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from cra_sym.arm.parameters import Arm
+
+KINDS = ("transverse base", "joint stiffness", "axial base")
+_WORDS = {
+    "joint stiffness": "a joint whose stiffness fluctuates, k_t (1 + epsilon cos varpi t)",
+    "axial base": "the same disturbance along the arm, u = epsilon u_0 cos varpi t",
+}
+
+
+_NO_GROWTH = 1e-9  # 1/s: what rounding makes of no growth at all
+
+
+def zone(arm: Arm, excitation: Any, epsilon: Any, resonance: tuple[int, int], **options: Any) -> tuple[Any, Any]:
+    """Return a stability boundary wherever its expansion is formally defined, as the paper draws it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AsymptoticWarning)
+        return stability_boundary(arm, excitation, epsilon, resonance, **options)
+
+
+def _terms(kind: str) -> tuple[bool, bool]:
+    """Tell whether an excited arm's equations have time-dependent coefficients, and whether they force an arm at "
+    "rest."""
+    from sympy import Function, Symbol
+
+    from cra_sym.arm.evaluation import put
+    from cra_sym.arm.parametric import AXIAL, TRANSVERSE, excited_motion, t, u, v, w, x
+
+    motion = excited_motion(kind)
+    size, shape = Symbol("size"), Function("shape")(x)
+    parametric = forced = False
+    for equation in (*motion.field_equations, *motion.boundary_conditions):
+        residual = put(equation.lhs - equation.rhs, {v: size * shape, u: AXIAL, w: TRANSVERSE}).doit()
+        parametric |= residual.diff(size).expand().has(t)
+        forced |= residual.subs(size, 0).doit().has(t)
+    return parametric, forced
+
+
+@claimed(
+    "C14",
+    "stability",
+    "Section 5.2, (35) and (36)",
+    "a shaken base is a parametric system",
+    "Substituting (35) into (11) yields [(36)]. Equation (36) defines a parametric vibration system, in which "
+    "instability "
+    "may occur under suitable conditions",
+)
+def _(setting: Setting) -> Finding:
+    found = {kind: _terms(kind) for kind in KINDS}
+    arm = setting.arm.replace(k_t=setting.soft_k_t)
+    omega = float(modal_parameters(arm, 2).omega[1])
+    rate = float(growth_rate(arm, JointStiffness(), 2 * omega, setting.epsilon, residual=True))
+    long = Setting.of(arm, duration=float(np.clip(10 / max(rate, 0.1), 5.0, 40.0)), modes=3)
+    base = {"amplitude": setting.epsilon * setting.amplitude}
+    swings = [tip(long, arm, base | {"angular_frequency": k * omega}) for k in (1, 2)]
+    envelope = np.maximum.accumulate(np.abs(swings), axis=-1)
+    parametric, forced = (np.array([found[kind][k] for kind in KINDS]) for k in (0, 1))
+    evidence = {
+        "parametric": Quantity(parametric, "1", "time-dependent coefficients, by excitation: transverse, joint, axial"),
+        "forced": Quantity(forced, "1", "an arm at rest is set in motion, by excitation"),
+        "times": Quantity(long.times, "s", "time"),
+        "envelope": Quantity(
+            envelope, "m", "peak so far with the transverse base at omega_2 and 2 omega_2: case, time"
+        ),
+        "growth": Quantity(rate, "1/s", "growth rate with the fluctuating joint at 2 omega_2"),
+    }
+    verdict = outcome(parametric[:1])
+    if verdict == "contradicted":
+        sentence = (
+            "A base that shakes across the arm enters (11) only as the force -Gamma_i w'': no coefficient of the "
+            "equation "
+            f"of motion or of a boundary condition depends on time. At omega_2 such a base makes the response grow in "
+            f"proportion to time, at 2 omega_2 it stays below {number(1e3 * envelope[1, -1])} mm, where a joint "
+            "fluctuating by "
+            f"{percent(setting.epsilon)} makes any vibration grow as exp({number(rate)} t), t in s."
+        )
+    else:
+        sentence = f"The equations of the shaken arm have time-dependent coefficients; it grows at {number(rate)} 1/s."
+    others = [_WORDS[kind] for kind, there in zip(KINDS[1:], parametric[1:], strict=True) if there]
+    remedy = listed(others, str, "or") if verdict == "contradicted" and others else None
+    return Finding(verdict, sentence, evidence, remedy)
+
+
+@pictured("C14")
+def _(verdict: Verdict, ax: Axes) -> None:
+    t, start = verdict["times"], 1e3 * verdict["envelope"][1, -1]
+    labels = ("across, at $\\omega_2$", "across, at $2\\omega_2$")
+    for k, (curve, label) in enumerate(zip(verdict["envelope"], labels, strict=True)):
+        ax.semilogy(t[1:], 1e3 * curve[1:], color=PALETTE[k], ls=STYLES[k], label=label)
+    growing = start * np.exp(float(verdict["growth"]) * t)
+    ax.semilogy(t, growing, color=PALETTE[2], ls=STYLES[2], label="joint, at $2\\omega_2$")
+    ax.set(xlabel="time $t$ / s", ylabel="peak of $|v(L,t)|$ so far / mm", xlim=(t[0], t[-1]))
+    ax.set_ylim(0.3 * start, 3 * max(growing.max(), 1e3 * verdict["envelope"].max()))
+    ax.legend(fontsize=8)
+
+
+@claimed(
+    "C15",
+    "stability",
+    "Section 5.2, (48) and (49)",
+    "(48) gives the boundary (49)",
+    "Equation (48) keeps similar form to the resulting equation in [16, 17]; thus ... the stability boundary can be "
+    "similarly "
+    "expressed by [(49)]",
+)
+def _(setting: Setting) -> Finding:
+    from sympy.core.function import AppliedUndef
+
+    from cra_sym.arm.boundaries import forced_resonance, general_resonance, n
+    from cra_sym.mechanics.two_scales import conjugate_amplitude
+
+    derived = [forced_resonance(), general_resonance("principal", 1, damped=False)]
+    bounded = np.array([scales.border is not None for scales in derived])
+    slow = [{f.func.__name__ for e in scales.amplitude_equations for f in e.atoms(AppliedUndef)} for scales in derived]
+    conjugate = np.array([conjugate_amplitude(n).name in names for names in slow])
+    arm = setting.arm.replace(k_t=setting.soft_k_t)
+    omega = modal_parameters(arm, 3).omega
+    excitations = (JointStiffness(), AxialBase(setting.amplitude))
+    sides = np.array([[zone(arm, e, setting.epsilon, (k, k)) for k in (1, 2, 3)] for e in excitations])
+    centre, half = sides.mean(-1), np.diff(sides)[..., 0] / 2
+    probes = np.linspace(-1.5, 1.5, 61)
+    rates = np.stack(
+        [
+            growth_rate(arm, e, centre[i, 1] + probes * half[i, 1], setting.epsilon, modes=3)
+            for i, e in enumerate(excitations)
+        ]
+    )
+    evidence = {
+        "bounded": Quantity(bounded, "1", "whether a boundary follows: forced (transverse base), parametric"),
+        "conjugate": Quantity(
+            conjugate, "1", "whether the amplitude equation has the conjugate amplitude: the same two"
+        ),
+        "centre": Quantity(centre / omega, "1", "centre of the zone over omega_n: excitation (joint, axial), mode"),
+        "detuning": Quantity(probes, "1", "detuning from 2 omega_2 over the derived half-width"),
+        "growth": Quantity(rates, "1/s", "growth rate by Floquet theory about 2 omega_2: excitation, detuning"),
+    }
+    verdict = outcome(bounded[:1], conjugate[:1])
+    sentence = (
+        "The printed (48) is lost. Derived from (36) as the paper builds it, the amplitude equation is A_n' = const "
+        "times "
+        f"exp(i sigma T1): {'with' if conjugate[0] else 'without'} the conjugate amplitude that makes a zone, so "
+        f"{'a' if bounded[0] else 'no'} boundary follows. It does for axially moving beams, whose speed stands in the "
+        f"coefficients. With a parametric excitation the zones sit at {number(evidence['centre'].values.mean(), 4)} "
+        "omega_n, "
+        f"not at omega_n, and Floquet theory confirms them."
+    )
+    remedy = None
+    inside = np.abs(probes) < 0.8
+    if verdict == "contradicted" and bounded[1] and (rates[:, inside] > 0).all():
+        remedy = f"{listed(_WORDS.values(), str, 'or')}; and the detuning (42) counted from 2 omega_n"
+    return Finding(verdict, sentence, evidence, remedy)
+
+
+@pictured("C15")
+def _(verdict: Verdict, ax: Axes) -> None:
+    for k, (curve, label) in enumerate(zip(verdict["growth"], ("joint stiffness", "axial base"), strict=True)):
+        ax.plot(verdict["detuning"], curve / curve.max(), color=PALETTE[k + 1], ls=STYLES[k], label=label)
+    ax.axvspan(-1, 1, color="#BFE3D6", alpha=0.6, lw=0)
+    ax.set(xlabel="detuning from $2\\omega_2$ / derived half-width", ylabel="growth rate / largest", ylim=(0, 1.3))
+    ax.set_xlim(-1.5, 1.5)
+    ax.legend(fontsize=8, loc="upper right")
+    note(ax, "green: derived zone", "upper left")
+
+
+@claimed(
+    "C19",
+    "stability",
+    "Section 5.2, (42)",
+    "resonance at any $\\omega_n$",
+    "If the variation frequency approaches any natural frequency of the system, the parametric resonance may occur",
+)
+def _(setting: Setting) -> Finding:
+    arm = setting.arm.replace(k_t=setting.soft_k_t, zeta=0.0)
+    epsilon = np.geomspace(0.02, 0.3, 8)
+    zeta = np.array([0.0, 1e-5, 1e-4, 1e-3, 1e-2])
+    omega = float(modal_parameters(arm, 2).omega[1])
+    rates = {tongue: _largest_growth(arm, epsilon, tongue) for tongue in (1, 2)}
+    logs = {tongue: np.log(np.maximum(rate, _NO_GROWTH)) for tongue, rate in rates.items()}
+    powers = [float(np.polyfit(np.log(epsilon[:5]), logs[tongue][:5], 1)[0]) for tongue in (1, 2)]
+    region = (
+        rates[2] > zeta[:, None] * omega + _NO_GROWTH
+    )  # uniform damping takes zeta omega_n from the growth of mode n
+    at = int(np.argmin(np.abs(epsilon - setting.epsilon)))
+    needed = [float(epsilon[row.argmax()]) if row.any() else np.inf for row in region]
+    evidence = {
+        "epsilon": Quantity(epsilon, "1", "depth of the joint's fluctuation"),
+        "growth_at_twice": Quantity(rates[1], "1/s", "largest growth rate near 2 omega_2, by epsilon"),
+        "growth_at_once": Quantity(rates[2], "1/s", "largest growth rate near omega_2, by epsilon"),
+        "powers": Quantity(powers, "1", "power of epsilon in the growth near 2 omega_2 and near omega_2"),
+        "zeta": Quantity(zeta, "1", "damping ratio"),
+        "region": Quantity(region, "1", "where the arm is unstable near omega_2: zeta, epsilon"),
+    }
+    reach = f"{number(epsilon[0])} to {number(epsilon[-1])}"
+    gone = [z for z, least in zip(zeta, needed, strict=True) if np.isinf(least)]
+    end = f"; a damping ratio of {percent(gone[0], 1)} removes it for epsilon of {reach}" if gone else ""
+    sentence = (
+        f"To first order only near 2 omega_n. For a fluctuating joint Floquet theory finds growth near 2 omega_2 in "
+        f"proportion to epsilon^{number(powers[0])} and near omega_2 to epsilon^{number(powers[1])}: "
+        f"{number(rates[1][at])} "
+        f"against {number(rates[2][at], 2)} 1/s at epsilon = {number(epsilon[at], 2)}. The first-order expansion "
+        "(37) cannot see "
+        f"the latter{end}."
+    )
+    if not region.any():
+        sentence = f"Only near 2 omega_n: for epsilon of {reach} nothing grows near omega_2."
+    return Finding(outcome(region), sentence, evidence)
+
+
+def _largest_growth(arm: Arm, epsilon: np.ndarray, tongue: int) -> np.ndarray:
+    """Return the largest growth rate in and around a zone of mode 2, by epsilon."""
+    low, high = zone(arm, JointStiffness(), epsilon, (2, 2), order=2, tongue=tongue)
+    centre, half = (low + high) / 2, (high - low) / 2
+    probes = centre + np.linspace(-2.5, 2.5, 101)[:, None] * half
+    return growth_rate(arm, JointStiffness(), probes, epsilon, residual=True, tolerance=1e-10).max(axis=0)
+
+
+@pictured("C19")
+def _(verdict: Verdict, ax: Axes) -> None:
+    for k, (name, label) in enumerate(
+        (("growth_at_twice", "near $2\\omega_2$"), ("growth_at_once", "near $\\omega_2$"))
+    ):
+        power = verdict["powers"][k]
+        ax.loglog(verdict["epsilon"], verdict[name], color=PALETTE[k], ls=STYLES[k], marker="o", ms=3,
+                  label=f"{label}, $\\propto\\epsilon^{{{power:.2f}}}$")  # fmt: skip
+    ax.set(xlabel="depth of the joint's fluctuation $\\epsilon$", ylabel="largest growth rate / (1/s)")
+    ax.set_xticks([0.02, 0.05, 0.1, 0.2], ["0.02", "0.05", "0.1", "0.2"])
+    ax.set_xticks([], minor=True)
+    ax.legend(fontsize=8)
