@@ -29,10 +29,12 @@ def base_motion() -> Eq:
 
 @checks(33)
 def _() -> bool:
-    """Dimensions; without disturbance the motion starts at zero with the mean velocity and the mean acceleration."""
-    mean = base_motion().rhs.subs(B, 0)
+    """Dimensions; without disturbance the motion starts at zero with the mean velocity and the mean acceleration; the
+    disturbance alone is a free vibration of angular frequency varpi, largest B."""
+    mean, alone = base_motion().rhs.subs(B, 0), base_motion().rhs.subs({v_m: 0, a_m: 0})
     start = [mean.diff(t, order).subs(t, 0) for order in range(3)]
-    return start == [0, v_m, a_m] and dimension(base_motion()) == dimension("w")
+    swings = alone.diff(t, 2) == -(varpi**2) * alone and alone.subs({t: 0, psi: pi / 2}) == B
+    return start == [0, v_m, a_m] and swings and dimension(base_motion()) == dimension("w")
 
 
 def _integral_of_cosine(phase: Expr) -> Expr:

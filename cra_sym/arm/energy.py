@@ -47,8 +47,9 @@ def displacement() -> Eq:
 
 @checks(1)
 def _() -> bool:
-    """Both sides are lengths; an arm that does not deform moves as its base."""
-    return dimension(displacement()) == Dimension(m=1) and displacement().rhs.subs(v, 0) == w
+    """Both sides are lengths; an arm that does not deform moves as its base, a base at rest leaves the deformation."""
+    seen = displacement().rhs
+    return dimension(displacement()) == Dimension(m=1) and (seen.subs(v, 0), seen.subs(w, 0)) == (w, v)
 
 
 @numbered(2, "separation of variables", "assumption")
@@ -96,10 +97,17 @@ def kinetic_energy() -> Eq:
 
 @checks(3)
 def _() -> bool:
-    """An energy; an arm that does not deform has the kinetic energy of one mass."""
-    rigid = single_mode(kinetic_energy().rhs, x * 0).doit()
+    """An energy; an arm that does not deform has the kinetic energy of one mass, one that turns rigidly about a root at
+    rest that of its moment of inertia."""
+    moved = single_mode(kinetic_energy().rhs, x * 0).doit()
+    turned = single_mode(kinetic_energy().rhs, x * q_i).subs(w, 0).doit()
     mass = m_b + m_e + rho * A * L
-    return dimension(kinetic_energy()) == ENERGY and (rigid - mass * w.diff(t) ** 2 / 2).expand() == 0
+    inertia = rho * A * L**3 / 3 + m_e * L**2 + J_e
+    return (
+        dimension(kinetic_energy()) == ENERGY
+        and (moved - mass * w.diff(t) ** 2 / 2).expand() == 0
+        and (turned - inertia * q_i.diff(t) ** 2 / 2).expand() == 0
+    )
 
 
 @numbered(4, "potential energy", "definition")
@@ -152,14 +160,15 @@ def generalised() -> tuple[Eq, Eq, Eq]:
 
 @checks(6)
 def _() -> bool:
-    """Dimensions; a shape that only translates has the arm's mass, twice, and the translational spring."""
-    mass, stiffness, participation = (put(e.rhs, {phi_i: x**0}) for e in generalised())
-    moving = rho * A * L + m_e
-    return (
-        [dimension(e) for e in generalised()] == [Dimension(kg=1), Dimension(kg=1, s=-2), Dimension(kg=1)]
-        and (mass.doit() - moving).expand() == 0
-        and (participation.doit() - moving).expand() == 0
-        and stiffness.doit() == k_t
+    """Dimensions; a shape that translates has the arm's mass, twice, and the translational spring; one that turns about
+    the root has the moment of inertia, the static moment and the rotational spring."""
+    mass, static, inertia = (rho * A * L**n / n + m_e * L ** (n - 1) for n in (1, 2, 3))
+    moved = (mass, k_t, mass)
+    turned = (inertia + J_e, k_r, static)
+    return [dimension(e) for e in generalised()] == [Dimension(kg=1), Dimension(kg=1, s=-2), Dimension(kg=1)] and all(
+        (put(e.rhs, {phi_i: shape}).doit() - known).expand() == 0
+        for shape, values in ((x**0, moved), (x, turned))
+        for e, known in zip(generalised(), values, strict=True)
     )
 
 
@@ -224,15 +233,15 @@ def _() -> bool:
         + values["k_r"] * elastic(0.0, q, 1) ** 2
         + integrate(lambda place: bending * elastic(place, q, 2) ** 2, length)
     ) / 2
-    found = [0.0, 0.0]
-    for k, e in enumerate(modal_energies()):
-        sums = list(e.rhs.atoms(ModalSum))
-        rest = e.rhs.subs({s: 0 for s in sums})
-        found[k] += float(rest.subs(w.diff(t), w_dot).subs({symbol(name): value for name, value in values.items()}))
+    found = []
+    for e in modal_energies():
+        sums = dict.fromkeys(e.rhs.atoms(ModalSum), 0.0)
         for s in sums:
             for shape, now, rate in zip(shapes, q, q_dot, strict=True):
                 numbers = {q_i.diff(t): rate, w.diff(t): w_dot, q_i: now}
-                found[k] += float(s.function.subs(numbers).subs(modal_numbers(values, shape)))
+                sums[s] += float(s.function.subs(numbers).subs(modal_numbers(values, shape)))
+        total = e.rhs.subs(sums).subs(w.diff(t), w_dot)
+        found.append(float(total.subs({symbol(name): value for name, value in values.items()})))
     return abs(found[0] / kinetic - 1) < 1e-10 and abs(found[1] / potential - 1) < 1e-10
 
 
