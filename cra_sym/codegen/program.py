@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
+from sympy.logic.boolalg import Boolean
 
 from cra_sym.codegen.names import FORTRAN, RESERVED
 from cra_sym.kernels.source import shared_steps
@@ -105,11 +106,7 @@ def function(name: str, summary: str, expression: Any, arguments: Sequence[tuple
     """
     scalar = isinstance(expression, sp.Expr)
     outputs = [sp.sympify(e, strict=True) for e in ([expression] if scalar else expression)]
-    pieces = [(condition, *shared_steps(values)) for condition, values in _alternatives(outputs)]
-    branches = [
-        Branch(condition, tuple((symbol, plain(value)) for symbol, value in steps), tuple(map(plain, values)))
-        for condition, steps, values in pieces
-    ]
+    branches = [_branch(condition, values) for condition, values in _alternatives(outputs)]
     free = set().union(*map(_free_symbols, branches))
     taken: set[str] = {"out"}
     places: dict[sp.Symbol, Place] = {}
@@ -146,6 +143,20 @@ def _alternatives(outputs: list[sp.Expr]) -> list[tuple[Any, list[sp.Expr]]]:
         (None if condition == sp.true else condition, [e.args[i][0] for e in outputs])
         for i, condition in enumerate(conditions[0])
     ]
+
+
+def _branch(condition: Any, values: list[sp.Expr]) -> Branch:
+    """Share subexpressions; conditions are written where they are used, since a variable holds a number."""
+    steps, values = shared_steps(values)
+    conditions: dict[sp.Basic, sp.Basic] = {}
+    kept = []
+    for symbol, value in steps:
+        value = value.xreplace(conditions)
+        if isinstance(value, Boolean):
+            conditions[symbol] = value
+        else:
+            kept.append((symbol, plain(value)))
+    return Branch(condition, tuple(kept), tuple(plain(value.xreplace(conditions)) for value in values))
 
 
 def _free_symbols(branch: Branch) -> set[sp.Symbol]:

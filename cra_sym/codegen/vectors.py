@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from importlib.metadata import version
@@ -13,9 +14,11 @@ import numpy as np
 import cra_sym as cra
 from cra_sym.arm import state_space as state_space_module
 from cra_sym.arm.analysis import frequency_parameters, modal_parameters, mode_shapes, natural_frequencies
+from cra_sym.arm.excitation import AxialBase, JointStiffness
 from cra_sym.arm.parameters import Arm
 from cra_sym.arm.response import tip_response
 from cra_sym.arm.sensitivity import sensitivities
+from cra_sym.arm.stability import stability_boundary
 from cra_sym.codegen.characteristic import characteristic
 
 __all__ = ["SEED", "TOLERANCE", "Check", "arm_checks", "extreme_arms", "random_arms", "written"]
@@ -166,6 +169,18 @@ def _system_checks(arm: Arm) -> Iterator[Check]:
     joint = 1.0 * modal.stiffness_translation + 0.5 * modal.stiffness_rotation
     yield _check("excitation_joint", _numbers(arm, 1.0, 0.5), joint, 1.0)
     yield _check("excitation_axial", _numbers(arm, 1e-3, 10.0), 1e-3 * 10.0**2 * modal.axial, 1.0)
+    yield from _boundary_checks(arm)
+
+
+def _boundary_checks(arm: Arm) -> Iterator[Check]:
+    excitations = ("joint", (1.0, 0.5), JointStiffness(1.0, 0.5)), ("axial", (1e-3, 0.0), AxialBase(1e-3))
+    for name, numbers, excitation in excitations:
+        for resonance in ((1, 1), (2, 2), (1, 2)):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # where there is no zone, and where its first order is doubtful
+                border = stability_boundary(arm, excitation, 0.2, resonance)
+            if np.isfinite(border).all():
+                yield Check(f"boundary_{name}", _numbers(arm, *numbers, 0.2, *resonance), _row(border))
 
 
 def written(checks: Iterable[Check], subject: str) -> str:
