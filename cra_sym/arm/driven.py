@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import mpmath
-from sympy import Add, Eq, Expr, I, Integral, Rational, cos, lambdify, pi, sin, sinc
+from sympy import Add, Eq, Expr, I, Integral, Rational, cos, expand_mul, lambdify, pi, sin, sinc
 from sympy.simplify.fu import TR8
 
 from cra_sym.arm.duhamel import unit_responses
@@ -58,7 +58,8 @@ def modal_response() -> Eq:
     shape = integral.function.subs(w.subs(t, tau).diff(tau, 2), moved.diff(t, 2).subs(t, tau))
     sums = TR8(shape.expand()).expand().replace(sin, lambda phase: cos((phase - pi / 2).expand(), evaluate=False))
     total = Add(*(_integrated(term) for term in Add.make_args(sums)))
-    return Eq(q_i, solution.subs(integral, total))
+    terms = Add.make_args(solution.subs(integral, total))
+    return Eq(q_i, Add(*(expand_mul(term, deep=False) for term in terms)))
 
 
 def _integrated(term: Expr) -> Expr:
