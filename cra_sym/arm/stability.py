@@ -292,7 +292,7 @@ def _doubt(
 
 def _overlapping(
     zone: Zone, arm: Arm, excitation: Parametric, epsilon: np.ndarray, resonance: tuple[int, int], modes: int
-) -> list[tuple[int, int]]:
+) -> list[str]:
     modal = modal_parameters(arm, modes)
     found = []
     for m in range(1, modes + 1):
@@ -300,10 +300,19 @@ def _overlapping(
             if (m, n) in (resonance, resonance[::-1]):
                 continue
             other = first_order_zone(arm, modal, excitation, epsilon, m, n)
-            with np.errstate(invalid="ignore"):
-                if np.any(np.abs(other.centre - zone.centre) < other.half_width + zone.half_width):
-                    found.append((m, n))
+            if _touches(zone, other.centre, other.half_width):
+                found.append(f"({m}, {n})")
+            # the second tongue, of order epsilon^2, lies at half the frequency; worth its sums only where it is near
+            if _touches(zone, other.centre / 2, 2 * zone.half_width):
+                second = zone_of(arm, excitation, epsilon, m, n, 2, modes)
+                if _touches(zone, second.centre + second.shift, second.half_width):
+                    found.append(f"({m}, {n}), second tongue")
     return found
+
+
+def _touches(zone: Zone, centre: np.ndarray, half_width: np.ndarray) -> bool:
+    with np.errstate(invalid="ignore"):
+        return bool(np.any(np.abs(centre - zone.centre - zone.shift) < half_width + zone.half_width))
 
 
 def _system(

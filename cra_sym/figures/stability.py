@@ -1,0 +1,328 @@
+"""Zones of parametric instability (Figs. 11 and 12): boundaries by multiple scales over growth by Floquet theory."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.figure import Figure
+
+from cra_sym.arm.analysis import modal_parameters
+from cra_sym.arm.edges import floquet_boundary
+from cra_sym.arm.excitation import AxialBase, JointStiffness, TransverseBase
+from cra_sym.arm.parameters import Arm
+from cra_sym.arm.stability import AsymptoticWarning, ResonanceWarning, forced_width, growth_rate, stability_boundary
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = [
+    "figure_11",
+    "figure_11_axial",
+    "figure_12",
+    "figure_12_axial",
+    "figure_accuracy",
+    "figure_combinations",
+    "figure_widths",
+]
+
+#: Assumed: the paper's values of k_t are lost; the masses are published but for the first.
+K_T, M_E = (1e5, 1e4, 1e3), (0.0, 0.001, 0.005)
+AXIAL, JOINT, TRANSVERSE = AxialBase(0.01), JointStiffness(), TransverseBase(0.001)
+STRONG = AxialBase(0.05)
+_GROWTH = colormaps["YlOrBr"].with_extremes(under="white")
+_FIRST: dict[str, Any] = {"color": "#0072B2", "linestyle": (0, (4, 2)), "linewidth": 1.2}
+_SECOND: dict[str, Any] = {"color": "#111111", "linestyle": "-", "linewidth": 1.2}
+
+
+def _grid(axes: Any, rows: int, columns: int, size: tuple[float, float], **options: Any) -> np.ndarray:
+    if axes is not None:
+        return np.asarray(axes).reshape(rows, columns)
+    return Figure(figsize=size, layout="constrained").subplots(rows, columns, squeeze=False, **options)
+
+
+def _described(excitation: Any) -> str:
+    if isinstance(excitation, AxialBase):
+        return f"base shakes along the arm, {1e3 * np.max(excitation.amplitude):g} mm × ε"
+    return "joint stiffness fluctuates"
+
+
+def _boundary(*given: Any, **more: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return a boundary where a figure shows by itself what a warning would say."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AsymptoticWarning)
+        warnings.simplefilter("ignore", ResonanceWarning)
+        return stability_boundary(*given, **more)
+
+
+def _growth(arm: Arm, excitation: Any, frequency: np.ndarray, epsilon: np.ndarray, modes: int) -> np.ndarray:
+    """Return the growth rate over a chart, converged in the number of modes."""
+    residual = isinstance(excitation, JointStiffness)
+    return growth_rate(arm, excitation, frequency, epsilon[:, None], modes, residual=residual, tolerance=1e-7)
+
+
+def _zone(ax: Axes, arm: Arm, excitation: Any, mode: int, epsilon: np.ndarray, points: int) -> None:
+    """Draw one principal zone against its detuning."""
+    centre = 2 * modal_parameters(arm, mode).omega[mode - 1]
+    first, second = (_boundary(arm, excitation, epsilon, (mode, mode), order=order) for order in (1, 2))
+    half = (first[1] - first[0])[-1] / 2
+    detuning = np.linspace(-1.7, 1.7, points) * half
+    rates = _growth(arm, excitation, centre + detuning, epsilon, mode + 2)
+    _shade(ax, detuning, epsilon, rates)
+    for sides, look in ((first, _FIRST), (second, _SECOND)):
+        for side in sides:
+            ax.plot(side - centre, epsilon, **look)
+    ax.set_xlim(detuning[0], detuning[-1])
+    ax.ticklabel_format(axis="x", style="sci", scilimits=(-2, 3), useMathText=True)
+    ax.locator_params(axis="x", nbins=4)
+    ax.grid(False)
+    text = f"$2\\omega_{mode}$ = {centre:.4g} rad/s\nwidth {2 * half:.3g} rad/s"
+    ax.text(0.03, 0.04, text, transform=ax.transAxes, fontsize=7.5, color="0.25", va="bottom")
+
+
+def _shade(ax: Axes, frequency: np.ndarray, epsilon: np.ndarray, rates: np.ndarray) -> Any:
+    """Shade what grows, the rest stays white."""
+    top = rates.max()
+    look = {"cmap": _GROWTH, "shading": "gouraud", "rasterized": True, "vmin": 0.02 * top, "vmax": top}
+    return ax.pcolormesh(frequency, epsilon, rates, **look)
+
+
+def _principal_zones(
+    arms: list[tuple[str, Arm]], excitation: Any, epsilon: float, title: str, axes: Any, points: int
+) -> Figure:
+    """Draw the zones of modes 1 to 3, a row an arm."""
+    panels = _grid(axes, len(arms), 3, (9.0, 2.45 * len(arms) + 0.6), sharey=True)
+    sizes = np.linspace(0.0, epsilon, points)
+    for row, (label, arm) in zip(panels, arms, strict=True):
+        for mode, ax in enumerate(row, start=1):
+            _zone(ax, arm, excitation, mode, sizes, points)
+        row[0].set_ylabel(f"{label}\n$\\epsilon$")
+    for mode, ax in enumerate(panels[0], start=1):
+        ax.set_title(f"{title}mode {mode}" if mode == 1 else f"mode {mode}")
+    for mode, ax in enumerate(panels[-1], start=1):
+        ax.set_xlabel(rf"$\varpi - 2\omega_{mode}$ / (rad/s)")
+    handles = [panels[0, 0].plot([], [], **look)[0] for look in (_FIRST, _SECOND)]
+    figure = panels[0, 0].figure
+    names = ("multiple scales, first order", "second order, all modes")
+    note = f"shaded: growth by Floquet theory; {_described(excitation)}; widths at ε = {epsilon:g}, scales differ"
+    figure.legend(handles, names, loc="outside lower center", ncols=2, title=note, title_fontsize=8)
+    return figure
+
+
+def figure_11(
+    arm: Arm | None = None,
+    k_t: Any = K_T,
+    excitation: Any = JOINT,
+    epsilon: float = 0.3,
+    *,
+    axes: Any = None,
+    points: int = 49,
+) -> Figure:
+    """Draw the principal zones of the first three modes for three translational stiffnesses of the joint.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        By default the nominal one.
+    k_t : sequence of float
+        N/m, a row each.
+    excitation : JointStiffness or AxialBase
+    epsilon : float
+        Top of the axis.
+    axes : array of Axes, optional
+    points : int
+        Points of the Floquet chart along each axis.
+    """
+    arm = arm or Arm.nominal()
+    arms = [(f"$k_t$ = {_power(k)} N/m", arm.replace(k_t=k)) for k in k_t]
+    return _principal_zones(arms, excitation, epsilon, "Fig. 11  ", axes, points)
+
+
+def figure_11_axial() -> Figure:
+    """Draw Fig. 11 for a base that shakes along the arm."""
+    return figure_11(excitation=AXIAL, epsilon=0.2)
+
+
+def figure_12(
+    arm: Arm | None = None,
+    m_e: Any = M_E,
+    excitation: Any = JOINT,
+    epsilon: float = 0.3,
+    *,
+    axes: Any = None,
+    points: int = 49,
+) -> Figure:
+    """Draw the principal zones of the first three modes for three end-effectors.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        By default the nominal one with k_t = 1e4 N/m: a rigid joint has no stiffness that could fluctuate.
+    m_e : sequence of float
+        kg, a row each.
+    excitation, epsilon, axes, points
+        As in :func:`figure_11`.
+    """
+    arm = arm or Arm.nominal().replace(k_t=1e4)
+    arms = [(f"$m_e$ = {1e3 * m:g} g", arm.replace(m_e=m)) for m in m_e]
+    return _principal_zones(arms, excitation, epsilon, "Fig. 12  ", axes, points)
+
+
+def figure_12_axial() -> Figure:
+    """Draw Fig. 12 for a base that shakes along the arm."""
+    return figure_12(excitation=AXIAL, epsilon=0.2)
+
+
+def _power(value: float) -> str:
+    exponent = np.log10(value)
+    return f"$10^{{{exponent:.0f}}}$" if abs(exponent - round(exponent)) < 1e-9 else f"{value:g}"
+
+
+def figure_widths(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+    """Draw how wide the principal zones are against k_t and m_e: first-order widths at epsilon = 1, three excitations.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        By default the nominal one; against m_e it has k_t = 1e4 N/m.
+    axes : 2 x 3 array of Axes, optional
+    """
+    arm = arm or Arm.nominal()
+    panels = _grid(axes, 2, 3, (9.6, 5.6), sharex="row")
+    k_t, m_e = np.logspace(1, 6, 201), np.linspace(0.0, 0.02, 101)
+    titles = ("joint stiffness", "base along the arm", "base across the arm")
+    rows: tuple[tuple[np.ndarray, Arm, str, Any], ...] = (
+        (k_t, arm.replace(k_t=k_t), "$k_t$ / (N/m)", K_T),
+        (m_e * 1e3, arm.replace(k_t=1e4, m_e=m_e), "$m_e$ / g", np.array(M_E) * 1e3),
+    )
+    for row, (values, batch, label, marks) in zip(panels, rows, strict=True):
+        for ax, excitation in zip(row, (JOINT, AXIAL, TRANSVERSE), strict=True):
+            for mode, width in enumerate(_widths(batch, excitation), start=1):
+                ax.plot(values, width, label=f"mode {mode}")
+            for mark in marks:
+                ax.axvline(mark, color="0.8", linewidth=0.8, zorder=0)
+            ax.set_yscale("log")
+            ax.set_xlabel(label)
+    for ax, title in zip(panels[0], titles, strict=True):
+        ax.set_xscale("log")
+        ax.set_title(title)
+    for row in panels:
+        row[0].set_ylabel("width / ε / (rad/s)")
+        row[2].set_ylabel("growth of the tip / ε / (m/s)")
+    panels[0, 0].legend()
+    figure = panels[0, 0].figure
+    note = "first order, no damping; the base moves 10 mm along or 1 mm across at ε = 1; the last column is no zone"
+    figure.supxlabel(note, fontsize=8, color="0.35")
+    return figure
+
+
+def _widths(arm: Arm, excitation: Any) -> list[np.ndarray]:
+    if isinstance(excitation, TransverseBase):
+        return list(np.moveaxis(forced_width(arm, excitation), -1, 0))
+    # the width is proportional to epsilon: any small value will do
+    sides = [_boundary(arm, excitation, 1e-3, (mode, mode)) for mode in (1, 2, 3)]
+    return [(upper - lower) / 1e-3 for lower, upper in sides]
+
+
+def figure_combinations(
+    arm: Arm | None = None,
+    excitation: Any = AXIAL,
+    epsilon: float = 1.0,
+    *,
+    ax: Axes | None = None,
+    points: int = 420,
+) -> Figure:
+    """Draw the whole chart: principal and combination resonances of three modes, with their names.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        By default the nominal one with k_t = 1e3 N/m.
+    excitation : JointStiffness or AxialBase
+    epsilon : float
+        Top of the axis.
+    ax : Axes, optional
+    points : int
+        Points of the Floquet chart along the frequency axis.
+    """
+    arm = arm or Arm.nominal().replace(k_t=1e3)
+    ax = _grid(None, 1, 1, (9.4, 5.0))[0, 0] if ax is None else ax
+    omega = modal_parameters(arm).omega
+    frequency = np.linspace(0.5 * omega[0], 2.2 * omega[2], points)
+    sizes = np.linspace(0.0, epsilon, points // 3)
+    rates = _growth(arm, excitation, frequency, sizes, 4)
+    mesh = _shade(ax, frequency, sizes, np.sqrt(rates))
+    for m in (1, 2, 3):
+        for n in range(m, 4):
+            for side in _boundary(arm, excitation, sizes, (m, n), order=2):
+                ax.plot(side, sizes, **_SECOND | {"linewidth": 0.9})
+            name = f"$2\\omega_{m}$" if m == n else f"$\\omega_{m}+\\omega_{n}$"
+            _name(ax, name, omega[m - 1] + omega[n - 1], epsilon)
+        for side in _boundary(arm, excitation, sizes, (m, m), order=2, tongue=2):
+            ax.plot(side, sizes, **_FIRST | {"linewidth": 0.9})
+        _name(ax, f"$\\omega_{m}$", omega[m - 1], epsilon, color=_FIRST["color"])
+    ax.set_xlim(frequency[0], frequency[-1])
+    ax.set_ylim(0, epsilon)
+    ax.grid(False)
+    ax.set_xlabel(r"excitation frequency $\varpi$ / (rad/s)")
+    ax.set_ylabel(r"$\epsilon$")
+    ax.set_title(f"Principal and sum resonances: {_described(excitation)}", pad=20)
+    handles = [ax.plot([], [], **look)[0] for look in (_SECOND, _FIRST)]
+    figure = ax.figure
+    names = ("multiple scales, second order", "second tongue, width of order ε²")
+    note = "shaded: growth by Floquet theory, 4 modes; thin streaks are tongues of higher order"
+    figure.legend(handles, names, loc="outside lower center", ncols=2, title=note, title_fontsize=8)
+    bar = figure.colorbar(mesh, ax=ax, pad=0.01, aspect=30)
+    bar.set_label(r"$\sqrt{\mathrm{growth\ rate\ /\ (1/s)}}$")
+    assert isinstance(figure, Figure)
+    return figure
+
+
+def _name(ax: Axes, name: str, place: float, top: float, **look: Any) -> None:
+    ax.annotate(name, (place, top), xytext=(0, 4), textcoords="offset points", ha="center", **look)
+
+
+def figure_accuracy(arm: Arm | None = None, epsilon: Any = None, *, axes: Any = None) -> Figure:
+    """Draw the error of the boundaries against epsilon: first order has slope 2, second order slope 3.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        By default the nominal one with k_t = 1e4 N/m.
+    epsilon : array_like, optional
+    axes : pair of Axes, optional
+    """
+    arm = arm or Arm.nominal().replace(k_t=1e4)
+    epsilon = np.geomspace(0.02, 0.16, 4) if epsilon is None else np.asarray(epsilon, dtype=float)
+    panels = _grid(axes, 1, 2, (8.6, 3.9), sharey=False)[0]
+    cases = ((JOINT, (2, 2)), (JOINT, (1, 2))), ((STRONG, (1, 1)), (STRONG, (2, 2)))
+    for ax, pair in zip(panels, cases, strict=True):
+        for (excitation, resonance), marker in zip(pair, "os", strict=True):
+            errors = boundary_errors(arm, excitation, epsilon, resonance)
+            for order, (error, look) in enumerate(zip(errors, (_FIRST, _SECOND), strict=True), start=1):
+                slope = np.polyfit(np.log(epsilon), np.log(error), 1)[0]
+                name = f"({resonance[0]}, {resonance[1]}), order {order}: slope {slope:.2f}"
+                fill = "white" if marker == "s" else look["color"]
+                ax.loglog(epsilon, error, marker=marker, markersize=5, markerfacecolor=fill, label=name, **look)
+        ax.set_xlabel(r"$\epsilon$")
+        ax.set_xticks(epsilon, [f"{size:.2g}" for size in epsilon])
+        ax.minorticks_off()
+        ax.legend(fontsize=8)
+    panels[0].set_ylabel("largest error of the two sides / (rad/s)")
+    panels[0].set_title("Joint stiffness: error against Floquet")
+    panels[1].set_title("Base along the arm, 50 mm × ε")
+    return panels[0].figure
+
+
+def boundary_errors(arm: Arm, excitation: Any, epsilon: Any, resonance: tuple[int, int]) -> np.ndarray:
+    """Return the largest error of a zone's two sides at orders 1 and 2 against Floquet theory, rad/s.
+
+    Returns
+    -------
+    ndarray, shape (2, len(epsilon))
+    """
+    truth = np.array([floquet_boundary(arm, excitation, size, resonance) for size in epsilon]).T
+    found = [np.array(_boundary(arm, excitation, epsilon, resonance, order=order)) for order in (1, 2)]
+    return np.array([np.abs(sides - truth).max(axis=0) for sides in found])
