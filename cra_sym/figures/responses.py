@@ -31,6 +31,10 @@ def _tip(arm: Arm, t: np.ndarray, disturbed: bool = True, rate: float = RATE, ph
     return 1e3 * tip_response(arm, motion, t)
 
 
+def _name(arm: Arm) -> str:
+    return "nominal arm" if arm == Arm.nominal() else "arm as given"
+
+
 def _panels(axes: Any, rows: int, columns: int, size: tuple[float, float], **options: Any) -> np.ndarray:
     if axes is not None:
         return np.asarray(axes).reshape(rows, columns)
@@ -80,7 +84,7 @@ def figure_6(arm: Arm | None = None, *, axes: Any = None) -> Figure:
             ax.legend([with_line, without], labels, loc="lower left", bbox_to_anchor=(0.0, 0.98), borderaxespad=0)
             ax.text(0.99, 1.03, rf"$\psi={name}$", transform=ax.transAxes, ha="right", va="bottom")
         row[0].set_ylabel(_TIP)
-    return _finish(panels, f"nominal arm, $B$ = 1 mm, $\\varpi$ = 10 rad/s, {_FROM_REST}")
+    return _finish(panels, f"{_name(arm)}, $B$ = 1 mm, $\\varpi$ = 10 rad/s, {_FROM_REST}")
 
 
 def _against_rigid(axes: Any, arm: Arm | None, quantity: Any, label: str, title: str) -> Figure:
@@ -96,7 +100,7 @@ def _against_rigid(axes: Any, arm: Arm | None, quantity: Any, label: str, title:
         ax.text(0.99, 1.03, rf"$\varpi={rate:g}$ rad/s", transform=ax.transAxes, ha="right", va="bottom")
     panels[0, 0].set_title(title, pad=36)
     panels[0, 0].set_ylabel(label)
-    return _finish(panels, f"nominal arm, mean acceleration 0.1 m/s², $B$ = 1 mm, $\\psi$ = 0, {_FROM_REST}")
+    return _finish(panels, f"{_name(arm)}, mean acceleration 0.1 m/s², $B$ = 1 mm, $\\psi$ = 0, {_FROM_REST}")
 
 
 def figure_7(arm: Arm | None = None, *, axes: Any = None) -> Figure:
@@ -154,7 +158,7 @@ def figure_9(arm: Arm | None = None, *, axes: Any = None) -> Figure:
         ax.text(0.99, 1.03, f"{word} disturbance", transform=ax.transAxes, ha="right", va="bottom")
     panels[0, 0].set_title("Fig. 9  Peaks grow with the mean acceleration", pad=52)
     panels[0, 0].set_ylabel(_TIP)
-    return _finish(panels, f"nominal arm, $B$ = 1 mm, $\\varpi$ = 10 rad/s, $\\psi$ = 0, {_FROM_REST}")
+    return _finish(panels, f"{_name(arm)}, $B$ = 1 mm, $\\varpi$ = 10 rad/s, $\\psi$ = 0, {_FROM_REST}")
 
 
 def figure_10(arm: Arm | None = None, *, axes: Any = None) -> Figure:
@@ -187,6 +191,6 @@ def figure_10(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     right.legend(loc="lower left", ncols=3, bbox_to_anchor=(0.0, 0.98), borderaxespad=0)
     right.set_title("Error of the peak: never grows", pad=22)
     right.set_ylabel("peak with minus peak without / mm")
-    figure = _finish(panels, f"nominal arm, $B$ = 1 mm, $\\varpi$ = 10 rad/s, {_FROM_REST}; 0 to 2 s")
+    figure = _finish(panels, f"{_name(arm)}, $B$ = 1 mm, $\\varpi$ = 10 rad/s, {_FROM_REST}; 0 to 2 s")
     right.set_xlabel("mean acceleration / (m/s²)")
     return figure

@@ -141,7 +141,8 @@ def steady_response(osc: Oscillators, cause: Steady, t: Array, derivative: int =
         q, u = _advance(wide, shift, start, acceleration, 0.0, [f.phasor(0.0) for f in harmonics])
         return _outputs(osc, q, u, acceleration - sum(f.phasor(times).imag for f in harmonics), derivative)
 
-    return _in_parts(part, t, osc.omega.size)
+    width = np.prod(np.broadcast_shapes(osc.omega.shape, osc.zeta.shape, cause.velocity.shape))
+    return _in_parts(part, t, int(width))
 
 
 def piecewise_response(osc: Oscillators, cause: Piecewise, t: Array, derivative: int = 0) -> Array:
@@ -163,7 +164,7 @@ def piecewise_response(osc: Oscillators, cause: Piecewise, t: Array, derivative:
         q, u, acceleration = (np.where(before, 0.0, value) for value in (q, u, local + jerk * tau))
         return _outputs(osc, q, u, acceleration, derivative)
 
-    return _in_parts(part, t, max(osc.omega.size, q_k[..., 0].size))
+    return _in_parts(part, t, q_k[..., 0].size)
 
 
 def knot_states(osc: Oscillators, cause: Piecewise) -> tuple[Array, Array]:

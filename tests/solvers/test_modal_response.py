@@ -1,0 +1,97 @@
+"""The solver alone: undamped oscillators with unit responses written down here, against matrix exponentials."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from cra_sym.solvers.modal_response import (
+    Harmonics,
+    Oscillators,
+    Piecewise,
+    Steady,
+    free_peak,
+    knot_states,
+    piecewise_response,
+    segment,
+    steady_response,
+)
+
+OMEGA, GAMMA, ROWS = np.array([3.0, 11.0]), np.array([0.5, -0.2]), np.array([[1.0, 0.7], [0.3, -1.0]])
+
+
+def free(t, omega, zeta):
+    """Unit responses without damping."""
+    t, omega = np.broadcast_arrays(t, omega)
+    sine, cosine = np.sin(omega * t), np.cos(omega * t)
+    return {
+        "displacement": cosine, "impulse": sine / omega,
+        "step": (1 - cosine) / omega**2, "ramp": (t - sine / omega) / omega**2,
+    }  # fmt: skip
+
+
+def forced(t, omega, zeta, varpi):
+    """Response to exp(i varpi t), off resonance."""
+    return (np.exp(1j * varpi * t) - np.cos(omega * t) - 1j * varpi / omega * np.sin(omega * t)) / (omega**2 - varpi**2)
+
+
+OSC = Oscillators(OMEGA, np.zeros(1), GAMMA, ROWS, free, forced)
+CAUSE = Steady(np.array([0.1, -0.3]), np.array([0.4]), [Harmonics(*np.array([[2e-2], [5.0], [0.3]]))])
+
+
+def exact(t, derivative):
+    """Return the outputs by one matrix exponential of oscillators, constant and phasor."""
+    B, varpi, psi = (value[0] for value in CAUSE.harmonics[0])
+    A = np.zeros((7, 7))  # q, q', 1, cos, sin
+    A[:2, 2:4], A[2:4, :2] = np.eye(2), -np.diag(OMEGA**2)
+    A[2:4, 4], A[2:4, 6] = -GAMMA * CAUSE.acceleration[0], GAMMA * B * varpi**2
+    A[5, 6], A[6, 5] = -varpi, varpi
+    start = np.array([0, 0, *CAUSE.velocity, 1, np.cos(psi), np.sin(psi)])
+    read = np.hstack([ROWS, np.zeros((2, 5))]) @ np.linalg.matrix_power(A, derivative)
+    return np.array([read @ expm(A * time) @ start for time in t]).T
+
+
+@pytest.mark.parametrize("derivative", [0, 1, 2])
+@pytest.mark.parametrize("t", [np.linspace(0.5, 7.0, 90), np.array([3.0, 0.0, 1.1])], ids=["grid", "any"])
+def test_steady_causes(t, derivative):
+    found = steady_response(OSC, CAUSE, t, derivative)
+    assert found == pytest.approx(exact(t, derivative), rel=1e-11, abs=1e-12)
+
+
+@pytest.mark.parametrize("count", [64, 65, 100, 127, 1000])
+def test_a_grid_of_any_length_is_its_points(count):
+    t = np.linspace(0.0, 20.0, count)
+    scattered = steady_response(OSC, CAUSE, t[::-1])[..., ::-1]
+    assert steady_response(OSC, CAUSE, t) == pytest.approx(scattered, abs=1e-13)
+
+
+def test_a_piece_is_a_sum_of_delayed_ramps():
+    knots = np.array([0.2, 0.5, 1.4, 1.6])  # not uniform
+    level, jerk = np.array([0.3, -0.5, 1.0, 0.0]), np.array([1.0, 0.0, -2.0, 0.0])
+    t = np.linspace(0, 3, 50)
+    expected = np.zeros((2, t.size))
+    span = np.diff(knots, append=np.inf)
+    for k, duration in enumerate(span):
+        after, beyond = np.maximum(t - knots[k], 0.0), np.maximum(t - knots[k] - duration, 0.0)
+        end = level[k] + (jerk[k] * duration if np.isfinite(duration) else 0.0)
+        for values, a, j in ((after, level[k], jerk[k]), (beyond, -end, -jerk[k])):
+            unit = free(values, OMEGA[:, None], 0.0)
+            expected += ROWS @ (-GAMMA[:, None] * (a * unit["step"] + j * unit["ramp"]))
+    assert piecewise_response(OSC, Piecewise(knots, level, jerk), t) == pytest.approx(expected, abs=1e-13)
+
+
+def test_uniform_and_listed_knots_agree():
+    knots = np.linspace(0, 2, 21)
+    level, jerk = np.random.default_rng(0).normal(size=(2, 21))
+    uniform = knot_states(OSC, Piecewise(knots, level, jerk))
+    listed = knot_states(OSC, Piecewise(knots[None], level, jerk))
+    assert np.allclose(uniform, [values[0] for values in listed], atol=1e-13)
+    t = np.array([-1.0, 0.0, 0.05, 2.0, 3.0])
+    assert segment(knots, t).tolist() == segment(knots[None], t)[0].tolist() == [-1, 0, 0, 20, 20]
+
+
+def test_free_peak_is_the_largest_value_ever_reached():
+    q, u = np.array([0.3, -0.1]), np.array([1.0, 2.0])
+    t = np.linspace(0, 10, 20001)
+    unit = free(t, OMEGA[:, None], 0.0)
+    history = np.abs(unit["displacement"] * q[:, None] + unit["impulse"] * u[:, None]).max(-1)
+    assert free_peak(OSC, q, u) == pytest.approx(history, rel=1e-6)
