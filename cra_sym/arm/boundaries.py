@@ -92,7 +92,7 @@ def forced_growth() -> tuple[Expr, tuple[Symbol, ...]]:
 @cache
 def forced_resonance() -> MultipleScales:
     """Return multiple scales for the dynamic equation (11) with a base that shakes across the arm at resonance n."""
-    from cra_sym.arm.motion import dynamic_equation
+    from cra_sym.arm.modal_dynamics import dynamic_equation
     from cra_sym.arm.parametric import TRANSVERSE, t, varpi, w
 
     named = {symbol(f"{name}_i"): symbol(f"{name}_n") for name in ("Gamma", "M", "omega", "zeta")}

@@ -10,7 +10,7 @@ from sympy.simplify.fu import TR8
 
 from cra_sym.arm.duhamel import unit_responses
 from cra_sym.arm.equations import checks, numbered
-from cra_sym.arm.motion import duhamel, dynamic_equation
+from cra_sym.arm.modal_dynamics import duhamel, dynamic_equation
 from cra_sym.symbols import dimension, symbol
 
 __all__ = ["base_motion", "modal_response"]

@@ -1,4 +1,4 @@
-"""Displacement, energies and the Lagrangian of the arm: equations (1)-(7)."""
+"""Displacement, energies and the Lagrangian of the arm: equations (1)-(4), (6) and (7)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from sympy import Eq, Expr, Integral, Rational
 from cra_sym.arm.equations import checks, numbered
 from cra_sym.arm.evaluation import at, evaluate, put
 from cra_sym.arm.modal_sum import ModalSum
-from cra_sym.arm.shooting import integrate, sample, shoot
 from cra_sym.symbols import Dimension, dimension, symbol
 
 __all__ = ["ArmLagrangian", "lagrangian", "single_mode"]
@@ -133,7 +132,7 @@ def _() -> bool:
     )
 
 
-# Modal energies (5)-(6) -----------------------------------------------------------------------------------------
+# Modal masses and stiffnesses (6) ------------------------------------------------------------------------------
 
 
 def inner_mass(first: Expr, second: Expr) -> Expr:
@@ -172,77 +171,9 @@ def _() -> bool:
     )
 
 
-def _quadratic_form(energy: Expr, variables: list[Expr]) -> dict[tuple[Expr, Expr], Expr]:
-    """Second derivatives of an energy with respect to generalised coordinates or velocities."""
-    names = [symbol("C_1"), symbol("C_2"), symbol("C_3")][: len(variables)]
-    plain = energy.subs(dict(zip(variables, names, strict=True)))
-    pairs = [(row, column) for row in range(len(names)) for column in range(row, len(names))]
-    return {(variables[r], variables[c]): plain.diff(names[r]).diff(names[c]).doit(integrals=False) for r, c in pairs}
-
-
-def _modal(energy: Expr, variables: list[Expr], named: dict[Expr, Expr]) -> Expr:
-    """Write a quadratic energy of the modes i and j as a sum over all modes, with its coefficients named."""
-    form = {pair: tidy(value).subs(named) for pair, value in _quadratic_form(energy, variables).items()}
-    total = energy * 0
-    for (first, second), value in form.items():
-        factor = HALF if first == second else 1
-        if {first, second} <= {q_i, q_i.diff(t), w.diff(t)}:
-            term = factor * value * first * second
-            total += term if {first, second} == {w.diff(t)} else ModalSum(term)
-        elif first.has(q_i) and second.has(q_j) and value != 0:
-            raise ArithmeticError(f"modes i and j do not decouple: {value}")
-    return total
-
-
 def tidy(value: Expr) -> Expr:
     """Return the integrals of ``value`` with one common integrand shape: expanded, constants inside."""
     return value.expand().replace(lambda e: isinstance(e, Integral), lambda e: Integral(e.function.expand(), *e.limits))
-
-
-@numbered(5, "modal energies", "derived", (2, 3, 4, 6, "16c"))
-def modal_energies() -> tuple[Eq, Eq]:
-    """(2) put into (3) and (4): orthogonality leaves no product of two modes."""
-    from cra_sym.arm.orthogonality import orthogonality
-
-    two = separation().rhs.members("i", "j")
-    named = {tidy(e.rhs): e.lhs for e in generalised()} | {tidy(e.lhs): e.rhs for e in orthogonality()}
-    kinetic = _modal(single_mode(kinetic_energy().rhs, two), [q_i.diff(t), q_j.diff(t), w.diff(t)], named)
-    potential = _modal(single_mode(potential_energy()[1].rhs, two), [q_i, q_j], named)
-    return Eq(symbol("T"), kinetic.doit()), Eq(symbol("U"), potential)
-
-
-@checks(5)
-def _() -> bool:
-    """Numbers: the energies of a random arm moving in three modes found by shooting, by quadrature of (3) and (4)."""
-    values = sample(5)
-    shapes, length = shoot(values), values["L"]
-    q, q_dot, w_dot = [0.3, -0.5, 0.2], [0.7, 0.4, -0.6], 0.9
-
-    def elastic(place, amplitudes, derivative=0):
-        return sum(a * shape(place, derivative) for a, shape in zip(amplitudes, shapes, strict=True))
-
-    line_mass, bending = values["rho"] * values["A"], values["E"] * values["I_z"]
-    kinetic = (
-        values["m_b"] * w_dot**2
-        + values["m_e"] * (w_dot + elastic(length, q_dot)) ** 2
-        + values["J_e"] * elastic(length, q_dot, 1) ** 2
-        + integrate(lambda place: line_mass * (w_dot + elastic(place, q_dot)) ** 2, length)
-    ) / 2
-    potential = (
-        values["k_t"] * elastic(0.0, q) ** 2
-        + values["k_r"] * elastic(0.0, q, 1) ** 2
-        + integrate(lambda place: bending * elastic(place, q, 2) ** 2, length)
-    ) / 2
-    found = []
-    for e in modal_energies():
-        sums = dict.fromkeys(e.rhs.atoms(ModalSum), 0.0)
-        for s in sums:
-            for shape, now, rate in zip(shapes, q, q_dot, strict=True):
-                numbers = {q_i.diff(t): rate, w.diff(t): w_dot, q_i: now}
-                sums[s] += float(s.function.subs(numbers).subs(modal_numbers(values, shape)))
-        total = e.rhs.subs(sums).subs(w.diff(t), w_dot)
-        found.append(float(total.subs({symbol(name): value for name, value in values.items()})))
-    return abs(found[0] / kinetic - 1) < 1e-10 and abs(found[1] / potential - 1) < 1e-10
 
 
 def modal_numbers(values: dict[str, float], shape: Any) -> dict[Expr, float]:

@@ -30,7 +30,8 @@ Kind = Literal["definition", "assumption", "derived"]
 #: Section of the package that builds each equation; a new section adds a line here.
 _HOMES: dict[str, range] = {
     "cra_sym.arm.energy": range(1, 8),
-    "cra_sym.arm.motion": range(8, 14),
+    "cra_sym.arm.motion": range(8, 11),
+    "cra_sym.arm.modal_dynamics": range(11, 14),
     "cra_sym.arm.joint": range(14, 17),
     "cra_sym.arm.orthogonality": range(16, 17),
     "cra_sym.arm.modes": range(17, 27),

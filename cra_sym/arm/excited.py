@@ -14,7 +14,7 @@ from sympy import Eq
 from cra_sym.arm.energy import lagrangian
 from cra_sym.arm.equations import checks, numbered
 from cra_sym.arm.evaluation import at, evaluate
-from cra_sym.arm.motion import dynamic_equation
+from cra_sym.arm.modal_dynamics import dynamic_equation
 from cra_sym.arm.parametric import AXIAL, TRANSVERSE, coupling, excited_lagrangian, phi_i, phi_j, t, u, w
 from cra_sym.arm.shooting import integrate, sample, shoot
 from cra_sym.symbols import Dimension, dimension, symbol

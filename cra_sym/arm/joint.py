@@ -109,15 +109,6 @@ def _solved(condition: Expr, derivative: Expr) -> Eq:
     return Eq(E * I_z * derivative, (-(condition - sign * E * I_z * derivative) / sign).expand())
 
 
-@checks(16)
-def _() -> bool:
-    """Hamilton's principle gives the same four conditions."""
-    from cra_sym.arm.motion import natural_conditions
-
-    pairs = zip(boundary_conditions(), natural_conditions(), strict=True)
-    return all((ours.lhs - ours.rhs - theirs.lhs + theirs.rhs).expand() == 0 for ours, theirs in pairs)
-
-
 @numbered("16a", "boundary conditions of a mode", "derived", (2, 16))
 def mode_conditions() -> tuple[Eq, Eq, Eq, Eq]:
     """(2) in (16), the base at rest: in free vibration each coordinate obeys q'' = -ω² q and cancels."""

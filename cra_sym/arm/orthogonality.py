@@ -1,18 +1,40 @@
-"""Orthogonality of the modes with the end-effector's inertia, and K_i = omega_i^2 M_i: companions of (16)."""
+"""Orthogonality of the modes with the end-effector's inertia, K_i = omega_i^2 M_i, and the modal energies (5)."""
 
 from __future__ import annotations
 
 from sympy import Eq, Expr, Integral, solve
 
-from cra_sym.arm.energy import E, I_z, L, inner_mass, inner_stiffness, modal_numbers, phi_i, phi_j, x
+from cra_sym.arm.energy import (
+    HALF,
+    E,
+    I_z,
+    L,
+    generalised,
+    inner_mass,
+    inner_stiffness,
+    kinetic_energy,
+    modal_numbers,
+    phi_i,
+    phi_j,
+    potential_energy,
+    q_i,
+    q_j,
+    separation,
+    single_mode,
+    t,
+    tidy,
+    w,
+    x,
+)
 from cra_sym.arm.equations import checks, numbered
 from cra_sym.arm.evaluation import at, evaluate
 from cra_sym.arm.joint import mode_conditions
-from cra_sym.arm.modal_sum import member
-from cra_sym.arm.shooting import sample, shoot
+from cra_sym.arm.modal_sum import ModalSum, member
+from cra_sym.arm.motion import mode_field_equation
+from cra_sym.arm.shooting import integrate, sample, shoot
 from cra_sym.symbols import symbol
 
-__all__ = ["orthogonality", "stiffness_identity"]
+__all__ = ["modal_energies", "orthogonality", "stiffness_identity"]
 
 omega_i, omega_j, M_i, K_i, K_b = (symbol(name) for name in ("omega_i", "omega_j", "M_i", "K_i", "K_b"))
 
@@ -22,8 +44,6 @@ def stiffness_identity() -> tuple[Eq, Eq]:
     """Integrating by parts twice moves two derivatives from mode j to mode i, where the field equation and the four
     end conditions replace them: the stiffness product is ω_i² times the mass product, springs, tip mass and
     rotary inertia included; for i = j it is K_i = ω_i² M_i."""
-    from cra_sym.arm.motion import mode_field_equation
-
     by_parts = phi_i.diff(x, 2) * phi_j.diff(x) - phi_i.diff(x, 3) * phi_j
     if (by_parts.diff(x) + phi_i.diff(x, 4) * phi_j - phi_i.diff(x, 2) * phi_j.diff(x, 2)).expand() != 0:
         raise ArithmeticError("integration by parts went wrong")
@@ -116,3 +136,72 @@ def _() -> bool:
         if abs(strain / predicted - 1) > 1e-8 or strain / (mode.omega**2 * numbers[M_i]) > 0.999:
             return False
     return True
+
+
+# Modal energies (5) ---------------------------------------------------------------------------------------------
+
+
+def _quadratic_form(energy: Expr, variables: list[Expr]) -> dict[tuple[Expr, Expr], Expr]:
+    """Second derivatives of an energy with respect to generalised coordinates or velocities."""
+    names = [symbol("C_1"), symbol("C_2"), symbol("C_3")][: len(variables)]
+    plain = energy.subs(dict(zip(variables, names, strict=True)))
+    pairs = [(row, column) for row in range(len(names)) for column in range(row, len(names))]
+    return {(variables[r], variables[c]): plain.diff(names[r]).diff(names[c]).doit(integrals=False) for r, c in pairs}
+
+
+def _modal(energy: Expr, variables: list[Expr], named: dict[Expr, Expr]) -> Expr:
+    """Write a quadratic energy of the modes i and j as a sum over all modes, with its coefficients named."""
+    form = {pair: tidy(value).subs(named) for pair, value in _quadratic_form(energy, variables).items()}
+    total = energy * 0
+    for (first, second), value in form.items():
+        factor = HALF if first == second else 1
+        if {first, second} <= {q_i, q_i.diff(t), w.diff(t)}:
+            term = factor * value * first * second
+            total += term if {first, second} == {w.diff(t)} else ModalSum(term)
+        elif first.has(q_i) and second.has(q_j) and value != 0:
+            raise ArithmeticError(f"modes i and j do not decouple: {value}")
+    return total
+
+
+@numbered(5, "modal energies", "derived", (2, 3, 4, 6, "16c"))
+def modal_energies() -> tuple[Eq, Eq]:
+    """(2) put into (3) and (4): orthogonality leaves no product of two modes."""
+    two = separation().rhs.members("i", "j")
+    named = {tidy(e.rhs): e.lhs for e in generalised()} | {tidy(e.lhs): e.rhs for e in orthogonality()}
+    kinetic = _modal(single_mode(kinetic_energy().rhs, two), [q_i.diff(t), q_j.diff(t), w.diff(t)], named)
+    potential = _modal(single_mode(potential_energy()[1].rhs, two), [q_i, q_j], named)
+    return Eq(symbol("T"), kinetic.doit()), Eq(symbol("U"), potential)
+
+
+@checks(5)
+def _() -> bool:
+    """Numbers: the energies of a random arm moving in three modes found by shooting, by quadrature of (3) and (4)."""
+    values = sample(5)
+    shapes, length = shoot(values), values["L"]
+    q, q_dot, w_dot = [0.3, -0.5, 0.2], [0.7, 0.4, -0.6], 0.9
+
+    def elastic(place, amplitudes, derivative=0):
+        return sum(a * shape(place, derivative) for a, shape in zip(amplitudes, shapes, strict=True))
+
+    line_mass, bending = values["rho"] * values["A"], values["E"] * values["I_z"]
+    kinetic = (
+        values["m_b"] * w_dot**2
+        + values["m_e"] * (w_dot + elastic(length, q_dot)) ** 2
+        + values["J_e"] * elastic(length, q_dot, 1) ** 2
+        + integrate(lambda place: line_mass * (w_dot + elastic(place, q_dot)) ** 2, length)
+    ) / 2
+    potential = (
+        values["k_t"] * elastic(0.0, q) ** 2
+        + values["k_r"] * elastic(0.0, q, 1) ** 2
+        + integrate(lambda place: bending * elastic(place, q, 2) ** 2, length)
+    ) / 2
+    found = []
+    for e in modal_energies():
+        sums = dict.fromkeys(e.rhs.atoms(ModalSum), 0.0)
+        for s in sums:
+            for shape, now, rate in zip(shapes, q, q_dot, strict=True):
+                numbers = {q_i.diff(t): rate, w.diff(t): w_dot, q_i: now}
+                sums[s] += float(s.function.subs(numbers).subs(modal_numbers(values, shape)))
+        total = e.rhs.subs(sums).subs(w.diff(t), w_dot)
+        found.append(float(total.subs({symbol(name): value for name, value in values.items()})))
+    return abs(found[0] / kinetic - 1) < 1e-10 and abs(found[1] / potential - 1) < 1e-10

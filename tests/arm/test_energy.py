@@ -4,9 +4,10 @@ import pytest
 from sympy import Integral, Rational
 
 from cra_sym import symbols as s
-from cra_sym.arm.energy import lagrangian, modal_energies, potential_energy
+from cra_sym.arm.energy import lagrangian, potential_energy
 from cra_sym.arm.evaluation import evaluate, put
 from cra_sym.arm.modal_sum import ModalSum, member
+from cra_sym.arm.orthogonality import modal_energies
 
 
 def test_without_the_joint_the_lagrangian_is_the_papers():
