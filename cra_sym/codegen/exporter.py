@@ -188,6 +188,7 @@ def _arm_texts(name: str) -> dict[str, str]:
     values = common_values(language) | _spectrum_values(language)
     if everything:
         values |= _modal_values(language)
+        values["helpers"] = language.helped(values["spectrum_functions"] + values["modal_functions"])
     values["nomenclature"] = nomenclature_rows()
     texts = rendered(name, values)
     texts["reference.txt"] = _reference(everything)

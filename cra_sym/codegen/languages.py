@@ -42,6 +42,11 @@ class Language:
     tail: str
     comment: str
     indent: str = "    "
+    helpers: tuple[tuple[str, str], ...] = ()
+
+    def helped(self, text: str) -> str:
+        """Return the helper functions that a text of generated functions calls."""
+        return "\n".join(helper for name, helper in self.helpers if f"{name}(" in text)
 
     def function(self, function: Function) -> str:
         """Return the text of a function."""
@@ -126,6 +131,68 @@ def _octave_head(f: Function) -> list[str]:
     return lines if f.scalar else [*lines, f"    out = zeros(1, {f.size});"]
 
 
+_FORTRAN_HELPERS = (
+    (
+        "expm1",
+        """\
+  !> exp(x) - 1 without cancellation; not an intrinsic of Fortran.
+  pure elemental function expm1(x) result(out)
+    real(dp), intent(in) :: x
+    real(dp) :: out
+    out = 2.0_dp*sinh(0.5_dp*x)*exp(0.5_dp*x)
+  end function expm1
+""",
+    ),
+    (
+        "log1p",
+        """\
+  !> log(1 + x) without cancellation.
+  pure elemental function log1p(x) result(out)
+    real(dp), intent(in) :: x
+    real(dp) :: out
+    out = x
+    if (abs(x) > 1e-300_dp) out = 2.0_dp*atanh(x/(2.0_dp + x))
+  end function log1p
+""",
+    ),
+    (
+        "floor_real",
+        """\
+  !> Largest whole number not above x, as a real.
+  pure elemental function floor_real(x) result(out)
+    real(dp), intent(in) :: x
+    real(dp) :: out
+    out = aint(x)
+    if (out > x) out = out - 1.0_dp
+  end function floor_real
+""",
+    ),
+)
+_OCTAVE_HELPERS = (
+    (
+        "choose",
+        """\
+function out = choose(condition, value, alternative)
+    if condition
+        out = value;
+    else
+        out = alternative;
+    end
+end
+""",
+    ),
+)
+_PYTHON_HELPERS = (
+    (
+        "inverse",
+        """\
+def inverse(x):
+    \"\"\"Return 1 / x, and infinity for 0: where that occurs the quotient is discarded.\"\"\"
+    return 1.0 / x if x else math.copysign(math.inf, x)
+
+""",
+    ),
+)
 _BRACES = ("if ({}) {{", "}} else if ({}) {{", "}} else {{", "}")
 
 LANGUAGES = {
@@ -137,7 +204,8 @@ LANGUAGES = {
         ),
         Language(
             "fortran", "Fortran 2008", _fortran_head, "{name} = {value}", "out({index}) = {value}", "out = {value}",
-            ("if ({}) then", "else if ({}) then", "else", "end if"), "  end {kind} {name}", "  !", indent="    ",
+            ("if ({}) then", "else if ({}) then", "else", "end if"), "  end {kind} {name}", "  !",
+            helpers=_FORTRAN_HELPERS,
         ),
         Language(
             "julia", "Julia", _plain_head("function {name}({arguments})"), "{name} = {value}", "return ({values},)",
@@ -145,7 +213,7 @@ LANGUAGES = {
         ),
         Language(
             "octave", "Octave", _octave_head, "{name} = {value};", "out({index}) = {value};", "out = {value};",
-            ("if ({})", "elseif ({})", "else", "end"), "end", "%",
+            ("if ({})", "elseif ({})", "else", "end"), "end", "%", helpers=_OCTAVE_HELPERS,
         ),
         Language(
             "rust", "Rust", _rust_head, "let {name}: f64 = {value};", "[{values}]", "{value}",
@@ -157,7 +225,7 @@ LANGUAGES = {
         ),
         Language(
             "python", "Python", _plain_head("def {name}({arguments}):"), "{name} = {value}", "return ({values})",
-            "return {value}", ("if {}:", "elif {}:", "else:", ""), "", "#",
+            "return {value}", ("if {}:", "elif {}:", "else:", ""), "", "#", helpers=_PYTHON_HELPERS,
         ),
     )
 }  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from importlib.metadata import version
@@ -18,7 +17,7 @@ from cra_sym.arm.excitation import AxialBase, JointStiffness
 from cra_sym.arm.parameters import Arm
 from cra_sym.arm.response import tip_response
 from cra_sym.arm.sensitivity import sensitivities
-from cra_sym.arm.stability import stability_boundary
+from cra_sym.arm.zones import first_order_zone
 from cra_sym.codegen.characteristic import characteristic
 
 __all__ = ["SEED", "TOLERANCE", "Check", "arm_checks", "extreme_arms", "random_arms", "written"]
@@ -176,10 +175,9 @@ def _boundary_checks(arm: Arm) -> Iterator[Check]:
     excitations = ("joint", (1.0, 0.5), JointStiffness(1.0, 0.5)), ("axial", (1e-3, 0.0), AxialBase(1e-3))
     for name, numbers, excitation in excitations:
         for resonance in ((1, 1), (2, 2), (1, 2)):
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # where there is no zone, and where its first order is doubtful
-                border = stability_boundary(arm, excitation, 0.2, resonance)
-            if np.isfinite(border).all():
+            zone = first_order_zone(arm, modal_parameters(arm, 3), excitation, np.asarray(0.2), *resonance)
+            if np.isfinite(zone.half_width):
+                border = zone.centre - zone.half_width, zone.centre + zone.half_width
                 yield Check(f"boundary_{name}", _numbers(arm, *numbers, 0.2, *resonance), _row(border))
 
 
