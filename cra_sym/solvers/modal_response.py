@@ -263,7 +263,8 @@ def _state_table(osc: Oscillators, cause: Steady, times: Array, step: float) -> 
 def _row_table(osc: Oscillators, cause: Steady, step: float, length: int, derivative: int) -> Array:
     """Return what each entry of a state contributes to the output ``step * arange(length)`` later.
 
-    The shape is (..., R, length, columns). A row y(tau) = r_q q + r_u q' + ... is shifted by substituting the shifted state into it.
+    The shape is (..., R, length, columns). A row y(tau) = r_q q + r_u q' + ... is shifted by substituting the shifted
+    state into it.
     """
     osc = _widened(osc, -2)
     harmonics = [Harmonics(*_with_axis(f, -2)) for f in cause.harmonics]
