@@ -38,11 +38,11 @@ def test_the_covariance_is_that_of_repeated_measurements():
     true = NOMINAL.replace(k_t=2e3, k_r=40.0)
     exact, sigma = cra.natural_frequencies(true, 4), np.array([0.002, 0.01, 0.02, 0.05])
     rng = np.random.default_rng(11)
-    estimates = [cra.identify_joint(NOMINAL, exact + sigma * rng.normal(size=4), sigma) for _ in range(40)]
+    estimates = [cra.identify_joint(NOMINAL, exact + sigma * rng.normal(size=4), sigma) for _ in range(24)]
     found = np.array([(e.k_t, e.k_r) for e in estimates])
     covariance = cra.identify_joint(NOMINAL, exact, sigma).covariance
-    assert np.std(found, axis=0) == pytest.approx(np.sqrt(np.diag(covariance)), rel=0.3)
-    assert np.mean([np.sum(e.residuals**2) for e in estimates]) == pytest.approx(2.0, rel=0.4)  # 4 data, 2 unknowns
+    assert np.std(found, axis=0) == pytest.approx(np.sqrt(np.diag(covariance)), rel=0.4)
+    assert np.mean([np.sum(e.residuals**2) for e in estimates]) == pytest.approx(2.0, rel=0.6)  # 4 data, 2 unknowns
 
 
 def test_one_frequency_tells_only_a_combination():

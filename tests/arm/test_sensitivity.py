@@ -51,7 +51,7 @@ def stiffnesses(low, high):
     return st.sampled_from([0.0, np.inf]) | st.floats(low, high).map(lambda power: 10**power)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(stiffnesses(0, 7), stiffnesses(-1, 6), st.floats(0, 0.2), st.floats(0, 1e-2))
 def test_the_two_routes_agree_for_every_stiffness(k_t, k_r, m_e, J_e):
     arm = Arm.nominal().replace(k_t=k_t, k_r=k_r, m_e=m_e, J_e=J_e)
