@@ -115,6 +115,7 @@ COMPILE_FROM = 300_000
 _ROOTS_PER_PART = 30_000  # that are worth handing out
 _PARTS_PER_THREAD = 8  # so that a thread on a busy processor keeps nobody waiting
 _BLOCK = 32_768  # points and roots whose temporaries stay in the processor's cache
+_FEWEST = 256  # lanes in a block, below which a call of NumPy costs more than its work
 
 
 def frequency_parameters(
@@ -154,7 +155,7 @@ def in_parts(fill: Callable[[slice], Any], lanes: int, modes: int, *, threads: i
     """Call ``fill`` for all lanes, part by part: in threads if compiled, else in blocks that fit the cache."""
     threads = (threads or _processors()) if compiled else 1
     fair = -(-lanes // (threads if threads == 1 else _PARTS_PER_THREAD * threads))
-    share = max(fair, _ROOTS_PER_PART // modes, 1) if compiled else max(_BLOCK // (modes + 4), 1)
+    share = max(fair, _ROOTS_PER_PART // modes, 1) if compiled else max(_BLOCK // (modes + 4), _FEWEST)
     parts = [slice(start, min(start + share, lanes)) for start in range(0, lanes, share)]
     if threads == 1 or len(parts) <= 1:
         for part in parts:

@@ -1,31 +1,31 @@
-"""Frequencies of random arms: ours against a brentq loop and SciPy's vectorised solver, as ratios within one run.
+"""Frequencies of random arms: this package's routes, a brentq loop, SciPy's vectorised solver, elements, C.
 
-    python tests/benchmarks/frequencies.py [arms]
-
-The others are handed brackets that hold exactly one root each, which they could not know without a count.
+The root finders of SciPy are handed brackets that hold exactly one root each, which they could not know without a
+count. Slow routes solve a part of the arms; what is compared is the time of a set of frequencies.
 """
 
 from __future__ import annotations
 
 import math
-import os
-import statistics
-import sys
-import time
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq, elementwise
 
-import cra_sym
-from cra_sym import Arm, modal_parameters, natural_frequencies
+import cra_sym as cra
 from cra_sym.arm import spectrum
+from cra_sym.kernels import has_compiler
+from tests.benchmarks import c_twin, elements
+from tests.benchmarks.machine import in_rounds, processors, summary
 
-MODES = 3
-REPEATS = 5
+SEED = 20261122
+LOOP = "brentq loop"
 
 
-def random_arms(size: int, seed: int = 0) -> tuple[np.ndarray, ...]:
+def random_arms(size: int, seed: int = SEED) -> tuple[np.ndarray, ...]:
     """Stiffness over seven and six decades around the interesting range, tip masses up to the arm's own."""
     rng = np.random.default_rng(seed)
     return 10 ** rng.uniform(-1, 6, size), 10 ** rng.uniform(-2, 4, size), rng.uniform(0, 1, size), np.zeros(size)
@@ -47,89 +47,135 @@ def brackets(lam: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.column_stack([lam[:, 0] / 2, middle[:, :-1]]), middle
 
 
-def seconds(function: Callable[[], object]) -> list[float]:
-    """Return the times of some runs, the first of which, with its warm-up, is thrown away."""
-    times = []
-    for _ in range(REPEATS + 1):
-        start = time.perf_counter()
-        function()
-        times.append(time.perf_counter() - start)
-    return times[1:]
+def elements_for(modes: int) -> int:
+    """Return a number of elements for a relative error about 1e-6; more would lose it again to rounding."""
+    return 4 * modes + 12
 
 
-def loop(low, high, a_t, a_r, mu):
-    """Solve root by root."""
-    return [
-        [
-            brentq(frequency_equation, low[i, j], high[i, j], args=(a_t[i], a_r[i], mu[i]), xtol=1e-14)
-            for j in range(MODES)
-        ]
-        for i in range(len(low))
-    ]
+class Case:
+    """Random arms with every route to their frequencies.
 
+    Parameters
+    ----------
+    size, modes : int
+    folder : Path
+        Where the C twin is built.
+    """
 
-def measured(size: int) -> dict[str, tuple[float, float]]:
-    """Return median and spread of the microseconds a set of three frequencies takes, by solver."""
-    arms = random_arms(size)
-    lam = spectrum.frequency_parameters(*arms, modes=MODES + 1, compile=True)
-    low, high = brackets(lam)
-    a_t, a_r, mu = 1 / arms[0], 1 / arms[1], arms[2]
-    few, some = slice(0, max(size // 1000, 300)), slice(0, max(size // 20, 300))
+    def __init__(self, size: int, modes: int, folder: Path) -> None:
+        self.size, self.modes, self.groups = size, modes, random_arms(size)
+        lam = spectrum.frequency_parameters(*self.groups, modes=modes + 1)
+        self.lam, self.brackets = lam[:, :modes], brackets(lam)
+        kappa_t, kappa_r, mu, _ = self.groups
+        self.compliant = 1 / kappa_t, 1 / kappa_r, mu
+        arm = cra.Arm.nominal()
+        stiffness = {"k_t": kappa_t * arm.EI / arm.L**3, "k_r": kappa_r * arm.EI / arm.L}
+        self.arms = arm.replace(**stiffness, m_e=mu * arm.rhoA * arm.L)
+        self.twin, self.width = c_twin.build(folder) if c_twin.has_gcc() else (None, 0)
 
-    def elementwise_root(part: slice) -> np.ndarray:
-        arguments = [np.repeat(x[part, None], MODES, axis=1) for x in (a_t, a_r, mu)]
+    def loop(self, number: int) -> np.ndarray:
+        """Solve root by root."""
+        low, high = self.brackets
+        return np.array([
+            [brentq(frequency_equation, low[i, j], high[i, j], args=arguments, xtol=1e-14) for j in range(self.modes)]
+            for i, arguments in enumerate(zip(*(x[:number].tolist() for x in self.compliant), strict=True))
+        ])  # fmt: skip
+
+    def vectorised(self, number: int) -> np.ndarray:
+        """Solve with SciPy's vectorised bracketing solver."""
+        arguments = tuple(np.repeat(x[:number, None], self.modes, axis=1) for x in self.compliant)
         tolerances = {"xrtol": 1e-15, "xatol": 0.0, "fatol": 0.0}
-        bracket = low[part], high[part]
+        ends = self.brackets[0][:number], self.brackets[1][:number]
         call = lambda b, t, r, m: frequency_equation(b, t, r, m, np)  # noqa: E731
-        return elementwise.find_root(call, bracket, args=tuple(arguments), tolerances=tolerances).x
+        return elementwise.find_root(call, ends, args=arguments, tolerances=tolerances).x
 
-    def ours(part: slice, **options: object) -> np.ndarray:
-        return spectrum.frequency_parameters(*(x[part] for x in arms), modes=MODES, **options)
+    def by_elements(self, number: int) -> np.ndarray:
+        """Solve a dense eigenvalue problem for each arm."""
+        rows = zip(*(x[:number].tolist() for x in self.groups[:3]), strict=True)
+        return np.array([elements.parameters(*row, self.modes, elements_for(self.modes)) for row in rows])
 
-    np.testing.assert_allclose(loop(low[few], high[few], a_t[few], a_r[few], mu[few]), lam[few, :MODES], rtol=1e-9)
-    np.testing.assert_allclose(elementwise_root(some), lam[some, :MODES], rtol=1e-9)
-    threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    runs: dict[str, tuple[slice, Callable[[slice], object]]] = {
-        "brentq loop": (few, lambda part: loop(low[part], high[part], a_t[part], a_r[part], mu[part])),
-        "scipy elementwise.find_root": (some, elementwise_root),
-        "cra_sym, NumPy": (some, lambda part: ours(part, compile=False)),
-        "cra_sym, compiled, 1 thread": (slice(None), lambda part: ours(part, compile=True, threads=1)),
-        f"cra_sym, compiled, {threads} threads": (slice(None), lambda part: ours(part, compile=True, threads=threads)),
-    }
-    arm = Arm.nominal()
-    mass = arm.rhoA * arm.L
-    bending = arm.EI
-    batch = arm.replace(k_t=arms[0] * bending / arm.L**3, k_r=arms[1] * bending / arm.L, m_e=arms[2] * mass)
-    runs |= {
-        "cra_sym, natural_frequencies": (slice(None), lambda part: natural_frequencies(batch)),
-        "cra_sym, modal_parameters": (slice(None), lambda part: modal_parameters(batch)),
-    }
-    table = {}
-    for name, (part, function) in runs.items():
-        count = len(range(*part.indices(size)))
-        times = [1e6 * t / count for t in seconds(lambda function=function, part=part: function(part))]
-        table[name] = statistics.median(times), max(times) - min(times)
-    return table
+    def ours(self, number: int, **options: Any) -> np.ndarray:
+        """Solve by this package."""
+        return spectrum.frequency_parameters(*(x[:number] for x in self.groups), modes=self.modes, **options)
+
+    def in_c(self, number: int, threads: int = 1) -> np.ndarray:
+        """Solve by the C twin."""
+        assert self.twin is not None
+        result = np.empty((number, self.modes))
+        fill = self.twin
+
+        def part(lanes: slice) -> None:
+            fill(result[lanes], *(x[lanes] for x in self.groups))
+
+        spectrum.in_parts(part, number, self.modes, threads=threads, compiled=True)
+        return result
+
+    def routes(self) -> dict[str, tuple[int, Callable[[int], Any]]]:
+        """Return name -> (number of arms, function of that number)."""
+        few, some, two = min(self.size, 300), min(self.size, 20_000), processors()
+        found: dict[str, tuple[int, Callable[[int], Any]]] = {
+            LOOP: (few, self.loop),
+            f"dense elements, {elements_for(self.modes)} of them": (min(self.size, 100), self.by_elements),
+            "scipy elementwise.find_root": (some, self.vectorised),
+            "cra_sym, NumPy": (some, lambda n: self.ours(n, compile=False)),
+        }
+        if has_compiler():
+            found["cra_sym, compiled, 1 thread"] = self.size, lambda n: self.ours(n, compile=True, threads=1)
+            name = f"cra_sym, compiled, {two} threads"
+            found[name] = self.size, lambda n: self.ours(n, compile=True, threads=two)
+        if self.twin is not None:
+            found["C twin, 1 thread"] = self.size, self.in_c
+            found[f"C twin, {two} threads"] = self.size, lambda n: self.in_c(n, two)
+        return found
+
+    def quantities(self) -> dict[str, tuple[int, Callable[[int], Any]]]:
+        """Return the public functions over all arms, on as many threads as they take."""
+        return {
+            "natural_frequencies": (self.size, lambda n: cra.natural_frequencies(self.arms, self.modes)),
+            "modal_parameters": (self.size, lambda n: cra.modal_parameters(self.arms, self.modes)),
+            "sensitivities": (self.size, lambda n: cra.sensitivities(self.arms, self.modes)),
+        }
+
+
+def measured(size: int, modes: int, rounds: int) -> dict[str, Any]:
+    """Return microseconds a set, errors against our own values and ratios to the loop."""
+    with tempfile.TemporaryDirectory() as folder:
+        case = Case(size, modes, Path(folder))
+        routes, quantities = case.routes(), case.quantities()
+        errors = {
+            name: float(np.max(np.abs(function(number) / case.lam[:number] - 1)))
+            for name, (number, function) in routes.items()
+        }
+        jobs = routes | quantities
+        times = in_rounds({name: (lambda f=f, n=n: f(n)) for name, (n, f) in jobs.items()}, rounds)  # type: ignore[misc]
+        rows = {name: summary([1e6 * t for t in times[name]], number) for name, (number, _) in jobs.items()}
+        evaluations = evaluations_per_root(min(size, 20_000), modes) if has_compiler() else float("nan")
+    for name, row in rows.items():
+        row["times the loop"] = rows[LOOP]["median"] / row["median"]
+        row["arms"] = jobs[name][0]
+        if name in errors:
+            row["differs by"] = errors[name]
+    return {"modes": modes, "rows": rows, "evaluations a root": evaluations, "C vector bits": case.width}
+
+
+def growth(most: int) -> dict[str, dict[str, list[list[float]]]]:
+    """Return, by route, (arms or modes, seconds, quartiles): more and more arms of three modes, and modes of arms."""
+    paths = {"NumPy": False, "compiled, 1 thread": True} if has_compiler() else {"NumPy": False}
+    numbers = [10**n for n in range(2, round(math.log10(most)) + 1)]
+    many, few = random_arms(most), random_arms(300)
+    found: dict[str, dict[str, list[list[float]]]] = {"arms": {}, "modes": {}}
+    for name, compile in paths.items():
+
+        def spent(groups: tuple[np.ndarray, ...], modes: int, compile: bool = compile) -> list[float]:
+            route = {"": lambda: spectrum.frequency_parameters(*groups, modes=modes, compile=compile, threads=1)}
+            return list(summary(in_rounds(route, 3)[""]).values())
+
+        affordable = [n for n in numbers if compile or n <= 1_000_000]
+        found["arms"][name] = [[n, *spent(tuple(x[:n] for x in many), 3)] for n in affordable]
+        found["modes"][name] = [[n, *spent(few, n)] for n in (1, 3, 10, 30, 100, 300, 1000)]
+    return found
 
 
 def evaluations_per_root(size: int, modes: int) -> float:
     """Return how often the determinant is evaluated for a root, counts at fixed points left out."""
-    arms = random_arms(size)
-    return spectrum._fill_compiled(np.empty((size, modes)), *arms) / (size * modes)
-
-
-def main() -> None:
-    """Print the table."""
-    size = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
-    table = measured(size)
-    reference = table["brentq loop"][0]
-    print(f"three frequencies of {size} random arms, cra_sym {cra_sym.__version__}, numpy {np.__version__}")
-    print(f"{'solver':38} {'us a set':>10} {'spread':>8} {'x loop':>8}")
-    for name, (median, spread) in table.items():
-        print(f"{name:38} {median:10.3f} {spread:8.3f} {reference / median:8.1f}")
-    for modes in (3, 10):
-        print(f"evaluations a root, {modes} modes: {evaluations_per_root(20_000, modes):.2f}")
-
-
-if __name__ == "__main__":
-    main()
+    return spectrum._fill_compiled(np.empty((size, modes)), *random_arms(size)) / (size * modes)

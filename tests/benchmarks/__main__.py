@@ -1,0 +1,112 @@
+"""All benchmarks in one go: ``python -m tests.benchmarks [--quick] [--output DIR]``.
+
+Writes one table, its data and one picture. Times are medians with quartiles; only ratios within one run mean anything.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+from tests.benchmarks import cold, frequencies, kernel, machine, nodes
+
+RESULTS = Path(__file__).parent / "results"
+
+
+def run(quick: bool) -> dict[str, Any]:
+    """Measure everything."""
+    size, rounds = (20_000, 3) if quick else (1_000_000, 7)
+    report: dict[str, Any] = {"quick": quick, "seed": frequencies.SEED, "machine": machine.description()}
+    report["floor"] = machine.floor()
+    report["kernel"] = kernel.main(1 << 14 if quick else 1 << 16)["table"]
+    report["frequencies"] = [frequencies.measured(size, 3, rounds), frequencies.measured(size // 3, 10, rounds)]
+    report["growth"] = frequencies.growth(100_000 if quick else 10_000_000)
+    report["cold start"] = cold.measured()
+    report["sweep"] = nodes.measured(40_000 if quick else 4_000_000)
+    return report
+
+
+def table(report: dict[str, Any]) -> str:
+    """Return the report as Markdown."""
+    lines = ["# Benchmarks", "", "| machine | |", "| --- | --- |"]
+    lines += [f"| {name} | {value} |" for name, value in report["machine"].items()]
+    lines += [f"| {name} | {value:.2f} |" for name, value in report["floor"].items()]
+    for case in report["frequencies"]:
+        lines += ["", f"## {case['modes']} frequencies of an arm", ""]
+        lines += [
+            "| route | arms | µs a set | quartiles | times the loop | differs by |",
+            "| --- | --: " + "| --: " * 4 + "|",
+        ]
+        for name, row in case["rows"].items():
+            differs = f"{row['differs by']:.0e}" if "differs by" in row else ""
+            lines.append(
+                f"| {name} | {row['arms']} | {row['median']:.3g} | {row['low']:.3g} to {row['high']:.3g} "
+                f"| {row['times the loop']:.1f} | {differs} |"
+            )
+        lines += ["", f"{case['evaluations a root']:.2f} evaluations a root; the C twin multiplies in "]
+        lines[-1] += (
+            f"{case['C vector bits']}-bit registers. 'Differs by' is the largest relative difference from ours."
+        )
+    lines += [
+        "",
+        "## One evaluation of the determinant",
+        "",
+        "| route | ns | quartiles | times C |",
+        "| --- | --: | --: | --: |",
+    ]
+    for name, row in report["kernel"].items():
+        low, high = row["quartiles ns"]
+        lines.append(f"| {name} | {row['median ns']} | {low} to {high} | {row['ratio to C']} |")
+    lines += ["", "## Cold start, a new process", "", "| what | processor s | wall s |", "| --- | --: | --: |"]
+    lines += [f"| {name} | {row['processor s']} | {row['wall s']} |" for name, row in report["cold start"].items()]
+    for kind, routes in report["growth"].items():
+        lines += ["", f"## Growth with {kind}", "", f"| route | {kind} | s | quartiles |", "| --- | --: | --: | --: |"]
+        for route, points in routes.items():
+            lines += [f"| {route} | {n} | {median:.3g} | {low:.3g} to {high:.3g} |" for n, median, low, high in points]
+    lines += ["", "## Sweeps", "", nodes.note(report["sweep"])]
+    return "\n".join(lines) + "\n"
+
+
+def picture(report: dict[str, Any], path: Path) -> None:
+    """Draw the ratios, and how cost grows."""
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 4), layout="constrained")
+    rows = report["frequencies"][0]["rows"]
+    left.barh(list(rows), [row["times the loop"] for row in rows.values()], color="0.4")
+    left.set(xscale="log", xlabel="times as fast as the brentq loop, 3 frequencies")
+    left.invert_yaxis()
+    labels = {"arms": "arms, 3 modes each", "modes": "modes, 300 arms"}
+    for axes, (kind, routes) in zip((middle, right), report["growth"].items(), strict=True):
+        for (name, points), style in zip(routes.items(), ("o-", "s--"), strict=False):
+            axes.loglog([p[0] for p in points], [p[1] for p in points], style, label=name)
+        n, median, *_ = points[-1]
+        axes.loglog([p[0] for p in points], [median * p[0] / n for p in points], ":", color="0.5", label="proportional")
+        axes.set(xlabel=labels[kind], ylabel="time / s")
+        axes.legend()
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def main() -> None:
+    """Measure, print and write."""
+    parser = argparse.ArgumentParser(prog="python -m tests.benchmarks", description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="small sets, for a look")
+    parser.add_argument("--output", type=Path, default=RESULTS)
+    options = parser.parse_args()
+    report = run(options.quick)
+    options.output.mkdir(parents=True, exist_ok=True)
+    text = table(report)
+    (options.output / "benchmarks.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    (options.output / "benchmarks.md").write_text(text, encoding="utf-8")
+    picture(report, options.output / "benchmarks.png")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()
