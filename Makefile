@@ -8,7 +8,7 @@ SUPPORTED = import sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3
 RUN = .venv/bin/python
 NOTEBOOKS = --nbval --nbval-current-env --nbval-sanitize-with tests/notebooks/sanitize.cfg notebooks
 
-.PHONY: reproduce test lab notebooks lint clean
+.PHONY: reproduce test lab notebooks lint mutation clean
 
 reproduce: .venv/.ready
 	$(RUN) -m cra_sym reproduce --output "$(OUTPUT)"
@@ -27,6 +27,10 @@ lint: .venv/.ready
 	$(RUN) -m ruff check .
 	$(RUN) -m ruff format --check .
 	$(RUN) -m mypy
+
+# Hours: every mutant of every module; ARGS="--sample 10" or ARGS=arm/energy for less.
+mutation: .venv/.ready
+	$(RUN) -m tests.mutation $(ARGS)
 
 clean:
 	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .hypothesis

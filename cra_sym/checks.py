@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["broadcastable", "count", "real_array"]
+__all__ = ["broadcastable", "count", "instance", "real_array"]
 
 
 def _shown(value: Any) -> str:
-    text = repr(value)
+    text = " ".join(repr(value).split())
     return text if len(text) <= 80 else text[:77] + "..."
 
 
@@ -77,8 +77,15 @@ def count(name: str, value: Any, *, low: int = 1, high: int | None = None) -> in
         kind = ValueError if isinstance(value, (float, np.floating)) else TypeError
         raise kind(f"{name} = {_shown(value)}: allowed is {allowed}") from None
     if number < low or (high is not None and number > high):
-        raise ValueError(f"{name} = {number}: allowed is {allowed}")
+        raise ValueError(f"{name} = {_shown(number)}: allowed is {allowed}")
     return number
+
+
+def instance(name: str, value: Any, kind: type) -> None:
+    """Raise a ``TypeError`` that names the field unless ``value`` is of the class ``kind``."""
+    if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        raise TypeError(f"{name} = {_shown(value)}: allowed is {article} {kind.__name__}")
 
 
 def broadcastable(**arrays: np.ndarray) -> tuple[int, ...]:

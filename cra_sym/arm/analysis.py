@@ -16,6 +16,7 @@ from cra_sym.arm.parameters import Arm
 __all__ = ["ModalParameters", "frequency_parameters", "modal_parameters", "mode_shapes", "natural_frequencies"]
 
 MOST_MODES = 1000
+_SOFTEST = 1e-150  # the product of two stiffnesses of this size is a number yet
 
 
 def frequency_parameters(kappa_t: Any, kappa_r: Any, mu: Any, iota: Any = 0.0, modes: int = 3) -> np.ndarray:
@@ -24,7 +25,8 @@ def frequency_parameters(kappa_t: Any, kappa_r: Any, mu: Any, iota: Any = 0.0, m
     Parameters
     ----------
     kappa_t, kappa_r : array_like
-        Dimensionless translational and rotational stiffness of the joint, in ``[0, inf]``.
+        Dimensionless translational and rotational stiffness of the joint, in ``[0, inf]``; below 1e-150 they count as
+        0, for their product has to be a number.
     mu, iota : array_like
         Mass and rotary inertia of the end-effector over those of the arm, in ``[0, inf)``.
     modes : int
@@ -54,6 +56,8 @@ def frequency_parameters(kappa_t: Any, kappa_r: Any, mu: Any, iota: Any = 0.0, m
         "mu": checks.real_array("mu", mu, low=0.0),
         "iota": checks.real_array("iota", iota, low=0.0),
     }
+    for name in ("kappa_t", "kappa_r"):
+        arrays[name] = np.where(arrays[name] < _SOFTEST, 0.0, arrays[name])
     shape = checks.broadcastable(**arrays)
     return spectrum.frequency_parameters(*(np.broadcast_to(a, shape) for a in arrays.values()), modes=modes)
 
@@ -105,6 +109,7 @@ def mode_shapes(arm: Arm, x: Any, modes: int = 3, derivative: int = 0) -> np.nda
     ValueError
         If a point lies outside ``[0, L]`` of any arm, among others.
     """
+    checks.instance("arm", arm, Arm)
     derivative = checks.count("derivative", derivative, low=0, high=3)
     points = checks.real_array("x", x, low=0.0)
     if points.ndim > 1:
@@ -230,8 +235,7 @@ def _lambda(arm: Arm, modes: int) -> np.ndarray:
 
 
 def _groups(arm: Arm) -> list[np.ndarray]:
-    if not isinstance(arm, Arm):
-        raise TypeError(f"arm = {arm!r}: allowed is an Arm")
+    checks.instance("arm", arm, Arm)
     return [np.broadcast_to(value, arm.shape) for value in (arm.kappa_t, arm.kappa_r, arm.mu, arm.iota)]
 
 

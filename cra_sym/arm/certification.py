@@ -11,7 +11,7 @@ import numpy as np
 
 from cra_sym.arm.analysis import natural_frequencies
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import count
+from cra_sym.checks import count, instance
 from cra_sym.extras import require
 from cra_sym.kernels import derived_kernel
 from cra_sym.solvers.certificates import UndecidedError, decided, enclose
@@ -66,6 +66,7 @@ def certify(arm: Arm, modes: int = 3) -> Certificate:
     MissingExtraError
         If python-flint is not installed (extra ``certify``).
     """
+    instance("arm", arm, Arm)
     modes = count("modes", modes)
     flint = require("flint", "certify")
     values = np.broadcast_arrays(*(getattr(arm, name) for name in _FIELDS))

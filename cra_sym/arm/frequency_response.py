@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import real_array
+from cra_sym.checks import instance, real_array
 from cra_sym.kernels import derived_kernel
 
 __all__ = ["frequency_response"]
@@ -71,8 +71,7 @@ def frequency_response(
     >>> print(f"{static.real:.4e} s2")
     -6.6053e-03 s2
     """
-    if not isinstance(arm, Arm):
-        raise TypeError(f"arm = {arm!r}: allowed is an Arm")
+    instance("arm", arm, Arm)
     Omega = real_array("angular_frequency", angular_frequency, low=0.0)
     places = real_array("x", np.min(arm.L) if x is None else x, low=0.0, high=float(np.min(arm.L)))
     for name, value in (("angular_frequency", Omega), ("x", places)):

@@ -13,7 +13,7 @@ import numpy as np
 from cra_sym.arm.analysis import natural_frequencies
 from cra_sym.arm.parameters import Arm
 from cra_sym.arm.sensitivity import Sensitivities, sensitivities
-from cra_sym.checks import broadcastable, real_array
+from cra_sym.checks import broadcastable, instance, real_array
 
 __all__ = ["IdentifiabilityWarning", "JointEstimate", "identify_joint"]
 
@@ -122,8 +122,7 @@ def identify_joint(arm: Arm, measured_frequencies: Any, uncertainty: Any) -> Joi
 
 
 def _checked(arm: Arm, measured_frequencies: Any, uncertainty: Any) -> tuple[np.ndarray, np.ndarray]:
-    if not isinstance(arm, Arm):
-        raise TypeError(f"arm = {arm!r}: allowed is an Arm")
+    instance("arm", arm, Arm)
     if arm.shape:
         raise ValueError(f"arm has shape {arm.shape}: allowed is a single arm")
     measured = real_array("measured_frequencies", measured_frequencies, low=0.0, open_low=True)

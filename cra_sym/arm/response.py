@@ -9,7 +9,7 @@ import numpy as np
 from cra_sym.arm.analysis import ModalParameters, modal_parameters, mode_shapes
 from cra_sym.arm.base_motion import BaseMotion, Harmonic, Piecewise
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import broadcastable, count, real_array
+from cra_sym.checks import broadcastable, count, instance, real_array
 from cra_sym.kernels import derived_kernel
 from cra_sym.solvers import modal_response as solver
 
@@ -98,6 +98,7 @@ def response(
     TypeError, ValueError
         If an argument is out of its range or shapes do not fit; the error names it.
     """
+    instance("arm", arm, Arm)
     places = real_array("x", x, low=0.0, high=float(np.min(arm.L)))
     if places.ndim > 1:
         raise ValueError(f"x has shape {places.shape}: allowed are a number or one axis of places")
@@ -131,6 +132,7 @@ def residual_vibration(arm: Arm, motion: BaseMotion, modes: int = 5, *, zeta: An
     ValueError
         If the motion never stops.
     """
+    instance("motion", motion, BaseMotion)
     if not np.all(np.isfinite(motion.duration)):
         raise ValueError("motion never stops accelerating: allowed are moves with a stop, or sampled records")
     parameters = modal_parameters(arm, count("modes", modes))
@@ -161,8 +163,7 @@ def _oscillators(arm: Arm, parameters: ModalParameters, rows: np.ndarray, zeta: 
 
 def _response(osc: solver.Oscillators, motion: BaseMotion, t: Any, derivative: int, start: Start) -> np.ndarray:
     """Return the outputs at the times, shape (..., outputs, times)."""
-    if not isinstance(motion, BaseMotion):
-        raise TypeError(f"motion = {motion!r}: allowed is a BaseMotion")
+    instance("motion", motion, BaseMotion)
     times = real_array("t", t, low=0.0)
     if times.ndim > 1:
         raise ValueError(f"t has shape {times.shape}: allowed are a number or one axis of times")

@@ -198,6 +198,7 @@ def forced_width(arm: Arm, excitation: TransverseBase, modes: int = 3) -> np.nda
     """
     if not isinstance(excitation, TransverseBase):
         raise TypeError(f"excitation = {excitation!r}: allowed is a TransverseBase; the others have stability_boundary")
+    checks.instance("arm", arm, Arm)
     checks.broadcastable(arm=np.empty(arm.shape), amplitude=np.empty(excitation.shape))
     modal = modal_parameters(arm, checks.count("modes", modes))
     amplitude = np.asarray(excitation.amplitude)[..., None]
@@ -216,8 +217,7 @@ def _parametric(excitation: Any) -> Parametric:
 
 
 def _shape(arm: Any, excitation: Excitation, **arrays: np.ndarray) -> tuple[int, ...]:
-    if not isinstance(arm, Arm):
-        raise TypeError(f"arm = {arm!r}: allowed is an Arm")
+    checks.instance("arm", arm, Arm)
     return checks.broadcastable(arm=np.empty(arm.shape), excitation=np.empty(excitation.shape), **arrays)
 
 
@@ -320,7 +320,7 @@ def _system(
 ) -> dict[str, Any]:
     """Return what the Floquet solver takes."""
     excitation = _parametric(excitation)
-    frequency = checks.real_array("angular_frequency", angular_frequency, low=0.0, open_low=True)
+    frequency = checks.real_array("angular_frequency", angular_frequency, low=1e-300)
     epsilon = checks.real_array("epsilon", epsilon, low=0.0)
     _shape(arm, excitation, angular_frequency=frequency, epsilon=epsilon)
     modal = modal_parameters(arm, checks.count("modes", modes))

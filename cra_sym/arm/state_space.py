@@ -9,7 +9,7 @@ import numpy as np
 
 from cra_sym.arm.analysis import modal_parameters
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import count
+from cra_sym.checks import count, instance
 
 __all__ = ["state_space"]
 
@@ -48,6 +48,7 @@ def state_space(
     """
     from scipy.signal import StateSpace
 
+    instance("arm", arm, Arm)
     if arm.shape:
         raise ValueError(f"arm has shape {arm.shape}: allowed is a single arm")
     p = modal_parameters(arm, count("modes", modes))

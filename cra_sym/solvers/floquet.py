@@ -23,6 +23,7 @@ DRIFTS = np.diff([0.0, *_NODES, 1.0])
 #: Weight of the nested commutator in one step: what the quadrature misses of the double integral of |s - t|.
 COMMUTATOR = float(1.0 / 3.0 - KICKS @ np.abs(_NODES[:, None] - _NODES) @ KICKS) / 2
 _BLOCK = 512  # systems propagated together, small enough for the cache
+_MOST_STEPS = 1e7  # a period: minutes
 _COMPILED_FROM = 20000  # systems from which the compiled path pays for loading it
 
 
@@ -97,7 +98,13 @@ class Oscillators:
         strength = np.sqrt(self.epsilon * np.abs(self.coupling).sum(axis=(0, 2)).max(axis=0))
         fastest = np.maximum(self.omega.max(axis=0), 2.0 * strength) + 2 * np.pi / self.period
         angle = self.period * fastest
-        steps = 0.6 * angle * (angle * 1e-6 / tolerance) ** 0.25  # the method is of fourth order
+        with np.errstate(over="ignore"):
+            steps = 0.6 * angle * (angle * 1e-6 / tolerance) ** 0.25  # the method is of fourth order
+        if not (steps <= _MOST_STEPS).all():
+            raise ValueError(
+                f"a period takes {steps.max():.2g} steps, allowed are {_MOST_STEPS:g}: the excitation is too slow "
+                "against the fastest mode, or too strong"
+            )
         return 2 * np.ceil(np.maximum(steps, 8) / 2).astype(np.int64)
 
     def take(self, index: np.ndarray) -> Oscillators:

@@ -11,6 +11,7 @@ from tqdm import tqdm
 
 import cra_sym as cra
 from cra_sym.arm.parameters import Arm
+from cra_sym.checks import instance
 from cra_sym.extras import require
 from cra_sym.studies.quantities import ARM_FIELDS, Quantity, named_quantity
 from cra_sym.symbols import nomenclature
@@ -104,6 +105,7 @@ def make_study(arm: Arm, quantity: str | Callable[..., Any], parameters: Mapping
     TypeError, ValueError
         Naming the parameter that is unknown, missing, out of range, or no axis.
     """
+    instance("arm", arm, Arm)
     if arm.shape:
         raise ValueError(f"arm: its fields have shape {arm.shape}; allowed are numbers, arrays belong to the axes")
     chosen = named_quantity(quantity)

@@ -1,0 +1,68 @@
+"""Does the suite notice every wrong sign, exponent and constant? ``python -m tests.mutation --help``.
+
+Each mutant runs the tests that watch over its module, quickest first, in a copy of the package and a process of its
+own. Verdicts go to ``results.json`` beside this file: counts a module with the seed, and every survivor with the reason
+why it may survive. One without a reason is a hole in the suite, and the exit code says so.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import sys
+from pathlib import Path
+
+from tests.mutation.runner import SUITE, Laboratory, Verdict
+
+RESULTS = Path(__file__).with_name("results.json")
+
+
+def main() -> int:
+    """Run and record; return 1 if a mutant survives without a reason."""
+    parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__)
+    parser.add_argument("modules", nargs="*", metavar="MODULE", help="such as arm/energy (all)")
+    parser.add_argument("--sample", type=int, metavar="N", help="this many mutants a module, drawn at random (all)")
+    parser.add_argument("--seed", type=int, default=20261122, help="of the draw (%(default)s)")
+    options = parser.parse_args()
+    if unknown := set(options.modules) - set(SUITE):
+        parser.error(f"unknown: {', '.join(unknown)}; known are {', '.join(SUITE)}")
+    open_ends = 0
+    modules = options.modules or list(SUITE)
+    with Laboratory() as laboratory:
+        if not laboratory.control(modules):
+            raise SystemExit("the package as it is fails its tests")
+        for module in modules:
+            pool = laboratory.mutants(module)
+            drawn = pool
+            if options.sample is not None and options.sample < len(pool):
+                drawn = random.Random(f"{options.seed} {module}").sample(pool, options.sample)
+            verdicts = []
+            for mutant in drawn:
+                verdict = laboratory.examine(module, mutant)
+                verdicts.append((mutant, verdict))
+                print(f"{verdict.name.lower():9}{module} {mutant.function}: {mutant.after}", flush=True)
+            open_ends += record(module, len(pool), verdicts, options.seed)
+    return 1 if open_ends else 0
+
+
+def record(module: str, mutants: int, verdicts: list, seed: int) -> int:
+    """Write a module's counts and survivors; return the number of survivors that have no reason yet."""
+    results = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else {}
+    known = results.get(module, {}).get("survivors", [])
+    reasons = {(s["function"], s["before"], s["after"]): s["reason"] for s in known}
+    examined = {mutant.change for mutant, _ in verdicts}
+    survivors = [s for s in known if (s["function"], s["before"], s["after"]) not in examined]
+    for mutant, verdict in verdicts:
+        if verdict is Verdict.SURVIVED:
+            names = ("function", "before", "after")
+            reason = reasons.get(mutant.change, "")
+            survivors.append({**dict(zip(names, mutant.change, strict=True)), "reason": reason})
+    counts = {v.name.lower(): sum(verdict is v for _, verdict in verdicts) for v in Verdict}
+    results[module] = {"seed": seed, "mutants": mutants, "tried": len(verdicts), **counts, "survivors": survivors}
+    RESULTS.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    return sum(not s["reason"] for s in survivors)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

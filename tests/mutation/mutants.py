@@ -1,0 +1,101 @@
+"""Mutants of a module: each differs from it in one sign, one exponent or one numeric constant."""
+
+from __future__ import annotations
+
+import ast
+import copy
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+__all__ = ["Mutant", "mutants"]
+
+_ANNOTATIONS = {"annotation", "returns", "decorator_list"}
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One change; ``before`` and ``after`` are the smallest statement or clause around it."""
+
+    function: str
+    before: str
+    after: str
+    kind: str
+    source: str
+
+    @property
+    def change(self) -> tuple[str, str, str]:
+        """What was changed, whatever its line number."""
+        return self.function, self.before, self.after
+
+
+def mutants(source: str) -> list[Mutant]:
+    """Return every mutant of a module's source.
+
+    A plus becomes a minus and the other way round, a leading minus is dropped, a constant (and so an exponent) goes up
+    and down by one, a float by a tenth. Left alone are annotations, decorators, which hold the equations' numbers, and
+    functions that are checks themselves.
+    """
+    tree = ast.parse(source)
+    return [_mutant(tree, *place) for place in _places(tree, (), "", None)]
+
+
+def _places(node: ast.AST, path: tuple, function: str, statement: tuple | None) -> Iterator[tuple]:
+    if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+        if any("checks(" in ast.unparse(decorator) for decorator in node.decorator_list):
+            return
+        function = f"{function}.{node.name}".lstrip(".")
+    if isinstance(node, (ast.stmt, ast.ExceptHandler)) and path:
+        statement = path
+    for change in _changes(node):
+        yield path, function, statement, change
+    for name, value in ast.iter_fields(node):
+        if name in _ANNOTATIONS:
+            continue
+        for index, child in enumerate(value if isinstance(value, list) else [value]):
+            if isinstance(child, ast.AST):
+                step = (name, index if isinstance(value, list) else None)
+                yield from _places(child, (*path, step), function, statement)
+
+
+def _changes(node: ast.AST) -> tuple[str, ...]:
+    if isinstance(node, (ast.BinOp, ast.AugAssign)) and isinstance(node.op, (ast.Add, ast.Sub)):
+        return ("flip",)
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        return ("drop",)
+    if isinstance(node, ast.Constant) and type(node.value) is int:
+        return ("+1", "-1")
+    if isinstance(node, ast.Constant) and type(node.value) is float:
+        return ("*1.1", "*0.9")
+    return ()
+
+
+def _reach(tree: ast.AST, path: tuple) -> ast.AST:
+    for name, index in path:
+        child = getattr(tree, name)
+        tree = child if index is None else child[index]
+    return tree
+
+
+def _mutant(tree: ast.Module, path: tuple, function: str, statement: tuple, change: str) -> Mutant:
+    changed = copy.deepcopy(tree)
+    node = _reach(changed, path)
+    if change == "flip":
+        node.op = ast.Sub() if isinstance(node.op, ast.Add) else ast.Add()
+    elif change == "drop":
+        *head, (name, index) = path
+        parent = _reach(changed, tuple(head))
+        if index is None:
+            setattr(parent, name, node.operand)
+        else:
+            getattr(parent, name)[index] = node.operand
+    elif change.startswith("*"):
+        node.value *= float(change[1:])
+    else:
+        node.value += int(change)
+    before, after = (_shown(_reach(t, statement)) for t in (tree, changed))
+    return Mutant(function, before, after, change, ast.unparse(changed))
+
+
+def _shown(node: ast.AST) -> str:
+    """Return a statement without the block it heads."""
+    return ast.unparse(node).partition(":\n")[0]

@@ -1,0 +1,52 @@
+"""The mutation tool: it changes what it says, one thing at a time, and tells a caught mutant from one that is not."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+_spec = importlib.util.spec_from_file_location("mutants_tool", Path(__file__).with_name("mutants.py"))
+tool = importlib.util.module_from_spec(_spec)
+SOURCE = '''
+@numbered(3, "kinetic energy", (1,))
+def energy(x: Shape[2]) -> float:
+    """A docstring with 3 - 2."""
+    return -x**2 + 0.5
+
+
+@checks(3)
+def _():
+    return 1 - 1
+'''
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _load():
+    import sys
+
+    sys.modules["mutants_tool"] = tool  # a dataclass looks its module up
+    _spec.loader.exec_module(tool)
+
+
+def test_signs_exponents_and_constants_change_one_at_a_time():
+    found = {mutant.after for mutant in tool.mutants(SOURCE)}
+    assert found == {
+        "return -x ** 2 - 0.5",
+        "return x ** 2 + 0.5",
+        "return -x ** 3 + 0.5",
+        "return -x ** 1 + 0.5",
+        "return -x ** 2 + 0.55",
+        "return -x ** 2 + 0.45",
+    }
+    assert {mutant.function for mutant in tool.mutants(SOURCE)} == {"energy"}
+
+
+def test_every_mutant_of_the_sections_differs_and_compiles():
+    for name in ("energy", "joint", "limits"):
+        source = (ROOT / "cra_sym" / "arm" / f"{name}.py").read_text(encoding="utf-8")
+        found = tool.mutants(source)
+        assert len(found) > 30
+        for mutant in found:
+            compile(mutant.source, name, "exec")
+            assert mutant.before != mutant.after

@@ -1,0 +1,193 @@
+"""Whatever is thrown at the public functions and the command line: documented errors only, and nothing is executed."""
+
+import inspect
+import os
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+import pytest
+
+import cra_sym as cra
+from cra_sym.__main__ import COMMANDS, main
+
+TRAP = "CRA_SYM_TRAP"
+ATTACKS = (
+    f"__import__('os').environ.__setitem__('{TRAP}', 'sprung')",
+    f"exec(\"import os; os.environ['{TRAP}'] = 'sprung'\")",
+    f"lambda: __import__('os').putenv('{TRAP}', '1')",
+    "$(touch sprung)",
+    "`touch sprung`",
+    "; touch sprung",
+    "{0.__class__.__mro__}",
+    "%s%n",
+    "../../sprung",
+    "\0",
+    "λ\u202e\ud800",
+)
+NUMBERS = (0.0, -0.0, -1.0, 1.0, 1e300, -1e300, 1e-300, 5e-324, np.nan, np.inf, -np.inf, 2**70, 10**400, 1 + 2j)
+SHAPES = ((), [], [[]], [1.0, 2.0], [[1.0], [2.0]], [1.0, [2.0]], np.ones((0, 3)), np.zeros((2, 1, 2)))
+OBJECTS = (None, True, "1", b"1", {}, {"k_t": 1}, object(), int, len, np.array(["a"]), np.datetime64("now"), ...)
+ANYTHING = (*ATTACKS, *NUMBERS, *SHAPES, *OBJECTS)
+
+ARM = cra.Arm.nominal().replace(k_t=1e3, k_r=50.0, zeta=0.01)
+SPRING = cra.JointStiffness(k_t=1.0)
+MOTION = cra.BaseMotion(velocity=0.1)
+GOOD = {
+    "Arm": dict(L=1.0, b=0.03, h=0.003, E=7e10, rho=2700.0, m_b=5.0, m_e=0.1, J_e=0.0, k_t=1e3, k_r=1e2, zeta=0.0),
+    "equation": dict(number=1),
+    "equations": {},
+    "natural_frequencies": dict(arm=ARM, modes=2),
+    "frequency_parameters": dict(kappa_t=1.0, kappa_r=2.0, mu=0.1, iota=0.0, modes=2),
+    "mode_shapes": dict(arm=ARM, x=0.5, modes=2, derivative=1),
+    "modal_parameters": dict(arm=ARM, modes=2),
+    "BaseMotion": dict(velocity=0.1, acceleration=0.1, amplitude=1e-3, angular_frequency=10.0, phase=0.0),
+    "response": dict(arm=ARM, motion=MOTION, t=[0.0, 0.1], x=0.5, modes=2, derivative=0, zeta=0.01, start="base"),
+    "tip_response": dict(arm=ARM, motion=MOTION, t=0.1, modes=2, derivative=0, zeta=0.01, start="inertial"),
+    "residual_vibration": dict(arm=ARM, motion=cra.BaseMotion.trapezoid(0.1, 0.2, 1.0), modes=2, zeta=0.0),
+    "state_space": dict(arm=ARM, modes=2, input="base_acceleration"),
+    "frequency_response": dict(arm=ARM, angular_frequency=[5.0, 9.0], x=0.5),
+    "sensitivities": dict(arm=ARM, modes=2, method="modal"),
+    "identify_joint": dict(arm=ARM, measured_frequencies=[2.3, 14.0], uncertainty=0.01),
+    "input_shaper": dict(angular_frequency=10.0, zeta=0.01, order=1),
+    "certify": dict(arm=ARM, modes=1),
+    "AxialBase": dict(amplitude=0.01),
+    "JointStiffness": dict(k_t=1.0, k_r=0.5),
+    "TransverseBase": dict(amplitude=0.01),
+    "floquet_exponents": dict(arm=ARM, excitation=SPRING, angular_frequency=28.0, epsilon=0.05, modes=2),
+    "forced_width": dict(arm=ARM, excitation=cra.TransverseBase(amplitude=0.01), modes=2),
+    "growth_rate": dict(arm=ARM, excitation=SPRING, angular_frequency=28.0, epsilon=0.05, modes=2),
+    "stability_boundary": dict(
+        arm=ARM.replace(zeta=0.0), excitation=SPRING, epsilon=0.01, resonance=(1, 1), order=1, modes=2
+    ),
+    "sweep": dict(arm=ARM, quantity="natural_frequencies", k_t=[1e3, 1e4]),
+}
+ELSEWHERE = {
+    "AsymptoticWarning", "ResonanceWarning",  # nothing to call with values
+    "Model", "kernel",  # take SymPy expressions: their own tests
+    "export",  # writes a folder: below
+}  # fmt: skip
+NOISY = {  # values no machine has make these overflow with NumPy's RuntimeWarning
+    ("frequency_response", "angular_frequency"),
+    ("identify_joint", "uncertainty"),
+    ("floquet_exponents", "angular_frequency"),
+    ("growth_rate", "angular_frequency"),
+}
+PLACES = [(name, argument) for name, arguments in GOOD.items() for argument in arguments]
+
+
+def call(name, **changes):
+    return getattr(cra, name)(**{**GOOD[name], **changes})
+
+
+def test_every_public_function_is_attacked():
+    assert set(GOOD) | ELSEWHERE == set(cra._HOME)
+    for name, arguments in GOOD.items():
+        assert set(arguments) <= set(inspect.signature(getattr(cra, name)).parameters) | {"k_t"}, name
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_the_good_values_are_good(name):
+    call(name)
+
+
+def refused_or_done(name, argument, value):
+    """Call with one bad value; only documented errors and warnings may come out."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.simplefilter("ignore", UserWarning)  # ours derive from it, NumPy's RuntimeWarning does not
+        if (name, argument) in NOISY:
+            warnings.simplefilter("ignore", RuntimeWarning)
+        try:
+            return call(name, **{argument: value})
+        except (TypeError, ValueError) as error:
+            text = str(error)
+            assert text and len(text) < 600, text
+    return None
+
+
+@pytest.mark.parametrize(("name", "argument"), PLACES, ids=lambda x: str(x))
+def test_only_documented_errors(name, argument, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv(TRAP, raising=False)
+    for value in ANYTHING:
+        result = refused_or_done(name, argument, value)
+        assert result is None or not isinstance(value, str) or value == "1", value
+    assert TRAP not in os.environ and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("low", [5e-324, 1e-307, 1e-160])
+def test_two_springs_of_next_to_nothing_count_as_none(low):
+    """The product of both was no number, and the search for a zero of it did not end well."""
+    found = cra.frequency_parameters([low, low], [low, 1e-300], 0.1, modes=4)
+    np.testing.assert_allclose(found, np.broadcast_to(cra.frequency_parameters(0.0, 0.0, 0.1, modes=4), (2, 4)))
+
+
+@pytest.mark.parametrize(
+    ("function", "argument", "value"),
+    [("growth_rate", "angular_frequency", 1e-9), ("growth_rate", "epsilon", 1e20)],
+)
+def test_work_without_end_is_refused(function, argument, value):
+    with pytest.raises(ValueError, match="steps, allowed are"):
+        call(function, **{argument: value})
+
+
+@pytest.mark.parametrize("text", [*ATTACKS[:-2], "1e999", "nan", "-inf", "", "0x10", "1_0", "\u0661"])
+@pytest.mark.parametrize("option", ["--k-t", "--modes", "--L"])
+def test_the_command_line_refuses_or_computes(option, text, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    try:
+        code = main(["frequencies", f"{option}={text}"])
+    except SystemExit as end:
+        code = end.code
+    out, err = capsys.readouterr()
+    assert code in (0, 2) and (err.count("\n") == 1 and not out if code else out and not err)
+    assert TRAP not in os.environ and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command", sorted(COMMANDS))
+@pytest.mark.parametrize("attack", ATTACKS[:6])
+def test_no_command_takes_a_stray_word(command, attack, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as end:
+        main([command, "--no-such-option", attack])
+    assert end.value.code == 2 and capsys.readouterr().err.count("\n") == 1
+    assert TRAP not in os.environ and not list(tmp_path.iterdir())
+
+
+def test_an_export_to_an_odd_name_stays_where_it_was_sent(tmp_path):
+    folder = tmp_path / "; touch sprung $(id) λ"
+    cra.export("c", folder)
+    assert [path.name for path in tmp_path.iterdir()] == [folder.name]
+
+
+@pytest.mark.parametrize("language", [*ATTACKS[:8], None, 1, "C", ""])
+def test_an_export_in_no_language_leaves_nothing(language, tmp_path):
+    with pytest.raises((TypeError, ValueError)):
+        cra.export(language, tmp_path / "out")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("attack", ATTACKS)
+def test_no_text_becomes_an_expression(attack):
+    """Texts where expressions belong are refused before anything reads them."""
+    with pytest.raises((TypeError, ValueError)):
+        cra.kernel(attack, ["x"])
+    with pytest.raises((TypeError, ValueError)):
+        cra.kernel("x", [attack])
+    with pytest.raises((TypeError, ValueError)):
+        cra.Model(attack, fields=[attack], x=attack, domain=(0, attack), t=attack)
+    assert TRAP not in os.environ
+
+
+def test_a_store_in_an_odd_or_closed_place_changes_nothing(tmp_path):
+    """A cache path with spaces and quotes, and one that is a file."""
+    (tmp_path / "file").write_text("mine")
+    code = "import cra_sym as cra; print(cra.frequency_parameters(1.0, 2.0, 0.1).tolist())"
+    expected = str(cra.frequency_parameters(1.0, 2.0, 0.1).tolist())
+    for place in (tmp_path / "a b'; touch sprung", tmp_path / "file"):
+        environment = {**os.environ, "XDG_CACHE_HOME": str(place)}
+        run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+        assert run.stdout.strip() == expected, run.stderr
+    assert (tmp_path / "file").read_text() == "mine" and not (tmp_path / "sprung").exists()
