@@ -2,7 +2,7 @@
 
 from cra_sym.claims.family import ArmFamily, provenance_family
 from cra_sym.claims.ledger import OUTCOMES, THEMES, Finding, Quantity, Verdict, claim, claims, outcome
-from cra_sym.claims.pictures import figure_claims, figure_family
+from cra_sym.claims.pictures import figure_claims, figure_family, small_png
 from cra_sym.claims.setting import Setting
 
 __all__ = [
@@ -19,4 +19,5 @@ __all__ = [
     "figure_family",
     "outcome",
     "provenance_family",
+    "small_png",
 ]

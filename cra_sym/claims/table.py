@@ -1,4 +1,4 @@
-"""The ledger as text for a terminal."""
+"""The ledger as text for a terminal and for a page."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from cra_sym.claims.ledger import OUTCOMES, Verdict
 from cra_sym.claims.pictures import MARKS
 
-__all__ = ["verdict_text"]
+__all__ = ["verdict_markdown", "verdict_text"]
 
 
 def verdict_text(verdicts: Sequence[Verdict], width: int | None = None) -> str:
@@ -36,3 +36,21 @@ def verdict_text(verdicts: Sequence[Verdict], width: int | None = None) -> str:
     counts = Counter(verdict.outcome for verdict in verdicts)
     lines.append(", ".join(f"{counts[name]} {name}" for name in OUTCOMES if counts[name]))
     return "\n".join(lines)
+
+
+def verdict_markdown(verdicts: Sequence[Verdict]) -> str:
+    """Return the verdicts as a Markdown table: outcome, what the paper says, what the computation says."""
+    rows = ["| | the paper | computed |", "| --- | --- | --- |"]
+    for verdict in verdicts:
+        mark, _ = MARKS[verdict.outcome]
+        found = verdict.sentence
+        found += f" **Would reproduce the paper:** {verdict.remedy}." if verdict.remedy else ""
+        found += f" **Missing:** {verdict.missing}." if verdict.missing else ""
+        head = f"**{verdict.id}** {mark} {verdict.outcome}"
+        words = f"{verdict.claim} *({verdict.source})*"
+        rows.append("| " + " | ".join(_cell(text) for text in (head, words, found)) + " |")
+    return "\n".join(rows)
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", r"\|").replace("_", r"\_").replace("^", r"\^")

@@ -89,7 +89,8 @@ def _(verdict: Verdict, ax: Axes) -> None:
     _strips(ax, k_t[1:], verdict["region"], KINDS)
     stiffness_axis(ax, "k_t")
     ax.set_ylabel("width of the zone / (rad/s)")
-    ax.legend(fontsize=8, loc="upper right")
+    ax.set_ylim(top=8 * ax.get_ylim()[1])
+    ax.legend(fontsize=8, loc="upper center", ncols=3, columnspacing=1.0, handlelength=1.6)
 
 
 def _strips(ax: Axes, x: np.ndarray, rows: np.ndarray, names: tuple[str, ...]) -> None:
