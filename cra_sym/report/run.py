@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable
+import textwrap
 from pathlib import Path
 
 from tqdm import tqdm
@@ -45,8 +45,7 @@ def reproduce(output: str | Path, notebooks: str | Path | None = None) -> str:
         save_figures(folder / "figures")
         _write_tables(folder / "tables")
         write_page(folder)
-        made = [path for path in folder.rglob("*") if path.is_file()]
-        listing = _listing(folder, made)
+        listing = _listing(folder)
     return f"{listing}\n\nTo read everything, open {Path(output) / 'report.html'}"
 
 
@@ -63,8 +62,15 @@ def _write_tables(folder: Path) -> None:
         write_text(folder / f"{name}.md", table.markdown())
 
 
-def _listing(folder: Path, made: Iterable[Path]) -> str:
-    """One line a file: its path and size, folder by folder."""
-    rows = sorted((path.relative_to(folder).as_posix(), path.stat().st_size) for path in made)
-    width = max(len(name) for name, _ in rows)
-    return "\n".join(f"{name:<{width}}  {size / 1000:8.1f} kB" for name, size in rows)
+def _listing(folder: Path) -> str:
+    """A line for each entry of a folder: its size, the kinds and the names of the files in it."""
+    lines = []
+    for entry in sorted(folder.iterdir(), key=lambda path: (path.is_file(), path.name)):
+        files = [entry] if entry.is_file() else sorted(path for path in entry.iterdir() if path.is_file())
+        size = sum(path.stat().st_size for path in files) / 1e6
+        lines.append(f"{size:6.1f} MB  {entry.name}")
+        if entry.is_dir():
+            kinds = ", ".join(sorted({path.suffix[1:] for path in files}))
+            names = f"{kinds}: {' '.join(sorted({path.stem for path in files}))}"
+            lines.append(textwrap.indent(textwrap.fill(names, 90), " " * 11))
+    return "\n".join(lines)
