@@ -25,7 +25,7 @@ from cra_sym.arm.equations import checks, numbered
 from cra_sym.arm.evaluation import at, integrate_polynomials, put
 from cra_sym.arm.joint import boundary_conditions, free_vibration, section_forces
 from cra_sym.arm.shooting import sample, shoot
-from cra_sym.mechanics import hamilton
+from cra_sym.mechanics.hamilton import hamilton
 from cra_sym.symbols import dimension, symbol
 
 __all__ = ["dynamics", "mode_field_equation", "natural_conditions"]
