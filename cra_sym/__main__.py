@@ -153,6 +153,8 @@ def _claims(options: Options) -> None:
         arm = _chosen_arm(options)
         verdicts = [claim(id, arm) for id in options.id] if options.id else claims(arm)
     print(json.dumps([v.as_dict() for v in verdicts], indent=1) if options.json else verdict_text(verdicts))
+
+
 def _export_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "language", choices=("c", "fortran", "python", "julia", "octave", "rust", "javascript"), metavar="LANGUAGE",
