@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import cra_sym
@@ -125,12 +126,13 @@ def _write(target: Path, texts: dict[str, str]) -> None:
         earlier = [str(name) for name in json.loads(manifest.read_text(encoding="utf-8"))["files"]]
     except (OSError, ValueError, KeyError, TypeError):
         earlier = []
-    with staged_directory(target.with_name(f".{target.name}-export")) as folder:
-        for name, text in texts.items():
+    listed = json.dumps({"files": sorted(texts)}, indent=1) + "\n"
+    with TemporaryDirectory(dir=target.parent, prefix=f".{target.name}-") as stage:
+        folder = Path(stage)
+        for name, text in {**texts, "manifest.json": listed}.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             write_text(folder / name, text)
-        (folder / "manifest.json").write_text(json.dumps({"files": sorted(texts)}, indent=1) + "\n", encoding="utf-8")
-        for name in [*texts, "manifest.json"]:
+        for name in (*texts, "manifest.json"):
             (target / name).parent.mkdir(parents=True, exist_ok=True)
             os.replace(folder / name, target / name)
     for name in set(earlier) - set(texts):

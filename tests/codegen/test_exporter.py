@@ -40,15 +40,17 @@ def test_same_input_same_bytes(tmp_path):
 
 
 def test_a_folder_with_content_is_left_alone(short, tmp_path):
-    (tmp_path / "mine.txt").write_text("mine")
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "mine.txt").write_text("mine")
     with pytest.raises(ValueError, match="not empty"):
-        cra.export("c", tmp_path)
-    assert [p.name for p in tmp_path.iterdir()] == ["mine.txt"]
-    cra.export("c", tmp_path, overwrite=True)
-    assert (tmp_path / "mine.txt").read_text() == "mine" and (tmp_path / "cra_arm.h").exists()
-    cra.export("python", tmp_path, overwrite=True)
-    assert (tmp_path / "mine.txt").exists() and not (tmp_path / "cra_arm.h").exists()
-    assert not [p for p in tmp_path.parent.iterdir() if p.name.startswith(".")]
+        cra.export("c", folder)
+    assert [p.name for p in folder.iterdir()] == ["mine.txt"]
+    cra.export("c", folder, overwrite=True)
+    assert (folder / "mine.txt").read_text() == "mine" and (folder / "cra_arm.h").exists()
+    cra.export("python", folder, overwrite=True)
+    assert (folder / "mine.txt").exists() and not (folder / "cra_arm.h").exists()
+    assert [p.name for p in tmp_path.iterdir()] == ["out"]
 
 
 def test_a_failed_export_leaves_nothing(tmp_path, monkeypatch):
