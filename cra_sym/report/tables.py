@@ -88,8 +88,18 @@ def frequencies() -> Table:
     return Table("Natural frequencies", columns, rows)
 
 
+def claims() -> Table:
+    """What the paper says, and what the computation says about it."""
+    from cra_sym.claims import claims
+
+    rows = [(v.id, v.outcome, v.claim, v.source, v.sentence, v.remedy or v.missing or "") for v in claims()]
+    columns = ("claim", "outcome", "the paper", "where", "computed", "would reproduce the paper, or is missing")
+    return Table("Claims", columns, rows)
+
+
 TABLES: dict[str, Callable[[], Table]] = {
     "nomenclature": nomenclature,
     "equations": equations,
     "frequencies": frequencies,
+    "claims": claims,
 }
