@@ -59,8 +59,8 @@ def floquet_boundary(
     residual = isinstance(excitation, JointStiffness) if residual is None else residual
 
     inside, outside = np.full(2, middle), middle + 2.0 * half * np.array([-1.0, 1.0])
-    for _ in range(5):  # 20 times closer each
-        grid = np.linspace(inside, outside, 21, axis=-1)
+    for _ in range(5):  # 16 times closer each
+        grid = np.linspace(inside, outside, 17, axis=-1)
         growing = growth_rate(arm, excitation, grid, epsilon, modes, residual=residual) > 1e-5 * half
         if growing.all(axis=-1).any() or not growing[:, 0].all():
             where = (

@@ -6,7 +6,6 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from cra_sym.arm.analysis import modal_parameters
@@ -32,7 +31,7 @@ __all__ = [
 K_T, M_E = (1e5, 1e4, 1e3), (0.0, 0.001, 0.005)
 AXIAL, JOINT, TRANSVERSE = AxialBase(0.01), JointStiffness(), TransverseBase(0.001)
 STRONG = AxialBase(0.05)
-_GROWTH = colormaps["YlOrBr"].with_extremes(under="white")
+_GROWTH = "YlOrBr"
 _FIRST: dict[str, Any] = {"color": "#0072B2", "linestyle": (0, (4, 2)), "linewidth": 1.2}
 _SECOND: dict[str, Any] = {"color": "#111111", "linestyle": "-", "linewidth": 1.2}
 
@@ -82,18 +81,18 @@ def _zone(ax: Axes, arm: Arm, excitation: Any, mode: int, epsilon: np.ndarray, p
     ax.text(0.03, 0.04, text, transform=ax.transAxes, fontsize=7.5, color="0.25", va="bottom")
 
 
-def _shade(ax: Axes, frequency: np.ndarray, epsilon: np.ndarray, rates: np.ndarray) -> Any:
-    """Shade what grows, the rest stays white."""
+def _shade(ax: Axes, frequency: np.ndarray, epsilon: np.ndarray, rates: np.ndarray, step: float | None = None) -> Any:
+    """Shade what grows in steps; the rest stays white."""
     top = rates.max()
-    look = {"cmap": _GROWTH, "shading": "gouraud", "rasterized": True, "vmin": 0.02 * top, "vmax": top}
-    return ax.pcolormesh(frequency, epsilon, rates, **look)
+    levels = np.linspace(0.02, 1.0, 7) * top if step is None else np.r_[0.1 * step, np.arange(step, top + step, step)]
+    return ax.contourf(frequency, epsilon, rates, levels=levels, cmap=_GROWTH, antialiased=False)
 
 
 def _principal_zones(
     arms: list[tuple[str, Arm]], excitation: Any, epsilon: float, title: str, axes: Any, points: int
 ) -> Figure:
     """Draw the zones of modes 1 to 3, a row an arm."""
-    panels = _grid(axes, len(arms), 3, (9.0, 2.45 * len(arms) + 0.6), sharey=True)
+    panels = _grid(axes, len(arms), 3, (8.4, 1.95 * len(arms) + 0.8), sharey=True)
     sizes = np.linspace(0.0, epsilon, points)
     for row, (label, arm) in zip(panels, arms, strict=True):
         for mode, ax in enumerate(row, start=1):
@@ -118,7 +117,7 @@ def figure_11(
     epsilon: float = 0.3,
     *,
     axes: Any = None,
-    points: int = 49,
+    points: int = 37,
 ) -> Figure:
     """Draw the principal zones of the first three modes for three translational stiffnesses of the joint.
 
@@ -152,7 +151,7 @@ def figure_12(
     epsilon: float = 0.3,
     *,
     axes: Any = None,
-    points: int = 49,
+    points: int = 37,
 ) -> Figure:
     """Draw the principal zones of the first three modes for three end-effectors.
 
@@ -253,7 +252,7 @@ def figure_combinations(
     frequency = np.linspace(0.5 * omega[0], 2.2 * omega[2], points)
     sizes = np.linspace(0.0, epsilon, points // 3)
     rates = _growth(arm, excitation, frequency, sizes, 4)
-    mesh = _shade(ax, frequency, sizes, np.sqrt(rates))
+    mesh = _shade(ax, frequency, sizes, np.sqrt(rates), step=1.0)
     for m in (1, 2, 3):
         for n in range(m, 4):
             for side in _boundary(arm, excitation, sizes, (m, n), order=2):
@@ -295,9 +294,9 @@ def figure_accuracy(arm: Arm | None = None, epsilon: Any = None, *, axes: Any = 
     axes : pair of Axes, optional
     """
     arm = arm or Arm.nominal().replace(k_t=1e4)
-    epsilon = np.geomspace(0.02, 0.16, 4) if epsilon is None else np.asarray(epsilon, dtype=float)
+    epsilon = np.geomspace(0.03, 0.12, 3) if epsilon is None else np.asarray(epsilon, dtype=float)
     panels = _grid(axes, 1, 2, (8.6, 3.9), sharey=False)[0]
-    cases = ((JOINT, (2, 2)), (JOINT, (1, 2))), ((STRONG, (1, 1)), (STRONG, (2, 2)))
+    cases = ((JOINT, (2, 2)), (JOINT, (1, 2))), ((STRONG, (2, 2)), (STRONG, (1, 2)))
     for ax, pair in zip(panels, cases, strict=True):
         for (excitation, resonance), marker in zip(pair, "os", strict=True):
             errors = boundary_errors(arm, excitation, epsilon, resonance)
@@ -309,7 +308,7 @@ def figure_accuracy(arm: Arm | None = None, epsilon: Any = None, *, axes: Any = 
         ax.set_xlabel(r"$\epsilon$")
         ax.set_xticks(epsilon, [f"{size:.2g}" for size in epsilon])
         ax.minorticks_off()
-        ax.legend(fontsize=8)
+        ax.legend(fontsize=8, loc="lower right")
     panels[0].set_ylabel("largest error of the two sides / (rad/s)")
     panels[0].set_title("Joint stiffness: error against Floquet")
     panels[1].set_title("Base along the arm, 50 mm × ε")
