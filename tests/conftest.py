@@ -1,7 +1,32 @@
 """Settings shared by every test; read before NumPy is imported, so the libraries' thread pools see them."""
 
 import os
+import shutil
+
+import pytest
 
 for pool in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(pool, "1")  # the test workers share the cores already; a pool each only gets in the way
 os.environ.setdefault("MPLBACKEND", "agg")
+
+_QUIET = (
+    "--disable-gpu",
+    "--disable-quic",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """The system's Chromium, headless, driven by Playwright; tests that use it are marked ``browser``."""
+    sync_api = pytest.importorskip("playwright.sync_api", reason="needs Playwright: pip install playwright")
+    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if found is None:
+        pytest.skip("needs a browser: install Chromium, on Debian with apt install chromium")
+    with sync_api.sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=found, args=list(_QUIET), timeout=60_000)
+        yield chromium
+        chromium.close()
