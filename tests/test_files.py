@@ -82,3 +82,55 @@ def test_permissions_follow_the_umask(tmp_path):
     finally:
         os.umask(before)
     assert stat.S_IMODE((tmp_path / "out").stat().st_mode) == 0o750
+
+
+def test_what_is_kept(tmp_path):
+    fill(tmp_path / "out", a="1", b="1")
+    (tmp_path / "out" / "mine").mkdir()
+    (tmp_path / "out" / "mine" / "note").write_text("mine")
+    (tmp_path / "out" / "link").symlink_to("mine")
+    (tmp_path / "out" / "c").write_text("old")
+    with staged_directory(tmp_path / "out", keep=True) as folder:
+        (folder / "a").write_text("2")
+        (folder / "c").write_text("2")
+    left = {path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*")}
+    assert left == {"a", "c", "link", "mine", "mine/note", "manifest.json"}
+    assert json.loads((tmp_path / "out" / "manifest.json").read_text()) == {"files": ["a", "c"]}
+    assert (tmp_path / "out" / "link" / "note").read_text() == "mine" and (tmp_path / "out" / "c").read_text() == "2"
+
+
+def test_a_file_in_the_way_of_a_folder_is_safe(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "src").write_text("mine")
+    with (
+        pytest.raises(OutputError, match="'src' cannot be kept"),
+        staged_directory(tmp_path / "out", keep=True) as folder,
+    ):
+        (folder / "src").mkdir()
+        (folder / "src" / "a").write_text("1")
+    assert contents(tmp_path / "out") == {"src": "mine"}
+
+
+@pytest.mark.parametrize("calls", [1, 2])
+@pytest.mark.parametrize("error", [OSError, KeyboardInterrupt])
+def test_an_interrupted_exchange_is_undone(tmp_path, monkeypatch, calls, error):
+    fill(tmp_path / "out", a="1")
+    rename, left = os.rename, [calls]
+
+    def failing(*paths):
+        left[0] -= 1
+        if left[0] == 0:
+            raise error
+        rename(*paths)
+
+    with pytest.raises(error), staged_directory(tmp_path / "out") as folder:
+        (folder / "a").write_text("2")
+        monkeypatch.setattr(os, "rename", failing)
+    assert contents(tmp_path / "out") == {"a": "1"}
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_failure_takes_the_folders_above_along(tmp_path):
+    with pytest.raises(KeyboardInterrupt), staged_directory(tmp_path / "deep" / "er"):
+        raise KeyboardInterrupt
+    assert not list(tmp_path.iterdir())

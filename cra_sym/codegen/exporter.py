@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import cra_sym
@@ -18,7 +16,7 @@ from cra_sym.codegen.expressions import gauss_rule, modal_functions, spectrum_fu
 from cra_sym.codegen.languages import LANGUAGES, Language
 from cra_sym.codegen.program import Function
 from cra_sym.codegen.vectors import TOLERANCE, arm_checks, written
-from cra_sym.files import OutputError, staged_directory, write_text
+from cra_sym.files import OutputError, staged_directory
 
 __all__ = ["Export", "export"]
 
@@ -65,8 +63,8 @@ def export(language: str, directory: str | Path, model: Any = None, overwrite: b
     model : Model, optional
         Its characteristic function with the derivative by omega is exported instead of the arm.
     overwrite : bool
-        Whether a folder that is not empty is written into. Files of the same name are replaced, those of an earlier
-        export that are no longer made are removed, all others stay.
+        Whether a folder that is not empty is replaced by one that holds the new files and, of the old ones, those no
+        earlier export made. The folder changes in one step: a failed export leaves it as it was.
 
     Returns
     -------
@@ -79,7 +77,7 @@ def export(language: str, directory: str | Path, model: Any = None, overwrite: b
     """
     if language not in LANGUAGES:
         raise ValueError(f"language = {language!r}: allowed are {', '.join(LANGUAGES)}")
-    target = Path(os.path.abspath(directory))
+    target = Path(os.path.realpath(directory))
     _check_free(target, overwrite)
     if model is None:
         texts = _arm_texts(language)
@@ -89,7 +87,7 @@ def export(language: str, directory: str | Path, model: Any = None, overwrite: b
         texts = model_texts(language, model)
     digest = _digest(texts)
     texts = {name: text.replace(_DIGEST, digest) for name, text in texts.items()}
-    _write(target, texts)
+    _write(target, texts, overwrite)
     return Export(language, Path(directory), tuple(sorted(texts)), digest)
 
 
@@ -113,32 +111,12 @@ def _check_free(target: Path, overwrite: bool) -> None:
         raise OutputError(f"directory = {str(target)!r}: is not empty; overwrite=True (--force) writes into it")
 
 
-def _write(target: Path, texts: dict[str, str]) -> None:
-    """Write everything or nothing; into a folder that is not empty, file by file once all of them exist."""
-    if not target.is_dir() or not any(target.iterdir()):
-        with staged_directory(target) as folder:
-            for name, text in texts.items():
-                (folder / name).parent.mkdir(parents=True, exist_ok=True)
-                write_text(folder / name, text)
-        return
-    manifest = target / "manifest.json"
-    try:
-        earlier = [str(name) for name in json.loads(manifest.read_text(encoding="utf-8"))["files"]]
-    except (OSError, ValueError, KeyError, TypeError):
-        earlier = []
-    listed = json.dumps({"files": sorted(texts)}, indent=1) + "\n"
-    with TemporaryDirectory(dir=target.parent, prefix=f".{target.name}-") as stage:
-        folder = Path(stage)
-        for name, text in {**texts, "manifest.json": listed}.items():
+def _write(target: Path, texts: dict[str, str], keep: bool) -> None:
+    """Write everything or nothing: the folder is complete before it takes its place."""
+    with staged_directory(target, keep=keep) as folder:
+        for name, text in texts.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            write_text(folder / name, text)
-        for name in (*texts, "manifest.json"):
-            (target / name).parent.mkdir(parents=True, exist_ok=True)
-            os.replace(folder / name, target / name)
-    for name in set(earlier) - set(texts):
-        path = target / name
-        if path.is_file() and target in path.resolve().parents:
-            path.unlink()
+            (folder / name).write_text(text, encoding="utf-8", newline="\n")
 
 
 @cache

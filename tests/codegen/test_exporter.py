@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -53,14 +54,26 @@ def test_a_folder_with_content_is_left_alone(short, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
 
 
-def test_a_failed_export_leaves_nothing(tmp_path, monkeypatch):
-    def fail(everything):
-        raise ArithmeticError
+@pytest.mark.parametrize("error", [ArithmeticError, KeyboardInterrupt])
+@pytest.mark.parametrize("place", ["reference", "writing"])
+def test_a_failed_export_leaves_everything_as_it_was(short, tmp_path, monkeypatch, error, place):
+    cra.export("c", tmp_path / "old")
+    (tmp_path / "old" / "mine.txt").write_text("mine")
+    before = {path.name: path.read_bytes() for path in (tmp_path / "old").iterdir()}
+    left = [3]
 
-    monkeypatch.setattr(exporter, "_reference", fail)
-    with pytest.raises(ArithmeticError):
-        cra.export("c", tmp_path / "out")
-    assert not list(tmp_path.iterdir())
+    def failing(*_, **__):
+        left[0] -= 1 if place == "writing" else 3
+        if left[0] <= 0:
+            raise error
+
+    monkeypatch.setattr(*((exporter, "_reference") if place == "reference" else (Path, "write_text")), failing)
+    for target, overwrite in (("old", True), ("new/deep", False)):
+        left[0] = 3
+        with pytest.raises(error):
+            cra.export("python", tmp_path / target, overwrite=overwrite)
+    assert {path.name: path.read_bytes() for path in (tmp_path / "old").iterdir()} == before
+    assert [path.name for path in tmp_path.iterdir()] == ["old"]
 
 
 def test_unknown_language_is_refused(tmp_path):
