@@ -5,11 +5,15 @@
 
 from __future__ import annotations
 
+import asyncio
+import os
 import sys
 from base64 import b64decode, b64encode
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import CancelledError, ThreadPoolExecutor, as_completed
 from io import BytesIO
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
@@ -65,15 +69,15 @@ def _indexed(picture: str) -> str:
     return b64encode(small.getvalue()).decode("ascii")
 
 
-def execute(path: str | Path, progress: tqdm[Any] | None = None, timeout: int = 600) -> NotebookNode:
+def execute(path: str | Path, advance: Callable[[], Any] | None = None, timeout: int = 600) -> NotebookNode:
     """Execute one notebook in a fresh kernel of this Python, in its own folder, and return it with its outputs.
 
     Parameters
     ----------
     path : path
         The notebook; the file itself is left as it is.
-    progress : tqdm, optional
-        Advanced by one for each code cell.
+    advance : callable, optional
+        Called after each code cell; what it raises ends the run.
     timeout : int
         Seconds allowed for one cell.
 
@@ -101,10 +105,10 @@ def execute(path: str | Path, progress: tqdm[Any] | None = None, timeout: int = 
         record_timing=False,
         coalesce_streams=True,
         resources={"metadata": {"path": str(path.parent)}},
-        on_cell_executed=lambda **_: progress.update() if progress is not None else None,
+        on_cell_executed=lambda **_: advance() if advance is not None else None,
     )
     try:
-        client.execute(cleanup_kc=True)  # it ends the kernels of its own managers only, unless told
+        asyncio.run(client.async_execute(cleanup_kc=True))  # it ends the kernels of its own managers only, unless told
     except (CellExecutionError, CellTimeoutError, DeadKernelError) as error:
         raise NotebookError(f"{path.name} did not run: {strip_ansi(str(error))}") from None
     _normalise(notebook)
@@ -123,13 +127,31 @@ def cells_to_run(paths: Iterable[Path]) -> int:
 
 
 def refresh(paths: Sequence[Path]) -> None:
-    """Execute notebooks one after the other and store their outputs in place; a failing one keeps its file."""
+    """Execute notebooks, as many at once as there are processors, and store their outputs in place.
+
+    A failing one keeps its file, and nothing more is begun.
+    """
     import nbformat
 
-    with tqdm(total=cells_to_run(paths), unit="cell", disable=None) as progress:
-        for path in paths:
-            progress.set_description(path.stem)
-            write_text(path, nbformat.writes(execute(path, progress)) + "\n")
+    stop = Event()
+
+    def advance() -> None:
+        if stop.is_set():
+            raise CancelledError
+        progress.update()
+
+    with (
+        tqdm(total=cells_to_run(paths), unit="cell", disable=None) as progress,
+        ThreadPoolExecutor(max_workers=min(len(paths), os.cpu_count() or 1)) as pool,
+    ):
+        running = {pool.submit(execute, path, advance): path for path in paths}
+        try:
+            for finished in as_completed(running):
+                write_text(running[finished], nbformat.writes(finished.result()) + "\n")
+        except BaseException:  # an interrupt too: no cell more than those now running
+            pool.shutdown(wait=False, cancel_futures=True)
+            stop.set()
+            raise
 
 
 if __name__ == "__main__":

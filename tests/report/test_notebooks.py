@@ -1,5 +1,7 @@
 """The runner: executes in place, stores no trace of the machine, and says which cell failed."""
 
+import os
+
 import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
@@ -41,6 +43,16 @@ def test_a_failing_cell_is_shown_and_the_file_kept(notebook):
     with pytest.raises(NotebookError, match=r"(?s)trial run\.ipynb.*no such arm"):
         refresh([path])
     assert path.read_bytes() == before
+
+
+def test_notebooks_run_side_by_side_and_a_failure_ends_them_all(notebook, tmp_path):
+    count = 2 * (os.cpu_count() or 1) + 1
+    slow = [notebook("import time", "time.sleep(1)", *["1"] * 300, name=f"{n}.ipynb") for n in range(count)]
+    before = {path: path.read_bytes() for path in slow}
+    broken = notebook("raise RuntimeError('no such arm')", name="broken.ipynb")
+    with pytest.raises(NotebookError, match="no such arm"):
+        refresh([broken, *slow])
+    assert {path: path.read_bytes() for path in slow} == before
 
 
 def test_the_file_itself_is_left_alone(notebook):
