@@ -126,7 +126,8 @@ def mode_shapes(arm: Arm, x: Any, modes: int = 3, derivative: int = 0) -> np.nda
 class ModalParameters:
     """Modal quantities for mass-normalised modes (M_i = 1 kg, so that K_i = omega_i^2) with phi(L) >= 0.
 
-    The mode axis is last; ``...`` is the batch shape of the arm. All finite at zero and at infinite stiffness.
+    The mode axis is last; ``...`` is the batch shape of the arm. All finite at zero and at infinite stiffness; each is
+    computed when it is first asked for.
 
     Attributes
     ----------
@@ -144,18 +145,62 @@ class ModalParameters:
         k_t phi_i(0) phi_j(0) and k_r phi_i'(0) phi_j'(0), 1/s2; 0 for infinite stiffness.
     """
 
-    omega: np.ndarray
-    frequency: np.ndarray
-    lam: np.ndarray
-    participation: np.ndarray
-    root_displacement: np.ndarray
-    root_slope: np.ndarray
-    root_moment: np.ndarray
-    root_shear: np.ndarray
-    tip_displacement: np.ndarray
-    tip_slope: np.ndarray
     _arm: Arm = field(repr=False)
     _modes: Modes = field(repr=False)
+
+    @property
+    def lam(self) -> np.ndarray:
+        """Frequency parameter."""
+        return self._modes.lam
+
+    @cached_property
+    def omega(self) -> np.ndarray:
+        """Natural angular frequency, rad/s."""
+        return _angular_frequencies(self._arm, self.lam)
+
+    @cached_property
+    def frequency(self) -> np.ndarray:
+        """Natural frequency, Hz."""
+        return self.omega / (2 * np.pi)
+
+    @cached_property
+    def participation(self) -> np.ndarray:
+        """Modal participation factor, kg^1/2."""
+        return self._modes.participation * _column(np.sqrt(self._arm.rhoA * self._arm.L))
+
+    @cached_property
+    def root_displacement(self) -> np.ndarray:
+        """phi(0), kg^-1/2."""
+        return self._modes.root[0] * self._unit(0)
+
+    @cached_property
+    def root_slope(self) -> np.ndarray:
+        """phi'(0), kg^-1/2/m."""
+        return self._modes.root[1] * self._unit(1)
+
+    @cached_property
+    def root_moment(self) -> np.ndarray:
+        """EI phi''(0)."""
+        return self._modes.root[2] * (_column(self._arm.EI) * self._unit(2))
+
+    @cached_property
+    def root_shear(self) -> np.ndarray:
+        """EI phi'''(0)."""
+        return self._modes.root[3] * (_column(self._arm.EI) * self._unit(3))
+
+    @cached_property
+    def tip_displacement(self) -> np.ndarray:
+        """phi(L), kg^-1/2."""
+        return self._modes.tip[0] * self._unit(0)
+
+    @cached_property
+    def tip_slope(self) -> np.ndarray:
+        """phi'(L), kg^-1/2/m."""
+        return self._modes.tip[1] * self._unit(1)
+
+    def _unit(self, derivative: int) -> Any:
+        """Return the unit of a derivative of a mass-normalised shape."""
+        return _column(1 / np.sqrt(self._arm.rhoA * self._arm.L) / self._arm.L**derivative)
 
     @cached_property
     def stiffness_translation(self) -> np.ndarray:
@@ -207,26 +252,7 @@ def modal_parameters(arm: Arm, modes: int = 3) -> ModalParameters:
     >>> print(parameters.participation.round(4))
     [ 0.3868 -0.2143  0.1257]
     """
-    dimensionless = _modes(arm, modes)
-    omega = _angular_frequencies(arm, dimensionless.lam)
-    length, rhoA, EI = (_column(value) for value in (arm.L, arm.rhoA, arm.EI))
-    unit = 1 / np.sqrt(rhoA * length)  # of a mass-normalised shape, kg^-1/2
-    factors = unit, unit / length, EI * unit / length**2, EI * unit / length**3
-    root = [value * factor for value, factor in zip(dimensionless.root, factors, strict=True)]
-    return ModalParameters(
-        omega=omega,
-        frequency=omega / (2 * np.pi),
-        lam=dimensionless.lam,
-        participation=dimensionless.participation * (1 / unit),
-        root_displacement=root[0],
-        root_slope=root[1],
-        root_moment=root[2],
-        root_shear=root[3],
-        tip_displacement=dimensionless.tip[0] * unit,
-        tip_slope=dimensionless.tip[1] * (unit / length),
-        _arm=arm,
-        _modes=dimensionless,
-    )
+    return ModalParameters(arm, _modes(arm, modes))
 
 
 def _lambda(arm: Arm, modes: int) -> np.ndarray:

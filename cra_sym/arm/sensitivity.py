@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -15,13 +16,17 @@ from cra_sym.kernels import derived_kernel
 
 __all__ = ["Sensitivities", "sensitivities"]
 
-_implicit = derived_kernel("cra_sym.arm.implicit:implicit_kernel", backend="numpy")
+_implicit_rates = derived_kernel("cra_sym.arm.implicit:implicit_kernel", backend="numpy")
 _exponents = derived_kernel("cra_sym.arm.implicit:group_exponents", backend="numpy")
 
 
-@dataclass(frozen=True)
+_NAMES = ("k_t", "k_r", "c_t", "c_r", "m_e", "J_e")  # what a derivative of omega^2 is known by; the rest follows
+_Rate = Callable[[Arm, ModalParameters, str], np.ndarray]
+
+
 class Sensitivities:
-    """Derivatives of the natural frequencies f (Hz), every array of shape (..., modes).
+    """Derivatives of the natural frequencies f (Hz), every array of shape (..., modes),
+    computed when it is first asked for.
 
     Raw derivatives have the unit Hz over that of the parameter and cannot be compared with each other. Logarithmic
     ones, d ln f / d ln p, can: that of a spring is half its share of the strain energy of the mode, that of m_e minus
@@ -68,6 +73,61 @@ class Sensitivities:
     log_E: np.ndarray
     log_rho: np.ndarray
 
+    def __init__(self, arm: Arm, modal: ModalParameters, rate: _Rate) -> None:
+        self._arm, self._modal, self._rate = arm, modal, rate
+        self.frequency = modal.frequency
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        if name not in Sensitivities.__annotations__:
+            raise AttributeError(f"Sensitivities have no {name!r}")
+        logarithmic = name.startswith("log_")
+        parameter = name.removeprefix("log_" if logarithmic else "df_d")
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            value = self._logarithmic(parameter) if logarithmic else self._raw(parameter)
+        setattr(self, name, value)
+        return value
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *Sensitivities.__annotations__]
+
+    def _raw(self, name: str) -> np.ndarray:
+        if name not in _NAMES:
+            value = self.frequency * self._logarithmic(name) / _column(self._arm, getattr(self._arm, name))
+            return np.where(self._still, 0.0, value) if self._still.any() else value
+        change, spring = self._rate(self._arm, self._modal, name), name in _NAMES[:4]
+        value = change / (8 * np.pi**2 * self.frequency)  # d omega^2 = 8 pi^2 f df
+        if self._still.any():
+            held = np.where(np.abs(change) > 0, np.copysign(np.inf, change), 0.0) if spring else 0.0
+            loose = (np.asarray(self._arm.k_t) == 0) & (np.asarray(self._arm.k_r) == 0) & spring
+            value = np.where(self._still, np.where(_column(self._arm, loose), np.nan, held), value)
+        return value
+
+    def _logarithmic(self, name: str) -> np.ndarray:
+        share = self._shares(name) if name in _NAMES else self._exponents[name]
+        value = share / (-2 if name in _NAMES[4:] else 2)
+        return np.where(self._still, np.nan, value) if self._still.any() else value
+
+    def _shares(self, name: str) -> np.ndarray:
+        """Return the share of a spring in the strain energy, or of an inertia in the kinetic energy."""
+        value = _column(self._arm, getattr(self._arm, name))
+        share = value * self._rate(self._arm, self._modal, name) / self._square
+        if name in _NAMES[:2]:
+            return np.where(np.isinf(value), 0.0, share) if np.isinf(value).any() else share
+        return -share
+
+    @cached_property
+    def _exponents(self) -> dict[str, np.ndarray]:
+        """The chain rule over the dimensionless groups."""
+        return _exponents(*(self._shares(name) for name in ("k_t", "k_r", "m_e", "J_e")))
+
+    @cached_property
+    def _square(self) -> np.ndarray:
+        return self._modal.omega**2
+
+    @cached_property
+    def _still(self) -> np.ndarray:
+        return self.frequency == 0
+
 
 def sensitivities(arm: Arm, modes: int = 3, *, method: Literal["modal", "implicit"] = "modal") -> Sensitivities:
     """Return the sensitivities of the natural frequencies to every parameter.
@@ -95,68 +155,47 @@ def sensitivities(arm: Arm, modes: int = 3, *, method: Literal["modal", "implici
     """
     if method not in ("modal", "implicit"):
         raise ValueError(f"method = {method!r}: allowed are 'modal' and 'implicit'")
-    parameters = modal_parameters(arm, count("modes", modes))
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        found = _modal(arm, parameters) if method == "modal" else _by_determinant(arm, parameters)
-        return _assembled(arm, parameters.frequency, *found)
+    return Sensitivities(arm, modal_parameters(arm, count("modes", modes)), _modal if method == "modal" else _implicit)
 
 
 def _column(arm: Arm, value: Any) -> np.ndarray:
     return np.broadcast_to(value, arm.shape)[..., None]
 
 
-def _modal(arm: Arm, p: ModalParameters) -> tuple[np.ndarray, ...]:
-    """Return d omega^2 by k_t, k_r, 1/k_t, 1/k_r, m_e and J_e."""
-    square = p.omega**2
-    return (
-        p.root_displacement**2,
-        p.root_slope**2,
-        -(p.root_shear**2),
-        -(p.root_moment**2),
-        -square * p.tip_displacement**2,
-        -square * p.tip_slope**2,
-    )
+def _modal(arm: Arm, p: ModalParameters, name: str) -> np.ndarray:
+    """Return d omega^2 by a parameter, from the modes."""
+    match name:
+        case "k_t":
+            return p.root_displacement**2
+        case "k_r":
+            return p.root_slope**2
+        case "c_t":
+            return -(p.root_shear**2)
+        case "c_r":
+            return -(p.root_moment**2)
+        case "m_e":
+            return -((p.omega * p.tip_displacement) ** 2)
+        case _:
+            return -((p.omega * p.tip_slope) ** 2)
 
 
-def _by_determinant(arm: Arm, p: ModalParameters) -> tuple[np.ndarray, ...]:
+def _implicit(arm: Arm, p: ModalParameters, name: str) -> np.ndarray:
     """Return the same by implicit differentiation; omega^2 = scale^2 lambda^4."""
     pairs = [value for kappa in (arm.kappa_t, arm.kappa_r) for value in pair(_column(arm, kappa))]
-    rates = _implicit(p.lam, *pairs, *(_column(arm, value) for value in (arm.mu, arm.iota)))
+    rates = _implicit_rates(p.lam, *pairs, *(_column(arm, value) for value in (arm.mu, arm.iota)))
     (s_t, c_t, s_r, c_r), length, EI = pairs, _column(arm, arm.L), _column(arm, arm.EI)
     by_lam = 4 * _column(arm, arm.angular_frequency_scale) ** 2 * p.lam**3
     stiffness_t, stiffness_r, mass = EI / length**3, EI / length, _column(arm, arm.rhoA) * length
-    return (
-        by_lam * rates["kappa_t"] * c_t**2 / stiffness_t,
-        by_lam * rates["kappa_r"] * c_r**2 / stiffness_r,
-        -by_lam * rates["kappa_t"] * s_t**2 * stiffness_t,
-        -by_lam * rates["kappa_r"] * s_r**2 * stiffness_r,
-        by_lam * rates["mu"] / mass,
-        by_lam * rates["iota"] / (mass * length**2),
-    )
-
-
-def _assembled(arm: Arm, f: np.ndarray, *by_square: np.ndarray) -> Sensitivities:
-    """Turn derivatives of omega^2 into those of f, and complete them by the chain rule over the dimensionless
-    groups."""
-    square = (2 * np.pi * f) ** 2
-    still = f == 0
-    lost = still & _column(arm, (np.asarray(arm.k_t) == 0) & (np.asarray(arm.k_r) == 0))
-
-    def raw(change: np.ndarray) -> np.ndarray:
-        held = np.where(np.abs(change) > 0, np.copysign(np.inf, change), 0.0)
-        return np.where(lost, np.nan, np.where(still, held, f * change / (2 * square)))
-
-    raws = [raw(change) for change in by_square[:4]]
-    raws += [np.where(still, 0.0, raw(change)) for change in by_square[4:]]
-    shares = []
-    for k, by_k in ((arm.k_t, by_square[0]), (arm.k_r, by_square[1])):
-        stiffness = _column(arm, k)
-        shares.append(np.where(np.isinf(stiffness), 0.0, stiffness * by_k) / square)
-    shares += [-_column(arm, value) * by / square for value, by in zip((arm.m_e, arm.J_e), by_square[4:], strict=True)]
-    exponents = _exponents(*shares)
-    logs = [np.where(still, np.nan, value / 2) for value in (*shares[:2], -shares[2], -shares[3], *exponents.values())]
-    rest = [
-        np.where(still, 0.0, f * log / _column(arm, getattr(arm, name)))
-        for name, log in zip(exponents, logs[4:], strict=True)
-    ]
-    return Sensitivities(f, *raws, *rest, *logs)
+    match name:
+        case "k_t":
+            return by_lam * rates["kappa_t"] * c_t**2 / stiffness_t
+        case "k_r":
+            return by_lam * rates["kappa_r"] * c_r**2 / stiffness_r
+        case "c_t":
+            return -by_lam * rates["kappa_t"] * s_t**2 * stiffness_t
+        case "c_r":
+            return -by_lam * rates["kappa_r"] * s_r**2 * stiffness_r
+        case "m_e":
+            return by_lam * rates["mu"] / mass
+        case _:
+            return by_lam * rates["iota"] / (mass * length**2)
