@@ -41,6 +41,7 @@ _HOME = {
     "sweep": "studies",
     "kernel": "kernels",
     "export": "codegen",
+    "explore": "explorer",
 }
 
 __all__ = ["__version__", *_HOME]

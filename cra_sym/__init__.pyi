@@ -25,6 +25,7 @@ from .arm.stability import growth_rate as growth_rate
 from .arm.stability import stability_boundary as stability_boundary
 from .arm.state_space import state_space as state_space
 from .codegen import export as export
+from .explorer import explore as explore
 from .kernels import kernel as kernel
 from .model import Model as Model
 from .studies import sweep as sweep

@@ -22,7 +22,7 @@ FLOORS = [
     {"model"},
     {"arm"},
     {"studies", "codegen", "figures"},
-    {"claims"},
+    {"claims", "explorer"},
     {"report"},
     {"__main__"},
 ]

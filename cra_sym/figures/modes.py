@@ -77,7 +77,9 @@ def figure_4(arm: Arm | None = None, k_r: Any = None, *, axes: Any = None) -> Fi
     return figure
 
 
-def figure_mode_shapes(arm: Arm | None = None, k_t: float = 1e3, k_r: float = 1e2, *, axes: Any = None) -> Figure:
+def figure_mode_shapes(
+    arm: Arm | None = None, k_t: float = 1e3, k_r: float = 1e2, *, phase: float | None = None, axes: Any = None
+) -> Figure:
     """Draw the first three mode shapes of the arm with a rigid and with an elastic joint.
 
     Parameters
@@ -86,6 +88,9 @@ def figure_mode_shapes(arm: Arm | None = None, k_t: float = 1e3, k_r: float = 1e
         By default the nominal one.
     k_t, k_r : float
         The elastic joint, N/m and N m/rad.
+    phase : float, optional
+        Instant of a free vibration, rad: the elastic arm's shapes times its cosine, on axes with room for the whole
+        swing.
     axes : three Axes, optional
     """
     arm = arm or Arm.nominal()
@@ -93,16 +98,19 @@ def figure_mode_shapes(arm: Arm | None = None, k_t: float = 1e3, k_r: float = 1e
     x = np.linspace(0.0, float(arm.L), 301)
     rigid, elastic = arm.replace(k_t=np.inf, k_r=np.inf), arm.replace(k_t=k_t, k_r=k_r)
     pairs = [(mode_shapes(a, x), natural_frequencies(a)) for a in (rigid, elastic)]
+    swing = 1.0 if phase is None else np.cos(phase)
     for mode, ax in enumerate(panels):
         ax.axhline(0.0, color="0.75", linewidth=0.8)
-        for (shapes, hertz), style, name in zip(pairs, ("C0", "C1"), ("rigid", "elastic"), strict=True):
-            line: dict[str, Any] = {"color": style, "linestyle": "-" if name == "elastic" else (0, (4, 2))}
-            ax.plot(x, shapes[mode], label=f"{name}, {hertz[mode]:.2f} Hz", **line)
+        for (shapes, hertz), colour, name in zip(pairs, ("C0", "C1"), ("rigid", "elastic"), strict=True):
+            line: dict[str, Any] = {"color": colour, "linestyle": "-" if name == "elastic" else (0, (4, 2))}
+            shape = shapes[mode] * (swing if name == "elastic" else 1.0)
+            ax.plot(x, shape, label=f"{name}, {hertz[mode]:.2f} Hz", **line)
         ax.set_title(f"mode {mode + 1}")
         ax.set_xlabel("position along the arm $x$ / m")
         ax.margins(x=0.02, y=0.12)
         ax.legend(loc=("upper left", "upper center", "upper center")[mode], fontsize=8)
-    panels[0].set_ylim(top=5.6)
+    largest = max(np.abs(shapes).max() for shapes, _ in pairs)
+    panels[0].set_ylim(None if phase is None else -1.15 * largest, 1.35 * largest)
     panels[0].set_ylabel("mass-normalised shape $\\phi$ / kg$^{-1/2}$")
     return figure
 

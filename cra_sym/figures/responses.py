@@ -14,7 +14,7 @@ from cra_sym.arm.response import tip_response
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["figure_6", "figure_7", "figure_8", "figure_9", "figure_10"]
+__all__ = ["figure_6", "figure_7", "figure_8", "figure_9", "figure_10", "figure_response"]
 
 #: The assumed scenario: the paper's values are lost.
 AMPLITUDE, RATE, VELOCITY, ACCELERATIONS, SOFT = 1e-3, 10.0, 0.1, (0.1, 0.2, 0.3), 1e3
@@ -54,6 +54,38 @@ def _peak(ax: Axes, t: np.ndarray, v: np.ndarray, color: Any) -> float:
     k = int(np.argmax(np.abs(v)))
     ax.plot(t[k], v[k], "o", color=color, markersize=5, markerfacecolor="white", zorder=3)
     return float(abs(v[k]))
+
+
+def figure_response(
+    arm: Arm | None = None, motion: BaseMotion | None = None, t: Any = None, *, axes: Any = None
+) -> Figure:
+    """Draw the tip's response to any motion of the base, with the joint as it is and with a rigid one.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        By default the nominal one with k_t = 1e3 N/m.
+    motion : BaseMotion, optional
+        By default a mean acceleration of 0.1 m/s2 with the disturbance of Fig. 7.
+    t : array_like, optional
+        Times, s, by default 0 to 2.
+    axes : Axes, optional
+    """
+    arm, t = arm or Arm.nominal().replace(k_t=SOFT), _TIME if t is None else np.asarray(t, dtype=float)
+    motion = motion or BaseMotion(acceleration=0.1, amplitude=AMPLITUDE, angular_frequency=RATE)
+    panels = _panels(axes, 1, 1, (6.4, 3.6))
+    ax = panels[0, 0]
+    for joined, name, look in (
+        (arm.replace(k_t=np.inf, k_r=np.inf), "rigid joint", _GREY),
+        (arm, "joint as given", {"color": "C1", "linestyle": "-"}),
+    ):
+        v = 1e3 * tip_response(joined, motion, t)
+        ax.plot(t, v, label=f"{name}, peak {_peak(ax, t, v, look['color']):.2f} mm", **look)
+    ax.legend(loc="lower right", ncols=2, bbox_to_anchor=(1.0, 0.98), borderaxespad=0)
+    ax.set_title("Response of the tip", pad=8)
+    ax.set_xlabel("time $t$ / s")
+    ax.set_ylabel(_TIP)
+    return ax.figure
 
 
 def figure_6(arm: Arm | None = None, *, axes: Any = None) -> Figure:

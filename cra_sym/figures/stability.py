@@ -25,6 +25,7 @@ __all__ = [
     "figure_accuracy",
     "figure_combinations",
     "figure_widths",
+    "figure_zones",
 ]
 
 #: Assumed: the paper's values of k_t are lost; the masses are published but for the first.
@@ -56,29 +57,38 @@ def _boundary(*given: Any, **more: Any) -> tuple[np.ndarray, np.ndarray]:
         return stability_boundary(*given, **more)
 
 
-def _growth(arm: Arm, excitation: Any, frequency: np.ndarray, epsilon: np.ndarray, modes: int) -> np.ndarray:
+def _growth(
+    arm: Arm, excitation: Any, frequency: np.ndarray, epsilon: np.ndarray, modes: int, tolerance: float = 1e-7
+) -> np.ndarray:
     """Return the growth rate over a chart, converged in the number of modes."""
     residual = isinstance(excitation, JointStiffness)
-    return growth_rate(arm, excitation, frequency, epsilon[:, None], modes, residual=residual, tolerance=1e-7)
+    return growth_rate(arm, excitation, frequency, epsilon[:, None], modes, residual=residual, tolerance=tolerance)
 
 
-def _zone(ax: Axes, arm: Arm, excitation: Any, mode: int, epsilon: np.ndarray, points: int) -> None:
+def _zone(
+    ax: Axes, arm: Arm, excitation: Any, mode: int, epsilon: np.ndarray, points: int, tolerance: float = 1e-7
+) -> None:
     """Draw one principal zone against its detuning."""
     centre = 2 * modal_parameters(arm, mode).omega[mode - 1]
     first, second = (_boundary(arm, excitation, epsilon, (mode, mode), order=order) for order in (1, 2))
     half = (first[1] - first[0])[-1] / 2
+    where: dict[str, Any] = {"transform": ax.transAxes, "fontsize": 7.5, "color": "0.25", "va": "bottom"}
+    if not half > 0:
+        rigid = isinstance(excitation, JointStiffness) and np.isinf(arm.k_t)
+        ax.text(0.03, 0.04, "no zone: a rigid joint cannot fluctuate" if rigid else "no zone up to this ε", **where)
+        return
     detuning = np.linspace(-1.7, 1.7, points) * half
-    rates = _growth(arm, excitation, centre + detuning, epsilon, mode + 2)
+    rates = _growth(arm, excitation, centre + detuning, epsilon, mode + 2, tolerance)
     _shade(ax, detuning, epsilon, rates)
     for sides, look in ((first, _FIRST), (second, _SECOND)):
         for side in sides:
             ax.plot(side - centre, epsilon, **look)
     ax.set_xlim(detuning[0], detuning[-1])
+    ax.set_ylim(0.0, epsilon[-1])
     ax.ticklabel_format(axis="x", style="sci", scilimits=(-2, 3), useMathText=True)
     ax.locator_params(axis="x", nbins=4)
     ax.grid(False)
-    text = f"$2\\omega_{mode}$ = {centre:.4g} rad/s\nwidth {2 * half:.3g} rad/s"
-    ax.text(0.03, 0.04, text, transform=ax.transAxes, fontsize=7.5, color="0.25", va="bottom")
+    ax.text(0.03, 0.04, f"$2\\omega_{mode}$ = {centre:.4g} rad/s\nwidth {2 * half:.3g} rad/s", **where)
 
 
 def _shade(ax: Axes, frequency: np.ndarray, epsilon: np.ndarray, rates: np.ndarray, step: float | None = None) -> Any:
@@ -89,15 +99,21 @@ def _shade(ax: Axes, frequency: np.ndarray, epsilon: np.ndarray, rates: np.ndarr
 
 
 def _principal_zones(
-    arms: list[tuple[str, Arm]], excitation: Any, epsilon: float, title: str, axes: Any, points: int
+    arms: list[tuple[str, Arm]],
+    excitation: Any,
+    epsilon: float,
+    title: str,
+    axes: Any,
+    points: int,
+    tolerance: float = 1e-7,
 ) -> Figure:
     """Draw the zones of modes 1 to 3, a row an arm."""
     panels = _grid(axes, len(arms), 3, (8.4, 1.95 * len(arms) + 0.8), sharey=True)
     sizes = np.linspace(0.0, epsilon, points)
     for row, (label, arm) in zip(panels, arms, strict=True):
         for mode, ax in enumerate(row, start=1):
-            _zone(ax, arm, excitation, mode, sizes, points)
-        row[0].set_ylabel(f"{label}\n$\\epsilon$")
+            _zone(ax, arm, excitation, mode, sizes, points, tolerance)
+        row[0].set_ylabel(f"{label}\n$\\epsilon$".strip())
     for mode, ax in enumerate(panels[0], start=1):
         ax.set_title(f"{title}mode {mode}" if mode == 1 else f"mode {mode}")
     for mode, ax in enumerate(panels[-1], start=1):
@@ -108,6 +124,34 @@ def _principal_zones(
     note = f"shaded: growth by Floquet theory; {_described(excitation)}; widths at ε = {epsilon:g}, scales differ"
     figure.legend(handles, names, loc="outside lower center", ncols=2, title=note, title_fontsize=8)
     return figure
+
+
+def figure_zones(
+    arm: Arm | None = None,
+    excitation: Any = JOINT,
+    epsilon: float = 0.3,
+    *,
+    axes: Any = None,
+    points: int = 37,
+    tolerance: float = 1e-7,
+) -> Figure:
+    """Draw the principal zones of the first three modes of one arm.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        By default the nominal one with k_t = 1e4 N/m.
+    excitation : JointStiffness or AxialBase
+    epsilon : float
+        Top of the axis.
+    axes : three Axes, optional
+    points : int
+        Points of the Floquet chart along each axis.
+    tolerance : float
+        Relative error of the monodromy matrices.
+    """
+    arm = arm or Arm.nominal().replace(k_t=1e4)
+    return _principal_zones([("", arm)], excitation, epsilon, "Zones of ", axes, points, tolerance)
 
 
 def figure_11(

@@ -56,6 +56,7 @@ def _normalise(notebook: NotebookNode) -> None:
         for output in cell.get("outputs", []):
             if "metadata" in output:
                 output.metadata = {}
+            output.get("data", {}).pop("application/vnd.jupyter.widget-view+json", None)  # dead without its kernel
             if "image/png" in output.get("data", {}):
                 output.data["image/png"] = _indexed(output.data["image/png"])
 

@@ -1,0 +1,160 @@
+"""The explorer: sliders made from the nomenclature, pictures that are the kernels' numbers, life without widgets."""
+
+from __future__ import annotations
+
+import sys
+from base64 import b64decode
+from io import BytesIO
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import cra_sym as cra
+from cra_sym.extras import MissingExtraError
+from cra_sym.symbols import nomenclature, row
+
+VALUES = {"k_t", "k_r", "m_e", "v_m", "a_m", "B", "varpi", "psi", "epsilon"}
+WIDGET = "application/vnd.jupyter.widget-view+json"
+
+
+def pixels(png):
+    return np.asarray(Image.open(BytesIO(png)).convert("L"), dtype=float)
+
+
+def drawn(view, axis=0):
+    """The curves of an axis: x and y of every line with more than a few points."""
+    return [line.get_xydata() for line in view.figure.axes[axis].lines if len(line.get_xdata()) > 10]
+
+
+@pytest.fixture(scope="module")
+def moved():
+    """An explorer whose sliders were all moved away from where they stood."""
+    pytest.importorskip("ipywidgets", reason="needs the extra explore: ipywidgets")
+    view = cra.explore()
+    assert view.panel.children
+    for name, value in {"k_t": 1e3, "k_r": np.inf, "m_e": 0.005, "v_m": 0.05, "B": 2e-3, "varpi": 20.0}.items():
+        view.sliders[name].value = value
+    view.sliders["epsilon"].value = 0.2
+    return view
+
+
+def test_a_slider_for_each_value_labelled_by_the_nomenclature(moved):
+    assert set(moved.sliders) == VALUES <= {entry.name for entry in nomenclature()}
+    for name, slider in moved.sliders.items():
+        assert slider.tooltip == row(name).meaning
+        assert f"${row(name).latex}$" in slider.description
+        assert row(name).unit == "1" or row(name).unit in slider.description
+
+
+def test_stiffness_runs_through_decades_to_a_rigid_joint(moved):
+    for name in ("k_t", "k_r"):
+        *finite, (label, rigid) = moved.sliders[name].options
+        assert (label, rigid) == ("rigid", np.inf)
+        np.testing.assert_allclose(np.diff(np.log10([value for _, value in finite])), 0.1, atol=1e-6)
+
+
+def test_sliders_are_arm_and_motion(moved):
+    assert moved.arm == cra.Arm.nominal().replace(k_t=1e3, k_r=np.inf, m_e=0.005)
+    expected = cra.BaseMotion(velocity=0.05, acceleration=0.1, amplitude=2e-3, angular_frequency=20.0)
+    t = np.linspace(0, 1, 7)
+    np.testing.assert_array_equal(moved.motion.kinematics(t), expected.kinematics(t))
+
+
+def test_mode_shapes_are_the_kernels(moved):
+    for mode in range(3):
+        zero, rigid, elastic = moved.views["modes"].figure.axes[mode].lines
+        x = elastic.get_xdata()
+        np.testing.assert_array_equal(elastic.get_ydata(), cra.mode_shapes(moved.arm, x)[mode])
+        np.testing.assert_array_equal(rigid.get_ydata(), cra.mode_shapes(moved.arm.replace(k_t=np.inf), x)[mode])
+        assert not np.any(zero.get_ydata())
+        hertz = cra.natural_frequencies(moved.arm)[mode]
+        assert f"{hertz:.2f} Hz" in elastic.get_label()
+
+
+def test_response_is_the_kernels(moved):
+    rigid, given = drawn(moved.views["response"])
+    for arm, curve in ((moved.arm.replace(k_t=np.inf), rigid), (moved.arm, given)):
+        np.testing.assert_array_equal(curve[:, 1], 1e3 * cra.tip_response(arm, moved.motion, curve[:, 0]))
+
+
+def test_zones_are_the_kernels(moved):
+    for mode in (1, 2, 3):
+        lines = [
+            line.get_xydata() for line in moved.views["zones"].figure.axes[mode - 1].lines if line.get_xdata().size
+        ]
+        centre = 2 * cra.modal_parameters(moved.arm).omega[mode - 1]
+        assert lines[0][-1, 1] == 0.2
+        expected = [
+            np.array(side) - centre
+            for order in (1, 2)
+            for side in cra.stability_boundary(moved.arm, moved.excitation, lines[0][:, 1], (mode, mode), order=order)
+        ]
+        np.testing.assert_allclose([line[:, 0] for line in lines], expected, rtol=0, atol=1e-12)
+
+
+def test_only_what_depends_on_a_slider_is_redrawn(moved):
+    before = {name: image.value for name, image in moved.images.items()}
+    moved.sliders["psi"].value = 1.5
+    changed = {name for name, image in moved.images.items() if image.value != before[name]}
+    assert changed == {"response"}
+
+
+def test_a_redrawn_picture_is_the_one_drawn_from_scratch():
+    """Frames are kept while only curves move; nothing of the old curves may stay."""
+    pytest.importorskip("ipywidgets", reason="needs the extra explore: ipywidgets")
+    view = cra.explore(B=2e-3)
+    slider, image = view.sliders["psi"], view.images["response"]
+    first = image.value
+    slider.value = 0.1
+    assert np.abs(pixels(image.value) - pixels(first)).max() > 100
+    slider.value = 0.0
+    np.testing.assert_array_equal(pixels(image.value), pixels(first))
+
+
+def test_shapes_swing(moved):
+    (play,) = [w for box in moved.panel.children[0].children for w in box.children if type(w).__name__ == "Play"]
+    play.value = 12
+    elastic = moved.views["modes"].figure.axes[0].lines[2]
+    np.testing.assert_allclose(elastic.get_ydata(), -cra.mode_shapes(moved.arm, elastic.get_xdata())[0])
+    play.value = 0
+
+
+def test_a_rigid_joint_cannot_fluctuate():
+    view = cra.explore(k_t=np.inf)
+    assert view.picture()
+    assert all("rigid joint" in ax.texts[0].get_text() for ax in view.views["zones"].figure.axes)
+    assert all(len(ax.collections) == 0 for ax in view.views["zones"].figure.axes)
+
+
+def test_shows_sliders_and_a_picture(moved):
+    data = moved._repr_mimebundle_()
+    assert {WIDGET, "image/png", "text/plain"} == set(data)
+    heights = [pixels(image.value).shape[0] for image in moved.images.values()]
+    assert pixels(b64decode(data["image/png"])).shape[0] == sum(heights)
+
+
+def test_without_the_extra_a_picture_and_an_error_that_names_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ipywidgets", None)
+    view = cra.explore(k_t=1e3)
+    assert set(view._repr_mimebundle_()) == {"image/png", "text/plain"}
+    with pytest.raises(MissingExtraError, match=r"ipywidgets.*'explore'"):
+        _ = view.panel
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"k": 1.0}, "k: allowed names"),
+        ({"k_t": -1.0}, "k_t"),
+        ({"k_t": [1.0, 2.0]}, r"k_t has shape \(2,\)"),
+        ({"B": np.nan}, "amplitude"),
+        ({"epsilon": 0.0}, "epsilon"),
+        ({"arm": cra.Arm.nominal().replace(k_t=[1.0, 2.0])}, r"arm has shape \(2,\)"),
+        ({"arm": 3}, "arm"),
+        ({"excitation": cra.TransverseBase(0.001)}, "TransverseBase"),
+    ],
+)
+def test_bad_values_are_named(given, told):
+    with pytest.raises((TypeError, ValueError), match=told):
+        cra.explore(**given)
