@@ -13,8 +13,10 @@ a pair ``(s, c) = (kappa, 1) / (1 + kappa)``, so that zero and infinity are ordi
 from __future__ import annotations
 
 from functools import cache
+from math import prod
 
 import sympy as sp
+from sympy.polys.ring_series import rs_cos, rs_cosh, rs_sin, rs_sinh
 
 from cra_sym.arm.modes import root_matrix, tip_matrix
 from cra_sym.symbols import symbol
@@ -117,6 +119,7 @@ def theta(expression: sp.Expr) -> sp.Expr:
     return sum((sp.diff(expression, x) * image for x, image in images.items()), sp.Integer(0))
 
 
+@cache
 def _monomials() -> list[tuple[sp.Symbol, sp.Expr, sp.Expr]]:
     """Return (name, coefficient in the parameters, monomial in z and the basis) for each term of the determinant."""
     terms = sorted(sp.Poly(determinant(), *BASIS, z).terms(), reverse=True)
@@ -164,14 +167,18 @@ def power_series() -> Derivation:
 @cache
 def basis_series() -> dict[sp.Symbol, sp.Expr]:
     """Return the basis as polynomials in z, cut where a term is below rounding for z up to `NEAR`."""
-    series: dict[sp.Symbol, sp.Expr] = {unit: sp.Integer(1)}
+    result: dict[sp.Symbol, sp.Expr] = {unit: sp.Integer(1)}
     order = next(n for n in range(1, 40) if sp.Float((4 * NEAR) ** n) / sp.factorial(4 * n) < 2.0**-60)
-    replacements = {_cos: sp.cos(b), _sin: sp.sin(b), _cosh: sp.cosh(b), _sinh: sp.sinh(b)}
-    taylor = {x: f.series(b, 0, 4 * order + 2).removeO() for x, f in replacements.items()}
-    for x, product in _PRODUCTS.items():
-        polynomial = sp.Poly(product.subs(taylor), b)
-        series[x] = sum(c * z ** (n // 4) for (n,), c in polynomial.terms() if n <= 4 * order)
-    return series
+    ring, x = sp.ring(b, sp.QQ)
+    functions = {_cos: rs_cos, _sin: rs_sin, _cosh: rs_cosh, _sinh: rs_sinh}
+    taylor = {b: x} | {name: function(x, x, 4 * order + 2) for name, function in functions.items()}
+    for name, product in _PRODUCTS.items():
+        polynomial = ring(0)
+        for powers, coefficient in sp.Poly(product, *taylor).terms():
+            factors = (series**power for series, power in zip(taylor.values(), powers, strict=True))
+            polynomial += prod(factors, start=ring(sp.QQ.from_sympy(coefficient)))
+        result[name] = sum(sp.QQ.to_sympy(c) * z ** (n // 4) for (n,), c in polynomial.terms() if n <= 4 * order)
+    return result
 
 
 def basis() -> Derivation:

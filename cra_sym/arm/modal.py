@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from cra_sym.arm.spectrum import in_parts, pair, wants_compiler
-from cra_sym.kernels import compiled, derived_kernel
+from cra_sym.kernels import Kernel, compiled, derived_kernel
 
 __all__ = ["NEAR", "Modes", "modes_of"]
 
@@ -88,7 +88,7 @@ def modes_of(
     groups = [np.ascontiguousarray(value).reshape(-1) for value in (kappa_t, kappa_r, mu, iota)]
     modes = lam.shape[-1]
     rows, table = lam.reshape(-1, modes), np.empty((13, lam.size))
-    compile = wants_compiler(lam.size, compile)
+    compile = wants_compiler(lam.size, _template_parts) if compile is None else compile
     fill = _template().fill if compile else _fill
 
     def fill_part(part: slice) -> None:
@@ -189,7 +189,12 @@ def _far_shape(waves: np.ndarray, lam: np.ndarray, xi: np.ndarray, derivative: i
 
 @cache
 def _template() -> Any:
+    return compiled(*_template_parts())
+
+
+@cache
+def _template_parts() -> tuple[str, dict[str, Kernel]]:
     text = files("cra_sym.arm").joinpath("modal_lanes.py").read_text(encoding="utf-8")
     names = "polynomials", "tip_rows", "tip_near", "amplitudes_far", "tip_far", "generalised_mass"
     kernels = _POLYNOMIALS, _TIP_ROWS, _TIP_NEAR, _AMPLITUDES_FAR, _TIP_FAR, _MASS
-    return compiled(text, dict(zip(names, kernels, strict=True)))
+    return text, dict(zip(names, kernels, strict=True))

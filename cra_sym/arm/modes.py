@@ -70,7 +70,8 @@ def mode_form() -> tuple[Eq, Eq]:
     """The field equation of a mode has four exponential solutions, here in real form; the boundary conditions
     determine the coefficients."""
     shape = sum(coefficient * function for coefficient, function in zip(coefficients, basis(), strict=True))
-    (square,) = solve(mode_field_equation().lhs.subs(phi_i.diff(x, 4), beta**4 * phi_i) / phi_i, beta**4)
+    balance = mode_field_equation().lhs.subs(phi_i.diff(x, 4), beta**4 * phi_i) / phi_i
+    (square,) = solve(balance.expand(), beta**4, simplify=False, check=False)
     return Eq(phi_i, shape), Eq(beta**4, square)
 
 

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
-from scipy.optimize import brentq
 
 __all__ = ["ShotMode", "integrate", "sample", "shoot"]
 
@@ -80,6 +79,8 @@ def _shoot(items: tuple, modes: int) -> tuple[ShotMode, ...]:
 
     def residual(beta: Any) -> Any:
         return np.linalg.det(tip(beta))
+
+    from scipy.optimize import brentq  # takes longer to import than the rest of this package
 
     grid = np.linspace(0.05, 12.0, 240) / length
     crossings = np.flatnonzero(np.diff(np.sign(residual(grid))))[:modes]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, cached_property
@@ -11,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from cra_sym.kernels import compiled, derived_kernel, has_compiler
+from cra_sym.kernels import Kernel, compiled, derived_kernel, has_compiler, is_compiled
 from cra_sym.solvers.spectrum import Lanes, spectrum
 
 __all__ = ["ArmCharacteristic", "frequency_parameters", "pair"]
@@ -110,8 +111,10 @@ def _basis(z: np.ndarray) -> tuple[np.ndarray, ...]:
     return lam, *(np.where(z < NEAR, a, b) for a, b in zip(near, _BASIS.function(lam, np.exp(-lam)), strict=True))
 
 
-COMPILE_FROM = 300_000
-"""Roots in one call from where on loading or compiling machine code costs less than it saves."""
+LOAD_FROM = 300_000
+"""Roots in one call from where on loading machine code costs less than it saves."""
+COMPILE_FROM = 6_000_000
+"""Roots in such calls of this process until making machine code has cost no more than doing without it."""
 _ROOTS_PER_PART = 30_000  # that are worth handing out
 _PARTS_PER_THREAD = 8  # so that a thread on a busy processor keeps nobody waiting
 _BLOCK = 32_768  # points and roots whose temporaries stay in the processor's cache
@@ -136,7 +139,7 @@ def frequency_parameters(
     shape = kappa_t.shape
     groups = [np.ascontiguousarray(value).reshape(-1) for value in (kappa_t, kappa_r, mu, iota)]
     result = np.empty((groups[0].size, modes))
-    compile = wants_compiler(result.size, compile)
+    compile = wants_compiler(result.size, _template_parts) if compile is None else compile
     fill = _fill_compiled if compile else _fill
 
     def fill_part(part: slice) -> None:
@@ -146,9 +149,19 @@ def frequency_parameters(
     return result.reshape(*shape, modes)
 
 
-def wants_compiler(roots: int, compile: bool | None) -> bool:
-    """Return whether the compiled path is to be taken: where it pays, if nothing is said."""
-    return roots >= COMPILE_FROM and has_compiler() if compile is None else compile
+def wants_compiler(roots: int, parts: Callable[[], tuple[str, dict[str, Kernel]]]) -> bool:
+    """Return whether the compiled path of a template pays for a call.
+
+    Loading machine code pays in one large call. Making it takes as long as millions of roots without it: it is made
+    once this process has done so many.
+    """
+    if roots < LOAD_FROM or not has_compiler():
+        return False
+    _done[parts] += roots
+    return _done[parts] > COMPILE_FROM or is_compiled(*parts())
+
+
+_done: Counter[Callable[[], Any]] = Counter()  # roots in large calls, by template
 
 
 def in_parts(fill: Callable[[slice], Any], lanes: int, modes: int, *, threads: int | None, compiled: bool) -> None:
@@ -184,7 +197,12 @@ def _fill_compiled(result: np.ndarray, *groups: np.ndarray) -> int:
 
 @cache
 def _template() -> Any:
+    return compiled(*_template_parts())
+
+
+@cache
+def _template_parts() -> tuple[str, dict[str, Kernel]]:
     text = files("cra_sym.solvers").joinpath("spectrum_lanes.py").read_text(encoding="utf-8")
     names = "coefficients", "power_series", "basis", "basis_near", "chain", "derivatives"
     kernels = _COEFFICIENTS, _POWER_SERIES, _BASIS, _BASIS_NEAR, _CHAIN, _DERIVATIVES
-    return compiled(text, dict(zip(names, kernels, strict=True)))
+    return text, dict(zip(names, kernels, strict=True))

@@ -2,6 +2,6 @@
 
 from cra_sym.kernels.callables import Kernel, kernel
 from cra_sym.kernels.derived import derived_kernel
-from cra_sym.kernels.specialise import compiled, has_compiler
+from cra_sym.kernels.specialise import compiled, has_compiler, is_compiled
 
-__all__ = ["Kernel", "compiled", "derived_kernel", "has_compiler", "kernel"]
+__all__ = ["Kernel", "compiled", "derived_kernel", "has_compiler", "is_compiled", "kernel"]

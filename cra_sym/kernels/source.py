@@ -6,13 +6,12 @@ import ast
 import builtins
 import keyword
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from itertools import islice
 from typing import Any
 
 import numpy as np
 import sympy as sp
-from scipy import special
 from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.numpy import NumPyPrinter, SciPyPrinter
 from sympy.printing.precedence import PRECEDENCE
@@ -133,15 +132,10 @@ def module_source(expression: Any, arguments: Sequence[sp.Symbol]) -> str:
     missing = sorted(str(s) for s in found - set(symbols))
     if missing:
         raise ValueError(f"symbols of the expression that are not arguments: {', '.join(missing)}")
-    names: dict[sp.Symbol, str] = {}
-    for symbol in symbols:
-        _christen(symbol, names)
     steps, outputs = shared_steps(outputs)
-    for number, (symbol, _) in enumerate(steps):
-        _christen(symbol, names, f"x{number}")
-    printer = _Printer(names)
-    lines = [f"{names[symbol]} = {_printed(printer, value)}" for symbol, value in steps]
-    results = [_printed(printer, value) for value in outputs]
+    printer, values, results = _with_names(symbols, steps, outputs, frozenset())
+    names = printer.names
+    lines = [f"{names[symbol]} = {value}" for (symbol, _), value in zip(steps, values, strict=True)]
     lines.append(f"return {results[0]}" if layout == () else f"return ({''.join(text + ', ' for text in results)})")
     imports = [f"from {m} import {', '.join(sorted(n))}\n" for m, n in sorted(printer.module_imports.items())]
     signature = ", ".join(names[s] for s in symbols)
@@ -181,12 +175,33 @@ def _flatten(expression: Any) -> tuple[Layout, list[sp.Expr]]:
     return (), [expression]
 
 
-def _christen(symbol: sp.Symbol, names: dict[sp.Symbol, str], wish: str | None = None) -> None:
-    """Give ``symbol`` an identifier of its own: Python's, NumPy's and SciPy's names stay what they are."""
+def _with_names(
+    symbols: Sequence[sp.Symbol],
+    steps: Sequence[tuple[sp.Symbol, sp.Expr]],
+    outputs: Sequence[sp.Expr],
+    taken: Set[str],
+) -> tuple[_Printer, list[str], list[str]]:
+    """Print steps and outputs; if a function turns out to have the name of a symbol, print again with other names."""
+    names: dict[sp.Symbol, str] = {}
+    for symbol in symbols:
+        _christen(symbol, names, taken)
+    for number, (symbol, _) in enumerate(steps):
+        _christen(symbol, names, taken, f"x{number}")
+    printer = _Printer(names)
+    values = [_printed(printer, value) for _, value in steps]
+    results = [_printed(printer, value) for value in outputs]
+    imported: set[str] = set().union(*printer.module_imports.values())
+    if imported & set(names.values()):
+        return _with_names(symbols, steps, outputs, imported)
+    return printer, values, results
+
+
+def _christen(symbol: sp.Symbol, names: dict[sp.Symbol, str], taken: Set[str], wish: str | None = None) -> None:
+    """Give ``symbol`` an identifier of its own: Python's and NumPy's names stay what they are."""
     base = wish or re.sub(r"[^0-9A-Za-z_]", "_", symbol.name)
     base = base if re.match(r"[A-Za-z]", base) else f"s{base}"
-    taken = set(names.values())
-    while base in taken or keyword.iskeyword(base) or any(hasattr(m, base) for m in (builtins, np, special)):
+    others = taken | set(names.values())
+    while base in others or keyword.iskeyword(base) or any(hasattr(m, base) for m in (builtins, np)):
         base += "_"
     names[symbol] = base
 

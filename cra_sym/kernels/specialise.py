@@ -24,7 +24,7 @@ from cra_sym.kernels import store
 if TYPE_CHECKING:
     from cra_sym.kernels.callables import Kernel
 
-__all__ = ["compiled", "has_compiler"]
+__all__ = ["compiled", "has_compiler", "is_compiled"]
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
 _INLINED = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, **_OPTIONS}
@@ -91,6 +91,15 @@ def compiled(template: str, kernels: Mapping[str, Kernel], *, elementary: bool =
     return _entries(_prelude(kernels, elementary), template)
 
 
+def is_compiled(template: str, kernels: Mapping[str, Kernel]) -> bool:
+    """Return whether machine code of the specialised template was made before, here or by an earlier process.
+
+    The answer costs no import of Numba; another processor than the one that compiled may need to do it again.
+    """
+    digest = _digest(_prelude(kernels, True), template)
+    return digest in _MADE or store.load(_mark(digest)) is not None
+
+
 def _prelude(kernels: Mapping[str, Kernel], elementary: bool) -> str:
     """Return the text that goes before a template: imports, elementary functions, kernels."""
     imports, bodies = set(), []
@@ -105,13 +114,32 @@ def _prelude(kernels: Mapping[str, Kernel], elementary: bool) -> str:
     return "\n\n".join(["\n".join(sorted(imports)), own, _WHERE, *bodies])
 
 
+_MADE: set[str] = set()  # digests of what this process compiled
+
+
+def _digest(prelude: str, template: str) -> str:
+    return hashlib.sha256(repr((prelude, template, _OPTIONS)).encode()).hexdigest()
+
+
+def _mark(digest: str) -> str:
+    """Return the key of an entry that says that machine code is there, without asking Numba for the processor."""
+    return repr((digest, sys.version, _versions()))
+
+
+@cache
+def _versions() -> list[str]:
+    from importlib.metadata import version
+
+    return [version(package) for package in ("numba", "llvmlite", "numpy")]
+
+
 @cache
 def _entries(prelude: str, template: str) -> SimpleNamespace:
     if not has_compiler():
         raise ImportError("compiling needs numba: pip install numba")
     import numba
 
-    digest = hashlib.sha256(repr((prelude, template, _OPTIONS)).encode()).hexdigest()
+    digest = _digest(prelude, template)
     module = ModuleType(f"cra_sym_compiled_{digest[:32]}")
     sys.modules[module.__name__] = module  # where stored machine code looks for its constants
     namespace = module.__dict__
@@ -203,14 +231,13 @@ class _StoredCode:
 
         if self._bar is not None:
             self._bar.close()
+        _MADE.add(self._digest)
         if not result.lifted and not result.library.has_dynamic_globals:
             store.save(self._key(signature, result.library.codegen), dumps(result._reduce()))
+            store.save(_mark(self._digest), b"")
 
     def _key(self, signature: Any, codegen: Any) -> str:
-        from importlib.metadata import version
-
-        versions = [version(package) for package in ("numba", "llvmlite", "numpy")]
-        return repr((self._digest, self._name, str(signature), codegen.magic_tuple(), sys.version, versions))
+        return repr((self._digest, self._name, str(signature), codegen.magic_tuple(), sys.version, _versions()))
 
     def enable(self) -> None:
         """Do nothing: the store is always asked."""

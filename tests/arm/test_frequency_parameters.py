@@ -1,6 +1,7 @@
 """Frequency parameters: every digit against mpmath, completeness against finite elements, limits and theorems."""
 
 import importlib.util
+from collections import Counter
 from pathlib import Path
 
 import mpmath as mp
@@ -219,15 +220,27 @@ def test_every_digit_of_the_compiled_path():
     assert reference.relative_errors(high, *(x[:3] for x in arms)).max() < 1e-15
 
 
-def test_the_path_is_chosen_by_size(monkeypatch):
-    calls = []
+def test_the_path_is_chosen_by_what_it_costs(monkeypatch):
+    """Machine code is loaded for a large call, and made when this process has done enough without it."""
+    calls, made = [], []
     monkeypatch.setattr(spectrum, "_fill_compiled", lambda result, *groups: calls.append("compiled"))
     monkeypatch.setattr(spectrum, "_fill", lambda result, *groups: calls.append("numpy"))
     monkeypatch.setattr(spectrum, "has_compiler", lambda: True)
-    frequency_parameters(np.ones(10), 1.0, 0.0)
-    assert set(calls) == {"numpy"}
-    frequency_parameters(np.ones(spectrum.COMPILE_FROM), 1.0, 0.0, modes=1)
-    assert calls[-1] == "compiled"
+    monkeypatch.setattr(spectrum, "is_compiled", lambda *parts: bool(made))
+    monkeypatch.setattr(spectrum, "_done", Counter())
+    monkeypatch.setattr(spectrum, "COMPILE_FROM", 2.5 * spectrum.LOAD_FROM)
+    large = np.ones(spectrum.LOAD_FROM), 1.0, 0.0
+
+    def path(*arguments):
+        calls.clear()
+        frequency_parameters(*arguments, modes=1)
+        (taken,) = set(calls)
+        return taken
+
+    assert path(np.ones(10), 1.0, 0.0) == "numpy"
+    assert [path(*large) for _ in range(3)] == ["numpy", "numpy", "compiled"]
+    monkeypatch.setattr(spectrum, "_done", Counter())
+    made.append(True)
+    assert path(*large) == "compiled" and path(np.ones(10), 1.0, 0.0) == "numpy"
     monkeypatch.setattr(spectrum, "has_compiler", lambda: False)
-    frequency_parameters(np.ones(spectrum.COMPILE_FROM), 1.0, 0.0, modes=1)
-    assert calls[-1] == "numpy"
+    assert path(*large) == "numpy"
