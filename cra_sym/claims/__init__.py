@@ -1,9 +1,10 @@
 """The paper's claims, each with a verdict the package computes: what holds, where, what does not, and what would."""
 
 from cra_sym.claims.family import ArmFamily, provenance_family
-from cra_sym.claims.ledger import OUTCOMES, THEMES, Finding, Quantity, Verdict, claim, claims, outcome
-from cra_sym.claims.pictures import figure_claims, figure_family, small_png
+from cra_sym.claims.ledger import claim, claims
+from cra_sym.claims.overviews import figure_claims, figure_family
 from cra_sym.claims.setting import Setting
+from cra_sym.claims.verdict import OUTCOMES, THEMES, Finding, Quantity, Verdict, outcome
 
 __all__ = [
     "OUTCOMES",
@@ -19,5 +20,4 @@ __all__ = [
     "figure_family",
     "outcome",
     "provenance_family",
-    "small_png",
 ]

@@ -10,15 +10,17 @@ from cra_sym.arm.analysis import frequency_parameters, modal_parameters, mode_sh
 from cra_sym.arm.flipped import flipped_frequencies
 from cra_sym.arm.parameters import Arm
 from cra_sym.claims.family import common_scale
-from cra_sym.claims.ledger import Finding, Quantity, Verdict, claimed, outcome, pictured
 from cra_sym.claims.pictures import PALETTE, STYLES, by_mode, note, stiffness_axis
+from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
+from cra_sym.claims.verdict import Finding, Quantity, Verdict, outcome
 from cra_sym.claims.words import listed, number, percent, span
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_MODES = np.arange(1, 4)
+_NEAR_ONE = 0.05  # a power fitted to computed numbers
+_ROUNDING = 1e-9  # relative: what quadrature and rounding may leave of an identity
 
 
 @claimed(
@@ -42,24 +44,25 @@ def _(setting: Setting) -> Finding:
         "scale_allowed": Quantity(np.array([low, high]), "rad/s", "interval all printed frequencies agree with"),
         "scale_by_mode": Quantity(offered, "rad/s", "interval of each printed frequency: mode, (low, high)"),
     }
+    criterion = "all printed frequencies, to within 0.0005 Hz, are those of one clamped uniform beam: this arm"
     if low > high:
         sentence = (
             f"No clamped uniform beam has these frequencies: mode by mode they ask for different values of "
             f"sqrt(EI/rho A)/L^2, from {number(offered.max(), 6)} down to {number(offered.min(), 6)} rad/s."
         )
-        return Finding("contradicted", sentence, evidence)
+        return Finding("contradicted", sentence, evidence, criterion)
     same = f"sqrt(EI/rho A)/L^2 between {number(low, 6)} and {number(high, 6)} rad/s"
     if low <= scale <= high:
         sentence = (
             f"{listed(found, lambda f: f'{f:.3f}')} Hz come out, every printed digit. The three numbers are those of a "
             f"clamped uniform beam whatever it is made of, and all agree with {same}: that one number is all they tell."
         )
-        return Finding("holds", sentence, evidence)
+        return Finding("holds", sentence, evidence, criterion)
     sentence = (
         f"The three printed numbers are those of a clamped uniform beam with {same}; this arm has "
         f"{number(scale, 6)} rad/s and {listed(found, lambda f: f'{f:.3f}')} Hz."
     )
-    return Finding("holds where", sentence, evidence)
+    return Finding("holds where", sentence, evidence, criterion)
 
 
 @pictured("C01")
@@ -118,7 +121,11 @@ def _(setting: Setting) -> Finding:
             f"In {percent(falls.mean())} of the steps from {number(k_t[0])} to {number(k_t[-1])} N/m a softer joint "
             f"lowers a frequency, in the others it does not."
         )
-    return Finding(verdict, sentence, evidence)
+    criterion = (
+        f"each softer k_t from {number(k_t[0])} to {number(k_t[-1])} N/m has the lower frequency, below that of the "
+        "ideal fixed joint, for every end-effector and k_r; no threshold"
+    )
+    return Finding(verdict, sentence, evidence, criterion)
 
 
 @pictured("C02")
@@ -183,7 +190,11 @@ def _(setting: Setting) -> Finding:
             "an axis in "
             f"hertz that shows f3, so that it looks flat. Such a joint {_energy_of_a_tilt()}"
         )
-    return Finding(verdict, sentence, evidence, remedy)
+    criterion = (
+        f"on one axis in hertz that reaches f3, f1 moves by at most {percent(setting.visible)} of it, and f2 and f3 "
+        f"rise by more, for k_r of {number(k_r[-1])} to {number(k_r[0])} N m/rad"
+    )
+    return Finding(verdict, sentence, evidence, criterion, remedy)
 
 
 def _energy_of_a_tilt() -> str:
@@ -239,7 +250,7 @@ def _(setting: Setting) -> Finding:
         ]
     )
     order = -np.diff(np.log(np.abs(gaps[..., -9:, :])), axis=1) / np.log(kappa[1] / kappa[0])
-    reached = np.abs(order - 1) < 0.05
+    reached = np.abs(order - 1) < _NEAR_ONE
     evidence = {
         "kappa": Quantity(kappa, "1", "dimensionless stiffness of the one spring, the other one rigid"),
         "gap": Quantity(gaps, "1", "shortfall of the frequency from the rigid joint's: spring (t, r), kappa, mode"),
@@ -261,7 +272,11 @@ def _(setting: Setting) -> Finding:
             f"cantilever's equation, and {percent(reached.mean())} of the frequencies approach the rigid joint's as "
             "1/kappa."
         )
-    return Finding(verdict, sentence, evidence)
+    criterion = (
+        "(27), (28) and (29) pass their checks, (29) is the cantilever's, and over the last decades of kappa the "
+        f"shortfall vanishes as a power of 1/kappa within {number(_NEAR_ONE)} of 1"
+    )
+    return Finding(verdict, sentence, evidence, criterion)
 
 
 @pictured("C04")
@@ -291,7 +306,7 @@ def _(setting: Setting) -> Finding:
     square = np.stack([modal_parameters(arm).omega ** 2 for arm in cases])
     alone, whole = beam / square, (beam + joint) / square
     clamped = _beam_stiffness(setting.rigid) / modal_parameters(setting.rigid).omega ** 2
-    agrees = np.abs(alone - 1) < 1e-9
+    agrees = np.abs(alone - 1) < _ROUNDING
     evidence = {
         "k_t": Quantity(k_t, "N/m", "translational stiffness, the rotational one infinite"),
         "k_r": Quantity(k_r, "N m/rad", "rotational stiffness, the translational one infinite"),
@@ -307,17 +322,20 @@ def _(setting: Setting) -> Finding:
     sentence = (
         f"For an elastic joint K_i/M_i of (6) with the beam's energy alone falls short of omega_i^2 of (30): at k_t = "
         f"{number(setting.soft_k_t)} N/m it is {listed(soft, percent)} of it. "
-        + ("It is exact only for the rigid joint." if np.allclose(clamped, 1, rtol=1e-9) else "")
+        + ("It is exact only for the rigid joint." if np.allclose(clamped, 1, rtol=_ROUNDING) else "")
         if verdict == "contradicted"
         else f"K_i/M_i of (6) equals omega_i^2 of (30) in {percent(agrees.mean())} of the cases."
     )
     remedy = None
-    if verdict != "holds" and np.allclose(whole, 1, rtol=1e-9):
+    if verdict != "holds" and np.allclose(whole, 1, rtol=_ROUNDING):
         remedy = (
             "the springs' energy, k_t v(0)^2/2 + k_r v_x(0)^2/2, added to (4): then K_i = M_i omega_i^2 to "
             f"{number(np.abs(whole - 1).max(), 1)} for every stiffness"
         )
-    return Finding(verdict, sentence, evidence, remedy)
+    criterion = (
+        f"K_i/M_i with the beam's energy alone is omega_i^2 to {number(_ROUNDING, 1)}, for every stiffness and mode"
+    )
+    return Finding(verdict, sentence, evidence, criterion, remedy)
 
 
 def _beam_stiffness(arm: Arm) -> np.ndarray:
@@ -374,7 +392,8 @@ def _(setting: Setting) -> Finding:
         f"conditions once (4) holds the springs' energy; with the beam's energy alone {lost} of the four, those at the "
         f"joint, come out as those of a free end."
     )
-    return Finding(verdict, sentence, evidence)
+    criterion = "each condition of (16) is one of Hamilton's principle with the springs in (4); symbolic, no threshold"
+    return Finding(verdict, sentence, evidence, criterion)
 
 
 @pictured("C21")

@@ -14,6 +14,7 @@ from cra_sym.arm.base_motion import BaseMotion
 from cra_sym.arm.parameters import Arm
 from cra_sym.arm.response import response
 from cra_sym.claims.setting import Setting
+from cra_sym.claims.verdict import Quantity
 
 __all__ = ["Plane", "peak", "tip"]
 
@@ -68,6 +69,14 @@ class Plane:
         if varpi is not None:
             return cls(setting, np.array([varpi]), np.radians(np.linspace(0.0, 360.0, 361)))
         return cls(setting, np.linspace(plane.varpi[0], plane.varpi[-1], 241), np.array([psi]))
+
+    @property
+    def axes(self) -> dict[str, Quantity]:
+        """Frequency and phase as evidence."""
+        return {
+            "varpi": Quantity(self.varpi, "rad/s", "frequency of the disturbance"),
+            "psi": Quantity(np.degrees(self.psi), "deg", "phase of the disturbance"),
+        }
 
     @cached_property
     def disturbance(self) -> np.ndarray:

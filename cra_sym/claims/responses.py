@@ -7,20 +7,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cra_sym.arm.frequency_response import frequency_response
-from cra_sym.claims.ledger import Finding, Quantity, Verdict, claimed, outcome, pictured
 from cra_sym.claims.motions import Plane, peak, tip
 from cra_sym.claims.pictures import PALETTE, note, region_map, stiffness_axis
+from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
-from cra_sym.claims.words import listed, number, percent, span
+from cra_sym.claims.verdict import Finding, Quantity, Verdict, outcome
+from cra_sym.claims.words import listed, mm, number, percent, span
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_PLANE = "every phase and frequencies up to twice the first natural one"
 _SHARES = np.array([0.2, 0.5, 1.0, 2.0, 5.0])  # of the nominal amplitude
-
-
-def _mm(value: float) -> str:
-    return number(1e3 * value)
 
 
 def _peak_claim(setting: Setting, lowers: bool, mean: dict[str, float], words: str) -> Finding:
@@ -33,6 +31,7 @@ def _peak_claim(setting: Setting, lowers: bool, mean: dict[str, float], words: s
 
     plane = Plane.of(setting)
     found, without = plane.peaks(**mean)
+    region = held(plane)
     ratio = sign * np.log(found / without)
     shares = [held(plane, setting.amplitude * share).mean() for share in _SHARES]
     on_base = Plane.of(setting, start="base")
@@ -45,11 +44,11 @@ def _peak_claim(setting: Setting, lowers: bool, mean: dict[str, float], words: s
     )
     degrees = np.degrees(along_psi.psi)
     evidence = {
-        "varpi": Quantity(plane.varpi, "rad/s", "frequency of the disturbance"),
-        "psi": Quantity(np.degrees(plane.psi), "deg", "phase of the disturbance"),
+        **plane.axes,
         "peak_with": Quantity(found, "m", "peak of |v(L, t)| with the disturbance: varpi, psi"),
         "peak_without": Quantity(without, "m", "peak of |v(L, t)| without it"),
         "log_ratio": Quantity(ratio, "1", "ln of the ratio of the peaks, negative where the claim holds: varpi, psi"),
+        "region": Quantity(region, "1", "where the claim holds: varpi, psi"),
         "amplitude": Quantity(setting.amplitude * _SHARES, "m", "amplitudes of the disturbance"),
         "share": Quantity(shares, "1", "share of the plane where the claim holds, by amplitude"),
         "share_start_on_base": Quantity(
@@ -61,24 +60,29 @@ def _peak_claim(setting: Setting, lowers: bool, mean: dict[str, float], words: s
     }
     verb = "lowers" if lowers else "raises"
     sentence = (
-        f"{words}, a disturbance of {_mm(setting.amplitude)} mm {verb} the peak in {percent((ratio < 0).mean())} of "
+        f"{words}, a disturbance of {mm(setting.amplitude)} mm {verb} the peak in {percent(region.mean())} of "
         "the "
         f"plane of frequency and phase. At {number(setting.angular_frequency)} rad/s it does for psi of "
         f"{span(degrees, held(along_psi)[0], 'deg')}; at psi = {number(np.degrees(setting.phase))} deg for varpi of "
         f"{span(in_phase.varpi, held(in_phase)[:, 0], 'rad/s')}, at 180 deg for "
         f"{span(opposite.varpi, held(opposite)[:, 0], 'rad/s')}. "
-        f"Peaks at {number(setting.angular_frequency)} rad/s: {_mm(nominal)} mm (psi = "
+        f"Peaks at {number(setting.angular_frequency)} rad/s: {mm(nominal)} mm (psi = "
         f"{number(np.degrees(setting.phase))} deg) and "
-        f"{_mm(against)} mm (180 deg) against {_mm(without)} mm without."
+        f"{mm(against)} mm (180 deg) against {mm(without)} mm without."
     )
     if without_base < 1e-12 * without:
         sentence += (
             " If the arm already moves with the base at t = 0, a constant velocity alone makes no vibration at all."
         )
-    return Finding(outcome(ratio < 0), sentence, evidence)
+    criterion = (
+        f"the largest |v(L, t)| from 0 to {number(setting.duration)} s is {'smaller' if lowers else 'larger'} with the "
+        f"disturbance than without, over {_PLANE}; no threshold"
+    )
+    return Finding(outcome(region), sentence, evidence, criterion)
 
 
-def _plane_picture(verdict: Verdict, ax: Axes, label: str) -> None:
+def plane_picture(verdict: Verdict, ax: Axes, label: str) -> None:
+    """Draw where a claim holds over the disturbance's frequency and phase; the dot is the nominal disturbance."""
     setting = verdict.setting
     here = setting.angular_frequency, np.degrees(setting.phase) % 360
     region_map(ax, verdict["varpi"], verdict["psi"], verdict["log_ratio"], ("varpi", "psi"), label, here)
@@ -115,12 +119,12 @@ def _(setting: Setting) -> Finding:
 
 @pictured("C07")
 def _(verdict: Verdict, ax: Axes) -> None:
-    _plane_picture(verdict, ax, "peak lowered")
+    plane_picture(verdict, ax, "peak lowered")
 
 
 @pictured("C08")
 def _(verdict: Verdict, ax: Axes) -> None:
-    _plane_picture(verdict, ax, "peak raised")
+    plane_picture(verdict, ax, "peak raised")
 
 
 @claimed(
@@ -140,11 +144,11 @@ def _(setting: Setting) -> Finding:
     here = Plane(setting, np.array([setting.angular_frequency]), np.array([setting.phase]))
     nominal = [float(found[0, 0] / without - 1) for found, without in (here.peaks(**mean) for mean in means)]
     evidence = {
-        "varpi": Quantity(plane.varpi, "rad/s", "frequency of the disturbance"),
-        "psi": Quantity(np.degrees(plane.psi), "deg", "phase of the disturbance"),
+        **plane.axes,
         "log_ratio": Quantity(
             ratio, "1", "ln of the relative change of the peak, velocity over acceleration: varpi, psi"
         ),
+        "region": Quantity(ratio < 0, "1", "where the claim holds: varpi, psi"),
         "nominal": Quantity(
             nominal, "1", "relative change of the peak at the nominal disturbance: velocity, acceleration"
         ),
@@ -152,18 +156,22 @@ def _(setting: Setting) -> Finding:
     }
     same = "the same at every instant" if gap < 1e-9 else f"different by {percent(gap)}"
     sentence = (
-        f"In millimetres, no: what the disturbance adds to v(L, t) is {same} in both operations, by superposition. "
+        f"In mm, no: what the disturbance adds to v(L, t) is {same} in both operations, by superposition. "
         "As a share "
         f"of the peak it matters more when accelerating in {percent((ratio < 0).mean())} of the plane of frequency "
         "and phase; "
         f"for the nominal disturbance the peak changes by {listed(nominal, percent)} (velocity, acceleration)."
     )
-    return Finding(outcome(ratio < 0), sentence, evidence)
+    criterion = (
+        "the peak with over the peak without disturbance is larger under the mean acceleration than at the mean "
+        f"velocity, over {_PLANE}; no threshold"
+    )
+    return Finding(outcome(ratio < 0), sentence, evidence, criterion)
 
 
 @pictured("C09")
 def _(verdict: Verdict, ax: Axes) -> None:
-    _plane_picture(verdict, ax, "changes more when accelerating")
+    plane_picture(verdict, ax, "changes more when accelerating")
 
 
 @claimed(
@@ -195,22 +203,23 @@ def _(setting: Setting) -> Finding:
             [without for _, without in pairs], "m", "peak without disturbance: velocity and acceleration"
         ),
     }
-    ours = f"With the values assumed here they are {listed(computed, _mm)} mm"
+    criterion = f"the four peaks agree with those printed to {percent(setting.visible)}; without the print, no verdict"
+    ours = f"With the values assumed here they are {listed(computed, mm)} mm"
     if setting.peaks is None:
         text = (
-            f"{ours}; over frequency and phase of the disturbance alone the model can give {_mm(reach[0, 0])} to "
-            f"{_mm(reach[0, 1])} mm for the mean velocity and {_mm(reach[1, 0])} to {_mm(reach[1, 1])} mm for the "
+            f"{ours}; over frequency and phase of the disturbance alone the model can give {mm(reach[0, 0])} to "
+            f"{mm(reach[0, 1])} mm for the mean velocity and {mm(reach[1, 0])} to {mm(reach[1, 1])} mm for the "
             "mean acceleration."
         )
         missing = (
             "the four amplitudes in mm, the mean velocity and acceleration, and B, varpi and psi of the disturbance"
         )
-        return Finding("undecidable", text, evidence, missing=missing)
+        return Finding("undecidable", text, evidence, criterion, missing=missing)
     printed = np.array(setting.peaks)
     near = np.abs(computed / printed - 1) < setting.visible
     agree = f"{int(near.sum())} of 4 agree to {percent(setting.visible)}"
-    text = f"{ours}, where the paper prints {listed(printed, _mm)} mm: {agree}."
-    return Finding(outcome(near), text, evidence)
+    text = f"{ours}, where the paper prints {listed(printed, mm)} mm: {agree}."
+    return Finding(outcome(near), text, evidence, criterion)
 
 
 @pictured("C22")
@@ -250,6 +259,7 @@ def _(setting: Setting) -> Finding:
         "k_t": Quantity(k_t, "N/m", "translational stiffness"),
         "k_r": Quantity(k_r, "N m/rad", "rotational stiffness"),
         "log_ratio": Quantity(ratio, "1", "ln of the tip's sag by k_r over that by k_t: k_t, k_r"),
+        "region": Quantity(ratio < 0, "1", "where k_t adds more: k_t, k_r"),
         "critical": Quantity(critical, "1", "k_t L^2 / k_r below which k_t adds more"),
         "series": Quantity(series, "1", "the claim at the stiffnesses of Fig. 5: k_t, k_r"),
     }
@@ -260,7 +270,12 @@ def _(setting: Setting) -> Finding:
         "spring matters "
         f"depends on the joint, not on the kind of spring."
     )
-    return Finding(outcome(ratio < 0), sentence, evidence)
+    criterion = (
+        f"k_t adds more than k_r to the tip's deflection under a steady acceleration of the base, for k_t of "
+        f"{number(k_t[0])} to {number(k_t[-1])} N/m and k_r of {number(k_r[0])} to {number(k_r[-1])} N m/rad; no "
+        "threshold"
+    )
+    return Finding(outcome(ratio < 0), sentence, evidence, criterion)
 
 
 @pictured("C23")

@@ -8,9 +8,10 @@ import numpy as np
 
 from cra_sym.arm.analysis import modal_parameters, natural_frequencies
 from cra_sym.arm.sensitivity import sensitivities
-from cra_sym.claims.ledger import Finding, Quantity, Verdict, claimed, outcome, pictured
 from cra_sym.claims.pictures import PALETTE, STYLES, by_mode, note, stiffness_axis
+from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
+from cra_sym.claims.verdict import Finding, Quantity, Verdict, outcome
 from cra_sym.claims.words import listed, number, percent
 
 if TYPE_CHECKING:
@@ -51,7 +52,11 @@ def _(setting: Setting) -> Finding:
         f"(dln f/dln k) it holds in {percent(region.mean())} of the plane, near the rigid joint for k_t L^2/k_r below "
         f"{listed(critical)} (modes 1 to 3), and at {at_series.sum()} of the {at_series.size} points of Fig. 5."
     )
-    return Finding(outcome(region), sentence, evidence)
+    criterion = (
+        f"dln f/dln k_t is larger than dln f/dln k_r, for k_t of {number(k_t[0])} to {number(k_t[-1])} N/m, k_r of "
+        f"{number(k_r[0])} to {number(k_r[-1])} N m/rad and modes 1 to 3; no threshold"
+    )
+    return Finding(outcome(region), sentence, evidence, criterion)
 
 
 @pictured("C05")
@@ -88,15 +93,16 @@ def _(setting: Setting) -> Finding:
     # the other reading of the sentence: the sensitivity to k_r while k_t falls
     other = sensitivities(setting.arm.replace(k_t=np.array(setting.k_t), k_r=setting.k_r[1])).df_dk_r
     factor, factor_other = series[-1] / series[0], other[-1] / other[0]
-    tiny = np.abs(np.log(factor)) < np.log1p(10 * setting.visible)
-    tiny_other = np.abs(np.log(factor_other)) < np.log1p(10 * setting.visible)
+    change = 10 * setting.visible
+    tiny, tiny_other = (np.abs(np.log(f)) < np.log1p(change) for f in (factor, factor_other))
     turn = k_t[np.argmax(by_t.df_dk_t, axis=0)]
     evidence = {
         "k_t": Quantity(k_t, "N/m", "translational stiffness, stiff to soft"),
         "k_r": Quantity(k_r, "N m/rad", "rotational stiffness, stiff to soft"),
         "df_dk_t": Quantity(by_t.df_dk_t, "Hz m/N", "along k_t: k_t, mode"),
         "df_dk_r": Quantity(by_r.df_dk_r, "Hz rad/(N m)", "along k_r: k_r, mode"),
-        "grows": Quantity(grows, "1", "whether the next softer k_t has the larger df/dk_t: k_t, mode"),
+        "region": Quantity(grows, "1", "whether the next softer k_t has the larger df/dk_t: k_t, mode"),
+        "tiny": Quantity(tiny | tiny_other, "1", "whether df/dk_r hardly changes in either reading, by mode"),
         "turn": Quantity(turn, "N/m", "k_t at which df/dk_t is largest, by mode"),
         "factor": Quantity(factor, "1", "df/dk_r from the first to the last k_r of Fig. 5, by mode"),
         "factor_other": Quantity(factor_other, "1", "df/dk_r from the first to the last k_t of Fig. 5, by mode"),
@@ -117,7 +123,11 @@ def _(setting: Setting) -> Finding:
             f"stiffer joints on one common axis: for k_r over {number(unseen.min())} N m/rad df/dk_r stays below "
             f"{percent(setting.visible)} of an axis that shows df/dk_t, a tiny change to the eye"
         )
-    return Finding(verdict, sentence, evidence, remedy)
+    criterion = (
+        f"df/dk_t grows with each step of k_t from {number(k_t[0])} down to {number(k_t[-1])} N/m, and df/dk_r changes "
+        f"by less than {percent(change)} over the k_r, or over the k_t, of Fig. 5"
+    )
+    return Finding(verdict, sentence, evidence, criterion, remedy)
 
 
 def _factor(value: float) -> str:
@@ -165,7 +175,11 @@ def _(setting: Setting) -> Finding:
         f"translational one {listed(drop_t)}, which grows {number(1 + spread_t, 2)}-fold: k_r scales the spectrum, k_t "
         f"bends it."
     )
-    return Finding(outcome(differ), sentence, evidence)
+    criterion = (
+        "from mode 1 to modes 2 and 3 the two springs' shares in the fall of the frequency change their ratio by over "
+        f"{percent(setting.visible)}"
+    )
+    return Finding(outcome(differ), sentence, evidence, criterion)
 
 
 @pictured("C20")

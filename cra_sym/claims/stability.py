@@ -10,10 +10,11 @@ import numpy as np
 from cra_sym.arm.analysis import modal_parameters
 from cra_sym.arm.excitation import AxialBase, JointStiffness
 from cra_sym.arm.stability import AsymptoticWarning, growth_rate, stability_boundary
-from cra_sym.claims.ledger import Finding, Quantity, Verdict, claimed, outcome, pictured
 from cra_sym.claims.motions import tip
 from cra_sym.claims.pictures import PALETTE, STYLES, note
+from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
+from cra_sym.claims.verdict import Finding, Quantity, Verdict, outcome
 from cra_sym.claims.words import listed, number, percent
 
 if TYPE_CHECKING:
@@ -98,7 +99,11 @@ def _(setting: Setting) -> Finding:
         sentence = f"The equations of the shaken arm have time-dependent coefficients; it grows at {number(rate)} 1/s."
     others = [_WORDS[kind] for kind, there in zip(KINDS[1:], parametric[1:], strict=True) if there]
     remedy = listed(others, str, "or") if verdict == "contradicted" and others else None
-    return Finding(verdict, sentence, evidence, remedy)
+    criterion = (
+        "a coefficient of the equation of motion or of a boundary condition depends on time when the base shakes "
+        "across the arm; symbolic, no threshold"
+    )
+    return Finding(verdict, sentence, evidence, criterion, remedy)
 
 
 @pictured("C14")
@@ -168,7 +173,11 @@ def _(setting: Setting) -> Finding:
     inside = np.abs(probes) < 0.8
     if verdict == "contradicted" and bounded[1] and (rates[:, inside] > 0).all():
         remedy = f"{listed(_WORDS.values(), str, 'or')}; and the detuning (42) counted from 2 omega_n"
-    return Finding(verdict, sentence, evidence, remedy)
+    criterion = (
+        "the amplitude equation derived from (36) holds the conjugate amplitude and gives a boundary; symbolic, no "
+        "threshold"
+    )
+    return Finding(verdict, sentence, evidence, criterion, remedy)
 
 
 @pictured("C15")
@@ -223,7 +232,11 @@ def _(setting: Setting) -> Finding:
     )
     if not region.any():
         sentence = f"Only near 2 omega_n: for epsilon of {reach} nothing grows near omega_2."
-    return Finding(outcome(region), sentence, evidence)
+    criterion = (
+        f"near omega_2 a vibration grows by more than {number(_NO_GROWTH, 1)} 1/s, for epsilon of {reach} and damping "
+        f"ratios of {listed(zeta, percent)}"
+    )
+    return Finding(outcome(region), sentence, evidence, criterion)
 
 
 def _largest_growth(arm: Arm, epsilon: np.ndarray, tongue: int) -> np.ndarray:

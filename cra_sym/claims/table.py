@@ -7,8 +7,8 @@ import textwrap
 from collections import Counter
 from collections.abc import Sequence
 
-from cra_sym.claims.ledger import OUTCOMES, Verdict
 from cra_sym.claims.pictures import MARKS
+from cra_sym.claims.verdict import OUTCOMES, Verdict
 
 __all__ = ["verdict_markdown", "verdict_text"]
 

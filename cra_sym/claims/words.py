@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["listed", "number", "percent", "span"]
+__all__ = ["listed", "mm", "number", "percent", "span"]
 
 
 def number(value: Any, digits: int = 3) -> str:
@@ -24,6 +24,15 @@ def number(value: Any, digits: int = 3) -> str:
         return f"{rounded:.10f}".rstrip("0").rstrip(".")
     mantissa, exponent = f"{rounded:.{digits - 1}e}".split("e")
     return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}e{int(exponent)}"
+
+
+def mm(value: Any) -> str:
+    """Return a length given in m as a number of mm.
+
+    >>> mm(0.00123)
+    '1.23'
+    """
+    return number(1e3 * float(value))
 
 
 def percent(value: Any, digits: int = 2) -> str:

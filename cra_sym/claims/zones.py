@@ -8,10 +8,11 @@ import numpy as np
 
 from cra_sym.arm.excitation import AxialBase, JointStiffness, TransverseBase
 from cra_sym.arm.stability import forced_width
-from cra_sym.claims.ledger import Finding, Quantity, Verdict, claimed, outcome, pictured
-from cra_sym.claims.pictures import PALETTE, by_mode, note, stiffness_axis
+from cra_sym.claims.pictures import PALETTE, by_mode, note, stiffness_axis, strip
+from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
 from cra_sym.claims.stability import KINDS, zone
+from cra_sym.claims.verdict import Finding, Quantity, Verdict, outcome
 from cra_sym.claims.words import listed, number, percent, span
 
 if TYPE_CHECKING:
@@ -34,6 +35,15 @@ def _widths(setting: Setting, arm: Arm) -> np.ndarray:
         return np.stack([high - low for low, high in sides], axis=-1)
 
     return np.stack([forced, parametric(JointStiffness()), parametric(AxialBase(setting.amplitude))])
+
+
+def _where(k_t: np.ndarray, region: np.ndarray) -> str:
+    """Say in words for which k_t a claim holds, excitation by excitation."""
+    across, joint, along = (span(k_t, row, "N/m") for row in region)
+    return (
+        f"for the fluctuating joint for k_t of {joint}, for the base shaken along the arm {along}, for the forced "
+        f"resonances of the base shaken across {across}"
+    )
 
 
 _WIDTH = "width at epsilon (transverse base: rate of its forced resonance, m/s)"
@@ -65,20 +75,20 @@ def _(setting: Setting) -> Finding:
         "region": Quantity(region, "1", "where the claim holds in absolute width: excitation, k_t but the first"),
         "relative": Quantity(relative, "1", "the same for the relative change of the widths"),
     }
-    where = dict(zip(KINDS, (span(k_t[1:], row, "N/m") for row in region), strict=True))
     factors = widths[1, -1] / widths[1, 0]
     in_relative = f"in {percent(relative.mean())} of the cases" if relative.any() else "it does nowhere"
     sentence = (
         f"As k_t falls from {number(k_t[0])} N/m, zones 2 and 3 widen, and zone 1 by under {percent(minor)} of what "
-        "they do in "
-        f"rad/s: for the fluctuating joint for k_t of {where['joint stiffness']}, for the base shaken along the arm "
-        f"{where['axial base']}, for the forced resonances of the base shaken across for {where['transverse base']}. "
-        "In "
+        f"they do in rad/s: {_where(k_t[1:], region)}. In "
         f"relative width {in_relative}: down to {number(k_t[-1])} N/m the joint's three zones widen "
         f"{listed(factors, lambda f: number(f, 2))}-fold, and zone 3 is "
         f"widest at {number(k_t[widths[1, :, 2].argmax()])} N/m."
     )
-    return Finding(outcome(region), sentence, evidence)
+    criterion = (
+        f"zones 2 and 3 are wider than at {number(k_t[0])} N/m and zone 1 has changed by at most {percent(minor)} of "
+        f"what the lesser of them has, in rad/s, for k_t down to {number(k_t[-1])} N/m and three excitations"
+    )
+    return Finding(outcome(region), sentence, evidence, criterion)
 
 
 @pictured("C16")
@@ -88,7 +98,7 @@ def _(verdict: Verdict, ax: Axes) -> None:
     ax.set_yscale("log")
     _strips(ax, k_t[1:], verdict["region"], KINDS)
     stiffness_axis(ax, "k_t")
-    ax.set_ylabel("width of the zone / (rad/s)")
+    ax.set_ylabel("width, fluctuating joint / (rad/s)")
     ax.set_ylim(top=8 * ax.get_ylim()[1])
     ax.legend(fontsize=8, loc="upper center", ncols=3, columnspacing=1.0, handlelength=1.6)
 
@@ -99,8 +109,7 @@ def _strips(ax: Axes, x: np.ndarray, rows: np.ndarray, names: tuple[str, ...]) -
     step = 0.11 * (high - low)
     for k, (row, name) in enumerate(zip(rows, names, strict=True)):
         base = low - step * (k + 1)
-        for colour, where in (("#BFE3D6", row), ("#F8E4D6", ~row)):
-            ax.fill_between(x, np.exp(base), np.exp(base + 0.85 * step), where=where, color=colour, lw=0, step="mid")
+        strip(ax, x, row, np.exp(base), np.exp(base + 0.85 * step))
         ax.text(x.max(), np.exp(base + 0.42 * step), f"{name} ", va="center", ha="right", fontsize=7.5, color="0.25")
     ax.set_ylim(np.exp(low - step * (len(names) + 0.15)), np.exp(high))
 
@@ -125,18 +134,18 @@ def _(setting: Setting) -> Finding:
         "narrows": Quantity(narrows, "1", "whether the width falls with every step of mass: excitation, k_t, mode"),
         "region": Quantity(region, "1", "whether it does for all three: excitation, k_t"),
     }
-    where = dict(zip(KINDS, (span(k_t, row, "N/m") for row in np.atleast_2d(region)), strict=True))
     change = widths[1, :, -1] / widths[1, :, 0] - 1
     stiff = int(np.argmin(np.abs(k_t - setting.k_t[-1])))
     sentence = (
-        f"All three narrow with the mass for the fluctuating joint for k_t of {where['joint stiffness']}, for the "
-        "base shaken "
-        f"along the arm {where['axial base']}, for the forced resonances of a base shaken across "
-        f"{where['transverse base']}. "
+        f"All three narrow with the mass {_where(k_t, region)}. "
         f"From {number(masses[0])} to {number(masses[-1])} kg the joint's zones change by "
         f"{listed(change[stiff], percent)} at {number(k_t[stiff])} N/m."
     )
-    return Finding(outcome(region), sentence, evidence)
+    criterion = (
+        f"each step of the end-effector's mass narrows all three zones, for k_t of {number(k_t[0])} to "
+        f"{number(k_t[-1])} N/m and three excitations; no threshold"
+    )
+    return Finding(outcome(region), sentence, evidence, criterion)
 
 
 @pictured("C17")
@@ -145,8 +154,7 @@ def _(verdict: Verdict, ax: Axes) -> None:
     for kind in range(narrows.shape[0]):
         for mode in range(narrows.shape[-1]):
             base = 4 * kind + mode
-            for colour, where in (("#BFE3D6", narrows[kind, :, mode]), ("#F8E4D6", ~narrows[kind, :, mode])):
-                ax.fill_between(k_t, base, base + 0.85, where=where, color=colour, lw=0, step="mid")
+            strip(ax, k_t, narrows[kind, :, mode], base, base + 0.85)
             ax.text(k_t[0] * 1.15, base + 0.42, f"zone {mode + 1}", va="center", fontsize=7.5, color=PALETTE[mode])
     ax.set_xscale("log")
     ax.set_yticks([4 * kind + 1.4 for kind in range(3)], [name.replace(" ", "\n") for name in KINDS])

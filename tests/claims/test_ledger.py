@@ -40,15 +40,20 @@ def test_a_verdict_says_what_and_why(verdict):
 
 
 def test_where_is_a_region(verdict):
-    """What holds somewhere shows where: an array of truth values, or of signs, that takes both."""
-    if verdict.outcome != "holds where":
-        return
-    takes_both = [
-        0 < (q.values if q.values.dtype.kind == "b" else q.values < 0).mean() < 1
-        for q in verdict.evidence.values()
-        if q.values.size > 1
-    ]
-    assert any(takes_both)
+    """What holds somewhere shows where: truth values over the quantities their meaning names."""
+    if verdict.outcome == "holds where":
+        region = verdict.evidence["region"]
+        assert region.values.dtype.kind == "b" and outcome(region.values) == "holds where"
+        assert region.values.size > 20 and ("where" in region.meaning or "whether" in region.meaning)
+
+
+def test_thresholds_are_told(verdict):
+    """The criterion carries every threshold, and moves with those of the setting."""
+    assert any(c.isdigit() for c in verdict.criterion) or "no threshold" in verdict.criterion
+
+
+def test_a_threshold_of_the_setting_is_that_of_the_criterion(judge):
+    assert "1 %" in judge("C03").criterion and "2 %" in judge("C03", visible=0.02).criterion
 
 
 def test_a_contradiction_carries_a_remedy(verdict):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import cra_sym as cra
-from cra_sym.claims import Setting, claim, comparisons, responses
+from cra_sym.claims import Setting, claim, responses
 from cra_sym.claims.motions import Plane, peak, tip
 
 ARM = cra.Arm.nominal()
@@ -36,7 +36,7 @@ def test_c07_numbers():
 
 
 def test_c07_and_c08_turn_with_disturbance_and_start(judge):
-    assert judge("C07", amplitude=0.0).outcome == judge("C08", amplitude=0.0).outcome == "contradicted"
+    assert judge("C07", amplitude=0.0).outcome == "contradicted"
     assert claim("C07")["share_start_on_base"] == 0.0
     assert np.all(np.diff(claim("C08")["share"]) > 0)
 
@@ -56,18 +56,15 @@ def test_c09_turns_when_the_mean_velocity_is_small(judge):
     assert (gentle.evidence["log_ratio"].values < 0).mean() < 0.1
 
 
-def test_superposition_is_what_decides_c09_and_c13(judge, monkeypatch):
+def test_superposition_is_what_decides_c09(judge, monkeypatch):
     """A stiffening arm, whose response is no sum, makes the error depend on the mean motion."""
 
     def stiffening(*arguments, **options):
         v = tip(*arguments, **options)
         return v + 1e3 * v**3
 
-    assert claim("C13").outcome == "contradicted" and not claim("C13")["grows"].any()
-    for module in (responses, comparisons):
-        monkeypatch.setattr(module, "tip", stiffening)
+    monkeypatch.setattr(responses, "tip", stiffening)
     assert judge("C09").evidence["absolute_gap"].values > 1e-3
-    assert judge("C13").outcome != "contradicted"
 
 
 @pytest.mark.parametrize("id", ["C10", "C11"])
@@ -85,13 +82,7 @@ def test_softening_helps_above_the_resonance_only(id):
     assert verdict.outcome == "holds where"
 
 
-def test_c11_turns_with_the_threshold(judge):
-    assert judge("C11", visible=0.9).outcome == "contradicted"
-
-
-def test_c12_turns_with_the_disturbance(judge):
-    assert judge("C12", amplitude=1e-9).outcome == "holds"
-    assert claim("C12").outcome == "holds where"
+def test_c12_is_proportional_without_disturbance():
     np.testing.assert_allclose(claim("C12")["without"] / claim("C12")["without"][0], [1, 2, 3], rtol=1e-12)
 
 
@@ -108,7 +99,6 @@ def test_c22_is_decided_by_the_printed_numbers(judge):
     verdict = claim("C22")
     assert verdict.outcome == "undecidable" and "B, varpi and psi" in verdict.missing
     assert judge("C22", peaks=tuple(verdict["computed"])).outcome == "holds"
-    assert judge("C22", peaks=(1.0, 2.0, 3.0, 4.0)).outcome == "contradicted"
 
 
 def test_c23_border_is_statics(judge):

@@ -1,0 +1,64 @@
+"""Where the claims' modules enter one function that judges and one that draws a claim.
+
+::
+
+    @claimed("C02", "modes", "Section 4, Fig. 3", "f1 to f3 fall with k_t", "with the decreasing of ...")
+    def _(setting):
+        ...
+        return Finding(outcome(region), sentence, evidence)
+
+    @pictured("C02")
+    def _(verdict, ax):
+        ...
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from cra_sym.claims.setting import Setting
+    from cra_sym.claims.verdict import Finding, Verdict
+
+__all__ = ["ENTRIES", "Entry", "claimed", "pictured"]
+
+
+@dataclass
+class Entry:
+    """A claim, the function that judges it and the one that draws it."""
+
+    id: str
+    theme: str
+    source: str
+    title: str
+    claim: str
+    find: Callable[[Setting], Finding]
+    picture: Callable[[Verdict, Axes], None] | None = None
+
+
+ENTRIES: dict[str, Entry] = {}
+"""Claims by id, in the order their modules were imported."""
+
+
+def claimed(id: str, theme: str, source: str, title: str, words: str) -> Callable:
+    """Register the decorated function, ``Setting -> Finding``, as the judge of a claim."""
+
+    def register(function: Callable[[Setting], Finding]) -> Callable[[Setting], Finding]:
+        ENTRIES[id] = Entry(id, theme, source, title, words, function)
+        return function
+
+    return register
+
+
+def pictured(id: str) -> Callable:
+    """Register the decorated function, ``(Verdict, Axes) -> None``, as what draws the evidence."""
+
+    def register(function: Callable[[Verdict, Axes], None]) -> Callable[[Verdict, Axes], None]:
+        ENTRIES[id].picture = function
+        return function
+
+    return register
