@@ -13,24 +13,24 @@ _BLOCK = 256
 
 def fill(table, lam, modes, kappa_t, kappa_r, mu, iota):
     """Fill the rows of ``table``: root (4), tip (2), waves (4), strain (2) and participation of every mode."""
-    arm, w, state = np.empty((5, _BLOCK)), np.empty((13, _BLOCK)), np.empty(13)
+    arm, w, state, place = np.empty((5, _BLOCK)), np.empty((13, _BLOCK)), np.empty(13), np.empty(_BLOCK, np.int64)
     for first in range(0, lam.size, _BLOCK):
-        size = min(_BLOCK, lam.size - first)
-        for i in range(size):
-            lane = (first + i) // modes
-            arm[0, i], arm[1, i], arm[2, i], arm[3, i] = kappa_t[lane], kappa_r[lane], mu[lane], iota[lane]
-            arm[4, i] = lam[first + i]
-        for i in range(size):
-            _far(w, i, max(arm[4, i], 2.0), arm[0, i], arm[1, i], arm[2, i], arm[3, i])
-        for i in range(size):
-            if arm[4, i] * arm[4, i] * arm[4, i] * arm[4, i] < _NEAR:
-                number = (first + i) % modes
-                _near(state, arm[4, i], number, arm[0, i], arm[1, i], arm[2, i], arm[3, i])
+        far = 0
+        for i in range(first, min(first + _BLOCK, lam.size)):
+            lane, z = i // modes, lam[i] * lam[i] * lam[i] * lam[i]
+            if z < _NEAR:
+                _near(state, lam[i], i % modes, kappa_t[lane], kappa_r[lane], mu[lane], iota[lane])
                 for row in range(13):
-                    w[row, i] = state[row]
+                    table[row, i] = state[row] + 0.0
+            else:
+                arm[0, far], arm[1, far], arm[2, far], arm[3, far] = kappa_t[lane], kappa_r[lane], mu[lane], iota[lane]
+                arm[4, far], place[far] = lam[i], i
+                far += 1
+        for i in range(far):
+            _far(w, i, arm[4, i], arm[0, i], arm[1, i], arm[2, i], arm[3, i])
         for row in range(13):
-            for i in range(size):
-                table[row, first + i] = w[row, i] + 0.0
+            for i in range(far):
+                table[row, place[i]] = w[row, i] + 0.0
 
 
 def _pair(kappa):

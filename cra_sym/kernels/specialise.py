@@ -114,11 +114,19 @@ def _prelude(kernels: Mapping[str, Kernel], elementary: bool) -> str:
     return "\n\n".join(["\n".join(sorted(imports)), own, _WHERE, *bodies])
 
 
-_MADE: set[str] = set()  # digests of what this process compiled
+_MADE: set[str] = set()  # digests of what this process compiled or loaded
 
 
 def _digest(prelude: str, template: str) -> str:
     return hashlib.sha256(repr((prelude, template, _OPTIONS)).encode()).hexdigest()
+
+
+def _remember(digest: str) -> None:
+    """Note that machine code is there, for this process and for others."""
+    if digest not in _MADE:
+        _MADE.add(digest)
+        if store.load(_mark(digest)) is None:
+            store.save(_mark(digest), b"")
 
 
 def _mark(digest: str) -> str:
@@ -220,7 +228,9 @@ class _StoredCode:
         content = store.load(self._key(signature, target.codegen()))
         if content is not None:
             try:
-                return CompileResult._rebuild(target, *pickle.loads(content))
+                found = CompileResult._rebuild(target, *pickle.loads(content))
+                _remember(self._digest)
+                return found
             except Exception:  # whatever is wrong with code this process did not make: make it anew
                 pass
         self._bar = tqdm(total=0, desc=f"compiling {self._name}, once", bar_format="{desc}", leave=False, disable=None)
@@ -231,10 +241,9 @@ class _StoredCode:
 
         if self._bar is not None:
             self._bar.close()
-        _MADE.add(self._digest)
         if not result.lifted and not result.library.has_dynamic_globals:
             store.save(self._key(signature, result.library.codegen), dumps(result._reduce()))
-            store.save(_mark(self._digest), b"")
+        _remember(self._digest)
 
     def _key(self, signature: Any, codegen: Any) -> str:
         return repr((self._digest, self._name, str(signature), codegen.magic_tuple(), sys.version, _versions()))
