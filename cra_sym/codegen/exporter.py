@@ -164,16 +164,20 @@ def _reference(everything: bool) -> str:
 
 
 def _arm_texts(name: str) -> dict[str, str]:
-    language, everything = LANGUAGES[name], name in _FULL
+    texts = arm_sources(name)
+    texts["reference.txt"] = _reference(name in _FULL)
+    return texts
+
+
+def arm_sources(name: str) -> dict[str, str]:
+    """Return the texts of an arm's export, by file, all but the reference vectors."""
+    language = LANGUAGES[name]
     values = common_values(language) | _spectrum_values(language)
-    if everything:
+    if name in _FULL:
         values |= _modal_values(language)
         values["helpers"] = language.helped(values["spectrum_functions"] + values["modal_functions"])
     values["nomenclature"] = nomenclature_rows()
-    texts = rendered(name, values)
-    texts["reference.txt"] = _reference(everything)
-    texts["LICENSE"] = values["licence"]
-    return texts
+    return rendered(name, values) | {"LICENSE": values["licence"]}
 
 
 def _spectrum_values(language: Language) -> dict[str, Any]:

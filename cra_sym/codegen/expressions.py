@@ -21,6 +21,7 @@ _PAIRS = ("pairs", PARAMETERS)
 _BASIS = ("basis_row", BASIS)
 _KRYLOV = ("krylov", shapes.KRYLOV)
 _WAVES = ("waves", shapes.WAVES)
+_CIRCLE = sp.symbols("cos_lambda sin_lambda decay", real=True)
 
 
 def _row(prefix: str, arguments: Sequence[sp.Symbol]) -> tuple[str, list[sp.Symbol]]:
@@ -50,11 +51,22 @@ def spectrum_functions() -> tuple[Function, ...]:
     return (
         _make("Coefficients of the characteristic determinant.", characteristic.coefficients, _PAIRS),
         _make("Coefficients of its power series in z.", characteristic.power_series, k),
-        _make("Basis of the determinant at lambda, scaled by decay = exp(-lambda).", characteristic.basis),
+        _make("Basis of the determinant at lambda, scaled by exp(-lambda).", _basis, ("circle", _CIRCLE)),
         _make("The same basis for small z, not scaled.", characteristic.basis_near),
         _make("Determinants whose signs count the zeros below z.", characteristic.chain, _PAIRS, _BASIS),
         _make("Determinant D, z D' and z^2 D'', scaled alike.", characteristic.derivatives, k, _BASIS),
     )
+
+
+def _basis() -> Any:
+    """Return the scaled basis as a polynomial in cos, sin and exp(-lambda), which each caller computes its own way."""
+    scaled, (lamda, decay) = characteristic.basis()
+    c, s, e = _CIRCLE
+    polynomials = [x.xreplace({sp.cos(lamda): c, sp.sin(lamda): s, decay: e}) for x in scaled]
+    return polynomials, (lamda, *_CIRCLE)
+
+
+_basis.__name__ = "basis"
 
 
 @cache

@@ -204,6 +204,14 @@ class FortranPrinter(ScalarPrinter, FCodePrinter):
             exponent = f"({exponent})"
         return f"{base if expr.base.is_Atom and not expr.base.is_negative else f'({base})'}**{exponent}"
 
+    def _print_Relational(self, expr: Any) -> str:
+        ends = self._print(expr.lhs), self._print(expr.rhs)
+        if isinstance(expr, sp.Ne):  # strict compilers warn of == and /= between reals
+            return "({0} < {1} .or. {0} > {1})".format(*ends)
+        if isinstance(expr, sp.Eq):
+            return "({0} <= {1} .and. {0} >= {1})".format(*ends)
+        return super()._print_Relational(expr)
+
     def wrapped(self, text: str, indent: str) -> str:
         spaced = re.sub(r"(?<=[\w)])(\*\*|\*|/)(?=[\w(])", r"\1 ", text) if len(indent + text) > 110 else text
         lines = textwrap.wrap(

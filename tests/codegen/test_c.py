@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -11,12 +12,16 @@ import numpy as np
 import pytest
 
 import cra_sym as cra
+from cra_sym.kernels import elementary
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None or shutil.which("make") is None, reason="needs gcc and make")
 
 MATHEMATICS = (
     "sqrt", "exp", "expm1", "sin", "cos", "sincos", "atan2", "fmax", "fmin", "memset", "memcpy", "memmove",
     "_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail",
+)  # fmt: skip
+INTERNAL = (
+    "pair", "groups_of", "valid_groups", "frequency_parameters", "frequency_parameters_batch",
 )  # fmt: skip
 
 
@@ -57,7 +62,7 @@ def test_no_memory_no_input_no_output(folder):
         pytest.skip("needs nm")
     symbols = [line.split() for line in run("nm", "libcra_arm.a", cwd=folder).splitlines()]
     wanted = {s[-1] for s in symbols if s[-2:-1] == ["U"]}
-    assert wanted <= set(MATHEMATICS) | {f"cra_{name}" for name in ("pair", "groups_of", "frequency_parameters")}
+    assert wanted <= {*MATHEMATICS, *(f"cra_{name}" for name in INTERNAL)}
     assert not [s for s in symbols if s[-2:-1] and s[-2] in "BDCbd"]  # no variable
 
 
@@ -69,25 +74,48 @@ class _Arm(ctypes.Structure):
 
 @pytest.fixture(scope="module")
 def library(folder):
-    flags = "-std=c99 -O2 -ffp-contract=off -shared -fPIC -o libcra_arm.so spectrum.c modes.c -lm".split()
-    run("cc", *flags, cwd=folder)
+    command = (
+        "cc -std=c99 -pedantic -Wall -Wextra -Werror -O2 -shared -fPIC -o libcra_arm.so spectrum.c batch.c modes.c -lm"
+    )
+    run(*command.split(), cwd=folder)
     return ctypes.CDLL(str(folder / "libcra_arm.so"))
 
 
-def test_random_groups_agree_with_the_package(library):
+@pytest.mark.parametrize("modes", [1, 6, 40])
+def test_random_groups_agree_with_the_package(library, modes):
     rng = np.random.default_rng(7)
-    count, modes = 3000, 6
+    count = 6000 // modes
     groups = 10 ** rng.uniform(-6, 9, (4, count))
     for row, special in zip(groups, ((0, np.inf), (0, np.inf), (0,), (0,)), strict=True):
         row[rng.random(count) < 0.2] = rng.choice(special)
     expected = cra.frequency_parameters(*groups, modes=modes)
-    found = np.empty((count, modes))
-    solve = library.cra_frequency_parameters
-    solve.argtypes = [ctypes.c_double] * 4 + [ctypes.c_int, ctypes.POINTER(ctypes.c_double)]
-    for i in range(count):
-        row = found[i].ctypes.data_as(ctypes.POINTER(ctypes.c_double))
-        assert solve(*groups[:, i], modes, row) == 0
-    assert np.max(np.abs(found - expected) / np.where(expected > 0, expected, 1)) < 1e-12
+    pointer, rows = np.ctypeslib.ndpointer(np.float64, flags="C"), np.ctypeslib.ndpointer(np.float64)
+    one, batch = library.cra_frequency_parameters, library.cra_frequency_parameters_batch
+    one.argtypes = [ctypes.c_double] * 4 + [ctypes.c_int, rows]
+    batch.argtypes = [ctypes.c_size_t, *[pointer] * 4, ctypes.c_int, pointer]
+    alone, together = np.empty((count, modes)), np.empty((count, modes))
+    assert not any(one(*groups[:, i], modes, alone[i]) for i in range(count))
+    assert batch(count, *groups, modes, together) == 0
+    for found in (alone, together):
+        assert np.max(np.abs(found - expected) / np.where(expected > 0, expected, 1)) < 1e-12
+
+
+def test_the_most_modes_and_no_more(library):
+    one = library.cra_frequency_parameters
+    one.argtypes = [ctypes.c_double] * 4 + [ctypes.c_int, np.ctypeslib.ndpointer(np.float64)]
+    found = np.zeros(1001)
+    assert one(3.0, 0.0, 0.1, 0.0, 1001, found) == 2 and not found.any()
+    assert one(3.0, 0.0, 0.1, 0.0, 1000, found) == 0
+    np.testing.assert_allclose(found[:1000], cra.frequency_parameters(3.0, 0.0, 0.1, modes=1000), rtol=1e-12)
+
+
+def test_branch_free_functions_are_those_of_the_kernels(folder):
+    """The constants of sine, cosine and exponential in batch.c are those of the package, digit for digit."""
+    text = (folder / "batch.c").read_text()
+    function = text[text.index("static inline void circle_at") : text.index("/* The steps of spectrum.c")]
+    digits = re.compile(r"\d\.\d{8,}(?:e-\d+)?")
+    kernels = Path(elementary.__file__).read_text()
+    assert set(digits.findall(function)) == set(digits.findall(kernels))
 
 
 @pytest.mark.parametrize(

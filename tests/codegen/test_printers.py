@@ -48,7 +48,7 @@ def expected(point) -> list[float]:
 
 
 CC = "cc -std=c99 -pedantic -Wall -Wextra -Wconversion -Werror -O1 -o run coverage.c -lm && ./run"
-GFORTRAN = "gfortran -std=f2008 -Wall -Werror -o run coverage.f90 && ./run"
+GFORTRAN = "gfortran -std=f2008 -Wall -Wextra -Werror -o run coverage.f90 && ./run"
 PROGRAMS = {
     "python": (sys.executable, "coverage.py", [sys.executable, "coverage.py"]),
     "c": ("cc", "coverage.c", ["sh", "-c", CC]),

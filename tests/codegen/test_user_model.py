@@ -16,7 +16,7 @@ COMMANDS = {
     "c": ("cc", ["make", "test"]),
     "fortran": (
         "gfortran",
-        ["sh", "-c", "gfortran -std=f2008 -Wall -Werror -o self_test model.f90 self_test.f90 && ./self_test"],
+        ["sh", "-c", "gfortran -std=f2008 -Wall -Wextra -Werror -o self_test model.f90 self_test.f90 && ./self_test"],
     ),
     "python": (sys.executable, [sys.executable, "self_test.py"]),
     "octave": ("octave", ["octave", "--norc", "--no-gui", "--quiet", "--eval", "self_test"]),
