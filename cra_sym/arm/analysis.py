@@ -10,6 +10,7 @@ import numpy as np
 
 from cra_sym import checks
 from cra_sym.arm import spectrum
+from cra_sym.arm.close_pairs import resolve_close_pairs
 from cra_sym.arm.modal import Modes, modes_of
 from cra_sym.arm.parameters import Arm
 
@@ -59,7 +60,10 @@ def frequency_parameters(kappa_t: Any, kappa_r: Any, mu: Any, iota: Any = 0.0, m
     for name in ("kappa_t", "kappa_r"):
         arrays[name] = np.where(arrays[name] < _SOFTEST, 0.0, arrays[name])
     shape = checks.broadcastable(**arrays)
-    return spectrum.frequency_parameters(*(np.broadcast_to(a, shape) for a in arrays.values()), modes=modes)
+    groups = [np.broadcast_to(array, shape) for array in arrays.values()]
+    lam = spectrum.frequency_parameters(*groups, modes=modes)
+    resolve_close_pairs(lam, *groups)
+    return lam
 
 
 def natural_frequencies(arm: Arm, modes: int = 3) -> np.ndarray:
