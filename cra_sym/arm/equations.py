@@ -20,6 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
+from operator import index
 from typing import Any, Literal
 
 __all__ = ["Equation", "checks", "equation", "equations", "numbered"]
@@ -70,11 +71,17 @@ class Equation:
     statement: str
     source: str
     _build: Callable[[], Any] = field(compare=False)
+    _shown: Callable[[], Any] | None = field(default=None, compare=False)
 
     @property
     def expression(self) -> Any:
         """The SymPy equation, or a tuple of them; derived on first use."""
         return self._build()
+
+    @property
+    def shown(self) -> Any:
+        """What is displayed: the expression or, where that fills a page, the same in terms of its sources."""
+        return self.expression if self._shown is None else self._shown()
 
     @property
     def checked_by(self) -> str:
@@ -89,7 +96,7 @@ class Equation:
         return f"Equation ({self.number}), {self.title}"
 
     def _formula(self) -> str:
-        parts = self.expression if isinstance(self.expression, tuple) else (self.expression,)
+        parts = self.shown if isinstance(self.shown, tuple) else (self.shown,)
         body = r" \\[4pt] ".join(map(_typeset, parts))
         return rf"\begin{{gathered}} {body} \end{{gathered}} \qquad ({self.number})"
 
@@ -129,15 +136,24 @@ def _route(number: Number) -> Callable[[], Any]:
     return _ROUTES[number]
 
 
-def numbered(number: Number, title: str, kind: Kind, derived_from: tuple[Number, ...] = ()) -> Callable:
-    """Register the decorated function, whose docstring is the statement, as the builder of an equation."""
+def numbered(
+    number: Number,
+    title: str,
+    kind: Kind,
+    derived_from: tuple[Number, ...] = (),
+    shown: Callable[[], Any] | None = None,
+) -> Callable:
+    """Register the decorated function, whose docstring is the statement, as the builder of an equation.
+
+    ``shown`` builds what is displayed in place of an expression that fills a page.
+    """
 
     def register(function: Callable[[], Any]) -> Callable[[], Any]:
         source = f"{function.__module__}:{function.__qualname__}"
         if number in _EQUATIONS and _EQUATIONS[number].source != source:
             raise ValueError(f"equation ({number}) is already built by {_EQUATIONS[number].source}")
         build = cache(function)
-        _EQUATIONS[number] = Equation(number, title, kind, derived_from, _text(function), source, build)
+        _EQUATIONS[number] = Equation(number, title, kind, derived_from, _text(function), source, build, shown)
         return build
 
     return register
@@ -179,9 +195,11 @@ def equation(number: Number) -> Equation:
     >>> equation(1).kind, equation(5).derived_from
     ('definition', (2, 3, 4, 6, '16c'))
     """
-    if isinstance(number, bool) or not isinstance(number, int | str):
-        raise TypeError(f"number = {number!r}: allowed are integers, or strings such as '11a'")
-    if isinstance(number, str) and number.isdecimal():
+    if not isinstance(number, str):
+        if isinstance(number, bool) or not hasattr(number, "__index__"):
+            raise TypeError(f"number = {number!r}: allowed are integers, or strings such as '11a'")
+        number = index(number)
+    elif number.isdecimal():
         number = int(number)
     if number not in _EQUATIONS:
         _load()

@@ -52,18 +52,27 @@ def implicit_derivatives() -> dict[str, sp.Expr]:
     return {name: -part / slope for name, part in parts.items()}
 
 
-@numbered(32, "sensitivities of the frequencies", "derived", (23, 30, 31))
+def _in_hertz(rates: dict[str, sp.Expr]) -> tuple[sp.Eq, sp.Eq]:
+    """Turn d lamda / d kappa for each stiffness into hertz per unit of the stiffness, by (30)."""
+    frequency, hertz = sp.Function("f_i")(symbol("k_t"), symbol("k_r")), natural_frequency().rhs
+    by_k_t, by_k_r = (
+        sp.Eq(frequency.diff(symbol(f"k_{name}")), hertz.diff(lamda) * L**power / (E * I_z) * rates[name])
+        for name, power in (("t", 3), ("r", 1))
+    )
+    return by_k_t, by_k_r
+
+
+def _by_parts() -> tuple[sp.Eq, sp.Eq]:
+    kappa_t = symbol("kappa_t")
+    return _in_hertz({name: sensitivity_function().rhs.subs(kappa_t, symbol(f"kappa_{name}")) for name in _PAIRS})
+
+
+@numbered(32, "sensitivities of the frequencies", "derived", (23, 30, 31), shown=_by_parts)
 def frequency_sensitivities() -> tuple[sp.Eq, sp.Eq]:
     """(31) for the two stiffnesses, turned into hertz per N/m and hertz per N m/rad by (30); f_i is proportional to the
-    square of λ. Raw sensitivities have different units: only logarithmic ones can be compared."""
-    hertz = natural_frequency().rhs
-    equations = []
-    for name, power in (("t", 3), ("r", 1)):
-        k, (_, c) = symbol(f"k_{name}"), _PAIRS[name]
-        rate = implicit_derivatives()[f"kappa_{name}"] * c**2 * L**power / (E * I_z)
-        frequency = sp.Function("f_i")(symbol("k_t"), symbol("k_r"))
-        equations.append(sp.Eq(frequency.diff(k), hertz.diff(lamda) * rate))
-    return equations[0], equations[1]
+    square of λ. Raw sensitivities have different units: only logarithmic ones can be compared. The expression has
+    Δ of (23) written out, which fills a page."""
+    return _in_hertz({name: implicit_derivatives()[f"kappa_{name}"] * c**2 for name, (_, c) in _PAIRS.items()})
 
 
 @checks(32)

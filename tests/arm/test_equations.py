@@ -3,12 +3,15 @@
 import sys
 from importlib import import_module
 
+import numpy as np
 import pytest
-from sympy import Add, Basic, Eq, Integral, MatMul, Rational
+from sympy import Add, Basic, Eq, Function, Integral, Lambda, MatMul, Rational
 
 import cra_sym as cra
 from cra_sym.arm import equations as registry
 from cra_sym.arm.modal_sum import ModalSum
+from cra_sym.arm.modes import frequency_function
+from cra_sym.symbols import symbol
 
 PUBLISHED = tuple(range(1, 31))
 ALL = [e.number for e in cra.equations(companions=True)]
@@ -103,3 +106,31 @@ def test_the_check_notices_one_per_cent(e, monkeypatch):
         for holder in holders:
             monkeypatch.setattr(holder, name, lambda: wrong if isinstance(e.expression, tuple) else wrong[0])  # noqa: B023
         assert e.check() is False, f"part {place}"
+
+
+def test_any_integer_is_a_number():
+    assert cra.equation(np.int64(23)) is cra.equation("23") is cra.equation(23)
+    for number in (True, np.True_, 23.0, None, (23,)):
+        with pytest.raises(TypeError, match="allowed are integers"):
+            cra.equation(number)
+
+
+def test_what_is_shown_of_a_long_equation_is_the_equation():
+    """(32) is shown with (31)'s Delta; putting (23) in its place gives the expression."""
+    e, function = cra.equation(32), frequency_function()[0]
+    values = {"lamda": 1.7, "mu": 0.3, "iota": 0.1, "L": 1.1, "A": 0.3, "E": 2.0, "I_z": 0.7, "rho": 1.3}
+    kappa = {"t": symbol("kappa_t"), "r": symbol("kappa_r")}
+    sizes = {"t": 3.0, "r": 5.0}
+    for name, shown, whole in zip("tr", e.shown, e.expression, strict=True):
+        pairs = {n: (k, 1) if n == name else (sizes[n], 1) for n, k in kappa.items()}
+        pair = {
+            symbol(f"{letter}_{n}"): part / (1 + pairs[n][0])
+            for n in "tr"
+            for letter, part in zip("sc", pairs[n], strict=True)
+        }
+        Delta = Lambda((symbol("lamda"), kappa[name]), function.subs(pair))
+        numbers = {symbol(n): v for n, v in values.items()} | {kappa[n]: v for n, v in sizes.items()}
+        found = shown.rhs.replace(Function("Delta"), Delta).doit().subs(numbers)
+        assert shown.lhs == whole.lhs
+        assert float(found) == pytest.approx(float(whole.rhs.subs(pair).subs(numbers)), rel=1e-12)
+    assert len(e._repr_latex_()) < 1000
