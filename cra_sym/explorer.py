@@ -189,7 +189,8 @@ class Explorer:
         widgets = require("ipywidgets", "explore")
         for name in self.views.keys() - self._pictures.keys():
             self._draw(name)
-        return {name: widgets.Image(value=self._pictures[name], format="png") for name in self.views}
+        look: dict[str, Any] = {"format": "png", "layout": {"width": f"{90 * _SIZE[0]:.0f}px", "max_width": "100%"}}
+        return {name: widgets.Image(value=self._pictures[name], **look) for name in self.views}
 
     @cached_property
     def panel(self) -> Any:
@@ -228,6 +229,7 @@ class Explorer:
 def _divisor(unit: str) -> str:
     if unit == "1":
         return ""
+    unit = unit.replace("^2", "²")
     return f"/ ({unit})" if {" ", "/"} & {*unit} else f"/ {unit}"
 
 

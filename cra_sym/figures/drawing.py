@@ -13,9 +13,10 @@ from cra_sym.arm.parameters import Arm
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["BLUE", "INK", "ORANGE", "canvas", "deflection"]
+__all__ = ["BLUE", "GREEN", "INK", "ORANGE", "canvas", "deflection"]
 
-INK, BLUE, ORANGE = "#222222", "#0072B2", "#D55E00"
+#: The style's first colours by value: "C0" would take the colour of whoever shows the figure, not of the style.
+INK, BLUE, ORANGE, GREEN = "#222222", "#0072B2", "#D55E00", "#009E73"
 
 
 def canvas(ax: Axes | None, figsize: tuple[float, float]) -> tuple[Figure, Axes]:

@@ -28,9 +28,8 @@ def figure_slenderness(slenderness: Any, thin: Any, thick: Any, *, axes: Any = N
     with style.context(STYLE):
         left, right = Figure(figsize=(8.6, 3.9), layout="constrained").subplots(1, 2) if axes is None else axes
         for mode in range(thick.shape[1]):
-            look: dict[str, Any] = {"color": f"C{mode}"}
-            left.loglog(slenderness, thick[:, mode], linestyle="-", label=f"$f_{mode + 1}$", **look)
-            left.loglog(slenderness, thin[:, mode], linestyle=":", linewidth=1.2, **look)
+            (line,) = left.loglog(slenderness, thick[:, mode], linestyle="-", label=f"$f_{mode + 1}$")
+            left.loglog(slenderness, thin[:, mode], linestyle=":", linewidth=1.2, color=line.get_color())
             right.semilogx(slenderness, thick[:, mode] / thin[:, mode], label=f"$f_{mode + 1}$")
         left.set_ylabel("natural frequency / Hz")
         left.set_title("Timoshenko (solid), Euler-Bernoulli (dotted)")

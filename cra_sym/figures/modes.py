@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from cra_sym.arm.analysis import mode_shapes, natural_frequencies
 from cra_sym.arm.flipped import flipped_frequencies
 from cra_sym.arm.parameters import Arm
+from cra_sym.figures.drawing import BLUE, ORANGE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -101,7 +102,7 @@ def figure_mode_shapes(
     swing = 1.0 if phase is None else np.cos(phase)
     for mode, ax in enumerate(panels):
         ax.axhline(0.0, color="0.75", linewidth=0.8)
-        for (shapes, hertz), colour, name in zip(pairs, ("C0", "C1"), ("rigid", "elastic"), strict=True):
+        for (shapes, hertz), colour, name in zip(pairs, (BLUE, ORANGE), ("rigid", "elastic"), strict=True):
             line: dict[str, Any] = {"color": colour, "linestyle": "-" if name == "elastic" else (0, (4, 2))}
             shape = shapes[mode] * (swing if name == "elastic" else 1.0)
             ax.plot(x, shape, label=f"{name}, {hertz[mode]:.2f} Hz", **line)

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from cra_sym.arm.base_motion import BaseMotion
 from cra_sym.arm.parameters import Arm
 from cra_sym.arm.response import tip_response
+from cra_sym.figures.drawing import BLUE, ORANGE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,7 +78,7 @@ def figure_response(
     ax = panels[0, 0]
     for joined, name, look in (
         (arm.replace(k_t=np.inf, k_r=np.inf), "rigid joint", _GREY),
-        (arm, "joint as given", {"color": "C1", "linestyle": "-"}),
+        (arm, "joint as given", {"color": ORANGE, "linestyle": "-"}),
     ):
         v = 1e3 * tip_response(joined, motion, t)
         ax.plot(t, v, label=f"{name}, peak {_peak(ax, t, v, look['color']):.2f} mm", **look)
@@ -107,9 +108,9 @@ def figure_6(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     for row, (phase, name) in zip(panels, ((0.0, "0"), (np.pi, r"\pi")), strict=True):
         for ax, (_, mean) in zip(row, cases, strict=True):
             plain, moved = (_tip(arm, t, disturbed, phase=phase, **mean) for disturbed in (False, True))
-            (with_line,) = ax.plot(t, moved, color="C0", linestyle="-", zorder=2)
+            (with_line,) = ax.plot(t, moved, color=BLUE, linestyle="-", zorder=2)
             (without,) = ax.plot(t, plain, **_GREY, zorder=2.5)
-            peaks = _peak(ax, t, moved, "C0"), _peak(ax, t, plain, "0.45")
+            peaks = _peak(ax, t, moved, BLUE), _peak(ax, t, plain, "0.45")
             labels = [
                 f"{word} disturbance, peak {p:.2f} mm" for word, p in zip(("with", "without"), peaks, strict=True)
             ]
@@ -122,7 +123,7 @@ def figure_6(arm: Arm | None = None, *, axes: Any = None) -> Figure:
 def _against_rigid(axes: Any, arm: Arm | None, quantity: Any, label: str, title: str) -> Figure:
     arm, t = arm or Arm.nominal(), _TIME
     panels = _panels(axes, 1, 2, (8.6, 3.9), sharex=True, sharey=True)
-    joints = ((np.inf, "rigid joint", "C0", "-"), (SOFT, "$k_t$ = 1000 N/m", "C1", "--"))
+    joints = ((np.inf, "rigid joint", BLUE, "-"), (SOFT, "$k_t$ = 1000 N/m", ORANGE, "--"))
     for ax, rate in zip(panels[0], (RATE, 2 * RATE), strict=True):
         for k_t, name, color, style in joints:
             v = quantity(arm.replace(k_t=k_t), t, rate)

@@ -14,6 +14,7 @@ from cra_sym.arm.frequency_response import frequency_response
 from cra_sym.arm.parameters import Arm
 from cra_sym.arm.response import residual_vibration, tip_response
 from cra_sym.arm.shaping import input_shaper
+from cra_sym.figures.drawing import GREEN, ORANGE
 
 __all__ = ["figure_frequency_response", "figure_input_shaping", "figure_residual_vibration"]
 
@@ -51,7 +52,7 @@ def figure_frequency_response(arm: Arm | None = None, *, axes: Any = None) -> Fi
         ax.loglog(Omega, np.abs(frequency_response(arm, Omega, x)), label="exact", color="0.25", linestyle="-")
         for modes in (3, 12):
             ax.loglog(Omega, np.abs(_series(arm, Omega, x, modes)), label=f"{modes} modes", linewidth=1.3,
-                      linestyle=("--", ":")[modes > 3], color=("C1", "C2")[modes > 3])  # fmt: skip
+                      linestyle=("--", ":")[modes > 3], color=(ORANGE, GREEN)[modes > 3])  # fmt: skip
         ax.set_title(title)
         ax.set_xlabel(r"frequency of the base $\Omega$ / (rad/s)")
     panels[0].set_ylabel("elastic displacement per base acceleration / s²")

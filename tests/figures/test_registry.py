@@ -33,6 +33,8 @@ def test_draws_something_and_leaves_no_trace(name):
     before = dict(rcParams)
     figure = draw(name)
     assert dict(rcParams) == before
+    # "C0" would be looked up where the figure is shown, in another style than that it was drawn in
+    assert not [line for ax in figure.axes for line in ax.lines if str(line.get_color()).startswith("C")]
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     grey = np.asarray(canvas.buffer_rgba())[..., :3].mean(axis=-1)
