@@ -64,14 +64,17 @@ def _figures_options(parser: argparse.ArgumentParser) -> None:
 
     _add_output(parser, "figures")
     parser.add_argument("--only", nargs="+", choices=sorted(FIGURES), metavar="FIG", help=f"of {', '.join(FIGURES)}")
+    _arm_options(parser)
 
 
 def _figures(options: Options) -> None:
     from cra_sym.files import staged_directory
     from cra_sym.report.pictures import save_figures
 
-    with staged_directory(options.output) as folder:
-        made = save_figures(folder, options.only)
+    with _reading_input():
+        arm = _changed_arm(options)
+    with staged_directory(options.output) as folder, _reading_input():
+        made = save_figures(folder, options.only, arm=arm)
     print("\n".join(str(options.output / path.name) for path in made))
 
 
@@ -91,10 +94,20 @@ def _arm_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _chosen_arm(options: Options) -> Arm:
+    return _changed_arm(options) or _nominal()
+
+
+def _changed_arm(options: Options) -> Arm | None:
+    """Return the arm asked for, or None if no option speaks of it."""
+    given = {f.name: getattr(options, f.name) for f in dataclasses.fields(_nominal())}
+    given = {name: value for name, value in given.items() if value is not None}
+    return _nominal().replace(**given) if given else None
+
+
+def _nominal() -> Arm:
     from cra_sym.arm.parameters import Arm
 
-    given = {f.name: getattr(options, f.name) for f in dataclasses.fields(Arm)}
-    return Arm.nominal().replace(**{name: value for name, value in given.items() if value is not None})
+    return Arm.nominal()
 
 
 def _modes_options(parser: argparse.ArgumentParser) -> None:

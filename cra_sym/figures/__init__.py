@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 from importlib.resources import files
+from inspect import signature
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["FIGURES", "STYLE", "draw"]
+    from cra_sym.arm.parameters import Arm
+
+__all__ = ["FIGURES", "STYLE", "draw", "shows_an_arm"]
 
 FIGURES = {
     "fig01": "cra_sym.figures.robot:figure_1",
@@ -41,18 +45,29 @@ STYLE = str(files(__name__) / "style.mplstyle")
 """The one style: ``with plt.style.context(STYLE): ...``."""
 
 
-def draw(name: str) -> Figure:
-    """Draw one figure of ``FIGURES`` in the house style.
+def draw(name: str, arm: Arm | None = None) -> Figure:
+    """Draw one figure of ``FIGURES`` in the house style, of the arm given or of the paper's.
 
     Raises
     ------
     ValueError
-        If there is no such figure.
+        If there is no such figure, or an arm is given to one that shows none.
     """
     if name not in FIGURES:
         raise ValueError(f"figure = {name!r}: allowed are {', '.join(FIGURES)}")
+    if arm is not None and not shows_an_arm(name):
+        raise ValueError(f"figure = {name!r}: it shows no arm, so none can be given")
     from matplotlib import style
 
-    module, function = FIGURES[name].split(":")
     with style.context(STYLE):
-        return getattr(import_module(module), function)()
+        return _function(name)(**({} if arm is None else {"arm": arm}))
+
+
+def shows_an_arm(name: str) -> bool:
+    """Tell whether a figure of ``FIGURES`` can be drawn of an arm other than the paper's."""
+    return "arm" in signature(_function(name)).parameters
+
+
+def _function(name: str) -> Callable[..., Figure]:
+    module, function = FIGURES[name].split(":")
+    return getattr(import_module(module), function)

@@ -183,9 +183,9 @@ def figure_11(
     return _principal_zones(arms, excitation, epsilon, "Fig. 11  ", axes, points)
 
 
-def figure_11_axial() -> Figure:
+def figure_11_axial(arm: Arm | None = None) -> Figure:
     """Draw Fig. 11 for a base that shakes along the arm."""
-    return figure_11(excitation=AXIAL, epsilon=0.2)
+    return figure_11(arm, excitation=AXIAL, epsilon=0.2)
 
 
 def figure_12(
@@ -213,9 +213,9 @@ def figure_12(
     return _principal_zones(arms, excitation, epsilon, "Fig. 12  ", axes, points)
 
 
-def figure_12_axial() -> Figure:
+def figure_12_axial(arm: Arm | None = None) -> Figure:
     """Draw Fig. 12 for a base that shakes along the arm."""
-    return figure_12(excitation=AXIAL, epsilon=0.2)
+    return figure_12(arm, excitation=AXIAL, epsilon=0.2)
 
 
 def _power(value: float) -> str:

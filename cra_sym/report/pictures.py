@@ -8,19 +8,28 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
 
-from cra_sym.figures import FIGURES, draw
+from cra_sym.figures import FIGURES, draw, shows_an_arm
+
+if TYPE_CHECKING:
+    from cra_sym.arm.parameters import Arm
 
 __all__ = ["save_figures"]
 
 _OPTIONS: dict[str, dict[str, Any]] = {"png": {"dpi": 200}, "svg": {"metadata": {"Date": None}}}
 
 
-def save_figures(folder: Path, names: Iterable[str] | None = None, kinds: Sequence[str] = ("png", "svg")) -> list[Path]:
-    """Draw the named figures, by default all, and return the files made.
+def save_figures(
+    folder: Path,
+    names: Iterable[str] | None = None,
+    kinds: Sequence[str] = ("png", "svg"),
+    *,
+    arm: Arm | None = None,
+) -> list[Path]:
+    """Draw the named figures, by default all, of the arm given or of the paper's; return the files made.
 
     The files depend on the figures alone: no date, and SVG identifiers that are the same in each run.
     """
@@ -29,8 +38,9 @@ def save_figures(folder: Path, names: Iterable[str] | None = None, kinds: Sequen
 
     folder.mkdir(parents=True, exist_ok=True)
     made = []
-    for name in tqdm(sorted(FIGURES if names is None else set(names)), unit="figure", disable=None):
-        figure = draw(name)
+    chosen = [name for name in FIGURES if arm is None or shows_an_arm(name)] if names is None else set(names)
+    for name in tqdm(sorted(chosen), unit="figure", disable=None):
+        figure = draw(name, arm)
         FigureCanvasAgg(figure)
         with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "path"}):
             for kind in kinds:

@@ -118,6 +118,7 @@ def run_all(page, address, name):
     page.wait_for_function("count => document.querySelectorAll('.jp-CodeCell').length === count", arg=len(code))
     menu(page, "Edit", "Clear Outputs of All Cells")
     page.wait_for_function("() => !document.querySelector('.jp-RenderedImage')")
+    page.get_by_text("Python 3 (ipykernel) | Idle").wait_for()
     menu(page, "Run", "Run All Cells")
     page.wait_for_function(DONE, arg=len(code), timeout=PATIENCE)
     page.wait_for_function(FRAMED)
