@@ -172,10 +172,19 @@ def _by_phase(lane: np.ndarray, right: np.ndarray, points: np.ndarray, values: n
     return points[right - 1] + turn * (points[right] - points[right - 1])
 
 
-def _step(value: np.ndarray, slope: np.ndarray, curvature: np.ndarray) -> np.ndarray:
-    """Return Ostrowski's step, which is the root of one over the sum of (z - zero)^-2: no zero is nearer."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        step = np.abs(value) / np.sqrt(slope * slope - value * curvature)
+def _step(
+    value: np.ndarray, slope: np.ndarray, curvature: np.ndarray, z: np.ndarray | float = 1.0, lower: np.ndarray | int = 0
+) -> np.ndarray:
+    """Return Ostrowski's step, which is the root of one over the sum of (z - zero)^-2: no zero is nearer.
+
+    Each of the ``lower`` zeros between 0 and the wanted one adds at least z^-2 to that sum. That much is taken off: the
+    step becomes longer, and yet never passes the wanted zero. Where nearly all would go, rounding would decide: nothing
+    is taken off.
+    """
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        whole, known = slope * slope - value * curvature, lower * (value / z) ** 2
+        rest = np.where(whole - known > 1e-3 * whole, whole - known, whole)
+        step = np.abs(value) / np.sqrt(rest)
     return np.where(value == 0, 0.0, step)
 
 
@@ -183,15 +192,16 @@ def _climbed(characteristic: Characteristic, number: np.ndarray, lane: np.ndarra
     """Climb, in place, to the zeros from points next to them."""
     active = np.arange(z.size)
     previous = np.zeros(z.size)  # the step before, none at first
-    even = number % 2 == 0
+    even, lower = number % 2 == 0, number - characteristic.zeros[lane]
     for _ in range(_MOST_STEPS):
         if not active.size:
             return z
         value, slope, curvature = characteristic.evaluate(z[active], lane[active])
-        step = _step(value, slope, curvature)
+        step = _step(value, slope, curvature, z[active], lower[active])
         z[active] += np.where((value > 0) == even[active], step, -step)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            remaining = step * (step / previous[active]) ** 3  # the order is three
+            remaining = step * (step / previous[active]) ** 3  # the order is three, once steps are short
         previous[active] = step
-        active = active[~((remaining <= 1e-15 * z[active]) | (step <= 1e-13 * z[active]))]
+        there = (remaining <= 1e-15 * z[active]) & (step <= 0.1 * z[active])
+        active = active[~(there | (step <= 1e-13 * z[active]))]
     raise ArithmeticError(f"{active.size} zeros were not reached")

@@ -172,8 +172,8 @@ def _by_phase(lane, k, tables, values, last):
     return lam**4
 
 
-def _step(z, k, h, lane):
-    """Return the function, up to a positive factor, and Ostrowski's step."""
+def _step(z, lower, k, h, lane):
+    """Return the function, up to a positive factor, and Ostrowski's step less what lower zeros take from it."""
     lam = np.sqrt(np.sqrt(z))
     unit, p, q, r, s = basis(lam, exp(-lam))
     value, first, second = derivatives(
@@ -190,7 +190,10 @@ def _step(z, k, h, lane):
     first = near_first if near else first
     second = 2.0 * near_second if near else second
     factor = 1.0 if near else z
-    step = factor * abs(value) / np.sqrt(first * first - value * second)
+    share = value * factor / z if lower > 0 else 0.0
+    whole = first * first - value * second
+    rest = whole - lower * share * share
+    step = factor * abs(value) / np.sqrt(rest if rest > 1e-3 * whole else whole)
     return value, 0.0 if value == 0.0 else step
 
 
@@ -199,7 +202,7 @@ def _climb(z, previous, fresh, ahead, active, evaluations, number, zeros, k, h, 
     even = number & 1 == 0
     for _ in range(2):
         for lane in range(size):
-            value, step = _step(z[lane], k, h, lane)
+            value, step = _step(z[lane], number - zeros[lane], k, h, lane)
             previous[lane], ahead[lane] = ahead[lane], step
             z[lane] += step if (value > 0) == even else -step
     left = 0
@@ -217,7 +220,7 @@ def _climb(z, previous, fresh, ahead, active, evaluations, number, zeros, k, h, 
         evaluations[0] += left
         for i in range(left):
             lane = active[i]
-            value, ahead[i] = _step(z[lane], k, h, lane)
+            value, ahead[i] = _step(z[lane], number - zeros[lane], k, h, lane)
             fresh[i] = z[lane] + (ahead[i] if (value > 0) == even else -ahead[i])
         still = 0
         for i in range(left):
@@ -233,4 +236,4 @@ def _climb(z, previous, fresh, ahead, active, evaluations, number, zeros, k, h, 
 
 def _there(step, previous, z):
     ratio = step / previous
-    return step * ratio * ratio * ratio <= 1e-15 * z or step <= 1e-13 * z
+    return (step * ratio * ratio * ratio <= 1e-15 * z and step <= 0.1 * z) or step <= 1e-13 * z
