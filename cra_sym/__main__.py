@@ -169,10 +169,9 @@ def _claims(options: Options) -> None:
 
 
 def _export_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "language", choices=("c", "fortran", "python", "julia", "octave", "rust", "javascript"), metavar="LANGUAGE",
-        help="c, fortran, python, julia, octave, rust or javascript",
-    )  # fmt: skip
+    from cra_sym.codegen.languages import LANGUAGES
+
+    parser.add_argument("language", choices=LANGUAGES, metavar="LANGUAGE", help=f"of {', '.join(LANGUAGES)}")
     parser.add_argument("directory", metavar="DIR", type=Path, help="folder to make")
     parser.add_argument("--force", action="store_true", help="write into a folder that is not empty")
 
