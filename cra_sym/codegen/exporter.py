@@ -171,11 +171,14 @@ def _arm_texts(name: str) -> dict[str, str]:
 
 def arm_sources(name: str) -> dict[str, str]:
     """Return the texts of an arm's export, by file, all but the reference vectors."""
+    from tqdm import tqdm
+
     language = LANGUAGES[name]
-    values = common_values(language) | _spectrum_values(language)
-    if name in _FULL:
-        values |= _modal_values(language)
-        values["helpers"] = language.helped(values["spectrum_functions"] + values["modal_functions"])
+    with tqdm(total=0, desc=f"deriving and printing {language.title}", bar_format="{desc}", leave=False, disable=None):
+        values = common_values(language) | _spectrum_values(language)
+        if name in _FULL:
+            values |= _modal_values(language)
+            values["helpers"] = language.helped(values["spectrum_functions"] + values["modal_functions"])
     values["nomenclature"] = nomenclature_rows()
     return rendered(name, values) | {"LICENSE": values["licence"]}
 

@@ -28,7 +28,7 @@ fmax fmin fmod frexp hypot ilogb ldexp lgamma tgamma gamma log log10 log1p log2 
 nextafter pow remainder remquo rint round scalbn signbit sin sinh sqrt tan tanh trunc j0 j1 jn y0 y1 yn index time
 signal clock exit abort free malloc main stdin stdout errno min max sum size shape real aint anint merge huge
 tiny dp pi inf nan math e i j ans im isnan isfinite isinf ones zeros eye sign floor choose number list str tuple
-dict set type id map filter range len repr input
+dict set type id map filter range len repr input status evaluate characteristic model checks self_test
 """
 
 RESERVED = frozenset(f"{_KEYWORDS} {_LIBRARY} True False None NaN Inf Infinity Math Self".split())

@@ -32,8 +32,8 @@ def model_texts(name: str, model: Model) -> dict[str, str]:
     language = LANGUAGES[name]
     expressions, arguments = _characteristic(model)
     made = function(
-        "characteristic",
-        "Characteristic function and its derivative by omega.",
+        "evaluate",
+        "The expressions, shared parts computed once.",
         expressions,
         scalars(arguments),
     )
@@ -46,8 +46,10 @@ def model_texts(name: str, model: Model) -> dict[str, str]:
         "nomenclature": [(a.name, "rad/s" if i == 0 else "", str(a.symbols[0])) for i, a in enumerate(used)],
         "model": repr(model).strip("<>"),
     }
+    checks = _checks(made, expressions)
+    values["sample"] = [repr(x) for x in checks[0].inputs]
     texts = rendered(f"model/{name}", values) | rendered("model/common", values)
-    texts["reference.txt"] = written(_checks(made, expressions), values["model"])
+    texts["reference.txt"] = written(checks, values["model"])
     texts["LICENSE"] = values["licence"]
     return texts
 

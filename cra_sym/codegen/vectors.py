@@ -123,13 +123,13 @@ def _check(quantity: str, inputs: tuple[float, ...], values: Any, loss: float = 
 
 
 def _spectrum_checks(arms: list[Arm], together: Arm) -> Iterator[Check]:
-    groups = [together.kappa_t, together.kappa_r, together.mu, together.iota]
-    solved = frequency_parameters(*groups, 6)
-    for row, lam in zip(np.transpose(groups), solved, strict=True):
+    groups = np.stack([np.asarray(x) for x in (together.kappa_t, together.kappa_r, together.mu, together.iota)])
+    solved = frequency_parameters(groups[0], groups[1], groups[2], groups[3], modes=6)
+    for row, lam in zip(groups.T, solved, strict=True):
         yield Check("frequency_parameters", _row(row), _row(lam))
     for arm, frequencies in zip(arms, natural_frequencies(together, 4), strict=True):
         yield Check("natural_frequencies", _numbers(arm), _row(frequencies))
-    for number, (kappa_t, kappa_r, mu, iota) in enumerate(np.transpose(groups).tolist()):
+    for number, (kappa_t, kappa_r, mu, iota) in enumerate(groups.T.tolist()):
         for lam in (0.0, 0.7, 1.6, 4.0 + number / 7, 30.0):  # below and above the change to exponentials
             for order, (value, scale) in enumerate(zip(*characteristic(kappa_t, kappa_r, mu, iota, lam), strict=True)):
                 inputs = kappa_t, kappa_r, mu, iota, lam, float(order)

@@ -1,0 +1,143 @@
+"""Every export does what its README says: the examples are saved under their names, every command is run as written.
+
+The self-tests among the commands compare with the reference vectors; the compilers' strictest flags are in the folders'
+own build files.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+import sympy as sp
+
+import cra_sym as cra
+
+PACKAGES = {
+    "cc": "gcc", "make": "make", "cmake": "cmake", "gfortran": "gfortran", "fpm": "fpm (from PyPI)", "octave": "octave",
+    "cargo": "cargo", "node": "nodejs", "npm": "npm", "python": "python3", "pip": "pip and a package index",
+}  # fmt: skip
+LANGUAGES = ("c", "fortran", "python", "rust", "javascript", "octave")
+BLOCK = re.compile(r"(?:Save as `([^`]+)`:\n\n)?```(\w+)\n(.*?)```\n", re.DOTALL)
+
+
+class Step(NamedTuple):
+    """A file to save, or a command to run in the folder."""
+
+    file: str
+    text: str
+
+
+def steps(readme: str) -> list[Step]:
+    found = []
+    for name, kind, text in BLOCK.findall(readme):
+        if kind == "sh":
+            found += [Step("", line.split("#")[0].strip()) for line in text.splitlines()]
+        else:
+            assert name, f"no file name for:\n{text}"
+            found.append(Step(name, text))
+    return found
+
+
+@pytest.fixture(scope="module")
+def environment(tmp_path_factory) -> dict[str, str]:
+    """No display, a clean Python environment, and the package manager of Fortran where Python's brought it."""
+    clean = tmp_path_factory.mktemp("venv")
+    subprocess.run([sys.executable, "-m", "venv", clean], check=True, capture_output=True)
+    paths = [str(clean / "bin"), os.environ["PATH"], str(Path(sys.executable).parent)]
+    kept = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "PYTHONPATH", "CARGO_TARGET_DIR", "CFLAGS")}
+    return kept | {"PATH": os.pathsep.join(paths), "PYTHONWARNINGS": "error", "CARGO_NET_OFFLINE": "true"}
+
+
+def has(command: str, environment: dict[str, str]) -> bool:
+    tool = command.split()[0]
+    if tool.startswith("./"):
+        return True
+    if tool == "pip":  # it fetches its build system
+        probe = [
+            "pip",
+            "download",
+            "--quiet",
+            "--no-deps",
+            "--retries=0",
+            "--timeout=10",
+            "--dest=.probe",
+            "setuptools>=77",
+        ]
+        quiet = environment | {"PYTHONWARNINGS": "default"}
+        return subprocess.run(probe, env=quiet, capture_output=True, cwd=environment["TMPDIR"]).returncode == 0
+    return shutil.which(tool, path=environment["PATH"]) is not None
+
+
+def follow(folder: Path, environment: dict[str, str]) -> str:
+    """Do what the README says; return what was printed. Skip, naming the packages, if tools are missing."""
+    environment = environment | {"TMPDIR": str(folder.parent)}
+    printed, missing = "", set()
+    todo = steps((folder / "README.md").read_text())
+    assert sum(not step.file for step in todo) >= 2
+    for file, text in todo:
+        if file:
+            (folder / file).parent.mkdir(exist_ok=True)
+            (folder / file).write_text(text)
+        elif not has(text, environment):
+            missing.add(PACKAGES[text.split()[0]])
+        elif not (text.startswith("./") and not (folder / text[2:]).exists()):
+            quiet = environment | ({"PYTHONWARNINGS": "default"} if text.startswith("pip") else {})
+            done = subprocess.run(text, shell=True, cwd=folder, env=quiet, capture_output=True, text=True, timeout=300)
+            assert done.returncode == 0, f"{text}\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
+            printed += done.stdout
+    if missing:
+        pytest.skip(f"the README's commands need {', '.join(sorted(missing))}")
+    return printed
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_the_arm(language, tmp_path, environment):
+    cra.export(language, tmp_path / "arm")
+    printed = follow(tmp_path / "arm", environment)
+    assert re.search(r"\b2\.4\d", printed), "the example's first frequency"
+    assert re.search(r"\b0 failures|test result: ok|100% tests passed", printed)
+
+
+@pytest.fixture(scope="module")
+def beam() -> cra.Model:
+    x, t = sp.symbols("x t", real=True)
+    EI, rhoA, length, m, k = sp.symbols("EI rhoA lambda m end", positive=True)  # two names are taken in some languages
+    v = sp.Function("v")(x, t)
+    density = rhoA * v.diff(t) ** 2 / 2 - EI * v.diff(x, 2) ** 2 / 2
+    return cra.Model(
+        density, fields=[v], x=x, domain=(0, length), t=t, left=-k * v**2 / 2, right=m * v.diff(t) ** 2 / 2,
+        essential=[v.diff(x).subs(x, 0)],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_model_of_ones_own(language, beam, tmp_path, environment):
+    cra.export(language, tmp_path / "model", model=beam)
+    printed = follow(tmp_path / "model", environment)
+    assert re.search(r"\b0 failures|test result: ok|100% tests passed", printed)
+    first = next(line for line in (tmp_path / "model" / "reference.txt").read_text().splitlines() if line[0] != "#")
+    expected = float(first.split()[-2])
+    numbers = [float(word) for word in re.findall(r"-?\d+\.\d+(?:[eE][-+]?\d+)?", printed)]
+    assert any(abs(number - expected) <= 1e-4 * abs(expected) for number in numbers), "the example's first number"
+
+
+def test_a_model_without_real_form_is_refused(tmp_path):
+    x, t = sp.symbols("x t", real=True)
+    T, rho, length, c = sp.symbols("tension density l damper", positive=True)
+    y = sp.Function("y")(x, t)
+    string = cra.Model(
+        rho * y.diff(t) ** 2 / 2 - T * y.diff(x) ** 2 / 2, fields=[y], x=x, domain=(0, length), t=t,
+        virtual_work=[(-c * y.diff(t), y, "right")],
+    )  # fmt: skip
+    with pytest.raises(ValueError, match="damped"):
+        cra.export("c", tmp_path / "model", model=string)
+    with pytest.raises(TypeError, match="allowed is a Model"):
+        cra.export("c", tmp_path / "model", model="beam")  # type: ignore[arg-type]
+    assert not list(tmp_path.iterdir())
