@@ -1,73 +1,29 @@
-"""Examine mutants: a copy of the package, and for each mutant a process that runs the tests watching its module."""
+"""Examine mutants: for each a fork of one warm process, in which only what depends on its module is made anew."""
 
 from __future__ import annotations
 
-import compileall
+import ast
+import importlib
+import importlib.abc
+import importlib.util
 import os
+import re
 import resource
-import shutil
 import sys
-import tempfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from enum import Enum
+from functools import cache
 from pathlib import Path
-from typing import Self
+from typing import Any
 
 from tests.mutation.mutants import Mutant, mutants
+from tests.mutation.watch import PACKAGE, rounds
 
-__all__ = ["SUITE", "Laboratory", "Verdict"]
+__all__ = ["Laboratory", "Verdict"]
 
-ROOT = Path(__file__).resolve().parents[2]
-SECONDS = 300  # of one core; many times what all tests of a module need
-BYTES = 6 << 30
-
-_CONFIRMS = "tests/arm/test_equations.py::test_the_independent_route_confirms"
-_LAMBDA, _MODAL = "tests/arm/test_frequency_parameters.py", "tests/arm/test_modal_parameters.py"
-_FREQUENCIES = [
-    f"{_LAMBDA}::test_{name}"
-    for name in ("classical_beams", "rigid_body_zeros", "none_is_missed_against_finite_elements")
-]
-_DIGITS = [f"{_LAMBDA}::test_{name}" for name in ("every_digit_of_random_extreme_arms", "monotonic_and_interlaced")]
-_MODES = [
-    f"{_MODAL}::test_{name}"
-    for name in (
-        "orthonormal_with_the_end_effector",
-        "modal_stiffness_is_the_squared_frequency",
-        "participation",
-        "boundary_conditions",
-        "end_values_are_those_of_the_shapes",
-    )
-]
-
-
-def _section(*numbers: int | str) -> list[list[str]]:
-    """Return the tests of a section of the paper: its own checks, then the physics, then every equation's check."""
-    return [[f"{_CONFIRMS}[{number}]" for number in numbers], _FREQUENCIES, _MODES, [_CONFIRMS]]
-
-
-#: Tests of each module in rounds; the first round that fails decides.
-SUITE: dict[str, list[list[str]]] = {
-    "arm/energy": _section(*range(1, 8)),
-    "arm/motion": _section(8, 9, 10, "10a", "10b", "10c"),
-    "arm/modal_dynamics": _section(11, 12, 13),
-    "arm/joint": _section(14, 15, 16, "16a"),
-    "arm/orthogonality": _section("16b", "16c", "16d", 5),
-    "arm/modes": _section(*range(17, 27)),
-    "arm/limits": _section(*range(27, 31)),
-    "arm/characteristic": [_FREQUENCIES, _MODES, _DIGITS, ["tests/arm/test_characteristic.py"]],
-    "arm/shapes": [_MODES, [_MODAL]],
-    "solvers/spectrum": [_FREQUENCIES, _DIGITS, [_LAMBDA]],
-    "solvers/shapes": [_MODES, [_MODAL]],
-    "solvers/stiffness": [["tests/solvers/test_stiffness.py"], ["tests/model"]],
-    "solvers/eigenvalues": [["tests/solvers/test_stiffness.py"], ["tests/model"]],
-    "solvers/rayleigh": [["tests/solvers/test_stiffness.py"], ["tests/model"]],
-    "solvers/modal_response": [
-        ["tests/arm/test_response.py", "tests/arm/test_duhamel.py", "tests/arm/test_shaping.py"]
-    ],
-    "solvers/floquet": [["tests/solvers/test_floquet.py"]],
-    "solvers/hill": [["tests/solvers/test_floquet.py"]],
-    "solvers/certificates": [["tests/arm/test_certification.py"]],
-}
+SECONDS = 90  # of processor time; several times what all tests of a module need
+BYTES = 8 << 30
+_DERIVED = re.compile(r"cra_sym(\.\w+)+(?=:|$)")
 
 
 class Verdict(Enum):
@@ -79,72 +35,176 @@ class Verdict(Enum):
 
 
 class Laboratory:
-    """A copy of package and tests in which one module at a time is replaced."""
+    """One process that has imported and derived everything; no file is changed, no store is written.
 
-    def __enter__(self) -> Self:
-        self._folder = tempfile.TemporaryDirectory()
-        self.root = Path(self._folder.name) / "copy"
-        for name in ("cra_sym", "tests"):
-            shutil.copytree(ROOT / name, self.root / name, ignore=shutil.ignore_patterns("__pycache__"))
-        shutil.copy(ROOT / "pyproject.toml", self.root)
-        compileall.compile_dir(self.root / "cra_sym", quiet=1)
-        for library in ("sympy", "numpy", "scipy.linalg", "mpmath", "pytest"):  # once for all mutants
-            __import__(library)
-        return self
+    Parameters
+    ----------
+    tests : bool
+        Whether the rounds of tests follow the checks of the numbered equations.
+    """
 
-    def __exit__(self, *_: object) -> None:
-        self._folder.cleanup()
+    def __init__(self, tests: bool = True) -> None:
+        self._tests = tests
 
     def mutants(self, module: str) -> list[Mutant]:
-        """Return every mutant of a module given as in `SUITE`."""
-        return mutants((ROOT / "cra_sym" / f"{module}.py").read_text(encoding="utf-8"))
+        """Return every mutant of a module given as ``room/name``."""
+        return mutants(_file(module).read_text(encoding="utf-8"))
 
     def control(self, modules: Iterable[str]) -> bool:
-        """Return whether the package as it is passes all these tests; without that no verdict means anything."""
-        rounds = {tuple(tests): list(tests) for module in modules for tests in SUITE[module]}
-        return self._verdict(list(rounds.values())) is Verdict.SURVIVED
+        """Return whether the package as it is passes all these tests; without that no verdict means anything.
+
+        What the checks derive on the way stays in this process, ready for the mutants that do not change it.
+        """
+        affected = {name for module in modules for name in dependents(_dotted(module))}
+        confirmed = all(check() for check in _checks(affected))
+        wanted = {tuple(tests): list(tests) for module in modules for tests in rounds(module)} if self._tests else {}
+        return confirmed and _in_a_fork(lambda: _pass(list(wanted.values()))) is Verdict.SURVIVED
 
     def examine(self, module: str, mutant: Mutant) -> Verdict:
-        """Run the module's tests upon the mutant."""
-        file = self.root / "cra_sym" / f"{module}.py"
-        original = file.read_text(encoding="utf-8")
-        for stale in (file.parent / "__pycache__").glob(f"{file.stem}.*.pyc"):
-            stale.unlink()
-        file.write_text(mutant.source, encoding="utf-8")
+        """Run what watches over the module upon one of its mutants."""
+        affected = dependents(_dotted(module))
+
+        def survives() -> bool:
+            _replace(module, mutant.source, affected)
+            first = sorted(_checks(affected), key=lambda check: check.__self__.source.split(":")[0] != _dotted(module))
+            return all(check() for check in first) and (not self._tests or _pass(rounds(module)))
+
+        return _in_a_fork(survives)
+
+
+def _file(module: str) -> Path:
+    return PACKAGE / f"{module}.py"
+
+
+def _dotted(module: str) -> str:
+    return "cra_sym." + module.replace("/", ".")
+
+
+# what depends on what ---------------------------------------------------------------------------------------------
+
+
+@cache
+def _uses() -> dict[str, set[str]]:
+    """Return what each module of the package names: modules it imports and those whose derivations it runs."""
+    files = {_name(file): file for file in PACKAGE.rglob("*.py")}
+    return {name: _named(name, ast.parse(file.read_text(encoding="utf-8"))) & set(files) for name, file in files.items()}
+
+
+def _name(file: Path) -> str:
+    parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def _named(name: str, tree: ast.Module) -> set[str]:
+    found: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            room = name.rsplit(".", node.level)[0] + "." if node.level else ""
+            source = room + (node.module or "")
+            found |= {source, *(f"{source}.{alias.name}" for alias in node.names)}
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and (match := _DERIVED.match(node.value)):
+            found.add(match[0])
+    return found
+
+
+@cache
+def dependents(dotted: str) -> frozenset[str]:
+    """Return the modules that are not the same after a change in one: itself and all that use it, however far."""
+    affected, fresh = {dotted}, {dotted}
+    while fresh:
+        fresh = {name for name, uses in _uses().items() if uses & fresh} - affected
+        affected |= fresh
+    return frozenset(affected - {"cra_sym"})
+
+
+# in the process of a mutant ---------------------------------------------------------------------------------------
+
+
+def _in_a_fork(passes: Callable[[], bool]) -> Verdict:
+    child = os.fork()
+    if child == 0:
         try:
-            return self._verdict(SUITE[module])
-        finally:
-            file.write_text(original, encoding="utf-8")
+            _isolate()
+            os._exit(0 if passes() else 1)
+        except BaseException:
+            os._exit(1)
+    _, status = os.waitpid(child, 0)
+    if os.WIFSIGNALED(status):
+        return Verdict.EXHAUSTED
+    return Verdict.CAUGHT if os.WEXITSTATUS(status) else Verdict.SURVIVED
 
-    def _verdict(self, rounds: list[list[str]]) -> Verdict:
-        child = os.fork()
-        if child == 0:
-            try:
-                self._run(rounds)
-            finally:
-                os._exit(1)
-        _, status = os.waitpid(child, 0)
-        if os.WIFSIGNALED(status):
-            return Verdict.EXHAUSTED
-        return Verdict.CAUGHT if os.WEXITSTATUS(status) else Verdict.SURVIVED
 
-    def _run(self, rounds: list[list[str]]) -> None:
-        """Run the rounds of tests, in the process of the mutant; leave with 1 at the first that fails."""
-        import pytest
+def _isolate() -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+    resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
+    silence = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silence, 1)
+    os.dup2(silence, 2)
 
-        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-        resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
-        os.chdir(self.root)
-        os.environ["XDG_CACHE_HOME"] = str(self.root.parent / "cache")
-        os.environ["PYTHONPATH"] = str(self.root)
-        sys.dont_write_bytecode = True
-        sys.path[:] = [str(self.root), *(p for p in sys.path if Path(p or ".").resolve() != ROOT)]
-        for name in [name for name in sys.modules if name.split(".")[0] in ("cra_sym", "tests")]:
-            del sys.modules[name]
-        silence = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(silence, 1)
-        os.dup2(silence, 2)
-        for tests in rounds:
-            if pytest.main(["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *tests]):
-                os._exit(1)
-        os._exit(0)
+
+def _replace(module: str, source: str, affected: frozenset[str]) -> None:
+    """Put the mutant in the module's place and forget all that was made with the original."""
+    import cra_sym
+    from cra_sym.arm import equations
+    from cra_sym.kernels import derived, store
+
+    sys.meta_path.insert(0, _Finder(_dotted(module), source, _file(module)))
+    original, read_text = derived._source_of, Path.read_text
+
+    def source_of(path: str) -> tuple[str, tuple[str, ...]]:  # of a kernel: never from the store, never into it
+        if path.partition(":")[0] not in affected:
+            return original(path)
+        made = derived._derived(path)
+        return made.source, tuple(made.arguments)
+
+    def read(path: Path, *args: Any, **options: Any) -> str:  # templates are read, not imported
+        return source if path == _file(module) else read_text(path, *args, **options)
+
+    store.save = lambda key, content: False
+    derived._source_of, Path.read_text = cache(source_of), read
+    for number in [n for n, e in equations._EQUATIONS.items() if e.source.partition(":")[0] in affected]:
+        del equations._EQUATIONS[number]
+    for number in [n for n, route in equations._ROUTES.items() if route.__module__ in affected]:
+        del equations._ROUTES[number]
+    for name in affected:
+        sys.modules.pop(name, None)
+        room, _, last = name.rpartition(".")
+        vars(sys.modules[room]).pop(last, None) if room in sys.modules else None
+    for name in cra_sym._HOME:
+        vars(cra_sym).pop(name, None)
+
+
+class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
+    """Finds one module, whose text is given."""
+
+    def __init__(self, name: str, source: str, file: Path) -> None:
+        self._name, self._source, self._file = name, source, file
+
+    def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> Any:
+        """Return the spec of this one module."""
+        if fullname == self._name:
+            return importlib.util.spec_from_file_location(fullname, self._file, loader=self)
+        return None
+
+    def exec_module(self, module: Any) -> None:
+        """Run the text."""
+        exec(compile(self._source, str(self._file), "exec"), vars(module))
+
+
+def _checks(affected: Iterable[str]) -> list[Callable[[], bool]]:
+    """Return the checks of the equations that these modules build, in the paper's order."""
+    from cra_sym.arm.equations import equations
+
+    return [e.check for e in equations(companions=True) if e.source.partition(":")[0] in affected]
+
+
+def _pass(tests: Sequence[Sequence[str]]) -> bool:
+    """Run rounds of tests; return whether all pass."""
+    import pytest
+
+    os.chdir(PACKAGE.parent)
+    options = ["-x", "-q", "-o", "addopts=--import-mode=importlib"]
+    options += [f"-pno:{plugin}" for plugin in ("cacheprovider", "xdist", "nbval", "faulthandler")]
+    return not any(pytest.main([*options, *part]) for part in tests)

@@ -1,0 +1,100 @@
+"""Which tests watch over which module: in rounds, quickest first; the first round that fails decides.
+
+Before any round come the checks of all numbered equations that the module has a part in.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+__all__ = ["EXEMPT", "PACKAGE", "rounds", "watched_modules"]
+
+PACKAGE = Path(__file__).resolve().parents[2] / "cra_sym"
+
+#: Modules in which nothing stands for physics.
+EXEMPT = {
+    "arm/equations": "the registry of equations and how wide a printed line may be",
+}
+
+_LAMBDA, _MODAL = "tests/arm/test_frequency_parameters.py", "tests/arm/test_modal_parameters.py"
+_FREQUENCIES = [
+    f"{_LAMBDA}::test_{name}"
+    for name in ("classical_beams", "rigid_body_zeros", "none_is_missed_against_finite_elements")
+]
+_DIGITS = [
+    f"{_LAMBDA}::test_{name}"
+    for name in ("every_digit_of_random_extreme_arms", "continuous_through_zero_and_infinite_stiffness")
+]
+_MODES = [
+    f"{_MODAL}::test_{name}"
+    for name in (
+        "orthonormal_with_the_end_effector",
+        "modal_stiffness_is_the_squared_frequency",
+        "participation",
+        "boundary_conditions",
+        "end_values_are_those_of_the_shapes",
+    )
+]
+_STABILITY = [["tests/arm/test_boundaries.py"], ["tests/arm/test_stability.py"]]
+_LANES = ["tests/arm/test_templates.py"]
+_STIFFNESS = [["tests/solvers/test_stiffness.py"], ["tests/model"]]
+_FLOQUET = [["tests/solvers/test_floquet.py"]]
+_PHYSICS = [_FREQUENCIES, _MODES]
+
+_ROUNDS: dict[str, list[list[str]]] = {
+    "arm/analysis": [_MODES, [_MODAL, _LAMBDA]],
+    "arm/boundaries": _STABILITY,
+    "arm/characteristic": [_FREQUENCIES, _MODES, _DIGITS, ["tests/arm/test_characteristic.py"]],
+    "arm/driven": [["tests/arm/test_response.py"]],
+    "arm/duhamel": [["tests/arm/test_duhamel.py"], ["tests/arm/test_response.py"]],
+    "arm/edges": _STABILITY,
+    "arm/energy": _PHYSICS,
+    "arm/evaluation": [],
+    "arm/excitation": _STABILITY,
+    "arm/excited": [],
+    "arm/forced": [["tests/arm/test_frequency_response.py"]],
+    "arm/implicit": [["tests/arm/test_sensitivity.py"]],
+    "arm/joint": _PHYSICS,
+    "arm/limits": [],
+    "arm/modal": [_MODES, [_MODAL]],
+    "arm/modal_dynamics": [],
+    "arm/modal_lanes": [_LANES],
+    "arm/modal_sum": [],
+    "arm/motion": [],
+    "arm/orthogonality": [],
+    "arm/parametric": _STABILITY,
+    "arm/residual": [["tests/arm/test_response.py"]],
+    "arm/resonance": [],
+    "arm/shapes": [_MODES, [_MODAL]],
+    "arm/shooting": [],
+    "arm/spectrum": [_FREQUENCIES, _DIGITS, [_LAMBDA]],
+    "arm/stability": _STABILITY[::-1],
+    "arm/zones": _STABILITY,
+    "solvers/_floquet_compiled": [_LANES],
+    "solvers/certificates": [["tests/arm/test_certification.py"]],
+    "solvers/eigenvalues": _STIFFNESS,
+    "solvers/floquet": [*_FLOQUET, ["tests/arm/test_stability.py"]],
+    "solvers/hill": _FLOQUET,
+    "solvers/modal_response": [
+        ["tests/solvers/test_modal_response.py"],
+        ["tests/arm/test_response.py", "tests/arm/test_shaping.py"],
+    ],
+    "solvers/rayleigh": _STIFFNESS,
+    "solvers/shapes": _STIFFNESS,
+    "solvers/spectrum": [_FREQUENCIES, _DIGITS, [_LAMBDA]],
+    "solvers/spectrum_lanes": [_LANES],
+    "solvers/stiffness": _STIFFNESS,
+}
+
+
+def watched_modules() -> tuple[str, ...]:
+    """Return all modules of the arm and of the solvers, such as ``arm/energy``, but those that are exempt."""
+    files = sorted(file for room in ("arm", "solvers") for file in (PACKAGE / room).glob("*.py"))
+    names = (file.relative_to(PACKAGE).with_suffix("").as_posix() for file in files if file.stem != "__init__")
+    return tuple(name for name in names if name not in EXEMPT)
+
+
+def rounds(module: str) -> list[list[str]]:
+    """Return the rounds of a module; without an entry, the tests of the same name."""
+    room, _, name = module.partition("/")
+    return _ROUNDS.get(module, [[f"tests/{room}/test_{name}.py"]])
