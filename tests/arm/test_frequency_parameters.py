@@ -48,6 +48,21 @@ def test_every_digit_of_structured_extreme_arms():
     assert reference.relative_errors(lam, *grid).max() < 1e-15
 
 
+def test_every_digit_of_two_frequencies_next_to_each_other():
+    """A tip that is hard to turn, and springs that make both slow modes meet: the determinant alone left 1e-12."""
+    rng = np.random.default_rng(7)
+    iota, mu, kappa_r = 10.0 ** rng.uniform([[3], [-3], [-3]], [[9], [3], [3]], (3, 60))
+    kappa_r[:5] = np.inf
+    with np.errstate(invalid="ignore"):
+        turning = np.where(np.isinf(kappa_r), 1.0, kappa_r / (1 + kappa_r)) / iota
+    arms = turning * (1 + mu) * (1 + 10.0 ** rng.uniform(-9, -2, 60)), kappa_r, mu, iota
+    lam = frequency_parameters(*arms, modes=2)
+    assert np.median(lam[:, 1] / lam[:, 0] - 1) < 1e-2
+    assert reference.relative_errors(lam, *arms).max() < 1e-15
+    whole = [np.repeat(x, 2600) for x in arms]  # many enough for the compiled path
+    np.testing.assert_allclose(frequency_parameters(*whole, modes=2)[::2600], lam, rtol=1e-15)
+
+
 @pytest.mark.parametrize("arm", [(np.inf, np.inf, 0.0, 0.0), (3e5, 20.0, 0.3, 0.01), (0.0, 1e-9, 1e6, 0.0)])
 def test_every_digit_of_the_thousandth_mode(arm):
     lam = frequency_parameters(*arm, modes=1000)
