@@ -27,6 +27,7 @@ __all__ = ["Equation", "checks", "equation", "equations", "numbered"]
 
 Number = int | str
 Kind = Literal["definition", "assumption", "derived"]
+Evidence = Literal["proved", "sampled"]
 
 #: Section of the package that builds each equation; a new section adds a line here.
 _HOMES: dict[str, range] = {
@@ -44,7 +45,7 @@ _HOMES: dict[str, range] = {
 }
 
 _EQUATIONS: dict[Number, Equation] = {}
-_ROUTES: dict[Number, Callable[[], Any]] = {}
+_ROUTES: dict[Number, tuple[Callable[[], Any], Evidence]] = {}
 
 
 @dataclass(frozen=True, repr=False)
@@ -86,11 +87,16 @@ class Equation:
     @property
     def checked_by(self) -> str:
         """The independent route :meth:`check` takes, in words."""
-        return _text(_route(self.number))
+        return _text(_route(self.number)[0])
+
+    @property
+    def evidence(self) -> Evidence:
+        """Whether :meth:`check` proves exact identities, or only samples numbers because nothing exact is at hand."""
+        return _route(self.number)[1]
 
     def check(self) -> bool:
         """Tell whether the independent route confirms the equation."""
-        return bool(_route(self.number)())
+        return bool(_route(self.number)[0]())
 
     def __repr__(self) -> str:
         return f"Equation ({self.number}), {self.title}"
@@ -130,7 +136,7 @@ def _text(function: Callable) -> str:
     return " ".join((inspect.getdoc(function) or "").split())
 
 
-def _route(number: Number) -> Callable[[], Any]:
+def _route(number: Number) -> tuple[Callable[[], Any], Evidence]:
     if number not in _ROUTES:
         raise NotImplementedError(f"equation ({number}) has no check")
     return _ROUTES[number]
@@ -159,11 +165,11 @@ def numbered(
     return register
 
 
-def checks(number: Number) -> Callable:
+def checks(number: Number, evidence: Evidence = "proved") -> Callable:
     """Register the decorated function, whose docstring names the route, as the check of an equation."""
 
     def register(function: Callable[[], Any]) -> Callable[[], Any]:
-        _ROUTES[number] = function
+        _ROUTES[number] = function, evidence
         return function
 
     return register

@@ -21,7 +21,7 @@ from cra_sym.symbols import Dimension, dimension, symbol
 
 __all__: list[str] = []
 
-epsilon, varpi, P_ij, w_1 = (symbol(name) for name in ("epsilon", "varpi", "P_ij", "w_1"))
+epsilon, varpi, P_ij, w_0, w_1, u_0 = (symbol(n) for n in ("epsilon", "varpi", "P_ij", "w_0", "w_1", "u_0"))
 
 
 @numbered(35, "disturbed base", "assumption")
@@ -32,8 +32,11 @@ def disturbed_base() -> Eq:
 
 @checks(35)
 def _() -> bool:
-    """A length; without epsilon the base rests."""
-    return dimension(disturbed_base()) == Dimension(m=1) and disturbed_base().rhs.subs(epsilon, 0).diff(t) == 0
+    """A length; it starts at w_0 with the speed epsilon w_1 varpi and swings about w_0 with angular frequency varpi."""
+    motion = disturbed_base().rhs
+    start = (motion.subs(t, 0), motion.diff(t).subs(t, 0)) == (w_0, epsilon * w_1 * varpi)
+    swings = (motion.diff(t, 2) + varpi**2 * (motion - w_0)).expand() == 0
+    return dimension(disturbed_base()) == Dimension(m=1) and start and swings
 
 
 @numbered("35a", "base disturbed along the arm", "assumption")
@@ -44,8 +47,10 @@ def axial_base() -> Eq:
 
 @checks("35a")
 def _() -> bool:
-    """A length; without epsilon the base rests."""
-    return dimension(axial_base()) == Dimension(m=1) and axial_base().rhs.subs(epsilon, 0) == 0
+    """A length; it starts at rest, epsilon u_0 away, and swings about zero with angular frequency varpi."""
+    motion = axial_base().rhs
+    start = (motion.subs(t, 0), motion.diff(t).subs(t, 0)) == (epsilon * u_0, 0)
+    return dimension(axial_base()) == Dimension(m=1) and start and motion.diff(t, 2) == -(varpi**2) * motion
 
 
 @numbered("35b", "fluctuating joint", "assumption", (4,))
@@ -70,9 +75,12 @@ def excited_system() -> Eq:
 
 @checks(36)
 def _() -> bool:
-    """Numbers: the work of the inertia forces of a random arm, carried rigidly by the base, on modes found by shooting;
-    and the coefficients on the left do not depend on time."""
+    """Equation (11) on the left, whose coefficients do not depend on time, and on the right -Gamma_i times the
+    acceleration of (35); and numbers: the work of the inertia forces of a random arm, carried rigidly by the base, on
+    modes found by shooting."""
     values, equation = sample(36), excited_system()
+    if equation.lhs != dynamic_equation().lhs or equation.rhs + symbol("Gamma_i") * TRANSVERSE.diff(t, 2) != 0:
+        return False
     length, q = values["L"], symbol("q_i")
     constant = all(not equation.lhs.diff(q.diff(t, k) if k else q).has(t) for k in range(3))
     instant = {t: 0.37, varpi: 2.1, w_1: 0.6, epsilon: 0.01}
@@ -99,7 +107,7 @@ def axial_coupling() -> Eq:
     return Eq(P_ij, coupling("axial base"), evaluate=False)
 
 
-@checks("36a")
+@checks("36a", "sampled")
 def _() -> bool:
     """Numbers: the work of the two extra spring forces of a mode found by shooting on another."""
     values = sample(361)
@@ -109,7 +117,7 @@ def _() -> bool:
     return bool(abs(found / work - 1) < 1e-10)
 
 
-@checks("36b")
+@checks("36b", "sampled")
 def _() -> bool:
     """Numbers: the axial momentum of a bent arm, with the foreshortening of every point by its own quadrature from
     the joint on, its second derivative by two modes found by shooting."""

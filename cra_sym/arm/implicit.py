@@ -12,6 +12,7 @@ from cra_sym.arm.equations import checks, numbered
 from cra_sym.arm.limits import natural_frequency
 from cra_sym.arm.modes import frequency_function, group_numbers
 from cra_sym.arm.shooting import sample, shoot
+from cra_sym.mechanics.identities import vanishes
 from cra_sym.symbols import symbol
 
 __all__ = ["frequency_sensitivities", "group_exponents", "implicit_derivatives", "sensitivity_function"]
@@ -35,7 +36,7 @@ def _() -> bool:
     kappa = symbol("kappa_t")
     circle = sp.Lambda((lamda, kappa), lamda**2 + kappa**2 - 1)
     found = sensitivity_function().rhs.replace(sp.Function("Delta"), circle).doit()
-    return (found.subs(lamda, sp.sqrt(1 - kappa**2)) - sp.sqrt(1 - kappa**2).diff(kappa)).equals(0)
+    return vanishes(found.subs(lamda, sp.sqrt(1 - kappa**2)) - sp.sqrt(1 - kappa**2).diff(kappa))
 
 
 @cache
@@ -75,9 +76,9 @@ def frequency_sensitivities() -> tuple[sp.Eq, sp.Eq]:
     return _in_hertz({name: implicit_derivatives()[f"kappa_{name}"] * c**2 for name, (_, c) in _PAIRS.items()})
 
 
-@checks(32)
+@checks(32, "sampled")
 def _() -> bool:
-    """Another principle: first-order perturbation. ω_i² changes by φ_i(0)² / M_i per k_t and by
+    """Numbers: another principle, first-order perturbation. ω_i² changes by φ_i(0)² / M_i per k_t and by
     φ_i'(0)² / M_i per k_r, for modes of a random arm found by shooting."""
     values = sample(32)
     numbers = {symbol(name): value for name, value in values.items()}

@@ -46,7 +46,7 @@ def _with_section_forces(expression: Expr) -> Expr:
     return put(expression, {law.lhs: law.rhs for law in section_forces()})
 
 
-@checks(14)
+@checks(14, "sampled")
 def _() -> bool:
     """With (15): the virtual work of the whole arm, for random polynomial motions, is the work (14) at the two ends
     plus that of the field equation along the manipulator."""
@@ -126,7 +126,7 @@ def free_vibration(expression: Expr) -> Expr:
     return (expression.subs(q_i.diff(t, 2), -(omega_i**2) * q_i) / q_i).expand()
 
 
-@checks("16a")
+@checks("16a", "sampled")
 def _() -> bool:
     """Numbers: the end values of a mode of a random arm, found by shooting, satisfy all four."""
     values = sample(16)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from sympy import Eq, Expr, Mul, Pow, cancel, limit, oo, pi, solve
+from sympy import Eq, Expr, Matrix, Mul, Pow, cancel, limit, oo, pi, solve
 
-from cra_sym.arm.energy import HALF, L, modal_numbers, phi_i
+from cra_sym.arm.by_hand import jets
+from cra_sym.arm.energy import HALF, L, modal_numbers, phi_i, x
 from cra_sym.arm.equations import checks, numbered
 from cra_sym.arm.evaluation import group_numbers, shapes_agree
 from cra_sym.arm.modes import (
@@ -32,6 +33,7 @@ from cra_sym.arm.modes import (
     s_t,
 )
 from cra_sym.arm.shooting import sample, shoot
+from cra_sym.mechanics.identities import vanishes
 from cra_sym.symbols import Dimension, dimension, symbol
 
 __all__ = ["cantilever_frequency", "cantilever_shape", "natural_frequency", "rigid_joint"]
@@ -107,22 +109,23 @@ def _() -> bool:
 
 @checks(28)
 def _() -> bool:
-    """Numbers: modes found by shooting for a very stiff joint and no end-effector."""
+    """It does not move or turn at the joint, and no moment acts at the tip; and numbers: modes found by shooting for a
+    very stiff joint and no end-effector."""
     shape, ratio = cantilever_shape()
+    derivatives = [shape.rhs.subs(r_2, ratio.rhs).diff(x, order) for order in range(4)]
+    free = [derivatives[order].subs(x, L).subs(beta, lamda / L) for order in (2, 3)]
+    if not (all(vanishes(f.subs(x, 0)) for f in derivatives[:2]) and any(map(vanishes, free))):
+        return False
     return shapes_agree((28,), shape.rhs, ratio.rhs, **_RIGID, m_e=0.0, J_e=0.0)
 
 
 @checks(29)
 def _() -> bool:
-    """Numbers: its roots are those found by shooting for a very stiff joint and no end-effector."""
-    values = sample(29) | _RIGID | {"m_e": 0.0, "J_e": 0.0}
-    function = cantilever_frequency().lhs
-    for mode in shoot(values):
-        place = mode.beta * values["L"]
-        step = float((function / function.diff(lamda)).subs(lamda, place))
-        if abs(step) > 1e-8:
-            return False
-    return True
+    """The determinant of the free end for the two shapes that neither move nor turn at the joint, by hand."""
+    _, _, moment, shear = jets(lamda)
+    clamped = Matrix([[1, 0], [0, 1], [-1, 0], [0, -1]])
+    determinant = (Matrix.vstack(moment, shear) * clamped).det() / (2 * lamda**5)
+    return vanishes(cantilever_frequency().lhs - determinant)
 
 
 @numbered(30, "natural frequency", "derived", (17,))
@@ -136,8 +139,11 @@ def natural_frequency() -> Eq:
 
 @checks(30)
 def _() -> bool:
-    """Dimensions; and numbers: the frequency of modes of a random arm, from the energies of shapes found by shooting
-    (Rayleigh's quotient)."""
+    """Dimensions; a sine of this wave number balances stiffness and inertia; and numbers: the frequency of modes of a
+    random arm, from the energies of shapes found by shooting (Rayleigh's quotient)."""
+    bending, inertia = (symbol(a) * symbol(b) for a, b in (("E", "I_z"), ("rho", "A")))
+    if not vanishes(bending * (lamda / L) ** 4 - inertia * (2 * pi * natural_frequency().rhs) ** 2):
+        return False
     values = sample(30)
     names = {symbol(name): value for name, value in values.items()}
     for mode in shoot(values):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from sympy import Eq, Expr, Integral, S, cos, dsolve, lambdify
+from sympy import Eq, Expr, Integral, S, cos, dsolve, exp, lambdify, sqrt
 
 from cra_sym.arm.energy import L, generalised, inner_mass, modal_numbers, phi_i, q_i, t, tidy, w, x
 from cra_sym.arm.equations import checks, numbered
@@ -13,6 +13,7 @@ from cra_sym.arm.modal_sum import ModalSum
 from cra_sym.arm.orthogonality import modal_energies
 from cra_sym.arm.shooting import integrate, sample, shoot
 from cra_sym.mechanics import hamilton
+from cra_sym.mechanics.identities import vanishes
 from cra_sym.symbols import symbol
 
 __all__ = ["duhamel", "dynamic_equation", "initial_values"]
@@ -44,8 +45,13 @@ def _one_mode(energy: Expr) -> Expr:
 
 @checks(11)
 def _() -> bool:
-    """Numbers: the virtual work of all forces on a random arm, for a virtual displacement along a mode found by
-    shooting while three modes move, by quadrature."""
+    """With damping, a free vibration that decays by exp(-zeta_i omega_i t) solves it; and numbers: the virtual work of
+    all forces on a random arm, for a virtual displacement along a mode found by shooting while three modes move, by
+    quadrature."""
+    free, decay = dynamic_equation().lhs, exp(-zeta_i * omega_i * t)
+    ringing = decay * cos(omega_i * sqrt(1 - zeta_i**2) * t)
+    if not vanishes(free.subs(q_i, ringing).doit()):
+        return False
     values = sample(11)
     shapes, length = shoot(values), values["L"]
     q, acceleration, base = np.array([0.3, -0.5, 0.2]), np.array([0.7, 0.4, -0.6]), 0.9
@@ -123,7 +129,7 @@ def initial_values() -> tuple[Eq, Eq]:
     return Eq(start, projected[0].doit() / M_i), Eq(rate, -speed * projected[1] / M_i)
 
 
-@checks(13)
+@checks(13, "sampled")
 def _() -> bool:
     """Numbers: among all modal velocities these leave the least kinetic energy (3) in the inertial frame, found by
     least squares over quadrature points of a random arm."""
@@ -138,4 +144,5 @@ def _() -> bool:
     best = np.linalg.lstsq(np.array(rows).T, target, rcond=None)[0]
     rate = initial_values()[1].rhs.subs(w.diff(t).subs(t, 0), speed)
     found = [float(rate.subs(modal_numbers(values, shape))) for shape in shapes]
-    return initial_values()[0].rhs == 0 and bool(np.allclose(found, best, rtol=1e-7))
+    named = [e.lhs for e in initial_values()] == [q_i.subs(t, 0), q_i.diff(t).subs(t, 0)]
+    return named and initial_values()[0].rhs == 0 and bool(np.allclose(found, best, rtol=1e-7))

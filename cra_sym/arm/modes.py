@@ -26,6 +26,8 @@ from sympy import (
     zeros,
 )
 
+from cra_sym.arm import by_hand
+from cra_sym.arm.by_hand import proportional
 from cra_sym.arm.energy import A, E, I_z, J_e, L, k_r, k_t, m_e, phi_i, rho, x
 from cra_sym.arm.equations import checks, numbered
 from cra_sym.arm.evaluation import group_numbers, put, shapes_agree, shot_coefficients
@@ -33,6 +35,7 @@ from cra_sym.arm.joint import mode_conditions
 from cra_sym.arm.motion import dynamics, mode_field_equation
 from cra_sym.arm.shooting import sample, shoot
 from cra_sym.mechanics import HamiltonResult, separate
+from cra_sym.mechanics.identities import vanishes
 from cra_sym.symbols import symbol
 
 __all__ = ["coefficients", "frequency_function", "reduced_matrix", "root_matrix", "tip_matrix"]
@@ -172,14 +175,14 @@ def _annihilates(system: Eq, seed: int) -> bool:
 
 @checks(18)
 def _() -> bool:
-    """Numbers: the coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
-    return _annihilates(root_system(), 18)
+    """Written down by hand; and numbers: the coefficients of modes of a random arm found by shooting satisfy it."""
+    return proportional(root_system().lhs.args[0], by_hand.root_rows()) and _annihilates(root_system(), 18)
 
 
 @checks(19)
 def _() -> bool:
-    """Numbers: the coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
-    return _annihilates(tip_system(), 19)
+    """Written down by hand; and numbers: the coefficients of modes of a random arm found by shooting satisfy it."""
+    return proportional(tip_system().lhs.args[0], by_hand.tip_rows()) and _annihilates(tip_system(), 19)
 
 
 # Elimination and the frequency equation (20)-(23) ---------------------------------------------------------------
@@ -224,8 +227,10 @@ def reduced_system() -> Eq:
 
 @checks(20)
 def _() -> bool:
-    """Numbers: the coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
-    return _annihilates(reduced_system().subs(_named_entries()), 20)
+    """With (21), Cramer's rule for the conditions written down by hand; and numbers: the coefficients of modes of a
+    random arm found by shooting satisfy it, at another wave number not."""
+    system = reduced_system().subs(_named_entries())
+    return proportional(system.lhs.args[0], by_hand.eliminated()) and _annihilates(system, 20)
 
 
 def _named_entries() -> dict[Expr, Expr]:
@@ -241,14 +246,8 @@ def reduced_coefficients() -> tuple[Eq, ...]:
 
 @checks(21)
 def _() -> bool:
-    """Numbers: Gaussian elimination of (18) and (19) with random values."""
-    rng = np.random.default_rng(21)
-    names = (lamda, s_t, c_t, s_r, c_r, mu, iota)
-    values = dict(zip(names, rng.uniform(0.3, 2.0, len(names)), strict=True))
-    root, tip = (np.array(m.subs(values), dtype=float) for m in (root_matrix(), tip_matrix()))
-    left = tip[:, :2] - tip[:, 2:] @ np.linalg.solve(root[:, 2:], root[:, :2])
-    found = np.array([float(e.rhs.subs(values)) for e in reduced_coefficients()]).reshape(2, 2)
-    return bool(np.allclose(found, np.linalg.det(root[:, 2:]) * left, rtol=1e-10))
+    """Cramer's rule for the conditions written down by hand: C_1 or C_2 with the two hyperbolic coefficients."""
+    return proportional(Matrix(2, 2, [e.rhs for e in reduced_coefficients()]), by_hand.eliminated())
 
 
 @numbered(22, "determinant", "derived", (20,))
@@ -352,16 +351,20 @@ def coefficient_ratios() -> tuple[Eq, Eq]:
 
 @checks(24)
 def _() -> bool:
-    """Numbers: the coefficients of modes of a random arm found by shooting; by hand, a rigid joint mirrors C_1, C_2."""
+    """They satisfy the conditions at the joint written down by hand; by hand, a rigid joint mirrors C_1, C_2; and
+    numbers: modes of a random arm found by shooting."""
+    found = {e.lhs: e.rhs for e in coefficient_ratios()}
+    if not all(vanishes(row) for row in by_hand.root_rows() * Matrix(coefficients).subs(found)):
+        return False
     values = sample(26)
     for mode in shoot(values):
         known = dict(zip(coefficients, shot_coefficients(mode), strict=True))
         numbers = group_numbers(values, mode.beta)
-        for e in coefficient_ratios():
-            if abs(float(e.rhs.subs(numbers).subs(known)) - known[e.lhs]) > 1e-8 * max(map(abs, known.values())):
+        for name, ratio in found.items():
+            if abs(float(ratio.subs(numbers).subs(known)) - known[name]) > 1e-8 * max(map(abs, known.values())):
                 return False
     rigid = {s_t: 1, c_t: 0, s_r: 1, c_r: 0}
-    return [e.rhs.subs(rigid) for e in coefficient_ratios()] == [-C_1, -C_2]
+    return [ratio.subs(rigid) for ratio in found.values()] == [-C_1, -C_2]
 
 
 @numbered(25, "mode shape", "derived", (17, 24))
@@ -386,13 +389,20 @@ def circular_ratio() -> Eq:
 
 @checks(25)
 def _() -> bool:
-    """Numbers: with (26), the shape of modes of random arms found by shooting, along the whole manipulator."""
-    return shapes_agree((25, 27), mode_shape().rhs, circular_ratio().rhs)
+    """Whatever r_2, the functions of (17) with coefficients that satisfy the conditions at the joint written down by
+    hand; and numbers: with (26), the shape of modes of a random arm found by shooting."""
+    shape = mode_shape().rhs
+    row = Matrix([[shape.expand().coeff(function) for function in basis()]])
+    exact = all(vanishes(condition) for condition in by_hand.root_rows() * row.T)
+    return exact and shapes_agree((25,), shape, circular_ratio().rhs)
 
 
 @checks(26)
 def _() -> bool:
-    """Numbers: the ratio of modes of a random arm found by shooting, and the second row of the reduced system."""
+    """With it one condition at the tip, written down by hand, is satisfied; and numbers: the ratio of modes of a random
+    arm found by shooting, and the second row of the reduced system."""
+    if not any(map(vanishes, by_hand.eliminated() * Matrix([1, circular_ratio().rhs]))):
+        return False
     values = sample(28)
     for mode in shoot(values):
         numbers = group_numbers(values, mode.beta)

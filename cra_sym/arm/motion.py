@@ -65,7 +65,7 @@ def hamiltons_principle() -> Eq:
     return Eq(Integral(delta_L + F * delta_w, (t, t_1, t_2)), 0)
 
 
-@checks(8)
+@checks(8, "sampled")
 def _() -> bool:
     """Dimensions; and numbers: the action of a random arm swinging in a mode found by shooting is stationary for a
     virtual displacement that vanishes at both instants, and is not when the mode swings one per cent too fast."""
@@ -113,7 +113,7 @@ def variation() -> Eq:
     return Eq(delta_L + F * delta_w, _step("Variation"))
 
 
-@checks(9)
+@checks(9, "sampled")
 def _() -> bool:
     """Another route to the first variation: the Lagrangian of v + e delta_v, w + e delta_w differentiated by e, for
     random polynomial motions."""
@@ -149,7 +149,7 @@ def integrated_by_parts() -> Eq:
     return Eq(_step("Integration by parts in x"), 0)
 
 
-@checks(10)
+@checks(10, "sampled")
 def _() -> bool:
     """For random polynomial motions and variations that vanish at both instants, the time integrals of (9) and of (10)
     agree."""
@@ -177,7 +177,7 @@ def _() -> bool:
     return all((ours.lhs - ours.rhs - theirs.lhs + theirs.rhs).expand() == 0 for ours, theirs in pairs)
 
 
-@checks("10a")
+@checks("10a", "sampled")
 def _() -> bool:
     """Newton: a slice accelerates under the slope of the shear force (15); the whole arm is one momentum balance."""
     field, base = field_and_base()
@@ -197,7 +197,7 @@ def mode_field_equation() -> Eq:
     return Eq(free_vibration(single_mode(field).expand()), 0)
 
 
-@checks("10b")
+@checks("10b", "sampled")
 def _() -> bool:
     """Numbers: modes of a random arm found by shooting satisfy it along the manipulator."""
     values = sample(102)

@@ -64,7 +64,7 @@ def stiffness_identity() -> tuple[Eq, Eq]:
     return Eq(inner_stiffness(phi_i, phi_j), omega_i**2 * mass), Eq(K_i, omega_i**2 * M_i)
 
 
-@checks("16b")
+@checks("16b", "sampled")
 def _() -> bool:
     """Numbers: both products of all pairs of modes of a random arm, found by shooting, by quadrature."""
     values = sample(161)
@@ -103,7 +103,7 @@ def _swap(expression: Expr) -> Expr:
     return member(aside, "j").replace(symbol("eta").func, phi_i.func).xreplace({symbol("omega"): omega_i})
 
 
-@checks("16c")
+@checks("16c", "sampled")
 def _() -> bool:
     """Numbers: both products of different modes of a random arm vanish; without the end-effector they would not."""
     values = sample(163)
@@ -125,7 +125,7 @@ def stiffness_of_manipulator_alone() -> Eq:
     return Eq(K_b, stiffness_identity()[1].rhs - springs)
 
 
-@checks("16d")
+@checks("16d", "sampled")
 def _() -> bool:
     """Numbers: the strain energy of modes found by shooting; it falls short of ω_i² M_i by the springs' share."""
     values, alone = sample(164), stiffness_of_manipulator_alone().rhs
@@ -173,7 +173,7 @@ def modal_energies() -> tuple[Eq, Eq]:
     return Eq(symbol("T"), kinetic.doit()), Eq(symbol("U"), potential)
 
 
-@checks(5)
+@checks(5, "sampled")
 def _() -> bool:
     """Numbers: the energies of a random arm moving in three modes found by shooting, by quadrature of (3) and (4)."""
     values = sample(5)

@@ -10,14 +10,17 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from sympy import Derivative, Eq, Expr, Function, I, S, Symbol, conjugate, cos, exp
+from sympy import Abs, Derivative, Eq, Expr, Function, I, Pow, S, Sum, Symbol, conjugate, cos, exp, integrate, pi, solve
 
 from cra_sym.arm.boundaries import forced_growth, forced_resonance, general_resonance, plain
-from cra_sym.arm.energy import inner_mass
+from cra_sym.arm.energy import L, inner_mass, modal_numbers
 from cra_sym.arm.equations import checks, numbered
-from cra_sym.arm.evaluation import evaluate
-from cra_sym.arm.parametric import phi_i, t, x
+from cra_sym.arm.evaluation import evaluate, put
+from cra_sym.arm.excited import excited_system
+from cra_sym.arm.operators import acting, named
+from cra_sym.arm.parametric import t, x
 from cra_sym.arm.shooting import sample, shoot
+from cra_sym.mechanics.identities import vanishes
 from cra_sym.symbols import Dimension, dimension, symbol
 
 __all__: list[str] = []
@@ -107,13 +110,13 @@ def residual(rate: Expr | None = None) -> tuple[Expr, Expr]:
     The slow derivative of the amplitude is that of (48), or ``rate`` if given.
     """
     a, b = Function("a")(t), Function("b")(t)
-    names = {Symbol("A_n", commutative=False): a, Symbol("Abar_n", commutative=False): b}
-    (written,) = order_0_solution()
+    names = {named("A_n"): a, named("Abar_n"): b}
+    (written,), (driven,) = order_0_solution(), principal(2).step("order-1 solution").expression
     zeroth = written.rhs.subs(T_0, t).xreplace(names)
-    driven = principal(2).step("order-1 solution").expression[0].rhs
-    first = plain(driven).subs({T_0: t, T_1: epsilon * t}).xreplace(names)
+    first = plain(driven.rhs).subs({T_0: t, T_1: epsilon * t}).xreplace(names)
     excitation = excitation_in_exponentials().rhs.subs({T_0: t, T_1: epsilon * t})
-    q = zeroth + epsilon * first
+    (expanded,) = two_scale_expansion()
+    q = expanded.rhs.xreplace({named("q_n0"): zeroth, named("q_n1"): first})
     motion = q.diff(t, 2) + omega_n**2 * q + epsilon * excitation * P_nn * q
     rates = _rates(a, b) if rate is None else {a: epsilon * rate, b: epsilon * conjugate(rate)}
     for f in (a, b):
@@ -134,6 +137,34 @@ def _rates(a: Expr, b: Expr) -> dict[Expr, Expr]:
     return {a: forward, b: forward.xreplace(swapped)}
 
 
+_TIMES = {named("D_0"): T_0, named("D_1"): T_1}
+_SLOW = {named("A_n"): Function("a")(T_1), named("Abar_n"): Function("b")(T_1)}
+
+
+@cache
+def _fields() -> dict[Symbol, Expr]:
+    """Return orders 0 and 1 of a single mode, and its amplitudes, as functions of fast and slow time."""
+    (zeroth,), (first,) = order_0_solution(), principal(2).step("order-1 solution").expression
+    orders = {named("q_n0"): zeroth.rhs, named("q_n1"): plain(first.rhs)}
+    return _SLOW | {name: order.xreplace(_SLOW) for name, order in orders.items()}
+
+
+def _acted(expression: Expr) -> Expr:
+    """Return what an expression with operators is for a single mode: in sums over modes, all others rest."""
+    for total in expression.atoms(Sum):
+        own = {s: Symbol(s.name.replace("j", "n"), **s.assumptions0) for s in total.function.free_symbols}
+        expression = expression.xreplace({total: total.function.xreplace(own)})
+    excitation = excitation_in_exponentials()
+    return acting(expression, _fields(), _TIMES).subs(excitation.lhs, excitation.rhs)
+
+
+def _left_over(equation: Eq) -> Expr:
+    """Return what is left of an equation of the expansion when the amplitude follows (48)."""
+    a, b = _SLOW.values()
+    rates = {f.diff(T_1): (rate / epsilon).subs(epsilon * t, T_1) for f, rate in _rates(a, b).items()}
+    return _acted(equation.lhs - equation.rhs).subs(rates)
+
+
 @checks(37)
 def _() -> bool:
     """Put into the equation of motion of a mode, with the slow evolution (48), it leaves nothing at orders 0 and 1."""
@@ -142,60 +173,60 @@ def _() -> bool:
 
 @checks(38)
 def _() -> bool:
-    """A function of t and epsilon t, differentiated twice."""
-    trial = cos(2 * T_0) * exp(T_1)
-    total = trial.subs({T_0: t, T_1: epsilon * t}).diff(t, 2)
-    scales = {symbol_.name: time for symbol_, time in zip((Symbol("D_0"), Symbol("D_1")), (T_0, T_1), strict=True)}
-    _, second = derivative_operators()
-    found: Expr = S.Zero
-    for term in second.rhs.expand().as_ordered_terms():
-        part, factor = trial, S.One
-        for base, power in (f.as_base_exp() for f in term.as_ordered_factors()):
-            if base.is_Symbol and base.name in scales:
-                part = part.diff(scales[base.name], power)
-            else:
-                factor = factor * base**power
-        found += factor * part
-    gap = (total - found.subs({T_0: t, T_1: epsilon * t})).expand()
-    return gap.coeff(epsilon, 0) == gap.coeff(epsilon, 1) == 0 != gap
+    """A function of t and epsilon t, differentiated once and twice."""
+    trial, gaps = cos(2 * T_0) * exp(T_1), []
+    for order, operator in enumerate(derivative_operators(), start=1):
+        total = trial.subs({T_0: t, T_1: epsilon * t}).diff(t, order)
+        applied = operator.rhs.subs({Symbol(name): named(name) for name in ("D_0", "D_1")}) * named("trial")
+        found = acting(applied, {named("trial"): trial}, _TIMES)
+        gaps.append((total - found.subs({T_0: t, T_1: epsilon * t})).subs(exp(epsilon * t), 1).expand())
+    return gaps[0] == 0 != gaps[1] and gaps[1].coeff(epsilon, 0) == gaps[1].coeff(epsilon, 1) == 0
 
 
 @checks(39)
 def _() -> bool:
-    """The free vibration, put into the equation of motion without excitation, leaves nothing."""
-    return residual()[0] == 0
+    """Its operators at work on the free vibration (41) leave nothing."""
+    return vanishes(_left_over(order_0()[0]))
 
 
 @checks(40)
 def _() -> bool:
-    """Its bounded solution, put with the rest into the equation of motion, leaves nothing at first order."""
-    return residual()[1] == 0
+    """Its operators at work on the free vibration (41) and on the bounded response of first order leave nothing when
+    the amplitude follows (48)."""
+    return vanishes(_left_over(order_1()[0]))
 
 
 @checks(41)
 def _() -> bool:
-    """Differentiated twice."""
+    """Differentiated twice; and it is real: its own complex conjugate."""
     (solution,) = order_0_solution()
-    return (solution.rhs.diff(T_0, 2) + omega_n**2 * solution.rhs).expand() == 0
+    swap = {named("A_n"): named("Abar_n"), named("Abar_n"): named("A_n"), I: -I}
+    real = solution.rhs.xreplace(swap) - solution.rhs
+    return (solution.rhs.diff(T_0, 2) + omega_n**2 * solution.rhs).expand() == 0 == real.expand()
 
 
 @checks(42)
 def _() -> bool:
-    """Frequencies; at the exact resonance one excitation period is half a period of the mode."""
-    return dimension(detuning()) == Dimension(s=-1) and detuning().rhs.subs(sigma, 0) == 2 * omega_n
+    """Frequencies; at the exact resonance one excitation period is half a period of the mode, and sigma in slow time
+    is the distance from it."""
+    given = detuning().rhs
+    known = given.subs(sigma, 0) == 2 * omega_n and given.diff(sigma) == epsilon
+    return known and dimension(detuning()) == Dimension(s=-1)
 
 
 @checks("42a")
 def _() -> bool:
-    """Frequencies; at the exact resonance both periods are the same."""
-    return dimension(forced_detuning()) == Dimension(s=-1) and forced_detuning().rhs.subs(sigma, 0) == omega_n
+    """Frequencies; at the exact resonance both periods are the same, and sigma in slow time is the distance from it."""
+    given = forced_detuning().rhs
+    known = given.subs(sigma, 0) == omega_n and given.diff(sigma) == epsilon
+    return known and dimension(forced_detuning()) == Dimension(s=-1)
 
 
 @checks(43)
 def _() -> bool:
     """Euler's formula for the detuned frequency."""
     cosine = cos((detuning().rhs * T_0).expand().subs(epsilon * T_0, T_1))
-    return (cosine.rewrite(exp) - excitation_in_exponentials().rhs).expand().equals(0)
+    return vanishes(cosine - excitation_in_exponentials().rhs)
 
 
 @checks(44)
@@ -203,20 +234,23 @@ def _() -> bool:
     """Any other slow evolution of the amplitude leaves in the equation of motion just these terms, sign changed."""
     rate = Symbol("r", real=True)
     left = [term for term in residual(rate)[1].args if not any(e.args[0].has(t) for e in term.atoms(exp))]
-    slow = {Symbol(name, commutative=False): Function(small)(t) for name, small in (("A_n", "a"), ("Abar_n", "b"))}
+    slow = {named("A_n"): Function("a")(t), named("Abar_n"): Function("b")(t)}
     (terms,) = secular_terms()
-    shown = terms.subs(Symbol("D_1", commutative=False) * Symbol("A_n", commutative=False), rate).xreplace(slow)
+    shown = terms.subs(named("D_1") * named("A_n"), rate).xreplace(slow)
     return (sum(left, S.Zero) + shown.subs(T_1, Symbol("phase", real=True) / sigma)).expand() == 0
 
 
 @checks(45)
 def _() -> bool:
-    """An oscillator driven at its own frequency, whatever the force, swings ever wider: t times a harmonic."""
-    from sympy import dsolve
-
-    f = Function("f")(t)
-    driven = dsolve(Eq(f.diff(t, 2) + omega_n**2 * f, cos(omega_n * t)), f).rhs
-    return driven.expand().coeff(t, 1).has(t) and not solvability()[0].lhs.has(T_0)
+    """A force of an oscillator's own frequency makes it swing ever wider, t times a harmonic, and the mean of the right
+    of (40) times exp(-i omega_n T_0) over one period tells how much of it there is: just this."""
+    swelling = t * exp(I * omega_n * t)
+    force = swelling.diff(t, 2) + omega_n**2 * swelling
+    period = 2 * pi / omega_n
+    turned = (_acted(order_1()[0].rhs) * exp(-I * omega_n * T_0)).expand()
+    mean = sum((integrate(term, (T_0, 0, period)) / period for term in turned.args), S.Zero)
+    (condition,) = solvability()
+    return vanishes(force - 2 * I * omega_n * exp(I * omega_n * t)) and vanishes(mean - _acted(condition.lhs))
 
 
 @numbered(46, "inner product", "definition", (6,))
@@ -228,13 +262,19 @@ def inner_product() -> Eq:
 
 @checks(46)
 def _() -> bool:
-    """Numbers: modes of a random arm found by shooting are orthogonal in it."""
-    values, f, g = sample(46), Function("f")(x), Function("g")(x)
-    shapes = shoot(values)
-    real = inner_mass(f, g)
-    gram = [[evaluate(real, values, {f: a, g: b}) for a in shapes] for b in shapes]
-    scale = np.sqrt(np.diag(gram))
-    return bool(np.abs(gram / scale / scale[:, None] - np.eye(len(shapes))).max() < 1e-8)
+    """A shape that translates has the mass of the arm, one that turns about the root its moment of inertia, whatever
+    its phase; and numbers: modes of a random arm found by shooting are orthogonal in it."""
+    f, g, phase = Function("f"), Function("g"), exp(I * T_0)
+    product, (rho, A, m_e, J_e) = inner_product().rhs, (symbol(name) for name in ("rho", "A", "m_e", "J_e"))
+
+    def of(first: Expr, second: Expr) -> Expr:
+        return put(product, {f(x): first, g(x): second}).doit().expand()
+
+    known = of(phase, phase) == rho * A * L + m_e and of(phase * x, x * phase) == rho * A * L**3 / 3 + m_e * L**2 + J_e
+    values, (one, two, *_rest) = sample(46), shoot(sample(46))
+    real = product.replace(conjugate, lambda e: e)
+    gram = np.array([[evaluate(real, values, {f(x): a, g(x): b}) for a in (one, two)] for b in (one, two)])
+    return known and bool(abs(gram[0, 1]) < 1e-8 * np.sqrt(gram[0, 0] * gram[1, 1]))
 
 
 @numbered(47, "solvability, term by term", "derived", (45, 46))
@@ -243,14 +283,15 @@ def distributed() -> Eq:
     return Eq((M_n * solvability()[0].lhs).expand(), 0, evaluate=False)
 
 
-@checks(47)
+@checks(47, "sampled")
 def _() -> bool:
-    """Numbers: the mass in front is the inner product of a mode found by shooting with itself."""
-    values = sample(47)
+    """Numbers: the inner product (46) of each term, carried by a mode found by shooting, with that mode."""
+    values, real = sample(47), inner_product().rhs.replace(conjugate, lambda e: e)
     (mode, *_rest) = shoot(values)
-    mass = evaluate(inner_mass(phi_i, phi_i), values, {phi_i: mode})
-    ratio = (distributed().lhs.subs(M_n, mass) - mass * solvability()[0].lhs).expand()
-    return mass > 0 and ratio == 0
+    mass = evaluate(real, values, {Function(name)(x): mode for name in "fg"})
+    by_definition = modal_numbers(values, mode)[symbol("M_i")]
+    gap = (distributed().lhs.subs(M_n, mass) - mass * solvability()[0].lhs).expand()
+    return gap == 0 and bool(abs(mass / by_definition - 1) < 1e-12)
 
 
 # Amplitude equation and boundary (48)-(49) ----------------------------------------------------------------------
@@ -278,16 +319,12 @@ def forced_amplitude_equation() -> Eq:
 
 @checks("48a")
 def _() -> bool:
-    """Numbers: a forced oscillator integrated for a hundred periods against the amplitude's straight line."""
-    from scipy.integrate import solve_ivp
-
-    numbers = {omega_n: 2.0, Gamma_n: 0.8, M_n: 1.3, w_1: 0.7, epsilon: 0.01, sigma: 0}
-    rate = abs(complex(forced_amplitude_equation().rhs.subs(numbers)))
-    push = 0.8 / 1.3 * 0.7 * 0.01 * 2.0**2
-    end = 200.0 * np.pi / 2.0
-    run = solve_ivp(lambda s, q: (q[1], push * np.sin(2.0 * s) - 4.0 * q[0]), (0, end), (0, 0), rtol=1e-9, atol=1e-12)
-    amplitude = np.hypot(run.y[0, -1], run.y[1, -1] / 2.0)
-    return bool(abs(2 * rate * end / amplitude - 1) < 0.01)
+    """At resonance the amplitude grows in proportion to time; so made into a motion of the mode, it balances the force
+    of (36)."""
+    amplitude = forced_amplitude_equation().rhs.subs(sigma, 0) * t
+    motion = 2 * amplitude * cos(omega_n * t)
+    force = excited_system().rhs.xreplace({symbol("Gamma_i"): Gamma_n}).subs(varpi, omega_n)
+    return vanishes(M_n * (motion.diff(t, 2) + omega_n**2 * motion) - force)
 
 
 @numbered(49, "stability boundary", "derived", (48,))
@@ -297,9 +334,9 @@ def stability_boundary() -> tuple[Eq, Eq]:
     return _step("boundary")
 
 
-@checks(49)
+@checks(49, "sampled")
 def _() -> bool:
-    """Mathieu's characteristic values: the error shrinks with the square of epsilon."""
+    """Numbers: Mathieu's characteristic values; the error shrinks with the square of epsilon."""
     from scipy.special import mathieu_a, mathieu_b
 
     errors = []
@@ -322,11 +359,26 @@ def forced_measure() -> Eq:
 
 @checks("49a")
 def _() -> bool:
-    """A velocity; and it does not change when the mode is scaled."""
+    """A velocity that does not change when the mode is scaled; squared it is that of a motion t times a harmonic, which
+    balances the force of (36) at resonance, at the tip."""
     expression, (_, gamma, tip, mass, _) = forced_growth()
-    scaled = expression.subs({gamma: 3 * gamma, tip: 3 * tip, mass: 9 * mass}, simultaneous=True)
-    units = dimension(expression, {tip: Dimension()})
-    return units == Dimension(m=1, s=-1) and scaled.equals(expression)
+    shown = forced_measure().rhs
+    scaled = shown.subs({gamma: 3 * gamma, tip: 3 * tip, mass: 9 * mass}, simultaneous=True)
+    units = dimension(shown, {tip: Dimension()})
+    rate = Symbol("r")
+    motion = rate * t * cos(omega_n * t)
+    force = excited_system().rhs.xreplace({symbol("Gamma_i"): gamma}).subs(varpi, omega_n) / epsilon
+    balance = (mass * (motion.diff(t, 2) + omega_n**2 * motion) - force).subs(t, pi / (2 * omega_n))
+    (needed,) = solve(balance, rate)
+    found = shown**2 - (needed * tip) ** 2
+    return units == Dimension(m=1, s=-1) and scaled == shown == expression and vanishes(_real(found))
+
+
+def _real(expression: Expr) -> Expr:
+    """Write squares of magnitudes of real numbers as squares."""
+    return expression.replace(
+        lambda e: isinstance(e, Pow) and isinstance(e.base, Abs) and e.exp == 2, lambda e: e.base.args[0] ** 2
+    )
 
 
 @numbered("49b", "threshold of damping", "derived", (48,))
@@ -336,13 +388,13 @@ def damping_threshold() -> Eq:
     return Eq(epsilon, plain(damped.explicit(damped.border.threshold)), evaluate=False)
 
 
-@checks("49b")
+@checks("49b", "sampled")
 def _() -> bool:
     """Numbers: the Floquet multipliers of one mode in the middle of its zone, just below and just above."""
     from cra_sym.solvers.floquet import floquet_exponents
 
     numbers = {omega_n: 1.0, P_nn: 1.0, zeta_n: 0.005}
     threshold = float(damping_threshold().rhs.subs(numbers))
-    sizes = threshold * np.array([0.98, 1.02])
+    sizes = threshold * np.array([0.995, 1.005])
     below, above = floquet_exponents([1.0], [[[1.0]]], 2.0 - sizes**2 / 32, sizes, 0.005)[:, 0].real
     return bool(below < 0 < above)
