@@ -1,7 +1,8 @@
 """Does the suite notice every wrong sign, exponent and constant? ``python -m tests.mutation --help``.
 
-Each mutant runs the checks and tests that watch over its module, quickest first, in a process of its own. Verdicts go to ``results.json`` beside this file: counts a module with the seed, and every survivor with the reason
-why it may survive. One without a reason is a hole in the suite, and the exit code says so.
+Each mutant runs the checks and tests that watch over its module, quickest first, in a process of its own. Verdicts go
+to ``results.json`` beside this file: counts a module with the seed, and every survivor with the reason why it may
+survive. One without a reason is a hole in the suite, and the exit code says so.
 """
 
 from __future__ import annotations

@@ -87,7 +87,9 @@ def _dotted(module: str) -> str:
 def _uses() -> dict[str, set[str]]:
     """Return what each module of the package names: modules it imports and those whose derivations it runs."""
     files = {_name(file): file for file in PACKAGE.rglob("*.py")}
-    return {name: _named(name, ast.parse(file.read_text(encoding="utf-8"))) & set(files) for name, file in files.items()}
+    return {
+        name: _named(name, ast.parse(file.read_text(encoding="utf-8"))) & set(files) for name, file in files.items()
+    }
 
 
 def _name(file: Path) -> str:
@@ -166,7 +168,7 @@ def _replace(module: str, source: str, affected: frozenset[str]) -> None:
     derived._source_of, Path.read_text = cache(source_of), read
     for number in [n for n, e in equations._EQUATIONS.items() if e.source.partition(":")[0] in affected]:
         del equations._EQUATIONS[number]
-    for number in [n for n, route in equations._ROUTES.items() if route.__module__ in affected]:
+    for number in [n for n, (route, _) in equations._ROUTES.items() if route.__module__ in affected]:
         del equations._ROUTES[number]
     for name in affected:
         sys.modules.pop(name, None)
