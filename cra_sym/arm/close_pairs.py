@@ -1,23 +1,14 @@
-<<<<<<< HEAD
 """The first two modes where their frequencies nearly coincide: Rayleigh-Ritz values keep digits a determinant loses.
 
 A heavy end-effector on a soft joint moves as a rigid body, along and about itself. Tuned alike, the two motions have
 frequencies as close as their coupling is weak, and zeros of the determinant at a relative distance g are known to
 eps / g only. The energies of the two motions have no such loss. All other neighbours are well apart.
-=======
-"""Two frequencies next to each other: what the determinant cannot tell apart to the last digit, two inertias can.
-
-A tip that is hard to turn leaves two slow modes, the arm on its translational spring and the tip on the elastic arm.
-Their frequencies may meet but for a small gap, and as a zero of the determinant each is known to rounding over that gap
-only. As the two values of a symmetric problem in the root's displacement and the tip's rotation both keep every digit.
->>>>>>> 1f81b0b (wip2)
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-<<<<<<< HEAD
 from cra_sym.arm.spectrum import pair
 from cra_sym.kernels import derived_kernel
 
@@ -97,49 +88,3 @@ def _eigenvalues(strain: np.ndarray, kinetic: np.ndarray) -> np.ndarray:
     right = (strain[1, 1] - coupling * (2 * strain[0, 1] - coupling * left)) / independent
     middle, radius = (left + right) / 2, np.hypot((left - right) / 2, mixed)
     return np.array([middle - radius, middle + radius])
-=======
-from cra_sym.kernels import derived_kernel
-
-__all__ = ["sharpen"]
-
-_KRYLOV, _INERTIAS = (derived_kernel(f"cra_sym.arm.shapes:{name}") for name in ("polynomials", "two_inertias"))
-_GAP = 0.1  # relative, of lambda; with more the determinant is good enough
-_SLOWEST = 0.5  # lambda of the upper one: the two inertias hardly change with it
-
-
-def sharpen(lam: np.ndarray, kappa_t: np.ndarray, kappa_r: np.ndarray, mu: np.ndarray, iota: np.ndarray) -> np.ndarray:
-    """Improve in place the first two frequency parameters of arms that have them slow and close; return which arms.
-
-    Parameters
-    ----------
-    lam : ndarray, shape (arms, modes)
-    kappa_t, kappa_r, mu, iota : ndarray, shape (arms,)
-    """
-    if lam.shape[1] < 2:
-        return np.zeros(0, dtype=np.int64)
-    low, high = lam[:, 0], lam[:, 1]
-    close = np.flatnonzero((high < _SLOWEST) & (low > (1 - _GAP) * high) & np.isfinite(kappa_t))
-    if close.size:
-        arm = [value[close] for value in (kappa_t, kappa_r, mu, iota)]
-        for mode, sign in ((0, -1.0), (1, 1.0)):
-            z = lam[close, mode] ** 4
-            for _ in range(2):
-                z = _value(z, sign, *arm)
-            lam[close, mode] = np.sqrt(np.sqrt(z))
-    return close
-
-
-def _value(
-    z: np.ndarray, sign: float, kappa_t: np.ndarray, kappa_r: np.ndarray, mu: np.ndarray, iota: np.ndarray
-) -> np.ndarray:
-    """Return the lower or upper value of the two inertias at z on their two springs, from sums of positive terms."""
-    give, light = 1 / (1 + kappa_r), 1 / (1 + mu)
-    spring = 1 / (1 + 1 / np.maximum(kappa_r, 1e-300))
-    m_11, m_12, k_2, own = _INERTIAS.function(spring, give, mu * light, light, z, *_KRYLOV.function(1.0, z))
-    m_22 = own + iota
-    first, second, coupling = kappa_t / m_11, k_2 / m_22, m_12**2 / (m_11 * m_22)
-    half = np.sqrt((first - second) ** 2 + 4 * coupling * first * second)
-    if sign < 0:
-        return 2 * first * second / (first + second + half)
-    return (first + second + half) / (2 * (1 - coupling))
->>>>>>> 1f81b0b (wip2)

@@ -97,8 +97,8 @@ _RIGID = {"k_t": 1e12, "k_r": 1e12}
 
 @checks(27)
 def _() -> bool:
-    """Numbers: modes found by shooting for a very stiff joint; and the other way of being rigid, (s, c) = (1, 0) in
-    (23), gives the same equation exactly."""
+    """The other way of being rigid, (s, c) = (1, 0) in (23), gives the same equation exactly; and numbers: modes found
+    by shooting for a very stiff joint."""
     frequency, shape, ratio = rigid_joint()
     other = frequency_function()[0].subs({s_t: 1, c_t: 0, s_r: 1, c_r: 0})
     values = sample(27) | _RIGID

@@ -13,17 +13,7 @@ import sympy as sp
 from cra_sym.arm.characteristic import PAIRS, PARAMETERS, Derivation, b, c_r, c_t, conditions, s_r, s_t, z
 from cra_sym.symbols import symbol
 
-__all__ = [
-    "NEAR",
-    "amplitudes_far",
-    "generalised_mass",
-    "polynomials",
-    "shape_far",
-    "tip_far",
-    "tip_near",
-    "tip_rows",
-    "two_inertias",
-]
+__all__ = ["NEAR", "amplitudes_far", "generalised_mass", "polynomials", "shape_far", "tip_far", "tip_near", "tip_rows"]
 
 NEAR = 25
 """Below this z a shape is a power series from the root, above it waves and decaying exponentials."""
@@ -54,13 +44,9 @@ def polynomials() -> Derivation:
 
 def _near(derivative: int) -> sp.Expr:
     """Return a derivative of the shape at xi = 1 in the Krylov functions there."""
-    return sum((state * image for state, image in zip(ROOT, _images(derivative), strict=True)), sp.Integer(0))
-
-
-def _images(derivative: int) -> list[sp.Expr]:
-    """Return a derivative of the four solutions with one unit derivative at the root, in the Krylov functions there."""
     # the derivative of the j-th solution is the one before it; of the first, z times the last
-    return [z ** ((derivative - j + 3) // 4) * KRYLOV[(j - derivative) % 4] for j in range(4)]
+    images = [z ** ((derivative - j + 3) // 4) * KRYLOV[(j - derivative) % 4] for j in range(4)]
+    return sum((state * image for state, image in zip(ROOT, images, strict=True)), sp.Integer(0))
 
 
 def _tip_rows(weights: dict[sp.Symbol, sp.Expr]) -> list[sp.Matrix]:
@@ -145,32 +131,3 @@ def generalised_mass() -> Derivation:
     square = sp.expand((invariant + bracket[1] - bracket[0]) / (4 * z))
     mass = sp.expand(square + mu * tip**2 + iota * slope**2)
     return (mass,), (s_t, c_t, s_r, c_r, alpha, beta, z, invariant, tip, slope, mu, iota)
-
-
-def two_inertias() -> Derivation:
-    """Return the arm as two inertias on two springs, for any z: what moves the root and what turns the tip.
-
-    With the root displaced by a and the tip turned by t, the root's rotational spring and the tip's mass leave one
-    shape. The spring at the root then feels z (m_11 a + m_12 t), and the tip the moment (k_2 - z m) t - z m_12 a. With
-    the stiffness k_1 of that spring and the rotary inertia iota of the tip, a zero of the determinant is where
-    ``diag(k_1, k_2) - z [[m_11, m_12], [m_12, m + iota]]`` is singular. Returned are m_11, m_12, k_2 and m.
-    """
-    a, t, shear = sp.symbols("a t shear", real=True)
-    state = (a, ROOT[1], ROOT[2], shear)
-    at_tip = [sum((x * image for x, image in zip(state, _images(j), strict=True)), sp.Integer(0)) for j in range(4)]
-    unknowns = sp.Matrix([shear, beta])
-    system = sp.Matrix([_conditions(at_tip)[0], at_tip[1] - t])
-    matrix = system.jacobian(unknowns)
-    solved = -matrix.adjugate() * system.subs({shear: 0, beta: 0})
-    denominator = matrix.det()
-
-    def held(x: sp.Expr) -> sp.Expr:
-        """Return the denominator times x in the shape that is left."""
-        rest = denominator * x.subs({shear: 0, beta: 0})
-        return sp.expand(rest + x.coeff(shear) * solved[0] + x.coeff(beta) * solved[1])
-
-    force, moment = held(-shear), held(sp.expand(at_tip[2]))
-    stiff = moment.coeff(t)
-    static = sum((term for term in stiff.args if not term.has(z)), sp.Integer(0))
-    parts = (force.coeff(a) / z, force.coeff(t) / z, static, (static - stiff) / z)
-    return tuple(sp.expand(part) / denominator for part in parts), (s_r, c_r, *PAIRS["mu"], z, *KRYLOV)

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from cra_sym.arm.close_pairs import sharpen
 from cra_sym.kernels import Kernel, compiled, derived_kernel, has_compiler, is_compiled
 from cra_sym.solvers.spectrum import Lanes, spectrum
 
@@ -145,7 +144,6 @@ def frequency_parameters(
 
     def fill_part(part: slice) -> None:
         fill(result[part], *(x[part] for x in groups))
-        sharpen(result[part], *(x[part] for x in groups))
 
     in_parts(fill_part, len(result), modes, threads=threads, compiled=compile)
     return result.reshape(*shape, modes)

@@ -173,7 +173,11 @@ def _by_phase(lane: np.ndarray, right: np.ndarray, points: np.ndarray, values: n
 
 
 def _step(
-    value: np.ndarray, slope: np.ndarray, curvature: np.ndarray, z: np.ndarray | float = 1.0, lower: np.ndarray | int = 0
+    value: np.ndarray,
+    slope: np.ndarray,
+    curvature: np.ndarray,
+    z: np.ndarray | float = 1.0,
+    lower: np.ndarray | int = 0,
 ) -> np.ndarray:
     """Return Ostrowski's step, which is the root of one over the sum of (z - zero)^-2: no zero is nearer.
 
