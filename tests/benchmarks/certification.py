@@ -35,10 +35,10 @@ def arms(rng: np.random.Generator, number: int) -> cra.Arm:
 
 
 def main(number: int = 100_000, modes: int = 10) -> dict[str, object]:
-    """Certify ``number`` arms and return the summary."""
+    """Certify ``number`` arms and return the summary, which is written on the way as well."""
     rng = np.random.default_rng(SEED)
-    proved, beyond, widest, farthest = 0, 0, 0.0, 0.0
-    for _ in tqdm(range(number // BATCH), disable=None):
+    proved, beyond, widest, farthest, summary = 0, 0, 0.0, 0.0, {}
+    for done in tqdm(range(BATCH, number + 1, BATCH), disable=None):
         arm = arms(rng, BATCH)
         frequency = cra.natural_frequencies(arm, modes=modes)
         certificate = cra.certify(arm, modes=modes)
@@ -48,23 +48,22 @@ def main(number: int = 100_000, modes: int = 10) -> dict[str, object]:
         beyond += int((outside > TOLERANCE).sum())
         widest = max(widest, float(np.nanmax((certificate.upper - certificate.lower) / unit)))
         farthest = max(farthest, float(np.nanmax(outside)))
-    return {
-        "seed": SEED,
-        "arms": number // BATCH * BATCH,
-        "modes": modes,
-        "frequencies": number // BATCH * BATCH * modes,
-        "proved": proved,
-        "widest enclosure, relative": widest,
-        "farthest solver value outside, relative": farthest,
-        f"solver values more than {TOLERANCE:g} outside": beyond,
-        "sources": fingerprint()[:16],
-        "versions": {name: metadata.version(name) for name in ("python-flint", "numpy", "sympy")},
-        "python": platform.python_version(),
-    }
+        summary = {
+            "seed": SEED,
+            "arms": done,
+            "modes": modes,
+            "frequencies": done * modes,
+            "proved": proved,
+            "widest enclosure, relative": widest,
+            "farthest solver value outside, relative": farthest,
+            f"solver values more than {TOLERANCE:g} outside": beyond,
+            "sources": fingerprint()[:16],
+            "versions": {name: metadata.version(name) for name in ("python-flint", "numpy", "sympy")},
+            "python": platform.python_version(),
+        }
+        Path(__file__).with_suffix(".json").write_text(json.dumps(summary, indent=1) + "\n")
+    return summary
 
 
 if __name__ == "__main__":
-    summary = main(*map(int, sys.argv[1:]))
-    text = json.dumps(summary, indent=1)
-    Path(__file__).with_suffix(".json").write_text(text + "\n")
-    print(text)
+    print(json.dumps(main(*map(int, sys.argv[1:])), indent=1))
