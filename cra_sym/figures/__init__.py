@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from importlib import import_module
 from importlib.resources import files
-from inspect import signature
-from typing import TYPE_CHECKING
+from inspect import cleandoc, signature
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cra_sym.arm.parameters import Arm
 
-__all__ = ["FIGURES", "STYLE", "draw", "shows_an_arm"]
+__all__ = ["ANIMATIONS", "FIGURES", "STYLE", "animate", "described", "draw", "shows_an_arm"]
 
 FIGURES = {
     "fig01": "cra_sym.figures.robot:figure_1",
@@ -40,6 +41,12 @@ FIGURES = {
     "derivation": "cra_sym.figures.derivation:figure_derivation",
 }
 """Name of a figure -> the function that draws it; called with no arguments, it draws the paper's case."""
+
+ANIMATIONS = {
+    "moving_arm": "cra_sym.figures.animation:moving_arm",
+    "moving_modes": "cra_sym.figures.animation:moving_modes",
+}
+"""Name of an animation -> the function that returns it as an SVG document."""
 
 STYLE = str(files(__name__) / "style.mplstyle")
 """The one style: ``with plt.style.context(STYLE): ...``."""
@@ -68,6 +75,27 @@ def shows_an_arm(name: str) -> bool:
     return "arm" in signature(_function(name)).parameters
 
 
-def _function(name: str) -> Callable[..., Figure]:
-    module, function = FIGURES[name].split(":")
+def animate(name: str) -> str:
+    """Return one animation of ``ANIMATIONS``, an SVG document.
+
+    Raises
+    ------
+    ValueError
+        If there is no such animation.
+    """
+    if name not in ANIMATIONS:
+        raise ValueError(f"animation = {name!r}: allowed are {', '.join(ANIMATIONS)}")
+    return _function(name)()
+
+
+def described(name: str) -> tuple[str, str]:
+    """Return what a figure or an animation shows, and what else there is to say, from the docstring of its function."""
+    text = cleandoc(_function(name).__doc__ or "").partition("\n\nParameters\n")[0].replace("``", "")
+    first, more = (" ".join(part.split()) for part in (text + "\n\n").split("\n\n", 1))
+    shown = re.sub("^(Draw|Show) ", "", first)
+    return re.sub(r"^\w(?=[a-z ])", lambda letter: letter[0].upper(), shown), more
+
+
+def _function(name: str) -> Callable[..., Any]:
+    module, function = {**FIGURES, **ANIMATIONS}[name].split(":")
     return getattr(import_module(module), function)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
 
 from nbconvert.filters import Highlight2HTML
 
-from cra_sym.report.markup import Markup, mathml
+from cra_sym.report.markup import Markup, formula
+from cra_sym.report.svg import inline_svg
 
 if TYPE_CHECKING:
     from nbformat import NotebookNode
@@ -29,28 +30,23 @@ class Chapter:
     figures: list[str]
 
 
-def chapter(
-    name: str,
-    notebook: NotebookNode,
-    chapters: Collection[str],
-    numbers: Collection[str],
-    figures: Mapping[str, str],
-) -> Chapter:
+def chapter(name: str, notebook: NotebookNode, markup: Markup, figures: Mapping[str, str]) -> Chapter:
     """Return an executed notebook as a chapter.
 
     Parameters
     ----------
     name : str
         Stem of the notebook's file.
-    chapters, numbers : collection of str
-        What the page holds: chapters and equation numbers that links may lead to.
+    notebook : NotebookNode
+    markup : Markup
+        Renders the chapter's text.
     figures : mapping
         HTML of each figure of the registry; a cell that ends in ``draw("name")`` shows it instead of its picture.
     """
-    markup, highlight = Markup(name, chapters, numbers), Highlight2HTML(pygments_lexer="python3")
+    highlight = Highlight2HTML(pygments_lexer="python3")
     pieces: list[str] = []
     shown: list[str] = []
-    for cell in notebook.cells:
+    for place, cell in enumerate(notebook.cells):
         if cell.cell_type == "markdown":
             pieces.append(markup(cell.source))
         elif cell.cell_type == "code":
@@ -60,20 +56,29 @@ def chapter(
                 shown.append(drawn[1])
                 pieces.append(figures[drawn[1]])
             else:
-                pieces.extend(f'<div class="output">{_output(output, markup)}</div>' for output in cell.outputs)
+                pieces.extend(
+                    f'<div class="output">{_output(output, markup, f"{name}-{place}-{number}")}</div>'
+                    for number, output in enumerate(cell.outputs)
+                )
     return Chapter("\n".join(pieces), markup.headings, shown)
 
 
-def _output(output: Any, markup: Markup) -> str:
-    """Return the richest form of one output that a page without scripts can show."""
+def _output(output: Any, markup: Markup, name: str) -> str:
+    """Return the richest form of one output that a page without scripts can show; ``name`` is what a picture is called.
+
+    A picture that comes with no words is that of the section it stands in.
+    """
     if output.output_type == "stream":
         return f"<pre>{escape(output.text)}</pre>"
     data = output.data
+    section = f"Figure: {markup.headings[-1][2]}" if markup.headings else "Figure"
+    if "image/svg+xml" in data:
+        return inline_svg(data["image/svg+xml"], name, section)
     if "image/png" in data:
-        words = escape(data.get("text/plain", "figure"), quote=True)
+        words = escape(section, quote=True)
         return f'<img src="data:image/png;base64,{data["image/png"].strip()}" alt="{words}">'
     if "text/markdown" in data:
         return markup(data["text/markdown"])
     if "text/latex" in data:
-        return f'<div class="formula">{mathml(data["text/latex"], block=True)}</div>'
+        return formula(data["text/latex"])
     return data.get("text/html") or f"<pre>{escape(data['text/plain'])}</pre>"

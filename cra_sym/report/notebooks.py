@@ -70,7 +70,19 @@ def _indexed(picture: str) -> str:
     return b64encode(small.getvalue()).decode("ascii")
 
 
-def execute(path: str | Path, advance: Callable[[], Any] | None = None, timeout: int = 600) -> NotebookNode:
+_SVG_TOO = """
+def show_figures_as_svg_too(*_):
+    from functools import partial
+    from IPython.core.pylabtools import print_figure
+    svg = get_ipython().display_formatter.formatters["image/svg+xml"]
+    svg.for_type_by_name("matplotlib.figure", "Figure", partial(print_figure, fmt="svg", metadata={"Date": None}))
+get_ipython().events.register("pre_run_cell", show_figures_as_svg_too)
+"""
+
+
+def execute(
+    path: str | Path, advance: Callable[[], Any] | None = None, timeout: int = 600, *, svg: bool = False
+) -> NotebookNode:
     """Execute one notebook in a fresh kernel of this Python, in its own folder, and return it with its outputs.
 
     Parameters
@@ -81,6 +93,8 @@ def execute(path: str | Path, advance: Callable[[], Any] | None = None, timeout:
         Called after each code cell; what it raises ends the run.
     timeout : int
         Seconds allowed for one cell.
+    svg : bool
+        Whether figures shown by value are also kept as SVG, whatever formats the notebook itself asks for.
 
     Raises
     ------
@@ -98,7 +112,7 @@ def execute(path: str | Path, advance: Callable[[], Any] | None = None, timeout:
     notebook = nbformat.read(path, as_version=4)
     # No kernel directories: of the kernels called python3, only that of the running Python is meant.
     manager = AsyncKernelManager(kernel_name="python3", kernel_spec_manager=KernelSpecManager(kernel_dirs=[]))
-    client = NotebookClient(
+    client: Any = NotebookClient(
         notebook,
         km=manager,
         timeout=timeout,
@@ -106,6 +120,7 @@ def execute(path: str | Path, advance: Callable[[], Any] | None = None, timeout:
         record_timing=False,
         coalesce_streams=True,
         resources={"metadata": {"path": str(path.parent)}},
+        on_notebook_start=lambda **_: client.kc.execute(_SVG_TOO, silent=True, store_history=False) if svg else None,
         on_cell_executed=lambda **_: advance() if advance is not None else None,
     )
     try:
@@ -127,10 +142,10 @@ def cells_to_run(paths: Iterable[Path]) -> int:
     )
 
 
-def refresh(paths: Sequence[Path]) -> None:
+def refresh(paths: Sequence[Path], *, svg: bool = False) -> None:
     """Execute notebooks, as many at once as there are processors, and store their outputs in place.
 
-    A failing one keeps its file, and nothing more is begun.
+    A failing one keeps its file, and nothing more is begun. ``svg`` is that of :func:`execute`.
     """
     import nbformat
 
@@ -145,7 +160,7 @@ def refresh(paths: Sequence[Path]) -> None:
         tqdm(total=cells_to_run(paths), unit="cell", disable=None) as progress,
         ThreadPoolExecutor(max_workers=min(len(paths), os.cpu_count() or 1)) as pool,
     ):
-        running = {pool.submit(execute, path, advance): path for path in paths}
+        running = {pool.submit(execute, path, advance, svg=svg): path for path in paths}
         try:
             for finished in as_completed(running):
                 write_text(running[finished], nbformat.writes(finished.result()) + "\n")

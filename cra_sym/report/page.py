@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import base64
-import inspect
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
-from html import escape
-from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,10 +12,13 @@ from typing import TYPE_CHECKING, Any
 from tqdm import tqdm
 
 import cra_sym
-from cra_sym.figures import FIGURES
+from cra_sym.claims import OUTCOMES, claims
+from cra_sym.claims.pictures import MARKS
+from cra_sym.figures import ANIMATIONS, FIGURES
 from cra_sym.files import write_text
 from cra_sym.report.chapters import Chapter, chapter
-from cra_sym.report.markup import Markup, anchor, mathml
+from cra_sym.report.exhibits import claim_entries, figure
+from cra_sym.report.markup import Markup, anchor, formula
 from cra_sym.report.tables import TABLES, Table
 
 if TYPE_CHECKING:
@@ -28,11 +27,11 @@ if TYPE_CHECKING:
 __all__ = ["write_page"]
 
 _VERSIONS = ("sympy", "mpmath", "numpy", "scipy", "numba", "matplotlib")
-_OWN_SECTION = {"equations", "nomenclature"}  # shown otherwise: as formulas, and in the overview
+_OWN_SECTION = {"equations", "nomenclature", "claims"}  # shown otherwise: as formulas, in the overview, with pictures
 
 
 def write_page(folder: Path) -> Path:
-    """Write ``report.html`` from the executed notebooks and the figures in ``folder``, and return its path."""
+    """Write ``report.html`` from the notebooks, figures and pictures of claims in ``folder``, and return its path."""
     import nbformat
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from pygments.formatters import HtmlFormatter
@@ -41,8 +40,13 @@ def write_page(folder: Path) -> Path:
     names = [path.stem for path in notebooks]
     equations = _equations()
     numbers = [str(entry.equation.number) for entry in equations]
-    figures = {name: _figure(name, folder / "figures" / f"{name}.svg") for name in FIGURES}
-    chapters = [chapter(path.stem, nbformat.read(path, as_version=4), names, numbers, figures) for path in notebooks]
+    verdicts = claims()
+    ids = [verdict.id for verdict in verdicts]
+    figures = {name: figure(name, folder / "figures") for name in FIGURES}
+    chapters = [
+        chapter(path.stem, nbformat.read(path, as_version=4), Markup(path.stem, names, numbers, ids), figures)
+        for path in notebooks
+    ]
     shown = {name for part in chapters for name in part.figures}
     environment = Environment(
         loader=PackageLoader("cra_sym", "report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
@@ -51,6 +55,10 @@ def write_page(folder: Path) -> Path:
         chapters=chapters,
         contents=[_contents(part) for part in chapters],
         equations=equations,
+        claims=claim_entries(verdicts, folder / "claims", Markup("claims", names, numbers)),
+        counts=[(name, count) for name in OUTCOMES if (count := sum(v.outcome == name for v in verdicts))],
+        marks={name: mark for name, (mark, _) in MARKS.items()},
+        animations=[figure(name, folder / "figures") for name in ANIMATIONS],
         figures=[html for name, html in figures.items() if name not in shown],
         tables={name: _table(make()) for name, make in TABLES.items() if name not in _OWN_SECTION},
         versions={"Python": ".".join(map(str, sys.version_info[:3])), **{name: version(name) for name in _VERSIONS}},
@@ -91,7 +99,7 @@ def _equations() -> list[_Entry]:
         _Entry(
             equation=e,
             anchor=anchor("eq", e.number),
-            formula=mathml(e._repr_latex_(), block=True),
+            formula=formula(e._repr_latex_()),
             statement=markup(e.statement),
             route=markup(e.checked_by),
             confirmed=e.check(),
@@ -100,15 +108,6 @@ def _equations() -> list[_Entry]:
         )
         for e in tqdm(found, unit="equation", disable=None)
     ]
-
-
-def _figure(name: str, svg: Path) -> str:
-    """Return a figure with its caption, the first paragraph of the docstring of the function that draws it."""
-    module, function = FIGURES[name].split(":")
-    caption = inspect.cleandoc(getattr(import_module(module), function).__doc__).split("\n\n")[0].replace("\n", " ")
-    data = base64.b64encode(svg.read_bytes()).decode("ascii")
-    image = f'<img src="data:image/svg+xml;base64,{data}" alt="{escape(caption, quote=True)}">'
-    return f'<figure id="{anchor(name)}">{image}<figcaption>{escape(caption)}</figcaption></figure>'
 
 
 def _table(table: Table) -> str:

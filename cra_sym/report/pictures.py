@@ -12,12 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
 
-from cra_sym.figures import FIGURES, draw, shows_an_arm
+from cra_sym.figures import ANIMATIONS, FIGURES, animate, draw, shows_an_arm
+from cra_sym.files import write_text
 
 if TYPE_CHECKING:
-    from cra_sym.arm.parameters import Arm
+    from matplotlib.figure import Figure
 
-__all__ = ["save_figures"]
+    from cra_sym.arm.parameters import Arm
+    from cra_sym.claims import Verdict
+
+__all__ = ["save_animations", "save_claims", "save_figures"]
 
 _OPTIONS: dict[str, dict[str, Any]] = {"png": {"dpi": 200}, "svg": {"metadata": {"Date": None}}}
 
@@ -33,19 +37,38 @@ def save_figures(
 
     The files depend on the figures alone: no date, and SVG identifiers that are the same in each run.
     """
+    chosen = [name for name in FIGURES if arm is None or shows_an_arm(name)] if names is None else set(names)
+    bar = tqdm(sorted(chosen), unit="figure", disable=None)
+    return [path for name in bar for path in _save(draw(name, arm), folder, name, kinds)]
+
+
+def save_claims(folder: Path, verdicts: Iterable[Verdict], kinds: Sequence[str] = ("svg",)) -> list[Path]:
+    """Draw each verdict from its evidence and return the files made, named by the claims."""
+    return [
+        path
+        for verdict in tqdm(verdicts, unit="claim", disable=None)
+        for path in _save(verdict.draw(), folder, verdict.id, kinds)
+    ]
+
+
+def save_animations(folder: Path) -> list[Path]:
+    """Write every animation as SVG and return the files made."""
+    made = [folder / f"{name}.svg" for name in ANIMATIONS]
+    for path in made:
+        write_text(path, animate(path.stem))
+    return made
+
+
+def _save(figure: Figure, folder: Path, name: str, kinds: Sequence[str]) -> list[Path]:
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     folder.mkdir(parents=True, exist_ok=True)
-    made = []
-    chosen = [name for name in FIGURES if arm is None or shows_an_arm(name)] if names is None else set(names)
-    for name in tqdm(sorted(chosen), unit="figure", disable=None):
-        figure = draw(name, arm)
-        FigureCanvasAgg(figure)
-        with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "path"}):
-            for kind in kinds:
-                made.append(folder / f"{name}.{kind}")
-                figure.savefig(made[-1], format=kind, **_OPTIONS[kind])
+    FigureCanvasAgg(figure)
+    made = [folder / f"{name}.{kind}" for kind in kinds]
+    with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "path"}):
+        for path, kind in zip(made, kinds, strict=True):
+            figure.savefig(path, format=kind, **_OPTIONS[kind])
     return made
 
 

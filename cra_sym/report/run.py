@@ -8,10 +8,11 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from cra_sym.claims import claims
 from cra_sym.files import staged_directory, write_text
 from cra_sym.report.notebooks import find_notebooks, refresh
 from cra_sym.report.page import write_page
-from cra_sym.report.pictures import save_figures
+from cra_sym.report.pictures import save_animations, save_claims, save_figures
 from cra_sym.report.tables import TABLES
 
 __all__ = ["reproduce"]
@@ -43,6 +44,8 @@ def reproduce(output: str | Path, notebooks: str | Path | None = None) -> str:
     with staged_directory(output) as folder:
         _run_notebooks(sources[0].parent, folder / "notebooks")
         save_figures(folder / "figures")
+        save_animations(folder / "figures")
+        save_claims(folder / "claims", claims())
         _write_tables(folder / "tables")
         write_page(folder)
         listing = _listing(folder)
@@ -51,7 +54,7 @@ def reproduce(output: str | Path, notebooks: str | Path | None = None) -> str:
 
 def _run_notebooks(source: Path, folder: Path) -> None:
     shutil.copytree(source, folder, ignore=shutil.ignore_patterns(".*"))
-    refresh(find_notebooks(folder))
+    refresh(find_notebooks(folder), svg=True)
 
 
 def _write_tables(folder: Path) -> None:
