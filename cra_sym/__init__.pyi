@@ -2,7 +2,6 @@ from .arm.analysis import frequency_parameters as frequency_parameters
 from .arm.analysis import modal_parameters as modal_parameters
 from .arm.analysis import mode_shapes as mode_shapes
 from .arm.analysis import natural_frequencies as natural_frequencies
-from .arm.base_motion import BaseMotion as BaseMotion
 from .arm.certification import certify as certify
 from .arm.equations import equation as equation
 from .arm.equations import equations as equations
@@ -28,6 +27,8 @@ from .codegen import export as export
 from .explorer import explore as explore
 from .kernels import kernel as kernel
 from .model import Model as Model
+from .solvers.motion import BaseMotion as BaseMotion
+from .solvers.motion import Force as Force
 from .studies import sweep as sweep
 
 __version__: str

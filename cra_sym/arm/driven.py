@@ -8,9 +8,9 @@ import mpmath
 from sympy import Add, Eq, Expr, I, Integral, Rational, cos, expand_mul, lambdify, pi, sin, sinc
 from sympy.simplify.fu import TR8
 
-from cra_sym.arm.duhamel import unit_responses
 from cra_sym.arm.equations import checks, numbered
 from cra_sym.arm.modal_dynamics import duhamel, dynamic_equation
+from cra_sym.model.oscillator import unit_responses
 from cra_sym.symbols import dimension, symbol
 
 __all__ = ["base_motion", "modal_response"]
@@ -70,7 +70,7 @@ def _integrated(term: Expr) -> Expr:
 @checks(34)
 def _() -> bool:
     """Another derivation, by divided differences of the exponential function: the unit responses of
-    :mod:`cra_sym.arm.duhamel` without damping, away from resonance, near it and at it; and it solves (11)."""
+    :mod:`cra_sym.model.oscillator` without damping, away from resonance, near it and at it; and it solves (11)."""
     unit, push, start = unit_responses(), -Gamma_i / M_i, base_motion().rhs.diff(t).subs(t, 0)
     wave = unit.harmonic * (cos(psi) + I * sin(psi))
     numbers = {v_m: 0.3, a_m: -0.7, B: 0.05, psi: 0.9, Gamma_i: 0.4, M_i: 1.3, omega_i: 2, zeta_i: 0}

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from cra_sym.arm.analysis import ModalParameters, modal_parameters, mode_shapes
-from cra_sym.arm.base_motion import BaseMotion, Harmonic, Piecewise
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import broadcastable, count, instance, real_array
 from cra_sym.kernels import derived_kernel
 from cra_sym.solvers import modal_response as solver
+from cra_sym.solvers.driven_modes import Start, driven_response, state_at_stop
+from cra_sym.solvers.motion import BaseMotion
 
 __all__ = ["residual_vibration", "response", "tip_response"]
 
-Start = Literal["inertial", "base"]
-
 _DAMPING: dict[str, Any] = {"low": 0.0, "high": np.nextafter(1.0, 0.0), "allowed": "real numbers in [0, 1)"}
 
-_free = derived_kernel("cra_sym.arm.duhamel:free_kernel", backend="numpy")
-_forced = derived_kernel("cra_sym.arm.duhamel:forced_kernel", backend="numpy")
+_free = derived_kernel("cra_sym.model.oscillator:free_kernel", backend="numpy")
+_forced = derived_kernel("cra_sym.model.oscillator:forced_kernel", backend="numpy")
 
 
 def tip_response(
@@ -47,7 +46,7 @@ def tip_response(
     modes = count("modes", modes)
     parameters = modal_parameters(arm, modes)
     osc = _oscillators(arm, parameters, parameters.tip_displacement[..., None, :], zeta)
-    values = _response(osc, motion, t, derivative, start)[..., 0, :]
+    values = driven_response(osc, motion, t, derivative, start)[..., 0, :]
     return values if np.ndim(t) else values[..., 0]
 
 
@@ -105,7 +104,7 @@ def response(
     modes = count("modes", modes)
     rows = np.swapaxes(mode_shapes(arm, np.atleast_1d(places), modes), -1, -2)
     osc = _oscillators(arm, modal_parameters(arm, modes), rows, zeta)
-    values = _response(osc, motion, t, derivative, start)
+    values = driven_response(osc, motion, t, derivative, start)
     values = values if places.ndim else values[..., 0, :]
     return values if np.ndim(t) else values[..., 0]
 
@@ -137,7 +136,7 @@ def residual_vibration(arm: Arm, motion: BaseMotion, modes: int = 5, *, zeta: An
         raise ValueError("motion never stops accelerating: allowed are moves with a stop, or sampled records")
     parameters = modal_parameters(arm, count("modes", modes))
     osc = _oscillators(arm, parameters, parameters.tip_displacement[..., None, :], zeta)
-    q, u = _state_at_stop(osc, motion)
+    q, u = state_at_stop(osc, motion)
     # a rigid-body mode keeps its inertial momentum: its velocity is the base's, rounding if the base has really stopped
     drift = -osc.gamma * _column(motion.velocity(np.max(motion.duration)))
     u = np.where(osc.omega > 0, u, np.where(np.abs(drift) > 1e-9 * np.abs(osc.gamma), drift, 0.0))
@@ -159,57 +158,3 @@ def _oscillators(arm: Arm, parameters: ModalParameters, rows: np.ndarray, zeta: 
     if shape[-1] != parameters.omega.shape[-1]:
         raise ValueError(f"zeta has shape {ratios.shape}: its last axis must have one value, or one for each mode")
     return solver.Oscillators(parameters.omega, ratios, parameters.participation, rows, _free, _forced)
-
-
-def _response(osc: solver.Oscillators, motion: BaseMotion, t: Any, derivative: int, start: Start) -> np.ndarray:
-    """Return the outputs at the times, shape (..., outputs, times)."""
-    instance("motion", motion, BaseMotion)
-    times = real_array("t", t, low=0.0)
-    if times.ndim > 1:
-        raise ValueError(f"t has shape {times.shape}: allowed are a number or one axis of times")
-    derivative = count("derivative", derivative, low=0, high=2)
-    if start not in ("inertial", "base"):
-        raise ValueError(f"start = {start!r}: allowed are 'inertial' and 'base'")
-    grid = np.atleast_1d(times)
-    modes = osc.omega.shape[:-1]
-    shape = broadcastable(arm=np.empty(modes), zeta=osc.zeta[..., 0], motion=np.empty(motion.shape))
-    parts = [solver.piecewise_response(osc, piece, grid, derivative) for piece in _pieces(motion)]
-    steady = _steady(osc, motion, start)
-    if steady is not None:
-        parts.append(solver.steady_response(osc, steady, grid, derivative))
-    wanted = (*shape, osc.rows.shape[-2], grid.size)
-    if not parts:
-        return np.zeros(wanted)
-    total = sum(parts[1:], parts[0])
-    return total if total.shape == wanted else np.broadcast_to(total, wanted).copy()
-
-
-def _profiles(motion: BaseMotion, *, mean: bool) -> list[Piecewise]:
-    """Return the terms that are a mean motion, one constant acceleration from t = 0 on, or the other profiles."""
-    profiles = [term for term in motion.terms if isinstance(term, Piecewise)]
-    return [p for p in profiles if mean is (p.knots.shape == (1,) and not (p.knots.any() or p.jerk.any()))]
-
-
-def _pieces(motion: BaseMotion) -> list[solver.Piecewise]:
-    return [solver.Piecewise(p.knots, p.acceleration, p.jerk) for p in _profiles(motion, mean=False)]
-
-
-def _steady(osc: solver.Oscillators, motion: BaseMotion, start: Start) -> solver.Steady | None:
-    """Collect initial velocity, constant acceleration and harmonics, or return None if there are none."""
-    harmonics = [solver.Harmonics(*map(_column, term)) for term in motion.terms if isinstance(term, Harmonic)]
-    level = sum((profile.acceleration for profile in _profiles(motion, mean=True)), np.zeros(1))
-    impulse = -osc.gamma * _column(motion.velocity(0.0)) * (start == "inertial")
-    return solver.Steady(impulse, level, harmonics) if harmonics or level.any() or impulse.any() else None
-
-
-def _state_at_stop(osc: solver.Oscillators, motion: BaseMotion) -> tuple[np.ndarray, np.ndarray]:
-    """Return q and q' when the base stops accelerating, shape (..., modes)."""
-    stop = _column(motion.duration)
-    rest = np.zeros(1), -osc.gamma * _column(motion.velocity(0.0))
-    q, u = solver.free_motion(osc, stop, rest)
-    for piece in _pieces(motion):
-        q_knots, u_knots = solver.knot_states(osc, piece)
-        end = q_knots[..., -1], u_knots[..., -1]
-        q_piece, u_piece = solver.free_motion(osc, stop - piece.knots[..., -1:], end)
-        q, u = q + q_piece, u + u_piece
-    return q, u

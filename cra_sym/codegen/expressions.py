@@ -8,11 +8,12 @@ from typing import Any
 
 import sympy as sp
 
-from cra_sym.arm import characteristic, duhamel, shapes
+from cra_sym.arm import characteristic, shapes
 from cra_sym.arm.characteristic import BASIS, PARAMETERS
 from cra_sym.codegen.complex_parts import complex_parts
 from cra_sym.codegen.program import Function, function, scalars
 from cra_sym.mechanics import multiple_scales
+from cra_sym.model import oscillator
 from cra_sym.symbols import symbol
 
 __all__ = ["gauss_rule", "modal_functions", "spectrum_functions", "stability_functions"]
@@ -96,7 +97,7 @@ _mass.__name__ = "modal_mass"
 def _responses() -> list[Function]:
     """Return the closed forms of Duhamel's integral, in real numbers."""
     t, omega, zeta, varpi = (symbol(name) for name in ("t", "omega_i", "zeta_i", "varpi"))
-    unit = duhamel.guarded_responses()
+    unit = oscillator.guarded_responses()
     times = [("t", t), ("omega", omega), ("zeta", zeta)]
     return [
         function("free_response", "Answers to unit displacement and to unit velocity.", unit[:2], times),

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cra_sym.arm.base_motion import BaseMotion
 from cra_sym.arm.parameters import Arm
 from cra_sym.arm.response import tip_response
 from cra_sym.figures.drawing import BLUE, ORANGE
+from cra_sym.solvers.motion import BaseMotion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from sympy import Derivative, Expr, S, Symbol, sympify
+from sympy import Expr, S, Symbol, sympify
 from sympy.core.function import AppliedUndef
 
 from cra_sym.checks import count, real_array
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics import HamiltonResult, Modal, StateForm, hamilton, ritz, separate, state_form
-from cra_sym.mechanics.jets import listed
+from cra_sym.mechanics.jets import Jet, listed
+from cra_sym.mechanics.weak import weak_form
 from cra_sym.model.forced import driven_displacement, steady_states
 from cra_sym.model.galerkin import Ritz
-from cra_sym.model.modes import Modes
-from cra_sym.model.spatial import SpatialProblem
+from cra_sym.model.modes import Modes, tip_sign
+from cra_sym.model.projection import modal_basis
+from cra_sym.model.response import History, oscillation
+from cra_sym.model.spatial import SpatialProblem, shares
+from cra_sym.model.symmetry import asymmetry, odd_in_time
 from cra_sym.model.units import check_dimensions
-from cra_sym.model.values import Values
+from cra_sym.model.values import Values, parameters
+from cra_sym.solvers.driven_modes import Start
 from cra_sym.solvers.eigenvalues import lowest, refine
 from cra_sym.solvers.shapes import mode_states
-from cra_sym.solvers.stiffness import DynamicStiffness
 
 __all__ = ["Model"]
 
@@ -48,6 +51,8 @@ class Model:
         What vanishes at an end, such as ``v.subs(x, 0)``.
     coordinates : sequence of applied undefined functions, optional
         Lumped coordinates ``w(t)``.
+    prescribed : sequence of applied undefined functions, optional
+        Motions ``w(t)`` that are given, see `response`. A force ``F(t)`` needs no mention.
     virtual_work : sequence of (force, displacement, place), optional
         Non-conservative forces; place is 'left', 'right' or 'domain'.
     units : mapping, optional
@@ -89,12 +94,14 @@ class Model:
         right: Expr | None = None,
         essential: Sequence[Expr] = (),
         coordinates: Sequence[AppliedUndef] = (),
+        prescribed: Sequence[AppliedUndef] = (),
         virtual_work: Sequence[tuple[Expr, Expr, Any]] | None = None,
         units: Mapping[Any, str] | None = None,
     ) -> None:
         self._options: dict[str, Any] = {
             "fields": listed("fields", fields),
             "coordinates": listed("coordinates", coordinates),
+            "prescribed": listed("prescribed", prescribed),
             "x": x,
             "domain": listed("domain", domain),
             "t": t,
@@ -106,10 +113,12 @@ class Model:
         self._virtual_work = listed("virtual_work", () if virtual_work is None else virtual_work)
         self.equations: HamiltonResult = hamilton(density, virtual_work=self._virtual_work, **self._options)
         """Equations of motion, boundary conditions and the steps that led there."""
-        given = ((f"{end} end", self._options[end]) for end in ("left", "right"))
-        ends = {label: sympify(term, strict=True) for label, term in given if term is not None}
+        stated = ((f"{end} end", self._options[end]) for end in ("left", "right"))
+        ends = {label: sympify(term, strict=True) for label, term in stated if term is not None}
         check_dimensions(sympify(density, strict=True), ends, units or {})
-        self.symbols: tuple[Symbol, ...] = self._parameters()
+        given = [density, *self._options["domain"], *self._options["essential"], *ends.values()]
+        given += [part for force, displacement, _ in self._virtual_work for part in (force, displacement)]
+        self.symbols: tuple[Symbol, ...] = parameters(given, self.equations)
         """The parameters: every symbol but x and t, by name."""
 
     def __repr__(self) -> str:
@@ -118,22 +127,6 @@ class Model:
 
     def _repr_latex_(self) -> str:
         return self.equations._repr_latex_()
-
-    def _parameters(self) -> tuple[Symbol, ...]:
-        given = [self._density, *self._options["domain"], *self._options["essential"]]
-        given += [self._options[end] for end in ("left", "right") if self._options[end] is not None]
-        given += [part for force, displacement, _ in self._virtual_work for part in (force, displacement)]
-        expressions = [sympify(part, strict=True) for part in given]
-        own = {self._options["x"], self._options["t"]}
-        known = {f.func for f in (*self.equations.fields, *self.equations.coordinates)}
-        for function in {f for e in expressions for f in e.atoms(AppliedUndef) if f.func not in known}:
-            if own <= function.free_symbols:
-                raise ValueError(f"{function} is not one of the fields {list(map(str, self.equations.fields))}")
-        found = sorted({s for e in expressions for s in e.free_symbols} - own, key=lambda s: (s.name, str(s)))
-        for first, second in itertools.pairwise(found):
-            if first.name == second.name:
-                raise ValueError(f"two different symbols are named {first.name}: their assumptions differ")
-        return tuple(found)
 
     # ------------------------------------------------------------------------------------------------- symbolic
 
@@ -149,7 +142,7 @@ class Model:
             form = self.state_form
         else:
             form = state_form(hamilton(self._density, virtual_work=self._undamped_work(), **self._options))
-        problem = _asymmetry(form)
+        problem = asymmetry(form)
         if problem:
             raise ValueError(f"natural frequencies need conservative forces, and {problem}; use eigenvalues")
         return form
@@ -159,14 +152,14 @@ class Model:
 
         def still(force: Expr) -> Expr:
             terms = sympify(force, strict=True).expand().as_ordered_terms()
-            return sum((term for term in terms if not _odd_in_time(term, t)), S.Zero)
+            return sum((term for term in terms if not odd_in_time(term, t)), S.Zero)
 
         kept = ((still(force), displacement, place) for force, displacement, place in self._virtual_work)
         return tuple(work for work in kept if work[0] != 0)
 
     @cached_property
     def _damped(self) -> SpatialProblem:
-        return SpatialProblem(self.state_form, self.symbols, self._left)
+        return SpatialProblem(self.state_form, self.symbols, self._left, self.equations.fields)
 
     @property
     def _left(self) -> Expr:
@@ -174,7 +167,7 @@ class Model:
 
     @cached_property
     def _spatial(self) -> SpatialProblem:
-        return SpatialProblem(self._conservative, self.symbols, self._left)
+        return SpatialProblem(self._conservative, self.symbols, self._left, self.equations.fields)
 
     def separate(self, **options: Any) -> Modal:
         """Separate the variables: characteristic matrix and function, mode shapes, in closed form."""
@@ -255,7 +248,7 @@ class Model:
             If a refinement does not settle.
         """
         modes = count("modes", modes)
-        if not self.state_form.damped and not _asymmetry(self.state_form):
+        if not self.state_form.damped and not asymmetry(self.state_form):
             return 1j * _TAU * self.natural_frequencies(values, modes)
         given = Values.read(self.symbols, values)
         guesses = self.ritz(2 * modes + 10).eigenvalues(values, modes, oscillating=oscillating).reshape(-1, modes)
@@ -306,9 +299,9 @@ class Model:
         place = self._conservative.displacements.index(wanted)
         shapes = np.empty((given.columns.shape[1], modes, len(x)))
         for rows, left, problem in self._spatial.problems(given):
-            z, share = lowest(problem, modes), self._shares(x, left, problem)
+            z, share = lowest(problem, modes), shares(x, left, problem.length, "x_values")
             state = mode_states(problem, z, np.concatenate([share, np.ones((len(rows), 1))], axis=1))
-            sign = _tip_sign(state[:, :, -1, : problem.displacements])
+            sign = tip_sign(state[:, :, -1, : problem.displacements])
             row = self._spatial.derivative_row(place, derivative, z, x, given.take(rows))
             shapes[rows] = sign * (row * state[:, :, :-1]).sum(axis=-1)
         return shapes.reshape(*given.shape, modes, len(x))
@@ -353,23 +346,90 @@ class Model:
         for rows, left, problem in self._damped.problems(given):
             row = np.repeat(np.arange(len(rows)), len(omega))
             parameter = np.tile(1j * omega if form.damped else omega**2, len(rows))
-            share = self._shares(x, left, problem)[row]
+            share = shares(x, left, problem.length, "x_values")[row]
             state = steady_states(problem, parameter, row, share, driven, kind)
             found[rows] = state[..., place].reshape(len(rows), len(omega), len(x))
         return found.reshape(*given.shape, len(omega), len(x))
+
+    def response(
+        self,
+        values: Mapping[Any, Any],
+        motion: Mapping[AppliedUndef, History] | None,
+        t: Any,
+        x: Any,
+        modes: int = 5,
+        derivative: int = 0,
+        *,
+        initial: Mapping[Expr, Expr] | None = None,
+        zeta: Any = 0.0,
+        field: AppliedUndef | None = None,
+        start: Start = "inertial",
+    ) -> np.ndarray:
+        """Return a field in time: the modes driven by prescribed motions and forces, or let go from an initial state.
+
+        Parameters
+        ----------
+        values : mapping
+        motion : mapping of function of t to BaseMotion or Force
+            What the prescribed motions and the forces of the Lagrangian and of the virtual work are. A motion must
+            act by its acceleration alone: measure the fields from the frame that moves. Constant loads act from t = 0.
+        t : array_like
+            Times from 0 on, s.
+        x : array_like
+            Place or one axis of places.
+        modes : int
+            Modes in the sum.
+        derivative : {0, 1, 2}
+            By time.
+        initial : mapping of field, coordinate or its first time derivative to an expression in x, optional
+            State at t = 0, such as ``{v: a*x**2, v.diff(t): 0}``; at rest otherwise.
+        zeta : array_like, optional
+            Modal damping ratios in [0, 1) beside the dampers of the model, one or one for each mode.
+        field : applied undefined function, optional
+            Default: the first.
+        start : {'inertial', 'base'}
+            At rest before t = 0 in the inertial frame, or seen from the moving one.
+
+        Returns
+        -------
+        ndarray, shape (..., x, t)
+            A single x or t has no axis.
+
+        Raises
+        ------
+        ValueError
+            Names the load without a history, or the function that is not at rest, known or allowed.
+        """
+        modes = count("modes", modes)
+        wanted, given = self._field(field), Values.read(self.symbols, values)
+        places = np.empty(()) if x is None else real_array("x", x)
+        if places.ndim > 1:
+            raise ValueError(f"x has shape {places.shape}: allowed are a number or one axis of places")
+        basis = modal_basis(self._spatial, given, modes, None if x is None else np.atleast_1d(places))
+        shape = Jet(self.equations.fields.index(wanted), 0, 0, None)
+        rows = basis.values(shape)[..., basis.places]
+        weak = weak_form(self.equations.variation)
+        found = oscillation(basis, weak, motion or {}, rows, given.shape, t, derivative, zeta, start, initial or {})
+        found = found if places.ndim else found[..., 0, :]
+        return found if np.ndim(t) else found[..., 0]
+
+    def tip_response(
+        self,
+        values: Mapping[Any, Any],
+        motion: Mapping[AppliedUndef, History] | None,
+        t: Any,
+        modes: int = 5,
+        derivative: int = 0,
+        **options: Any,
+    ) -> np.ndarray:
+        """Return a field of the right end in time; as `response`, shape (..., t)."""
+        return self.response(values, motion, t, None, modes, derivative, **options)
 
     def _field(self, field: AppliedUndef | None) -> AppliedUndef:
         wanted = self.equations.fields[0] if field is None else field
         if wanted not in self.equations.fields:
             raise ValueError(f"field = {field}: allowed are {', '.join(map(str, self.equations.fields))}")
         return wanted
-
-    def _shares(self, x: np.ndarray, left: np.ndarray, problem: DynamicStiffness) -> np.ndarray:
-        """Return the positions as shares of the length, shape (rows, stations)."""
-        share = (x - left[:, None]) / problem.length[:, None]
-        if (share < -1e-12).any() or (share > 1.0 + 1e-12).any():
-            raise ValueError(f"x_values = {x}: allowed is the domain {self.equations.domain}")
-        return np.clip(share, 0.0, 1.0)
 
     def modal_parameters(self, values: Mapping[Any, Any], modes: int = 3) -> Modes:
         """Return frequencies with the mass-normalised displacements and natural forces of both ends."""
@@ -381,33 +441,7 @@ class Model:
         for rows, _, problem in self._spatial.problems(given):
             z = lowest(problem, modes)
             state = mode_states(problem, z, np.tile([0.0, 1.0], (len(rows), 1)))
-            omega[rows], ends[rows] = np.sqrt(z), state * _tip_sign(state[:, :, 1, :n])[..., None]
+            omega[rows], ends[rows] = np.sqrt(z), state * tip_sign(state[:, :, 1, :n])[..., None]
         ends = ends.reshape(*given.shape, modes, 2, 2 * n + m)
         q, w, p = ends[..., :n], ends[..., 0, n : n + m], ends[..., n + m :]
         return Modes(omega.reshape(*given.shape, modes), q[..., 0, :], q[..., 1, :], p[..., 0, :], p[..., 1, :], w)
-
-
-def _tip_sign(tip: np.ndarray) -> np.ndarray:
-    """Return the sign that makes the first tip displacement which is not zero positive, shape (..., 1)."""
-    scale = np.abs(tip).max(axis=-2, keepdims=True)
-    moving = np.abs(tip) > 1e-7 * np.where(scale > 0.0, scale, 1.0)
-    first = np.take_along_axis(tip, moving.argmax(axis=-1)[..., None], axis=-1)
-    return np.where(first < 0.0, -1.0, 1.0)
-
-
-def _odd_in_time(term: Expr, t: Symbol) -> bool:
-    """Tell whether a force term changes sign when time runs backwards."""
-    orders = (number for node in term.atoms(Derivative) for symbol, number in node.variable_count if symbol == t)
-    return sum(orders) % 2 == 1
-
-
-def _asymmetry(form: StateForm) -> str:
-    """Return what keeps the problem from being symmetric, or an empty text."""
-    if form.damped:
-        return "the Lagrangian has terms of first order in time"
-    half = form.system.rows // 2
-    a, b, c, d = (form.system[i : i + half, j : j + half] for i in (0, half) for j in (0, half))
-    pairs = ((b, b.T), (c, c.T), (d, -a.T), (form.boundary, form.boundary.T))
-    if all(entry.expand() == 0 for left, right in pairs for entry in left - right):
-        return ""
-    return "the virtual work has forces that follow the motion"

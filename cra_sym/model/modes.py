@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Modes"]
+__all__ = ["Modes", "tip_sign"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,3 +36,11 @@ class Modes:
     def frequency(self) -> np.ndarray:
         """Hz."""
         return self.omega / (2.0 * np.pi)
+
+
+def tip_sign(tip: np.ndarray) -> np.ndarray:
+    """Return the sign that makes the first tip displacement which is not zero positive, shape (..., 1)."""
+    scale = np.abs(tip).max(axis=-2, keepdims=True)
+    moving = np.abs(tip) > 1e-7 * np.where(scale > 0.0, scale, 1.0)
+    first = np.take_along_axis(tip, moving.argmax(axis=-1)[..., None], axis=-1)
+    return np.where(first < 0.0, -1.0, 1.0)

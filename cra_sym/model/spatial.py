@@ -14,7 +14,7 @@ from cra_sym.mechanics import StateForm
 from cra_sym.model.values import Values
 from cra_sym.solvers.stiffness import DynamicStiffness
 
-__all__ = ["SpatialProblem"]
+__all__ = ["SpatialProblem", "shares"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +28,14 @@ class SpatialProblem:
         All parameters of the model.
     left : Expr
         Coordinate of the left end.
+    fields : tuple of Expr
+        The unknown functions of x, in the order of the model.
     """
 
     form: StateForm
     symbols: tuple[Symbol, ...]
     left: Expr
+    fields: tuple[Expr, ...] = ()
 
     @cached_property
     def _kernels(self):
@@ -109,6 +112,14 @@ class SpatialProblem:
             allowed = ", ".join(s.name for s in self._end_stiffness) or "none"
             raise ValueError(f"{symbol.name} = inf: allowed only for a stiffness of an end ({allowed})")
         return kernel(self._end_stiffness[symbol], self.symbols, backend="numpy")(*columns)
+
+
+def shares(x: np.ndarray, left: np.ndarray, length: np.ndarray, name: str = "x") -> np.ndarray:
+    """Return places as shares of the length, shape (rows, stations)."""
+    share = (x - left[:, None]) / length[:, None]
+    if (share < -1e-12).any() or (share > 1.0 + 1e-12).any():
+        raise ValueError(f"{name} = {x}: allowed is the domain, {left.max():g} to {(left + length).min():g}")
+    return np.clip(share, 0.0, 1.0)
 
 
 def _finite(matrices: tuple[np.ndarray, np.ndarray], what: str) -> tuple[np.ndarray, np.ndarray]:

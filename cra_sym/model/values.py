@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from sympy import Symbol
+from sympy import Expr, Symbol, sympify
+from sympy.core.function import AppliedUndef
 
 from cra_sym.checks import broadcastable, real_array
+from cra_sym.mechanics import HamiltonResult
 
-__all__ = ["Values"]
+__all__ = ["Values", "parameters"]
 
 
 @dataclass(frozen=True)
@@ -75,3 +78,18 @@ class Values:
         columns = self.columns[:, rows].copy()
         columns[list(finite)] = 0.0
         return columns
+
+
+def parameters(given: Iterable[Expr], result: HamiltonResult) -> tuple[Symbol, ...]:
+    """Return every symbol of the expressions but x and t, by name; refuse an undeclared field and two of a name."""
+    expressions = [sympify(part, strict=True) for part in given]
+    own = {result.x, result.t}
+    known = {f.func for f in (*result.fields, *result.coordinates)}
+    for function in {f for e in expressions for f in e.atoms(AppliedUndef) if f.func not in known}:
+        if own <= function.free_symbols:
+            raise ValueError(f"{function} is not one of the fields {list(map(str, result.fields))}")
+    found = sorted({s for e in expressions for s in e.free_symbols} - own, key=lambda s: (s.name, str(s)))
+    for first, second in itertools.pairwise(found):
+        if first.name == second.name:
+            raise ValueError(f"two different symbols are named {first.name}: their assumptions differ")
+    return tuple(found)

@@ -14,6 +14,8 @@ from .stiffness import DynamicStiffness, Evaluation, form
 __all__ = ["lowest", "refine"]
 
 _NOISE = 512 * np.finfo(float).eps
+_SOFT, _BLURRED = 1e-8, 1e-14
+"""Relative rounding of a root that is left to Ritz values, and of one whose shape takes part in them."""
 _SWEEPS = 200
 
 
@@ -38,13 +40,15 @@ def lowest(problem: DynamicStiffness, modes: int) -> np.ndarray:
 
     Notes
     -----
-    Roots that come near the rounding of the static stiffness (soft joints, heavy tips) are replaced by the Ritz values
-    of their own shapes; what remains below 1e-24 of the first elastic bound is a rigid-body zero.
+    A root found on the stiffness is replaced by the Rayleigh quotient of its shape, which the rounding of the stiffness
+    enters squared; those near that rounding (soft joints, heavy tips) by Ritz values of their shapes together. What
+    remains below 1e-24 of the first elastic bound is a rigid-body zero.
     """
     rows = len(problem.length)
     every = np.arange(rows)
     static = problem.evaluate(np.zeros(rows), every)
     rigid = _rigid_count(static)
+    asked, modes = modes, max(modes, _soft_count(static))
     wanted = np.arange(1, modes + 1)
     low, below = np.zeros((rows, modes)), np.repeat(rigid[:, None], modes, axis=1)
     high, above, guess, bounds = _upper_bounds(problem, static, modes)
@@ -53,7 +57,7 @@ def lowest(problem: DynamicStiffness, modes: int) -> np.ndarray:
     for sweep in range(_SWEEPS):
         row, mode = np.nonzero(open_)
         if not row.size:
-            return _polish(problem, np.sort(result, axis=1), noise, bounds)
+            return _polish(problem, np.sort(result, axis=1), noise, bounds)[:, :asked]
         z = _next_point(guess[row, mode], low[row, mode], high[row, mode], below[row, mode], above[row, mode], mode + 1)
         here = problem.evaluate(z, row)
         value, step, count, noise[row, mode] = _newton(here, mode + 1)
@@ -70,17 +74,24 @@ def lowest(problem: DynamicStiffness, modes: int) -> np.ndarray:
 
 
 def _polish(problem: DynamicStiffness, z: np.ndarray, noise: np.ndarray, bounds: np.ndarray) -> np.ndarray:
-    """Replace the roots that are close to rounding, the first few of a row, by Ritz values of their shapes."""
-    if not problem.uniform:
-        z = quotients(problem, z)
+    """Replace the roots by quotients of their shapes, and the soft ones, the first few of a row, by Ritz values."""
     last = bounds.shape[1] - 1
-    drowned = np.cumprod(noise > 1e-14 * z, axis=1).sum(axis=1)
-    for number in np.unique(drowned[drowned > 0]):
-        rows = np.nonzero(drowned == number)[0]
-        almost_rigid = np.cumprod(noise[rows, :number] > 1e-3 * z[rows, :number], axis=1).sum(axis=1)
-        value = ritz_values(problem.take(rows), z[rows, :number], almost_rigid)
-        z[rows, :number] = np.where(value > 1e-24 * bounds[rows, None, min(number, last)], value, 0.0)
-    return z
+    soft, span = (np.cumprod(noise > level * z, axis=1).astype(bool) for level in (_SOFT, _BLURRED))
+    polished = np.where(soft, z, quotients(problem, z))
+    number = np.where(soft[:, 0], span.sum(axis=1), 0)
+    for size in np.unique(number[number > 0]):
+        rows = np.nonzero(number == size)[0]
+        almost_rigid = np.cumprod(noise[rows, :size] > 1e-3 * z[rows, :size], axis=1).sum(axis=1)
+        value = ritz_values(problem.take(rows), z[rows, :size], almost_rigid)
+        value = np.where(value > 1e-24 * bounds[rows, None, min(size, last)], value, 0.0)
+        polished[rows, :size] = np.where(soft[rows, :size], value, polished[rows, :size])
+    return polished
+
+
+def _soft_count(static: Evaluation) -> int:
+    """Return how many modes can be soft in any row: their Ritz values need the shapes of all of them."""
+    bounds = _static_bounds(static)
+    return int((bounds < _SOFT * bounds[:, -1:]).sum(axis=1).max(initial=0))
 
 
 def _rigid_count(static: Evaluation) -> np.ndarray:
@@ -105,11 +116,7 @@ def _upper_bounds(problem: DynamicStiffness, static: Evaluation, modes: int):
     Static deflections are admissible motions: their Rayleigh-Ritz values bound the lowest frequencies from above.
     """
     rows = len(static.matrix)
-    mass, frame = np.linalg.eigh(-static.derivative)
-    if (mass[:, 0] < -1e-6 * np.abs(mass).max(axis=1)).any():
-        raise ValueError("values: a static deflection has negative kinetic energy; allowed are masses of at least 0")
-    whitener = frame / np.sqrt(np.maximum(mass, 1e-14 * mass.max(axis=1, keepdims=True)))[:, None, :]
-    bounds = np.linalg.eigvalsh(np.swapaxes(whitener, -1, -2) @ static.matrix @ whitener)
+    bounds = _static_bounds(static)
     guess = np.full((rows, modes), np.nan)
     shared = min(modes, bounds.shape[1])
     guess[:, :shared] = bounds[:, :shared]
@@ -128,6 +135,15 @@ def _upper_bounds(problem: DynamicStiffness, static: Evaluation, modes: int):
             return high, above, guess, bounds
         z[pending] *= 4.0
     raise ValueError(f"modes = {modes}: the model has only {int(above.max())} natural frequencies")
+
+
+def _static_bounds(static: Evaluation) -> np.ndarray:
+    """Return the Rayleigh-Ritz values of the static deflections of the free coordinates."""
+    mass, frame = np.linalg.eigh(-static.derivative)
+    if (mass[:, 0] < -1e-6 * np.abs(mass).max(axis=1)).any():
+        raise ValueError("values: a static deflection has negative kinetic energy; allowed are masses of at least 0")
+    whitener = frame / np.sqrt(np.maximum(mass, 1e-14 * mass.max(axis=1, keepdims=True)))[:, None, :]
+    return np.linalg.eigvalsh(np.swapaxes(whitener, -1, -2) @ static.matrix @ whitener)
 
 
 def _next_point(guess, low, high, below, above, mode):

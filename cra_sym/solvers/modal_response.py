@@ -55,11 +55,12 @@ class Harmonics(NamedTuple):
 
 
 class Steady(NamedTuple):
-    """Initial modal velocities (..., N), a constant base acceleration (..., 1), and harmonics."""
+    """Initial modal velocities (..., N), a constant base acceleration (..., 1), harmonics, initial displacements."""
 
     velocity: Array
     acceleration: Array
     harmonics: Sequence[Harmonics] = ()
+    displacement: Array = np.zeros(1)
 
 
 class Piecewise(NamedTuple):
@@ -134,7 +135,7 @@ def steady_response(osc: Oscillators, cause: Steady, t: Array, derivative: int =
     wide = _widened(osc, -1)
     acceleration = cause.acceleration[..., None]
     harmonics = [Harmonics(*_with_axis(f, -1)) for f in cause.harmonics]
-    start = (np.zeros(1), cause.velocity[..., None])
+    start = (cause.displacement[..., None], cause.velocity[..., None])
 
     def part(times: Array) -> Array:
         shift = _shift(wide, times, harmonics)
@@ -242,7 +243,7 @@ def _grid_response(osc: Oscillators, cause: Steady, start: float, step: float, c
 def _state_table(osc: Oscillators, cause: Steady, times: Array, step: float) -> Array:
     """Return q, q', the constant acceleration and the phasors (Im, Re) at the times, shape (..., blocks, columns)."""
     harmonics, a = cause.harmonics, cause.acceleration
-    start = (np.zeros(1), cause.velocity)
+    start = (cause.displacement, cause.velocity)
     state = _advance(osc, _shift(osc, times[0], harmonics), start, a, 0.0, [f.phasor(0.0) for f in harmonics])
     shift = _shift(osc, step, harmonics)
     n, size = state[0].shape[-1], len(harmonics)

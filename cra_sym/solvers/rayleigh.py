@@ -1,7 +1,8 @@
-"""Rayleigh-Ritz values of computed mode shapes: full relative accuracy for frequencies far below those of the beam.
+"""Rayleigh-Ritz values of computed mode shapes: the digits that the rounding of the stiffness has taken from the roots.
 
-A soft joint moves the arm almost rigidly. Its frequency drowns in the rounding of the static stiffness, but the forces
-in the computed shape do not: strain energy taken from the forces has no cancellation.
+A stiffness joined from short pieces is the small difference of large terms where the motion hardly strains a piece:
+soft joints, heavy tips, strings that resist bending a little. The forces in the computed shape have no such
+cancellation, and strain energy taken from them is as exact as the shape squared.
 """
 
 from __future__ import annotations
@@ -10,16 +11,36 @@ from itertools import combinations
 
 import numpy as np
 
-from .shapes import mode_states
-from .stiffness import DynamicStiffness
+from .shapes import mode_vectors, nodes
+from .stiffness import GOLDEN, DynamicStiffness, transfer
 
 __all__ = ["quotients", "ritz_values"]
 
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
+
+def quotients(problem: DynamicStiffness, z: np.ndarray) -> np.ndarray:
+    """Return strain over kinetic energy of each mode: an error of the shape enters squared.
+
+    Parameters
+    ----------
+    problem : DynamicStiffness
+    z : ndarray, shape (rows, modes)
+        Approximate roots, as `mode_states` takes them.
+
+    Returns
+    -------
+    ndarray, shape (rows, modes)
+    """
+    here, u, row = mode_vectors(problem, z)
+    at, result = z.ravel(), np.empty(z.size)
+    for level, member, start, edge in nodes(problem, here, u):
+        own = at[member, None]
+        strain, kinetic = _energies(problem, row[member], own, at[member], level, start[:, :, None], edge[:, None])
+        result[member] = (strain / kinetic)[:, 0, 0]
+    return result.reshape(z.shape)
 
 
 def ritz_values(problem: DynamicStiffness, z: np.ndarray, almost_rigid: np.ndarray) -> np.ndarray:
-    """Return strain over kinetic energy, minimised over the span of the modes with the given approximate roots.
+    """Return strain over kinetic energy, minimised over the span of soft modes with the given approximate roots.
 
     Parameters
     ----------
@@ -33,10 +54,17 @@ def ritz_values(problem: DynamicStiffness, z: np.ndarray, almost_rigid: np.ndarr
     ndarray, shape (rows, modes)
         omega^2
     """
-    at = np.where(np.arange(z.shape[1]) < almost_rigid[:, None], 0.0, z)  # shapes of one evaluation are independent
-    strain, kinetic = _energies(problem, at)
-    frame = np.linalg.inv(np.linalg.cholesky(kinetic))
-    return np.sort(_jacobi(frame @ strain @ np.swapaxes(frame, -1, -2)), axis=1)
+    modes = z.shape[1]
+    at = np.where(np.arange(modes) < almost_rigid[:, None], 0.0, z)  # shapes of one evaluation are independent
+    here, u, _ = mode_vectors(problem, at, common_levels=True)
+    result = np.empty(z.shape)
+    for level, member, start, edge in nodes(problem, here, u):
+        of = member[::modes] // modes
+        start, edge = start.reshape(2, len(of), modes, *start.shape[2:]), edge.reshape(len(of), modes, -1)
+        strain, kinetic = _energies(problem, of, at[of], np.zeros(len(of)), level, start, edge)
+        frame = np.linalg.inv(np.linalg.cholesky(kinetic))
+        result[of] = np.sort(_jacobi(frame @ strain @ np.swapaxes(frame, -1, -2)), axis=1)
+    return result
 
 
 def _jacobi(matrix: np.ndarray) -> np.ndarray:
@@ -62,35 +90,39 @@ def _jacobi(matrix: np.ndarray) -> np.ndarray:
     return np.diagonal(a, axis1=1, axis2=2)
 
 
-def quotients(problem: DynamicStiffness, z: np.ndarray) -> np.ndarray:
-    """Return strain over kinetic energy of each mode: an error of the shape enters squared."""
-    strain, kinetic = _energies(problem, z)
-    return np.diagonal(strain, axis1=1, axis2=2) / np.diagonal(kinetic, axis1=1, axis2=2)
+def _energies(
+    problem: DynamicStiffness,
+    rows: np.ndarray,
+    z: np.ndarray,
+    reference: np.ndarray,
+    level: int,
+    start: np.ndarray,
+    edge: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the matrices of strain and kinetic energy of the modes of each row, shape (rows, modes, modes).
 
-
-def _energies(problem: DynamicStiffness, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the matrices of strain and kinetic energy of the modes, integrated panel by panel."""
+    ``start`` (part, row, mode, piece, state) is the state at the left of every piece, ``edge`` (row, mode, place) the
+    motion of the ends and coordinates. The energies are those at ``z = reference``.
+    """
     n, m = problem.displacements, problem.coordinates
-    every = np.arange(len(z))
-    reference = z[:, -1]
-    system, _ = problem.system(reference, every, np.array([[0.0, 0.5, 1.0]]))
-    radius = np.abs(np.linalg.eigvals(system)).max(initial=0.0) * problem.length.max()
-    panels = int(np.ceil(radius)) + (1 if problem.uniform else 12)
-    share = ((np.arange(panels)[:, None] + 0.5 * (1.0 + _POINTS)) / panels).ravel()
-    state = mode_states(problem, z, np.broadcast_to(np.r_[0.0, share, 1.0], (len(z), len(share) + 2)))
-    inner = (
-        state[:, :, 1:-1]
-        * np.sqrt(problem.length[:, None] * np.tile(0.5 * _WEIGHTS / panels, panels))[:, None, :, None]
-    )
-    densities = _energy_densities(*problem.system(reference, every, share[None]), reference, n, m)
-    end, end_slope = problem.boundary(reference, every)
+    pieces = 1 if problem.uniform else start.shape[3]
+    index, modes = np.repeat(rows, z.shape[1]), z.shape[1]
+    end, end_slope = problem.boundary(reference, rows)
     lumped = end - reference[:, None, None] * end_slope, -end_slope
-    edge = np.concatenate([state[:, :, 0, : n + m], state[:, :, -1, :n]], axis=-1)
-    strain, kinetic = (
-        (inner[:, :, None] * (density[:, None, None] @ inner[:, None, ..., None])[..., 0]).sum(axis=(-2, -1))
-        + edge @ ends @ np.swapaxes(edge, -1, -2)
-        for density, ends in zip(densities, lumped, strict=True)
-    )
+    strain, kinetic = (edge @ ends @ np.swapaxes(edge, -1, -2) for ends in lumped)
+    points, weights = np.polynomial.legendre.leggauss(8 if problem.uniform else 5)  # of pieces with exponents to 1, 1/4
+    for part, (origin, share) in enumerate(((0.0, GOLDEN), (GOLDEN, 1.0 - GOLDEN))):
+        width = np.full((1, pieces), share / 2.0**level)
+        nodes_left = origin + np.arange(pieces) * width
+        for point, weight in zip(0.5 * (1.0 + points), 0.5 * weights, strict=True):
+            omega, _ = problem.exponent(z.ravel(), index, nodes_left, width * point)
+            carried = transfer(omega).reshape(len(rows), modes, pieces, *omega.shape[2:])
+            state = (carried @ start[part][..., None])[..., : 2 * n + m, 0]
+            densities = _energy_densities(*problem.system(reference, rows, nodes_left + width * point), reference, n, m)
+            length = (weight * problem.length[rows])[:, None, None] * width[0, 0]
+            for total, density in zip((strain, kinetic), densities, strict=True):
+                weighted = (density[:, None] @ state[..., None])[..., 0]
+                total += length * np.einsum("rips,rjps->rij", state, weighted)
     return strain, kinetic
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from .stiffness import GOLDEN, TERMS, DynamicStiffness, Evaluation, Tree, form
 
-__all__ = ["mode_states", "states"]
+__all__ = ["mode_states", "mode_vectors", "nodes", "states"]
 
 
 def mode_states(problem: DynamicStiffness, z: np.ndarray, share: np.ndarray) -> np.ndarray:
@@ -27,12 +29,48 @@ def mode_states(problem: DynamicStiffness, z: np.ndarray, share: np.ndarray) -> 
         complex shapes are scaled to a largest nodal displacement of one.
     """
     rows, modes = z.shape
+    here, u, row = mode_vectors(problem, z)
+    state = states(problem, here, u, _clusters(z)[1].ravel(), row, share[row])
+    return state.reshape(rows, modes, *state.shape[1:])
+
+
+def mode_vectors(
+    problem: DynamicStiffness, z: np.ndarray, *, common_levels: bool = False
+) -> tuple[Evaluation, np.ndarray, np.ndarray]:
+    """Return an evaluation at the roots that kept its tree, the normalised free coordinates, and each root's row.
+
+    With ``common_levels`` all roots of a row are evaluated on the same pieces.
+    """
+    rows, modes = z.shape
     row = np.repeat(np.arange(rows), modes)
     place, z = _clusters(z)
-    here = problem.evaluate(z.ravel(), row, keep_tree=True)
-    u = _null_vectors(here, place, rows, modes)
-    state = states(problem, here, u, z.ravel(), row, share[row])
-    return state.reshape(rows, modes, *state.shape[1:])
+    levels = problem.levels(z.ravel(), row)
+    if common_levels:
+        levels = np.repeat(levels.reshape(rows, modes).max(axis=1), modes)
+    here = problem.evaluate(z.ravel(), row, keep_tree=True, levels=levels)
+    return here, _null_vectors(here, place, rows, modes), row
+
+
+def nodes(
+    problem: DynamicStiffness, here: Evaluation, u: np.ndarray
+) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield level, members, states left of every piece (part, member, piece, state), and (q(0), w, q(L)) of members.
+
+    Parameters
+    ----------
+    here : Evaluation
+        One that kept its tree.
+    u : ndarray, shape (members, f)
+        Free coordinates.
+    """
+    assert here.tree is not None
+    nodal = (here.unit @ u[..., None])[..., 0]
+    unit = here.tree.scale
+    size = unit.shape[1]
+    for level in np.unique(here.tree.levels):
+        member = np.nonzero(here.tree.levels == level)[0]
+        start = _spread(problem, here.tree, nodal[member], member, int(level))
+        yield int(level), member, start, nodal[member, :size] * unit[member]
 
 
 def states(
@@ -47,13 +85,9 @@ def states(
     u : ndarray, shape (len(z), f)
     share : ndarray, shape (len(z), stations)
     """
-    assert here.tree is not None
-    nodal = (here.unit @ u[..., None])[..., 0]
     state = np.empty((len(z), share.shape[1], 2 * problem.displacements + problem.coordinates), dtype=u.dtype)
-    for level in np.unique(here.tree.levels):
-        member = np.nonzero(here.tree.levels == level)[0]
-        start = _spread(problem, here.tree, nodal[member], member, int(level))
-        state[member] = _carry(problem, z[member], row[member], start, int(level), share[member])
+    for level, member, start, _ in nodes(problem, here, u):
+        state[member] = _carry(problem, z[member], row[member], start, level, share[member])
     return state
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Coefficients", "DynamicStiffness", "Evaluation", "Tree"]
+__all__ = ["Coefficients", "DynamicStiffness", "Evaluation", "Tree", "transfer"]
 
 GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 """Share of the left part. The golden ratio keeps the dividing node away from the nodes of every mode."""
@@ -131,10 +131,12 @@ class DynamicStiffness:
             free=self.free[rows] if self.free is not None and self.free.ndim == 3 else self.free,
         )
 
-    def evaluate(self, z: np.ndarray, rows: np.ndarray, *, keep_tree: bool = False) -> Evaluation:
-        """Condense the whole domain at ``z[i]`` for the parameter sets ``rows[i]``."""
+    def evaluate(
+        self, z: np.ndarray, rows: np.ndarray, *, keep_tree: bool = False, levels: np.ndarray | None = None
+    ) -> Evaluation:
+        """Condense the whole domain at ``z[i]`` for the parameter sets ``rows[i]``, halved ``levels[i]`` times."""
         n, m = self.displacements, self.coordinates
-        levels = self._levels(z, rows)
+        levels = self.levels(z, rows) if levels is None else levels
         matrix, slope, start, growth = _short_piece(*self._transfer(z, rows, levels), n, m)
         ends = np.diagonal(matrix, axis1=-2, axis2=-1)
         scale = 1.0 / np.sqrt(np.abs(ends[..., :n] + ends[..., n + m :])).max(axis=(0, 2))
@@ -166,7 +168,7 @@ class DynamicStiffness:
         tree = Tree(levels, unit, start, middles) if keep_tree else None
         return self._assemble(z, rows, matrix[:, :, 0], slope[:, :, 0], unit, fixed.sum(axis=(0, 2)), poles, tree)
 
-    def _levels(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    def levels(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Return how often to halve, so that every exponent of the longer part is at most one on a piece.
 
         A scalar equation with exponents lambda has no clamped-clamped frequency below z on a piece shorter than
@@ -261,6 +263,15 @@ def exponential(a: np.ndarray, da: np.ndarray) -> Dual:
         total += term
         total_slope += term_slope
     return total, total_slope
+
+
+def transfer(a: np.ndarray) -> np.ndarray:
+    """Return ``exp(a)`` alone."""
+    term = total = np.broadcast_to(np.eye(a.shape[-1], dtype=a.dtype), a.shape)
+    for j in range(1, TERMS + 1):
+        term = a @ term / j
+        total = total + term
+    return total
 
 
 def _short_piece(t: np.ndarray, dt: np.ndarray, n: int, m: int):

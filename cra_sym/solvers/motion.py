@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cra_sym.checks import broadcastable, real_array
-from cra_sym.solvers.modal_response import pick, segment
+from ..checks import broadcastable, real_array
+from .modal_response import pick, segment
 
-__all__ = ["BaseMotion", "Harmonic", "Piecewise"]
+__all__ = ["BaseMotion", "Force", "Harmonic", "Piecewise"]
 
 Array = np.ndarray
 
@@ -312,6 +312,59 @@ class BaseMotion:
     def __repr__(self) -> str:
         kinds = ", ".join(type(term).__name__.lower() for term in self.terms) or "at rest"
         return f"<BaseMotion of shape {self.shape}: {kinds}>"
+
+
+class Force:
+    """History of a force, F = level + amplitude sin(angular_frequency t + phase) from t = 0 on.
+
+    Forces are added with ``+``; an array in any field means a batch.
+
+    Parameters
+    ----------
+    level, amplitude : float or ndarray
+        N (or the unit of the generalised force).
+    angular_frequency, phase : float or ndarray
+        rad/s, not negative, and rad.
+
+    Examples
+    --------
+    >>> step = Force(2.0) + Force(amplitude=1.0, angular_frequency=3.0)
+    >>> float(step(0.0))
+    2.0
+    """
+
+    profile: BaseMotion
+    """The motion whose acceleration the force is."""
+
+    def __init__(self, level: Any = 0.0, amplitude: Any = 0.0, angular_frequency: Any = 0.0, phase: Any = 0.0) -> None:
+        constant, size = real_array("level", level), real_array("amplitude", amplitude)
+        varpi, psi = real_array("angular_frequency", angular_frequency, low=0.0), real_array("phase", phase)
+        broadcastable(level=constant, amplitude=size, angular_frequency=varpi, phase=psi)
+        constant = constant + np.where(varpi == 0.0, size * np.sin(psi), 0.0)
+        size = np.where(varpi == 0.0, 0.0, -size / np.where(varpi == 0.0, 1.0, varpi) ** 2)
+        self.profile = BaseMotion(acceleration=constant, amplitude=size, angular_frequency=varpi, phase=psi)
+
+    @classmethod
+    def sampled(cls, t: Any, force: Any) -> Force:
+        """Return a sampled force, linear between uniform times and zero outside the record; shape (..., T)."""
+        history = cls()
+        history.profile = BaseMotion.sampled(t, real_array("force", force))
+        return history
+
+    def __call__(self, t: Any) -> Any:
+        """Return the force at times ``t`` >= 0, shape (..., t)."""
+        return self.profile.acceleration(t)
+
+    def __add__(self, other: Any) -> Force:
+        """Superpose two forces; batches broadcast."""
+        if not isinstance(other, Force):
+            return NotImplemented
+        total = Force()
+        total.profile = self.profile + other.profile
+        return total
+
+    def __repr__(self) -> str:
+        return f"<Force of shape {self.profile.shape}>"
 
 
 def _after(first: Array, rest: Array) -> Array:

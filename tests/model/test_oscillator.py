@@ -6,12 +6,12 @@ import pytest
 import sympy as sp
 
 import cra_sym as cra
-from cra_sym.arm.duhamel import convolution, impulse_response, modal_operator, unit_responses
 from cra_sym.kernels import derived_kernel
+from cra_sym.model.oscillator import convolution, impulse_response, modal_operator, unit_responses
 from cra_sym.symbols import symbol
 
-FREE = derived_kernel("cra_sym.arm.duhamel:free_kernel", backend="numpy")
-FORCED = derived_kernel("cra_sym.arm.duhamel:forced_kernel", backend="numpy")
+FREE = derived_kernel("cra_sym.model.oscillator:free_kernel", backend="numpy")
+FORCED = derived_kernel("cra_sym.model.oscillator:forced_kernel", backend="numpy")
 t, omega, zeta, varpi = (symbol(name) for name in ("t", "omega_i", "zeta_i", "varpi"))
 
 

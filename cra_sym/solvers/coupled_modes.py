@@ -1,0 +1,139 @@
+"""Modes that dampers couple, driven by a motion: exponentials of the state matrix, exact for every term of the motion.
+
+The cause of a term is itself a linear system, s' = S s (a sine and a cosine, or a constant and a ramp). Modes and cause
+together move freely, so that resonance and overdamped modes need no cases.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.linalg import expm
+
+from ..checks import broadcastable, count, instance, real_array
+from .driven_modes import Start
+from .motion import BaseMotion, Harmonic, Piecewise
+
+__all__ = ["CoupledModes", "coupled_response"]
+
+_CHUNK = 512  # times whose exponentials are formed at once
+
+
+class CoupledModes(NamedTuple):
+    """Modes (..., N) with q'' + (D + 2 zeta omega) q' + omega^2 q = -gamma w'', and the rows (..., R, N) of the
+    outputs."""
+
+    omega: np.ndarray
+    zeta: np.ndarray
+    damping: np.ndarray
+    gamma: np.ndarray
+    rows: np.ndarray
+
+
+class _Cause(NamedTuple):
+    """A base acceleration ``weight @ s`` with s' = generator s from ``start``."""
+
+    generator: np.ndarray
+    weight: np.ndarray
+    start: np.ndarray
+
+
+def coupled_response(
+    modes: CoupledModes,
+    motion: BaseMotion,
+    t: Any,
+    derivative: int,
+    start: Start = "inertial",
+    initial: tuple[np.ndarray, np.ndarray] | None = None,
+) -> np.ndarray:
+    """Return the outputs at the times, shape (..., outputs, times); as `driven_response` for coupled modes."""
+    instance("motion", motion, BaseMotion)
+    times = np.atleast_1d(real_array("t", t, low=0.0))
+    if times.ndim > 1:
+        raise ValueError(f"t has shape {times.shape}: allowed are a number or one axis of times")
+    derivative = count("derivative", derivative, low=0, high=2)
+    size = modes.omega.shape[-1]
+    shape = broadcastable(values=modes.omega[..., 0], zeta=modes.zeta[..., 0], motion=np.empty(motion.shape))
+    still = np.zeros(size)
+    q, u = (still, still) if initial is None else initial
+    if start == "inertial":
+        u = u - modes.gamma * np.asarray(motion.velocity(0.0))[..., None]
+    state = np.concatenate(np.broadcast_arrays(q, u), axis=-1)
+    inner = {"omega": 1, "zeta": 1, "damping": 2, "gamma": 1, "rows": 2}
+    result = np.empty((*shape, modes.rows.shape[-2], times.size))
+    for index in np.ndindex(shape):
+        here = CoupledModes(*(_member(getattr(modes, name), shape, index, axes) for name, axes in inner.items()))
+        causes = [_member_term(term, shape, index) for term in motion.terms]
+        result[index] = _outputs(here, causes, _member(state, shape, index, 1), times, derivative)
+    return result
+
+
+def _member(values: np.ndarray, shape: tuple[int, ...], index: tuple[int, ...], axes: int) -> np.ndarray:
+    return np.broadcast_to(values, (*shape, *values.shape[values.ndim - axes :]))[index]
+
+
+def _member_term(term: Harmonic | Piecewise, shape: tuple[int, ...], index: tuple[int, ...]) -> Harmonic | Piecewise:
+    if isinstance(term, Harmonic):
+        return Harmonic(*(_member(value, shape, index, 0) for value in term))
+    velocity, *rest = term
+    return Piecewise(_member(velocity, shape, index, 0), *(_member(value, shape, index, 1) for value in rest))
+
+
+def _outputs(
+    modes: CoupledModes, terms: list[Harmonic | Piecewise], state: np.ndarray, times: np.ndarray, derivative: int
+) -> np.ndarray:
+    """Return the outputs (R, T) of one set of modes: the free motion and what each term of the base motion adds."""
+    size = len(modes.omega)
+    friction = modes.damping + np.diag(np.broadcast_to(2.0 * modes.zeta * modes.omega, size))
+    system = np.block([[np.zeros((size, size)), np.eye(size)], [-np.diag(modes.omega**2), -friction]])
+    push = np.concatenate([np.zeros(size), -modes.gamma])
+    rows = np.concatenate([modes.rows, np.zeros_like(modes.rows)], axis=1)
+    for _ in range(derivative):
+        rows, direct = rows @ system, rows @ push
+    nothing = _Cause(np.zeros((0, 0)), np.zeros(0), np.zeros(0))
+    moved, _ = _carried(system, push, nothing, state, times)
+    total = rows @ moved.T
+    for term in terms:
+        moved, force = _moved(system, push, term, times)
+        total += rows @ moved.T
+        if derivative == 2:
+            total += direct[:, None] * force
+    return total
+
+
+def _moved(
+    system: np.ndarray, push: np.ndarray, term: Harmonic | Piecewise, times: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the state (T, 2 N) from rest and the base acceleration (T) of one term."""
+    rest = np.zeros(len(push))
+    if isinstance(term, Harmonic):
+        B, varpi, psi = map(float, term)
+        generator = np.array([[0.0, varpi], [-varpi, 0.0]])
+        cause = _Cause(generator, np.array([-B * varpi**2, 0.0]), np.array([np.sin(psi), np.cos(psi)]))
+        return _carried(system, push, cause, rest, times)
+    ramp, begin = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([1.0, 0.0])
+    state, force = np.zeros((len(times), len(push))), np.zeros(len(times))
+    for k, knot in enumerate(term.knots):
+        cause = _Cause(ramp, np.array([term.acceleration[k], term.jerk[k]]), begin)
+        end = term.knots[k + 1] if k + 1 < len(term.knots) else np.inf
+        within = (times >= knot) & (times < end)
+        if within.any():
+            state[within], force[within] = _carried(system, push, cause, rest, times[within] - knot)
+        if np.isfinite(end):
+            rest = _carried(system, push, cause, rest, np.array([end - knot]))[0][0]
+    return state, force
+
+
+def _carried(
+    system: np.ndarray, push: np.ndarray, cause: _Cause, state: np.ndarray, times: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return state and base acceleration at the times after a start."""
+    size = len(state)
+    whole = np.zeros((size + len(cause.start),) * 2)
+    whole[:size, :size], whole[size:, size:] = system, cause.generator
+    whole[:size, size:] = np.outer(push, cause.weight)
+    start = np.concatenate([state, cause.start])
+    parts = [expm(times[i : i + _CHUNK, None, None] * whole) @ start for i in range(0, max(len(times), 1), _CHUNK)]
+    moved = np.concatenate(parts)
+    return moved[:, :size], moved[:, size:] @ cause.weight

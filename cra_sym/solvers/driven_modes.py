@@ -1,0 +1,97 @@
+"""Modal oscillators driven by a motion: superposition of its terms, each answered in closed form."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+
+from ..checks import broadcastable, count, instance, real_array
+from . import modal_response as solver
+from .motion import BaseMotion, Harmonic, Piecewise
+
+__all__ = ["Start", "driven_response", "state_at_stop"]
+
+Start = Literal["inertial", "base"]
+
+
+def driven_response(
+    osc: solver.Oscillators,
+    motion: BaseMotion,
+    t: Any,
+    derivative: int,
+    start: Start = "inertial",
+    initial: tuple[np.ndarray, np.ndarray] | None = None,
+) -> np.ndarray:
+    """Return the outputs at the times, shape (..., outputs, times).
+
+    Parameters
+    ----------
+    osc : Oscillators
+    motion : BaseMotion
+    t : array_like
+        Times from 0 on.
+    derivative : {0, 1, 2}
+    start : {'inertial', 'base'}
+        At rest before t = 0 in the inertial frame or seen from the moving base.
+    initial : pair of ndarray, shape (..., modes), optional
+        Modal displacements and velocities at t = 0, beside those of the start.
+    """
+    instance("motion", motion, BaseMotion)
+    times = real_array("t", t, low=0.0)
+    if times.ndim > 1:
+        raise ValueError(f"t has shape {times.shape}: allowed are a number or one axis of times")
+    derivative = count("derivative", derivative, low=0, high=2)
+    if start not in ("inertial", "base"):
+        raise ValueError(f"start = {start!r}: allowed are 'inertial' and 'base'")
+    grid = np.atleast_1d(times)
+    modes = osc.omega.shape[:-1]
+    shape = broadcastable(arm=np.empty(modes), zeta=osc.zeta[..., 0], motion=np.empty(motion.shape))
+    parts = [solver.piecewise_response(osc, piece, grid, derivative) for piece in _pieces(motion)]
+    steady = _steady(osc, motion, start)
+    if initial is not None:
+        free = solver.Steady(initial[1], np.zeros(1), displacement=initial[0])
+        parts.append(solver.steady_response(osc, free, grid, derivative))
+    if steady is not None:
+        parts.append(solver.steady_response(osc, steady, grid, derivative))
+    wanted = (*shape, osc.rows.shape[-2], grid.size)
+    if not parts:
+        return np.zeros(wanted)
+    total = sum(parts[1:], parts[0])
+    return total if total.shape == wanted else np.broadcast_to(total, wanted).copy()
+
+
+def _column(value: Any) -> np.ndarray:
+    """Return the batch array with an axis for the modes."""
+    return np.asarray(value, float)[..., None]
+
+
+def _profiles(motion: BaseMotion, *, mean: bool) -> list[Piecewise]:
+    """Return the terms that are a mean motion, one constant acceleration from t = 0 on, or the other profiles."""
+    profiles = [term for term in motion.terms if isinstance(term, Piecewise)]
+    return [p for p in profiles if mean is (p.knots.shape == (1,) and not (p.knots.any() or p.jerk.any()))]
+
+
+def _pieces(motion: BaseMotion) -> list[solver.Piecewise]:
+    return [solver.Piecewise(p.knots, p.acceleration, p.jerk) for p in _profiles(motion, mean=False)]
+
+
+def _steady(osc: solver.Oscillators, motion: BaseMotion, start: Start) -> solver.Steady | None:
+    """Collect initial velocity, constant acceleration and harmonics, or return None if there are none."""
+    harmonics = [solver.Harmonics(*map(_column, term)) for term in motion.terms if isinstance(term, Harmonic)]
+    level = sum((profile.acceleration for profile in _profiles(motion, mean=True)), np.zeros(1))
+    impulse = -osc.gamma * _column(motion.velocity(0.0)) * (start == "inertial")
+    return solver.Steady(impulse, level, harmonics) if harmonics or level.any() or impulse.any() else None
+
+
+def state_at_stop(osc: solver.Oscillators, motion: BaseMotion) -> tuple[np.ndarray, np.ndarray]:
+    """Return q and q' when the base stops accelerating, shape (..., modes)."""
+    stop = _column(motion.duration)
+    rest = np.zeros(1), -osc.gamma * _column(motion.velocity(0.0))
+    q, u = solver.free_motion(osc, stop, rest)
+    for piece in _pieces(motion):
+        q_knots, u_knots = solver.knot_states(osc, piece)
+        end = q_knots[..., -1], u_knots[..., -1]
+        q_piece, u_piece = solver.free_motion(osc, stop - piece.knots[..., -1:], end)
+        q, u = q + q_piece, u + u_piece
+    return q, u
