@@ -104,7 +104,7 @@ class Explorer:
         return {"arm": self.arm, "motion": self.motion}
 
     def _zones(self) -> dict[str, Any]:
-        coarse = {"points": 21, "tolerance": 1e-5}  # a picture's worth
+        coarse = {"points": 17, "tolerance": 1e-4}  # growth to about 1e-4 of its largest: a picture's worth
         return {"arm": self.arm, "excitation": self.excitation, "epsilon": self.values["epsilon"], **coarse}
 
     def _set(self, **changes: Any) -> None:

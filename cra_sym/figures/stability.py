@@ -70,8 +70,9 @@ def _zone(
 ) -> None:
     """Draw one principal zone against its detuning."""
     centre = 2 * modal_parameters(arm, mode).omega[mode - 1]
-    first, second = (_boundary(arm, excitation, epsilon, (mode, mode), order=order) for order in (1, 2))
-    half = (first[1] - first[0])[-1] / 2
+    second = _boundary(arm, excitation, epsilon, (mode, mode), order=2)
+    width = second[1] - second[0]  # to second order the zone moves and keeps its width
+    first, half = (centre - width / 2, centre + width / 2), width[-1] / 2
     where: dict[str, Any] = {"transform": ax.transAxes, "fontsize": 7.5, "color": "0.25", "va": "bottom"}
     if not half > 0:
         rigid = isinstance(excitation, JointStiffness) and np.isinf(arm.k_t)
