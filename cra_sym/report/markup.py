@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from latex2mathml.converter import convert
 from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 
-__all__ = ["Markup", "anchor", "formula", "math_width", "mathml"]
+__all__ = ["Markup", "anchor", "formula", "math_width", "mathml", "too_wide"]
 
 _DOLLARS = re.compile(r"^\$+|\$+$")
 _ENVIRONMENTS = {
@@ -37,7 +37,16 @@ def mathml(tex: str, *, block: bool = False) -> str:
 def formula(tex: str) -> str:
     """Return a displayed formula that tells the style sheet how wide it is, so that it can be made to fit."""
     text = mathml(tex, block=True)
-    return f'<div class="formula" style="--ems:{3 + 1.2 * math_width(ElementTree.fromstring(text)):.0f}">{text}</div>'
+    return f'<div class="formula" style="--ems:{_ems(text):.0f}">{text}</div>'
+
+
+def too_wide(tex: str) -> bool:
+    """Tell whether a formula cannot be read on paper when it is made to fit."""
+    return _ems(mathml(tex, block=True)) > 200
+
+
+def _ems(text: str) -> float:
+    return 3 + 1.2 * math_width(ElementTree.fromstring(text))
 
 
 def math_width(element: ElementTree.Element) -> float:

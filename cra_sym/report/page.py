@@ -18,7 +18,7 @@ from cra_sym.figures import ANIMATIONS, FIGURES
 from cra_sym.files import write_text
 from cra_sym.report.chapters import Chapter, chapter
 from cra_sym.report.exhibits import claim_entries, figure
-from cra_sym.report.markup import Markup, anchor, formula
+from cra_sym.report.markup import Markup, anchor, formula, too_wide
 from cra_sym.report.tables import TABLES, Table
 
 if TYPE_CHECKING:
@@ -77,6 +77,7 @@ class _Entry:
     equation: Equation
     anchor: str
     formula: str
+    on_paper: str
     statement: str
     route: str
     confirmed: bool
@@ -100,6 +101,7 @@ def _equations() -> list[_Entry]:
             equation=e,
             anchor=anchor("eq", e.number),
             formula=formula(e._repr_latex_()),
+            on_paper=str(e.expression) if too_wide(e._repr_latex_()) else "",
             statement=markup(e.statement),
             route=markup(e.checked_by),
             confirmed=e.check(),
