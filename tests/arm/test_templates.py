@@ -1,0 +1,72 @@
+"""The templates that Numba compiles are plain Python: run as such they give what the NumPy path gives."""
+
+import sys
+
+import numpy as np
+import pytest
+
+import cra_sym as cra
+from cra_sym.arm import modal, spectrum
+from cra_sym.kernels import specialise
+from cra_sym.solvers import floquet
+
+
+def plain(template, kernels):
+    """Return the template's functions as Python reads them."""
+    names = {}
+    with np.errstate(all="ignore"):
+        exec(specialise._prelude(kernels, True), names)
+        exec(template, names)
+    return type("Template", (), {name: staticmethod(value) for name, value in names.items() if callable(value)})
+
+
+def arms(seed, size):
+    rng = np.random.default_rng(seed)
+
+    def draw(low, high, *ends):
+        return np.where(rng.random(size) < 0.3, rng.choice(ends, size), 10.0 ** rng.uniform(low, high, size))
+
+    return draw(-3, 6, 0.0, np.inf), draw(-3, 6, 0.0, np.inf), draw(-3, 3, 0.0), draw(-3, 3, 0.0)
+
+
+@pytest.fixture
+def groups(monkeypatch):
+    for module in (spectrum, modal):
+        template = plain(*module._template_parts())
+        monkeypatch.setattr(module, "_template", lambda template=template: template)
+    with np.errstate(all="ignore"):
+        yield arms(11, 24)
+
+
+def test_spectrum(groups):
+    one, two = (spectrum.frequency_parameters(*groups, modes=5, compile=c, threads=1) for c in (True, False))
+    assert ((one == 0) == (two == 0)).all()
+    np.testing.assert_allclose(one, two, rtol=2e-15)
+
+
+def test_modes(groups):
+    lam = cra.frequency_parameters(*groups, modes=5)
+    one, two = (modal.modes_of(*groups, lam=lam, compile=c, threads=1) for c in (True, False))
+    for order in range(4):
+        size = np.maximum(lam[..., None], 1) ** order
+        xi = np.linspace(0, 1, 5)
+        np.testing.assert_allclose(one.shape(xi, order) / size, two.shape(xi, order) / size, atol=1e-12)
+    for name in ("root", "strain", "participation"):
+        np.testing.assert_allclose(getattr(one, name), getattr(two, name), rtol=1e-10, atol=1e-13)
+
+
+def test_floquet(monkeypatch):
+    pytest.importorskip("numba")
+    loops = sys.modules.get("cra_sym.solvers._floquet_compiled")
+    if loops is None:
+        from cra_sym.solvers import _floquet_compiled as loops
+    for name, function in vars(loops).copy().items():
+        if hasattr(function, "py_func"):
+            monkeypatch.setattr(loops, name, function.py_func)
+    coupling = np.array([[[1.0, 0.4], [0.3, -0.7]], [[0.2, 0.1], [0.1, 0.5]]])
+    system = (np.array([1.0, 2.2]), coupling, np.array([1.9, 3.1]), 0.3, np.array([0.01, 0.03]))
+    one, two = (
+        floquet.monodromy(*system, compliance=np.array([0.5, 0.2]), tolerance=1e-4, backend=b)
+        for b in ("numba", "numpy")
+    )
+    np.testing.assert_allclose(one, two, rtol=1e-11, atol=1e-13)

@@ -1,0 +1,172 @@
+"""Laws that hold whatever the arm: scaling, interlacing, symmetry, limits, and broadcasting of every public function."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import cra_sym as cra
+
+quick = settings(max_examples=12, deadline=None, derandomize=True, database=None)
+stiffnesses = st.one_of(st.sampled_from([0.0, np.inf]), st.floats(-2, 7).map(lambda x: 10.0**x))
+inertias = st.one_of(st.just(0.0), st.floats(-5, 1).map(lambda x: 10.0**x))
+factors = st.floats(-1, 1).map(lambda x: 10.0**x)
+arms = st.builds(
+    lambda k_t, k_r, m_e, J_e: cra.Arm.nominal().replace(k_t=k_t, k_r=k_r, m_e=m_e, J_e=J_e),
+    stiffnesses, stiffnesses, inertias, inertias,
+)  # fmt: skip
+elastic = st.builds(
+    lambda k_t, k_r, m_e: cra.Arm.nominal().replace(k_t=10.0**k_t, k_r=10.0**k_r, m_e=m_e),
+    st.floats(1, 5), st.floats(0, 4), st.floats(0, 0.2),
+)  # fmt: skip
+SPRING = cra.JointStiffness(k_t=1.0, k_r=0.5)
+
+
+def scaled(arm, **factors):
+    return arm.replace(**{name: getattr(arm, name) * factor for name, factor in factors.items()})
+
+
+@quick
+@given(arms, factors)
+def test_all_lengths(arm, c):
+    """An arm c times as large in every direction: mass as c^3, inertia c^5, springs c and c^3, frequencies 1 / c."""
+    larger = scaled(arm, L=c, b=c, h=c, m_e=c**3, J_e=c**5, k_t=c, k_r=c**3, m_b=c**3)
+    one, two = cra.modal_parameters(arm), cra.modal_parameters(larger)
+    np.testing.assert_allclose(two.omega * c, one.omega, rtol=1e-13, atol=1e-200)
+    size = np.sqrt(arm.rhoA * arm.L + arm.m_e)
+    np.testing.assert_allclose(two.participation / c**1.5 / size, one.participation / size, atol=1e-11)
+
+
+@quick
+@given(arms, factors, factors)
+def test_modulus_and_density(arm, c, d):
+    """Moduli and springs times c, densities and masses times d: frequencies times sqrt(c / d), the same shapes."""
+    other = scaled(arm, E=c, k_t=c, k_r=c, rho=d, m_e=d, J_e=d, m_b=d)
+    one, two = cra.natural_frequencies(arm), cra.natural_frequencies(other)
+    np.testing.assert_allclose(two, one * np.sqrt(c / d), rtol=1e-13)
+    shapes = [cra.mode_shapes(x, [0.0, 0.4, 1.0]) for x in (arm, other)]
+    np.testing.assert_allclose(shapes[1] * np.sqrt(d), shapes[0], atol=1e-10 * np.abs(shapes[0]).max())
+
+
+@quick
+@given(arms, st.sampled_from(["k_t", "k_r", "m_e", "J_e"]), factors)
+def test_interlacing_of_the_physical_parameters(arm, name, c):
+    """One spring or one inertia is a change of rank one: each frequency moves one way and not past its neighbour."""
+    more = arm.replace(**{name: (getattr(arm, name) or 1e-3) * (1 + c)})
+    low, high = cra.natural_frequencies(arm, modes=5), cra.natural_frequencies(more, modes=5)
+    if name in ("m_e", "J_e"):
+        low, high = high, low
+    slack = 1 + 1e-13
+    assert (low <= high * slack).all() and (high[:-1] <= low[1:] * slack).all()
+
+
+@quick
+@given(arms)
+def test_couplings_are_symmetric_and_positive(arm):
+    p = cra.modal_parameters(arm)
+    for matrix in (p.axial, p.stiffness_translation, p.stiffness_rotation):
+        size = np.abs(matrix).max()
+        np.testing.assert_allclose(matrix, matrix.T, atol=1e-13 * size)
+        assert np.linalg.eigvalsh(matrix).min() >= -1e-11 * size
+    assert (p.participation**2).sum() <= (arm.rhoA * arm.L + arm.m_e) * (1 + 1e-12)  # Bessel
+
+
+@quick
+@given(elastic, st.sampled_from(["k_t", "k_r"]), st.sampled_from([0.0, np.inf]))
+def test_continuous_through_zero_and_infinity(arm, name, end):
+    near = arm.replace(**{name: 1e-9 if end == 0 else 1e13})
+    there = arm.replace(**{name: end})
+    for function in (cra.natural_frequencies, lambda a: cra.tip_response(a, cra.BaseMotion(acceleration=0.1), 0.3)):
+        np.testing.assert_allclose(function(near), function(there), rtol=1e-5, atol=1e-4 * (end == 0))
+
+
+@settings(quick, max_examples=5)
+@given(elastic, st.floats(0.2, 2.2), st.floats(0, 0.3))
+def test_undamped_multipliers_come_in_reciprocal_pairs(arm, ratio, epsilon):
+    """And without excitation nothing grows."""
+    omega = cra.modal_parameters(arm, 2).omega
+    exponents = cra.floquet_exponents(arm, SPRING, ratio * omega[0], epsilon, modes=2)
+    np.testing.assert_allclose(np.sort(exponents.real), np.sort(-exponents.real), atol=1e-6 * omega[0])
+    growth = cra.growth_rate(arm, SPRING, ratio * omega[0], [0.0, epsilon], modes=2)
+    assert growth[0] <= 1e-6 * omega[0] and (growth >= 0).all()
+
+
+@quick
+@given(elastic, st.floats(1e-3, 0.05))
+def test_boundaries_are_scaled_like_frequencies(arm, epsilon):
+    """Lower below upper, about twice the natural frequency; a stiffer and denser arm has the same ratio."""
+    lower, upper = cra.stability_boundary(arm, cra.JointStiffness(k_t=1.0), epsilon, (1, 1))
+    twice = 2 * cra.modal_parameters(arm).omega[0]
+    assert lower <= twice * (1 + 1e-12) and twice <= upper * (1 + 1e-12)
+    other = scaled(arm, E=4.0, k_t=4.0, k_r=4.0)
+    np.testing.assert_allclose(
+        cra.stability_boundary(other, cra.JointStiffness(k_t=1.0), epsilon, (1, 1)), [2 * lower, 2 * upper], rtol=1e-12
+    )
+
+
+@quick
+@given(elastic, st.floats(-3, 3), st.floats(0.01, 1.0))
+def test_responses_are_linear_in_the_motion(arm, c, t):
+    one, two = cra.BaseMotion(velocity=0.1), cra.BaseMotion(amplitude=1e-3, angular_frequency=11.0)
+    both = cra.BaseMotion(velocity=0.1 * c) + two
+    expected = c * cra.tip_response(arm, one, t) + cra.tip_response(arm, two, t)
+    assert cra.tip_response(arm, both, t) == pytest.approx(expected, abs=1e-13)
+
+
+@quick
+@given(elastic, st.floats(0.1, 300.0))
+def test_undamped_steady_motion_is_real_and_damping_turns_it(arm, omega):
+    undamped = cra.frequency_response(arm, omega)
+    assert abs(undamped.imag) <= 1e-12 * abs(undamped.real) or not np.isfinite(undamped)
+    assert np.sign(cra.frequency_response(arm.replace(zeta=0.01), omega).imag) != 0
+
+
+@quick
+@given(elastic)
+def test_logarithmic_sensitivities_are_shares(arm):
+    s = cra.sensitivities(arm)
+    assert (s.log_k_t >= 0).all() and (s.log_k_r >= 0).all() and (s.log_k_t + s.log_k_r <= 0.5 + 1e-12).all()
+
+
+ARM = cra.Arm.nominal().replace(k_t=[[1e2], [1e4]], k_r=[5.0, 50.0, np.inf], m_e=0.01, zeta=0.01)
+MOVE = cra.BaseMotion(velocity=0.1, amplitude=1e-3, angular_frequency=12.0)
+STOP = cra.BaseMotion.trapezoid(0.1, 0.2, 1.0)
+LOOPED = {
+    "natural_frequencies": lambda arm: cra.natural_frequencies(arm),
+    "frequency_parameters": lambda arm: cra.frequency_parameters(arm.kappa_t, arm.kappa_r, arm.mu, arm.iota),
+    "mode_shapes": lambda arm: cra.mode_shapes(arm, [0.0, 0.3, 1.0]),
+    "modal_parameters": lambda arm: cra.modal_parameters(arm).axial,
+    "response": lambda arm: cra.response(arm, MOVE, [0.1, 0.7], [0.0, 1.0]),
+    "tip_response": lambda arm: cra.tip_response(arm, MOVE, [0.1, 0.7]),
+    "residual_vibration": lambda arm: cra.residual_vibration(arm, STOP),
+    "frequency_response": lambda arm: cra.frequency_response(arm, [3.0, 40.0]),
+    "sensitivities": lambda arm: cra.sensitivities(arm).df_dk_t,
+    "certify": lambda arm: cra.certify(arm, modes=2).lower,
+    "floquet_exponents": lambda arm: cra.floquet_exponents(arm, SPRING, 30.0, 0.05, modes=2).real,
+    "growth_rate": lambda arm: cra.growth_rate(arm, SPRING, 30.0, 0.05, modes=2),
+    "forced_width": lambda arm: cra.forced_width(arm, cra.TransverseBase(amplitude=0.01)),
+    "stability_boundary": lambda arm: np.stack(
+        cra.stability_boundary(arm.replace(zeta=0.0), SPRING, 0.05, (1, 2)), axis=-1
+    ),
+}
+#: No numeric function of an arm, or one whose arms are single: a fit, a system, a labelled study with tests of its own.
+NOT_LOOPED = {
+    "Arm", "AsymptoticWarning", "AxialBase", "BaseMotion", "JointStiffness", "Model", "ResonanceWarning",
+    "TransverseBase", "equation", "equations", "explore", "export", "identify_joint", "input_shaper", "kernel",
+    "state_space", "sweep",
+}  # fmt: skip
+
+
+def test_every_public_function_of_an_arm_is_looped():
+    assert set(LOOPED) | NOT_LOOPED == set(cra._HOME)
+
+
+@pytest.mark.parametrize("name", LOOPED)
+def test_broadcasting_equals_looping(name):
+    if name == "certify":
+        pytest.importorskip("flint")
+    whole = np.asarray(LOOPED[name](ARM))
+    assert whole.shape[:2] == ARM.shape == (2, 3)
+    for i, j in np.ndindex(ARM.shape):
+        one = LOOPED[name](ARM.replace(k_t=float(ARM.k_t[i, 0]), k_r=float(ARM.k_r[j])))
+        np.testing.assert_allclose(one, whole[i, j], rtol=1e-9, atol=1e-9 * np.abs(whole[i, j]).max(), err_msg=name)
