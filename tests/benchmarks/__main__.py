@@ -1,6 +1,7 @@
 """All benchmarks in one go: ``python -m tests.benchmarks [--quick] [--output DIR]``.
 
-Writes one table, its data and one picture. Times are medians with quartiles; only ratios within one run mean anything.
+Writes ``results.md``, ``results.json`` and ``results.png``. Times are medians with quartiles; only ratios within a run
+say anything.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Any
 
 import matplotlib
 
-from tests.benchmarks import cold, frequencies, kernel, machine, nodes
+from tests.benchmarks import cold, frequencies, kernel, machine, nodes, responses, stability, targets
 
 RESULTS = Path(__file__).parent / "results"
 
@@ -26,7 +27,9 @@ def run(quick: bool) -> dict[str, Any]:
     report["frequencies"] = [frequencies.measured(size, 3, rounds), frequencies.measured(size // 3, 10, rounds)]
     report["growth"] = frequencies.growth(100_000 if quick else 10_000_000)
     report["cold start"] = cold.measured()
+    report["responses"], report["stability"] = responses.measured(), stability.measured()
     report["sweep"] = nodes.measured(40_000 if quick else 4_000_000)
+    report["targets"] = targets.rows(report)
     return report
 
 
@@ -35,6 +38,11 @@ def table(report: dict[str, Any]) -> str:
     lines = ["# Benchmarks", "", "| machine | |", "| --- | --- |"]
     lines += [f"| {name} | {value} |" for name, value in report["machine"].items()]
     lines += [f"| {name} | {value:.2f} |" for name, value in report["floor"].items()]
+    lines += ["", "## Targets", "", "| what | measured | target | |", "| --- | --: | --: | --- |"]
+    for row in report["targets"]:
+        lines.append(
+            f"| {row['what']} | {row['measured']:.3g} | {row['target']} | {'met' if row['met'] else 'missed'} |"
+        )
     for case in report["frequencies"]:
         lines += ["", f"## {case['modes']} frequencies of an arm", ""]
         lines += [
@@ -47,10 +55,14 @@ def table(report: dict[str, Any]) -> str:
                 f"| {name} | {row['arms']} | {row['median']:.3g} | {row['low']:.3g} to {row['high']:.3g} "
                 f"| {row['times the loop']:.1f} | {differs} |"
             )
-        lines += ["", f"{case['evaluations a root']:.2f} evaluations a root; the C twin multiplies in "]
-        lines[-1] += (
-            f"{case['C vector bits']}-bit registers. 'Differs by' is the largest relative difference from ours."
-        )
+        found = ", ".join(f"{value:.2f} {name}" for name, value in case["evaluations a root"].items())
+        widths = ", ".join(f"{name} {bits}" for name, bits in case["C vector bits"].items())
+        lines += [
+            "",
+            f"Evaluations of the determinant a root: {found}. Bits of the registers C multiplies in: {widths}. ",
+        ]
+        lines[-1] += "'Differs by' is the largest relative difference from ours."
+        lines += ["", *(f"- not run: {name}: {why}" for name, why in case["absent"].items())]
     lines += [
         "",
         "## One evaluation of the determinant",
@@ -67,6 +79,9 @@ def table(report: dict[str, Any]) -> str:
         lines += ["", f"## Growth with {kind}", "", f"| route | {kind} | s | quartiles |", "| --- | --: | --: | --: |"]
         for route, points in routes.items():
             lines += [f"| {route} | {n} | {median:.3g} | {low:.3g} to {high:.3g} |" for n, median, low, high in points]
+    for title, unit in (("responses", "ns a sample"), ("stability", "ms a point")):
+        lines += ["", f"## {title.capitalize()}", "", f"| route | {unit} | times as long |", "| --- | --: | --: |"]
+        lines += [f"| {name} | {row[unit]:.3g} | {row['times as long']:.1f} |" for name, row in report[title].items()]
     lines += ["", "## Sweeps", "", nodes.note(report["sweep"])]
     return "\n".join(lines) + "\n"
 
@@ -102,9 +117,9 @@ def main() -> None:
     report = run(options.quick)
     options.output.mkdir(parents=True, exist_ok=True)
     text = table(report)
-    (options.output / "benchmarks.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
-    (options.output / "benchmarks.md").write_text(text, encoding="utf-8")
-    picture(report, options.output / "benchmarks.png")
+    (options.output / "results.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    (options.output / "results.md").write_text(text, encoding="utf-8")
+    picture(report, options.output / "results.png")
     print(text)
 
 

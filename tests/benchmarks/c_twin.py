@@ -8,11 +8,13 @@ import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cra_sym.codegen.exporter import arm_sources
 
+WIDE = "-mprefer-vector-width=512"
 FLAGS = ["-std=c99", "-O3", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"]
 
 
@@ -27,16 +29,36 @@ def simd_width(text: str) -> int:
     return {"x": 128, "y": 256, "z": 512, "": 64}[max(found, default="", key=" xyz".index)]
 
 
-def build(folder: Path) -> tuple[Callable[..., None], int]:
-    """Return ``fill(out, kappa_t, kappa_r, mu, iota)`` and the SIMD width in bits."""
-    for name, text in arm_sources("c").items():
+#: One arm after the other, as a program that knows nothing of batches would ask.
+ONE_BY_ONE = """
+#include <stddef.h>
+#include "cra_arm.h"
+int one_by_one(size_t n, const double *kt, const double *kr, const double *mu, const double *io, int modes, double *out)
+{
+    for (size_t i = 0; i < n; i++)
+        if (cra_frequency_parameters(kt[i], kr[i], mu[i], io[i], modes, out + i * modes)) return 1;
+    return 0;
+}
+"""
+Fill = Callable[..., None]
+
+
+def build(folder: Path, *more: str) -> tuple[Fill, Fill, int]:
+    """Return ``fill(out, kappa_t, kappa_r, mu, iota)`` by batches and one by one, and the SIMD width in bits."""
+    for name, text in {**arm_sources("c"), "one_by_one.c": ONE_BY_ONE}.items():
         (folder / name).write_text(text, encoding="utf-8")
-    sources, library = ["spectrum.c", "batch.c", "modes.c"], folder / "twin.so"
-    command = ["gcc", *FLAGS, "-shared", "-fPIC", *sources, "-o", str(library), "-lm"]
+    flags, library = [*FLAGS, *more], folder / f"twin{''.join(more)}.so"
+    sources = ["spectrum.c", "batch.c", "modes.c", "one_by_one.c"]
+    command = ["gcc", *flags, "-shared", "-fPIC", *sources, "-o", str(library), "-lm"]
     subprocess.run(command, cwd=folder, check=True)
-    command = ["gcc", *FLAGS, "-S", "batch.c", "-o", "-"]
+    command = ["gcc", *flags, "-S", "batch.c", "-o", "-"]
     assembly = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
-    function = ctypes.CDLL(str(library)).cra_frequency_parameters_batch
+    loaded = ctypes.CDLL(str(library))
+    routes = [_filling(loaded[name]) for name in ("cra_frequency_parameters_batch", "one_by_one")]
+    return routes[0], routes[1], simd_width(assembly.stdout)
+
+
+def _filling(function: Any) -> Fill:
     pointer = np.ctypeslib.ndpointer(np.float64, flags="C")
     function.argtypes = [ctypes.c_size_t, *[pointer] * 4, ctypes.c_int, pointer]
     function.restype = ctypes.c_int
@@ -45,4 +67,4 @@ def build(folder: Path) -> tuple[Callable[..., None], int]:
         if function(len(out), *groups, out.shape[1], out):
             raise ArithmeticError("a zero was not reached")
 
-    return fill, simd_width(assembly.stdout)
+    return fill

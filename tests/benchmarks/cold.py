@@ -8,13 +8,22 @@ import sys
 import tempfile
 from time import perf_counter
 
+from cra_sym.kernels import has_compiler
+
 CALL = """
 import numpy as np, cra_sym as cra
+{before}
 number = {arms}
 rng = np.random.default_rng(0)
 arm = cra.Arm.nominal().replace(k_t=10 ** rng.uniform(2, 6, number), k_r=10 ** rng.uniform(0, 5, number))
 cra.natural_frequencies(arm)
 """
+
+CASES = (
+    ("one arm", 1, ""),
+    ("1e6 arms", 1_000_000, ""),
+    ("1e6 arms, machine code at once", 1_000_000, "from cra_sym.arm import spectrum; spectrum.COMPILE_FROM = 0"),
+)
 
 
 def spent(code: str, cache: str) -> dict[str, float]:
@@ -32,8 +41,9 @@ def measured() -> dict[str, dict[str, float]]:
     with tempfile.TemporaryDirectory() as cache:
         table["import numpy"] = spent("import numpy", cache)
         table["import cra_sym and numpy"] = spent("import numpy, cra_sym", cache)
-        for name, arms in (("one arm", 1), ("1e6 arms", 1_000_000)):
+        for name, arms, before in CASES if has_compiler() else CASES[:2]:
             with tempfile.TemporaryDirectory() as empty:
-                table[f"{name}, nothing stored"] = spent(CALL.format(arms=arms), empty)
-                table[f"{name}, stored"] = spent(CALL.format(arms=arms), empty)
+                code = CALL.format(arms=arms, before=before)
+                table[f"{name}, nothing stored"] = spent(code, empty)
+                table[f"{name}, stored"] = spent(code, empty)
     return table

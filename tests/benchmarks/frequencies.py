@@ -18,17 +18,26 @@ from scipy.optimize import brentq, elementwise
 import cra_sym as cra
 from cra_sym.arm import spectrum
 from cra_sym.kernels import has_compiler
-from tests.benchmarks import c_twin, elements
+from tests.benchmarks import c_twin, elements, peers
 from tests.benchmarks.machine import in_rounds, processors, summary
 
 SEED = 20261122
-LOOP = "brentq loop"
+LOOP, FREQUENCIES = "brentq loop", "natural_frequencies"
+MODAL = (
+    "omega", "participation", "root_displacement", "root_slope", "root_moment", "root_shear", "tip_displacement",
+    "tip_slope",
+)  # fmt: skip
+SENSITIVITIES = ("df_dk_t", "df_dk_r", "log_k_t", "log_k_r")
 
 
-def random_arms(size: int, seed: int = SEED) -> tuple[np.ndarray, ...]:
-    """Stiffness over seven and six decades around the interesting range, tip masses up to the arm's own."""
+def random_arms(size: int, seed: int = SEED, *, inert: bool = False) -> tuple[np.ndarray, ...]:
+    """Stiffness over seven and six decades around the interesting range, tip masses up to the arm's own.
+
+    The tip's rotary inertia is none, or spread over six decades up to the arm's own about its root.
+    """
     rng = np.random.default_rng(seed)
-    return 10 ** rng.uniform(-1, 6, size), 10 ** rng.uniform(-2, 4, size), rng.uniform(0, 1, size), np.zeros(size)
+    arms = 10 ** rng.uniform(-1, 6, size), 10 ** rng.uniform(-2, 4, size), rng.uniform(0, 1, size)
+    return *arms, 10 ** rng.uniform(-6, 0, size) if inert else np.zeros(size)
 
 
 def frequency_equation(b, a_t, a_r, mu, xp=math):
@@ -71,7 +80,9 @@ class Case:
         arm = cra.Arm.nominal()
         stiffness = {"k_t": kappa_t * arm.EI / arm.L**3, "k_r": kappa_r * arm.EI / arm.L}
         self.arms = arm.replace(**stiffness, m_e=mu * arm.rhoA * arm.L)
-        self.twin, self.width = c_twin.build(folder) if c_twin.has_gcc() else (None, 0)
+        self.twins: dict[str, tuple[c_twin.Fill, c_twin.Fill, int]] = {}
+        if c_twin.has_gcc():
+            self.twins = {"exported C": c_twin.build(folder), "exported C, wide": c_twin.build(folder, c_twin.WIDE)}
 
     def loop(self, number: int) -> np.ndarray:
         """Solve root by root."""
@@ -98,11 +109,9 @@ class Case:
         """Solve by this package."""
         return spectrum.frequency_parameters(*(x[:number] for x in self.groups), modes=self.modes, **options)
 
-    def in_c(self, number: int, threads: int = 1) -> np.ndarray:
-        """Solve by the C twin."""
-        assert self.twin is not None
+    def in_c(self, number: int, fill: c_twin.Fill, threads: int = 1) -> np.ndarray:
+        """Solve by exported C."""
         result = np.empty((number, self.modes))
-        fill = self.twin
 
         def part(lanes: slice) -> None:
             fill(result[lanes], *(x[lanes] for x in self.groups))
@@ -123,17 +132,29 @@ class Case:
             found["cra_sym, compiled, 1 thread"] = self.size, lambda n: self.ours(n, compile=True, threads=1)
             name = f"cra_sym, compiled, {two} threads"
             found[name] = self.size, lambda n: self.ours(n, compile=True, threads=two)
-        if self.twin is not None:
-            found["C twin, 1 thread"] = self.size, self.in_c
-            found[f"C twin, {two} threads"] = self.size, lambda n: self.in_c(n, two)
+        for twin, (fill, one_by_one, _) in self.twins.items():
+            for threads in (1, two):
+                name = f"{twin}, {threads} thread{'s' * (threads > 1)}"
+                found[name] = self.size, lambda n, fill=fill, threads=threads: self.in_c(n, fill, threads)
+            if "wide" not in twin:
+                found[f"{twin}, one arm after the other"] = some, lambda n, fill=one_by_one: self.in_c(n, fill)
         return found
 
     def quantities(self) -> dict[str, tuple[int, Callable[[int], Any]]]:
-        """Return the public functions over all arms, on as many threads as they take."""
+        """Return the public functions over all arms, on as many threads as they take, every array of ours looked at."""
+
+        def modal(_: int) -> list[np.ndarray]:
+            found = cra.modal_parameters(self.arms, self.modes)
+            return [getattr(found, name) for name in MODAL]
+
+        def sensitive(_: int) -> list[np.ndarray]:
+            found = cra.sensitivities(self.arms, self.modes)
+            return [getattr(found, name) for name in SENSITIVITIES]
+
         return {
-            "natural_frequencies": (self.size, lambda n: cra.natural_frequencies(self.arms, self.modes)),
-            "modal_parameters": (self.size, lambda n: cra.modal_parameters(self.arms, self.modes)),
-            "sensitivities": (self.size, lambda n: cra.sensitivities(self.arms, self.modes)),
+            FREQUENCIES: (self.size, lambda n: cra.natural_frequencies(self.arms, self.modes)),
+            "modal_parameters": (self.size, modal),
+            "sensitivities": (self.size, sensitive),
         }
 
 
@@ -149,13 +170,24 @@ def measured(size: int, modes: int, rounds: int) -> dict[str, Any]:
         jobs = routes | quantities
         times = in_rounds({name: (lambda f=f, n=n: f(n)) for name, (n, f) in jobs.items()}, rounds)  # type: ignore[misc]
         rows = {name: summary([1e6 * t for t in times[name]], number) for name, (number, _) in jobs.items()}
-        evaluations = evaluations_per_root(min(size, 20_000), modes) if has_compiler() else float("nan")
+        number = min(size, 100)
+        others = peers.measured(tuple(x[:number] for x in case.groups), case.lam[:number], elements_for(modes), rounds)
+        widths = {name: width for name, (*_, width) in case.twins.items()}
     for name, row in rows.items():
-        row["times the loop"] = rows[LOOP]["median"] / row["median"]
         row["arms"] = jobs[name][0]
         if name in errors:
             row["differs by"] = errors[name]
-    return {"modes": modes, "rows": rows, "evaluations a root": evaluations, "C vector bits": case.width}
+    rows |= {
+        f"{name} {row['version']}, {elements_for(modes)} elements": row
+        for name, row in others.items()
+        if "median" in row
+    }
+    for row in rows.values():
+        row["times the loop"] = rows[LOOP]["median"] / row["median"]
+    absent = {name: row["failed"] for name, row in others.items() if "failed" in row} | peers.CANNOT
+    sets = {"no rotary inertia": False, "with rotary inertia": True} if has_compiler() else {}
+    evaluations = {name: evaluations_per_root(min(size, 20_000), modes, inert) for name, inert in sets.items()}
+    return {"modes": modes, "rows": rows, "evaluations a root": evaluations, "C vector bits": widths, "absent": absent}
 
 
 def growth(most: int) -> dict[str, dict[str, list[list[float]]]]:
@@ -176,6 +208,6 @@ def growth(most: int) -> dict[str, dict[str, list[list[float]]]]:
     return found
 
 
-def evaluations_per_root(size: int, modes: int) -> float:
+def evaluations_per_root(size: int, modes: int, inert: bool) -> float:
     """Return how often the determinant is evaluated for a root, counts at fixed points left out."""
-    return spectrum._fill_compiled(np.empty((size, modes)), *random_arms(size)) / (size * modes)
+    return spectrum._fill_compiled(np.empty((size, modes)), *random_arms(size, inert=inert)) / (size * modes)

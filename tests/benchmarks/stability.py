@@ -1,6 +1,6 @@
 """A stability chart against one solve_ivp a point, in one run.
 
-Run it as ``python tests/benchmarks/stability.py``. It prints ratios; nothing is asserted but agreement. solve_ivp is
+Run it as ``python -m tests.benchmarks.stability``. It prints ratios; nothing is asserted but agreement. solve_ivp is
 timed on random points of the chart and scaled up, once with its default method and tolerances and once as accurate
 as the chart.
 """
@@ -11,6 +11,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import cra_sym as cra
+from cra_sym.kernels import has_compiler
 
 SIDE, MODES, SAMPLE = 200, 3, 40
 ACCURATE = {"method": "DOP853", "rtol": 1e-6, "atol": 1e-8}
@@ -51,33 +52,38 @@ def timed(function, repeat=3):
     return min(times), result
 
 
-def main():
-    """Time the chart with NumPy, compiled, and by solve_ivp, for a fluctuating joint."""
+def measured() -> dict[str, dict[str, float]]:
+    """Time the chart with NumPy, compiled, and by solve_ivp, for a fluctuating joint; return milliseconds a point."""
     arm, excitation = cra.Arm.nominal().replace(k_t=1e3), cra.JointStiffness()
     varpi, epsilon = chart(arm)
     rng = np.random.default_rng(1)
     points = [(varpi[i], epsilon[k]) for i, k in rng.integers(0, SIDE, (SAMPLE, 2))]
-    reference = {}
-    for name, options in (("default", {}), ("accurate", ACCURATE)):
+    exact = np.array([float(cra.growth_rate(arm, excitation, *p, MODES, tolerance=1e-12)) for p in points])
+    rows, results = {}, {}
+    for name, options in (("solve_ivp, default", {}), ("solve_ivp, as accurate", ACCURATE)):
         seconds, rates = timed(lambda o=options: [one_growth_rate(arm, excitation, *p, **o) for p in points], repeat=1)
-        reference[name] = seconds / SAMPLE * SIDE**2
-        exact = np.array([float(cra.growth_rate(arm, excitation, *p, MODES, tolerance=1e-12)) for p in points])
-        print(f"solve_ivp, {name}: largest error of a growth rate {np.abs(rates - exact).max():.1e} 1/s")
-    results = {}
-    for backend in ("numpy", "numba"):
+        rows[name] = {"ms a point": 1e3 * seconds / SAMPLE, "error 1/s": float(np.abs(rates - exact).max())}
+    for backend in ("numpy", "numba") if has_compiler() else ("numpy",):
 
         def run(backend=backend):
             return cra.growth_rate(arm, excitation, varpi, epsilon[:, None], MODES, tolerance=1e-7, backend=backend)
 
         run()
         seconds, results[backend] = timed(run)
-        ratios = ", ".join(
-            f"{total / seconds:.0f} times faster than solve_ivp ({name})" for name, total in reference.items()
-        )
-        print(f"{SIDE} x {SIDE} chart, {MODES} modes, {backend}: {ratios}")
         at = [results[backend][np.searchsorted(epsilon, e), np.searchsorted(varpi, v)] for v, e in points]
-        print(f"    largest error of a growth rate {np.abs(np.array(at) - exact).max():.1e} 1/s")
-    assert np.allclose(results["numpy"], results["numba"], atol=1e-8)
+        error = float(np.abs(np.array(at) - exact).max())
+        rows[f"cra_sym, {backend}"] = {"ms a point": 1e3 * seconds / SIDE**2, "error 1/s": error}
+    for rates in results.values():
+        assert np.allclose(rates, results["numpy"], atol=1e-8)
+    fastest = min(row["ms a point"] for row in rows.values())
+    return {name: {**row, "times as long": row["ms a point"] / fastest} for name, row in rows.items()}
+
+
+def main() -> None:
+    """Print the table."""
+    print(f"{SIDE} x {SIDE} chart, {MODES} modes")
+    for name, row in measured().items():
+        print(f"{name:24} {row['ms a point']:10.4f} ms a point, {row['times as long']:8.1f} times as long")
 
 
 if __name__ == "__main__":

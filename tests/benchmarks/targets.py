@@ -1,0 +1,48 @@
+"""What the package set out to reach, each a ratio within one run, beside what the run says."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tests.benchmarks.frequencies import FREQUENCIES, LOOP
+
+ONE, NUMPY, FIND = "cra_sym, compiled, 1 thread", "cra_sym, NumPy", "scipy elementwise.find_root"
+
+
+def rows(report: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return what was aimed at, what was measured, and whether it is met."""
+    found: list[dict[str, Any]] = []
+
+    def add(what: str, measured: float | None, target: float, *, least: bool = True) -> None:
+        if measured is not None:
+            met = measured >= target if least else measured <= target
+            sign = "at least" if least else "at most"
+            found.append({"what": what, "measured": measured, "target": f"{sign} {target:g}", "met": met})
+
+    for case in report["frequencies"]:
+        name, median = f"{case['modes']} modes", {key: row["median"] for key, row in case["rows"].items()}
+        several = next((key for key in median if key.startswith("cra_sym, compiled") and key != ONE), None)
+
+        def ratio(slow: str, fast: str | None, median: dict[str, float] = median) -> float | None:
+            return median[slow] / median[fast] if slow in median and fast in median else None
+
+        add(f"{name}: one thread, times the loop", ratio(LOOP, ONE), 200)
+        add(f"{name}: {str(several)[19:]}, times the loop", ratio(LOOP, several), 400)
+        add(f"{name}: one thread, times find_root", ratio(FIND, ONE), 15)
+        add(f"{name}: NumPy alone, times the loop", ratio(LOOP, NUMPY), 25)
+        twins = [key for key in median if key.startswith("exported C") and key.endswith("1 thread")]
+        for twin in twins:
+            add(f"{name}: one thread over {twin.removesuffix(', 1 thread')}", ratio(ONE, twin), 1.3, least=False)
+        for quantity in ("modal_parameters", "sensitivities"):
+            add(f"{name}: {quantity} over frequencies", ratio(quantity, FREQUENCIES), 2.0, least=False)
+        for arms, value in case["evaluations a root"].items():
+            add(f"{name}: evaluations a root, {arms}", value, 2.5, least=False)
+    kernel = report["kernel"]
+    if "Numba, kernel" in kernel and "C, branch-free functions" in kernel:
+        add("one evaluation over C", kernel["Numba, kernel"]["ratio to C"], 1.6, least=False)
+    cold = {key: row["wall s"] for key, row in report["cold start"].items()}
+    add("import, s more than NumPy's", cold["import cra_sym and numpy"] - cold["import numpy"], 0.3, least=False)
+    for key, seconds in cold.items():
+        if "nothing stored" in key or key == "one arm, stored":
+            add(f"{key}, s", seconds, 8.0 if "nothing" in key else 1.0, least=False)
+    return found
