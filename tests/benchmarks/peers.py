@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 import tempfile
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -24,20 +25,29 @@ _PATIENCE = 240  # seconds for an installation or a run
 def measured(groups: tuple[np.ndarray, ...], lam: np.ndarray, elements: int, rounds: int) -> dict[str, Any]:
     """Return a row for each peer: microseconds a set and the largest difference from ``lam``, or why it did not run."""
     job = {"arms": np.column_stack(groups[:3]).tolist(), "modes": lam.shape[1], "elements": elements, "rounds": rounds}
-    with tempfile.TemporaryDirectory() as folder:
-        python = Path(folder) / ("Scripts" if sys.platform == "win32" else "bin") / "python"
-        try:
-            subprocess.run([sys.executable, "-m", "venv", folder], check=True, capture_output=True, timeout=_PATIENCE)
-            install = [str(python), "-m", "pip", "install", "--quiet", "--only-binary", ":all:", *PACKAGES]
-            subprocess.run(install, check=True, capture_output=True, timeout=_PATIENCE)
-            run = subprocess.run(
-                [str(python), str(Path(__file__).with_name("peers_job.py"))],
-                input=json.dumps(job), capture_output=True, text=True, check=True, timeout=_PATIENCE,
-            )  # fmt: skip
-            rows = json.loads(next(line for line in run.stdout.splitlines() if line.startswith("{")))
-        except (subprocess.SubprocessError, OSError, StopIteration) as error:
-            return {name: {"failed": f"no environment: {type(error).__name__}"} for name in PACKAGES}
+    command = [str(Path(__file__).with_name("peers_job.py"))]
+    try:
+        done = _run([_environment(), *command], input=json.dumps(job), text=True)
+        rows = json.loads(next(line for line in done.stdout.splitlines() if line.startswith("{")))
+    except (subprocess.SubprocessError, OSError, StopIteration) as error:
+        return {name: {"failed": f"no environment: {type(error).__name__}"} for name in PACKAGES}
     return {name: _row(row, lam) for name, row in rows.items()}
+
+
+def _run(command: list[str], **options: Any) -> subprocess.CompletedProcess:
+    return subprocess.run(command, check=True, capture_output=True, timeout=_PATIENCE, **options)
+
+
+_folder = tempfile.TemporaryDirectory(prefix="peers")  # goes with the process
+
+
+@cache
+def _environment() -> str:
+    """Make the scratch environment and return its Python."""
+    _run([sys.executable, "-m", "venv", _folder.name])
+    python = str(Path(_folder.name) / ("Scripts" if sys.platform == "win32" else "bin") / "python")
+    _run([python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:", *PACKAGES])
+    return python
 
 
 def _row(row: dict[str, Any], lam: np.ndarray) -> dict[str, Any]:
