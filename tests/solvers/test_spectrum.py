@@ -1,0 +1,114 @@
+"""The driver of complete spectra on products with known zeros: close ones, those at zero or on a point, and misfits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import cra_sym as cra
+from cra_sym.arm.instance import arm_model, model_values
+from cra_sym.arm.spectrum import ArmCharacteristic
+from cra_sym.model.values import Values
+from cra_sym.solvers.spectrum import Characteristic, spectrum
+
+
+class Product:
+    """F(z) = product of (1 - z / z_i), its zeros at 0 left out; lanes are rows of zeros."""
+
+    def __init__(self, roots):
+        roots = np.atleast_2d(roots)
+        self.zeros = (roots == 0.0).sum(axis=1)
+        self.roots = np.where(roots == 0.0, np.inf, roots)
+
+    def count(self, z, lanes):
+        roots = self.roots[lanes]
+        z = np.broadcast_to(z, len(roots))
+        value, _, _ = self.evaluate(z, lanes)
+        return (roots < z[:, None]).sum(axis=1) + self.zeros[lanes], value
+
+    def evaluate(self, z, lanes):
+        """Factor by factor, each over 1 + z / z_i, so that nothing grows."""
+        value, slope, curvature = (-1.0) ** self.zeros[lanes], np.zeros(z.shape), np.zeros(z.shape)
+        for root in self.roots[lanes].T:
+            factor, rate, size = 1.0 - z / root, -1.0 / root, 1.0 + z / root
+            curvature = (curvature * factor + 2.0 * slope * rate) / size
+            slope = (slope * factor + value * rate) / size
+            value = value * factor / size
+        return value, slope, curvature
+
+
+def regular(shift, number=60):
+    return (np.pi * (np.arange(number) + shift)) ** 4
+
+
+def test_the_arm_and_the_products_speak_the_protocol():
+    products: Characteristic = Product(regular(0.6))
+    arm: Characteristic = ArmCharacteristic(*np.ones((4, 1)))
+    for pair in (products, arm):
+        number, value = pair.count(np.array([50.0]), slice(None))
+        same, _, _ = pair.evaluate(np.array([50.0]), np.zeros(1, dtype=int))
+        assert np.sign(value) == np.sign(same) == (-1.0) ** number
+
+
+@pytest.mark.parametrize("shift", [0.05, 0.3, 0.5625, 0.8])
+def test_regular_zeros(shift):
+    found = spectrum(Product(regular(shift)), 12)
+    np.testing.assert_allclose(found[0], regular(shift)[:12], rtol=1e-12)
+
+
+def test_lanes_keep_apart():
+    shifts = np.random.default_rng(5).uniform(0.05, 0.95, 40)
+    roots = np.array([regular(shift) for shift in shifts])
+    np.testing.assert_allclose(spectrum(Product(roots), 7), roots[:, :7], rtol=1e-12)
+
+
+@pytest.mark.parametrize("gap", [1e-2, 1e-5, 1e-9])
+@pytest.mark.parametrize("where", [0, 1, 4])
+def test_close_zeros_are_both_found(gap, where):
+    roots = regular(0.4)
+    roots[where + 1] = roots[where] * (1.0 + gap)
+    found = spectrum(Product(roots), 8)
+    np.testing.assert_allclose(found[0], roots[:8], rtol=1e-11)
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_zeros_at_zero_are_exact(number):
+    roots = np.r_[np.zeros(number), regular(0.7)]
+    found = spectrum(Product(roots), 6)
+    assert (found[0, :number] == 0.0).all()
+    np.testing.assert_allclose(found[0, number:], roots[number:6], rtol=1e-12)
+
+
+def test_a_tiny_zero_is_not_a_zero():
+    roots = np.r_[1e-20, regular(0.7)]
+    np.testing.assert_allclose(spectrum(Product(roots), 3)[0], roots[:3], rtol=1e-12)
+
+
+def test_a_zero_on_a_point_where_zeros_are_counted():
+    for point in (1, 2, 5):
+        lam = np.pi * ((point - 1) / 2 + 1 / 16)
+        roots = regular(0.45)
+        roots[(point - 1) // 2] = lam**4
+        np.testing.assert_allclose(spectrum(Product(np.sort(roots)), 6)[0], np.sort(roots)[:6], rtol=1e-12)
+
+
+def test_too_few_zeros_are_an_error():
+    with pytest.raises(ArithmeticError, match=r"3 zeros lie below .* 5 are wanted"):
+        spectrum(Product(regular(0.5, number=3)), 5)
+
+
+def test_counts_of_the_arm_are_those_of_the_dynamic_stiffness():
+    """The specialised pair against the generic one, at random places of random arms, rigid and absent springs too."""
+    rng = np.random.default_rng(11)
+    k_t, k_r = 10 ** rng.uniform(-2, 7, (2, 40))
+    k_t[:6], k_r[3:9] = [0.0, np.inf, 0.0, np.inf, 0.0, np.inf], [0.0, np.inf, 0.0, np.inf, 0.0, np.inf]
+    arm = cra.Arm.nominal().replace(
+        k_t=k_t, k_r=k_r, m_e=10 ** rng.uniform(-4, 1, 40), J_e=10 ** rng.uniform(-6, 0, 40)
+    )
+    z = rng.uniform(0.2, 40.0, 40) ** 4
+    special, _ = ArmCharacteristic(arm.kappa_t, arm.kappa_r, arm.mu, arm.iota).count(z, slice(None))
+    model = arm_model()
+    omega = np.sqrt(z * arm.EI / arm.rhoA) / arm.L**2
+    for rows, _, problem in model._spatial.problems(Values.read(model.symbols, model_values(arm))):
+        generic = problem.evaluate(omega[rows] ** 2, np.arange(len(rows))).count
+        np.testing.assert_array_equal(generic, special[rows])
