@@ -1,4 +1,4 @@
-"""Laws that hold whatever the arm: scaling, interlacing, symmetry, limits, and broadcasting of every public function."""
+"""Laws that hold whatever the arm: scaling, interlacing, symmetry, limits; broadcasting of every public function."""
 
 import numpy as np
 import pytest
@@ -170,3 +170,28 @@ def test_broadcasting_equals_looping(name):
     for i, j in np.ndindex(ARM.shape):
         one = LOOPED[name](ARM.replace(k_t=float(ARM.k_t[i, 0]), k_r=float(ARM.k_r[j])))
         np.testing.assert_allclose(one, whole[i, j], rtol=1e-9, atol=1e-9 * np.abs(whole[i, j]).max(), err_msg=name)
+
+
+@pytest.mark.parametrize("method", ["modal", "implicit"])
+@pytest.mark.parametrize("name", ["k_t", "k_r", "m_e", "J_e", "L", "b", "h", "E", "rho"])
+def test_sensitivities_are_slopes_at_any_length(name, method):
+    """An arm of no unit length: a wrong power of L cannot hide."""
+    arm = cra.Arm.nominal().replace(L=0.7, k_t=800.0, k_r=40.0, m_e=0.03, J_e=2e-4)
+    step = 1e-5 * getattr(arm, name)
+    up, down = (cra.natural_frequencies(arm.replace(**{name: getattr(arm, name) + s * step})) for s in (1, -1))
+    found = getattr(cra.sensitivities(arm, method=method), f"df_d{name}")
+    np.testing.assert_allclose(found, (up - down) / (2 * step), rtol=1e-7, atol=1e-7 * np.abs(found).max())
+
+
+def test_damping_may_come_close_to_critical():
+    assert cra.Arm.nominal().replace(zeta=0.999).zeta == 0.999
+    with pytest.raises(ValueError, match="zeta = 1"):
+        cra.Arm.nominal().replace(zeta=1.0)
+
+
+def test_a_harmonic_of_no_size_or_speed_is_over_at_once():
+    """A motion that goes on has no time after it; one that never starts has."""
+    with pytest.raises(ValueError, match="stop|end|rest"):
+        cra.residual_vibration(ARM, cra.BaseMotion(amplitude=0.5, angular_frequency=2.0))
+    still = cra.BaseMotion(amplitude=0.0, angular_frequency=5.0) + STOP
+    np.testing.assert_allclose(cra.residual_vibration(ARM, still), cra.residual_vibration(ARM, STOP), rtol=1e-12)

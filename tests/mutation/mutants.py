@@ -89,7 +89,7 @@ def _mutant(tree: ast.Module, path: tuple, function: str, statement: tuple, chan
         else:
             getattr(parent, name)[index] = node.operand
     elif change.startswith("*"):
-        node.value *= float(change[1:])
+        node.value = node.value * float(change[1:]) or float(change[1:]) - 1.0  # zero becomes a tenth, up or down
     else:
         node.value += int(change)
     before, after = (_shown(_reach(t, statement)) for t in (tree, changed))
