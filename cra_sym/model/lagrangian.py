@@ -115,7 +115,7 @@ class Model:
         """Equations of motion, boundary conditions and the steps that led there."""
         stated = ((f"{end} end", self._options[end]) for end in ("left", "right"))
         ends = {label: sympify(term, strict=True) for label, term in stated if term is not None}
-        check_dimensions(sympify(density, strict=True), ends, units or {})
+        check_dimensions(sympify(density, strict=True), ends, units or {}, self._virtual_work)
         given = [density, *self._options["domain"], *self._options["essential"], *ends.values()]
         given += [part for force, displacement, _ in self._virtual_work for part in (force, displacement)]
         self.symbols: tuple[Symbol, ...] = parameters(given, self.equations)

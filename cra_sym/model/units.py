@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from sympy import Add, Expr, expand
@@ -17,7 +17,12 @@ ENERGY = Dimension(2, 1, -2)
 ENERGY_PER_LENGTH = Dimension(1, 1, -2)
 
 
-def check_dimensions(density: Expr, ends: Mapping[str, Expr], units: Mapping[Any, str]) -> None:
+def check_dimensions(
+    density: Expr,
+    ends: Mapping[str, Expr],
+    units: Mapping[Any, str],
+    virtual_work: Iterable[tuple[Expr, Expr, Any]] = (),
+) -> None:
     """Refuse a term whose dimension is not energy (per length in the density).
 
     Parameters
@@ -26,6 +31,8 @@ def check_dimensions(density: Expr, ends: Mapping[str, Expr], units: Mapping[Any
     ends : mapping of label to Expr
     units : mapping of symbol, function or name to unit
         For symbols that are not those of ``cra_sym.symbols``. Terms with a symbol of unknown unit are not judged.
+    virtual_work : iterable of (force, displacement, place)
+        The force times the displacement is judged, per length where the place is 'domain'.
 
     Raises
     ------
@@ -36,6 +43,14 @@ def check_dimensions(density: Expr, ends: Mapping[str, Expr], units: Mapping[Any
     for label, expression, wanted in (
         ("density", density, ENERGY_PER_LENGTH),
         *((label, end, ENERGY) for label, end in ends.items()),
+        *(
+            (
+                f"virtual work on {displacement}",
+                force * displacement,
+                ENERGY_PER_LENGTH if place == "domain" else ENERGY,
+            )
+            for force, displacement, place in virtual_work
+        ),
     ):
         for term in Add.make_args(expand(expression, deep=False)):
             found = _dimension(term, declared)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from sympy import Expr, Symbol, sympify
+from sympy import Add, Expr, Symbol, sympify
 from sympy.core.function import AppliedUndef
 
 from cra_sym.checks import broadcastable, real_array
@@ -85,9 +85,10 @@ def parameters(given: Iterable[Expr], result: HamiltonResult) -> tuple[Symbol, .
     expressions = [sympify(part, strict=True) for part in given]
     own = {result.x, result.t}
     known = {f.func for f in (*result.fields, *result.coordinates)}
-    for function in {f for e in expressions for f in e.atoms(AppliedUndef) if f.func not in known}:
-        if own <= function.free_symbols:
-            raise ValueError(f"{function} is not one of the fields {list(map(str, result.fields))}")
+    for term in (term for e in expressions for term in Add.make_args(e)):
+        for function in term.atoms(AppliedUndef):
+            if function.func not in known and own <= function.free_symbols:
+                raise ValueError(f"term {term}: {function} is not one of the fields {list(map(str, result.fields))}")
     found = sorted({s for e in expressions for s in e.free_symbols} - own, key=lambda s: (s.name, str(s)))
     for first, second in itertools.pairwise(found):
         if first.name == second.name:

@@ -142,6 +142,8 @@ def _static_bounds(static: Evaluation) -> np.ndarray:
     mass, frame = np.linalg.eigh(-static.derivative)
     if (mass[:, 0] < -1e-6 * np.abs(mass).max(axis=1)).any():
         raise ValueError("values: a static deflection has negative kinetic energy; allowed are masses of at least 0")
+    if (mass[:, -1] <= 0.0).any():
+        raise ValueError("values: no motion of the structure has kinetic energy")
     whitener = frame / np.sqrt(np.maximum(mass, 1e-14 * mass.max(axis=1, keepdims=True)))[:, None, :]
     return np.linalg.eigvalsh(np.swapaxes(whitener, -1, -2) @ static.matrix @ whitener)
 

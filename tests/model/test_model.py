@@ -153,7 +153,7 @@ theta = sp.Function("theta")(x, t)
     ("build", "message"),
     [
         (lambda: model(BEAM - HALF * N * (v.diff(x) - theta) ** 2), r"theta\(x, t\) is not one of the fields"),
-        (lambda: model(BEAM - HALF * N * theta.diff(x) ** 2), r"theta\(x, t\) is not one of the fields"),
+        (lambda: model(BEAM - HALF * N * theta.diff(x) ** 2), r"term -N\*.*: theta\(x, t\) is not one of the fields"),
         (lambda: model(right=HALF * m_e * v.diff(x, 2, t) ** 2), "not a displacement of that end"),
         (lambda: model(essential=[v.subs(x, 0)]), "k_t.*essential"),
         (lambda: model(essential=[v.diff(x, 2).subs(x, 0)], left=None), "no displacement of an end"),
@@ -167,6 +167,11 @@ theta = sp.Function("theta")(x, t)
 def test_refused_at_once(build, message):
     with pytest.raises(ValueError, match=message):
         build()
+
+
+def test_a_structure_without_mass_has_no_frequencies():
+    with pytest.raises(ValueError, match="no motion of the structure has kinetic energy"):
+        model(-HALF * EI * v.diff(x, 2) ** 2, right=None).natural_frequencies({EI: 1, L: 1, k_t: 1, k_r: 1})
 
 
 def test_a_nonlinear_lagrangian_has_equations_but_no_frequencies():
@@ -201,6 +206,12 @@ def test_a_unit_slip_is_named():
         declared(ARM.subs(Y.diff(X, 2), Y.diff(X)))
     with pytest.raises(ValueError, match=r"left end, term -k_r\*v\(x, t\)\*\*2/2: its dimension is m\^4 kg\^1 s\^-2"):
         declared(left=-HALF * table.k_r * Y**2)
+
+
+def test_a_unit_slip_in_the_virtual_work_is_named():
+    assert declared(virtual_work=[(-table.k_t * Y, Y, "left")])
+    with pytest.raises(ValueError, match=r"virtual work on v\(x, t\), term -k_t\*.*its dimension is m\^2 kg\^1 s\^-3"):
+        declared(virtual_work=[(-table.k_t * Y.diff(T), Y, "left")])
 
 
 def test_units_given_by_the_user_are_checked_and_unknown_ones_are_not():
