@@ -17,6 +17,7 @@ from scipy.optimize import brentq, elementwise
 
 import cra_sym as cra
 from cra_sym.arm import spectrum
+from cra_sym.arm.modal import modes_of
 from cra_sym.kernels import has_compiler
 from tests.benchmarks import c_twin, elements, peers
 from tests.benchmarks.machine import in_rounds, processors, summary
@@ -142,6 +143,10 @@ class Case:
 
     def quantities(self) -> dict[str, tuple[int, Callable[[int], Any]]]:
         """Return the public functions over all arms, on as many threads as they take, every array of ours looked at."""
+
+        if has_compiler():
+            few = [x[:3] for x in self.groups]
+            modes_of(*few, lam=self.lam[:3], compile=True)  # machine code is there from now on
 
         def modal(_: int) -> list[np.ndarray]:
             found = cra.modal_parameters(self.arms, self.modes)
