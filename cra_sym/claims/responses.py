@@ -156,7 +156,7 @@ def _(setting: Setting) -> Finding:
     }
     same = "the same at every instant" if gap < 1e-9 else f"different by {percent(gap)}"
     sentence = (
-        f"In mm, no: what the disturbance adds to v(L, t) is {same} in both operations, by superposition. "
+        f"In millimetres, no: what the disturbance adds to v(L, t) is {same} in both operations, by superposition. "
         "As a share "
         f"of the peak it matters more when accelerating in {percent((ratio < 0).mean())} of the plane of frequency "
         "and phase; "

@@ -3,6 +3,7 @@
 import ast
 import dataclasses
 import json
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import numpy as np
@@ -135,3 +136,14 @@ def test_words():
     assert percent(0.5) == "50 %" and listed([1.0]) == "1"
     assert span([1, 2, 3], [False] * 3) == "nowhere"
     assert span([1, 2, 3], [True, False, True], "s") == "1 and 3 s"
+
+
+def test_imports_of_the_room_form_no_circle():
+    """Not at import, not inside functions, not for types."""
+    needs = {}
+    for path in FOLDER.glob("*.py"):
+        tree = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        origins = {node.module or "" for node in tree if isinstance(node, ast.ImportFrom)}
+        needs[path.stem] = {name.rpartition(".")[2] for name in origins if name.startswith("cra_sym.claims.")}
+    order = list(TopologicalSorter(needs).static_order())  # raises CycleError
+    assert order.index("verdict") < order.index("registry") < order.index("ledger") < order.index("overviews")
