@@ -8,7 +8,7 @@ SUPPORTED = import sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3
 RUN = .venv/bin/python
 NOTEBOOKS = --nbval --nbval-current-env --nbval-sanitize-with tests/notebooks/sanitize.cfg notebooks
 
-.PHONY: reproduce test lab notebooks lint mutation clean
+.PHONY: reproduce test lab notebooks oldest newest lint mutation clean
 
 reproduce: .venv/.ready
 	$(RUN) -m cra_sym reproduce --output "$(OUTPUT)"
@@ -23,6 +23,13 @@ notebooks: .venv/.ready
 	$(RUN) -m cra_sym.report.notebooks notebooks
 	$(RUN) -m cra_sym.report.pictures notebooks/images
 
+# Every notebook through on the oldest or the newest versions that pyproject.toml allows, in an environment of its own.
+oldest newest: .venv/.ready
+	$(RUN) -m venv .venv-$@
+	$(RUN) -m tests.notebooks.gate --requirements $@ > .venv-$@/requirements.txt
+	.venv-$@/bin/python -m pip install --quiet --no-compile --disable-pip-version-check -r .venv-$@/requirements.txt
+	.venv-$@/bin/python -m tests.notebooks.gate
+
 lint: .venv/.ready
 	$(RUN) -m ruff check .
 	$(RUN) -m ruff format --check .
@@ -33,7 +40,7 @@ mutation: .venv/.ready
 	$(RUN) -m tests.mutation $(ARGS)
 
 clean:
-	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-oldest .venv-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 .venv/.ready: requirements.txt pyproject.toml
 	@for python in $(CANDIDATES); do \

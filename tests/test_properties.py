@@ -191,7 +191,7 @@ def test_damping_may_come_close_to_critical():
 
 def test_a_harmonic_of_no_size_or_speed_is_over_at_once():
     """A motion that goes on has no time after it; one that never starts has."""
-    with pytest.raises(ValueError, match="stop|end|rest"):
+    with pytest.raises(ValueError, match=r"stop|end|rest"):
         cra.residual_vibration(ARM, cra.BaseMotion(amplitude=0.5, angular_frequency=2.0))
     still = cra.BaseMotion(amplitude=0.0, angular_frequency=5.0) + STOP
     np.testing.assert_allclose(cra.residual_vibration(ARM, still), cra.residual_vibration(ARM, STOP), rtol=1e-12)

@@ -28,6 +28,7 @@ def main() -> int:
     parser.add_argument("--sample", type=int, metavar="N", help="this many mutants a module, drawn at random (all)")
     parser.add_argument("--seed", type=int, default=20261122, help="of the draw (%(default)s)")
     parser.add_argument("--checks", action="store_true", help="only the equations' own checks, no other tests")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="where verdicts go (%(default)s)")
     options = parser.parse_args()
     known = watched_modules()
     if unknown := set(options.modules) - set(known):
@@ -51,12 +52,12 @@ def _examine(laboratory: Laboratory, module: str, options: argparse.Namespace) -
         verdicts.append((mutant, verdict))
         seconds = time.process_time() + sum(os.times()[2:4]) - start
         print(f"{verdict.name.lower():9} {seconds:5.1f} s  {module} {mutant.function}: {mutant.after}", flush=True)
-    return record(module, len(pool), verdicts, options.seed)
+    return record(options.results, module, len(pool), verdicts, options.seed)
 
 
-def record(module: str, mutants: int, verdicts: list, seed: int) -> int:
+def record(file: Path, module: str, mutants: int, verdicts: list, seed: int) -> int:
     """Write a module's counts and survivors; return the number of survivors that have no reason yet."""
-    results = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else {}
+    results = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
     known = results.get(module, {}).get("survivors", [])
     reasons = {(s["function"], s["before"], s["after"]): s["reason"] for s in known}
     examined = {mutant.change for mutant, _ in verdicts}
@@ -68,7 +69,7 @@ def record(module: str, mutants: int, verdicts: list, seed: int) -> int:
             survivors.append({**dict(zip(names, mutant.change, strict=True)), "reason": reason})
     counts = {v.name.lower(): sum(verdict is v for _, verdict in verdicts) for v in Verdict}
     results[module] = {"seed": seed, "mutants": mutants, "tried": len(verdicts), **counts, "survivors": survivors}
-    RESULTS.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    file.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     return sum(not s["reason"] for s in survivors)
 
 

@@ -1,6 +1,8 @@
 """The mutation tool: it changes what it says, one thing at a time, and tells a caught mutant from one that is not."""
 
 import importlib.util
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -23,8 +25,6 @@ def _():
 
 @pytest.fixture(scope="module", autouse=True)
 def _load():
-    import sys
-
     sys.modules["mutants_tool"] = tool  # a dataclass looks its module up
     _spec.loader.exec_module(tool)
 
@@ -50,3 +50,25 @@ def test_every_mutant_of_the_sections_differs_and_compiles():
         for mutant in found:
             compile(mutant.source, name, "exec")
             assert mutant.before != mutant.after
+
+
+def test_every_test_that_watches_is_there():
+    sys.path.insert(0, str(ROOT))
+    try:
+        from tests.mutation import watch
+    finally:
+        sys.path.remove(str(ROOT))
+    for module in watch.watched_modules():
+        for name in (name for part in watch.rounds(module) for name in part):
+            file, _, test = name.partition("::")
+            assert (ROOT / file).exists(), f"{module}: {file}"
+            assert not test or f"def {test}(" in (ROOT / file).read_text(encoding="utf-8"), f"{module}: {name}"
+
+
+def test_a_sample_of_a_section_is_caught(tmp_path):
+    """The tool at work on mutants of one section, seeded, by the equations' own checks."""
+    command = [sys.executable, "-m", "tests.mutation", "arm/driven", "--checks", "--sample", "5"]
+    run = subprocess.run(
+        [*command, "--seed", "2", "--results", str(tmp_path / "results.json")], cwd=ROOT, capture_output=True, text=True
+    )
+    assert run.returncode == 0 and run.stdout.count("caught") == 5, run.stdout + run.stderr

@@ -16,6 +16,7 @@ EXEMPT = {
     "arm/equations": "the registry of equations and how wide a printed line may be",
 }
 
+_LAWS = "tests/test_properties.py"
 _LAMBDA, _MODAL = "tests/arm/test_frequency_parameters.py", "tests/arm/test_modal_parameters.py"
 _FREQUENCIES = [
     f"{_LAMBDA}::test_{name}"
@@ -44,6 +45,7 @@ _PHYSICS = [_FREQUENCIES, _MODES]
 _ROUNDS: dict[str, list[list[str]]] = {
     "arm/analysis": [_MODES, [_MODAL, _LAMBDA]],
     "arm/boundaries": _STABILITY,
+    "arm/by_hand": [],
     "arm/characteristic": [_FREQUENCIES, _MODES, _DIGITS, ["tests/arm/test_characteristic.py"]],
     "arm/driven": [["tests/arm/test_response.py"]],
     "arm/edges": _STABILITY,
@@ -61,9 +63,12 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "arm/modal_sum": [],
     "arm/motion": [],
     "arm/orthogonality": [],
+    "arm/operators": [],
+    "arm/parameters": [["tests/arm/test_parameters.py", f"{_LAWS}::test_damping_may_come_close_to_critical"]],
     "arm/parametric": _STABILITY,
     "arm/residual": [["tests/arm/test_response.py"]],
     "arm/resonance": [],
+    "arm/sensitivity": [["tests/arm/test_sensitivity.py"], [f"{_LAWS}::test_sensitivities_are_slopes_at_any_length"]],
     "arm/shapes": [_MODES, [_MODAL]],
     "arm/shooting": [],
     "arm/spectrum": [_FREQUENCIES, _DIGITS, [_LAMBDA]],

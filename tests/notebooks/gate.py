@@ -1,18 +1,31 @@
 """Run every notebook through on the versions at hand: ``python -m tests.notebooks.gate [NOTEBOOK...]``.
 
-Nothing is stored or compared; a cell that raises, such as an assertion that does not hold, fails the gate.
+Nothing is stored or compared; a cell that raises, such as an assertion that does not hold, fails the gate. With
+``--requirements oldest`` or ``newest`` it prints what to install before, from the ranges in ``pyproject.toml``.
 """
 
 from __future__ import annotations
 
 import platform
 import sys
+import tomllib
 from importlib import metadata
 from pathlib import Path
 
 from cra_sym.report.notebooks import NotebookError, execute, find_notebooks
 
+ROOT = Path(__file__).resolve().parents[2]
 LIBRARIES = ("sympy", "numpy", "scipy", "numba", "matplotlib")
+
+
+def requirements(which: str) -> list[str]:
+    """Return the dependencies at the lower ends of their ranges, or the ranges; the tools of the notebooks as they come."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    ranges = project["dependencies"]
+    if which == "oldest":
+        ranges = [f"{name.replace('>=', '==')}.*" for name in ranges]
+    return [*ranges, *(line for extra in ("notebooks", "certify", "scale", "explore") for line in extras[extra])]
 
 
 def main(names: list[str]) -> int:
@@ -31,4 +44,7 @@ def main(names: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(min(main(sys.argv[1:]), 1))
+    if sys.argv[1:2] == ["--requirements"]:
+        print(*requirements(sys.argv[2]), sep="\n")
+    else:
+        sys.exit(min(main(sys.argv[1:]), 1))
