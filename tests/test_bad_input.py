@@ -43,6 +43,7 @@ GOOD = {
     "mode_shapes": dict(arm=ARM, x=0.5, modes=2, derivative=1),
     "modal_parameters": dict(arm=ARM, modes=2),
     "BaseMotion": dict(velocity=0.1, acceleration=0.1, amplitude=1e-3, angular_frequency=10.0, phase=0.0),
+    "Force": dict(level=1.0, amplitude=0.5, angular_frequency=10.0, phase=0.0),
     "response": dict(arm=ARM, motion=MOTION, t=[0.0, 0.1], x=0.5, modes=2, derivative=0, zeta=0.01, start="base"),
     "tip_response": dict(arm=ARM, motion=MOTION, t=0.1, modes=2, derivative=0, zeta=0.01, start="inertial"),
     "residual_vibration": dict(arm=ARM, motion=cra.BaseMotion.trapezoid(0.1, 0.2, 1.0), modes=2, zeta=0.0),

@@ -151,7 +151,7 @@ LOOPED = {
 }
 #: No numeric function of an arm, or one whose arms are single: a fit, a system, a labelled study with tests of its own.
 NOT_LOOPED = {
-    "Arm", "AsymptoticWarning", "AxialBase", "BaseMotion", "JointStiffness", "Model", "ResonanceWarning",
+    "Arm", "AsymptoticWarning", "AxialBase", "BaseMotion", "Force", "JointStiffness", "Model", "ResonanceWarning",
     "TransverseBase", "equation", "equations", "explore", "export", "identify_joint", "input_shaper", "kernel",
     "state_space", "sweep",
 }  # fmt: skip
