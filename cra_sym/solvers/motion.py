@@ -341,7 +341,11 @@ class Force:
         varpi, psi = real_array("angular_frequency", angular_frequency, low=0.0), real_array("phase", phase)
         broadcastable(level=constant, amplitude=size, angular_frequency=varpi, phase=psi)
         constant = constant + np.where(varpi == 0.0, size * np.sin(psi), 0.0)
-        size = np.where(varpi == 0.0, 0.0, -size / np.where(varpi == 0.0, 1.0, varpi) ** 2)
+        with np.errstate(all="ignore"):
+            way = np.where(varpi == 0.0, 0.0, -size / np.where(varpi == 0.0, 1.0, varpi) ** 2)
+        if not np.isfinite(way).all() or ((way == 0.0) & (size != 0.0) & (varpi != 0.0)).any():
+            raise ValueError(f"angular_frequency = {angular_frequency!r}: too small or too large to compute with")
+        size = way
         self.profile = BaseMotion(acceleration=constant, amplitude=size, angular_frequency=varpi, phase=psi)
 
     @classmethod
