@@ -19,7 +19,7 @@ LIBRARIES = ("sympy", "numpy", "scipy", "numba", "matplotlib")
 
 
 def requirements(which: str) -> list[str]:
-    """Return the dependencies at the lower ends of their ranges, or the ranges; the tools of the notebooks as they come."""
+    """Return the dependencies, the oldest or the newest in their ranges; the notebooks' tools as they come."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"]
     ranges = project["dependencies"]
