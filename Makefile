@@ -24,11 +24,18 @@ notebooks: .venv/.ready
 	$(RUN) -m cra_sym.report.pictures notebooks/images
 
 # Every notebook through on the oldest or the newest versions that pyproject.toml allows, in an environment of its own.
-oldest newest: .venv/.ready
-	$(RUN) -m venv .venv-$@
-	$(RUN) -m tests.notebooks.gate --requirements $@ > .venv-$@/requirements.txt
-	.venv-$@/bin/python -m pip install --quiet --no-compile --disable-pip-version-check -r .venv-$@/requirements.txt
-	.venv-$@/bin/python -m tests.notebooks.gate
+oldest: .venv/.ready
+	$(call gate,oldest)
+
+newest: .venv/.ready
+	$(call gate,newest)
+
+define gate
+	$(RUN) -m venv .venv-$(1)
+	$(RUN) -m tests.notebooks.gate --requirements $(1) > .venv-$(1)/requirements.txt
+	.venv-$(1)/bin/python -m pip install --quiet --no-compile --disable-pip-version-check -r .venv-$(1)/requirements.txt
+	.venv-$(1)/bin/python -m tests.notebooks.gate
+endef
 
 lint: .venv/.ready
 	$(RUN) -m ruff check .

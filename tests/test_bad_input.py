@@ -69,12 +69,6 @@ ELSEWHERE = {
     "Model", "kernel",  # take SymPy expressions: their own tests
     "export",  # writes a folder: below
 }  # fmt: skip
-NOISY = {  # values no machine has make these overflow with NumPy's RuntimeWarning
-    ("frequency_response", "angular_frequency"),
-    ("identify_joint", "uncertainty"),
-    ("floquet_exponents", "angular_frequency"),
-    ("growth_rate", "angular_frequency"),
-}
 PLACES = [(name, argument) for name, arguments in GOOD.items() for argument in arguments]
 
 
@@ -98,8 +92,6 @@ def refused_or_done(name, argument, value):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warnings.simplefilter("ignore", UserWarning)  # ours derive from it, NumPy's RuntimeWarning does not
-        if (name, argument) in NOISY:
-            warnings.simplefilter("ignore", RuntimeWarning)
         try:
             return call(name, **{argument: value})
         except (TypeError, ValueError) as error:

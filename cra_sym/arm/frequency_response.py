@@ -20,6 +20,9 @@ _NEAR = 2.0  # modulus of lambda below which power series serve
 _BELOW, _ABOVE, _DIGITS = 18.0, 14.0, 37.0  # reach of the quadrature in ln y, and minus ln of its error
 
 
+_FASTEST = 1e60  # rad/s, whose fourth power is a number; what is slower than its inverse is static
+
+
 def frequency_response(
     arm: Arm, angular_frequency: Any, x: Any = None, *, damping: Literal["modal", "structural"] = "modal"
 ) -> Any:
@@ -72,7 +75,8 @@ def frequency_response(
     -6.6053e-03 s2
     """
     instance("arm", arm, Arm)
-    Omega = real_array("angular_frequency", angular_frequency, low=0.0)
+    Omega = real_array("angular_frequency", angular_frequency, low=0.0, high=_FASTEST)
+    Omega = np.where(Omega * _FASTEST < 1.0, 0.0, Omega)
     places = real_array("x", np.min(arm.L) if x is None else x, low=0.0, high=float(np.min(arm.L)))
     for name, value in (("angular_frequency", Omega), ("x", places)):
         if value.ndim > 1:

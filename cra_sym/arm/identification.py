@@ -126,7 +126,7 @@ def _checked(arm: Arm, measured_frequencies: Any, uncertainty: Any) -> tuple[np.
     if arm.shape:
         raise ValueError(f"arm has shape {arm.shape}: allowed is a single arm")
     measured = real_array("measured_frequencies", measured_frequencies, low=0.0, open_low=True)
-    sigma = real_array("uncertainty", uncertainty, low=0.0, open_low=True)
+    sigma = real_array("uncertainty", uncertainty, low=1e-60, high=1e60)
     if measured.ndim != 1 or measured.size == 0:
         raise ValueError(f"measured_frequencies has shape {measured.shape}: allowed is one axis of frequencies")
     if np.any(np.diff(measured) <= 0):
