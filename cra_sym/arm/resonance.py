@@ -10,7 +10,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from sympy import Abs, Derivative, Eq, Expr, Function, I, Pow, S, Sum, Symbol, conjugate, cos, exp, integrate, pi, solve
+from sympy import Derivative, Eq, Expr, Function, I, S, Sum, Symbol, conjugate, cos, exp, integrate, pi, solve
 
 from cra_sym.arm.boundaries import forced_growth, forced_resonance, general_resonance, plain
 from cra_sym.arm.energy import L, inner_mass, modal_numbers
@@ -250,7 +250,9 @@ def _() -> bool:
     turned = (_acted(order_1()[0].rhs) * exp(-I * omega_n * T_0)).expand()
     mean = sum((integrate(term, (T_0, 0, period)) / period for term in turned.args), S.Zero)
     (condition,) = solvability()
-    return vanishes(force - 2 * I * omega_n * exp(I * omega_n * t)) and vanishes(mean - _acted(condition.lhs))
+    return vanishes(force - 2 * I * omega_n * exp(I * omega_n * t)) and vanishes(
+        mean - _acted(condition.lhs - condition.rhs)
+    )
 
 
 @numbered(46, "inner product", "definition", (6,))
@@ -290,7 +292,8 @@ def _() -> bool:
     (mode, *_rest) = shoot(values)
     mass = evaluate(real, values, {Function(name)(x): mode for name in "fg"})
     by_definition = modal_numbers(values, mode)[symbol("M_i")]
-    gap = (distributed().lhs.subs(M_n, mass) - mass * solvability()[0].lhs).expand()
+    sides = distributed().lhs - distributed().rhs
+    gap = (sides.subs(M_n, mass) - mass * solvability()[0].lhs).expand()
     return gap == 0 and bool(abs(mass / by_definition - 1) < 1e-12)
 
 
@@ -371,14 +374,7 @@ def _() -> bool:
     balance = (mass * (motion.diff(t, 2) + omega_n**2 * motion) - force).subs(t, pi / (2 * omega_n))
     (needed,) = solve(balance, rate)
     found = shown**2 - (needed * tip) ** 2
-    return units == Dimension(m=1, s=-1) and scaled == shown == expression and vanishes(_real(found))
-
-
-def _real(expression: Expr) -> Expr:
-    """Write squares of magnitudes of real numbers as squares."""
-    return expression.replace(
-        lambda e: isinstance(e, Pow) and isinstance(e.base, Abs) and e.exp == 2, lambda e: e.base.args[0] ** 2
-    )
+    return units == Dimension(m=1, s=-1) and scaled == shown == expression and vanishes(found)
 
 
 @numbered("49b", "threshold of damping", "derived", (48,))
