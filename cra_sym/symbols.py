@@ -219,12 +219,16 @@ def __dir__() -> list[str]:
 
 @cache
 def unit_dimension(unit: str) -> Dimension:
-    """Return the dimension of a unit such as ``N m/rad``."""
+    """Return the dimension of a unit such as ``N m/rad``; a ValueError names one that is not known."""
+    if not isinstance(unit, str):
+        raise TypeError(f"unit = {unit!r}: allowed is a text such as 'N m/rad'")
     above, _, below = unit.partition("/")
     total = Dimension()
     for part, sign in ((above, 1), (below, -1)):
         for atom in part.split():
             base, _, power = atom.partition("^")
+            if base not in _UNITS:
+                raise ValueError(f"unit = {unit!r}: {base!r} is not one of {', '.join(_UNITS)}")
             total = total * _UNITS[base] ** (sign * int(power or 1))
     return total
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from cra_sym.codegen.printers import PRINTERS, ScalarPrinter
+from cra_sym.codegen.printers import PRINTERS, FortranPrinter, ScalarPrinter
 from cra_sym.codegen.program import Argument, Branch, Function
 
 __all__ = ["LANGUAGES", "Language"]
@@ -104,7 +104,8 @@ def _fortran_head(f: Function) -> list[str]:
     names = [a.name for a in f.arguments]
     kind = "function" if f.scalar else "subroutine"
     result = " result(out)" if f.scalar else ""
-    lines = [f"  pure {kind} {f.name}({', '.join(names + ([] if f.scalar else ['out']))}){result}"]
+    head = f"pure {kind} {f.name}({', '.join(names + ([] if f.scalar else ['out']))}){result}"
+    lines = [FortranPrinter({}).wrapped(head, "  ")]
     for a in f.arguments:
         lines.append(f"    real(dp), intent(in) :: {a.name}{f'({len(a.symbols)})' if a.row else ''}")
     lines.append("    real(dp) :: out" if f.scalar else f"    real(dp), intent(out) :: out({f.size})")

@@ -29,6 +29,7 @@ nextafter pow remainder remquo rint round scalbn signbit sin sinh sqrt tan tanh 
 signal clock exit abort free malloc main stdin stdout errno min max sum size shape real aint anint merge huge
 tiny dp pi inf nan math e i j ans im isnan isfinite isinf ones zeros eye sign floor choose number list str tuple
 dict set type id map filter range len repr input status evaluate characteristic model checks self_test
+all any isreal inverse error real64 floor_real DomainError RangeError ArithmeticError Number NAN INFINITY HUGE_VAL
 """
 
 RESERVED = frozenset(f"{_KEYWORDS} {_LIBRARY} True False None NaN Inf Infinity Math Self".split())

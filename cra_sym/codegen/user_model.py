@@ -44,7 +44,7 @@ def model_texts(name: str, model: Model) -> dict[str, str]:
         "helpers": language.helped(text),
         "parameters": [a.name for a in used],
         "nomenclature": [(a.name, "rad/s" if i == 0 else "", str(a.symbols[0])) for i, a in enumerate(used)],
-        "model": repr(model).strip("<>"),
+        "model": repr(model).strip("<>").replace("\\", ""),  # it stands in comments and docstrings
     }
     checks = _checks(made, expressions)
     values["sample"] = [repr(x) for x in checks[0].inputs]

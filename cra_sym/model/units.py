@@ -39,6 +39,8 @@ def check_dimensions(
     ValueError
         Names the term, its dimension and the dimension it should have.
     """
+    if not isinstance(units, Mapping):
+        raise TypeError(f"units = {units!r}: allowed is a mapping from symbols to units")
     declared = {_name(key): table.unit_dimension(unit) for key, unit in units.items()}
     for label, expression, wanted in (
         ("density", density, ENERGY_PER_LENGTH),

@@ -47,6 +47,8 @@ class Values:
                 raise ValueError(f"values: {key} does not occur in the model; it has {', '.join(by_name) or 'none'}")
             if name in found:
                 raise ValueError(f"values: {name} is given twice")
+            if isinstance(value, Expr) and value.is_extended_real:
+                value = float(value)
             try:
                 found[name] = real_array(name, value, allow_infinite=True)
             except TypeError as error:

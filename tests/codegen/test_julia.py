@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+import sympy as sp
 
 import cra_sym as cra
 from cra_sym.codegen import exporter
@@ -27,3 +28,22 @@ def test_every_file_parses(tmp_path, monkeypatch):
     for name in sources:
         assert not parsed((tmp_path / "julia" / name).read_text()).has_error, name
     assert "Parsed, not run" in (tmp_path / "julia" / "README.md").read_text()
+
+
+def test_a_model_of_ones_own_parses(tmp_path):
+    x, t = sp.symbols("x t")
+    tension, mass, length, spring = sp.symbols("DomainError all end lambda")  # each has a meaning in Julia or Python
+    y = sp.Function("y")(x, t)
+    density = mass * y.diff(t) ** 2 / 2 - tension * y.diff(x) ** 2 / 2
+    string = cra.Model(density, fields=[y], x=x, domain=(0, length), t=t, left=-spring * y**2 / 2)
+    folder = tmp_path / "model"
+    made = cra.export("julia", folder, model=string)
+    texts = {name: (folder / name).read_text() for name in made.files if name.endswith(".jl")}
+    assert sorted(texts) == ["Model.jl", "self_test.jl"]
+    for name, text in texts.items():
+        assert not parsed(text).has_error, name
+    (head,) = (line for line in texts["Model.jl"].splitlines() if line.startswith("function characteristic("))
+    assert not {"DomainError", "all", "end", "lambda"} & set(head[:-1].partition("(")[2].split(", "))
+    readme = (folder / "README.md").read_text()
+    assert "Parsed, not run" in readme
+    assert not parsed(readme.partition("```julia\n")[2].partition("```")[0]).has_error

@@ -108,11 +108,14 @@ def test_the_arm(language, tmp_path, environment):
 @pytest.fixture(scope="module")
 def beam() -> cra.Model:
     x, t = sp.symbols("x t", real=True)
-    EI, rhoA, length, m, k = sp.symbols("EI rhoA lambda m end", positive=True)  # two names are taken in some languages
+    names = "all isreal Number NAN inverse lambda end"  # each is taken in some language
+    E, I_z, rho, area, k, length, m = sp.symbols(names, positive=True)
+    summer, winter = (sp.Symbol(rf"\lambda_of_the_foundation_under_the_arm_in_{time}") for time in ("summer", "winter"))
+    more = sum(sp.symbols("k_1:8"))  # a Fortran line ends at column 132
     v = sp.Function("v")(x, t)
-    density = rhoA * v.diff(t) ** 2 / 2 - EI * v.diff(x, 2) ** 2 / 2
+    density = rho * area * v.diff(t) ** 2 / 2 - E * I_z * v.diff(x, 2) ** 2 / 2 - (summer + winter) * v**2 / 2
     return cra.Model(
-        density, fields=[v], x=x, domain=(0, length), t=t, left=-k * v**2 / 2, right=m * v.diff(t) ** 2 / 2,
+        density, fields=[v], x=x, domain=(0, length), t=t, left=-(k + more) * v**2 / 2, right=m * v.diff(t) ** 2 / 2,
         essential=[v.diff(x).subs(x, 0)],
     )  # fmt: skip
 

@@ -42,6 +42,8 @@ def test_values_by_symbol_or_by_name_and_broadcasting(arm):
     single = arm.natural_frequencies(VALUES, modes=4)
     assert single.shape == (4,)
     np.testing.assert_array_equal(arm.natural_frequencies(names, modes=4), single)
+    symbolic = arm.natural_frequencies({**VALUES, m_e: sp.Rational(1, 20), k_t: sp.Integer(900)}, modes=4)
+    np.testing.assert_array_equal(symbolic, single)
     batch = arm.natural_frequencies({**VALUES, k_t: [[900.0], [50.0]], L: [1.0, 1.1, 1.2]}, modes=4)
     assert batch.shape == (2, 3, 4)
     np.testing.assert_allclose(batch[0, 1], single, rtol=1e-12)
@@ -55,6 +57,8 @@ def test_values_by_symbol_or_by_name_and_broadcasting(arm):
         ({k_t: np.nan}, "k_t = nan"),
         ({k_t: True}, "k_t = True"),
         ({k_t: 1j}, "k_t = 1j"),
+        ({k_t: 2 * sp.I}, r"k_t = 2\*I"),
+        ({k_t: 2 * L}, r"k_t = 2\*L"),
         ({"k_q": 1.0}, "k_q does not occur in the model; it has EI, L, k_r, k_t, m_e, rhoA"),
         ({"k_t": 1.0}, "k_t is given twice"),
         ({k_t: [1.0, 2.0], k_r: [1.0, 2.0, 3.0]}, "k_t"),
@@ -220,6 +224,19 @@ def test_units_given_by_the_user_are_checked_and_unknown_ones_are_not():
     assert declared(left=-HALF * spring * Y.diff(X) ** 2, units={spring: "N m/rad"})
     with pytest.raises(ValueError, match="left end"):
         declared(left=-HALF * spring * Y.diff(X) ** 2, units={"k": "N/m"})
+
+
+@pytest.mark.parametrize(
+    ("units", "error", "message"),
+    [
+        ({"k": "furlong/s"}, ValueError, "unit = 'furlong/s': 'furlong' is not one of 1, rad, m"),
+        ({"k": 3}, TypeError, "unit = 3"),
+        (["N/m"], TypeError, r"units = \['N/m'\]: allowed is a mapping"),
+    ],
+)
+def test_units_that_are_none_are_refused(units, error, message):
+    with pytest.raises(error, match=message):
+        declared(units=units)
 
 
 def test_the_same_letter_with_other_assumptions_is_another_symbol():
