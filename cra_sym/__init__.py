@@ -23,6 +23,7 @@ _HOME = {
     "response": "arm.response",
     "tip_response": "arm.response",
     "residual_vibration": "arm.response",
+    "residual_vibration_gradient": "arm.vibration_gradient",
     "state_space": "arm.state_space",
     "frequency_response": "arm.frequency_response",
     "sensitivities": "arm.sensitivity",

@@ -23,6 +23,7 @@ from .arm.stability import forced_width as forced_width
 from .arm.stability import growth_rate as growth_rate
 from .arm.stability import stability_boundary as stability_boundary
 from .arm.state_space import state_space as state_space
+from .arm.vibration_gradient import residual_vibration_gradient as residual_vibration_gradient
 from .codegen import export as export
 from .explorer import explore as explore
 from .kernels import kernel as kernel

@@ -47,6 +47,9 @@ GOOD = {
     "response": dict(arm=ARM, motion=MOTION, t=[0.0, 0.1], x=0.5, modes=2, derivative=0, zeta=0.01, start="base"),
     "tip_response": dict(arm=ARM, motion=MOTION, t=0.1, modes=2, derivative=0, zeta=0.01, start="inertial"),
     "residual_vibration": dict(arm=ARM, motion=cra.BaseMotion.trapezoid(0.1, 0.2, 1.0), modes=2, zeta=0.0),
+    "residual_vibration_gradient": dict(
+        arm=ARM, motion=cra.BaseMotion.trapezoid(0.1, 0.2, 1.0), by=("k_r", "duration"), modes=2, zeta=0.0
+    ),
     "state_space": dict(arm=ARM, modes=2, input="base_acceleration"),
     "frequency_response": dict(arm=ARM, angular_frequency=[5.0, 9.0], x=0.5),
     "sensitivities": dict(arm=ARM, modes=2, method="modal"),

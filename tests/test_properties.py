@@ -139,6 +139,7 @@ LOOPED = {
     "response": lambda arm: cra.response(arm, MOVE, [0.1, 0.7], [0.0, 1.0]),
     "tip_response": lambda arm: cra.tip_response(arm, MOVE, [0.1, 0.7]),
     "residual_vibration": lambda arm: cra.residual_vibration(arm, STOP),
+    "residual_vibration_gradient": lambda arm: cra.residual_vibration_gradient(arm, STOP)[1],
     "frequency_response": lambda arm: cra.frequency_response(arm, [3.0, 40.0]),
     "sensitivities": lambda arm: cra.sensitivities(arm).df_dk_t,
     "certify": lambda arm: cra.certify(arm, modes=2).lower,

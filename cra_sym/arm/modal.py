@@ -12,7 +12,7 @@ import numpy as np
 from cra_sym.arm.spectrum import in_parts, pair, wants_compiler
 from cra_sym.kernels import Kernel, compiled, derived_kernel
 
-__all__ = ["NEAR", "Modes", "modes_of"]
+__all__ = ["NEAR", "Modes", "modes_of", "tip_factors"]
 
 NEAR = 25.0  # shapes.NEAR; a test holds the two together
 
@@ -104,12 +104,19 @@ def _fill(table: np.ndarray, lam: np.ndarray, modes: int, *groups: np.ndarray) -
     """Fill the rows of the table: root (4), tip (2), waves (4), strain (2) and participation of every mode."""
     kappa_t, kappa_r, mu, iota = (np.repeat(value, modes) for value in groups)
     pairs = np.array([x for value in (kappa_t, kappa_r, mu, iota) for x in pair(value)])
-    alpha, beta, tip, waves = np.zeros(lam.size), np.zeros(lam.size), np.zeros((4, lam.size)), np.zeros((4, lam.size))
+    _fill_from_pairs(table, lam, modes, pairs, mu, iota)
+
+
+def _fill_from_pairs(
+    table: np.ndarray, lam: np.ndarray, modes: int, pairs: np.ndarray, mu: np.ndarray, iota: np.ndarray
+) -> None:
+    """Fill the table; complex values carry a derivative along in their imaginary parts, see `tip_factors`."""
+    alpha, beta, tip, waves = (np.zeros((*rows, lam.size), lam.dtype) for rows in ((), (), (4,), (4,)))
     near = lam**4 < NEAR
     alpha[near], beta[near], tip[:, near] = _near(pairs[:, near], lam[near])
     alpha[~near], beta[~near], tip[:, ~near], waves[:, ~near] = _far(pairs[:, ~near], lam[~near])
-    _rigid(alpha, beta, tip, modes, kappa_t + kappa_r == 0, mu)
     s_t, c_t, s_r, c_r = pairs[:4]
+    _rigid(alpha, beta, tip, modes, s_t + s_r == 0, mu)
     root = np.array([c_t * alpha, c_r * beta, s_r * beta, -s_t * alpha])
     displacement, slope = _tip_state(tip, mu, iota, lam)
     invariant = _invariant(near, root, waves, lam)
@@ -123,6 +130,27 @@ def _fill(table: np.ndarray, lam: np.ndarray, modes: int, *groups: np.ndarray) -
     table[10], table[11], table[12] = np.sqrt(s_t * c_t) * alpha, np.sqrt(s_r * c_r) * beta, participation
     table *= np.where(displacement < 0, -1.0, 1.0) / np.sqrt(mass)
     table += 0.0  # -0.0 becomes 0.0
+
+
+def tip_factors(lam: np.ndarray, pairs: np.ndarray, mu: np.ndarray, iota: np.ndarray) -> np.ndarray:
+    """Return the integral of phi over the arm, tip mass included, times phi at the tip: a pure number of each mode.
+
+    Parameters
+    ----------
+    lam : ndarray, shape (..., modes)
+    pairs : ndarray, shape (8, ..., modes)
+        (value, 1) / (1 + value) of kappa_t, kappa_r, mu and iota.
+    mu, iota : ndarray, shape (..., modes)
+
+    Notes
+    -----
+    Analytic in all of them: a change along the frequency equation, put as a tiny imaginary part, comes back as the
+    derivative in the imaginary part, with no difference taken.
+    """
+    table = np.empty((13, lam.size), lam.dtype)
+    flat = [value.reshape(-1) for value in (lam, mu, iota)]
+    _fill_from_pairs(table, flat[0], lam.shape[-1], pairs.reshape(8, -1), flat[1], flat[2])
+    return (table[12] * table[4]).reshape(lam.shape)
 
 
 def _invariant(near: np.ndarray, root: np.ndarray, waves: np.ndarray, lam: np.ndarray) -> np.ndarray:

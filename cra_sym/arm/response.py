@@ -14,7 +14,7 @@ from cra_sym.solvers import modal_response as solver
 from cra_sym.solvers.driven_modes import Start, driven_response, state_at_stop
 from cra_sym.solvers.motion import BaseMotion
 
-__all__ = ["residual_vibration", "response", "tip_response"]
+__all__ = ["oscillators", "residual_vibration", "response", "tip_response"]
 
 _DAMPING: dict[str, Any] = {"low": 0.0, "high": np.nextafter(1.0, 0.0), "allowed": "real numbers in [0, 1)"}
 
@@ -45,7 +45,7 @@ def tip_response(
     """
     modes = count("modes", modes)
     parameters = modal_parameters(arm, modes)
-    osc = _oscillators(arm, parameters, parameters.tip_displacement[..., None, :], zeta)
+    osc = oscillators(arm, parameters, parameters.tip_displacement[..., None, :], zeta)
     values = driven_response(osc, motion, t, derivative, start)[..., 0, :]
     return values if np.ndim(t) else values[..., 0]
 
@@ -103,7 +103,7 @@ def response(
         raise ValueError(f"x has shape {places.shape}: allowed are a number or one axis of places")
     modes = count("modes", modes)
     rows = np.swapaxes(mode_shapes(arm, np.atleast_1d(places), modes), -1, -2)
-    osc = _oscillators(arm, modal_parameters(arm, modes), rows, zeta)
+    osc = oscillators(arm, modal_parameters(arm, modes), rows, zeta)
     values = driven_response(osc, motion, t, derivative, start)
     values = values if places.ndim else values[..., 0, :]
     return values if np.ndim(t) else values[..., 0]
@@ -135,7 +135,7 @@ def residual_vibration(arm: Arm, motion: BaseMotion, modes: int = 5, *, zeta: An
     if not np.all(np.isfinite(motion.duration)):
         raise ValueError("motion never stops accelerating: allowed are moves with a stop, or sampled records")
     parameters = modal_parameters(arm, count("modes", modes))
-    osc = _oscillators(arm, parameters, parameters.tip_displacement[..., None, :], zeta)
+    osc = oscillators(arm, parameters, parameters.tip_displacement[..., None, :], zeta)
     q, u = state_at_stop(osc, motion)
     # a rigid-body mode keeps its inertial momentum: its velocity is the base's, rounding if the base has really stopped
     drift = -osc.gamma * _column(motion.velocity(np.max(motion.duration)))
@@ -149,7 +149,8 @@ def _column(value: Any) -> np.ndarray:
     return np.asarray(value, float)[..., None]
 
 
-def _oscillators(arm: Arm, parameters: ModalParameters, rows: np.ndarray, zeta: Any) -> solver.Oscillators:
+def oscillators(arm: Arm, parameters: ModalParameters, rows: np.ndarray, zeta: Any) -> solver.Oscillators:
+    """Return the modes as oscillators driven by the base, with the damping ratios of the arm or the given ones."""
     if zeta is None:
         ratios = _column(arm.zeta)
     else:

@@ -14,7 +14,7 @@ from cra_sym.arm.spectrum import pair
 from cra_sym.checks import count
 from cra_sym.kernels import derived_kernel
 
-__all__ = ["Sensitivities", "sensitivities"]
+__all__ = ["Sensitivities", "sensitivities", "squared_frequency_rate"]
 
 _implicit_rates = derived_kernel("cra_sym.arm.implicit:implicit_kernel", backend="numpy")
 _exponents = derived_kernel("cra_sym.arm.implicit:group_exponents", backend="numpy")
@@ -155,15 +155,17 @@ def sensitivities(arm: Arm, modes: int = 3, *, method: Literal["modal", "implici
     """
     if method not in ("modal", "implicit"):
         raise ValueError(f"method = {method!r}: allowed are 'modal' and 'implicit'")
-    return Sensitivities(arm, modal_parameters(arm, count("modes", modes)), _modal if method == "modal" else _implicit)
+    return Sensitivities(
+        arm, modal_parameters(arm, count("modes", modes)), squared_frequency_rate if method == "modal" else _implicit
+    )
 
 
 def _column(arm: Arm, value: Any) -> np.ndarray:
     return np.broadcast_to(value, arm.shape)[..., None]
 
 
-def _modal(arm: Arm, p: ModalParameters, name: str) -> np.ndarray:
-    """Return d omega^2 by a parameter, from the modes."""
+def squared_frequency_rate(arm: Arm, p: ModalParameters, name: str) -> np.ndarray:
+    """Return d omega^2 by k_t, k_r, a compliance c_t = 1/k_t or c_r, m_e or J_e, from the modes."""
     match name:
         case "k_t":
             return p.root_displacement**2

@@ -176,7 +176,7 @@ def knot_states(osc: Oscillators, cause: Piecewise) -> tuple[Array, Array]:
     wide = _widened(osc, -1)
     shift = _shift(wide, np.expand_dims(span, -2))
     shape = np.broadcast_shapes(osc.omega.shape, (*cause.acceleration.shape[:-1], 1), shift.p.shape[:-1])
-    states = np.zeros((2, *shape, cause.knots.shape[-1]))
+    states = np.zeros((2, *shape, cause.knots.shape[-1]), shift.p.dtype)
     state = (states[0, ..., 0], states[1, ..., 0])
     for k in range(1, states.shape[-1]):
         at = min(k, span.shape[-1]) - 1
@@ -313,13 +313,15 @@ def free_peak(osc: Oscillators, q: Array, u: Array) -> Array:
     """Return the largest absolute value each freely vibrating oscillator reaches from q, q' on, shape (..., N).
 
     It is the initial value or the first turning point after it. An oscillator of frequency zero keeps its value, or
-    leaves without bound if it has a velocity.
+    leaves without bound if it has a velocity. Complex values may carry a derivative along in their imaginary parts:
+    the turning time, where the velocity is zero, is stationary and stays real.
     """
-    omega, delta = osc.omega, osc.zeta * osc.omega
-    damped = omega * np.sqrt(1 - osc.zeta**2)
+    omega = osc.omega.real
+    delta, damped = osc.zeta * omega, omega * np.sqrt(1 - osc.zeta**2)
     with np.errstate(divide="ignore", invalid="ignore"):
-        turn = np.mod(np.arctan2(damped * u, omega**2 * q + delta * u), np.pi) / damped
+        turn = np.mod(np.arctan2(damped * u.real, omega**2 * q.real + delta * u.real), np.pi) / damped
     turn = np.where(damped > 0, turn, 0.0)
     q_turn, _ = free_motion(osc, turn, (q, u))
-    peak = np.maximum(np.abs(q), np.abs(q_turn))
+    first, later = (np.where(value.real < 0, -value, value) for value in (q, q_turn))
+    peak = np.where(first.real >= later.real, first, later)
     return np.where((omega == 0) & (u != 0), np.inf, peak)
