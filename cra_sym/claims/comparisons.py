@@ -104,11 +104,11 @@ def _softened_picture(verdict: Verdict, ax: Axes, label: str) -> None:
         verdict["k_t"],
         verdict["log_ratio"],
         ("varpi", "k_t"),
-        label,
         here,
         verdict.setting.visible,
     )
-    note(ax, "grey: less than 1 % apart" if verdict.setting.visible == 0.01 else "grey: not to be seen", "lower right")
+    apart = f"grey: less than {percent(verdict.setting.visible)} apart"
+    note(ax, f"green: {label}; dot: nominal\n{apart}", "upper right")
 
 
 @pictured("C10")

@@ -70,8 +70,8 @@ def _(verdict: Verdict, ax: Axes) -> None:
     centre = verdict["scale_allowed"].mean()
     for mode, (low, high) in enumerate(verdict["scale_by_mode"], 1):
         ax.plot([1e6 * (low / centre - 1), 1e6 * (high / centre - 1)], [mode, mode], "-", color=PALETTE[mode - 1], lw=5)
-        ax.annotate(f"{verdict['published'][mode - 1]:.3f} Hz", (0, mode), xytext=(0, 7), textcoords="offset points",
-                    ha="center", fontsize=8.5)  # fmt: skip
+        ax.annotate(f"{verdict['published'][mode - 1]:.3f} Hz", (0, mode), xytext=(20, 7), textcoords="offset points",
+                    fontsize=8.5)  # fmt: skip
     ax.axvspan(*(1e6 * (verdict["scale_allowed"] / centre - 1)), color="0.88", lw=0)
     offset = 1e6 * (float(verdict["scale"]) / centre - 1)
     if abs(offset) < 500:
@@ -355,7 +355,7 @@ def _joint_stiffness(arm: Arm) -> np.ndarray:
 def _(verdict: Verdict, ax: Axes) -> None:
     by_mode(ax, verdict["k_t"], verdict["beam_only"][0])
     ax.plot(verdict["k_t"], verdict["with_springs"][0].mean(-1), color="0.3", lw=1.0, ls="-")
-    note(ax, "grey: with the springs' energy", "lower left")
+    note(ax, "grey: with the springs' energy", "lower right")
     stiffness_axis(ax, "k_t")
     ax.legend(fontsize=8.5, loc="center right")
     ax.set_ylabel("$K_i / (M_i\\,\\omega_i^2)$")

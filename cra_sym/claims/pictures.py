@@ -87,7 +87,6 @@ def region_map(
     y: np.ndarray,
     ratio: np.ndarray,
     names: tuple[str, str],
-    label: str,
     here: Any = None,
     visible: float = 0.0,
 ) -> None:
@@ -102,8 +101,6 @@ def region_map(
         A logarithmic ratio, negative where the claim holds.
     names : pair of str
         What x and y are.
-    label : str
-        What the green part is.
     here : pair of float, optional
         The nominal point.
     visible : float
@@ -119,13 +116,13 @@ def region_map(
     ax.set_ylabel(_LABELS[names[1]])
     ax.grid(False)
     ax.margins(0)
-    note(ax, f"green: {label}", "upper right")
 
 
 def strip(ax: Axes, x: np.ndarray, where: np.ndarray, low: float, high: float) -> None:
     """Add a horizontal strip from ``low`` to ``high``, tinted by where a claim holds along a logarithmic axis."""
     edges = np.concatenate([x[:1], np.sqrt(x[1:] * x[:-1]), x[-1:]])
-    ax.pcolormesh(edges, [low, high], ~where[None], cmap=ListedColormap(TINTS[::2]), vmin=0, vmax=1, shading="flat")
+    ax.pcolormesh(edges, [low, high], ~where[None], cmap=ListedColormap(TINTS[::2]), vmin=0, vmax=1, shading="flat",
+                  rasterized=True)  # fmt: skip
 
 
 def note(ax: Axes, text: str, place: str) -> None:

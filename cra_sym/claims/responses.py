@@ -85,7 +85,9 @@ def plane_picture(verdict: Verdict, ax: Axes, label: str) -> None:
     """Draw where a claim holds over the disturbance's frequency and phase; the dot is the nominal disturbance."""
     setting = verdict.setting
     here = setting.angular_frequency, np.degrees(setting.phase) % 360
-    region_map(ax, verdict["varpi"], verdict["psi"], verdict["log_ratio"], ("varpi", "psi"), label, here)
+    remark = f"green: {label}\ndot: nominal disturbance"
+    region_map(ax, verdict["varpi"], verdict["psi"], verdict["log_ratio"], ("varpi", "psi"), here)
+    note(ax, remark, "upper right")
     ax.set_yticks(range(0, 361, 90))
 
 
@@ -232,7 +234,7 @@ def _(verdict: Verdict, ax: Axes) -> None:
     ax.set(xlabel="disturbance frequency $\\varpi$ / (rad/s)", ylabel="peak of $|v(L,t)|$ / mm", ylim=(0, None))
     ax.set_xlim(verdict["varpi"][0], verdict["varpi"][-1])
     ax.legend(fontsize=8, loc="upper left")
-    note(ax, "bands: any phase; lines: no disturbance", "lower right")
+    note(ax, "bands: any phase;\nlines: no disturbance", "upper right")
 
 
 @claimed(
@@ -282,7 +284,8 @@ def _(setting: Setting) -> Finding:
 def _(verdict: Verdict, ax: Axes) -> None:
     x, y = verdict["k_t"], verdict["k_r"]
     ax.set(xscale="log", yscale="log")
-    region_map(ax, x, y, verdict["log_ratio"], ("k_t", "k_r"), "$k_t$ adds more sag")
+    region_map(ax, x, y, verdict["log_ratio"], ("k_t", "k_r"))
+    note(ax, "green: $k_t$ adds more sag\ndots: stiffnesses of Fig. 5", "lower right")
     ax.plot(*np.meshgrid(verdict.setting.k_t, verdict.setting.k_r), "o", color="0.2", ms=3, ls="")
     stiffness_axis(ax, "k_t")
     ax.set_xlim(x[0], x[-1])

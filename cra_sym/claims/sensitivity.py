@@ -67,12 +67,14 @@ def _(verdict: Verdict, ax: Axes) -> None:
     for mode in range(ratio.shape[-1]):
         ax.contour(x, y, ratio[..., mode].T, levels=[0], colors=[PALETTE[mode]], linestyles=[STYLES[mode]])
         ax.plot([], [], color=PALETTE[mode], ls=STYLES[mode], label=f"mode {mode + 1}")
-    ax.plot(*np.meshgrid(verdict.setting.k_t, verdict.setting.k_r), "o", color="0.2", ms=3, ls="")
+    grid = np.meshgrid(verdict.setting.k_t, verdict.setting.k_r)
+    ax.plot(*map(np.ravel, grid), "o", color="0.2", ms=3, ls="", label="Fig. 5")
     stiffness_axis(ax, "k_t")
     stiffness_axis(ax, "k_r", "y")
     ax.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-    ax.legend(loc="upper left", fontsize=8, facecolor="white", framealpha=0.8, frameon=True, edgecolor="none")
-    note(ax, "tint: it holds in 1, 2, 3 modes", "lower right")
+    box = {"facecolor": "white", "framealpha": 0.8, "frameon": True, "edgecolor": "none"}
+    ax.legend(loc="upper left", fontsize=8, ncols=2, columnspacing=0.8, handlelength=1.5,
+              title="tint: in 1, 2, 3 modes", title_fontsize=8, **box)  # fmt: skip
 
 
 @claimed(

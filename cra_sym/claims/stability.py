@@ -40,8 +40,7 @@ def zone(arm: Arm, excitation: Any, epsilon: Any, resonance: tuple[int, int], **
 
 
 def _terms(kind: str) -> tuple[bool, bool]:
-    """Tell whether an excited arm's equations have time-dependent coefficients, and whether they force an arm at "
-    "rest."""
+    """Tell whether an excited arm's equations have coefficients that vary in time, and force an arm at rest."""
     from sympy import Function, Symbol
 
     from cra_sym.arm.evaluation import put
@@ -160,18 +159,17 @@ def _(setting: Setting) -> Finding:
         "growth": Quantity(rates, "1/s", "growth rate by Floquet theory about 2 omega_2: excitation, detuning"),
     }
     verdict = outcome(bounded[:1], conjugate[:1])
+    confirmed = bool((rates[:, np.abs(probes) < 0.8] > 0).all())
     sentence = (
         "The printed (48) is lost. Derived from (36) as the paper builds it, the amplitude equation is A_n' = const "
         "times "
         f"exp(i sigma T1): {'with' if conjugate[0] else 'without'} the conjugate amplitude that makes a zone, so "
         f"{'a' if bounded[0] else 'no'} boundary follows. It does for axially moving beams, whose speed stands in the "
         f"coefficients. With a parametric excitation the zones sit at {number(evidence['centre'].values.mean(), 4)} "
-        "omega_n, "
-        f"not at omega_n, and Floquet theory confirms them."
+        f"omega_n, not at omega_n, and Floquet theory {'confirms' if confirmed else 'does not confirm'} them."
     )
     remedy = None
-    inside = np.abs(probes) < 0.8
-    if verdict == "contradicted" and bounded[1] and (rates[:, inside] > 0).all():
+    if verdict == "contradicted" and bounded[1] and confirmed:
         remedy = f"{listed(_WORDS.values(), str, 'or')}; and the detuning (42) counted from 2 omega_n"
     criterion = (
         "the amplitude equation derived from (36) holds the conjugate amplitude and gives a boundary; symbolic, no "
