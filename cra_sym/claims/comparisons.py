@@ -53,9 +53,10 @@ def _softened(setting: Setting, mean: dict[str, float], head: str) -> Finding:
         f"{percent(setting.visible)}, for varpi of "
         f"{span(fine, smaller, 'rad/s')}; at {number(setting.angular_frequency)} rad/s it is {mm(nominal[0])} mm "
         "against "
-        f"{mm(nominal[1])} mm. The spring only lowers omega_1 from {number(first[1])} to {number(first[0])} rad/s: "
-        "it helps "
-        f"where that leads away from the disturbance. For k_t of {number(k_t[0])} to {number(k_t[-1])} N/m the claim "
+        f"{mm(nominal[1])} mm. The spring lowers omega_1 from {number(first[1])} to {number(first[0])} rad/s: "
+        f"towards a disturbance below it (smaller at {percent(smaller[fine < first[0]].mean())} of these frequencies) "
+        f"and away from one above ({percent(smaller[fine > first[1]].mean())}; well above, how the beats fall into "
+        f"{number(setting.duration)} s decides). For k_t of {number(k_t[0])} to {number(k_t[-1])} N/m the claim "
         "holds in "
         f"{percent(region.mean())} of the plane, measured as v(L) - v(0) in "
         f"{percent(region_relative.mean())}."
@@ -226,4 +227,4 @@ def _(verdict: Verdict, ax: Axes) -> None:
     ax.set(xlabel="time $t$ / s", ylabel="$v(L,t)$ with $-$ without / mm", xlim=(t[0], t[-1]))
     low, high = ax.get_ylim()
     ax.set_ylim(low, high + 0.25 * (high - low))
-    ax.legend(fontsize=8, loc="upper center", ncols=3, columnspacing=1.0, handlelength=1.6)
+    ax.legend(fontsize=8, loc="upper center", ncols=3, columnspacing=1.0, handlelength=2.2)

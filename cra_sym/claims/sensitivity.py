@@ -73,7 +73,7 @@ def _(verdict: Verdict, ax: Axes) -> None:
     stiffness_axis(ax, "k_r", "y")
     ax.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     box = {"facecolor": "white", "framealpha": 0.8, "frameon": True, "edgecolor": "none"}
-    ax.legend(loc="upper left", fontsize=8, ncols=2, columnspacing=0.8, handlelength=1.5,
+    ax.legend(loc="upper left", fontsize=8, ncols=2, columnspacing=0.8,
               title="tint: in 1, 2, 3 modes", title_fontsize=8, **box)  # fmt: skip
 
 

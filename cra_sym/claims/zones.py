@@ -100,7 +100,7 @@ def _(verdict: Verdict, ax: Axes) -> None:
     stiffness_axis(ax, "k_t")
     ax.set_ylabel("width, fluctuating joint / (rad/s)")
     ax.set_ylim(top=8 * ax.get_ylim()[1])
-    ax.legend(fontsize=8, loc="upper center", ncols=3, columnspacing=1.0, handlelength=1.6)
+    ax.legend(fontsize=8, loc="upper center", ncols=3, columnspacing=1.0, handlelength=2.2)
 
 
 def _strips(ax: Axes, x: np.ndarray, rows: np.ndarray, names: tuple[str, ...]) -> None:
