@@ -7,15 +7,15 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import cra_sym
 from cra_sym.codegen.expressions import gauss_rule, modal_functions, spectrum_functions, stability_functions
 from cra_sym.codegen.languages import LANGUAGES, Language
 from cra_sym.codegen.program import Function
-from cra_sym.codegen.vectors import TOLERANCE, arm_checks, written
+from cra_sym.codegen.rendering import DIGEST, common_values, rendered
+from cra_sym.codegen.user_model import model_texts
+from cra_sym.codegen.vectors import arm_checks, written
 from cra_sym.files import OutputError, staged_directory
 
 __all__ = ["Export", "export"]
@@ -79,19 +79,11 @@ def export(language: str, directory: str | Path, model: Any = None, overwrite: b
         raise ValueError(f"language = {language!r}: allowed are {', '.join(LANGUAGES)}")
     target = Path(os.path.realpath(directory))
     _check_free(target, overwrite)
-    if model is None:
-        texts = _arm_texts(language)
-    else:
-        from cra_sym.codegen.user_model import model_texts
-
-        texts = model_texts(language, model)
+    texts = _arm_texts(language) if model is None else model_texts(language, model)
     digest = _digest(texts)
-    texts = {name: text.replace(_DIGEST, digest) for name, text in texts.items()}
+    texts = {name: text.replace(DIGEST, digest) for name, text in texts.items()}
     _write(target, texts, overwrite)
     return Export(language, Path(directory), tuple(sorted(texts)), digest)
-
-
-_DIGEST = "@content-hash@"
 
 
 def _digest(texts: dict[str, str]) -> str:
@@ -117,45 +109,6 @@ def _write(target: Path, texts: dict[str, str], keep: bool) -> None:
         for name, text in texts.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_text(text, encoding="utf-8", newline="\n")
-
-
-@cache
-def _environment() -> Any:
-    from jinja2 import Environment, StrictUndefined
-
-    return Environment(undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True)
-
-
-def rendered(folder: str, values: dict[str, Any]) -> dict[str, str]:
-    """Return the texts of all templates of a folder, by the name of the file to write."""
-    texts = {}
-    root = files("cra_sym.codegen").joinpath("templates", folder)
-    for path, text in sorted(_templates(root)):
-        texts[path.removesuffix(".jinja")] = _environment().from_string(text).render(values)
-    return texts
-
-
-def _templates(root: Any, prefix: str = "") -> list[tuple[str, str]]:
-    found = []
-    for entry in root.iterdir():
-        if entry.is_dir():
-            found += _templates(entry, f"{prefix}{entry.name}/")
-        elif entry.name.endswith(".jinja"):
-            found.append((prefix + entry.name, entry.read_text(encoding="utf-8")))
-    return found
-
-
-def common_values(language: Language) -> dict[str, Any]:
-    """Return what every template may use."""
-    licence = files("cra_sym.codegen").joinpath("templates", "LICENSE.txt").read_text(encoding="utf-8")
-    return {
-        "version": cra_sym.__version__,
-        "title": "cra_arm",
-        "language": language.title,
-        "digest": _DIGEST,
-        "tolerance": f"{TOLERANCE:g}",
-        "licence": licence,
-    }
 
 
 @cache

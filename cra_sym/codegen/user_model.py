@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
-from cra_sym.codegen.exporter import common_values, rendered
 from cra_sym.codegen.languages import LANGUAGES
 from cra_sym.codegen.program import Function, function, scalars
+from cra_sym.codegen.rendering import common_values, rendered
 from cra_sym.codegen.vectors import SEED, TOLERANCE, Check, written
 from cra_sym.kernels import kernel
 from cra_sym.model import Model

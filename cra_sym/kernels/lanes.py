@@ -6,14 +6,11 @@ import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise, starmap
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cra_sym.kernels.generated import Generated
 from cra_sym.kernels.specialise import compiled, has_compiler
-
-if TYPE_CHECKING:
-    from cra_sym.kernels.callables import Kernel
 
 __all__ = ["COMPILE_FROM", "evaluated", "suits"]
 
@@ -21,7 +18,7 @@ COMPILE_FROM = 1 << 22  # lanes in one call from where on loading or compiling m
 _SPAN = 1 << 16  # lanes that are worth a thread
 
 
-def suits(kernel: Kernel, arrays: Sequence[np.ndarray], size: int) -> bool:
+def suits(kernel: Generated, arrays: Sequence[np.ndarray], size: int) -> bool:
     """Return whether the compiled path is wanted, possible, and meant for these values."""
     if kernel.backend == "numpy" or (kernel.backend is None and size < COMPILE_FROM):
         return False
@@ -30,7 +27,7 @@ def suits(kernel: Kernel, arrays: Sequence[np.ndarray], size: int) -> bool:
 
 
 def evaluated(
-    kernel: Kernel, arrays: Sequence[np.ndarray], shape: tuple[int, ...], outputs: int
+    kernel: Generated, arrays: Sequence[np.ndarray], shape: tuple[int, ...], outputs: int
 ) -> list[np.ndarray] | None:
     """Return the outputs of the kernel, each of the given shape, or None if Numba cannot compile it.
 

@@ -17,12 +17,10 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from types import FunctionType, ModuleType, SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from cra_sym.kernels import store
-
-if TYPE_CHECKING:
-    from cra_sym.kernels.callables import Kernel
+from cra_sym.kernels.generated import Generated
 
 __all__ = ["compiled", "has_compiler", "is_compiled"]
 
@@ -41,7 +39,7 @@ def has_compiler() -> bool:
     return find_spec("numba") is not None
 
 
-def compiled(template: str, kernels: Mapping[str, Kernel], *, elementary: bool = True) -> SimpleNamespace:
+def compiled(template: str, kernels: Mapping[str, Generated], *, elementary: bool = True) -> SimpleNamespace:
     """Specialise the text of a module with kernels, and compile its functions.
 
     The template is plain Python that Numba understands, without decorators. It calls each kernel by its name in
@@ -91,7 +89,7 @@ def compiled(template: str, kernels: Mapping[str, Kernel], *, elementary: bool =
     return _entries(_prelude(kernels, elementary), template)
 
 
-def is_compiled(template: str, kernels: Mapping[str, Kernel]) -> bool:
+def is_compiled(template: str, kernels: Mapping[str, Generated]) -> bool:
     """Return whether machine code of the specialised template was made before, here or by an earlier process.
 
     The answer costs no import of Numba; another processor than the one that compiled may need to do it again.
@@ -100,7 +98,7 @@ def is_compiled(template: str, kernels: Mapping[str, Kernel]) -> bool:
     return digest in _MADE or store.load(_mark(digest)) is not None
 
 
-def _prelude(kernels: Mapping[str, Kernel], elementary: bool) -> str:
+def _prelude(kernels: Mapping[str, Generated], elementary: bool) -> str:
     """Return the text that goes before a template: imports, elementary functions, kernels."""
     imports, bodies = set(), []
     for name, kernel in kernels.items():

@@ -1,0 +1,55 @@
+"""Templates of a language filled in: the texts of a folder, and what every template may use."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import cra_sym
+from cra_sym.codegen.languages import Language
+from cra_sym.codegen.vectors import TOLERANCE
+
+__all__ = ["DIGEST", "common_values", "rendered"]
+
+#: Stands for the content hash, until all texts are there.
+DIGEST = "@content-hash@"
+
+
+@cache
+def _environment() -> Any:
+    from jinja2 import Environment, StrictUndefined
+
+    return Environment(undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True)
+
+
+def rendered(folder: str, values: dict[str, Any]) -> dict[str, str]:
+    """Return the texts of all templates of a folder, by the name of the file to write."""
+    texts = {}
+    root = files("cra_sym.codegen").joinpath("templates", folder)
+    for path, text in sorted(_templates(root)):
+        texts[path.removesuffix(".jinja")] = _environment().from_string(text).render(values)
+    return texts
+
+
+def _templates(root: Any, prefix: str = "") -> list[tuple[str, str]]:
+    found = []
+    for entry in root.iterdir():
+        if entry.is_dir():
+            found += _templates(entry, f"{prefix}{entry.name}/")
+        elif entry.name.endswith(".jinja"):
+            found.append((prefix + entry.name, entry.read_text(encoding="utf-8")))
+    return found
+
+
+def common_values(language: Language) -> dict[str, Any]:
+    """Return what every template may use."""
+    licence = files("cra_sym.codegen").joinpath("templates", "LICENSE.txt").read_text(encoding="utf-8")
+    return {
+        "version": cra_sym.__version__,
+        "title": "cra_arm",
+        "language": language.title,
+        "digest": DIGEST,
+        "tolerance": f"{TOLERANCE:g}",
+        "licence": licence,
+    }

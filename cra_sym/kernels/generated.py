@@ -1,0 +1,26 @@
+"""What the compiler needs to know of a kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+__all__ = ["Generated"]
+
+
+class Generated(Protocol):
+    """Generated source and what it means; :class:`cra_sym.kernels.Kernel` is one."""
+
+    backend: str | None
+
+    @property
+    def source(self) -> str:
+        """The generated module text."""
+
+    @property
+    def function(self) -> Callable[..., Any]:
+        """The generated function."""
+
+    @property
+    def layout(self) -> Any:
+        """What the outputs form."""
