@@ -1,7 +1,7 @@
 """Stability boundaries as kernels: what multiple scales derive for each kind of resonance, in plain symbols.
 
-``border_sum_1``, ``damped_border_sum_1``, ``sums_sum_1`` and so on, for each kind and tongue, take nothing and return
-``(expressions, arguments)`` for :func:`cra_sym.kernels.derived_kernel`.
+``half_width_sum_1``, ``shift_sum_1``, ``damped_shift_sum_1``, ``sums_sum_1`` and so on, for each kind and tongue, take
+nothing and return ``(expressions, arguments)`` for :func:`cra_sym.kernels.derived_kernel`.
 """
 
 from __future__ import annotations
@@ -42,20 +42,30 @@ def plain(expression: Expr) -> Expr:
     return expression.xreplace(names)
 
 
-def _border(kind: str, damped: bool, tongue: int = 1) -> tuple[dict[str, Expr], tuple[Symbol, ...]]:
-    """Return how far the second order moves the zone, and half its width."""
-    second = general_resonance(kind, 2, damped=damped, tongue=tongue).border
-    first = general_resonance(kind, tongue, damped=damped, tongue=tongue).border
-    assert first is not None and second is not None
-    expressions = {"shift": plain(second.centre), "half_width": plain(first.half_width)}
+def _half_width(kind: str, damped: bool, tongue: int) -> tuple[Expr, tuple[Symbol, ...]]:
+    """Return half the width of a zone, from the first order at which there is one."""
+    border = general_resonance(kind, tongue, damped=damped, tongue=tongue).border
+    assert border is not None
+    return _in_order(kind, plain(border.half_width))
+
+
+def _shift(kind: str, damped: bool, tongue: int) -> tuple[Expr, tuple[Symbol, ...]]:
+    """Return how far the second order moves the zone."""
+    border = general_resonance(kind, 2, damped=damped, tongue=tongue).border
+    assert border is not None
+    return _in_order(kind, plain(border.centre))
+
+
+def _in_order(kind: str, expression: Expr) -> tuple[Expr, tuple[Symbol, ...]]:
+    """Return an expression and the arguments of the kernels of its kind."""
     labels = "n" if kind == "principal" else "mn"
     names = [f"omega_{i}" for i in labels]
     names += [f"P_{i}{k}" for i in labels for k in labels] + [f"dP_{i}{k}" for i in labels for k in labels]
     names += [f"S_{i}" for i in labels]
     names += [f"W_{i}{k}" for i in labels for k in labels if kind == "principal" or i != k]
     names += ["epsilon", *(f"c_{i}" for i in labels)]
-    known = {s.name: s for e in expressions.values() for s in e.free_symbols}
-    return expressions, tuple(known.get(name, Symbol(name, real=True)) for name in names)
+    known = {s.name: s for s in expression.free_symbols}
+    return expression, tuple(known.get(name, Symbol(name, real=True)) for name in names)
 
 
 def _sums(kind: str, tongue: int = 1) -> tuple[dict[str, dict[str, Expr]], tuple[Symbol, ...]]:
@@ -111,8 +121,10 @@ _KERNELS = {
     for kind in _ABOUT
     for tongue in (1, 2)
     for name, made in (
-        (f"border_{kind}_{tongue}", partial(_border, kind, False, tongue)),
-        (f"damped_border_{kind}_{tongue}", partial(_border, kind, True, tongue)),
+        (f"half_width_{kind}_{tongue}", partial(_half_width, kind, False, tongue)),
+        (f"damped_half_width_{kind}_{tongue}", partial(_half_width, kind, True, tongue)),
+        (f"shift_{kind}_{tongue}", partial(_shift, kind, False, tongue)),
+        (f"damped_shift_{kind}_{tongue}", partial(_shift, kind, True, tongue)),
         (f"sums_{kind}_{tongue}", partial(_sums, kind, tongue)),
     )
 }

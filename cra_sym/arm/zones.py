@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -35,7 +35,7 @@ class Zone:
     free_half_width : ndarray
         Without damping.
     shift : ndarray
-        How far the second order moves the zone, rad/s.
+        How far the second order moves the zone, rad/s; 0 in a zone to first order.
     strength : ndarray
         Positive where the coupling can feed both modes, zero without coupling, negative where it cannot.
     """
@@ -52,7 +52,7 @@ def _kernel(name: str) -> Kernel:
     return derived_kernel(f"cra_sym.arm.boundaries:{name}")
 
 
-def _evaluate(name: str, values: dict[str, Any]) -> dict[str, Any]:
+def _evaluate(name: str, values: dict[str, Any]) -> Any:
     kernel = _kernel(name)
     return kernel(*(values[argument] for argument in kernel.arguments))
 
@@ -119,7 +119,8 @@ def zone_of(
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         values, centre, coupling = _quantities(arm, modal, excitation, epsilon, first, second, tongue)
         values |= _sums(arm, modal, excitation, values, coupling, labels, f"sums_{kind}_{tongue}")
-        return _zone(kind, tongue, values, centre, arm)
+        zone = _zone(kind, tongue, values, centre, arm)
+        return replace(zone, shift=_with_damping(f"shift_{kind}_{tongue}", values, arm)[0])
 
 
 def first_order_zone(
@@ -132,15 +133,16 @@ def first_order_zone(
 
 
 def _zone(kind: str, tongue: int, values: dict[str, Any], centre: np.ndarray, arm: Arm) -> Zone:
-    free = _evaluate(f"border_{kind}_{tongue}", values)
-    half_width, shift = free["half_width"], free["shift"]
-    if np.any(np.asarray(arm.zeta) > 0):
-        damped, damping = _evaluate(f"damped_border_{kind}_{tongue}", values), np.asarray(arm.zeta) > 0
-        half_width = np.where(damping, damped["half_width"], half_width)
-        shift = np.where(damping, damped["shift"], shift)
+    half_width, free = _with_damping(f"half_width_{kind}_{tongue}", values, arm)
     through = "P" if tongue == 1 else "W"
     strength = values[f"{through}_nn"] ** 2
     if kind != "principal":
         strength = (1 if kind == "sum" else -1) * values[f"{through}_mn"] * values[f"{through}_nm"]
     half_width = np.where((strength > 0) & (centre > 0), half_width, np.nan)
-    return Zone(centre, half_width, free["half_width"], shift, strength)
+    return Zone(centre, half_width, free, np.zeros_like(free), strength)
+
+
+def _with_damping(name: str, values: dict[str, Any], arm: Arm) -> tuple[np.ndarray, np.ndarray]:
+    """Return a quantity of the boundary, each arm with its damping, and the same without any."""
+    free, damping = _evaluate(name, values), np.asarray(arm.zeta) > 0
+    return (np.where(damping, _evaluate(f"damped_{name}", values), free) if damping.any() else free), free

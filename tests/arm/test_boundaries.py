@@ -33,10 +33,13 @@ def boundary(kind, omega, coupling, epsilon, decay, power=0, tongue=1, order=2):
             total += table["spectator"]
         values[name] = table["resonant"] + total
     damped = "damped_" if np.any(decay) else ""
-    border = derived_kernel(f"cra_sym.arm.boundaries:{damped}border_{kind}_{tongue}")
-    found = border(*(values[argument] for argument in border.arguments))
-    middle = centre + (found["shift"] if order == 2 else 0.0)
-    return np.array([middle - found["half_width"], middle + found["half_width"]])
+    half_width, shift = (
+        kernel(*(values[argument] for argument in kernel.arguments))
+        for name in ("half_width", "shift")
+        for kernel in [derived_kernel(f"cra_sym.arm.boundaries:{damped}{name}_{kind}_{tongue}")]
+    )
+    middle = centre + (shift if order == 2 else 0.0)
+    return np.array([middle - half_width, middle + half_width])
 
 
 def truth(sides, omega, coupling, epsilon, decay, power):
