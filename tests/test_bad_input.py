@@ -71,6 +71,7 @@ ELSEWHERE = {
     "AsymptoticWarning", "ResonanceWarning",  # nothing to call with values
     "Model", "kernel",  # take SymPy expressions: their own tests
     "export",  # writes a folder: below
+    "explore",  # shows sliders: its own tests
 }  # fmt: skip
 PLACES = [(name, argument) for name, arguments in GOOD.items() for argument in arguments]
 
