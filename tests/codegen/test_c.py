@@ -21,7 +21,7 @@ MATHEMATICS = (
     "_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail",
 )  # fmt: skip
 INTERNAL = (
-    "pair", "groups_of", "valid_groups", "frequency_parameters", "frequency_parameters_batch",
+    "all_finite", "pair", "groups_of", "valid_groups", "frequency_parameters", "frequency_parameters_batch",
 )  # fmt: skip
 
 
@@ -128,3 +128,42 @@ def test_status_of_bad_input(library, change, status):
     frequencies = (ctypes.c_double * 3)()
     assert library.cra_natural_frequencies(ctypes.byref(_Arm(**values)), 3, frequencies) == status
     assert library.cra_natural_frequencies(ctypes.byref(_Arm(**values)), 0, frequencies) != 0
+
+
+def test_no_silent_infinity_or_nan(library):
+    """Whatever is put in, a function that says all is well has given finite numbers."""
+    rng = np.random.default_rng(5)
+    special = np.array([0.0, 1e-300, 1e-30, 1e-6, 1e3, 1e12, 1e100, 1e300, np.inf, -1.0, np.nan])
+    fields = 25  # of a mode, all numbers
+    seen = set()
+
+    def drawn(count, share):
+        usual = 10 ** rng.uniform(-3, 3, count)
+        return np.where(rng.random(count) < share, rng.choice(special, count), usual)
+
+    def checked(name, outputs, *arguments):
+        pointers = [a.ctypes.data_as(ctypes.c_void_p) if isinstance(a, np.ndarray) else a for a in arguments]
+        status = getattr(library, f"cra_{name}")(*pointers)
+        seen.add(status)
+        assert status or all(np.isfinite(output).all() for output in outputs), (name, arguments)
+        return status
+
+    nominal = cra.Arm.nominal().replace(k_t=1e4, k_r=1e3, zeta=0.01)
+    for _ in range(2000):
+        arm = np.array([float(getattr(nominal, name)) for name, _ in _Arm._fields_])
+        arm = np.where(rng.random(11) < 0.2, drawn(11, 0.3), arm)
+        modes, out = np.zeros((4, fields)), np.zeros(64)
+        checked("natural_frequencies", [out[:4]], arm, 4, out)
+        if checked("modes", [modes], arm, 4, modes):
+            continue
+        if (modes[:, 1] > 0.0).all():
+            checked("sensitivities", [out[:16]], arm, 4, modes, out)
+        checked("tip_response", [out[:1]], arm, 4, modes, drawn(5, 0.3), ctypes.c_double(drawn(1, 0.3)[0]), out)
+        checked("mode_shape", [out[:1]], modes[3], ctypes.c_double(arm[0] / 2), 3, out)
+        A, B, C = np.zeros(100), np.zeros(10), np.zeros(10)
+        checked("state_space_acceleration", [A, B, C], arm, 4, modes, A, B, C)
+        checked("state_space_force", [A, B, C], arm, 4, modes, A, B, C)
+        excitation, ratio = drawn(3, 0.3), ctypes.c_double(drawn(1, 0.3)[0])
+        checked("excitation_matrix", [out[:16]], arm, 4, modes, excitation, ratio, out)
+        checked("stability_boundary", [A[:1], B[:1]], arm, 4, modes, excitation, ratio, 1, 2, A, B)
+    assert seen >= {0, 1, 2, 4, 5}
