@@ -65,6 +65,17 @@ def _growth(
     return growth_rate(arm, excitation, frequency, epsilon[:, None], modes, residual=residual, tolerance=tolerance)
 
 
+_RIGID = "no zone: a rigid joint cannot\nfluctuate; give $k_t$, as 1e4 N/m"
+
+
+def _is_rigid(arm: Arm, excitation: Any) -> bool:
+    return isinstance(excitation, JointStiffness) and bool(np.isinf(arm.k_t))
+
+
+def _say(ax: Axes, words: str) -> None:
+    ax.text(0.03, 0.04, words, transform=ax.transAxes, fontsize=7.5, color="0.25", va="bottom")
+
+
 def _zone(
     ax: Axes, arm: Arm, excitation: Any, mode: int, epsilon: np.ndarray, points: int, tolerance: float = 1e-7
 ) -> None:
@@ -73,10 +84,10 @@ def _zone(
     second = _boundary(arm, excitation, epsilon, (mode, mode), order=2)
     width = second[1] - second[0]  # to second order the zone moves and keeps its width
     first, half = (centre - width / 2, centre + width / 2), width[-1] / 2
-    where: dict[str, Any] = {"transform": ax.transAxes, "fontsize": 7.5, "color": "0.25", "va": "bottom"}
     if not half > 0:
-        rigid = isinstance(excitation, JointStiffness) and np.isinf(arm.k_t)
-        ax.text(0.03, 0.04, "no zone: a rigid joint cannot fluctuate" if rigid else "no zone up to this ε", **where)
+        _say(ax, _RIGID if _is_rigid(arm, excitation) else "no zone up to this ε")
+        ax.set_xticks([0])
+        ax.set_ylim(0.0, epsilon[-1])
         return
     detuning = np.linspace(-1.7, 1.7, points) * half
     rates = _growth(arm, excitation, centre + detuning, epsilon, mode + 2, tolerance)
@@ -89,7 +100,7 @@ def _zone(
     ax.ticklabel_format(axis="x", style="sci", scilimits=(-2, 3), useMathText=True)
     ax.locator_params(axis="x", nbins=4)
     ax.grid(False)
-    ax.text(0.03, 0.04, f"$2\\omega_{mode}$ = {centre:.4g} rad/s\nwidth {2 * half:.3g} rad/s", **where)
+    _say(ax, f"$2\\omega_{mode}$ = {centre:.4g} rad/s\nwidth {2 * half:.3g} rad/s")
 
 
 def _shade(ax: Axes, frequency: np.ndarray, epsilon: np.ndarray, rates: np.ndarray, step: float | None = None) -> Any:
@@ -343,6 +354,9 @@ def figure_accuracy(arm: Arm | None = None, epsilon: Any = None, *, axes: Any = 
     panels = _grid(axes, 1, 2, (8.6, 3.9), sharey=False)[0]
     cases = ((JOINT, (2, 2)), (JOINT, (1, 2))), ((STRONG, (2, 2)), (STRONG, (1, 2)))
     for ax, pair in zip(panels, cases, strict=True):
+        if _is_rigid(arm, pair[0][0]):
+            _say(ax, _RIGID)
+            continue
         for (excitation, resonance), marker in zip(pair, "os", strict=True):
             errors = boundary_errors(arm, excitation, epsilon, resonance)
             for order, (error, look) in enumerate(zip(errors, (_FIRST, _SECOND), strict=True), start=1):

@@ -48,3 +48,10 @@ def test_accuracy():
     assert len(slopes) == 8 or len({*slopes}) >= 6
     for label, slope in slopes.items():
         assert float(slope) > (2.8 if "order 2" in label else 1.9)
+
+
+def test_a_rigid_joint_is_told_what_to_do():
+    rigid = cra.Arm.nominal()
+    for drawn in (figures.figure_12(rigid, m_e=[0.0], points=5), figures.figure_accuracy(rigid, [0.1, 0.2])):
+        words = [text.get_text() for ax in drawn.axes for text in ax.texts]
+        assert any("a rigid joint cannot" in said and "give $k_t$" in said for said in words)
