@@ -170,10 +170,13 @@ def _(setting: Setting) -> Finding:
     verdict = outcome(flat & rises)
     last, change = found[-1] / fixed - 1, np.diff(found, axis=0)
     if verdict == "contradicted" and np.all(change < 0):
+        near = (1 - found[0] / fixed) * float(arm.kappa_r[0])
+        equal = np.ptp(near) < setting.visible * near.max()
+        share = f"same fraction {number(near[0], 1)}" if equal else f"fractions {listed(near)} over"
         sentence = (
             f"All three fall, by {listed(-last, percent)} at {number(k_r[-1])} N m/rad, near the rigid joint by the "
-            "same "
-            f"fraction 2/kappa_r. A softer spring cannot raise a frequency: d(omega_i^2)/dk_r = phi_i'(0)^2."
+            f"{share}{'/' if equal else ' '}kappa_r. A softer spring cannot raise a frequency: "
+            f"d(omega_i^2)/dk_r = phi_i'(0)^2."
         )
     else:
         sentence = (
