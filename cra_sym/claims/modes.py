@@ -170,7 +170,7 @@ def _(setting: Setting) -> Finding:
     verdict = outcome(flat & rises)
     last, change = found[-1] / fixed - 1, np.diff(found, axis=0)
     if verdict == "contradicted" and np.all(change < 0):
-        near = (1 - found[0] / fixed) * float(arm.kappa_r[0])
+        near = (1 - found[0] / fixed) * float(np.max(arm.kappa_r))
         equal = np.ptp(near) < setting.visible * near.max()
         share = f"same fraction {number(near[0], 1)}" if equal else f"fractions {listed(near)} over"
         sentence = (
