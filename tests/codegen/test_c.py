@@ -100,6 +100,20 @@ def test_random_groups_agree_with_the_package(library, modes):
         assert np.max(np.abs(found - expected) / np.where(expected > 0, expected, 1)) < 1e-12
 
 
+def test_groups_of_any_size_converge(library):
+    """As far as the header says."""
+    groups = 10 ** np.random.default_rng(8).uniform(-12, 12, (4, 20000))
+    found = np.empty((20000, 4))
+    pointer = np.ctypeslib.ndpointer(np.float64, flags="C")
+    batch = library.cra_frequency_parameters_batch
+    batch.argtypes = [ctypes.c_size_t, *[pointer] * 4, ctypes.c_int, pointer]
+    one = library.cra_frequency_parameters
+    one.argtypes = [ctypes.c_double] * 4 + [ctypes.c_int, np.ctypeslib.ndpointer(np.float64)]
+    assert not any(one(*groups[:, i], 4, found[i]) for i in range(20000))
+    assert (np.diff(found, axis=1) > 0.0).all()
+    assert batch(20000, *groups, 4, found) == 0
+
+
 def test_the_most_modes_and_no_more(library):
     one = library.cra_frequency_parameters
     one.argtypes = [ctypes.c_double] * 4 + [ctypes.c_int, np.ctypeslib.ndpointer(np.float64)]
