@@ -155,7 +155,7 @@ def test_no_command_takes_a_stray_word(command, attack, capsys, monkeypatch, tmp
 
 def test_an_export_to_an_odd_name_stays_where_it_was_sent(tmp_path):
     folder = tmp_path / "; touch sprung $(id) λ"
-    cra.export("c", folder)
+    cra.export("octave", folder)
     assert [path.name for path in tmp_path.iterdir()] == [folder.name]
 
 

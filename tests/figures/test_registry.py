@@ -28,11 +28,16 @@ def test_words_for_those_who_do_not_see_it(name):
     assert 20 < len(first) < 300
 
 
-@pytest.mark.parametrize("name", FIGURES)
-def test_draws_something_and_leaves_no_trace(name):
+@pytest.fixture(scope="module", params=FIGURES)
+def drawn(request):
+    """Every figure, drawn once, with the global settings before and after."""
     before = dict(rcParams)
-    figure = draw(name)
-    assert dict(rcParams) == before
+    return draw(request.param), before, dict(rcParams)
+
+
+def test_draws_something_and_leaves_no_trace(drawn):
+    figure, before, after = drawn
+    assert before == after
     # "C0" would be looked up where the figure is shown, in another style than that it was drawn in
     assert not [line for ax in figure.axes for line in ax.lines if str(line.get_color()).startswith("C")]
     canvas = FigureCanvasAgg(figure)
@@ -41,10 +46,9 @@ def test_draws_something_and_leaves_no_trace(name):
     assert 0.005 < (grey < 250).mean() < 0.9
 
 
-@pytest.mark.parametrize("name", FIGURES)
-def test_axes_carry_quantity_and_unit(name):
+def test_axes_carry_quantity_and_unit(drawn):
     """Each column of panels names its horizontal axis at least once, each row its vertical one."""
-    panels = [ax for ax in draw(name).axes if ax.axison and ax.get_subplotspec()]
+    panels = [ax for ax in drawn[0].axes if ax.axison and ax.get_subplotspec()]
     columns, rows = defaultdict(str), defaultdict(str)
     for ax in panels:
         columns[ax.get_subplotspec().colspan.start] += ax.get_xlabel()
