@@ -13,6 +13,8 @@ NOTEBOOKS = --nbval --nbval-current-env --nbval-sanitize-with tests/notebooks/sa
 reproduce: .venv/.ready
 	$(RUN) -m cra_sym reproduce --output "$(OUTPUT)"
 
+# The processes share the processors: linear algebra takes one thread in each.
+test: export OPENBLAS_NUM_THREADS = 1
 test: .venv/.ready
 	$(RUN) -m pytest -n $(JOBS) --dist loadfile tests cra_sym README.md $(NOTEBOOKS) $(ARGS)
 
