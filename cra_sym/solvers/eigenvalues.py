@@ -48,10 +48,12 @@ def lowest(problem: DynamicStiffness, modes: int) -> np.ndarray:
     every = np.arange(rows)
     static = problem.evaluate(np.zeros(rows), every)
     rigid = _rigid_count(static)
-    asked, modes = modes, max(modes, _soft_count(static))
+    bounds = _static_bounds(static)
+    # Ritz values of soft modes need the shapes of all of them
+    asked, modes = modes, max(modes, int((bounds < _SOFT * bounds[:, -1:]).sum(axis=1).max(initial=0)))
     wanted = np.arange(1, modes + 1)
     low, below = np.zeros((rows, modes)), np.repeat(rigid[:, None], modes, axis=1)
-    high, above, guess, bounds = _upper_bounds(problem, static, modes)
+    high, above, guess = _upper_bounds(problem, bounds, modes)
     open_ = wanted > rigid[:, None]
     result, noise = np.zeros((rows, modes)), np.full((rows, modes), np.inf)
     for sweep in range(_SWEEPS):
@@ -88,12 +90,6 @@ def _polish(problem: DynamicStiffness, z: np.ndarray, noise: np.ndarray, bounds:
     return polished
 
 
-def _soft_count(static: Evaluation) -> int:
-    """Return how many modes can be soft in any row: their Ritz values need the shapes of all of them."""
-    bounds = _static_bounds(static)
-    return int((bounds < _SOFT * bounds[:, -1:]).sum(axis=1).max(initial=0))
-
-
 def _rigid_count(static: Evaluation) -> np.ndarray:
     """Return how many rigid-body motions each row has; refuse a structure that has buckled."""
     if static.matrix.shape[-1] == 0:
@@ -110,13 +106,12 @@ def _rigid_count(static: Evaluation) -> np.ndarray:
     return (np.abs(value) <= rounding).sum(axis=1)
 
 
-def _upper_bounds(problem: DynamicStiffness, static: Evaluation, modes: int):
-    """Return, for every mode, a z with that many frequencies below it, the count there and a guess; then all bounds.
+def _upper_bounds(problem: DynamicStiffness, bounds: np.ndarray, modes: int):
+    """Return, for every mode, a z with that many frequencies below it, the count there and a guess.
 
     Static deflections are admissible motions: their Rayleigh-Ritz values bound the lowest frequencies from above.
     """
-    rows = len(static.matrix)
-    bounds = _static_bounds(static)
+    rows = len(bounds)
     guess = np.full((rows, modes), np.nan)
     shared = min(modes, bounds.shape[1])
     guess[:, :shared] = bounds[:, :shared]
@@ -132,7 +127,7 @@ def _upper_bounds(problem: DynamicStiffness, static: Evaluation, modes: int):
         )
         pending = pending[np.isinf(high[pending, -1])]
         if not pending.size:
-            return high, above, guess, bounds
+            return high, above, guess
         z[pending] *= 4.0
     raise ValueError(f"modes = {modes}: the model has only {int(above.max())} natural frequencies")
 
