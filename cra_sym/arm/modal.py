@@ -12,7 +12,7 @@ import numpy as np
 from cra_sym.arm.spectrum import in_parts, pair, wants_compiler
 from cra_sym.kernels import Kernel, compiled, derived_kernel
 
-__all__ = ["NEAR", "Modes", "modes_of", "tip_factors"]
+__all__ = ["NEAR", "Modes", "modes_of", "near_shape", "tip_factors"]
 
 NEAR = 25.0  # shapes.NEAR; a test holds the two together
 
@@ -61,7 +61,7 @@ class Modes:
         near = lam**4 < NEAR
         result = np.empty(lam.shape)
         root, waves = (np.broadcast_to(x[..., None], (4, *lam.shape)) for x in (self.root, self.waves))
-        result[near] = _near_shape(root[:, near], lam[near], xi[near], derivative)
+        result[near] = near_shape(root[:, near], lam[near] ** 4, xi[near], derivative)
         result[~near] = _far_shape(waves[:, ~near], lam[~near], xi[~near], derivative)
         return result
 
@@ -205,8 +205,8 @@ def _tip_state(tip: np.ndarray, mu: np.ndarray, iota: np.ndarray, lam: np.ndarra
     return displacement, slope
 
 
-def _near_shape(root: np.ndarray, lam: np.ndarray, xi: np.ndarray, derivative: int) -> np.ndarray:
-    z = lam**4
+def near_shape(root: np.ndarray, z: np.ndarray, xi: np.ndarray, derivative: int) -> np.ndarray:
+    """Return a derivative by xi of the solution with the given state (4, ...) at the root, for z up to `NEAR`."""
     solutions = _POLYNOMIALS.function(xi, z)
     return sum(root[j] * z ** ((derivative - j + 3) // 4) * solutions[(j - derivative) % 4] for j in range(4))
 

@@ -14,7 +14,7 @@ import numpy as np
 from .shapes import mode_vectors, nodes
 from .stiffness import GOLDEN, DynamicStiffness, transfer
 
-__all__ = ["quotients", "ritz_values"]
+__all__ = ["quotients", "ritz_values", "stationary_values"]
 
 
 def quotients(problem: DynamicStiffness, z: np.ndarray) -> np.ndarray:
@@ -62,9 +62,14 @@ def ritz_values(problem: DynamicStiffness, z: np.ndarray, almost_rigid: np.ndarr
         of = member[::modes] // modes
         start, edge = start.reshape(2, len(of), modes, *start.shape[2:]), edge.reshape(len(of), modes, -1)
         strain, kinetic = _energies(problem, of, at[of], np.zeros(len(of)), level, start, edge)
-        frame = np.linalg.inv(np.linalg.cholesky(kinetic))
-        result[of] = np.sort(_jacobi(frame @ strain @ np.swapaxes(frame, -1, -2)), axis=1)
+        result[of] = stationary_values(strain, kinetic)
     return result
+
+
+def stationary_values(strain: np.ndarray, kinetic: np.ndarray) -> np.ndarray:
+    """Return the stationary values of strain over kinetic energy, ascending, of a stack of pairs of small matrices."""
+    frame = np.linalg.inv(np.linalg.cholesky(kinetic))
+    return np.sort(_jacobi(frame @ strain @ np.swapaxes(frame, -1, -2)), axis=1)
 
 
 def _jacobi(matrix: np.ndarray) -> np.ndarray:
