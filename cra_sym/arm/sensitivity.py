@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Literal
 
 import numpy as np
@@ -21,7 +21,7 @@ _exponents = derived_kernel("cra_sym.arm.implicit:group_exponents", backend="num
 
 
 _NAMES = ("k_t", "k_r", "c_t", "c_r", "m_e", "J_e")  # what a derivative of omega^2 is known by; the rest follows
-_Rate = Callable[[Arm, ModalParameters, str], np.ndarray]
+_Rate = Callable[[str], np.ndarray]
 
 
 class Sensitivities:
@@ -94,7 +94,7 @@ class Sensitivities:
         if name not in _NAMES:
             value = self.frequency * self._logarithmic(name) / _column(self._arm, getattr(self._arm, name))
             return np.where(self._still, 0.0, value) if self._still.any() else value
-        change, spring = self._rate(self._arm, self._modal, name), name in _NAMES[:4]
+        change, spring = self._rate(name), name in _NAMES[:4]
         value = change / (8 * np.pi**2 * self.frequency)  # d omega^2 = 8 pi^2 f df
         if self._still.any():
             held = np.where(np.abs(change) > 0, np.copysign(np.inf, change), 0.0) if spring else 0.0
@@ -110,7 +110,7 @@ class Sensitivities:
     def _shares(self, name: str) -> np.ndarray:
         """Return the share of a spring in the strain energy, or of an inertia in the kinetic energy."""
         value = _column(self._arm, getattr(self._arm, name))
-        share = value * self._rate(self._arm, self._modal, name) / self._square
+        share = value * self._rate(name) / self._square
         if name in _NAMES[:2]:
             return np.where(np.isinf(value), 0.0, share) if np.isinf(value).any() else share
         return -share
@@ -155,9 +155,9 @@ def sensitivities(arm: Arm, modes: int = 3, *, method: Literal["modal", "implici
     """
     if method not in ("modal", "implicit"):
         raise ValueError(f"method = {method!r}: allowed are 'modal' and 'implicit'")
-    return Sensitivities(
-        arm, modal_parameters(arm, count("modes", modes)), squared_frequency_rate if method == "modal" else _implicit
-    )
+    modal = modal_parameters(arm, count("modes", modes))
+    rate = partial(squared_frequency_rate, arm, modal) if method == "modal" else _implicit(arm, modal).__getitem__
+    return Sensitivities(arm, modal, rate)
 
 
 def _column(arm: Arm, value: Any) -> np.ndarray:
@@ -181,23 +181,19 @@ def squared_frequency_rate(arm: Arm, p: ModalParameters, name: str) -> np.ndarra
             return -((p.omega * p.tip_slope) ** 2)
 
 
-def _implicit(arm: Arm, p: ModalParameters, name: str) -> np.ndarray:
-    """Return the same by implicit differentiation; omega^2 = scale^2 lambda^4."""
+def _implicit(arm: Arm, p: ModalParameters) -> dict[str, np.ndarray]:
+    """Return the same by implicit differentiation, all from one evaluation; omega^2 = scale^2 lambda^4."""
     pairs = [value for kappa in (arm.kappa_t, arm.kappa_r) for value in pair(_column(arm, kappa))]
-    rates = _implicit_rates(p.lam, *pairs, *(_column(arm, value) for value in (arm.mu, arm.iota)))
     (s_t, c_t, s_r, c_r), length, EI = pairs, _column(arm, arm.L), _column(arm, arm.EI)
-    by_lam = 4 * _column(arm, arm.angular_frequency_scale) ** 2 * p.lam**3
     stiffness_t, stiffness_r, mass = EI / length**3, EI / length, _column(arm, arm.rhoA) * length
-    match name:
-        case "k_t":
-            return by_lam * rates["kappa_t"] * c_t**2 / stiffness_t
-        case "k_r":
-            return by_lam * rates["kappa_r"] * c_r**2 / stiffness_r
-        case "c_t":
-            return -by_lam * rates["kappa_t"] * s_t**2 * stiffness_t
-        case "c_r":
-            return -by_lam * rates["kappa_r"] * s_r**2 * stiffness_r
-        case "m_e":
-            return by_lam * rates["mu"] / mass
-        case _:
-            return by_lam * rates["iota"] / (mass * length**2)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        rates = _implicit_rates(p.lam, *pairs, *(_column(arm, value) for value in (arm.mu, arm.iota)))
+        by_lam = 4 * _column(arm, arm.angular_frequency_scale) ** 2 * p.lam**3
+        return {
+            "k_t": by_lam * rates["kappa_t"] * c_t**2 / stiffness_t,
+            "k_r": by_lam * rates["kappa_r"] * c_r**2 / stiffness_r,
+            "c_t": -by_lam * rates["kappa_t"] * s_t**2 * stiffness_t,
+            "c_r": -by_lam * rates["kappa_r"] * s_r**2 * stiffness_r,
+            "m_e": by_lam * rates["mu"] / mass,
+            "J_e": by_lam * rates["iota"] / (mass * length**2),
+        }
