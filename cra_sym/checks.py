@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["broadcastable", "count", "instance", "real_array"]
+__all__ = ["broadcastable", "count", "instance", "one_axis", "real_array"]
 
 
 def _shown(value: Any) -> str:
@@ -63,6 +63,14 @@ def real_array(
         good &= np.isfinite(array)
     if not good.all():
         raise ValueError(f"{name} = {_shown(array[~good].flat[0].item())}: allowed are {allowed}")
+    return array
+
+
+def one_axis(name: str, value: Any, of: str, **limits: Any) -> np.ndarray:
+    """Return a number or one axis of numbers as :func:`real_array` does, or raise an error that names the field."""
+    array = real_array(name, value, **limits)
+    if array.ndim > 1:
+        raise ValueError(f"{name} has shape {array.shape}: allowed are a number or one axis of {of}")
     return array
 
 

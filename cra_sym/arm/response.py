@@ -8,7 +8,7 @@ import numpy as np
 
 from cra_sym.arm.analysis import ModalParameters, modal_parameters, mode_shapes
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import broadcastable, count, instance, real_array
+from cra_sym.checks import broadcastable, count, instance, one_axis, real_array
 from cra_sym.kernels import derived_kernel
 from cra_sym.solvers import modal_response as solver
 from cra_sym.solvers.driven_modes import Start, driven_response, state_at_stop
@@ -98,9 +98,7 @@ def response(
         If an argument is out of its range or shapes do not fit; the error names it.
     """
     instance("arm", arm, Arm)
-    places = real_array("x", x, low=0.0, high=float(np.min(arm.L)))
-    if places.ndim > 1:
-        raise ValueError(f"x has shape {places.shape}: allowed are a number or one axis of places")
+    places = one_axis("x", x, "places", low=0.0, high=float(np.min(arm.L)))
     modes = count("modes", modes)
     rows = np.swapaxes(mode_shapes(arm, np.atleast_1d(places), modes), -1, -2)
     osc = oscillators(arm, modal_parameters(arm, modes), rows, zeta)

@@ -10,7 +10,7 @@ import numpy as np
 from sympy import Expr, S, Symbol, sympify
 from sympy.core.function import AppliedUndef
 
-from cra_sym.checks import count, real_array
+from cra_sym.checks import count, one_axis, real_array
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics import HamiltonResult, Modal, StateForm, hamilton, ritz, separate, state_form
 from cra_sym.mechanics.jets import Jet, listed
@@ -402,9 +402,7 @@ class Model:
         """
         modes = count("modes", modes)
         wanted, given = self._field(field), Values.read(self.symbols, values)
-        places = np.empty(()) if x is None else real_array("x", x)
-        if places.ndim > 1:
-            raise ValueError(f"x has shape {places.shape}: allowed are a number or one axis of places")
+        places = np.empty(()) if x is None else one_axis("x", x, "places")
         basis = modal_basis(self._spatial, given, modes, None if x is None else np.atleast_1d(places))
         shape = Jet(self.equations.fields.index(wanted), 0, 0, None)
         rows = basis.values(shape)[..., basis.places]

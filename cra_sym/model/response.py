@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from sympy import Derivative, Expr, S, sympify
@@ -15,7 +15,7 @@ from cra_sym.mechanics.jets import Jet
 from cra_sym.mechanics.weak import WeakForm
 from cra_sym.model.projection import Load, ModalBasis
 from cra_sym.solvers.coupled_modes import CoupledModes, coupled_response
-from cra_sym.solvers.driven_modes import Start, driven_response
+from cra_sym.solvers.driven_modes import Start, check_start, driven_response
 from cra_sym.solvers.modal_response import Oscillators
 from cra_sym.solvers.motion import BaseMotion, Force
 
@@ -42,8 +42,7 @@ def oscillation(
     """Return the outputs ``rows`` (rows, modes, outputs) of the driven modes, shape (*shape, outputs, times)."""
     modes = basis.z.shape[1]
     damping = basis.damping(weak.inside, weak.ends)
-    if start not in get_args(Start):
-        raise ValueError(f"start = {start!r}: allowed are {' and '.join(map(repr, get_args(Start)))}")
+    check_start(start)
     ratio = np.atleast_1d(
         real_array("zeta", zeta, low=0.0, high=np.nextafter(1.0, 0.0), allowed="real numbers in [0, 1)")
     )

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
-from ..checks import broadcastable, count, instance, real_array
-from .driven_modes import Start
+from ..checks import broadcastable
+from .driven_modes import Start, checked
 from .motion import BaseMotion, Harmonic, Piecewise
 
 __all__ = ["CoupledModes", "coupled_response"]
@@ -48,11 +48,7 @@ def coupled_response(
     initial: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> np.ndarray:
     """Return the outputs at the times, shape (..., outputs, times); as `driven_response` for coupled modes."""
-    instance("motion", motion, BaseMotion)
-    times = np.atleast_1d(real_array("t", t, low=0.0))
-    if times.ndim > 1:
-        raise ValueError(f"t has shape {times.shape}: allowed are a number or one axis of times")
-    derivative = count("derivative", derivative, low=0, high=2)
+    times, derivative = checked(motion, t, derivative, start)
     size = modes.omega.shape[-1]
     shape = broadcastable(values=modes.omega[..., 0], zeta=modes.zeta[..., 0], motion=np.empty(motion.shape))
     still = np.zeros(size)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
-from ..checks import broadcastable, count, instance, real_array
+from ..checks import broadcastable, count, instance, one_axis
 from . import modal_response as solver
 from .motion import BaseMotion, Harmonic, Piecewise
 
-__all__ = ["Start", "driven_response", "state_at_stop"]
+__all__ = ["Start", "check_start", "checked", "driven_response", "state_at_stop"]
 
 Start = Literal["inertial", "base"]
 
@@ -37,14 +37,7 @@ def driven_response(
     initial : pair of ndarray, shape (..., modes), optional
         Modal displacements and velocities at t = 0, beside those of the start.
     """
-    instance("motion", motion, BaseMotion)
-    times = real_array("t", t, low=0.0)
-    if times.ndim > 1:
-        raise ValueError(f"t has shape {times.shape}: allowed are a number or one axis of times")
-    derivative = count("derivative", derivative, low=0, high=2)
-    if start not in ("inertial", "base"):
-        raise ValueError(f"start = {start!r}: allowed are 'inertial' and 'base'")
-    grid = np.atleast_1d(times)
+    grid, derivative = checked(motion, t, derivative, start)
     modes = osc.omega.shape[:-1]
     shape = broadcastable(arm=np.empty(modes), zeta=osc.zeta[..., 0], motion=np.empty(motion.shape))
     parts = [solver.piecewise_response(osc, piece, grid, derivative) for piece in _pieces(motion)]
@@ -59,6 +52,20 @@ def driven_response(
         return np.zeros(wanted)
     total = sum(parts[1:], parts[0])
     return total if total.shape == wanted else np.broadcast_to(total, wanted).copy()
+
+
+def checked(motion: Any, t: Any, derivative: Any, start: Any) -> tuple[np.ndarray, int]:
+    """Return the times as one axis and the derivative, or raise an error that names what is not allowed."""
+    instance("motion", motion, BaseMotion)
+    times = np.atleast_1d(one_axis("t", t, "times", low=0.0))
+    check_start(start)
+    return times, count("derivative", derivative, low=0, high=2)
+
+
+def check_start(start: Any) -> None:
+    """Raise an error that names the start unless it is allowed."""
+    if start not in get_args(Start):
+        raise ValueError(f"start = {start!r}: allowed are {' and '.join(map(repr, get_args(Start)))}")
 
 
 def _column(value: Any) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..checks import broadcastable, real_array
+from ..checks import broadcastable, one_axis, real_array
 from .modal_response import pick, segment
 
 __all__ = ["BaseMotion", "Force", "Harmonic", "Piecewise"]
@@ -279,9 +279,7 @@ class BaseMotion:
     def kinematics(self, t: Any) -> tuple[Any, Any, Any]:
         """Return displacement (m), velocity (m/s) and acceleration (m/s2) of the base at times ``t`` >= 0, shape
         (..., t)."""
-        times = real_array("t", t, low=0.0)
-        if times.ndim > 1:
-            raise ValueError(f"t has shape {times.shape}: allowed are a number or one axis of times")
+        times = one_axis("t", t, "times", low=0.0)
         total = [np.zeros((*self.shape, times.size)) for _ in range(3)]
         for term in self.terms:
             for i, part in enumerate(term.kinematics(np.atleast_1d(times))):
