@@ -14,10 +14,13 @@ from collections.abc import Callable, Iterable, Sequence
 from enum import Enum
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tests.mutation.mutants import Mutant, mutants
 from tests.mutation.watch import PACKAGE, rounds
+
+if TYPE_CHECKING:
+    from cra_sym.arm.equations import Equation
 
 __all__ = ["Laboratory", "Verdict"]
 
@@ -46,9 +49,10 @@ class Laboratory:
     def __init__(self, tests: bool = True) -> None:
         self._tests = tests
 
-    def mutants(self, module: str) -> list[Mutant]:
-        """Return every mutant of a module given as ``room/name``."""
-        return mutants(_file(module).read_text(encoding="utf-8"))
+    def mutants(self, module: str) -> tuple[str, list[Mutant]]:
+        """Return the code of a module given as ``room/name``, and every mutant of it."""
+        source = _file(module).read_text(encoding="utf-8")
+        return source, mutants(source)
 
     def control(self, modules: Iterable[str]) -> bool:
         """Return whether the package as it is passes all these tests; without that no verdict means anything.
@@ -56,20 +60,24 @@ class Laboratory:
         What the checks derive on the way stays in this process, ready for the mutants that do not change it.
         """
         affected = {name for module in modules for name in dependents(_dotted(module))}
-        confirmed = all(check() for check in _checks(affected))
+        if failed := _first_failing_check(_built_by(affected)):
+            print(failed)
+            return False
         wanted = {tuple(tests): list(tests) for module in modules for tests in rounds(module)} if self._tests else {}
-        return confirmed and _in_a_fork(lambda: _pass(list(wanted.values()))) is Verdict.SURVIVED
+        verdict, failed = _in_a_fork(lambda: _first_failing_test(list(wanted.values())))
+        print(failed, end="\n" if failed else "")
+        return verdict is Verdict.SURVIVED
 
-    def examine(self, module: str, mutant: Mutant) -> Verdict:
-        """Run what watches over the module upon one of its mutants."""
+    def examine(self, module: str, mutant: Mutant) -> tuple[Verdict, str]:
+        """Run what watches over the module upon one of its mutants; return the verdict and what noticed it."""
         affected = dependents(_dotted(module))
 
-        def survives() -> bool:
+        def noticed() -> str:
             _replace(module, mutant.source, affected)
-            first = sorted(_checks(affected), key=lambda check: check.__self__.source.split(":")[0] != _dotted(module))
-            return all(check() for check in first) and (not self._tests or _pass(rounds(module)))
+            found = sorted(_built_by(affected), key=lambda equation: equation.source.split(":")[0] != _dotted(module))
+            return _first_failing_check(found) or (self._tests and _first_failing_test(rounds(module))) or ""
 
-        return _in_a_fork(survives)
+        return _in_a_fork(noticed)
 
 
 def _file(module: str) -> Path:
@@ -124,18 +132,24 @@ def dependents(dotted: str) -> frozenset[str]:
 # in the process of a mutant ---------------------------------------------------------------------------------------
 
 
-def _in_a_fork(passes: Callable[[], bool]) -> Verdict:
+def _in_a_fork(noticed: Callable[[], str]) -> tuple[Verdict, str]:
+    reader, writer = os.pipe()
     child = os.fork()
     if child == 0:
         try:
             _isolate()
-            os._exit(0 if passes() else 1)
-        except BaseException:
-            os._exit(1)
+            by = noticed()
+        except BaseException as error:
+            by = type(error).__name__
+        os.write(writer, by.encode()[:1000])
+        os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader) as pipe:
+        by = pipe.read()
     _, status = os.waitpid(child, 0)
     if os.WIFSIGNALED(status):
-        return Verdict.EXHAUSTED
-    return Verdict.CAUGHT if os.WEXITSTATUS(status) else Verdict.SURVIVED
+        return Verdict.EXHAUSTED, ""
+    return (Verdict.CAUGHT if by else Verdict.SURVIVED), by
 
 
 def _isolate() -> None:
@@ -195,18 +209,47 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         exec(compile(self._source, str(self._file), "exec"), vars(module))
 
 
-def _checks(affected: Iterable[str]) -> list[Callable[[], bool]]:
-    """Return the checks of the equations that these modules build, in the paper's order."""
+def _built_by(affected: Iterable[str]) -> list[Equation]:
+    """Return the equations that these modules build, in the paper's order."""
     from cra_sym.arm.equations import equations
 
-    return [e.check for e in equations(companions=True) if e.source.partition(":")[0] in affected]
+    return [e for e in equations(companions=True) if e.source.partition(":")[0] in affected]
 
 
-def _pass(tests: Sequence[Sequence[str]]) -> bool:
-    """Run rounds of tests; return whether all pass."""
+def _first_failing_check(found: Iterable[Equation]) -> str:
+    for equation in found:
+        try:
+            if equation.check():
+                continue
+        except Exception:
+            pass
+        return f"equation ({equation.number})"
+    return ""
+
+
+def _first_failing_test(parts: Sequence[Sequence[str]]) -> str:
+    """Run rounds of tests; return the name of the first that fails, or nothing."""
     import pytest
 
     os.chdir(PACKAGE.parent)
     options = ["-x", "-q", "-o", "addopts=--import-mode=importlib"]
     options += [f"-pno:{plugin}" for plugin in ("cacheprovider", "xdist", "nbval", "faulthandler")]
-    return not any(pytest.main([*options, *part]) for part in tests)
+    witness = _Witness()
+    for part in parts:
+        if pytest.main([*options, *part], plugins=[witness]):
+            return witness.failed or "pytest"
+    return ""
+
+
+class _Witness:
+    """Remembers which test failed first."""
+
+    failed = ""
+
+    def pytest_collectreport(self, report: Any) -> None:
+        """A module that cannot be imported fails as a whole."""
+        self.failed = self.failed or (report.nodeid if report.failed else "")
+
+    def pytest_runtest_logreport(self, report: Any) -> None:
+        """A test or its fixture."""
+        self.failed = self.failed or (report.nodeid if report.failed else "")

@@ -69,6 +69,6 @@ def test_a_sample_of_a_section_is_caught(tmp_path):
     """The tool at work on mutants of one section, seeded, by the equations' own checks."""
     command = [sys.executable, "-m", "tests.mutation", "arm/driven", "--checks", "--sample", "3"]
     run = subprocess.run(
-        [*command, "--seed", "2", "--results", str(tmp_path / "results.json")], cwd=ROOT, capture_output=True, text=True
+        [*command, "--seed", "2", "--results", str(tmp_path)], cwd=ROOT, capture_output=True, text=True
     )
     assert run.returncode == 0 and run.stdout.count("caught") == 3, run.stdout + run.stderr
