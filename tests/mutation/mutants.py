@@ -20,12 +20,18 @@ class Mutant:
     before: str
     after: str
     kind: str
-    source: str
+    tree: ast.Module
+    path: tuple
 
     @property
     def change(self) -> tuple[str, str, str]:
         """What was changed, whatever its line number."""
         return self.function, self.before, self.after
+
+    @property
+    def source(self) -> str:
+        """The text of the changed module."""
+        return ast.unparse(_changed(self.tree, self.path, self.kind))
 
 
 def mutants(source: str) -> list[Mutant]:
@@ -77,6 +83,13 @@ def _reach(tree: ast.AST, path: tuple) -> ast.AST:
 
 
 def _mutant(tree: ast.Module, path: tuple, function: str, statement: tuple, change: str) -> Mutant:
+    original = _reach(tree, statement)
+    changed = _changed(original, path[len(statement) :], change)
+    return Mutant(function, _shown(original), _shown(changed), change, tree, path)
+
+
+def _changed(tree: ast.AST, path: tuple, change: str) -> ast.AST:
+    """Return a copy in which the node at the path is changed."""
     changed = copy.deepcopy(tree)
     node = _reach(changed, path)
     if change == "flip":
@@ -92,8 +105,7 @@ def _mutant(tree: ast.Module, path: tuple, function: str, statement: tuple, chan
         node.value = node.value * float(change[1:]) or float(change[1:]) - 1.0  # zero becomes a tenth, up or down
     else:
         node.value += int(change)
-    before, after = (_shown(_reach(t, statement)) for t in (tree, changed))
-    return Mutant(function, before, after, change, ast.unparse(changed))
+    return changed
 
 
 def _shown(node: ast.AST) -> str:
