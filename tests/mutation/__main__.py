@@ -36,13 +36,13 @@ def main() -> int:
         parser.error(f"unknown: {', '.join(unknown)}; known are {', '.join(known)}")
     modules = options.modules or known
     laboratory = Laboratory(tests=not options.checks)
-    if not laboratory.control(modules):
-        raise SystemExit("the package as it is fails its tests")
     return 1 if sum(_examine(laboratory, module, options) for module in modules) else 0
 
 
 def _examine(laboratory: Laboratory, module: str, options: argparse.Namespace) -> int:
     """Examine a module's mutants, or some; return how many survive without a reason."""
+    if failing := laboratory.control(module):
+        raise SystemExit(f"{failing} fails without a mutant")
     source, mutants = laboratory.mutants(module)
     record = Record(options.results, module, source, mutants, options.seed)
     if options.holes:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 __all__ = ["Mutant", "mutants"]
 
 _ANNOTATIONS = {"annotation", "returns", "decorator_list"}
+_NEAR = 1e-5
 
 
 @dataclass(frozen=True)
@@ -38,39 +39,41 @@ def mutants(source: str) -> list[Mutant]:
     """Return every mutant of a module's source.
 
     A plus becomes a minus and the other way round, a leading minus is dropped, a constant (and so an exponent) goes up
-    and down by one, a float by a tenth. Left alone are annotations, decorators, which hold the equations' numbers, and
-    functions that are checks themselves.
+    and down by one, a float by a tenth. An index of 0 only goes up: below it is the last item, and mostly the only one.
+    Left alone are annotations, decorators, which hold the equations' numbers, functions that are checks themselves, and
+    floats of 1e-5 or less, which say how near is near enough or stand in for zero.
     """
     tree = ast.parse(source)
     return [_mutant(tree, *place) for place in _places(tree, (), "", None)]
 
 
-def _places(node: ast.AST, path: tuple, function: str, statement: tuple | None) -> Iterator[tuple]:
+def _places(node: ast.AST, path: tuple, function: str, statement: tuple | None, index: bool = False) -> Iterator[tuple]:
     if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
         if any("checks(" in ast.unparse(decorator) for decorator in node.decorator_list):
             return
         function = f"{function}.{node.name}".lstrip(".")
     if isinstance(node, (ast.stmt, ast.ExceptHandler)) and path:
         statement = path
-    for change in _changes(node):
+    for change in _changes(node, index):
         yield path, function, statement, change
     for name, value in ast.iter_fields(node):
         if name in _ANNOTATIONS:
             continue
-        for index, child in enumerate(value if isinstance(value, list) else [value]):
+        for place, child in enumerate(value if isinstance(value, list) else [value]):
             if isinstance(child, ast.AST):
-                step = (name, index if isinstance(value, list) else None)
-                yield from _places(child, (*path, step), function, statement)
+                step = (name, place if isinstance(value, list) else None)
+                inside = name == "slice" or (index and isinstance(node, ast.Tuple))
+                yield from _places(child, (*path, step), function, statement, inside)
 
 
-def _changes(node: ast.AST) -> tuple[str, ...]:
+def _changes(node: ast.AST, index: bool) -> tuple[str, ...]:
     if isinstance(node, (ast.BinOp, ast.AugAssign)) and isinstance(node.op, (ast.Add, ast.Sub)):
         return ("flip",)
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         return ("drop",)
     if isinstance(node, ast.Constant) and type(node.value) is int:
-        return ("+1", "-1")
-    if isinstance(node, ast.Constant) and type(node.value) is float:
+        return ("+1",) if index and node.value == 0 else ("+1", "-1")
+    if isinstance(node, ast.Constant) and type(node.value) is float and not 0 < node.value <= _NEAR:
         return ("*1.1", "*0.9")
     return ()
 

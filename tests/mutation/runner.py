@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Laboratory", "Verdict"]
 
+LIKELY = 3
 SECONDS = 90  # of processor time; several times what all tests of a module need
 BYTES = 8 << 30
 _DERIVED = re.compile(r"cra_sym(\.\w+)+(?=:|$)")
@@ -48,36 +49,54 @@ class Laboratory:
 
     def __init__(self, tests: bool = True) -> None:
         self._tests = tests
+        self._noticed: dict[str, list[tuple[str, str]]] = {}  # of a module: function and what noticed, latest first
+        self._sound: set[str] = set()  # tests that pass without a mutant
 
     def mutants(self, module: str) -> tuple[str, list[Mutant]]:
         """Return the code of a module given as ``room/name``, and every mutant of it."""
         source = _file(module).read_text(encoding="utf-8")
         return source, mutants(source)
 
-    def control(self, modules: Iterable[str]) -> bool:
-        """Return whether the package as it is passes all these tests; without that no verdict means anything.
+    def control(self, module: str) -> str:
+        """Return what fails on the module as it is: a check of an equation, or nothing; verdicts would mean nothing.
 
-        What the checks derive on the way stays in this process, ready for the mutants that do not change it.
+        What the checks derive on the way stays in this process, ready for the mutants that do not change it. A test is
+        tried on the module as it is when it first notices a mutant.
         """
-        affected = {name for module in modules for name in dependents(_dotted(module))}
-        if failed := _first_failing_check(_built_by(affected)):
-            print(failed)
-            return False
-        wanted = {tuple(tests): list(tests) for module in modules for tests in rounds(module)} if self._tests else {}
-        verdict, failed = _in_a_fork(lambda: _first_failing_test(list(wanted.values())))
-        print(failed, end="\n" if failed else "")
-        return verdict is Verdict.SURVIVED
+        return _first_failing_check(_built_by(dependents(_dotted(module))))
 
     def examine(self, module: str, mutant: Mutant) -> tuple[Verdict, str]:
         """Run what watches over the module upon one of its mutants; return the verdict and what noticed it."""
         affected = dependents(_dotted(module))
+        likely = self._likely(module, mutant.function)
 
         def noticed() -> str:
             _replace(module, mutant.source, affected)
-            found = sorted(_built_by(affected), key=lambda equation: equation.source.split(":")[0] != _dotted(module))
-            return _first_failing_check(found) or (self._tests and _first_failing_test(rounds(module))) or ""
+            found = _built_by(affected)
+            suspects = [e for name in likely for e in found if _title(e) == name]
+            own = [e for e in found if e.source.partition(":")[0] == _dotted(module)]
+            tests = [[name] for name in likely if name.startswith("tests/")]
+            return (
+                _first_failing_check([*suspects, *own])
+                or (self._tests and _first_failing_test(tests))
+                or _first_failing_check(e for e in found if e not in own and e not in suspects)
+                or (self._tests and _first_failing_test(rounds(module)))
+                or ""
+            )
 
-        return _in_a_fork(noticed)
+        verdict, by = _in_a_fork(noticed)
+        if by.startswith("tests/") and by not in self._sound:
+            if _in_a_fork(lambda: _first_failing_test([[by]]))[0] is not Verdict.SURVIVED:
+                raise RuntimeError(f"{by} fails without a mutant")
+            self._sound.add(by)
+        if by:
+            self._noticed.setdefault(module, []).insert(0, (mutant.function, by))
+        return verdict, by
+
+    def _likely(self, module: str, function: str) -> list[str]:
+        """Return what noticed the latest mutants of the same function, or else of the same module."""
+        latest = sorted(self._noticed.get(module, []), key=lambda entry: entry[0] != function)
+        return list(dict.fromkeys(by for _, by in latest))[:LIKELY]
 
 
 def _file(module: str) -> Path:
@@ -223,8 +242,12 @@ def _first_failing_check(found: Iterable[Equation]) -> str:
                 continue
         except Exception:
             pass
-        return f"equation ({equation.number})"
+        return _title(equation)
     return ""
+
+
+def _title(equation: Equation) -> str:
+    return f"equation ({equation.number})"
 
 
 def _first_failing_test(parts: Sequence[Sequence[str]]) -> str:
@@ -234,17 +257,25 @@ def _first_failing_test(parts: Sequence[Sequence[str]]) -> str:
     os.chdir(PACKAGE.parent)
     options = ["-x", "-q", "-o", "addopts=--import-mode=importlib"]
     options += [f"-pno:{plugin}" for plugin in ("cacheprovider", "xdist", "nbval", "faulthandler")]
+    passing = pytest.ExitCode.OK, pytest.ExitCode.USAGE_ERROR, pytest.ExitCode.NO_TESTS_COLLECTED  # the name has gone
     witness = _Witness()
     for part in parts:
-        if pytest.main([*options, *part], plugins=[witness]):
+        if pytest.main([*options, *part], plugins=[witness]) not in passing:
             return witness.failed or "pytest"
     return ""
 
 
 class _Witness:
-    """Remembers which test failed first."""
+    """Remembers which test failed first; a failure is enough, its smallest example is not wanted."""
 
     failed = ""
+
+    def pytest_configure(self) -> None:
+        """Let Hypothesis neither shrink nor store."""
+        from hypothesis import Phase, settings
+
+        settings.register_profile("mutants", phases=(Phase.explicit, Phase.generate), database=None)
+        settings.load_profile("mutants")
 
     def pytest_collectreport(self, report: Any) -> None:
         """A module that cannot be imported fails as a whole."""

@@ -14,7 +14,7 @@ SOURCE = '''
 @numbered(3, "kinetic energy", (1,))
 def energy(x: Shape[2]) -> float:
     """A docstring with 3 - 2."""
-    return -x**2 + 0.5
+    return -x**2 + 0.5 if x[0, 4:] > 1e-9 else 0
 
 
 @checks(3)
@@ -31,13 +31,19 @@ def _load():
 
 def test_signs_exponents_and_constants_change_one_at_a_time():
     found = {mutant.after for mutant in tool.mutants(SOURCE)}
+    kept = "if x[0, 4:] > 1e-09 else 0"
     assert found == {
-        "return -x ** 2 - 0.5",
-        "return x ** 2 + 0.5",
-        "return -x ** 3 + 0.5",
-        "return -x ** 1 + 0.5",
-        "return -x ** 2 + 0.55",
-        "return -x ** 2 + 0.45",
+        f"return -x ** 2 - 0.5 {kept}",
+        f"return x ** 2 + 0.5 {kept}",
+        f"return -x ** 3 + 0.5 {kept}",
+        f"return -x ** 1 + 0.5 {kept}",
+        f"return -x ** 2 + 0.55 {kept}",
+        f"return -x ** 2 + 0.45 {kept}",
+        "return -x ** 2 + 0.5 if x[1, 4:] > 1e-09 else 0",
+        "return -x ** 2 + 0.5 if x[0, 5:] > 1e-09 else 0",
+        "return -x ** 2 + 0.5 if x[0, 3:] > 1e-09 else 0",
+        "return -x ** 2 + 0.5 if x[0, 4:] > 1e-09 else 1",
+        "return -x ** 2 + 0.5 if x[0, 4:] > 1e-09 else -1",
     }
     assert {mutant.function for mutant in tool.mutants(SOURCE)} == {"energy"}
 
