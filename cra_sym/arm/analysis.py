@@ -233,7 +233,8 @@ class ModalParameters:
             part = slice(start, start + share)
             slopes = self._modes.lanes(part).shape(xi, 1)
             load = (1 - xi + mu[part, None]) * weights
-            result[part] = (slopes * load) @ slopes.transpose(0, 2, 1)
+            product = (slopes * load) @ slopes.swapaxes(1, 2)
+            result[part] = (product + product.swapaxes(1, 2)) / 2  # to the last digit, as Floquet's shorter way needs
         return result.reshape(*self.lam.shape, modes) / _column(self._arm.L, 2)
 
 

@@ -229,16 +229,22 @@ def monodromy(*system: Any, tolerance: float = 1e-8, backend: str = "auto", **mo
     return maps.reshape(*shape, *maps.shape[1:])
 
 
-def _half_period_cosines(batch: Oscillators, tolerance: float, backend: str) -> np.ndarray:
-    r"""Return :math:`d^T a + b^T c`, whose eigenvalues are :math:`(\rho + 1/\rho)/2`, shape (points, N, N).
+def _conservative_exponents(batch: Oscillators, tolerance: float, backend: str) -> np.ndarray:
+    r"""Return one exponent s of each pair (s, -s) of a system without damping, its real part not negative.
 
-    The excitation is even in time, so the second half of the period is the first one mirrored; a, b, c, d are the
-    blocks of the half-period map.
+    The excitation is even in time, so the second half of the period is the first one mirrored: with the blocks a, b,
+    c, d of the half-period map, :math:`\sinh^2(sT/2)` are the eigenvalues of :math:`b^Tc`, and :math:`\cosh^2(sT/2)`
+    those of :math:`d^Ta`. The smaller of the two is used: a double multiplier 1 or -1 then costs no digits.
     """
     maps = _maps(batch, 0.5, tolerance, backend)
     n = maps.shape[-1] // 2
     a, b, c, d = maps[:, :n, :n], maps[:, :n, n:], maps[:, n:, :n], maps[:, n:, n:]
-    return d.swapaxes(1, 2) @ a + b.swapaxes(1, 2) @ c
+    sines = np.linalg.eigvals(b.swapaxes(1, 2) @ c).astype(complex)
+    cosines = np.linalg.eigvals(d.swapaxes(1, 2) @ a).astype(complex)
+    nearest = np.abs(1.0 + sines[:, :, None] - cosines[:, None, :]).argmin(axis=-1)
+    cosines = np.take_along_axis(cosines, nearest, axis=-1)
+    half = np.where(sines.real > -0.5, np.arcsinh(np.sqrt(sines)), np.arccosh(np.sqrt(cosines)))
+    return 2 * half / batch.period[:, None]
 
 
 def floquet_exponents(*system: Any, tolerance: float = 1e-8, backend: str = "auto", **more: Any) -> np.ndarray:
@@ -249,9 +255,8 @@ def floquet_exponents(*system: Any, tolerance: float = 1e-8, backend: str = "aut
     batch, shape = Oscillators.of(*system, **more)
     period = batch.period[:, None]
     if batch.conservative:
-        cosines = np.linalg.eigvals(_half_period_cosines(batch, tolerance, backend)).astype(complex)
-        half = np.arccosh(cosines) / period
-        exponents = np.concatenate([half, -half], axis=-1)
+        growing = _conservative_exponents(batch, tolerance, backend)
+        exponents = np.concatenate([growing, -growing], axis=-1)
     else:
         maps = _maps(batch, 1.0, tolerance, backend)
         exponents = np.log(np.linalg.eigvals(maps).astype(complex)) / period
@@ -264,8 +269,7 @@ def growth_rate(*system: Any, tolerance: float = 1e-8, backend: str = "auto", **
     """Return max(0, largest real part of the exponents), shape (...); arguments of :class:`Oscillators`."""
     batch, shape = Oscillators.of(*system, **more)
     if batch.conservative:
-        cosines = np.linalg.eigvals(_half_period_cosines(batch, tolerance, backend)).astype(complex)
-        rates = np.arccosh(cosines).real.max(axis=-1) / batch.period
+        rates = _conservative_exponents(batch, tolerance, backend).real.max(axis=-1)
     else:
         multipliers = np.linalg.eigvals(_maps(batch, 1.0, tolerance, backend))
         rates = np.log(np.abs(multipliers).max(axis=-1)) / batch.period

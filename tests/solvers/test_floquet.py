@@ -114,11 +114,13 @@ def test_damping_loses_phase_volume():
 
 
 def test_no_excitation_no_growth():
+    """Not even where a double multiplier 1 or -1 would lose half the digits: there are rigid and resonant modes."""
     omega = np.array([0.0, 1.0, 2.0])
-    rates = floquet.growth_rate(omega, np.ones((1, 3, 3)), np.linspace(0.3, 5.0, 30), 0.0)
-    assert np.all(rates < 1e-6)  # a rigid mode's double multiplier 1 is known to half the digits
-    damped = floquet.growth_rate(omega[1:], np.ones((1, 2, 2)), np.linspace(0.3, 5.0, 30), 0.0, decay=0.01)
-    assert np.all(damped == 0.0)
+    varpi = np.concatenate([np.linspace(0.3, 5.0, 30), [2.0, 1.0, 2 / 3, 0.5, 4.0, 3.0]])
+    assert floquet.growth_rate(omega, np.ones((1, 3, 3)), varpi, 0.0).max() < 1e-14
+    decay = np.array([0.01, 0.2])
+    damped = floquet.floquet_exponents(omega[1:], np.ones((1, 2, 2)), varpi, 0.0, decay=decay)
+    np.testing.assert_allclose(damped.real, np.broadcast_to(-decay.repeat(2), damped.shape), atol=1e-12)
 
 
 def test_batch_equals_loop():
