@@ -1,7 +1,8 @@
 """Run every notebook through on the versions at hand: ``python -m tests.notebooks.gate [NOTEBOOK...]``.
 
 Nothing is stored or compared; a cell that raises, such as an assertion that does not hold, fails the gate. With
-``--requirements oldest`` or ``newest`` it prints what to install before, from the ranges in ``pyproject.toml``.
+``--requirements oldest`` or ``newest`` it prints what to install before, the package among it, from the ranges in
+``pyproject.toml``.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ def requirements(which: str) -> list[str]:
     ranges = project["dependencies"]
     if which == "oldest":
         ranges = [f"{name.replace('>=', '==')}.*" for name in ranges]
-    return [*ranges, *(line for extra in ("notebooks", "certify", "scale", "explore") for line in extras[extra])]
+    wanted = (line for extra in ("notebooks", "certify", "scale", "explore") for line in extras[extra])
+    return [*ranges, *wanted, "-e ."]
 
 
 def main(names: list[str]) -> int:

@@ -57,6 +57,14 @@ def test_ends_with_assertions(notebook):
     assert any(asserting[-2:]), "the last cells hold assertions a reader can rerun"
 
 
+def test_needs_nothing_that_only_tests_need(notebook):
+    """A reader installs the package and its notebooks' tools."""
+    nodes = [node for cell in code(notebook) for node in ast.walk(ast.parse(source(cell)))]
+    names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    names |= {node.module for node in nodes if isinstance(node, ast.ImportFrom)}
+    assert not {name.partition(".")[0] for name in names} & {"hypothesis", "nbval", "pytest", "tests"}
+
+
 def test_is_one_sitting(notebook):
     assert len(notebook["cells"]) <= 30
     assert notebook["cells"][0]["cell_type"] == "markdown"
