@@ -6,10 +6,13 @@ import subprocess
 import sys
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
+from importlib.metadata import Distribution, PackageNotFoundError, distribution
 from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -43,18 +46,51 @@ def test_supported_pythons_agree():
     assert set(PYTHONS) <= set(declared)
 
 
-def resolve(python: str, target: Path) -> subprocess.CompletedProcess[str]:
-    """Let pip look for the wheels of all pins for another Python, without installing anything.
+def installed() -> dict[str, Distribution]:
+    """Return what the pins bring, by canonical name, with their dependencies, as far as it is there."""
+    found: dict[str, Distribution] = {}
+    todo = [(Requirement(line).name, "") for line in PINS]
+    while todo:
+        name, extra = todo.pop()
+        try:
+            found[canonicalize_name(name)] = package = distribution(name)
+        except PackageNotFoundError:
+            continue
+        for needed in map(Requirement, package.requires or ()):
+            if needed.marker is None or needed.marker.evaluate({"extra": extra}):
+                new = {"", *needed.extras} if canonicalize_name(needed.name) not in found else needed.extras
+                todo += [(needed.name, wanted) for wanted in new]
+    return found
 
-    For the newest Python it also follows what the pins depend on, which takes a while.
+
+def suits_every_python(package: Distribution) -> bool:
+    """Return whether the package is one wheel without machine code."""
+    return "-none-any" in (package.read_text("WHEEL") or "")
+
+
+def test_packages_without_machine_code_accept_every_python():
+    there = {name: package.metadata.get("Requires-Python") or "" for name, package in installed().items()}
+    assert len(there) > len(PINS) / 2
+    refused = {n: r for n, r in there.items() if not all(SpecifierSet(r).contains(f"{p}.99") for p in PYTHONS)}
+    assert refused == {}
+
+
+def resolve(python: str, target: Path) -> subprocess.CompletedProcess[str]:
+    """Let pip look for wheels for another Python, without installing anything.
+
+    Only what has machine code is asked for, the rest suits every Python: of the pins, and for the newest Python also
+    of what they bring.
     """
+    there = installed()
+    pinned = {canonicalize_name(Requirement(line).name): line for line in PINS}
+    asked = {*pinned, *there} if python == PYTHONS[-1] else set(pinned)
+    general = {name for name, package in there.items() if suits_every_python(package)}
+    lines = [pinned.get(name, name) for name in sorted(asked - general)]
     listed = target / f"pins-{python}.txt"
-    listed.write_text("\n".join(PINS), encoding="utf-8")
-    options = ["--dry-run", "--ignore-installed", "--only-binary=:all:", "--retries=0", "--timeout=20", "--quiet"]
+    listed.write_text("\n".join(lines), encoding="utf-8")
+    options = ["--dry-run", "--ignore-installed", "--no-deps", "--only-binary=:all:", "--retries=0", "--timeout=20"]
     where = ["--python-version", python, "--target", str(target / python), "--requirement", str(listed)]
-    if python != PYTHONS[-1]:
-        options.append("--no-deps")
-    command = [sys.executable, "-m", "pip", "install", "--disable-pip-version-check", *options, *where]
+    command = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *options, *where]
     return subprocess.run(command, capture_output=True, text=True, timeout=600)
 
 
@@ -63,6 +99,7 @@ def test_wheels_resolve_on_every_python(tmp_path):
     probe = [sys.executable, "-m", "pip", "index", "versions", "mpmath", "--retries=0", "--timeout=10"]
     if subprocess.run(probe, capture_output=True).returncode:
         pytest.skip("no package index within reach")
-    with ThreadPoolExecutor(2) as pool:
-        runs = dict(zip(PYTHONS, pool.map(lambda python: resolve(python, tmp_path), PYTHONS), strict=True))
+    others = [python for python in PYTHONS if python != f"{sys.version_info.major}.{sys.version_info.minor}"]
+    with ThreadPoolExecutor(len(others)) as pool:
+        runs = dict(zip(others, pool.map(lambda python: resolve(python, tmp_path), others), strict=True))
     assert {python: run.stderr[-2000:] for python, run in runs.items() if run.returncode} == {}
