@@ -11,8 +11,10 @@ import re
 import resource
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import redirect_stdout
 from enum import Enum
 from functools import cache
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +29,7 @@ __all__ = ["Laboratory", "Verdict"]
 LIKELY = 3
 SECONDS = 90  # of processor time; several times what all tests of a module need
 BYTES = 8 << 30
+_LIBRARIES = ("mpmath", "scipy.integrate", "scipy.linalg", "scipy.optimize", "scipy.special", "scipy.stats")
 _DERIVED = re.compile(r"cra_sym(\.\w+)+(?=:|$)")
 
 
@@ -51,6 +54,7 @@ class Laboratory:
         self._tests = tests
         self._noticed: dict[str, list[tuple[str, str]]] = {}  # of a module: function and what noticed, latest first
         self._sound: set[str] = set()  # tests that pass without a mutant
+        _warm_up()
 
     def mutants(self, module: str) -> tuple[str, list[Mutant]]:
         """Return the code of a module given as ``room/name``, and every mutant of it."""
@@ -63,7 +67,7 @@ class Laboratory:
         What the checks derive on the way stays in this process, ready for the mutants that do not change it. A test is
         tried on the module as it is when it first notices a mutant.
         """
-        return _first_failing_check(_built_by(dependents(_dotted(module))))
+        return _first_failing_check(_checked(module, dependents(_dotted(module))))
 
     def examine(self, module: str, mutant: Mutant) -> tuple[Verdict, str]:
         """Run what watches over the module upon one of its mutants; return the verdict and what noticed it."""
@@ -72,7 +76,7 @@ class Laboratory:
 
         def noticed() -> str:
             _replace(module, mutant.source, affected)
-            found = _built_by(affected)
+            found = _checked(module, affected)
             suspects = [e for name in likely for e in found if _title(e) == name]
             own = [e for e in found if e.source.partition(":")[0] == _dotted(module)]
             tests = [[name] for name in likely if name.startswith("tests/")]
@@ -105,6 +109,16 @@ def _file(module: str) -> Path:
 
 def _dotted(module: str) -> str:
     return "cra_sym." + module.replace("/", ".")
+
+
+def _warm_up() -> None:
+    """Import here what every mutant would import in a process of its own: the package, pytest and what tests use."""
+    import cra_sym
+
+    for name in (*(f"cra_sym.{home}" for home in cra_sym._HOME.values()), *_LIBRARIES):
+        importlib.import_module(name)
+    with redirect_stdout(StringIO()):
+        _first_failing_test([["tests/mutation/test_mutants.py", "--collect-only"]])
 
 
 # what depends on what ---------------------------------------------------------------------------------------------
@@ -228,6 +242,11 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         exec(compile(self._source, str(self._file), "exec"), vars(module))
 
 
+def _checked(module: str, affected: frozenset[str]) -> list[Equation]:
+    """Return the equations whose checks watch over a module: the arm's, for the solvers know of none."""
+    return [] if module.startswith("solvers/") else _built_by(affected)
+
+
 def _built_by(affected: Iterable[str]) -> list[Equation]:
     """Return the equations that these modules build, in the paper's order."""
     from cra_sym.arm.equations import equations
@@ -255,8 +274,10 @@ def _first_failing_test(parts: Sequence[Sequence[str]]) -> str:
     import pytest
 
     os.chdir(PACKAGE.parent)
-    options = ["-x", "-q", "-o", "addopts=--import-mode=importlib"]
-    options += [f"-pno:{plugin}" for plugin in ("cacheprovider", "xdist", "nbval", "faulthandler")]
+    options = ["-x", "-q", "--assert=plain", "-o", "addopts=--import-mode=importlib"]
+    options += [
+        f"-pno:{plugin}" for plugin in ("cacheprovider", "xdist", "nbval", "faulthandler", "unraisableexception")
+    ]
     passing = pytest.ExitCode.OK, pytest.ExitCode.USAGE_ERROR, pytest.ExitCode.NO_TESTS_COLLECTED  # the name has gone
     witness = _Witness()
     for part in parts:

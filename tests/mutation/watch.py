@@ -38,7 +38,25 @@ _MODES = [
 ]
 _STABILITY = [["tests/arm/test_boundaries.py"], ["tests/arm/test_stability.py"]]
 _LANES = ["tests/arm/test_templates.py"]
-_STIFFNESS = [["tests/solvers/test_stiffness.py"], ["tests/model"]]
+_STIFFNESS = [
+    ["tests/solvers/test_stiffness.py"],
+    [
+        f"tests/model/test_{name}"
+        for name in (
+            "gallery.py::test_tapered_rod",
+            "gallery.py::test_hanging_string_with_a_tip_mass",
+            "gallery.py::test_heavy_tips_on_soft_joints_keep_their_digits",
+            "gallery.py::test_an_upright_arm_buckles_under_its_own_weight",
+            "gallery.py::test_shapes_of_the_arm",
+            "gallery.py::test_free_base_as_a_coordinate",
+            "damped.py::test_viscous_joint_damper",
+            "damped.py::test_receptance_of_a_cantilever",
+            "damped.py::test_follower_force_has_eigenvalues_but_no_natural_frequencies",
+            "model.py::test_modal_parameters_close_the_balance_of_forces",
+            "model.py::test_a_structure_without_mass_has_no_frequencies",
+        )
+    ],
+]
 _FLOQUET = [["tests/solvers/test_floquet.py"]]
 _PHYSICS = [_FREQUENCIES, _MODES]
 
@@ -96,10 +114,10 @@ _ROUNDS: dict[str, list[list[str]]] = {
 
 
 def watched_modules() -> tuple[str, ...]:
-    """Return all modules of the arm and of the solvers, such as ``arm/energy``, but those that are exempt."""
+    """Return the oscillators and all modules of the arm and of the solvers, as ``arm/energy``, but those exempt."""
     files = sorted(file for room in ("arm", "solvers") for file in (PACKAGE / room).glob("*.py"))
     names = (file.relative_to(PACKAGE).with_suffix("").as_posix() for file in files if file.stem != "__init__")
-    return tuple(name for name in names if name not in EXEMPT)
+    return ("model/oscillator", *(name for name in names if name not in EXEMPT))
 
 
 def rounds(module: str) -> list[list[str]]:
