@@ -30,6 +30,8 @@ def _reading_input() -> Iterator[None]:
     """Turn the package's complaints about a value into a usage error."""
     try:
         yield
+    except OutputError:
+        raise
     except (ValueError, TypeError) as error:
         raise UsageError(str(error)) from error
 
@@ -202,9 +204,11 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code.
 
-    0 is success, 2 one line on standard error about what was wrong with the input, 1 a notebook that did not run.
+    0 is success, 2 one line on standard error about what was wrong with the input or the place to write to, 1 a
+    notebook that did not run, and 128 plus its number a signal that ended the run.
     """
     import cra_sym
+    from cra_sym.ending import run_command
     from cra_sym.extras import MissingExtraError
     from cra_sym.report.notebooks import NotebookError
 
@@ -222,12 +226,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             command.options(sub)
         sub.set_defaults(run=command.run)
     options = parser.parse_args(arguments)
-    try:
-        options.run(options)
-    except (UsageError, OutputError, FileNotFoundError, MissingExtraError, NotebookError) as error:
-        print(f"{parser.prog} {options.command}: {error}", file=sys.stderr)
-        return 1 if isinstance(error, NotebookError) else 2
-    return 0
+    return run_command(
+        f"{parser.prog} {options.command}",
+        lambda: options.run(options),
+        {UsageError: 2, MissingExtraError: 2, NotebookError: 1},
+    )
 
 
 if __name__ == "__main__":

@@ -2,31 +2,60 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import re
 import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from secrets import token_hex
 
-__all__ = ["OutputError", "staged_directory", "write_text"]
+try:
+    import fcntl
+except ImportError:  # Windows: nothing is locked, and so nothing is taken for abandoned
+    fcntl = None  # type: ignore[assignment]
+
+__all__ = ["OutputError", "draft", "staged_directory", "write_text", "writing"]
 
 _MANIFEST = "manifest.json"
+_OLD = ".replaced"
+_DISK = {getattr(errno, name, 0) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EROFS", "EIO", "ENXIO", "ENODEV", "ESTALE")}
 
 
 class OutputError(ValueError):
     """An output place that cannot be used; the message names it and says why."""
 
 
+@contextmanager
+def draft(path: str | Path) -> Iterator[Path]:
+    """Give a temporary place of the same name to write a file to; at the end of the block it becomes ``path``.
+
+    ``path`` holds either its old content or all of the new; its parents are made.
+
+    Raises
+    ------
+    OutputError
+        If ``path`` cannot be written.
+    """
+    path = _absolute(path)
+    with _stage(path) as place:
+        yield place
+        with writing(path):
+            os.replace(place, path)
+
+
 def write_text(path: str | Path, text: str) -> None:
-    """Write ``text`` as UTF-8 so that ``path`` holds either its old content or all of the new."""
-    path = Path(path)
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}-") as folder:
-        draft = Path(folder) / path.name
-        draft.write_text(text, encoding="utf-8", newline="\n")
-        os.replace(draft, path)
+    """Write ``text`` as UTF-8 so that ``path`` holds either its old content or all of the new.
+
+    Raises
+    ------
+    OutputError
+        If ``path`` cannot be written.
+    """
+    with draft(path) as place:
+        place.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _files(folder: Path) -> Iterator[str]:
@@ -48,6 +77,8 @@ def _check_replaceable(target: Path, keep: bool) -> None:
         return
     if target.is_symlink() or not target.is_dir():
         raise OutputError(f"output = {str(target)!r}: is not a directory")
+    if target.is_mount():
+        raise OutputError(f"output = {str(target)!r}: is a mount point, which cannot be replaced; name a folder in it")
     made = _listed(target)
     foreign = next((name for name in _files(target) if name not in made), None)
     if foreign is not None and not keep:
@@ -63,7 +94,9 @@ def staged_directory(target: str | Path, *, keep: bool = False) -> Iterator[Path
 
     The sibling carries a ``manifest.json`` that lists its files. An earlier output at ``target`` is replaced as a
     whole, once everything new is complete; a directory with anything else in it is refused before any work. Whatever
-    ends the block early, ``target`` and the directories around it stay as they were.
+    ends the block early, ``target`` and the directories around it stay as they were. Processes that write to the same
+    place at once each write the whole of it, and the last one stays. What a killed process left behind is cleared
+    away by the next one that writes there.
 
     Parameters
     ----------
@@ -78,36 +111,24 @@ def staged_directory(target: str | Path, *, keep: bool = False) -> Iterator[Path
     OutputError
         If ``target`` cannot be written or holds files that an earlier output did not put there.
     """
-    target = Path(os.path.abspath(target))
+    target = _absolute(target)
     _check_replaceable(target, keep)
-    made = [folder for folder in target.parents if not folder.exists()]
-    stage = target.with_name(f".{target.name}-{token_hex(4)}")
-    complete = False
-    try:
-        try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            stage.mkdir()
-        except OSError as error:
-            raise OutputError(f"output = {str(target)!r}: cannot be written ({error.strerror or error})") from None
-        yield stage
-        write_text(stage / _MANIFEST, json.dumps({"files": sorted(_files(stage))}, indent=1) + "\n")
-        _check_replaceable(target, keep)
-        if keep:
-            _carry_over(target, stage)
-        _swap(stage, target)
-        complete = True
-    finally:
-        shutil.rmtree(stage, ignore_errors=True)
-        for folder in () if complete else made:
-            with suppress(OSError):
-                folder.rmdir()
+    with _stage(target) as folder:
+        folder.mkdir()
+        yield folder
+        write_text(folder / _MANIFEST, json.dumps({"files": sorted(_files(folder))}, indent=1) + "\n")
+        with _alone_at(target):
+            _check_replaceable(target, keep)
+            if keep:
+                _carry_over(target, folder)
+            _swap(folder, target)
 
 
-def _carry_over(target: Path, stage: Path) -> None:
+def _carry_over(target: Path, folder: Path) -> None:
     """Copy what is in ``target``, was not made by an earlier run and is not made now."""
     earlier = _listed(target)
     for name in _files(target):
-        place = stage / name
+        place = folder / name
         if name in earlier or (os.path.lexists(place) and not place.is_dir()):
             continue
         try:
@@ -119,17 +140,119 @@ def _carry_over(target: Path, stage: Path) -> None:
             raise OutputError(f"output = {str(target)!r}: {name!r} cannot be kept ({error})") from None
 
 
-def _swap(stage: Path, target: Path) -> None:
-    """Put ``stage`` in the place of ``target``; whatever goes wrong, ``target`` is the old one or the new."""
-    old = stage.with_name(f"{stage.name}-old")
+def _swap(folder: Path, target: Path) -> None:
+    """Put ``folder`` in the place of ``target``; what was there goes with the stage, or returns from it."""
+    if target.exists():
+        os.rename(target, folder.parent / _OLD)
+    os.rename(folder, target)
+
+
+# Stages, and processes that know of each other --------------------------------------------------------------------
+
+
+def _absolute(path: str | Path) -> Path:
     try:
-        if target.exists():
-            os.rename(target, old)
-        os.rename(stage, target)
-    except BaseException:
-        if old.exists() and not target.exists():
-            os.rename(old, target)
+        made = Path(os.path.abspath(path))
+        os.lstat(made)
+    except OSError:
+        pass
+    except (TypeError, ValueError) as error:
+        kind = TypeError if isinstance(error, TypeError) else ValueError
+        raise kind(f"output = {path!r}: allowed is a path ({error})") from None
+    return made
+
+
+@contextmanager
+def writing(target: Path, inside: Path | None = None) -> Iterator[None]:
+    """Say of what the system refuses to write that it was meant for ``target``.
+
+    With ``inside`` only of a place in there, and of a disk that is full or failing.
+    """
+    try:
+        yield
+    except OutputError as error:
+        raise OutputError(str(error).replace(str(inside), str(target)) if inside else str(error)) from None
+    except OSError as error:
+        place, reason = error.filename, error.strerror or error
+        if isinstance(error, shutil.Error):  # of copying a folder: (from, to, reason) of each file
+            _, place, reason = error.args[0][0]
+        if inside is None or (error.errno in _DISK if place is None else str(place).startswith(str(inside))):
+            said = f"output = {str(target)!r}: cannot be written ({reason})"
+            raise OutputError(said.replace(str(inside), str(target))) from None
         raise
+
+
+@contextmanager
+def _stage(target: Path) -> Iterator[Path]:
+    """Give a place for ``target`` in a folder beside it, which is locked while it is there, and goes at the end.
+
+    With an error the parents that were made for it go too.
+    """
+    made = [folder for folder in target.parents if not folder.exists()]
+    stage = target.with_name(f".{target.name}.cra_sym-{token_hex(4)}")
+    lock, complete = None, False
+    try:
+        with writing(target):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with _alone_at(target):
+                _clear_abandoned(target)
+                stage.mkdir()
+                lock = _locked(stage)
+        with writing(target, stage / target.name):
+            yield stage / target.name
+        complete = True
     finally:
-        if target.exists():
-            shutil.rmtree(old, ignore_errors=True)
+        _discard(stage, target)
+        _unlock(lock)
+        for folder in () if complete else made:
+            with suppress(OSError):
+                folder.rmdir()
+
+
+@contextmanager
+def _alone_at(target: Path) -> Iterator[None]:
+    """Be the only process at work on the names beside ``target``."""
+    lock = _locked(target.parent)
+    try:
+        yield
+    finally:
+        _unlock(lock)
+
+
+def _clear_abandoned(target: Path) -> None:
+    """Remove the stages of ``target`` that no process holds; an output that was about to be replaced returns."""
+    pattern = re.compile(re.escape(f".{target.name}.cra_sym-") + "[0-9a-f]{8}")
+    for stage in [path for path in target.parent.iterdir() if pattern.fullmatch(path.name)]:
+        lock = _locked(stage, wait=False)
+        if lock is not None:
+            _discard(stage, target)
+            _unlock(lock)
+
+
+def _discard(stage: Path, target: Path) -> None:
+    """Remove a stage; an output that was about to be replaced, and was not, returns to its place first."""
+    with suppress(OSError):
+        if (stage / _OLD).exists() and not os.path.lexists(target):
+            os.rename(stage / _OLD, target)
+        shutil.rmtree(stage, ignore_errors=True)
+
+
+def _locked(folder: Path, *, wait: bool = True) -> int | None:
+    """Lock a folder until it is unlocked or the process ends; return None where that is not possible."""
+    if fcntl is None:
+        return None
+    held = None
+    try:
+        held = os.open(folder, os.O_RDONLY)
+        fcntl.flock(held, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except BaseException as error:
+        _unlock(held)
+        if isinstance(error, OSError):
+            return None
+        raise
+    return held
+
+
+def _unlock(lock: int | None) -> None:
+    if lock is not None:
+        os.close(lock)

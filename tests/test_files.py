@@ -1,12 +1,19 @@
 """Writing: all or nothing, and never over somebody else's files."""
 
+import errno
 import json
 import os
+import shutil
+import signal
 import stat
+import subprocess
+import sys
 
 import pytest
 
-from cra_sym.files import OutputError, staged_directory, write_text
+from cra_sym.files import OutputError, draft, staged_directory, write_text
+
+locks = pytest.mark.skipif(sys.platform == "win32", reason="folders are locked the POSIX way")
 
 
 def fill(target, **files):
@@ -134,3 +141,139 @@ def test_a_failure_takes_the_folders_above_along(tmp_path):
     with pytest.raises(KeyboardInterrupt), staged_directory(tmp_path / "deep" / "er"):
         raise KeyboardInterrupt
     assert not list(tmp_path.iterdir())
+
+
+def test_a_file_is_made_in_one_step_with_the_folders_above(tmp_path):
+    place = tmp_path / "new folder" / "λ.svg"
+    with draft(place) as here:
+        assert here.name == place.name and not place.exists()
+        here.write_text("<svg/>")
+    assert place.read_text() == "<svg/>" and list(place.parent.iterdir()) == [place]
+    with pytest.raises(ZeroDivisionError), draft(place) as here:
+        here.write_text("half")
+        raise ZeroDivisionError
+    assert place.read_text() == "<svg/>" and list(place.parent.iterdir()) == [place]
+
+
+@pytest.mark.parametrize("path", [None, 3, "nul\0", "\ud800x"])
+def test_what_is_no_path_is_named(path):
+    with pytest.raises((TypeError, ValueError), match=r"output = .*allowed is a path"):
+        write_text(path, "")
+    with pytest.raises((TypeError, ValueError), match=r"output = .*allowed is a path"), staged_directory(path):
+        pass
+
+
+@pytest.fixture
+def little_disk():
+    """Let no file grow beyond 1 kB, as on a full disk: what is written up to there stays."""
+    resource = pytest.importorskip("resource", reason="the size of files is limited the Unix way")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1024, limits[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def test_a_full_disk_leaves_what_there_was_and_is_named(tmp_path, little_disk):
+    fill(tmp_path / "out", a="1")
+    write_text(tmp_path / "file", "old")
+    with pytest.raises(OutputError, match=rf"output = '{tmp_path}/out': cannot be written \(File too large\)"):
+        fill(tmp_path / "out", a="2", b="x" * 2000)
+    with pytest.raises(OutputError, match=rf"output = '{tmp_path}/file': cannot be written"):
+        write_text(tmp_path / "file", "x" * 2000)
+    with pytest.raises(OutputError, match=rf"'{tmp_path}/out/deep/file'"), staged_directory(tmp_path / "out") as folder:
+        write_text(folder / "deep" / "file", "x" * 2000)
+    assert contents(tmp_path / "out") == {"a": "1"} and (tmp_path / "file").read_text() == "old"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "out"]
+
+
+def test_a_full_disk_is_named_when_folders_are_copied(tmp_path):
+    (tmp_path / "source").mkdir()
+    with (
+        pytest.raises(OutputError, match=r"out': cannot .*No space .*/out/copy/a"),
+        staged_directory(tmp_path / "out") as folder,
+    ):
+        raise shutil.Error([("source/a", str(folder / "copy" / "a"), f"No space left on device: '{folder}/copy/a'")])
+    assert [path.name for path in tmp_path.iterdir()] == ["source"]
+
+
+def test_a_disk_that_cannot_be_written_is_named(tmp_path, monkeypatch):
+    def closed(path, *_, **__):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+
+    monkeypatch.setattr(os, "mkdir", closed)
+    for write in (lambda: write_text(tmp_path / "out", ""), lambda: fill(tmp_path / "out", a="1")):
+        with pytest.raises(OutputError, match=rf"output = '{tmp_path}/out': cannot be written \(Read-only file system"):
+            write()
+
+
+def test_errors_about_other_places_stay_what_they_are(tmp_path):
+    with pytest.raises(FileNotFoundError, match="elsewhere"), staged_directory(tmp_path / "out"):
+        open(tmp_path / "elsewhere")
+
+
+def test_a_mount_point_is_refused_before_any_work(tmp_path, monkeypatch):
+    (tmp_path / "out").mkdir()
+    monkeypatch.setattr("pathlib.Path.is_mount", lambda self: True)
+    with pytest.raises(OutputError, match="mount point"), staged_directory(tmp_path / "out"):
+        pytest.fail("no work before the check")
+
+
+KILLED = """
+import os, sys
+from cra_sym import files
+rename = os.rename
+def killed(*paths):
+    rename(*paths)
+    os.kill(os.getpid(), 9)
+with files.staged_directory(sys.argv[1], keep=True) as folder:
+    (folder / "a").write_text("2")
+    if sys.argv[2] == "working":
+        os.kill(os.getpid(), 9)
+    os.rename = killed
+"""
+
+
+@locks
+@pytest.mark.parametrize("when", ["working", "exchanging"])
+def test_what_a_killed_process_left_is_cleared_away_and_nothing_is_lost(tmp_path, when):
+    fill(tmp_path / "out", a="1")
+    (tmp_path / "out" / "mine").write_text("mine")
+    done = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path / "out"), when], check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert any(path.name.startswith(".out") for path in tmp_path.iterdir())
+    with pytest.raises(ZeroDivisionError), staged_directory(tmp_path / "out", keep=True) as folder:
+        (folder / "a").write_text("3")
+        raise ZeroDivisionError
+    assert contents(tmp_path / "out") == {"a": "1", "mine": "mine"}
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@locks
+def test_a_stage_in_use_is_left_alone(tmp_path):
+    with staged_directory(tmp_path / "out") as outer:
+        (outer / "a").write_text("outer")
+        fill(tmp_path / "out", a="inner")
+        assert (outer / "a").read_text() == "outer"
+        assert contents(tmp_path / "out") == {"a": "inner"}
+    assert contents(tmp_path / "out") == {"a": "outer"}
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+MANY = """
+import sys
+from cra_sym.files import staged_directory
+for n in range(20):
+    with staged_directory(sys.argv[1]) as folder:
+        for name in "abc":
+            (folder / name).write_text(sys.argv[2])
+"""
+
+
+@locks
+def test_processes_that_write_to_one_place_at_once_all_succeed(tmp_path):
+    command = [sys.executable, "-c", MANY, str(tmp_path / "out")]
+    started = [subprocess.Popen([*command, name]) for name in "123"]
+    assert [process.wait(timeout=120) for process in started] == [0, 0, 0]
+    made = contents(tmp_path / "out")
+    assert made.keys() == {"a", "b", "c"} and len({*made.values()}) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]

@@ -26,7 +26,7 @@ FLOORS = [
     {"report"},
     {"__main__"},
 ]
-OPEN_TO_ALL = {"checks", "extras", "files"}  # argument checks, optional libraries, safe writing: none imports a room
+OPEN_TO_ALL = {"checks", "ending", "extras", "files"}  # checks, signals, optional libraries, safe writing: no rooms
 RANK = {room: rank for rank, floor in enumerate(FLOORS) for room in floor}
 
 

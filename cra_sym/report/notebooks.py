@@ -11,13 +11,14 @@ import sys
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor, as_completed
+from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
-from threading import Event
 from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
 
+from cra_sym.ending import run_command
 from cra_sym.files import write_text
 
 if TYPE_CHECKING:
@@ -81,7 +82,12 @@ get_ipython().events.register("pre_run_cell", show_figures_as_svg_too)
 
 
 def execute(
-    path: str | Path, advance: Callable[[], Any] | None = None, timeout: int = 600, *, svg: bool = False
+    path: str | Path,
+    advance: Callable[[], Any] | None = None,
+    timeout: int = 600,
+    *,
+    svg: bool = False,
+    begun: Callable[[Callable[[], Any]], Any] | None = None,
 ) -> NotebookNode:
     """Execute one notebook in a fresh kernel of this Python, in its own folder, and return it with its outputs.
 
@@ -95,11 +101,15 @@ def execute(
         Seconds allowed for one cell.
     svg : bool
         Whether figures shown by value are also kept as SVG, whatever formats the notebook itself asks for.
+    begun : callable, optional
+        Called at the start with a function that ends the run, cell and kernel, from any thread.
 
     Raises
     ------
     NotebookError
         If a cell raises or takes too long.
+    concurrent.futures.CancelledError
+        If the run was ended.
     """
     import nbformat
     from jupyter_client import AsyncKernelManager
@@ -123,8 +133,17 @@ def execute(
         on_notebook_start=lambda **_: client.kc.execute(_SVG_TOO, silent=True, store_history=False) if svg else None,
         on_cell_executed=lambda **_: advance() if advance is not None else None,
     )
+
+    async def run() -> None:
+        loop, task = asyncio.get_running_loop(), asyncio.current_task()
+        if begun is not None and task is not None:
+            begun(lambda: loop.call_soon_threadsafe(task.cancel))
+        await client.async_execute(cleanup_kc=True)  # it ends the kernels of its own managers only, unless told
+
     try:
-        asyncio.run(client.async_execute(cleanup_kc=True))  # it ends the kernels of its own managers only, unless told
+        asyncio.run(run())
+    except asyncio.CancelledError:
+        raise CancelledError from None
     except (CellExecutionError, CellTimeoutError, DeadKernelError) as error:
         raise NotebookError(f"{path.name} did not run: {strip_ansi(str(error))}") from None
     _normalise(notebook)
@@ -149,27 +168,27 @@ def refresh(paths: Sequence[Path], *, svg: bool = False) -> None:
     """
     import nbformat
 
-    stop = Event()
-
-    def advance() -> None:
-        if stop.is_set():
-            raise CancelledError
-        progress.update()
-
+    running: list[Callable[[], Any]] = []
     with (
         tqdm(total=cells_to_run(paths), unit="cell", disable=None) as progress,
         ThreadPoolExecutor(max_workers=min(len(paths), os.cpu_count() or 1)) as pool,
     ):
-        running = {pool.submit(execute, path, advance, svg=svg): path for path in paths}
+        jobs = {pool.submit(execute, path, progress.update, svg=svg, begun=running.append): path for path in paths}
         try:
-            for finished in as_completed(running):
-                write_text(running[finished], nbformat.writes(finished.result()) + "\n")
-        except BaseException:  # an interrupt too: no cell more than those now running
+            for finished in as_completed(jobs):
+                write_text(jobs[finished], nbformat.writes(finished.result()) + "\n")
+        except BaseException:  # an interrupt too
             pool.shutdown(wait=False, cancel_futures=True)
-            stop.set()
+            for end in running:
+                with suppress(RuntimeError):  # its loop is closed: it has ended
+                    end()
             raise
 
 
-if __name__ == "__main__":
+def _refresh_as_asked() -> None:
     given = [Path(argument) for argument in sys.argv[1:]]
     refresh([path for place in given for path in (find_notebooks(place) if place.is_dir() else [place])])
+
+
+if __name__ == "__main__":
+    sys.exit(run_command("python -m cra_sym.report.notebooks", _refresh_as_asked, {NotebookError: 1}))

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
 
+from cra_sym.ending import run_command
 from cra_sym.figures import ANIMATIONS, FIGURES, animate, draw, shows_an_arm
-from cra_sym.files import write_text
+from cra_sym.files import draft, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,15 +64,19 @@ def _save(figure: Figure, folder: Path, name: str, kinds: Sequence[str]) -> list
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    folder.mkdir(parents=True, exist_ok=True)
     FigureCanvasAgg(figure)
     made = [folder / f"{name}.{kind}" for kind in kinds]
     with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "path"}):
         for path, kind in zip(made, kinds, strict=True):
-            figure.savefig(path, format=kind, **_OPTIONS[kind])
+            with draft(path) as place:
+                figure.savefig(place, format=kind, **_OPTIONS[kind])
     return made
 
 
-if __name__ == "__main__":
+def _redraw_as_asked() -> None:
     place = Path(sys.argv[1])
     save_figures(place, [path.stem for path in place.glob("*.svg")], kinds=["svg"])
+
+
+if __name__ == "__main__":
+    sys.exit(run_command("python -m cra_sym.report.pictures", _redraw_as_asked, {}))

@@ -10,6 +10,7 @@ from typing import Any
 from tqdm import tqdm
 
 from cra_sym.extras import require
+from cra_sym.files import OutputError, draft, writing
 from cra_sym.studies.study import Study
 
 __all__ = ["sweep_into"]
@@ -38,6 +39,8 @@ def sweep_into(study: Study, path: Path, chunks: int, client: Any = None) -> Any
     ------
     ValueError
         If the store holds something else than this sweep.
+    OutputError
+        If it cannot be written; what is there is whole, and a later sweep goes on from it.
     """
     xarray = require("xarray", "scale")
     zarr = require("zarr", "scale")
@@ -46,20 +49,23 @@ def sweep_into(study: Study, path: Path, chunks: int, client: Any = None) -> Any
     stored = _opened(zarr, study, path)
     missing = [region for region in _regions(study.shape, stored.chunks) if not _is_there(stored, path, region)]
     progress = tqdm(total=len(missing), desc=study.quantity.name, disable=None if missing else True)
-    for _ in _written(study, path, missing, client):
-        progress.update()
-    progress.close()
+    with progress, writing(path, path):
+        for _ in _written(study, path, missing, client):
+            progress.update()
     return xarray.open_zarr(path, consolidated=False)
 
 
 def _make(study: Study, path: Path, chunks: int) -> None:
     """Write coordinates, attributes and the empty variable, under a temporary name until all is there."""
-    draft = path.with_name(f".{path.name}.partial")
     require("dask.array", "scale")
     dataset = study.dataset(study.lazy(chunks)).assign_attrs({_DIGEST: study.digest()})
     encoding = {study.quantity.name: {"chunks": _chunk_shape(study, chunks), "write_empty_chunks": True}}
-    dataset.to_zarr(draft, mode="w", compute=False, consolidated=False, encoding=encoding)
-    draft.rename(path)
+    try:
+        with draft(path) as place:
+            dataset.to_zarr(place, mode="w", compute=False, consolidated=False, encoding=encoding)
+    except OutputError:
+        if not path.exists():  # else another process has made it meanwhile
+            raise
 
 
 def _chunk_shape(study: Study, chunks: int) -> tuple[int, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import cra_sym as cra
+from cra_sym.files import OutputError
 from cra_sym.studies import store as store_module
 from cra_sym.studies.study import make_study
 
@@ -93,6 +94,39 @@ def test_a_store_of_another_sweep_is_not_touched(tmp_path):
         cra.sweep(cra.Arm.nominal(), k_t=K_T, store=tmp_path / "letters")
     assert sorted(str(p) for p in place.rglob("*")) == before
     assert (tmp_path / "letters" / "one.txt").read_text() == "keep me"
+
+
+def test_a_full_disk_stops_a_sweep_that_goes_on_later(tmp_path):
+    """A limit on the size of files stands for the disk: what is in the store is whole, and the rest follows."""
+    resource = pytest.importorskip("resource", reason="the size of files is limited the Unix way")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def numbers(arm, *, small):
+        return np.random.default_rng(1).random((*arm.shape, 8 if small else 2000))
+
+    study = {"k_t": K_T, "chunks": 1, "store": tmp_path / "a study"}
+    try:
+        for size, small in ((300, True), (4000, False)):  # too small for the labels, then for a region
+            resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+            with pytest.raises(
+                OutputError, match=rf"output = '{tmp_path}/a study.*: cannot be written \(File too large"
+            ):
+                cra.sweep(cra.Arm.nominal(), numbers, small=small, **study)
+            assert size > 300 or not list(tmp_path.iterdir())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert [path.name for path in tmp_path.iterdir()] == ["a study"]
+    found = cra.sweep(cra.Arm.nominal(), numbers, small=False, **study).numbers.values
+    np.testing.assert_array_equal(found[0], np.random.default_rng(1).random((1, 2000))[0])
+
+
+def test_a_store_made_by_another_process_meanwhile_is_used(tmp_path, monkeypatch):
+    place, answers = tmp_path / "study.zarr", iter([False])
+    cra.sweep(cra.Arm.nominal(), k_t=K_T, store=place)
+    monkeypatch.setattr(store_module.Path, "exists", lambda path: next(answers, True))
+    study = cra.sweep(cra.Arm.nominal(), k_t=K_T, store=place)
+    assert not list(answers) and study.sizes["k_t"] == K_T.size
+    assert [path.name for path in tmp_path.iterdir()] == [place.name]
 
 
 def test_two_workers_one_killed(tmp_path):

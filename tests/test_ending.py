@@ -1,0 +1,108 @@
+"""How commands end: by signals, full disks and closed outputs, with a line, a code and nothing half made."""
+
+import errno
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from cra_sym.__main__ import main
+from cra_sym.codegen import exporter
+from cra_sym.ending import orderly_ending, run_command
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+SLOW = """
+import sys, time
+from cra_sym.ending import run_command
+from cra_sym.files import staged_directory
+
+def job():
+    with staged_directory(sys.argv[1]) as folder:
+        (folder / "half").write_text("made")
+        print("ready", flush=True)
+        time.sleep(60)
+
+sys.exit(run_command("slow", job, {}))
+"""
+
+
+@posix
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_leaves_nothing_half_made(name, tmp_path):
+    command = [sys.executable, "-c", SLOW, str(tmp_path / "out")]
+    with subprocess.Popen(command, stdout=-1, stderr=-1, text=True) as process:
+        assert process.stdout.readline() == "ready\n"
+        process.send_signal(signal.Signals[name])
+        _, said = process.communicate(timeout=60)
+    assert (process.returncode, said) == (128 + signal.Signals[name], f"slow: ended by {name}\n")
+    assert not list(tmp_path.iterdir())
+
+
+def test_handlers_return_to_what_they_were():
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    with orderly_ending():
+        assert signal.getsignal(signal.SIGTERM) != before[1]
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+@posix
+def test_an_ignored_signal_stays_ignored():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with orderly_ending():
+            signal.raise_signal(signal.SIGHUP)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_foreseen_errors_have_their_codes(capsys):
+    def fail():
+        raise KeyError("k")
+
+    assert run_command("name", fail, {LookupError: 7}) == 7
+    assert capsys.readouterr() == ("", "name: 'k'\n")
+    with pytest.raises(KeyError):
+        run_command("name", fail, {})
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs /dev/full")
+def test_a_full_or_closed_output_is_said_in_a_line():
+    command = [sys.executable, "-m", "cra_sym", "frequencies", "--csv"]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, stdout=full, stderr=-1, text=True, check=False)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1 and "No space left on device" in done.stderr
+
+
+WRITING = {
+    "export": ["export", "python", "{}"],
+    "figures": ["figures", "--only", "fig02", "--output", "{}"],
+    "reproduce": ["reproduce", "--output", "{}"],
+}
+
+
+@pytest.mark.parametrize("command", WRITING)
+@pytest.mark.parametrize("disk", ["full", "read-only"])
+def test_every_command_that_writes_names_the_place_and_leaves_nothing(command, disk, tmp_path, capsys, monkeypatch):
+    resource = pytest.importorskip("resource", reason="the size of files is limited the Unix way")
+    monkeypatch.setattr(exporter, "_arm_texts", lambda name: {"README.md": "", f"arm.{name}": 2000 * "x"})
+    arguments = [word.format(tmp_path / "out put") for word in WRITING[command]]
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    if disk == "full":
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1024, limits[1]))
+    else:
+
+        def closed(path, *_, **__):
+            raise OSError(errno.EROFS, "Read-only file system", str(path))
+
+        monkeypatch.setattr("os.mkdir", closed)
+    try:
+        code = main(arguments)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    out, err = capsys.readouterr()
+    assert code == 2 and out == "" and err.count("\n") == 1
+    assert (
+        err.startswith(f"python -m cra_sym {command}: output = '{tmp_path / 'out put'}") and "cannot be written" in err
+    )
+    assert not list(tmp_path.iterdir())
