@@ -57,7 +57,25 @@ _STIFFNESS = [
         )
     ],
 ]
-_FLOQUET = [["tests/solvers/test_floquet.py"]]
+_HILL = [
+    f"tests/solvers/test_floquet.py::test_{name}" for name in ("exponents_are_hills", "too_few_harmonics_are_refused")
+]
+_FLOQUET = [
+    _HILL[:1],
+    [
+        f"tests/solvers/test_floquet.py::test_{name}"
+        for name in (
+            "mathieu_edges",
+            "monodromy_is_that_of_a_general_integrator",
+            "compliance_is_a_spring_in_series",
+            "error_is_what_was_asked_for",
+            "multipliers_come_in_reciprocal_pairs",
+            "no_excitation_no_growth",
+            "batch_equals_loop",
+            "unknown_backend",
+        )
+    ],
+]
 _PHYSICS = [_FREQUENCIES, _MODES]
 
 _ROUNDS: dict[str, list[list[str]]] = {
@@ -93,13 +111,13 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "arm/stability": _STABILITY[::-1],
     "arm/zones": _STABILITY,
     "model/oscillator": [["tests/model/test_oscillator.py"], ["tests/arm/test_response.py"]],
-    "solvers/_floquet_compiled": [_LANES],
+    "solvers/_floquet_compiled": [[f"{_LANES[0]}::test_floquet"]],
     "solvers/certificates": [["tests/arm/test_certification.py"]],
     "solvers/coupled_modes": [["tests/model/test_response.py"]],
     "solvers/driven_modes": [["tests/arm/test_response.py"], ["tests/model/test_response.py"]],
     "solvers/eigenvalues": _STIFFNESS,
-    "solvers/floquet": [*_FLOQUET, ["tests/arm/test_stability.py"]],
-    "solvers/hill": _FLOQUET,
+    "solvers/floquet": _FLOQUET,
+    "solvers/hill": [_HILL],
     "solvers/modal_response": [
         ["tests/solvers/test_modal_response.py"],
         ["tests/arm/test_response.py", "tests/arm/test_shaping.py"],
@@ -108,7 +126,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "solvers/rayleigh": _STIFFNESS,
     "solvers/shapes": _STIFFNESS,
     "solvers/spectrum": [_FREQUENCIES, _DIGITS, [_LAMBDA]],
-    "solvers/spectrum_lanes": [_LANES],
+    "solvers/spectrum_lanes": [[f"{_LANES[0]}::test_spectrum"]],
     "solvers/stiffness": _STIFFNESS,
 }
 
