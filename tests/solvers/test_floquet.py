@@ -34,9 +34,15 @@ def multipliers_apart(first, second):
 def test_exponents_are_hills(seed):
     omega, coupling, varpi, epsilon, decay = random_system(seed)
     period = 2 * np.pi / varpi
-    hill = np.exp(period * hill_exponents(omega, coupling, varpi, epsilon, decay, harmonics=30))
-    mine = np.exp(period * floquet.floquet_exponents(omega, coupling[None], varpi, epsilon, decay, tolerance=1e-13))
+    both = (
+        floquet.floquet_exponents(omega, coupling[None], varpi, epsilon, decay, tolerance=1e-13),
+        hill_exponents(omega, coupling, varpi, epsilon, decay, harmonics=16),
+    )
+    mine, hill = (np.exp(period * exponents) for exponents in both)
     assert multipliers_apart(mine, hill) < 1e-11 * np.abs(hill).max()
+    for exponents in both:  # in one strip, the fastest growing first
+        assert (np.abs(exponents.imag) <= varpi / 2 * (1 + 1e-12)).all()
+        assert (np.diff(exponents.real) * period < 1e-8).all()
 
 
 def test_mathieu_edges():

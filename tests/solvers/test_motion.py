@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cra_sym.solvers.motion import BaseMotion
+from cra_sym.solvers.motion import BaseMotion, Force
 
 
 def test_mean_motion_and_disturbance_follow_equation_33():
@@ -23,6 +23,41 @@ def test_a_sum_is_a_superposition_and_an_array_is_a_batch():
     assert total.shape == (2,)
     assert total.displacement(0.3) == pytest.approx(2 * (first.displacement(0.3) + second.displacement(0.3)))
     assert total.velocity([0.0, 1.0]).shape == (2, 2)
+
+
+def test_velocity_and_way_are_integrals():
+    """Simpson's rule is exact on every piece of a record, of a move and of their delayed copies, and before them."""
+    record = BaseMotion.sampled(
+        np.linspace(0.4, 1.6, 5), [[0.7, -0.2, 1.1, 0.3, 0.9], np.ones(5)], velocity=[0.2, -0.3]
+    )
+    move = BaseMotion.s_curve([0.5, -0.8], 0.4, 1.0, 4.0).shaped([0.3, 0.7], [0.0, 0.37])
+    for motion in (record, move, BaseMotion([0.3, 0.1], -0.6), 3.0 * record + move):
+        knots = [np.ravel(term.knots) for term in motion.terms]
+        ends = np.unique(np.round(np.concatenate([[0.0, 3.0], *knots]), 12))
+        left, right = ends[:-1] + 1e-9, ends[1:] - 1e-9  # to either side of a jump of acceleration
+        (w_0, v_0, a_0), (_, v_m, a_m), (w_1, v_1, a_1) = map(motion.kinematics, (left, (left + right) / 2, right))
+        np.testing.assert_allclose(w_1 - w_0, (right - left) / 6 * (v_0 + 4 * v_m + v_1), atol=1e-13)
+        np.testing.assert_allclose(v_1 - v_0, (right - left) / 6 * (a_0 + 4 * a_m + a_1), atol=1e-13)
+        np.testing.assert_allclose(motion.displacement(0.0), 0.0, atol=0.0)
+        np.testing.assert_allclose(w_1[:, :-1], w_0[:, 1:], atol=1e-8)
+        np.testing.assert_allclose(v_1[:, :-1], v_0[:, 1:], atol=1e-8)
+
+
+def test_the_fastest_move_is_at_one_of_its_limits_all_the_time():
+    """Pontryagin: jerk, acceleration or velocity sits at its limit in every phase, whichever of them are reached."""
+    reached = set()
+    for v_max, a_max, j_max in np.array(np.meshgrid([0.1, 1.0, 30.0], [0.5, 3.0, 50.0], [2.0, 40.0, 900.0])).T.reshape(
+        -1, 3
+    ):
+        move = BaseMotion.s_curve(0.8, v_max, a_max, j_max)
+        (piece,) = move.terms
+        phases = np.nonzero(np.diff(piece.knots) > 1e-9)[0]
+        _, v, a = move.kinematics((piece.knots[phases] + piece.knots[phases + 1]) / 2)
+        at = np.isclose(np.abs([piece.jerk[phases], a, v]), np.array([[j_max], [a_max], [v_max]]), rtol=1e-9)
+        assert at.any(axis=0).all()
+        assert piece.jerk[-1] == piece.acceleration[-1] == 0.0
+        reached.add(tuple(at.any(axis=1)[1:]))
+    assert len(reached) == 4  # limits of acceleration and of velocity: each of the four cases has come up
 
 
 @settings(max_examples=60, deadline=None)
@@ -105,6 +140,19 @@ def test_duration_is_when_the_acceleration_ends():
     assert BaseMotion(velocity=1.0).duration == 0.0
     assert BaseMotion(acceleration=[0.0, 1.0]).duration.tolist() == [0.0, np.inf]
     assert (BaseMotion.trapezoid(1, 1, 1) + BaseMotion(amplitude=1e-3, angular_frequency=3.0)).duration == np.inf
+
+
+def test_a_force_is_what_its_fields_say():
+    t = np.linspace(0.0, 2.0, 9)
+    force = Force([1.0, -2.0], 1.5, [3.0, 0.0], 0.4)
+    assert force(t)[0] == pytest.approx(1.0 + 1.5 * np.sin(3.0 * t + 0.4))
+    assert force(t)[1] == pytest.approx(-2.0 + 1.5 * np.sin(0.4))  # one that does not swing is constant
+    record = Force.sampled([0.5, 1.0, 1.5], [2.0, -1.0, 3.0])
+    assert record([0.2, 0.5, 0.75, 1.25, 1.5]) == pytest.approx([0.0, 2.0, 0.5, 1.0, 0.0])
+    assert (force + record)(t) == pytest.approx(force(t) + record(t))
+    for size, varpi in ((1.0, 1e-160), (1e-160, 1e160)):
+        with pytest.raises(ValueError, match="too small or too large"):
+            Force(amplitude=size, angular_frequency=varpi)
 
 
 @pytest.mark.parametrize(
