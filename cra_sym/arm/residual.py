@@ -3,6 +3,7 @@
 A static unit force at the joint moves the whole arm by 1/k_t, a unit moment turns it by 1/k_r, and nothing bends. So
 the sums over all modes of b_i b_j / omega^2 and b_i b_j / omega^4, with b the displacement or slope at the joint, are
 the compliance 1/k and the rigid body's inertia over k_s k_r; what the first modes leave of them is known exactly.
+Without one of the springs its motion is free, and the other's takes along as much of it as leaves it no momentum.
 """
 
 from __future__ import annotations
@@ -41,9 +42,13 @@ def moments_of_all_modes(
     second = sum(w**2 * p[..., row, target] for w, p in zip(weights, springs, strict=True))
     ends = [modal.root_displacement, modal.root_slope]
     beam, length, tip = np.asarray(arm.rhoA) * arm.L, np.asarray(arm.L), np.asarray(arm.m_e)
-    first_moment = (beam / 2 + tip) * length
-    inertia = [[beam + tip, first_moment], [first_moment, (beam / 3 + tip) * length**2 + arm.J_e]]
-    there = [np.where(np.asarray(k) > 0, weight, 0.0) for k, weight in zip((arm.k_t, arm.k_r), weights, strict=True)]
+    mass, moment, turning = beam + tip, (beam / 2 + tip) * length, (beam / 3 + tip) * length**2 + arm.J_e
+    elastic = [np.asarray(k) > 0 for k in (arm.k_t, arm.k_r)]
+    inertia = [
+        [mass - np.where(elastic[1], 0.0, moment**2 / turning), moment],
+        [moment, turning - np.where(elastic[0], 0.0, moment**2 / mass)],
+    ]
+    there = [np.where(spring, weight, 0.0) for spring, weight in zip(elastic, weights, strict=True)]
     fourth = sum(
         there[s] * there[r] * inertia[s][r] * ends[s][..., row] * ends[r][..., target] for s in (0, 1) for r in (0, 1)
     )

@@ -1,5 +1,6 @@
 """Identification: recovery, exact gradients, covariance against repeated noisy measurements, and honest warnings."""
 
+import re
 import warnings
 
 import numpy as np
@@ -88,3 +89,31 @@ def test_enough_precise_data_do_not_warn():
 def test_bad_input_is_named(arguments, error, words):
     with pytest.raises(error, match=words):
         cra.identify_joint(**({"arm": NOMINAL, "measured_frequencies": [2.4, 15.0], "uncertainty": 0.1} | arguments))
+
+
+def number_after(words, text):
+    return float(re.search(re.escape(words) + r" ?([-+.e\d]+)", text)[1])
+
+
+def test_the_combination_one_frequency_tells_is_the_one_the_shapes_say():
+    """By Rayleigh's principle a give of the joint costs half the square of the force it carries, over the energy."""
+    with pytest.warns(IdentifiabilityWarning) as caught:
+        estimate = cra.identify_joint(NOMINAL.replace(L=0.8), [3.0], 0.01)
+    told = str(caught[0].message)
+    fitted = NOMINAL.replace(L=0.8, k_t=estimate.k_t, k_r=estimate.k_r)
+    modal = cra.modal_parameters(fitted, 1)
+    shear, moment, omega = modal.root_shear[0], modal.root_moment[0], modal.omega[0]
+    ratio = (moment / shear) ** 2
+    assert number_after("1/k_t +", told) == pytest.approx(ratio, rel=6e-3)
+    assert number_after("= (", told) == pytest.approx(1 / estimate.k_t + ratio / estimate.k_r, rel=6e-3)
+    slope = shear**2 / (2 * omega) / (2 * np.pi)  # Hz lost by a give in translation of 1 m/N
+    assert number_after("+-", told) == pytest.approx(0.01 / slope, rel=6e-2)
+
+
+def test_a_bound_is_two_standard_deviations_of_the_compliance_away():
+    with pytest.warns(IdentifiabilityWarning) as caught:
+        estimate = cra.identify_joint(NOMINAL, cra.natural_frequencies(NOMINAL.replace(k_t=1e4, k_r=1e4)), 0.05)
+    least = number_after("k_r is only known to exceed", str(caught[0].message))
+    deviation = np.sqrt(estimate.compliance_covariance[1, 1])
+    assert (1 / least - 1 / estimate.k_r) / deviation == pytest.approx(2.0, rel=0.02)
+    assert estimate.log_standard_deviation[1] == pytest.approx(deviation * estimate.k_r)

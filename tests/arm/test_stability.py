@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import cra_sym as cra
+from cra_sym.arm import zones
 from cra_sym.arm.edges import floquet_boundary
 from cra_sym.arm.residual import moments_of_all_modes, spring_vectors
 from cra_sym.solvers import floquet
@@ -85,19 +86,46 @@ def test_damped_zone():
 # statics of the modes left out ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("arm", [SOFT, SOFT.replace(k_r=30.0, J_e=1e-4), SOFT.replace(k_t=40.0, k_r=3.0, m_e=0.1)])
+@pytest.mark.parametrize(
+    "arm",
+    [
+        SOFT,
+        SOFT.replace(L=0.8, k_r=30.0, J_e=1e-4),
+        SOFT.replace(k_t=40.0, k_r=3.0, m_e=0.1),
+        SOFT.replace(L=1.3, k_r=0.0, m_e=0.1, J_e=0.01),
+        SOFT.replace(L=0.7, k_t=0.0, k_r=3.0, m_e=0.1, J_e=0.01),
+    ],
+)
 def test_sums_over_all_modes(arm):
     excitation = cra.JointStiffness(k_t=1.0, k_r=0.7)
     modal = cra.modal_parameters(arm, 400)
-    coupling = excitation.coupling(modal, 1.0)
-    for row, target in ((0, 0), (0, 2), (1, 1)):
-        path = coupling[row] * coupling[:, target]
+    coupling, vibrating = excitation.coupling(modal, 1.0), modal.omega > 0
+    for row, target in ((0, 0), (0, 2), (1, 1), (1, 2)):
+        path = (coupling[row] * coupling[:, target])[vibrating]
         second, fourth = moments_of_all_modes(arm, modal, excitation, row, target)
-        assert np.sum(path / modal.omega**4) == pytest.approx(fourth, rel=1e-6)
-        assert np.sum(path / modal.omega**2) == pytest.approx(second, rel=1e-2)
+        assert np.sum(path / modal.omega[vibrating] ** 4) == pytest.approx(fourth, rel=1e-6)
+        assert np.sum(path / modal.omega[vibrating] ** 2) == pytest.approx(second, rel=1e-2)
     springs = spring_vectors(modal)
     assert np.allclose(springs[0][:, None] * springs[0], modal.stiffness_translation)
     assert np.allclose(springs[1][:, None] * springs[1], modal.stiffness_rotation)
+
+
+@pytest.mark.parametrize(("free", "fluctuating"), [("k_r", JOINT), ("k_t", cra.JointStiffness(k_t=0.3, k_r=1.0))])
+def test_the_zone_is_continuous_where_a_spring_vanishes(free, fluctuating):
+    arms = [SOFT.replace(**{"k_t": 40.0, "k_r": 3.0, "m_e": 0.05, free: value}) for value in (0.0, 1e-9)]
+    for resonance in ((2, 2), (2, 3)):
+        none, hardly = (np.array(cra.stability_boundary(arm, fluctuating, 0.01, resonance, order=2)) for arm in arms)
+        assert none == pytest.approx(hardly, rel=1e-10)
+
+
+def test_the_second_order_does_not_depend_on_how_many_modes_are_summed_one_by_one(monkeypatch):
+    """With two terms of the others' statics the rest falls off with omega^-6, the number of modes to the power 11."""
+    arm, shifts = SOFT.replace(k_t=40.0, k_r=3.0), []
+    for spectators in (4, 8, 48):
+        monkeypatch.setattr(zones, "_SPECTATORS", spectators)
+        shifts.append(zones.zone_of(arm, cra.JointStiffness(1.0, 0.7), 0.1, 2, 2, 1, 3).shift)
+    errors = np.abs(np.array(shifts[:2]) / shifts[2] - 1)
+    assert errors[0] < 1e-5 and errors[0] / errors[1] > 2.0**10
 
 
 def test_residual_flexibility_is_the_limit_of_many_modes():
