@@ -61,14 +61,6 @@ class Laboratory:
         source = _file(module).read_text(encoding="utf-8")
         return source, mutants(source)
 
-    def control(self, module: str) -> str:
-        """Return what fails on the module as it is: a check of an equation, or nothing; verdicts would mean nothing.
-
-        What the checks derive on the way stays in this process, ready for the mutants that do not change it. A test is
-        tried on the module as it is when it first notices a mutant.
-        """
-        return _first_failing_check(_checked(module, dependents(_dotted(module))))
-
     def examine(self, module: str, mutant: Mutant) -> tuple[Verdict, str]:
         """Run what watches over the module upon one of its mutants; return the verdict and what noticed it."""
         affected = dependents(_dotted(module))
@@ -89,13 +81,25 @@ class Laboratory:
             )
 
         verdict, by = _in_a_fork(noticed)
-        if by.startswith("tests/") and by not in self._sound:
-            if _in_a_fork(lambda: _first_failing_test([[by]]))[0] is not Verdict.SURVIVED:
-                raise RuntimeError(f"{by} fails without a mutant")
-            self._sound.add(by)
         if by:
+            self._confirm(by)
             self._noticed.setdefault(module, []).insert(0, (mutant.function, by))
         return verdict, by
+
+    def _confirm(self, by: str) -> None:
+        """Make sure that what noticed a mutant has nothing against the package as it is.
+
+        A check is tried in this process: what it derives stays, ready for the mutants that do not change it.
+        """
+        if by in self._sound:
+            return
+        if by.startswith("tests/"):
+            failing = _in_a_fork(lambda: _first_failing_test([[by]]))[1]
+        else:
+            failing = _first_failing_check(e for e in _equations() if _title(e) == by)
+        if failing:
+            raise RuntimeError(f"{by} fails without a mutant")
+        self._sound.add(by)
 
     def _likely(self, module: str, function: str) -> list[str]:
         """Return what noticed the latest mutants of the same function, or else of the same module."""
@@ -247,11 +251,15 @@ def _checked(module: str, affected: frozenset[str]) -> list[Equation]:
     return [] if module.startswith("solvers/") else _built_by(affected)
 
 
-def _built_by(affected: Iterable[str]) -> list[Equation]:
-    """Return the equations that these modules build, in the paper's order."""
+def _equations() -> tuple[Equation, ...]:
     from cra_sym.arm.equations import equations
 
-    return [e for e in equations(companions=True) if e.source.partition(":")[0] in affected]
+    return equations(companions=True)
+
+
+def _built_by(affected: Iterable[str]) -> list[Equation]:
+    """Return the equations that these modules build, in the paper's order."""
+    return [e for e in _equations() if e.source.partition(":")[0] in affected]
 
 
 def _first_failing_check(found: Iterable[Equation]) -> str:
