@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["Laboratory", "Verdict"]
 
 LIKELY = 3
-SECONDS = 90  # of processor time; several times what all tests of a module need
+SECONDS = {"arm": 90, "model": 90, "solvers": 30}  # of processor time; several times what the tests of a module need
 BYTES = 8 << 30
 _LIBRARIES = ("mpmath", "scipy.integrate", "scipy.linalg", "scipy.optimize", "scipy.special", "scipy.stats")
 _DERIVED = re.compile(r"cra_sym(\.\w+)+(?=:|$)")
@@ -80,7 +80,7 @@ class Laboratory:
                 or ""
             )
 
-        verdict, by = _in_a_fork(noticed)
+        verdict, by = _in_a_fork(noticed, _seconds(module))
         if by:
             self._confirm(by)
             self._noticed.setdefault(module, []).insert(0, (mutant.function, by))
@@ -94,7 +94,7 @@ class Laboratory:
         if by in self._sound:
             return
         if by.startswith("tests/"):
-            failing = _in_a_fork(lambda: _first_failing_test([[by]]))[1]
+            failing = _in_a_fork(lambda: _first_failing_test([[by]]), _seconds(module))[1]
         else:
             failing = _first_failing_check(e for e in _equations() if _title(e) == by)
         if failing:
@@ -105,6 +105,10 @@ class Laboratory:
         """Return what noticed the latest mutants of the same function, or else of the same module."""
         latest = sorted(self._noticed.get(module, []), key=lambda entry: entry[0] != function)
         return list(dict.fromkeys(by for _, by in latest))[:LIKELY]
+
+
+def _seconds(module: str) -> int:
+    return SECONDS[module.partition("/")[0]]
 
 
 def _file(module: str) -> Path:
@@ -169,12 +173,12 @@ def dependents(dotted: str) -> frozenset[str]:
 # in the process of a mutant ---------------------------------------------------------------------------------------
 
 
-def _in_a_fork(noticed: Callable[[], str]) -> tuple[Verdict, str]:
+def _in_a_fork(noticed: Callable[[], str], seconds: int) -> tuple[Verdict, str]:
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:
         try:
-            _isolate()
+            _isolate(seconds)
             by = noticed()
         except BaseException as error:
             by = type(error).__name__
@@ -189,8 +193,8 @@ def _in_a_fork(noticed: Callable[[], str]) -> tuple[Verdict, str]:
     return (Verdict.CAUGHT if by else Verdict.SURVIVED), by
 
 
-def _isolate() -> None:
-    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+def _isolate(seconds: int) -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
     resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
     silence = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silence, 1)

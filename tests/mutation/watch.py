@@ -76,6 +76,7 @@ _FLOQUET = [
         )
     ],
 ]
+_COUPLED = ["tests/solvers/test_coupled_modes.py"]
 _PHYSICS = [_FREQUENCIES, _MODES]
 
 _ROUNDS: dict[str, list[list[str]]] = {
@@ -113,16 +114,18 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "model/oscillator": [["tests/model/test_oscillator.py"], ["tests/arm/test_response.py"]],
     "solvers/_floquet_compiled": [[f"{_LANES[0]}::test_floquet"]],
     "solvers/certificates": [["tests/arm/test_certification.py"]],
-    "solvers/coupled_modes": [["tests/model/test_response.py"]],
-    "solvers/driven_modes": [["tests/arm/test_response.py"], ["tests/model/test_response.py"]],
+    "solvers/coupled_modes": [_COUPLED, ["tests/model/test_response.py"]],
+    "solvers/driven_modes": [_COUPLED, ["tests/arm/test_response.py"]],
     "solvers/eigenvalues": _STIFFNESS,
     "solvers/floquet": _FLOQUET,
     "solvers/hill": [_HILL],
     "solvers/modal_response": [
-        ["tests/solvers/test_modal_response.py"],
+        ["tests/solvers/test_modal_response.py", *_COUPLED],
         ["tests/arm/test_response.py", "tests/arm/test_shaping.py"],
     ],
-    "solvers/motion": [["tests/solvers/test_motion.py"], ["tests/arm/test_response.py"]],
+    "solvers/motion": [
+        ["tests/solvers/test_motion.py", f"{_LAWS}::test_a_harmonic_of_no_size_or_speed_is_over_at_once"]
+    ],
     "solvers/rayleigh": _STIFFNESS,
     "solvers/shapes": _STIFFNESS,
     "solvers/spectrum": [_FREQUENCIES, _DIGITS, [_LAMBDA]],
