@@ -82,11 +82,11 @@ class Laboratory:
 
         verdict, by = _in_a_fork(noticed, _seconds(module))
         if by:
-            self._confirm(by)
+            self._confirm(by, _seconds(module))
             self._noticed.setdefault(module, []).insert(0, (mutant.function, by))
         return verdict, by
 
-    def _confirm(self, by: str) -> None:
+    def _confirm(self, by: str, seconds: int) -> None:
         """Make sure that what noticed a mutant has nothing against the package as it is.
 
         A check is tried in this process: what it derives stays, ready for the mutants that do not change it.
@@ -94,7 +94,7 @@ class Laboratory:
         if by in self._sound:
             return
         if by.startswith("tests/"):
-            failing = _in_a_fork(lambda: _first_failing_test([[by]]), _seconds(module))[1]
+            failing = _in_a_fork(lambda: _first_failing_test([[by]]), seconds)[1]
         else:
             failing = _first_failing_check(e for e in _equations() if _title(e) == by)
         if failing:
