@@ -11,6 +11,7 @@ import numpy as np
 _LANES = 128
 _NEAR = 5.0
 _TERMS = 10  # of the power series
+_ROWS = 12 + _TERMS  # what describes a lane: the determinant's coefficients, and those of its power series
 _MOST_STEPS = 80
 
 
@@ -23,22 +24,33 @@ def frequency_parameters(out, evaluations, kappa_t, kappa_r, mu, iota):
         lam = np.pi * ((k - 1) / 2 + 0.0625) if k else 0.0
         tables[k, 0], tables[k, 1] = lam, lam**4
         tables[k, 2], tables[k, 3], tables[k, 4], tables[k, 5], tables[k, 6] = _scaled_basis(lam, lam**4)
-    pairs, k, h = np.empty((8, _LANES)), np.empty((12, _LANES)), np.empty((_TERMS, _LANES))
+    pairs, k = np.empty((8, _LANES)), np.zeros((2 * _ROWS, _LANES))  # of all lanes; then of those still on their way
     counts, values = np.empty((points, _LANES), np.int64), np.empty((points, _LANES))
+    fewest, most = np.empty(points, np.int64), np.empty(points, np.int64)  # zeros below a point in any lane
     right, zeros = np.empty(_LANES, np.int64), np.empty(_LANES, np.int64)
-    z, previous, fresh, ahead = np.empty(_LANES), np.empty(_LANES), np.empty(_LANES), np.empty(_LANES)
-    active = np.empty(_LANES, np.int64)
+    crowded, around = np.empty(_LANES, np.int64), np.empty((8, _LANES))
+    z, place, lower = np.empty(_LANES), np.empty(_LANES), np.empty(_LANES)
+    step, previous = np.empty(_LANES), np.empty(_LANES)
+    active, left = np.empty(_LANES, np.int64), np.empty(_LANES, np.int64)
     reached = True
     for first in range(0, out.shape[0], _LANES):
         size = min(_LANES, out.shape[0] - first)
-        _prepare(pairs, k, h, zeros, kappa_t, kappa_r, mu, iota, first, size)
-        last = _counted(counts, values, pairs, zeros, tables, modes, size)
+        _prepare(pairs, k, zeros, kappa_t, kappa_r, mu, iota, first, size)
+        last = _counted(counts, values, fewest, most, pairs, zeros, tables, modes, size)
+        reached &= fewest[last] >= modes
+        low = high = 0
         for number in range(modes):
-            _first_points(right, counts, number, last, size)
-            _start(z, number, right, counts, values, tables, pairs, h, zeros, last, size)
-            reached &= _climb(z, previous, fresh, ahead, active, evaluations, number, zeros, k, h, size)
+            while low < last and most[low] <= number:
+                low += 1
+            while high < last and fewest[high] <= number:
+                high += 1
+            _first_points(right, counts, number, low, high, size)
+            _start(z, crowded, around, number, right, counts, values, tables, pairs, k, zeros, last, size)
+            reached &= _climb(z, place, lower, step, previous, active, left, evaluations, number, zeros, k, size)
             for lane in range(size):
-                out[first + lane, number] = np.sqrt(np.sqrt(z[lane]))
+                z[lane] = np.sqrt(np.sqrt(z[lane]))
+            for lane in range(size):
+                out[first + lane, number] = z[lane]
     return reached
 
 
@@ -50,7 +62,7 @@ def _scaled_basis(lam, z):
     return unit, p, q, r, s
 
 
-def _prepare(pairs, k, h, zeros, kappa_t, kappa_r, mu, iota, first, size):
+def _prepare(pairs, k, zeros, kappa_t, kappa_r, mu, iota, first, size):
     """Fill in the pairs (kappa, 1) / (1 + kappa), the determinant's coefficients and its power series."""
     for lane in range(size):
         t, r, m, j = kappa_t[first + lane], kappa_r[first + lane], mu[first + lane], iota[first + lane]
@@ -72,12 +84,12 @@ def _prepare(pairs, k, h, zeros, kappa_t, kappa_r, mu, iota, first, size):
             k[6, lane], k[7, lane], k[8, lane], k[9, lane], k[10, lane], k[11, lane],
         )  # fmt: skip
         for i in range(_TERMS):
-            h[i, lane] = a[i]
+            k[12 + i, lane] = a[i]
     for lane in range(size):
         for _ in range(zeros[lane]):
-            for i in range(_TERMS - 1):
-                h[i, lane] = h[i + 1, lane]
-            h[_TERMS - 1, lane] = 0.0
+            for i in range(12, _ROWS - 1):
+                k[i, lane] = k[i + 1, lane]
+            k[_ROWS - 1, lane] = 0.0
 
 
 def _count(pairs, lane, lam, z, unit, p, q, r, s):
@@ -96,144 +108,157 @@ def _count(pairs, lane, lam, z, unit, p, q, r, s):
     return number, rotating
 
 
-def _counted(counts, values, pairs, zeros, tables, modes, size):
+def _counted(counts, values, fewest, most, pairs, zeros, tables, modes, size):
     """Count at one point after the other until every lane has enough zeros; return the last point."""
+    fewest[0], most[0] = modes, 0
     for lane in range(size):
         counts[0, lane], values[0, lane] = zeros[lane], np.nan
+        fewest[0], most[0] = min(fewest[0], zeros[lane]), max(most[0], zeros[lane])
     for point in range(1, tables.shape[0]):
         lam, z, unit, p, q, r, s = tables[point]
-        fewest = modes
+        least, largest = modes, 0
         for lane in range(size):
             number, value = _count(pairs, lane, lam, z, unit, p, q, r, s)
             counts[point, lane], values[point, lane] = number, value
-            fewest = min(fewest, number)
-        if fewest >= modes:
+            least, largest = min(least, number), max(largest, number)
+        fewest[point], most[point] = least, largest
+        if least >= modes:
             return point
     return tables.shape[0] - 1
 
 
-def _first_points(right, counts, number, last, size):
-    """Find the first point with more than ``number`` zeros below: at most some three intervals of pi to either side."""
-    low, high = max(0, 2 * number - 8), min(last, 2 * number + 8)
+def _first_points(right, counts, number, low, high, size):
+    """Find the first point with more than ``number`` zeros below; no lane has it before ``low`` or after ``high``."""
     for lane in range(size):
         right[lane] = low
-    for point in range(low, high + 1):
+    for point in range(low, high):
         for lane in range(size):
             right[lane] += counts[point, lane] <= number
 
 
-def _start(z, number, right, counts, values, tables, pairs, h, zeros, last, size):
+def _start(z, crowded, around, number, right, counts, values, tables, pairs, k, zeros, last, size):
+    """Put every lane next to its zero: what it has at points around the zero is gathered, then used."""
     for lane in range(size):
-        k = right[lane]
-        if number < zeros[lane]:
-            z[lane] = 0.0
-            continue
-        below, above, low, high = counts[k - 1, lane], counts[k, lane], tables[k - 1, 1], tables[k, 1]
-        if number == zeros[lane]:
-            z[lane] = min(abs(h[0, lane]) / np.sqrt(h[1, lane] ** 2 - 2.0 * h[0, lane] * h[2, lane]), high)
-        elif number == zeros[lane] + 1 and k < 3 and above == number + 1 and _second(h, lane, low, high) > 0.0:
-            z[lane] = _second(h, lane, low, high)
-        elif below == number and above == number + 1 and k > 1:
-            z[lane] = _by_phase(lane, k, tables, values, last)
+        point = max(right[lane], 1)
+        around[0, lane], around[1, lane] = values[max(point - 2, 0), lane], values[point - 1, lane]
+        around[2, lane], around[3, lane] = values[point, lane], values[min(point + 1, last), lane]
+        around[4, lane], around[5, lane], around[6, lane] = tables[point - 1, 0], tables[point - 1, 1], tables[point, 1]
+        around[7, lane] = counts[point, lane] - number  # zeros from the wanted one to the point
+        crowded[lane] = (counts[point - 1, lane] != number) | (counts[point, lane] != number + 1) | (point == 1)
+    for lane in range(size):
+        z[lane] = _by_phase(around, right[lane], last, lane)
+    if number < 4:  # there are no more than two zeros at 0
+        for lane in range(size):
+            lower, second = number - zeros[lane], _second(k, around[5, lane], around[6, lane], lane)
+            known = (lower <= 0) | ((lower == 1) & (right[lane] < 3) & (around[7, lane] == 1.0) & (second > 0.0))
+            guess = min(_first(k, lane), around[6, lane]) if lower == 0 else second
+            z[lane] = (0.0 if lower < 0 else guess) if known else z[lane]
+            crowded[lane] = 0 if known else crowded[lane]
+    for lane in range(size):
+        if crowded[lane]:
+            z[lane] = _between(pairs, lane, number, right[lane], counts, tables)
+
+
+def _between(pairs, lane, number, point, counts, tables):
+    """Return one end of an interval, halved until it has no other zero on that side of the wanted one."""
+    below, above, low, high = counts[point - 1, lane], counts[point, lane], tables[point - 1, 1], tables[point, 1]
+    while below < number and number + 1 < above:
+        middle = np.sqrt(low * high) if low > 0 else high / 16
+        lam = np.sqrt(np.sqrt(middle))
+        unit, p, q, r, s = _scaled_basis(lam, middle)
+        counted, _ = _count(pairs, lane, lam, middle, unit, p, q, r, s)
+        if counted <= number:
+            low, below = middle, counted
         else:
-            while below < number and number + 1 < above:
-                middle = np.sqrt(low * high) if low > 0 else high / 16
-                lam = np.sqrt(np.sqrt(middle))
-                unit, p, q, r, s = _scaled_basis(lam, middle)
-                counted, _ = _count(pairs, lane, lam, middle, unit, p, q, r, s)
-                if counted <= number:
-                    low, below = middle, counted
-                else:
-                    high, above = middle, counted
-            z[lane] = low if below == number else high
+            high, above = middle, counted
+    return low if below == number else high
 
 
-def _second(h, lane, low, high):
+def _first(k, lane):
+    """Return where the first step from z = 0 ends."""
+    return abs(k[12, lane]) / np.sqrt(k[13, lane] ** 2 - 2.0 * k[12, lane] * k[14, lane])
+
+
+def _second(k, low, high, lane):
     """Return the larger zero of the first three terms of the power series if it is apart from the other, else 0."""
-    square = h[1, lane] ** 2
-    discriminant = square - 4.0 * h[0, lane] * h[2, lane]
-    z = (abs(h[1, lane]) + np.sqrt(max(discriminant, 0.0))) / (2.0 * abs(h[2, lane]))
-    return z if discriminant > 0.1 * square and low < z < high else 0.0
+    square = k[13, lane] ** 2
+    discriminant = square - 4.0 * k[12, lane] * k[14, lane]
+    z = (abs(k[13, lane]) + np.sqrt(max(discriminant, 0.0))) / (2.0 * abs(k[14, lane]))
+    return z if (discriminant > 0.1 * square) & (low < z) & (z < high) else 0.0
 
 
-def _by_phase(lane, k, tables, values, last):
-    left, here = values[k - 1, lane], values[k, lane]
-    amplitude = left * left + here * here
-    growth = 1.0
-    if k > 2:
-        growth = amplitude / (values[k - 2, lane] ** 2 + left * left)
-        if k < last:
-            growth *= (here * here + values[k + 1, lane] ** 2) / amplitude
-        else:
-            growth *= growth
-        growth = np.sqrt(np.sqrt(growth))
-    turn = np.arctan2(abs(left) * growth, abs(here)) * (2 / np.pi)
-    lam = tables[k - 1, 0] + turn * (tables[k, 0] - tables[k - 1, 0])
-    return lam**4
+def _by_phase(around, right, last, lane):
+    before, left, here, after = around[0, lane], around[1, lane], around[2, lane], around[3, lane]
+    after = after if right < last else left
+    growth = np.sqrt((here * here + after * after) / (before * before + left * left))
+    growth = np.sqrt(growth) if right < last else growth
+    opposite = abs(left) * (growth if right > 2 else 1.0)
+    share = opposite / (opposite + abs(here))
+    product = share * (1.0 - share)
+    turn = share + product * (1.0 - 2.0 * share) * (-0.3664 - product * (0.3404 + product * 1.5))
+    lam = around[4, lane] + turn * (np.pi / 2)
+    return (lam * lam) * (lam * lam)
 
 
-def _step(z, lower, k, h, lane):
-    """Return the function, up to a positive factor, and Ostrowski's step less what lower zeros take from it."""
+def _step(z, lower, even, k, row, lane):
+    """Return Ostrowski's step towards the zero, less what lower zeros take from it; k from ``row`` on is the lane's."""
     lam = np.sqrt(np.sqrt(z))
     unit, p, q, r, s = basis(lam, exp(-lam))
     value, first, second = derivatives(
-        k[0, lane], k[1, lane], k[2, lane], k[3, lane], k[4, lane], k[5, lane],
-        k[6, lane], k[7, lane], k[8, lane], k[9, lane], k[10, lane], k[11, lane], z, unit, p, q, r, s,
+        k[row, lane], k[row + 1, lane], k[row + 2, lane], k[row + 3, lane], k[row + 4, lane], k[row + 5, lane],
+        k[row + 6, lane], k[row + 7, lane], k[row + 8, lane], k[row + 9, lane], k[row + 10, lane], k[row + 11, lane],
+        z, unit, p, q, r, s,
     )  # fmt: skip
-    near_value, near_first, near_second = h[_TERMS - 1, lane], 0.0, 0.0
-    for i in range(_TERMS - 2, -1, -1):
+    near_value, near_first, near_second = k[row + _ROWS - 1, lane], 0.0, 0.0
+    for i in range(_ROWS - 2, 11, -1):
         near_second = near_second * z + near_first
         near_first = near_first * z + near_value
-        near_value = near_value * z + h[i, lane]
+        near_value = near_value * z + k[row + i, lane]
     near = z < _NEAR
     value = near_value if near else value
     first = near_first if near else first
     second = 2.0 * near_second if near else second
-    factor = 1.0 if near else z
-    share = value * factor / z if lower > 0 else 0.0
+    share = value / z if near else value
     whole = first * first - value * second
-    rest = whole - lower * share * share
-    step = factor * abs(value) / np.sqrt(rest if rest > 1e-3 * whole else whole)
-    return value, 0.0 if value == 0.0 else step
+    rest = whole - (lower * share * share if lower > 0.0 else 0.0)
+    step = (1.0 if near else z) * abs(value) / np.sqrt(rest if rest > 1e-3 * whole else whole)
+    step = 0.0 if value == 0.0 else step
+    return step if (value > 0.0) == even else -step
 
 
-def _climb(z, previous, fresh, ahead, active, evaluations, number, zeros, k, h, size):
-    """Climb to the zeros: twice with all lanes, then with those that are not there yet."""
-    even = number & 1 == 0
-    for _ in range(2):
-        for lane in range(size):
-            value, step = _step(z[lane], number - zeros[lane], k, h, lane)
-            previous[lane], ahead[lane] = ahead[lane], step
-            z[lane] += step if (value > 0) == even else -step
-    left = 0
+def _climb(z, place, lower, step, previous, active, left, evaluations, number, zeros, k, size):
+    """Climb to the zeros: twice with all lanes, then with those that are not there yet, moved side by side."""
     for lane in range(size):
-        if number < zeros[lane]:
-            z[lane] = 0.0
-        elif not _there(ahead[lane], previous[lane], z[lane]):
-            active[left] = lane
-            previous[lane] = ahead[lane]
-            left += 1
-    evaluations[0] += 2 * size
-    for _ in range(_MOST_STEPS):
-        if left == 0:
-            return True
-        evaluations[0] += left
-        for i in range(left):
-            lane = active[i]
-            value, ahead[i] = _step(z[lane], number - zeros[lane], k, h, lane)
-            fresh[i] = z[lane] + (ahead[i] if (value > 0) == even else -ahead[i])
+        place[lane], lower[lane], active[lane] = z[lane], number - zeros[lane], lane
+    rows = 12 if number > 3 else _ROWS  # the power series is for points with three zeros below at most
+    many, row = size, 0
+    for turn in range(_MOST_STEPS):
+        for i in range(many):
+            previous[i] = step[i]
+            step[i] = _step(place[i], lower[i], number & 1 == 0, k, row, i)
+            place[i] += step[i]
+        evaluations[0] += many
+        if turn == 0:
+            continue
+        for i in range(many):
+            z[active[i]] = 0.0 if lower[i] < 0.0 else place[i]
         still = 0
-        for i in range(left):
-            lane = active[i]
-            z[lane] = fresh[i]
-            if not _there(ahead[i], previous[lane], z[lane]):
-                active[still] = lane
-                still += 1
-            previous[lane] = ahead[i]
-        left = still
+        for i in range(many):
+            left[still] = i
+            still += (lower[i] >= 0.0) & (not _there(abs(step[i]), abs(previous[i]), place[i]))
+        many = still
+        if many == 0:
+            return True
+        for i in range(many):
+            j = left[i]
+            active[i], place[i], lower[i], step[i] = active[j], place[j], lower[j], step[j]
+        for entry in range(rows):
+            for i in range(many):
+                k[_ROWS + entry, i] = k[row + entry, left[i]]
+        row = _ROWS
     return False
 
 
 def _there(step, previous, z):
     ratio = step / previous
-    return (step * ratio * ratio * ratio <= 1e-15 * z and step <= 0.1 * z) or step <= 1e-13 * z
+    return ((step * ratio * ratio * ratio <= 1e-15 * z) & (step <= 0.1 * z)) | (step <= 1e-13 * z)
