@@ -95,3 +95,23 @@ def test_free_peak_is_the_largest_value_ever_reached():
     unit = free(t, OMEGA[:, None], 0.0)
     history = np.abs(unit["displacement"] * q[:, None] + unit["impulse"] * u[:, None]).max(-1)
     assert free_peak(OSC, q, u) == pytest.approx(history, rel=1e-6)
+
+
+def test_free_peak_with_damping_and_of_rigid_modes():
+    """A first extreme may be the largest although the start was smaller; a rigid mode leaves, or stays for ever."""
+
+    def fading(t, omega, zeta):
+        damped = omega * np.sqrt(1 - zeta**2)
+        impulse = np.exp(-zeta * omega * t) * t * np.sinc(damped * t / np.pi)
+        level = np.exp(-zeta * omega * t) * np.cos(damped * t) + zeta * omega * impulse
+        return {"displacement": level, "impulse": impulse, "step": 0.0 * t, "ramp": 0.0 * t}
+
+    zeta, rng = np.array([0.05, 0.6]), np.random.default_rng(2)
+    fade = OSC._replace(zeta=zeta, free=fading)
+    t = np.linspace(0, 5, 20001)
+    unit = fading(t, OMEGA[:, None], zeta[:, None])
+    for q, u in rng.normal(size=(20, 2, 2)) * np.array([[1.0], [8.0]]):
+        history = np.abs(unit["displacement"] * q[:, None] + unit["impulse"] * u[:, None]).max(-1)
+        assert free_peak(fade, q, u) == pytest.approx(history, rel=1e-6)
+    rigid = fade._replace(omega=np.zeros(2))
+    assert free_peak(rigid, np.array([-0.3, 0.2]), np.array([0.0, 1e-3])).tolist() == [0.3, np.inf]

@@ -8,8 +8,9 @@ from mpmath import mp, mpf
 from scipy.integrate import simpson
 
 from cra_sym.solvers.eigenvalues import lowest, refine
+from cra_sym.solvers.rayleigh import stationary_values
 from cra_sym.solvers.shapes import mode_states
-from cra_sym.solvers.stiffness import DynamicStiffness
+from cra_sym.solvers.stiffness import DynamicStiffness, exponential
 
 PINNED = np.eye(4)[:, [1, 3]]
 CLAMPED_FREE = np.eye(4)[:, 2:]
@@ -118,17 +119,92 @@ def test_foundation():
     np.testing.assert_allclose(lowest(beam(foundation=1e4, free=PINNED), 20)[0], k**4 + 1e4, rtol=1e-12)
 
 
-def test_double_roots_are_counted_twice_and_get_orthogonal_shapes():
-    a0, a1 = np.zeros((4, 4)), np.zeros((4, 4))
-    a0[0, 2] = a0[1, 3] = 1.0
-    a1[2, 0] = a1[3, 1] = -1.0
-    strings = constant(a0, a1, displacements=2, free=np.zeros((4, 0)))
-    z = lowest(strings, 10)
-    np.testing.assert_allclose(z[0], np.repeat((np.arange(1, 6) * np.pi) ** 2, 2), rtol=1e-12)
+@pytest.mark.parametrize("strings", [2, 3])
+def test_equal_roots_are_counted_and_get_orthogonal_shapes(strings):
+    one, none = np.eye(strings), np.zeros((strings, strings))
+    a0, a1 = np.block([[none, one], [none, none]]), np.block([[none, none], [-one, none]])
+    problem = constant(a0, a1, displacements=strings, free=np.zeros((2 * strings, 0)))
+    z = lowest(problem, 4 * strings)
+    np.testing.assert_allclose(z[0], np.repeat((np.arange(1, 5) * np.pi) ** 2, strings), rtol=1e-12)
     x = np.linspace(0.0, 1.0, 2001)
-    u = mode_states(strings, z, x[None])[0, :, :, :2]
+    u = mode_states(problem, z, x[None])[0, :, :, :strings]
     gram = simpson(np.einsum("isa,jsa->ijs", u, u), x=x)
-    np.testing.assert_allclose(gram, np.eye(10), atol=1e-10)
+    np.testing.assert_allclose(gram, np.eye(4 * strings), atol=1e-10)
+
+
+GROWTH = 0.8
+
+
+def flared_rod(free=None):
+    """(e^2cx u')' + z e^2cx u = 0, solved by e^-cx times a sine of sqrt(z - c^2) x."""
+
+    def system(z, rows, share):
+        area = np.exp(2 * GROWTH * np.broadcast_to(share, (len(z), np.shape(share)[-1])))
+        a, da = np.zeros((2, *area.shape, 2, 2))
+        a[..., 0, 1], a[..., 1, 0], da[..., 1, 0] = 1 / area, -z[:, None] * area, -area
+        return a, da
+
+    def boundary(z, rows):
+        return np.zeros((2, len(z), 2, 2))
+
+    return DynamicStiffness(system, boundary, np.ones(1), 1, free=free, uniform=False)
+
+
+def carried(z):
+    """The exact transfer matrix of the flared rod, and its derivative by a complex step."""
+
+    def basis(x, z):
+        k = np.sqrt(z - GROWTH**2)
+        u = np.exp(-GROWTH * x) * np.array([np.cos(k * x), np.sin(k * x)])
+        du = -GROWTH * u + np.exp(-GROWTH * x) * k * np.array([-np.sin(k * x), np.cos(k * x)])
+        return np.array([u, np.exp(2 * GROWTH * x) * du])
+
+    exact = basis(1.0, z + 1e-30j) @ np.linalg.inv(basis(0.0, z + 1e-30j))
+    return exact.real, exact.imag / 1e-30
+
+
+def test_steps_through_varying_coefficients_are_of_sixth_order():
+    """Every coefficient of the Magnus expansion counts: transfer and its derivative gain 2^6 when steps are halved."""
+    rod, z, row = flared_rod(), np.array([9.0]), np.zeros(1, dtype=int)
+    errors = []
+    for steps in (8, 16, 32):
+        total, slope = np.eye(2), np.zeros((2, 2))
+        for k in range(steps):
+            start, share = np.full((1, 1), k / steps), np.full((1, 1), 1 / steps)
+            t, dt = (a[0, 0] for a in exponential(*rod.exponent(z, row, start, share)))
+            total, slope = t @ total, dt @ total + t @ slope
+        errors.append([np.abs(a - b).max() for a, b in zip((total, slope), carried(9.0), strict=True)])
+    assert max(errors[-1]) < 1e-9
+    np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 6.0, atol=0.1)
+
+
+def test_a_flared_rod():
+    z = lowest(flared_rod(np.zeros((2, 0))), 25)
+    np.testing.assert_allclose(z[0], (np.arange(1, 26) * np.pi) ** 2 + GROWTH**2, rtol=1e-9)
+    x = np.linspace(0.0, 1.0, 13)
+    state = mode_states(flared_rod(np.zeros((2, 0))), z[:, :3], x[None])[0]
+    for k, (u, force) in enumerate(np.moveaxis(state, -1, 1), start=1):
+        angle = k * np.pi * x  # int e^2cx u^2 dx = 1
+        shape = np.sqrt(2) * np.exp(-GROWTH * x) * np.array([np.sin(angle), np.cos(angle)])
+        sign = np.sign(u[1])
+        np.testing.assert_allclose(sign * u, shape[0], atol=1e-8)
+        slope = k * np.pi * shape[1] - GROWTH * shape[0]
+        np.testing.assert_allclose(sign * force, np.exp(2 * GROWTH * x) * slope, atol=1e-6)
+
+
+def test_stationary_values_of_graded_energies_keep_their_digits():
+    """Scales from 1e-12 to 1, soft ones first: each is exact to rounding of itself, which LAPACK does not promise."""
+    rng = np.random.default_rng(5)
+    for size in (2, 3, 4):
+        strain, kinetic = (a @ np.swapaxes(a, 1, 2) + np.eye(size) for a in rng.normal(size=(2, 6, size, size)))
+        grade = 10.0 ** np.linspace(-6.0, 0.0, size)
+        strain = grade[:, None] * strain * grade
+        found = stationary_values(strain, kinetic)
+        with mp.workdps(50):
+            for row in range(6):
+                frame = mp.inverse(mp.cholesky(mp.matrix(kinetic[row].tolist())))
+                exact = mp.eigsy(frame * mp.matrix(strain[row].tolist()) * frame.T, eigvals_only=True)
+                np.testing.assert_allclose(found[row], np.array(exact, dtype=float), rtol=4e-15)
 
 
 def frequency_function(lam, k_t, k_r, mu):
