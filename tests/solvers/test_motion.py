@@ -15,6 +15,9 @@ def test_mean_motion_and_disturbance_follow_equation_33():
     assert w == pytest.approx(0.1 * t + 0.15 * t**2 + 1e-3 * np.sin(10 * t + 0.4))
     assert v == pytest.approx(0.1 + 0.3 * t + 1e-2 * np.cos(10 * t + 0.4))
     assert a == pytest.approx(0.3 - 0.1 * np.sin(10 * t + 0.4))
+    plain = BaseMotion(amplitude=1e-3, angular_frequency=10.0)
+    assert plain.displacement(t) == pytest.approx(1e-3 * np.sin(10 * t))
+    assert not BaseMotion(0.1, angular_frequency=10.0, phase=0.4).acceleration(t).any()
 
 
 def test_a_sum_is_a_superposition_and_an_array_is_a_batch():
@@ -116,6 +119,22 @@ def test_an_infeasible_move_names_the_limit(limits, named):
     BaseMotion.s_curve(0.5, *limits, duration=least)
 
 
+@pytest.mark.parametrize(
+    ("limits", "reached"),
+    [
+        ((np.inf, 2.0, np.inf), "a_max"),
+        ((0.5, 1.0, np.inf), "v_max and a_max"),
+        ((0.5, 1.0, 9.0), "v_max and a_max and j_max"),
+        ((0.1, 50.0, 9.0), "v_max and j_max"),
+        ((np.inf, 0.5, 9.0), "a_max and j_max"),
+        ((np.inf, 50.0, 9.0), "j_max"),
+    ],
+)
+def test_only_limits_that_the_fastest_move_reaches_are_in_its_way(limits, reached):
+    with pytest.raises(ValueError, match=f"within its limit {reached}$"):
+        BaseMotion.s_curve(0.5, *limits, duration=0.01)
+
+
 def test_sampled_acceleration_is_linear_between_samples():
     t = np.linspace(0.5, 2.5, 5)
     motion = BaseMotion.sampled(t, [0.0, 1.0, 0.0, -1.0, 0.0], velocity=0.2)
@@ -139,6 +158,7 @@ def test_duration_is_when_the_acceleration_ends():
     assert BaseMotion().duration == 0.0
     assert BaseMotion(velocity=1.0).duration == 0.0
     assert BaseMotion(acceleration=[0.0, 1.0]).duration.tolist() == [0.0, np.inf]
+    assert BaseMotion.sampled([1.0, 2.0], [[0.0, 0.0], [0.0, 1.0]]).duration.tolist() == [0.0, 2.0]
     assert (BaseMotion.trapezoid(1, 1, 1) + BaseMotion(amplitude=1e-3, angular_frequency=3.0)).duration == np.inf
 
 
@@ -147,6 +167,8 @@ def test_a_force_is_what_its_fields_say():
     force = Force([1.0, -2.0], 1.5, [3.0, 0.0], 0.4)
     assert force(t)[0] == pytest.approx(1.0 + 1.5 * np.sin(3.0 * t + 0.4))
     assert force(t)[1] == pytest.approx(-2.0 + 1.5 * np.sin(0.4))  # one that does not swing is constant
+    assert Force(amplitude=1.5, angular_frequency=3.0)(t) == pytest.approx(1.5 * np.sin(3.0 * t))
+    assert not Force()(t).any()
     record = Force.sampled([0.5, 1.0, 1.5], [2.0, -1.0, 3.0])
     assert record([0.2, 0.5, 0.75, 1.25, 1.5]) == pytest.approx([0.0, 2.0, 0.5, 1.0, 0.0])
     assert (force + record)(t) == pytest.approx(force(t) + record(t))
