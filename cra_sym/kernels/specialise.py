@@ -2,11 +2,12 @@
 
 Numba's own file cache overlooks changes of inlined helpers, trusts time stamps and unpickles whatever lies beside the
 source. Here everything that is compiled is one text, its hash is the key, and machine code goes through the private
-store.
+store. Nothing else in the package compiles.
 """
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import linecache
 import os
@@ -16,7 +17,7 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from types import FunctionType, ModuleType, SimpleNamespace
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 from cra_sym.kernels import store
@@ -24,9 +25,11 @@ from cra_sym.kernels.generated import Generated
 
 __all__ = ["compiled", "has_compiler", "is_compiled"]
 
-_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
-_INLINED = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, **_OPTIONS}
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "no_cfunc_wrapper": True}
 _ELEMENTARY = Path(__file__).with_name("elementary.py")
+_COMPILER = [
+    Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8") for name in ("arithmetic", "inlined", "writer")
+]
 _WHERE = "def where(condition, value, otherwise):\n    return value if condition else otherwise\n"
 
 
@@ -46,8 +49,9 @@ def compiled(template: str, kernels: Mapping[str, Generated], *, elementary: boo
     ``kernels`` with scalars (the result is a scalar for one expression, else a flat tuple), and may call ``sin``,
     ``cos`` and ``exp``, the branch-free functions of :mod:`cra_sym.kernels.elementary`. Everything is inlined, so that
     a simple loop over the lanes of contiguous arrays becomes SIMD code. Functions with a leading underscore are
-    helpers, all others are entries: an entry is compiled, or loaded from the store, when it is first called with new
-    types. It releases the interpreter lock, so threads scale.
+    helpers: plain loops and arithmetic, as :func:`cra_sym.kernels.writer.call` has it. All others are entries, and may
+    hold whatever Numba knows: an entry is compiled, or loaded from the store, when it is first called with new types.
+    It releases the interpreter lock, so threads scale.
 
     Parameters
     ----------
@@ -116,7 +120,7 @@ _MADE: set[str] = set()  # digests of what this process compiled or loaded
 
 
 def _digest(prelude: str, template: str) -> str:
-    return hashlib.sha256(repr((prelude, template, _OPTIONS)).encode()).hexdigest()
+    return hashlib.sha256(repr((prelude, template, _OPTIONS, _COMPILER)).encode()).hexdigest()
 
 
 def _remember(digest: str) -> None:
@@ -145,69 +149,26 @@ def _entries(prelude: str, template: str) -> SimpleNamespace:
         raise ImportError("compiling needs numba: pip install numba")
     import numba
 
+    from cra_sym.kernels.inlined import inlined
+
     digest = _digest(prelude, template)
     module = ModuleType(f"cra_sym_compiled_{digest[:32]}")
     sys.modules[module.__name__] = module  # where stored machine code looks for its constants
     namespace = module.__dict__
-    helpers = _functions(prelude, f"<prelude {digest[:16]}>", namespace)
-    entries = _functions(template, f"<template {digest[:16]}>", namespace)
-    for name, function in (helpers | entries).items():
-        if name in entries and not name.startswith("_"):
-            namespace[name] = numba.njit(**_OPTIONS)(function)
-            namespace[name]._cache = _StoredCode(digest, name)
-        else:
-            namespace[name] = numba.njit(pipeline_class=_helper_pipeline(), **_INLINED)(function)
-    return SimpleNamespace(**{name: namespace[name] for name in entries if not name.startswith("_")})
-
-
-def _functions(text: str, filename: str, namespace: dict[str, Any]) -> dict[str, FunctionType]:
-    """Run the text in the namespace and return the functions it defines."""
+    text, filename = f"{prelude}\n\n{template}", f"<template {digest[:16]}>"
     linecache.cache[filename] = (len(text), None, text.splitlines(True), filename)
     exec(compile(text, filename, "exec"), namespace)
-    return {
-        name: value
-        for name, value in namespace.items()
-        if isinstance(value, FunctionType) and value.__code__.co_filename == filename
-    }
-
-
-@cache
-def _helper_pipeline() -> Any:
-    """Return the compiler of helpers: what is inlined is optimised once, where it ends up, and nowhere else."""
-    from numba.core.codegen import JITCodeLibrary
-    from numba.core.compiler import CompilerBase, DefaultPassBuilder
-    from numba.core.compiler_machinery import register_pass
-    from numba.core.typed_passes import NativeLowering
-
-    class Linked(JITCodeLibrary):
-        """Code to be linked into other code, never to be run on its own."""
-
-        def _optimize_final_module(self) -> None: ...
-
-        def _finalize_final_module(self) -> None:
-            self._finalized = True
-
-    @register_pass(mutates_CFG=True, analysis_only=False)
-    class Lowering(NativeLowering):
-        _name = "cra_sym_helper_lowering"
-
-        def run_pass(self, state: Any) -> bool:
-            state.library = Linked(state.targetctx.codegen(), state.func_id.func_qualname)
-            state.flags.no_compile = True
-            super().run_pass(state)
-            key: Any = [].append  # stands for the function that is never made: any built-in one, unlike all others
-            state.targetctx.insert_user_function(key, state["cr"].fndesc, [state.library])
-            state["cr"] = state["cr"]._replace(cfunc=key)
-            return True
-
-    class Pipeline(CompilerBase):
-        def define_pipelines(self) -> list[Any]:
-            manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
-            manager.passes = [(Lowering if p is NativeLowering else p, why) for p, why in manager.passes]
-            manager.finalize()
-            return [manager]
-
-    return Pipeline
+    functions = {node.name: node for node in ast.parse(text).body if isinstance(node, ast.FunctionDef)}
+    entries = [node.name for node in ast.parse(template).body if isinstance(node, ast.FunctionDef)]
+    entries = [name for name in entries if not name.startswith("_")]
+    meanings = namespace | functions
+    for name, function in functions.items():
+        if name in entries:
+            namespace[name] = numba.njit(**_OPTIONS)(namespace[name])
+            namespace[name]._cache = _StoredCode(digest, name)
+        else:
+            namespace[name] = inlined(function, meanings)
+    return SimpleNamespace(**{name: namespace[name] for name in entries})
 
 
 class _StoredCode:

@@ -1,0 +1,318 @@
+"""Functions of numbers and arrays written to LLVM where they are called, statement by statement.
+
+Numba finds types by search, at about a millisecond for every operation. In generated functions and in the loops around
+them there are thousands of operations and nothing to find: a value is a double, an integer, a condition or a contiguous
+array, and the arguments tell which. Everything is inlined, so that loops over lanes become SIMD code.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any, NoReturn
+
+import numpy as np
+from numba.core import cgutils, errors
+
+from cra_sym.kernels.arithmetic import INTEGER, Arithmetic, is_constant, kind_of
+
+__all__ = ["Array", "call"]
+
+
+@dataclass(frozen=True)
+class Array:
+    """A contiguous array, or the part of one that leading indices select."""
+
+    data: Any
+    shape: tuple[Any, ...]
+
+
+def call(
+    context: Any, builder: Any, function: ast.FunctionDef, arguments: Sequence[Any], namespace: Mapping[str, Any]
+) -> Any:
+    """Write the body of a function where the builder stands.
+
+    Parameters
+    ----------
+    context, builder
+        Numba's target context and LLVM's builder.
+    function : ast.FunctionDef
+        Made of assignments, ``for`` over ``range``, ``while``, ``if``, ``continue`` and ``return``. Indices count from
+        the start of an array, and both sides of a conditional expression are evaluated.
+    arguments : sequence of number, LLVM value, or Array
+    namespace : dict
+        What other names mean: constants, NumPy and its functions of numbers, further functions as ast.FunctionDef.
+
+    Returns
+    -------
+    number, LLVM value, tuple of them, or None
+    """
+    return _Body(context, builder, function, arguments, namespace).written()
+
+
+def _refuse(node: ast.AST) -> NoReturn:
+    raise errors.TypingError(f"compiled functions hold nothing like: {ast.unparse(node)}")
+
+
+def _in_double(result: Any) -> Any:
+    """Return a result with whole constants, as SymPy writes them, as the doubles they are."""
+    if isinstance(result, tuple):
+        return tuple(map(_in_double, result))
+    return float(result) if type(result) is int else result
+
+
+class _Body(Arithmetic):
+    """One call of a function.
+
+    A name stands for a value. In a function that branches, a name it assigns stands for a place in memory of the type
+    assigned first; LLVM makes registers of these.
+    """
+
+    def __init__(
+        self,
+        context: Any,
+        builder: Any,
+        function: ast.FunctionDef,
+        arguments: Sequence[Any],
+        namespace: Mapping[str, Any],
+    ) -> None:
+        super().__init__(context, builder)
+        self.statements, self.namespace = function.body, namespace
+        self.values: dict[str, Any] = {}
+        self.places: dict[str, Any] = {}
+        self.again: Any = None  # where `continue` leads
+        self.end: Any = None  # where `return` leads, if the function branches
+        self.results: list[Any] = []
+        self.single = True
+        if any(isinstance(node, (ast.For, ast.While, ast.If)) for node in ast.walk(function)):
+            self.end = builder.append_basic_block("end")
+        stored = {node.id for node in ast.walk(function) if isinstance(node, ast.Name) and _is_stored(node)}
+        for parameter, argument in zip((a.arg for a in function.args.args), arguments, strict=True):
+            if parameter in stored:
+                self.assign_name(parameter, argument)
+            else:
+                self.values[parameter] = argument
+
+    def written(self) -> Any:
+        """Write all statements and return the result."""
+        if self.end is None:
+            *statements, last = self.statements
+            self.run(statements)
+            if isinstance(last, ast.Return) and last.value is not None:
+                return _in_double(self.value(last.value))
+            self.run([last])
+            return None
+        self.run(self.statements)
+        if not self.builder.block.is_terminated:
+            self.builder.branch(self.end)
+        self.builder.position_at_end(self.end)
+        results = tuple(self.builder.load(place) for place in self.results)
+        return (results[0] if self.single else results) if results else None
+
+    # Statements ---------------------------------------------------------------------------------------------------
+
+    def run(self, statements: Sequence[ast.stmt]) -> None:
+        for statement in statements:
+            if self.builder.block.is_terminated:
+                return
+            match statement:
+                case ast.Assign(targets=[target], value=value):
+                    self.assign(target, self.value(value))
+                case ast.AugAssign(target=target, op=op, value=value):
+                    self.assign(target, self.binary(op, self.value(target), self.value(value)))
+                case ast.Expr(value=ast.Constant(value=str())):
+                    pass
+                case ast.Expr(value=value):
+                    self.value(value)
+                case ast.If(test=test, body=body, orelse=orelse):
+                    self.branch(test, body, orelse)
+                case ast.For(target=ast.Name(id=name), iter=ast.Call(func=ast.Name(id="range"), args=bounds)):
+                    self.count(name, [self.value(bound) for bound in bounds], statement.body)
+                case ast.While(test=test, body=body):
+                    self.repeat(test, body)
+                case ast.Continue():
+                    self.builder.branch(self.again)
+                case ast.Return(value=value):
+                    self.give_back(None if value is None else self.value(value))
+                case _:
+                    _refuse(statement)
+
+    def assign(self, target: ast.expr, value: Any) -> None:
+        match target:
+            case ast.Name(id=name):
+                self.assign_name(name, value)
+            case ast.Tuple(elts=targets):
+                if isinstance(value, Array):
+                    value = [self.element(value, (k,)) for k in range(len(targets))]
+                for one, part in zip(targets, value, strict=True):
+                    self.assign(one, part)
+            case ast.Subscript(value=array, slice=index):
+                self.put(value, self.pointer(self.value(array), self.indices(index)))
+            case _:
+                _refuse(target)
+
+    def assign_name(self, name: str, value: Any) -> None:
+        if self.end is None or isinstance(value, (Array, tuple)):
+            self.values[name] = value
+            return
+        if name not in self.places:
+            self.places[name] = cgutils.alloca_once(self.builder, kind_of(value), name=name)
+        self.put(value, self.places[name])
+
+    def put(self, value: Any, place: Any) -> None:
+        self.builder.store(self.typed(value, place.type.pointee), place)
+
+    def branch(self, test: ast.expr, body: Sequence[ast.stmt], orelse: Sequence[ast.stmt]) -> None:
+        then, otherwise, after = map(self.builder.append_basic_block, ("then", "else", "after"))
+        self.builder.cbranch(self.truth(self.value(test)), then, otherwise)
+        for block, statements in ((then, body), (otherwise, orelse)):
+            self.builder.position_at_end(block)
+            self.run(statements)
+            if not self.builder.block.is_terminated:
+                self.builder.branch(after)
+        self.builder.position_at_end(after)
+
+    def count(self, name: str, bounds: Sequence[Any], body: Sequence[ast.stmt]) -> None:
+        """Write a loop over a range; a plain one of known length as its rounds in a row."""
+        start, stop, *steps = bounds if len(bounds) > 1 else (0, *bounds)
+        step = steps[0] if steps else 1
+        if is_constant(start) and is_constant(stop) and _is_plain(body):
+            for number in range(start, stop, step):
+                self.values[name] = number
+                self.run(body)
+            self.values.pop(name, None)
+            return
+        head, inside, following, after = map(self.builder.append_basic_block, ("head", "inside", "following", "after"))
+        limit, before = self.typed(stop), self.builder.block
+        self.builder.branch(head)
+        self.builder.position_at_end(head)
+        number = self.builder.phi(INTEGER)
+        number.add_incoming(self.typed(start), before)
+        self.builder.cbranch(self.compared(ast.Lt() if step > 0 else ast.Gt(), number, limit), inside, after)
+        self.builder.position_at_end(inside)
+        self.assign_name(name, number)
+        self.loop(body, following)
+        self.builder.position_at_end(following)
+        number.add_incoming(self.builder.add(number, self.typed(step), flags=("nsw",)), following)
+        self.builder.branch(head)
+        self.builder.position_at_end(after)
+
+    def repeat(self, test: ast.expr, body: Sequence[ast.stmt]) -> None:
+        head, inside, after = map(self.builder.append_basic_block, ("head", "inside", "after"))
+        self.builder.branch(head)
+        self.builder.position_at_end(head)
+        self.builder.cbranch(self.truth(self.value(test)), inside, after)
+        self.builder.position_at_end(inside)
+        self.loop(body, head)
+        self.builder.position_at_end(after)
+
+    def loop(self, body: Sequence[ast.stmt], again: Any) -> None:
+        outer, self.again = self.again, again
+        self.run(body)
+        if not self.builder.block.is_terminated:
+            self.builder.branch(again)
+        self.again = outer
+
+    def give_back(self, value: Any) -> None:
+        """Put the result where all returns of the function put it, and leave."""
+        parts = () if value is None else value if isinstance(value, tuple) else (value,)
+        self.single = not isinstance(value, tuple)
+        if not self.results:
+            self.results = [cgutils.alloca_once(self.builder, kind_of(part)) for part in parts]
+        for part, place in zip(parts, self.results, strict=True):
+            self.put(part, place)
+        self.builder.branch(self.end)
+
+    # Expressions --------------------------------------------------------------------------------------------------
+
+    def value(self, node: ast.expr) -> Any:
+        match node:
+            case ast.Constant(value=value) if is_constant(value):
+                return value
+            case ast.Name(id=name):
+                return self.named(name)
+            case ast.Attribute(value=ast.Name(id="np"), attr=name):
+                return getattr(np, name)
+            case ast.Attribute(value=array, attr="shape"):
+                return self.value(array).shape
+            case ast.Tuple(elts=parts):
+                return tuple(self.value(part) for part in parts)
+            case ast.Subscript(value=base, slice=index):
+                whole, where = self.value(base), self.indices(index)
+                return whole[where[0]] if isinstance(whole, tuple) else self.element(whole, where)
+            case ast.UnaryOp(op=ast.USub(), operand=part):
+                return self.negative(self.value(part))
+            case ast.UnaryOp(op=ast.Not(), operand=part):
+                return self.builder.not_(self.truth(self.value(part)))
+            case ast.BinOp(left=left, op=op, right=right):
+                return self.binary(op, self.value(left), self.value(right))
+            case ast.Compare(left=left, ops=ops, comparators=others):
+                parts = [self.value(part) for part in (left, *others)]
+                triples = zip(ops, parts, parts[1:], strict=False)
+                return reduce(self.builder.and_, [self.compared(*triple) for triple in triples])
+            case ast.BoolOp(op=op, values=parts):
+                join = self.builder.and_ if isinstance(op, ast.And) else self.builder.or_
+                return reduce(join, [self.truth(self.value(part)) for part in parts])
+            case ast.IfExp(test=test, body=body, orelse=orelse):
+                return self.chosen(self.value(test), self.value(body), self.value(orelse))
+            case ast.Call(func=ast.Attribute(value=bits, attr="view"), args=[kind]):
+                return self.viewed(self.value(bits), self.value(kind))
+            case ast.Call(func=function, args=arguments, keywords=[]):
+                return self.called(self.value(function), [self.value(argument) for argument in arguments])
+        _refuse(node)
+
+    def named(self, name: str) -> Any:
+        if name in self.values:
+            return self.values[name]
+        if name in self.places:
+            return self.builder.load(self.places[name])
+        return self.namespace[name] if name in self.namespace else _BUILT_IN[name]
+
+    def called(self, function: Any, arguments: Sequence[Any]) -> Any:
+        if isinstance(function, ast.FunctionDef):
+            return call(self.context, self.builder, function, arguments, self.namespace)
+        if function in (np.float64, np.int64):
+            return self.cast(function, *arguments)
+        if function in _BUILT_IN.values():
+            return function(self, *arguments)
+        return self.known_to_numba(function, arguments)
+
+    def indices(self, node: ast.expr) -> tuple[Any, ...]:
+        index = self.value(node)
+        return index if isinstance(index, tuple) else (index,)
+
+    def pointer(self, array: Array, indices: Sequence[Any]) -> Any:
+        """Return where a part of an array begins; its elements lie in C order."""
+        offset: Any = 0
+        for length, index in zip(array.shape, [*indices, *[0] * (len(array.shape) - len(indices))], strict=True):
+            rows = 0 if offset == 0 else self.binary(ast.Mult(), offset, length)
+            offset = index if rows == 0 else self.binary(ast.Add(), rows, index)
+        return self.builder.gep(array.data, [self.typed(offset, INTEGER)], inbounds=True)
+
+    def element(self, array: Array, indices: Sequence[Any]) -> Any:
+        place, rest = self.pointer(array, indices), array.shape[len(indices) :]
+        return Array(place, rest) if rest else self.builder.load(place)
+
+
+def _is_stored(name: ast.Name) -> bool:
+    return isinstance(name.ctx, ast.Store)
+
+
+def _is_plain(body: Sequence[ast.stmt]) -> bool:
+    """Return whether statements hold no loop and nothing that leaves them."""
+    others = ast.For, ast.While, ast.Continue, ast.Return
+    return not any(isinstance(node, others) for statement in body for node in ast.walk(statement))
+
+
+def _extreme(op: ast.cmpop) -> Callable[..., Any]:
+    return lambda body, *values: reduce(lambda one, two: body.chosen(body.compared(op, two, one), two, one), values)
+
+
+_BUILT_IN: dict[str, Callable[..., Any]] = {
+    "abs": lambda body, value: body.known_to_numba(abs, [value]),
+    "len": lambda body, array: array.shape[0],
+    "max": _extreme(ast.Gt()),
+    "min": _extreme(ast.Lt()),
+}
