@@ -65,6 +65,7 @@ _FLOQUET = [
     [
         f"tests/solvers/test_floquet.py::test_{name}"
         for name in (
+            "free_modes_drift_by_the_exponential_of_their_matrix",
             "mathieu_edges",
             "monodromy_is_that_of_a_general_integrator",
             "compliance_is_a_spring_in_series",
@@ -114,7 +115,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "model/oscillator": [["tests/model/test_oscillator.py"], ["tests/arm/test_response.py"]],
     "solvers/_floquet_compiled": [[f"{_LANES[0]}::test_floquet"]],
     "solvers/certificates": [["tests/arm/test_certification.py"]],
-    "solvers/coupled_modes": [_COUPLED, ["tests/model/test_response.py"]],
+    "solvers/coupled_modes": [_COUPLED],
     "solvers/driven_modes": [_COUPLED, ["tests/arm/test_response.py"]],
     "solvers/eigenvalues": _STIFFNESS,
     "solvers/floquet": _FLOQUET,

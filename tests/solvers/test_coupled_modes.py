@@ -71,3 +71,10 @@ def test_state_at_the_stop():
             still = CoupledModes(OMEGA, ZETA, np.zeros((2, 2)), GAMMA, np.eye(2))
             found = coupled_response(still, motion, stop, derivative)[member, :, 0]
             np.testing.assert_allclose(values[member], found, atol=1e-12)
+
+
+def test_no_times_give_no_values():
+    coupled = CoupledModes(OMEGA, ZETA, DAMPING, GAMMA, ROWS)
+    assert coupled_response(coupled, MOTION, [], 0).shape == (2, 0)
+    free, forced = (derived_kernel(f"cra_sym.model.oscillator:{name}_kernel") for name in ("free", "forced"))
+    assert driven_response(Oscillators(OMEGA, ZETA, GAMMA, ROWS, free, forced), MOTION, [], 0).shape == (2, 0)

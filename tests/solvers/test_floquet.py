@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 from scipy.optimize import linear_sum_assignment
 from scipy.special import mathieu_a, mathieu_b
 
@@ -101,6 +102,18 @@ def test_error_is_what_was_asked_for(tolerance):
     exact = floquet.monodromy(omega, coupling, varpi, epsilon, tolerance=1e-13)
     error = floquet.monodromy(omega, coupling, varpi, epsilon, tolerance=tolerance) - exact
     assert np.abs(error / scale[:, None] * scale).max() < 10 * tolerance
+
+
+@pytest.mark.parametrize("h", [0.3, 2.0])
+def test_free_modes_drift_by_the_exponential_of_their_matrix(h):
+    """Swinging, critically damped to the last digit and nearly so, overdamped, rigid."""
+    omega = np.array([2.0, 7.0, 1.5, 1.5, 1.5, 1.5, 0.0, 0.0, 3e-5])
+    near = 8e-5 / h  # root of |omega^2 - decay^2| just below where the series takes over
+    decay = np.array([0.1, 0.0, 1.5, np.sqrt(1.5**2 - near**2), np.hypot(1.5, near), 4.0, 0.0, 0.7, 0.0])
+    found = floquet.drift_matrix(omega[:, None], decay[:, None], np.array([h]))[..., 0]
+    for k, (w, c) in enumerate(zip(omega, decay, strict=True)):
+        exact = expm(h * np.array([[0.0, 1.0], [-(w**2), -2 * c]]))
+        np.testing.assert_allclose(found[..., k], exact, rtol=2e-13, atol=1e-17)
 
 
 def test_multipliers_come_in_reciprocal_pairs():
