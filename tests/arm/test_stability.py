@@ -5,9 +5,11 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
+import warnings
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import cra_sym as cra
 from cra_sym.arm import zones
@@ -183,9 +185,10 @@ def test_both_order_conventions_of_a_resonance():
     )
 
 
-def test_difference_resonance_of_a_symmetric_coupling_is_none():
-    with pytest.warns(cra.ResonanceWarning, match="P is symmetric"):
-        sides = cra.stability_boundary(SOFT, JOINT, [0.1, 0.2], (2, -1))
+@pytest.mark.parametrize("resonance", [(2, -1), (1, -2)])
+def test_difference_resonance_of_a_symmetric_coupling_is_none(resonance):
+    with pytest.warns(cra.ResonanceWarning, match=r"\(2, -1\).*P is symmetric"):
+        sides = cra.stability_boundary(SOFT, JOINT, [0.1, 0.2], resonance)
     assert np.isnan(sides).all()
 
 
@@ -215,6 +218,43 @@ def test_overlap_and_reach_are_said():
         cra.stability_boundary(SOFT, JOINT, 0.5, (1, 2))
     with pytest.warns(cra.AsymptoticWarning, match="negative in part"):
         cra.stability_boundary(SOFT, JOINT, 1.1, (1, 1))
+
+
+def sides_and_words(arm, excitation, epsilon, resonance, order=2):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        sides = cra.stability_boundary(arm, excitation, epsilon, resonance, order=order)
+    return sides, " ".join(str(warning.message) for warning in caught)
+
+
+def test_overlap_is_said_from_where_the_zones_touch():
+    excitation = cra.AxialBase(0.05)
+
+    def gap(epsilon):
+        (lower, upper), _ = sides_and_words(SOFT, excitation, epsilon, (2, 2))
+        (other_lower, other_upper), _ = sides_and_words(SOFT, excitation, epsilon, (1, 3), order=1)
+        return max(lower, other_lower) - min(upper, other_upper)
+
+    touch = brentq(gap, 0.1, 0.6, xtol=1e-4)
+    for share, said in ((0.99, False), (1.01, True)):
+        _, words = sides_and_words(SOFT, excitation, share * touch, (2, 2))
+        assert ("overlaps that of resonance (1, 3)," in words) == said
+
+
+def test_overlap_with_a_second_tongue_is_said():
+    """Where the second frequency is twice the first, the second tongue of its zone lies at the first one's zone."""
+
+    def arm(k_t):
+        return cra.Arm.nominal().replace(k_t=k_t, k_r=0.05, m_e=0.0, J_e=0.5)
+
+    def detuning(k_t):
+        first, second = cra.modal_parameters(arm(k_t), 2).omega
+        return second / first - 2
+
+    tuned = brentq(detuning, 1e-3, 1e-2)
+    for k_t, said in ((tuned, True), (1.2 * tuned, False)):
+        _, words = sides_and_words(arm(k_t), JOINT, 0.1, (1, 1))
+        assert ("resonance (2, 2), second tongue" in words) == said
 
 
 @pytest.mark.parametrize(
