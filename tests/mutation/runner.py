@@ -53,7 +53,7 @@ class Laboratory:
     def __init__(self, tests: bool = True) -> None:
         self._tests = tests
         self._noticed: dict[str, list[tuple[str, str]]] = {}  # of a module: function and what noticed, latest first
-        self._sound: set[str] = set()  # tests that pass without a mutant
+        self._sound: set[str] = set()  # checks and tests that pass without a mutant
         _warm_up()
 
     def mutants(self, module: str) -> tuple[str, list[Mutant]]:
@@ -63,6 +63,7 @@ class Laboratory:
 
     def examine(self, module: str, mutant: Mutant) -> tuple[Verdict, str]:
         """Run what watches over the module upon one of its mutants; return the verdict and what noticed it."""
+        self._prepare(module)
         affected = dependents(_dotted(module))
         likely = self._likely(module, mutant.function)
 
@@ -82,24 +83,24 @@ class Laboratory:
 
         verdict, by = _in_a_fork(noticed, _seconds(module))
         if by:
-            self._confirm(by, _seconds(module))
+            self._confirm(by)
             self._noticed.setdefault(module, []).insert(0, (mutant.function, by))
         return verdict, by
 
-    def _confirm(self, by: str, seconds: int) -> None:
-        """Make sure that what noticed a mutant has nothing against the package as it is.
+    def _prepare(self, module: str) -> None:
+        """Run the tests on the package as it is; what they derive goes to the store, from which mutants read it."""
+        tests = {name for part in rounds(module) for name in part} if self._tests else set()
+        if missing := sorted(tests - self._sound):
+            if failing := _in_a_fork(lambda: _first_failing_test([missing]))[1]:
+                raise RuntimeError(f"{failing} fails without a mutant")
+            self._sound |= tests
 
-        A check is tried in this process: what it derives stays, ready for the mutants that do not change it.
-        """
-        if by in self._sound:
-            return
-        if by.startswith("tests/"):
-            failing = _in_a_fork(lambda: _first_failing_test([[by]]), seconds)[1]
-        else:
-            failing = _first_failing_check(e for e in _equations() if _title(e) == by)
-        if failing:
-            raise RuntimeError(f"{by} fails without a mutant")
-        self._sound.add(by)
+    def _confirm(self, check: str) -> None:
+        """Run a check that noticed a mutant, here; what it derives stays, ready for mutants that do not change it."""
+        if check not in self._sound:
+            if _first_failing_check(e for e in _equations() if _title(e) == check):
+                raise RuntimeError(f"{check} fails without a mutant")
+            self._sound.add(check)
 
     def _likely(self, module: str, function: str) -> list[str]:
         """Return what noticed the latest mutants of the same function, or else of the same module."""
@@ -173,7 +174,7 @@ def dependents(dotted: str) -> frozenset[str]:
 # in the process of a mutant ---------------------------------------------------------------------------------------
 
 
-def _in_a_fork(noticed: Callable[[], str], seconds: int) -> tuple[Verdict, str]:
+def _in_a_fork(noticed: Callable[[], str], seconds: int = resource.RLIM_INFINITY) -> tuple[Verdict, str]:
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:
