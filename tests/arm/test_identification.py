@@ -74,6 +74,17 @@ def test_enough_precise_data_do_not_warn():
         cra.identify_joint(NOMINAL, cra.natural_frequencies(NOMINAL.replace(k_t=1e4, k_r=1e3), 5), 1e-3)
 
 
+@pytest.mark.filterwarnings("ignore::cra_sym.arm.identification.IdentifiabilityWarning")
+def test_two_frequencies_tell_two_stiffnesses_until_a_factor_of_two():
+    true = NOMINAL.replace(k_t=2e3, k_r=40.0)
+    measured, sigma = cra.natural_frequencies(true, 2), 1e-4
+    estimate = cra.identify_joint(NOMINAL, measured, sigma)
+    assert (estimate.k_t, estimate.k_r) == (pytest.approx(2e3, rel=1e-6), pytest.approx(40.0, rel=1e-6))
+    limit = sigma * np.log(2) / estimate.log_standard_deviation.max()
+    for share, told in ((0.99, True), (1.01, False)):
+        assert cra.identify_joint(NOMINAL, measured, share * limit).identifiable == told
+
+
 @pytest.mark.parametrize(
     ("arguments", "error", "words"),
     [
