@@ -72,8 +72,8 @@ def _member(values: np.ndarray, shape: tuple[int, ...], index: tuple[int, ...], 
 def _member_term(term: Harmonic | Piecewise, shape: tuple[int, ...], index: tuple[int, ...]) -> Harmonic | Piecewise:
     if isinstance(term, Harmonic):
         return Harmonic(*(_member(value, shape, index, 0) for value in term))
-    velocity, *rest = term
-    return Piecewise(_member(velocity, shape, index, 0), *(_member(value, shape, index, 1) for value in rest))
+    velocity, *rest = term  # the velocity is part of the state at the start
+    return Piecewise(velocity, *(_member(value, shape, index, 1) for value in rest))
 
 
 def _outputs(
