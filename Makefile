@@ -6,6 +6,7 @@ JOBS ?= 2
 CANDIDATES = "$(PYTHON)" python3 python3.14 python3.13 python3.12 python3.11
 SUPPORTED = import sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))
 RUN = .venv/bin/python
+ORDER = --dist loadfile --no-loadscope-reorder
 NOTEBOOKS = --nbval --nbval-current-env --nbval-sanitize-with tests/notebooks/sanitize.cfg notebooks
 
 .PHONY: reproduce test lab notebooks oldest newest lint mutation clean
@@ -13,10 +14,11 @@ NOTEBOOKS = --nbval --nbval-current-env --nbval-sanitize-with tests/notebooks/sa
 reproduce: .venv/.ready
 	$(RUN) -m cra_sym reproduce --output "$(OUTPUT)"
 
-# The processes share the processors: linear algebra takes one thread in each.
+# The processes share the processors: linear algebra takes one thread in each. The longest files come first, so that all
+# end together.
 test: export OPENBLAS_NUM_THREADS = 1
 test: .venv/.ready
-	$(RUN) -m pytest -n $(JOBS) --dist loadfile tests cra_sym README.md $(NOTEBOOKS) $(ARGS)
+	$(RUN) -m pytest -n $(JOBS) $(ORDER) README.md $(NOTEBOOKS) tests cra_sym $(ARGS)
 
 lab: .venv/.ready
 	$(RUN) -m jupyterlab notebooks/00_overview.ipynb

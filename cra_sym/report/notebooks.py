@@ -98,7 +98,7 @@ def execute(
     advance : callable, optional
         Called after each code cell; what it raises ends the run.
     timeout : int
-        Seconds allowed for one cell.
+        Seconds allowed for one cell, and for the kernel to start.
     svg : bool
         Whether figures shown by value are also kept as SVG, whatever formats the notebook itself asks for.
     begun : callable, optional
@@ -126,6 +126,7 @@ def execute(
         notebook,
         km=manager,
         timeout=timeout,
+        startup_timeout=timeout,  # a busy machine may need more than the minute it gets by default
         extra_arguments=["--log-level=40"],  # the kernel's errors, not its advice
         record_timing=False,
         coalesce_streams=True,

@@ -28,7 +28,7 @@ def main() -> int:
     parser.add_argument("--sample", type=int, metavar="N", help="the first N of a module, in random order (all)")
     parser.add_argument("--seed", type=int, default=20261122, help="of the order (%(default)s)")
     parser.add_argument("--holes", action="store_true", help="only survivors without a reason, again")
-    parser.add_argument("--checks", action="store_true", help="only the equations' own checks, no other tests")
+    parser.add_argument("--checks", action="store_true", help="only the checks of its own equations, no tests")
     parser.add_argument("--results", type=Path, default=RESULTS, metavar="DIR", help="where verdicts go")
     options = parser.parse_args()
     known = watched_modules()

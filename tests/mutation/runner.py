@@ -47,7 +47,8 @@ class Laboratory:
     Parameters
     ----------
     tests : bool
-        Whether the rounds of tests follow the checks of the numbered equations.
+        Whether the rounds of tests follow the checks of the numbered equations; if not, the checks are those of the
+        equations that the module itself builds.
     """
 
     def __init__(self, tests: bool = True) -> None:
@@ -69,7 +70,7 @@ class Laboratory:
 
         def noticed() -> str:
             _replace(module, mutant.source, affected)
-            found = _checked(module, affected)
+            found = self._checked(module)
             suspects = [e for name in likely for e in found if _title(e) == name]
             own = [e for e in found if e.source.partition(":")[0] == _dotted(module)]
             tests = [[name] for name in likely if name.startswith("tests/")]
@@ -101,6 +102,11 @@ class Laboratory:
             if _first_failing_check(e for e in _equations() if _title(e) == check):
                 raise RuntimeError(f"{check} fails without a mutant")
             self._sound.add(check)
+
+    def _checked(self, module: str) -> list[Equation]:
+        """Return the equations whose checks watch over a module: the arm's, for the solvers know of none."""
+        builders = dependents(_dotted(module)) if self._tests else {_dotted(module)}
+        return [] if module.startswith("solvers/") else _built_by(builders)
 
     def _likely(self, module: str, function: str) -> list[str]:
         """Return what noticed the latest mutants of the same function, or else of the same module."""
@@ -249,11 +255,6 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
     def exec_module(self, module: Any) -> None:
         """Run the text."""
         exec(compile(self._source, str(self._file), "exec"), vars(module))
-
-
-def _checked(module: str, affected: frozenset[str]) -> list[Equation]:
-    """Return the equations whose checks watch over a module: the arm's, for the solvers know of none."""
-    return [] if module.startswith("solvers/") else _built_by(affected)
 
 
 def _equations() -> tuple[Equation, ...]:
