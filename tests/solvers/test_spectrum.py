@@ -9,7 +9,7 @@ import cra_sym as cra
 from cra_sym.arm.instance import arm_model, model_values
 from cra_sym.arm.spectrum import ArmCharacteristic
 from cra_sym.model.values import Values
-from cra_sym.solvers.spectrum import Characteristic, spectrum
+from cra_sym.solvers.spectrum import Characteristic, _quarters, spectrum
 
 
 class Product:
@@ -135,6 +135,33 @@ class Generic:
         change = aside.logarithmic_derivative.imag * self.unit[lanes] / (1e-20 * z)
         sign = (-1.0) ** self.problem.evaluate(z * self.unit[lanes], lanes).count
         return sign, sign * slope, sign * (slope**2 + change)
+
+
+class Counted:
+    """The same functions, and how many values were asked for."""
+
+    def __init__(self, characteristic):
+        self.zeros, self.count = characteristic.zeros, characteristic.count
+        self.values, self._evaluate = 0, characteristic.evaluate
+
+    def evaluate(self, z, lanes):
+        self.values += z.size
+        return self._evaluate(z, lanes)
+
+
+@pytest.mark.parametrize(("iota", "budget"), [(0.0, 2.25), (1.0, 2.42)])
+def test_a_zero_costs_little_more_than_two_evaluations(iota, budget):
+    """Starts next to the zeros and steps of third order: what makes the driver fast, counted instead of timed."""
+    rng = np.random.default_rng(0)
+    groups = [10 ** rng.uniform(*ends, 300) for ends in ((-2, 6), (-2, 6), (-3, 3), (-3, 3))]
+    arms: Characteristic = Counted(ArmCharacteristic(*groups[:3], iota * groups[3]))
+    assert (spectrum(arms, 10) > 0).all()
+    assert arms.values < budget * 3000
+
+
+def test_quarters_of_a_turn():
+    angle = np.linspace(0.0, np.pi / 2, 2001)
+    np.testing.assert_allclose(_quarters(np.sin(angle), np.cos(angle)), angle / (np.pi / 2), atol=2e-4)
 
 
 def test_one_driver_finds_the_same_zeros_by_the_arms_pair_and_by_the_generic_one():
