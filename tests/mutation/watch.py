@@ -122,7 +122,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "solvers/hill": [_HILL],
     "solvers/modal_response": [
         ["tests/solvers/test_modal_response.py", *_COUPLED],
-        ["tests/arm/test_response.py", "tests/arm/test_shaping.py"],
+        ["tests/arm/test_response.py"],
     ],
     "solvers/motion": [
         ["tests/solvers/test_motion.py", f"{_LAWS}::test_a_harmonic_of_no_size_or_speed_is_over_at_once"]

@@ -89,6 +89,32 @@ def test_uniform_and_listed_knots_agree():
     assert segment(knots, t).tolist() == segment(knots[None], t)[0].tolist() == [-1, 0, 0, 20, 20]
 
 
+@pytest.mark.parametrize("derivative", [0, 2])
+def test_batches_are_loops(derivative):
+    """Oscillators in rows, causes in columns: steady ones on a grid or not, pieces with knots of their own."""
+    rng = np.random.default_rng(4)
+    omega, rows = rng.uniform(2.0, 9.0, (3, 1, 2)), rng.normal(size=(3, 1, 2, 2))
+    osc = OSC._replace(omega=omega, rows=rows, gamma=rng.normal(size=(3, 1, 2)))
+    harmonics = [Harmonics(*rng.uniform(10.0, 20.0, (3, 4, 1)) / 10), Harmonics(*np.array([[0.1], [11.0], [0.5]]))]
+    steady = Steady(rng.normal(size=(4, 2)), rng.normal(size=(4, 1)), harmonics, rng.normal(size=(4, 2)))
+    knots, level, jerk = np.sort(rng.uniform(0.0, 2.0, (4, 5))), *rng.normal(size=(2, 4, 5))
+    times = np.linspace(0.0, 3.0, 70), np.array([0.3, 2.5, 0.0])
+    found = [steady_response(osc, steady, t, derivative) for t in times]
+    found += [piecewise_response(osc, Piecewise(knots, level, jerk), t, derivative) for t in times]
+    for i, j in np.ndindex(3, 4):
+        one = osc._replace(omega=omega[i, 0], rows=rows[i, 0], gamma=osc.gamma[i, 0])
+        cause = Steady(
+            steady.velocity[j],
+            steady.acceleration[j],
+            [Harmonics(*(value[j] for value in harmonics[0])), harmonics[1]],
+            steady.displacement[j],
+        )
+        single = [steady_response(one, cause, t, derivative) for t in times]
+        single += [piecewise_response(one, Piecewise(knots[j], level[j], jerk[j]), t, derivative) for t in times]
+        for whole, part in zip(found, single, strict=True):
+            np.testing.assert_allclose(whole[i, j], part, atol=1e-11)
+
+
 def test_free_peak_is_the_largest_value_ever_reached():
     q, u = np.array([0.3, -0.1]), np.array([1.0, 2.0])
     t = np.linspace(0, 10, 20001)
