@@ -64,6 +64,20 @@ def test_a_grid_of_any_length_is_its_points(count):
     assert steady_response(OSC, CAUSE, t) == pytest.approx(scattered, abs=1e-13)
 
 
+def test_a_uniform_grid_needs_few_unit_responses():
+    """One for the first time, one from block to block, one from point to point; other times need one each."""
+    asked = []
+
+    def counted(t, omega, zeta):
+        asked.append(np.size(t))
+        return free(t, omega, zeta)
+
+    for t, wanted in (np.linspace(0.3, 9.0, 1000), 3), (np.geomspace(0.3, 9.0, 1000), 1000):
+        asked.clear()
+        steady_response(OSC._replace(free=counted), CAUSE, t)
+        assert sum(asked) == wanted
+
+
 def test_a_piece_is_a_sum_of_delayed_ramps():
     knots = np.array([0.2, 0.5, 1.4, 1.6])  # not uniform
     level, jerk = np.array([0.3, -0.5, 1.0, 0.0]), np.array([1.0, 0.0, -2.0, 0.0])
