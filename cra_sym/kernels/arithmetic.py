@@ -21,6 +21,8 @@ _OPERATIONS: dict[type, tuple[Callable[..., Any], str | None, str | None]] = {  
     ast.Sub: (operator.sub, "fsub", "sub"),
     ast.Mult: (operator.mul, "fmul", "mul"),
     ast.Div: (operator.truediv, "fdiv", None),
+    ast.FloorDiv: (operator.floordiv, None, "sdiv"),
+    ast.Mod: (operator.mod, None, "srem"),
     ast.Pow: (operator.pow, None, None),
     ast.BitAnd: (operator.and_, None, "and_"),
     ast.BitOr: (operator.or_, None, "or_"),

@@ -47,14 +47,15 @@ def inlined(function: ast.FunctionDef, namespace: Mapping[str, Any]) -> Any:
     @cache
     def found(*given: Any) -> Any:
         """Write the function where nobody runs it, to see what it returns."""
-        context = cpu_target.target_context
+        context = cpu_target.target_context.subtarget(enable_nrt=True)
         kinds = [_plain(kind) for kind in given]
         library = context.codegen().create_library("trial")
-        arguments = [context.get_value_type(kind) for kind in kinds]
-        trial = ir.Function(library.create_ir_module("trial"), ir.FunctionType(ir.VoidType(), arguments), "trial")
+        shape = context.call_conv.get_function_type(types.none, kinds)
+        trial = ir.Function(library.create_ir_module("trial"), shape, "trial")
         builder = ir.IRBuilder(trial.append_basic_block())
+        arguments = context.call_conv.decode_arguments(builder, kinds, trial)
         with context.push_code_library(library):
-            return signature(_type_of(value(context, builder, kinds, trial.args)), *kinds)
+            return signature(_type_of(value(context, builder, kinds, arguments)), *kinds)
 
     names = ", ".join(argument.arg for argument in function.args.args)
     scope = {"typing": lambda *given: (found(*given), write)}
@@ -78,7 +79,7 @@ def _argument(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     if not isinstance(kind, types.Array):
         return value
     array = context.make_array(kind)(context, builder, value)
-    return writer.Array(array.data, tuple(cgutils.unpack_tuple(builder, array.shape)))
+    return writer.Array(array.data, tuple(cgutils.unpack_tuple(builder, array.shape)), kind.mutable)
 
 
 def _type_of(value: Any) -> Any:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import ast
 import hashlib
-import linecache
 import os
 import pickle
 import sys
@@ -45,13 +44,12 @@ def has_compiler() -> bool:
 def compiled(template: str, kernels: Mapping[str, Generated], *, elementary: bool = True) -> SimpleNamespace:
     """Specialise the text of a module with kernels, and compile its functions.
 
-    The template is plain Python that Numba understands, without decorators. It calls each kernel by its name in
-    ``kernels`` with scalars (the result is a scalar for one expression, else a flat tuple), and may call ``sin``,
-    ``cos`` and ``exp``, the branch-free functions of :mod:`cra_sym.kernels.elementary`. Everything is inlined, so that
-    a simple loop over the lanes of contiguous arrays becomes SIMD code. Functions with a leading underscore are
-    helpers: plain loops and arithmetic, as :func:`cra_sym.kernels.writer.call` has it. All others are entries, and may
-    hold whatever Numba knows: an entry is compiled, or loaded from the store, when it is first called with new types.
-    It releases the interpreter lock, so threads scale.
+    The template is plain Python without decorators: loops, arithmetic and arrays, as :func:`cra_sym.kernels.writer.call`
+    has it. It calls each kernel by its name in ``kernels`` with scalars (the result is a scalar for one expression,
+    else a flat tuple), and may call ``sin``, ``cos`` and ``exp``, the branch-free functions of
+    :mod:`cra_sym.kernels.elementary`. Everything is inlined, so that a simple loop over the lanes of contiguous arrays
+    becomes SIMD code. Functions with a leading underscore are helpers, all others are entries: an entry is compiled, or
+    loaded from the store, when it is first called with new types. It releases the interpreter lock, so threads scale.
 
     Parameters
     ----------
@@ -113,7 +111,7 @@ def _prelude(kernels: Mapping[str, Generated], elementary: bool) -> str:
         imports.update(lines)
         bodies.append(f"def {name}({body}")
     own = _ELEMENTARY.read_text(encoding="utf-8") if elementary else ""
-    return "\n\n".join(["\n".join(sorted(imports)), own, _WHERE, *bodies])
+    return "\n\n".join(["\n".join(sorted(imports)), own, _WHERE, *bodies, ""])
 
 
 _MADE: set[str] = set()  # digests of what this process compiled or loaded
@@ -155,19 +153,17 @@ def _entries(prelude: str, template: str) -> SimpleNamespace:
     module = ModuleType(f"cra_sym_compiled_{digest[:32]}")
     sys.modules[module.__name__] = module  # where stored machine code looks for its constants
     namespace = module.__dict__
-    text, filename = f"{prelude}\n\n{template}", f"<template {digest[:16]}>"
-    linecache.cache[filename] = (len(text), None, text.splitlines(True), filename)
-    exec(compile(text, filename, "exec"), namespace)
-    functions = {node.name: node for node in ast.parse(text).body if isinstance(node, ast.FunctionDef)}
+    exec(prelude + template, namespace)
+    functions = {node.name: node for node in ast.parse(prelude + template).body if isinstance(node, ast.FunctionDef)}
     entries = [node.name for node in ast.parse(template).body if isinstance(node, ast.FunctionDef)]
     entries = [name for name in entries if not name.startswith("_")]
     meanings = namespace | functions
-    for name, function in functions.items():
-        if name in entries:
-            namespace[name] = numba.njit(**_OPTIONS)(namespace[name])
-            namespace[name]._cache = _StoredCode(digest, name)
-        else:
-            namespace[name] = inlined(function, meanings)
+    for name in entries:
+        written, arguments = f"{name}_written", ", ".join(a.arg for a in functions[name].args.args)
+        namespace[written] = inlined(functions[name], meanings)
+        exec(f"def {name}({arguments}):\n    return {written}({arguments})\n", namespace)
+        namespace[name] = numba.njit(**_OPTIONS)(namespace[name])
+        namespace[name]._cache = _StoredCode(digest, name)
     return SimpleNamespace(**{name: namespace[name] for name in entries})
 
 

@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numba.core import cgutils, errors
 
-from cra_sym.kernels.arithmetic import INTEGER, Arithmetic, is_constant, kind_of
+from cra_sym.kernels.arithmetic import DOUBLE, INTEGER, Arithmetic, is_constant, kind_of
 
 __all__ = ["Array", "call"]
 
@@ -27,6 +27,7 @@ class Array:
 
     data: Any
     shape: tuple[Any, ...]
+    writable: bool = True
 
 
 def call(
@@ -40,7 +41,8 @@ def call(
         Numba's target context and LLVM's builder.
     function : ast.FunctionDef
         Made of assignments, ``for`` over ``range``, ``while``, ``if``, ``continue`` and ``return``. Indices count from
-        the start of an array, and both sides of a conditional expression are evaluated.
+        the start of an array, ``//`` and ``%`` are for integers that are not negative, and all parts of an expression
+        are evaluated, whatever its conditions. Arrays that it makes are gone when it returns.
     arguments : sequence of number, LLVM value, or Array
     namespace : dict
         What other names mean: constants, NumPy and its functions of numbers, further functions as ast.FunctionDef.
@@ -86,6 +88,7 @@ class _Body(Arithmetic):
         self.end: Any = None  # where `return` leads, if the function branches
         self.results: list[Any] = []
         self.single = True
+        self.owned: list[Any] = []  # memory of arrays made here
         if any(isinstance(node, (ast.For, ast.While, ast.If)) for node in ast.walk(function)):
             self.end = builder.append_basic_block("end")
         stored = {node.id for node in ast.walk(function) if isinstance(node, ast.Name) and _is_stored(node)}
@@ -108,6 +111,8 @@ class _Body(Arithmetic):
         if not self.builder.block.is_terminated:
             self.builder.branch(self.end)
         self.builder.position_at_end(self.end)
+        for memory in self.owned:
+            self.context.nrt.free(self.builder, self.builder.load(memory))
         results = tuple(self.builder.load(place) for place in self.results)
         return (results[0] if self.single else results) if results else None
 
@@ -118,8 +123,10 @@ class _Body(Arithmetic):
             if self.builder.block.is_terminated:
                 return
             match statement:
-                case ast.Assign(targets=[target], value=value):
-                    self.assign(target, self.value(value))
+                case ast.Assign(targets=targets, value=value):
+                    result = self.value(value)
+                    for target in targets:
+                        self.assign(target, result)
                 case ast.AugAssign(target=target, op=op, value=value):
                     self.assign(target, self.binary(op, self.value(target), self.value(value)))
                 case ast.Expr(value=ast.Constant(value=str())):
@@ -148,8 +155,11 @@ class _Body(Arithmetic):
                     value = [self.element(value, (k,)) for k in range(len(targets))]
                 for one, part in zip(targets, value, strict=True):
                     self.assign(one, part)
-            case ast.Subscript(value=array, slice=index):
-                self.put(value, self.pointer(self.value(array), self.indices(index)))
+            case ast.Subscript(value=base, slice=index):
+                array = self.value(base)
+                if not array.writable:
+                    raise errors.TypingError(f"{ast.unparse(base)} is read-only")
+                self.put(value, self.pointer(array, self.indices(index)))
             case _:
                 _refuse(target)
 
@@ -157,6 +167,7 @@ class _Body(Arithmetic):
         if self.end is None or isinstance(value, (Array, tuple)):
             self.values[name] = value
             return
+        self.values.pop(name, None)
         if name not in self.places:
             self.places[name] = cgutils.alloca_once(self.builder, kind_of(value), name=name)
         self.put(value, self.places[name])
@@ -237,6 +248,8 @@ class _Body(Arithmetic):
                 return getattr(np, name)
             case ast.Attribute(value=array, attr="shape"):
                 return self.value(array).shape
+            case ast.Attribute(value=array, attr="size"):
+                return self.product(self.value(array).shape)
             case ast.Tuple(elts=parts):
                 return tuple(self.value(part) for part in parts)
             case ast.Subscript(value=base, slice=index):
@@ -275,6 +288,8 @@ class _Body(Arithmetic):
             return call(self.context, self.builder, function, arguments, self.namespace)
         if function in (np.float64, np.int64):
             return self.cast(function, *arguments)
+        if function in (np.empty, np.zeros):
+            return self.made(function is np.zeros, *arguments)
         if function in _BUILT_IN.values():
             return function(self, *arguments)
         return self.known_to_numba(function, arguments)
@@ -293,7 +308,23 @@ class _Body(Arithmetic):
 
     def element(self, array: Array, indices: Sequence[Any]) -> Any:
         place, rest = self.pointer(array, indices), array.shape[len(indices) :]
-        return Array(place, rest) if rest else self.builder.load(place)
+        return Array(place, rest, array.writable) if rest else self.builder.load(place)
+
+    def product(self, numbers: Sequence[Any]) -> Any:
+        return reduce(lambda one, two: self.binary(ast.Mult(), one, two), numbers)
+
+    def made(self, zeros: bool, shape: Any, kind: type = np.float64) -> Array:
+        """Return a new array of doubles or integers."""
+        if self.end is None or self.again is not None:
+            raise errors.TypingError("arrays are made outside of loops, in functions that hold one")
+        shape = shape if isinstance(shape, tuple) else (shape,)
+        size = self.typed(self.binary(ast.Mult(), self.product(shape), 8))
+        memory = self.context.nrt.allocate(self.builder, size)
+        self.owned.append(cgutils.alloca_once(self.builder, memory.type))
+        self.builder.store(memory, self.owned[-1])
+        if zeros:
+            cgutils.memset(self.builder, memory, size, 0)
+        return Array(self.builder.bitcast(memory, (DOUBLE if kind is np.float64 else INTEGER).as_pointer()), shape)
 
 
 def _is_stored(name: ast.Name) -> bool:

@@ -33,11 +33,13 @@ def roots(out, start, a):
     x = np.empty(_LANES)
     for first in range(0, out.size, _LANES):
         count = min(_LANES, out.size - first)
-        x[:count] = start[first : first + count]
+        for lane in range(count):
+            x[lane] = start[first + lane]
         for _ in range(6):
             for lane in range(count):
                 x[lane] = _improved(x[lane], a[first + lane])
-        out[first : first + count] = x[:count]
+        for lane in range(count):
+            out[first + lane] = x[lane]
 '''
 
 
