@@ -65,6 +65,7 @@ _FLOQUET = [
             "error_is_what_was_asked_for",
             "multipliers_come_in_reciprocal_pairs",
             "no_excitation_no_growth",
+            "growth_is_that_of_the_fastest_exponent",
             "batch_equals_loop",
             "unknown_backend",
         )

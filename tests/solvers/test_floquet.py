@@ -154,6 +154,21 @@ def test_batch_equals_loop():
 
 
 @pytest.mark.parametrize("decay", [0.0, 0.02])
+@pytest.mark.parametrize("skew", [0.0, 0.3])
+def test_growth_is_that_of_the_fastest_exponent(decay, skew):
+    """Through zones of one mode, of a sum and (skew only) of a difference, and never negative between them."""
+    coupling, varpi = np.array([[[1.0, 0.5 + skew], [0.5 - skew, -0.7]]]), np.linspace(0.9, 4.6, 60)
+    system = (np.array([1.0, 2.2]), coupling, varpi, 0.4, decay)
+    growth, exponents = floquet.growth_rate(*system), floquet.floquet_exponents(*system)
+    assert (growth == 0.0).any() or not decay
+    assert growth.max() > 0.05
+    np.testing.assert_allclose(growth, np.maximum(exponents[:, 0].real, 0.0), atol=1e-9)
+    at = int(growth.argmax())
+    hill = hill_exponents([1.0, 2.2], coupling[0], varpi[at], 0.4, decay, harmonics=12)
+    assert growth[at] == pytest.approx(hill[0].real, rel=1e-6)
+
+
+@pytest.mark.parametrize("decay", [0.0, 0.02])
 def test_compiled_path_is_the_numpy_path(decay):
     omega, coupling = np.array([1.0, 2.2]), np.array([[[1.0, 0.5], [0.5, -0.7]], [[0.1, 0.0], [0.0, 0.2]]])
     given = (omega, coupling, np.linspace(0.7, 6.0, 70)[:, None], np.linspace(0.0, 0.6, 3), decay, [0.1, 0.3])
