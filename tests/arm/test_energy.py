@@ -1,13 +1,14 @@
 """Energies and the Lagrangian against hand-made cases."""
 
 import pytest
-from sympy import Integral, Rational
+from sympy import Integral, Rational, oo
 
 from cra_sym import symbols as s
 from cra_sym.arm.energy import lagrangian, potential_energy
 from cra_sym.arm.evaluation import evaluate, put
 from cra_sym.arm.modal_sum import ModalSum, member
 from cra_sym.arm.orthogonality import modal_energies
+from cra_sym.symbols import symbol
 
 
 def test_without_the_joint_the_lagrangian_is_the_papers():
@@ -36,6 +37,7 @@ def test_a_derivative_at_the_tip_is_taken_before_the_place_is_put_in():
 def test_members_of_a_modal_sum():
     total = ModalSum(s.omega_i * s.phi_i * s.q_i)
     assert total.doit() is total
+    assert total.limits == ((symbol("i"), 1, oo),), "modes are counted from one, and all are meant"
     assert total.members("i", "j") == s.omega_i * s.phi_i * s.q_i + s.omega_j * s.phi_j * s.q_j
     assert member(s.phi_i.diff(s.x), "j") == s.phi_j.diff(s.x)
 

@@ -43,6 +43,12 @@ def test_rigid_limit_is_the_same():
     np.testing.assert_allclose(flipped_frequencies(ARM), cra.natural_frequencies(ARM), rtol=1e-12)
 
 
+def test_without_a_rotational_spring_there_is_no_sign_to_flip():
+    """The mode that loses its oscillation is then the rigid-body mode."""
+    arm = ARM.replace(k_t=300.0, k_r=0.0)
+    np.testing.assert_allclose(flipped_frequencies(arm), cra.natural_frequencies(arm, 4)[1:], rtol=1e-12)
+
+
 def test_its_potential_energy_can_be_negative():
     turn = single_mode(potential_energy()[1].rhs, s.x * s.psi).doit()
     assert turn == Rational(1, 2) * s.k_r * s.psi**2  # so with the flipped sign a rotation releases energy

@@ -31,12 +31,19 @@ def test_more_derivatives_forgive_a_wrong_frequency():
     assert orders == pytest.approx([1, 2, 3], abs=0.1)
 
 
+def test_two_equal_impulses_half_a_period_apart_unless_asked_for_more():
+    amplitudes, times = cra.input_shaper(4.0)
+    assert amplitudes == pytest.approx([0.5, 0.5]) and times == pytest.approx([0.0, np.pi / 4])
+    almost_critical = cra.input_shaper(4.0, 0.99)[0]
+    assert almost_critical[0] == pytest.approx(1.0, abs=1e-9)  # the first impulse's vibration dies by itself
+
+
 def test_batches():
     amplitudes, times = cra.input_shaper([10.0, 20.0], [[0.0], [0.1]], order=2)
     assert amplitudes.shape == times.shape == (2, 2, 3)
 
 
-@pytest.mark.parametrize("arguments", [{"angular_frequency": 0.0}, {"zeta": 1.0}, {"order": 0}])
+@pytest.mark.parametrize("arguments", [{"angular_frequency": 0.0}, {"zeta": -1e-3}, {"zeta": 1.0}, {"order": 0}])
 def test_bad_input_is_named(arguments):
     (name,) = arguments
     with pytest.raises(ValueError, match=f"{name} = "):

@@ -92,7 +92,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "arm/modal": [_MODES, [_MODAL]],
     "arm/modal_dynamics": [],
     "arm/modal_lanes": [_LANES],
-    "arm/modal_sum": [],
+    "arm/modal_sum": [["tests/arm/test_energy.py"]],
     "arm/motion": [],
     "arm/orthogonality": [],
     "arm/operators": [],
