@@ -6,10 +6,10 @@ JOBS ?= 2
 CANDIDATES = "$(PYTHON)" python3 python3.14 python3.13 python3.12 python3.11
 SUPPORTED = import sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))
 RUN = .venv/bin/python
-ORDER = --dist loadfile --no-loadscope-reorder
 NOTEBOOKS = --nbval --nbval-current-env --nbval-sanitize-with tests/notebooks/sanitize.cfg notebooks
+SHARED = -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
-.PHONY: reproduce test lab notebooks oldest newest lint mutation clean
+.PHONY: reproduce test coverage lab notebooks oldest newest lint mutation clean
 
 reproduce: .venv/.ready
 	$(RUN) -m cra_sym reproduce --output "$(OUTPUT)"
@@ -18,7 +18,16 @@ reproduce: .venv/.ready
 # end together.
 test: export OPENBLAS_NUM_THREADS = 1
 test: .venv/.ready
-	$(RUN) -m pytest -n $(JOBS) $(ORDER) README.md $(NOTEBOOKS) tests cra_sym $(ARGS)
+	$(RUN) -m pytest $(SHARED) README.md $(NOTEBOOKS) tests cra_sym $(ARGS)
+
+# Lines and branches of the package that the tests run, without the notebooks; derivations too: the store is empty.
+coverage: export OPENBLAS_NUM_THREADS = 1
+coverage: export XDG_CACHE_HOME = $(CURDIR)/.venv/coverage
+coverage: .venv/.ready
+	rm -rf .venv/coverage .coverage .coverage.*
+	$(RUN) -m coverage run -m pytest $(SHARED) README.md tests cra_sym $(ARGS)
+	$(RUN) -m coverage combine --quiet
+	$(RUN) -m coverage report
 
 lab: .venv/.ready
 	$(RUN) -m jupyterlab notebooks/00_overview.ipynb
@@ -51,7 +60,7 @@ mutation: .venv/.ready
 	$(RUN) -m tests.mutation $(ARGS)
 
 clean:
-	rm -rf .venv .venv-oldest .venv-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-oldest .venv-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage .coverage.*
 
 .venv/.ready: requirements.txt pyproject.toml
 	@for python in $(CANDIDATES); do \
