@@ -111,10 +111,12 @@ def _basis(z: np.ndarray) -> tuple[np.ndarray, ...]:
     return lam, *(np.where(z < NEAR, a, b) for a, b in zip(near, _BASIS.function(lam, np.exp(-lam)), strict=True))
 
 
-LOAD_FROM = 300_000
+# A root costs NumPy about 2 microseconds and compiled code 0.1; to load machine code, Numba included, takes as long as
+# LOAD_FROM roots by NumPy, to make it as long as COMPILE_FROM. The benchmark of cold starts measures both.
+LOAD_FROM = 400_000
 """Roots in one call from where on loading machine code costs less than it saves."""
-COMPILE_FROM = 6_000_000
-"""Roots in such calls of this process until making machine code has cost no more than doing without it."""
+COMPILE_FROM = 1_200_000
+"""Roots in such calls of this process from where on making machine code costs less than going on without it."""
 _ROOTS_PER_PART = 30_000  # that are worth handing out
 _PARTS_PER_THREAD = 8  # so that a thread on a busy processor keeps nobody waiting
 _BLOCK = 32_768  # points and roots whose temporaries stay in the processor's cache
@@ -150,10 +152,11 @@ def frequency_parameters(
 
 
 def wants_compiler(roots: int, parts: Callable[[], tuple[str, dict[str, Kernel]]]) -> bool:
-    """Return whether the compiled path of a template pays for a call.
+    """Return whether the compiled path of a template pays for a call: the policy of the package.
 
-    Loading machine code pays in one large call. Making it takes as long as millions of roots without it: it is made
-    once this process has done so many.
+    Small calls never compile and never load. A call of `LOAD_FROM` roots takes machine code that is there. If there is
+    none, it is made for a call of more than `COMPILE_FROM` roots, or as soon as such calls of this process have come to
+    that number: nobody waits more than twice as long as whoever knew what comes next.
     """
     if roots < LOAD_FROM or not has_compiler():
         return False

@@ -255,6 +255,9 @@ def test_the_path_is_chosen_by_what_it_costs(monkeypatch):
     assert path(np.ones(10), 1.0, 0.0) == "numpy"
     assert [path(*large) for _ in range(3)] == ["numpy", "numpy", "compiled"]
     monkeypatch.setattr(spectrum, "_done", Counter())
+    assert path(np.ones(3 * spectrum.LOAD_FROM), 1.0, 0.0) == "compiled"  # at once, if one call is worth it
+    monkeypatch.setattr(spectrum, "_done", Counter())
+    assert {path(np.ones(spectrum.LOAD_FROM // 2), 1.0, 0.0) for _ in range(9)} == {"numpy"}
     made.append(True)
     assert path(*large) == "compiled" and path(np.ones(10), 1.0, 0.0) == "numpy"
     monkeypatch.setattr(spectrum, "has_compiler", lambda: False)
