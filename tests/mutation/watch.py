@@ -39,6 +39,16 @@ _MODES = [
 _STABILITY = [["tests/arm/test_boundaries.py"], ["tests/arm/test_stability.py"]]
 _LANES = ["tests/arm/test_templates.py"]
 _STIFFNESS = [
+    [
+        f"tests/solvers/test_stiffness.py::test_{name}"
+        for name in (
+            "steps_through_varying_coefficients_are_of_sixth_order",
+            "stationary_values_of_graded_energies_keep_their_digits",
+            "count_equals_closed_form_everywhere",
+            "string_with_a_damper_at_its_end",
+            "equal_roots_are_counted_and_get_orthogonal_shapes",
+        )
+    ],
     ["tests/solvers/test_stiffness.py"],
     [
         f"tests/model/test_{name}"
