@@ -11,10 +11,17 @@ import numpy as np
 from cra_sym import checks
 from cra_sym.arm import spectrum
 from cra_sym.arm.close_pairs import resolve_close_pairs
-from cra_sym.arm.modal import Modes, modes_of
+from cra_sym.arm.modal import ENDS, STRAIN, Modes, modes_of
 from cra_sym.arm.parameters import Arm
 
-__all__ = ["ModalParameters", "frequency_parameters", "modal_parameters", "mode_shapes", "natural_frequencies"]
+__all__ = [
+    "ModalParameters",
+    "arm_modes",
+    "frequency_parameters",
+    "modal_parameters",
+    "mode_shapes",
+    "natural_frequencies",
+]
 
 MOST_MODES = 1000
 _SOFTEST = 1e-150  # the product of two stiffnesses of this size is a number yet
@@ -85,9 +92,7 @@ def natural_frequencies(arm: Arm, modes: int = 3) -> np.ndarray:
     >>> print(natural_frequencies(Arm.nominal().replace(m_e=0)).round(3))
     [ 2.448 15.339 42.95 ]
     """
-    frequency = _angular_frequencies(arm, _lambda(arm, modes))
-    frequency /= 2 * np.pi
-    return frequency
+    return _frequencies(arm, _lambda(arm, modes))
 
 
 def mode_shapes(arm: Arm, x: Any, modes: int = 3, derivative: int = 0) -> np.ndarray:
@@ -121,7 +126,7 @@ def mode_shapes(arm: Arm, x: Any, modes: int = 3, derivative: int = 0) -> np.nda
     if points.size and points.max() > np.min(arm.L):
         raise ValueError(f"x = {points.max():g}: allowed are points in [0, L], L = {np.min(arm.L):g}")
     length = _column(arm.L, 2)
-    shapes = _modes(arm, modes).shape(np.atleast_1d(points) / length, derivative)
+    shapes = arm_modes(arm, modes).shape(np.atleast_1d(points) / length, derivative)
     shapes = shapes / (np.sqrt(_column(arm.rhoA, 2) * length) * length**derivative)
     return shapes if points.ndim else shapes[..., 0]
 
@@ -165,46 +170,50 @@ class ModalParameters:
     @cached_property
     def frequency(self) -> np.ndarray:
         """Natural frequency, Hz."""
-        return self.omega / (2 * np.pi)
+        return _frequencies(self._arm, self.lam)
 
     @cached_property
-    def participation(self) -> np.ndarray:
-        """Modal participation factor, kg^1/2."""
-        return self._modes.participation * _column(np.sqrt(self._arm.rhoA * self._arm.L))
+    def _ends(self) -> np.ndarray:
+        """What the modes are at the tip, in all and at the joint, shape (7, ..., modes)."""
+        length, mass, stiffness = self._arm.L, np.sqrt(self._arm.rhoA * self._arm.L), self._arm.EI
+        here, slope = 1 / mass, 1 / mass / length
+        units = here, slope, mass, here, slope, stiffness * (slope / length), stiffness * (slope / length / length)
+        return self._modes.quantities(ENDS, units)
 
-    @cached_property
-    def root_displacement(self) -> np.ndarray:
-        """phi(0), kg^-1/2."""
-        return self._modes.root[0] * self._unit(0)
-
-    @cached_property
-    def root_slope(self) -> np.ndarray:
-        """phi'(0), kg^-1/2/m."""
-        return self._modes.root[1] * self._unit(1)
-
-    @cached_property
-    def root_moment(self) -> np.ndarray:
-        """EI phi''(0)."""
-        return self._modes.root[2] * (_column(self._arm.EI) * self._unit(2))
-
-    @cached_property
-    def root_shear(self) -> np.ndarray:
-        """EI phi'''(0)."""
-        return self._modes.root[3] * (_column(self._arm.EI) * self._unit(3))
-
-    @cached_property
+    @property
     def tip_displacement(self) -> np.ndarray:
         """phi(L), kg^-1/2."""
-        return self._modes.tip[0] * self._unit(0)
+        return self._ends[0]
 
-    @cached_property
+    @property
     def tip_slope(self) -> np.ndarray:
         """phi'(L), kg^-1/2/m."""
-        return self._modes.tip[1] * self._unit(1)
+        return self._ends[1]
 
-    def _unit(self, derivative: int) -> Any:
-        """Return the unit of a derivative of a mass-normalised shape."""
-        return _column(1 / np.sqrt(self._arm.rhoA * self._arm.L) / self._arm.L**derivative)
+    @property
+    def participation(self) -> np.ndarray:
+        """Modal participation factor, kg^1/2."""
+        return self._ends[2]
+
+    @property
+    def root_displacement(self) -> np.ndarray:
+        """phi(0), kg^-1/2."""
+        return self._ends[3]
+
+    @property
+    def root_slope(self) -> np.ndarray:
+        """phi'(0), kg^-1/2/m."""
+        return self._ends[4]
+
+    @property
+    def root_moment(self) -> np.ndarray:
+        """EI phi''(0)."""
+        return self._ends[5]
+
+    @property
+    def root_shear(self) -> np.ndarray:
+        """EI phi'''(0)."""
+        return self._ends[6]
 
     @cached_property
     def stiffness_translation(self) -> np.ndarray:
@@ -217,7 +226,7 @@ class ModalParameters:
         return self._joint_matrix(1)
 
     def _joint_matrix(self, spring: int) -> np.ndarray:
-        root_energy = self._modes.strain[spring] * _column(self._arm.angular_frequency_scale)
+        root_energy = self._modes.quantities(STRAIN)[spring] * _column(self._arm.angular_frequency_scale)
         return root_energy[..., :, None] * root_energy[..., None, :]
 
     @cached_property
@@ -257,7 +266,7 @@ def modal_parameters(arm: Arm, modes: int = 3) -> ModalParameters:
     >>> print(parameters.participation.round(4))
     [ 0.3868 -0.2143  0.1257]
     """
-    return ModalParameters(arm, _modes(arm, modes))
+    return ModalParameters(arm, arm_modes(arm, modes))
 
 
 def _lambda(arm: Arm, modes: int) -> np.ndarray:
@@ -270,7 +279,8 @@ def _groups(arm: Arm) -> list[np.ndarray]:
     return [np.broadcast_to(value, arm.shape) for value in (arm.kappa_t, arm.kappa_r, arm.mu, arm.iota)]
 
 
-def _modes(arm: Arm, modes: int) -> Modes:
+def arm_modes(arm: Arm, modes: int) -> Modes:
+    """Return the dimensionless modes of the arm, from which everything else follows."""
     return modes_of(*_groups(arm), lam=_lambda(arm, modes))
 
 
@@ -278,6 +288,12 @@ def _angular_frequencies(arm: Arm, lam: np.ndarray) -> np.ndarray:
     omega = lam**2
     omega *= _column(arm.angular_frequency_scale)  # in place: fresh memory costs more than the product
     return omega
+
+
+def _frequencies(arm: Arm, lam: np.ndarray) -> np.ndarray:
+    frequency = _angular_frequencies(arm, lam)
+    frequency /= 2 * np.pi
+    return frequency
 
 
 def _column(value: float | np.ndarray, axes: int = 1) -> float | np.ndarray:

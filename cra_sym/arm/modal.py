@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from functools import cache
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
 from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
-from cra_sym.arm.spectrum import in_parts, pair, wants_compiler
+from cra_sym.arm.spectrum import flattened, in_parts, pair, wants_compiler
 from cra_sym.kernels import Kernel, compiled, derived_kernel
 
-__all__ = ["NEAR", "Modes", "modes_of", "near_shape", "tip_factors"]
+__all__ = [
+    "COMPLIANCES",
+    "ENDS",
+    "INERTIAS",
+    "NEAR",
+    "SPRINGS",
+    "STRAIN",
+    "Modes",
+    "modes_of",
+    "near_shape",
+    "tip_factors",
+]
 
 NEAR = 25.0  # shapes.NEAR; a test holds the two together
 
@@ -22,48 +34,109 @@ _POLYNOMIALS, _TIP_ROWS, _TIP_NEAR, _AMPLITUDES_FAR, _TIP_FAR, _SHAPE_FAR, _MASS
 )
 
 
-@dataclass(frozen=True)
+ENDS, STATE, STRAIN = slice(0, 7), slice(3, 11), slice(11, 13)
+"""Rows of a table of modes: tip (2), participation and root (4); root and waves (4); strain (2)."""
+SPRINGS, COMPLIANCES, INERTIAS = slice(13, 17), slice(17, 19), slice(19, 23)
+"""Rows of rates: by kappa_t and kappa_r, then logarithmic; by their inverses; by mu and iota, then logarithmic."""
+_ROWS = 13  # of a table without the rates
+
+
+@dataclass(frozen=True, eq=False)
 class Modes:
-    """Modes of unit generalised mass, phi(1) >= 0; every array has one entry a mode.
+    """Modes of unit generalised mass, phi(1) >= 0; what is asked for has one entry a mode and is computed then.
 
     Attributes
     ----------
-    lam : ndarray
+    lam : ndarray, shape (..., modes)
         Frequency parameter.
-    root : ndarray, shape (4, ...)
-        phi and its first three derivatives at the joint.
-    tip : ndarray, shape (2, ...)
-        phi and phi' at the tip.
-    waves : ndarray, shape (4, ...)
-        Coefficients of cos, sin, exp(-lam xi), exp(-lam (1 - xi)), where lam^4 is over `NEAR`.
-    strain : ndarray, shape (2, ...)
-        Square roots of kappa phi^2 and of kappa phi'^2 at the joint, signed; 0 for infinite stiffness.
-    participation : ndarray
-        Integral of phi over the arm, the tip mass included.
+    groups : tuple of ndarray, shape (arms,)
+        kappa_t, kappa_r, mu and iota.
+    compile, threads
+        As in `cra_sym.arm.spectrum.frequency_parameters`, decided.
     """
 
     lam: np.ndarray
-    root: np.ndarray
-    tip: np.ndarray
-    waves: np.ndarray
-    strain: np.ndarray
-    participation: np.ndarray
+    groups: tuple[np.ndarray, ...]
+    compile: bool
+    threads: int | None
+
+    def quantities(self, rows: slice, units: Sequence[float | np.ndarray] | None = None) -> np.ndarray:
+        """Return some of the rows of the table, each times its unit, which is a number or has the shape of the batch.
+
+        The table holds phi and phi' at the tip; the integral of phi over the arm, the tip mass included; phi and its
+        first three derivatives at the joint; the coefficients of cos, sin, exp(-lam xi), exp(-lam (1 - xi)) where lam^4
+        is over `NEAR`; and the square roots of kappa phi^2 and of kappa phi'^2 at the joint, signed, 0 for infinite
+        stiffness. Rates follow from these by first-order perturbation: those of z = lam^4 by a parameter, over lam^2,
+        and half of those of ln z by its logarithm.
+        """
+        shape = rows.stop - rows.start, *self.lam.shape
+        if not self.compile:
+            table = (self._table[rows] if rows.stop <= _ROWS else self._rates(rows)).reshape(shape)
+            return table if units is None else table * _columns(units, self.lam.shape[:-1])
+        lam = np.ascontiguousarray(self.lam).reshape(-1, shape[-1])
+        by_arm = np.ones((1, shape[0])) if units is None else _columns(units, self.lam.shape[:-1])
+        by_arm = np.ascontiguousarray(by_arm.reshape(shape[0], -1).T)
+        table = np.empty((shape[0], *lam.shape))
+        fill = _template().fill
+
+        def fill_part(part: slice) -> None:
+            fill(table, rows.start, by_arm, lam, *self.groups, part.start, part.stop)
+
+        in_parts(fill_part, *lam.shape, threads=self.threads, compiled=True)
+        return table.reshape(shape)
+
+    @cached_property
+    def _table(self) -> np.ndarray:
+        """All quantities by NumPy, block by block."""
+        modes, lam, table = self.lam.shape[-1], self.lam.reshape(-1), np.empty((_ROWS, self.lam.size))
+
+        def fill_part(part: slice) -> None:
+            roots = slice(part.start * modes, part.stop * modes)
+            _fill(table[:, roots], lam[roots], modes, *(x[part] for x in self.groups))
+
+        in_parts(fill_part, len(self.groups[0]), modes, threads=None, compiled=False)
+        return table
+
+    def _rates(self, rows: slice) -> np.ndarray:
+        tip, slope, _, displacement, turn, moment, shear = self._table[ENDS]
+        by_t, by_r = self._table[STRAIN]
+        square = self.lam.reshape(-1) ** 2
+        mu, iota = (np.repeat(value, self.lam.shape[-1]) for value in self.groups[2:])
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            springs = displacement**2 / square, turn**2 / square, (by_t / square) ** 2 / 2, (by_r / square) ** 2 / 2
+            compliances = -(shear**2) / square, -(moment**2) / square
+        inertias = -(tip**2) * square, -(slope**2) * square, -mu * tip**2 / 2, -iota * slope**2 / 2
+        return np.array([*springs, *compliances, *inertias][rows.start - _ROWS : rows.stop - _ROWS])
+
+    @cached_property
+    def state(self) -> np.ndarray:
+        """phi and its first three derivatives at the joint, and the four coefficients of waves."""
+        return self.quantities(STATE)
 
     def lanes(self, part: slice) -> Modes:
         """Return some of the arms, the batch axes taken as one."""
         modes = self.lam.shape[-1]
-        values = (getattr(self, field.name) for field in fields(self))
-        return Modes(*(x.reshape(*x.shape[: x.ndim - self.lam.ndim], -1, modes)[..., part, :] for x in values))
+        some = Modes(self.lam.reshape(-1, modes)[part], tuple(x[part] for x in self.groups), self.compile, self.threads)
+        if not self.compile:  # the table is there or will be needed
+            some.__dict__["_table"] = self._table.reshape(_ROWS, -1, modes)[:, part].reshape(_ROWS, -1)
+        return some
 
     def shape(self, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
         """Return a derivative of every shape by xi at points that broadcast on a new last axis."""
         lam, xi = np.broadcast_arrays(self.lam[..., None], xi)
         near = lam**4 < NEAR
         result = np.empty(lam.shape)
-        root, waves = (np.broadcast_to(x[..., None], (4, *lam.shape)) for x in (self.root, self.waves))
-        result[near] = near_shape(root[:, near], lam[near] ** 4, xi[near], derivative)
-        result[~near] = _far_shape(waves[:, ~near], lam[~near], xi[~near], derivative)
+        state = np.broadcast_to(self.state[..., None], (8, *lam.shape))
+        result[near] = near_shape(state[:4, near], lam[near] ** 4, xi[near], derivative)
+        result[~near] = _far_shape(state[4:, ~near], lam[~near], xi[~near], derivative)
         return result
+
+
+def _columns(units: Sequence[float | np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
+    """Return the units of rows as an array (rows, ..., 1), or (rows, 1) if they are the same for the whole batch."""
+    if all(np.ndim(unit) == 0 for unit in units):
+        return np.array(units).reshape(-1, *(1 for _ in shape), 1)
+    return np.array([np.broadcast_to(unit, shape) for unit in units])[..., None]
 
 
 def modes_of(
@@ -85,23 +158,13 @@ def modes_of(
     compile, threads
         As in `cra_sym.arm.spectrum.frequency_parameters`.
     """
-    groups = [np.ascontiguousarray(value).reshape(-1) for value in (kappa_t, kappa_r, mu, iota)]
-    modes = lam.shape[-1]
-    rows, table = lam.reshape(-1, modes), np.empty((13, lam.size))
+    groups = flattened(kappa_t, kappa_r, mu, iota)
     compile = wants_compiler(lam.size, _template_parts) if compile is None else compile
-    fill = _template().fill if compile else _fill
-
-    def fill_part(part: slice) -> None:
-        columns = table[:, part.start * modes : part.stop * modes]
-        fill(columns, rows[part].reshape(-1), modes, *(x[part] for x in groups))
-
-    in_parts(fill_part, len(rows), modes, threads=threads if compile else None, compiled=compile)
-    parts = table[:4], table[4:6], table[6:10], table[10:12], table[12]
-    return Modes(lam, *(x.reshape(*x.shape[:-1], *lam.shape) for x in parts))
+    return Modes(lam, groups, compile, threads)
 
 
 def _fill(table: np.ndarray, lam: np.ndarray, modes: int, *groups: np.ndarray) -> None:
-    """Fill the rows of the table: root (4), tip (2), waves (4), strain (2) and participation of every mode."""
+    """Fill the rows of the table for every mode."""
     kappa_t, kappa_r, mu, iota = (np.repeat(value, modes) for value in groups)
     pairs = np.array([x for value in (kappa_t, kappa_r, mu, iota) for x in pair(value)])
     _fill_from_pairs(table, lam, modes, pairs, mu, iota)
@@ -126,8 +189,8 @@ def _fill_from_pairs(
     a, s, rigid = root[0], root[1], lam == 0
     mass = np.where(rigid, a * a + a * s + s * s / 3 + mu * (a + s) ** 2 + iota * s * s, mass)
     participation = np.where(rigid, a + s / 2 + mu * (a + s), participation)
-    table[:4], table[4], table[5], table[6:10] = root, displacement, slope, waves
-    table[10], table[11], table[12] = np.sqrt(s_t * c_t) * alpha, np.sqrt(s_r * c_r) * beta, participation
+    table[0], table[1], table[2], table[3:7], table[7:11] = displacement, slope, participation, root, waves
+    table[11], table[12] = np.sqrt(s_t * c_t) * alpha, np.sqrt(s_r * c_r) * beta
     table *= np.where(displacement < 0, -1.0, 1.0) / np.sqrt(mass)
     table += 0.0  # -0.0 becomes 0.0
 
@@ -147,10 +210,10 @@ def tip_factors(lam: np.ndarray, pairs: np.ndarray, mu: np.ndarray, iota: np.nda
     Analytic in all of them: a change along the frequency equation, put as a tiny imaginary part, comes back as the
     derivative in the imaginary part, with no difference taken.
     """
-    table = np.empty((13, lam.size), lam.dtype)
+    table = np.empty((_ROWS, lam.size), lam.dtype)
     flat = [value.reshape(-1) for value in (lam, mu, iota)]
     _fill_from_pairs(table, flat[0], lam.shape[-1], pairs.reshape(8, -1), flat[1], flat[2])
-    return (table[12] * table[4]).reshape(lam.shape)
+    return (table[2] * table[0]).reshape(lam.shape)
 
 
 def _invariant(near: np.ndarray, root: np.ndarray, waves: np.ndarray, lam: np.ndarray) -> np.ndarray:

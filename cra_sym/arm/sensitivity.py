@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property, partial
+from functools import cache, cached_property
 from typing import Any, Literal
 
 import numpy as np
 
-from cra_sym.arm.analysis import ModalParameters, modal_parameters
+from cra_sym.arm.analysis import ModalParameters, arm_modes
+from cra_sym.arm.modal import COMPLIANCES, INERTIAS, SPRINGS, Modes
 from cra_sym.arm.parameters import Arm
 from cra_sym.arm.spectrum import pair
 from cra_sym.checks import count
@@ -21,7 +22,7 @@ _exponents = derived_kernel("cra_sym.arm.implicit:group_exponents", backend="num
 
 
 _NAMES = ("k_t", "k_r", "c_t", "c_r", "m_e", "J_e")  # what a derivative of omega^2 is known by; the rest follows
-_Rate = Callable[[str], np.ndarray]
+_Known = Callable[[str], np.ndarray]
 
 
 class Sensitivities:
@@ -73,9 +74,9 @@ class Sensitivities:
     log_E: np.ndarray
     log_rho: np.ndarray
 
-    def __init__(self, arm: Arm, modal: ModalParameters, rate: _Rate) -> None:
-        self._arm, self._modal, self._rate = arm, modal, rate
-        self.frequency = modal.frequency
+    def __init__(self, arm: Arm, frequency: np.ndarray, known: _Known) -> None:
+        self._arm, self._known = arm, known
+        self.frequency = frequency
 
     def __getattr__(self, name: str) -> np.ndarray:
         if name not in Sensitivities.__annotations__:
@@ -93,40 +94,32 @@ class Sensitivities:
     def _raw(self, name: str) -> np.ndarray:
         if name not in _NAMES:
             value = self.frequency * self._logarithmic(name) / _column(self._arm, getattr(self._arm, name))
-            return np.where(self._still, 0.0, value) if self._still.any() else value
-        change, spring = self._rate(name), name in _NAMES[:4]
-        value = change / (8 * np.pi**2 * self.frequency)  # d omega^2 = 8 pi^2 f df
-        if self._still.any():
-            held = np.where(np.abs(change) > 0, np.copysign(np.inf, change), 0.0) if spring else 0.0
+            return np.where(self._still, 0.0, value) if self._rigid else value
+        value = self._known(f"df_d{name}")
+        if self._rigid:
+            spring = name in _NAMES[:4]
+            held = np.where(np.isnan(value), 0.0, value) if spring else 0.0  # 0 over 0: it holds nothing
             loose = (np.asarray(self._arm.k_t) == 0) & (np.asarray(self._arm.k_r) == 0) & spring
             value = np.where(self._still, np.where(_column(self._arm, loose), np.nan, held), value)
         return value
 
     def _logarithmic(self, name: str) -> np.ndarray:
-        share = self._shares(name) if name in _NAMES else self._exponents[name]
-        value = share / (-2 if name in _NAMES[4:] else 2)
-        return np.where(self._still, np.nan, value) if self._still.any() else value
-
-    def _shares(self, name: str) -> np.ndarray:
-        """Return the share of a spring in the strain energy, or of an inertia in the kinetic energy."""
-        value = _column(self._arm, getattr(self._arm, name))
-        share = value * self._rate(name) / self._square
-        if name in _NAMES[:2]:
-            return np.where(np.isinf(value), 0.0, share) if np.isinf(value).any() else share
-        return -share
+        value = self._known(f"log_{name}") if name in _NAMES else self._exponents[name] / 2
+        return np.where(self._still, np.nan, value) if self._rigid else value
 
     @cached_property
     def _exponents(self) -> dict[str, np.ndarray]:
         """The chain rule over the dimensionless groups."""
-        return _exponents(*(self._shares(name) for name in ("k_t", "k_r", "m_e", "J_e")))
-
-    @cached_property
-    def _square(self) -> np.ndarray:
-        return self._modal.omega**2
+        factors = {"k_t": 2, "k_r": 2, "m_e": -2, "J_e": -2}  # shares of energy, in strain and in motion
+        return _exponents(*(factor * self._known(f"log_{name}") for name, factor in factors.items()))
 
     @cached_property
     def _still(self) -> np.ndarray:
         return self.frequency == 0
+
+    @cached_property
+    def _rigid(self) -> bool:
+        return bool(self._still.any())
 
 
 def sensitivities(arm: Arm, modes: int = 3, *, method: Literal["modal", "implicit"] = "modal") -> Sensitivities:
@@ -155,13 +148,47 @@ def sensitivities(arm: Arm, modes: int = 3, *, method: Literal["modal", "implici
     """
     if method not in ("modal", "implicit"):
         raise ValueError(f"method = {method!r}: allowed are 'modal' and 'implicit'")
-    modal = modal_parameters(arm, count("modes", modes))
-    rate = partial(squared_frequency_rate, arm, modal) if method == "modal" else _implicit(arm, modal).__getitem__
-    return Sensitivities(arm, modal, rate)
+    found = arm_modes(arm, count("modes", modes))
+    modal = ModalParameters(arm, found)
+    known = _by_modes(arm, found) if method == "modal" else _by_rates(arm, modal, _implicit(arm, modal))
+    return Sensitivities(arm, modal.frequency, known)
 
 
 def _column(arm: Arm, value: Any) -> np.ndarray:
     return np.broadcast_to(value, arm.shape)[..., None]
+
+
+def _by_modes(arm: Arm, modes: Modes) -> _Known:
+    """Return what gives the derivatives of f that modes know, each with others that cost next to nothing beside it."""
+    scale = arm.angular_frequency_scale / (4 * np.pi)  # d f = scale / lambda^2 d lambda^4
+    length, stiffness = arm.L, arm.EI
+    force, moment = stiffness / length**3, stiffness / length
+
+    @cache
+    def together(names: tuple[str, ...]) -> dict[str, np.ndarray]:
+        rows, units = groups[names]
+        return dict(zip(names, modes.quantities(rows, units), strict=True))
+
+    mass = arm.rhoA * length
+    groups = {
+        ("df_dk_t", "df_dk_r", "log_k_t", "log_k_r"): (SPRINGS, (scale / force, scale / moment, 1.0, 1.0)),
+        ("df_dc_t", "df_dc_r"): (COMPLIANCES, (scale * force, scale * moment)),
+        ("df_dm_e", "df_dJ_e", "log_m_e", "log_J_e"): (INERTIAS, (scale / mass, scale / (mass * length**2), 1.0, 1.0)),
+    }
+    return lambda name: next(together(names)[name] for names in groups if name in names)
+
+
+def _by_rates(arm: Arm, p: ModalParameters, rates: dict[str, np.ndarray]) -> _Known:
+    """Return what gives the derivatives of f from those of omega^2 by the parameters of the joint and the tip."""
+
+    def known(name: str) -> np.ndarray:
+        parameter = name.removeprefix("df_d").removeprefix("log_")
+        if name.startswith("df_d"):
+            return rates[parameter] / (8 * np.pi**2 * p.frequency)  # d omega^2 = 8 pi^2 f df
+        value = _column(arm, getattr(arm, parameter))
+        return np.where(np.isinf(value), 0.0, value * rates[parameter] / (2 * p.omega**2))
+
+    return known
 
 
 def squared_frequency_rate(arm: Arm, p: ModalParameters, name: str) -> np.ndarray:

@@ -15,7 +15,7 @@ import numpy as np
 from cra_sym.kernels import Kernel, compiled, derived_kernel, has_compiler, is_compiled
 from cra_sym.solvers.spectrum import Lanes, spectrum
 
-__all__ = ["ArmCharacteristic", "frequency_parameters", "pair"]
+__all__ = ["ArmCharacteristic", "flattened", "frequency_parameters", "pair"]
 
 NEAR = 5.0  # characteristic.NEAR; a test holds the two together
 
@@ -139,7 +139,7 @@ def frequency_parameters(
     ``compile`` says otherwise; ``threads`` are then as many as there are processors and work for.
     """
     shape = kappa_t.shape
-    groups = [np.ascontiguousarray(value).reshape(-1) for value in (kappa_t, kappa_r, mu, iota)]
+    groups = flattened(kappa_t, kappa_r, mu, iota)
     result = np.empty((groups[0].size, modes))
     compile = wants_compiler(result.size, _template_parts) if compile is None else compile
     fill = _fill_compiled if compile else _fill
@@ -149,6 +149,14 @@ def frequency_parameters(
 
     in_parts(fill_part, len(result), modes, threads=threads, compiled=compile)
     return result.reshape(*shape, modes)
+
+
+def flattened(*values: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return arrays of lanes, all contiguous and read-only: of one type, for which machine code is made once."""
+    lanes = tuple(np.ascontiguousarray(value).reshape(-1).view() for value in values)
+    for array in lanes:
+        array.flags.writeable = False
+    return lanes
 
 
 def wants_compiler(roots: int, parts: Callable[[], tuple[str, dict[str, Kernel]]]) -> bool:
