@@ -78,3 +78,11 @@ def test_no_times_give_no_values():
     assert coupled_response(coupled, MOTION, [], 0).shape == (2, 0)
     free, forced = (derived_kernel(f"cra_sym.model.oscillator:{name}_kernel") for name in ("free", "forced"))
     assert driven_response(Oscillators(OMEGA, ZETA, GAMMA, ROWS, free, forced), MOTION, [], 0).shape == (2, 0)
+
+
+def test_an_acceleration_that_sets_in_late_is_a_profile_of_one_knot():
+    late = BaseMotion(acceleration=0.5).shaped([0.4, 0.6], [0.0, 0.3])
+    free, forced = (derived_kernel(f"cra_sym.model.oscillator:{name}_kernel") for name in ("free", "forced"))
+    found = driven_response(Oscillators(OMEGA, ZETA, GAMMA, ROWS, free, forced), late, TIMES, 0)
+    coupled = CoupledModes(OMEGA, ZETA, np.zeros((2, 2)), GAMMA, ROWS)
+    np.testing.assert_allclose(found, coupled_response(coupled, late, TIMES, 0), atol=1e-12)
