@@ -106,8 +106,13 @@ def _null_vectors(here: Evaluation, place: np.ndarray, rows: int, modes: int) ->
     pick = place.ravel()
     if np.iscomplexobj(here.matrix):
         vector = np.conj(np.linalg.svd(here.matrix)[2][np.arange(len(pick)), -1 - pick])
-        size = np.abs(np.einsum("rij,rj->ri", here.unit, vector)).max(axis=1, keepdims=True)
-        return vector / size
+        nodal = np.einsum("rij,rj->ri", here.unit, vector)
+        assert here.tree is not None
+        unit = here.tree.scale
+        unit = np.concatenate(
+            [unit, unit[:, : nodal.shape[1] - unit.shape[1]]], axis=1
+        )  # the middle's as the left end's
+        return vector / np.abs(nodal * unit).max(axis=1, keepdims=True)
     value, vector = np.linalg.eigh(here.matrix)
     order = np.argsort(np.abs(value), axis=1)[np.arange(len(pick)), pick]
     # K has as many negative eigenvalues as modes lie below: the next one is this mode's, however close its neighbours

@@ -10,7 +10,7 @@ from scipy.integrate import simpson
 from cra_sym.solvers.eigenvalues import lowest, refine
 from cra_sym.solvers.rayleigh import stationary_values
 from cra_sym.solvers.shapes import mode_states
-from cra_sym.solvers.stiffness import DynamicStiffness, exponential
+from cra_sym.solvers.stiffness import GOLDEN, DynamicStiffness, exponential
 
 PINNED = np.eye(4)[:, [1, 3]]
 CLAMPED_FREE = np.eye(4)[:, 2:]
@@ -112,6 +112,22 @@ def test_axial_force(bending, tension, rtol):
 def test_buckled_structure_is_refused(load, number):
     with pytest.raises(ValueError, match=f"buckled: {number} unstable mode"):
         lowest(beam(tension=-load * np.pi**2, free=PINNED), 3)
+
+
+def test_how_many_have_buckled_and_in_how_many_sets():
+    problem = joint_arm([1.0, -2.0, -5.0, 3.0], [1.0, 1.0, -3.0, 0.0], 0.0)
+    with pytest.raises(ValueError, match=r"buckled: 2 unstable modes \(omega\^2 < 0\), in 2 of 4 parameter sets"):
+        lowest(problem, 3)
+    assert (lowest(problem.take(np.array([0, 3])), 3)[:, 0] > [0.0, -1.0]).all()
+
+
+def test_energy_of_motion_is_never_negative():
+    ends1 = np.zeros((4, 4))
+    ends1[2, 2] = 0.5
+    with pytest.raises(ValueError, match="negative kinetic energy"):
+        lowest(beam(ends1=ends1, free=CLAMPED_FREE), 1)
+    with pytest.raises(ValueError, match="no motion of the structure has kinetic energy"):
+        lowest(beam(mass=0.0, free=CLAMPED_FREE), 1)
 
 
 def test_foundation():
@@ -309,8 +325,9 @@ def test_string_with_a_damper_at_its_end(damper):
     exact = -0.5 * np.log(abs((damper + 1) / (damper - 1))) + 1j * np.pi * k
     found = refine(string, (1.02j * np.pi * k - 0.1)[None])
     np.testing.assert_allclose(found[0], exact, rtol=1e-12)
-    shape = mode_states(string, found, np.array([[0.25, 1.0]]))[0, :, :, 0]
-    np.testing.assert_allclose(shape[:, 0] / shape[:, 1], np.sinh(0.25 * exact) / np.sinh(exact), rtol=1e-10)
+    shape = mode_states(string, found, np.array([[0.25, GOLDEN, 1.0]]))[0, :, :, 0]
+    np.testing.assert_allclose(shape[:, 0] / shape[:, 2], np.sinh(0.25 * exact) / np.sinh(exact), rtol=1e-10)
+    np.testing.assert_allclose(np.abs(shape[:, 1:]).max(axis=1), 1.0, rtol=1e-12)  # at the nodes inside and at the end
 
 
 def test_two_rigid_motions_are_exact_zeros_whatever_their_masses():
