@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import sys
 
 import pytest
 
@@ -17,6 +18,13 @@ _QUIET = (
     "--disable-sync",
     "--no-first-run",
 )
+
+
+def pytest_sessionfinish(session):
+    """Store what a worker covered while there is time: it is ended ten seconds after its last test."""
+    coverage = sys.modules.get("coverage")
+    if hasattr(session.config, "workerinput") and coverage and (running := coverage.Coverage.current()):
+        running.save()
 
 
 @pytest.fixture(scope="module")
