@@ -91,6 +91,14 @@ def test_solvers_know_numbers_only(module):
     assert not [name for name in imported(module) if name.split(".")[0] == "sympy"]
 
 
+def test_one_way_of_compiling():
+    """Machine code is made in one place, which stores it where nobody else can have put it."""
+    users = {m for m in MODULES if {"numba", "llvmlite"} & {name.split(".")[0] for name in imported(m)}}
+    assert {m.parent.name for m in users} == {"kernels"}
+    makers = [name_of(m) for m in MODULES if "njit" in m.read_text(encoding="utf-8")]
+    assert makers == ["cra_sym/kernels/specialise.py"]
+
+
 @pytest.mark.parametrize("module", MODULES, ids=name_of)
 def test_module_reads_in_one_sitting(module):
     assert len(module.read_text(encoding="utf-8").splitlines()) <= 450

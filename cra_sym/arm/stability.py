@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from functools import cache
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -12,8 +14,9 @@ from cra_sym.arm.analysis import modal_parameters
 from cra_sym.arm.excitation import AxialBase, Excitation, JointStiffness, TransverseBase
 from cra_sym.arm.parameters import Arm
 from cra_sym.arm.residual import static_terms
+from cra_sym.arm.spectrum import wants_compiler
 from cra_sym.arm.zones import Parametric, Zone, first_order_zone, zone_of
-from cra_sym.kernels import derived_kernel
+from cra_sym.kernels import Kernel, compiled, derived_kernel, has_compiler
 from cra_sym.solvers import floquet
 
 __all__ = [
@@ -26,6 +29,7 @@ __all__ = [
 ]
 
 _FORCED = derived_kernel("cra_sym.arm.boundaries:forced_growth")
+_ROOTS = 5  # of the spectrum, for which the compiled path saves as much as for a point of a chart
 _REACH = 0.5  # share of the half-width by which second order may move the zone
 
 
@@ -136,7 +140,7 @@ def growth_rate(
     tolerance : float
         Relative error of the monodromy matrix.
     backend : {'auto', 'numpy', 'numba'}
-        'auto' compiles for large charts if Numba is there.
+        'auto' compiles for large charts if Numba is there, by the policy for frequencies.
 
     Returns
     -------
@@ -156,7 +160,7 @@ def growth_rate(
     [0.    0.102 0.   ]
     """
     system = _system(arm, excitation, angular_frequency, epsilon, modes, residual)
-    return floquet.growth_rate(**system, tolerance=tolerance, backend=backend)[()]
+    return floquet.growth_rate(**system, tolerance=tolerance, loop=_loop(backend, system))[()]
 
 
 def floquet_exponents(
@@ -176,7 +180,7 @@ def floquet_exponents(
     Imaginary parts are given between -1/2 and 1/2 of the excitation frequency. Arguments as in :func:`growth_rate`.
     """
     system = _system(arm, excitation, angular_frequency, epsilon, modes, residual)
-    return floquet.floquet_exponents(**system, tolerance=tolerance, backend=backend)
+    return floquet.floquet_exponents(**system, tolerance=tolerance, loop=_loop(backend, system))
 
 
 def forced_width(arm: Arm, excitation: TransverseBase, modes: int = 3) -> np.ndarray:
@@ -313,6 +317,26 @@ def _overlapping(
 def _touches(zone: Zone, centre: np.ndarray, half_width: np.ndarray) -> bool:
     with np.errstate(invalid="ignore"):
         return bool(np.any(np.abs(centre - zone.centre - zone.shift) < half_width + zone.half_width))
+
+
+def _loop(backend: str, system: dict[str, Any]) -> floquet.Loop | None:
+    """Return the compiled loop of the Floquet solver if it is asked for, or pays."""
+    if backend not in ("auto", "numpy", "numba"):
+        raise ValueError(f"backend = {backend!r}: allowed are 'auto', 'numpy' and 'numba'")
+    if backend == "numba" and not has_compiler():
+        raise ValueError("backend = 'numba': Numba is not installed; allowed are 'auto' and 'numpy'")
+    points = np.broadcast(system["angular_frequency"], system["epsilon"], system["omega"][..., 0]).size
+    compile = backend == "auto" and wants_compiler(_ROOTS * points, _template_parts)
+    return _template().kick_and_drift if compile or backend == "numba" else None
+
+
+@cache
+def _template() -> Any:
+    return compiled(*_template_parts())
+
+
+def _template_parts() -> tuple[str, dict[str, Kernel]]:
+    return files("cra_sym.solvers").joinpath("floquet_lanes.py").read_text(encoding="utf-8"), {}
 
 
 def _system(

@@ -45,11 +45,12 @@ def compiled(template: str, kernels: Mapping[str, Generated], *, elementary: boo
     """Specialise the text of a module with kernels, and compile its functions.
 
     The template is plain Python without decorators: loops, arithmetic and arrays, as
-    :func:`cra_sym.kernels.writer.call` has it. It calls each kernel by its name in ``kernels`` with scalars (the result is a scalar for one expression,
-    else a flat tuple), and may call ``sin``, ``cos`` and ``exp``, the branch-free functions of
-    :mod:`cra_sym.kernels.elementary`. Everything is inlined, so that a simple loop over the lanes of contiguous arrays
-    becomes SIMD code. Functions with a leading underscore are helpers, all others are entries: an entry is compiled, or
-    loaded from the store, when it is first called with new types. It releases the interpreter lock, so threads scale.
+    :func:`cra_sym.kernels.writer.call` has it. It calls each kernel by its name in ``kernels`` with scalars (the result
+    is a scalar for one expression, else a flat tuple), and may call ``sin``, ``cos`` and ``exp``, the branch-free
+    functions of :mod:`cra_sym.kernels.elementary`. Everything is inlined, so that a simple loop over the lanes of
+    contiguous arrays becomes SIMD code. Functions with a leading underscore are helpers, all others are entries: an
+    entry is compiled, or loaded from the store, when it is first called with new types. It releases the interpreter
+    lock, so threads scale.
 
     Parameters
     ----------

@@ -10,12 +10,11 @@ symmetric in time, and symplectic without damping.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.util import find_spec
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-__all__ = ["Oscillators", "floquet_exponents", "growth_rate", "monodromy"]
+__all__ = ["Loop", "Oscillators", "floquet_exponents", "growth_rate", "monodromy"]
 
 _NODES, KICKS = (0.5 * np.array(row) for row in np.polynomial.legendre.leggauss(3))
 _NODES = _NODES + 0.5
@@ -24,7 +23,6 @@ DRIFTS = np.diff([0.0, *_NODES, 1.0])
 COMMUTATOR = float(1.0 / 3.0 - KICKS @ np.abs(_NODES[:, None] - _NODES) @ KICKS) / 2
 _BLOCK = 512  # systems propagated together, small enough for the cache
 _MOST_STEPS = 1e7  # a period: minutes
-_COMPILED_FROM = 20000  # systems from which the compiled path pays for loading it
 
 
 @dataclass(frozen=True)
@@ -120,6 +118,41 @@ class Oscillators:
         )
 
 
+class Loop(Protocol):
+    """The inner loop, compiled."""
+
+    def __call__(
+        self,
+        drifts: np.ndarray,
+        h: np.ndarray,
+        kicks: np.ndarray,
+        commutator: float,
+        swings: np.ndarray,
+        coupling: np.ndarray,
+        compliance: np.ndarray,
+        epsilon: np.ndarray,
+        state: np.ndarray,
+    ) -> None:
+        """Propagate the states in place.
+
+        Parameters
+        ----------
+        drifts : ndarray, shape (stages + 1, 2, 2, N, points)
+            Free propagators: before each kick, and (last) between steps.
+        h : ndarray, shape (points,)
+            Step.
+        kicks : ndarray, shape (stages,)
+            Weights of the kicks.
+        commutator : float
+            Weight of the commutator in the middle kick.
+        swings : ndarray, shape (steps, stages)
+            cos(varpi t) at the kicks.
+        coupling, compliance, epsilon : ndarray
+            As in :class:`Oscillators`, with a full batch axis.
+        state : ndarray, shape (2N, 2N, points)
+        """
+
+
 def _flat(array: np.ndarray, shape: tuple[int, ...], own: int) -> np.ndarray:
     """Broadcast, flatten the batch axes and put them last."""
     tail = array.shape[array.ndim - own :]
@@ -140,7 +173,7 @@ def drift_matrix(omega: np.ndarray, decay: np.ndarray, h: np.ndarray) -> np.ndar
     return fall * np.array([[level + decay * ratio, ratio], [-(omega**2) * ratio, level - decay * ratio]])
 
 
-def _propagate(part: Oscillators, steps: int, share: float, compiled: bool) -> np.ndarray:
+def _propagate(part: Oscillators, steps: int, share: float, loop: Loop | None) -> np.ndarray:
     """Return the map over a share of the period, shape (2N, 2N, points), in equal numbers of steps."""
     modes, points = part.omega.shape
     h = part.period * share / steps
@@ -149,11 +182,10 @@ def _propagate(part: Oscillators, steps: int, share: float, compiled: bool) -> n
     times = np.arange(steps)[:, None] + _NODES
     swings = np.cos(2 * np.pi * share / steps * times)
     state = np.broadcast_to(np.eye(2 * modes)[:, :, None], (2 * modes, 2 * modes, points)).copy()
-    if compiled:
-        from ._floquet_compiled import kick_and_drift
-
-        coupling = np.ascontiguousarray(np.broadcast_to(part.coupling, (*part.coupling.shape[:3], points)))
-        kick_and_drift(drifts, h, KICKS, COMMUTATOR, swings, coupling, part.compliance, part.epsilon, state)
+    if loop is not None:
+        coupling = np.array(np.broadcast_to(part.coupling, (*part.coupling.shape[:3], points)))
+        compliance = np.ascontiguousarray(part.compliance)
+        loop(drifts, h, KICKS, COMMUTATOR, swings, coupling, compliance, part.epsilon, state)
     else:
         _kick_and_drift(drifts[:, :, :, :, None], h, swings, part, state)
     return state
@@ -162,7 +194,7 @@ def _propagate(part: Oscillators, steps: int, share: float, compiled: bool) -> n
 def _kick_and_drift(
     drifts: np.ndarray, h: np.ndarray, swings: np.ndarray, part: Oscillators, state: np.ndarray
 ) -> None:
-    """Propagate the states in place: the compiled loop's counterpart in NumPy."""
+    """Propagate the states in place: `Loop` in NumPy."""
     q, p = state[: len(state) // 2], state[len(state) // 2 :]
     for step, row in enumerate(swings):
         for stage, cosine in enumerate(row):
@@ -192,51 +224,34 @@ def _force(coupling: np.ndarray, weights: np.ndarray, q: np.ndarray) -> np.ndarr
     return sum(np.einsum("ijp,jkp->ikp", g * m, q) for m, g in zip(coupling, weights, strict=True))
 
 
-def _maps(batch: Oscillators, share: float, tolerance: float, backend: str) -> np.ndarray:
+def _maps(batch: Oscillators, share: float, tolerance: float, loop: Loop | None) -> np.ndarray:
     """Return the maps over a share of the period, shape (points, 2N, 2N)."""
     size, points = 2 * len(batch.omega), batch.period.size
-    compiled = _use_compiled(backend, points)
     steps = np.ceil(batch.steps(tolerance) * share).astype(np.int64)
     out = np.empty((points, size, size))
     order = np.argsort(steps, kind="stable")
     for start in range(0, points, _BLOCK):
         block = order[start : start + _BLOCK]
-        state = _propagate(batch.take(block), int(steps[block[-1]]), share, compiled)
+        state = _propagate(batch.take(block), int(steps[block[-1]]), share, loop)
         out[block] = np.moveaxis(state, -1, 0)
     return out
 
 
-def _use_compiled(backend: str, points: int) -> bool:
-    if backend not in ("auto", "numpy", "numba"):
-        raise ValueError(f"backend = {backend!r}: allowed are 'auto', 'numpy' and 'numba'")
-    installed = _installed("numba")
-    if backend == "numba" and not installed:
-        raise ValueError("backend = 'numba': Numba is not installed; allowed are 'auto' and 'numpy'")
-    return backend == "numba" or (backend == "auto" and installed and points >= _COMPILED_FROM)
-
-
-def _installed(package: str) -> bool:
-    try:
-        return find_spec(package) is not None
-    except ValueError:  # blocked on purpose
-        return False
-
-
-def monodromy(*system: Any, tolerance: float = 1e-8, backend: str = "auto", **more: Any) -> np.ndarray:
+def monodromy(*system: Any, tolerance: float = 1e-8, loop: Loop | None = None, **more: Any) -> np.ndarray:
     """Return the monodromy matrices of (q, dq/dt), shape (..., 2N, 2N); arguments of :class:`Oscillators`."""
     batch, shape = Oscillators.of(*system, **more)
-    maps = _maps(batch, 1.0, tolerance, backend)
+    maps = _maps(batch, 1.0, tolerance, loop)
     return maps.reshape(*shape, *maps.shape[1:])
 
 
-def _conservative_exponents(batch: Oscillators, tolerance: float, backend: str) -> np.ndarray:
+def _conservative_exponents(batch: Oscillators, tolerance: float, loop: Loop | None) -> np.ndarray:
     r"""Return one exponent s of each pair (s, -s) of a system without damping, its real part not negative.
 
     The excitation is even in time, so the second half of the period is the first one mirrored: with the blocks a, b,
     c, d of the half-period map, :math:`\sinh^2(sT/2)` are the eigenvalues of :math:`b^Tc`, and :math:`\cosh^2(sT/2)`
     those of :math:`d^Ta`. The smaller of the two is used: a double multiplier 1 or -1 then costs no digits.
     """
-    maps = _maps(batch, 0.5, tolerance, backend)
+    maps = _maps(batch, 0.5, tolerance, loop)
     n = maps.shape[-1] // 2
     a, b, c, d = maps[:, :n, :n], maps[:, :n, n:], maps[:, n:, :n], maps[:, n:, n:]
     sines = np.linalg.eigvals(b.swapaxes(1, 2) @ c).astype(complex)
@@ -247,7 +262,7 @@ def _conservative_exponents(batch: Oscillators, tolerance: float, backend: str) 
     return 2 * half / batch.period[:, None]
 
 
-def floquet_exponents(*system: Any, tolerance: float = 1e-8, backend: str = "auto", **more: Any) -> np.ndarray:
+def floquet_exponents(*system: Any, tolerance: float = 1e-8, loop: Loop | None = None, **more: Any) -> np.ndarray:
     """Return all Floquet exponents, shape (..., 2N), largest real part first; arguments of :class:`Oscillators`.
 
     Their imaginary parts are fixed up to multiples of the excitation frequency and given between -1/2 and 1/2 of it.
@@ -255,22 +270,22 @@ def floquet_exponents(*system: Any, tolerance: float = 1e-8, backend: str = "aut
     batch, shape = Oscillators.of(*system, **more)
     period = batch.period[:, None]
     if batch.conservative:
-        growing = _conservative_exponents(batch, tolerance, backend)
+        growing = _conservative_exponents(batch, tolerance, loop)
         exponents = np.concatenate([growing, -growing], axis=-1)
     else:
-        maps = _maps(batch, 1.0, tolerance, backend)
+        maps = _maps(batch, 1.0, tolerance, loop)
         exponents = np.log(np.linalg.eigvals(maps).astype(complex)) / period
     order = np.lexsort((exponents.imag, -np.round(exponents.real * period, 9)), axis=-1)
     exponents = np.take_along_axis(exponents, order, axis=-1)
     return exponents.reshape(*shape, exponents.shape[-1])
 
 
-def growth_rate(*system: Any, tolerance: float = 1e-8, backend: str = "auto", **more: Any) -> np.ndarray:
+def growth_rate(*system: Any, tolerance: float = 1e-8, loop: Loop | None = None, **more: Any) -> np.ndarray:
     """Return max(0, largest real part of the exponents), shape (...); arguments of :class:`Oscillators`."""
     batch, shape = Oscillators.of(*system, **more)
     if batch.conservative:
-        rates = _conservative_exponents(batch, tolerance, backend).real.max(axis=-1)
+        rates = _conservative_exponents(batch, tolerance, loop).real.max(axis=-1)
     else:
-        multipliers = np.linalg.eigvals(_maps(batch, 1.0, tolerance, backend))
+        multipliers = np.linalg.eigvals(_maps(batch, 1.0, tolerance, loop))
         rates = np.log(np.abs(multipliers).max(axis=-1)) / batch.period
     return np.maximum(rates, 0.0).reshape(shape)

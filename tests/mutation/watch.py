@@ -117,7 +117,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "arm/stability": _STABILITY[::-1],
     "arm/zones": _STABILITY,
     "model/oscillator": [["tests/model/test_oscillator.py"], ["tests/arm/test_response.py"]],
-    "solvers/_floquet_compiled": [[f"{_LANES[0]}::test_floquet"]],
+    "solvers/floquet_lanes": [[f"{_LANES[0]}::test_floquet"]],
     "solvers/certificates": [["tests/arm/test_certification.py"]],
     "solvers/coupled_modes": [_COUPLED],
     "solvers/driven_modes": [_COUPLED, ["tests/arm/test_response.py"]],

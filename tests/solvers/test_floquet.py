@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -166,36 +163,6 @@ def test_growth_is_that_of_the_fastest_exponent(decay, skew):
     at = int(growth.argmax())
     hill = hill_exponents([1.0, 2.2], coupling[0], varpi[at], 0.4, decay, harmonics=12)
     assert growth[at] == pytest.approx(hill[0].real, rel=1e-6)
-
-
-@pytest.mark.parametrize("decay", [0.0, 0.02])
-def test_compiled_path_is_the_numpy_path(decay):
-    omega, coupling = np.array([1.0, 2.2]), np.array([[[1.0, 0.5], [0.5, -0.7]], [[0.1, 0.0], [0.0, 0.2]]])
-    given = (omega, coupling, np.linspace(0.7, 6.0, 70)[:, None], np.linspace(0.0, 0.6, 3), decay, [0.1, 0.3])
-    plain = floquet.monodromy(*given, backend="numpy")
-    assert np.allclose(floquet.monodromy(*given, backend="numba"), plain, rtol=1e-11, atol=1e-11)
-
-
-def test_works_without_numba():
-    code = (
-        "import sys; sys.modules['numba'] = None\n"
-        "import numpy as np\n"
-        "from cra_sym.solvers import floquet\n"
-        "r = floquet.growth_rate([1.0], [[[1.0]]], np.linspace(1.9, 2.1, 2500), 0.1)\n"
-        "print(r.max() > 0.02, 'sympy' in sys.modules)\n"
-        "try: floquet.growth_rate([1.0], [[[1.0]]], 2.0, 0.1, backend='numba')\n"
-        "except ValueError as error: print(error)\n"
-    )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert run.stdout.splitlines() == [
-        "True False",
-        "backend = 'numba': Numba is not installed; allowed are 'auto' and 'numpy'",
-    ]
-
-
-def test_unknown_backend():
-    with pytest.raises(ValueError, match="backend = 'fortran'"):
-        floquet.growth_rate([1.0], [[[1.0]]], 2.0, 0.1, backend="fortran")
 
 
 def test_too_few_harmonics_are_refused():
