@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
 
-__all__ = ["broadcastable", "count", "instance", "one_axis", "real_array"]
+__all__ = ["broadcastable", "choice", "count", "instance", "mapping", "one_axis", "real_array", "shown"]
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
+    """Return a value as errors show it: in one line, and not a long one."""
     text = " ".join(repr(value).split())
     return text if len(text) <= 80 else text[:77] + "..."
 
@@ -32,7 +34,7 @@ def real_array(
     name : str
         Field name used in the error.
     value : array_like
-        Real numbers; strings, booleans, complex numbers and ragged sequences are refused.
+        Real numbers; strings, booleans, complex numbers, ragged sequences and masked elements are refused.
     low, high : float
         Inclusive bounds (``open_low`` excludes ``low`` itself).
     allow_infinite : bool
@@ -53,16 +55,17 @@ def real_array(
     )
     try:
         raw = np.asarray(value)
-    except (ValueError, TypeError):
-        raise TypeError(f"{name} = {_shown(value)}: allowed are {allowed}") from None
-    if raw.dtype.kind not in "iuf":
-        raise TypeError(f"{name} = {_shown(value)}: allowed are {allowed}")
-    array = raw.astype(np.float64)
+    except Exception as error:  # whatever an object does when it is asked for its numbers
+        raise TypeError(f"{name} = {shown(value)}: allowed are {allowed}") from error
+    if raw.dtype.kind not in "iuf" or np.ma.is_masked(value):
+        raise TypeError(f"{name} = {shown(value)}: allowed are {allowed}")
+    with np.errstate(over="ignore"):
+        array = raw.astype(np.float64)
     good = (array > low if open_low else array >= low) & (array <= high)  # NaN fails both
     if not allow_infinite:
         good &= np.isfinite(array)
     if not good.all():
-        raise ValueError(f"{name} = {_shown(array[~good].flat[0].item())}: allowed are {allowed}")
+        raise ValueError(f"{name} = {shown(array[~good].flat[0].item())}: allowed are {allowed}")
     return array
 
 
@@ -78,14 +81,14 @@ def count(name: str, value: Any, *, low: int = 1, high: int | None = None) -> in
     """Return ``value`` as an int within ``[low, high]``, or raise an error that names the field."""
     allowed = f"an integer of at least {low}" if high is None else f"an integer from {low} to {high}"
     if isinstance(value, (bool, np.bool_)):
-        raise TypeError(f"{name} = {_shown(value)}: allowed is {allowed}")
+        raise TypeError(f"{name} = {shown(value)}: allowed is {allowed}")
     try:
         number = operator.index(value)
     except TypeError:
         kind = ValueError if isinstance(value, (float, np.floating)) else TypeError
-        raise kind(f"{name} = {_shown(value)}: allowed is {allowed}") from None
+        raise kind(f"{name} = {shown(value)}: allowed is {allowed}") from None
     if number < low or (high is not None and number > high):
-        raise ValueError(f"{name} = {_shown(number)}: allowed is {allowed}")
+        raise ValueError(f"{name} = {shown(number)}: allowed is {allowed}")
     return number
 
 
@@ -93,7 +96,22 @@ def instance(name: str, value: Any, kind: type) -> None:
     """Raise a ``TypeError`` that names the field unless ``value`` is of the class ``kind``."""
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
-        raise TypeError(f"{name} = {_shown(value)}: allowed is {article} {kind.__name__}")
+        raise TypeError(f"{name} = {shown(value)}: allowed is {article} {kind.__name__}")
+
+
+def choice(name: str, value: Any, allowed: Collection[str]) -> str:
+    """Return ``value``, which is one of some words, or raise an error that names the field and the words."""
+    if isinstance(value, str) and value in allowed:
+        return value
+    words = " and ".join(map(repr, allowed)) if len(allowed) < 3 else ", ".join(allowed)
+    raise (ValueError if isinstance(value, str) else TypeError)(f"{name} = {shown(value)}: allowed are {words}")
+
+
+def mapping(name: str, value: Any, entries: str) -> Mapping[Any, Any]:
+    """Return a mapping, an empty one for None, or raise an error that names the field and its entries."""
+    if value is not None and not isinstance(value, Mapping):
+        raise TypeError(f"{name} = {shown(value)}: allowed is a mapping from {entries}")
+    return {} if value is None else value
 
 
 def broadcastable(**arrays: np.ndarray) -> tuple[int, ...]:

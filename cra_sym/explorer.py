@@ -123,8 +123,9 @@ class Explorer:
         if unknown:
             raise TypeError(f"{', '.join(sorted(unknown))}: allowed names are {', '.join(_RANGES)}")
         for name, value in values.items():
-            if np.ndim(value):
-                raise ValueError(f"{name} has shape {np.shape(value)}: allowed is one number")
+            shape = real_array(name, value, allow_infinite=True).shape
+            if shape:
+                raise ValueError(f"{name} has shape {shape}: allowed is one number")
         self._given.replace(**{name: values[name] for name in _ARM if name in values})
         BaseMotion(**{_MOTION[name]: values[name] for name in _MOTION if name in values})
         if "epsilon" in values:

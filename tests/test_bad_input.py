@@ -29,7 +29,25 @@ ATTACKS = (
 NUMBERS = (0.0, -0.0, -1.0, 1.0, 1e300, -1e300, 1e-300, 5e-324, np.nan, np.inf, -np.inf, 2**70, 10**400, 1 + 2j)
 SHAPES = ((), [], [[]], [1.0, 2.0], [[1.0], [2.0]], [1.0, [2.0]], np.ones((0, 3)), np.zeros((2, 1, 2)))
 OBJECTS = (None, True, "1", b"1", {}, {"k_t": 1}, object(), int, len, np.array(["a"]), np.datetime64("now"), ...)
-ANYTHING = (*ATTACKS, *NUMBERS, *SHAPES, *OBJECTS)
+
+
+class Hostile:
+    """An object that refuses to be an array in its own way."""
+
+    def __array__(self, *_, **__):
+        raise RuntimeError("not me")
+
+
+STRANGERS = (
+    np.ma.masked_array([1.0, 2.0], mask=[False, True]),
+    np.longdouble("1e400"),
+    np.array([None, 1.0]),
+    np.array([1.0, 2.0, 3.0]),
+    Hostile(),
+    10**9,
+    "x" * 10**5,
+)
+ANYTHING = (*ATTACKS, *NUMBERS, *SHAPES, *OBJECTS, *STRANGERS)
 
 ARM = cra.Arm.nominal().replace(k_t=1e3, k_r=50.0, zeta=0.01)
 SPRING = cra.JointStiffness(k_t=1.0)

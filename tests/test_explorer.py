@@ -148,7 +148,7 @@ def test_without_the_extra_a_picture_and_an_error_that_names_it(monkeypatch):
         ({"k": 1.0}, "k: allowed names"),
         ({"k_t": -1.0}, "k_t"),
         ({"k_t": [1.0, 2.0]}, r"k_t has shape \(2,\)"),
-        ({"B": np.nan}, "amplitude"),
+        ({"B": np.nan}, "B = nan"),
         ({"epsilon": 0.0}, "epsilon"),
         ({"arm": cra.Arm.nominal().replace(k_t=[1.0, 2.0])}, r"arm has shape \(2,\)"),
         ({"arm": 3}, "arm"),

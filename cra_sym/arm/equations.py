@@ -23,6 +23,8 @@ from importlib import import_module
 from operator import index
 from typing import Any, Literal
 
+from cra_sym.checks import shown
+
 __all__ = ["Equation", "checks", "equation", "equations", "numbered"]
 
 Number = int | str
@@ -201,10 +203,13 @@ def equation(number: Number) -> Equation:
     >>> equation(1).kind, equation(5).derived_from
     ('definition', (2, 3, 4, 6, '16c'))
     """
+    if isinstance(number, bool):
+        raise TypeError(f"number = {number}: allowed are integers, or strings such as '11a'")
     if not isinstance(number, str):
-        if isinstance(number, bool) or not hasattr(number, "__index__"):
-            raise TypeError(f"number = {number!r}: allowed are integers, or strings such as '11a'")
-        number = index(number)
+        try:
+            number = index(number)
+        except TypeError:
+            raise TypeError(f"number = {shown(number)}: allowed are integers, or strings such as '11a'") from None
     elif number.isdecimal():
         number = int(number)
     if number not in _EQUATIONS:
@@ -215,7 +220,7 @@ def equation(number: Number) -> Equation:
         companions = [key for key in _EQUATIONS if isinstance(key, str)]
         whole = [key for key in _EQUATIONS if isinstance(key, int)]
         also = f", and {', '.join(map(repr, sorted(companions, key=_order)))}" if companions else ""
-        raise ValueError(f"number = {number!r}: allowed are {min(whole)} to {max(whole)}{also}") from None
+        raise ValueError(f"number = {shown(number)}: allowed are {min(whole)} to {max(whole)}{also}") from None
 
 
 def equations(*, companions: bool = False) -> tuple[Equation, ...]:

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import instance, real_array
+from cra_sym.checks import choice, instance, real_array
 from cra_sym.kernels import derived_kernel
 
 __all__ = ["frequency_response"]
@@ -81,8 +81,7 @@ def frequency_response(
     for name, value in (("angular_frequency", Omega), ("x", places)):
         if value.ndim > 1:
             raise ValueError(f"{name} has shape {value.shape}: allowed are a number or one axis")
-    if damping not in ("modal", "structural"):
-        raise ValueError(f"damping = {damping!r}: allowed are 'modal' and 'structural'")
+    choice("damping", damping, ("modal", "structural"))
     scale = _column(arm, arm.angular_frequency_scale)
     ratio, xi = np.broadcast_to(arm.zeta, arm.shape)[..., None], np.atleast_1d(places) / _column(arm, arm.L)
     xi = np.where(x is None, 1.0, xi)

@@ -12,7 +12,7 @@ from cra_sym.arm.analysis import ModalParameters, arm_modes
 from cra_sym.arm.modal import COMPLIANCES, INERTIAS, SPRINGS, Modes
 from cra_sym.arm.parameters import Arm
 from cra_sym.arm.spectrum import pair
-from cra_sym.checks import count
+from cra_sym.checks import choice, count
 from cra_sym.kernels import derived_kernel
 
 __all__ = ["Sensitivities", "sensitivities", "squared_frequency_rate"]
@@ -146,8 +146,7 @@ def sensitivities(arm: Arm, modes: int = 3, *, method: Literal["modal", "implici
     >>> print(found.log_k_t.round(4), found.log_k_r.round(4))
     [0.0173 0.2076 0.204 ] [0.0089 0.0047 0.    ]
     """
-    if method not in ("modal", "implicit"):
-        raise ValueError(f"method = {method!r}: allowed are 'modal' and 'implicit'")
+    choice("method", method, ("modal", "implicit"))
     found = arm_modes(arm, count("modes", modes))
     modal = ModalParameters(arm, found)
     known = _by_modes(arm, found) if method == "modal" else _by_rates(arm, modal, _implicit(arm, modal))

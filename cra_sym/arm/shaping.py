@@ -11,6 +11,8 @@ from cra_sym.checks import broadcastable, count, real_array
 
 __all__ = ["input_shaper"]
 
+_MOST_IMPULSES = 50
+
 
 def input_shaper(angular_frequency: Any, zeta: Any = 0.0, order: int = 1) -> tuple[np.ndarray, np.ndarray]:
     """Return amplitudes and times of the zero-vibration shaper of a mode, for :meth:`BaseMotion.shaped`.
@@ -26,6 +28,7 @@ def input_shaper(angular_frequency: Any, zeta: Any = 0.0, order: int = 1) -> tup
     zeta : array_like
         Damping ratio, in [0, 1).
     order : int
+        At most 50.
 
     Returns
     -------
@@ -42,7 +45,7 @@ def input_shaper(angular_frequency: Any, zeta: Any = 0.0, order: int = 1) -> tup
     omega = real_array("angular_frequency", angular_frequency, low=1e-300)
     ratio = real_array("zeta", zeta, low=0.0, high=np.nextafter(1.0, 0.0), allowed="real numbers in [0, 1)")
     broadcastable(angular_frequency=omega, zeta=ratio)
-    order = count("order", order)
+    order = count("order", order, high=_MOST_IMPULSES)
     root = np.sqrt(1 - ratio**2)
     decay = np.exp(-np.pi * ratio / root)[..., None]
     steps = np.arange(order + 1)

@@ -201,7 +201,9 @@ def forced_width(arm: Arm, excitation: TransverseBase, modes: int = 3) -> np.nda
         m/s.
     """
     if not isinstance(excitation, TransverseBase):
-        raise TypeError(f"excitation = {excitation!r}: allowed is a TransverseBase; the others have stability_boundary")
+        raise TypeError(
+            f"excitation = {checks.shown(excitation)}: allowed is a TransverseBase; the others have stability_boundary"
+        )
     checks.instance("arm", arm, Arm)
     checks.broadcastable(arm=np.empty(arm.shape), amplitude=np.empty(excitation.shape))
     modal = modal_parameters(arm, checks.count("modes", modes))
@@ -216,7 +218,7 @@ def _parametric(excitation: Any) -> Parametric:
             "see forced_width"
         )
     if not isinstance(excitation, JointStiffness | AxialBase):
-        raise TypeError(f"excitation = {excitation!r}: allowed are JointStiffness and AxialBase")
+        raise TypeError(f"excitation = {checks.shown(excitation)}: allowed are JointStiffness and AxialBase")
     return excitation
 
 
@@ -230,12 +232,12 @@ def _resonance(resonance: Any, modes: int) -> tuple[int, int]:
     try:
         first, second = resonance
     except (TypeError, ValueError):
-        raise ValueError(f"resonance = {resonance!r}: {allowed}") from None
+        raise ValueError(f"resonance = {checks.shown(resonance)}: {allowed}") from None
     sign = -1 if isinstance(second, int | np.integer) and second < 0 else 1
     try:
         first, second = checks.count("m", first, high=modes), sign * checks.count("n", sign * second, high=modes)
     except (TypeError, ValueError):
-        raise ValueError(f"resonance = {resonance!r}: {allowed}") from None
+        raise ValueError(f"resonance = {checks.shown(resonance)}: {allowed}") from None
     if first == -second:
         raise ValueError(f"resonance = {resonance!r}: {allowed}; the difference of a mode with itself is no frequency")
     # which of the two is named first does not matter; omega_m - omega_n is to be positive

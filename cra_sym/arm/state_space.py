@@ -9,7 +9,7 @@ import numpy as np
 
 from cra_sym.arm.analysis import modal_parameters
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import count, instance
+from cra_sym.checks import choice, count, instance
 
 __all__ = ["state_space"]
 
@@ -49,19 +49,18 @@ def state_space(
     from scipy.signal import StateSpace
 
     instance("arm", arm, Arm)
+    choice("input", input, ("base_acceleration", "drive_force"))
     if arm.shape:
         raise ValueError(f"arm has shape {arm.shape}: allowed is a single arm")
     p = modal_parameters(arm, count("modes", modes))
     if input == "base_acceleration":
         mass, stiffness, damping = np.eye(modes), np.diag(p.omega**2), np.diag(2 * float(arm.zeta) * p.omega)
         push, tip = -p.participation, p.tip_displacement
-    elif input == "drive_force":
+    else:
         whole = arm.m_b + arm.m_e + arm.rhoA * arm.L
         mass = np.block([[np.array([[whole]]), p.participation[None]], [p.participation[:, None], np.eye(modes)]])
         stiffness, damping = (np.diag([0.0, *d]) for d in (p.omega**2, 2 * float(arm.zeta) * p.omega))
         push, tip = np.eye(modes + 1)[0], np.array([0.0, *p.tip_displacement])
-    else:
-        raise ValueError(f"input = {input!r}: allowed are 'base_acceleration' and 'drive_force'")
     size = push.size
     accelerations = np.linalg.solve(mass, np.hstack([-stiffness, -damping, push[:, None]]))
     A = np.vstack([np.hstack([np.zeros((size, size)), np.eye(size)]), accelerations[:, :-1]])

@@ -13,7 +13,7 @@ from cra_sym.arm.parameters import Arm
 from cra_sym.arm.response import oscillators, residual_vibration
 from cra_sym.arm.sensitivity import squared_frequency_rate
 from cra_sym.arm.spectrum import pair
-from cra_sym.checks import count
+from cra_sym.checks import count, shown
 from cra_sym.solvers.driven_modes import state_at_stop
 from cra_sym.solvers.modal_response import Oscillators, free_peak
 from cra_sym.solvers.motion import BaseMotion
@@ -71,7 +71,7 @@ def residual_vibration_gradient(
     """
     known = isinstance(by, Sequence) and not isinstance(by, str)
     if not known or not all(isinstance(name, str) and name in _NAMES for name in by):
-        raise ValueError(f"by = {by!r}: allowed is a sequence of {', '.join(_NAMES)}")
+        raise ValueError(f"by = {shown(by)}: allowed is a sequence of {', '.join(_NAMES)}")
     value = residual_vibration(arm, motion, modes, zeta=zeta)
     p = modal_parameters(arm, count("modes", modes))
     peak, stretched = _unit_peaks(oscillators(arm, p, p.tip_displacement[..., None, :], zeta), motion)

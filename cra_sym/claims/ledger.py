@@ -7,6 +7,7 @@ from importlib import import_module
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from cra_sym.checks import choice
 from cra_sym.claims.registry import ENTRIES, Entry
 from cra_sym.claims.setting import Setting
 from cra_sym.claims.verdict import OUTCOMES, THEMES, Verdict
@@ -28,9 +29,7 @@ def _load() -> tuple[str, ...]:
 
 
 def _entry(id: str) -> Entry:
-    if id not in _load():
-        raise ValueError(f"claim = {id!r}: allowed are {', '.join(_load())}")
-    return ENTRIES[id]
+    return ENTRIES[choice("claim", id, _load())]
 
 
 @cache

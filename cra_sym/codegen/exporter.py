@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from cra_sym.checks import choice, shown
 from cra_sym.codegen.expressions import gauss_rule, modal_functions, spectrum_functions, stability_functions
 from cra_sym.codegen.languages import LANGUAGES, Language
 from cra_sym.codegen.program import Function
@@ -75,9 +76,11 @@ def export(language: str, directory: str | Path, model: Any = None, overwrite: b
     ValueError
         If the language is unknown, the folder is not empty, or the model has no real closed form. Nothing is written.
     """
-    if language not in LANGUAGES:
-        raise ValueError(f"language = {language!r}: allowed are {', '.join(LANGUAGES)}")
-    target = Path(os.path.realpath(directory))
+    choice("language", language, LANGUAGES)
+    try:
+        target = Path(os.path.realpath(directory))
+    except TypeError:
+        raise TypeError(f"directory = {shown(directory)}: allowed is a path") from None
     _check_free(target, overwrite)
     texts = _arm_texts(language) if model is None else model_texts(language, model)
     digest = _digest(texts)

@@ -9,6 +9,8 @@ from importlib.resources import files
 from inspect import cleandoc, signature
 from typing import TYPE_CHECKING, Any
 
+from cra_sym.checks import choice
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -60,8 +62,7 @@ def draw(name: str, arm: Arm | None = None) -> Figure:
     ValueError
         If there is no such figure, or an arm is given to one that shows none.
     """
-    if name not in FIGURES:
-        raise ValueError(f"figure = {name!r}: allowed are {', '.join(FIGURES)}")
+    choice("figure", name, FIGURES)
     if arm is not None and not shows_an_arm(name):
         raise ValueError(f"figure = {name!r}: it shows no arm, so none can be given")
     from matplotlib import style
@@ -83,8 +84,7 @@ def animate(name: str) -> str:
     ValueError
         If there is no such animation.
     """
-    if name not in ANIMATIONS:
-        raise ValueError(f"animation = {name!r}: allowed are {', '.join(ANIMATIONS)}")
+    choice("animation", name, ANIMATIONS)
     return _function(name)()
 
 

@@ -17,6 +17,8 @@ from sympy.printing.numpy import NumPyPrinter, SciPyPrinter
 from sympy.printing.precedence import PRECEDENCE
 from sympy.simplify.cse_main import tree_cse
 
+from cra_sym.checks import shown
+
 __all__ = ["check_arguments", "module_source", "shared_steps"]
 
 Layout = Any  # (): one expression; (2, 2): a matrix; [layouts]: a sequence; {name: layout}: a mapping
@@ -109,11 +111,11 @@ def check_arguments(arguments: Any) -> tuple[sp.Symbol, ...]:
     if isinstance(arguments, sp.Symbol):
         return (arguments,)
     if not isinstance(arguments, Iterable) or isinstance(arguments, str):
-        raise TypeError(f"arguments = {arguments!r}: allowed is a sequence of SymPy symbols")
+        raise TypeError(f"arguments = {shown(arguments)}: allowed is a sequence of SymPy symbols")
     symbols = tuple(arguments)
     for symbol in symbols:
         if not isinstance(symbol, sp.Symbol):
-            raise TypeError(f"argument {symbol!s}: allowed are SymPy symbols; substitute one for it in the expression")
+            raise TypeError(f"argument {shown(symbol)}: allowed are SymPy symbols; substitute one for it")
     twice = {s.name for k, s in enumerate(symbols) if s in symbols[:k]}
     if twice:
         raise ValueError(f"arguments come twice: {', '.join(sorted(twice))}")
@@ -170,7 +172,7 @@ def _flatten(expression: Any) -> tuple[Layout, list[sp.Expr]]:
         expression = sp.sympify(expression, strict=True)
     if not isinstance(expression, sp.Expr):
         raise TypeError(
-            f"expression = {expression!r}: allowed are SymPy expressions, matrices, sequences or dicts of them"
+            f"expression = {shown(expression)}: allowed are SymPy expressions, matrices, sequences or dicts of them"
         )
     return (), [expression]
 

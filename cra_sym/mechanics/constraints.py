@@ -40,6 +40,13 @@ class Elimination:
         """Return (pivot, factor) for the pivots that move with ``displacement``."""
         return [(pivot, row[displacement]) for pivot, row in self.factors.items() if displacement in row]
 
+    def check_homogeneous(self, label: str) -> None:
+        """Refuse a prescribed displacement, where only the motions that the conditions leave free are computed."""
+        for jet, offset in self.offsets.items():
+            if offset != 0:
+                given = f"{self.space.form(jet)} = {self.space.write(self.value(jet) or S.Zero)}"
+                raise HamiltonError(f"{label}: essential, {given}: allowed is 0; measure the displacement from there")
+
     def check_effective(self, term: Expr, label: str) -> None:
         """Refuse an end term that the essential conditions make constant: it contradicts them."""
         space, values = self.space, {}

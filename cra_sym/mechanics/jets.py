@@ -38,7 +38,9 @@ from sympy import (
 )
 from sympy.core.function import AppliedUndef, Derivative, UndefinedFunction
 
-__all__ = ["END_NAMES", "End", "HamiltonError", "Jet", "JetSpace", "grouped", "listed"]
+from cra_sym.checks import shown
+
+__all__ = ["END_NAMES", "End", "HamiltonError", "Jet", "JetSpace", "grouped", "listed", "scalar"]
 
 End = Literal["left", "right"]
 END_NAMES: tuple[End, End] = ("left", "right")
@@ -53,9 +55,20 @@ class HamiltonError(ValueError):
 
 def listed(name: str, values: Any) -> tuple[Any, ...]:
     """Return ``values`` as a tuple, or raise an error that names the argument."""
-    if isinstance(values, str) or not isinstance(values, Iterable):
-        raise TypeError(f"{name} = {values!r}: allowed is a sequence such as [{values}]")
+    if isinstance(values, str | bytes) or not isinstance(values, Iterable) or getattr(values, "ndim", 1) != 1:
+        raise TypeError(f"{name} = {shown(values)}: allowed is a sequence such as [{shown(values)}]")
     return tuple(values)
+
+
+def scalar(name: str, value: Any) -> Expr:
+    """Return ``value`` as an expression, or raise an error that names the argument; no text is read."""
+    try:
+        expression = sympify(value, strict=True)
+    except Exception:  # whatever an object does when it is asked for its number
+        expression = None
+    if not isinstance(expression, Expr) or expression.is_Matrix:  # type: ignore[attr-defined]
+        raise TypeError(f"{name} = {shown(value)}: allowed is a scalar SymPy expression")
+    return expression
 
 
 class Jet(NamedTuple):
@@ -93,29 +106,33 @@ class JetSpace:
     ) -> None:
         self.fields, self.coordinates = listed("fields", fields), listed("coordinates", coordinates)
         self.x, self.t = x, t
-        self._check_symbols()
+        prescribed = listed("prescribed", prescribed)
+        self._check_symbols(prescribed)
         self.unknowns = (*self.fields, *self.coordinates)
-        ends = tuple(sympify(end, strict=True) for end in listed("domain", domain))
+        ends = tuple(scalar("domain", end) for end in listed("domain", domain))
         if len(ends) != 2 or ends[0] == ends[1] or any(end.has(x, t) for end in ends):
             raise HamiltonError(f"domain = {domain}: allowed are two different end coordinates free of {x} and {t}")
         self.ends: dict[End, Expr] = dict(zip(END_NAMES, ends, strict=True))
-        self.known = {function.func for function in listed("prescribed", prescribed)}
+        self.known = {function.func for function in prescribed}
         self._heads = {unknown.func: number for number, unknown in enumerate(self.unknowns)}
         if len(self._heads) != len(self.unknowns):
             raise HamiltonError(f"fields and coordinates {self.unknowns}: each may be named once only")
         self._symbols: dict[Jet, Dummy] = {}
         self._jets: dict[Dummy, Jet] = {}
 
-    def _check_symbols(self) -> None:
+    def _check_symbols(self, prescribed: tuple[Any, ...]) -> None:
         for name, value in (("x", self.x), ("t", self.t)):
             if not isinstance(value, Symbol):
-                raise TypeError(f"{name} = {value!r}: allowed is a SymPy symbol")
+                raise TypeError(f"{name} = {shown(value)}: allowed is a SymPy symbol")
+        for function in prescribed:
+            if not isinstance(function, AppliedUndef):
+                raise TypeError(f"prescribed: {shown(function)}: allowed is an undefined function, such as w(t)")
         kinds = (("fields", self.fields, {self.x, self.t}), ("coordinates", self.coordinates, {self.t}))
         for name, functions, allowed in kinds:
             for function in functions:
                 if not isinstance(function, AppliedUndef):
                     raise TypeError(
-                        f"{name}: {function!r}: allowed is an undefined function of {allowed}, such as v(x, t)"
+                        f"{name}: {shown(function)}: allowed is an undefined function of {allowed}, such as v(x, t)"
                     )
                 if set(function.args) != allowed or len(function.args) != len(allowed):
                     raise HamiltonError(
@@ -217,11 +234,7 @@ class JetSpace:
         HamiltonError
             Names the term and the reason.
         """
-        if expression is None or isinstance(expression, str):
-            raise TypeError(f"{label} = {expression!r}: allowed is a SymPy expression")
-        expression = sympify(expression, strict=True)
-        if not isinstance(expression, Expr):
-            raise TypeError(f"{label} = {expression}: allowed is a scalar SymPy expression")
+        expression = scalar(label, expression)
         return Add(*(self._read_term(term, place, label) for term in Add.make_args(expression)))
 
     def _read_term(self, term: Expr, place: Any, label: str) -> Expr:

@@ -188,10 +188,7 @@ class _Mesh:
         self.weak, self.elements = weak, elements
         if max(weak.powers, default=0) > 2:
             raise HamiltonError("ritz: more than two time derivatives; there is no mass matrix")
-        for jet, offset in weak.variation.elimination.offsets.items():
-            if offset != 0:
-                place = weak.variation.space.form(jet)
-                raise HamiltonError(f"ritz: {place} = {offset} is prescribed; take the displacement relative to it")
+        weak.variation.elimination.check_homogeneous("ritz")
         self.space = weak.variation.space
         self.step, self.begin = step, begin
         self.sizes = [max(order, 2) for order in weak.variation.orders]

@@ -8,6 +8,7 @@ from typing import Literal
 
 from sympy import Add, Expr, S, expand_mul
 
+from cra_sym.checks import shown
 from cra_sym.mechanics.constraints import Elimination, eliminate
 from cra_sym.mechanics.jets import END_NAMES, End, HamiltonError, Jet, JetSpace
 
@@ -90,11 +91,11 @@ def _read_work(space: JetSpace, triple: VirtualWork) -> list[tuple[Expr, Jet, bo
     try:
         force, displacement, place = triple
     except (TypeError, ValueError):
-        raise HamiltonError(f"virtual_work: {triple} is not a triple (force, displacement, place)") from None
-    if place not in (*END_NAMES, "domain", None):
-        raise HamiltonError(f"virtual_work: place = {place!r}: allowed are 'left', 'right', 'domain' and None")
+        raise HamiltonError(f"virtual_work: {shown(triple)} is not a triple (force, displacement, place)") from None
+    if not (place is None or isinstance(place, str)) or place not in (*END_NAMES, "domain", None):
+        raise HamiltonError(f"virtual_work: place = {shown(place)}: allowed are 'left', 'right', 'domain' and None")
     where = "ends" if place is None else place
-    label = f"virtual work of {force} on {displacement}"
+    label = f"virtual work of {shown(force)} on {shown(displacement)}"
     moved = space.read(displacement, where, label)  # type: ignore[arg-type]
     ends = {jet.place for jet in space.jets(moved) if jet.place is not None}
     if where == "ends" and len(ends) == 1:

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from sympy import Expr
 
+from cra_sym.checks import shown
 from cra_sym.mechanics import StateForm
 from cra_sym.solvers.shapes import states
 from cra_sym.solvers.stiffness import DynamicStiffness
@@ -24,8 +25,8 @@ def driven_displacement(form: StateForm, drive: Expr, ends: tuple[Expr, Expr]) -
     """
     left, right = ([displacement.subs(form.x, end) for displacement in form.displacements] for end in ends)
     order = [*left, *form.coordinates, *right]
-    if drive not in order:
-        raise ValueError(f"drive = {drive}: allowed are {', '.join(map(str, order))}")
+    if not isinstance(drive, Expr) or drive not in order:
+        raise ValueError(f"drive = {shown(drive)}: allowed are {', '.join(map(str, order))}")
     place = order.index(drive)
     if form.free[place, :].is_zero_matrix:
         raise ValueError(f"drive = {drive}: an essential condition holds it still")

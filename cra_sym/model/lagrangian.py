@@ -10,7 +10,7 @@ import numpy as np
 from sympy import Expr, S, Symbol, sympify
 from sympy.core.function import AppliedUndef
 
-from cra_sym.checks import count, one_axis, real_array
+from cra_sym.checks import choice, count, one_axis, shown
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics import HamiltonResult, Modal, StateForm, hamilton, ritz, separate, state_form
 from cra_sym.mechanics.jets import Jet, listed
@@ -22,7 +22,7 @@ from cra_sym.model.projection import modal_basis
 from cra_sym.model.response import History, oscillation
 from cra_sym.model.spatial import SpatialProblem, shares
 from cra_sym.model.symmetry import asymmetry, odd_in_time
-from cra_sym.model.units import check_dimensions
+from cra_sym.model.units import check_dimensions, named_units
 from cra_sym.model.values import Values, parameters
 from cra_sym.solvers.driven_modes import Start
 from cra_sym.solvers.eigenvalues import lowest, refine
@@ -31,6 +31,7 @@ from cra_sym.solvers.shapes import mode_states
 __all__ = ["Model"]
 
 _TAU = 2.0 * np.pi
+_MOST_MODES, _MOST_DERIVATIVES = 1000, 20
 
 
 class Model:
@@ -48,7 +49,7 @@ class Model:
     left, right : Expr, optional
         Lagrangian of each end, in ``v(x, t)`` and its derivatives, understood at that end. Nothing means a free end.
     essential : sequence of Expr, optional
-        What vanishes at an end, such as ``v.subs(x, 0)``.
+        What vanishes at an end, such as ``v.subs(x, 0)``. Measure a field from a displacement that is given.
     coordinates : sequence of applied undefined functions, optional
         Lumped coordinates ``w(t)``.
     prescribed : sequence of applied undefined functions, optional
@@ -56,8 +57,8 @@ class Model:
     virtual_work : sequence of (force, displacement, place), optional
         Non-conservative forces; place is 'left', 'right' or 'domain'.
     units : mapping, optional
-        Units of symbols that are not those of ``cra_sym.symbols``, such as ``{c: "N s/m"}``. Every term whose symbols
-        all have a known unit must be an energy (per length in the density).
+        Units of symbols of the model that are not those of ``cra_sym.symbols``, such as ``{c: "N s/m"}``. Every term
+        whose symbols all have a known unit must be an energy (per length in the density).
 
     Raises
     ------
@@ -115,11 +116,13 @@ class Model:
         """Equations of motion, boundary conditions and the steps that led there."""
         stated = ((f"{end} end", self._options[end]) for end in ("left", "right"))
         ends = {label: sympify(term, strict=True) for label, term in stated if term is not None}
-        check_dimensions(sympify(density, strict=True), ends, units or {}, self._virtual_work)
+        self.equations.variation.elimination.check_homogeneous("Model")
         given = [density, *self._options["domain"], *self._options["essential"], *ends.values()]
         given += [part for force, displacement, _ in self._virtual_work for part in (force, displacement)]
         self.symbols: tuple[Symbol, ...] = parameters(given, self.equations)
         """The parameters: every symbol but x and t, by name."""
+        units = named_units(units, [*given, *self._options["fields"], *self._options["coordinates"]])
+        check_dimensions(sympify(density, strict=True), ends, units, self._virtual_work)
 
     def __repr__(self) -> str:
         unknowns = ", ".join(map(str, (*self.equations.fields, *self.equations.coordinates)))
@@ -216,7 +219,7 @@ class Model:
             If a value is missing, unknown or not allowed; if the structure has buckled under its static load; if it
             has fewer natural frequencies.
         """
-        modes = count("modes", modes)
+        modes = count("modes", modes, high=_MOST_MODES)
         given = Values.read(self.symbols, values)
         squares = np.empty((given.columns.shape[1], modes))
         for rows, _, problem in self._spatial.problems(given):
@@ -247,7 +250,7 @@ class Model:
         ArithmeticError
             If a refinement does not settle.
         """
-        modes = count("modes", modes)
+        modes = count("modes", modes, high=_MOST_MODES)
         if not self.state_form.damped and not asymmetry(self.state_form):
             return 1j * _TAU * self.natural_frequencies(values, modes)
         given = Values.read(self.symbols, values)
@@ -282,7 +285,7 @@ class Model:
         ----------
         values : mapping
         x_values : array_like, shape (stations,)
-            Within the domain.
+            Within the domain; a single place makes one station.
         modes : int
         field : applied undefined function, optional
             Default: the first.
@@ -293,9 +296,12 @@ class Model:
         -------
         ndarray, shape (..., modes, stations)
         """
-        modes, derivative = count("modes", modes), count("derivative", derivative, low=0)
+        modes, derivative = (
+            count("modes", modes, high=_MOST_MODES),
+            count("derivative", derivative, low=0, high=_MOST_DERIVATIVES),
+        )
         wanted, given = self._field(field), Values.read(self.symbols, values)
-        x = np.atleast_1d(real_array("x_values", x_values))
+        x = np.atleast_1d(one_axis("x_values", x_values, "places"))
         place = self._conservative.displacements.index(wanted)
         shapes = np.empty((given.columns.shape[1], modes, len(x)))
         for rows, left, problem in self._spatial.problems(given):
@@ -335,13 +341,12 @@ class Model:
         -------
         ndarray of complex, shape (..., n, stations)
         """
-        if kind not in ("force", "motion"):
-            raise ValueError(f"kind = {kind!r}: allowed are 'force' and 'motion'")
+        choice("kind", kind, ("force", "motion"))
         form, given = self.state_form, Values.read(self.symbols, values)
         place = form.displacements.index(self._field(field))
         driven = driven_displacement(form, drive, self.equations.domain)
-        omega = np.atleast_1d(real_array("angular_frequency", angular_frequency))
-        x = np.atleast_1d(real_array("x_values", x_values))
+        omega = np.atleast_1d(one_axis("angular_frequency", angular_frequency, "frequencies"))
+        x = np.atleast_1d(one_axis("x_values", x_values, "places"))
         found = np.empty((given.columns.shape[1], len(omega), len(x)), dtype=complex)
         for rows, left, problem in self._damped.problems(given):
             row = np.repeat(np.arange(len(rows)), len(omega))
@@ -400,14 +405,14 @@ class Model:
         ValueError
             Names the load without a history, or the function that is not at rest, known or allowed.
         """
-        modes = count("modes", modes)
+        modes = count("modes", modes, high=_MOST_MODES)
         wanted, given = self._field(field), Values.read(self.symbols, values)
         places = np.empty(()) if x is None else one_axis("x", x, "places")
         basis = modal_basis(self._spatial, given, modes, None if x is None else np.atleast_1d(places))
         shape = Jet(self.equations.fields.index(wanted), 0, 0, None)
         rows = basis.values(shape)[..., basis.places]
         weak = weak_form(self.equations.variation)
-        found = oscillation(basis, weak, motion or {}, rows, given.shape, t, derivative, zeta, start, initial or {})
+        found = oscillation(basis, weak, motion, rows, given.shape, t, derivative, zeta, start, initial)
         found = found if places.ndim else found[..., 0, :]
         return found if np.ndim(t) else found[..., 0]
 
@@ -425,13 +430,13 @@ class Model:
 
     def _field(self, field: AppliedUndef | None) -> AppliedUndef:
         wanted = self.equations.fields[0] if field is None else field
-        if wanted not in self.equations.fields:
-            raise ValueError(f"field = {field}: allowed are {', '.join(map(str, self.equations.fields))}")
+        if not isinstance(wanted, AppliedUndef) or wanted not in self.equations.fields:
+            raise ValueError(f"field = {shown(field)}: allowed are {', '.join(map(str, self.equations.fields))}")
         return wanted
 
     def modal_parameters(self, values: Mapping[Any, Any], modes: int = 3) -> Modes:
         """Return frequencies with the mass-normalised displacements and natural forces of both ends."""
-        modes = count("modes", modes)
+        modes = count("modes", modes, high=_MOST_MODES)
         given = Values.read(self.symbols, values)
         n, m = len(self._conservative.displacements), len(self._conservative.coordinates)
         omega = np.empty((given.columns.shape[1], modes))

@@ -9,7 +9,7 @@ import numpy as np
 from sympy import Derivative, Expr, S, sympify
 from sympy.core.function import AppliedUndef
 
-from cra_sym.checks import broadcastable, real_array
+from cra_sym.checks import broadcastable, mapping, real_array, shown
 from cra_sym.kernels import derived_kernel
 from cra_sym.mechanics.jets import Jet
 from cra_sym.mechanics.weak import WeakForm
@@ -30,19 +30,21 @@ _forced = derived_kernel("cra_sym.model.oscillator:forced_kernel", backend="nump
 def oscillation(
     basis: ModalBasis,
     weak: WeakForm,
-    histories: Mapping[AppliedUndef, History],
+    motion: Mapping[AppliedUndef, History] | None,
     rows: np.ndarray,
     shape: tuple[int, ...],
     t: Any,
     derivative: int,
     zeta: Any,
     start: Start,
-    initial: Mapping[Expr, Expr],
+    initial: Mapping[Expr, Expr] | None,
 ) -> np.ndarray:
     """Return the outputs ``rows`` (rows, modes, outputs) of the driven modes, shape (*shape, outputs, times)."""
     modes = basis.z.shape[1]
     damping = basis.damping(weak.inside, weak.ends)
     check_start(start)
+    histories = mapping("motion", motion, "functions of t to BaseMotion or Force")
+    initial = mapping("initial", initial, "fields and coordinates to expressions in x")
     ratio = np.atleast_1d(
         real_array("zeta", zeta, low=0.0, high=np.nextafter(1.0, 0.0), allowed="real numbers in [0, 1)")
     )
@@ -115,7 +117,7 @@ def _loads(weak: WeakForm, histories: Mapping[AppliedUndef, History]) -> Iterato
         if function not in histories:
             raise ValueError(f"motion: no history for {function}; allowed are a Force or a BaseMotion")
         if not isinstance(histories[function], Force | BaseMotion):
-            raise TypeError(f"motion: {function} = {histories[function]!r}: allowed are a Force or a BaseMotion")
+            raise TypeError(f"motion: {function} = {shown(histories[function])}: allowed are a Force or a BaseMotion")
         force = isinstance(histories[function], Force)
         cause = function if force else function.diff(space.t, 2)
         for term in (term for load in loads for e in load.values() for term in e.as_ordered_terms()):

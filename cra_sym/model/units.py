@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from sympy import Add, Expr, expand
+from sympy import Add, Expr, expand, sympify
 from sympy.core.function import AppliedUndef
 
 from cra_sym import symbols as table
+from cra_sym.checks import mapping, shown
 from cra_sym.symbols import Dimension
 
-__all__ = ["check_dimensions"]
+__all__ = ["check_dimensions", "named_units"]
 
 ENERGY = Dimension(2, 1, -2)
 ENERGY_PER_LENGTH = Dimension(1, 1, -2)
@@ -39,8 +40,6 @@ def check_dimensions(
     ValueError
         Names the term, its dimension and the dimension it should have.
     """
-    if not isinstance(units, Mapping):
-        raise TypeError(f"units = {units!r}: allowed is a mapping from symbols to units")
     declared = {_name(key): table.unit_dimension(unit) for key, unit in units.items()}
     for label, expression, wanted in (
         ("density", density, ENERGY_PER_LENGTH),
@@ -63,8 +62,20 @@ def check_dimensions(
                 )
 
 
+def named_units(units: Mapping[Any, str] | None, expressions: Iterable[Any]) -> Mapping[Any, str]:
+    """Return the units, or refuse one of what does not occur in the expressions."""
+    units = mapping("units", units, "symbols to units")
+    given = [sympify(expression, strict=True) for expression in expressions]
+    known = {_name(atom) for e in given for atom in (*e.atoms(AppliedUndef), *e.free_symbols)}
+    for key in units:
+        if _name(key) not in known:
+            names = ", ".join(sorted(known))
+            raise ValueError(f"units: {shown(_name(key))} does not occur in the model; it has {names}")
+    return units
+
+
 def _name(key: Any) -> str:
-    return key if isinstance(key, str) else key.func.__name__ if isinstance(key, AppliedUndef) else key.name
+    return key.func.__name__ if isinstance(key, AppliedUndef) else getattr(key, "name", str(key))
 
 
 def _dimension(term: Expr, declared: Mapping[str, Dimension]) -> Dimension | None:

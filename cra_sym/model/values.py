@@ -11,7 +11,7 @@ import numpy as np
 from sympy import Add, Expr, Symbol, sympify
 from sympy.core.function import AppliedUndef
 
-from cra_sym.checks import broadcastable, real_array
+from cra_sym.checks import broadcastable, real_array, shown
 from cra_sym.mechanics import HamiltonResult
 
 __all__ = ["Values", "parameters"]
@@ -38,7 +38,7 @@ class Values:
         """Match values to symbols; each error names the symbol."""
         symbols = tuple(symbols)
         if not isinstance(given, Mapping):
-            raise TypeError(f"values = {given!r}: allowed is a mapping from symbols or their names to numbers")
+            raise TypeError(f"values = {shown(given)}: allowed is a mapping from symbols or their names to numbers")
         by_name = {symbol.name: symbol for symbol in symbols}
         found: dict[str, np.ndarray] = {}
         for key, value in given.items():

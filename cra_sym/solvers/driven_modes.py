@@ -6,7 +6,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from ..checks import broadcastable, count, instance, one_axis
+from ..checks import broadcastable, choice, count, instance, one_axis
 from . import modal_response as solver
 from .motion import BaseMotion, Harmonic, Piecewise
 
@@ -64,8 +64,7 @@ def checked(motion: Any, t: Any, derivative: Any, start: Any) -> tuple[np.ndarra
 
 def check_start(start: Any) -> None:
     """Raise an error that names the start unless it is allowed."""
-    if start not in get_args(Start):
-        raise ValueError(f"start = {start!r}: allowed are {' and '.join(map(repr, get_args(Start)))}")
+    choice("start", start, get_args(Start))
 
 
 def _column(value: Any) -> np.ndarray:

@@ -12,6 +12,7 @@ import numpy as np
 
 import cra_sym as cra
 from cra_sym.arm.parameters import Arm
+from cra_sym.checks import choice
 
 __all__ = ["ARM_FIELDS", "QUANTITIES", "Quantity", "named_quantity"]
 
@@ -122,6 +123,4 @@ def named_quantity(quantity: str | Callable[..., Any]) -> Quantity:
     if callable(quantity):
         name = getattr(quantity, "__name__", type(quantity).__name__)
         return Quantity(name, quantity, "", (inspect.getdoc(quantity) or name).splitlines()[0])
-    if quantity not in QUANTITIES:
-        raise ValueError(f"quantity = {quantity!r}: allowed are {', '.join(QUANTITIES)}, or a function of an arm")
-    return QUANTITIES[quantity]
+    return QUANTITIES[choice("quantity", quantity, QUANTITIES)]

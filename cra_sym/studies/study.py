@@ -11,7 +11,7 @@ from tqdm import tqdm
 
 import cra_sym as cra
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import instance
+from cra_sym.checks import instance, real_array
 from cra_sym.extras import require
 from cra_sym.studies.quantities import ARM_FIELDS, Quantity, named_quantity
 from cra_sym.symbols import nomenclature
@@ -112,15 +112,13 @@ def make_study(arm: Arm, quantity: str | Callable[..., Any], parameters: Mapping
     fields = {name: value for name, value in parameters.items() if name in ARM_FIELDS}
     options = {name: value for name, value in parameters.items() if name not in fields}
     chosen.check_options(list(options))
-    axes = {}
-    for name, value in parameters.items():
-        if np.ndim(value) and (name in fields or name in chosen.axes):
-            axes[name] = np.asarray(value)
-            if axes[name].ndim != 1 or axes[name].size == 0:
-                raise ValueError(f"{name}: an array of shape {np.shape(value)}; allowed are one-dimensional, not empty")
-    for name, value in fields.items():
-        arm = arm.replace(**{name: value})  # checks every value, alone: axes need not broadcast
-        arm = arm.replace(**{name: np.ravel(value)[0]})
+    swept = {name: getattr(arm.replace(**{name: value}), name) for name, value in fields.items()}  # checked alone
+    swept |= {name: real_array(name, value) for name, value in options.items() if name in chosen.axes}
+    axes = {name: np.asarray(swept[name]) for name in parameters if np.ndim(swept.get(name, 0.0))}
+    for name, values in axes.items():
+        if values.ndim != 1 or values.size == 0:
+            raise ValueError(f"{name}: an array of shape {values.shape}; allowed are one-dimensional, not empty")
+    arm = arm.replace(**{name: np.ravel(swept[name])[0] for name in fields})
     options = {name: value for name, value in options.items() if name not in axes}
     corner = _evaluated(arm, chosen, {name: axis[:1] for name, axis in axes.items()}, options)
     lengths = corner.shape[len(axes) :]

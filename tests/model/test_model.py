@@ -229,8 +229,15 @@ def test_units_given_by_the_user_are_checked_and_unknown_ones_are_not():
 @pytest.mark.parametrize(
     ("units", "error", "message"),
     [
-        ({"k": "furlong/s"}, ValueError, "unit = 'furlong/s': 'furlong' is not one of 1, rad, m"),
-        ({"k": 3}, TypeError, "unit = 3"),
+        ({"rho": "furlong/s"}, ValueError, "unit = 'furlong/s': 'furlong' is not one of 1, rad, m"),
+        ({"rho": 3}, TypeError, "unit = 3"),
+        (
+            {"rhoo": "kg/m^3"},
+            ValueError,
+            "units: 'rhoo' does not occur in the model; it has A, E, I_z, L, rho, t, v, x",
+        ),
+        ({sp.Symbol("k"): "N/m"}, ValueError, "units: 'k' does not occur"),
+        ({3: "N/m"}, ValueError, "units: '3' does not occur"),
         (["N/m"], TypeError, r"units = \['N/m'\]: allowed is a mapping"),
     ],
 )
@@ -267,3 +274,75 @@ def test_separation_says_what_it_cannot_do():
     with pytest.raises(ValueError, match="ritz"):
         tapered.separate()
     assert (np.diff(tapered.natural_frequencies(VALUES)) > 0).all()
+
+
+AXIS = "allowed are a number or one axis of"
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda m: m.mode_shapes(VALUES, [[0.1, 0.2]]), rf"x_values has shape \(1, 2\): {AXIS} places"),
+        (
+            lambda m: m.frequency_response(VALUES, [[1.0]], 0.5, drive=v.subs(x, L)),
+            rf"frequency has shape .*: {AXIS} freq",
+        ),
+        (
+            lambda m: m.frequency_response(VALUES, 1.0, [[0.5]], drive=v.subs(x, L)),
+            rf"x_values has shape .*: {AXIS} places",
+        ),
+        (lambda m: m.response(VALUES, None, 0.0, [[0.5]]), rf"x has shape \(1, 1\): {AXIS} places"),
+        (lambda m: m.natural_frequencies(VALUES, modes=10**6), "modes = 1000000: allowed is an integer from 1 to 1000"),
+        (
+            lambda m: m.mode_shapes(VALUES, 0.5, derivative=10**6),
+            "derivative = 1000000: allowed is an integer from 0 to",
+        ),
+        (
+            lambda m: m.mode_shapes(VALUES, 0.5, field=np.zeros(2)),
+            r"field = array\(\[0., 0.\]\): allowed are v\(x, t\)",
+        ),
+        (
+            lambda m: m.frequency_response(VALUES, 1.0, 0.5, drive=np.zeros(2)),
+            r"drive = array.*: allowed are v\(0, t\)",
+        ),
+        (
+            lambda m: m.frequency_response(VALUES, 1.0, 0.5, drive=v.subs(x, L), kind=np.zeros(2)),
+            "kind = array.* allowed are",
+        ),
+        (
+            lambda m: m.response(VALUES, np.zeros(2), 0.0, 0.5),
+            "motion = array.*: allowed is a mapping from functions of t",
+        ),
+        (
+            lambda m: m.response(VALUES, None, 0.0, 0.5, initial=np.zeros(2)),
+            "initial = array.*: allowed is a mapping from",
+        ),
+    ],
+)
+def test_arguments_of_a_wrong_shape_or_kind_are_named(arm, call, message):
+    with pytest.raises((TypeError, ValueError), match=message):
+        call(arm)
+
+
+class Hostile:
+    """An object that refuses to be a number in its own way."""
+
+    def __float__(self):
+        raise RuntimeError("not me")
+
+
+@pytest.mark.parametrize("stranger", [[1], np.zeros(2), Hostile(), b"1", len, sp.Matrix([1, 2]), int, {}])
+@pytest.mark.parametrize("place", ["density", "left", "domain", "essential", "prescribed", "fields", "virtual_work"])
+def test_what_is_no_expression_is_named(place, stranger):
+    one = {"density": stranger, "left": stranger, "domain": (0, stranger), "virtual_work": [(stranger, v, "left")]}
+    with pytest.raises((TypeError, ValueError), match=f"^{place.replace('_', '.')}.*allowed"):
+        model(**{place: one.get(place, [stranger])})
+
+
+@pytest.mark.parametrize("given", [1, sp.Function("y")(t)])
+def test_a_displacement_that_is_given_is_refused(given):
+    """Frequencies do not depend on it, but a response would, and would be silent about it."""
+    with pytest.raises(
+        ValueError, match=r"essential, v\(0, t\) = .*: allowed is 0; measure the displacement from there"
+    ):
+        model(left=None, essential=[v.subs(x, 0) - given])

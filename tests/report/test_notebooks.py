@@ -1,6 +1,7 @@
 """The runner: executes in place, stores no trace of the machine, and says which cell failed."""
 
 import os
+from concurrent.futures import CancelledError
 
 import nbformat
 import pytest
@@ -53,6 +54,14 @@ def test_notebooks_run_side_by_side_and_a_failure_ends_them_all(notebook, tmp_pa
     with pytest.raises(NotebookError, match="no such arm"):
         refresh([broken, *slow])
     assert {path: path.read_bytes() for path in slow} == before
+
+
+def test_a_run_can_be_ended_in_the_middle_of_a_cell(notebook):
+    path = notebook("1", "import time\ntime.sleep(1000)")
+    before, ends = path.read_bytes(), []
+    with pytest.raises(CancelledError):
+        execute(path, lambda: ends[0](), begun=ends.append)
+    assert path.read_bytes() == before
 
 
 def test_the_file_itself_is_left_alone(notebook):
