@@ -14,6 +14,8 @@ from cra_sym.solvers.stiffness import DynamicStiffness
 
 __all__ = ["driven_displacement", "steady_states"]
 
+_MOST_LEVELS = 22  # four million pieces
+
 
 def driven_displacement(form: StateForm, drive: Expr, ends: tuple[Expr, Expr]) -> int:
     """Return the position of a displacement in the order (q(left), w, q(right)).
@@ -44,8 +46,18 @@ def steady_states(
     """Return the complex state (q, w, P) for a unit force on, or a unit motion of, one displacement.
 
     A prescribed motion is the force that produces it, divided by what that force does.
+
+    Raises
+    ------
+    ValueError
+        If the waves are too short to follow, or an infinite stiffness holds what is driven.
     """
-    here = problem.evaluate(parameter, row, keep_tree=True)
+    levels = problem.levels(parameter, row)
+    if levels.max(initial=0) > _MOST_LEVELS:
+        raise ValueError(
+            "angular_frequency: allowed are those whose waves are no shorter than a millionth of the domain"
+        )
+    here = problem.evaluate(parameter, row, keep_tree=True, levels=levels)
     assert here.tree is not None
     drive = here.tree.scale[:, place, None] * here.unit[:, place, :]
     if (drive == 0.0).all(axis=1).any():

@@ -345,7 +345,7 @@ class Model:
         form, given = self.state_form, Values.read(self.symbols, values)
         place = form.displacements.index(self._field(field))
         driven = driven_displacement(form, drive, self.equations.domain)
-        omega = np.atleast_1d(one_axis("angular_frequency", angular_frequency, "frequencies"))
+        omega = np.atleast_1d(one_axis("angular_frequency", angular_frequency, "frequencies", low=-1e60, high=1e60))
         x = np.atleast_1d(one_axis("x_values", x_values, "places"))
         found = np.empty((given.columns.shape[1], len(omega), len(x)), dtype=complex)
         for rows, left, problem in self._damped.problems(given):

@@ -14,6 +14,7 @@ from concurrent.futures import CancelledError, ThreadPoolExecutor, as_completed
 from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
@@ -134,18 +135,24 @@ def execute(
         on_notebook_start=lambda **_: client.kc.execute(_SVG_TOO, silent=True, store_history=False) if svg else None,
         on_cell_executed=lambda **_: advance() if advance is not None else None,
     )
+    ended = Event()
 
     async def run() -> None:
         loop, task = asyncio.get_running_loop(), asyncio.current_task()
-        if begun is not None and task is not None:
-            begun(lambda: loop.call_soon_threadsafe(task.cancel))
+
+        def end() -> None:
+            ended.set()
+            loop.call_soon_threadsafe(task.cancel)  # type: ignore[union-attr]
+
+        if begun is not None:
+            begun(end)
         await client.async_execute(cleanup_kc=True)  # it ends the kernels of its own managers only, unless told
 
     try:
         asyncio.run(run())
-    except asyncio.CancelledError:
-        raise CancelledError from None
-    except (CellExecutionError, CellTimeoutError, DeadKernelError) as error:
+    except (asyncio.CancelledError, CellExecutionError, CellTimeoutError, DeadKernelError) as error:
+        if ended.is_set():
+            raise CancelledError from None
         raise NotebookError(f"{path.name} did not run: {strip_ansi(str(error))}") from None
     _normalise(notebook)
     return notebook

@@ -44,7 +44,10 @@ class Quantity:
 
     def check_options(self, given: list[str]) -> None:
         """Raise a TypeError that names an option the function does not take, or one that it needs."""
-        parameters = list(inspect.signature(self.function).parameters.values())[1:]
+        try:
+            parameters = list(inspect.signature(self.function).parameters.values())[1:]
+        except ValueError:  # a built-in function that does not say
+            return
         if any(p.kind is p.VAR_KEYWORD for p in parameters):
             return
         allowed = [p.name for p in parameters]

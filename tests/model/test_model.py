@@ -292,6 +292,14 @@ AXIS = "allowed are a number or one axis of"
             rf"x_values has shape .*: {AXIS} places",
         ),
         (lambda m: m.response(VALUES, None, 0.0, [[0.5]]), rf"x has shape \(1, 1\): {AXIS} places"),
+        (
+            lambda m: m.frequency_response(VALUES, 1e20, 0.5, drive=v.subs(x, L)),
+            "angular_frequency: allowed are those whose",
+        ),
+        (
+            lambda m: m.frequency_response(VALUES, 1e99, 0.5, drive=v.subs(x, L)),
+            r"angular_frequency = 1e\+99: allowed are",
+        ),
         (lambda m: m.natural_frequencies(VALUES, modes=10**6), "modes = 1000000: allowed is an integer from 1 to 1000"),
         (
             lambda m: m.mode_shapes(VALUES, 0.5, derivative=10**6),
