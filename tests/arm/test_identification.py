@@ -46,6 +46,20 @@ def test_the_covariance_is_that_of_repeated_measurements():
     assert np.mean([np.sum(e.residuals**2) for e in estimates]) == pytest.approx(2.0, rel=0.6)  # 4 data, 2 unknowns
 
 
+def test_the_covariance_is_the_inverse_of_what_the_shapes_tell():
+    """Fisher information from the forces the joint carries: a give in the joint costs each mode their square."""
+    true, sigma = NOMINAL.replace(L=0.8, k_t=2e3, k_r=40.0), np.array([0.002, 0.01, 0.02])
+    estimate = cra.identify_joint(NOMINAL.replace(L=0.8), cra.natural_frequencies(true), sigma)
+    modal = cra.modal_parameters(true)
+    slopes = np.stack([modal.root_shear**2, modal.root_moment**2], -1) / (4 * np.pi * modal.omega * sigma)[:, None]
+    expected = np.linalg.inv(slopes.T @ slopes)
+    assert estimate.compliance_covariance == pytest.approx(expected, rel=1e-6)
+    square = np.array([2e3, 40.0]) ** 2
+    assert estimate.covariance == pytest.approx(expected * np.outer(square, square), rel=1e-6)
+    relative = np.sqrt(np.diag(expected)) * [2e3, 40.0]
+    assert estimate.log_standard_deviation == pytest.approx(relative, rel=1e-6)
+
+
 def test_one_frequency_tells_only_a_combination():
     with pytest.warns(IdentifiabilityWarning, match="do not tell k_t and k_r apart: what they tell is 1/k_t"):
         estimate = cra.identify_joint(NOMINAL, [2.3], 0.01)
@@ -106,10 +120,11 @@ def number_after(words, text):
     return float(re.search(re.escape(words) + r" ?([-+.e\d]+)", text)[1])
 
 
-def test_the_combination_one_frequency_tells_is_the_one_the_shapes_say():
+@pytest.mark.parametrize(("measured", "sigma"), [([3.0], 0.01), ([3.0, 21.0], [0.01, 1e3])])
+def test_the_combination_one_frequency_tells_is_the_one_the_shapes_say(measured, sigma):
     """By Rayleigh's principle a give of the joint costs half the square of the force it carries, over the energy."""
     with pytest.warns(IdentifiabilityWarning) as caught:
-        estimate = cra.identify_joint(NOMINAL.replace(L=0.8), [3.0], 0.01)
+        estimate = cra.identify_joint(NOMINAL.replace(L=0.8), measured, sigma)
     told = str(caught[0].message)
     fitted = NOMINAL.replace(L=0.8, k_t=estimate.k_t, k_r=estimate.k_r)
     modal = cra.modal_parameters(fitted, 1)

@@ -252,3 +252,13 @@ def test_bad_input_is_named(arguments, error, words):
 def test_residual_vibration_needs_a_stop():
     with pytest.raises(ValueError, match="never stops"):
         cra.residual_vibration(NOMINAL, BaseMotion(acceleration=0.1))
+
+
+def test_a_slow_mode_vibrates_after_the_stop_too():
+    """However slow, it is no rigid-body mode: what is left is the largest displacement of the next period."""
+    arm, move = Arm.nominal().replace(k_t=0.02), BaseMotion.trapezoid(0.5, 1.0, 2.0)
+    omega = cra.modal_parameters(arm, 1).omega[0]
+    assert omega < 0.5
+    t = move.duration + np.linspace(0, 2 * np.pi / omega, 2001)
+    largest = np.abs(cra.tip_response(arm, move, t, modes=1)).max()
+    assert cra.residual_vibration(arm, move, modes=1) == pytest.approx(largest, rel=1e-5)

@@ -2,7 +2,8 @@
 
 Each mutant runs the checks and tests that watch over its module, quickest first, in a process of its own. What became
 of them goes to ``results``, a file a module: counts with the seed, and every survivor with the reason why it may
-survive. One without a reason is a hole in the suite, and the exit code says so. A run continues the one before it.
+survive. One without a reason is a hole in the suite, and the exit code says so. A run continues the one before it. A
+mutant takes some 4 s of processor time, a survivor more: all of them 7 hours, ``--sample 10`` three quarters of one.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ def main() -> int:
     parser.add_argument("modules", nargs="*", metavar="MODULE", help="such as arm/energy (all)")
     parser.add_argument("--sample", type=int, metavar="N", help="the first N of a module, in random order (all)")
     parser.add_argument("--seed", type=int, default=20261122, help="of the order (%(default)s)")
+    parser.add_argument("--again", action="store_true", help="do not continue the run before: start anew")
     parser.add_argument("--holes", action="store_true", help="only survivors without a reason, again")
     parser.add_argument("--checks", action="store_true", help="only the checks of its own equations, no tests")
     parser.add_argument("--results", type=Path, default=RESULTS, metavar="DIR", help="where verdicts go")
@@ -42,7 +44,7 @@ def main() -> int:
 def _examine(laboratory: Laboratory, module: str, options: argparse.Namespace) -> int:
     """Examine a module's mutants, or some; return how many survive without a reason."""
     source, mutants = laboratory.mutants(module)
-    record = Record(options.results, module, source, mutants, options.seed)
+    record = Record(options.results, module, source, mutants, options.seed, again=options.again)
     if options.holes:
         for mutant in record.unexplained():
             record.close(mutant, *_verdict(laboratory, module, mutant))

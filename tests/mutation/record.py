@@ -35,16 +35,20 @@ class Record:
         All of it.
     seed : int
         Of the order.
+    again : bool
+        Whether to start anew in any case.
     """
 
-    def __init__(self, directory: Path, module: str, source: str, mutants: list[Mutant], seed: int) -> None:
+    def __init__(
+        self, directory: Path, module: str, source: str, mutants: list[Mutant], seed: int, *, again: bool = False
+    ) -> None:
         self._file = directory / f"{module}.json"
         known = json.loads(self._file.read_text(encoding="utf-8")) if self._file.exists() else {}
         self._reasons = {_change(s): s["reason"] for s in known.get("survivors", [])}
         self._order = random.Random(f"{seed} {module}").sample(mutants, len(mutants))
         fresh = {"code": _digest(source), "seed": seed, "mutants": len(mutants)}
         counts = {"tried": 0, **{verdict.name.lower(): 0 for verdict in Verdict}, "survivors": []}
-        same = all(known.get(name) == value for name, value in fresh.items())
+        same = not again and all(known.get(name) == value for name, value in fresh.items())
         self._data: dict[str, Any] = known if same else {**fresh, **counts, "closed": known.get("closed", [])}
 
     def drawn(self, sample: int | None) -> list[Mutant]:
