@@ -61,7 +61,12 @@ _STIFFNESS = [
     ],
 ]
 _HILL = [
-    f"tests/solvers/test_floquet.py::test_{name}" for name in ("exponents_are_hills", "too_few_harmonics_are_refused")
+    f"tests/solvers/test_floquet.py::test_{name}"
+    for name in (
+        "exponents_are_hills",
+        "too_few_harmonics_are_refused",
+        "exponents_of_free_modes_in_whole_ratios_to_the_excitation",
+    )
 ]
 _FLOQUET = [
     _HILL[:1],

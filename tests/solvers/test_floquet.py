@@ -165,6 +165,16 @@ def test_growth_is_that_of_the_fastest_exponent(decay, skew):
     assert growth[at] == pytest.approx(hill[0].real, rel=1e-6)
 
 
+@pytest.mark.parametrize("parts", [5, 6, 8, 10, 12])
+def test_exponents_of_free_modes_in_whole_ratios_to_the_excitation(parts):
+    """The edges of a strip chosen without care would meet exponents, where rounding decides which of two counts."""
+    for number in range(1, parts):
+        omega = np.unique([3.0 * number / parts, 3.0 / parts])
+        found = hill_exponents(omega, np.zeros((omega.size,) * 2), 3.0, 0.0, harmonics=4)
+        turns = [np.exp(2 * np.pi / 3.0 * s) for s in (found, 1j * np.r_[omega, -omega])]
+        assert multipliers_apart(*turns) < 1e-6  # double ones are known to half the digits
+
+
 def test_too_few_harmonics_are_refused():
     with pytest.raises(ValueError, match="harmonics"):
         hill_exponents([1.0, 30.0], np.eye(2), 0.9, 0.1, harmonics=3)
