@@ -82,7 +82,6 @@ _FLOQUET = [
             "no_excitation_no_growth",
             "growth_is_that_of_the_fastest_exponent",
             "batch_equals_loop",
-            "unknown_backend",
         )
     ],
 ]
