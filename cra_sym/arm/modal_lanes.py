@@ -19,7 +19,7 @@ def fill(table, row, units, lam, kappa_t, kappa_r, mu, iota, start, stop):
 
     Each is multiplied by its entry in ``units`` (1 or arms, rows).
     """
-    arm, b, w = np.empty((14, _LANES)), np.empty(_LANES), np.empty((_ROWS, _LANES))
+    arm, b, w = np.empty((15, _LANES)), np.empty(_LANES), np.empty((_ROWS, _LANES))
     apart = 0 if units.shape[0] == 1 else 1
     for first in range(start, stop, _LANES):
         real = min(_LANES, stop - first)
@@ -59,6 +59,7 @@ def _prepare(arm, lane):
     arm[6, lane], arm[7, lane] = j / (1.0 + j), 1.0 / (1.0 + j)
     arm[10, lane], arm[11, lane] = 1.0 / m, 1.0 / j
     arm[12, lane], arm[13, lane] = np.sqrt(arm[0, lane] * arm[1, lane]), np.sqrt(arm[2, lane] * arm[3, lane])
+    arm[14, lane] = (0.5 + m) / (1.0 + m)  # from the joint to the centre of mass
 
 
 def _far(w, lam, arm, lane):
@@ -96,8 +97,7 @@ def _near(w, lam, number, arm, lane):
         )
     )  # fmt: skip
     free = (z == 0.0) & (s_t == 0.0) & (s_r == 0.0)
-    offset = 1.0 if number == 0 else -(0.5 + mu) * arm[5, lane]  # rotation is about the centre of mass
-    alpha = offset if free else alpha
+    alpha = (1.0 if number == 0 else -arm[14, lane]) if free else alpha  # rotation is about the centre of mass
     beta = (0.0 if number == 0 else 1.0) if free else beta
     tip, slope, moment, shear = tip_near(s_t, c_t, s_r, c_r, alpha, beta, z, k0, k1, k2, k3)
     tip, slope = _tip(tip, slope, moment, shear, lam, z, arm, lane)
