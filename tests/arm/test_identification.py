@@ -120,9 +120,10 @@ def number_after(words, text):
     return float(re.search(re.escape(words) + r" ?([-+.e\d]+)", text)[1])
 
 
-@pytest.mark.parametrize(("measured", "sigma"), [([3.0], 0.01), ([3.0, 21.0], [0.01, 1e3])])
-def test_the_combination_one_frequency_tells_is_the_one_the_shapes_say(measured, sigma):
+@pytest.mark.parametrize("sigma", [[0.01], [0.01, 1e3, 1e3]])
+def test_the_combination_one_frequency_tells_is_the_one_the_shapes_say(sigma):
     """By Rayleigh's principle a give of the joint costs half the square of the force it carries, over the energy."""
+    measured = cra.natural_frequencies(NOMINAL.replace(L=0.8, k_t=500.0, k_r=20.0), len(sigma))
     with pytest.warns(IdentifiabilityWarning) as caught:
         estimate = cra.identify_joint(NOMINAL.replace(L=0.8), measured, sigma)
     told = str(caught[0].message)

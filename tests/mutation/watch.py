@@ -36,6 +36,14 @@ _MODES = [
         "end_values_are_those_of_the_shapes",
     )
 ]
+_STATICS = [
+    f"tests/arm/test_stability.py::test_{name}"
+    for name in (
+        "sums_over_all_modes",
+        "the_zone_is_continuous_where_a_spring_vanishes",
+        "residual_flexibility_is_the_limit_of_many_modes",
+    )
+]
 _STABILITY = [["tests/arm/test_boundaries.py"], ["tests/arm/test_stability.py"]]
 _LANES = ["tests/arm/test_templates.py"]
 _STIFFNESS = [
@@ -112,7 +120,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "arm/operators": [],
     "arm/parameters": [["tests/arm/test_parameters.py", f"{_LAWS}::test_damping_may_come_close_to_critical"]],
     "arm/parametric": _STABILITY,
-    "arm/residual": [["tests/arm/test_response.py"]],
+    "arm/residual": [_STATICS, *_STABILITY],
     "arm/resonance": [],
     "arm/sensitivity": [["tests/arm/test_sensitivity.py"], [f"{_LAWS}::test_sensitivities_are_slopes_at_any_length"]],
     "arm/shapes": [_MODES, [_MODAL]],
