@@ -31,7 +31,7 @@ rng = np.random.default_rng(8)
 arms = cra.Arm.nominal().replace(
     k_t=10 ** rng.uniform(1, 6, 200), k_r=10 ** rng.uniform(0, 5, 200), m_e=rng.uniform(0, 0.1, 200)
 )
-many = cra.Arm.nominal().replace(k_t=np.geomspace(1e1, 1e6, 120_000))
+many = cra.Arm.nominal().replace(k_t=np.geomspace(1e1, 1e6, 140_000))
 soft = cra.Arm.nominal().replace(k_t=1e3)
 t, x = np.linspace(0.0, 2.0, 101), np.linspace(0.0, 1.0, 7)
 modal, slopes = cra.modal_parameters(arms), cra.sensitivities(arms)

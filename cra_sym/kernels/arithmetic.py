@@ -134,7 +134,10 @@ class Arithmetic:
     def known_to_numba(self, function: Any, arguments: Sequence[Any]) -> Any:
         """Return a function of doubles as Numba writes it."""
         typing = cpu_target.typing_context
-        kind = typing.resolve_value_type(function)
+        try:
+            kind = typing.resolve_value_type(function)
+        except ValueError as error:
+            raise errors.TypingError(f"{function} is unknown to Numba") from error
         found = typing.resolve_function_type(kind, (types.float64,) * len(arguments), {})
         if found is None or found.return_type != types.float64:
             raise errors.TypingError(f"{function} is no function of doubles")

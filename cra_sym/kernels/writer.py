@@ -193,7 +193,7 @@ class _Body(Arithmetic):
             for number in range(start, stop, step):
                 self.values[name] = number
                 self.run(body)
-            self.values.pop(name, None)
+                self.assign_name(name, number)
             return
         head, inside, following, after = map(self.builder.append_basic_block, ("head", "inside", "following", "after"))
         limit, before = self.typed(stop), self.builder.block

@@ -129,3 +129,18 @@ def test_without_numba_there_is_a_clear_error(monkeypatch):
     monkeypatch.undo()
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     assert not has_compiler()
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="the subprocess finds its cache by XDG_CACHE_HOME")
+def test_machine_code_without_a_place_or_for_two_at_once(private, monkeypatch):
+    both = [subprocess.Popen([sys.executable, "-c", PROCESS], stdout=-1, text=True) for _ in range(2)]
+    values = [process.communicate(timeout=120)[0].split()[2] for process in both]
+    assert not [path for path in private.iterdir() if path.suffix]  # no drafts are left
+    made = run()
+    assert values == [made[2]] * 2 and made[0] == "True" and made[3:] == ["0", "1"]
+    for path in private.iterdir():  # as if put there by somebody else
+        path.chmod(0o644)
+    assert run()[2:] == [made[2], "1", "0"]
+    (private.parent / "file").write_text("no directory")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(private.parent / "file"))
+    assert run() == ["False", "False", made[2], "1", "0"]
