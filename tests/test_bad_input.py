@@ -148,6 +148,14 @@ def test_work_without_end_is_refused(function, argument, value):
         call(function, **{argument: value})
 
 
+def test_times_without_a_phase_and_moves_without_an_end_are_refused():
+    """They came back as nan, one in silence, the other with a warning of NumPy's."""
+    with pytest.raises(ValueError, match=r"t = 1e\+308: allowed are real numbers in \[0, 1e\+15\]"):
+        call("tip_response", t=[0.1, 1e308])
+    with pytest.raises(ValueError, match="the move never ends"):
+        cra.BaseMotion.s_curve(0.1, 5e-324, 1.0, 5.0)
+
+
 @pytest.mark.parametrize("text", [*ATTACKS[:-2], "1e999", "nan", "-inf", "", "0x10", "1_0", "\u0661"])
 @pytest.mark.parametrize("option", ["--k-t", "--modes", "--L"])
 def test_the_command_line_refuses_or_computes(option, text, capsys, monkeypatch, tmp_path):

@@ -211,9 +211,13 @@ class BaseMotion:
         shapes = {"distance": d, "v_max": v_max, "a_max": a_max, "j_max": j_max}
         shape = broadcastable(**shapes, **({} if wanted is None else {"duration": wanted}))
         t_j, t_a, t_v = (np.broadcast_to(value, shape) for value in _fastest(np.abs(d), v_max, a_max, j_max))
+        least = 2 * (2 * t_j + t_a) + t_v
+        if not np.isfinite(least).all():
+            raise ValueError(
+                "v_max, a_max, j_max: the move never ends; allowed are limits that are not next to nothing"
+            )
         peak = _quotient(d, (t_j + t_a) * (2 * t_j + t_a + t_v))
         if wanted is not None:
-            least = 2 * (2 * t_j + t_a) + t_v
             _feasible(wanted, least, {"v_max": t_v > 0, "a_max": (t_a > 0) | np.isinf(j_max), "j_max": t_j > 0})
             stretch = np.where(least > 0, wanted / np.where(least > 0, least, 1.0), 1.0)
             t_j, t_a, t_v, peak = t_j * stretch, t_a * stretch, t_v * stretch, peak / stretch**2
