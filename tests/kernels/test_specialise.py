@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -144,3 +146,28 @@ def test_machine_code_without_a_place_or_for_two_at_once(private, monkeypatch):
     (private.parent / "file").write_text("no directory")
     monkeypatch.setenv("XDG_CACHE_HOME", str(private.parent / "file"))
     assert run() == ["False", "False", made[2], "1", "0"]
+
+
+def on_a_terminal(code):
+    """Return what a process writes to its standard error while that is a terminal."""
+    pty = pytest.importorskip("pty", reason="terminals are made the Unix way")
+    termios = pytest.importorskip("termios")
+    ours, theirs = pty.openpty()
+    termios.tcsetwinsize(theirs, (24, 120))
+    done = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.DEVNULL, stderr=theirs)
+    os.close(theirs)
+    shown = b""
+    with contextlib.suppress(OSError):  # the other end is closed
+        while part := os.read(ours, 1024):
+            shown += part
+    os.close(ours)
+    assert done.wait() == 0, shown.decode()
+    return shown.decode()
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="the subprocess finds its cache by XDG_CACHE_HOME")
+def test_a_terminal_is_told_what_takes_long(private):
+    derive = "from cra_sym.kernels import derived_kernel\nderived_kernel('cra_sym.arm.characteristic:basis').source\n"
+    shown = on_a_terminal(derive + PROCESS)
+    assert "deriving cra_sym.arm.characteristic:basis, once" in shown and "compiling at, once" in shown
+    assert on_a_terminal(derive + PROCESS) == ""

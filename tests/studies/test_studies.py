@@ -82,6 +82,16 @@ def test_a_stored_sweep_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
     assert rest == []
 
 
+def test_a_terminal_sees_how_far_a_sweep_is(tmp_path, monkeypatch, capsys):
+    def shown(terminal):
+        monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal, raising=False)
+        cra.sweep(cra.Arm.nominal(), tip_stiffness, k_t=K_T, m_e=M_E, chunks=2, store=tmp_path / f"{terminal}.zarr")
+        return capsys.readouterr().err
+
+    assert shown(False) == ""
+    assert "tip_stiffness" in (bar := shown(True)) and "4/4" in bar
+
+
 def test_a_store_of_another_sweep_is_not_touched(tmp_path):
     place = tmp_path / "study.zarr"
     cra.sweep(cra.Arm.nominal(), k_t=K_T, store=place)
