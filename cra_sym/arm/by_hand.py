@@ -6,14 +6,14 @@ Nothing here comes from a derivation. In units of the length and the bending sti
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import combinations
 
 from sympy import Expr, Matrix, cos, cosh, sin, sinh
 
-from cra_sym.mechanics.identities import vanishes
 from cra_sym.symbols import symbol
 
-__all__ = ["eliminated", "jets", "proportional", "root_rows", "tip_rows"]
+__all__ = ["eliminated", "jets", "joined", "minors", "root_rows", "tip_rows"]
 
 lamda, mu, iota = (symbol(name) for name in ("lamda", "mu", "iota"))
 s_t, c_t, s_r, c_r = (symbol(name) for name in ("s_t", "c_t", "s_r", "c_r"))
@@ -38,18 +38,25 @@ def tip_rows() -> Matrix:
     return Matrix.vstack(third + mu * lamda**4 * shape, curvature - iota * lamda**4 * slope)
 
 
+def joined(place: Expr) -> Matrix:
+    """Return displacement and three derivatives, at a place in units of the length, of any shape that satisfies the
+    conditions at the joint: at the joint they are 1, C_2, kappa_r C_2 and -kappa_t."""
+    turn = symbol("C_2")
+    start = Matrix([1, turn, symbol("kappa_r") * turn, -symbol("kappa_t")])
+    c, s, ch, sh = (function(lamda * place) for function in (cos, sin, cosh, sinh))
+    krylov = [(ch + c) / 2, (sh + s) / 2, (ch - c) / 2, (sh - s) / 2]
+    return Matrix(4, 4, lambda row, column: lamda ** (row - column) * krylov[(column - row) % 4]) * start
+
+
 def eliminated() -> Matrix:
     """Return the two conditions on C_1 and C_2 alone, by Cramer's rule: force and moment at the tip."""
     systems = [Matrix.vstack(root_rows(), tip_rows()[row, :]) for row in (0, 1)]
     return Matrix([[system[:, [first, 2, 3]].det() for first in (0, 1)] for system in systems])
 
 
-def proportional(rows: Matrix, others: Matrix) -> bool:
-    """Tell whether each row of a matrix is some row of another but for a factor, exactly: every minor vanishes."""
-
-    def same(one: Matrix, two: Matrix) -> bool:
-        columns = combinations(range(one.cols), 2)
-        return any(one) and all(vanishes(one[i] * two[j] - one[j] * two[i]) for i, j in columns)
-
-    used = {next((k for k in range(others.rows) if same(rows[r, :], others[k, :])), None) for r in range(rows.rows)}
-    return None not in used and len(used) == others.rows
+def minors(rows: Matrix, others: Matrix) -> Iterator[Expr | bool]:
+    """Yield what vanishes if each row of a matrix is that row of another but for a factor: every minor of the two."""
+    for one, two in ((rows[r, :], others[r, :]) for r in range(rows.rows)):
+        yield any(one)
+        for i, j in combinations(range(rows.cols), 2):
+            yield one[i] * two[j] - one[j] * two[i]

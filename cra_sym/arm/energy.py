@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 from sympy import Eq, Expr, Integral, Rational
 
-from cra_sym.arm.equations import checks, numbered
-from cra_sym.arm.evaluation import at, evaluate, put
+from cra_sym.arm.equations import Proof, numbered, proves
+from cra_sym.arm.evaluation import at, evaluate, put, termwise
 from cra_sym.arm.modal_sum import ModalSum
 from cra_sym.symbols import Dimension, dimension, symbol
 
@@ -44,11 +44,13 @@ def displacement() -> Eq:
     return Eq(y, w + v)
 
 
-@checks(1)
-def _() -> bool:
+@proves(1)
+def _() -> Proof:
     """Both sides are lengths; an arm that does not deform moves as its base, a base at rest leaves the deformation."""
     seen = displacement().rhs
-    return dimension(displacement()) == Dimension(m=1) and (seen.subs(v, 0), seen.subs(w, 0)) == (w, v)
+    yield dimension(displacement()) == Dimension(m=1)
+    yield seen.subs(v, 0) - w
+    yield seen.subs(w, 0) - v
 
 
 @numbered(2, "separation of variables", "assumption")
@@ -57,15 +59,18 @@ def separation() -> Eq:
     return Eq(v, ModalSum(phi_i * q_i))
 
 
-@checks(2)
-def _() -> bool:
+@proves(2)
+def _() -> Proof:
     """Both sides are lengths; one term is separable, v v_xt = v_x v_t, and a sum of two is not."""
     one, two = separation().rhs.members("i"), separation().rhs.members("i", "j")
 
     def coupling(shape: Expr) -> Expr:
-        return (shape * shape.diff(x, t) - shape.diff(x) * shape.diff(t)).expand()
+        return shape * shape.diff(x, t) - shape.diff(x) * shape.diff(t)
 
-    return dimension(separation()) == Dimension(m=1) and coupling(one) == 0 and coupling(two) != 0
+    yield dimension(separation()) == Dimension(m=1)
+    yield one - phi_i * q_i
+    yield coupling(one)
+    yield coupling(two).expand() != 0
 
 
 def single_mode(expression: Expr, shape: Expr = phi_i * q_i) -> Expr:
@@ -94,19 +99,20 @@ def kinetic_energy() -> Eq:
     return Eq(symbol("T"), _kinetic().total())
 
 
-@checks(3)
-def _() -> bool:
-    """An energy; an arm that does not deform has the kinetic energy of one mass, one that turns rigidly about a root at
-    rest that of its moment of inertia."""
-    moved = single_mode(kinetic_energy().rhs, x * 0).doit()
-    turned = single_mode(kinetic_energy().rhs, x * q_i).subs(w, 0).doit()
-    mass = m_b + m_e + rho * A * L
-    inertia = rho * A * L**3 / 3 + m_e * L**2 + J_e
-    return (
-        dimension(kinetic_energy()) == ENERGY
-        and (moved - mass * w.diff(t) ** 2 / 2).expand() == 0
-        and (turned - inertia * q_i.diff(t) ** 2 / 2).expand() == 0
-    )
+@proves(3)
+def _() -> Proof:
+    """An energy; an arm that turns rigidly about the root, which moves with the base, has the kinetic energy of its
+    mass, its static moment and its moment of inertia."""
+    turned = single_mode(kinetic_energy().rhs, x * q_i).doit()
+    mass, static, inertia = _rigid_body()
+    base, turn = w.diff(t), q_i.diff(t)
+    yield dimension(kinetic_energy()) == ENERGY
+    yield turned - (m_b + mass) * base**2 / 2 - static * base * turn - (inertia + J_e) * turn**2 / 2
+
+
+def _rigid_body() -> tuple[Expr, Expr, Expr]:
+    """Return mass, static moment and moment of inertia about the root of a strip with a point mass, by hand."""
+    return tuple(rho * A * L**n / n + m_e * L ** (n - 1) for n in (1, 2, 3))
 
 
 @numbered(4, "potential energy", "definition")
@@ -116,20 +122,16 @@ def potential_energy() -> tuple[Eq, Eq]:
     return Eq(symbol("U_b"), _potential(False).total()), Eq(symbol("U"), _potential(True).total())
 
 
-@checks(4)
-def _() -> bool:
-    """Energies; a straight arm stores energy in the joint alone, and a clamped one makes both forms equal."""
-    beam, full = (equation.rhs for equation in potential_energy())
-    give, turn = symbol("C_1") * L, symbol("C_2")
-    straight = [single_mode(energy, give + turn * x).doit() for energy in (beam, full)]
-    clamped = [single_mode(energy, x**2 / L).doit() for energy in (beam, full)]
-    springs = (k_t * give**2 + k_r * turn**2) / 2
-    return (
-        all(dimension(equation) == ENERGY for equation in potential_energy())
-        and straight[0] == 0
-        and (straight[1] - springs).expand() == 0
-        and clamped[0] == clamped[1] != 0
-    )
+@proves(4)
+def _() -> Proof:
+    """Energies; an arc of radius R stores E I L / (2 R^2) however it is displaced and turned at the joint, which stores
+    what springs do."""
+    give, turn, radius = symbol("C_1") * L, symbol("C_2"), symbol("h")
+    beam, full = (single_mode(e.rhs, give + turn * x + x**2 / (2 * radius)).doit() for e in potential_energy())
+    arc, springs = E * I_z * L / (2 * radius**2), (k_t * give**2 + k_r * turn**2) / 2
+    yield all(dimension(e) == ENERGY for e in potential_energy())
+    yield beam - arc
+    yield full - arc - springs
 
 
 # Modal masses and stiffnesses (6) ------------------------------------------------------------------------------
@@ -157,18 +159,16 @@ def generalised() -> tuple[Eq, Eq, Eq]:
     )
 
 
-@checks(6)
-def _() -> bool:
-    """Dimensions; a shape that translates has the arm's mass, twice, and the translational spring; one that turns about
-    the root has the moment of inertia, the static moment and the rotational spring."""
-    mass, static, inertia = (rho * A * L**n / n + m_e * L ** (n - 1) for n in (1, 2, 3))
-    moved = (mass, k_t, mass)
-    turned = (inertia + J_e, k_r, static)
-    return [dimension(e) for e in generalised()] == [Dimension(kg=1), Dimension(kg=1, s=-2), Dimension(kg=1)] and all(
-        (put(e.rhs, {phi_i: shape}).doit() - known).expand() == 0
-        for shape, values in ((x**0, moved), (x, turned))
-        for e, known in zip(generalised(), values, strict=True)
-    )
+@proves(6)
+def _() -> Proof:
+    """Dimensions; with the base and one mode moving, the energies (3) and (4) have them as coefficients."""
+    M, K, Gamma = (e.rhs for e in generalised())
+    kinetic, potential = (single_mode(e.rhs) for e in (kinetic_energy(), potential_energy()[1]))
+    mass, *_ = _rigid_body()
+    base, rate = w.diff(t), q_i.diff(t)
+    yield [dimension(e) for e in generalised()] == [Dimension(kg=1), Dimension(kg=1, s=-2), Dimension(kg=1)]
+    yield termwise(kinetic - (m_b + mass) * base**2 / 2 - Gamma * base * rate - M * rate**2 / 2)
+    yield termwise(potential - K * q_i**2 / 2)
 
 
 def tidy(value: Expr) -> Expr:
@@ -196,12 +196,8 @@ def lagrangian_function() -> Eq:
     return Eq(symbol("Lcal"), lagrangian().total())
 
 
-@checks(7)
-def _() -> bool:
-    """An energy; equal to the difference of (3) and (4) on a shape that moves and bends everywhere."""
-    shape = (x**3 / L**2 + x + L) * symbol("psi") * t / symbol("T_0")
-    whole, T, U = (
-        single_mode(e.rhs, shape).doit().expand()
-        for e in (lagrangian_function(), kinetic_energy(), potential_energy()[1])
-    )
-    return dimension(lagrangian_function()) == ENERGY and (whole - T + U).expand() == 0 and U != 0 != T
+@proves(7)
+def _() -> Proof:
+    """An energy: the difference of (3) and (4), whatever the motion."""
+    yield dimension(lagrangian_function()) == ENERGY
+    yield termwise(lagrangian_function().rhs - kinetic_energy().rhs + potential_energy()[1].rhs)

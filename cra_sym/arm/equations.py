@@ -1,22 +1,30 @@
 """The paper's numbered equations: one registry, filled by the sections' modules, each equation built on first use.
 
-A section's module writes one small function an equation and one a check::
+A section's module writes one small function an equation, and one each for a proof and for a trial in numbers::
 
     @numbered(1, "displacement", "definition")
     def displacement():
         '''The statement, in words.'''
         return Eq(y, w + v)
 
-    @checks(1)
+    @proves(1)
     def _():
         '''The independent route, in words.'''
-        return dimension(displacement()) == dimension("y")
+        yield displacement().rhs.subs(v, 0) - w
+
+    @samples(1)
+    def _():
+        '''The independent route, in words.'''
+        return isclose(...)
+
+A proof yields what has to vanish, and :func:`cra_sym.mechanics.identities.vanishes` decides: that an equation is proved
+is its answer, not the author's.
 """
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
@@ -25,11 +33,13 @@ from typing import Any, Literal
 
 from cra_sym.checks import shown
 
-__all__ = ["Equation", "checks", "equation", "equations", "numbered"]
+__all__ = ["Equation", "Proof", "equation", "equations", "numbered", "proves", "samples"]
 
 Number = int | str
 Kind = Literal["definition", "assumption", "derived"]
 Evidence = Literal["proved", "sampled"]
+#: What a proof yields: expressions that vanish identically, and truths without numbers, such as equal dimensions.
+Proof = Iterator[Any]
 
 #: Section of the package that builds each equation; a new section adds a line here.
 _HOMES: dict[str, range] = {
@@ -47,7 +57,8 @@ _HOMES: dict[str, range] = {
 }
 
 _EQUATIONS: dict[Number, Equation] = {}
-_ROUTES: dict[Number, tuple[Callable[[], Any], Evidence]] = {}
+_PROOFS: dict[Number, Callable[[], Proof]] = {}
+_SAMPLES: dict[Number, Callable[[], bool]] = {}
 
 
 @dataclass(frozen=True, repr=False)
@@ -88,17 +99,26 @@ class Equation:
 
     @property
     def checked_by(self) -> str:
-        """The independent route :meth:`check` takes, in words."""
-        return _text(_route(self.number)[0])
+        """The independent routes :meth:`check` takes, in words."""
+        routes: dict[str, dict[Number, Callable]] = {"Proved": _PROOFS, "Sampled": _SAMPLES}
+        return " ".join(f"{how}: {_text(of[self.number])}" for how, of in routes.items() if self.number in of)
 
     @property
     def evidence(self) -> Evidence:
         """Whether :meth:`check` proves exact identities, or only samples numbers because nothing exact is at hand."""
-        return _route(self.number)[1]
+        return "proved" if self.number in _PROOFS else "sampled"
 
     def check(self) -> bool:
-        """Tell whether the independent route confirms the equation."""
-        return bool(_route(self.number)[0]())
+        """Tell whether the independent routes confirm the equation: the proof if there is one, then the numbers."""
+        if self.number not in _PROOFS and self.number not in _SAMPLES:
+            raise NotImplementedError(f"equation ({self.number}) has no check")
+        return self.prove() is not False and bool(_SAMPLES.get(self.number, lambda: True)())
+
+    def prove(self) -> bool | None:
+        """Tell whether the proof holds, without a number drawn or rounded; None if there is no proof."""
+        if self.number not in _PROOFS:
+            return None
+        return all(map(_decide, _PROOFS[self.number]()))
 
     def __repr__(self) -> str:
         return f"Equation ({self.number}), {self.title}"
@@ -138,10 +158,11 @@ def _text(function: Callable) -> str:
     return " ".join((inspect.getdoc(function) or "").split())
 
 
-def _route(number: Number) -> tuple[Callable[[], Any], Evidence]:
-    if number not in _ROUTES:
-        raise NotImplementedError(f"equation ({number}) has no check")
-    return _ROUTES[number]
+def _decide(part: Any) -> bool:
+    """Decide one part of a proof."""
+    from cra_sym.mechanics.identities import vanishes
+
+    return part if isinstance(part, bool) else vanishes(part)
 
 
 def numbered(
@@ -167,11 +188,19 @@ def numbered(
     return register
 
 
-def checks(number: Number, evidence: Evidence = "proved") -> Callable:
-    """Register the decorated function, whose docstring names the route, as the check of an equation."""
+def proves(number: Number) -> Callable:
+    """Register the decorated generator, whose docstring names the route, as the proof of an equation."""
+    return _registered(_PROOFS, number)
 
-    def register(function: Callable[[], Any]) -> Callable[[], Any]:
-        _ROUTES[number] = function, evidence
+
+def samples(number: Number) -> Callable:
+    """Register the decorated function, whose docstring names the route, as the trial of an equation in numbers."""
+    return _registered(_SAMPLES, number)
+
+
+def _registered(routes: dict[Number, Callable], number: Number) -> Callable:
+    def register(function: Callable) -> Callable:
+        routes[number] = function
         return function
 
     return register

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from sympy import Derivative, Dummy, Expr, Integral, Matrix, Poly, S, Subs, lambdify, sympify
+from sympy import Add, Derivative, Dummy, Expr, Function, Integral, Matrix, S, Subs, lambdify, sympify
 
 from cra_sym.arm.shooting import ShotMode, integrate, sample, shoot
 from cra_sym.symbols import symbol
@@ -16,13 +16,14 @@ __all__ = [
     "at",
     "evaluate",
     "group_numbers",
-    "integrate_polynomials",
     "put",
     "shapes_agree",
     "shot_coefficients",
+    "termwise",
+    "virtual_factors",
 ]
 
-x, L = symbol("x"), symbol("L")
+x, t, L = symbol("x"), symbol("t"), symbol("L")
 C_1, beta, c_r, c_t, iota, kappa_r, kappa_t, lamda, mu, r_2, s_r, s_t = (
     symbol(name)
     for name in ("C_1", "beta", "c_r", "c_t", "iota", "kappa_r", "kappa_t", "lamda", "mu", "r_2", "s_r", "s_t")
@@ -44,10 +45,11 @@ def put(expression: Expr, values: Mapping[Expr, Expr]) -> Expr:
     ----------
     expression : Expr
     values : mapping of applied function to Expr
-        For example ``{v: x**2 * t / L}``, in the variables the function is applied to.
+        For example ``{v: x**2 * t / L}``, in the variables the function is applied to; it may contain the function.
     """
     for function, value in values.items():
-        variables = function.args
+        variables, aside = function.args, Function("aside")
+        value = value.replace(function.func, aside)
 
         def local(place: tuple, counts: dict, function=function, value=value, variables=variables) -> Expr:
             moved = dict(zip(variables, place, strict=True))
@@ -61,19 +63,81 @@ def put(expression: Expr, values: Mapping[Expr, Expr]) -> Expr:
 
         head = function.func
         expression = expression.replace(lambda e, h=head: isinstance(e, Derivative) and e.expr.func == h, derivative)
-        expression = expression.replace(head, lambda *place, local=local: local(place, {}))
+        expression = expression.replace(head, lambda *place, local=local: local(place, {})).replace(aside, head)
     return expression.replace(lambda e: isinstance(e, Subs), lambda e: e.doit(integrals=False))
 
 
-def integrate_polynomials(expression: Expr) -> Expr:
-    """Return ``expression`` with its definite integrals of polynomials done."""
+def termwise(expression: Expr) -> Expr:
+    """Return ``expression`` with each integral split into its terms, constants in front, and the variables of each
+    derivative in order: a normal form."""
 
-    def done(integral: Integral) -> Expr:
+    def split(integral: Integral) -> Expr:
         ((variable, low, high),) = integral.limits
-        antiderivative = Poly(integral.function, variable).integrate()
-        return antiderivative.eval(high) - antiderivative.eval(low)
+        total = S.Zero
+        for term in Add.make_args(integral.function.expand()):
+            constant, varying = term.as_independent(variable, as_Add=False)
+            total += constant * (high - low if varying == 1 else Integral(varying, *integral.limits))
+        return total
 
-    return expression.replace(lambda e: isinstance(e, Integral), done)
+    ordered = expression.replace(lambda e: isinstance(e, Derivative), lambda e: e.expr.diff(*e.variable_count))
+    return ordered.replace(lambda e: isinstance(e, Integral), split).expand()
+
+
+def virtual_factors(work: Expr, virtual: Expr) -> tuple[Expr, ...]:
+    """Return what a virtual displacement is multiplied by in a virtual work, whatever its shape.
+
+    Integration by parts along the manipulator, and in time between instants at which the displacement vanishes, frees
+    it of its derivatives. Two works are equal for all virtual displacements when these factors are.
+
+    Parameters
+    ----------
+    work : Expr
+        Linear in the virtual displacement: integrals over the manipulator, and terms at its ends.
+    virtual : applied function
+        Of position, of position and time, or of time alone.
+
+    Returns
+    -------
+    tuple of Expr
+        The factor along the manipulator, and those of the displacement and of the slope at the root and at the tip; of
+        a function of time its factor alone.
+    """
+    work = termwise(work)
+    if termwise(put(work, {virtual: S.Zero})) != 0:
+        raise ArithmeticError(f"not without {virtual}: {work}")
+    if x not in virtual.args:
+        return (_stationary(work, virtual),)
+    along, ends = S.Zero, work.replace(lambda e: isinstance(e, Integral), lambda _: S.Zero)
+    for integral in work.atoms(Integral):
+        density = work.coeff(integral) * integral.function
+        for factor, in_x, in_t in _linear(density, virtual):
+            for k in range(in_x):
+                moved = (-1) ** k * factor.diff(x, k) * virtual.diff(x, in_x - 1 - k, t, in_t)
+                ends += at(moved, L) - at(moved, 0)
+            along += (-1) ** (in_x + in_t) * factor.diff(x, in_x, t, in_t)
+    amplitudes = [Function(f"g_{k}")(t) for k in range(4)]
+    z = x / L
+    hermite = (1 - 3 * z**2 + 2 * z**3, x * (1 - z) ** 2, 3 * z**2 - 2 * z**3, x * z * (z - 1))
+    shape = Add(*(amplitude * h for amplitude, h in zip(amplitudes, hermite, strict=True)))
+    ends = put(ends, {virtual: shape}).doit(integrals=False).expand()
+    return tuple(map(termwise, [along, *(_stationary(ends, amplitude) for amplitude in amplitudes)]))
+
+
+def _stationary(work: Expr, virtual: Expr) -> Expr:
+    """Return the factor of a function of time after integration by parts in time."""
+    return Add(*((-1) ** in_t * factor.diff(t, in_t) for factor, _, in_t in _linear(work, virtual))).expand()
+
+
+def _linear(work: Expr, virtual: Expr) -> list[tuple[Expr, int, int]]:
+    """Return the factors of a function and of its derivatives, each with the orders in x and t."""
+    derivatives = [d for d in work.atoms(Derivative) if d.expr == virtual]
+    stand_ins = {jet: Dummy() for jet in [*derivatives, virtual]}
+    plain = work.xreplace(stand_ins)
+    counts = ((jet, dict(jet.variable_count) if jet in derivatives else {}) for jet in stand_ins)
+    found = [(plain.diff(stand_ins[jet]), count.get(x, 0), count.get(t, 0)) for jet, count in counts]
+    if any(factor.has(*stand_ins.values()) for factor, *_ in found):
+        raise ArithmeticError(f"not linear in {virtual}: {work}")
+    return found
 
 
 @cache

@@ -9,11 +9,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from sympy import Eq
+from sympy import Eq, Integral, cos, sin
 
-from cra_sym.arm.energy import lagrangian
-from cra_sym.arm.equations import checks, numbered
-from cra_sym.arm.evaluation import at, evaluate
+from cra_sym.arm.energy import potential_energy, single_mode, x
+from cra_sym.arm.equations import Proof, numbered, proves, samples
+from cra_sym.arm.evaluation import at, evaluate, termwise, virtual_factors
 from cra_sym.arm.modal_dynamics import dynamic_equation
 from cra_sym.arm.parametric import AXIAL, TRANSVERSE, coupling, excited_lagrangian, phi_i, phi_j, t, u, w
 from cra_sym.arm.shooting import integrate, sample, shoot
@@ -30,13 +30,14 @@ def disturbed_base() -> Eq:
     return Eq(w, TRANSVERSE)
 
 
-@checks(35)
-def _() -> bool:
+@proves(35)
+def _() -> Proof:
     """A length; it starts at w_0 with the speed epsilon w_1 varpi and swings about w_0 with angular frequency varpi."""
     motion = disturbed_base().rhs
-    start = (motion.subs(t, 0), motion.diff(t).subs(t, 0)) == (w_0, epsilon * w_1 * varpi)
-    swings = (motion.diff(t, 2) + varpi**2 * (motion - w_0)).expand() == 0
-    return dimension(disturbed_base()) == Dimension(m=1) and start and swings
+    yield dimension(disturbed_base()) == Dimension(m=1)
+    yield motion.subs(t, 0) - w_0
+    yield motion.diff(t).subs(t, 0) - epsilon * w_1 * varpi
+    yield motion.diff(t, 2) + varpi**2 * (motion - w_0)
 
 
 @numbered("35a", "base disturbed along the arm", "assumption")
@@ -45,12 +46,14 @@ def axial_base() -> Eq:
     return Eq(u, AXIAL)
 
 
-@checks("35a")
-def _() -> bool:
+@proves("35a")
+def _() -> Proof:
     """A length; it starts at rest, epsilon u_0 away, and swings about zero with angular frequency varpi."""
     motion = axial_base().rhs
-    start = (motion.subs(t, 0), motion.diff(t).subs(t, 0)) == (epsilon * u_0, 0)
-    return dimension(axial_base()) == Dimension(m=1) and start and motion.diff(t, 2) == -(varpi**2) * motion
+    yield dimension(axial_base()) == Dimension(m=1)
+    yield motion.subs(t, 0) - epsilon * u_0
+    yield motion.diff(t).subs(t, 0)
+    yield motion.diff(t, 2) + varpi**2 * motion
 
 
 @numbered("35b", "fluctuating joint", "assumption", (4,))
@@ -59,11 +62,13 @@ def fluctuating_joint() -> Eq:
     return Eq(symbol("U"), -at(excited_lagrangian("joint stiffness").left, 0))
 
 
-@checks("35b")
-def _() -> bool:
-    """An energy; without epsilon the springs of (4)."""
-    same = fluctuating_joint().rhs.subs(epsilon, 0) + at(lagrangian().left.subs(w, 0).doit(), 0)
-    return dimension(fluctuating_joint()) == dimension("U") and same.expand() == 0
+@proves("35b")
+def _() -> Proof:
+    """An energy: that of the springs of (4), which swings about its mean by epsilon of it, with angular frequency
+    varpi."""
+    beam, full = (e.rhs for e in potential_energy())
+    yield dimension(fluctuating_joint()) == dimension("U")
+    yield fluctuating_joint().rhs - (full - beam) * (1 + epsilon * cos(varpi * t))
 
 
 @numbered(36, "excited system", "derived", (11, 35))
@@ -73,25 +78,29 @@ def excited_system() -> Eq:
     return dynamic_equation().subs(w, TRANSVERSE).doit()
 
 
-@checks(36)
-def _() -> bool:
+@proves(36)
+def _() -> Proof:
     """Equation (11) on the left, whose coefficients do not depend on time, and on the right -Gamma_i times the
-    acceleration of (35); and numbers: the work of the inertia forces of a random arm, carried rigidly by the base, on
-    modes found by shooting."""
+    acceleration of (35)."""
+    equation, q = excited_system(), symbol("q_i")
+    yield not any(equation.lhs.diff(q.diff(t, k) if k else q).has(t) for k in range(3))
+    yield equation.lhs - dynamic_equation().lhs
+    yield equation.rhs - symbol("Gamma_i") * epsilon * w_1 * varpi**2 * sin(varpi * t)
+
+
+@samples(36)
+def _() -> bool:
+    """The work of the inertia forces of a random arm, carried rigidly by the base, on modes found by shooting."""
     values, equation = sample(36), excited_system()
-    if equation.lhs != dynamic_equation().lhs or equation.rhs + symbol("Gamma_i") * TRANSVERSE.diff(t, 2) != 0:
-        return False
-    length, q = values["L"], symbol("q_i")
-    constant = all(not equation.lhs.diff(q.diff(t, k) if k else q).has(t) for k in range(3))
-    instant = {t: 0.37, varpi: 2.1, w_1: 0.6, epsilon: 0.01}
-    acceleration = float(TRANSVERSE.diff(t, 2).subs(instant))
+    length, instant = values["L"], {t: 0.37, varpi: 2.1, w_1: 0.6, epsilon: 0.01}
+    acceleration = float(disturbed_base().rhs.diff(t, 2).subs(instant))
     for mode in shoot(values):
         line = integrate(lambda p, mode=mode: values["rho"] * values["A"] * mode(p), length)
         gamma = line + values["m_e"] * mode(length)
         force = equation.rhs.subs(symbol("Gamma_i"), gamma).subs(instant)
         if abs(float(force) + gamma * acceleration) > 1e-9 * abs(gamma):
             return False
-    return constant
+    return True
 
 
 @numbered("36a", "coupling by the fluctuating joint", "derived", ("35b", 7))
@@ -107,9 +116,19 @@ def axial_coupling() -> Eq:
     return Eq(P_ij, coupling("axial base"), evaluate=False)
 
 
-@checks("36a", "sampled")
+@proves("36a")
+def _() -> Proof:
+    """The energy (35b) of two modes, differentiated by both coordinates and by the fluctuation: the work of the extra
+    spring forces of one on the other."""
+    q_i, q_j, swing = symbol("q_i"), symbol("q_j"), epsilon * cos(varpi * t)
+    energy = single_mode(fluctuating_joint().rhs, phi_i * q_i + phi_j * q_j)
+    yield energy.diff(q_i).diff(q_j).diff(epsilon) * epsilon / swing - joint_coupling().rhs
+    yield joint_coupling().lhs == P_ij
+
+
+@samples("36a")
 def _() -> bool:
-    """Numbers: the work of the two extra spring forces of a mode found by shooting on another."""
+    """The work of the two extra spring forces of a mode found by shooting on another."""
     values = sample(361)
     first, second = shoot(values)[:2]
     work = values["k_t"] * first(0.0) * second(0.0) + values["k_r"] * first(0.0, 1) * second(0.0, 1)
@@ -117,9 +136,23 @@ def _() -> bool:
     return bool(abs(found / work - 1) < 1e-10)
 
 
-@checks("36b", "sampled")
+@proves("36b")
+def _() -> Proof:
+    """The axial momentum of a bent arm: the foreshortening of every point, whose slope is the product of the slopes of
+    the two modes, grows from the joint on and carries the masses of manipulator and end-effector."""
+    shortening, (rho, A, L, m_e) = symbol("eta"), (symbol(name) for name in ("rho", "A", "L", "m_e"))
+    momentum = Integral(rho * A * shortening, (x, 0, L)) + at(m_e * shortening, L)
+    found = axial_coupling().rhs / (u_0 * varpi**2)
+    found = found.xreplace({phi_i.diff(x): shortening.diff(x) / phi_j.diff(x)})
+    along, _, *others = virtual_factors(termwise(found) - momentum, shortening)
+    yield axial_coupling().lhs == P_ij
+    yield along
+    yield from others
+
+
+@samples("36b")
 def _() -> bool:
-    """Numbers: the axial momentum of a bent arm, with the foreshortening of every point by its own quadrature from
+    """The axial momentum of a bent arm, with the foreshortening of every point by its own quadrature from
     the joint on, its second derivative by two modes found by shooting."""
     values = sample(362)
     first, second = shoot(values)[:2]

@@ -7,12 +7,12 @@ from functools import cache
 import numpy as np
 import sympy as sp
 
+from cra_sym.arm import by_hand
 from cra_sym.arm.energy import modal_numbers
-from cra_sym.arm.equations import checks, numbered
+from cra_sym.arm.equations import Proof, numbered, proves, samples
 from cra_sym.arm.limits import natural_frequency
 from cra_sym.arm.modes import frequency_function, group_numbers
 from cra_sym.arm.shooting import sample, shoot
-from cra_sym.mechanics.identities import vanishes
 from cra_sym.symbols import symbol
 
 __all__ = ["frequency_sensitivities", "group_exponents", "implicit_derivatives", "sensitivity_function"]
@@ -30,13 +30,15 @@ def sensitivity_function() -> sp.Eq:
     return sp.Eq(sp.Function("lamda")(kappa).diff(kappa), slope)
 
 
-@checks(31)
-def _() -> bool:
-    """A curve known in closed form: on the unit circle the slope of the ordinate is minus abscissa over ordinate."""
-    kappa = symbol("kappa_t")
+@proves(31)
+def _() -> Proof:
+    """The chain rule: whatever the function, its change along the path is none; on the unit circle, a curve known in
+    closed form, the slope of the ordinate is minus abscissa over ordinate."""
+    kappa, Delta, slope = symbol("kappa_t"), sp.Function("Delta"), sensitivity_function()
+    yield slope.lhs == sp.Function("lamda")(kappa).diff(kappa)
+    yield Delta(lamda, kappa).diff(lamda) * slope.rhs + Delta(lamda, kappa).diff(kappa)
     circle = sp.Lambda((lamda, kappa), lamda**2 + kappa**2 - 1)
-    found = sensitivity_function().rhs.replace(sp.Function("Delta"), circle).doit()
-    return vanishes(found.subs(lamda, sp.sqrt(1 - kappa**2)) - sp.sqrt(1 - kappa**2).diff(kappa))
+    yield slope.rhs.replace(Delta, circle).doit() + kappa / lamda
 
 
 @cache
@@ -76,9 +78,33 @@ def frequency_sensitivities() -> tuple[sp.Eq, sp.Eq]:
     return _in_hertz({name: implicit_derivatives()[f"kappa_{name}"] * c**2 for name, (_, c) in _PAIRS.items()})
 
 
-@checks(32, "sampled")
+@proves(32)
+def _() -> Proof:
+    """Another principle, first-order perturbation: ω_i² changes by φ_i(0)² / M_i per k_t and by φ_i'(0)² / M_i per k_r.
+    Any shape that satisfies the conditions at the joint will do: it is a mode of the arm whose end-effector balances
+    its tip. The integral of its square is known from its ends."""
+    xi, mu, iota = (symbol(name) for name in ("xi", "mu", "iota"))
+    joint: dict[sp.Symbol, sp.Expr] = {}
+    for name, (s, c) in _PAIRS.items():
+        kappa = symbol(f"kappa_{name}")
+        joint |= {s: kappa / (1 + kappa), c: 1 / (1 + kappa)}
+    shape = by_hand.joined(xi)
+    phi, slope, curvature, third = shape
+    integral = 3 * phi * third - slope * curvature + xi * (lamda**4 * phi**2 - 2 * slope * third + curvature**2)
+    yield integral.diff(xi) - 4 * lamda**4 * phi**2
+    root, tip = shape.subs(xi, 0), shape.subs(xi, 1)
+    mass = integral.subs(xi, 1) - integral.subs(xi, 0) - 4 * tip[0] * tip[3] + 4 * tip[1] * tip[2]
+    inertia = {mu: -tip[3] / (lamda**4 * tip[0]), iota: tip[2] / (lamda**4 * tip[1])}
+    for e, rate, power in zip(frequency_sensitivities(), root, (1, -1), strict=False):
+        above, units = e.rhs.as_independent(L, E, I_z, symbol("rho"), symbol("A"), as_Add=False)
+        yield units - L**power / sp.sqrt(E * I_z * symbol("rho") * symbol("A"))
+        above, below = above.subs(joint | inertia).as_numer_denom()
+        yield sp.pi * mass * above - lamda**2 * rate**2 * below
+
+
+@samples(32)
 def _() -> bool:
-    """Numbers: another principle, first-order perturbation. ω_i² changes by φ_i(0)² / M_i per k_t and by
+    """Another principle, first-order perturbation. ω_i² changes by φ_i(0)² / M_i per k_t and by
     φ_i'(0)² / M_i per k_r, for modes of a random arm found by shooting."""
     values = sample(32)
     numbers = {symbol(name): value for name, value in values.items()}

@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
-import random
-
 from sympy import Eq, Expr, Integral, Rational, S
 
-from cra_sym.arm.energy import E, I_z, J_e, L, displacement, k_r, k_t, m_e, phi_i, q_i, single_mode, t, v, w, x
-from cra_sym.arm.equations import checks, numbered
-from cra_sym.arm.evaluation import at, evaluate, integrate_polynomials, put
+from cra_sym.arm.energy import (
+    E,
+    I_z,
+    J_e,
+    L,
+    displacement,
+    generalised,
+    k_r,
+    k_t,
+    m_e,
+    phi_i,
+    q_i,
+    single_mode,
+    t,
+    v,
+    w,
+    x,
+)
+from cra_sym.arm.equations import Proof, numbered, proves, samples
+from cra_sym.arm.evaluation import at, evaluate, put, virtual_factors
 from cra_sym.arm.shooting import sample, shoot
 from cra_sym.symbols import Dimension, dimension, symbol
 
@@ -46,43 +61,36 @@ def _with_section_forces(expression: Expr) -> Expr:
     return put(expression, {law.lhs: law.rhs for law in section_forces()})
 
 
-@checks(14, "sampled")
-def _() -> bool:
-    """With (15): the virtual work of the whole arm, for random polynomial motions, is the work (14) at the two ends
-    plus that of the field equation along the manipulator."""
-    rng = random.Random(14)
-
-    def polynomial(variable: Expr, degree: int) -> Expr:
-        return sum((rng.randint(-5, 5) * variable**k for k in range(degree)), S(rng.randint(1, 5)) * variable**degree)
-
-    motion, base, virtual = polynomial(x, 5) * polynomial(t, 2), polynomial(t, 3), polynomial(x, 4)
-    acceleration, bending = base.diff(t, 2) + motion.diff(t, 2), E * I_z
+@proves(14)
+def _() -> Proof:
+    """With (15): for any motion and any virtual displacement, the virtual work of the whole arm is the work (14) at the
+    two ends plus that of the field equation along the manipulator."""
+    acceleration, bending = w.diff(t, 2) + v.diff(t, 2), E * I_z
     inertia = rho * A * acceleration
-    at_root = k_t * motion * virtual + k_r * motion.diff(x) * virtual.diff(x)
-    at_tip = m_e * acceleration * virtual + J_e * motion.diff(x, t, t) * virtual.diff(x)
-    density = bending * motion.diff(x, 2) * virtual.diff(x, 2) + inertia * virtual
+    at_root = k_t * v * eta + k_r * v.diff(x) * eta.diff(x)
+    at_tip = m_e * acceleration * eta + J_e * v.diff(x, t, t) * eta.diff(x)
+    density = bending * v.diff(x, 2) * eta.diff(x, 2) + inertia * eta
     whole = -Integral(density, (x, 0, L)) - at(at_root, 0) - at(at_tip, L)
-    ends = sum((_with_section_forces(e.lhs) for e in virtual_work()), S.Zero)
-    ends = put(ends, {v: motion, eta: virtual, w: base})
-    along = -Integral((bending * motion.diff(x, 4) + inertia) * virtual, (x, 0, L))
-    energies = all(dimension(e) == dimension("U") for e in virtual_work())
-    return energies and integrate_polynomials(whole - ends - along).expand() == 0
+    ends = sum((_with_section_forces(e.lhs - e.rhs) for e in virtual_work()), S.Zero)
+    along = -Integral((bending * v.diff(x, 4) + inertia) * eta, (x, 0, L))
+    yield all(dimension(e) == dimension("U") for e in virtual_work())
+    for one, other in zip(virtual_factors(whole, eta), virtual_factors(ends + along, eta), strict=True):
+        yield one - other
 
 
-@checks(15)
-def _() -> bool:
+@proves(15)
+def _() -> Proof:
     """Dimensions; an arc of radius R carries the moment E I / R and no shear; a tip load F gives the shear -F
     everywhere, no moment at the tip and the textbook deflection F L^3 / (3 E I)."""
     radius, load = symbol("h"), symbol("C_1")
     shear, moment = (law.rhs for law in section_forces())
     arc, cantilever = x**2 / (2 * radius), load * x**2 * (3 * L - x) / (6 * E * I_z)
-    return (
-        [dimension(law) for law in section_forces()] == [Dimension(1, 1, -2), Dimension(2, 1, -2)]
-        and (single_mode(shear, arc), single_mode(moment, arc)) == (0, E * I_z / radius)
-        and single_mode(shear, cantilever).expand() == -load
-        and at(single_mode(moment, cantilever), L).expand() == 0
-        and at(cantilever, L) == Rational(1, 3) * load * L**3 / (E * I_z)
-    )
+    yield [dimension(law) for law in section_forces()] == [Dimension(1, 1, -2), Dimension(2, 1, -2)]
+    yield single_mode(shear, arc)
+    yield single_mode(moment, arc) - E * I_z / radius
+    yield single_mode(shear, cantilever) + load
+    yield at(single_mode(moment, cantilever), L)
+    yield at(cantilever, L) - Rational(1, 3) * load * L**3 / (E * I_z)
 
 
 @numbered(16, "boundary conditions", "derived", (14, 15))
@@ -126,9 +134,29 @@ def free_vibration(expression: Expr) -> Expr:
     return (expression.subs(q_i.diff(t, 2), -(omega_i**2) * q_i) / q_i).expand()
 
 
-@checks("16a", "sampled")
+def rayleigh_factors() -> tuple[Expr, ...]:
+    """Return what a virtual change of a mode's shape is multiplied by in that of (K_i - omega_i^2 M_i) / 2, by (6).
+
+    Along the manipulator, displacement and slope at the root, displacement and slope at the tip.
+    """
+    size = symbol("epsilon")
+    M, K, _ = (e.rhs for e in generalised())
+    varied = put(K - omega_i**2 * M, {phi_i: phi_i + size * eta}).diff(size).subs(size, 0)
+    return virtual_factors(varied.doit(integrals=False) / 2, eta)
+
+
+@proves("16a")
+def _() -> Proof:
+    """Rayleigh: among all shapes, that of a mode makes K_i - ω_i² M_i of (6) stationary, so these are its natural
+    conditions."""
+    _, *factors = rayleigh_factors()
+    for e, factor, sign in zip(mode_conditions(), factors, (1, -1, -1, 1), strict=True):
+        yield e.lhs - e.rhs - sign * factor
+
+
+@samples("16a")
 def _() -> bool:
-    """Numbers: the end values of a mode of a random arm, found by shooting, satisfy all four."""
+    """The end values of a mode of a random arm, found by shooting, satisfy all four."""
     values = sample(16)
     for mode in shoot(values):
         for e in mode_conditions():

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from sympy import Eq, Expr, Matrix, Mul, Pow, cancel, limit, oo, pi, solve
 
-from cra_sym.arm.by_hand import jets
-from cra_sym.arm.energy import HALF, L, modal_numbers, phi_i, x
-from cra_sym.arm.equations import checks, numbered
+from cra_sym.arm.by_hand import tip_rows
+from cra_sym.arm.energy import HALF, L, modal_numbers, phi_i
+from cra_sym.arm.equations import Proof, numbered, proves, samples
 from cra_sym.arm.evaluation import group_numbers, shapes_agree
 from cra_sym.arm.modes import (
     C_1,
@@ -18,6 +18,7 @@ from cra_sym.arm.modes import (
     c_r,
     c_t,
     circular_ratio,
+    coefficients_of,
     frequency_function,
     frequency_polynomial,
     iota,
@@ -33,7 +34,6 @@ from cra_sym.arm.modes import (
     s_t,
 )
 from cra_sym.arm.shooting import sample, shoot
-from cra_sym.mechanics.identities import vanishes
 from cra_sym.symbols import Dimension, dimension, symbol
 
 __all__ = ["cantilever_frequency", "cantilever_shape", "natural_frequency", "rigid_joint"]
@@ -92,40 +92,65 @@ def _bare(expression: Expr) -> Expr:
     return limit(limit(placed, mu, 0), iota, 0).subs(VALUES)
 
 
+_BARE = {mu: 0, iota: 0}
 _RIGID = {"k_t": 1e12, "k_r": 1e12}
 
 
-@checks(27)
-def _() -> bool:
-    """The other way of being rigid, (s, c) = (1, 0) in (23), gives the same equation exactly; and numbers: modes found
-    by shooting for a very stiff joint."""
+def _clamped(shape: Expr, ratio: Expr, frequency: Expr, tip: Matrix) -> Proof:
+    """Yield what vanishes for a shape and a frequency equation of an arm clamped at the root, by hand: displacement and
+    slope there, and force and moment at the tip of the two shapes that are left."""
+    plain, second = (coefficients_of(shape.coeff(r_2, power) / C_1) for power in (0, 1))
+    for clamped in (plain, second):
+        yield clamped[0] + clamped[2]
+        yield clamped[1] + clamped[3]
+    yield (plain[0], plain[1], second[0], second[1]) == (1, 0, 0, 1)
+    ends = tip * Matrix.hstack(plain, second)
+    yield ends[0, 0] + ratio * ends[0, 1]
+    yield ends.det() + 2 * lamda**5 * frequency
+
+
+@proves(27)
+def _() -> Proof:
+    """By hand, the two shapes that neither move nor turn at the joint: in this ratio they balance the force at the tip,
+    and this is the determinant of force and moment. The other way of being rigid, (s, c) = (1, 0) in (23)."""
     frequency, shape, ratio = rigid_joint()
-    other = frequency_function()[0].subs({s_t: 1, c_t: 0, s_r: 1, c_r: 0})
+    yield (shape.lhs, ratio.lhs) == (phi_i, r_2)
+    yield from _clamped(shape.rhs.expand(), ratio.rhs, frequency.lhs - frequency.rhs, tip_rows())
+    yield frequency.lhs - frequency_function()[0].subs({s_t: 1, c_t: 0, s_r: 1, c_r: 0})
+
+
+@samples(27)
+def _() -> bool:
+    """Modes found by shooting for a very stiff joint."""
+    frequency, shape, ratio = rigid_joint()
     values = sample(27) | _RIGID
     residuals = [float(frequency.lhs.subs(group_numbers(values, mode.beta))) for mode in shoot(values)]
-    small = all(abs(residual) < 1e-5 for residual in residuals)
-    return (frequency.lhs - other).expand() == 0 and small and shapes_agree((27,), shape.rhs, ratio.rhs, **_RIGID)
+    return all(abs(r) < 1e-5 for r in residuals) and shapes_agree((27,), shape.rhs, ratio.rhs, **_RIGID)
 
 
-@checks(28)
-def _() -> bool:
-    """It does not move or turn at the joint, and no moment acts at the tip; and numbers: modes found by shooting for a
-    very stiff joint and no end-effector."""
+@proves(28)
+def _() -> Proof:
+    """By hand, the two shapes that neither move nor turn at the joint: in this ratio no force acts at the tip, and with
+    (29) no moment."""
     shape, ratio = cantilever_shape()
-    derivatives = [shape.rhs.subs(r_2, ratio.rhs).diff(x, order) for order in range(4)]
-    free = [derivatives[order].subs(x, L).subs(beta, lamda / L) for order in (2, 3)]
-    if not (all(vanishes(f.subs(x, 0)) for f in derivatives[:2]) and any(map(vanishes, free))):
-        return False
+    yield (shape.lhs, ratio.lhs) == (phi_i, r_2)
+    frequency = cantilever_frequency()
+    yield from _clamped(shape.rhs.expand(), ratio.rhs, frequency.lhs - frequency.rhs, tip_rows().subs(_BARE))
+
+
+@samples(28)
+def _() -> bool:
+    """Modes found by shooting for a very stiff joint and no end-effector."""
+    shape, ratio = cantilever_shape()
     return shapes_agree((28,), shape.rhs, ratio.rhs, **_RIGID, m_e=0.0, J_e=0.0)
 
 
-@checks(29)
-def _() -> bool:
+@proves(29)
+def _() -> Proof:
     """The determinant of the free end for the two shapes that neither move nor turn at the joint, by hand."""
-    _, _, moment, shear = jets(lamda)
     clamped = Matrix([[1, 0], [0, 1], [-1, 0], [0, -1]])
-    determinant = (Matrix.vstack(moment, shear) * clamped).det() / (2 * lamda**5)
-    return vanishes(cantilever_frequency().lhs - determinant)
+    determinant = (tip_rows().subs(_BARE) * clamped).det() / (2 * lamda**5)
+    yield cantilever_frequency().lhs - cantilever_frequency().rhs + determinant
 
 
 @numbered(30, "natural frequency", "derived", (17,))
@@ -137,13 +162,18 @@ def natural_frequency() -> Eq:
     return Eq(symbol("f_i"), Mul(lamda**2 / (2 * pi * L**2), speed, evaluate=False), evaluate=False)
 
 
-@checks(30)
-def _() -> bool:
-    """Dimensions; a sine of this wave number balances stiffness and inertia; and numbers: the frequency of modes of a
-    random arm, from the energies of shapes found by shooting (Rayleigh's quotient)."""
+@proves(30)
+def _() -> Proof:
+    """Dimensions; a sine of this wave number balances stiffness and inertia."""
     bending, inertia = (symbol(a) * symbol(b) for a, b in (("E", "I_z"), ("rho", "A")))
-    if not vanishes(bending * (lamda / L) ** 4 - inertia * (2 * pi * natural_frequency().rhs) ** 2):
-        return False
+    yield dimension(natural_frequency()) == Dimension(s=-1)
+    yield natural_frequency().lhs == symbol("f_i")
+    yield bending * (lamda / L) ** 4 - inertia * (2 * pi * natural_frequency().rhs) ** 2
+
+
+@samples(30)
+def _() -> bool:
+    """The frequency of modes of a random arm, from the energies of shapes found by shooting (Rayleigh's quotient)."""
     values = sample(30)
     names = {symbol(name): value for name, value in values.items()}
     for mode in shoot(values):
@@ -152,4 +182,4 @@ def _() -> bool:
         found = float(natural_frequency().rhs.subs(lamda, mode.beta * values["L"]).subs(names))
         if abs(found / rayleigh - 1) > 1e-8:
             return False
-    return dimension(natural_frequency()) == Dimension(s=-1)
+    return True

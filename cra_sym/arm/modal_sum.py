@@ -9,7 +9,7 @@ from sympy.core.function import AppliedUndef
 
 from cra_sym.symbols import symbol
 
-__all__ = ["ModalSum", "member"]
+__all__ = ["ModalSum", "member", "written_out"]
 
 
 def member(expression: Any, index: str) -> Any:
@@ -20,6 +20,11 @@ def member(expression: Any, index: str) -> Any:
     for atom in {atom for atom in expression.atoms(Symbol) if atom.name.endswith("_i")}:
         renamed = renamed.xreplace({atom: Symbol(atom.name[:-1] + index, **atom.assumptions0)})
     return renamed
+
+
+def written_out(expression: Any, *indices: str) -> Any:
+    """Return ``expression`` with the members of the given indices in place of each sum over modes."""
+    return expression.replace(lambda part: isinstance(part, ModalSum), lambda part: part.members(*indices))
 
 
 class ModalSum(Sum):

@@ -27,15 +27,14 @@ from sympy import (
 )
 
 from cra_sym.arm import by_hand
-from cra_sym.arm.by_hand import proportional
+from cra_sym.arm.by_hand import minors
 from cra_sym.arm.energy import A, E, I_z, J_e, L, k_r, k_t, m_e, phi_i, rho, x
-from cra_sym.arm.equations import checks, numbered
+from cra_sym.arm.equations import Proof, numbered, proves, samples
 from cra_sym.arm.evaluation import group_numbers, put, shapes_agree, shot_coefficients
 from cra_sym.arm.joint import mode_conditions
 from cra_sym.arm.motion import dynamics, mode_field_equation
 from cra_sym.arm.shooting import sample, shoot
 from cra_sym.mechanics import HamiltonResult, separate
-from cra_sym.mechanics.identities import vanishes
 from cra_sym.symbols import symbol
 
 __all__ = ["coefficients", "frequency_function", "reduced_matrix", "root_matrix", "tip_matrix"]
@@ -78,20 +77,26 @@ def mode_form() -> tuple[Eq, Eq]:
     return Eq(phi_i, shape), Eq(beta**4, square)
 
 
-@checks(17)
-def _() -> bool:
-    """It satisfies the field equation and its four functions are independent; and numbers: modes of a random arm found
-    by shooting with power series are combinations of them."""
+@proves(17)
+def _() -> Proof:
+    """It satisfies the field equation, and its four functions are independent."""
     shape, wave = mode_form()
-    residual = put(mode_field_equation().lhs, {phi_i: shape.rhs}).subs(omega_i, sqrt(solve(wave, omega_i**2)[0]))
-    wronskian = Matrix(4, 4, lambda row, column: basis()[column].diff(x, row)).subs(x, 0).det()
+    residual = put(mode_field_equation().lhs, {phi_i: shape.rhs})
+    yield residual.subs(omega_i, sqrt(solve(wave, omega_i**2)[0]))
+    yield Matrix(4, 4, lambda row, column: basis()[column].diff(x, row)).subs(x, 0).det().expand() != 0
+    yield set(coefficients) < shape.rhs.free_symbols
+
+
+@samples(17)
+def _() -> bool:
+    """Modes of a random arm found by shooting with power series are combinations of its functions."""
     places = np.linspace(0.0, 1.0, 30)
     for mode in shoot(sample(17)):
         table = np.array([[float(f.subs({beta: mode.beta, x: p})) for f in basis()] for p in places])
         gap = np.linalg.lstsq(table, mode(places), rcond=None)[1]
         if gap[0] > 1e-20 * np.sum(mode(places) ** 2):
             return False
-    return residual.expand() == 0 and wronskian.expand() != 0
+    return True
 
 
 # Boundary conditions as linear systems (18)-(19) ----------------------------------------------------------------
@@ -173,16 +178,28 @@ def _annihilates(system: Eq, seed: int) -> bool:
     return True
 
 
-@checks(18)
-def _() -> bool:
-    """Written down by hand; and numbers: the coefficients of modes of a random arm found by shooting satisfy it."""
-    return proportional(root_system().lhs.args[0], by_hand.root_rows()) and _annihilates(root_system(), 18)
+@proves(18)
+def _() -> Proof:
+    """Written down by hand."""
+    yield from minors(root_system().lhs.args[0], by_hand.root_rows())
 
 
-@checks(19)
+@samples(18)
 def _() -> bool:
-    """Written down by hand; and numbers: the coefficients of modes of a random arm found by shooting satisfy it."""
-    return proportional(tip_system().lhs.args[0], by_hand.tip_rows()) and _annihilates(tip_system(), 19)
+    """The coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
+    return _annihilates(root_system(), 18)
+
+
+@proves(19)
+def _() -> Proof:
+    """Written down by hand."""
+    yield from minors(tip_system().lhs.args[0], by_hand.tip_rows())
+
+
+@samples(19)
+def _() -> bool:
+    """The coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
+    return _annihilates(tip_system(), 19)
 
 
 # Elimination and the frequency equation (20)-(23) ---------------------------------------------------------------
@@ -225,12 +242,16 @@ def reduced_system() -> Eq:
     return _system(_entries, Matrix(coefficients[:2]))
 
 
-@checks(20)
+@proves(20)
+def _() -> Proof:
+    """With (21), Cramer's rule for the conditions written down by hand."""
+    yield from minors(reduced_system().subs(_named_entries()).lhs.args[0], by_hand.eliminated())
+
+
+@samples(20)
 def _() -> bool:
-    """With (21), Cramer's rule for the conditions written down by hand; and numbers: the coefficients of modes of a
-    random arm found by shooting satisfy it, at another wave number not."""
-    system = reduced_system().subs(_named_entries())
-    return proportional(system.lhs.args[0], by_hand.eliminated()) and _annihilates(system, 20)
+    """The coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
+    return _annihilates(reduced_system().subs(_named_entries()), 20)
 
 
 def _named_entries() -> dict[Expr, Expr]:
@@ -244,10 +265,10 @@ def reduced_coefficients() -> tuple[Eq, ...]:
     return tuple(Eq(name, value) for name, value in zip(_entries, grouped, strict=True))
 
 
-@checks(21)
-def _() -> bool:
+@proves(21)
+def _() -> Proof:
     """Cramer's rule for the conditions written down by hand: C_1 or C_2 with the two hyperbolic coefficients."""
-    return proportional(Matrix(2, 2, [e.rhs for e in reduced_coefficients()]), by_hand.eliminated())
+    yield from minors(Matrix(2, 2, [e.rhs for e in reduced_coefficients()]), by_hand.eliminated())
 
 
 @numbered(22, "determinant", "derived", (20,))
@@ -256,13 +277,13 @@ def determinant() -> Eq:
     return Eq(_entries.det(), 0)
 
 
-@checks(22)
-def _() -> bool:
+@proves(22)
+def _() -> Proof:
     """The determinant of (18) and (19) together, all four coefficients at once, times that of the elimination."""
     matrix, factor = _elimination()
     whole = Matrix.vstack(root_matrix(), _tip()).det(method="berkowitz")
     named = dict(zip(_entries, matrix, strict=True))
-    return _reduced(determinant().lhs.subs(named) - factor * whole) == 0
+    yield _reduced((determinant().lhs - determinant().rhs).subs(named) - factor * whole)
 
 
 @cache
@@ -315,19 +336,21 @@ def separated(result: HamiltonResult) -> Expr:
     return modal.characteristic_function.subs(wave, lamda)
 
 
-@checks(23)
+@proves(23)
+def _() -> Proof:
+    """The four conditions of Hamilton's principle in one determinant."""
+    yield separated(dynamics(driven=False)) - frequency_equation().lhs + frequency_equation().rhs
+
+
+@samples(23)
 def _() -> bool:
-    """The four conditions of Hamilton's principle in one determinant; and numbers: it changes sign at every frequency
-    parameter of random arms found by shooting and nowhere between."""
-    function, arguments = frequency_function()
-    if (separated(dynamics(driven=False)) - frequency_equation().lhs).expand() != 0:
-        return False
+    """It changes sign at every frequency parameter of random arms found by shooting and nowhere between."""
+    function = frequency_equation().lhs
     for seed in (23, 24):
         values = sample(seed)
-        shapes = shoot(values)
-        found = [mode.beta * values["L"] for mode in shapes]
+        found = [mode.beta * values["L"] for mode in shoot(values)]
         numbers = group_numbers(values, 1.0)
-        numeric = function.subs({name: numbers[name] for name in arguments[1:]})
+        numeric = function.subs({name: numbers[name] for name in numbers if name != lamda})
         places = [0.1, *(place for root in found for place in (root * (1 - 1e-9), root * (1 + 1e-9)))]
         signs = [float(numeric.subs(lamda, place)) > 0 for place in places]
         if signs != [k // 2 % 2 == 0 for k in range(len(places))]:
@@ -349,13 +372,21 @@ def coefficient_ratios() -> tuple[Eq, Eq]:
     )
 
 
-@checks(24)
+@proves(24)
+def _() -> Proof:
+    """They satisfy the conditions at the joint written down by hand; by hand, a rigid joint mirrors C_1, C_2."""
+    third, fourth = coefficient_ratios()
+    rigid = {s_t: 1, c_t: 0, s_r: 1, c_r: 0}
+    yield (third.lhs, fourth.lhs) == (C_3, C_4)
+    yield from by_hand.root_rows() * Matrix([C_1, C_2, third.rhs, fourth.rhs])
+    yield third.rhs.subs(rigid) + C_1
+    yield fourth.rhs.subs(rigid) + C_2
+
+
+@samples(24)
 def _() -> bool:
-    """They satisfy the conditions at the joint written down by hand; by hand, a rigid joint mirrors C_1, C_2; and
-    numbers: modes of a random arm found by shooting."""
+    """Modes of a random arm found by shooting have them."""
     found = {e.lhs: e.rhs for e in coefficient_ratios()}
-    if not all(vanishes(row) for row in by_hand.root_rows() * Matrix(coefficients).subs(found)):
-        return False
     values = sample(26)
     for mode in shoot(values):
         known = dict(zip(coefficients, shot_coefficients(mode), strict=True))
@@ -363,8 +394,7 @@ def _() -> bool:
         for name, ratio in found.items():
             if abs(float(ratio.subs(numbers).subs(known)) - known[name]) > 1e-8 * max(map(abs, known.values())):
                 return False
-    rigid = {s_t: 1, c_t: 0, s_r: 1, c_r: 0}
-    return [ratio.subs(rigid) for ratio in found.values()] == [-C_1, -C_2]
+    return True
 
 
 @numbered(25, "mode shape", "derived", (17, 24))
@@ -387,22 +417,38 @@ def circular_ratio() -> Eq:
     return Eq(r_2, -first / second)
 
 
-@checks(25)
-def _() -> bool:
+@proves(25)
+def _() -> Proof:
     """Whatever r_2, the functions of (17) with coefficients that satisfy the conditions at the joint written down by
-    hand; and numbers: with (26), the shape of modes of a random arm found by shooting."""
-    shape = mode_shape().rhs
-    row = Matrix([[shape.expand().coeff(function) for function in basis()]])
-    exact = all(vanishes(condition) for condition in by_hand.root_rows() * row.T)
-    return exact and shapes_agree((25,), shape, circular_ratio().rhs)
+    hand, the second r_2 times the first."""
+    row = coefficients_of(mode_shape().rhs)
+    yield from by_hand.root_rows() * row
+    yield row[1] - r_2 * row[0]
+    yield row[0] != 0
 
 
-@checks(26)
+def coefficients_of(shape: Expr) -> Matrix:
+    """Return what the functions of (17) are multiplied by in a mode shape."""
+    expanded = shape.expand()
+    return Matrix([expanded.coeff(function) for function in basis()])
+
+
+@samples(25)
 def _() -> bool:
-    """With it one condition at the tip, written down by hand, is satisfied; and numbers: the ratio of modes of a random
-    arm found by shooting, and the second row of the reduced system."""
-    if not any(map(vanishes, by_hand.eliminated() * Matrix([1, circular_ratio().rhs]))):
-        return False
+    """With (26), the shape of modes of a random arm found by shooting."""
+    return shapes_agree((25,), mode_shape().rhs, circular_ratio().rhs)
+
+
+@proves(26)
+def _() -> Proof:
+    """With it the force at the tip balances, written down by hand."""
+    yield circular_ratio().lhs == r_2
+    yield (by_hand.eliminated() * Matrix([1, circular_ratio().rhs]))[0]
+
+
+@samples(26)
+def _() -> bool:
+    """The ratio of modes of a random arm found by shooting, and the second row of the reduced system."""
     values = sample(28)
     for mode in shoot(values):
         numbers = group_numbers(values, mode.beta)

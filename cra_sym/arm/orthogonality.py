@@ -26,10 +26,10 @@ from cra_sym.arm.energy import (
     w,
     x,
 )
-from cra_sym.arm.equations import checks, numbered
-from cra_sym.arm.evaluation import at, evaluate
+from cra_sym.arm.equations import Proof, numbered, proves, samples
+from cra_sym.arm.evaluation import at, evaluate, put, termwise, virtual_factors
 from cra_sym.arm.joint import mode_conditions
-from cra_sym.arm.modal_sum import ModalSum, member
+from cra_sym.arm.modal_sum import ModalSum, member, written_out
 from cra_sym.arm.motion import mode_field_equation
 from cra_sym.arm.shooting import integrate, sample, shoot
 from cra_sym.symbols import symbol
@@ -64,9 +64,33 @@ def stiffness_identity() -> tuple[Eq, Eq]:
     return Eq(inner_stiffness(phi_i, phi_j), omega_i**2 * mass), Eq(K_i, omega_i**2 * M_i)
 
 
-@checks("16b", "sampled")
+def _is_mode(factors: tuple[Expr, ...], index: str) -> Proof:
+    """Yield what is left of five factors of a virtual shape when mode ``index`` satisfies (10b) and (16a)."""
+    equations = (member(mode_field_equation(), index), *(member(condition, index) for condition in mode_conditions()))
+    tops = (member(phi_i, index).diff(x, 4), *(e.lhs / (E * I_z) for e in equations[1:]))
+    known = {top: solve(e, top)[0] for top, e in zip(tops, equations, strict=True)}
+    for factor in factors:
+        yield factor.xreplace(known)
+
+
+@proves("16b")
+def _() -> Proof:
+    """The difference of both sides is the virtual work of the forces of mode i, in balance by (10b) and (16a), on any
+    mode j; mode i for mode j and (6) make it the second equation."""
+    pair, single = stiffness_identity()
+    yield from _is_mode(virtual_factors(pair.lhs - pair.rhs, phi_j), "i")
+    alone = put(pair.lhs - pair.rhs, {phi_j: phi_i})
+    yield termwise((single.lhs - single.rhs).subs(_generalised()) - alone)
+
+
+def _generalised(index: str = "i") -> dict[Expr, Expr]:
+    """Return the names of mass, stiffness and participation of a mode, with what (6) says they are."""
+    return {member(e.lhs, index): member(e.rhs, index) for e in generalised()}
+
+
+@samples("16b")
 def _() -> bool:
-    """Numbers: both products of all pairs of modes of a random arm, found by shooting, by quadrature."""
+    """Both products of all pairs of modes of a random arm, found by shooting, by quadrature."""
     values = sample(161)
     shapes = shoot(values)
     pair, single = stiffness_identity()
@@ -103,9 +127,18 @@ def _swap(expression: Expr) -> Expr:
     return member(aside, "j").replace(symbol("eta").func, phi_i.func).xreplace({symbol("omega"): omega_i})
 
 
-@checks("16c", "sampled")
+@proves("16c")
+def _() -> Proof:
+    """The forces of each mode balance by (10b) and (16a): stiffness minus ω_i² times mass product is no work on mode j,
+    and with ω_j² none on mode i. So ω_i² - ω_j² times the mass product is zero, and with it the stiffness product."""
+    mass, stiffness = (e.lhs - e.rhs for e in orthogonality())
+    yield from _is_mode(virtual_factors(stiffness - omega_i**2 * mass, phi_j), "i")
+    yield from _is_mode(virtual_factors(stiffness - omega_j**2 * mass, phi_i), "j")
+
+
+@samples("16c")
 def _() -> bool:
-    """Numbers: both products of different modes of a random arm vanish; without the end-effector they would not."""
+    """Both products of different modes of a random arm vanish; without the end-effector they would not."""
     values = sample(163)
     first, second, third = shoot(values)
     for pair in ((first, second), (first, third), (second, third)):
@@ -125,9 +158,21 @@ def stiffness_of_manipulator_alone() -> Eq:
     return Eq(K_b, stiffness_identity()[1].rhs - springs)
 
 
-@checks("16d", "sampled")
+@proves("16d")
+def _() -> Proof:
+    """Twice the first energy of (4) differs from it by the work of the forces of the mode on itself, in balance by (10b)
+    and (16a)."""
+    energy = single_mode(potential_energy()[0].rhs) / q_i**2
+    alone, size, virtual = stiffness_of_manipulator_alone(), symbol("epsilon"), symbol("eta")
+    gap = 2 * energy - alone.rhs.subs(_generalised())
+    varied = put(gap, {phi_i: phi_i + size * virtual}).diff(size).subs(size, 0).doit(integrals=False)
+    yield alone.lhs == K_b
+    yield from _is_mode(virtual_factors(varied, virtual), "i")
+
+
+@samples("16d")
 def _() -> bool:
-    """Numbers: the strain energy of modes found by shooting; it falls short of ω_i² M_i by the springs' share."""
+    """The strain energy of modes found by shooting; it falls short of ω_i² M_i by the springs' share."""
     values, alone = sample(164), stiffness_of_manipulator_alone().rhs
     for mode in shoot(values):
         strain = evaluate(inner_stiffness(phi_i, phi_i, joint=False), values, {phi_i: mode})
@@ -173,9 +218,21 @@ def modal_energies() -> tuple[Eq, Eq]:
     return Eq(symbol("T"), kinetic.doit()), Eq(symbol("U"), potential)
 
 
-@checks(5, "sampled")
+@proves(5)
+def _() -> Proof:
+    """Both energies (3) and (4) of any two modes, with (6); what is left is their products of (16c)."""
+    two = separation().rhs.members("i", "j")
+    mass, stiffness = (e.lhs - e.rhs for e in orthogonality())
+    products = (mass * q_i.diff(t) * q_j.diff(t), stiffness * q_i * q_j)
+    for e, whole, product in zip(modal_energies(), (kinetic_energy(), potential_energy()[1]), products, strict=True):
+        modes = written_out(e.rhs, "i", "j")
+        yield e.lhs == whole.lhs
+        yield termwise(modes.subs(_generalised() | _generalised("j")) + product - single_mode(whole.rhs, two))
+
+
+@samples(5)
 def _() -> bool:
-    """Numbers: the energies of a random arm moving in three modes found by shooting, by quadrature of (3) and (4)."""
+    """The energies of a random arm moving in three modes found by shooting, by quadrature of (3) and (4)."""
     values = sample(5)
     shapes, length = shoot(values), values["L"]
     q, q_dot, w_dot = [0.3, -0.5, 0.2], [0.7, 0.4, -0.6], 0.9

@@ -10,17 +10,16 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from sympy import Derivative, Eq, Expr, Function, I, S, Sum, Symbol, conjugate, cos, exp, integrate, pi, solve
+from sympy import Derivative, Eq, Expr, Function, I, S, Sum, Symbol, conjugate, cos, exp, integrate, pi, sin, solve
 
 from cra_sym.arm.boundaries import forced_growth, forced_resonance, general_resonance, plain
-from cra_sym.arm.energy import L, inner_mass, modal_numbers
-from cra_sym.arm.equations import checks, numbered
-from cra_sym.arm.evaluation import evaluate, put
+from cra_sym.arm.energy import generalised, inner_mass, modal_numbers, phi_i
+from cra_sym.arm.equations import Proof, numbered, proves, samples
+from cra_sym.arm.evaluation import evaluate, put, termwise
 from cra_sym.arm.excited import excited_system
 from cra_sym.arm.operators import acting, named
 from cra_sym.arm.parametric import t, x
 from cra_sym.arm.shooting import sample, shoot
-from cra_sym.mechanics.identities import vanishes
 from cra_sym.symbols import Dimension, dimension, symbol
 
 __all__: list[str] = []
@@ -165,94 +164,96 @@ def _left_over(equation: Eq) -> Expr:
     return _acted(equation.lhs - equation.rhs).subs(rates)
 
 
-@checks(37)
-def _() -> bool:
+@proves(37)
+def _() -> Proof:
     """Put into the equation of motion of a mode, with the slow evolution (48), it leaves nothing at orders 0 and 1."""
-    return residual() == (0, 0)
+    yield from residual()
 
 
-@checks(38)
-def _() -> bool:
-    """A function of t and epsilon t, differentiated once and twice."""
-    trial, gaps = cos(2 * T_0) * exp(T_1), []
+@proves(38)
+def _() -> Proof:
+    """Any exponential of T_0 and T_1, and so any sum of such, differentiated once and twice as one of t and epsilon t;
+    the second leaves only epsilon^2."""
+    fast, slow = Symbol("a"), Symbol("b")
+    trial, gaps = exp(fast * T_0 + slow * T_1), []
     for order, operator in enumerate(derivative_operators(), start=1):
-        total = trial.subs({T_0: t, T_1: epsilon * t}).diff(t, order)
         applied = operator.rhs.subs({Symbol(name): named(name) for name in ("D_0", "D_1")}) * named("trial")
         found = acting(applied, {named("trial"): trial}, _TIMES)
-        gaps.append((total - found.subs({T_0: t, T_1: epsilon * t})).subs(exp(epsilon * t), 1).expand())
-    return gaps[0] == 0 != gaps[1] and gaps[1].coeff(epsilon, 0) == gaps[1].coeff(epsilon, 1) == 0
+        times = {T_0: t, T_1: epsilon * t}
+        gaps.append(trial.subs(times).diff(t, order) - found.subs(times))
+    yield gaps[0]
+    yield gaps[1] - (epsilon * slow) ** 2 * trial.subs(times)
 
 
-@checks(39)
-def _() -> bool:
+@proves(39)
+def _() -> Proof:
     """Its operators at work on the free vibration (41) leave nothing."""
-    return vanishes(_left_over(order_0()[0]))
+    yield _left_over(order_0()[0])
 
 
-@checks(40)
-def _() -> bool:
+@proves(40)
+def _() -> Proof:
     """Its operators at work on the free vibration (41) and on the bounded response of first order leave nothing when
     the amplitude follows (48)."""
-    return vanishes(_left_over(order_1()[0]))
+    yield _left_over(order_1()[0])
 
 
-@checks(41)
-def _() -> bool:
+@proves(41)
+def _() -> Proof:
     """Differentiated twice; and it is real: its own complex conjugate."""
-    (solution,) = order_0_solution()
-    swap = {named("A_n"): named("Abar_n"), named("Abar_n"): named("A_n"), I: -I}
-    real = solution.rhs.xreplace(swap) - solution.rhs
-    return (solution.rhs.diff(T_0, 2) + omega_n**2 * solution.rhs).expand() == 0 == real.expand()
+    amplitudes = {named("A_n"): Symbol("a"), named("Abar_n"): Symbol("b")}
+    swap = {Symbol("a"): Symbol("b"), Symbol("b"): Symbol("a"), I: -I}
+    solution = order_0_solution()[0].rhs.xreplace(amplitudes)
+    yield solution.xreplace(swap) - solution
+    yield solution.diff(T_0, 2) + omega_n**2 * solution
+    yield solution.coeff(Symbol("a")) - exp(I * omega_n * T_0)
 
 
-@checks(42)
-def _() -> bool:
+@proves(42)
+def _() -> Proof:
     """Frequencies; at the exact resonance one excitation period is half a period of the mode, and sigma in slow time
     is the distance from it."""
-    given = detuning().rhs
-    known = given.subs(sigma, 0) == 2 * omega_n and given.diff(sigma) == epsilon
-    return known and dimension(detuning()) == Dimension(s=-1)
+    yield dimension(detuning()) == Dimension(s=-1)
+    yield detuning().lhs == varpi
+    yield detuning().rhs - 2 * omega_n - epsilon * sigma
 
 
-@checks("42a")
-def _() -> bool:
+@proves("42a")
+def _() -> Proof:
     """Frequencies; at the exact resonance both periods are the same, and sigma in slow time is the distance from it."""
-    given = forced_detuning().rhs
-    known = given.subs(sigma, 0) == omega_n and given.diff(sigma) == epsilon
-    return known and dimension(forced_detuning()) == Dimension(s=-1)
+    yield dimension(forced_detuning()) == Dimension(s=-1)
+    yield forced_detuning().lhs == varpi
+    yield forced_detuning().rhs - omega_n - epsilon * sigma
 
 
-@checks(43)
-def _() -> bool:
+@proves(43)
+def _() -> Proof:
     """Euler's formula for the detuned frequency."""
-    cosine = cos((detuning().rhs * T_0).expand().subs(epsilon * T_0, T_1))
-    return vanishes(cosine - excitation_in_exponentials().rhs)
+    yield cos((detuning().rhs * T_0).expand().subs(epsilon * T_0, T_1)) - excitation_in_exponentials().rhs
 
 
-@checks(44)
-def _() -> bool:
+@proves(44)
+def _() -> Proof:
     """Any other slow evolution of the amplitude leaves in the equation of motion just these terms, sign changed."""
     rate = Symbol("r", real=True)
     left = [term for term in residual(rate)[1].args if not any(e.args[0].has(t) for e in term.atoms(exp))]
     slow = {named("A_n"): Function("a")(t), named("Abar_n"): Function("b")(t)}
     (terms,) = secular_terms()
     shown = terms.subs(named("D_1") * named("A_n"), rate).xreplace(slow)
-    return (sum(left, S.Zero) + shown.subs(T_1, Symbol("phase", real=True) / sigma)).expand() == 0
+    yield sum(left, S.Zero) + shown.subs(T_1, Symbol("phase", real=True) / sigma)
 
 
-@checks(45)
-def _() -> bool:
+@proves(45)
+def _() -> Proof:
     """A force of an oscillator's own frequency makes it swing ever wider, t times a harmonic, and the mean of the right
     of (40) times exp(-i omega_n T_0) over one period tells how much of it there is: just this."""
     swelling = t * exp(I * omega_n * t)
-    force = swelling.diff(t, 2) + omega_n**2 * swelling
     period = 2 * pi / omega_n
     turned = (_acted(order_1()[0].rhs) * exp(-I * omega_n * T_0)).expand()
     mean = sum((integrate(term, (T_0, 0, period)) / period for term in turned.args), S.Zero)
     (condition,) = solvability()
-    return vanishes(force - 2 * I * omega_n * exp(I * omega_n * t)) and vanishes(
-        mean - _acted(condition.lhs - condition.rhs)
-    )
+    yield swelling.diff(t, 2) + omega_n**2 * swelling - 2 * I * omega_n * exp(I * omega_n * t)
+    yield mean - _acted(condition.lhs - condition.rhs)
 
 
 @numbered(46, "inner product", "definition", (6,))
@@ -262,21 +263,31 @@ def inner_product() -> Eq:
     return Eq(Symbol(r"\langle f, g \rangle"), inner_mass(f, conjugate(g)).doit(integrals=False), evaluate=False)
 
 
-@checks(46)
+@proves(46)
+def _() -> Proof:
+    """For functions with real and imaginary parts it is what the mass of (6) makes of the four pairs of those, the part
+    of the second function conjugate."""
+    f, g = (Function(name)(x) for name in "fg")
+    a, b, c, d = (Function(name)(x) for name in ("Re f", "Im f", "Re g", "Im g"))
+    product = put(inner_product().rhs, {f: a + I * b, g: c + I * d})
+    found = product.replace(conjugate, lambda e: e.xreplace({I: -I}))
+    yield termwise(found - _mass(a, c) - _mass(b, d) - I * (_mass(b, c) - _mass(a, d)))
+
+
+def _mass(first: Expr, second: Expr) -> Expr:
+    """Return the product of two shapes that the mass (6) of one shape goes with."""
+    mass = generalised()[0].rhs
+    return (put(mass, {phi_i: first + second}) - put(mass, {phi_i: first - second})) / 4
+
+
+@samples(46)
 def _() -> bool:
-    """A shape that translates has the mass of the arm, one that turns about the root its moment of inertia, whatever
-    its phase; and numbers: modes of a random arm found by shooting are orthogonal in it."""
-    f, g, phase = Function("f"), Function("g"), exp(I * T_0)
-    product, (rho, A, m_e, J_e) = inner_product().rhs, (symbol(name) for name in ("rho", "A", "m_e", "J_e"))
-
-    def of(first: Expr, second: Expr) -> Expr:
-        return put(product, {f(x): first, g(x): second}).doit().expand()
-
-    known = of(phase, phase) == rho * A * L + m_e and of(phase * x, x * phase) == rho * A * L**3 / 3 + m_e * L**2 + J_e
+    """Modes of a random arm found by shooting are orthogonal in it."""
+    f, g = Function("f"), Function("g")
     values, (one, two, *_rest) = sample(46), shoot(sample(46))
-    real = product.replace(conjugate, lambda e: e)
+    real = inner_product().rhs.replace(conjugate, lambda e: e)
     gram = np.array([[evaluate(real, values, {f(x): a, g(x): b}) for a in (one, two)] for b in (one, two)])
-    return known and bool(abs(gram[0, 1]) < 1e-8 * np.sqrt(gram[0, 0] * gram[1, 1]))
+    return bool(abs(gram[0, 1]) < 1e-8 * np.sqrt(gram[0, 0] * gram[1, 1]))
 
 
 @numbered(47, "solvability, term by term", "derived", (45, 46))
@@ -285,16 +296,24 @@ def distributed() -> Eq:
     return Eq((M_n * solvability()[0].lhs).expand(), 0, evaluate=False)
 
 
-@checks(47, "sampled")
+@proves(47)
+def _() -> Proof:
+    """The inner product (46) of any factor times a real mode with that mode is the factor times the mass of (6); with
+    that mass in front, (45)."""
+    f, g, factor = Function("f")(x), Function("g")(x), Symbol("c")
+    product = put(inner_product().rhs, {f: factor * phi_i, g: phi_i}).replace(conjugate, lambda e: e)
+    before, after = (e.lhs - e.rhs for e in (solvability()[0], distributed()))
+    yield termwise(product - factor * generalised()[0].rhs)
+    yield (after - M_n * before).expand() == 0
+
+
+@samples(47)
 def _() -> bool:
-    """Numbers: the inner product (46) of each term, carried by a mode found by shooting, with that mode."""
+    """The inner product (46) of a mode found by shooting with itself is its mass."""
     values, real = sample(47), inner_product().rhs.replace(conjugate, lambda e: e)
     (mode, *_rest) = shoot(values)
     mass = evaluate(real, values, {Function(name)(x): mode for name in "fg"})
-    by_definition = modal_numbers(values, mode)[symbol("M_i")]
-    sides = distributed().lhs - distributed().rhs
-    gap = (sides.subs(M_n, mass) - mass * solvability()[0].lhs).expand()
-    return gap == 0 and bool(abs(mass / by_definition - 1) < 1e-12)
+    return bool(abs(mass / modal_numbers(values, mode)[symbol("M_i")] - 1) < 1e-12)
 
 
 # Amplitude equation and boundary (48)-(49) ----------------------------------------------------------------------
@@ -307,10 +326,11 @@ def amplitude_equation() -> Eq:
     return plain(principal().amplitude_equations[0]).subs(Symbol("Delta", real=True), epsilon * sigma)
 
 
-@checks(48)
-def _() -> bool:
-    """Put with the expansion into the equation of motion it leaves nothing at orders 0 and 1."""
-    return residual() == (0, 0) != residual(Symbol("r", real=True))
+@proves(48)
+def _() -> Proof:
+    """Put with the expansion into the equation of motion it leaves nothing at orders 0 and 1; another one would."""
+    yield from residual()
+    yield residual(Symbol("r", real=True)) != (0, 0)
 
 
 @numbered("48a", "amplitude equation of the literal route", "derived", (36, "42a"))
@@ -320,14 +340,15 @@ def forced_amplitude_equation() -> Eq:
     return found.subs(Symbol("Delta", real=True), epsilon * sigma)
 
 
-@checks("48a")
-def _() -> bool:
+@proves("48a")
+def _() -> Proof:
     """At resonance the amplitude grows in proportion to time; so made into a motion of the mode, it balances the force
-    of (36)."""
-    amplitude = forced_amplitude_equation().rhs.subs(sigma, 0) * t
-    motion = 2 * amplitude * cos(omega_n * t)
+    of (36). Away from it, it turns with the detuning."""
+    drift = forced_amplitude_equation().rhs
+    motion = 2 * drift.subs(sigma, 0) * t * cos(omega_n * t)
     force = excited_system().rhs.xreplace({symbol("Gamma_i"): Gamma_n}).subs(varpi, omega_n)
-    return vanishes(M_n * (motion.diff(t, 2) + omega_n**2 * motion) - force)
+    yield M_n * (motion.diff(t, 2) + omega_n**2 * motion) - force
+    yield drift - drift.subs(sigma, 0) * exp(I * epsilon * sigma * t)
 
 
 @numbered(49, "stability boundary", "derived", (48,))
@@ -337,9 +358,34 @@ def stability_boundary() -> tuple[Eq, Eq]:
     return _step("boundary")
 
 
-@checks(49, "sampled")
+@proves(49)
+def _() -> Proof:
+    """Borders of instability have motions of twice the period of the excitation. With a third harmonic, a sine at one
+    border and a cosine at the other leave nothing at orders 0 and 1 in the equation of motion."""
+    for sign in (1, -1):
+        size, shapes = sign * abs(P_nn), (sin, cos)[::sign]
+        for border, shape in zip(stability_boundary(), shapes, strict=True):
+            yield border.lhs == varpi
+            motion = shape(angle) + epsilon * size / (16 * omega_n**2) * shape(3 * angle)
+            yield from _left_by(motion, size, border.rhs)
+
+
+angle = Symbol("theta")
+
+
+def _left_by(motion: Expr, size: Expr, frequency: Expr, damping: Expr = S.Zero) -> Proof:
+    """Yield what a motion, a function of half the phase of the excitation, leaves at orders 0 and 1 in the equation of
+    a mode whose coupling P_nn is ``size``."""
+    rate = frequency / 2
+    force = rate**2 * motion.diff(angle, 2) + 2 * damping * omega_n * rate * motion.diff(angle)
+    left = (force + (omega_n**2 + epsilon * size * cos(2 * angle)) * motion).expand()
+    for order in (0, 1):
+        yield left.coeff(epsilon, order)
+
+
+@samples(49)
 def _() -> bool:
-    """Numbers: Mathieu's characteristic values; the error shrinks with the square of epsilon."""
+    """Mathieu's characteristic values; the error shrinks with the square of epsilon."""
     from scipy.special import mathieu_a, mathieu_b
 
     errors = []
@@ -360,21 +406,22 @@ def forced_measure() -> Eq:
     return Eq(Derivative(Symbol("a"), t), expression, evaluate=False)
 
 
-@checks("49a")
-def _() -> bool:
+@proves("49a")
+def _() -> Proof:
     """A velocity that does not change when the mode is scaled; squared it is that of a motion t times a harmonic, which
     balances the force of (36) at resonance, at the tip."""
     expression, (_, gamma, tip, mass, _) = forced_growth()
     shown = forced_measure().rhs
-    scaled = shown.subs({gamma: 3 * gamma, tip: 3 * tip, mass: 9 * mass}, simultaneous=True)
-    units = dimension(shown, {tip: Dimension()})
+    yield forced_measure().lhs == Derivative(Symbol("a"), t)
+    yield dimension(shown, {tip: Dimension()}) == Dimension(m=1, s=-1)
+    yield shown - expression
+    yield shown - shown.subs({gamma: 3 * gamma, tip: 3 * tip, mass: 9 * mass}, simultaneous=True)
     rate = Symbol("r")
     motion = rate * t * cos(omega_n * t)
     force = excited_system().rhs.xreplace({symbol("Gamma_i"): gamma}).subs(varpi, omega_n) / epsilon
     balance = (mass * (motion.diff(t, 2) + omega_n**2 * motion) - force).subs(t, pi / (2 * omega_n))
     (needed,) = solve(balance, rate)
-    found = shown**2 - (needed * tip) ** 2
-    return units == Dimension(m=1, s=-1) and scaled == shown == expression and vanishes(found)
+    yield shown**2 - (needed * tip) ** 2
 
 
 @numbered("49b", "threshold of damping", "derived", (48,))
@@ -384,9 +431,22 @@ def damping_threshold() -> Eq:
     return Eq(epsilon, plain(damped.explicit(damped.border.threshold)), evaluate=False)
 
 
-@checks("49b", "sampled")
+@proves("49b")
+def _() -> Proof:
+    """With this damping a motion of twice the period of the excitation neither grows nor decays in the middle of the
+    zone: with a third harmonic it leaves nothing at orders 0 and 1 in the equation of motion."""
+    needed = zeta_n * epsilon / damping_threshold().rhs
+    yield damping_threshold().lhs == epsilon
+    yield not needed.has(zeta_n)
+    for sign in (1, -1):
+        size = sign * abs(P_nn)
+        third = epsilon * size / (16 * omega_n**2) * (cos(3 * angle) - sign * sin(3 * angle))
+        yield from _left_by(cos(angle) - sign * sin(angle) + third, size, 2 * omega_n, needed)
+
+
+@samples("49b")
 def _() -> bool:
-    """Numbers: the Floquet multipliers of one mode in the middle of its zone, just below and just above."""
+    """The Floquet multipliers of one mode in the middle of its zone, just below and just above."""
     from cra_sym.solvers.floquet import floquet_exponents
 
     numbers = {omega_n: 1.0, P_nn: 1.0, zeta_n: 0.005}

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from math import lcm
-from random import Random
 
 from sympy import (
+    QQ,
+    QQ_I,
     Abs,
     Derivative,
     Dummy,
     Expr,
-    Float,
     I,
     Indexed,
     Integral,
+    Mul,
     Poly,
     Pow,
     Rational,
@@ -26,28 +27,33 @@ from sympy import (
     cos,
     cosh,
     exp,
+    factorint,
     pi,
+    preorder_traversal,
+    prime,
     sin,
     sinh,
+    sympify,
 )
-from sympy.core.function import AppliedUndef, Function
-from sympy.polys.fields import sfield
+from sympy.core.function import AppliedUndef
 
 __all__ = ["vanishes"]
 
 #: What stands for itself: whatever its value, the identity has to hold.
 _OPAQUE = (AppliedUndef, Derivative, Subs, Integral, Sum, Indexed, conjugate, Abs)
 
-Exponential = Callable[[Expr], Expr]
+_PI = Dummy("pi")
 
 
 def vanishes(expression: Expr) -> bool:
     """Decide whether an expression is zero for all values of its symbols: proved, not sampled.
 
-    The expression is rational in its symbols, in roots of them, in cos, sin, cosh, sinh and exp of polynomials without
-    a constant multiple of pi, and in functions and derivatives that nothing is known of. Exponentials of arguments
-    that are linearly independent over the rationals are algebraically independent, so after the addition theorems
-    all these are independent indeterminates, and zero is what is the zero polynomial in them.
+    The expression is rational in its symbols, in roots, in cos, sin, cosh, sinh and exp of polynomials without a
+    constant multiple of pi, and in functions and derivatives that nothing is known of. By the addition theorems it
+    becomes a rational function of exponentials, of roots and of the rest, each an indeterminate of its own; what is
+    zero as such a function is zero, wherever it is defined. The converse holds too, since exponentials of arguments
+    that are linearly independent over the rationals are algebraically independent; only between unknown functions,
+    or between roots of different sums, may a relation be missed.
 
     Parameters
     ----------
@@ -56,7 +62,8 @@ def vanishes(expression: Expr) -> bool:
     Raises
     ------
     ValueError
-        If the expression holds something else, such as a floating-point number or a symbolic power.
+        If the expression holds something else, such as a floating-point number, a symbolic power or symbols that do
+        not commute; or if it divides by zero.
 
     Examples
     --------
@@ -67,44 +74,47 @@ def vanishes(expression: Expr) -> bool:
     >>> vanishes(cosh(2 * x) - 2 * sinh(x) ** 2 + 1)
     False
     """
-    plain = expression.xreplace({atom: Dummy(commutative=True) for atom in expression.atoms(*_OPAQUE)})
-    plain = plain.xreplace({atom: Dummy() for atom in plain.atoms() if not atom.is_commutative} | {pi: _PI})
-    plain = _without_functions(plain)
-    plain, relations = _without_roots(plain)
-    if plain.atoms(Float) or plain.atoms(Function):
+    expression = sympify(expression, strict=True)
+    plain = expression.xreplace({atom: Dummy() for atom in expression.atoms(*_OPAQUE)} | {pi: _PI})
+    plain, relations = _without_roots(_without_functions(plain))
+    if not expression.is_commutative or not all(map(_is_rational, preorder_traversal(plain))):
         raise ValueError(f"{expression}: allowed are exact numbers and circular, hyperbolic and exponential functions")
     if not relations and _is_witness(plain):
         return False
-    remainder = _numerator(plain)
-    for root, relation in relations:
-        remainder = Poly(remainder, root).rem(Poly(relation, root)).as_expr()
-    symbols = sorted(remainder.free_symbols, key=str)
-    return Poly(remainder, *symbols).is_zero if symbols else remainder.expand() == 0
+    above, below = (_normal(part, relations) for part in plain.as_numer_denom())
+    if below == 0:
+        raise ValueError(f"{expression}: allowed are no divisions by zero")
+    return above == 0
+
+
+def _is_rational(node: Expr) -> bool:
+    """Tell whether a node may occur in a rational function with Gaussian rational coefficients."""
+    known = node.is_Symbol or node.is_Rational or node is I
+    return known or node.is_Add or node.is_Mul or (node.is_Pow and node.exp.is_Integer)
 
 
 def _is_witness(expression: Expr) -> bool:
     """Tell whether one exact evaluation shows that a rational function is not zero; that settles most of those."""
-    rng = Random(0)
-    point = {symbol: Rational(rng.randint(2, 97), 101) for symbol in sorted(expression.free_symbols, key=str)}
-    value = expression.xreplace(point).expand()
-    return bool(value.is_finite and value != 0)
+    symbols = sorted(expression.free_symbols, key=str)
+    value = expression.xreplace({s: Rational(prime(k + 3), 101) for k, s in enumerate(symbols)}).expand()
+    turned = value.coeff(I)
+    return bool(turned.is_Rational and (value - I * turned).is_Rational and value != 0)
 
 
-def _numerator(expression: Expr) -> Expr:
-    """Return the numerator of a rational function in normal form."""
-    if not expression.free_symbols:
-        return expression.expand()
-    _, element = sfield(expression, *sorted(expression.free_symbols, key=str))
-    return element.numer.as_expr()
-
-
-_PI = Dummy("pi", positive=True)
+def _normal(polynomial: Expr, relations: Iterable[tuple[Dummy, Expr]]) -> Expr:
+    """Return a polynomial in normal form: expanded, and reduced by the relations that the roots satisfy."""
+    for root, relation in relations:
+        polynomial = Poly(polynomial, root).rem(Poly(relation, root)).as_expr().as_numer_denom()[0]
+    symbols = sorted(polynomial.free_symbols, key=str)
+    domain = QQ_I if polynomial.has(I) else QQ
+    return domain.poly_ring(*symbols or [_PI]).from_sympy(polynomial).as_expr()
 
 
 def _without_functions(expression: Expr) -> Expr:
     """Write all exponentials as powers of independent ones."""
     known = (cos, sin, cosh, sinh, exp)
-    arguments = [f.args[0] * (I if isinstance(f, (cos, sin)) else 1) for f in expression.atoms(*known)]
+    functions = expression.atoms(*known) - {S.Exp1}
+    arguments = [f.args[0] * (I if isinstance(f, (cos, sin)) else 1) for f in functions] + [S.One]
     if any(argument.has(*known) for argument in arguments):
         raise ValueError(f"{expression}: allowed are no functions of functions")
     scales: dict[tuple[Expr, bool], int] = defaultdict(lambda: 1)
@@ -126,9 +136,8 @@ def _without_functions(expression: Expr) -> Expr:
         cos: lambda a: (exponential(I * a) + 1 / exponential(I * a)) / 2,
         sin: lambda a: (exponential(I * a) - 1 / exponential(I * a)) / (2 * I),
     }
-    for function, form in forms.items():
-        expression = expression.replace(function, form)
-    return expression
+    written = {function: forms[function.func](function.args[0]) for function in functions}
+    return expression.xreplace(written | {S.Exp1: exponential(S.One)})
 
 
 def _terms(argument: Expr) -> list[tuple[Rational, Expr, bool]]:
@@ -138,7 +147,10 @@ def _terms(argument: Expr) -> list[tuple[Rational, Expr, bool]]:
         factor, rest = term.as_coeff_Mul()
         turns = rest.has(I)
         monomial = (rest / I).expand() if turns else rest
-        if not factor.is_Rational or monomial.has(I) or (turns and monomial.free_symbols <= {_PI}):
+        # a root of a sum is independent of its multiples, a quotient is not
+        quotient = any(p.base.is_Add and not 0 < p.exp < 1 for p in monomial.atoms(Pow))
+        constant = turns and monomial.free_symbols <= {_PI}
+        if not factor.is_Rational or monomial.has(I) or constant or quotient:
             raise ValueError(f"{argument}: allowed are no such arguments")
         if factor != 0:
             terms.append((factor, monomial, turns))
@@ -146,17 +158,35 @@ def _terms(argument: Expr) -> list[tuple[Rational, Expr, bool]]:
 
 
 def _without_roots(expression: Expr) -> tuple[Expr, list[tuple[Dummy, Expr]]]:
-    """Write roots as powers of new symbols, and return the polynomials that vanish for roots of more than a symbol."""
-    orders: dict[Expr, int] = defaultdict(lambda: 1)
-    for power in expression.atoms(Pow):
-        if not power.exp.is_Rational:
-            raise ValueError(f"{power}: allowed are no symbolic powers")
-        orders[power.base] = lcm(orders[power.base], int(power.exp.q))
-    roots = {base: Dummy("root", positive=True) for base, order in orders.items() if order > 1}
-    simple = {base: root ** orders[base] for base, root in roots.items() if base.is_Symbol}
-    replaced = expression.replace(
-        lambda e: isinstance(e, Pow) and e.base in roots and not e.base.is_Symbol,
-        lambda e: roots[e.base] ** (e.exp * orders[e.base]),
-    )
-    relations = [(root, root ** orders[base] - base) for base, root in roots.items() if not base.is_Symbol]
-    return replaced.subs(simple), [(root, relation.subs(simple)) for root, relation in relations]
+    """Write roots as powers of new symbols, innermost first, and return the polynomials that vanish for them, outermost
+    first. The root of a symbol needs no such polynomial: the symbol is a power of it."""
+    symbols = expression.free_symbols
+    simple: dict[Expr, Expr] = {}
+    relations: list[tuple[Dummy, Expr]] = []
+    while inner := [
+        power for power in expression.atoms(Pow) if _is_root(power) and not any(map(_is_root, power.base.atoms(Pow)))
+    ]:
+        orders: dict[Expr, int] = defaultdict(lambda: 1)
+        for power in inner:
+            for base in _factors(power.base):
+                orders[base] = lcm(orders[base], int(power.exp.q))
+        # nothing is assumed of a root, lest SymPy simplify an outer one by it
+        roots = {base: Dummy("root") for base in orders}
+        expression = expression.xreplace(
+            {p: Mul(*(roots[b] ** (p.exp * n * orders[b]) for b, n in _factors(p.base).items())) for p in inner}
+        )
+        simple |= {base: roots[base] ** order for base, order in orders.items() if base in symbols}
+        found = [(roots[base], roots[base] ** order - base) for base, order in orders.items() if base not in symbols]
+        relations = found + relations
+    return expression.xreplace(simple), [(root, relation.xreplace(simple)) for root, relation in relations]
+
+
+def _is_root(power: Expr) -> bool:
+    if not power.exp.is_Rational:
+        raise ValueError(f"{power}: allowed are no symbolic powers")
+    return not power.exp.is_Integer
+
+
+def _factors(base: Expr) -> dict[Expr, int]:
+    """Return the primes of a whole number, whose roots depend on theirs, and any other base as it is."""
+    return {sympify(p): n for p, n in factorint(base).items()} if base.is_Integer and base > 0 else {base: 1}

@@ -230,8 +230,9 @@ def _replace(module: str, source: str, affected: frozenset[str]) -> None:
     derived._source_of, Path.read_text = cache(source_of), read
     for number in [n for n, e in equations._EQUATIONS.items() if e.source.partition(":")[0] in affected]:
         del equations._EQUATIONS[number]
-    for number in [n for n, (route, _) in equations._ROUTES.items() if route.__module__ in affected]:
-        del equations._ROUTES[number]
+    for routes in (equations._PROOFS, equations._SAMPLES):
+        for number in [n for n, route in routes.items() if route.__module__ in affected]:
+            del routes[number]
     for name in affected:
         sys.modules.pop(name, None)
         room, _, last = name.rpartition(".")
