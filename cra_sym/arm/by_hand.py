@@ -40,12 +40,11 @@ def tip_rows() -> Matrix:
 
 def joined(place: Expr) -> Matrix:
     """Return displacement and three derivatives, at a place in units of the length, of any shape that satisfies the
-    conditions at the joint: at the joint they are 1, C_2, kappa_r C_2 and -kappa_t."""
-    turn = symbol("C_2")
-    start = Matrix([1, turn, symbol("kappa_r") * turn, -symbol("kappa_t")])
+    conditions at the joint, where they are c_t, c_r, s_r and -s_t: the pairs (s, c) need no common scale."""
     c, s, ch, sh = (function(lamda * place) for function in (cos, sin, cosh, sinh))
     krylov = [(ch + c) / 2, (sh + s) / 2, (ch - c) / 2, (sh - s) / 2]
-    return Matrix(4, 4, lambda row, column: lamda ** (row - column) * krylov[(column - row) % 4]) * start
+    table = Matrix(4, 4, lambda row, column: lamda ** (row - column) * krylov[(column - row) % 4])
+    return table * Matrix([c_t, c_r, s_r, -s_t])
 
 
 def eliminated() -> Matrix:

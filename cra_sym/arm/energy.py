@@ -9,7 +9,7 @@ from sympy import Eq, Expr, Integral, Rational
 
 from cra_sym.arm.equations import Proof, numbered, proves
 from cra_sym.arm.evaluation import at, evaluate, put, termwise
-from cra_sym.arm.modal_sum import ModalSum
+from cra_sym.arm.modal_sum import ModalSum, written_out
 from cra_sym.symbols import Dimension, dimension, symbol
 
 __all__ = ["ArmLagrangian", "lagrangian", "single_mode"]
@@ -62,7 +62,7 @@ def separation() -> Eq:
 @proves(2)
 def _() -> Proof:
     """Both sides are lengths; one term is separable, v v_xt = v_x v_t, and a sum of two is not."""
-    one, two = separation().rhs.members("i"), separation().rhs.members("i", "j")
+    one, two = written_out(separation().rhs, "i"), written_out(separation().rhs, "i", "j")
 
     def coupling(shape: Expr) -> Expr:
         return shape * shape.diff(x, t) - shape.diff(x) * shape.diff(t)

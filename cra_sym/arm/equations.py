@@ -100,12 +100,16 @@ class Equation:
     @property
     def checked_by(self) -> str:
         """The independent routes :meth:`check` takes, in words."""
-        routes: dict[str, dict[Number, Callable]] = {"Proved": _PROOFS, "Sampled": _SAMPLES}
+        exact = "Proved" if self.kind == "derived" else "Exact"
+        routes: dict[str, dict[Number, Callable]] = {exact: _PROOFS, "Sampled": _SAMPLES}
         return " ".join(f"{how}: {_text(of[self.number])}" for how, of in routes.items() if self.number in of)
 
     @property
     def evidence(self) -> Evidence:
-        """Whether :meth:`check` proves exact identities, or only samples numbers because nothing exact is at hand."""
+        """Whether :meth:`check` proves exact identities, or only samples numbers because nothing exact is at hand.
+
+        Of a definition or an assumption it is what has to follow from it that is proved.
+        """
         return "proved" if self.number in _PROOFS else "sampled"
 
     def check(self) -> bool:

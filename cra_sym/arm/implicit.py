@@ -83,23 +83,21 @@ def _() -> Proof:
     """Another principle, first-order perturbation: ω_i² changes by φ_i(0)² / M_i per k_t and by φ_i'(0)² / M_i per k_r.
     Any shape that satisfies the conditions at the joint will do: it is a mode of the arm whose end-effector balances
     its tip. The integral of its square is known from its ends."""
-    xi, mu, iota = (symbol(name) for name in ("xi", "mu", "iota"))
-    joint: dict[sp.Symbol, sp.Expr] = {}
-    for name, (s, c) in _PAIRS.items():
-        kappa = symbol(f"kappa_{name}")
-        joint |= {s: kappa / (1 + kappa), c: 1 / (1 + kappa)}
+    xi, mu, iota, rho, A = (symbol(name) for name in ("xi", "mu", "iota", "rho", "A"))
     shape = by_hand.joined(xi)
     phi, slope, curvature, third = shape
     integral = 3 * phi * third - slope * curvature + xi * (lamda**4 * phi**2 - 2 * slope * third + curvature**2)
     yield integral.diff(xi) - 4 * lamda**4 * phi**2
     root, tip = shape.subs(xi, 0), shape.subs(xi, 1)
     mass = integral.subs(xi, 1) - integral.subs(xi, 0) - 4 * tip[0] * tip[3] + 4 * tip[1] * tip[2]
-    inertia = {mu: -tip[3] / (lamda**4 * tip[0]), iota: tip[2] / (lamda**4 * tip[1])}
-    for e, rate, power in zip(frequency_sensitivities(), root, (1, -1), strict=False):
-        above, units = e.rhs.as_independent(L, E, I_z, symbol("rho"), symbol("A"), as_Add=False)
-        yield units - L**power / sp.sqrt(E * I_z * symbol("rho") * symbol("A"))
-        above, below = above.subs(joint | inertia).as_numer_denom()
-        yield sp.pi * mass * above - lamda**2 * rate**2 * below
+    below = frequency_function()[0].diff(lamda)
+    for e, rate, power, pair in zip(frequency_sensitivities(), root, (1, -1), _PAIRS.values(), strict=False):
+        above, units = e.rhs.as_independent(L, E, I_z, rho, A, as_Add=False)
+        yield units - L**power / sp.sqrt(E * I_z * rho * A)
+        sides = [above * below, below]
+        for inertia, force, motion in ((mu, -tip[3], lamda**4 * tip[0]), (iota, tip[2], lamda**4 * tip[1])):
+            sides = [motion * s.expand().coeff(inertia, 0) + force * s.expand().coeff(inertia, 1) for s in sides]
+        yield sp.pi * mass * sides[0] - lamda**2 * rate**2 * sum(pair) * sides[1]
 
 
 @samples(32)

@@ -147,6 +147,7 @@ def variation() -> Eq:
 @proves(9)
 def _() -> Proof:
     """Another route to the first variation: the Lagrangian of v + e delta_v, w + e delta_w differentiated by e."""
+    yield variation().lhs - delta_L - F * delta_w
     yield termwise(variation().rhs - F * delta_w - _first_variation())
 
 

@@ -160,8 +160,8 @@ def stiffness_of_manipulator_alone() -> Eq:
 
 @proves("16d")
 def _() -> Proof:
-    """Twice the first energy of (4) differs from it by the work of the forces of the mode on itself, in balance by (10b)
-    and (16a)."""
+    """Twice the first energy of (4) differs from it by the work of the forces of the mode, in balance by (10b) and
+    (16a), on itself."""
     energy = single_mode(potential_energy()[0].rhs) / q_i**2
     alone, size, virtual = stiffness_of_manipulator_alone(), symbol("epsilon"), symbol("eta")
     gap = 2 * energy - alone.rhs.subs(_generalised())
