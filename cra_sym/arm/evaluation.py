@@ -13,6 +13,7 @@ from cra_sym.arm.shooting import ShotMode, integrate, sample, shoot
 from cra_sym.symbols import symbol
 
 __all__ = [
+    "annihilates",
     "at",
     "evaluate",
     "group_numbers",
@@ -203,6 +204,19 @@ def shot_coefficients(mode: ShotMode) -> Matrix:
     """Return C_1..C_4 of a mode found by shooting, from its values and derivatives at the root."""
     a, b, c, d = (mode.start[k] / mode.beta**k for k in range(4))
     return Matrix([(a - c) / 2, (b - d) / 2, (a + c) / 2, (b + d) / 2])
+
+
+def annihilates(matrix: Matrix, seed: int) -> bool:
+    """Tell whether a matrix annihilates the coefficients of modes found by shooting, and at no other wave number."""
+    values = sample(seed)
+    for mode in shoot(values):
+        found = np.array(shot_coefficients(mode), dtype=float)[: matrix.cols]
+        for factor, expected in ((1.0, True), (1.03, False)):
+            numeric = np.array(matrix.subs(group_numbers(values, factor * mode.beta)), dtype=float)
+            residual = np.abs(numeric @ found) / (np.abs(numeric) @ np.abs(found))
+            if (residual.max() < 1e-8) != expected:
+                return False
+    return True
 
 
 def shapes_agree(seeds: tuple[int, ...], shape: Expr, ratio: Expr, **joint: float) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 from sympy import Derivative, Eq, Expr, Function, I, S, Sum, Symbol, conjugate, cos, exp, integrate, pi, sin, solve
 
 from cra_sym.arm.boundaries import forced_growth, forced_resonance, general_resonance, plain
-from cra_sym.arm.energy import generalised, inner_mass, modal_numbers, phi_i
+from cra_sym.arm.energy import generalised, inner_mass, phi_i
 from cra_sym.arm.equations import Proof, numbered, proves, samples
 from cra_sym.arm.evaluation import evaluate, put, termwise
 from cra_sym.arm.excited import excited_system
@@ -305,15 +305,6 @@ def _() -> Proof:
     before, after = (e.lhs - e.rhs for e in (solvability()[0], distributed()))
     yield termwise(product - factor * generalised()[0].rhs)
     yield (after - M_n * before).expand() == 0
-
-
-@samples(47)
-def _() -> bool:
-    """The inner product (46) of a mode found by shooting with itself is its mass."""
-    values, real = sample(47), inner_product().rhs.replace(conjugate, lambda e: e)
-    (mode, *_rest) = shoot(values)
-    mass = evaluate(real, values, {Function(name)(x): mode for name in "fg"})
-    return bool(abs(mass / modal_numbers(values, mode)[symbol("M_i")] - 1) < 1e-12)
 
 
 # Amplitude equation and boundary (48)-(49) ----------------------------------------------------------------------

@@ -15,6 +15,7 @@ from sympy import (
     Expr,
     I,
     Indexed,
+    Integer,
     Integral,
     Mul,
     Poly,
@@ -189,4 +190,4 @@ def _is_root(power: Expr) -> bool:
 
 def _factors(base: Expr) -> dict[Expr, int]:
     """Return the primes of a whole number, whose roots depend on theirs, and any other base as it is."""
-    return {sympify(p): n for p, n in factorint(base).items()} if base.is_Integer and base > 0 else {base: 1}
+    return {Integer(p): n for p, n in factorint(base).items()} if base.is_Integer and base > 0 else {base: 1}

@@ -104,7 +104,13 @@ def no_numbers(monkeypatch):
     A floating-point number that a proof yields all the same is refused by the decision procedure.
     """
     sources = [np, mpmath, random, lambdify, shooting.sample, shooting.shoot, shooting.integrate]
-    sources += [evaluation.evaluate, evaluation.shapes_agree, evaluation.group_numbers, evaluation.shot_coefficients]
+    sources += [
+        evaluation.annihilates,
+        evaluation.evaluate,
+        evaluation.shapes_agree,
+        evaluation.group_numbers,
+        evaluation.shot_coefficients,
+    ]
     for module in map(import_module, registry._HOMES):
         for name, value in list(vars(module).items()):
             if any(value is source for source in sources):
@@ -148,8 +154,10 @@ PERCENT = Rational(101, 100)
 #: What one per cent leaves true: a scale that is free, by equation, part and term.
 FREE = {(25, 0, "whole"), (27, 1, "whole"), (28, 0, "whole"), (17, 0, "whole")}
 FREE |= {(17, 0, f"C_{k}*{f}(beta*x)") for k, f in enumerate(("cos", "sin", "cosh", "sinh"), start=1)}
+#: Other equations written out, whose terms are tried there: (23), differentiated.
+WRITTEN_OUT = {32}
 #: How many of an equation's terms are tried, so that the long ones do not take all the time.
-TRIED = 6
+TRIED = 4
 
 
 def parts(expression):
@@ -197,7 +205,8 @@ def test_the_proof_notices_one_per_cent(e, monkeypatch):
     holders = [m for key, m in sys.modules.items() if key.startswith("cra_sym.arm") and vars(m).get(name) is builder]
     missed = []
     for place, part in enumerate(right):
-        for term, worse in random.Random(1).sample(found := list(spoiled(part)), min(TRIED, len(found))):
+        found = [spoil for spoil in spoiled(part) if e.number not in WRITTEN_OUT or spoil[0] == "whole"]
+        for term, worse in random.Random(1).sample(found, min(TRIED, len(found))):
             wrong = (*right[:place], worse, *right[place + 1 :])
             for holder in holders:
                 monkeypatch.setattr(holder, name, lambda: wrong if isinstance(e.expression, tuple) else wrong[0])  # noqa: B023
