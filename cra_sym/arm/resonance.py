@@ -166,7 +166,10 @@ def _left_over(equation: Eq) -> Expr:
 
 @proves(37)
 def _() -> Proof:
-    """Put into the equation of motion of a mode, with the slow evolution (48), it leaves nothing at orders 0 and 1."""
+    """It is order 0 without epsilon; put into the equation of motion of a mode, with the slow evolution (48), it leaves
+    nothing at orders 0 and 1."""
+    (expanded,) = two_scale_expansion()
+    yield expanded.rhs.subs(epsilon, 0) == named("q_n0")
     yield from residual()
 
 
@@ -229,7 +232,9 @@ def _() -> Proof:
 @proves(43)
 def _() -> Proof:
     """Euler's formula for the detuned frequency."""
-    yield cos((detuning().rhs * T_0).expand().subs(epsilon * T_0, T_1)) - excitation_in_exponentials().rhs
+    written = excitation_in_exponentials()
+    yield written.lhs - cos(varpi * T_0)
+    yield written.rhs - cos((detuning().rhs * T_0).expand().subs(epsilon * T_0, T_1))
 
 
 @proves(44)

@@ -181,6 +181,9 @@ def spoils(expression):
 
 def spoiled(part):
     """Yield (name, equation) with one term or one side one per cent off."""
+    if not isinstance(part, Eq):
+        yield from spoils(part)
+        return
     left, right = part.args
     if isinstance(left, MatMul):
         matrix, unknowns = left.args

@@ -17,7 +17,7 @@ def energy(x: Shape[2]) -> float:
     return -x**2 + 0.5 if x[0, 4:] > 1e-9 else 0
 
 
-@checks(3)
+@proves(3)
 def _():
     return 1 - 1
 '''
