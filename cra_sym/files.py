@@ -112,8 +112,9 @@ def staged_directory(target: str | Path, *, keep: bool = False) -> Iterator[Path
         If ``target`` cannot be written or holds files that an earlier output did not put there.
     """
     target = _absolute(target)
-    _check_replaceable(target, keep)
     with _stage(target) as folder:
+        with _alone_at(target):
+            _check_replaceable(target, keep)
         folder.mkdir()
         yield folder
         write_text(folder / _MANIFEST, json.dumps({"files": sorted(_files(folder))}, indent=1) + "\n")
@@ -202,7 +203,8 @@ def _stage(target: Path) -> Iterator[Path]:
             yield stage / target.name
         complete = True
     finally:
-        _discard(stage, target)
+        with _alone_at(target):
+            _discard(stage, target)
         _unlock(lock)
         for folder in () if complete else made:
             with suppress(OSError):
