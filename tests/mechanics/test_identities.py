@@ -44,6 +44,50 @@ def test_what_is_close_to_an_identity_is_none(zero):
     assert not vanishes(zero + x / 10**9)
 
 
+z = symbols("z")
+p, q = symbols("p q", commutative=False)
+HARD = [
+    exp(x + 1) - exp(1) * exp(x),
+    (sqrt(2) + sqrt(3)) ** 2 - 5 - 2 * sqrt(6),
+    1 / (a - I * b) - (a + I * b) / (a**2 + b**2),
+    (sqrt(1 + sqrt(1 + z)) + 1) ** 2 - 2 - sqrt(1 + z) - 2 * sqrt(1 + sqrt(1 + z)),
+    cos(a) - 4 * cos(a / 3) ** 3 + 3 * cos(a / 3),
+    exp(a * sqrt(1 + b) ** 3) - exp(a * sqrt(1 + b)) * exp(a * b * sqrt(1 + b)),
+]
+#: True on one branch of a root only.
+ON_ONE_BRANCH = [
+    sqrt(n**2) - n,
+    sqrt(n * z) - sqrt(n) * sqrt(z),
+    sqrt(n) * (sqrt(n**2 * sqrt(1 + z)) - n * (1 + z) ** Rational(1, 4)),
+    sqrt(1 - cos(x) ** 2) - sin(x),
+]
+
+
+@pytest.mark.parametrize("zero", HARD, ids=str)
+def test_what_takes_more_than_expanding(zero):
+    assert vanishes(zero) and not vanishes(zero + x / 10**9)
+
+
+@pytest.mark.parametrize("branch", ON_ONE_BRANCH, ids=str)
+def test_a_root_is_not_simplified_by_a_sign_nobody_gave(branch):
+    assert not vanishes(branch)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        p * q - q * p,
+        (sin(x) ** 2 + cos(x) ** 2 - 1) / (cosh(x) ** 2 - sinh(x) ** 2 - 1),
+        ((sqrt(n + 1) - 1) * (sqrt(n + 1) + 1) - n) / ((sqrt(z + 1) - 1) * (sqrt(z + 1) + 1) - z),
+        exp(x / (1 + x)) * exp(1 / (1 + x)) - exp(1),
+    ],
+    ids=str,
+)
+def test_what_does_not_commute_and_what_divides_by_zero_is_refused(wrong):
+    with pytest.raises(ValueError, match="allowed are"):
+        vanishes(wrong)
+
+
 def test_random_products_of_sums():
     """A polynomial in all the functions, expanded and shuffled, against itself factored; a changed one differs."""
     rng = random.Random(3)
