@@ -148,6 +148,20 @@ def test_equal_roots_are_counted_and_get_orthogonal_shapes(strings):
     np.testing.assert_allclose(gram, np.eye(4 * strings), atol=1e-10)
 
 
+def test_equal_roots_of_unlike_strings_get_shapes_that_are_orthogonal_by_mass():
+    """One speed of waves, masses 1 and 5, in skew coordinates: orthogonal vectors alone would not do."""
+    skew, none = np.array([[1.0, 0.7], [0.0, 1.0]]), np.zeros((2, 2))
+    mass = skew.T @ np.diag([1.0, 5.0]) @ skew
+    a0, a1 = np.block([[none, np.linalg.inv(mass)], [none, none]]), np.block([[none, none], [-mass, none]])
+    problem = constant(a0, a1, displacements=2, free=np.zeros((4, 0)))
+    z = lowest(problem, 4)
+    np.testing.assert_allclose(z[0], np.repeat((np.arange(1, 3) * np.pi) ** 2, 2), rtol=1e-12)
+    x = np.linspace(0.0, 1.0, 1001)
+    u = mode_states(problem, z, x[None])[0, :, :, :2]
+    gram = simpson(np.einsum("isa,ab,jsb->ijs", u, mass, u), x=x)
+    np.testing.assert_allclose(gram, np.eye(4), atol=1e-9)
+
+
 GROWTH = 0.8
 
 
