@@ -113,12 +113,18 @@ def test_sums_over_all_modes(arm):
     assert np.allclose(springs[1][:, None] * springs[1], modal.stiffness_rotation)
 
 
-@pytest.mark.parametrize(("free", "fluctuating"), [("k_r", JOINT), ("k_t", cra.JointStiffness(k_t=0.3, k_r=1.0))])
+@pytest.mark.parametrize(
+    ("free", "fluctuating"),
+    [("k_r", cra.JointStiffness(k_t=1.0, k_r=0.5)), ("k_t", cra.JointStiffness(k_t=0.3, k_r=1.0))],
+)
 def test_the_zone_is_continuous_where_a_spring_vanishes(free, fluctuating):
     arms = [SOFT.replace(**{"k_t": 40.0, "k_r": 3.0, "m_e": 0.05, free: value}) for value in (0.0, 1e-9)]
     for resonance in ((2, 2), (2, 3)):
         none, hardly = (np.array(cra.stability_boundary(arm, fluctuating, 0.01, resonance, order=2)) for arm in arms)
         assert none == pytest.approx(hardly, rel=1e-10)
+    varpi = 2.0 * cra.modal_parameters(arms[0]).omega[1]
+    rates = [cra.growth_rate(arm, fluctuating, varpi, 0.3, 2, residual=True) for arm in arms]
+    assert rates[0] > 0.1 and rates[0] == pytest.approx(rates[1], rel=1e-6)
 
 
 def test_the_second_order_does_not_depend_on_how_many_modes_are_summed_one_by_one(monkeypatch):
