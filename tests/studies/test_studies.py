@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import pickle
+import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -80,6 +83,56 @@ def test_a_stored_sweep_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
     rest.clear()
     cra.sweep(cra.Arm.nominal(), k_t=K_T, m_e=M_E, store=place)
     assert rest == []
+
+
+COUNTED = """
+import os, pathlib, time
+import numpy as np
+
+def counted(arm):
+    "Notes every region it is asked for, as soon as it is asked."
+    with pathlib.Path(os.environ["COUNTED"]).open("a") as notes:
+        notes.write(f"{np.ravel(arm.k_t)[0]} {np.ravel(arm.m_e)[0]}\\n")
+    time.sleep(0.01)
+    return np.asarray(arm.k_t) + np.asarray(arm.m_e)
+"""
+
+
+def test_a_killed_sweep_loses_nothing_and_computes_nothing_twice(tmp_path, monkeypatch):
+    """Killed outright, it has lost the region in hand and no other."""
+    place, notes = tmp_path / "study.zarr", tmp_path / "notes"
+    (tmp_path / "counting.py").write_text(COUNTED)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("COUNTED", str(notes))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *sys.path]))
+    k_t, m_e = np.geomspace(1e2, 1e6, 10), np.linspace(0.0, 0.05, 10)
+    text = f"""
+import numpy as np, cra_sym as cra
+from counting import counted
+axes = {{"k_t": np.geomspace(1e2, 1e6, 10), "m_e": np.linspace(0.0, 0.05, 10)}}
+cra.sweep(cra.Arm.nominal(), counted, **axes, chunks=1, store={str(place)!r})
+"""
+    process = subprocess.Popen([sys.executable, "-c", text], stderr=subprocess.PIPE)
+    while not notes.exists() or len(notes.read_text().splitlines()) < 20:
+        assert process.poll() is None, process.stderr.read()
+        time.sleep(0.005)
+    process.kill()
+    process.wait()
+    process.stderr.close()
+    from counting import counted
+
+    asked = notes.read_text().splitlines()
+    assert 20 <= len(asked) < 100
+    notes.unlink()
+    study = cra.sweep(cra.Arm.nominal(), counted, k_t=k_t, m_e=m_e, chunks=1, store=place)
+    (corner, *again), first = (
+        notes.read_text().splitlines(),
+        asked[1:],
+    )  # each call asks for one corner to learn the axes
+    assert corner == asked[0] and len(set(again)) == len(again)
+    assert set(first) | set(again) == {f"{a} {b}" for a in k_t for b in m_e}
+    assert set(first) & set(again) <= {first[-1]}
+    np.testing.assert_array_equal(study.counted, k_t[:, None] + m_e)
 
 
 def test_a_terminal_sees_how_far_a_sweep_is(tmp_path, monkeypatch, capsys):
