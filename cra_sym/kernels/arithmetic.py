@@ -12,10 +12,11 @@ from llvmlite import ir
 from numba.core import errors, types
 from numba.core.registry import cpu_target
 
-__all__ = ["CONDITION", "DOUBLE", "INTEGER", "Arithmetic", "is_constant", "kind_of"]
+__all__ = ["CONDITION", "DOUBLE", "INTEGER", "Arithmetic", "is_constant", "kind_named", "kind_of"]
 
 DOUBLE, INTEGER, CONDITION = ir.DoubleType(), ir.IntType(64), ir.IntType(1)
 _KINDS = {bool: CONDITION, int: INTEGER, float: DOUBLE}
+_WIDTHS = CONDITION, INTEGER, DOUBLE  # each holds what those before it hold
 _OPERATIONS: dict[type, tuple[Callable[..., Any], str | None, str | None]] = {  # of constants, doubles, integers
     ast.Add: (operator.add, "fadd", "add"),
     ast.Sub: (operator.sub, "fsub", "sub"),
@@ -30,6 +31,12 @@ _OPERATIONS: dict[type, tuple[Callable[..., Any], str | None, str | None]] = {  
     ast.RShift: (operator.rshift, None, "ashr"),
 }
 _COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+_BY_CONSTANTS = {  # operators whose right side is one of these constants: LLVM leaves others undefined
+    ast.FloorDiv: range(1, 2**63),
+    ast.Mod: range(1, 2**63),
+    ast.LShift: range(64),
+    ast.RShift: range(64),
+}
 _LARGEST_POWER = 64  # that becomes products
 
 
@@ -40,7 +47,18 @@ def is_constant(value: Any) -> bool:
 
 def kind_of(value: Any) -> Any:
     """Return the LLVM type of a number."""
-    return _KINDS[type(value)] if is_constant(value) else value.type
+    if is_constant(value):
+        return next(kind for of, kind in _KINDS.items() if isinstance(value, of))
+    if getattr(value, "type", None) not in _WIDTHS:
+        raise errors.TypingError(f"{value!r} is no number")
+    return value.type
+
+
+def kind_named(name: Any) -> Any:
+    """Return the LLVM type that ``np.float64`` or ``np.int64`` stands for."""
+    if name not in (np.float64, np.int64):
+        raise errors.TypingError(f"{name} is neither np.float64 nor np.int64")
+    return DOUBLE if name is np.float64 else INTEGER
 
 
 class Arithmetic:
@@ -59,21 +77,21 @@ class Arithmetic:
         """Return a number as an LLVM value, of its own type or of a wider one."""
         own = kind_of(value)
         kind = kind or own
-        if is_constant(value) and (kind == DOUBLE or own != DOUBLE):
+        if _WIDTHS.index(own) > _WIDTHS.index(kind) or (kind == INTEGER and is_constant(value) and abs(value) >= 2**63):
+            raise errors.TypingError(f"a value of type {own} where {kind} is expected")
+        if is_constant(value):
             return ir.Constant(kind, float(value) if kind == DOUBLE else int(value))
         if own == kind:
             return value
-        if own == CONDITION:
-            return self.builder.uitofp(value, kind) if kind == DOUBLE else self.builder.zext(value, kind)
-        if (own, kind) == (INTEGER, DOUBLE):
-            return self.builder.sitofp(value, kind)
-        raise errors.TypingError(f"a value of type {own} where {kind} is expected")
+        if kind == INTEGER:
+            return self.builder.zext(value, kind)
+        return self.builder.uitofp(value, kind) if own == CONDITION else self.builder.sitofp(value, kind)
 
     def negative(self, value: Any) -> Any:
         """Return -value."""
         if is_constant(value):
             return -value
-        return self.builder.fneg(value) if kind_of(value) == DOUBLE else self.builder.neg(value)
+        return self.builder.fneg(value) if kind_of(value) == DOUBLE else self.builder.neg(self.typed(value, INTEGER))
 
     def binary(self, op: ast.operator, left: Any, right: Any) -> Any:
         """Return the result of an operator."""
@@ -82,13 +100,23 @@ class Arithmetic:
             return constant(left, right)
         if isinstance(op, ast.Pow):
             return self.power(left, right)
+        if type(op) in _BY_CONSTANTS and (type(right) is not int or right not in _BY_CONSTANTS[type(op)]):
+            raise errors.TypingError(f"{type(op).__name__} by what is no constant in {_BY_CONSTANTS[type(op)]}")
         kind = DOUBLE if isinstance(op, ast.Div) else _widest(left, right)
         if kind == CONDITION and not isinstance(op, (ast.BitAnd, ast.BitOr)):
             kind = INTEGER
         name = of_doubles if kind == DOUBLE else of_integers
         if name is None:
             raise errors.TypingError(f"{type(op).__name__} of {kind}")
+        if isinstance(op, (ast.FloorDiv, ast.Mod)):
+            return self.divided(op, self.typed(left, kind), right)
         return getattr(self.builder, name)(self.typed(left, kind), self.typed(right, kind))
+
+    def divided(self, op: ast.operator, left: Any, right: int) -> Any:
+        """Return // or %, rounded down, by a positive constant."""
+        rest = self.builder.srem(left, self.typed(right))
+        rest = self.chosen(self.compared(ast.Lt(), rest, 0), self.binary(ast.Add(), rest, right), rest)
+        return rest if isinstance(op, ast.Mod) else self.builder.sdiv(self.builder.sub(left, rest), self.typed(right))
 
     def power(self, base: Any, exponent: Any) -> Any:
         """Return a power; one with a small whole exponent by repeated squaring."""
@@ -107,7 +135,7 @@ class Arithmetic:
         kind, sign = _widest(left, right), _COMPARISONS[type(op)]
         values = self.typed(left, kind), self.typed(right, kind)
         if kind != DOUBLE:
-            return self.builder.icmp_signed(sign, *values)
+            return (self.builder.icmp_signed if kind == INTEGER else self.builder.icmp_unsigned)(sign, *values)
         return (self.builder.fcmp_unordered if sign == "!=" else self.builder.fcmp_ordered)(sign, *values)
 
     def truth(self, value: Any) -> Any:
@@ -125,11 +153,11 @@ class Arithmetic:
         """Return what ``np.float64(value)`` or ``np.int64(value)`` is."""
         if kind is np.int64 and kind_of(value) == DOUBLE:
             return self.builder.fptosi(self.typed(value), INTEGER)
-        return self.typed(value, DOUBLE if kind is np.float64 else INTEGER)
+        return self.typed(value, kind_named(kind))
 
     def viewed(self, value: Any, kind: type) -> Any:
         """Return what the bits of a number are as a double or an integer."""
-        return self.builder.bitcast(self.typed(value), DOUBLE if kind is np.float64 else INTEGER)
+        return self.builder.bitcast(self.typed(value), kind_named(kind))
 
     def known_to_numba(self, function: Any, arguments: Sequence[Any]) -> Any:
         """Return a function of doubles as Numba writes it."""

@@ -11,12 +11,12 @@ import ast
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 from numba.core import cgutils, errors
 
-from cra_sym.kernels.arithmetic import DOUBLE, INTEGER, Arithmetic, is_constant, kind_of
+from cra_sym.kernels.arithmetic import CONDITION, INTEGER, Arithmetic, is_constant, kind_named, kind_of
 
 __all__ = ["Array", "call"]
 
@@ -41,8 +41,8 @@ def call(
         Numba's target context and LLVM's builder.
     function : ast.FunctionDef
         Made of assignments, ``for`` over ``range``, ``while``, ``if``, ``continue`` and ``return``. Indices count from
-        the start of an array, ``//`` and ``%`` are for integers that are not negative, and all parts of an expression
-        are evaluated, whatever its conditions. Arrays that it makes are gone when it returns.
+        the start of an array and stay within it, and all parts of an expression are evaluated, whatever its conditions.
+        A name keeps the type it is given first. Arrays that it makes are gone when it returns.
     arguments : sequence of number, LLVM value, or Array
     namespace : dict
         What other names mean: constants, NumPy and its functions of numbers, further functions as ast.FunctionDef.
@@ -54,8 +54,8 @@ def call(
     return _Body(context, builder, function, arguments, namespace).written()
 
 
-def _refuse(node: ast.AST) -> NoReturn:
-    raise errors.TypingError(f"compiled functions hold nothing like: {ast.unparse(node)}")
+def _refused(node: ast.AST) -> errors.TypingError:
+    return errors.TypingError(f"compiled functions hold nothing like: {ast.unparse(node)}")
 
 
 def _in_double(result: Any) -> Any:
@@ -69,7 +69,7 @@ class _Body(Arithmetic):
     """One call of a function.
 
     A name stands for a value. In a function that branches, a name it assigns stands for a place in memory of the type
-    assigned first; LLVM makes registers of these.
+    assigned first, and LLVM makes registers of these; names of arrays and tuples are assigned once.
     """
 
     def __init__(
@@ -86,12 +86,13 @@ class _Body(Arithmetic):
         self.places: dict[str, Any] = {}
         self.again: Any = None  # where `continue` leads
         self.end: Any = None  # where `return` leads, if the function branches
-        self.results: list[Any] = []
+        self.returned: Any = None  # if the function does not branch
+        self.results: list[Any] | None = None
         self.single = True
         self.owned: list[Any] = []  # memory of arrays made here
         if any(isinstance(node, (ast.For, ast.While, ast.If)) for node in ast.walk(function)):
             self.end = builder.append_basic_block("end")
-        stored = {node.id for node in ast.walk(function) if isinstance(node, ast.Name) and _is_stored(node)}
+        stored = self.own = {n.id for n in ast.walk(function) if isinstance(n, ast.Name) and _is_stored(n)}
         for parameter, argument in zip((a.arg for a in function.args.args), arguments, strict=True):
             if parameter in stored:
                 self.assign_name(parameter, argument)
@@ -100,20 +101,16 @@ class _Body(Arithmetic):
 
     def written(self) -> Any:
         """Write all statements and return the result."""
-        if self.end is None:
-            *statements, last = self.statements
-            self.run(statements)
-            if isinstance(last, ast.Return) and last.value is not None:
-                return _in_double(self.value(last.value))
-            self.run([last])
-            return None
         self.run(self.statements)
+        if self.end is None:
+            return _in_double(self.returned)
         if not self.builder.block.is_terminated:
-            self.builder.branch(self.end)
+            self.give_back(None)
         self.builder.position_at_end(self.end)
         for memory in self.owned:
             self.context.nrt.free(self.builder, self.builder.load(memory))
-        results = tuple(self.builder.load(place) for place in self.results)
+            self.builder.store(memory.type.pointee(None), memory)  # the next call may not make this array
+        results = tuple(self.builder.load(place) for place in self.results or ())
         return (results[0] if self.single else results) if results else None
 
     # Statements ---------------------------------------------------------------------------------------------------
@@ -122,29 +119,37 @@ class _Body(Arithmetic):
         for statement in statements:
             if self.builder.block.is_terminated:
                 return
-            match statement:
-                case ast.Assign(targets=targets, value=value):
-                    result = self.value(value)
-                    for target in targets:
-                        self.assign(target, result)
-                case ast.AugAssign(target=target, op=op, value=value):
-                    self.assign(target, self.binary(op, self.value(target), self.value(value)))
-                case ast.Expr(value=ast.Constant(value=str())):
-                    pass
-                case ast.Expr(value=value):
-                    self.value(value)
-                case ast.If(test=test, body=body, orelse=orelse):
-                    self.branch(test, body, orelse)
-                case ast.For(target=ast.Name(id=name), iter=ast.Call(func=ast.Name(id="range"), args=bounds)):
-                    self.count(name, [self.value(bound) for bound in bounds], statement.body)
-                case ast.While(test=test, body=body):
-                    self.repeat(test, body)
-                case ast.Continue():
-                    self.builder.branch(self.again)
-                case ast.Return(value=value):
-                    self.give_back(None if value is None else self.value(value))
-                case _:
-                    _refuse(statement)
+            try:
+                self.write(statement)
+            except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
+                raise _refused(statement) from error
+
+    def write(self, statement: ast.stmt) -> None:
+        match statement:
+            case ast.Assign(targets=targets, value=value):
+                result = self.value(value)
+                for target in targets:
+                    self.assign(target, result)
+            case ast.AugAssign(target=target, op=op, value=value):
+                self.assign(target, self.binary(op, self.value(target), self.value(value)))
+            case ast.Expr(value=ast.Constant(value=str())):
+                pass
+            case ast.Expr(value=value):
+                self.value(value)
+            case ast.If(test=test, body=body, orelse=orelse):
+                self.branch(test, body, orelse)
+            case ast.For(target=ast.Name(id=name), iter=ast.Call(func=ast.Name(id="range"), args=bounds), orelse=[]):
+                self.count(name, [self.value(bound) for bound in bounds], statement.body)
+            case ast.While(test=test, body=body, orelse=[]):
+                self.repeat(test, body)
+            case ast.Continue():
+                self.builder.branch(self.again)
+            case ast.Return(value=value) if self.end is None and statement is self.statements[-1]:
+                self.returned = None if value is None else self.value(value)
+            case ast.Return(value=value) if self.end is not None:
+                self.give_back(None if value is None else self.value(value))
+            case _:
+                raise _refused(statement)
 
     def assign(self, target: ast.expr, value: Any) -> None:
         match target:
@@ -156,18 +161,23 @@ class _Body(Arithmetic):
                 for one, part in zip(targets, value, strict=True):
                     self.assign(one, part)
             case ast.Subscript(value=base, slice=index):
-                array = self.value(base)
+                array, indices = self.value(base), self.indices(index)
                 if not array.writable:
                     raise errors.TypingError(f"{ast.unparse(base)} is read-only")
-                self.put(value, self.pointer(array, self.indices(index)))
+                if len(indices) != len(array.shape):
+                    raise errors.TypingError(f"{ast.unparse(target)} is not one element")
+                self.put(value, self.pointer(array, indices))
             case _:
-                _refuse(target)
+                raise _refused(target)
 
     def assign_name(self, name: str, value: Any) -> None:
-        if self.end is None or isinstance(value, (Array, tuple)):
+        before = self.values.pop(name, None)
+        several = isinstance(value, (Array, tuple))
+        if self.end is not None and (isinstance(before, (Array, tuple)) or (several and name in self.places)):
+            raise errors.TypingError(f"{name} is assigned again, and is an array or a tuple")
+        if self.end is None or several:
             self.values[name] = value
             return
-        self.values.pop(name, None)
         if name not in self.places:
             self.places[name] = cgutils.alloca_once(self.builder, kind_of(value), name=name)
         self.put(value, self.places[name])
@@ -178,17 +188,23 @@ class _Body(Arithmetic):
     def branch(self, test: ast.expr, body: Sequence[ast.stmt], orelse: Sequence[ast.stmt]) -> None:
         then, otherwise, after = map(self.builder.append_basic_block, ("then", "else", "after"))
         self.builder.cbranch(self.truth(self.value(test)), then, otherwise)
+        ends: list[bool] = []
         for block, statements in ((then, body), (otherwise, orelse)):
             self.builder.position_at_end(block)
             self.run(statements)
-            if not self.builder.block.is_terminated:
+            ends.append(self.builder.block.is_terminated)
+            if not ends[-1]:
                 self.builder.branch(after)
         self.builder.position_at_end(after)
+        if all(ends):
+            self.builder.unreachable()
 
     def count(self, name: str, bounds: Sequence[Any], body: Sequence[ast.stmt]) -> None:
         """Write a loop over a range; a plain one of known length as its rounds in a row."""
         start, stop, *steps = bounds if len(bounds) > 1 else (0, *bounds)
         step = steps[0] if steps else 1
+        if not is_constant(step) or not step or any(kind_of(bound) != INTEGER for bound in bounds):
+            raise errors.TypingError("ranges are of integers, in constant steps")
         if is_constant(start) and is_constant(stop) and _is_plain(body):
             for number in range(start, stop, step):
                 self.values[name] = number
@@ -228,10 +244,15 @@ class _Body(Arithmetic):
 
     def give_back(self, value: Any) -> None:
         """Put the result where all returns of the function put it, and leave."""
-        parts = () if value is None else value if isinstance(value, tuple) else (value,)
-        self.single = not isinstance(value, tuple)
-        if not self.results:
+        parts, single = (
+            () if value is None else value if isinstance(value, tuple) else (value,),
+            not isinstance(value, tuple),
+        )
+        if self.results is None:
             self.results = [cgutils.alloca_once(self.builder, kind_of(part)) for part in parts]
+            self.single = single
+        if single != self.single or len(parts) != len(self.results):
+            raise errors.TypingError("all ways out return as much")
         for part, place in zip(parts, self.results, strict=True):
             self.put(part, place)
         self.builder.branch(self.end)
@@ -267,20 +288,25 @@ class _Body(Arithmetic):
                 return reduce(self.builder.and_, [self.compared(*triple) for triple in triples])
             case ast.BoolOp(op=op, values=parts):
                 join = self.builder.and_ if isinstance(op, ast.And) else self.builder.or_
-                return reduce(join, [self.truth(self.value(part)) for part in parts])
+                conditions = [self.value(part) for part in parts]
+                if any(kind_of(part) != CONDITION for part in conditions):  # Python's result is one of them
+                    raise _refused(node)
+                return reduce(join, map(self.typed, conditions))
             case ast.IfExp(test=test, body=body, orelse=orelse):
                 return self.chosen(self.value(test), self.value(body), self.value(orelse))
             case ast.Call(func=ast.Attribute(value=bits, attr="view"), args=[kind]):
                 return self.viewed(self.value(bits), self.value(kind))
             case ast.Call(func=function, args=arguments, keywords=[]):
                 return self.called(self.value(function), [self.value(argument) for argument in arguments])
-        _refuse(node)
+        raise _refused(node)
 
     def named(self, name: str) -> Any:
         if name in self.values:
             return self.values[name]
         if name in self.places:
             return self.builder.load(self.places[name])
+        if name in self.own:
+            raise errors.TypingError(f"{name} has no value yet")
         return self.namespace[name] if name in self.namespace else _BUILT_IN[name]
 
     def called(self, function: Any, arguments: Sequence[Any]) -> Any:
@@ -302,6 +328,8 @@ class _Body(Arithmetic):
         """Return where a part of an array begins; its elements lie in C order."""
         offset: Any = 0
         for length, index in zip(array.shape, [*indices, *[0] * (len(array.shape) - len(indices))], strict=True):
+            if kind_of(index) != INTEGER or (is_constant(index) and index < 0):
+                raise errors.TypingError("indices are integers that count from the start")
             rows = 0 if offset == 0 else self.binary(ast.Mult(), offset, length)
             offset = index if rows == 0 else self.binary(ast.Add(), rows, index)
         return self.builder.gep(array.data, [self.typed(offset, INTEGER)], inbounds=True)
@@ -318,13 +346,13 @@ class _Body(Arithmetic):
         if self.end is None or self.again is not None:
             raise errors.TypingError("arrays are made outside of loops, in functions that hold one")
         shape = shape if isinstance(shape, tuple) else (shape,)
-        size = self.typed(self.binary(ast.Mult(), self.product(shape), 8))
+        size = self.typed(self.binary(ast.Mult(), self.product(shape), 8), INTEGER)
         memory = self.context.nrt.allocate(self.builder, size)
         self.owned.append(cgutils.alloca_once(self.builder, memory.type))
         self.builder.store(memory, self.owned[-1])
         if zeros:
             cgutils.memset(self.builder, memory, size, 0)
-        return Array(self.builder.bitcast(memory, (DOUBLE if kind is np.float64 else INTEGER).as_pointer()), shape)
+        return Array(self.builder.bitcast(memory, kind_named(kind).as_pointer()), shape)
 
 
 def _is_stored(name: ast.Name) -> bool:
@@ -338,7 +366,10 @@ def _is_plain(body: Sequence[ast.stmt]) -> bool:
 
 
 def _extreme(op: ast.cmpop) -> Callable[..., Any]:
-    return lambda body, *values: reduce(lambda one, two: body.chosen(body.compared(op, two, one), two, one), values)
+    def extreme(body: Any, first: Any, second: Any, *others: Any) -> Any:
+        return reduce(lambda one, two: body.chosen(body.compared(op, two, one), two, one), (second, *others), first)
+
+    return extreme
 
 
 _BUILT_IN: dict[str, Callable[..., Any]] = {
