@@ -78,7 +78,8 @@ class Arithmetic:
         own = kind_of(value)
         kind = kind or own
         if _WIDTHS.index(own) > _WIDTHS.index(kind) or (kind == INTEGER and is_constant(value) and abs(value) >= 2**63):
-            raise errors.TypingError(f"a value of type {own} where {kind} is expected")
+            what = value if is_constant(value) else f"a value of type {own}"
+            raise errors.TypingError(f"{what} where {kind} is expected")
         if is_constant(value):
             return ir.Constant(kind, float(value) if kind == DOUBLE else int(value))
         if own == kind:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -120,6 +121,66 @@ def test_new_arrays_are_given_back(written):
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 20_000
 
 
+EDGES = '''
+import numpy as np
+
+
+def doubles(x, y):
+    """What nan, infinities and signed zeros go through: every result is one rounded operation, or none."""
+    less, more = (x < y) + 0, 2 * (x >= y) + (x > y)
+    alike, unlike = 2 * (x == y) + (x <= y <= 1.5), 2 * (x != y) + (not x) + 4 * (not x < y)
+    ranked = ((x > 0.0) < (y > 0.0)) + 2 * max(x > 0.0, y > 0.0) + 4 * ((x > 0.0) <= (y > 0.0))
+    picked, other = x if x else y, (y if x == x and y == y else -x)
+    return less, more, alike, unlike, ranked, picked, other, max(x, y), min(x, y, 1.0), abs(x), 1 / x, x / y, x**2
+
+
+def integers(n, m):
+    """Signs in divisions and shifts; a name that is read where only an earlier round assigns it."""
+    before = total = 0
+    for k in range(n, -3, -2):
+        total = 10 * total + k
+        if k % 3 == 1:
+            continue
+        before = k
+    return before, total, n // 3, n % 3, -n // 8, -n % 8, n >> 1, n << 5, n & m, n | m, n**3, n / m, abs(n - m)
+
+
+def rounds(n):
+    """A helper makes an array in some rounds only."""
+    total = 0.0
+    for k in range(n):
+        total = 2.0 * total + _last(k % 2, k)
+    a, b = total, 1.0
+    for _ in range(3):
+        a, b = b, a
+    return a, b
+
+
+def _last(odd, k):
+    if odd == 1:
+        a = np.zeros(3)
+        a[2] += k
+        return a[2]
+    else:
+        return -1.0
+'''
+
+
+def test_edges_of_arithmetic():
+    entries, names = compiled(EDGES, {}), {}
+    exec(EDGES, names)
+    values = [np.float64(value) for value in (0.0, -0.0, 1.5, -2.5, math.inf, -math.inf, math.nan)]
+    numbers = [-9, -7, -1, 1, 2, 8]
+    for name, arguments in (("doubles", (values, values)), ("integers", (numbers, numbers)), ("rounds", (numbers,))):
+        for given in itertools.product(*arguments):
+            with np.errstate(all="ignore"):
+                wanted = np.array(names[name](*given), float)
+            got = np.array(getattr(entries, name)(*given), float)
+            np.testing.assert_array_equal(got, wanted, err_msg=f"{name}{given}")
+            known = ~np.isnan(wanted)
+            np.testing.assert_array_equal(np.signbit(got[known]), np.signbit(wanted[known]), err_msg=f"{name}{given}")
+
+
 REFUSED = {
     "with open(x) as f:\n        pass": "nothing like: with open",
     "return [x]": r"nothing like: \[x\]",
@@ -128,6 +189,36 @@ REFUSED = {
     "for i in range(x.size):\n        x[i] = 0.0": "x is read-only",
     "for i in range(x.size):\n        y = np.empty(3)": "outside of loops",
     "return np.sort_complex(x)": "sort_complex",
+    "return x // 2": "FloorDiv of double",
+    "return 6 % np.int64(x)": "Mod by what is no constant",
+    "return np.int64(x) // -2": "FloorDiv by what is no constant",
+    "return 1 << np.int64(x)": "LShift by what is no constant",
+    "return np.int64(x) << 64": "LShift by what is no constant",
+    "return np.int64(x) ^ 1": "nothing like: return",
+    "return np.int64(x) + 2**63": "9223372036854775808 where i64 is expected",
+    "return x or 2.0": "nothing like: x or 2.0",
+    "return x + 1 / 0": "nothing like: return",
+    "return max((x, 1.0))": "nothing like: return",
+    "return entry(x)": "nothing like: return",
+    "return unknown(x)": "nothing like: return",
+    "return entry": "is no number",
+    "return x\n    return 0.0": "nothing like: return x",
+    "y = x > 0.0\n    if x > 1.0:\n        y = 5\n    return y": "5 where i1 is expected",
+    "if x > 1.0:\n        return x > 2.0\n    return 5": "5 where i1 is expected",
+    "if x > 1.0:\n        return x": "all ways out return as much",
+    "if x > 1.0:\n        return x\n    return x, x": "all ways out return as much",
+    "if x > 1.0:\n        return x\n    return (x,)": "all ways out return as much",
+    "if x > 0.0:\n        y = (1.0, x)\n    else:\n        y = (2.0, x)\n    return y[0]": "y is assigned again",
+    "y = 1.0\n    if x > 0.0:\n        y = (2.0, x)\n    return 0.0": "y is assigned again",
+    "for k in range(9):\n        if k > 0:\n            x = np\n        np = x\n    return x": "np has no value yet",
+    "for k in range(3):\n        x += k\n    else:\n        x = 0.0\n    return x": "nothing like: for k in",
+    "while x > 3.0:\n        x -= 1.0\n    else:\n        x = 0.0\n    return x": "nothing like: while x",
+    "for k in range(0, 9, np.int64(x)):\n        x += k\n    return x": "in constant steps",
+    "for k in range(x):\n        x += k\n    return x": "ranges are of integers",
+    "return x[-1] + x.size": "count from the start",
+    "return x[x[0]] + x.size": "indices are integers",
+    "y = np.zeros((2, x.size))\n    if x[0] > 0.0:\n        y[1] = 1.0\n    return y": r"y\[1\] is not one element",
+    "y = np.zeros(2, np.int32)\n    if x > 0.0:\n        y[0] = 1\n    return y[0]": "neither np.float64 nor",
 }
 
 
