@@ -69,7 +69,8 @@ class _Body(Arithmetic):
     """One call of a function.
 
     A name stands for a value. In a function that branches, a name it assigns stands for a place in memory of the type
-    assigned first, and LLVM makes registers of these; names of arrays and tuples are assigned once.
+    assigned first, and LLVM makes registers of these. Arrays and tuples that get a name in a branch or a loop have it
+    only there.
     """
 
     def __init__(
@@ -86,6 +87,7 @@ class _Body(Arithmetic):
         self.places: dict[str, Any] = {}
         self.again: Any = None  # where `continue` leads
         self.end: Any = None  # where `return` leads, if the function branches
+        self.depth = 0  # of statements in statements
         self.returned: Any = None  # if the function does not branch
         self.results: list[Any] | None = None
         self.single = True
@@ -116,13 +118,17 @@ class _Body(Arithmetic):
     # Statements ---------------------------------------------------------------------------------------------------
 
     def run(self, statements: Sequence[ast.stmt]) -> None:
+        outer = set(self.values)
+        self.depth += 1
         for statement in statements:
             if self.builder.block.is_terminated:
-                return
+                break
             try:
                 self.write(statement)
             except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
                 raise _refused(statement) from error
+        self.depth -= 1
+        self.values = {name: value for name, value in self.values.items() if name in outer}
 
     def write(self, statement: ast.stmt) -> None:
         match statement:
@@ -173,7 +179,7 @@ class _Body(Arithmetic):
     def assign_name(self, name: str, value: Any) -> None:
         before = self.values.pop(name, None)
         several = isinstance(value, (Array, tuple))
-        if self.end is not None and (isinstance(before, (Array, tuple)) or (several and name in self.places)):
+        if self.depth > 1 and (isinstance(before, (Array, tuple)) or (several and name in self.places)):
             raise errors.TypingError(f"{name} is assigned again, and is an array or a tuple")
         if self.end is None or several:
             self.values[name] = value
@@ -205,7 +211,7 @@ class _Body(Arithmetic):
         step = steps[0] if steps else 1
         if not is_constant(step) or not step or any(kind_of(bound) != INTEGER for bound in bounds):
             raise errors.TypingError("ranges are of integers, in constant steps")
-        if is_constant(start) and is_constant(stop) and _is_plain(body):
+        if is_constant(start) and is_constant(stop) and _is_plain(name, body):
             for number in range(start, stop, step):
                 self.values[name] = number
                 self.run(body)
@@ -359,10 +365,12 @@ def _is_stored(name: ast.Name) -> bool:
     return isinstance(name.ctx, ast.Store)
 
 
-def _is_plain(body: Sequence[ast.stmt]) -> bool:
-    """Return whether statements hold no loop and nothing that leaves them."""
+def _is_plain(name: str, body: Sequence[ast.stmt]) -> bool:
+    """Return whether statements hold no loop, nothing that leaves them, and leave a name alone."""
     others = ast.For, ast.While, ast.Continue, ast.Return
-    return not any(isinstance(node, others) for statement in body for node in ast.walk(statement))
+    nodes = [node for statement in body for node in ast.walk(statement)]
+    own = any(isinstance(node, ast.Name) and node.id == name and _is_stored(node) for node in nodes)
+    return not own and not any(isinstance(node, others) for node in nodes)
 
 
 def _extreme(op: ast.cmpop) -> Callable[..., Any]:

@@ -151,8 +151,11 @@ def rounds(n):
     for k in range(n):
         total = 2.0 * total + _last(k % 2, k)
     a, b = total, 1.0
-    for _ in range(3):
+    for i in range(3):
         a, b = b, a
+        if n > 1:
+            i = -i
+        b += i
     return a, b
 
 
@@ -208,8 +211,9 @@ REFUSED = {
     "if x > 1.0:\n        return x": "all ways out return as much",
     "if x > 1.0:\n        return x\n    return x, x": "all ways out return as much",
     "if x > 1.0:\n        return x\n    return (x,)": "all ways out return as much",
-    "if x > 0.0:\n        y = (1.0, x)\n    else:\n        y = (2.0, x)\n    return y[0]": "y is assigned again",
+    "if x > 0.0:\n        y = (1.0, x)\n    else:\n        y = (2.0, x)\n    return y[0]": "y has no value yet",
     "y = 1.0\n    if x > 0.0:\n        y = (2.0, x)\n    return 0.0": "y is assigned again",
+    "y = (1.0, x)\n    while x > 0.0:\n        y = (y[1], y[0])\n    return y[0]": "y is assigned again",
     "for k in range(9):\n        if k > 0:\n            x = np\n        np = x\n    return x": "np has no value yet",
     "for k in range(3):\n        x += k\n    else:\n        x = 0.0\n    return x": "nothing like: for k in",
     "while x > 3.0:\n        x -= 1.0\n    else:\n        x = 0.0\n    return x": "nothing like: while x",
