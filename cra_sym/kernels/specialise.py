@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
+from threading import Lock
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
@@ -29,6 +30,7 @@ _ELEMENTARY = Path(__file__).with_name("elementary.py")
 _COMPILER = [
     Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8") for name in ("arithmetic", "inlined", "writer")
 ]
+_TURN = Lock()  # one thread specialises what others want too; Python 3.11 cannot parse in two at once
 _WHERE = "def where(condition, value, otherwise):\n    return value if condition else otherwise\n"
 
 
@@ -89,7 +91,8 @@ def compiled(template: str, kernels: Mapping[str, Generated], *, elementary: boo
     >>> out
     array([1., 1., 1.])
     """
-    return _entries(_prelude(kernels, elementary), template)
+    with _TURN:
+        return _entries(_prelude(kernels, elementary), template)
 
 
 def is_compiled(template: str, kernels: Mapping[str, Generated]) -> bool:

@@ -77,6 +77,18 @@ def test_threads_share_an_entry(newton):
     np.testing.assert_allclose(out - eccentricity * np.sin(out), 1, rtol=0, atol=1e-15)
 
 
+def test_threads_that_ask_at_once_get_the_same_entries():
+    template = "def at(x):\n" + "    x = x + 1.0 / (x * x + 2.0)\n" * 300 + "    return x\n"
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            entries = list(pool.map(lambda _: compiled(template, {}), range(4)))
+    finally:
+        sys.setswitchinterval(interval)
+    assert all(one is entries[0] for one in entries)
+
+
 def test_division_by_zero_follows_ieee():
     entries = compiled("def at(x):\n    return f(x)\n", {"f": kernel(1 / x, (x,))})
     assert entries.at(0.0) == np.inf
