@@ -213,9 +213,10 @@ class _Body(Arithmetic):
             raise errors.TypingError("ranges are of integers, in constant steps")
         if is_constant(start) and is_constant(stop) and _is_plain(name, body):
             for number in range(start, stop, step):
-                self.values[name] = number
-                self.run(body)
                 self.assign_name(name, number)
+                self.values[name] = number  # a constant to the body
+                self.run(body)
+            self.values.pop(name, None)
             return
         head, inside, following, after = map(self.builder.append_basic_block, ("head", "inside", "following", "after"))
         limit, before = self.typed(stop), self.builder.block
