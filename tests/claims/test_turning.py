@@ -16,8 +16,9 @@ TURNS = {}
 
 def changed(results, **values):
     """Return a copy of lazily computed results with some of them fixed."""
-    results = copy.copy(results)
+    results, kind = copy.copy(results), type(results)
     vars(results).update(values)
+    object.__setattr__(results, "__class__", type(kind.__name__, (kind,), values))
     return results
 
 
