@@ -323,8 +323,7 @@ def _touches(zone: Zone, centre: np.ndarray, half_width: np.ndarray) -> bool:
 
 def _loop(backend: str, system: dict[str, Any]) -> floquet.Loop | None:
     """Return the compiled loop of the Floquet solver if it is asked for, or pays."""
-    if backend not in ("auto", "numpy", "numba"):
-        raise ValueError(f"backend = {backend!r}: allowed are 'auto', 'numpy' and 'numba'")
+    checks.choice("backend", backend, ("auto", "numpy", "numba"))
     if backend == "numba" and not has_compiler():
         raise ValueError("backend = 'numba': Numba is not installed; allowed are 'auto' and 'numpy'")
     points = np.broadcast(system["angular_frequency"], system["epsilon"], system["omega"][..., 0]).size
