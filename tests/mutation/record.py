@@ -20,8 +20,9 @@ _NAMES = ("function", "before", "after")
 class Record:
     """Counts of tried and caught mutants, and each survivor with the reason why it may survive.
 
-    Mutants are tried in one shuffled order, so a longer run continues a shorter one; the record of other code than the
-    present starts anew, but for the reasons.
+    Mutants are tried in one shuffled order, so a longer run continues a shorter one: first one change at every site,
+    then the others. The record of other code than the present starts anew, but for the reasons: those of survivors not
+    tried again yet wait under ``former``.
 
     Parameters
     ----------
@@ -44,12 +45,20 @@ class Record:
     ) -> None:
         self._file = directory / f"{module}.json"
         known = json.loads(self._file.read_text(encoding="utf-8")) if self._file.exists() else {}
-        self._reasons = {_change(s): s["reason"] for s in known.get("survivors", [])}
-        self._order = random.Random(f"{seed} {module}").sample(mutants, len(mutants))
-        fresh = {"code": _digest(source), "seed": seed, "mutants": len(mutants)}
+        explained = [s for s in (*known.get("survivors", []), *known.get("former", [])) if s["reason"]]
+        self._reasons = {_change(s): s["reason"] for s in explained}
+        self._order = _order(mutants, random.Random(f"{seed} {module}"))
+        sites = len({mutant.path for mutant in mutants})
+        fresh = {"code": _digest(source), "seed": seed, "sites": sites, "mutants": len(mutants)}
         counts = {"tried": 0, **{verdict.name.lower(): 0 for verdict in Verdict}, "survivors": []}
         same = not again and all(known.get(name) == value for name, value in fresh.items())
-        self._data: dict[str, Any] = known if same else {**fresh, **counts, "closed": known.get("closed", [])}
+        anew = {**fresh, **counts, "closed": known.get("closed", []), "former": explained}
+        self._data: dict[str, Any] = known if same else anew
+
+    @property
+    def sites(self) -> int:
+        """How many signs, exponents and constants there are, each with one or two mutants."""
+        return self._data["sites"]
 
     def drawn(self, sample: int | None) -> list[Mutant]:
         """Return the first mutants of the order, or all, without those that were tried before."""
@@ -64,6 +73,7 @@ class Record:
         """Write down what became of the next mutant of the order."""
         self._data["tried"] += 1
         self._data[verdict.name.lower()] += 1
+        self._data["former"] = [s for s in self._data["former"] if _change(s) != mutant.change]
         if verdict is Verdict.SURVIVED:
             entry = dict(zip(_NAMES, mutant.change, strict=True))
             self._data["survivors"].append({**entry, "reason": self._reasons.get(mutant.change, "")})
@@ -80,8 +90,17 @@ class Record:
         self._save()
 
     def _save(self) -> None:
+        if self._data["tried"] == self._data["mutants"]:
+            self._data["former"] = []  # what is not there any more needs no reason
         self._file.parent.mkdir(parents=True, exist_ok=True)
         self._file.write_text(json.dumps(self._data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def _order(mutants: list[Mutant], shuffle: random.Random) -> list[Mutant]:
+    """Return the mutants shuffled, the first of every site before all others."""
+    order = shuffle.sample(mutants, len(mutants))
+    first = {mutant.path: place for place, mutant in reversed(list(enumerate(order)))}
+    return sorted(order, key=lambda mutant: order[first[mutant.path]] is not mutant)
 
 
 def _change(entry: dict[str, str]) -> tuple[str, ...]:

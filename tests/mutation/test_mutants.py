@@ -82,10 +82,18 @@ def test_a_record_is_continued_and_keeps_reasons_and_closed_holes(tmp_path, pack
     assert one.change not in [m.change for m in continued.drawn(None)] and len(continued.drawn(5)) == 2
     continued.close(continued.unexplained()[0], Verdict.CAUGHT, "a test")
     assert not record().unexplained()
+    order = record(again=True).drawn(None)
+    sites = len({m.path for m in order})
+    assert len({m.path for m in order[:sites]}) == sites < len(order) == len(tool.mutants(SOURCE))
     for anew in (record(again=True), record(SOURCE + "x = 0.5")):
         assert len(anew.drawn(3)) == 3
+        anew.add(two, Verdict.CAUGHT)
         anew.add(one, Verdict.SURVIVED)
         assert not anew.unexplained()
+    record(again=True).add(two, Verdict.CAUGHT)
+    continued = record()
+    continued.add(one, Verdict.SURVIVED)
+    assert not continued.unexplained()
 
 
 def test_every_test_that_watches_is_there(package):
