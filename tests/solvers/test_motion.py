@@ -20,6 +20,13 @@ def test_mean_motion_and_disturbance_follow_equation_33():
     assert not BaseMotion(0.1, angular_frequency=10.0, phase=0.4).acceleration(t).any()
 
 
+def test_what_is_not_given_is_nothing():
+    t = np.linspace(0, 2, 5)
+    np.testing.assert_allclose(BaseMotion(amplitude=2.0, phase=np.pi / 2).kinematics(t)[:2], [[2.0] * 5, [0.0] * 5])
+    assert BaseMotion.sampled([0.0, 1.0], [3.0, 3.0]).velocity(0.0) == 0.0
+    assert Force(2.0, angular_frequency=3.0, phase=1.0)(t) == pytest.approx(2.0)
+
+
 def test_a_sum_is_a_superposition_and_an_array_is_a_batch():
     first, second = BaseMotion(velocity=0.1), BaseMotion(amplitude=[1e-3, 2e-3], angular_frequency=10.0)
     total = 2.0 * (first + second)
@@ -94,10 +101,11 @@ def test_the_fastest_move_is_the_classical_one():
 
 
 def test_a_given_duration_slows_the_move_down_uniformly():
-    fast, slow = BaseMotion.s_curve(0.5, 0.5, 1.0, 10.0), BaseMotion.s_curve(0.5, 0.5, 1.0, 10.0, duration=3.2)
-    assert slow.duration == pytest.approx(3.2)
-    t = np.linspace(0, fast.duration, 11)
-    assert slow.displacement(t * 3.2 / fast.duration) == pytest.approx(fast.displacement(t))
+    for way, duration in ((0.5, 3.2), (0.02, 1.1)):
+        fast, slow = BaseMotion.s_curve(way, 0.5, 1.0, 10.0), BaseMotion.s_curve(way, 0.5, 1.0, 10.0, duration=duration)
+        assert slow.duration == pytest.approx(duration)
+        t = np.linspace(0, fast.duration, 11)
+        assert slow.displacement(t * duration / fast.duration) == pytest.approx(fast.displacement(t))
 
 
 def test_batched_moves_are_single_moves():
@@ -144,6 +152,15 @@ def test_sampled_acceleration_is_linear_between_samples():
     assert motion.duration == 2.5
 
 
+def test_records_and_velocities_are_batches_of_their_own():
+    t, record, later = np.linspace(0.5, 2.5, 5), np.array([0.0, 1.0, 0.0, -2.0, 0.5]), np.linspace(0.0, 4.0, 9)
+    one = BaseMotion.sampled(t, record, 0.2).displacement(later)
+    coasts = BaseMotion.sampled(t, record, [0.2, 0.5]).displacement(later)
+    np.testing.assert_allclose(coasts, [one, one + 0.3 * later], rtol=1e-13)
+    runs = BaseMotion.sampled(t, [record, 2 * record], 0.2).displacement(later)
+    np.testing.assert_allclose(runs, [one, 2 * one - 0.2 * later], rtol=1e-13)
+
+
 def test_shaping_convolves_with_impulses():
     move = BaseMotion.trapezoid(1.0, 1.0, 2.0)
     shaped = move.shaped([0.25, 0.75], [0.0, 0.4])
@@ -154,9 +171,20 @@ def test_shaping_convolves_with_impulses():
         BaseMotion(velocity=0.1).shaped([1.0], [0.0])
 
 
+def test_an_impulse_delays_and_shapers_are_a_batch():
+    move, t = BaseMotion.trapezoid(1.0, 1.0, 2.0), np.linspace(0.4, 3, 20)
+    assert move.shaped([1.0], [0.4]).displacement(t) == pytest.approx(move.displacement(t - 0.4))
+    shapers = np.array([[0.25, 0.75], [0.5, 0.5], [1.0, 0.0]]), np.array([[0.0, 0.4], [0.1, 0.3], [0.2, 0.0]])
+    batch = move.shaped(*shapers).displacement(t)
+    np.testing.assert_allclose(
+        batch, [move.shaped(*shaper).displacement(t) for shaper in zip(*shapers, strict=True)], atol=1e-15
+    )
+
+
 def test_duration_is_when_the_acceleration_ends():
     assert BaseMotion().duration == 0.0
     assert BaseMotion(velocity=1.0).duration == 0.0
+    assert BaseMotion(amplitude=1e-3).terms[0].duration == 0.0
     assert BaseMotion(acceleration=[0.0, 1.0]).duration.tolist() == [0.0, np.inf]
     assert BaseMotion.sampled([1.0, 2.0], [[0.0, 0.0], [0.0, 1.0]]).duration.tolist() == [0.0, 2.0]
     assert (BaseMotion.trapezoid(1, 1, 1) + BaseMotion(amplitude=1e-3, angular_frequency=3.0)).duration == np.inf
@@ -185,6 +213,7 @@ def test_a_force_is_what_its_fields_say():
         (lambda: BaseMotion(angular_frequency=-1.0), ValueError, "angular_frequency = -1"),
         (lambda: BaseMotion(velocity=[1, 2], amplitude=[1, 2, 3]), ValueError, r"velocity \(2,\), amplitude \(3,\)"),
         (lambda: BaseMotion.sampled([0, 2, 1], [0, 0, 0]), ValueError, r"t\[2\] = 1 after 2: .*increase"),
+        (lambda: BaseMotion.sampled([0, 1, 0.5], [0, 0, 0]), ValueError, r"t\[2\] = 0.5 after 1: .*increase"),
         (lambda: BaseMotion.sampled([0, 1, 3], [0, 0, 0]), ValueError, "uniform"),
         (lambda: BaseMotion.sampled([0, 1], [0, 0, 0]), ValueError, r"acceleration has shape \(3,\)"),
         (lambda: BaseMotion.sampled([1.0], [0.0]), ValueError, "at least two"),
@@ -196,6 +225,7 @@ def test_a_force_is_what_its_fields_say():
         (lambda: BaseMotion().displacement(-0.1), ValueError, "t = -0.1"),
         (lambda: BaseMotion().displacement([[0.1]]), ValueError, "one axis"),
         (lambda: BaseMotion.trapezoid(1, 1, 1).shaped([0.5, 0.5], [0.1]), ValueError, "one time an impulse"),
+        (lambda: BaseMotion.trapezoid(1, 1, 1).shaped([0.5, 0.5], [-0.05, 0.1]), ValueError, "times = -0.05"),
         (lambda: BaseMotion() + 1.0, TypeError, "unsupported"),
     ],
 )
