@@ -49,7 +49,7 @@ def truth(sides, omega, coupling, epsilon, decay, power):
     for _ in range(6):
         grid = np.linspace(inside, outside, 17, axis=-1)
         matrices = coupling * grid[..., None, None, None] ** power
-        exponents = floquet_exponents(omega, matrices, grid, epsilon, decay, tolerance=1e-12)
+        exponents = floquet_exponents(omega, matrices, grid, epsilon, decay, tolerance=1e-10)
         growing = exponents[..., 0].real > (0.0 if np.any(decay) else 1e-5 * half)
         assert growing[:, 0].all() and not growing[:, -1].any()
         still = np.argmin(growing, axis=-1)[:, None]

@@ -30,6 +30,7 @@ LIKELY = 3
 SECONDS = {"arm": 90, "model": 90, "solvers": 30}  # of processor time; several times what the tests of a module need
 BYTES = 8 << 30
 _LIBRARIES = ("mpmath", "scipy.integrate", "scipy.linalg", "scipy.optimize", "scipy.special", "scipy.stats")
+_REGISTRY = "cra_sym.arm.equations"  # names the homes of the equations, and is the same whatever they hold
 _DERIVED = re.compile(r"cra_sym(\.\w+)+(?=:|$)")
 
 
@@ -143,9 +144,10 @@ def _warm_up() -> None:
 def _uses() -> dict[str, set[str]]:
     """Return what each module of the package names: modules it imports and those whose derivations it runs."""
     files = {_name(file): file for file in PACKAGE.rglob("*.py")}
-    return {
+    uses = {
         name: _named(name, ast.parse(file.read_text(encoding="utf-8"))) & set(files) for name, file in files.items()
     }
+    return uses | {_REGISTRY: set()}
 
 
 def _name(file: Path) -> str:

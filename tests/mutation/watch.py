@@ -36,15 +36,41 @@ _MODES = [
         "end_values_are_those_of_the_shapes",
     )
 ]
-_STATICS = [
-    f"tests/arm/test_stability.py::test_{name}"
-    for name in (
-        "sums_over_all_modes",
-        "the_zone_is_continuous_where_a_spring_vanishes",
-        "residual_flexibility_is_the_limit_of_many_modes",
-    )
-]
-_STABILITY = [["tests/arm/test_boundaries.py"], ["tests/arm/test_stability.py"]]
+
+
+def _stability(*names: str) -> list[str]:
+    return [f"tests/arm/test_stability.py::test_{name}" for name in names]
+
+
+_ZONES = _stability(
+    "known_numbers_of_a_soft_joint",
+    "the_zone_is_continuous_where_a_spring_vanishes",
+    "damping_threshold_is_said",
+    "both_order_conventions_of_a_resonance",
+    "difference_resonance_of_a_symmetric_coupling_is_none",
+    "rigid_joint_has_nothing_to_fluctuate",
+    "rigid_body_mode_does_not_resonate",
+    "tongue_at_the_natural_frequency_is_of_second_order",
+)
+_SUMMED = _stability("the_second_order_does_not_depend_on_how_many_modes_are_summed_one_by_one")
+_LOOPED = _stability("broadcasting_equals_looping")
+_DAMPED = _stability("damped_zone")
+_ORDER = _stability("order_of_accuracy")
+_DOUBTS = _stability(
+    "overlap_with_a_second_tongue_is_said", "overlap_and_reach_are_said", "overlap_is_said_from_where_the_zones_touch"
+)
+_FORCED = _stability("forced_width_is_the_growth_of_the_tip")
+_SYSTEM = _stability(
+    "bad_input_is_named",
+    "growth_is_that_of_the_written_out_system",
+    "charts_are_compiled_where_it_pays",
+    "without_excitation_nothing_grows",
+)
+_FEW_MODES = _stability(
+    "three_modes_shift_the_second_zone_the_wrong_way", "residual_flexibility_is_the_limit_of_many_modes"
+)
+_STATICS = _stability("sums_over_all_modes", "the_zone_is_continuous_where_a_spring_vanishes")
+_BORDERS = "tests/arm/test_boundaries.py"
 _LANES = ["tests/arm/test_templates.py"]
 _STIFFNESS = [
     [
@@ -98,14 +124,20 @@ _PHYSICS = [_FREQUENCIES, _MODES]
 
 _ROUNDS: dict[str, list[list[str]]] = {
     "arm/analysis": [_MODES, [_MODAL, _LAMBDA]],
-    "arm/boundaries": _STABILITY,
+    "arm/boundaries": [
+        [f"{_BORDERS}::test_a_difference_with_symmetric_coupling_has_no_border", *_ZONES[:1]],
+        [*_FORCED, *_SUMMED, _BORDERS],
+    ],
     "arm/by_hand": [],
     "arm/characteristic": [_FREQUENCIES, _MODES, _DIGITS, ["tests/arm/test_characteristic.py"]],
     "arm/driven": [["tests/arm/test_response.py"]],
-    "arm/edges": _STABILITY,
+    "arm/edges": [_ZONES[:1], [*_DAMPED, *_FEW_MODES[:1], *_ORDER]],
     "arm/energy": _PHYSICS,
     "arm/evaluation": [],
-    "arm/excitation": _STABILITY,
+    "arm/excitation": [
+        [*_ZONES[:2], *_FORCED, *_SYSTEM[:2]],
+        [*_stability("excitations_compare_hash_and_pickle"), *_LOOPED, *_ORDER],
+    ],
     "arm/excited": [],
     "arm/forced": [["tests/arm/test_frequency_response.py"]],
     "arm/implicit": [["tests/arm/test_sensitivity.py"]],
@@ -119,15 +151,15 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "arm/orthogonality": [],
     "arm/operators": [],
     "arm/parameters": [["tests/arm/test_parameters.py", f"{_LAWS}::test_damping_may_come_close_to_critical"]],
-    "arm/parametric": _STABILITY,
-    "arm/residual": [_STATICS, *_STABILITY],
+    "arm/parametric": [_FORCED],
+    "arm/residual": [_STATICS, _SUMMED + _FEW_MODES, _LOOPED],
     "arm/resonance": [],
     "arm/sensitivity": [["tests/arm/test_sensitivity.py"], [f"{_LAWS}::test_sensitivities_are_slopes_at_any_length"]],
     "arm/shapes": [_MODES, [_MODAL]],
     "arm/shooting": [],
     "arm/spectrum": [_FREQUENCIES, _DIGITS, [_LAMBDA]],
-    "arm/stability": _STABILITY[::-1],
-    "arm/zones": _STABILITY,
+    "arm/stability": [[*_ZONES, *_FORCED, *_SYSTEM], [*_LOOPED, *_DOUBTS, *_FEW_MODES]],
+    "arm/zones": [[*_ZONES, *_SUMMED], [*_LOOPED, *_DAMPED, *_DOUBTS], _ORDER],
     "model/oscillator": [["tests/model/test_oscillator.py"], ["tests/arm/test_response.py"]],
     "solvers/floquet_lanes": [[f"{_LANES[0]}::test_floquet"]],
     "solvers/certificates": [["tests/arm/test_certification.py"]],
