@@ -298,7 +298,7 @@ def _first_failing_test(parts: Sequence[Sequence[str]]) -> str:
     passing = pytest.ExitCode.OK, pytest.ExitCode.USAGE_ERROR, pytest.ExitCode.NO_TESTS_COLLECTED  # the name has gone
     witness = _Witness()
     for part in parts:
-        if pytest.main([*options, *part], plugins=[witness]) not in passing:
+        if pytest.main([*options, *part], plugins=[witness]) not in passing or witness.failed:
             return witness.failed or "pytest"
     return ""
 

@@ -4,6 +4,7 @@ import importlib.util
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -104,6 +105,23 @@ def test_every_test_that_watches_is_there(package):
             file, _, test = name.partition("::")
             assert (ROOT / file).exists(), f"{module}: {file}"
             assert not test or f"def {test}(" in (ROOT / file).read_text(encoding="utf-8"), f"{module}: {name}"
+
+
+@pytest.mark.parametrize(("broken", "noticed"), [(True, "test_some.py"), (False, "")])
+def test_a_file_that_cannot_be_imported_is_noticed_and_a_name_that_has_gone_is_not(
+    broken, noticed, package, monkeypatch
+):
+    """Of both pytest says that there is no test of that name."""
+    from tests.mutation import runner
+
+    def main(_, plugins):
+        if broken:
+            plugins[0].pytest_collectreport(SimpleNamespace(failed=True, nodeid="test_some.py"))
+        return pytest.ExitCode.USAGE_ERROR
+
+    monkeypatch.chdir(ROOT)
+    monkeypatch.setattr(pytest, "main", main)
+    assert runner._first_failing_test([["test_some.py::test_one"]]) == noticed
 
 
 def test_a_sample_of_a_section_is_caught(tmp_path):

@@ -154,7 +154,10 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "arm/parametric": [_FORCED],
     "arm/residual": [_STATICS, _SUMMED + _FEW_MODES, _LOOPED],
     "arm/resonance": [],
-    "arm/sensitivity": [["tests/arm/test_sensitivity.py"], [f"{_LAWS}::test_sensitivities_are_slopes_at_any_length"]],
+    "arm/sensitivity": [
+        ["tests/arm/test_sensitivity.py"],
+        [f"{_LAWS}::test_sensitivities_are_slopes_at_any_length", "tests/arm/test_vibration_gradient.py"],
+    ],
     "arm/shapes": [_MODES, [_MODAL]],
     "arm/shooting": [],
     "arm/spectrum": [_FREQUENCIES, _DIGITS, [_LAMBDA]],
