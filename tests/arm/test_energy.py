@@ -4,7 +4,7 @@ import pytest
 from sympy import Integral, Rational, oo
 
 from cra_sym import symbols as s
-from cra_sym.arm.energy import lagrangian, potential_energy
+from cra_sym.arm.energy import inner_stiffness, lagrangian, potential_energy
 from cra_sym.arm.evaluation import evaluate, put
 from cra_sym.arm.modal_sum import ModalSum, member
 from cra_sym.arm.orthogonality import modal_energies
@@ -17,6 +17,12 @@ def test_without_the_joint_the_lagrangian_is_the_papers():
     springs = s.k_t * s.v.subs(s.x, 0) ** 2 / 2 + s.k_r * s.v.diff(s.x).subs(s.x, 0) ** 2 / 2
     assert (gap - springs).expand() == 0
     assert not beam.rhs.has(s.k_t, s.k_r)
+
+
+def test_a_manipulator_that_moves_and_turns_unbent_stores_nothing_in_itself():
+    rigid = s.L + s.x
+    assert inner_stiffness(rigid, rigid, joint=False).doit() == 0
+    assert inner_stiffness(rigid, rigid).doit() == s.k_t * s.L**2 + s.k_r
 
 
 def test_modal_energies_name_all_their_coefficients():

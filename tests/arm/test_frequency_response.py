@@ -68,6 +68,7 @@ def test_statics_and_limits():
     turn = (arm.rhoA * arm.L**2 / 2 + arm.m_e * arm.L) / arm.k_r
     tip = root - turn * arm.L - (arm.rhoA * arm.L**4 / 8 + arm.m_e * arm.L**3 / 3) / arm.EI
     assert cra.frequency_response(arm, 0.0, [0.0, 1.0]) == pytest.approx([root, tip], rel=1e-12)
+    assert cra.frequency_response(arm.replace(zeta=0.05), [0.0, 5.0])[0] == pytest.approx(tip, rel=1e-12)
     stiff = cra.frequency_response(arm.replace(k_t=1e14, k_r=1e14), OMEGA)
     assert stiff == pytest.approx(cra.frequency_response(arm.replace(k_t=np.inf, k_r=np.inf), OMEGA), rel=1e-7)
     loose = arm.replace(k_t=0.0, k_r=0.0, zeta=0.02)

@@ -10,6 +10,7 @@ from numpy.polynomial.legendre import leggauss
 
 import cra_sym as cra
 from cra_sym.arm import characteristic, modal, shapes, spectrum
+from cra_sym.arm.analysis import arm_modes
 from cra_sym.kernels import has_compiler
 
 NOMINAL = cra.Arm.nominal()
@@ -86,6 +87,15 @@ def test_participation(arm, parameters, quadrature):
     integral += column(arm.m_e, arm) * parameters.tip_displacement
     total = np.sqrt(column(arm.rhoA, arm) * column(arm.L, arm) + column(arm.m_e, arm))
     np.testing.assert_allclose(parameters.participation / total, integral / total, atol=1e-12)
+
+
+def test_the_waves_are_those_of_the_shapes():
+    modes = arm_modes(NOMINAL.replace(k_t=1e3, k_r=50.0), MODES)
+    far = modes.lam**4 > modal.NEAR
+    lam, xi = modes.lam[far, None], np.linspace(0, 1, 7)
+    waves = np.array([np.cos(lam * xi), np.sin(lam * xi), np.exp(-lam * xi), np.exp(-lam * (1 - xi))])
+    written_out = np.sum(modes.state[4:, far, None] * waves, axis=0)
+    np.testing.assert_allclose(modes.shape(xi)[far], written_out, atol=1e-12)
 
 
 def test_axial_matrix(arm, parameters, quadrature):

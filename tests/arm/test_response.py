@@ -178,6 +178,7 @@ def test_batches_broadcast_and_single_values_drop_axes():
     assert cra.response(arms, motion, GRID, [0.0, 0.5]).shape == (3, 2, 2, GRID.size)
     assert cra.response(arms, motion, 0.3, [0.0, 0.5]).shape == (3, 2, 2)
     assert cra.response(arms, motion, 0.3, 0.5).shape == (3, 2)
+    assert cra.tip_response(arms, motion, 0.3) == pytest.approx(cra.response(arms, motion, 0.3, 1.0), abs=1e-15)
     assert cra.response(arms, motion, GRID, 1.0) == pytest.approx(whole, abs=1e-15)
     assert cra.tip_response(arms, BaseMotion(), GRID).tolist() == np.zeros((3, 1, GRID.size)).tolist()
     moves = BaseMotion.s_curve(0.1, 1.0, 2.0, 20.0, duration=[[0.8, 1.0]])
@@ -204,6 +205,7 @@ def test_residual_vibration_is_the_peak_after_the_stop():
         assert cra.residual_vibration(arm, move, modes=1) == pytest.approx(single, rel=1e-4)
         several = np.abs(cra.tip_response(arm, move, after)).max()
         assert several <= cra.residual_vibration(arm, move) <= 1.02 * several
+        assert cra.residual_vibration(arm, move) == cra.residual_vibration(arm, move, 5), "five modes, as a response"
     strike = cra.residual_vibration(NOMINAL, BaseMotion(velocity=0.1), 1)
     p = cra.modal_parameters(NOMINAL, 1)
     assert strike == pytest.approx(0.1 * p.participation[0] * p.tip_displacement[0] / p.omega[0])
@@ -238,6 +240,7 @@ def test_a_pinned_arm_is_left_behind_by_a_move():
         ({"derivative": 3}, ValueError, "derivative = 3"),
         ({"start": "moving"}, ValueError, "start = 'moving'"),
         ({"zeta": 1.0}, ValueError, "zeta = 1"),
+        ({"zeta": -0.05}, ValueError, "zeta = -0.05"),
         ({"zeta": [0.1, 0.2]}, ValueError, "zeta"),
         ({"motion": 3.0}, TypeError, "motion = 3.0"),
         ({"motion": BaseMotion([1.0, 2.0]), "arm": NOMINAL.replace(k_t=[1, 2, 3])}, ValueError, "broadcast"),

@@ -18,6 +18,7 @@ EXEMPT = {
 
 _LAWS = "tests/test_properties.py"
 _LAMBDA, _MODAL = "tests/arm/test_frequency_parameters.py", "tests/arm/test_modal_parameters.py"
+_SEAMS = f"{_MODAL}::test_ranges_of_the_numbers_are_those_of_the_derivation"
 _FREQUENCIES = [
     f"{_LAMBDA}::test_{name}"
     for name in ("classical_beams", "rigid_body_zeros", "none_is_missed_against_finite_elements")
@@ -129,10 +130,10 @@ _ROUNDS: dict[str, list[list[str]]] = {
         [*_FORCED, *_SUMMED, _BORDERS],
     ],
     "arm/by_hand": [],
-    "arm/characteristic": [_FREQUENCIES, _MODES, _DIGITS, ["tests/arm/test_characteristic.py"]],
+    "arm/characteristic": [_FREQUENCIES, _MODES, _DIGITS, ["tests/arm/test_characteristic.py", _SEAMS]],
     "arm/driven": [["tests/arm/test_response.py"]],
     "arm/edges": [_ZONES[:1], [*_DAMPED, *_FEW_MODES[:1], *_ORDER]],
-    "arm/energy": _PHYSICS,
+    "arm/energy": [["tests/arm/test_energy.py"], *_PHYSICS],
     "arm/evaluation": [],
     "arm/excitation": [
         [*_ZONES[:2], *_FORCED, *_SYSTEM[:2]],
@@ -147,7 +148,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "arm/modal_dynamics": [],
     "arm/modal_lanes": [_LANES],
     "arm/modal_sum": [["tests/arm/test_energy.py"]],
-    "arm/motion": [],
+    "arm/motion": [["tests/arm/test_motion.py"]],
     "arm/orthogonality": [],
     "arm/operators": [],
     "arm/parameters": [["tests/arm/test_parameters.py", f"{_LAWS}::test_damping_may_come_close_to_critical"]],
@@ -160,7 +161,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     ],
     "arm/shapes": [_MODES, [_MODAL]],
     "arm/shooting": [],
-    "arm/spectrum": [_FREQUENCIES, _DIGITS, [_LAMBDA]],
+    "arm/spectrum": [[*_FREQUENCIES, _SEAMS], _DIGITS, [_LAMBDA]],
     "arm/stability": [[*_ZONES, *_FORCED, *_SYSTEM], [*_LOOPED, *_DOUBTS, *_FEW_MODES]],
     "arm/zones": [[*_ZONES, *_SUMMED], [*_LOOPED, *_DAMPED, *_DOUBTS], _ORDER],
     "model/oscillator": [["tests/model/test_oscillator.py"], ["tests/arm/test_response.py"]],
