@@ -47,9 +47,10 @@ def cases():
         ]
         yield time, frequency, ratio, rng.choice(near)
     yield from [(2.0, 0.0, 0.0, 10.0), (2.0, 0.0, 0.5, 0.1), (0.0, 3.0, 0.1, 3.0), (2.0, 5.0, 0.02, 0.0)]
+    yield from [(1.0, 1.9, 0.99, 0.9), (1.0, 0.9, 0.99, 1.9)]  # angles for which the series would be too short
 
 
-@pytest.mark.parametrize("case", list(cases()), ids=map(str, range(36)))
+@pytest.mark.parametrize("case", list(cases()), ids=map(str, range(38)))
 def test_the_kernels_are_exact_at_and_around_every_limit(case):
     time, frequency, _, rate = case
     truth, found = exact(*case), FREE(*case[:3])

@@ -73,6 +73,37 @@ def test_state_at_the_stop():
             np.testing.assert_allclose(values[member], found, atol=1e-12)
 
 
+@pytest.mark.parametrize("modes", [1, 2])
+def test_a_batch_of_modes_is_a_loop(modes):
+    """Everything but the damping ratios is the member's own; there may be one mode only."""
+    few, size = slice(modes), np.array([1.0, 1.7, 0.6])[:, None]
+    own = OMEGA[few] * size, DAMPING[few, few] * size[..., None], GAMMA[few] * size, ROWS[:, few] * size[..., None]
+    free, forced = (derived_kernel(f"cra_sym.model.oscillator:{name}_kernel") for name in ("free", "forced"))
+
+    def both(omega, damping, gamma, rows):
+        coupled = CoupledModes(omega, ZETA[few], damping, gamma, rows)
+        closed = Oscillators(omega, ZETA[few], gamma, rows, free, forced)
+        return [f(o, MOTION, TIMES[:4], 0) for f, o in ((coupled_response, coupled), (driven_response, closed))]
+
+    singles = [both(*member) for member in zip(*own, strict=True)]
+    for found, expected in zip(both(*own), zip(*singles, strict=True), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-14)
+
+
+def test_times_that_run_backwards_give_the_same_values():
+    """In uniform steps they must not be taken for a grid, through which the closed form is shifted forwards."""
+    free, forced = (derived_kernel(f"cra_sym.model.oscillator:{name}_kernel") for name in ("free", "forced"))
+    osc, t = Oscillators(OMEGA, ZETA, GAMMA, ROWS, free, forced), np.linspace(0.0, 4.0, 70)
+    onwards, back = (driven_response(osc, MOTION, times, 0) for times in (t, t[::-1]))
+    np.testing.assert_allclose(back[:, ::-1], onwards, atol=1e-12)
+
+
+@pytest.mark.parametrize(("t", "derivative", "named"), [(-0.05, 0, "t = -0.05"), (0.0, -1, "derivative = -1")])
+def test_what_was_before_is_refused(t, derivative, named):
+    with pytest.raises(ValueError, match=named):
+        coupled_response(CoupledModes(OMEGA, ZETA, DAMPING, GAMMA, ROWS), MOTION, t, derivative)
+
+
 def test_no_times_give_no_values():
     coupled = CoupledModes(OMEGA, ZETA, DAMPING, GAMMA, ROWS)
     assert coupled_response(coupled, MOTION, [], 0).shape == (2, 0)

@@ -78,6 +78,30 @@ def test_a_uniform_grid_needs_few_unit_responses():
         assert sum(asked) == wanted
 
 
+def test_a_record_of_equal_steps_needs_one_shift():
+    asked = []
+
+    def counted(t, omega, zeta):
+        asked.append(np.size(t))
+        return free(t, omega, zeta)
+
+    level, jerk = np.random.default_rng(1).normal(size=(2, 21))
+    for knots, wanted in (np.linspace(0.0, 2.0, 21), 1), (np.geomspace(0.1, 2.0, 21), 20):
+        asked.clear()
+        knot_states(OSC._replace(free=counted), Piecewise(knots, level, jerk))
+        assert sum(asked) == wanted
+
+
+def test_times_taken_in_parts_and_a_batch_of_none(monkeypatch):
+    """Even parts of one time each, which is what more oscillators than a part may hold come to."""
+    t, several = np.array([0.3, 2.5, 0.0, 1.1]), OSC._replace(omega=OMEGA * [[1.0], [1.3], [0.7]])
+    whole = steady_response(several, CAUSE, t)
+    none = OSC._replace(omega=np.empty((0, 2)))
+    assert steady_response(none, CAUSE, t).shape == (0, 2, 4)
+    monkeypatch.setattr("cra_sym.solvers.modal_response._CHUNK", 1)
+    np.testing.assert_allclose(steady_response(several, CAUSE, t), whole, rtol=1e-12)
+
+
 def test_a_piece_is_a_sum_of_delayed_ramps():
     knots = np.array([0.2, 0.5, 1.4, 1.6])  # not uniform
     level, jerk = np.array([0.3, -0.5, 1.0, 0.0]), np.array([1.0, 0.0, -2.0, 0.0])
@@ -99,6 +123,9 @@ def test_uniform_and_listed_knots_agree():
     uniform = knot_states(OSC, Piecewise(knots, level, jerk))
     listed = knot_states(OSC, Piecewise(knots[None], level, jerk))
     assert np.allclose(uniform, [values[0] for values in listed], atol=1e-13)
+    records = knot_states(OSC, Piecewise(knots, np.outer([1.0, -2.0], level), np.outer([1.0, -2.0], jerk)))
+    for several, one in zip(records, uniform, strict=True):
+        np.testing.assert_allclose(several, [one, -2.0 * one], atol=1e-13)
     t = np.array([-1.0, 0.0, 0.05, 2.0, 3.0])
     assert segment(knots, t).tolist() == segment(knots[None], t)[0].tolist() == [-1, 0, 0, 20, 20]
 
@@ -131,10 +158,10 @@ def test_batches_are_loops(derivative):
 
 def test_free_peak_is_the_largest_value_ever_reached():
     q, u = np.array([0.3, -0.1]), np.array([1.0, 2.0])
-    t = np.linspace(0, 10, 20001)
-    unit = free(t, OMEGA[:, None], 0.0)
-    history = np.abs(unit["displacement"] * q[:, None] + unit["impulse"] * u[:, None]).max(-1)
-    assert free_peak(OSC, q, u) == pytest.approx(history, rel=1e-6)
+    for omega in (OMEGA, OMEGA / 20):
+        unit = free(np.linspace(0, 30 / omega[0], 20001), omega[:, None], 0.0)
+        history = np.abs(unit["displacement"] * q[:, None] + unit["impulse"] * u[:, None]).max(-1)
+        assert free_peak(OSC._replace(omega=omega), q, u) == pytest.approx(history, rel=1e-6)
 
 
 def test_free_peak_with_damping_and_of_rigid_modes():

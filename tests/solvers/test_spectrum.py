@@ -93,8 +93,25 @@ def test_a_zero_on_a_point_where_zeros_are_counted():
 
 
 def test_too_few_zeros_are_an_error():
-    with pytest.raises(ArithmeticError, match=r"3 zeros lie below .* 5 are wanted"):
-        spectrum(Product(regular(0.5, number=3)), 5)
+    """The third zero comes just before the last point at which they are counted."""
+    last = np.pi * (49 / 2 + 1 / 16)
+    roots = np.r_[regular(0.5, number=2), (last - 1.0) ** 4]
+    with pytest.raises(ArithmeticError, match=rf"3 zeros lie below lambda = {last:g}, 5 are wanted"):
+        spectrum(Product(roots), 5)
+
+
+def test_zeros_in_any_disorder():
+    """Anywhere, several between two points of the count, some double or nearly so, with and without zeros at 0."""
+    rng = np.random.default_rng(8)
+    for rigid in range(3):
+        lam = np.sort(rng.uniform(0.05, 3.0 * np.pi, (150, 12)), axis=1)
+        pair = rng.integers(0, 7, 150)[:, None]
+        gap = np.append(np.zeros(50), 10.0 ** rng.uniform(-9, -1, 100))[:, None]
+        close = np.take_along_axis(lam, pair, 1) * (1.0 + gap)
+        np.put_along_axis(lam, pair + 1, close, 1)
+        far = np.broadcast_to(np.pi * np.arange(4, 40), (150, 36))
+        roots = np.sort(np.concatenate([np.zeros((150, rigid)), lam**4, far**4], axis=1), axis=1)
+        np.testing.assert_allclose(spectrum(Product(roots), 8), roots[:, :8], rtol=1e-11)
 
 
 def test_counts_of_the_arm_are_those_of_the_dynamic_stiffness():
