@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
 from math import lcm
 
 from sympy import (
@@ -49,12 +49,13 @@ _PI = Dummy("pi")
 def vanishes(expression: Expr) -> bool:
     """Decide whether an expression is zero for all values of its symbols: proved, not sampled.
 
-    The expression is rational in its symbols, in roots, in cos, sin, cosh, sinh and exp of polynomials without a
-    constant multiple of pi, and in functions and derivatives that nothing is known of. By the addition theorems it
-    becomes a rational function of exponentials, of roots and of the rest, each an indeterminate of its own; what is
+    The expression is rational in its symbols, in roots, in functions and derivatives that nothing is known of, and in
+    cos, sin, cosh, sinh and exp of polynomials, of roots too, without an imaginary constant. By the addition theorems
+    it becomes a rational function of exponentials, of roots and of the rest, each an indeterminate of its own; what is
     zero as such a function is zero, wherever it is defined. The converse holds too, since exponentials of arguments
-    that are linearly independent over the rationals are algebraically independent; only between unknown functions,
-    or between roots of different sums, may a relation be missed.
+    that are linearly independent over the rationals are algebraically independent; a relation may be missed only
+    between unknown functions, or between roots of anything but symbols and natural numbers: of such a root no more is
+    known than its power.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ def vanishes(expression: Expr) -> bool:
     ------
     ValueError
         If the expression holds something else, such as a floating-point number, a symbolic power or symbols that do
-        not commute; or if it divides by zero.
+        not commute; or if it divides by zero, however deep inside.
 
     Examples
     --------
@@ -78,20 +79,24 @@ def vanishes(expression: Expr) -> bool:
     expression = sympify(expression, strict=True)
     plain = expression.xreplace({atom: Dummy() for atom in expression.atoms(*_OPAQUE)} | {pi: _PI})
     plain, relations = _without_roots(_without_functions(plain))
-    if not expression.is_commutative or not all(map(_is_rational, preorder_traversal(plain))):
+    nodes = {node for part in (plain, *relations.values()) for node in preorder_traversal(part)}
+    if not expression.is_commutative or not all(map(_is_rational, nodes)):
         raise ValueError(f"{expression}: allowed are exact numbers and circular, hyperbolic and exponential functions")
-    if not relations and _is_witness(plain):
-        return False
-    above, below = (_normal(part, relations) for part in plain.as_numer_denom())
-    if below == 0:
+    if any(_is_zero(node.base, relations) for node in nodes if node.is_Pow and node.exp.is_negative):
         raise ValueError(f"{expression}: allowed are no divisions by zero")
-    return above == 0
+    return _is_zero(plain, relations)
 
 
 def _is_rational(node: Expr) -> bool:
     """Tell whether a node may occur in a rational function with Gaussian rational coefficients."""
     known = node.is_Symbol or node.is_Rational or node is I
     return known or node.is_Add or node.is_Mul or (node.is_Pow and node.exp.is_Integer)
+
+
+def _is_zero(expression: Expr, relations: Mapping[Dummy, Expr]) -> bool:
+    """Tell whether an expression that is rational in its symbols, with no division by zero, is zero."""
+    independent = relations.keys().isdisjoint(expression.free_symbols)
+    return not (independent and _is_witness(expression)) and _normal(expression.as_numer_denom()[0], relations) == 0
 
 
 def _is_witness(expression: Expr) -> bool:
@@ -102,9 +107,9 @@ def _is_witness(expression: Expr) -> bool:
     return bool(turned.is_Rational and (value - I * turned).is_Rational and value != 0)
 
 
-def _normal(polynomial: Expr, relations: Iterable[tuple[Dummy, Expr]]) -> Expr:
+def _normal(polynomial: Expr, relations: Mapping[Dummy, Expr]) -> Expr:
     """Return a polynomial in normal form: expanded, and reduced by the relations that the roots satisfy."""
-    for root, relation in relations:
+    for root, relation in relations.items():
         polynomial = Poly(polynomial, root).rem(Poly(relation, root)).as_expr().as_numer_denom()[0]
     symbols = sorted(polynomial.free_symbols, key=str)
     domain = QQ_I if polynomial.has(I) else QQ
@@ -113,11 +118,8 @@ def _normal(polynomial: Expr, relations: Iterable[tuple[Dummy, Expr]]) -> Expr:
 
 def _without_functions(expression: Expr) -> Expr:
     """Write all exponentials as powers of independent ones."""
-    known = (cos, sin, cosh, sinh, exp)
-    functions = expression.atoms(*known) - {S.Exp1}
+    functions = expression.atoms(cos, sin, cosh, sinh, exp) - {S.Exp1}
     arguments = [f.args[0] * (I if isinstance(f, (cos, sin)) else 1) for f in functions] + [S.One]
-    if any(argument.has(*known) for argument in arguments):
-        raise ValueError(f"{expression}: allowed are no functions of functions")
     scales: dict[tuple[Expr, bool], int] = defaultdict(lambda: 1)
     for argument in arguments:
         for factor, monomial, turns in _terms(argument):
@@ -144,26 +146,27 @@ def _without_functions(expression: Expr) -> Expr:
 def _terms(argument: Expr) -> list[tuple[Rational, Expr, bool]]:
     """Return (rational factor, monomial, whether times i) for each term of an argument."""
     terms = []
+    known = all(_is_rational(p) or (p.is_Pow and p.exp.is_Rational) for p in preorder_traversal(argument))
     for term in argument.expand().as_ordered_terms():
         factor, rest = term.as_coeff_Mul()
         turns = rest.has(I)
         monomial = (rest / I).expand() if turns else rest
         # a root of a sum is independent of its multiples, a quotient is not
-        quotient = any(p.base.is_Add and not 0 < p.exp < 1 for p in monomial.atoms(Pow))
+        quotient = known and any(p.base.is_Add and not 0 < p.exp < 1 for p in monomial.atoms(Pow))
         constant = turns and monomial.free_symbols <= {_PI}
-        if not factor.is_Rational or monomial.has(I) or constant or quotient:
-            raise ValueError(f"{argument}: allowed are no such arguments")
+        if not known or not factor.is_Rational or monomial.has(I) or constant or quotient:
+            raise ValueError(f"{argument}: allowed are no arguments but polynomials without an imaginary constant")
         if factor != 0:
             terms.append((factor, monomial, turns))
     return terms
 
 
-def _without_roots(expression: Expr) -> tuple[Expr, list[tuple[Dummy, Expr]]]:
+def _without_roots(expression: Expr) -> tuple[Expr, dict[Dummy, Expr]]:
     """Write roots as powers of new symbols, innermost first, and return the polynomials that vanish for them, outermost
     first. The root of a symbol needs no such polynomial: the symbol is a power of it."""
     symbols = expression.free_symbols
     simple: dict[Expr, Expr] = {}
-    relations: list[tuple[Dummy, Expr]] = []
+    relations: dict[Dummy, Expr] = {}
     while inner := [
         power for power in expression.atoms(Pow) if _is_root(power) and not any(map(_is_root, power.base.atoms(Pow)))
     ]:
@@ -177,9 +180,9 @@ def _without_roots(expression: Expr) -> tuple[Expr, list[tuple[Dummy, Expr]]]:
             {p: Mul(*(roots[b] ** (p.exp * n * orders[b]) for b, n in _factors(p.base).items())) for p in inner}
         )
         simple |= {base: roots[base] ** order for base, order in orders.items() if base in symbols}
-        found = [(roots[base], roots[base] ** order - base) for base, order in orders.items() if base not in symbols]
-        relations = found + relations
-    return expression.xreplace(simple), [(root, relation.xreplace(simple)) for root, relation in relations]
+        found = {roots[base]: roots[base] ** order - base for base, order in orders.items() if base not in symbols}
+        relations = found | relations
+    return expression.xreplace(simple), {root: relation.xreplace(simple) for root, relation in relations.items()}
 
 
 def _is_root(power: Expr) -> bool:
