@@ -40,6 +40,32 @@ def test_known_numbers_of_a_soft_joint():
     assert np.allclose((second - centre) / UNIT, [-0.0520, 0.0491], atol=5e-5)
 
 
+def test_what_is_asked_for_by_default():
+    """The principal resonance of the first mode to first order, epsilon |P_11| / (2 omega_1) to both sides, in a system
+    of three modes."""
+    modal = cra.modal_parameters(SOFT)
+    half = 0.1 * modal.stiffness_translation[0, 0] / (2 * modal.omega[0])
+    sides = 2 * modal.omega[0] + half * np.array([-1.0, 1.0])
+    assert np.allclose(cra.stability_boundary(SOFT, JOINT, 0.1), sides, rtol=1e-12)
+    varpi = 2 * modal.omega[1] - 0.045 * UNIT
+    assert cra.growth_rate(SOFT, JOINT, varpi, 0.05) == cra.growth_rate(SOFT, JOINT, varpi, 0.05, 3) > 0
+    assert cra.floquet_exponents(SOFT, JOINT, varpi, 0.05).shape == (6,)
+    assert cra.growth_rate(SOFT, JOINT, 2 * modal.omega[0], 0.1, modes=1) == pytest.approx(half / 2, rel=1e-2)
+
+
+def test_zones_scale_with_the_arm():
+    """Thirty times longer, the arm is so slow that every frequency is below 1 rad/s; nothing else changes."""
+    length = np.array([1.0, 30.0])
+    arm = SOFT.replace(L=length, k_t=1e3 * SOFT.EI / length**3, m_e=0.0)
+    for excitation in (JOINT, cra.AxialBase(0.01 * length)):
+        for tongue, epsilon in ((1, 0.02), (2, 0.1)):
+            sides = cra.stability_boundary(arm, excitation, epsilon, (2, 2), order=2, tongue=tongue)
+            one, other = np.transpose(sides / arm.angular_frequency_scale)
+            assert other == pytest.approx(one, rel=1e-9) and other[0] < other[1]
+    with pytest.warns(cra.ResonanceWarning, match="resonance.*instability: epsilon is below the threshold"):
+        cra.stability_boundary(arm.replace(zeta=0.01), JOINT, 1e-4, (2, 2))
+
+
 def test_three_modes_shift_the_second_zone_the_wrong_way():
     """The statics of the modes left out put it right."""
     centre = 2 * cra.modal_parameters(SOFT).omega[1]
@@ -95,6 +121,7 @@ def test_damped_zone():
         SOFT,
         SOFT.replace(L=0.8, k_r=30.0, J_e=1e-4),
         SOFT.replace(k_t=40.0, k_r=3.0, m_e=0.1),
+        SOFT.replace(L=3.0, k_t=0.9, k_r=0.8),
         SOFT.replace(L=1.3, k_r=0.0, m_e=0.1, J_e=0.01),
         SOFT.replace(L=0.7, k_t=0.0, k_r=3.0, m_e=0.1, J_e=0.01),
     ],
@@ -137,6 +164,14 @@ def test_the_second_order_does_not_depend_on_how_many_modes_are_summed_one_by_on
     assert errors[0] < 1e-5 and errors[0] / errors[1] > 2.0**10
 
 
+def test_the_statics_of_a_rigid_spring_do_not_mix_with_those_of_the_other():
+    """It has nothing to fluctuate, and its fluctuation changes nothing."""
+    arm = SOFT.replace(k_t=np.inf, k_r=50.0)
+    system = 2.0 * cra.modal_parameters(arm).omega[0], 0.5, 2
+    both, one = (cra.growth_rate(arm, cra.JointStiffness(k_t, 0.5), *system, residual=True) for k_t in (1.0, 0.0))
+    assert both == pytest.approx(one, rel=1e-9) and one > 0.01
+
+
 def test_residual_flexibility_is_the_limit_of_many_modes():
     excitation = cra.JointStiffness(k_t=1.0, k_r=0.5)
     arm, varpi = SOFT.replace(k_r=50.0), 2.0 * cra.modal_parameters(SOFT.replace(k_r=50.0)).omega[0]
@@ -153,20 +188,23 @@ def test_residual_flexibility_is_the_limit_of_many_modes():
 
 def test_broadcasting_equals_looping():
     masses, sizes = np.array([0.0, 0.001, 0.005]), np.array([[0.02], [0.1]])
-    batch = SOFT.replace(m_e=masses)
-    for excitation in (JOINT, AXIAL, cra.AxialBase(np.array([0.01, 0.02, 0.03]))):
+    batch = SOFT.replace(k_r=50.0, m_e=masses)
+    weights = np.array([1.0, 0.7, 0.0])
+    for excitation in (AXIAL, cra.AxialBase(np.array([0.01, 0.02, 0.03])), cra.JointStiffness(weights, 0.4)):
+        joint = isinstance(excitation, cra.JointStiffness)
         together = np.array(cra.stability_boundary(batch, excitation, sizes, (1, 3), order=2))
-        growth = cra.growth_rate(batch, excitation, 40.0, sizes, 2)
+        growth = cra.growth_rate(batch, excitation, 40.0, sizes, 2, residual=joint)
         assert together.shape == (2, 2, 3) and growth.shape == (2, 3)
         for i, k in np.ndindex(2, 3):
             one = excitation
-            if isinstance(excitation, cra.AxialBase) and excitation.shape:
-                one = cra.AxialBase(excitation.amplitude[k])
-            alone = SOFT.replace(m_e=masses[k])
+            if excitation.shape:
+                one = cra.JointStiffness(weights[k], 0.4) if joint else cra.AxialBase(excitation.amplitude[k])
+            alone = SOFT.replace(k_r=50.0, m_e=masses[k])
             assert np.allclose(
                 cra.stability_boundary(alone, one, sizes[i, 0], (1, 3), order=2), together[:, i, k], rtol=1e-12
             )
-            assert cra.growth_rate(alone, one, 40.0, sizes[i, 0], 2) == pytest.approx(growth[i, k], abs=1e-9)
+            rate = cra.growth_rate(alone, one, 40.0, sizes[i, 0], 2, residual=joint)
+            assert rate == pytest.approx(growth[i, k], abs=1e-9)
 
 
 def test_without_excitation_nothing_grows():
@@ -194,9 +232,9 @@ def test_both_order_conventions_of_a_resonance():
 
 @pytest.mark.parametrize("resonance", [(2, -1), (1, -2)])
 def test_difference_resonance_of_a_symmetric_coupling_is_none(resonance):
-    with pytest.warns(cra.ResonanceWarning, match=r"\(2, -1\).*P is symmetric"):
+    with pytest.warns(cra.ResonanceWarning, match=r"\(2, -1\).*P is symmetric") as caught:
         sides = cra.stability_boundary(SOFT, JOINT, [0.1, 0.2], resonance)
-    assert np.isnan(sides).all()
+    assert np.isnan(sides).all() and caught[0].filename == __file__
 
 
 def test_rigid_joint_has_nothing_to_fluctuate():
@@ -223,14 +261,16 @@ def test_overlap_and_reach_are_said():
         cra.stability_boundary(SOFT, cra.AxialBase(0.05), 0.6, (2, 2))
     with pytest.warns(cra.AsymptoticWarning, match="beyond the reach"):
         cra.stability_boundary(SOFT, JOINT, 0.5, (1, 2))
-    with pytest.warns(cra.AsymptoticWarning, match="negative in part"):
+    with pytest.warns(cra.AsymptoticWarning, match="negative in part") as caught:
         cra.stability_boundary(SOFT, JOINT, 1.1, (1, 1))
+    assert {warning.filename for warning in caught} == {__file__}
 
 
 def sides_and_words(arm, excitation, epsilon, resonance, order=2):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         sides = cra.stability_boundary(arm, excitation, epsilon, resonance, order=order)
+    assert all(warning.filename == __file__ for warning in caught), "they point at the call"
     return sides, " ".join(str(warning.message) for warning in caught)
 
 
@@ -281,6 +321,9 @@ def test_overlap_with_a_second_tongue_is_said():
         (lambda: cra.stability_boundary(SOFT, JOINT, 0.1, 2), ValueError, "resonance = 2"),
         (lambda: cra.stability_boundary(SOFT, JOINT, 0.1, (1, 1), order=3), ValueError, "order = 3"),
         (lambda: cra.stability_boundary(SOFT, JOINT, 0.1, (1, 1), tongue=2), ValueError, "appears at order 2"),
+        (lambda: cra.stability_boundary(SOFT, JOINT, 0.1, (1, 1), order=2, tongue=3), ValueError, "tongue = 3"),
+        (lambda: floquet_boundary(SOFT, JOINT, 0.05, (2, 2), 1), ValueError, "growth nowhere in the middle"),
+        (lambda: floquet_boundary(SOFT, cra.AxialBase(0.1), 0.6, (2, 2), 3), ValueError, "merges with another"),
         (lambda: cra.growth_rate(SOFT, JOINT, 0.0, 0.1), ValueError, "angular_frequency = 0"),
         (lambda: cra.growth_rate(SOFT, AXIAL, 1.0, 0.1, residual=True), ValueError, "residual"),
         (lambda: cra.growth_rate(SOFT, JOINT, [1.0, 2.0], [0.1, 0.2, 0.3]), ValueError, "broadcast"),

@@ -45,6 +45,7 @@ def _stability(*names: str) -> list[str]:
 
 _ZONES = _stability(
     "known_numbers_of_a_soft_joint",
+    "zones_scale_with_the_arm",
     "the_zone_is_continuous_where_a_spring_vanishes",
     "damping_threshold_is_said",
     "both_order_conventions_of_a_resonance",
@@ -62,6 +63,7 @@ _DOUBTS = _stability(
 )
 _FORCED = _stability("forced_width_is_the_growth_of_the_tip")
 _SYSTEM = _stability(
+    "what_is_asked_for_by_default",
     "bad_input_is_named",
     "growth_is_that_of_the_written_out_system",
     "charts_are_compiled_where_it_pays",
@@ -70,7 +72,11 @@ _SYSTEM = _stability(
 _FEW_MODES = _stability(
     "three_modes_shift_the_second_zone_the_wrong_way", "residual_flexibility_is_the_limit_of_many_modes"
 )
-_STATICS = _stability("sums_over_all_modes", "the_zone_is_continuous_where_a_spring_vanishes")
+_STATICS = _stability(
+    "sums_over_all_modes",
+    "the_zone_is_continuous_where_a_spring_vanishes",
+    "the_statics_of_a_rigid_spring_do_not_mix_with_those_of_the_other",
+)
 _BORDERS = "tests/arm/test_boundaries.py"
 _LANES = ["tests/arm/test_templates.py"]
 _STIFFNESS = [
@@ -129,14 +135,14 @@ _ROUNDS: dict[str, list[list[str]]] = {
         [f"{_BORDERS}::test_a_difference_with_symmetric_coupling_has_no_border", *_ZONES[:1]],
         [*_FORCED, *_SUMMED, _BORDERS],
     ],
-    "arm/by_hand": [],
+    "arm/by_hand": [["tests/arm/test_by_hand.py"]],
     "arm/characteristic": [_FREQUENCIES, _MODES, _DIGITS, ["tests/arm/test_characteristic.py", _SEAMS]],
     "arm/driven": [["tests/arm/test_response.py"]],
-    "arm/edges": [_ZONES[:1], [*_DAMPED, *_FEW_MODES[:1], *_ORDER]],
+    "arm/edges": [[*_ZONES[:1], *_stability("bad_input_is_named")], [*_DAMPED, *_FEW_MODES[:1], *_ORDER]],
     "arm/energy": [["tests/arm/test_energy.py"], *_PHYSICS],
     "arm/evaluation": [],
     "arm/excitation": [
-        [*_ZONES[:2], *_FORCED, *_SYSTEM[:2]],
+        [*_ZONES[:3], *_FORCED, *_SYSTEM[:3]],
         [*_stability("excitations_compare_hash_and_pickle"), *_LOOPED, *_ORDER],
     ],
     "arm/excited": [],
@@ -152,7 +158,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "arm/orthogonality": [],
     "arm/operators": [],
     "arm/parameters": [["tests/arm/test_parameters.py", f"{_LAWS}::test_damping_may_come_close_to_critical"]],
-    "arm/parametric": [_FORCED],
+    "arm/parametric": [["tests/arm/test_parametric.py"], _FORCED],
     "arm/residual": [_STATICS, _SUMMED + _FEW_MODES, _LOOPED],
     "arm/resonance": [],
     "arm/sensitivity": [
