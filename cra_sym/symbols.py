@@ -348,6 +348,8 @@ def _pretty_unit(unit: str, power: str) -> str:
 
 def nomenclature(group: str | None = None) -> Nomenclature:
     """Return all rows, or those of one group, as a table that shows itself in a notebook."""
-    if group is not None and group not in _TABLE:
-        raise ValueError(f"group = {group!r}: allowed are {', '.join(_TABLE)}")
+    from cra_sym.checks import choice
+
+    if group is not None:
+        choice("group", group, _TABLE)
     return Nomenclature(r for r in _ROWS.values() if group in (None, r.group))

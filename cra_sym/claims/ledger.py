@@ -88,7 +88,7 @@ def claim(id: str, arm: Arm | None = None, **numbers: Any) -> Verdict:
 
 def claims(arm: Arm | None = None, *, theme: str | None = None, **numbers: Any) -> tuple[Verdict, ...]:
     """Return the verdicts on all claims, or on those of one theme; arguments as for :func:`claim`."""
-    if theme is not None and theme not in THEMES:
-        raise ValueError(f"theme = {theme!r}: allowed are {', '.join(THEMES)}")
+    if theme is not None:
+        choice("theme", theme, THEMES)
     setting = Setting.of(arm, **numbers)
     return tuple(_verdict(id, setting) for id in _load() if theme in (None, ENTRIES[id].theme))

@@ -3,6 +3,7 @@
 import ast
 import dataclasses
 import json
+import re
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -12,7 +13,10 @@ from matplotlib.figure import Figure
 
 import cra_sym as cra
 from cra_sym.__main__ import main
-from cra_sym.claims import OUTCOMES, THEMES, Setting, claim, claims, figure_claims, ledger, outcome
+from cra_sym.claims import OUTCOMES, THEMES, Setting, claim, claims, figure_claims, ledger, outcome, provenance_family
+from cra_sym.claims.family import MATERIALS
+from cra_sym.claims.overviews import figure_family
+from cra_sym.claims.table import verdict_markdown
 from cra_sym.claims.words import listed, number, percent, span
 
 FOLDER = Path(ledger.__file__).parent
@@ -85,6 +89,20 @@ def test_a_theme_is_one_picture():
     assert [ax.get_title(loc="left")[2:5] for ax in figure.axes] == [v.id for v in claims(theme="modes")[:4]]
 
 
+def test_every_arm_drawn_has_the_published_frequencies():
+    """To the digits printed; the nominal arm stands among them."""
+    figure = figure_family(provenance_family(length=np.linspace(0.4, 1.6, 4)))
+    *curves, nominal = figure.axes[0].lines
+    bare = cra.Arm.nominal().replace(m_e=0.0)
+    for curve in curves:
+        E, rho = MATERIALS[curve.get_label()]
+        length, thickness = curve.get_xdata(), curve.get_ydata() / 1e3
+        found = cra.natural_frequencies(bare.replace(L=length, h=thickness, E=E, rho=rho))
+        np.testing.assert_allclose(found, [Setting.frequencies] * 4, rtol=0, atol=0.0005)
+    assert len(curves) == len(MATERIALS)
+    assert nominal.get_xydata().ravel().tolist() == [bare.L, 1e3 * bare.h]
+
+
 def test_computed_once_and_for_each_arm():
     assert claim("C01") is claim("C01", cra.Arm.nominal())
     other = claim("C01", cra.Arm.nominal().replace(L=1.1))
@@ -129,6 +147,21 @@ def test_command_prints_the_table(capsys):
     assert only["outcome"] == "holds" and np.shape(only["evidence"]["frequency"]["values"]) == (61, 3)
     assert main(["claims", "C77"]) == 2
     assert "allowed are" in capsys.readouterr().err
+
+
+def test_the_table_of_a_page_has_three_cells_a_row():
+    """Whatever a verdict says, with its remedy or what is missing."""
+    verdicts = [claim(id) for id in ("C01", "C02", "C03")]
+    verdicts += [dataclasses.replace(verdicts[0], sentence="|v| is k_t^2.", missing="a figure", remedy="a spring")]
+    head, line, *rows = verdict_markdown(verdicts).splitlines()
+    cells = [re.split(r"(?<!\\)\|", row)[1:-1] for row in (head, line, *rows)]
+    assert {len(row) for row in cells} == {3} and len(rows) == 4
+    for verdict, (name, words, found) in zip(verdicts, cells[2:], strict=True):
+        assert verdict.id in name and verdict.outcome in name and verdict.source in words.replace("\\", "")
+        assert all(
+            text in found.replace("\\", "") for text in (verdict.sentence, verdict.remedy or "", verdict.missing or "")
+        )
+    assert r"\|v\| is k\_t\^2." in rows[-1]
 
 
 def test_words():

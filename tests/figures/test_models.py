@@ -1,0 +1,30 @@
+"""Model against model: the curves are the numbers given, axes say quantity and unit, styles differ."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cra_sym.figures.models import figure_damped_joint, figure_slenderness
+
+
+def drawn(ax):
+    return np.array([line.get_ydata() for line in ax.lines if len(line.get_xdata()) > 2])
+
+
+def test_a_thin_and_a_thick_theory_in_hertz_and_as_their_ratio():
+    slenderness, thin = np.array([10.0, 20.0, 50.0]), np.array([[1.0, 6.0], [2.0, 12.0], [4.0, 24.0]])
+    thick = thin * (1 - 3 / slenderness[:, None])
+    given = Figure().subplots(1, 2)
+    left, right = figure_slenderness(slenderness, thin, thick, axes=given).axes
+    assert [left, right] == list(given)
+    np.testing.assert_array_equal(drawn(left), [thick[:, 0], thin[:, 0], thick[:, 1], thin[:, 1]])
+    np.testing.assert_allclose(drawn(right), 2 * [1 - 3 / slenderness])
+    assert [line.get_linestyle() for line in left.lines] == ["-", ":", "-", ":"]
+    assert "Hz" in left.get_ylabel() and right.get_xlabel() == left.get_xlabel()
+
+
+def test_damping_ratios_against_the_damper():
+    damper, ratio = np.array([0.1, 1.0, 10.0]), np.array([[1e-4, 1e-3], [1e-3, 1e-2], [1e-4, 1e-3]])
+    (ax,) = figure_damped_joint(damper, ratio).axes
+    np.testing.assert_array_equal(drawn(ax), ratio.T)
+    assert len({line.get_linestyle() for line in ax.lines}) == 2
+    assert ax.get_xscale() == ax.get_yscale() == "log" and "N s/m" in ax.get_xlabel()
