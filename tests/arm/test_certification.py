@@ -84,15 +84,18 @@ def test_rigid_body_modes_are_zero():
 
 
 class Parabola:
-    """Zeros at 1 and 2, the sign that of (-1)**count."""
+    """Zeros at 1 and at 2 or another place above, the sign that of (-1)**count."""
 
     zeros = 0
 
+    def __init__(self, other=2):
+        self.other = other
+
     def count(self, point):
-        return int(point > 1) + int(point > 2)
+        return int(point > 1) + int(point > self.other)
 
     def is_positive(self, point):
-        return bool((point - 1) * (point - 2) > 0)
+        return bool((point - 1) * (point - self.other) > 0)
 
 
 def test_a_guess_elsewhere_proves_nothing():
@@ -100,6 +103,19 @@ def test_a_guess_elsewhere_proves_nothing():
         enclose(flint, Parabola(), [1.0, 1.5])
     (low, high), _ = enclose(flint, Parabola(), [1.0 + 1e-9, 2.0])
     assert low <= 1 <= high and float(high - low) < 1e-15
+
+
+def test_close_neighbours_get_enclosures_of_their_own():
+    """Also if both guesses are so far off that the first bracket around them holds the two."""
+    other = flint.arb(1) + flint.arb(2) ** -30
+    (low, high), (low_2, high_2) = enclose(flint, Parabola(other), [1 - 2.0**-21, 1 + 2.0**-21])
+    assert low <= 1 <= high < low_2 <= other <= high_2
+
+
+def test_enclosures_are_as_narrow_as_promised():
+    for root, (low, high) in zip((1, 2), enclose(flint, Parabola(), [1.0, 2.0]), strict=True):
+        assert low <= root <= high
+        assert high - low <= root * flint.arb(2) ** -53
 
 
 def test_zero_has_no_sign():

@@ -122,9 +122,11 @@ _FLOQUET = [
             "multipliers_come_in_reciprocal_pairs",
             "no_excitation_no_growth",
             "growth_is_that_of_the_fastest_exponent",
+            "any_argument_alone_may_be_the_batch",
             "batch_equals_loop",
         )
     ],
+    [f"{_LANES[0]}::test_floquet"],
 ]
 _COUPLED = ["tests/solvers/test_coupled_modes.py"]
 _PHYSICS = [_FREQUENCIES, _MODES]

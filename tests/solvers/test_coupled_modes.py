@@ -80,14 +80,15 @@ def test_a_batch_of_modes_is_a_loop(modes):
     own = OMEGA[few] * size, DAMPING[few, few] * size[..., None], GAMMA[few] * size, ROWS[:, few] * size[..., None]
     free, forced = (derived_kernel(f"cra_sym.model.oscillator:{name}_kernel") for name in ("free", "forced"))
 
-    def both(omega, damping, gamma, rows):
+    def answers(omega, damping, gamma, rows):
         coupled = CoupledModes(omega, ZETA[few], damping, gamma, rows)
         closed = Oscillators(omega, ZETA[few], gamma, rows, free, forced)
-        return [f(o, MOTION, TIMES[:4], 0) for f, o in ((coupled_response, coupled), (driven_response, closed))]
+        grid = [driven_response(closed, MOTION, np.linspace(0.0, 2.0, 70), derivative) for derivative in range(3)]
+        return [coupled_response(coupled, MOTION, TIMES[:4], 0), driven_response(closed, MOTION, TIMES[:4], 0), *grid]
 
-    singles = [both(*member) for member in zip(*own, strict=True)]
-    for found, expected in zip(both(*own), zip(*singles, strict=True), strict=True):
-        np.testing.assert_allclose(found, expected, atol=1e-14)
+    singles = [answers(*member) for member in zip(*own, strict=True)]
+    for found, expected in zip(answers(*own), zip(*singles, strict=True), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 def test_times_that_run_backwards_give_the_same_values():

@@ -136,7 +136,7 @@ def test_batches_are_loops(derivative):
     rng = np.random.default_rng(4)
     omega, rows = rng.uniform(2.0, 9.0, (3, 1, 2)), rng.normal(size=(3, 1, 2, 2))
     osc = OSC._replace(omega=omega, rows=rows, gamma=rng.normal(size=(3, 1, 2)))
-    harmonics = [Harmonics(*rng.uniform(10.0, 20.0, (3, 4, 1)) / 10), Harmonics(*np.array([[0.1], [11.0], [0.5]]))]
+    harmonics = [Harmonics(*rng.uniform(1.0, 2.0, (3, 3, 4, 1))), Harmonics(*np.array([[0.1], [11.0], [0.5]]))]
     steady = Steady(rng.normal(size=(4, 2)), rng.normal(size=(4, 1)), harmonics, rng.normal(size=(4, 2)))
     knots, level, jerk = np.sort(rng.uniform(0.0, 2.0, (4, 5))), *rng.normal(size=(2, 4, 5))
     times = np.linspace(0.0, 3.0, 70), np.array([0.3, 2.5, 0.0])
@@ -147,7 +147,7 @@ def test_batches_are_loops(derivative):
         cause = Steady(
             steady.velocity[j],
             steady.acceleration[j],
-            [Harmonics(*(value[j] for value in harmonics[0])), harmonics[1]],
+            [Harmonics(*(value[i, j] for value in harmonics[0])), harmonics[1]],
             steady.displacement[j],
         )
         single = [steady_response(one, cause, t, derivative) for t in times]
