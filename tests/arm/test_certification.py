@@ -76,6 +76,11 @@ def test_the_solver_lies_within_the_enclosures():
     assert (certificate.upper[:, :-1] <= certificate.lower[:, 1:]).all()
 
 
+def test_three_modes_unless_asked_for_more():
+    certificate = cra.certify(cra.Arm.nominal())
+    assert certificate.lower.shape == certificate.upper.shape == (3,) and certificate.complete.shape == ()
+
+
 def test_rigid_body_modes_are_zero():
     free = cra.Arm.nominal().replace(k_t=[0.0, 0.0, 1e3], k_r=[0.0, 1e2, 0.0])
     certificate = cra.certify(free, modes=3)

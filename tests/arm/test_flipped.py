@@ -40,7 +40,7 @@ def test_frequencies_rise_as_the_joint_softens_where_the_true_ones_fall():
 
 
 def test_rigid_limit_is_the_same():
-    np.testing.assert_allclose(flipped_frequencies(ARM), cra.natural_frequencies(ARM), rtol=1e-12)
+    np.testing.assert_allclose(flipped_frequencies(ARM), cra.natural_frequencies(ARM, modes=3), rtol=1e-12)
 
 
 def test_without_a_rotational_spring_there_is_no_sign_to_flip():

@@ -132,6 +132,19 @@ def test_end_values_are_those_of_the_shapes(arm, parameters):
     assert (parameters.tip_displacement >= 0).all()
 
 
+def test_three_modes_of_a_tip_without_inertia_unless_asked_for_more():
+    lam = cra.frequency_parameters(40.0, 3.0, 0.2)
+    np.testing.assert_array_equal(lam, cra.frequency_parameters(40.0, 3.0, 0.2, 0.0, modes=3))
+    shapes = cra.mode_shapes(NOMINAL, 0.5)
+    np.testing.assert_array_equal(shapes, cra.mode_shapes(NOMINAL, [0.5], modes=3, derivative=0)[:, 0])
+    for number in (
+        cra.natural_frequencies(NOMINAL),
+        cra.modal_parameters(NOMINAL).omega,
+        cra.sensitivities(NOMINAL).frequency,
+    ):
+        assert number.shape == (3,)
+
+
 def test_high_modes_stay_orthonormal():
     arm = NOMINAL.replace(k_t=1e3, k_r=1e2)
     nodes, weights = leggauss(400)
@@ -233,6 +246,7 @@ def test_ranges_of_the_numbers_are_those_of_the_derivation():
         (lambda: cra.mode_shapes(NOMINAL, "tip"), TypeError, "x = 'tip'"),
         (lambda: cra.mode_shapes(NOMINAL, 0.5, derivative=4), ValueError, "derivative = 4"),
         (lambda: cra.mode_shapes(NOMINAL, 0.5, modes=0), ValueError, "modes = 0"),
+        (lambda: cra.mode_shapes(NOMINAL, 0.5, modes=1001), ValueError, "modes = 1001: allowed is .* 1 to 1000"),
         (lambda: cra.natural_frequencies(1.0), TypeError, "arm = 1.0: allowed is an Arm"),
         (lambda: cra.modal_parameters(NOMINAL, 1.5), ValueError, "modes = 1.5"),
     ],

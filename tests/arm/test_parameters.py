@@ -30,6 +30,13 @@ def test_groups_do_not_depend_on_units():
         assert getattr(grams_millimetres, group) == pytest.approx(getattr(arm, group), rel=1e-14)
 
 
+def test_the_nominal_numbers_and_what_is_not_said():
+    strip = {"L": 1.0, "b": 0.03, "h": 0.003, "E": 68.875e9, "rho": 2700.0, "m_b": 5.0}
+    bare = Arm(**strip)
+    assert (bare.m_e, bare.J_e, bare.zeta) == (0.0, 0.0, 0.0) and bare.k_t == bare.k_r == np.inf
+    assert NOMINAL == bare.replace(m_e=0.001)
+
+
 def test_provenance_covers_every_field():
     assert set(Arm.provenance) == set(Arm._names())
     assert {entry.kind for entry in Arm.provenance.values()} == {"published", "calibrated", "assumed"}
@@ -43,7 +50,7 @@ def test_provenance_covers_every_field():
         ("rho", 0, ValueError), ("m_b", -1e-9, ValueError), ("m_e", np.inf, ValueError), ("J_e", -1.0, ValueError),
         ("k_t", -1.0, ValueError), ("k_r", np.nan, ValueError), ("zeta", 1.0, ValueError), ("zeta", -0.1, ValueError),
         ("L", "1", TypeError), ("k_t", None, TypeError), ("m_e", True, TypeError), ("E", 1 + 2j, TypeError),
-        ("k_t", [1.0, -2.0], ValueError), ("rho", [[1.0], [1.0, 2.0]], TypeError),
+        ("k_t", -0.05, ValueError), ("k_t", [1.0, -2.0], ValueError), ("rho", [[1.0], [1.0, 2.0]], TypeError),
     ],
 )  # fmt: skip
 def test_bad_values_name_the_field(field, value, error):

@@ -43,7 +43,9 @@ def test_batches():
     assert amplitudes.shape == times.shape == (2, 2, 3)
 
 
-@pytest.mark.parametrize("arguments", [{"angular_frequency": 0.0}, {"zeta": -1e-3}, {"zeta": 1.0}, {"order": 0}])
+@pytest.mark.parametrize(
+    "arguments", [{"angular_frequency": 0.0}, {"zeta": -1e-3}, {"zeta": 1.0}, {"order": 0}, {"order": 51}]
+)
 def test_bad_input_is_named(arguments):
     (name,) = arguments
     with pytest.raises(ValueError, match=f"{name} = "):

@@ -31,6 +31,11 @@ def test_an_exact_hold_agrees_with_the_closed_form():
     assert found == pytest.approx(cra.tip_response(ARM, motion, t, modes), rel=1e-10, abs=1e-14)
 
 
+def test_three_modes_and_no_direct_path_unless_asked_for_more():
+    system = cra.state_space(ARM)
+    assert system.A.shape == (6, 6) and system.D.tolist() == [[0.0]]
+
+
 def test_lsim_of_a_sampled_record_agrees_with_the_closed_form():
     t = np.linspace(0, 1, 51)
     a = np.random.default_rng(2).normal(size=51)

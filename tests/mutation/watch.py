@@ -18,6 +18,10 @@ EXEMPT = {
 
 _LAWS = "tests/test_properties.py"
 _LAMBDA, _MODAL = "tests/arm/test_frequency_parameters.py", "tests/arm/test_modal_parameters.py"
+_COUNTS = [
+    f"tests/arm/test_characteristic.py::test_count_{name}"
+    for name in ("steps_by_one_at_every_zero", "where_zeros_of_the_limits_are")
+]
 _SEAMS = f"{_MODAL}::test_ranges_of_the_numbers_are_those_of_the_derivation"
 _FREQUENCIES = [
     f"{_LAMBDA}::test_{name}"
@@ -152,7 +156,10 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "arm/implicit": [["tests/arm/test_sensitivity.py"]],
     "arm/joint": _PHYSICS,
     "arm/limits": [],
-    "arm/modal": [_MODES, [_MODAL]],
+    "arm/modal": [
+        [*_MODES, "tests/arm/test_sensitivity.py"],
+        ["tests/arm/test_vibration_gradient.py::test_the_gradient_is_the_slope", _MODAL],
+    ],
     "arm/modal_dynamics": [],
     "arm/modal_lanes": [_LANES],
     "arm/modal_sum": [["tests/arm/test_energy.py"]],
@@ -169,7 +176,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     ],
     "arm/shapes": [_MODES, [_MODAL]],
     "arm/shooting": [],
-    "arm/spectrum": [[*_FREQUENCIES, _SEAMS], _DIGITS, [_LAMBDA]],
+    "arm/spectrum": [["tests/arm/test_spectrum.py", *_FREQUENCIES, _SEAMS], _DIGITS, _COUNTS, [_LAMBDA]],
     "arm/stability": [[*_ZONES, *_FORCED, *_SYSTEM], [*_LOOPED, *_DOUBTS, *_FEW_MODES]],
     "arm/zones": [[*_ZONES, *_SUMMED], [*_LOOPED, *_DAMPED, *_DOUBTS], _ORDER],
     "model/oscillator": [["tests/model/test_oscillator.py"], ["tests/arm/test_response.py"]],
