@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,10 +13,13 @@ import pytest
 import cra_sym as cra
 from cra_sym.codegen import exporter
 
+once = cache(exporter.arm_sources)
+
 
 @pytest.fixture
 def short(monkeypatch):
-    """Exports with a short reference file: how they are written is all that matters here."""
+    """Exports with sources printed once and a short reference file: how they are written is all that matters here."""
+    monkeypatch.setattr(exporter, "arm_sources", lambda name: dict(once(name)))
     monkeypatch.setattr(exporter, "_reference", lambda everything: "# nothing\n")
 
 

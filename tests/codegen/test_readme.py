@@ -11,6 +11,8 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -57,22 +59,20 @@ def environment(tmp_path_factory) -> dict[str, str]:
 
 def has(command: str, environment: dict[str, str]) -> bool:
     tool = command.split()[0]
-    if tool.startswith("./"):
-        return True
-    if tool == "pip":  # it fetches its build system
-        probe = [
-            "pip",
-            "download",
-            "--quiet",
-            "--no-deps",
-            "--retries=0",
-            "--timeout=10",
-            "--dest=.probe",
-            "setuptools>=77",
-        ]
-        quiet = environment | {"PYTHONWARNINGS": "default"}
-        return subprocess.run(probe, env=quiet, capture_output=True, cwd=environment["TMPDIR"]).returncode == 0
-    return shutil.which(tool, path=environment["PATH"]) is not None
+    if tool == "pip":
+        return has_index(environment["PATH"])
+    return tool.startswith("./") or shutil.which(tool, path=environment["PATH"]) is not None
+
+
+@cache
+def has_index(path: str) -> bool:
+    """Whether pip reaches what it builds with."""
+    probe = "pip download --quiet --no-deps --retries=0 --timeout=10 --dest=probe setuptools>=77"
+    with tempfile.TemporaryDirectory() as folder:
+        return (
+            subprocess.run(probe.split(), env=os.environ | {"PATH": path}, capture_output=True, cwd=folder).returncode
+            == 0
+        )
 
 
 def follow(folder: Path, environment: dict[str, str]) -> str:
