@@ -12,7 +12,7 @@ import pytest
 from scipy.optimize import brentq
 
 import cra_sym as cra
-from cra_sym.arm import stability, zones
+from cra_sym.arm import edges, stability, zones
 from cra_sym.arm.edges import floquet_boundary
 from cra_sym.arm.residual import moments_of_all_modes, spring_vectors
 from cra_sym.kernels import has_compiler
@@ -51,6 +51,24 @@ def test_what_is_asked_for_by_default():
     assert cra.growth_rate(SOFT, JOINT, varpi, 0.05) == cra.growth_rate(SOFT, JOINT, varpi, 0.05, 3) > 0
     assert cra.floquet_exponents(SOFT, JOINT, varpi, 0.05).shape == (6,)
     assert cra.growth_rate(SOFT, JOINT, 2 * modal.omega[0], 0.1, modes=1) == pytest.approx(half / 2, rel=1e-2)
+
+
+def test_the_search_finds_the_borders_of_what_grows(monkeypatch):
+    """Of the first mode with five more, and the statics of the others where the joint fluctuates, unless told
+    otherwise."""
+    asked = []
+
+    def growth(arm, excitation, grid, epsilon, modes, *, residual):
+        asked.append((modes, residual))
+        return 1.0 * ((borders[0] < grid) & (grid < borders[1]))
+
+    monkeypatch.setattr(edges, "growth_rate", growth)
+    for excitation, resonance in ((JOINT, ()), (AXIAL, ((2, 2),))):
+        lower, upper = cra.stability_boundary(SOFT, excitation, 0.1, *resonance, order=2)
+        size = upper - lower
+        borders = lower - 0.1 * size, upper + 0.3 * size
+        assert floquet_boundary(SOFT, excitation, 0.1, *resonance) == pytest.approx(borders, rel=0, abs=2e-6 * size)
+    assert set(asked) == {(6, True), (7, False)}
 
 
 def test_zones_scale_with_the_arm():
@@ -110,6 +128,9 @@ def test_damped_zone():
         sides = np.array(cra.stability_boundary(damped, AXIAL, 0.3, resonance, order=2))
         assert np.abs(sides - truth).max() < 0.02 * np.ptp(truth)
         assert (np.ptp(sides) > np.ptp(cra.stability_boundary(SOFT, AXIAL, 0.3, resonance))) == wider
+    truth = np.array(floquet_boundary(damped, AXIAL, 0.2, (1, 3), 4))
+    sides = np.array(cra.stability_boundary(damped, AXIAL, 0.2, (1, 3), order=2))
+    assert abs(np.mean(sides - truth)) < 0.005 * np.ptp(truth), "where it is unequal damping moves a sum too"
 
 
 # statics of the modes left out ----------------------------------------------------------------------------------
@@ -266,10 +287,10 @@ def test_overlap_and_reach_are_said():
     assert {warning.filename for warning in caught} == {__file__}
 
 
-def sides_and_words(arm, excitation, epsilon, resonance, order=2):
+def sides_and_words(arm, excitation, epsilon, resonance, order=2, tongue=1):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        sides = cra.stability_boundary(arm, excitation, epsilon, resonance, order=order)
+        sides = cra.stability_boundary(arm, excitation, epsilon, resonance, order=order, tongue=tongue)
     assert all(warning.filename == __file__ for warning in caught), "they point at the call"
     return sides, " ".join(str(warning.message) for warning in caught)
 
@@ -298,8 +319,14 @@ def test_overlap_with_a_second_tongue_is_said():
         first, second = cra.modal_parameters(arm(k_t), 2).omega
         return second / first - 2
 
+    def gap(k_t):
+        lower, _ = sides_and_words(arm(k_t), JOINT, 0.1, (1, 1))[0]
+        _, upper = sides_and_words(arm(k_t), JOINT, 0.1, (2, 2), tongue=2)[0]
+        return lower - upper
+
     tuned = brentq(detuning, 1e-3, 1e-2)
-    for k_t, said in ((tuned, True), (1.2 * tuned, False)):
+    touch = brentq(gap, tuned, 1.2 * tuned, xtol=1e-9)
+    for k_t, said in ((tuned, True), (0.9999 * touch, True), (1.0001 * touch, False), (1.2 * tuned, False)):
         _, words = sides_and_words(arm(k_t), JOINT, 0.1, (1, 1))
         assert ("resonance (2, 2), second tongue" in words) == said
 
@@ -347,6 +374,7 @@ def test_excitations_compare_hash_and_pickle():
     for excitation in (JOINT, AXIAL, cra.TransverseBase(np.array([1.0, 2.0]))):
         copy = pickle.loads(pickle.dumps(excitation))
         assert copy == excitation and hash(copy) == hash(excitation)
+    assert JOINT == cra.JointStiffness(1.0, 0.0), "one spring, if not said otherwise"
     assert cra.AxialBase(1.0) != cra.TransverseBase(1.0) and cra.AxialBase(1.0) != cra.AxialBase(2.0)
 
 

@@ -144,7 +144,10 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "arm/by_hand": [["tests/arm/test_by_hand.py"]],
     "arm/characteristic": [_FREQUENCIES, _MODES, _DIGITS, ["tests/arm/test_characteristic.py", _SEAMS]],
     "arm/driven": [["tests/arm/test_response.py"]],
-    "arm/edges": [[*_ZONES[:1], *_stability("bad_input_is_named")], [*_DAMPED, *_FEW_MODES[:1], *_ORDER]],
+    "arm/edges": [
+        [*_stability("the_search_finds_the_borders_of_what_grows"), *_ZONES[:1], *_SYSTEM[1:2]],
+        [*_DAMPED, *_FEW_MODES[:1], *_ORDER],
+    ],
     "arm/energy": [["tests/arm/test_energy.py"], *_PHYSICS],
     "arm/evaluation": [],
     "arm/excitation": [
