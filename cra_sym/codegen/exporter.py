@@ -73,6 +73,8 @@ def export(language: str, directory: str | Path, model: Any = None, overwrite: b
 
     Raises
     ------
+    TypeError
+        If the language is no text, the directory no path or the model no Model.
     ValueError
         If the language is unknown, the folder is not empty, or the model has no real closed form. Nothing is written.
     """

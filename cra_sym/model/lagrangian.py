@@ -55,15 +55,15 @@ class Model:
     prescribed : sequence of applied undefined functions, optional
         Motions ``w(t)`` that are given, see `response`. A force ``F(t)`` needs no mention.
     virtual_work : sequence of (force, displacement, place), optional
-        Non-conservative forces; place is 'left', 'right' or 'domain'.
+        Non-conservative forces; place is 'left', 'right', 'domain' (per length) or None (on a coordinate).
     units : mapping, optional
         Units of symbols of the model that are not those of ``cra_sym.symbols``, such as ``{c: "N s/m"}``. Every term
         whose symbols all have a known unit must be an energy (per length in the density).
 
     Raises
     ------
-    ValueError
-        Names the term that cannot be treated, or whose dimension is wrong.
+    TypeError, ValueError
+        Names what is no expression, the term that cannot be treated, or whose dimension is wrong.
 
     Notes
     -----
@@ -177,7 +177,7 @@ class Model:
         return separate(self.equations, **options)
 
     def ritz(self, elements: int) -> Ritz:
-        """Return the same Lagrangian on Hermite elements: frequencies from above, coefficients may vary along x."""
+        """Return the same Lagrangian on equal Hermite elements: frequencies from above, coefficients may vary by x."""
         return Ritz(ritz(self.equations, elements=elements), self.symbols)
 
     def kernel(self) -> Kernel:
@@ -215,7 +215,7 @@ class Model:
 
         Raises
         ------
-        ValueError
+        TypeError, ValueError
             If a value is missing, unknown or not allowed; if the structure has buckled under its static load; if it
             has fewer natural frequencies.
         """
@@ -402,7 +402,7 @@ class Model:
 
         Raises
         ------
-        ValueError
+        TypeError, ValueError
             Names the load without a history, or the function that is not at rest, known or allowed.
         """
         modes = count("modes", modes, high=_MOST_MODES)

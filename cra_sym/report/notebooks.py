@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import os
 import sys
+from argparse import ArgumentParser
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor, as_completed
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["NotebookError", "execute", "find_notebooks", "refresh"]
 
+_COMMAND = "python -m cra_sym.report.notebooks"
 _KERNEL = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"}
 
 
@@ -194,9 +196,11 @@ def refresh(paths: Sequence[Path], *, svg: bool = False) -> None:
 
 
 def _refresh_as_asked() -> None:
-    given = [Path(argument) for argument in sys.argv[1:]]
+    parser = ArgumentParser(_COMMAND, description="Re-execute notebooks and store what they show in place.")
+    parser.add_argument("places", metavar="PLACE", type=Path, nargs="+", help="a notebook, or a folder of notebooks")
+    given = parser.parse_args().places
     refresh([path for place in given for path in (find_notebooks(place) if place.is_dir() else [place])])
 
 
 if __name__ == "__main__":
-    sys.exit(run_command("python -m cra_sym.report.notebooks", _refresh_as_asked, {NotebookError: 1}))
+    sys.exit(run_command(_COMMAND, _refresh_as_asked, {NotebookError: 1}))

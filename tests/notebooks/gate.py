@@ -10,6 +10,7 @@ from __future__ import annotations
 import platform
 import sys
 import tomllib
+from argparse import ArgumentParser
 from importlib import metadata
 from pathlib import Path
 
@@ -46,7 +47,11 @@ def main(names: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["--requirements"]:
-        print(*requirements(sys.argv[2]), sep="\n")
+    parser = ArgumentParser("python -m tests.notebooks.gate", description=__doc__)
+    parser.add_argument("notebooks", metavar="NOTEBOOK", nargs="*", help="by default all")
+    parser.add_argument("--requirements", choices=("oldest", "newest"), help="print what to install, and run nothing")
+    asked = parser.parse_args()
+    if asked.requirements:
+        print(*requirements(asked.requirements), sep="\n")
     else:
-        sys.exit(min(main(sys.argv[1:]), 1))
+        sys.exit(min(main(asked.notebooks), 1))

@@ -1,12 +1,14 @@
 """The runner: executes in place, stores no trace of the machine, and says which cell failed."""
 
 import os
+import sys
 from concurrent.futures import CancelledError
 
 import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
+from cra_sym.report import notebooks
 from cra_sym.report.notebooks import NotebookError, cells_to_run, execute, find_notebooks, refresh
 
 
@@ -78,3 +80,13 @@ def test_notebooks_are_found_in_reading_order(notebook, tmp_path):
     assert cells_to_run(find_notebooks(tmp_path)) == 3
     with pytest.raises(FileNotFoundError, match="nowhere"):
         find_notebooks(tmp_path / "nowhere")
+
+
+def test_the_command_says_what_it_takes(monkeypatch, capsys):
+    for given, code in (["--help"], 0), ([], 2):
+        monkeypatch.setattr(sys, "argv", ["notebooks", *given])
+        with pytest.raises(SystemExit) as ended:
+            notebooks._refresh_as_asked()
+        assert ended.value.code == code
+    shown = capsys.readouterr()
+    assert "a notebook, or a folder" in shown.out and "required: PLACE" in shown.err
