@@ -13,7 +13,10 @@ __all__ = ["broadcastable", "choice", "count", "instance", "mapping", "one_axis"
 
 def shown(value: Any) -> str:
     """Return a value as errors show it: in one line, and not a long one."""
-    text = " ".join(repr(value).split())
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # an integer of too many digits, an expression of too many levels
+        text = f"<{type(value).__name__}>"
     return text if len(text) <= 80 else text[:77] + "..."
 
 
@@ -118,6 +121,6 @@ def broadcastable(**arrays: np.ndarray) -> tuple[int, ...]:
     """Return the common shape of the named arrays, or raise an error that names those that do not fit."""
     try:
         return np.broadcast_shapes(*(np.shape(a) for a in arrays.values()))
-    except ValueError:
+    except (ValueError, RuntimeError):  # of more than 32 axes
         shapes = ", ".join(f"{name} {np.shape(a)}" for name, a in arrays.items() if np.ndim(a))
         raise ValueError(f"shapes do not broadcast together: {shapes}") from None

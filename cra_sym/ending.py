@@ -6,7 +6,8 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from io import TextIOWrapper
 from threading import current_thread, main_thread
 from typing import Any
 
@@ -66,6 +67,8 @@ def run_command(name: str, job: Callable[[], Any], codes: Mapping[type[Exception
         Errors to say in a line, besides a place that cannot be read or written, which is 2.
     """
     codes = {**codes, OutputError: 2, OSError: 2}
+    if isinstance(sys.stdout, TextIOWrapper):  # a terminal without a letter for it is no reason to fail
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         with orderly_ending():
             job()
@@ -78,7 +81,8 @@ def run_command(name: str, job: Callable[[], Any], codes: Mapping[type[Exception
     except tuple(codes) as error:
         told, code = f"{name}: {error}\n", next(codes[kind] for kind in codes if isinstance(error, kind))
     if sys.stderr is not None:
-        sys.stderr.write(told)
+        with suppress(OSError):
+            sys.stderr.write(told)
     _give_up_a_closed_output()
     return code
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from cra_sym.arm.excitation import AxialBase, JointStiffness
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import instance, real_array
+from cra_sym.checks import instance, real_array, shown
 from cra_sym.extras import MissingExtraError, require
 from cra_sym.figures.live import LiveFigure
 from cra_sym.figures.modes import figure_mode_shapes
@@ -67,7 +67,7 @@ class Explorer:
     def __init__(self, arm: Arm, excitation: Any, values: dict[str, Any]) -> None:
         self._given, self._excitations = arm, dict(_EXCITATIONS)
         if not isinstance(excitation, JointStiffness | AxialBase) or excitation.shape:
-            raise TypeError(f"excitation = {excitation!r}: allowed is a single JointStiffness or AxialBase")
+            raise TypeError(f"excitation = {shown(excitation)}: allowed is a single JointStiffness or AxialBase")
         if excitation not in self._excitations.values():
             self._excitations["as given"] = excitation
         self.excitation, self.swing = excitation, 0.0
@@ -129,7 +129,7 @@ class Explorer:
         self._given.replace(**{name: values[name] for name in _ARM if name in values})
         BaseMotion(**{_MOTION[name]: values[name] for name in _MOTION if name in values})
         if "epsilon" in values:
-            real_array("epsilon", values["epsilon"], low=0.0, open_low=True)
+            real_array("epsilon", values["epsilon"], low=0.0, high=1.0, open_low=True)
 
     def _draw(self, name: str) -> None:
         view = self.views[name]

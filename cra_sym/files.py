@@ -7,20 +7,25 @@ import json
 import os
 import re
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from reprlib import repr as brief
 from secrets import token_hex
 
 try:
     import fcntl
-except ImportError:  # Windows: nothing is locked, and so nothing is taken for abandoned
+except ImportError:  # Windows: nothing is locked, and only age tells what is abandoned
     fcntl = None  # type: ignore[assignment]
 
-__all__ = ["OutputError", "draft", "staged_directory", "write_text", "writing"]
+__all__ = ["OutputError", "draft", "path_of", "staged_directory", "write_text", "writing"]
 
 _MANIFEST = "manifest.json"
+_MAKER = {"made by": "cra_sym"}  # others list their files in a manifest.json too
 _OLD = ".replaced"
+_PATIENCE = 10.0  # seconds; locks are held for moments
+_ABANDONED = 86_400.0  # seconds; where folders cannot be locked, no run takes so long
 _DISK = {getattr(errno, name, 0) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EROFS", "EIO", "ENXIO", "ENODEV", "ESTALE")}
 
 
@@ -39,10 +44,11 @@ def draft(path: str | Path) -> Iterator[Path]:
     OutputError
         If ``path`` cannot be written.
     """
-    path = _absolute(path)
+    path = path_of("output", path)
     with _stage(path) as place:
         yield place
         with writing(path):
+            _copy_mode(path, place)
             os.replace(place, path)
 
 
@@ -59,15 +65,22 @@ def write_text(path: str | Path, text: str) -> None:
 
 
 def _files(folder: Path) -> Iterator[str]:
-    paths = (path for path in folder.rglob("*") if path.is_symlink() or not path.is_dir())
-    return (path.relative_to(folder).as_posix() for path in paths)
+    def refuse(error: OSError) -> None:
+        if not isinstance(error, FileNotFoundError):  # what cannot be looked into is not empty
+            raise OutputError(f"output = {str(folder)!r}: {str(error.filename)!r} cannot be read ({error.strerror})")
+
+    for place, folders, files in os.walk(folder, onerror=refuse):
+        paths = (Path(place, name) for name in (*folders, *files))
+        yield from (p.relative_to(folder).as_posix() for p in paths if p.name in files or p.is_symlink())
 
 
 def _listed(target: Path) -> set[str]:
     """Return the files that an earlier run put into ``target``, as its manifest says."""
+    path = target / _MANIFEST
     try:
-        return {*json.loads((target / _MANIFEST).read_text(encoding="utf-8"))["files"], _MANIFEST}
-    except (OSError, ValueError, KeyError, TypeError):
+        manifest = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+        return {*manifest["files"], _MANIFEST} if manifest.items() >= _MAKER.items() else set()
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return set()
 
 
@@ -79,6 +92,9 @@ def _check_replaceable(target: Path, keep: bool) -> None:
         raise OutputError(f"output = {str(target)!r}: is not a directory")
     if target.is_mount():
         raise OutputError(f"output = {str(target)!r}: is a mount point, which cannot be replaced; name a folder in it")
+    with suppress(OSError):
+        if Path.cwd().is_relative_to(target.resolve()):
+            raise OutputError(f"output = {str(target)!r}: is the working folder or holds it; name another")
     made = _listed(target)
     foreign = next((name for name in _files(target) if name not in made), None)
     if foreign is not None and not keep:
@@ -96,7 +112,7 @@ def staged_directory(target: str | Path, *, keep: bool = False) -> Iterator[Path
     whole, once everything new is complete; a directory with anything else in it is refused before any work. Whatever
     ends the block early, ``target`` and the directories around it stay as they were. Processes that write to the same
     place at once each write the whole of it, and the last one stays. What a killed process left behind is cleared
-    away by the next one that writes there.
+    away by the next one that writes there; after a day where folders cannot be locked.
 
     Parameters
     ----------
@@ -111,13 +127,13 @@ def staged_directory(target: str | Path, *, keep: bool = False) -> Iterator[Path
     OutputError
         If ``target`` cannot be written or holds files that an earlier output did not put there.
     """
-    target = _absolute(target)
+    target = path_of("output", target)
     with _stage(target) as folder:
         with _alone_at(target):
             _check_replaceable(target, keep)
         folder.mkdir()
         yield folder
-        write_text(folder / _MANIFEST, json.dumps({"files": sorted(_files(folder))}, indent=1) + "\n")
+        write_text(folder / _MANIFEST, json.dumps({**_MAKER, "files": sorted(_files(folder))}, indent=1) + "\n")
         with _alone_at(target):
             _check_replaceable(target, keep)
             if keep:
@@ -126,7 +142,7 @@ def staged_directory(target: str | Path, *, keep: bool = False) -> Iterator[Path
 
 
 def _carry_over(target: Path, folder: Path) -> None:
-    """Copy what is in ``target``, was not made by an earlier run and is not made now."""
+    """Link or copy what is in ``target``, was not made by an earlier run and is not made now."""
     earlier = _listed(target)
     for name in _files(target):
         place = folder / name
@@ -136,22 +152,33 @@ def _carry_over(target: Path, folder: Path) -> None:
             if place.is_dir():
                 raise IsADirectoryError("a folder of that name is made")
             place.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(target / name, place, follow_symlinks=False)
+            try:
+                os.link(target / name, place, follow_symlinks=False)  # the file itself, however large
+            except (OSError, NotImplementedError):
+                shutil.copy2(target / name, place, follow_symlinks=False)
         except (OSError, shutil.Error) as error:
             raise OutputError(f"output = {str(target)!r}: {name!r} cannot be kept ({error})") from None
 
 
 def _swap(folder: Path, target: Path) -> None:
     """Put ``folder`` in the place of ``target``; what was there goes with the stage, or returns from it."""
+    _copy_mode(target, folder)
     if target.exists():
         os.rename(target, folder.parent / _OLD)
     os.rename(folder, target)
 
 
+def _copy_mode(old: Path, new: Path) -> None:
+    """Give what takes the place of something the permissions of that."""
+    with suppress(OSError):
+        shutil.copymode(old, new)
+
+
 # Stages, and processes that know of each other --------------------------------------------------------------------
 
 
-def _absolute(path: str | Path) -> Path:
+def path_of(name: str, path: str | Path) -> Path:
+    """Return an absolute path, of something or of nothing, or raise an error that names the argument."""
     try:
         made = Path(os.path.abspath(path))
         os.lstat(made)
@@ -159,7 +186,7 @@ def _absolute(path: str | Path) -> Path:
         pass
     except (TypeError, ValueError) as error:
         kind = TypeError if isinstance(error, TypeError) else ValueError
-        raise kind(f"output = {path!r}: allowed is a path ({error})") from None
+        raise kind(f"{name} = {brief(path)}: allowed is a path ({error})") from None
     return made
 
 
@@ -189,7 +216,7 @@ def _stage(target: Path) -> Iterator[Path]:
 
     With an error the parents that were made for it go too.
     """
-    made = [folder for folder in target.parents if not folder.exists()]
+    made = [folder for folder in target.parents if not os.path.exists(folder)]
     stage = target.with_name(f".{target.name}.cra_sym-{token_hex(4)}")
     lock, complete = None, False
     try:
@@ -198,23 +225,34 @@ def _stage(target: Path) -> Iterator[Path]:
             with _alone_at(target):
                 _clear_abandoned(target)
                 stage.mkdir()
-                lock = _locked(stage)
+                lock = _locked(stage, 0.0)
         with writing(target, stage / target.name):
             yield stage / target.name
         complete = True
     finally:
-        with _alone_at(target):
-            _discard(stage, target)
-        _unlock(lock)
-        for folder in () if complete else made:
-            with suppress(OSError):
-                folder.rmdir()
+        try:
+            _clear(stage, target, [] if complete else made)
+        except BaseException:  # a signal just now: once more, as a run hears no second one
+            _clear(stage, target, [] if complete else made)
+            raise
+        finally:
+            _unlock(lock)
+
+
+def _clear(stage: Path, target: Path, made: list[Path]) -> None:
+    with _alone_at(target):
+        _discard(stage, target)
+    for folder in made:
+        with suppress(OSError):
+            folder.rmdir()
 
 
 @contextmanager
 def _alone_at(target: Path) -> Iterator[None]:
-    """Be the only process at work on the names beside ``target``."""
-    lock = _locked(target.parent)
+    """Be the only process at work on the names beside ``target``, unless somebody never lets go of them."""
+    lock = None
+    with suppress(BlockingIOError):
+        lock = _locked(target.parent, _PATIENCE)
     try:
         yield
     finally:
@@ -225,9 +263,10 @@ def _clear_abandoned(target: Path) -> None:
     """Remove the stages of ``target`` that no process holds; an output that was about to be replaced returns."""
     pattern = re.compile(re.escape(f".{target.name}.cra_sym-") + "[0-9a-f]{8}")
     for stage in [path for path in target.parent.iterdir() if pattern.fullmatch(path.name)]:
-        lock = _locked(stage, wait=False)
-        if lock is not None:
-            _discard(stage, target)
+        with suppress(BlockingIOError):  # at work
+            lock = _locked(stage, 0.0)
+            if lock is not None or time.time() - stage.stat().st_mtime > _ABANDONED:
+                _discard(stage, target)
             _unlock(lock)
 
 
@@ -239,20 +278,32 @@ def _discard(stage: Path, target: Path) -> None:
         shutil.rmtree(stage, ignore_errors=True)
 
 
-def _locked(folder: Path, *, wait: bool = True) -> int | None:
-    """Lock a folder until it is unlocked or the process ends; return None where that is not possible."""
+def _locked(folder: Path, patience: float) -> int | None:
+    """Lock a folder until it is unlocked or the process ends; return None where that is not possible.
+
+    Raises
+    ------
+    BlockingIOError
+        If another one has held it for so many seconds.
+    """
     if fcntl is None:
         return None
-    held = None
+    held, end = None, time.monotonic() + patience
     try:
         held = os.open(folder, os.O_RDONLY)
-        fcntl.flock(held, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        while True:
+            try:
+                fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                return held
+            except BlockingIOError:
+                if time.monotonic() > end:
+                    raise
+                time.sleep(0.005)
     except BaseException as error:
         _unlock(held)
-        if isinstance(error, OSError):
+        if isinstance(error, OSError) and not isinstance(error, BlockingIOError):
             return None
         raise
-    return held
 
 
 def _unlock(lock: int | None) -> None:

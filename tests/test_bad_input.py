@@ -1,16 +1,20 @@
 """Whatever is thrown at the public functions and the command line: documented errors only, and nothing is executed."""
 
+import contextlib
 import inspect
 import os
 import subprocess
 import sys
 import warnings
+from functools import cache
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import cra_sym as cra
 from cra_sym.__main__ import COMMANDS, main
+from cra_sym.mechanics import multiple_scales, ritz
 
 TRAP = "CRA_SYM_TRAP"
 ATTACKS = (
@@ -202,6 +206,82 @@ def test_no_text_becomes_an_expression(attack):
     with pytest.raises((TypeError, ValueError)):
         cra.Model(attack, fields=[attack], x=attack, domain=(0, attack), t=attack)
     assert TRAP not in os.environ
+
+
+X, T, LENGTH, RHO, PULL, K = sp.symbols("x t L rho T k")
+Y, PUSH = sp.Function("y")(X, T), sp.Function("F")(T)
+STRING = dict(
+    density=RHO * Y.diff(T) ** 2 / 2 - PULL * Y.diff(X) ** 2 / 2,
+    fields=[Y],
+    x=X,
+    domain=(0, LENGTH),
+    t=T,
+    right=PUSH * Y - K * Y**2 / 2,
+    essential=[Y.subs(X, 0)],
+    virtual_work=[(-K * Y.diff(T), Y, "right")],
+)
+OMEGA, P = sp.symbols("omega P", positive=True)
+VALUES = dict(values={RHO: 1.0, PULL: 2.0, LENGTH: 1.0, K: 3.0}, modes=1)
+
+
+@cache
+def plain_string():
+    return cra.Model(**{**STRING, "virtual_work": None})
+
+
+SYMBOLIC = {
+    "Model": (lambda **given: cra.Model(**given), {**STRING, "units": {K: "N/m"}}),
+    "kernel": (cra.kernel, dict(expression={"u": [X, sp.Matrix([[X, T]])]}, arguments=[X, T], backend="numpy")),
+    "separate": (
+        lambda **given: plain_string().separate(**given),
+        dict(parameters={K: 2 * PULL / LENGTH}, basis="hyperbolic", frequency=OMEGA),
+    ),
+    "ritz": (lambda problem, elements, **given: ritz(problem, elements=elements, **given), {"elements": 1}),
+    "multiple_scales": (
+        multiple_scales,
+        dict(frequencies=[OMEGA], coupling=sp.Matrix([[P]]), resonance=(1, 1), damping=[P], cubic={1: P}, size=None),
+    ),
+    "response": (
+        lambda **given: plain_string().response(**given),
+        dict(**VALUES, motion={PUSH: cra.Force(1.0)}, t=0.1, x=0.5, initial={Y: X}, field=Y, start="base"),
+    ),
+    "mode_shapes": (lambda **given: plain_string().mode_shapes(**given), dict(**VALUES, x_values=[0.5], field=Y)),
+    "frequency_response": (
+        lambda **given: plain_string().frequency_response(**given),
+        dict(values=VALUES["values"], angular_frequency=1.0, x_values=0.5, drive=Y.subs(X, LENGTH), field=Y),
+    ),
+}
+SYMBOLIC["ritz"][1].update(problem=STRING["density"], **{name: STRING[name] for name in ("fields", "x", "domain", "t")})
+
+
+def with_text_in_each_place(value, text):
+    """Yield copies of a nested value, each with a text in the place of one thing, or of one key, in it."""
+    yield text
+    if isinstance(value, dict):
+        for key, part in value.items():
+            others = {k: v for k, v in value.items() if k is not key}
+            yield from ({**others, key: changed} for changed in with_text_in_each_place(part, text))
+            yield {**others, text: part}
+    elif isinstance(value, list | tuple):
+        for k, part in enumerate(value):
+            for changed in with_text_in_each_place(part, text):
+                yield type(value)([*value[:k], changed, *value[k + 1 :]])
+
+
+@pytest.mark.parametrize("name", SYMBOLIC)
+def test_no_text_is_parsed_wherever_it_is_put(name, monkeypatch):
+    """SymPy's parser, which evaluates what it reads, is not reached from any place in any argument."""
+    function, good = SYMBOLIC[name]
+    function(**good)
+
+    def parser(text, *_, **__):
+        pytest.fail(f"{text!r} is parsed")
+
+    monkeypatch.setattr("sympy.parsing.sympy_parser.parse_expr", parser)
+    for argument, value in good.items():
+        for changed in with_text_in_each_place(value, "sin(1)"):
+            with contextlib.suppress(TypeError, ValueError):
+                function(**{**good, argument: changed})
 
 
 def test_a_store_in_an_odd_or_closed_place_changes_nothing(tmp_path):

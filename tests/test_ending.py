@@ -1,6 +1,7 @@
 """How commands end: by signals, full disks and closed outputs, with a line, a code and nothing half made."""
 
 import errno
+import os
 import signal
 import subprocess
 import sys
@@ -72,6 +73,13 @@ def test_a_full_or_closed_output_is_said_in_a_line():
     with open("/dev/full", "w") as full:
         done = subprocess.run(command, stdout=full, stderr=-1, text=True, check=False)
     assert done.returncode == 2 and done.stderr.count("\n") == 1 and "No space left on device" in done.stderr
+
+
+def test_letters_that_the_output_does_not_know_are_written_otherwise():
+    job = "from cra_sym.ending import run_command; raise SystemExit(run_command('n', lambda: print('λ'), {}))"
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run([sys.executable, "-c", job], env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "\\u03bb\n", "")
 
 
 WRITING = {

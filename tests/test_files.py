@@ -8,9 +8,11 @@ import signal
 import stat
 import subprocess
 import sys
+import time
 
 import pytest
 
+from cra_sym import files
 from cra_sym.files import OutputError, draft, staged_directory, write_text
 
 locks = pytest.mark.skipif(sys.platform == "win32", reason="folders are locked the POSIX way")
@@ -39,7 +41,7 @@ def test_new_and_empty_directories_are_filled(tmp_path):
         (tmp_path / "empty").mkdir(exist_ok=True)
         fill(tmp_path / name, a="1")
         assert contents(tmp_path / name) == {"a": "1"}
-    assert json.loads((tmp_path / "new" / "manifest.json").read_text()) == {"files": ["a"]}
+    assert json.loads((tmp_path / "new" / "manifest.json").read_text()) == {"made by": "cra_sym", "files": ["a"]}
 
 
 def test_an_earlier_output_is_replaced_as_a_whole(tmp_path):
@@ -102,7 +104,7 @@ def test_what_is_kept(tmp_path):
         (folder / "c").write_text("2")
     left = {path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*")}
     assert left == {"a", "c", "link", "mine", "mine/note", "manifest.json"}
-    assert json.loads((tmp_path / "out" / "manifest.json").read_text()) == {"files": ["a", "c"]}
+    assert json.loads((tmp_path / "out" / "manifest.json").read_text())["files"] == ["a", "c"]
     assert (tmp_path / "out" / "link" / "note").read_text() == "mine" and (tmp_path / "out" / "c").read_text() == "2"
 
 
@@ -209,6 +211,103 @@ def test_a_disk_that_cannot_be_written_is_named(tmp_path, monkeypatch):
 def test_errors_about_other_places_stay_what_they_are(tmp_path):
     with pytest.raises(FileNotFoundError, match="elsewhere"), staged_directory(tmp_path / "out"):
         open(tmp_path / "elsewhere")
+
+
+def test_a_manifest_of_somebody_else_tells_nothing(tmp_path):
+    """Other programs list their files in a manifest.json too; and one may be a pipe, which nobody writes to."""
+    for text in ('{"files": ["mine"]}', "[" * 10**5, "[]", '{"made by": "cra_sym", "files": 3}'):
+        (tmp_path / "out").mkdir(exist_ok=True)
+        (tmp_path / "out" / "mine").write_text("mine")
+        (tmp_path / "out" / "manifest.json").write_text(text)
+        with pytest.raises(OutputError, match="did not write"), staged_directory(tmp_path / "out"):
+            pytest.fail("no work before the check")
+    if hasattr(os, "mkfifo"):
+        (tmp_path / "out" / "manifest.json").unlink()
+        os.mkfifo(tmp_path / "out" / "manifest.json")
+        with pytest.raises(OutputError, match="did not write"), staged_directory(tmp_path / "out"):
+            pytest.fail("no work before the check")
+
+
+def test_the_working_folder_is_refused(tmp_path, monkeypatch):
+    """Who stands in a folder that is replaced stands in one that is gone."""
+    fill(tmp_path / "out", a="1")
+    (tmp_path / "out" / "below").mkdir()
+    for here in ("out", "out/below"):
+        monkeypatch.chdir(tmp_path / here)
+        with pytest.raises(OutputError, match="is the working folder or holds it"), staged_directory(tmp_path / "out"):
+            pytest.fail("no work before the check")
+
+
+def test_what_is_replaced_keeps_its_permissions(tmp_path):
+    fill(tmp_path / "out", a="1")
+    write_text(tmp_path / "file", "1")
+    (tmp_path / "out").chmod(0o710)
+    (tmp_path / "file").chmod(0o600)
+    fill(tmp_path / "out", a="2")
+    write_text(tmp_path / "file", "2")
+    assert [stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("out", "file")] == [0o710, 0o600]
+
+
+def test_what_is_kept_stays_the_file_it_is(tmp_path, monkeypatch):
+    """It is linked, so that no copy can be cut short; where that is not possible it is copied."""
+    fill(tmp_path / "out", a="1")
+    (tmp_path / "out" / "mine").write_text("mine")
+    number = (tmp_path / "out" / "mine").stat().st_ino
+    with staged_directory(tmp_path / "out", keep=True):
+        pass
+    assert (tmp_path / "out" / "mine").stat().st_ino == number
+
+    def impossible(*_, **__):
+        raise NotImplementedError
+
+    monkeypatch.setattr(os, "link", impossible)
+    with staged_directory(tmp_path / "out", keep=True):
+        pass
+    assert contents(tmp_path / "out") == {"mine": "mine"}
+
+
+@pytest.mark.parametrize("locked", ["nothing", "everything"])
+def test_where_locks_tell_nothing_age_does(tmp_path, monkeypatch, locked):
+    """What is a day old is cleared away where folders cannot be locked; where somebody never lets go, nobody hangs."""
+    ages = {".out.cra_sym-01234567": 90_000, ".out.cra_sym-89abcdef": 3_000}
+    for name, age in ages.items():
+        (tmp_path / name).mkdir()
+        os.utime(tmp_path / name, (time.time() - age,) * 2)
+
+    def answer(folder, patience):
+        if locked == "everything" and (folder == tmp_path or folder.name in ages):
+            raise BlockingIOError
+        return None
+
+    monkeypatch.setattr(files, "_locked", answer)
+    fill(tmp_path / "out", a="1") if locked == "nothing" else write_text(tmp_path / "out", "1")
+    left = {path.name for path in tmp_path.iterdir() if path.name.startswith(".")}
+    assert left == ({".out.cra_sym-89abcdef"} if locked == "nothing" else ages.keys())
+
+
+@locks
+def test_a_lock_that_is_never_let_go_is_waited_for_not_for_ever(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "_PATIENCE", 0.02)
+    held = files._locked(tmp_path, 0.0)
+    with pytest.raises(BlockingIOError):
+        files._locked(tmp_path, 0.01)
+    fill(tmp_path / "out", a="1")
+    os.close(held)
+    assert contents(tmp_path / "out") == {"a": "1"}
+
+
+def test_a_signal_while_it_is_cleared_away_leaves_nothing(tmp_path, monkeypatch):
+    whole, signals = files._discard, [KeyboardInterrupt]
+
+    def interrupted(stage, target):
+        if target.name == "out" and signals:
+            raise signals.pop()
+        whole(stage, target)
+
+    monkeypatch.setattr(files, "_discard", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        fill(tmp_path / "out", a="1")
+    assert contents(tmp_path / "out") == {"a": "1"} and [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
 def test_a_mount_point_is_refused_before_any_work(tmp_path, monkeypatch):

@@ -115,6 +115,7 @@ def test_no_text_is_evaluated(module):
         assert not (bare and called == "eval"), node.lineno
         assert not (bare and called == "exec") or module.parent.name == "kernels", node.lineno
         assert called not in {"parse_expr", "parse_latex"}, node.lineno
+        assert not (bare and called == "S"), f"S(...) reads text, line {node.lineno}"
         if called == "sympify":
             strict = [k.value for k in node.keywords if k.arg == "strict"]
             assert strict and getattr(strict[0], "value", False) is True, (

@@ -47,6 +47,9 @@ numbers = {
     "df_dk_r": slopes.df_dk_r,
     "response": cra.tip_response(soft, cra.BaseMotion(velocity=0.1, amplitude=1e-3, angular_frequency=10.0), t),
     "growth": cra.growth_rate(soft, cra.JointStiffness(), np.linspace(6.0, 90.0, 50), 0.3),
+    "boundary": cra.stability_boundary(soft, cra.JointStiffness(), 0.01, resonance=(1, 1), order=2),
+    "frequency response": np.abs(cra.frequency_response(soft, np.linspace(5.0, 90.0, 50), x)),
+    "residual": cra.residual_vibration(soft, cra.BaseMotion.trapezoid(0.3, 0.5, 1.0)),
     "kernel": cra.kernel(y**2 / a, (y, a))(np.linspace(0.0, 1.0, 5), 2.0),
 }
 """

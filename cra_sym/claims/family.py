@@ -11,7 +11,7 @@ import numpy as np
 
 from cra_sym.arm.analysis import frequency_parameters, natural_frequencies
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import real_array
+from cra_sym.checks import mapping, one_axis, real_array, shown
 from cra_sym.claims.setting import Setting
 
 __all__ = ["MATERIALS", "ArmFamily", "common_scale", "provenance_family"]
@@ -50,7 +50,7 @@ def common_scale(frequencies: Any, rounding: float = 0.0005) -> tuple[float, flo
     >>> print(f"{low:.5f} {high:.5f}")
     4.37394 4.37404
     """
-    f = real_array("frequencies", frequencies, low=0.0, open_low=True)
+    f = np.atleast_1d(one_axis("frequencies", frequencies, "frequencies", low=0.0, high=1e12, open_low=True))
     lam = frequency_parameters(np.inf, np.inf, 0.0, modes=f.size)
     by_mode = 2 * np.pi * (f[:, None] + [-rounding, rounding]) / lam[:, None] ** 2
     return float(by_mode[:, 0].max()), float(by_mode[:, 1].min()), by_mode
@@ -107,12 +107,17 @@ def provenance_family(
     ValueError
         If no clamped uniform arm has these frequencies.
     """
-    published = np.array(Setting.frequencies if frequencies is None else frequencies, dtype=float)
+    published = np.array(Setting.frequencies) if frequencies is None else np.atleast_1d(frequencies)
     low, high, _ = common_scale(published)
     if low > high:
         raise ValueError(f"frequencies = {published.tolist()}: those of no clamped uniform arm")
-    length = np.linspace(0.3, 2.0, 35) if length is None else real_array("length", length, low=0.0, open_low=True)
-    modulus, density = (np.array([row[k] for row in materials.values()])[:, None] for k in (0, 1))
+    given = np.linspace(0.3, 2.0, 35) if length is None else length
+    length = np.atleast_1d(one_axis("length", given, "lengths", low=1e-12, high=1e12))
+    rows = list(mapping("materials", materials, "names to modulus and density").values())
+    numbers = real_array("materials", rows, low=1e-12, high=1e30)
+    if numbers.ndim != 2 or numbers.shape[1] != 2:
+        raise ValueError(f"materials = {shown(materials)}: allowed is a modulus and a density each")
+    modulus, density = numbers.T[:, :, None]
     thickness = (low + high) / 2 * length**2 * np.sqrt(12 * density / modulus)
     bare = Arm.nominal().replace(m_e=0.0, J_e=0.0, k_t=np.inf, k_r=np.inf)
     arms = bare.replace(L=length, h=thickness, E=modulus, rho=density)

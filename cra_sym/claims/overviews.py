@@ -10,14 +10,14 @@ from matplotlib import style
 from matplotlib.figure import Figure
 
 from cra_sym.arm.parameters import Arm
+from cra_sym.checks import choice, count, instance
 from cra_sym.claims.family import ArmFamily, provenance_family
 from cra_sym.claims.ledger import claims
+from cra_sym.claims.verdict import THEMES, Verdict
 from cra_sym.figures import STYLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from cra_sym.claims.verdict import Verdict
 
 __all__ = ["figure_claims", "figure_family"]
 
@@ -32,8 +32,11 @@ def figure_claims(theme: str, verdicts: Sequence[Verdict] | None = None, columns
         By default those of the nominal setting.
     columns : int
     """
-    verdicts = claims(theme=theme) if verdicts is None else verdicts
-    rows = -(-len(verdicts) // columns)
+    choice("theme", theme, THEMES)
+    verdicts = claims(theme=theme) if verdicts is None else tuple(verdicts)
+    for verdict in verdicts:
+        instance("verdict", verdict, Verdict)
+    rows = max(-(-len(verdicts) // count("columns", columns, high=100)), 1)
     with style.context(STYLE):
         figure = Figure(figsize=(4.1 * columns, 3.15 * rows), dpi=100, layout="constrained")
         panels = list(figure.subplots(rows, columns, squeeze=False).flat)
@@ -46,7 +49,8 @@ def figure_claims(theme: str, verdicts: Sequence[Verdict] | None = None, columns
 
 def figure_family(family: ArmFamily | None = None, ax: Axes | None = None) -> Figure:
     """Draw the arms that share the published frequencies: thickness against length, a curve a material."""
-    family = family or provenance_family()
+    family = provenance_family() if family is None else family
+    instance("family", family, ArmFamily)
     with style.context(STYLE):
         if ax is None:
             ax = Figure(figsize=(5.6, 3.8), layout="constrained").subplots()

@@ -13,7 +13,7 @@ import numpy as np
 
 from cra_sym.arm.analysis import natural_frequencies
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import real_array
+from cra_sym.checks import count, instance, real_array
 
 __all__ = ["Setting"]
 
@@ -36,6 +36,9 @@ _KINDS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "visible": ("assumed", "1; a change counts as seen from this share of what is drawn on"),
     }
 )
+#: Series, with the number of values where the paper prints so many.
+_LENGTHS = {"frequencies": 3, "k_t": 0, "k_r": 0, "accelerations": 0, "masses": 0, "peaks": 4}
+_LARGEST = {"duration": 1e4, "angular_frequency": 1e4, "epsilon": 1.0, "visible": 1.0}
 
 
 @dataclass(frozen=True)
@@ -91,17 +94,20 @@ class Setting:
     provenance: ClassVar[Mapping[str, tuple[str, str]]] = _KINDS
 
     def __post_init__(self) -> None:
-        if not isinstance(self.arm, Arm):
-            raise TypeError(f"arm = {self.arm!r}: allowed is an Arm")
+        instance("arm", self.arm, Arm)
         if self.arm.shape:
             raise ValueError(f"arm has the batch shape {self.arm.shape}: allowed is one arm")
+        object.__setattr__(self, "modes", count("modes", self.modes, high=100))
         for entry in dataclasses.fields(self):
-            value = getattr(self, entry.name)
-            if entry.name in ("arm", "modes") or value is None:
+            name, value = entry.name, getattr(self, entry.name)
+            if name in ("arm", "modes") or (name == "peaks" and value is None):
                 continue
-            array = real_array(entry.name, value, low=-np.inf if entry.name == "phase" else 0.0)
-            plain = tuple(map(float, array)) if array.ndim else float(array)
-            object.__setattr__(self, entry.name, plain)
+            array = real_array(name, value, low=-1e6 if name == "phase" else 0.0, high=_LARGEST.get(name, 1e12))
+            length = _LENGTHS.get(name, ())
+            if array.ndim != (name in _LENGTHS) or array.size == 0 or (length and array.size != length):
+                one = f"{length or 'some'} numbers in a row" if name in _LENGTHS else "one number"
+                raise ValueError(f"{name} has shape {array.shape}: allowed is {one}")
+            object.__setattr__(self, name, tuple(map(float, array)) if array.ndim else float(array))
 
     @classmethod
     def of(cls, arm: Arm | None = None, **numbers: Any) -> Setting:

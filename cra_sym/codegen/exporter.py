@@ -10,14 +10,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from cra_sym.checks import choice, shown
+from cra_sym.checks import choice
 from cra_sym.codegen.expressions import gauss_rule, modal_functions, spectrum_functions, stability_functions
 from cra_sym.codegen.languages import LANGUAGES, Language
 from cra_sym.codegen.program import Function
 from cra_sym.codegen.rendering import DIGEST, common_values, rendered
 from cra_sym.codegen.user_model import model_texts
 from cra_sym.codegen.vectors import arm_checks, written
-from cra_sym.files import OutputError, staged_directory
+from cra_sym.files import OutputError, path_of, staged_directory
 
 __all__ = ["Export", "export"]
 
@@ -79,10 +79,7 @@ def export(language: str, directory: str | Path, model: Any = None, overwrite: b
         If the language is unknown, the folder is not empty, or the model has no real closed form. Nothing is written.
     """
     choice("language", language, LANGUAGES)
-    try:
-        target = Path(os.path.realpath(directory))
-    except TypeError:
-        raise TypeError(f"directory = {shown(directory)}: allowed is a path") from None
+    target = Path(os.path.realpath(path_of("directory", directory)))
     _check_free(target, overwrite)
     texts = _arm_texts(language) if model is None else model_texts(language, model)
     digest = _digest(texts)

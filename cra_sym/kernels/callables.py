@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from cra_sym.checks import choice, shown
 from cra_sym.kernels import lanes
 
 __all__ = ["Kernel", "kernel"]
 
 _BLOCK = 8192  # elements whose temporaries stay in the processor's second-level cache
-_BACKENDS = (None, "numpy", "numba")
+_BACKENDS = ("numpy", "numba")  # and None
 
 
 class Kernel:
@@ -36,8 +37,8 @@ class Kernel:
     """
 
     def __init__(self, source: str, arguments: tuple[str, ...], backend: str | None = None) -> None:
-        if backend not in _BACKENDS:
-            raise ValueError(f"backend = {backend!r}: allowed are None, 'numpy' and 'numba'")
+        if backend is not None:
+            choice("backend", backend, _BACKENDS)
         self._source, self._arguments, self.backend = source, tuple(arguments), backend
 
     @property
@@ -95,12 +96,12 @@ class Kernel:
         shape = _common_shape(self.arguments, arrays)
         with np.errstate(all="ignore"):
             flat = self._evaluated(arrays, shape)
-        return _arranged(self.layout, iter(flat))
+        return _arranged(self.layout, iter(flat), shape)
 
     def _evaluated(self, arrays: list[np.ndarray], shape: tuple[int, ...]) -> list[np.ndarray]:
         size = math.prod(shape)
-        if lanes.suits(self, arrays, size) and self.layout not in ([], {}):
-            outputs = lanes.evaluated(self, arrays, shape, _leaves(self.layout))
+        if lanes.suits(self, arrays, size) and (leaves := _leaves(self.layout)):
+            outputs = lanes.evaluated(self, arrays, shape, leaves)
             if outputs is not None:
                 return outputs
         if size > _BLOCK and all(a.shape == shape or a.ndim == 0 for a in arrays):
@@ -157,22 +158,29 @@ def kernel(expression: Any, arguments: Any, *, backend: str | None = None) -> Ke
     from cra_sym.kernels.source import check_arguments, module_source  # SymPy is loaded here, not at import
 
     symbols = check_arguments(arguments)
-    return Kernel(module_source(expression, symbols), tuple(s.name for s in symbols), backend)
+    try:
+        source = module_source(expression, symbols)
+    except RecursionError:
+        raise ValueError("expression: it has too many levels, or is part of itself") from None
+    return Kernel(source, tuple(s.name for s in symbols), backend)
 
 
 def _numeric(name: str, value: Any) -> np.ndarray:
-    array = np.asarray(value)
-    if array.dtype == np.float64:
+    try:
+        array = np.asarray(value)
+    except Exception:  # whatever an object does when it is asked for its numbers
+        raise TypeError(f"{name} = {shown(value)}: allowed are real or complex numbers") from None
+    if array.dtype == np.float64 and type(value) in (np.ndarray, float):
         return array
-    if array.dtype.kind not in "iufc":
-        raise TypeError(f"{name}: real or complex numbers are allowed, not {array.dtype}")
+    if array.dtype.kind not in "iufc" or np.ma.is_masked(value):
+        raise TypeError(f"{name} = {shown(value)}: allowed are real or complex numbers")
     return array.astype(np.result_type(array.dtype, np.float64), copy=False)
 
 
 def _common_shape(names: tuple[str, ...], arrays: list[np.ndarray]) -> tuple[int, ...]:
     try:
         return np.broadcast_shapes(*(a.shape for a in arrays))
-    except ValueError:
+    except (ValueError, RuntimeError):  # of more than 32 axes
         shapes = ", ".join(f"{n} {a.shape}" for n, a in zip(names, arrays, strict=True) if a.ndim)
         raise ValueError(f"shapes do not broadcast together: {shapes}") from None
 
@@ -202,15 +210,15 @@ def _in_blocks(function: Callable[..., Any], arrays: list[np.ndarray], shape: tu
     return [output.reshape(shape) for output in outputs]
 
 
-def _arranged(layout: Any, values: Iterator[np.ndarray]) -> Any:
+def _arranged(layout: Any, values: Iterator[np.ndarray], shape: tuple[int, ...]) -> Any:
     if isinstance(layout, dict):
-        return {name: _arranged(part, values) for name, part in layout.items()}
+        return {name: _arranged(part, values, shape) for name, part in layout.items()}
     if isinstance(layout, list):
-        return tuple(_arranged(part, values) for part in layout)
+        return tuple(_arranged(part, values, shape) for part in layout)
     if layout == ():
         return next(values)[()]
     entries = [next(values) for _ in range(math.prod(layout))]
-    return np.stack(entries, axis=-1).reshape(entries[0].shape + layout)
+    return (np.stack(entries, axis=-1) if entries else np.empty(0)).reshape(shape + layout)
 
 
 def _leaves(layout: Any) -> int:

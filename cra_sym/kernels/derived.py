@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import cra_sym
+from cra_sym.checks import shown
 from cra_sym.kernels import store
 from cra_sym.kernels.callables import Kernel, kernel
 
@@ -61,9 +62,9 @@ def derived_kernel(path: str, *, backend: str | None = None) -> Kernel:
     ValueError
         If the path is not of that form or leads out of the package.
     """
-    module, colon, function = path.partition(":")
+    module, colon, function = path.partition(":") if isinstance(path, str) else ("", "", "")
     if not (colon and function.isidentifier() and module.startswith("cra_sym.")):
-        raise ValueError(f"path = {path!r}: allowed is 'cra_sym.room.module:function'")
+        raise ValueError(f"path = {shown(path)}: allowed is 'cra_sym.room.module:function'")
     return _DerivedKernel(path, backend)
 
 

@@ -45,7 +45,7 @@ class _Printer(SciPyPrinter):
         if abs(expr) < 2**31:
             return str(expr)
         if abs(expr) >= 2**1024:
-            raise ValueError("number out of the range of double precision")
+            raise ValueError("expression: it holds a number out of the range of double precision")
         return repr(float(expr))
 
     def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:
@@ -112,10 +112,13 @@ def check_arguments(arguments: Any) -> tuple[sp.Symbol, ...]:
         return (arguments,)
     if not isinstance(arguments, Iterable) or isinstance(arguments, str):
         raise TypeError(f"arguments = {shown(arguments)}: allowed is a sequence of SymPy symbols")
-    symbols = tuple(arguments)
-    for symbol in symbols:
+    if getattr(arguments, "ndim", 1) != 1:
+        raise TypeError(f"arguments = {shown(arguments)}: allowed is a sequence of SymPy symbols")
+    symbols: tuple[sp.Symbol, ...] = ()
+    for symbol in arguments:  # one by one: there may be no end of them
         if not isinstance(symbol, sp.Symbol):
-            raise TypeError(f"argument {shown(symbol)}: allowed are SymPy symbols; substitute one for it")
+            raise TypeError(f"arguments: {shown(symbol)} is none; allowed are SymPy symbols; substitute one for it")
+        symbols += (symbol,)
     twice = {s.name for k, s in enumerate(symbols) if s in symbols[:k]}
     if twice:
         raise ValueError(f"arguments come twice: {', '.join(sorted(twice))}")
@@ -252,7 +255,7 @@ def _without_powers(
         return known[base, exponent]
 
     def rewrite(expression: sp.Expr) -> sp.Expr:
-        if expression.is_Atom:
+        if expression.is_Atom or isinstance(expression, (sp.RootOf, sp.RootSum)):  # whose polynomial is no expression
             return aliases.get(expression, expression)
         terms = [rewrite(term) for term in expression.args]
         if expression.is_Pow and expression.exp.is_Integer and 1 < abs(expression.exp) <= _LONGEST_CHAIN:

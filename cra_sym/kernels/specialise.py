@@ -11,14 +11,17 @@ import ast
 import hashlib
 import os
 import pickle
+import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from threading import Lock
-from types import ModuleType, SimpleNamespace
+from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
+from warnings import warn
 
 from cra_sym.kernels import store
 from cra_sym.kernels.generated import Generated
@@ -26,6 +29,7 @@ from cra_sym.kernels.generated import Generated
 __all__ = ["compiled", "has_compiler", "is_compiled"]
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "no_cfunc_wrapper": True}
+_UNKNOWN = (0, 69)  # the first version of Numba that was not tried
 _ELEMENTARY = Path(__file__).with_name("elementary.py")
 _COMPILER = [
     Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8") for name in ("arithmetic", "inlined", "writer")
@@ -91,8 +95,11 @@ def compiled(template: str, kernels: Mapping[str, Generated], *, elementary: boo
     >>> out
     array([1., 1., 1.])
     """
+    if not has_compiler():
+        raise ImportError("compiling needs numba: pip install numba")
+    prelude = _prelude(kernels, elementary)
     with _TURN:
-        return _entries(_prelude(kernels, elementary), template)
+        return (_entries if _is_known() else _tried)(prelude, template)
 
 
 def is_compiled(template: str, kernels: Mapping[str, Generated]) -> bool:
@@ -147,8 +154,6 @@ def _versions() -> list[str]:
 
 @cache
 def _entries(prelude: str, template: str) -> SimpleNamespace:
-    if not has_compiler():
-        raise ImportError("compiling needs numba: pip install numba")
     import numba
 
     from cra_sym.kernels.inlined import inlined
@@ -159,9 +164,7 @@ def _entries(prelude: str, template: str) -> SimpleNamespace:
     namespace = module.__dict__
     exec(prelude + template, namespace)
     functions = {node.name: node for node in ast.parse(prelude + template).body if isinstance(node, ast.FunctionDef)}
-    entries = [node.name for node in ast.parse(template).body if isinstance(node, ast.FunctionDef)]
-    entries = [name for name in entries if not name.startswith("_")]
-    meanings = namespace | functions
+    entries, meanings = _names(template), namespace | functions
     for name in entries:
         written, arguments = f"{name}_written", ", ".join(a.arg for a in functions[name].args.args)
         namespace[written] = inlined(functions[name], meanings)
@@ -169,6 +172,60 @@ def _entries(prelude: str, template: str) -> SimpleNamespace:
         namespace[name] = numba.njit(**_OPTIONS)(namespace[name])
         namespace[name]._cache = _StoredCode(digest, name)
     return SimpleNamespace(**{name: namespace[name] for name in entries})
+
+
+def _names(template: str) -> list[str]:
+    """Return the names of the entries of a template."""
+    names = (node.name for node in ast.parse(template).body if isinstance(node, ast.FunctionDef))
+    return [name for name in names if not name.startswith("_")]
+
+
+def _is_known() -> bool:
+    """Return whether Numba's inner life, on which our way of compiling and storing leans, is as it was tried."""
+    return tuple(map(int, re.findall(r"\d+", _versions()[0])[:2])) < _UNKNOWN
+
+
+@cache
+def _tried(prelude: str, template: str) -> SimpleNamespace:
+    """Return the entries for a Numba that is not known: compiled as ever, or if that fails by its own means."""
+    made = None
+    with suppress(ImportError, AttributeError):
+        made = _entries(prelude, template)
+
+    def entry(name: str) -> Callable[..., Any]:
+        def call(*arguments: Any) -> Any:
+            nonlocal made
+            tried = made
+            try:
+                return getattr(tried, name)(*arguments)
+            except Exception:  # compiled code raises nothing
+                with _TURN:
+                    made = _plain(prelude, template)
+                if made is tried:
+                    raise
+            return getattr(made, name)(*arguments)
+
+        return call
+
+    return SimpleNamespace(**{name: entry(name) for name in _names(template)})
+
+
+@cache
+def _plain(prelude: str, template: str) -> SimpleNamespace:
+    """Return the entries as Numba compiles them by itself, which takes seconds and is not stored."""
+    import numba
+
+    warn(
+        f"Numba {_versions()[0]} is newer than cra_sym knows: it compiles by its own means, anew in each process",
+        RuntimeWarning,
+        stacklevel=3,
+    )
+    module = ModuleType("cra_sym_compiled_by_numba")
+    exec(prelude + template, module.__dict__)
+    for name, value in list(vars(module).items()):
+        if isinstance(value, FunctionType):
+            setattr(module, name, numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})(value))
+    return SimpleNamespace(**vars(module))
 
 
 class _StoredCode:

@@ -56,19 +56,24 @@ def load(key: str) -> bytes | None:
 
 
 def save(key: str, content: bytes) -> bool:
-    """Store ``content`` under ``key`` in one step; return whether that was possible."""
-    temporary = None
+    """Store ``content`` under ``key``; return whether that was possible.
+
+    What is not written to its end is a miss like any damage, and the next one who saves replaces it: whenever a process
+    is killed, it leaves nothing else behind.
+    """
+    path = None
     try:
         path = _private_directory() / _name(key)
-        temporary = path.with_name(f"{secrets.token_hex(8)}.tmp")
+        path.unlink(missing_ok=True)
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
-        with open(os.open(temporary, flags, 0o600), "wb") as file:
+        with open(os.open(path, flags, 0o600), "wb") as file:
             file.write(_tag(key, content) + b"\n" + content)
-        os.replace(temporary, path)
+    except FileExistsError:  # another one saves it just now
+        return False
     except (OSError, RuntimeError, ValueError):
-        if temporary is not None:
+        if path is not None:
             with contextlib.suppress(OSError):
-                temporary.unlink()
+                path.unlink()
         return False
     return True
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from sympy import Add, Basic, Eq, Expr, Integral, S, Symbol
+from sympy import Add, Basic, Eq, Expr, Integral, S, Symbol, sympify
 from sympy.core.function import AppliedUndef
 from sympy.core.symbol import uniquely_named_symbol
 
@@ -59,7 +59,7 @@ class HamiltonResult:
         """Return a symbol of this name, changed if what was given (or ``others``) holds one that looks the same."""
         forces = (force for force, _, _ in self.virtual_work)
         given = (self.density, self.left, self.right, *self.domain, *self.essential, *forces, *others)
-        return uniquely_named_symbol(name, [S(expression) for expression in given])
+        return uniquely_named_symbol(name, [sympify(expression, strict=True) for expression in given])
 
     @cached_property
     def steps(self) -> tuple[Step, ...]:

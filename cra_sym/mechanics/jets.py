@@ -6,6 +6,7 @@ Coefficients then differentiate as plain expressions, and the total derivatives 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import islice
 from typing import Any, Literal, NamedTuple
 
 from sympy import (
@@ -17,6 +18,8 @@ from sympy import (
     Expr,
     Heaviside,
     Integral,
+    Lambda,
+    Limit,
     Max,
     Min,
     Mul,
@@ -37,6 +40,7 @@ from sympy import (
     sympify,
 )
 from sympy.core.function import AppliedUndef, Derivative, UndefinedFunction
+from sympy.matrices.expressions import MatrixExpr
 
 from cra_sym.checks import shown
 
@@ -47,6 +51,8 @@ END_NAMES: tuple[End, End] = ("left", "right")
 _SINGULAR = (DiracDelta,)
 _NOT_SMOOTH = (Abs, sign, Max, Min, Piecewise, Heaviside, floor, ceiling, re, im, arg, conjugate)
 _NOT_LOCAL = (Integral, Sum)
+_NO_SCALAR = (Lambda, Limit, MatrixExpr)
+_MOST_LISTED = 1000
 
 
 class HamiltonError(ValueError):
@@ -57,16 +63,20 @@ def listed(name: str, values: Any) -> tuple[Any, ...]:
     """Return ``values`` as a tuple, or raise an error that names the argument."""
     if isinstance(values, str | bytes) or not isinstance(values, Iterable) or getattr(values, "ndim", 1) != 1:
         raise TypeError(f"{name} = {shown(values)}: allowed is a sequence such as [{shown(values)}]")
-    return tuple(values)
+    found = tuple(islice(values, _MOST_LISTED + 1))
+    if len(found) > _MOST_LISTED:
+        raise ValueError(f"{name} = {shown(values)}: allowed are at most {_MOST_LISTED} entries")
+    return found
 
 
 def scalar(name: str, value: Any) -> Expr:
     """Return ``value`` as an expression, or raise an error that names the argument; no text is read."""
     try:
         expression = sympify(value, strict=True)
-    except Exception:  # whatever an object does when it is asked for its number
-        expression = None
-    if not isinstance(expression, Expr) or expression.is_Matrix:  # type: ignore[attr-defined]
+        is_scalar = isinstance(expression, Expr) and expression.is_commutative and not expression.has(*_NO_SCALAR)
+    except Exception:  # whatever an object does when it is asked for its number, or has too many levels to be read
+        is_scalar = False
+    if not is_scalar:
         raise TypeError(f"{name} = {shown(value)}: allowed is a scalar SymPy expression")
     return expression
 
@@ -256,6 +266,8 @@ class JetSpace:
                     raise HamiltonError(f"the symbol {symbol} here differs from {own} in its assumptions")
         if term.has(S.ComplexInfinity, S.NaN, S.Infinity, S.NegativeInfinity):
             raise HamiltonError("it is not finite")
+        if term.has(S.ImaginaryUnit):
+            raise HamiltonError("it is not real")
 
     def _mentions(self, node: Basic) -> bool:
         return any(function.func in self._heads for function in node.atoms(AppliedUndef))

@@ -76,10 +76,9 @@ def _apply(operator: Expr, f: Expr) -> Expr:
     """Write a polynomial in D0, D1, D2 in front of a field."""
     total = S.Zero
     for powers, factor in Poly(operator, D0, D1, D2).terms():
-        term = S(factor)
         for k, power in enumerate(powers):
-            term *= _operator(k) ** power
-        total += term * f
+            factor *= _operator(k) ** power
+        total += factor * f
     return total
 
 

@@ -21,11 +21,12 @@ from sympy import (
     fraction,
 )
 
+from cra_sym import checks
 from cra_sym.mechanics.basis import Basis
 from cra_sym.mechanics.determinants import cofactors, collected, determinant, divided, primitive_rows, without_content
 from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces
 from cra_sym.mechanics.hamilton import HamiltonResult
-from cra_sym.mechanics.jets import HamiltonError, Jet, grouped
+from cra_sym.mechanics.jets import HamiltonError, Jet, grouped, scalar
 from cra_sym.mechanics.solution import GeneralSolution
 from cra_sym.mechanics.steps import Step
 from cra_sym.mechanics.weak import WeakForm, weak_form
@@ -192,19 +193,24 @@ def separate(
     >>> modal.mode_shapes
     (sin(lambda*x/l),)
     """
+    checks.instance("result", result, HamiltonResult)
+    checks.choice("basis", basis, ("hyperbolic", "decaying"))
+    given = checks.mapping("parameters", parameters, "symbols to expressions")
+    others = {key: scalar(f"parameters: {checks.shown(key)}", value) for key, value in given.items()}
+    for symbol in (*others, *(() if frequency is None else (frequency,))):
+        checks.instance("a parameter or frequency", symbol, Symbol)
     weak = weak_form(result.variation)
     if not weak.uniform:
         raise HamiltonError(f"separate: {_varying(weak)} varies along {result.x}, so there is no closed form; use ritz")
-    others = tuple((parameters or {}).values())
 
     def names(name: str) -> Symbol:
-        return result.unused_symbol(name, *others)
+        return result.unused_symbol(name, *others.values())
 
     frequency = frequency or names("omega" if weak.even else "s")
     spatial = _spatial_problem(weak, frequency)
     solution = GeneralSolution(weak, frequency, basis, names)
     matrix, start = solution.conditions(), solution.initial_state()
-    known = {**solution.known, **(parameters or {})}
+    known = {**solution.known, **others}
     rows, contents = primitive_rows(matrix.subs(known))
     characteristic, scale = _characteristic(contents, rows, start.subs(known), solution.basis, frequency)
     return Modal(spatial, solution.basis, rows, characteristic, scale, solution.still.subs(known))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from sympy import Expr, Matrix, S, Symbol, eye, zeros
 from sympy.core.function import AppliedUndef
 
+from cra_sym import checks
 from cra_sym.mechanics.equations import GeneralisedForces
 from cra_sym.mechanics.hamilton import HamiltonResult
 from cra_sym.mechanics.jets import END_NAMES, HamiltonError, Jet
@@ -90,6 +91,7 @@ def state_form(result: HamiltonResult) -> StateForm:
     [0],
     [1]]))
     """
+    checks.instance("result", result, HamiltonResult)
     weak = weak_form(result.variation)
     parameter = result.unused_symbol("z" if weak.even else "s")
     section, _, _ = weak.fields()

@@ -4,7 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sympy import And, Expr, Ne, Piecewise, Poly, Rational, S, Sum, Symbol, collect, conjugate, expand, factor, symbols
+from sympy import (
+    And,
+    Expr,
+    Integer,
+    Ne,
+    Piecewise,
+    Poly,
+    Rational,
+    S,
+    Sum,
+    Symbol,
+    collect,
+    conjugate,
+    expand,
+    factor,
+    symbols,
+)
 
 from cra_sym.mechanics.harmonics import Harmonics, Vector, frequency_of
 from cra_sym.mechanics.parametric import Label, ParametricSystem, Resonance
@@ -120,7 +136,7 @@ class Expansion:
 
     def unit(self, i: Label, sign: int = 1) -> Vector:
         """Return the vector of plus or minus mode i's natural frequency."""
-        return tuple(S(sign) if row == i else S.Zero for row in self.system.rows)
+        return tuple(Integer(sign) if row == i else S.Zero for row in self.system.rows)
 
     def decay(self, i: Label) -> Expr:
         """Return the symbol of mode i's decay rate c_i = zeta_i omega_i, or zero without damping."""

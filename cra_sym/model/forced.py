@@ -9,6 +9,7 @@ from sympy import Expr
 
 from cra_sym.checks import shown
 from cra_sym.mechanics import StateForm
+from cra_sym.model.spatial import check_range
 from cra_sym.solvers.shapes import states
 from cra_sym.solvers.stiffness import DynamicStiffness
 
@@ -59,6 +60,7 @@ def steady_states(
         )
     here = problem.evaluate(parameter, row, keep_tree=True, levels=levels)
     assert here.tree is not None
+    check_range(here.matrix)
     drive = here.tree.scale[:, place, None] * here.unit[:, place, :]
     if (drive == 0.0).all(axis=1).any():
         raise ValueError("drive: an infinite stiffness holds it still")

@@ -14,6 +14,7 @@ from sympy import Symbol
 from cra_sym.checks import count
 from cra_sym.kernels import kernel
 from cra_sym.mechanics import RitzMatrices
+from cra_sym.model.spatial import check_range
 from cra_sym.model.values import Values
 
 __all__ = ["Ritz"]
@@ -106,10 +107,13 @@ class Ritz:
         """Yield (row, K, C, M) on the free unknowns, one parameter set at a time."""
         for rows, infinite in given.patterns():
             for row, column in zip(rows, given.take(rows, infinite).T, strict=True):
-                matrices, restraint = self._assembled(column)
+                with np.errstate(over="ignore", invalid="ignore"):
+                    matrices, restraint = self._assembled(column)
+                check_range(*matrices)
                 for position in infinite:
                     restraint = self._held(position, column, restraint)
-                yield int(row), *(restraint.T @ matrix @ restraint for matrix in matrices)
+                stiffness, damping, mass = (restraint.T @ matrix @ restraint for matrix in matrices)
+                yield int(row), stiffness, damping, mass
 
     def _assembled(self, column: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
         element, rest, factors, places = self._kernels

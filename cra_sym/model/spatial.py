@@ -12,9 +12,31 @@ from sympy import Expr, Symbol, zeros
 from cra_sym.kernels import kernel
 from cra_sym.mechanics import StateForm
 from cra_sym.model.values import Values
-from cra_sym.solvers.stiffness import DynamicStiffness
+from cra_sym.solvers.stiffness import DynamicStiffness, Evaluation
 
-__all__ = ["SpatialProblem", "shares"]
+__all__ = ["SpatialProblem", "check_range", "shares"]
+
+
+class _Checked(DynamicStiffness):
+    """The dynamic stiffness for parameters of any size, refused where doubles do not reach."""
+
+    def evaluate(
+        self, z: np.ndarray, rows: np.ndarray, *, keep_tree: bool = False, levels: np.ndarray | None = None
+    ) -> Evaluation:
+        try:
+            with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+                here = super().evaluate(z, rows, keep_tree=keep_tree, levels=levels)
+        except np.linalg.LinAlgError:
+            check_range(np.array(np.nan))
+        if not np.iscomplexobj(here.matrix):  # a guess of a complex eigenvalue may be far off
+            check_range(here.matrix, here.derivative)
+        return here
+
+
+def check_range(*numbers: np.ndarray) -> None:
+    """Raise a ValueError unless all numbers are finite."""
+    if not all(np.isfinite(array).all() for array in numbers):
+        raise ValueError("values: they lead beyond the range of double precision")
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +121,7 @@ class SpatialProblem:
         def ends(z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return _finite(boundary(z, *columns[:, rows]), "an end term")
 
-        return left, DynamicStiffness(section, ends, length, n, m, free, self.form.uniform)
+        return left, _Checked(section, ends, length, n, m, free, self.form.uniform)
 
     def _check_geometry(self, length: np.ndarray) -> None:
         if not (length > 0.0).all() or not np.isfinite(length).all():

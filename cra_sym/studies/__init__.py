@@ -9,6 +9,7 @@ from typing import Any
 from cra_sym import checks
 from cra_sym.arm.parameters import Arm
 from cra_sym.extras import require
+from cra_sym.files import path_of
 from cra_sym.studies.quantities import QUANTITIES, Quantity
 from cra_sym.studies.study import make_study
 
@@ -70,9 +71,11 @@ def sweep(
     require("xarray", "scale")
     study = make_study(arm, quantity, parameters)
     if chunks is not None:
-        checks.count("chunks", chunks)
+        checks.count("chunks", chunks, high=10**9)
     if store is not None:
         from cra_sym.studies.store import sweep_into
 
-        return sweep_into(study, Path(store), chunks or _CHUNKS, client)
+        return sweep_into(study, path_of("store", store), chunks or _CHUNKS, client)
+    if client is not None:
+        raise ValueError("client: allowed with a store only, whose regions it computes")
     return study.dataset(study.evaluate() if chunks is None else study.lazy(chunks))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
@@ -44,7 +45,7 @@ def sweep_into(study: Study, path: Path, chunks: int, client: Any = None) -> Any
     """
     xarray = require("xarray", "scale")
     zarr = require("zarr", "scale")
-    if not path.exists():
+    if not os.path.exists(path):
         _make(study, path, chunks)
     stored = _opened(zarr, study, path)
     missing = [region for region in _regions(study.shape, stored.chunks) if not _is_there(stored, path, region)]
@@ -64,7 +65,7 @@ def _make(study: Study, path: Path, chunks: int) -> None:
         with draft(path) as place:
             dataset.to_zarr(place, mode="w", compute=False, consolidated=False, encoding=encoding)
     except OutputError:
-        if not path.exists():  # else another process has made it meanwhile
+        if not os.path.exists(path):  # else another process has made it meanwhile
             raise
 
 

@@ -123,13 +123,25 @@ def test_outcomes():
         (("C01", cra.Arm.nominal().replace(k_t=[1.0, 2.0])), {}, "allowed is one arm"),
         (("C01",), {"speed": 1.0}, "no number of a setting"),
         (("C01",), {"amplitude": -1.0}, "amplitude"),
+        (("C01",), {"modes": 1.5}, "modes = 1.5"),
+        (("C01",), {"phase": [0.0, 1.0]}, r"phase has shape \(2,\): allowed is one number"),
+        (("C01",), {"k_r": []}, r"k_r has shape \(0,\): allowed is some numbers in a row"),
+        (("C01",), {"frequencies": [1.0]}, r"frequencies has shape \(1,\): allowed is 3 numbers"),
+        (("C01",), {"masses": [[0.0]]}, r"masses has shape \(1, 1\)"),
+        (("C01",), {"k_t": None}, "k_t = None"),
+        (("C01",), {"duration": 1e300}, r"duration = 1e\+300"),
     ],
 )
 def test_bad_input_is_refused(arguments, numbers, message):
     with pytest.raises((TypeError, ValueError), match=message):
         claim(*arguments, **numbers)
-    with pytest.raises(ValueError, match="theme"):
-        claims(theme="colours")
+    for theme, error in (("colours", ValueError), (3, TypeError), (np.zeros(2), TypeError)):
+        with pytest.raises(error, match="theme"):
+            claims(theme=theme)
+    with pytest.raises((TypeError, ValueError), match="verdict = 3: allowed is a Verdict"):
+        figure_claims("modes", [3])
+    with pytest.raises(TypeError, match="family = 3: allowed is an ArmFamily"):
+        figure_family(3)
 
 
 def test_every_number_has_a_provenance():

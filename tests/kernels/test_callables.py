@@ -149,15 +149,37 @@ def test_refusals_name_the_culprit():
         kernel(x, "x")
     with pytest.raises(TypeError, match="__import__"):
         kernel("__import__('os')", (x,))
-    with pytest.raises(ValueError, match="backend"):
-        kernel(x, (x,), backend="fortran")
+    for backend, error in (("fortran", ValueError), (np.zeros(3), TypeError), (3, TypeError)):
+        with pytest.raises(error, match=r"^backend = .*allowed are 'numpy' and 'numba'"):
+            kernel(x, (x,), backend=backend)
     f = kernel(x + a, (x, a))
     with pytest.raises(TypeError, match=r"1 values given, 2 expected: \(x, a\)"):
         f(1)
-    with pytest.raises(TypeError, match="a:"):
-        f(1, "2")
+    for value in ("2", [1.0, [2.0]], None, np.ma.masked_array([1.0, 2.0], mask=[False, True])):
+        with pytest.raises(TypeError, match=r"a = .*: allowed are real or complex numbers"):
+            f(1, value)
+    for given in (1.0, np.array(1.0), (n for n in range(9))):
+        with pytest.raises(TypeError, match=r"^arguments"):
+            kernel(x, given)
+    endless = []
+    endless.append(endless)
+    deep = x
+    for _ in range(2000):
+        deep = sp.Add(deep, 1, evaluate=False)
+    for expression in (endless, {"k": endless}, deep):
+        with pytest.raises(ValueError, match=r"^expression: it has too many levels"):
+            kernel(expression, (x,))
+    with pytest.raises(ValueError, match="made of CRootOf"):
+        kernel(sp.CRootOf(x**3 - x**2 + 1, 0) * x, (x,))
     with pytest.raises(ValueError, match=r"x \(2,\), a \(3,\)"):
         f([1, 2], [1, 2, 3])
+    with pytest.raises(ValueError, match="do not broadcast"):
+        f(np.ones((1,) * 40), 1.0)
+
+
+def test_matrices_without_entries_have_the_shape_of_the_values():
+    empty = kernel({"m": sp.Matrix(0, 3, []), "x": x}, (x,))([1.0, 2.0])
+    assert empty["m"].shape == (2, 0, 3) and empty["x"].tolist() == [1.0, 2.0]
 
 
 def test_equality_hash_and_copies_by_content():

@@ -145,6 +145,28 @@ def test_without_numba_there_is_a_clear_error(monkeypatch):
     assert not has_compiler()
 
 
+@pytest.mark.parametrize("missing", ["import", "writer", "store"])
+def test_a_numba_of_the_future_compiles_by_its_own_means(missing, monkeypatch, private):
+    template = "def total(x):\n    y = 0.0\n    for k in range(x.size):\n        y += f(x[k])\n    return y\n"
+    added = {"import": 1, "writer": 2, "store": 3}[missing]  # a text of its own, which no other test has compiled
+    kernels, values = {"f": kernel(sp.sin(x) + added, (x,))}, np.linspace(0.0, 1.0, 7)
+    monkeypatch.setattr(specialise, "_versions", lambda: ["1.99.0rc1", "1.0", "3.0"])
+    with monkeypatch.context() as future:
+        if missing == "import":
+            future.setitem(sys.modules, "cra_sym.kernels.inlined", None)
+        elif missing == "writer":
+            future.setattr("cra_sym.kernels.writer.cgutils", None)
+        else:
+            future.delattr("cra_sym.kernels.specialise._StoredCode.load_overload")
+        total = compiled(template, kernels).total
+        with pytest.warns(RuntimeWarning, match=r"Numba 1\.99\.0rc1 is newer than cra_sym knows"):
+            first = total(values)
+        assert total(values) == first  # and no second warning
+    assert first == pytest.approx((np.sin(values) + added).sum(), rel=1e-15)
+    with pytest.raises(Exception, match=r"(?i)argument|unbox"):
+        total(object())
+
+
 @pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="the subprocess finds its cache by XDG_CACHE_HOME")
 def test_machine_code_without_a_place_or_for_two_at_once(private, monkeypatch):
     both = [subprocess.Popen([sys.executable, "-c", PROCESS], stdout=-1, text=True) for _ in range(2)]

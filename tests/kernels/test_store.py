@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
+import subprocess
 import sys
 from pathlib import Path
 
@@ -110,13 +111,42 @@ def test_where_nothing_can_be_written(tmp_path, monkeypatch):
     assert store.load("key") is None
 
 
-def test_a_full_disk_leaves_nothing_behind(private, monkeypatch):
-    def full(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "replace", full)
-    assert not store.save("key", b"x")
+def test_a_full_disk_leaves_nothing_behind(private):
+    resource = pytest.importorskip("resource", reason="the size of files is limited the Unix way")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1024, limits[1]))
+    try:
+        assert not store.save("key", 2000 * b"x")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert list(private.iterdir()) == []
+
+
+KILLED = """
+import builtins, os
+from cra_sym.kernels import store
+def cut(descriptor, _):
+    os.write(descriptor, b"4fa0")
+    os.kill(os.getpid(), 9)
+builtins.open = cut
+store.save("key", b"content")
+"""
+
+
+@posix
+def test_a_killed_process_leaves_a_miss_and_nothing_beside_it(private, entry):
+    """The file it was writing is cut short; the next one who saves makes it whole."""
+    whole = entry.read_bytes()
+    assert subprocess.run([sys.executable, "-c", KILLED], check=False).returncode == -9
+    assert list(private.iterdir()) == [entry] and entry.read_bytes() == b"4fa0"
+    assert store.load("key") is None
+    assert store.save("key", b"content\nof two lines") and entry.read_bytes() == whole
+
+
+def test_somebody_else_who_saves_just_now_is_left_alone(private, entry, monkeypatch):
+    monkeypatch.setattr(Path, "unlink", lambda *_, **__: None)
+    assert not store.save("key", b"x")
+    assert store.load("key") == b"content\nof two lines"
 
 
 def test_without_a_home(monkeypatch):

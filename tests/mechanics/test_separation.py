@@ -286,6 +286,24 @@ def test_what_has_no_closed_form_says_so(density, words):
         separate(derive(density))
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"parameters": {k_t: "__import__('os')"}}, "parameters: k_t = .*allowed is a scalar"),
+        ({"parameters": {k_t: ["k_t"]}}, "parameters: k_t = .*allowed is a scalar"),
+        ({"parameters": {"k_t": 1}}, "'k_t': allowed is a Symbol"),
+        ({"parameters": [1]}, "parameters = .*allowed is a mapping"),
+        ({"basis": "exponential"}, "basis = 'exponential': allowed are 'hyperbolic' and 'decaying'"),
+        ({"frequency": 3.0}, "3.0: allowed is a Symbol"),
+    ],
+)
+def test_options_are_checked_and_no_text_is_read(options, message):
+    with pytest.raises((TypeError, ValueError), match=message):
+        separate(derive(BEAM, left=ROOT, right=TIP), **options)
+    with pytest.raises(TypeError, match="result = 'text': allowed is a HamiltonResult"):
+        separate("text")
+
+
 def test_names_in_use_are_left_alone():
     lam, omega = symbols("lambda omega")
     modal = separate(derive(lam * v.diff(t) ** 2 / 2 - omega * v.diff(x) ** 2 / 2, essential=[v.subs(x, 0)]))

@@ -332,6 +332,23 @@ def test_arguments_of_a_wrong_shape_or_kind_are_named(arm, call, message):
         call(arm)
 
 
+@pytest.mark.parametrize("change", [{EI: 1e-300}, {EI: 1.7e308}, {L: 1e300}, {L: 1e-300}, {rhoA: 1e300, L: 1e60}])
+def test_numbers_beyond_the_range_of_doubles_are_refused(arm, change):
+    """They ended in an eigensolver that did not converge, in nan, or in warnings of NumPy's."""
+    values = {**VALUES, **change}
+    calls = [
+        lambda: arm.natural_frequencies(values, modes=2),
+        lambda: arm.mode_shapes(values, [0.0], modes=2),
+        lambda: arm.frequency_response(values, [5.0], [0.0], drive=v.subs(x, L)),
+        lambda: arm.ritz(2).natural_frequencies(values, modes=2),
+    ]
+    for call in calls:
+        try:
+            assert np.isfinite(call()).all()
+        except ValueError as error:
+            assert not isinstance(error, np.linalg.LinAlgError) and str(error), error
+
+
 class Hostile:
     """An object that refuses to be a number in its own way."""
 

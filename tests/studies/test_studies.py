@@ -7,6 +7,7 @@ import pickle
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -186,7 +187,8 @@ def test_a_full_disk_stops_a_sweep_that_goes_on_later(tmp_path):
 def test_a_store_made_by_another_process_meanwhile_is_used(tmp_path, monkeypatch):
     place, answers = tmp_path / "study.zarr", iter([False])
     cra.sweep(cra.Arm.nominal(), k_t=K_T, store=place)
-    monkeypatch.setattr(store_module.Path, "exists", lambda path: next(answers, True))
+    disk = SimpleNamespace(path=SimpleNamespace(exists=lambda _: next(answers, True)))
+    monkeypatch.setattr(store_module, "os", disk)
     study = cra.sweep(cra.Arm.nominal(), k_t=K_T, store=place)
     assert not list(answers) and study.sizes["k_t"] == K_T.size
     assert [path.name for path in tmp_path.iterdir()] == [place.name]
@@ -231,6 +233,10 @@ def test_two_workers_one_killed(tmp_path):
         ("natural_frequencies", {"m_e": [0.0, -1.0]}, "m_e = -1.0"),
         ("natural_frequencies", {"k_t": [1.0], "chunks": 0}, "chunks = 0"),
         ("peak_response", {}, "peak_response needs the option motion"),
+        ("natural_frequencies", {"k_t": [1.0], "chunks": 2**70}, "chunks = 1180591620717411303424: allowed"),
+        ("natural_frequencies", {"k_t": [1.0], "client": "one"}, "client: allowed with a store only"),
+        ("natural_frequencies", {"k_t": [1.0], "store": 3}, "store = 3: allowed is a path"),
+        ("natural_frequencies", {"k_t": [1.0], "store": "x" * 5000}, "output = .*File name too long"),
     ],
 )
 def test_bad_input_names_the_field(quantity, parameters, message):
