@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sympy import Expr, IndexedBase, MatrixBase, Rational, S, Symbol, Tuple, sympify
+from sympy import Expr, IndexedBase, Integer, MatrixBase, Rational, S, Symbol, Tuple, sympify
 
 __all__ = ["ParametricSystem", "Resonance"]
 
@@ -123,7 +123,8 @@ class ParametricSystem:
             rows = (*resonance.modes, spectator)
         else:
             frequencies = tuple(sympify(w, strict=True) for w in frequencies)
-            size, spectator, rows = S(len(frequencies)), None, tuple(S(i + 1) for i in range(len(frequencies)))
+            size, spectator = Integer(len(frequencies)), None
+            rows = tuple(Integer(i + 1) for i in range(len(frequencies)))
             for mode in resonance.modes:
                 if mode not in rows:
                     raise ValueError(f"resonance with mode {mode}: allowed are modes 1 to {len(rows)}")
