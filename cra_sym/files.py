@@ -24,7 +24,7 @@ __all__ = ["OutputError", "draft", "path_of", "staged_directory", "write_text", 
 _MANIFEST = "manifest.json"
 _MAKER = {"made by": "cra_sym"}  # others list their files in a manifest.json too
 _OLD = ".replaced"
-_PATIENCE = 10.0  # seconds; locks are held for moments
+_PATIENCE = 60.0  # seconds; locks are held for moments
 _ABANDONED = 86_400.0  # seconds; where folders cannot be locked, no run takes so long
 _DISK = {getattr(errno, name, 0) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EROFS", "EIO", "ENXIO", "ENODEV", "ESTALE")}
 
