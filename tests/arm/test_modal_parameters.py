@@ -145,6 +145,15 @@ def test_three_modes_of_a_tip_without_inertia_unless_asked_for_more():
         assert number.shape == (3,)
 
 
+def test_a_textbook_cantilever():
+    """The tip swings twice the root of the mean square; the mean is 2 / lambda (sinh - sin) / (cosh + cos)."""
+    arm = NOMINAL.replace(m_e=0.0)
+    p, mass = cra.modal_parameters(arm), np.sqrt(arm.rhoA * arm.L)
+    np.testing.assert_allclose(p.tip_displacement * mass, 2.0, rtol=1e-12)
+    mean = 2 / p.lam * (np.sinh(p.lam) - np.sin(p.lam)) / (np.cosh(p.lam) + np.cos(p.lam))
+    np.testing.assert_allclose(p.participation / mass, mean * [1, -1, 1], rtol=1e-12)
+
+
 def test_high_modes_stay_orthonormal():
     arm = NOMINAL.replace(k_t=1e3, k_r=1e2)
     nodes, weights = leggauss(400)

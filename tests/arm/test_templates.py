@@ -51,6 +51,7 @@ def test_spectrum(groups):
 
 
 def test_modes(groups):
+    groups = [group.reshape(4, 6) for group in groups]
     lam = cra.frequency_parameters(*groups, modes=5)
     one, two = (modal.modes_of(*groups, lam=lam, compile=c, threads=1) for c in (True, False))
     for order in range(4):
@@ -59,6 +60,10 @@ def test_modes(groups):
         np.testing.assert_allclose(one.shape(xi, order) / size, two.shape(xi, order) / size, atol=1e-12)
     for rows in (modal.ENDS, modal.STRAIN, modal.SPRINGS, modal.COMPLIANCES, modal.INERTIAS):
         np.testing.assert_allclose(one.quantities(rows), two.quantities(rows), rtol=1e-10, atol=1e-13)
+    units = np.linspace(1, 2, 4 * 24).reshape(4, 4, 6)
+    np.testing.assert_allclose(
+        one.quantities(modal.SPRINGS, units), two.quantities(modal.SPRINGS, units), rtol=1e-10, atol=1e-13
+    )
 
 
 def test_floquet():

@@ -160,8 +160,8 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "arm/joint": _PHYSICS,
     "arm/limits": [],
     "arm/modal": [
-        [*_MODES, "tests/arm/test_sensitivity.py"],
-        ["tests/arm/test_vibration_gradient.py::test_the_gradient_is_the_slope", _MODAL],
+        [*_MODES, f"{_MODAL}::test_a_textbook_cantilever", "tests/arm/test_sensitivity.py"],
+        [f"{_LANES[0]}::test_modes", "tests/arm/test_vibration_gradient.py::test_the_gradient_is_the_slope", _MODAL],
     ],
     "arm/modal_dynamics": [],
     "arm/modal_lanes": [_LANES],
