@@ -127,6 +127,7 @@ _FLOQUET = [
             "no_excitation_no_growth",
             "growth_is_that_of_the_fastest_exponent",
             "any_argument_alone_may_be_the_batch",
+            "a_coupling_in_parts_takes_the_same_steps",
             "batch_equals_loop",
         )
     ],

@@ -101,6 +101,15 @@ def test_error_is_what_was_asked_for(tolerance):
     assert 0.6 * tolerance < np.abs(error / scale[:, None] * scale).max() < 1.5 * tolerance
 
 
+def test_a_coupling_in_parts_takes_the_same_steps():
+    whole, few = np.array([[[8.0, 1.0], [1.0, 5.0]]]), {"angular_frequency": 2.0, "epsilon": 0.9}
+    steps = [
+        floquet.Oscillators.of([0.3, 0.7], coupling, **few)[0].steps(1e-6)
+        for coupling in (whole, whole * np.array([0.5, 0.3, 0.2])[:, None, None])
+    ]
+    assert steps[0] == steps[1]
+
+
 @pytest.mark.parametrize("h", [0.3, 2.0])
 def test_free_modes_drift_by_the_exponential_of_their_matrix(h):
     """Swinging, critically damped to the last digit and nearly so, overdamped, rigid."""
