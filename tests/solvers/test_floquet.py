@@ -200,6 +200,12 @@ def test_exponents_of_free_modes_in_whole_ratios_to_the_excitation(parts):
         assert multipliers_apart(*turns) < 1e-6  # double ones are known to half the digits
 
 
+def test_many_exponents_leave_narrow_gaps():
+    omega = 3.0 * (np.arange(6) + 0.5) / 13
+    found = hill_exponents(omega, np.zeros((6, 6)), 3.0, 0.0, harmonics=3)
+    np.testing.assert_allclose(np.sort(found.imag), np.sort(np.r_[omega, -omega]), atol=1e-12)
+
+
 def test_too_few_harmonics_are_refused():
     with pytest.raises(ValueError, match="harmonics"):
         hill_exponents([1.0, 30.0], np.eye(2), 0.9, 0.1, harmonics=3)

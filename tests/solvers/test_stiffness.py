@@ -8,9 +8,9 @@ from mpmath import mp, mpf
 from scipy.integrate import simpson
 
 from cra_sym.solvers.eigenvalues import lowest, refine
-from cra_sym.solvers.rayleigh import stationary_values
+from cra_sym.solvers.rayleigh import quotients, stationary_values
 from cra_sym.solvers.shapes import mode_states
-from cra_sym.solvers.stiffness import GOLDEN, DynamicStiffness, exponential
+from cra_sym.solvers.stiffness import GOLDEN, DynamicStiffness, _inverse, exponential
 
 PINNED = np.eye(4)[:, [1, 3]]
 CLAMPED_FREE = np.eye(4)[:, 2:]
@@ -87,6 +87,58 @@ def test_count_equals_closed_form_everywhere():
     np.testing.assert_array_equal(count, np.floor(lam / np.pi))
 
 
+def test_a_root_costs_few_evaluations(monkeypatch):
+    """Newton's steps on the right eigenvalue of K, counted instead of timed; without them it is some fifty."""
+    evaluate, asked = DynamicStiffness.evaluate, []
+
+    def counted(self, z, rows, **options):
+        asked.append(len(z))
+        return evaluate(self, z, rows, **options)
+
+    monkeypatch.setattr(DynamicStiffness, "evaluate", counted)
+    for problem, modes in (
+        (beam(free=CLAMPED_FREE), 20),
+        (joint_arm([1.0, 1e3, 1e6], [1e-2, 1.0, 1e4], [0.0, 0.1, 3.0]), 8),
+    ):
+        asked.clear()
+        assert lowest(problem, modes).all()
+        assert sum(asked) < 10 * modes * len(problem.length)
+
+
+def test_any_basis_of_the_allowed_motions_and_any_number_of_rows():
+    turned = CLAMPED_FREE @ np.array([[-1.0, 0.4], [-0.2, -1.0]])
+    np.testing.assert_allclose(lowest(beam(free=turned), 3), lowest(beam(free=CLAMPED_FREE), 3), rtol=1e-12)
+    springs = 10.0 ** np.linspace(0.0, 4.0, 8)
+    for row in (0, 7):
+        single = lowest(joint_arm(springs[row], 1.0, 0.1), 8)[0]
+        np.testing.assert_allclose(lowest(joint_arm(springs, 1.0, 0.1), 8)[row], single, rtol=1e-12)
+
+
+def test_the_entire_function_is_the_product_over_all_roots():
+    """F'/F of closed forms: a string, a beam, a varying rod; and of two descriptions of one structure."""
+    z = np.array([0.7, 31.0, 700.0, 2.1e4])
+    row, b = np.zeros(4, dtype=int), z**0.25
+    cosine = constant([[0.0, 1.0], [0.0, 0.0]], [[0.0, 0.0], [-1.0, 0.0]], displacements=1, free=np.eye(2)[:, 1:])
+    k = np.sqrt(z - GROWTH**2 + 0j).real
+    for problem, expected, number in (
+        (cosine, -np.tan(np.sqrt(z)) / (2.0 * np.sqrt(z)), slice(None)),
+        (beam(free=PINNED), (1.0 / np.tan(b) + 1.0 / np.tanh(b) - 2.0 / b) / (4.0 * b**3), slice(None)),
+        (flared_rod(np.zeros((2, 0))), (1.0 / np.tan(k) - 1.0 / np.where(k > 0, k, 1.0)) / (2.0 * k), slice(1, 3)),
+    ):
+        found = problem.evaluate(z[number], row[number]).logarithmic_derivative
+        np.testing.assert_allclose(found, expected[number], rtol=1e-8)
+    slopes = [problem.evaluate(z, row).logarithmic_derivative for problem in with_a_base(0.7)]
+    np.testing.assert_allclose(slopes[0], slopes[1], rtol=1e-9)
+
+
+def test_a_matrix_that_is_singular_to_the_last_bit_is_moved_by_rounding_errors():
+    for matrix in (np.ones((2, 2)), np.zeros((9, 9)), 1e-20 * np.ones((3, 3)), 1e20 * np.ones((3, 3))):
+        inverse = _inverse(np.broadcast_to(matrix, (2, 5, *matrix.shape)))
+        size = matrix.max() or 1.0
+        assert np.isfinite(inverse).all()
+        np.testing.assert_allclose(np.linalg.inv(inverse), np.broadcast_to(matrix, inverse.shape), atol=0.3 * size)
+
+
 @pytest.mark.parametrize("thickness", [0.3, 0.05, 0.005])
 def test_timoshenko_across_the_cut_off(thickness):
     """Pinned ends: both branches are closed form, and one mode is pure shear at the cut-off frequency itself."""
@@ -119,6 +171,8 @@ def test_how_many_have_buckled_and_in_how_many_sets():
     with pytest.raises(ValueError, match=r"buckled: 2 unstable modes \(omega\^2 < 0\), in 2 of 4 parameter sets"):
         lowest(problem, 3)
     assert (lowest(problem.take(np.array([0, 3])), 3)[:, 0] > [0.0, -1.0]).all()
+    with pytest.raises(ValueError, match=r"buckled: 1 unstable mode \(omega\^2 < 0\), in 1 of 2 parameter sets"):
+        lowest(problem.take(np.array([0, 1])), 3)
 
 
 def test_energy_of_motion_is_never_negative():
@@ -169,6 +223,8 @@ def flared_rod(free=None):
     """(e^2cx u')' + z e^2cx u = 0, solved by e^-cx times a sine of sqrt(z - c^2) x."""
 
     def system(z, rows, share):
+        assert np.min(share) >= 0.0
+        assert np.max(share) <= 1.0
         area = np.exp(2 * GROWTH * np.broadcast_to(share, (len(z), np.shape(share)[-1])))
         a, da = np.zeros((2, *area.shape, 2, 2))
         a[..., 0, 1], a[..., 1, 0], da[..., 1, 0] = 1 / area, -z[:, None] * area, -area
@@ -180,22 +236,44 @@ def flared_rod(free=None):
     return DynamicStiffness(system, boundary, np.ones(1), 1, free=free, uniform=False)
 
 
-def carried(z):
-    """The exact transfer matrix of the flared rod, and its derivative by a complex step."""
+def flared_basis(x, z):
+    k = np.sqrt(z - GROWTH**2)
+    u = np.exp(-GROWTH * x) * np.array([np.cos(k * x), np.sin(k * x)])
+    du = -GROWTH * u + np.exp(-GROWTH * x) * k * np.array([-np.sin(k * x), np.cos(k * x)])
+    return np.array([u, np.exp(2 * GROWTH * x) * du])
 
-    def basis(x, z):
-        k = np.sqrt(z - GROWTH**2)
-        u = np.exp(-GROWTH * x) * np.array([np.cos(k * x), np.sin(k * x)])
-        du = -GROWTH * u + np.exp(-GROWTH * x) * k * np.array([-np.sin(k * x), np.cos(k * x)])
-        return np.array([u, np.exp(2 * GROWTH * x) * du])
 
+def dense_string(free=None):
+    """u'' + z u / (1 + x)^2 = 0, solved by sqrt(1 + x) times a sine of sqrt(z - 1/4) log(1 + x)."""
+
+    def system(z, rows, share):
+        density = 1.0 / (1.0 + np.broadcast_to(share, (len(z), np.shape(share)[-1]))) ** 2
+        a, da = np.zeros((2, *density.shape, 2, 2))
+        a[..., 0, 1], a[..., 1, 0], da[..., 1, 0] = 1.0, -z[:, None] * density, -density
+        return a, da
+
+    def boundary(z, rows):
+        return np.zeros((2, len(z), 2, 2))
+
+    return DynamicStiffness(system, boundary, np.ones(1), 1, free=free, uniform=False)
+
+
+def dense_basis(x, z):
+    k, s = np.sqrt(z - 0.25), np.log(1 + x)
+    u = np.sqrt(1 + x) * np.array([np.cos(k * s), np.sin(k * s)])
+    return np.array([u, (0.5 * u + k * np.sqrt(1 + x) * np.array([-np.sin(k * s), np.cos(k * s)])) / (1 + x)])
+
+
+def carried(basis, z):
+    """The exact transfer matrix, and its derivative by a complex step."""
     exact = basis(1.0, z + 1e-30j) @ np.linalg.inv(basis(0.0, z + 1e-30j))
     return exact.real, exact.imag / 1e-30
 
 
-def test_steps_through_varying_coefficients_are_of_sixth_order():
+@pytest.mark.parametrize(("rod", "basis"), [(flared_rod(), flared_basis), (dense_string(), dense_basis)])
+def test_steps_through_varying_coefficients_are_of_sixth_order(rod, basis):
     """Every coefficient of the Magnus expansion counts: transfer and its derivative gain 2^6 when steps are halved."""
-    rod, z, row = flared_rod(), np.array([9.0]), np.zeros(1, dtype=int)
+    z, row = np.array([9.0]), np.zeros(1, dtype=int)
     errors = []
     for steps in (8, 16, 32):
         total, slope = np.eye(2), np.zeros((2, 2))
@@ -203,9 +281,34 @@ def test_steps_through_varying_coefficients_are_of_sixth_order():
             start, share = np.full((1, 1), k / steps), np.full((1, 1), 1 / steps)
             t, dt = (a[0, 0] for a in exponential(*rod.exponent(z, row, start, share)))
             total, slope = t @ total, dt @ total + t @ slope
-        errors.append([np.abs(a - b).max() for a, b in zip((total, slope), carried(9.0), strict=True)])
+        errors.append([np.abs(a - b).max() for a, b in zip((total, slope), carried(basis, 9.0), strict=True)])
     assert max(errors[-1]) < 1e-9
     np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 6.0, atol=0.1)
+
+
+def test_a_varying_part_is_cut_finer_than_a_uniform_one():
+    assert flared_rod().levels(np.array([1.0, 2.0]), np.zeros(2, dtype=int)).tolist() == [6, 6]
+    assert flared_rod().levels(np.array([1e6]), np.zeros(1, dtype=int)).tolist() == [12]
+
+
+def test_coefficients_of_a_uniform_part_may_be_given_at_every_station():
+    def system(z, rows, share):
+        a, da = np.zeros((2, len(z), np.shape(share)[-1], 2, 2))
+        a[..., 0, 1], a[..., 1, 0], da[..., 1, 0] = 1.0, -z[:, None], -1.0
+        return a, da
+
+    def boundary(z, rows):
+        return np.zeros((2, len(z), 2, 2))
+
+    string = DynamicStiffness(system, boundary, np.ones(1), 1, free=np.zeros((2, 0)))
+    np.testing.assert_allclose(lowest(string, 12)[0], (np.arange(1, 13) * np.pi) ** 2, rtol=1e-12)
+
+
+def test_count_on_a_string_that_is_denser_at_one_end():
+    turns = np.random.default_rng(6).uniform(0.0, 20.0, 40)
+    z = 0.25 + (turns * np.pi / np.log(2.0)) ** 2
+    count = dense_string(np.zeros((2, 0))).evaluate(z, np.zeros(40, dtype=int)).count
+    np.testing.assert_array_equal(count, np.floor(turns))
 
 
 def test_a_flared_rod():
@@ -276,9 +379,8 @@ def test_rigid_body_modes_of_soft_and_absent_springs():
     np.testing.assert_allclose(z[1:, 1], [4e-14, 1.2e-9, 1.20000300e-8], rtol=1e-7)
 
 
-def test_lumped_coordinate_is_the_same_as_a_mass_at_the_root():
+def with_a_base(base):
     """y = w + v with v clamped at the root, and the base w carrying a mass, against y with an end mass."""
-    base = 0.7
     a0, a1 = np.zeros((6, 6)), np.zeros((6, 6))  # (v, v', w, P_v, P_v', r)
     a0[0, 1], a0[1, 4], a0[4, 3] = 1.0, 1.0, -1.0
     a1[3, [0, 2]] = a1[5, [0, 2]] = -1.0
@@ -287,7 +389,11 @@ def test_lumped_coordinate_is_the_same_as_a_mass_at_the_root():
     relative = constant(a0, a1, displacements=2, coordinates=1, ends1=ends1, free=np.eye(5)[:, 2:])
     absolute_end = np.zeros((4, 4))
     absolute_end[0, 0] = -base
-    absolute = beam(ends1=absolute_end, free=np.eye(4)[:, [0, 2, 3]])
+    return relative, beam(ends1=absolute_end, free=np.eye(4)[:, [0, 2, 3]])
+
+
+def test_lumped_coordinate_is_the_same_as_a_mass_at_the_root():
+    relative, absolute = with_a_base(0.7)
     z = lowest(relative, 8)
     np.testing.assert_allclose(z, lowest(absolute, 8), rtol=1e-11)
     assert z[0, 0] == 0.0 and z[0, 1] > 0.0
@@ -322,7 +428,7 @@ def test_mode_shapes_are_orthonormal_and_satisfy_the_equation():
 
 @pytest.mark.parametrize("damper", [0.3, 0.9, 5.0])
 def test_string_with_a_damper_at_its_end(damper):
-    """sinh(s) + c cosh(s) = 0: every eigenvalue has the same real part."""
+    """cosh(s) + c sinh(s) = 0: every eigenvalue has the same real part."""
 
     def system(s, rows, share):
         a, da = np.zeros((2, len(s), 1, 2, 2), dtype=complex)
@@ -339,9 +445,38 @@ def test_string_with_a_damper_at_its_end(damper):
     exact = -0.5 * np.log(abs((damper + 1) / (damper - 1))) + 1j * np.pi * k
     found = refine(string, (1.02j * np.pi * k - 0.1)[None])
     np.testing.assert_allclose(found[0], exact, rtol=1e-12)
+    near = refine(string, (exact[0] + 0.1 * np.exp(2j * np.arange(3)))[None])[0]  # no two end on one root
+    np.testing.assert_allclose(np.cosh(near) + damper * np.sinh(near), 0.0, atol=1e-10)
+    assert (np.abs(near[:, None] - near) + 9.0 * np.eye(3)).min() > 3.0
     shape = mode_states(string, found, np.array([[0.25, GOLDEN, 1.0]]))[0, :, :, 0]
     np.testing.assert_allclose(shape[:, 0] / shape[:, 2], np.sinh(0.25 * exact) / np.sinh(exact), rtol=1e-10)
     np.testing.assert_allclose(np.abs(shape[:, 1:]).max(axis=1), 1.0, rtol=1e-12)  # at the nodes inside and at the end
+
+
+def test_equal_damped_strings_get_shapes_of_their_own():
+    """The root twice, in two directions."""
+    one, none, damper = np.eye(2), np.zeros((2, 2)), 0.4
+
+    def system(s, rows, share):
+        a = np.array([np.block([[none, one], [z**2 * one, none]]) for z in s])
+        da = np.array([np.block([[none, none], [2.0 * z * one, none]]) for z in s])
+        return a[:, None], da[:, None]
+
+    def boundary(s, rows):
+        end = damper * np.block([[none, none], [none, one]])
+        return s[:, None, None] * end, np.broadcast_to(end + 0j, (len(s), 4, 4))
+
+    s = -0.5 * np.log((1 + damper) / (1 - damper)) + 0.5j * np.pi
+    strings = DynamicStiffness(system, boundary, np.ones(1), 2, 0, np.eye(4)[:, 2:])
+    shape = mode_states(strings, np.array([[s, s]]), np.array([[0.25, 1.0]]))[0, :, :, :2]
+    np.testing.assert_allclose(shape[:, 0] * np.sinh(s), shape[:, 1] * np.sinh(0.25 * s), atol=1e-10)
+    assert abs(np.linalg.det(shape[:, 1])) > 0.1
+
+
+def test_quotients_of_rough_roots_are_wrong_in_second_order_only():
+    arm = beam(free=CLAMPED_FREE)
+    z = lowest(arm, 4)
+    np.testing.assert_allclose(quotients(arm, z * (1.0 + 1e-4)), z, rtol=1e-6)
 
 
 def test_two_rigid_motions_are_exact_zeros_whatever_their_masses():
