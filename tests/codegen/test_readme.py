@@ -141,6 +141,13 @@ def test_a_model_without_real_form_is_refused(tmp_path):
     )  # fmt: skip
     with pytest.raises(ValueError, match="damped"):
         cra.export("c", tmp_path / "model", model=string)
+    z, sigma = sp.Function("z")(x, t), sp.Symbol("density_of_the_other", positive=True)
+    pair = cra.Model(
+        (rho * y.diff(t) ** 2 + sigma * z.diff(t) ** 2 - T * (y.diff(x) ** 2 + z.diff(x) ** 2)) / 2, fields=[y, z],
+        x=x, domain=(0, length), t=t, left=-T * (y - z) ** 2,
+    )  # fmt: skip
+    with pytest.raises(ValueError, match=r"wave numbers .*, .*: with one in closed form"):
+        cra.export("c", tmp_path / "model", model=pair)
     with pytest.raises(TypeError, match="allowed is a Model"):
         cra.export("c", tmp_path / "model", model="beam")  # type: ignore[arg-type]
     assert not list(tmp_path.iterdir())
