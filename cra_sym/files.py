@@ -217,7 +217,7 @@ def _stage(target: Path) -> Iterator[Path]:
     With an error the parents that were made for it go too.
     """
     made = [folder for folder in target.parents if not os.path.exists(folder)]
-    stage = target.with_name(f".{target.name}.cra_sym-{token_hex(4)}")
+    stage = target.parent / f".{target.name}.cra_sym-{token_hex(4)}"
     lock, complete = None, False
     try:
         with writing(target):

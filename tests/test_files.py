@@ -82,6 +82,11 @@ def test_unusable_places_are_named(tmp_path):
         pass
     with pytest.raises(OutputError, match="cannot be written"), staged_directory(tmp_path / "file" / "below"):
         pass
+    with (
+        pytest.raises(OutputError, match=r"output = '.*': (is a mount point|cannot be written)"),
+        staged_directory("/"),
+    ):
+        pytest.fail("no work before the check")
 
 
 def test_permissions_follow_the_umask(tmp_path):
