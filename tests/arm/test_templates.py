@@ -37,7 +37,7 @@ def groups(monkeypatch):
         template = plain(*module._template_parts())
         monkeypatch.setattr(module, "_template", lambda template=template: template)
     with np.errstate(all="ignore"):
-        yield arms(11, 24)
+        yield arms(11, 65)
 
 
 def test_spectrum(groups):
@@ -51,19 +51,30 @@ def test_spectrum(groups):
 
 
 def test_modes(groups):
-    groups = [group.reshape(4, 6) for group in groups]
-    lam = cra.frequency_parameters(*groups, modes=5)
+    """More arms than are kept side by side, by one."""
+    groups = [group.reshape(5, 13) for group in groups]
+    lam = cra.frequency_parameters(*groups, modes=4)
     one, two = (modal.modes_of(*groups, lam=lam, compile=c, threads=1) for c in (True, False))
     for order in range(4):
         size = np.maximum(lam[..., None], 1) ** order
         xi = np.linspace(0, 1, 5)
         np.testing.assert_allclose(one.shape(xi, order) / size, two.shape(xi, order) / size, atol=1e-12)
-    for rows in (modal.ENDS, modal.STRAIN, modal.SPRINGS, modal.COMPLIANCES, modal.INERTIAS):
+    for rows in (modal.ENDS, modal.STATE, modal.STRAIN, modal.SPRINGS, modal.COMPLIANCES, modal.INERTIAS):
         np.testing.assert_allclose(one.quantities(rows), two.quantities(rows), rtol=1e-10, atol=1e-13)
-    units = np.linspace(1, 2, 4 * 24).reshape(4, 4, 6)
+    units = np.linspace(1, 2, 4 * 65).reshape(4, 5, 13)
     np.testing.assert_allclose(
         one.quantities(modal.SPRINGS, units), two.quantities(modal.SPRINGS, units), rtol=1e-10, atol=1e-13
     )
+
+
+@pytest.mark.parametrize("loose", [1, 15])
+def test_a_mode_that_needs_another_basis_than_those_beside_it(loose, groups):
+    """The second mode of a loose arm is a rigid body's, in power series, and that of a rigid joint in waves."""
+    stiffness = np.where(np.arange(16) < loose, 0.0, np.inf)
+    groups = stiffness, stiffness, np.full(16, 0.1), np.zeros(16)
+    lam = cra.frequency_parameters(*groups, modes=2)
+    one, two = (modal.modes_of(*groups, lam=lam, compile=c, threads=1).quantities(modal.ENDS) for c in (True, False))
+    np.testing.assert_allclose(one, two, rtol=1e-12, atol=1e-13)
 
 
 def test_floquet():
