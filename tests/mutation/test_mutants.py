@@ -78,7 +78,7 @@ def test_a_record_is_continued_and_keeps_reasons_and_closed_holes(tmp_path, pack
     run.add(three, Verdict.SURVIVED)
     file = tmp_path / "room" / "name.json"
     file.write_text(file.read_text().replace('"reason": ""', '"reason": "because"', 1))
-    continued = record()
+    continued = record("# Only words.\n" + SOURCE.replace("3 - 2", "other words"))
     assert [m.change for m in continued.unexplained()] == [three.change]
     assert one.change not in [m.change for m in continued.drawn(None)] and len(continued.drawn(5)) == 2
     continued.close(continued.unexplained()[0], Verdict.CAUGHT, "a test")
