@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import sys
+from argparse import ArgumentParser
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["save_animations", "save_claims", "save_figures"]
 
+_COMMAND = "python -m cra_sym.report.pictures"
 _OPTIONS: dict[str, dict[str, Any]] = {"png": {"dpi": 200}, "svg": {"metadata": {"Date": None}}}
 
 
@@ -74,9 +76,11 @@ def _save(figure: Figure, folder: Path, name: str, kinds: Sequence[str]) -> list
 
 
 def _redraw_as_asked() -> None:
-    place = Path(sys.argv[1])
+    parser = ArgumentParser(_COMMAND, description="Redraw the SVG figures of a folder in place.")
+    parser.add_argument("place", metavar="PLACE", type=Path, help="a folder with figures, such as notebooks/images")
+    place = parser.parse_args().place
     save_figures(place, [path.stem for path in place.glob("*.svg")], kinds=["svg"])
 
 
 if __name__ == "__main__":
-    sys.exit(run_command("python -m cra_sym.report.pictures", _redraw_as_asked, {}))
+    sys.exit(run_command(_COMMAND, _redraw_as_asked, {}))

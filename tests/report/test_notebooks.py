@@ -8,7 +8,7 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from cra_sym.report import notebooks
+from cra_sym.report import notebooks, pictures
 from cra_sym.report.notebooks import NotebookError, cells_to_run, execute, find_notebooks, refresh
 
 
@@ -82,11 +82,15 @@ def test_notebooks_are_found_in_reading_order(notebook, tmp_path):
         find_notebooks(tmp_path / "nowhere")
 
 
-def test_the_command_says_what_it_takes(monkeypatch, capsys):
+@pytest.mark.parametrize(
+    "command, takes",
+    [(notebooks._refresh_as_asked, "a notebook, or a folder"), (pictures._redraw_as_asked, "a folder with figures")],
+)
+def test_the_commands_say_what_they_take(monkeypatch, capsys, command, takes):
     for given, code in (["--help"], 0), ([], 2):
-        monkeypatch.setattr(sys, "argv", ["notebooks", *given])
+        monkeypatch.setattr(sys, "argv", ["command", *given])
         with pytest.raises(SystemExit) as ended:
-            notebooks._refresh_as_asked()
+            command()
         assert ended.value.code == code
     shown = capsys.readouterr()
-    assert "a notebook, or a folder" in shown.out and "required: PLACE" in shown.err
+    assert takes in shown.out and "required: PLACE" in shown.err
