@@ -50,6 +50,18 @@ def test_spectrum(groups):
     np.testing.assert_allclose(one, two, rtol=2e-15)
 
 
+def test_zeros_are_counted_anywhere(groups):
+    """Not only at the points that the search begins with, and by another arithmetic than the NumPy path's."""
+    template, groups = spectrum._template(), arms(13, 120)
+    pairs, zeros = np.empty((8, 120)), np.empty(120, dtype=np.int64)
+    # plain numbers: two truths of NumPy add up to one truth, those of Python and of Numba to two
+    template._prepare(pairs, np.zeros((44, 120)), zeros, *(group.tolist() for group in groups), 0, 120)
+    np.testing.assert_array_equal(zeros, (groups[0] == 0.0).astype(int) + (groups[1] == 0.0))
+    lam = np.random.default_rng(14).uniform(0.05, 20.0, 120)
+    found = [template._count(pairs, lane, x, x**4, *template._scaled_basis(x, x**4))[0] for lane, x in enumerate(lam)]
+    np.testing.assert_array_equal(found, spectrum.ArmCharacteristic(*groups).count(lam**4, slice(None))[0])
+
+
 def test_modes(groups):
     """More arms than are kept side by side, by one."""
     groups = [group.reshape(5, 13) for group in groups]
@@ -78,10 +90,10 @@ def test_a_mode_that_needs_another_basis_than_those_beside_it(loose, groups):
 
 
 def test_floquet():
-    coupling = np.array([[[1.0, 0.4], [0.3, -0.7]], [[0.2, 0.1], [0.1, 0.5]]])
-    system = (np.array([1.0, 2.2]), coupling, np.array([1.9, 3.1]), 0.3, np.array([0.01, 0.03]))
+    coupling = np.array([[[1.0, 0.4], [0.3, -0.7]], [[0.2, 0.1], [0.1, 0.5]], [[0.0, 0.3], [-0.2, 0.1]]])
+    system = (np.array([1.0, 2.2]), coupling, np.array([1.9, 3.1, 4.2, 5.0]), 0.3, np.array([0.01, 0.03]))
     one, two = (
-        floquet.monodromy(*system, compliance=np.array([0.5, 0.2]), tolerance=1e-4, loop=loop)
+        floquet.monodromy(*system, compliance=np.array([0.5, 0.2, 0.3]), tolerance=1e-4, loop=loop)
         for loop in (plain(*stability._template_parts()).kick_and_drift, None)
     )
     np.testing.assert_allclose(one, two, rtol=1e-11, atol=1e-13)
