@@ -133,10 +133,10 @@ def test_the_entire_function_is_the_product_over_all_roots():
 
 def test_a_matrix_that_is_singular_to_the_last_bit_is_moved_by_rounding_errors():
     for matrix in (np.ones((2, 2)), np.zeros((9, 9)), 1e-20 * np.ones((3, 3)), 1e20 * np.ones((3, 3))):
-        inverse = _inverse(np.broadcast_to(matrix, (2, 5, *matrix.shape)))
-        size = matrix.max() or 1.0
-        assert np.isfinite(inverse).all()
-        np.testing.assert_allclose(np.linalg.inv(inverse), np.broadcast_to(matrix, inverse.shape), atol=0.3 * size)
+        for stack in (np.broadcast_to(matrix, (3, *matrix.shape)), np.broadcast_to(matrix, (2, 5, *matrix.shape))):
+            inverse = _inverse(stack)
+            assert np.isfinite(inverse).all()
+            np.testing.assert_allclose(np.linalg.inv(inverse), stack, atol=0.3 * (matrix.max() or 1.0))
 
 
 @pytest.mark.parametrize("thickness", [0.3, 0.05, 0.005])
