@@ -290,7 +290,7 @@ def _locked(folder: Path, patience: float) -> int | None:
         return None
     held, end = None, time.monotonic() + patience
     try:
-        held = os.open(folder, os.O_RDONLY)
+        held = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)  # a pipe of that name is not waited for
         while True:
             try:
                 fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -82,6 +82,10 @@ def test_unusable_places_are_named(tmp_path):
         pass
     with pytest.raises(OutputError, match="cannot be written"), staged_directory(tmp_path / "file" / "below"):
         pass
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(tmp_path / "pipe")
+        with pytest.raises(OutputError, match="cannot be written"), staged_directory(tmp_path / "pipe" / "below"):
+            pass
     with (
         pytest.raises(OutputError, match=r"output = '.*': (is a mount point|cannot be written)"),
         staged_directory("/"),
