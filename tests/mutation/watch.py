@@ -94,6 +94,8 @@ _STIFFNESS = [
             "equal_roots_are_counted_and_get_orthogonal_shapes",
             "the_entire_function_is_the_product_over_all_roots",
             "a_matrix_that_is_singular_to_the_last_bit_is_moved_by_rounding_errors",
+            "a_pole_that_is_hit_to_the_last_bit",
+            "how_often_a_part_is_halved_depends_on_no_unit_of_length",
             "a_root_costs_few_evaluations",
             "a_varying_part_is_cut_finer_than_a_uniform_one",
             "equal_damped_strings_get_shapes_of_their_own",
