@@ -87,6 +87,11 @@ def natural_frequencies(arm: Arm, modes: int = 3) -> np.ndarray:
     ndarray, shape (..., modes)
         Ascending and complete; ``...`` is ``arm.shape``.
 
+    Raises
+    ------
+    TypeError, ValueError
+        If ``arm`` is no :class:`Arm`, or ``modes`` no integer from 1 to 1000.
+
     Examples
     --------
     >>> print(natural_frequencies(Arm.nominal().replace(m_e=0)).round(3))
@@ -115,8 +120,9 @@ def mode_shapes(arm: Arm, x: Any, modes: int = 3, derivative: int = 0) -> np.nda
 
     Raises
     ------
-    ValueError
-        If a point lies outside ``[0, L]`` of any arm, among others.
+    TypeError, ValueError
+        If ``arm`` is no :class:`Arm`, ``x`` does not hold real numbers, has more than one axis or a point outside
+        ``[0, L]`` of any arm, or ``modes`` or ``derivative`` is no integer in its range.
     """
     checks.instance("arm", arm, Arm)
     derivative = checks.count("derivative", derivative, low=0, high=3)
@@ -248,7 +254,7 @@ class ModalParameters:
 
 
 def modal_parameters(arm: Arm, modes: int = 3) -> ModalParameters:
-    """Return the modal quantities of the first modes.
+    """Return the modal quantities of the first modes, by equations (6), (25) and (30).
 
     Parameters
     ----------
@@ -259,6 +265,12 @@ def modal_parameters(arm: Arm, modes: int = 3) -> ModalParameters:
     Returns
     -------
     ModalParameters
+        Arrays of shape (..., modes) and (..., modes, modes); ``...`` is ``arm.shape``.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If ``arm`` is no :class:`Arm`, or ``modes`` no integer from 1 to 1000.
 
     Examples
     --------

@@ -54,7 +54,7 @@ def certify(arm: Arm, modes: int = 3) -> Certificate:
     arm : Arm
         Any parameters in range, arrays too; infinite and zero stiffness are ordinary.
     modes : int
-        How many modes, at least 1.
+        How many, 1 to 1000, rigid-body modes included.
 
     Returns
     -------
@@ -63,6 +63,8 @@ def certify(arm: Arm, modes: int = 3) -> Certificate:
 
     Raises
     ------
+    TypeError, ValueError
+        If ``arm`` is no :class:`Arm`, or ``modes`` no integer from 1 to 1000.
     MissingExtraError
         If python-flint is not installed (extra ``certify``).
     """

@@ -56,6 +56,11 @@ class JointStiffness(Excitation):
     k_t, k_r : float or ndarray
         Weights of the translational and the rotational spring, not negative.
 
+    Raises
+    ------
+    TypeError, ValueError
+        If a weight is not made of finite real numbers or is negative, or the arrays do not broadcast together.
+
     Examples
     --------
     >>> JointStiffness()
@@ -83,6 +88,11 @@ class AxialBase(Excitation):
     ----------
     amplitude : float or ndarray
         Amplitude at epsilon = 1, m; not negative.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the amplitude is not made of finite real numbers or is negative.
     """
 
     amplitude: Number
@@ -106,6 +116,11 @@ class TransverseBase(Excitation):
     ----------
     amplitude : float or ndarray
         Amplitude at epsilon = 1, m; not negative.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the amplitude is not made of finite real numbers or is negative.
     """
 
     amplitude: Number

@@ -34,7 +34,22 @@ def tip_response(
 ) -> Any:
     """Return the elastic displacement v(L, t) of the tip seen from the base, equation (34), m.
 
-    As :func:`response` at x = L; shape (..., len(t)).
+    As :func:`response` at x = L.
+
+    Parameters
+    ----------
+    arm, motion, t, modes, derivative, zeta, start
+        As in :func:`response`; a velocity is in m/s, an acceleration in m/s2.
+
+    Returns
+    -------
+    ndarray, shape (..., t)
+        A single t has no axis.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is out of its range or shapes do not fit; the error names it.
 
     Examples
     --------
@@ -78,7 +93,7 @@ def response(
     x : array_like
         Place or one axis of places in [0, L], m.
     modes : int
-        Modes in the sum.
+        Modes in the sum, 1 to 1000.
     derivative : {0, 1, 2}
         Displacement (m), velocity (m/s) or acceleration (m/s2). A velocity is that to the right of a jump.
     zeta : array_like, optional
@@ -126,8 +141,8 @@ def residual_vibration(arm: Arm, motion: BaseMotion, modes: int = 5, *, zeta: An
 
     Raises
     ------
-    ValueError
-        If the motion never stops.
+    TypeError, ValueError
+        If the motion never stops accelerating; otherwise as :func:`response`.
     """
     instance("motion", motion, BaseMotion)
     if not np.all(np.isfinite(motion.duration)):

@@ -123,13 +123,13 @@ class Sensitivities:
 
 
 def sensitivities(arm: Arm, modes: int = 3, *, method: Literal["modal", "implicit"] = "modal") -> Sensitivities:
-    """Return the sensitivities of the natural frequencies to every parameter.
+    """Return the sensitivities (31)-(32) of the natural frequencies to every parameter.
 
     Parameters
     ----------
     arm : Arm
     modes : int
-        How many, rigid-body modes included.
+        How many, 1 to 1000, rigid-body modes included.
     method : {'modal', 'implicit'}
         By first-order perturbation, d omega_i^2 = phi_i(0)^2 dk_t + phi_i'(0)^2 dk_r + ... with mass-normalised
         modes; or by implicit differentiation (31) of the frequency equation (23). They agree; the first is exact at
@@ -138,6 +138,12 @@ def sensitivities(arm: Arm, modes: int = 3, *, method: Literal["modal", "implici
     Returns
     -------
     Sensitivities
+        Arrays of shape (..., modes); ``...`` is ``arm.shape``.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If ``arm`` is no :class:`Arm`, ``modes`` no integer from 1 to 1000, or ``method`` neither of the two.
 
     Examples
     --------

@@ -28,12 +28,17 @@ def input_shaper(angular_frequency: Any, zeta: Any = 0.0, order: int = 1) -> tup
     zeta : array_like
         Damping ratio, in [0, 1).
     order : int
-        At most 50.
+        1 to 50.
 
     Returns
     -------
     amplitudes, times : ndarray, shape (..., order + 1)
         Amplitudes add up to 1; times in s.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is out of its range or shapes do not broadcast together.
 
     Examples
     --------

@@ -24,7 +24,7 @@ def state_space(
     arm : Arm
         One arm, no batch.
     modes : int
-        Modes kept.
+        Modes kept, 1 to 1000.
     input : {'base_acceleration', 'drive_force'}
         The base acceleration w'' (m/s2) is prescribed: states q_i, q_i', equation (11). Or a force F (N) drives a
         free base of mass m_b, (m_b + m_e + rho A L) w'' + sum Gamma_i q_i'' = F: states w, q_i, w', q_i'.
@@ -37,8 +37,8 @@ def state_space(
 
     Raises
     ------
-    ValueError
-        If ``arm`` is a batch or ``input`` is none of the two.
+    TypeError, ValueError
+        If ``arm`` is no :class:`Arm` or a batch, ``modes`` no integer from 1 to 1000, or ``input`` neither of the two.
 
     Examples
     --------

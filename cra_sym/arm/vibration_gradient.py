@@ -59,7 +59,7 @@ def residual_vibration_gradient(
     Raises
     ------
     TypeError, ValueError
-        If a name is not among those above; otherwise as :func:`residual_vibration`.
+        If ``by`` is no sequence of the names above; otherwise as :func:`residual_vibration`.
 
     Examples
     --------
