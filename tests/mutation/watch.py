@@ -80,6 +80,7 @@ _STATICS = _stability(
     "sums_over_all_modes",
     "the_zone_is_continuous_where_a_spring_vanishes",
     "the_statics_of_a_rigid_spring_do_not_mix_with_those_of_the_other",
+    "rank_one_terms_make_up_springs_in_series_with_what_is_left_out",
 )
 _BORDERS = "tests/arm/test_boundaries.py"
 _LANES = ["tests/arm/test_templates.py"]
