@@ -113,7 +113,13 @@ class Equation:
         return "proved" if self.number in _PROOFS else "sampled"
 
     def check(self) -> bool:
-        """Tell whether the independent routes confirm the equation: the proof if there is one, then the numbers."""
+        """Tell whether the independent routes confirm the equation: the proof if there is one, then the numbers.
+
+        Raises
+        ------
+        NotImplementedError
+            If there is neither.
+        """
         if self.number not in _PROOFS and self.number not in _SAMPLES:
             raise NotImplementedError(f"equation ({self.number}) has no check")
         return self.prove() is not False and bool(_SAMPLES.get(self.number, lambda: True)())

@@ -49,7 +49,7 @@ class Excitation:
 
 @dataclass(frozen=True, eq=False)
 class JointStiffness(Excitation):
-    """A bolted joint whose preload fluctuates: each stiffness is k (1 + weight epsilon cos(varpi t)).
+    """A bolted joint whose preload fluctuates: each stiffness is k (1 + weight epsilon cos(varpi t)), (35b).
 
     Parameters
     ----------
@@ -82,7 +82,9 @@ class JointStiffness(Excitation):
 
 @dataclass(frozen=True, eq=False)
 class AxialBase(Excitation):
-    """A base that shakes along the arm, u = epsilon amplitude cos(varpi t), whose foreshortening feels the inertia.
+    """A base that shakes along the arm, u = epsilon amplitude cos(varpi t), (35a).
+
+    The foreshortening of the arm feels its inertia.
 
     Parameters
     ----------
@@ -110,7 +112,9 @@ class AxialBase(Excitation):
 
 @dataclass(frozen=True, eq=False)
 class TransverseBase(Excitation):
-    """A base that shakes across the arm, w = epsilon amplitude sin(varpi t): it forces the arm and has no boundary.
+    """A base that shakes across the arm, w = epsilon amplitude sin(varpi t), (35).
+
+    It forces the arm and has no boundary.
 
     Parameters
     ----------

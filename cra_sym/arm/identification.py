@@ -71,7 +71,7 @@ def identify_joint(arm: Arm, measured_frequencies: Any, uncertainty: Any) -> Joi
     measured_frequencies : array_like, shape (n,)
         The n lowest natural frequencies, Hz, ascending.
     uncertainty : float or array_like, shape (n,)
-        Standard deviation of each, Hz.
+        Standard deviation of each, Hz; 1e-60 to 1e60.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def identify_joint(arm: Arm, measured_frequencies: Any, uncertainty: Any) -> Joi
     Raises
     ------
     TypeError, ValueError
-        If the arm is a batch or the data are not positive, ascending and of one shape.
+        If ``arm`` is no :class:`Arm` or a batch, or the data are not positive, ascending and of one shape.
 
     Examples
     --------

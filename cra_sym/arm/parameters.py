@@ -138,7 +138,13 @@ class Arm:
         return {name: getattr(self, name) for name in self._names()}
 
     def replace(self, **changes: Any) -> Arm:
-        """Return a validated copy with some fields changed."""
+        """Return a validated copy with some fields changed.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If a name is no field, or as :class:`Arm`.
+        """
         unknown = [name for name in changes if name not in self._names()]
         if unknown:
             raise TypeError(f"{unknown[0]!r} is no parameter of Arm: allowed are {', '.join(self._names())}")

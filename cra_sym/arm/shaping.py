@@ -19,7 +19,8 @@ def input_shaper(angular_frequency: Any, zeta: Any = 0.0, order: int = 1) -> tup
 
     Two impulses half a damped period apart cancel each other's vibration: (1, K)/(1 + K) with K = exp(-pi zeta /
     sqrt(1 - zeta^2)) (ZV). Applied ``order`` times it also zeroes the first ``order - 1`` derivatives of the residual
-    vibration by the mode's frequency, at the price of half a period each: 2 is ZVD, 3 is ZVDD.
+    vibration by the mode's frequency, at the price of half a period each: 2 is ZVD, 3 is ZVDD (Singer and
+    Seering, 1990).
 
     Parameters
     ----------

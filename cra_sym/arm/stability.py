@@ -65,7 +65,7 @@ def stability_boundary(
         Order in epsilon. The second one moves the zone without changing its width. It contains the response of all
         modes of the arm, not only of the first ``modes``: those beyond the ones computed enter by their statics.
     modes : int
-        How many modes may take part; other resonances among them are checked for overlap.
+        How many modes may take part, 1 to 1000; other resonances among them are checked for overlap.
     tongue : {1, 2}
         2 asks for the zone about half the frequency, (omega_m + omega_n) / 2, whose width is of order epsilon^2.
 
@@ -124,6 +124,8 @@ def growth_rate(
 ) -> np.ndarray:
     """Return the rate at which the excited arm's vibration grows: max(0, largest real part of its Floquet exponents).
 
+    The couplings are those of (36a) and (36b); the method is in :mod:`cra_sym.solvers.floquet`.
+
     Parameters
     ----------
     arm : Arm
@@ -133,7 +135,7 @@ def growth_rate(
     epsilon : array_like
         Not negative.
     modes : int
-        How many modes move.
+        How many modes move, 1 to 1000.
     residual : bool
         Whether the static flexibility of the modes left out is kept, for a fluctuating joint: few modes then do for
         what would take many. Without it the arm is its first modes and nothing else.
@@ -150,7 +152,8 @@ def growth_rate(
     Raises
     ------
     TypeError, ValueError
-        If an argument is out of its range or shapes do not broadcast together.
+        If an argument is out of its range, as a :class:`TransverseBase`, ``residual`` without a fluctuating joint and
+        'numba' without Numba are; if shapes do not broadcast together; or if a period takes more than 1e7 steps.
 
     Examples
     --------
@@ -174,17 +177,32 @@ def floquet_exponents(
     tolerance: float = 1e-8,
     backend: str = "auto",
 ) -> np.ndarray:
-    """Return all Floquet exponents of the excited arm, 1/s, shape (..., 2 modes), largest real part first.
+    """Return all Floquet exponents of the excited arm, largest real part first.
 
     The first one's real part is the growth rate before it is cut at zero, so with damping it tells the margin.
-    Imaginary parts are given between -1/2 and 1/2 of the excitation frequency. Arguments as in :func:`growth_rate`.
+    Imaginary parts are given between -1/2 and 1/2 of the excitation frequency.
+
+    Parameters
+    ----------
+    arm, excitation, angular_frequency, epsilon, modes, residual, tolerance, backend
+        As in :func:`growth_rate`.
+
+    Returns
+    -------
+    complex ndarray, shape (..., 2 modes)
+        1/s; ``...`` is broadcast from arm, excitation, angular_frequency and epsilon.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As :func:`growth_rate`.
     """
     system = _system(arm, excitation, angular_frequency, epsilon, modes, residual)
     return floquet.floquet_exponents(**system, tolerance=tolerance, loop=_loop(backend, system))
 
 
 def forced_width(arm: Arm, excitation: TransverseBase, modes: int = 3) -> np.ndarray:
-    """Return the measure |Gamma_n phi_n(L)| omega_n w_1 / (2 M_n) of the forced resonances of a transverse base.
+    """Return the measure |Gamma_n phi_n(L)| omega_n w_1 / (2 M_n) of the forced resonances of a transverse base, (49a).
 
     It is no boundary. A base that shakes across the arm at a natural frequency makes the tip's amplitude grow in
     proportion to time, without damping at this rate for epsilon = 1. It does not depend on how modes are scaled.
@@ -192,13 +210,22 @@ def forced_width(arm: Arm, excitation: TransverseBase, modes: int = 3) -> np.nda
     Parameters
     ----------
     arm : Arm
+        Its damping does not matter.
     excitation : TransverseBase
+        Its amplitude is w_1.
     modes : int
+        How many resonances, 1 to 1000; that of a rigid-body mode, with omega_n = 0, has the measure 0.
 
     Returns
     -------
     ndarray, shape (..., modes)
-        m/s.
+        m/s; ``...`` is broadcast from arm and excitation.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If ``arm`` is no :class:`Arm`, ``excitation`` no :class:`TransverseBase`, ``modes`` no integer from 1 to 1000,
+        or shapes do not broadcast together.
     """
     if not isinstance(excitation, TransverseBase):
         raise TypeError(

@@ -147,8 +147,9 @@ class BaseMotion:
 
         Raises
         ------
-        ValueError
-            If the times are not sorted, not uniform or negative, or the shapes do not fit.
+        TypeError, ValueError
+            If an argument does not hold finite real numbers, the times are not sorted, not uniform or negative, or the
+            shapes do not fit.
         """
         times, a = real_array("t", t, low=0.0), real_array("acceleration", acceleration)
         v = real_array("velocity", velocity)
@@ -186,8 +187,9 @@ class BaseMotion:
 
         Raises
         ------
-        ValueError
-            If the move cannot be made in that time; the error names the limits in the way.
+        TypeError, ValueError
+            If an argument is out of its range, shapes do not broadcast together, the move would never end, or it cannot
+            be made in that time; the error names the limits in the way.
         """
         return cls.s_curve(distance, v_max, a_max, np.inf, duration)
 
@@ -202,6 +204,11 @@ class BaseMotion:
             As in :meth:`trapezoid`.
         j_max : float or ndarray
             Limit of jerk, m/s3; positive, infinite for a trapezoid.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As :meth:`trapezoid`.
         """
         limit: dict[str, Any] = {"low": 0.0, "open_low": True}
         d, a_max = real_array("distance", distance), real_array("a_max", a_max, **limit)
@@ -237,8 +244,9 @@ class BaseMotion:
 
         Raises
         ------
-        ValueError
-            If the motion holds a harmonic, or does not start from rest.
+        TypeError, ValueError
+            If the motion holds a harmonic or does not start from rest, an argument is out of its range, or the shapes
+            do not fit.
         """
         A, delays = real_array("amplitudes", amplitudes), real_array("times", times, low=0.0)
         if A.ndim == 0 or A.shape[-1:] != delays.shape[-1:]:
@@ -282,7 +290,13 @@ class BaseMotion:
 
     def kinematics(self, t: Any) -> tuple[Any, Any, Any]:
         """Return displacement (m), velocity (m/s) and acceleration (m/s2) of the base at times ``t`` >= 0, shape
-        (..., t)."""
+        (..., t).
+
+        Raises
+        ------
+        TypeError, ValueError
+            If ``t`` holds no real numbers, a negative one, or has more than one axis.
+        """
         times = one_axis("t", t, "times", low=0.0)
         total = [np.zeros((*self.shape, times.size)) for _ in range(3)]
         for term in self.terms:
@@ -328,6 +342,12 @@ class Force:
     angular_frequency, phase : float or ndarray
         rad/s, not negative, and rad.
 
+    Raises
+    ------
+    TypeError, ValueError
+        If a field is not made of finite real numbers, angular_frequency is negative, or its square too small or too
+        large to divide the amplitude by, or the arrays do not broadcast together.
+
     Examples
     --------
     >>> step = Force(2.0) + Force(amplitude=1.0, angular_frequency=3.0)
@@ -352,13 +372,25 @@ class Force:
 
     @classmethod
     def sampled(cls, t: Any, force: Any) -> Force:
-        """Return a sampled force, linear between uniform times and zero outside the record; shape (..., T)."""
+        """Return a sampled force, linear between uniform times and zero outside the record; shape (..., T).
+
+        Raises
+        ------
+        TypeError, ValueError
+            As :meth:`BaseMotion.sampled`.
+        """
         history = cls()
         history.profile = BaseMotion.sampled(t, real_array("force", force))
         return history
 
     def __call__(self, t: Any) -> Any:
-        """Return the force at times ``t`` >= 0, shape (..., t)."""
+        """Return the force at times ``t`` >= 0, shape (..., t).
+
+        Raises
+        ------
+        TypeError, ValueError
+            If ``t`` holds no real numbers, a negative one, or has more than one axis.
+        """
         return self.profile.acceleration(t)
 
     def __add__(self, other: Any) -> Force:
