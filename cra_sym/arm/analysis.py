@@ -151,9 +151,9 @@ class ModalParameters:
     participation : ndarray, shape (..., modes)
         Modal participation factor Gamma_i = int rho A phi_i dx + m_e phi_i(L), kg^1/2.
     root_displacement, root_slope, root_moment, root_shear : ndarray, shape (..., modes)
-        phi(0), phi'(0), EI phi''(0) and EI phi'''(0).
+        phi(0), kg^-1/2, phi'(0), kg^-1/2/m, EI phi''(0), N kg^-1/2, and EI phi'''(0), N kg^-1/2/m.
     tip_displacement, tip_slope : ndarray, shape (..., modes)
-        phi(L) and phi'(L).
+        phi(L), kg^-1/2, and phi'(L), kg^-1/2/m.
     axial : ndarray, shape (..., modes, modes)
         G_ij = int (rho A (L - x) + m_e) phi_i' phi_j' dx, 1/m: work of the axial load of a base accelerated along x.
     stiffness_translation, stiffness_rotation : ndarray, shape (..., modes, modes)
@@ -213,12 +213,12 @@ class ModalParameters:
 
     @property
     def root_moment(self) -> np.ndarray:
-        """EI phi''(0)."""
+        """EI phi''(0), N kg^-1/2."""
         return self._ends[5]
 
     @property
     def root_shear(self) -> np.ndarray:
-        """EI phi'''(0)."""
+        """EI phi'''(0), N kg^-1/2/m."""
         return self._ends[6]
 
     @cached_property
