@@ -9,7 +9,7 @@ from importlib.resources import files
 from inspect import cleandoc, signature
 from typing import TYPE_CHECKING, Any
 
-from cra_sym.checks import choice
+from cra_sym.checks import choice, instance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,12 +59,16 @@ def draw(name: str, arm: Arm | None = None) -> Figure:
 
     Raises
     ------
-    ValueError
-        If there is no such figure, or an arm is given to one that shows none.
+    TypeError, ValueError
+        If there is no such figure, or an arm is given to one that shows none, or it is no `Arm`.
     """
     choice("figure", name, FIGURES)
     if arm is not None and not shows_an_arm(name):
         raise ValueError(f"figure = {name!r}: it shows no arm, so none can be given")
+    if arm is not None:
+        from cra_sym.arm.parameters import Arm
+
+        instance("arm", arm, Arm)
     from matplotlib import style
 
     with style.context(STYLE):
@@ -97,5 +101,7 @@ def described(name: str) -> tuple[str, str]:
 
 
 def _function(name: str) -> Callable[..., Any]:
-    module, function = {**FIGURES, **ANIMATIONS}[name].split(":")
+    homes = {**FIGURES, **ANIMATIONS}
+    choice("figure", name, homes)
+    module, function = homes[name].split(":")
     return getattr(import_module(module), function)

@@ -11,6 +11,8 @@ from .modal_response import pick, segment
 
 __all__ = ["BaseMotion", "Force", "Harmonic", "Piecewise"]
 
+_FASTEST = 1e60  # rad/s, whose fourth power responses divide by
+
 Array = np.ndarray
 
 
@@ -85,12 +87,12 @@ class BaseMotion:
     acceleration : float or ndarray
         Mean acceleration a, m/s2.
     amplitude, angular_frequency, phase : float or ndarray
-        Disturbance: B in m, varpi in rad/s (not negative), psi in rad.
+        Disturbance: B in m, varpi in rad/s (0 to 1e60), psi in rad.
 
     Raises
     ------
     TypeError, ValueError
-        If a field is not made of finite real numbers, varpi is negative, or the arrays do not broadcast together.
+        If a field is not made of finite real numbers or out of its range, or the arrays do not broadcast together.
 
     Examples
     --------
@@ -113,7 +115,7 @@ class BaseMotion:
     ) -> None:
         v, a = real_array("velocity", velocity), real_array("acceleration", acceleration)
         B, psi = real_array("amplitude", amplitude), real_array("phase", phase)
-        varpi = real_array("angular_frequency", angular_frequency, low=0.0)
+        varpi = real_array("angular_frequency", angular_frequency, low=0.0, high=_FASTEST)
         broadcastable(velocity=v, acceleration=a, amplitude=B, angular_frequency=varpi, phase=psi)
         v, a = np.broadcast_arrays(v, a)
         terms: list[Term] = []
@@ -340,13 +342,13 @@ class Force:
     level, amplitude : float or ndarray
         N (or the unit of the generalised force).
     angular_frequency, phase : float or ndarray
-        rad/s, not negative, and rad.
+        rad/s, 0 to 1e60, and rad.
 
     Raises
     ------
     TypeError, ValueError
-        If a field is not made of finite real numbers, angular_frequency is negative, or its square too small or too
-        large to divide the amplitude by, or the arrays do not broadcast together.
+        If a field is not made of finite real numbers or out of its range, the square of angular_frequency is too small
+        or too large to divide the amplitude by, or the arrays do not broadcast together.
 
     Examples
     --------
@@ -360,7 +362,8 @@ class Force:
 
     def __init__(self, level: Any = 0.0, amplitude: Any = 0.0, angular_frequency: Any = 0.0, phase: Any = 0.0) -> None:
         constant, size = real_array("level", level), real_array("amplitude", amplitude)
-        varpi, psi = real_array("angular_frequency", angular_frequency, low=0.0), real_array("phase", phase)
+        varpi = real_array("angular_frequency", angular_frequency, low=0.0, high=_FASTEST)
+        psi = real_array("phase", phase)
         broadcastable(level=constant, amplitude=size, angular_frequency=varpi, phase=psi)
         constant = constant + np.where(varpi == 0.0, size * np.sin(psi), 0.0)
         with np.errstate(all="ignore"):

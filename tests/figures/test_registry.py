@@ -8,7 +8,7 @@ import pytest
 from matplotlib import rcParams
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from cra_sym.figures import FIGURES, draw
+from cra_sym.figures import FIGURES, described, draw, shows_an_arm
 from cra_sym.report.pictures import save_figures
 
 
@@ -56,9 +56,15 @@ def test_axes_carry_quantity_and_unit(drawn):
     assert all(columns.values()) and all(rows.values())
 
 
-def test_an_unknown_figure_is_named():
+@pytest.mark.parametrize("asked", [draw, described, shows_an_arm])
+def test_an_unknown_figure_is_named(asked):
     with pytest.raises(ValueError, match=r"fig99.*fig01"):
-        draw("fig99")
+        asked("fig99")
+
+
+def test_what_is_no_arm_is_named():
+    with pytest.raises(TypeError, match=r"arm = 5.*Arm"):
+        draw("fig03", arm=5)
 
 
 def test_files_are_the_same_in_each_run(tmp_path):
