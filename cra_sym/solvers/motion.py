@@ -11,7 +11,7 @@ from .modal_response import pick, segment
 
 __all__ = ["BaseMotion", "Force", "Harmonic", "Piecewise"]
 
-_FASTEST = 1e60  # rad/s, whose fourth power responses divide by
+_FASTEST = 1e15  # rad/s, beyond which responses are not even finite
 
 Array = np.ndarray
 
@@ -87,7 +87,8 @@ class BaseMotion:
     acceleration : float or ndarray
         Mean acceleration a, m/s2.
     amplitude, angular_frequency, phase : float or ndarray
-        Disturbance: B in m, varpi in rad/s (0 to 1e60), psi in rad.
+        Disturbance: B in m, varpi in rad/s (0 to 1e15), psi in rad. The phase varpi t is known to rounding only: a
+        response in which a mode of omega takes part is off by the order of 1e-16 B varpi^2 t / omega.
 
     Raises
     ------
@@ -342,7 +343,7 @@ class Force:
     level, amplitude : float or ndarray
         N (or the unit of the generalised force).
     angular_frequency, phase : float or ndarray
-        rad/s, 0 to 1e60, and rad.
+        rad/s, 0 to 1e15, and rad.
 
     Raises
     ------

@@ -200,12 +200,12 @@ def test_a_force_is_what_its_fields_say():
     record = Force.sampled([0.5, 1.0, 1.5], [2.0, -1.0, 3.0])
     assert record([0.2, 0.5, 0.75, 1.25, 1.5]) == pytest.approx([0.0, 2.0, 0.5, 1.0, 0.0])
     assert (force + record)(t) == pytest.approx(force(t) + record(t))
-    for size, varpi in ((1.0, 1e-160), (1e-250, 1e60)):
+    for size, varpi in ((1.0, 1e-160), (1e-300, 1e15)):
         with pytest.raises(ValueError, match="too small or too large"):
             Force(amplitude=size, angular_frequency=varpi)
     for history in (BaseMotion, Force):
-        with pytest.raises(ValueError, match=r"angular_frequency = .*1e\+60"):
-            history(amplitude=1.0, angular_frequency=1.1e60)
+        with pytest.raises(ValueError, match=r"angular_frequency = .*1e\+15"):
+            history(amplitude=1.0, angular_frequency=1.1e15)
 
 
 @pytest.mark.parametrize(
