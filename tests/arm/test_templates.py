@@ -22,13 +22,13 @@ def plain(template, kernels):
     return type("Template", (), {name: staticmethod(value) for name, value in names.items() if callable(value)})
 
 
-def arms(seed, size):
+def arms(seed, size, stiffness=(-3, 6), inertia=(-3, 3)):
     rng = np.random.default_rng(seed)
 
     def draw(low, high, *ends):
         return np.where(rng.random(size) < 0.3, rng.choice(ends, size), 10.0 ** rng.uniform(low, high, size))
 
-    return draw(-3, 6, 0.0, np.inf), draw(-3, 6, 0.0, np.inf), draw(-3, 3, 0.0), draw(-3, 3, 0.0)
+    return draw(*stiffness, 0.0, np.inf), draw(*stiffness, 0.0, np.inf), draw(*inertia, 0.0), draw(*inertia, 0.0)
 
 
 @pytest.fixture
@@ -48,6 +48,42 @@ def test_spectrum(groups):
     two = spectrum.frequency_parameters(*groups, modes=6, compile=False, threads=1)
     assert ((one == 0) == (two == 0)).all()
     np.testing.assert_allclose(one, two, rtol=2e-15)
+
+
+def test_spectrum_of_extreme_arms(groups):
+    """First zeros orders below all points where zeros are counted, and two of about one size in one interval."""
+    rng = np.random.default_rng(15)
+    mu, iota = 10.0 ** rng.uniform(-3, 1, 80), 10.0 ** rng.uniform(1, 6, 80)
+    z, ratio = 10.0 ** rng.uniform(-3, 1, 80), 10.0 ** rng.uniform(-0.3, 0.3, 80)
+    for extreme in (arms(24, 100, (-12, 14), (-8, 9)), (z * (1.0 + mu), z * iota * ratio, mu, iota)):
+        one = np.empty((extreme[0].size, 2))
+        spectrum._fill_compiled(one, *extreme)
+        two = spectrum.frequency_parameters(*extreme, modes=2, compile=False, threads=1)
+        np.testing.assert_allclose(one, two, rtol=1e-10)
+
+
+def test_spectrum_of_many_modes(groups):
+    groups, one = arms(16, 2), np.empty((2, 60))
+    spectrum._fill_compiled(one, *groups)
+    two = spectrum.frequency_parameters(*groups, modes=60, compile=False, threads=1)
+    np.testing.assert_allclose(one, two, rtol=2e-15)
+
+
+def test_the_count_does_not_jump_at_multiples_of_pi(groups):
+    """There the beam pinned at both ends, whose zeros they are, has one more; rounding must not decide for the arm."""
+    template, pairs = spectrum._template(), np.empty((8, 12))
+    rng = np.random.default_rng(17)
+    arms = (10.0 ** rng.uniform(*ends, 12) for ends in ((0, 5), (-1, 3), (-2, 0), (-3, -1)))
+    template._prepare(pairs, np.zeros((44, 12)), np.empty(12, dtype=np.int64), *arms, 0, 12)
+
+    def count(lane, lam):
+        return template._count(pairs, lane, lam, lam**4, *template._scaled_basis(lam, lam**4))[0]
+
+    for lane in range(12):
+        for turns in range(1, 9):
+            lam = turns * np.pi
+            around = {count(lane, lam * (1.0 + step * 1.2e-16)) for step in range(-4, 5)}
+            assert around == {count(lane, lam * (1.0 - 1e-9))} == {count(lane, lam * (1.0 + 1e-9))}
 
 
 def test_zeros_are_counted_anywhere(groups):

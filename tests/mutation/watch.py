@@ -213,7 +213,18 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "solvers/rayleigh": _STIFFNESS,
     "solvers/shapes": _STIFFNESS,
     "solvers/spectrum": [["tests/solvers/test_spectrum.py"], _DIGITS],
-    "solvers/spectrum_lanes": [[f"{_LANES[0]}::test_zeros_are_counted_anywhere", f"{_LANES[0]}::test_spectrum"]],
+    "solvers/spectrum_lanes": [
+        [
+            f"{_LANES[0]}::test_{name}"
+            for name in (
+                "zeros_are_counted_anywhere",
+                "the_count_does_not_jump_at_multiples_of_pi",
+                "spectrum",
+                "spectrum_of_many_modes",
+                "spectrum_of_extreme_arms",
+            )
+        ]
+    ],
     "solvers/stiffness": _STIFFNESS,
 }
 
