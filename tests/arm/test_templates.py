@@ -53,10 +53,15 @@ def test_spectrum(groups):
 def test_spectrum_of_extreme_arms(groups):
     """First zeros orders below all points where zeros are counted, and two of about one size in one interval."""
     rng = np.random.default_rng(15)
-    mu, iota = 10.0 ** rng.uniform(-3, 1, 80), 10.0 ** rng.uniform(1, 6, 80)
-    z, ratio = 10.0 ** rng.uniform(-3, 1, 80), 10.0 ** rng.uniform(-0.3, 0.3, 80)
-    for extreme in (arms(24, 100, (-12, 14), (-8, 9)), (z * (1.0 + mu), z * iota * ratio, mu, iota)):
-        one = np.empty((extreme[0].size, 2))
+    z = 10.0 ** rng.uniform(-2.8, 0.2, 80)
+    root, turn, stiff, mu = (10.0 ** rng.uniform(*ends, 80) for ends in ((-0.2, 0.2), (-0.2, 0.2), (2, 5), (-3, -1)))
+    second_and_third = [16.0, 3.2, 25.0], [1.2, 0.69, 7000.0], [0.22, 0.15, 0.51], [0.068, 0.038, 0.27]
+    for extreme in (
+        arms(24, 100, (-12, 14), (-8, 9)),
+        (z * root, stiff, mu, turn / z),
+        np.array(second_and_third),
+    ):
+        one = np.empty((len(extreme[0]), 2))
         spectrum._fill_compiled(one, *extreme)
         two = spectrum.frequency_parameters(*extreme, modes=2, compile=False, threads=1)
         np.testing.assert_allclose(one, two, rtol=1e-10)
