@@ -9,7 +9,7 @@ import pytest
 from mpmath import mp, mpf
 from scipy.integrate import simpson
 
-from cra_sym.solvers.eigenvalues import lowest, refine
+from cra_sym.solvers.eigenvalues import _polish, lowest, refine
 from cra_sym.solvers.rayleigh import quotients, stationary_values
 from cra_sym.solvers.shapes import mode_states
 from cra_sym.solvers.stiffness import GOLDEN, DynamicStiffness, _inverse, exponential
@@ -517,3 +517,12 @@ def test_two_rigid_motions_are_exact_zeros_whatever_their_masses():
     with mp.workdps(30):
         exact = mp.findroot(lambda l: mp.tan(l) + mp.tanh(l), 2.365) ** 4 * 170 / mpf("0.017") / mpf("1.6") ** 4
     np.testing.assert_allclose(z[2], float(exact), rtol=1e-10)
+
+
+def test_more_soft_roots_than_static_deflections():
+    """All Ritz values of more roots than K has coordinates; what rounds to nothing is measured by the last bound."""
+    exact = (np.arange(1, 7) * np.pi)[None] ** 4
+    bounds = np.array([[1e2, 2e3, 8e3, 3e4]])
+    for rough in (1.0, 1.0 + 1e-9):
+        found = _polish(beam(free=PINNED), rough * exact, 1e-6 * exact, bounds)
+        np.testing.assert_allclose(found, exact, rtol=1e-11)
