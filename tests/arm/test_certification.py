@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 
 import mpmath as mp
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import cra_sym as cra
+from cra_sym.arm.certification import _FIELDS, _BallArm
 from cra_sym.solvers.certificates import UndecidedError, decided, enclose
 
 flint = pytest.importorskip("flint", reason="the extra 'certify' brings python-flint")
@@ -86,6 +88,31 @@ def test_rigid_body_modes_are_zero():
     certificate = cra.certify(free, modes=3)
     assert ((certificate.upper == 0).sum(axis=-1) == [2, 1, 1]).all()
     assert ((certificate.lower == 0) == (certificate.upper == 0)).all()
+
+
+def test_the_proved_number_of_zeros_is_the_solvers():
+    """Between and next to the zeros, for joints of every kind: each constraint that is released may change it."""
+    arm = random_arms(40, seed=5)
+    lam = cra.modal_parameters(arm, modes=8).lam
+    values = np.broadcast_arrays(*(getattr(arm, name) for name in _FIELDS))
+    for place, zeros in enumerate(lam):
+        function = _BallArm(flint, {name: float(value[place]) for name, value in zip(_FIELDS, values, strict=True)})
+        near = zeros[zeros > 0] * np.array([[1 - 1e-9], [1 + 1e-9]])
+        for point in [*near.flat, *np.arange(1, 4) * np.pi + 0.1, *np.arange(1, 4) * np.pi - 0.1]:
+            assert function.count(flint.arb(point)) == (zeros < point).sum()
+
+
+def test_zeros_of_the_pinned_beam_next_to_a_floating_point_number():
+    """The number nearest to n pi lies below or above it; both occur, and rounding must not decide."""
+    function = _BallArm(flint, dict.fromkeys(_FIELDS, 1.0))
+    below = 0
+    with mp.workdps(60):
+        for n in range(1, 60):
+            for point in (n * math.pi, np.nextafter(n * math.pi, 0.0)):
+                expected = int(mp.floor(mp.mpf(float(point)) / mp.pi))
+                below += expected != int(point / math.pi)
+                assert function._pinned(flint.arb(float(point))) == expected
+    assert below > 5
 
 
 class Parabola:
