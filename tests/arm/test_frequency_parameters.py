@@ -200,10 +200,10 @@ def test_broadcasting():
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
-        ((-1.0, 1.0, 0.0), ValueError, "kappa_t = -1.0"),
+        ((-0.05, 1.0, 0.0), ValueError, "kappa_t = -0.05"),
         ((1.0, np.nan, 0.0), ValueError, "kappa_r = nan"),
         ((1.0, 1.0, np.inf), ValueError, "mu = inf"),
-        ((1.0, 1.0, 0.0, -2.0), ValueError, "iota = -2.0"),
+        ((1.0, 1.0, 0.0, -0.05), ValueError, "iota = -0.05"),
         (("stiff", 1.0, 0.0), TypeError, "kappa_t = 'stiff'"),
         (([1.0, 2.0], [1.0, 2.0, 3.0], 0.0), ValueError, "do not broadcast"),
         ((1.0, 1.0, 0.0, 0.0, 0), ValueError, "modes = 0"),

@@ -105,6 +105,7 @@ def test_axial_matrix(arm, parameters, quadrature):
     expected = np.einsum("nik,nk,njk->nij", slope, weights * load, slope)
     size = np.abs(expected).max(axis=(1, 2), keepdims=True)
     np.testing.assert_allclose(parameters.axial / size, expected / size, atol=1e-12)
+    assert (parameters.axial == parameters.axial.swapaxes(-1, -2)).all()
 
 
 def test_boundary_conditions(arm, parameters):
@@ -226,6 +227,10 @@ def test_batch_axes():
     single = cra.modal_parameters(arm.replace(k_t=1.0, m_e=5e-3), 2)
     for name in ("omega", "participation", "root_moment", "tip_slope", "axial", "stiffness_translation"):
         np.testing.assert_allclose(getattr(p, name)[0, 2], getattr(single, name), rtol=1e-12)
+    beams = arm.replace(L=[0.5, 1.0, 2.0], rho=np.geomspace(1e3, 8e3, 4)[:, None])
+    shapes = cra.mode_shapes(beams, [0.1, 0.5], 2, derivative=1)
+    one = beams.replace(k_t=float(beams.k_t[1, 0]), m_e=5e-3, L=2.0, rho=float(beams.rho[1, 0]))
+    np.testing.assert_allclose(shapes[1, 2], cra.mode_shapes(one, [0.1, 0.5], 2, derivative=1), rtol=1e-12)
     empty = cra.modal_parameters(NOMINAL.replace(k_t=np.ones((0,))), 2)
     assert empty.omega.shape == (0, 2) and empty.axial.shape == (0, 2, 2)
 
@@ -254,6 +259,7 @@ def test_ranges_of_the_numbers_are_those_of_the_derivation():
         (lambda: cra.mode_shapes(NOMINAL, [[0.1]]), ValueError, r"x has shape \(1, 1\)"),
         (lambda: cra.mode_shapes(NOMINAL, "tip"), TypeError, "x = 'tip'"),
         (lambda: cra.mode_shapes(NOMINAL, 0.5, derivative=4), ValueError, "derivative = 4"),
+        (lambda: cra.mode_shapes(NOMINAL, 0.5, derivative=-1), ValueError, "derivative = -1"),
         (lambda: cra.mode_shapes(NOMINAL, 0.5, modes=0), ValueError, "modes = 0"),
         (lambda: cra.mode_shapes(NOMINAL, 0.5, modes=1001), ValueError, "modes = 1001: allowed is .* 1 to 1000"),
         (lambda: cra.natural_frequencies(1.0), TypeError, "arm = 1.0: allowed is an Arm"),

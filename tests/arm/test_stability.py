@@ -225,12 +225,12 @@ def test_residual_flexibility_is_the_limit_of_many_modes():
 def test_broadcasting_equals_looping():
     masses, sizes = np.array([0.0, 0.001, 0.005]), np.array([[0.02], [0.1]])
     batch = SOFT.replace(k_r=50.0, m_e=masses)
-    weights = np.array([1.0, 0.7, 0.0])
+    weights, varpi = np.array([1.0, 0.7, 0.0]), 2 * cra.modal_parameters(batch, 1).omega[1, 0]
     for excitation in (AXIAL, cra.AxialBase(np.array([0.01, 0.02, 0.03])), cra.JointStiffness(weights, 0.4)):
         joint = isinstance(excitation, cra.JointStiffness)
         together = np.array(cra.stability_boundary(batch, excitation, sizes, (1, 3), order=2))
-        growth = cra.growth_rate(batch, excitation, 40.0, sizes, 2, residual=joint)
-        assert together.shape == (2, 2, 3) and growth.shape == (2, 3)
+        growth = cra.growth_rate(batch, excitation, varpi, sizes, residual=joint)
+        assert together.shape == (2, 2, 3) and growth.shape == (2, 3) and growth.max() > 0.01 * joint
         for i, k in np.ndindex(2, 3):
             one = excitation
             if excitation.shape:
@@ -239,7 +239,7 @@ def test_broadcasting_equals_looping():
             assert np.allclose(
                 cra.stability_boundary(alone, one, sizes[i, 0], (1, 3), order=2), together[:, i, k], rtol=1e-12
             )
-            rate = cra.growth_rate(alone, one, 40.0, sizes[i, 0], 2, residual=joint)
+            rate = cra.growth_rate(alone, one, varpi, sizes[i, 0], residual=joint)
             assert rate == pytest.approx(growth[i, k], abs=1e-9)
 
 

@@ -87,7 +87,7 @@ def test_a_batch_has_the_gradients_of_its_arms():
 
 def test_what_a_mode_leaves_behind_is_its_participation_times_its_tip():
     """Of loose arms too, whose rigid bodies are told apart by their number."""
-    k = np.array([[0.0], [50.0]])
+    k = np.array([[0.0], [50.0], [0.0]])
     arm = ARM.replace(k_t=k, k_r=k, m_e=[0.05, 0.1, 0.2])
     p = cra.modal_parameters(arm, 4)
     groups = [np.broadcast_to(g, arm.shape)[..., None] for g in (arm.kappa_t, arm.kappa_r, arm.mu, arm.iota)]
