@@ -55,11 +55,12 @@ def test_spectrum_of_extreme_arms(groups):
     rng = np.random.default_rng(15)
     z = 10.0 ** rng.uniform(-2.8, 0.2, 80)
     root, turn, stiff, mu = (10.0 ** rng.uniform(*ends, 80) for ends in ((-0.2, 0.2), (-0.2, 0.2), (2, 5), (-3, -1)))
-    second_and_third = [16.0, 3.2, 25.0], [1.2, 0.69, 7000.0], [0.22, 0.15, 0.51], [0.068, 0.038, 0.27]
+    # the second zero and the third in one interval; the first two in the first one, far apart
+    some = [16.0, 3.2, 25.0, 3e-11], [1.2, 0.69, 7000.0, 4.4e-11], [0.22, 0.15, 0.51, 0.013], [0.068, 0.038, 0.27, 89.0]
     for extreme in (
         arms(24, 100, (-12, 14), (-8, 9)),
         (z * root, stiff, mu, turn / z),
-        np.array(second_and_third),
+        np.array(some),
     ):
         one = np.empty((len(extreme[0]), 2))
         spectrum._fill_compiled(one, *extreme)
