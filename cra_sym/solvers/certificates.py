@@ -47,7 +47,7 @@ def decided(flint: Any, sign: Callable[[], Any]) -> bool:
     Raises
     ------
     UndecidedError
-        If the ball still holds zero at 16384 bits.
+        If the ball still holds zero at 12288 bits.
     """
     precision = _FIRST_PRECISION
     while precision <= _LARGEST_PRECISION:
