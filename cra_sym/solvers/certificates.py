@@ -13,7 +13,7 @@ from typing import Any, Protocol
 __all__ = ["BallCharacteristic", "UndecidedError", "decided", "enclose"]
 
 _FIRST_PRECISION = 192
-_LARGEST_PRECISION = 1 << 14
+_LARGEST_PRECISION = 12_288
 _NEAREST = -53  # the first width tried, relative, as a power of two; the width wanted is half of it
 _WIDEST = -8
 
