@@ -75,8 +75,8 @@ def test_packages_without_machine_code_accept_every_python():
     assert refused == {}
 
 
-def resolve(python: str, target: Path) -> subprocess.CompletedProcess[str]:
-    """Let pip look for wheels for another Python, without installing anything.
+def command(python: str, target: Path) -> list[str]:
+    """Return the command by which pip looks for wheels for another Python, without installing anything.
 
     Only what has machine code is asked for, the rest suits every Python: of the pins, and for the newest Python also
     of what they bring.
@@ -90,8 +90,11 @@ def resolve(python: str, target: Path) -> subprocess.CompletedProcess[str]:
     listed.write_text("\n".join(lines), encoding="utf-8")
     options = ["--dry-run", "--ignore-installed", "--no-deps", "--only-binary=:all:", "--retries=0", "--timeout=20"]
     where = ["--python-version", python, "--target", str(target / python), "--requirement", str(listed)]
-    command = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *options, *where]
-    return subprocess.run(command, capture_output=True, text=True, timeout=600)
+    return [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *options, *where]
+
+
+def run(given: list[str]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(given, capture_output=True, text=True, timeout=600)
 
 
 @pytest.mark.network
@@ -100,6 +103,7 @@ def test_wheels_resolve_on_every_python(tmp_path):
     if subprocess.run(probe, capture_output=True).returncode:
         pytest.skip("no package index within reach")
     others = [python for python in PYTHONS if python != f"{sys.version_info.major}.{sys.version_info.minor}"]
+    commands = [command(python, tmp_path) for python in others]  # not in threads, in which Python 3.11 fails to parse
     with ThreadPoolExecutor(len(others)) as pool:
-        runs = dict(zip(others, pool.map(lambda python: resolve(python, tmp_path), others), strict=True))
-    assert {python: run.stderr[-2000:] for python, run in runs.items() if run.returncode} == {}
+        runs = dict(zip(others, pool.map(run, commands), strict=True))
+    assert {python: done.stderr[-2000:] for python, done in runs.items() if done.returncode} == {}
