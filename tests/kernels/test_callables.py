@@ -169,7 +169,7 @@ def test_refusals_name_the_culprit():
     for expression in (endless, {"k": endless}, deep):
         with pytest.raises(ValueError, match=r"^expression: it has too many levels"):
             kernel(expression, (x,))
-    with pytest.raises(ValueError, match="no NumPy function for .*CRootOf"):
+    with pytest.raises(ValueError, match=r"no NumPy function for .*CRootOf"):
         kernel(sp.CRootOf(x**3 - x**2 + 1, 0) * x, (x,))
     with pytest.raises(ValueError, match=r"x \(2,\), a \(3,\)"):
         f([1, 2], [1, 2, 3])
