@@ -82,6 +82,8 @@ def test_value_semantics_with_arrays():
     assert arm == same and hash(arm) == hash(same) and arm != NOMINAL and arm != "arm"
     assert NOMINAL.replace(m_e=-0.0) == NOMINAL.replace(m_e=0)
     assert NOMINAL.replace(k_t=np.float64(3)).k_t.__class__ is float
+    loose = NOMINAL.replace(k_t=1e-9, k_r=1e-9)
+    assert loose.k_t == loose.k_r == 1e-9
 
 
 @pytest.mark.parametrize("clone", [copy.copy, copy.deepcopy, lambda arm: pickle.loads(pickle.dumps(arm))])
