@@ -208,6 +208,12 @@ def test_a_force_is_what_its_fields_say():
             history(amplitude=1.0, angular_frequency=1.1e15)
 
 
+def test_a_motion_lasts_until_it_accelerates_no_more():
+    assert BaseMotion.trapezoid(1.0, 1.0, 2.0).duration == pytest.approx(1.5)
+    assert BaseMotion.sampled([0.0, 1.0, 2.0], [1.0, 0.0, 0.0]).duration == 2.0
+    assert BaseMotion(velocity=1.0).duration == 0.0 and BaseMotion(acceleration=1.0).duration == np.inf
+
+
 @pytest.mark.parametrize(
     ("make", "error", "words"),
     [
@@ -225,7 +231,9 @@ def test_a_force_is_what_its_fields_say():
         (lambda: BaseMotion.trapezoid(1, 1, np.inf), ValueError, "a_max = inf"),
         (lambda: BaseMotion.trapezoid(1, 1, 1, duration=-2.0), ValueError, "duration = -2"),
         (lambda: BaseMotion.s_curve([1, 2], [1, 2, 3], 1, 1), ValueError, "broadcast"),
-        (lambda: BaseMotion().displacement(-0.1), ValueError, "t = -0.1"),
+        (lambda: BaseMotion().displacement(-0.05), ValueError, "t = -0.05"),
+        (lambda: BaseMotion.sampled([0, 1], 3.0), ValueError, r"acceleration has shape \(\)"),
+        (lambda: BaseMotion.trapezoid(1, 1, 1).shaped(1.0, [0.0, 0.1]), ValueError, r"amplitudes \(\) and times"),
         (lambda: BaseMotion().displacement([[0.1]]), ValueError, "one axis"),
         (lambda: BaseMotion.trapezoid(1, 1, 1).shaped([0.5, 0.5], [0.1]), ValueError, "one time an impulse"),
         (lambda: BaseMotion.trapezoid(1, 1, 1).shaped([0.5, 0.5], [-0.05, 0.1]), ValueError, "times = -0.05"),
