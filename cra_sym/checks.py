@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-__all__ = ["broadcastable", "choice", "count", "instance", "mapping", "one_axis", "real_array", "shown"]
+__all__ = ["broadcastable", "choice", "common_shape", "count", "instance", "mapping", "one_axis", "real_array", "shown"]
 
 
 def shown(value: Any) -> str:
@@ -119,8 +119,13 @@ def mapping(name: str, value: Any, entries: str) -> Mapping[Any, Any]:
 
 def broadcastable(**arrays: np.ndarray) -> tuple[int, ...]:
     """Return the common shape of the named arrays, or raise an error that names those that do not fit."""
+    return common_shape(tuple(arrays), tuple(arrays.values()))
+
+
+def common_shape(names: Sequence[str], arrays: Sequence[Any]) -> tuple[int, ...]:
+    """As `broadcastable`, for names of which two may be the same."""
     try:
-        return np.broadcast_shapes(*(np.shape(a) for a in arrays.values()))
+        return np.broadcast_shapes(*map(np.shape, arrays))
     except (ValueError, RuntimeError):  # of more than 32 axes
-        shapes = ", ".join(f"{name} {np.shape(a)}" for name, a in arrays.items() if np.ndim(a))
+        shapes = ", ".join(f"{name} {np.shape(a)}" for name, a in zip(names, arrays, strict=True) if np.ndim(a))
         raise ValueError(f"shapes do not broadcast together: {shapes}") from None

@@ -63,9 +63,9 @@ def draw(name: str, arm: Arm | None = None) -> Figure:
         If there is no such figure, or an arm is given to one that shows none, or it is no `Arm`.
     """
     choice("figure", name, FIGURES)
-    if arm is not None and not shows_an_arm(name):
-        raise ValueError(f"figure = {name!r}: it shows no arm, so none can be given")
     if arm is not None:
+        if not shows_an_arm(name):
+            raise ValueError(f"figure = {name!r}: it shows no arm, so none can be given")
         from cra_sym.arm.parameters import Arm
 
         instance("arm", arm, Arm)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cra_sym.checks import choice, shown
+from cra_sym.checks import choice, common_shape, shown
 from cra_sym.kernels import lanes
 
 __all__ = ["Kernel", "kernel"]
@@ -93,7 +93,7 @@ class Kernel:
             wanted = ", ".join(self.arguments)
             raise TypeError(f"{len(values)} values given, {len(self.arguments)} expected: ({wanted})")
         arrays = [_numeric(name, value) for name, value in zip(self.arguments, values, strict=True)]
-        shape = _common_shape(self.arguments, arrays)
+        shape = common_shape(self.arguments, arrays)
         with np.errstate(all="ignore"):
             flat = self._evaluated(arrays, shape)
         return _arranged(self.layout, iter(flat), shape)
@@ -175,14 +175,6 @@ def _numeric(name: str, value: Any) -> np.ndarray:
     if array.dtype.kind not in "iufc" or np.ma.is_masked(value):
         raise TypeError(f"{name} = {shown(value)}: allowed are real or complex numbers")
     return array.astype(np.result_type(array.dtype, np.float64), copy=False)
-
-
-def _common_shape(names: tuple[str, ...], arrays: list[np.ndarray]) -> tuple[int, ...]:
-    try:
-        return np.broadcast_shapes(*(a.shape for a in arrays))
-    except (ValueError, RuntimeError):  # of more than 32 axes
-        shapes = ", ".join(f"{n} {a.shape}" for n, a in zip(names, arrays, strict=True) if a.ndim)
-        raise ValueError(f"shapes do not broadcast together: {shapes}") from None
 
 
 def _tuple(result: Any) -> tuple[Any, ...]:

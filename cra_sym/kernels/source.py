@@ -110,9 +110,7 @@ def check_arguments(arguments: Any) -> tuple[sp.Symbol, ...]:
     """
     if isinstance(arguments, sp.Symbol):
         return (arguments,)
-    if not isinstance(arguments, Iterable) or isinstance(arguments, str):
-        raise TypeError(f"arguments = {shown(arguments)}: allowed is a sequence of SymPy symbols")
-    if getattr(arguments, "ndim", 1) != 1:
+    if not isinstance(arguments, Iterable) or isinstance(arguments, str) or getattr(arguments, "ndim", 1) != 1:
         raise TypeError(f"arguments = {shown(arguments)}: allowed is a sequence of SymPy symbols")
     symbols: tuple[sp.Symbol, ...] = ()
     for symbol in arguments:  # one by one: there may be no end of them

@@ -251,10 +251,8 @@ class _Body(Arithmetic):
 
     def give_back(self, value: Any) -> None:
         """Put the result where all returns of the function put it, and leave."""
-        parts, single = (
-            () if value is None else value if isinstance(value, tuple) else (value,),
-            not isinstance(value, tuple),
-        )
+        single = not isinstance(value, tuple)
+        parts = () if value is None else (value,) if single else value
         if self.results is None:
             self.results = [cgutils.alloca_once(self.builder, kind_of(part)) for part in parts]
             self.single = single

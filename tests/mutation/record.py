@@ -99,8 +99,8 @@ class Record:
 def _order(mutants: list[Mutant], shuffle: random.Random) -> list[Mutant]:
     """Return the mutants shuffled, the first of every site before all others."""
     order = shuffle.sample(mutants, len(mutants))
-    first = {mutant.path: place for place, mutant in reversed(list(enumerate(order)))}
-    return sorted(order, key=lambda mutant: order[first[mutant.path]] is not mutant)
+    first = {mutant.path: mutant for mutant in reversed(order)}
+    return sorted(order, key=lambda mutant: first[mutant.path] is not mutant)
 
 
 def _change(entry: dict[str, str]) -> tuple[str, ...]:
