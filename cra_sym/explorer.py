@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cra_sym.arm.excitation import AxialBase, JointStiffness
+from cra_sym.arm.excitations import AxialBase, JointStiffness
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import instance, real_array, shown
 from cra_sym.extras import MissingExtraError, require

@@ -189,7 +189,7 @@ def test_readme_links_lead_somewhere():
 
 def test_readme_tells_where_each_equation_lives():
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| \((\d+)\)(?:-\((\d+)\))? .*?`(arm/\w+)\.py`", readme, re.M)
+    rows = re.findall(r"^\| \((\d+)\)(?:-\((\d+)\))? .*?`(paper/\w+)\.py`", readme, re.M)
     told = {n: home.replace("/", ".") for first, last, home in rows for n in range(int(first), int(last or first) + 1)}
     assert told == {e.number: e.source.partition(":")[0].removeprefix("cra_sym.") for e in cra_sym.equations()}
 

@@ -1,1 +1,1 @@
-"""The paper: one module a section, its numbered equations, the parameters and the public numeric functions."""
+"""The paper's arm: its parameters, its Lagrangian and its excitations by name."""

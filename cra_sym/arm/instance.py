@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import cache
 
-from cra_sym.arm.energy import L, lagrangian, t, v, w, x
-from cra_sym.arm.motion import F
 from cra_sym.arm.parameters import Arm
 from cra_sym.model import Model
+from cra_sym.paper.energy import L, lagrangian, t, v, w, x
+from cra_sym.paper.motion import F
 
 __all__ = ["arm_model", "model_values"]
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cra_sym.arm.analysis import natural_frequencies
+from cra_sym.analysis.modes import natural_frequencies
 from cra_sym.claims.motions import Plane, peak, tip
 from cra_sym.claims.pictures import PALETTE, STYLES, note, region_map
 from cra_sym.claims.registry import claimed, pictured

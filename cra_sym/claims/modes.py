@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cra_sym.arm.analysis import frequency_parameters, modal_parameters, mode_shapes, natural_frequencies
-from cra_sym.arm.flipped import flipped_frequencies
+from cra_sym.analysis.modes import frequency_parameters, modal_parameters, mode_shapes, natural_frequencies
 from cra_sym.arm.parameters import Arm
 from cra_sym.claims.family import common_scale
 from cra_sym.claims.pictures import PALETTE, STYLES, by_mode, note, stiffness_axis
@@ -15,6 +14,7 @@ from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
 from cra_sym.claims.verdict import Finding, Quantity, Verdict, outcome
 from cra_sym.claims.words import listed, number, percent, span
+from cra_sym.paper.oracles.flipped import flipped_frequencies
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -202,8 +202,8 @@ def _(setting: Setting) -> Finding:
 
 def _energy_of_a_tilt() -> str:
     """Say how much energy the flipped joint holds when the straight arm is turned about it by one radian."""
-    from cra_sym.arm.energy import k_r, lagrangian, v, w, x
-    from cra_sym.arm.evaluation import at, put
+    from cra_sym.paper.energy import k_r, lagrangian, v, w, x
+    from cra_sym.paper.evaluation import at, put
 
     _, left, _ = lagrangian()
     flipped = 2 * left.coeff(k_r) * k_r - left
@@ -236,7 +236,7 @@ def _(verdict: Verdict, ax: Axes) -> None:
 def _(setting: Setting) -> Finding:
     from sympy import cos, cosh
 
-    from cra_sym.arm.equations import equation
+    from cra_sym.paper.equations import equation
     from cra_sym.symbols import symbol
 
     lamda = symbol("lamda")
@@ -372,9 +372,9 @@ def _(verdict: Verdict, ax: Axes) -> None:
     "Hamilton's variational principle ... the principle of virtual work is utilized [for the boundary conditions]",
 )
 def _(setting: Setting) -> Finding:
-    from cra_sym.arm.energy import L, lagrangian, t, v, w, x
-    from cra_sym.arm.joint import boundary_conditions
     from cra_sym.mechanics import hamilton
+    from cra_sym.paper.energy import L, lagrangian, t, v, w, x
+    from cra_sym.paper.joint import boundary_conditions
 
     agree = []
     for joint in (True, False):

@@ -9,9 +9,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from cra_sym.arm.analysis import natural_frequencies
+from cra_sym.analysis.modes import natural_frequencies
+from cra_sym.analysis.responses import response
 from cra_sym.arm.parameters import Arm
-from cra_sym.arm.response import response
 from cra_sym.claims.setting import Setting
 from cra_sym.claims.verdict import Quantity
 from cra_sym.solvers.motion import BaseMotion

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cra_sym.arm.frequency_response import frequency_response
+from cra_sym.analysis.frequency_response import frequency_response
 from cra_sym.claims.motions import Plane, peak, tip
 from cra_sym.claims.pictures import PALETTE, note, region_map, stiffness_axis
 from cra_sym.claims.registry import claimed, pictured

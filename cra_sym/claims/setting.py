@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cra_sym.arm.analysis import natural_frequencies
+from cra_sym.analysis.modes import natural_frequencies
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import count, instance, real_array
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cra_sym.arm.analysis import modal_parameters
-from cra_sym.arm.excitation import AxialBase, JointStiffness
-from cra_sym.arm.stability import AsymptoticWarning, growth_rate, stability_boundary
+from cra_sym.analysis.modes import modal_parameters
+from cra_sym.analysis.stability import AsymptoticWarning, growth_rate, stability_boundary
+from cra_sym.arm.excitations import AxialBase, JointStiffness
 from cra_sym.claims.motions import tip
 from cra_sym.claims.pictures import PALETTE, STYLES, note
 from cra_sym.claims.registry import claimed, pictured
@@ -43,8 +43,8 @@ def _terms(kind: str) -> tuple[bool, bool]:
     """Tell whether an excited arm's equations have coefficients that vary in time, and force an arm at rest."""
     from sympy import Function, Symbol
 
-    from cra_sym.arm.evaluation import put
-    from cra_sym.arm.parametric import AXIAL, TRANSVERSE, excited_motion, t, u, v, w, x
+    from cra_sym.paper.evaluation import put
+    from cra_sym.paper.parametric import AXIAL, TRANSVERSE, excited_motion, t, u, v, w, x
 
     motion = excited_motion(kind)
     size, shape = Symbol("size"), Function("shape")(x)
@@ -130,7 +130,7 @@ def _(verdict: Verdict, ax: Axes) -> None:
 def _(setting: Setting) -> Finding:
     from sympy.core.function import AppliedUndef
 
-    from cra_sym.arm.boundaries import forced_resonance, general_resonance, n
+    from cra_sym.analysis.boundaries import forced_resonance, general_resonance, n
     from cra_sym.mechanics.two_scales import conjugate_amplitude
 
     derived = [forced_resonance(), general_resonance("principal", 1, damped=False)]

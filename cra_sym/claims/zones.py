@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cra_sym.arm.excitation import AxialBase, JointStiffness, TransverseBase
-from cra_sym.arm.stability import forced_width
+from cra_sym.analysis.stability import forced_width
+from cra_sym.arm.excitations import AxialBase, JointStiffness, TransverseBase
 from cra_sym.claims.pictures import PALETTE, by_mode, note, stiffness_axis, strip
 from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting

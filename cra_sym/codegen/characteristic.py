@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from cra_sym.arm.spectrum import NEAR, pair
 from cra_sym.kernels import derived_kernel
+from cra_sym.model.spectrum import NEAR, pair
 
 __all__ = ["characteristic"]
 
 _COEFFICIENTS, _POWER_SERIES, _BASIS, _DERIVATIVES = (
-    derived_kernel(f"cra_sym.arm.characteristic:{name}")
+    derived_kernel(f"cra_sym.model.characteristic:{name}")
     for name in ("coefficients", "power_series", "basis", "derivatives")
 )
 

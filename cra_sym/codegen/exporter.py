@@ -139,7 +139,7 @@ def arm_sources(name: str) -> dict[str, str]:
 
 
 def _spectrum_values(language: Language) -> dict[str, Any]:
-    from cra_sym.arm.characteristic import NEAR
+    from cra_sym.model.characteristic import NEAR
 
     functions = spectrum_functions()
     terms = next(f.size for f in functions if f.name == "power_series")
@@ -147,7 +147,7 @@ def _spectrum_values(language: Language) -> dict[str, Any]:
 
 
 def _modal_values(language: Language) -> dict[str, Any]:
-    from cra_sym.arm.shapes import NEAR
+    from cra_sym.model.shapes import NEAR
 
     widths = stability_functions()
     nodes, weights = gauss_rule()

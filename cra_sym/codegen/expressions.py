@@ -8,12 +8,11 @@ from typing import Any
 
 import sympy as sp
 
-from cra_sym.arm import characteristic, shapes
-from cra_sym.arm.characteristic import BASIS, PARAMETERS
 from cra_sym.codegen.complex_parts import complex_parts
 from cra_sym.codegen.program import Function, function, scalars
 from cra_sym.mechanics import multiple_scales
-from cra_sym.model import oscillator
+from cra_sym.model import characteristic, oscillator, shapes
+from cra_sym.model.characteristic import BASIS, PARAMETERS
 from cra_sym.symbols import symbol
 
 __all__ = ["gauss_rule", "modal_functions", "spectrum_functions", "stability_functions"]

@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import cra_sym as cra
-from cra_sym.arm import state_space as state_space_module
-from cra_sym.arm.analysis import frequency_parameters, modal_parameters, mode_shapes, natural_frequencies
-from cra_sym.arm.excitation import AxialBase, JointStiffness
+from cra_sym.analysis import state_space as state_space_module
+from cra_sym.analysis.modes import frequency_parameters, modal_parameters, mode_shapes, natural_frequencies
+from cra_sym.analysis.responses import tip_response
+from cra_sym.analysis.sensitivities import sensitivities
+from cra_sym.analysis.zones import first_order_zone
+from cra_sym.arm.excitations import AxialBase, JointStiffness
 from cra_sym.arm.parameters import Arm
-from cra_sym.arm.response import tip_response
-from cra_sym.arm.sensitivity import sensitivities
-from cra_sym.arm.zones import first_order_zone
 from cra_sym.codegen.characteristic import characteristic
 
 __all__ = ["SEED", "TOLERANCE", "Check", "arm_checks", "extreme_arms", "random_arms", "written"]

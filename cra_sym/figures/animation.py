@@ -9,9 +9,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from cra_sym.arm.analysis import mode_shapes, natural_frequencies
+from cra_sym.analysis.modes import mode_shapes, natural_frequencies
+from cra_sym.analysis.responses import response
 from cra_sym.arm.parameters import Arm
-from cra_sym.arm.response import response
 from cra_sym.figures import described
 from cra_sym.solvers.motion import BaseMotion
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cra_sym.arm.equations import Equation, equations
+from cra_sym.paper.equations import Equation, equations
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

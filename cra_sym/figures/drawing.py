@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from matplotlib.figure import Figure
 
-from cra_sym.arm.analysis import mode_shapes
+from cra_sym.analysis.modes import mode_shapes
 from cra_sym.arm.parameters import Arm
 
 if TYPE_CHECKING:

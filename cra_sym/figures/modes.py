@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cra_sym.arm.analysis import mode_shapes, natural_frequencies
-from cra_sym.arm.flipped import flipped_frequencies
+from cra_sym.analysis.modes import mode_shapes, natural_frequencies
 from cra_sym.arm.parameters import Arm
 from cra_sym.figures.drawing import BLUE, ORANGE
+from cra_sym.paper.oracles.flipped import flipped_frequencies
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

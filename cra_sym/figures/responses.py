@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from cra_sym.analysis.responses import tip_response
 from cra_sym.arm.parameters import Arm
-from cra_sym.arm.response import tip_response
 from cra_sym.figures.drawing import BLUE, ORANGE
 from cra_sym.solvers.motion import BaseMotion
 

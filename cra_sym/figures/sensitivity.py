@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.arm.parameters import Arm
-from cra_sym.arm.sensitivity import sensitivities
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

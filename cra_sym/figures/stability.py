@@ -8,11 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cra_sym.arm.analysis import modal_parameters
-from cra_sym.arm.edges import floquet_boundary
-from cra_sym.arm.excitation import AxialBase, JointStiffness, TransverseBase
+from cra_sym.analysis.floquet_boundary import floquet_boundary
+from cra_sym.analysis.modes import modal_parameters
+from cra_sym.analysis.stability import (
+    AsymptoticWarning,
+    ResonanceWarning,
+    forced_width,
+    growth_rate,
+    stability_boundary,
+)
+from cra_sym.arm.excitations import AxialBase, JointStiffness, TransverseBase
 from cra_sym.arm.parameters import Arm
-from cra_sym.arm.stability import AsymptoticWarning, ResonanceWarning, forced_width, growth_rate, stability_boundary
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from cra_sym.arm.analysis import modal_parameters, mode_shapes
-from cra_sym.arm.frequency_response import frequency_response
+from cra_sym.analysis.frequency_response import frequency_response
+from cra_sym.analysis.modes import modal_parameters, mode_shapes
+from cra_sym.analysis.responses import residual_vibration, tip_response
+from cra_sym.analysis.shaping import input_shaper
 from cra_sym.arm.parameters import Arm
-from cra_sym.arm.response import residual_vibration, tip_response
-from cra_sym.arm.shaping import input_shaper
 from cra_sym.figures.drawing import GREEN, ORANGE
 from cra_sym.solvers.motion import BaseMotion, Piecewise
 

@@ -18,7 +18,7 @@ from cra_sym.kernels.callables import Kernel, kernel
 __all__ = ["derived_kernel"]
 
 _PACKAGE = Path(__file__).resolve().parent.parent
-_DERIVING = ("symbols.py", "checks.py", "mechanics", "model", "kernels", "arm")
+_DERIVING = ("symbols.py", "checks.py", "mechanics", "model", "kernels", "arm", "analysis", "paper")
 
 
 class _DerivedKernel(Kernel):

@@ -22,7 +22,7 @@ from cra_sym.report.markup import Markup, anchor, formula, too_wide
 from cra_sym.report.tables import TABLES, Table
 
 if TYPE_CHECKING:
-    from cra_sym.arm.equations import Equation
+    from cra_sym.paper.equations import Equation
 
 __all__ = ["write_page"]
 
@@ -91,7 +91,7 @@ def _links(numbers: Iterable[Any]) -> list[tuple[str, str]]:
 
 def _equations() -> list[_Entry]:
     """Derive, check and typeset every equation."""
-    from cra_sym.arm.equations import equations
+    from cra_sym.paper.equations import equations
 
     found = equations(companions=True)
     numbers = {str(e.number) for e in found}

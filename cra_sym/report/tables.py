@@ -64,7 +64,7 @@ def nomenclature() -> Table:
 
 def equations() -> Table:
     """The paper's numbered equations and what each was derived from."""
-    from cra_sym.arm.equations import equations
+    from cra_sym.paper.equations import equations
 
     rows = [(e.number, e.title, e.kind, ", ".join(map(str, e.derived_from))) for e in equations()]
     return Table("Equations", ("number", "title", "kind", "derived from"), rows)
@@ -72,7 +72,7 @@ def equations() -> Table:
 
 def frequencies() -> Table:
     """The first three natural frequencies along the two stiffness series of the paper."""
-    from cra_sym.arm.analysis import natural_frequencies
+    from cra_sym.analysis.modes import natural_frequencies
     from cra_sym.arm.parameters import Arm
 
     nominal, inf = Arm.nominal(), float("inf")

@@ -5,7 +5,7 @@ import pytest
 
 import cra_sym as cra
 from cra_sym.arm.instance import arm_model, model_values
-from cra_sym.arm.motion import dynamics
+from cra_sym.paper.motion import dynamics
 
 JOINTS = [(np.inf, np.inf), (1e3, 1e2), (1e2, np.inf), (np.inf, 1.0), (0.0, 50.0), (300.0, 0.0), (0.0, 0.0)]
 

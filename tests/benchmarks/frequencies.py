@@ -16,9 +16,9 @@ import numpy as np
 from scipy.optimize import brentq, elementwise
 
 import cra_sym as cra
-from cra_sym.arm import spectrum
-from cra_sym.arm.modal import ENDS, modes_of
 from cra_sym.kernels import has_compiler
+from cra_sym.model import spectrum
+from cra_sym.model.modal import ENDS, modes_of
 from tests.benchmarks import c_twin, elements, peers
 from tests.benchmarks.machine import in_rounds, processors, summary
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import cra_sym as cra
-from cra_sym.arm import joint
-from cra_sym.arm.flipped import flipped_frequencies
 from cra_sym.claims import claim, modes, provenance_family
 from cra_sym.claims.family import common_scale
+from cra_sym.paper import joint
+from cra_sym.paper.oracles.flipped import flipped_frequencies
 
 ARM = cra.Arm.nominal()
 BARE = ARM.replace(m_e=0.0)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import cra_sym as cra
-from cra_sym.arm import boundaries, joint, parametric
-from cra_sym.arm.flipped import flipped_frequencies
+from cra_sym.analysis import boundaries
 from cra_sym.claims import claim, comparisons, ledger, modes, motions, responses, sensitivity, stability, zones
+from cra_sym.paper import joint, parametric
+from cra_sym.paper.oracles.flipped import flipped_frequencies
 
 ARM = cra.Arm.nominal()
 TURNS = {}

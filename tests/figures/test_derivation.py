@@ -2,8 +2,8 @@
 
 from matplotlib.text import Annotation
 
-from cra_sym.arm.equations import equations
 from cra_sym.figures.derivation import figure_derivation, layers
+from cra_sym.paper.equations import equations
 
 
 def test_sources_come_before_what_rests_on_them():

@@ -7,9 +7,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import cra_sym as cra
-from cra_sym.arm.flipped import flipped_frequencies
 from cra_sym.figures import FIGURES, STYLE
 from cra_sym.figures.modes import figure_3, figure_4, figure_mode_shapes
+from cra_sym.paper.oracles.flipped import flipped_frequencies
 
 ARM = cra.Arm.nominal()
 

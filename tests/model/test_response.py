@@ -8,9 +8,9 @@ import sympy as sp
 from scipy.signal import lsim
 
 import cra_sym as cra
-from cra_sym.arm.energy import lagrangian
 from cra_sym.arm.instance import model_values
 from cra_sym.model.values import Values
+from cra_sym.paper.energy import lagrangian
 from cra_sym.symbols import symbol
 
 x, t = sp.symbols("x t")

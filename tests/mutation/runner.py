@@ -22,7 +22,7 @@ from tests.mutation.mutants import Mutant, mutants
 from tests.mutation.watch import PACKAGE, rounds
 
 if TYPE_CHECKING:
-    from cra_sym.arm.equations import Equation
+    from cra_sym.paper.equations import Equation
 
 __all__ = ["Laboratory", "Verdict"]
 
@@ -30,7 +30,7 @@ LIKELY = 3
 SECONDS = {"arm": 90, "model": 90, "solvers": 30}  # of processor time; several times what the tests of a module need
 BYTES = 8 << 30
 _LIBRARIES = ("mpmath", "scipy.integrate", "scipy.linalg", "scipy.optimize", "scipy.special", "scipy.stats")
-_REGISTRY = "cra_sym.arm.equations"  # names the homes of the equations, and is the same whatever they hold
+_REGISTRY = "cra_sym.paper.equations"  # names the homes of the equations, and is the same whatever they hold
 _DERIVED = re.compile(r"cra_sym(\.\w+)+(?=:|$)")
 
 
@@ -213,8 +213,8 @@ def _isolate(seconds: int) -> None:
 def _replace(module: str, source: str, affected: frozenset[str]) -> None:
     """Put the mutant in the module's place and forget all that was made with the original."""
     import cra_sym
-    from cra_sym.arm import equations
     from cra_sym.kernels import derived, store
+    from cra_sym.paper import equations
 
     sys.meta_path.insert(0, _Finder(_dotted(module), source, _file(module)))
     original, read_text = derived._source_of, Path.read_text
@@ -261,7 +261,7 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
 
 
 def _equations() -> tuple[Equation, ...]:
-    from cra_sym.arm.equations import equations
+    from cra_sym.paper.equations import equations
 
     return equations(companions=True)
 

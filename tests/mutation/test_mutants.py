@@ -57,7 +57,7 @@ def test_signs_exponents_and_constants_change_one_at_a_time():
 
 def test_every_mutant_of_the_sections_differs_and_compiles():
     for name in ("energy", "limits"):
-        source = (ROOT / "cra_sym" / "arm" / f"{name}.py").read_text(encoding="utf-8")
+        source = (ROOT / "cra_sym" / "paper" / f"{name}.py").read_text(encoding="utf-8")
         found = tool.mutants(source)
         assert len(found) > 30
         for mutant in found:
@@ -126,7 +126,7 @@ def test_a_file_that_cannot_be_imported_is_noticed_and_a_name_that_has_gone_is_n
 
 def test_a_sample_of_a_section_is_caught(tmp_path):
     """The tool at work on mutants of one section, seeded, by the equations' own checks."""
-    command = [sys.executable, "-m", "tests.mutation", "arm/driven", "--checks", "--sample", "3"]
+    command = [sys.executable, "-m", "tests.mutation", "paper/driven", "--checks", "--sample", "3"]
     run = subprocess.run(
         [*command, "--seed", "2", "--results", str(tmp_path)], cwd=ROOT, capture_output=True, text=True
     )

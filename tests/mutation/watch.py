@@ -13,13 +13,13 @@ PACKAGE = Path(__file__).resolve().parents[2] / "cra_sym"
 
 #: Modules in which nothing stands for physics.
 EXEMPT = {
-    "arm/equations": "the registry of equations and how wide a printed line may be",
+    "paper/equations": "the registry of equations and how wide a printed line may be",
 }
 
 _LAWS = "tests/test_properties.py"
-_LAMBDA, _MODAL = "tests/arm/test_frequency_parameters.py", "tests/arm/test_modal_parameters.py"
+_LAMBDA, _MODAL = "tests/analysis/test_frequency_parameters.py", "tests/analysis/test_modal_parameters.py"
 _COUNTS = [
-    f"tests/arm/test_characteristic.py::test_count_{name}"
+    f"tests/model/test_characteristic.py::test_count_{name}"
     for name in ("steps_by_one_at_every_zero", "where_zeros_of_the_limits_are")
 ]
 _SEAMS = f"{_MODAL}::test_ranges_of_the_numbers_are_those_of_the_derivation"
@@ -44,7 +44,7 @@ _MODES = [
 
 
 def _stability(*names: str) -> list[str]:
-    return [f"tests/arm/test_stability.py::test_{name}" for name in names]
+    return [f"tests/analysis/test_stability.py::test_{name}" for name in names]
 
 
 _ZONES = _stability(
@@ -82,8 +82,8 @@ _STATICS = _stability(
     "the_statics_of_a_rigid_spring_do_not_mix_with_those_of_the_other",
     "rank_one_terms_make_up_springs_in_series_with_what_is_left_out",
 )
-_BORDERS = "tests/arm/test_boundaries.py"
-_LANES = ["tests/arm/test_templates.py"]
+_BORDERS = "tests/analysis/test_boundaries.py"
+_LANES = ["tests/model/test_templates.py"]
 _STIFFNESS = [
     [
         f"tests/solvers/test_stiffness.py::test_{name}"
@@ -148,65 +148,65 @@ _COUPLED = ["tests/solvers/test_coupled_modes.py"]
 _PHYSICS = [_FREQUENCIES, _MODES]
 
 _ROUNDS: dict[str, list[list[str]]] = {
-    "arm/analysis": [_MODES, [_MODAL, _LAMBDA]],
-    "arm/boundaries": [
+    "analysis/modes": [_MODES, [_MODAL, _LAMBDA]],
+    "analysis/boundaries": [
         [f"{_BORDERS}::test_a_difference_with_symmetric_coupling_has_no_border", *_ZONES[:1]],
         [*_FORCED, *_SUMMED, _BORDERS],
     ],
-    "arm/by_hand": [["tests/arm/test_by_hand.py"]],
-    "arm/characteristic": [_FREQUENCIES, _MODES, _DIGITS, ["tests/arm/test_characteristic.py", _SEAMS]],
-    "arm/driven": [["tests/arm/test_response.py"]],
-    "arm/edges": [
+    "paper/oracles/by_hand": [["tests/paper/oracles/test_by_hand.py"]],
+    "model/characteristic": [_FREQUENCIES, _MODES, _DIGITS, ["tests/model/test_characteristic.py", _SEAMS]],
+    "paper/driven": [["tests/analysis/test_responses.py"]],
+    "analysis/floquet_boundary": [
         [*_stability("the_search_finds_the_borders_of_what_grows"), *_ZONES[:1], *_SYSTEM[1:2]],
         [*_DAMPED, *_FEW_MODES[:1], *_ORDER],
     ],
-    "arm/energy": [["tests/arm/test_energy.py"], *_PHYSICS],
-    "arm/evaluation": [],
-    "arm/excitation": [
+    "paper/energy": [["tests/paper/test_energy.py"], *_PHYSICS],
+    "paper/evaluation": [],
+    "arm/excitations": [
         [*_ZONES[:3], *_FORCED, *_SYSTEM[:3]],
         [*_stability("excitations_compare_hash_and_pickle"), *_LOOPED, *_ORDER],
     ],
-    "arm/excited": [],
-    "arm/forced": [["tests/arm/test_frequency_response.py"]],
-    "arm/implicit": [["tests/arm/test_sensitivity.py"]],
-    "arm/joint": _PHYSICS,
-    "arm/limits": [],
-    "arm/modal": [
-        [*_MODES, f"{_MODAL}::test_a_textbook_cantilever", "tests/arm/test_sensitivity.py"],
-        [f"{_LANES[0]}::test_modes", "tests/arm/test_vibration_gradient.py", _MODAL],
+    "paper/excited": [],
+    "model/forced_waves": [["tests/analysis/test_frequency_response.py"]],
+    "paper/implicit": [["tests/analysis/test_sensitivities.py"]],
+    "paper/joint": _PHYSICS,
+    "paper/limits": [],
+    "model/modal": [
+        [*_MODES, f"{_MODAL}::test_a_textbook_cantilever", "tests/analysis/test_sensitivities.py"],
+        [f"{_LANES[0]}::test_modes", "tests/analysis/test_residual_gradient.py", _MODAL],
     ],
-    "arm/modal_dynamics": [],
-    "arm/modal_lanes": [
+    "paper/modal_dynamics": [],
+    "model/modal_lanes": [
         [f"{_LANES[0]}::test_{name}" for name in ("a_mode_that_needs_another_basis_than_those_beside_it", "modes")]
     ],
-    "arm/modal_sum": [["tests/arm/test_energy.py"]],
-    "arm/motion": [["tests/arm/test_motion.py"]],
-    "arm/orthogonality": [],
-    "arm/operators": [],
+    "paper/modal_sum": [["tests/paper/test_energy.py"]],
+    "paper/motion": [["tests/paper/test_motion.py"]],
+    "paper/orthogonality": [],
+    "paper/operators": [],
     "arm/parameters": [["tests/arm/test_parameters.py", f"{_LAWS}::test_damping_may_come_close_to_critical"]],
-    "arm/parametric": [["tests/arm/test_parametric.py"], _FORCED],
-    "arm/residual": [_STATICS, _SUMMED + _FEW_MODES, _LOOPED],
-    "arm/resonance": [],
-    "arm/sensitivity": [
-        ["tests/arm/test_sensitivity.py"],
-        [f"{_LAWS}::test_sensitivities_are_slopes_at_any_length", "tests/arm/test_vibration_gradient.py"],
+    "paper/parametric": [["tests/paper/test_parametric.py"], _FORCED],
+    "analysis/static_corrections": [_STATICS, _SUMMED + _FEW_MODES, _LOOPED],
+    "paper/resonance": [],
+    "analysis/sensitivities": [
+        ["tests/analysis/test_sensitivities.py"],
+        [f"{_LAWS}::test_sensitivities_are_slopes_at_any_length", "tests/analysis/test_residual_gradient.py"],
     ],
-    "arm/shapes": [_MODES, [_MODAL]],
-    "arm/shooting": [],
-    "arm/spectrum": [["tests/arm/test_spectrum.py", *_FREQUENCIES, _SEAMS], _DIGITS, _COUNTS, [_LAMBDA]],
-    "arm/stability": [[*_ZONES, *_FORCED, *_SYSTEM], [*_LOOPED, *_DOUBTS, *_FEW_MODES]],
-    "arm/zones": [[*_ZONES, *_SUMMED], [*_LOOPED, *_DAMPED, *_DOUBTS], _ORDER],
-    "model/oscillator": [["tests/model/test_oscillator.py"], ["tests/arm/test_response.py"]],
+    "model/shapes": [_MODES, [_MODAL]],
+    "paper/oracles/shooting": [],
+    "model/spectrum": [["tests/model/test_spectrum.py", *_FREQUENCIES, _SEAMS], _DIGITS, _COUNTS, [_LAMBDA]],
+    "analysis/stability": [[*_ZONES, *_FORCED, *_SYSTEM], [*_LOOPED, *_DOUBTS, *_FEW_MODES]],
+    "analysis/zones": [[*_ZONES, *_SUMMED], [*_LOOPED, *_DAMPED, *_DOUBTS], _ORDER],
+    "model/oscillator": [["tests/model/test_oscillator.py"], ["tests/analysis/test_responses.py"]],
     "solvers/floquet_lanes": [[f"{_LANES[0]}::test_floquet"]],
-    "solvers/certificates": [["tests/arm/test_certification.py"]],
+    "solvers/certificates": [["tests/analysis/test_certification.py"]],
     "solvers/coupled_modes": [_COUPLED],
-    "solvers/driven_modes": [_COUPLED, ["tests/arm/test_response.py"]],
+    "solvers/driven_modes": [_COUPLED, ["tests/analysis/test_responses.py"]],
     "solvers/eigenvalues": _STIFFNESS,
     "solvers/floquet": _FLOQUET,
     "solvers/hill": [_HILL],
     "solvers/modal_response": [
         ["tests/solvers/test_modal_response.py", *_COUPLED],
-        ["tests/arm/test_response.py"],
+        ["tests/analysis/test_responses.py"],
     ],
     "solvers/motion": [
         ["tests/solvers/test_motion.py", f"{_LAWS}::test_a_harmonic_of_no_size_or_speed_is_over_at_once"]

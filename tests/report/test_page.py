@@ -9,9 +9,9 @@ from itertools import pairwise
 import pytest
 
 import cra_sym as cra
-from cra_sym.arm.equations import Equation
 from cra_sym.claims import claim
 from cra_sym.figures import ANIMATIONS, FIGURES
+from cra_sym.paper.equations import Equation
 from cra_sym.report import page as page_module
 from cra_sym.report.notebooks import find_notebooks
 from cra_sym.report.page import write_page

@@ -4,9 +4,9 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from cra_sym.arm.equations import Equation
 from cra_sym.claims import claim
 from cra_sym.figures import FIGURES
+from cra_sym.paper.equations import Equation
 from cra_sym.report import run
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import cra_sym as cra
 from cra_sym.arm.instance import arm_model, model_values
-from cra_sym.arm.spectrum import ArmCharacteristic
+from cra_sym.model.spectrum import ArmCharacteristic
 from cra_sym.model.values import Values
 from cra_sym.solvers.spectrum import Characteristic, _quarters, spectrum
 

@@ -1,0 +1,1 @@
+"""What can be asked of any System: one module a question."""

@@ -1,0 +1,136 @@
+"""Stability boundaries as kernels: what multiple scales derive for each kind of resonance, in plain symbols.
+
+``half_width_sum_1``, ``shift_sum_1``, ``damped_shift_sum_1``, ``sums_sum_1`` and so on, for each kind and tongue, take
+nothing and return ``(expressions, arguments)`` for :func:`cra_sym.kernels.derived_kernel`.
+"""
+
+from __future__ import annotations
+
+from functools import cache, partial
+from typing import Any
+
+from sympy import Dummy, Expr, I, IndexedBase, S, Symbol, expand, series, sin
+
+from cra_sym.mechanics import MultipleScales, multiple_scales
+from cra_sym.mechanics.two_scales import EPSILON
+from cra_sym.symbols import symbol
+
+__all__ = ["general_resonance"]
+
+OMEGA, P, ZETA, SLOPE = (IndexedBase(name, real=True) for name in ("omega", "P", "zeta", "dP"))
+m, n, j = (Symbol(name, integer=True, positive=True) for name in "mnj")
+_ASSUMED = ((OMEGA, {"positive": True}), (P, {"real": True}), (SLOPE, {"real": True}), (ZETA, {"nonnegative": True}))
+_ABOUT = {"principal": (n, n), "sum": (m, n), "difference": (m, -n)}
+#: The product P_rj P_jt of the couplings that lead through a spectator mode j, and its frequency.
+PATH, OMEGA_J, SOFTNESS = Symbol("path", real=True), Symbol("omega_j", positive=True), Symbol("y", positive=True)
+
+
+@cache
+def general_resonance(kind: str, order: int, *, damped: bool = True, tongue: int = 1) -> MultipleScales:
+    """Return multiple scales at one kind of resonance between modes m and n of any number of modes."""
+    damping = ZETA if damped else None
+    return multiple_scales(OMEGA, P, _ABOUT[kind], order=order, damping=damping, coupling_slope=SLOPE, tongue=tongue)
+
+
+def plain(expression: Expr) -> Expr:
+    """Return an expression with its indexed quantities as symbols: ``omega[n]`` becomes ``omega_n``."""
+    names = {}
+    for base, assumptions in _ASSUMED:
+        for entry in (e for e in expression.atoms(type(base[m])) if e.base == base):
+            name = f"{base.label}_" + "".join(str(index) for index in entry.indices)
+            names[entry] = Symbol(name, **assumptions)
+    return expression.xreplace(names)
+
+
+def _half_width(kind: str, damped: bool, tongue: int) -> tuple[Expr, tuple[Symbol, ...]]:
+    """Return half the width of a zone, from the first order at which there is one."""
+    border = general_resonance(kind, tongue, damped=damped, tongue=tongue).border
+    assert border is not None
+    return _in_order(kind, plain(border.half_width))
+
+
+def _shift(kind: str, damped: bool, tongue: int) -> tuple[Expr, tuple[Symbol, ...]]:
+    """Return how far the second order moves the zone."""
+    border = general_resonance(kind, 2, damped=damped, tongue=tongue).border
+    assert border is not None
+    return _in_order(kind, plain(border.centre))
+
+
+def _in_order(kind: str, expression: Expr) -> tuple[Expr, tuple[Symbol, ...]]:
+    """Return an expression and the arguments of the kernels of its kind."""
+    labels = "n" if kind == "principal" else "mn"
+    names = [f"omega_{i}" for i in labels]
+    names += [f"P_{i}{k}" for i in labels for k in labels] + [f"dP_{i}{k}" for i in labels for k in labels]
+    names += [f"S_{i}" for i in labels]
+    names += [f"W_{i}{k}" for i in labels for k in labels if kind == "principal" or i != k]
+    names += ["epsilon", *(f"c_{i}" for i in labels)]
+    known = {s.name: s for s in expression.free_symbols}
+    return expression, tuple(known.get(name, Symbol(name, real=True)) for name in names)
+
+
+def _sums(kind: str, tongue: int = 1) -> tuple[dict[str, dict[str, Expr]], tuple[Symbol, ...]]:
+    """Return each sum over modes: the resonant modes' share, a spectator's, and how the latter falls off with omega_j.
+
+    ``tail`` and ``tail_2`` are the coefficients of path / omega_j^2 and path / omega_j^4 for a fast spectator.
+    """
+    labels = "n" if kind == "principal" else "mn"
+    expressions = {}
+    for s in general_resonance(kind, 2, damped=False, tongue=tongue).sums:
+        row, target = ({"m": m, "n": n}[s.symbol.name[k]] for k in (2, -1))
+        share = plain(s.spectator.xreplace({P[row, j]: PATH, P[j, target]: S.One}))
+        far = series(share.subs(OMEGA_J**2, 1 / SOFTNESS), SOFTNESS, 0, 3)
+        expressions[s.symbol.name] = {
+            "resonant": plain(s.resonant),
+            "spectator": share,
+            "tail": expand(far.coeff(SOFTNESS, 1) / PATH),
+            "tail_2": expand(far.coeff(SOFTNESS, 2) / PATH),
+        }
+    names = [*(f"omega_{i}" for i in labels), *(f"P_{i}{k}" for i in labels for k in labels)]
+    known = {s.name: s for table in expressions.values() for e in table.values() for s in e.free_symbols}
+    return expressions, (*(known.get(name, Symbol(name, real=True)) for name in names), OMEGA_J, PATH)
+
+
+def forced_growth() -> tuple[Expr, tuple[Symbol, ...]]:
+    """Return the rate at which a transverse base of unit epsilon makes the tip's amplitude grow at resonance n."""
+    response = forced_resonance().response
+    assert response is not None
+    omega, gamma, mass, w_1 = (symbol(name) for name in ("omega_n", "Gamma_n", "M_n", "w_1"))
+    tip = Symbol("phi_L", real=True)
+    return plain(response.growth) / EPSILON * abs(tip), (omega, gamma, tip, mass, w_1)
+
+
+@cache
+def forced_resonance() -> MultipleScales:
+    """Return multiple scales for the dynamic equation (11) with a base that shakes across the arm at resonance n."""
+    from cra_sym.paper.modal_dynamics import dynamic_equation
+    from cra_sym.paper.parametric import TRANSVERSE, t, varpi, w
+
+    named = {symbol(f"{name}_i"): symbol(f"{name}_n") for name in ("Gamma", "M", "omega", "zeta")}
+    force = (dynamic_equation().rhs / symbol("M_i")).subs(w, TRANSVERSE).doit().xreplace(named)
+    swing = Dummy("swing")
+    shaken = force.subs(sin(varpi * t), swing)
+    if shaken.has(t) or shaken.subs(swing, 0) != 0:
+        raise ArithmeticError(f"the force is not in phase with the base: {force}")
+    # sin = Re(-i exp(i varpi t)), and the excitation sits at the resonance
+    strength = (shaken / swing / EPSILON).subs(varpi, symbol("omega_n"))
+    return multiple_scales(OMEGA, None, n, forcing={n: -I * strength.subs(symbol("omega_n"), OMEGA[n])})
+
+
+_KERNELS = {
+    name: made
+    for kind in _ABOUT
+    for tongue in (1, 2)
+    for name, made in (
+        (f"half_width_{kind}_{tongue}", partial(_half_width, kind, False, tongue)),
+        (f"damped_half_width_{kind}_{tongue}", partial(_half_width, kind, True, tongue)),
+        (f"shift_{kind}_{tongue}", partial(_shift, kind, False, tongue)),
+        (f"damped_shift_{kind}_{tongue}", partial(_shift, kind, True, tongue)),
+        (f"sums_{kind}_{tongue}", partial(_sums, kind, tongue)),
+    )
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _KERNELS:
+        return _KERNELS[name]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

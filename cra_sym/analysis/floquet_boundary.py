@@ -1,0 +1,75 @@
+"""Borders of a zone of instability found by Floquet theory alone: the truth that boundaries are compared with."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+
+from cra_sym.analysis.stability import AsymptoticWarning, growth_rate, stability_boundary
+from cra_sym.arm.excitations import JointStiffness
+from cra_sym.arm.parameters import Arm
+
+__all__ = ["floquet_boundary"]
+
+
+def floquet_boundary(
+    arm: Arm,
+    excitation: Any,
+    epsilon: float,
+    resonance: tuple[int, int] = (1, 1),
+    modes: int | None = None,
+    *,
+    residual: bool | None = None,
+) -> tuple[float, float]:
+    """Return the excitation frequencies between which the vibration grows, from Floquet multipliers.
+
+    The search starts in the middle of the zone that multiple scales give and goes outwards until nothing grows.
+
+    Parameters
+    ----------
+    arm, excitation
+        One arm and one excitation, no batch.
+    epsilon : float
+        Positive.
+    resonance : (int, int)
+        As in :func:`cra_sym.stability_boundary`.
+    modes : int, optional
+        How many modes move, by default five more than the highest that takes part.
+    residual : bool, optional
+        Whether the others are kept by their statics, by default for a fluctuating joint.
+
+    Returns
+    -------
+    lower, upper : float
+        rad/s.
+
+    Raises
+    ------
+    ValueError
+        If nothing grows in the middle of the zone, or it merges with another.
+    """
+    highest = max(map(abs, resonance))
+    modes = highest + 5 if modes is None else modes
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AsymptoticWarning)
+        sides = stability_boundary(arm, excitation, epsilon, resonance, order=2, modes=highest)
+    middle, half = np.mean(sides), np.ptp(sides) / 2
+    residual = isinstance(excitation, JointStiffness) if residual is None else residual
+
+    inside, outside = np.full(2, middle), middle + 2.0 * half * np.array([-1.0, 1.0])
+    for _ in range(5):  # 16 times closer each
+        grid = np.linspace(inside, outside, 17, axis=-1)
+        growing = growth_rate(arm, excitation, grid, epsilon, modes, residual=residual) > 1e-5 * half
+        if growing.all(axis=-1).any() or not growing[:, 0].all():
+            where = (
+                "beyond the zone: it merges with another"
+                if growing[:, 0].all()
+                else "nowhere in the middle of the zone"
+            )
+            raise ValueError(f"resonance = {resonance!r}: growth {where}")
+        first_still = np.argmin(growing, axis=-1)[:, None]
+        inside, outside = (np.take_along_axis(grid, first_still - back, axis=-1)[:, 0] for back in (1, 0))
+    lower, upper = (inside + outside) / 2
+    return float(lower), float(upper)

@@ -1,0 +1,106 @@
+"""The motion of the base and the response to it: equations (33) and (34)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mpmath
+from sympy import Add, Eq, Expr, I, Integral, Rational, cos, expand_mul, lambdify, pi, sin, sinc
+from sympy.simplify.fu import TR8
+
+from cra_sym.model.oscillator import unit_responses
+from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.modal_dynamics import duhamel, dynamic_equation
+from cra_sym.symbols import dimension, symbol
+
+__all__ = ["base_motion", "modal_response"]
+
+t, tau, w, q_i = (symbol(name) for name in ("t", "tau", "w", "q_i"))
+v_m, a_m, B, varpi, psi = (symbol(name) for name in ("v_m", "a_m", "B", "varpi", "psi"))
+omega_i, zeta_i, Gamma_i, M_i = (symbol(name) for name in ("omega_i", "zeta_i", "Gamma_i", "M_i"))
+
+
+@numbered(33, "motion of the driving base", "assumption")
+def base_motion() -> Eq:
+    """A mean motion, of constant velocity or constant acceleration, and a harmonic disturbance. Several harmonics add
+    up; the phase of each matters, the constant it adds to the displacement does not."""
+    return Eq(w, v_m * t + a_m * t**2 / 2 + B * sin(varpi * t + psi))
+
+
+@proves(33)
+def _() -> Proof:
+    """Dimensions; without disturbance the motion starts at zero with the mean velocity and the mean acceleration; the
+    disturbance alone is a free vibration of angular frequency varpi, largest B."""
+    mean, alone = base_motion().rhs.subs(B, 0), base_motion().rhs.subs({v_m: 0, a_m: 0})
+    yield dimension(base_motion()) == dimension("w")
+    yield base_motion().rhs - mean - alone
+    for order, start in enumerate((0, v_m, a_m, 0)):
+        yield mean.diff(t, order).subs(t, 0) - start
+    yield alone.diff(t, 2) + varpi**2 * alone
+    yield alone.subs({t: 0, psi: pi / 2}) - B
+    yield alone.subs({t: 0, psi: 0})
+
+
+def _integral_of_cosine(phase: Expr) -> Expr:
+    """Return the integral of the cosine of a phase linear in tau over (0, t): t sinc(half the change) cos(its middle).
+
+    Entire in the rate of the phase: at rate zero it is the secular term t cos(phase).
+    """
+    change = phase.coeff(tau) * t
+    return t * sinc(change / 2) * cos((phase.subs(tau, 0) + change / 2).expand())
+
+
+@numbered(34, "response of a mode", "derived", (12, 33))
+def modal_response() -> Eq:
+    """(33) in (12), with an arm at rest before the base starts: v(x, 0) = 0 and y'(x, 0) = 0, so that a base that
+    starts with a velocity strikes the arm. Undamped; where varpi meets omega_i, sinc(0) = 1 leaves the secular
+    term."""
+    moved = base_motion().rhs
+    strike = (-Gamma_i / M_i * moved.diff(t)).subs(t, 0)
+    solution = duhamel().rhs.subs({q_i.diff(t).subs(t, 0): strike, q_i.subs(t, 0): 0})
+    (integral,) = solution.atoms(Integral)
+    shape = integral.function.subs(w.subs(t, tau).diff(tau, 2), moved.diff(t, 2).subs(t, tau))
+    sums = TR8(shape.expand()).expand().replace(sin, lambda phase: cos((phase - pi / 2).expand(), evaluate=False))
+    total = Add(*(_integrated(term) for term in Add.make_args(sums)))
+    terms = Add.make_args(solution.subs(integral, total))
+    return Eq(q_i, Add(*(expand_mul(term, deep=False) for term in terms)))
+
+
+def _integrated(term: Expr) -> Expr:
+    factor, wave = term.as_independent(tau)
+    return factor * _integral_of_cosine(wave.args[0].expand())
+
+
+@proves(34)
+def _() -> Proof:
+    """It solves (11) with the motion (33), starts undisplaced, and starts with the speed that leaves the arm at rest:
+    where varpi is not omega_i, and since both sides are entire in varpi, where it is."""
+    plain = modal_response().rhs.replace(sinc, lambda angle: sin(angle) / angle)
+    equation = (dynamic_equation().lhs - dynamic_equation().rhs).subs({zeta_i: 0, q_i: plain, w: base_motion().rhs})
+    strike = -Gamma_i / M_i * base_motion().rhs.diff(t)
+    yield modal_response().lhs == q_i
+    yield equation.doit()
+    yield plain.subs(t, 0)
+    yield (plain.diff(t) - strike).subs(t, 0)
+
+
+@samples(34)
+def _() -> bool:
+    """Another derivation, by divided differences of the exponential function: the unit responses of
+    :mod:`cra_sym.model.oscillator` without damping, away from resonance, near it and at it."""
+    unit, push, start = unit_responses(), -Gamma_i / M_i, base_motion().rhs.diff(t).subs(t, 0)
+    wave = unit.harmonic * (cos(psi) + I * sin(psi))
+    numbers = {v_m: 0.3, a_m: -0.7, B: 0.05, psi: 0.9, Gamma_i: 0.4, M_i: 1.3, omega_i: 2, zeta_i: 0}
+    numbers = {name: Rational(str(value)) for name, value in numbers.items()}
+    with mpmath.workdps(40):
+        for rate in (Rational(7, 3), 2 + Rational(1, 10**9), Rational(2)):
+            parts = (modal_response().rhs, start * unit.impulse + a_m * unit.step, wave, push * B * varpi**2, push)
+            found, plain, swing, weight, factor = (_function(part.subs(numbers | {varpi: rate})) for part in parts)
+            gap = found(3) - factor(3) * plain(3) + weight(3) * mpmath.im(swing(3))
+            if abs(gap) > 1e-20:
+                return False
+    return True
+
+
+def _function(expression: Expr) -> Any:
+    return lambdify(t, expression, "mpmath")

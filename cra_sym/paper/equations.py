@@ -1,0 +1,273 @@
+"""The paper's numbered equations: one registry, filled by the sections' modules, each equation built on first use.
+
+A section's module writes one small function an equation, and one each for a proof and for a trial in numbers::
+
+    @numbered(1, "displacement", "definition")
+    def displacement():
+        '''The statement, in words.'''
+        return Eq(y, w + v)
+
+    @proves(1)
+    def _():
+        '''The independent route, in words.'''
+        yield displacement().rhs.subs(v, 0) - w
+
+    @samples(1)
+    def _():
+        '''The independent route, in words.'''
+        return isclose(...)
+
+A proof yields what has to vanish, and :func:`cra_sym.mechanics.identities.vanishes` decides: that an equation is proved
+is its answer, not the author's.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import import_module
+from operator import index
+from typing import Any, Literal
+
+from cra_sym.checks import shown
+
+__all__ = ["Equation", "Proof", "equation", "equations", "numbered", "proves", "samples"]
+
+Number = int | str
+Kind = Literal["definition", "assumption", "derived"]
+Evidence = Literal["proved", "sampled"]
+#: What a proof yields: expressions that vanish identically, and truths without numbers, such as equal dimensions.
+Proof = Iterator[Any]
+
+#: Section of the package that builds each equation; a new section adds a line here.
+_HOMES: dict[str, range] = {
+    "cra_sym.paper.energy": range(1, 8),
+    "cra_sym.paper.motion": range(8, 11),
+    "cra_sym.paper.modal_dynamics": range(11, 14),
+    "cra_sym.paper.joint": range(14, 17),
+    "cra_sym.paper.orthogonality": range(16, 17),
+    "cra_sym.paper.modes": range(17, 27),
+    "cra_sym.paper.limits": range(27, 31),
+    "cra_sym.paper.implicit": range(31, 33),
+    "cra_sym.paper.driven": range(33, 35),
+    "cra_sym.paper.excited": range(35, 37),
+    "cra_sym.paper.resonance": range(37, 50),
+}
+
+_EQUATIONS: dict[Number, Equation] = {}
+_PROOFS: dict[Number, Callable[[], Proof]] = {}
+_SAMPLES: dict[Number, Callable[[], bool]] = {}
+
+
+@dataclass(frozen=True, repr=False)
+class Equation:
+    """One numbered equation of the paper.
+
+    Attributes
+    ----------
+    number : int or str
+        The paper's number; a letter marks a companion the paper does not have, such as ``"11a"``.
+    title, statement : str
+        What the equation is, in a few words and in a sentence.
+    kind : {"definition", "assumption", "derived"}
+    derived_from : tuple
+        Numbers of the equations this one rests upon.
+    source : str
+        Where it is built, ``"module:function"``.
+    """
+
+    number: Number
+    title: str
+    kind: Kind
+    derived_from: tuple[Number, ...]
+    statement: str
+    source: str
+    _build: Callable[[], Any] = field(compare=False)
+    _shown: Callable[[], Any] | None = field(default=None, compare=False)
+
+    @property
+    def expression(self) -> Any:
+        """The SymPy equation, or a tuple of them; derived on first use."""
+        return self._build()
+
+    @property
+    def shown(self) -> Any:
+        """What is displayed: the expression or, where that fills a page, the same in terms of its sources."""
+        return self.expression if self._shown is None else self._shown()
+
+    @property
+    def checked_by(self) -> str:
+        """The independent routes :meth:`check` takes, in words."""
+        exact = "Proved" if self.kind == "derived" else "Exact"
+        routes: dict[str, dict[Number, Callable]] = {exact: _PROOFS, "Sampled": _SAMPLES}
+        return " ".join(f"{how}: {_text(of[self.number])}" for how, of in routes.items() if self.number in of)
+
+    @property
+    def evidence(self) -> Evidence:
+        """Whether :meth:`check` proves exact identities, or only samples numbers because nothing exact is at hand.
+
+        Of a definition or an assumption it is what has to follow from it that is proved.
+        """
+        return "proved" if self.number in _PROOFS else "sampled"
+
+    def check(self) -> bool:
+        """Tell whether the independent routes confirm the equation: the proof if there is one, then the numbers.
+
+        Raises
+        ------
+        NotImplementedError
+            If there is neither.
+        """
+        if self.number not in _PROOFS and self.number not in _SAMPLES:
+            raise NotImplementedError(f"equation ({self.number}) has no check")
+        return self.prove() is not False and bool(_SAMPLES.get(self.number, lambda: True)())
+
+    def prove(self) -> bool | None:
+        """Tell whether the proof holds, without a number drawn or rounded; None if there is no proof."""
+        if self.number not in _PROOFS:
+            return None
+        return all(map(_decide, _PROOFS[self.number]()))
+
+    def __repr__(self) -> str:
+        return f"Equation ({self.number}), {self.title}"
+
+    def _formula(self) -> str:
+        parts = self.shown if isinstance(self.shown, tuple) else (self.shown,)
+        body = r" \\[4pt] ".join(map(_typeset, parts))
+        return rf"\begin{{gathered}} {body} \end{{gathered}} \qquad ({self.number})"
+
+    def _repr_latex_(self) -> str:
+        return rf"$\displaystyle {self._formula()}$"
+
+    def _repr_markdown_(self) -> str:
+        sources = ", ".join(f"({number})" for number in self.derived_from)
+        origin = f"{self.kind} from {sources}" if sources else self.kind
+        return f"**({self.number}) {self.title}**, {origin}. {self.statement}\n\n$${self._formula()}$$"
+
+
+def _typeset(part: Any, width: int = 260) -> str:
+    """Return the LaTeX of an equation; a long sum is broken, one term a line."""
+    from sympy import Add
+
+    from cra_sym.mechanics.steps import compact_latex
+
+    whole = compact_latex(part)
+    longest = max(part.args, key=lambda side: len(compact_latex(side)), default=part)
+    if len(whole) < width or not isinstance(longest, Add):
+        return whole
+    terms = [compact_latex(term) for term in longest.as_ordered_terms()]
+    lines = r" \\ &".join([terms[0], *(term if term.startswith("-") else f"+ {term}" for term in terms[1:])])
+    left, right = part.args
+    head, tail = ("", f" = {compact_latex(right)}") if longest is left else (f"{compact_latex(left)} = ", "")
+    return rf"\begin{{aligned}} {head}&{lines}{tail} \end{{aligned}}"
+
+
+def _text(function: Callable) -> str:
+    return " ".join((inspect.getdoc(function) or "").split())
+
+
+def _decide(part: Any) -> bool:
+    """Decide one part of a proof."""
+    from cra_sym.mechanics.identities import vanishes
+
+    return part if isinstance(part, bool) else vanishes(part)
+
+
+def numbered(
+    number: Number,
+    title: str,
+    kind: Kind,
+    derived_from: tuple[Number, ...] = (),
+    shown: Callable[[], Any] | None = None,
+) -> Callable:
+    """Register the decorated function, whose docstring is the statement, as the builder of an equation.
+
+    ``shown`` builds what is displayed in place of an expression that fills a page.
+    """
+
+    def register(function: Callable[[], Any]) -> Callable[[], Any]:
+        source = f"{function.__module__}:{function.__qualname__}"
+        if number in _EQUATIONS and _EQUATIONS[number].source != source:
+            raise ValueError(f"equation ({number}) is already built by {_EQUATIONS[number].source}")
+        build = cache(function)
+        _EQUATIONS[number] = Equation(number, title, kind, derived_from, _text(function), source, build, shown)
+        return build
+
+    return register
+
+
+def proves(number: Number) -> Callable:
+    """Register the decorated generator, whose docstring names the route, as the proof of an equation."""
+    return _registered(_PROOFS, number)
+
+
+def samples(number: Number) -> Callable:
+    """Register the decorated function, whose docstring names the route, as the trial of an equation in numbers."""
+    return _registered(_SAMPLES, number)
+
+
+def _registered(routes: dict[Number, Callable], number: Number) -> Callable:
+    def register(function: Callable) -> Callable:
+        routes[number] = function
+        return function
+
+    return register
+
+
+def _order(number: Number) -> tuple[int, str]:
+    text = str(number)
+    digits = text.rstrip("abcdefghijklmnopqrstuvwxyz")
+    return int(digits), text[len(digits) :]
+
+
+def equation(number: Number) -> Equation:
+    """Return the paper's equation ``number``, such as ``23``, or a companion such as ``"11a"``.
+
+    Raises
+    ------
+    TypeError
+        If ``number`` is neither an integer nor a string.
+    ValueError
+        If there is no such equation.
+
+    Examples
+    --------
+    >>> from cra_sym import equation
+    >>> equation(1)
+    Equation (1), displacement
+    >>> equation(1).expression
+    Eq(y(x, t), v(x, t) + w(t))
+    >>> equation(1).kind, equation(5).derived_from
+    ('definition', (2, 3, 4, 6, '16c'))
+    """
+    if isinstance(number, bool):
+        raise TypeError(f"number = {number}: allowed are integers, or strings such as '11a'")
+    if not isinstance(number, str):
+        try:
+            number = index(number)
+        except TypeError:
+            raise TypeError(f"number = {shown(number)}: allowed are integers, or strings such as '11a'") from None
+    elif number.isdecimal():
+        number = int(number)
+    if number not in _EQUATIONS:
+        _load()
+    try:
+        return _EQUATIONS[number]
+    except KeyError:
+        companions = [key for key in _EQUATIONS if isinstance(key, str)]
+        whole = [key for key in _EQUATIONS if isinstance(key, int)]
+        also = f", and {', '.join(map(repr, sorted(companions, key=_order)))}" if companions else ""
+        raise ValueError(f"number = {shown(number)}: allowed are {min(whole)} to {max(whole)}{also}") from None
+
+
+def equations(*, companions: bool = False) -> tuple[Equation, ...]:
+    """Return all equations in the paper's order; with ``companions``, also those the paper does not number."""
+    _load()
+    return tuple(_EQUATIONS[key] for key in sorted(_EQUATIONS, key=_order) if companions or isinstance(key, int))
+
+
+def _load() -> None:
+    for module in _HOMES:
+        import_module(module)

@@ -1,0 +1,174 @@
+"""The disturbed base and what it excites: equations (35) and (36).
+
+What (35) leads to is no parametric system: in linear theory a base that moves across the arm only forces it. Numbers
+with a letter supply two excitations that are parametric: the same disturbance along the arm, and a fluctuating joint.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from sympy import Eq, Integral, cos, sin
+
+from cra_sym.paper.energy import potential_energy, single_mode, x
+from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.evaluation import at, evaluate, termwise, virtual_factors
+from cra_sym.paper.modal_dynamics import dynamic_equation
+from cra_sym.paper.oracles.shooting import integrate, sample, shoot
+from cra_sym.paper.parametric import AXIAL, TRANSVERSE, coupling, excited_lagrangian, phi_i, phi_j, t, u, w
+from cra_sym.symbols import Dimension, dimension, symbol
+
+__all__: list[str] = []
+
+epsilon, varpi, P_ij, w_0, w_1, u_0 = (symbol(n) for n in ("epsilon", "varpi", "P_ij", "w_0", "w_1", "u_0"))
+
+
+@numbered(35, "disturbed base", "assumption")
+def disturbed_base() -> Eq:
+    """A small harmonic motion of the driving base about a constant mean, across the arm."""
+    return Eq(w, TRANSVERSE)
+
+
+@proves(35)
+def _() -> Proof:
+    """A length; it starts at w_0 with the speed epsilon w_1 varpi and swings about w_0 with angular frequency varpi."""
+    motion = disturbed_base().rhs
+    yield dimension(disturbed_base()) == Dimension(m=1)
+    yield motion.subs(t, 0) - w_0
+    yield motion.diff(t).subs(t, 0) - epsilon * w_1 * varpi
+    yield motion.diff(t, 2) + varpi**2 * (motion - w_0)
+
+
+@numbered("35a", "base disturbed along the arm", "assumption")
+def axial_base() -> Eq:
+    """The same disturbance in the direction of the manipulator."""
+    return Eq(u, AXIAL)
+
+
+@proves("35a")
+def _() -> Proof:
+    """A length; it starts at rest, epsilon u_0 away, and swings about zero with angular frequency varpi."""
+    motion = axial_base().rhs
+    yield dimension(axial_base()) == Dimension(m=1)
+    yield motion.subs(t, 0) - epsilon * u_0
+    yield motion.diff(t).subs(t, 0)
+    yield motion.diff(t, 2) + varpi**2 * motion
+
+
+@numbered("35b", "fluctuating joint", "assumption", (4,))
+def fluctuating_joint() -> Eq:
+    """The preload of the bolts fluctuates, and both stiffnesses of the joint with it: the energy of the joint."""
+    return Eq(symbol("U"), -at(excited_lagrangian("joint stiffness").left, 0))
+
+
+@proves("35b")
+def _() -> Proof:
+    """An energy: that of the springs of (4), which swings about its mean by epsilon of it, with angular frequency
+    varpi."""
+    beam, full = (e.rhs for e in potential_energy())
+    yield dimension(fluctuating_joint()) == dimension("U")
+    yield fluctuating_joint().rhs - (full - beam) * (1 + epsilon * cos(varpi * t))
+
+
+@numbered(36, "excited system", "derived", (11, 35))
+def excited_system() -> Eq:
+    """(35) in (11). The disturbance stands on the right only: no coefficient of the unknown depends on time, so this
+    is a forced system and not, as the paper says, a parametric one."""
+    return dynamic_equation().subs(w, TRANSVERSE).doit()
+
+
+@proves(36)
+def _() -> Proof:
+    """Equation (11) on the left, whose coefficients do not depend on time, and on the right -Gamma_i times the
+    acceleration of (35)."""
+    equation, q = excited_system(), symbol("q_i")
+    yield not any(equation.lhs.diff(q.diff(t, k) if k else q).has(t) for k in range(3))
+    yield equation.lhs - dynamic_equation().lhs
+    yield equation.rhs - symbol("Gamma_i") * epsilon * w_1 * varpi**2 * sin(varpi * t)
+
+
+@samples(36)
+def _() -> bool:
+    """The work of the inertia forces of a random arm, carried rigidly by the base, on modes found by shooting."""
+    values, equation = sample(36), excited_system()
+    length, instant = values["L"], {t: 0.37, varpi: 2.1, w_1: 0.6, epsilon: 0.01}
+    acceleration = float(disturbed_base().rhs.diff(t, 2).subs(instant))
+    for mode in shoot(values):
+        line = integrate(lambda p, mode=mode: values["rho"] * values["A"] * mode(p), length)
+        gamma = line + values["m_e"] * mode(length)
+        force = equation.rhs.subs(symbol("Gamma_i"), gamma).subs(instant)
+        if abs(float(force) + gamma * acceleration) > 1e-9 * abs(gamma):
+            return False
+    return True
+
+
+@numbered("36a", "coupling by the fluctuating joint", "derived", ("35b", 7))
+def joint_coupling() -> Eq:
+    """Two modes in the Lagrangian's share of epsilon cos(varpi t), for modes of unit generalised mass. The stiffness
+    of the modes varies in time: genuinely parametric."""
+    return Eq(P_ij, coupling("joint stiffness"), evaluate=False)
+
+
+@numbered("36b", "coupling by the base disturbed along the arm", "derived", ("35a", 7))
+def axial_coupling() -> Eq:
+    """A bent manipulator is shorter, and its foreshortening feels the axial inertia. It grows with varpi^2."""
+    return Eq(P_ij, coupling("axial base"), evaluate=False)
+
+
+@proves("36a")
+def _() -> Proof:
+    """The energy (35b) of two modes, differentiated by both coordinates and by the fluctuation: the work of the extra
+    spring forces of one on the other."""
+    q_i, q_j, swing = symbol("q_i"), symbol("q_j"), epsilon * cos(varpi * t)
+    energy = single_mode(fluctuating_joint().rhs, phi_i * q_i + phi_j * q_j)
+    yield energy.diff(q_i).diff(q_j).diff(epsilon) * epsilon / swing - joint_coupling().rhs
+    yield joint_coupling().lhs == P_ij
+
+
+@samples("36a")
+def _() -> bool:
+    """The work of the two extra spring forces of a mode found by shooting on another."""
+    values = sample(361)
+    first, second = shoot(values)[:2]
+    work = values["k_t"] * first(0.0) * second(0.0) + values["k_r"] * first(0.0, 1) * second(0.0, 1)
+    found = evaluate(joint_coupling().rhs, values, {phi_i: first, phi_j: second})
+    return bool(abs(found / work - 1) < 1e-10)
+
+
+@proves("36b")
+def _() -> Proof:
+    """The axial momentum of a bent arm: the foreshortening of every point, whose slope is the product of the slopes of
+    the two modes, grows from the joint on and carries the masses of manipulator and end-effector."""
+    shortening, (rho, A, L, m_e) = symbol("eta"), (symbol(name) for name in ("rho", "A", "L", "m_e"))
+    momentum = Integral(rho * A * shortening, (x, 0, L)) + at(m_e * shortening, L)
+    found = axial_coupling().rhs / (u_0 * varpi**2)
+    found = found.xreplace({phi_i.diff(x): shortening.diff(x) / phi_j.diff(x)})
+    along, _, *others = virtual_factors(termwise(found) - momentum, shortening)
+    yield axial_coupling().lhs == P_ij
+    yield along
+    yield from others
+
+
+@samples("36b")
+def _() -> bool:
+    """The axial momentum of a bent arm, with the foreshortening of every point by its own quadrature from
+    the joint on, its second derivative by two modes found by shooting."""
+    values = sample(362)
+    first, second = shoot(values)[:2]
+    length, line_mass = values["L"], values["rho"] * values["A"]
+
+    def shortening(place: Any, a: float, b: float) -> Any:
+        shares = [
+            integrate(lambda p, end=end: (a * first(p, 1) + b * second(p, 1)) ** 2 / 2, end) for end in np.ravel(place)
+        ]
+        return np.reshape(shares, np.shape(place))
+
+    def moment(a: float, b: float) -> float:
+        line = integrate(lambda p: line_mass * shortening(p, a, b), length)
+        return line + values["m_e"] * float(shortening(length, a, b))
+
+    mixed = (moment(1, 1) - moment(1, -1) - moment(-1, 1) + moment(-1, -1)) / 4
+    numbers = values | {"u_0": 0.3, "varpi": 1.7}
+    found = evaluate(axial_coupling().rhs, numbers, {phi_i: first, phi_j: second})
+    return bool(abs(found / (0.3 * 1.7**2 * mixed) - 1) < 1e-9)

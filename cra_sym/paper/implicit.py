@@ -1,0 +1,162 @@
+"""Sensitivities by implicit differentiation of the frequency equation: equations (31) and (32)."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import sympy as sp
+
+from cra_sym.paper.energy import modal_numbers
+from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.limits import natural_frequency
+from cra_sym.paper.modes import frequency_function, group_numbers
+from cra_sym.paper.oracles import by_hand
+from cra_sym.paper.oracles.shooting import sample, shoot
+from cra_sym.symbols import symbol
+
+__all__ = ["frequency_sensitivities", "group_exponents", "implicit_derivatives", "sensitivity_function"]
+
+lamda, L, E, I_z = (symbol(name) for name in ("lamda", "L", "E", "I_z"))
+_PAIRS = {name: tuple(symbol(f"{letter}_{name}") for letter in ("s", "c")) for name in ("t", "r")}
+
+
+@numbered(31, "sensitivity function", "derived", (23,))
+def sensitivity_function() -> sp.Eq:
+    """Along a root λ(κ) the frequency equation Δ(λ, κ) = 0 stays satisfied as a stiffness changes: the total
+    derivative of Δ vanishes."""
+    kappa = symbol("kappa_t")
+    slope = sp.idiff(sp.Function("Delta")(lamda, kappa), lamda, kappa).doit()
+    return sp.Eq(sp.Function("lamda")(kappa).diff(kappa), slope)
+
+
+@proves(31)
+def _() -> Proof:
+    """The chain rule: whatever the function, its change along the path is none; on the unit circle, a curve known in
+    closed form, the slope of the ordinate is minus abscissa over ordinate."""
+    kappa, Delta, slope = symbol("kappa_t"), sp.Function("Delta"), sensitivity_function()
+    yield slope.lhs == sp.Function("lamda")(kappa).diff(kappa)
+    yield Delta(lamda, kappa).diff(lamda) * slope.rhs + Delta(lamda, kappa).diff(kappa)
+    circle = sp.Lambda((lamda, kappa), lamda**2 + kappa**2 - 1)
+    yield slope.rhs.replace(Delta, circle).doit() + kappa / lamda
+
+
+@cache
+def implicit_derivatives() -> dict[str, sp.Expr]:
+    """Return how lambda follows each group: for a stiffness its derivative by kappa is this times c^2.
+
+    The chain rule over the pair (s, c) = (kappa, 1) / (1 + kappa), d s / d kappa = c^2 = -d c / d kappa, keeps zero and
+    infinite stiffness ordinary.
+    """
+    function, _ = frequency_function()
+    slope = function.diff(lamda)
+    parts = {f"kappa_{name}": function.diff(s) - function.diff(c) for name, (s, c) in _PAIRS.items()}
+    parts |= {name: function.diff(symbol(name)) for name in ("mu", "iota")}
+    return {name: -part / slope for name, part in parts.items()}
+
+
+def _in_hertz(rates: dict[str, sp.Expr]) -> tuple[sp.Eq, sp.Eq]:
+    """Turn d lamda / d kappa for each stiffness into hertz per unit of the stiffness, by (30)."""
+    frequency, hertz = sp.Function("f_i")(symbol("k_t"), symbol("k_r")), natural_frequency().rhs
+    by_k_t, by_k_r = (
+        sp.Eq(frequency.diff(symbol(f"k_{name}")), hertz.diff(lamda) * L**power / (E * I_z) * rates[name])
+        for name, power in (("t", 3), ("r", 1))
+    )
+    return by_k_t, by_k_r
+
+
+def _by_parts() -> tuple[sp.Eq, sp.Eq]:
+    kappa_t = symbol("kappa_t")
+    return _in_hertz({name: sensitivity_function().rhs.subs(kappa_t, symbol(f"kappa_{name}")) for name in _PAIRS})
+
+
+@numbered(32, "sensitivities of the frequencies", "derived", (23, 30, 31), shown=_by_parts)
+def frequency_sensitivities() -> tuple[sp.Eq, sp.Eq]:
+    """(31) for the two stiffnesses, turned into hertz per N/m and hertz per N m/rad by (30); f_i is proportional to the
+    square of λ. Raw sensitivities have different units: only logarithmic ones can be compared. The expression has
+    Δ of (23) written out, which fills a page."""
+    return _in_hertz({name: implicit_derivatives()[f"kappa_{name}"] * c**2 for name, (_, c) in _PAIRS.items()})
+
+
+@proves(32)
+def _() -> Proof:
+    """Another principle, first-order perturbation: ω_i² changes by φ_i(0)² / M_i per k_t and by φ_i'(0)² / M_i per k_r.
+    Any shape that satisfies the conditions at the joint will do: it is a mode of the arm whose end-effector balances
+    its tip. The integral of its square is known from its ends."""
+    xi, mu, iota, rho, A = (symbol(name) for name in ("xi", "mu", "iota", "rho", "A"))
+    shape = by_hand.joined(xi)
+    phi, slope, curvature, third = shape
+    integral = 3 * phi * third - slope * curvature + xi * (lamda**4 * phi**2 - 2 * slope * third + curvature**2)
+    yield integral.diff(xi) - 4 * lamda**4 * phi**2
+    root, tip = shape.subs(xi, 0), shape.subs(xi, 1)
+    mass = integral.subs(xi, 1) - integral.subs(xi, 0) - 4 * tip[0] * tip[3] + 4 * tip[1] * tip[2]
+    below = frequency_function()[0].diff(lamda)
+    for e, rate, power, pair in zip(frequency_sensitivities(), root, (1, -1), _PAIRS.values(), strict=False):
+        above, units = e.rhs.as_independent(L, E, I_z, rho, A, as_Add=False)
+        yield units - L**power / sp.sqrt(E * I_z * rho * A)
+        sides = [above * below, below]
+        for inertia, force, motion in ((mu, -tip[3], lamda**4 * tip[0]), (iota, tip[2], lamda**4 * tip[1])):
+            sides = [motion * s.expand().coeff(inertia, 0) + force * s.expand().coeff(inertia, 1) for s in sides]
+        yield sp.pi * mass * sides[0] - lamda**2 * rate**2 * sum(pair) * sides[1]
+
+
+@samples(32)
+def _() -> bool:
+    """Another principle, first-order perturbation. ω_i² changes by φ_i(0)² / M_i per k_t and by
+    φ_i'(0)² / M_i per k_r, for modes of a random arm found by shooting."""
+    values = sample(32)
+    numbers = {symbol(name): value for name, value in values.items()}
+    for mode in shoot(values):
+        groups = group_numbers(values, mode.beta)
+        mass = modal_numbers(values, mode)[symbol("M_i")]
+        for e, order in zip(frequency_sensitivities(), (0, 1), strict=True):
+            found = float(e.rhs.subs(groups).subs(numbers))
+            expected = mode(0.0, order) ** 2 / mass / (8 * np.pi**2 * mode.omega / (2 * np.pi))
+            if abs(found / expected - 1) > 1e-6:
+                return False
+    return True
+
+
+def implicit_kernel() -> tuple[dict[str, sp.Expr], tuple[sp.Symbol, ...]]:
+    """Return the implicit derivatives with scaled exponentials, and their arguments, as the kernel wants them."""
+    _, arguments = frequency_function()
+    decay = sp.exp(-lamda)
+    scaled = {sp.cosh(lamda): (1 + decay**2) / 2, sp.sinh(lamda): (1 - decay**2) / 2}
+
+    def ratio(expression: sp.Expr) -> sp.Expr:
+        above, below = sp.fraction(expression)
+        return _scaled(above, scaled, decay) / _scaled(below, scaled, decay)
+
+    return {name: ratio(expression) for name, expression in implicit_derivatives().items()}, arguments
+
+
+def _scaled(expression: sp.Expr, scaled: dict[sp.Expr, sp.Expr], decay: sp.Expr) -> sp.Expr:
+    """Multiply an expression linear in cosh and sinh by exp(-lamda)."""
+    expanded = expression.expand()
+    grown = sum(expanded.coeff(function) * value for function, value in scaled.items())
+    return grown + decay * expanded.subs(dict.fromkeys(scaled, 0))
+
+
+def group_exponents() -> tuple[dict[str, sp.Expr], tuple[sp.Symbol, ...]]:
+    """Return d ln omega^2 / d ln p for the parameters that enter several groups, from the shares of energy in a mode.
+
+    The shares are d ln omega^2 / d ln kappa_t and d ln kappa_r, and minus those by mu and iota: of the two springs in
+    the strain energy and of the end-effector's mass and rotary inertia in the kinetic energy. The rest is the chain
+    rule.
+    """
+    b, h, rho, m_e, J_e = (symbol(name) for name in ("b", "h", "rho", "m_e", "J_e"))
+    k_t, k_r, A = symbol("k_t"), symbol("k_r"), b * h
+    bending, line = E * b * h**3 / 12, rho * A
+    groups = {k_t * L**3 / bending: 1, k_r * L / bending: 1, m_e / (line * L): -1, J_e / (line * L**3): -1}
+    shares = sp.symbols("share_t share_r share_m share_j", nonnegative=True)
+
+    def logarithmic(expression: sp.Expr, p: sp.Symbol) -> sp.Expr:
+        return sp.cancel(expression.diff(p) * p / expression)
+
+    exponents = {}
+    for p in (L, b, h, E, rho):
+        total = logarithmic(bending / (line * L**4), p)
+        for share, (group, sign) in zip(shares, groups.items(), strict=True):
+            total += sign * share * logarithmic(group, p)
+        exponents[p.name] = total
+    return exponents, shares

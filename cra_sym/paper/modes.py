@@ -1,0 +1,447 @@
+"""Mode shapes and the frequency equation, for every stiffness from zero to infinity: equations (17)-(26)."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from sympy import (
+    Eq,
+    Expr,
+    I,
+    MatMul,
+    Matrix,
+    Poly,
+    Symbol,
+    cancel,
+    cos,
+    cosh,
+    exp,
+    roots,
+    sin,
+    sinh,
+    solve,
+    sqrt,
+    symbols,
+    zeros,
+)
+
+from cra_sym.mechanics import HamiltonResult, separate
+from cra_sym.paper.energy import A, E, I_z, J_e, L, k_r, k_t, m_e, phi_i, rho, x
+from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.evaluation import annihilates, group_numbers, put, shapes_agree, shot_coefficients
+from cra_sym.paper.joint import mode_conditions
+from cra_sym.paper.motion import dynamics, mode_field_equation
+from cra_sym.paper.oracles import by_hand
+from cra_sym.paper.oracles.by_hand import minors
+from cra_sym.paper.oracles.shooting import sample, shoot
+from cra_sym.symbols import symbol
+
+__all__ = ["coefficients", "frequency_function", "reduced_matrix", "root_matrix", "tip_matrix"]
+
+omega_i, beta, lamda, Delta, r_2 = (symbol(n) for n in ("omega_i", "beta", "lamda", "Delta", "r_2"))
+kappa_t, kappa_r, mu, iota = (symbol(name) for name in ("kappa_t", "kappa_r", "mu", "iota"))
+s_t, c_t, s_r, c_r = (symbol(name) for name in ("s_t", "c_t", "s_r", "c_r"))
+coefficients = C_1, C_2, C_3, C_4 = tuple(symbol(f"C_{k}") for k in (1, 2, 3, 4))
+
+#: Placeholders for cos, sin, cosh, sinh of lamda: polynomials in these are decided exactly.
+_CIRCULAR = _c, _s, _ch, _sh = symbols("c s C S")
+VALUES = {_c: cos(lamda), _s: sin(lamda), _ch: cosh(lamda), _sh: sinh(lamda)}
+
+
+# General solution (17) ------------------------------------------------------------------------------------------
+
+
+@cache
+def basis() -> tuple[Expr, ...]:
+    """Return four real solutions of the field equation of a mode, from the roots of its characteristic polynomial."""
+    r = Symbol("r")
+    balance = put(mode_field_equation().lhs, {phi_i: exp(r * x)}) / exp(r * x)
+    quartic = Poly(balance.subs(omega_i, beta**2 * sqrt(E * I_z / (rho * A))).expand(), r)
+    circular: list[Expr] = []
+    hyperbolic: list[Expr] = []
+    for root in roots(quartic):
+        if root in (beta, I * beta):
+            pair = (cosh(beta * x), sinh(beta * x)) if root == beta else (cos(beta * x), sin(beta * x))
+            (hyperbolic if root == beta else circular).extend(pair)
+    return (*circular, *hyperbolic)
+
+
+@numbered(17, "form of the mode shape", "derived", ("10b",))
+def mode_form() -> tuple[Eq, Eq]:
+    """The field equation of a mode has four exponential solutions, here in real form; the boundary conditions
+    determine the coefficients."""
+    shape = sum(coefficient * function for coefficient, function in zip(coefficients, basis(), strict=True))
+    balance = mode_field_equation().lhs.subs(phi_i.diff(x, 4), beta**4 * phi_i) / phi_i
+    (square,) = solve(balance.expand(), beta**4, simplify=False, check=False)
+    return Eq(phi_i, shape), Eq(beta**4, square)
+
+
+@proves(17)
+def _() -> Proof:
+    """It satisfies the field equation, and its four functions are independent."""
+    shape, wave = mode_form()
+    residual = put(mode_field_equation().lhs, {phi_i: shape.rhs})
+    yield residual.subs(omega_i, sqrt(solve(wave, omega_i**2)[0]))
+    yield Matrix(4, 4, lambda row, column: basis()[column].diff(x, row)).subs(x, 0).det().expand() != 0
+    yield set(coefficients) < shape.rhs.free_symbols
+
+
+@samples(17)
+def _() -> bool:
+    """Modes of a random arm found by shooting with power series are combinations of its functions."""
+    places = np.linspace(0.0, 1.0, 30)
+    for mode in shoot(sample(17)):
+        table = np.array([[float(f.subs({beta: mode.beta, x: p})) for f in basis()] for p in places])
+        gap = np.linalg.lstsq(table, mode(places), rcond=None)[1]
+        if gap[0] > 1e-20 * np.sum(mode(places) ** 2):
+            return False
+    return True
+
+
+# Boundary conditions as linear systems (18)-(19) ----------------------------------------------------------------
+
+
+def dimensionless(expression: Expr) -> Expr:
+    """Write an expression in lamda = beta L and the dimensionless groups."""
+    bending = E * I_z
+    groups = {
+        omega_i: beta**2 * sqrt(bending / (rho * A)),
+        k_t: kappa_t * bending / L**3,
+        k_r: kappa_r * bending / L,
+        m_e: mu * rho * A * L,
+        J_e: iota * rho * A * L**3,
+    }
+    return expression.subs(groups).subs(beta, lamda / L)
+
+
+@cache
+def _rows() -> tuple[Matrix, ...]:
+    """Return the coefficients of C_1..C_4 in the four conditions on a mode in the order of (16), with placeholders."""
+    shape, rows = mode_form()[0].rhs, []
+    names = {value: name for name, value in VALUES.items()}
+    for condition, power in zip(mode_conditions(), (3, 2, 3, 2), strict=True):
+        balance = dimensionless(put(condition.lhs - condition.rhs, {phi_i: shape})) * L**power / (E * I_z)
+        entries = [balance.subs(names).expand().coeff(coefficient) for coefficient in coefficients]
+        common = lamda ** min(Poly(entry, lamda).monoms()[-1][0] for entry in entries if entry != 0)
+        rows.append(Matrix([[(entry / common).expand() for entry in entries]]))
+    return tuple(rows)
+
+
+def _weighted(row: Matrix, stiffness: Symbol, spring: Symbol, compliance: Symbol) -> Matrix:
+    """Write a row linear in a stiffness so that (spring, compliance) = (1, 0) is the rigid joint, (0, 1) no joint."""
+    return row.applyfunc(lambda e: (spring * e.coeff(stiffness, 1) + compliance * e.coeff(stiffness, 0)).expand())
+
+
+def root_matrix() -> Matrix:
+    """Return the 2 x 4 matrix of force and moment at the root, homogeneous in (s_t, c_t) and in (s_r, c_r)."""
+    force, moment, *_ = _rows()
+    return Matrix.vstack(_weighted(force, kappa_t, s_t, c_t), _weighted(moment, kappa_r, s_r, c_r))
+
+
+def tip_matrix() -> Matrix:
+    """Return the 2 x 4 matrix of force and moment at the tip."""
+    return _tip().subs(VALUES)
+
+
+def _tip() -> Matrix:
+    return Matrix.vstack(*_rows()[2:])
+
+
+def _system(matrix: Matrix, unknowns: Matrix) -> Eq:
+    return Eq(MatMul(matrix, unknowns), zeros(2, 1), evaluate=False)
+
+
+@numbered(18, "root system", "derived", ("16a", 17))
+def root_system() -> Eq:
+    """(17) in the conditions at the joint. Each stiffness is written as the pair (s, c) = (κ, 1) / (1 + κ), so
+    that a rigid joint (1, 0) and no joint (0, 1) are ordinary values."""
+    return _system(root_matrix(), Matrix(coefficients))
+
+
+@numbered(19, "tip system", "derived", ("16a", 17))
+def tip_system() -> Eq:
+    """(17) in the conditions at the end-effector."""
+    return _system(tip_matrix(), Matrix(coefficients))
+
+
+@proves(18)
+def _() -> Proof:
+    """Written down by hand."""
+    yield from minors(root_system().lhs.args[0], by_hand.root_rows())
+
+
+@samples(18)
+def _() -> bool:
+    """The coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
+    return annihilates(root_system().lhs.args[0], 18)
+
+
+@proves(19)
+def _() -> Proof:
+    """Written down by hand."""
+    yield from minors(tip_system().lhs.args[0], by_hand.tip_rows())
+
+
+@samples(19)
+def _() -> bool:
+    """The coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
+    return annihilates(tip_system().lhs.args[0], 19)
+
+
+# Elimination and the frequency equation (20)-(23) ---------------------------------------------------------------
+
+
+def _reduced(expression: Expr) -> Expr:
+    """Return a polynomial in the placeholders in normal form: s^2 = 1 - c^2 and S^2 = C^2 - 1."""
+    remainder = expression.expand()
+    for name, square in ((_s, 1 - _c**2), (_sh, _ch**2 - 1)):
+        polynomial = Poly(remainder, name)
+        remainder = sum(
+            (coefficient * square ** (power // 2) * name ** (power % 2)).expand()
+            for (power,), coefficient in polynomial.terms()
+        )
+    return remainder
+
+
+@cache
+def _elimination() -> tuple[Matrix, Expr]:
+    """Return (D, d): the 2 x 2 system for C_1, C_2 times d, free of denominators."""
+    root, tip = root_matrix(), _tip()
+    determinant = root[:, 2:].det().expand()
+    return (determinant * tip[:, :2] - tip[:, 2:] * root[:, 2:].adjugate() * root[:, :2]).applyfunc(
+        _reduced
+    ), determinant
+
+
+def reduced_matrix() -> Matrix:
+    """Return the 2 x 2 matrix of the system for C_1 and C_2, free of denominators."""
+    return _elimination()[0].subs(VALUES)
+
+
+_entries = Matrix(2, 2, [symbol(name) for name in ("d_11", "d_12", "d_21", "d_22")])
+
+
+@numbered(20, "reduced system", "derived", (18, 19))
+def reduced_system() -> Eq:
+    """(18) gives C_3 and C_4, (19) multiplied by the determinant of that step leaves two equations for C_1 and C_2. The
+    determinant vanishes, and the step is empty, for a pinned and for a sliding root only."""
+    return _system(_entries, Matrix(coefficients[:2]))
+
+
+@proves(20)
+def _() -> Proof:
+    """With (21), Cramer's rule for the conditions written down by hand."""
+    yield from minors(reduced_system().subs(_named_entries()).lhs.args[0], by_hand.eliminated())
+
+
+@samples(20)
+def _() -> bool:
+    """The coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
+    return annihilates(reduced_system().subs(_named_entries()).lhs.args[0], 20)
+
+
+def _named_entries() -> dict[Expr, Expr]:
+    return {e.lhs: e.rhs for e in reduced_coefficients()}
+
+
+@numbered(21, "its coefficients", "derived", (18, 19, 20))
+def reduced_coefficients() -> tuple[Eq, ...]:
+    """What the elimination leaves, with the joint as (s_t, c_t), (s_r, c_r) and the end-effector as μ, ι."""
+    grouped = (collect_stiffness(value).subs(VALUES) for value in _elimination()[0])
+    return tuple(Eq(name, value) for name, value in zip(_entries, grouped, strict=True))
+
+
+@proves(21)
+def _() -> Proof:
+    """Cramer's rule for the conditions written down by hand: C_1 or C_2 with the two hyperbolic coefficients."""
+    yield from minors(Matrix(2, 2, [e.rhs for e in reduced_coefficients()]), by_hand.eliminated())
+
+
+@numbered(22, "determinant", "derived", (20,))
+def determinant() -> Eq:
+    """A mode is a solution that is not zero: the determinant of the reduced system vanishes."""
+    return Eq(_entries.det(), 0)
+
+
+@proves(22)
+def _() -> Proof:
+    """The determinant of (18) and (19) together, all four coefficients at once, times that of the elimination."""
+    matrix, factor = _elimination()
+    whole = Matrix.vstack(root_matrix(), _tip()).det(method="berkowitz")
+    named = dict(zip(_entries, matrix, strict=True))
+    yield _reduced((determinant().lhs - determinant().rhs).subs(named) - factor * whole)
+
+
+@cache
+def frequency_polynomial() -> Expr:
+    """Return the determinant, divided so as to leave 1 + c C for the bare cantilever."""
+    matrix, factor = _elimination()
+    named = dict(zip(_entries, matrix, strict=True))
+    polynomial = cancel(_reduced(determinant().lhs.subs(named)) / factor).expand()
+    lowest = min(power for (power,), _ in Poly(polynomial, lamda).terms())
+    rigid = {s_t: 1, c_t: 0, s_r: 1, c_r: 0, mu: 0, iota: 0}
+    unit = (polynomial / lamda**lowest).expand().subs(rigid).subs({_c: 0})
+    return (polynomial / (unit * lamda**lowest)).expand()
+
+
+def frequency_function() -> tuple[Expr, tuple[Symbol, ...]]:
+    """Return Delta and its arguments (lamda, s_t, c_t, s_r, c_r, mu, iota)."""
+    return frequency_polynomial().subs(VALUES), (lamda, s_t, c_t, s_r, c_r, mu, iota)
+
+
+@numbered(23, "frequency equation", "derived", (21, 22))
+def frequency_equation() -> Eq:
+    """The determinant expanded; its factors that never vanish are divided out, so that a rigid joint without
+    end-effector leaves 1 + cos λ cosh λ."""
+    return Eq(collect_stiffness(frequency_polynomial()).subs(VALUES), 0)
+
+
+def collect_stiffness(polynomial: Expr) -> Expr:
+    """Return the polynomial grouped by the four products of (s_t, c_t) with (s_r, c_r)."""
+    pairs = [a * b for a in (s_t, c_t) for b in (s_r, c_r)]
+    generators = Poly(polynomial, s_t, c_t, s_r, c_r)
+    return sum(pair * by_power(generators.coeff_monomial(pair)) for pair in pairs)
+
+
+def by_power(coefficient: Expr) -> Expr:
+    """Return a polynomial grouped by powers of lamda, mu and iota."""
+    terms = Poly(coefficient, lamda, mu, iota).terms()
+    return sum((value.factor() * lamda**a * mu**b * iota**c for (a, b, c), value in terms), start=lamda * 0)
+
+
+def separated(result: HamiltonResult) -> Expr:
+    """Return the characteristic function that :func:`cra_sym.mechanics.separate` finds, in the table's symbols."""
+    groups = {
+        k_t: E * I_z / L**3 * s_t / c_t,
+        k_r: E * I_z / L * s_r / c_r,
+        m_e: mu * rho * A * L,
+        J_e: iota * rho * A * L**3,
+    }
+    modal = separate(result, parameters=groups)
+    (wave,) = modal.basis.wave_numbers
+    return modal.characteristic_function.subs(wave, lamda)
+
+
+@proves(23)
+def _() -> Proof:
+    """The four conditions of Hamilton's principle in one determinant."""
+    yield separated(dynamics(driven=False)) - frequency_equation().lhs + frequency_equation().rhs
+
+
+@samples(23)
+def _() -> bool:
+    """It changes sign at every frequency parameter of random arms found by shooting and nowhere between."""
+    function = frequency_equation().lhs
+    for seed in (23, 24):
+        values = sample(seed)
+        found = [mode.beta * values["L"] for mode in shoot(values)]
+        numbers = group_numbers(values, 1.0)
+        numeric = function.subs({name: numbers[name] for name in numbers if name != lamda})
+        places = [0.1, *(place for root in found for place in (root * (1 - 1e-9), root * (1 + 1e-9)))]
+        signs = [float(numeric.subs(lamda, place)) > 0 for place in places]
+        if signs != [k // 2 % 2 == 0 for k in range(len(places))]:
+            return False
+    return True
+
+
+# Mode shape (24)-(26) -------------------------------------------------------------------------------------------
+
+
+@numbered(24, "coefficient ratios", "derived", (18,))
+def coefficient_ratios() -> tuple[Eq, Eq]:
+    """The root system solved for the hyperbolic coefficients."""
+    root = root_matrix()
+    solved = -root[:, 2:].adjugate() * root[:, :2] * Matrix(coefficients[:2]) / root[:, 2:].det()
+    return tuple(
+        Eq(name, sum(cancel(value.expand().coeff(c)) * c for c in (C_1, C_2)))
+        for name, value in zip((C_3, C_4), solved.applyfunc(cancel), strict=True)
+    )
+
+
+@proves(24)
+def _() -> Proof:
+    """They satisfy the conditions at the joint written down by hand; by hand, a rigid joint mirrors C_1, C_2."""
+    third, fourth = coefficient_ratios()
+    rigid = {s_t: 1, c_t: 0, s_r: 1, c_r: 0}
+    yield (third.lhs, fourth.lhs) == (C_3, C_4)
+    yield from by_hand.root_rows() * Matrix([C_1, C_2, third.rhs, fourth.rhs])
+    yield third.rhs.subs(rigid) + C_1
+    yield fourth.rhs.subs(rigid) + C_2
+
+
+@samples(24)
+def _() -> bool:
+    """Modes of a random arm found by shooting have them."""
+    found = {e.lhs: e.rhs for e in coefficient_ratios()}
+    values = sample(26)
+    for mode in shoot(values):
+        known = dict(zip(coefficients, shot_coefficients(mode), strict=True))
+        numbers = group_numbers(values, mode.beta)
+        for name, ratio in found.items():
+            if abs(float(ratio.subs(numbers).subs(known)) - known[name]) > 1e-8 * max(map(abs, known.values())):
+                return False
+    return True
+
+
+@numbered(25, "mode shape", "derived", (17, 24))
+def mode_shape() -> Eq:
+    """(24) in (17), with C_2 / C_1 = r_2; the scale C_1 stays free."""
+    shape = mode_form()[0].rhs.subs({e.lhs: e.rhs for e in coefficient_ratios()}).subs(C_2, r_2 * C_1)
+    inside = (shape / C_1).expand()
+    plain, second = inside.coeff(r_2, 0), inside.coeff(r_2, 1)
+    return Eq(phi_i, C_1 * (_gather(plain) + r_2 * _gather(second)))
+
+
+def _gather(shape: Expr) -> Expr:
+    return sum(cancel(shape.coeff(function)) * function for function in basis())
+
+
+@numbered(26, "ratio of the circular coefficients", "derived", (20, 21))
+def circular_ratio() -> Eq:
+    """The first row of the reduced system, which the second repeats at a natural frequency."""
+    first, second = reduced_matrix()[0, :]
+    return Eq(r_2, -first / second)
+
+
+@proves(25)
+def _() -> Proof:
+    """Whatever r_2, the functions of (17) with coefficients that satisfy the conditions at the joint written down by
+    hand, the second r_2 times the first."""
+    row = coefficients_of(mode_shape().rhs)
+    yield from by_hand.root_rows() * row
+    yield row[1] - r_2 * row[0]
+    yield row[0] != 0
+
+
+def coefficients_of(shape: Expr) -> Matrix:
+    """Return what the functions of (17) are multiplied by in a mode shape."""
+    expanded = shape.expand()
+    return Matrix([expanded.coeff(function) for function in basis()])
+
+
+@samples(25)
+def _() -> bool:
+    """With (26), the shape of modes of a random arm found by shooting."""
+    return shapes_agree((25,), mode_shape().rhs, circular_ratio().rhs)
+
+
+@proves(26)
+def _() -> Proof:
+    """With it the force at the tip balances, written down by hand."""
+    yield circular_ratio().lhs == r_2
+    yield (by_hand.eliminated() * Matrix([1, circular_ratio().rhs]))[0]
+
+
+@samples(26)
+def _() -> bool:
+    """The ratio of modes of a random arm found by shooting, and the second row of the reduced system."""
+    values = sample(28)
+    for mode in shoot(values):
+        numbers = group_numbers(values, mode.beta)
+        known = shot_coefficients(mode)
+        third, fourth = reduced_matrix().subs(numbers)[1, :]
+        found, expected = float(circular_ratio().rhs.subs(numbers)), float(known[1] / known[0])
+        if max(abs(found - expected), abs(-third / fourth - expected)) > 1e-7 * abs(expected):
+            return False
+    return True

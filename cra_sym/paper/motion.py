@@ -1,0 +1,262 @@
+"""Hamilton's principle and what it gives in the interval, at the ends and for the base: equations (8)-(10)."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from sympy import Eq, Expr, Function, Integral, lambdify, solve
+
+from cra_sym.mechanics.hamilton import hamilton
+from cra_sym.paper.energy import (
+    ENERGY,
+    L,
+    lagrangian,
+    modal_numbers,
+    phi_i,
+    single_mode,
+    t,
+    v,
+    w,
+    x,
+)
+from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.evaluation import at, put, termwise, virtual_factors
+from cra_sym.paper.joint import boundary_conditions, free_vibration, rayleigh_factors, section_forces
+from cra_sym.paper.oracles.shooting import sample, shoot
+from cra_sym.symbols import dimension, symbol
+
+__all__ = ["dynamics", "mode_field_equation", "natural_conditions"]
+
+F, tau, rho, A, m_b, k_t = (symbol(name) for name in ("F", "tau", "rho", "A", "m_b", "k_t"))
+M_i, K_i, Gamma_i, omega_i, zeta_i = (symbol(name) for name in ("M_i", "K_i", "Gamma_i", "omega_i", "zeta_i"))
+Lcal, t_1, t_2 = (symbol(name) for name in ("Lcal", "t_1", "t_2"))
+
+#: The virtual displacements as :func:`cra_sym.mechanics.hamilton` writes them.
+delta_v, delta_w, delta_L = Function("δv")(x, t), Function("δw")(t), Function("δLcal")(t)
+
+
+@cache
+def dynamics(*, driven: bool = True) -> Any:
+    """Return Hamilton's principle carried out: the base driven by the force F, or its motion w prescribed."""
+    base: dict[str, Any] = {"coordinates": [w], "virtual_work": [(F, w, None)]} if driven else {"prescribed": [w]}
+    density, left, right = lagrangian()
+    return hamilton(density, fields=[v], x=x, domain=(0, L), t=t, left=left, right=right, **base)
+
+
+def _step(name: str) -> Expr:
+    """Return what a step of :func:`dynamics` says is zero."""
+    return next(step.expression for step in dynamics().steps if step.name == name)
+
+
+# Hamilton's principle (8)-(10) ----------------------------------------------------------------------------------
+
+
+@numbered(8, "Hamilton's principle", "assumption", (7,))
+def hamiltons_principle() -> Eq:
+    """Of all motions between two instants the true one makes the action stationary: the variation of the Lagrangian
+    and the virtual work of the driving force add to nothing."""
+    return Eq(Integral(delta_L + F * delta_w, (t, t_1, t_2)), 0)
+
+
+def _first_variation() -> Expr:
+    """Return the rate at which the Lagrangian (7) changes on the way to v + e delta_v, w + e delta_w."""
+    size = symbol("epsilon")
+    moved = {v: v + size * delta_v, w: w + size * delta_w}
+    return put(lagrangian().total(), moved).diff(size).subs(size, 0).doit(integrals=False)
+
+
+def _newton() -> tuple[Expr, ...]:
+    """Return the force on a slice, force and moment on the joint and on the end-effector, and the force on the arm,
+    inertia forces included: by hand, with shear and moment (15)."""
+    E, I_z, m_e, J_e, k_r = (symbol(name) for name in ("E", "I_z", "m_e", "J_e", "k_r"))
+    shear, moment = E * I_z * v.diff(x, 3), E * I_z * v.diff(x, 2)
+    acceleration = (w + v).diff(t, 2)
+    arm = Integral(rho * A * acceleration, (x, 0, L)) + at(m_e * acceleration, L)
+    return (
+        -shear.diff(x) - rho * A * acceleration,
+        at(-shear - k_t * v, 0),
+        at(moment - k_r * v.diff(x), 0),
+        at(shear - m_e * acceleration, L),
+        at(-moment - J_e * v.diff(x, t, t), L),
+        F - m_b * w.diff(t, 2) - arm,
+    )
+
+
+@proves(8)
+def _() -> Proof:
+    """Dimensions; for any motion and any virtual displacement that vanishes at both instants, the integral is the work
+    of Newton's forces on slices, joint, end-effector and base: zero for all when those balance."""
+    known = {"δLcal": ENERGY, "δw": dimension("w")}
+    yield dimension(hamiltons_principle().lhs.function, known) == ENERGY
+    rate = hamiltons_principle().lhs.function.subs(delta_L, _first_variation())
+    *elastic, base = _newton()
+    for found, force in zip(virtual_factors(put(rate, {delta_w: x * 0}), delta_v), elastic, strict=True):
+        yield termwise(found - force)
+    (found,) = virtual_factors(put(rate, {delta_v: x * 0}), delta_w)
+    yield termwise(found - base)
+
+
+@samples(8)
+def _() -> bool:
+    """The action of a random arm swinging in a mode found by shooting is stationary for a
+    virtual displacement that vanishes at both instants, and is not when the mode swings one per cent too fast."""
+    values, duration, step = sample(8), 2.0, 1e-4
+    mode = shoot(values, modes=1)[0]
+
+    def slope(omega: float) -> float:
+        def motion(size: float) -> Any:
+            def displaced(place: Any, in_x: int, in_t: int, instants: Any) -> Any:
+                virtual = (place**2 + 1.0, 2.0 * place, 2.0 + 0.0 * place)[in_x]
+                rate = np.pi / duration
+                window = rate * np.sin(2 * rate * instants) if in_t else np.sin(rate * instants) ** 2
+                swing = -omega * np.sin(omega * instants) if in_t else np.cos(omega * instants)
+                return np.multiply.outer(mode(place, in_x), swing) + size * np.multiply.outer(virtual, window)
+
+            return displaced
+
+        return (_action(values, motion(step), duration) - _action(values, motion(-step), duration)) / (2.0 * step)
+
+    return abs(slope(mode.omega)) < 1e-7 < 1e-3 < abs(slope(1.01 * mode.omega))
+
+
+def _action(values: dict[str, float], motion: Any, duration: float) -> float:
+    """Return the action of the arm on a base at rest, by quadrature of the Lagrangian (7)."""
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    instants, length = 0.5 * duration * (nodes + 1.0), values["L"]
+    orders = [(1, 1), (2, 0), (0, 1), (1, 0), (0, 0)]
+    jets = [symbol(f"C_{k}") for k in (1, 2, 3, 4)] + [symbol("psi")]
+    named = list(zip(orders, jets, strict=True))
+    numbers = {symbol(name): value for name, value in values.items()}
+    rates = []
+    for piece, place in zip(lagrangian(), (0.5 * length * (nodes + 1.0), 0.0, length), strict=True):
+        plain = piece.subs(w, 0).doit().subs([(v.diff((x, a), (t, b)), jet) for (a, b), jet in named])
+        values_of = lambdify(jets, plain.subs(numbers), "numpy")
+        rates.append(values_of(*(motion(place, a, b, instants) for a, b in orders)))
+    return float(0.5 * duration * weights @ (0.5 * length * weights @ rates[0] + rates[1] + rates[2]))
+
+
+@numbered(9, "variation of the Lagrangian", "derived", (7, 8))
+def variation() -> Eq:
+    """The elastic displacement and the base's motion are varied; the first-order change of the Lagrangian, with the
+    virtual work of the driving force."""
+    return Eq(delta_L + F * delta_w, _step("Variation"))
+
+
+@proves(9)
+def _() -> Proof:
+    """Another route to the first variation: the Lagrangian of v + e delta_v, w + e delta_w differentiated by e."""
+    yield variation().lhs - delta_L - F * delta_w
+    yield termwise(variation().rhs - F * delta_w - _first_variation())
+
+
+@numbered(10, "principle with the variation put in", "derived", (8, 9))
+def integrated_by_parts() -> Eq:
+    """(9) in (8): integration by parts in time and along the manipulator frees the variations of their derivatives and
+    leaves terms at the two ends."""
+    return Eq(_step("Integration by parts in x"), 0)
+
+
+@proves(10)
+def _() -> Proof:
+    """For all motions, and all variations that vanish at both instants, the time integrals of (9) and of (10) agree:
+    they have the same factor of each variation."""
+    for kept, other in ((delta_v, delta_w), (delta_w, delta_v)):
+        one, two = (
+            virtual_factors(put(side, {other: x * 0}), kept)
+            for side in (variation().rhs, integrated_by_parts().lhs - integrated_by_parts().rhs)
+        )
+        for found, expected in zip(one, two, strict=True):
+            yield termwise(found - expected)
+
+
+@numbered("10a", "field equation and equation of the base", "derived", (10,))
+def field_and_base() -> tuple[Eq, Eq]:
+    """Variations along the manipulator and of the base are arbitrary; those at the ends give the conditions (16)."""
+    return dynamics().field_equations[0], dynamics().coordinate_equations[0]
+
+
+def natural_conditions() -> tuple[Eq, ...]:
+    """Return the four end conditions that Hamilton's principle leaves: root force and moment, tip force and moment."""
+    return dynamics().boundary_conditions
+
+
+@proves(16)
+def _() -> Proof:
+    """Hamilton's principle gives the same four conditions."""
+    for ours, theirs in zip(boundary_conditions(), natural_conditions(), strict=True):
+        yield ours.lhs - ours.rhs - theirs.lhs + theirs.rhs
+
+
+@proves("10a")
+def _() -> Proof:
+    """Newton: a slice accelerates under the slope of the shear force (15); the whole arm is one momentum balance."""
+    field, base = field_and_base()
+    shear, _ = (law.rhs for law in section_forces())
+    momentum = m_b * w.diff(t) + symbol("m_e") * (w + at(v, L)).diff(t)
+    line = Integral(rho * A * (w + v).diff(t), (x, 0, L))
+    yield field.lhs - field.rhs - rho * A * (w + v).diff(t, 2) - shear.diff(x)
+    yield termwise((base.lhs - base.rhs + F - (momentum + line).diff(t)).doit(integrals=False))
+
+
+@numbered("10b", "field equation of a mode", "derived", (2, "10a"))
+def mode_field_equation() -> Eq:
+    """(2) in the field equation, the base at rest: each coordinate swings with q'' = -ω² q and cancels."""
+    field = field_and_base()[0].lhs.subs(w, 0).doit()
+    return Eq(free_vibration(single_mode(field).expand()), 0)
+
+
+@proves("10b")
+def _() -> Proof:
+    """Rayleigh: among all shapes, that of a mode makes K_i - ω_i² M_i of (6) stationary."""
+    along, *_ = rayleigh_factors()
+    yield mode_field_equation().lhs - mode_field_equation().rhs - along
+
+
+@samples("10b")
+def _() -> bool:
+    """Modes of a random arm found by shooting satisfy it along the manipulator."""
+    values = sample(102)
+    numbers = {symbol(name): value for name, value in values.items()}
+    for mode in shoot(values):
+        for place in np.linspace(0.1, 0.9, 5) * values["L"]:
+            jets = {phi_i.diff(x, 4): float(mode(place, 4)), phi_i: float(mode(place))}
+            residual = mode_field_equation().lhs.subs(jets).subs(numbers).subs(omega_i, mode.omega)
+            if abs(residual) > 1e-8 * abs(jets[phi_i.diff(x, 4)]):
+                return False
+    return True
+
+
+@numbered("10c", "equation of the base from its own free body", "derived", ("10a", 16))
+def base_free_body() -> Eq:
+    """The field equation integrated along the manipulator turns all inertia beyond the joint into the force of the
+    translational spring: the base feels its own inertia, the spring and the drive."""
+    field, base = field_and_base()
+    inertia = rho * A * (v + w).diff(t, 2)
+    (stiff,) = solve(Eq(field.lhs.expand(), 0), v.diff(x, 4))
+    force = symbol("E") * symbol("I_z") * v.diff(x, 3)
+    if (symbol("E") * symbol("I_z") * stiff + inertia).expand() != 0:
+        raise ArithmeticError("the slice does not balance")
+    at_ends = at(force, 0) - at(force, L)
+    for condition in natural_conditions():
+        at_ends = at_ends.subs(condition.lhs, condition.rhs)
+    spread = Integral(rho * A * v.diff(t, 2), (x, 0, L)) + rho * A * L * w.diff(t, 2)
+    left = (base.lhs - base.rhs + F).expand() - spread + at_ends
+    return Eq(left.expand(), F)
+
+
+@proves("10c")
+def _() -> Proof:
+    """Written down from the free body of the base."""
+    yield base_free_body().lhs - base_free_body().rhs - (m_b * w.diff(t, 2) - k_t * at(v, 0) - F)
+
+
+@samples("10c")
+def _() -> bool:
+    """Both forms agree on modes of a random arm found by shooting, ω_i² Γ_i = k_t φ_i(0)."""
+    values = sample(103)
+    gaps = [
+        mode.omega**2 * modal_numbers(values, mode)[Gamma_i] / (values["k_t"] * mode(0.0)) - 1 for mode in shoot(values)
+    ]
+    return bool(max(map(abs, gaps)) < 1e-7)

@@ -1,0 +1,75 @@
+"""The arm with the sign of the rotational spring's energy flipped: frequencies that rise as k_r falls.
+
+The paper reports (Fig. 4) that f2 and f3 rise while the joint softens in rotation. The derivation says they fall. Flip
+one sign in the Lagrangian, carry Hamilton's principle through again, and the condition at the root becomes
+EI v_xx(0) = -k_r v_x(0), whose frequencies rise. Its potential energy is not positive: the arm would fold by itself.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from scipy.optimize.elementwise import find_root
+
+from cra_sym import checks
+from cra_sym.analysis.modes import frequency_parameters
+from cra_sym.arm.parameters import Arm
+from cra_sym.kernels import derived_kernel
+
+__all__ = ["characteristic", "flipped", "flipped_frequencies"]
+
+
+@cache
+def flipped() -> Any:
+    """Return Hamilton's principle carried out with the sign of the rotational spring's energy flipped."""
+    from cra_sym.mechanics import hamilton
+    from cra_sym.paper.energy import L, k_r, lagrangian, t, v, w, x
+
+    density, left, right = lagrangian()
+    wrong = left - 2 * k_r * left.coeff(k_r)
+    return hamilton(density, fields=[v], prescribed=[w], x=x, domain=(0, L), t=t, left=wrong, right=right)
+
+
+def characteristic() -> tuple[Any, tuple[Any, ...]]:
+    """Return the frequency function of the flipped arm and its arguments (lamda, s_t, c_t, s_r, c_r, mu, iota)."""
+    from cra_sym.paper.modes import frequency_function, separated
+
+    return separated(flipped()), frequency_function()[1]
+
+
+_function = derived_kernel("cra_sym.paper.oracles.flipped:characteristic")
+
+
+def flipped_frequencies(arm: Arm, modes: int = 3) -> np.ndarray:
+    """Return the real natural frequencies of the flipped arm in Hz, those that start at the rigid joint's.
+
+    Its roots lie between those of the arm rigid in rotation and the next ones of the arm without rotational spring,
+    which the true arm's do too, from the other side. One more mode has a negative square and is not an oscillation.
+
+    Parameters
+    ----------
+    arm : Arm
+        May hold arrays.
+    modes : int
+
+    Returns
+    -------
+    ndarray, shape (..., modes)
+    """
+    modes = checks.count("modes", modes)
+    kappa_t, kappa_r, mu, iota = np.broadcast_arrays(arm.kappa_t, arm.kappa_r, arm.mu, arm.iota)
+    low = frequency_parameters(kappa_t, np.inf, mu, iota, modes)
+    high = frequency_parameters(kappa_t, 0.0, mu, iota, modes + 1)[..., 1:]
+    weights = []
+    for stiffness in (kappa_t, kappa_r):
+        rigid = np.isinf(stiffness)
+        soft = 1.0 / (1.0 + np.where(rigid, 0.0, stiffness))
+        weights += [np.where(rigid, 1.0, 1.0 - soft), np.where(rigid, 0.0, soft)]
+    arguments = tuple(np.broadcast_to(a[..., None], low.shape) for a in (*weights, mu, iota))
+    root = find_root(_function, (low * (1 - 1e-12), high * (1 + 1e-12)), args=arguments)
+    if not np.all(root.success):
+        raise ArithmeticError("a root of the flipped arm was not bracketed")
+    scale = np.asarray(arm.angular_frequency_scale)[..., None]
+    return root.x**2 * scale / (2.0 * np.pi)

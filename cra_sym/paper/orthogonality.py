@@ -1,0 +1,264 @@
+"""Orthogonality of the modes with the end-effector's inertia, K_i = omega_i^2 M_i, and the modal energies (5)."""
+
+from __future__ import annotations
+
+from sympy import Eq, Expr, Integral, solve
+
+from cra_sym.paper.energy import (
+    HALF,
+    E,
+    I_z,
+    L,
+    generalised,
+    inner_mass,
+    inner_stiffness,
+    kinetic_energy,
+    modal_numbers,
+    phi_i,
+    phi_j,
+    potential_energy,
+    q_i,
+    q_j,
+    separation,
+    single_mode,
+    t,
+    tidy,
+    w,
+    x,
+)
+from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.evaluation import at, evaluate, put, termwise, virtual_factors
+from cra_sym.paper.joint import mode_conditions
+from cra_sym.paper.modal_sum import ModalSum, member, written_out
+from cra_sym.paper.motion import mode_field_equation
+from cra_sym.paper.oracles.shooting import integrate, sample, shoot
+from cra_sym.symbols import symbol
+
+__all__ = ["modal_energies", "orthogonality", "stiffness_identity"]
+
+omega_i, omega_j, M_i, K_i, K_b = (symbol(name) for name in ("omega_i", "omega_j", "M_i", "K_i", "K_b"))
+
+
+@numbered("16b", "stiffness and mass of two modes", "derived", (6, "10b", "16a"))
+def stiffness_identity() -> tuple[Eq, Eq]:
+    """Integrating by parts twice moves two derivatives from mode j to mode i, where the field equation and the four
+    end conditions replace them: the stiffness product is ω_i² times the mass product, springs, tip mass and
+    rotary inertia included; for i = j it is K_i = ω_i² M_i."""
+    by_parts = phi_i.diff(x, 2) * phi_j.diff(x) - phi_i.diff(x, 3) * phi_j
+    if (by_parts.diff(x) + phi_i.diff(x, 4) * phi_j - phi_i.diff(x, 2) * phi_j.diff(x, 2)).expand() != 0:
+        raise ArithmeticError("integration by parts went wrong")
+    (fourth,) = solve(mode_field_equation(), phi_i.diff(x, 4))
+    interior = Integral((E * I_z * fourth * phi_j).expand(), (x, 0, L))
+    ends = E * I_z * (at(by_parts, L) - at(by_parts, 0))
+    for condition in mode_conditions():
+        ends = ends.subs(condition.lhs / (E * I_z), condition.rhs / (E * I_z))
+    springs = inner_stiffness(phi_i, phi_j) - Integral(E * I_z * phi_i.diff(x, 2) * phi_j.diff(x, 2), (x, 0, L))
+    mass = inner_mass(phi_i, phi_j)
+    integral = mass.atoms(Integral).pop()
+    rest = interior + ends + springs - omega_i**2 * mass
+    if (
+        rest.subs(interior, omega_i**2 * integral).expand() != 0
+        or (interior.function - omega_i**2 * integral.function).expand()
+    ):
+        raise ArithmeticError(f"stiffness and mass products differ by {rest}")
+    return Eq(inner_stiffness(phi_i, phi_j), omega_i**2 * mass), Eq(K_i, omega_i**2 * M_i)
+
+
+def _is_mode(factors: tuple[Expr, ...], index: str) -> Proof:
+    """Yield what is left of five factors of a virtual shape when mode ``index`` satisfies (10b) and (16a)."""
+    equations = (member(mode_field_equation(), index), *(member(condition, index) for condition in mode_conditions()))
+    tops = (member(phi_i, index).diff(x, 4), *(e.lhs / (E * I_z) for e in equations[1:]))
+    known = {top: solve(e, top)[0] for top, e in zip(tops, equations, strict=True)}
+    for factor in factors:
+        yield factor.xreplace(known)
+
+
+@proves("16b")
+def _() -> Proof:
+    """The difference of both sides is the virtual work of the forces of mode i, in balance by (10b) and (16a), on any
+    mode j; mode i for mode j and (6) make it the second equation."""
+    pair, single = stiffness_identity()
+    yield from _is_mode(virtual_factors(pair.lhs - pair.rhs, phi_j), "i")
+    alone = put(pair.lhs - pair.rhs, {phi_j: phi_i})
+    yield termwise((single.lhs - single.rhs).subs(_generalised()) - alone)
+
+
+def _generalised(index: str = "i") -> dict[Expr, Expr]:
+    """Return the names of mass, stiffness and participation of a mode, with what (6) says they are."""
+    return {member(e.lhs, index): member(e.rhs, index) for e in generalised()}
+
+
+@samples("16b")
+def _() -> bool:
+    """Both products of all pairs of modes of a random arm, found by shooting, by quadrature."""
+    values = sample(161)
+    shapes = shoot(values)
+    pair, single = stiffness_identity()
+    for first in shapes:
+        numbers = modal_numbers(values, first) | {omega_i: first.omega}
+        if abs((single.lhs / single.rhs).subs(numbers) - 1) > 1e-8:
+            return False
+        for second in shapes:
+            sides = (
+                evaluate(side, values | {"omega_i": first.omega}, {phi_i: first, phi_j: second}) for side in pair.args
+            )
+            scale = first.omega**2 * numbers[M_i]
+            if abs(next(sides) - next(sides)) > 1e-7 * scale:
+                return False
+    return True
+
+
+@numbered("16c", "orthogonality", "derived", ("16b",))
+def orthogonality() -> tuple[Eq, Eq]:
+    """Exchange i and j in the identity and subtract: (ω_i² - ω_j²) times the mass product is zero, so for
+    different frequencies both products vanish."""
+    identity, _ = stiffness_identity()
+    swapped = Eq(*(_swap(side) for side in identity.args))
+    difference = (identity.lhs - swapped.lhs) - (identity.rhs - swapped.rhs)
+    mass = inner_mass(phi_i, phi_j)
+    if (difference + (omega_i**2 - omega_j**2) * mass).expand() != 0:
+        raise ArithmeticError(f"the products are not symmetric: {difference}")
+    return Eq(mass, 0), Eq(inner_stiffness(phi_i, phi_j), 0)
+
+
+def _swap(expression: Expr) -> Expr:
+    """Exchange the modes i and j."""
+    aside = expression.replace(phi_j.func, symbol("eta").func).xreplace({omega_j: symbol("omega")})
+    return member(aside, "j").replace(symbol("eta").func, phi_i.func).xreplace({symbol("omega"): omega_i})
+
+
+@proves("16c")
+def _() -> Proof:
+    """The forces of each mode balance by (10b) and (16a): stiffness minus ω_i² times mass product is no work on mode j,
+    and with ω_j² none on mode i. So ω_i² - ω_j² times the mass product is zero, and with it the stiffness product."""
+    mass, stiffness = (e.lhs - e.rhs for e in orthogonality())
+    yield from _is_mode(virtual_factors(stiffness - omega_i**2 * mass, phi_j), "i")
+    yield from _is_mode(virtual_factors(stiffness - omega_j**2 * mass, phi_i), "j")
+
+
+@samples("16c")
+def _() -> bool:
+    """Both products of different modes of a random arm vanish; without the end-effector they would not."""
+    values = sample(163)
+    first, second, third = shoot(values)
+    for pair in ((first, second), (first, third), (second, third)):
+        modes = dict(zip((phi_i, phi_j), pair, strict=True))
+        for product in (e.lhs for e in orthogonality()):
+            beam = sum(evaluate(integral, values, modes) for integral in product.atoms(Integral))
+            if abs(evaluate(product, values, modes)) > 1e-8 * abs(beam):
+                return False
+    return True
+
+
+@numbered("16d", "what the manipulator's energy alone would give", "derived", (4, 6, "16b"))
+def stiffness_of_manipulator_alone() -> Eq:
+    """The paper's (4) without the springs leaves their share out of the generalised stiffness: K_b / M_i is not
+    ω_i² unless the joint is rigid or the mode does not move it."""
+    springs = inner_stiffness(phi_i, phi_i) - inner_stiffness(phi_i, phi_i, joint=False)
+    return Eq(K_b, stiffness_identity()[1].rhs - springs)
+
+
+@proves("16d")
+def _() -> Proof:
+    """Twice the first energy of (4) differs from it by the work of the forces of the mode, in balance by (10b) and
+    (16a), on itself."""
+    energy = single_mode(potential_energy()[0].rhs) / q_i**2
+    alone, size, virtual = stiffness_of_manipulator_alone(), symbol("epsilon"), symbol("eta")
+    gap = 2 * energy - alone.rhs.subs(_generalised())
+    varied = put(gap, {phi_i: phi_i + size * virtual}).diff(size).subs(size, 0).doit(integrals=False)
+    yield alone.lhs == K_b
+    yield from _is_mode(virtual_factors(varied, virtual), "i")
+
+
+@samples("16d")
+def _() -> bool:
+    """The strain energy of modes found by shooting; it falls short of ω_i² M_i by the springs' share."""
+    values, alone = sample(164), stiffness_of_manipulator_alone().rhs
+    for mode in shoot(values):
+        strain = evaluate(inner_stiffness(phi_i, phi_i, joint=False), values, {phi_i: mode})
+        numbers = modal_numbers(values, mode) | {omega_i: mode.omega}
+        predicted = evaluate(alone.subs(numbers), values, {phi_i: mode})
+        if abs(strain / predicted - 1) > 1e-8 or strain / (mode.omega**2 * numbers[M_i]) > 0.999:
+            return False
+    return True
+
+
+# Modal energies (5) ---------------------------------------------------------------------------------------------
+
+
+def _quadratic_form(energy: Expr, variables: list[Expr]) -> dict[tuple[Expr, Expr], Expr]:
+    """Second derivatives of an energy with respect to generalised coordinates or velocities."""
+    names = [symbol("C_1"), symbol("C_2"), symbol("C_3")][: len(variables)]
+    plain = energy.subs(dict(zip(variables, names, strict=True)))
+    pairs = [(row, column) for row in range(len(names)) for column in range(row, len(names))]
+    return {(variables[r], variables[c]): plain.diff(names[r]).diff(names[c]).doit(integrals=False) for r, c in pairs}
+
+
+def _modal(energy: Expr, variables: list[Expr], named: dict[Expr, Expr]) -> Expr:
+    """Write a quadratic energy of the modes i and j as a sum over all modes, with its coefficients named."""
+    form = {pair: tidy(value).subs(named) for pair, value in _quadratic_form(energy, variables).items()}
+    total = energy * 0
+    for (first, second), value in form.items():
+        factor = HALF if first == second else 1
+        if {first, second} <= {q_i, q_i.diff(t), w.diff(t)}:
+            term = factor * value * first * second
+            total += term if {first, second} == {w.diff(t)} else ModalSum(term)
+        elif first.has(q_i) and second.has(q_j) and value != 0:
+            raise ArithmeticError(f"modes i and j do not decouple: {value}")
+    return total
+
+
+@numbered(5, "modal energies", "derived", (2, 3, 4, 6, "16c"))
+def modal_energies() -> tuple[Eq, Eq]:
+    """(2) put into (3) and (4): orthogonality leaves no product of two modes."""
+    two = separation().rhs.members("i", "j")
+    named = {tidy(e.rhs): e.lhs for e in generalised()} | {tidy(e.lhs): e.rhs for e in orthogonality()}
+    kinetic = _modal(single_mode(kinetic_energy().rhs, two), [q_i.diff(t), q_j.diff(t), w.diff(t)], named)
+    potential = _modal(single_mode(potential_energy()[1].rhs, two), [q_i, q_j], named)
+    return Eq(symbol("T"), kinetic.doit()), Eq(symbol("U"), potential)
+
+
+@proves(5)
+def _() -> Proof:
+    """Both energies (3) and (4) of any two modes, with (6); what is left is their products of (16c)."""
+    two = separation().rhs.members("i", "j")
+    mass, stiffness = (e.lhs - e.rhs for e in orthogonality())
+    products = (mass * q_i.diff(t) * q_j.diff(t), stiffness * q_i * q_j)
+    for e, whole, product in zip(modal_energies(), (kinetic_energy(), potential_energy()[1]), products, strict=True):
+        modes = written_out(e.rhs, "i", "j")
+        yield e.lhs == whole.lhs
+        yield termwise(modes.subs(_generalised() | _generalised("j")) + product - single_mode(whole.rhs, two))
+
+
+@samples(5)
+def _() -> bool:
+    """The energies of a random arm moving in three modes found by shooting, by quadrature of (3) and (4)."""
+    values = sample(5)
+    shapes, length = shoot(values), values["L"]
+    q, q_dot, w_dot = [0.3, -0.5, 0.2], [0.7, 0.4, -0.6], 0.9
+
+    def elastic(place, amplitudes, derivative=0):
+        return sum(a * shape(place, derivative) for a, shape in zip(amplitudes, shapes, strict=True))
+
+    line_mass, bending = values["rho"] * values["A"], values["E"] * values["I_z"]
+    kinetic = (
+        values["m_b"] * w_dot**2
+        + values["m_e"] * (w_dot + elastic(length, q_dot)) ** 2
+        + values["J_e"] * elastic(length, q_dot, 1) ** 2
+        + integrate(lambda place: line_mass * (w_dot + elastic(place, q_dot)) ** 2, length)
+    ) / 2
+    potential = (
+        values["k_t"] * elastic(0.0, q) ** 2
+        + values["k_r"] * elastic(0.0, q, 1) ** 2
+        + integrate(lambda place: bending * elastic(place, q, 2) ** 2, length)
+    ) / 2
+    found = []
+    for e in modal_energies():
+        sums = dict.fromkeys(e.rhs.atoms(ModalSum), 0.0)
+        for s in sums:
+            for shape, now, rate in zip(shapes, q, q_dot, strict=True):
+                numbers = {q_i.diff(t): rate, w.diff(t): w_dot, q_i: now}
+                sums[s] += float(s.function.subs(numbers).subs(modal_numbers(values, shape)))
+        total = e.rhs.subs(sums).subs(w.diff(t), w_dot)
+        found.append(float(total.subs({symbol(name): value for name, value in values.items()})))
+    return abs(found[0] / kinetic - 1) < 1e-10 and abs(found[1] / potential - 1) < 1e-10

@@ -1,0 +1,450 @@
+"""Multiple scales at a principal resonance: equations (37)-(49).
+
+The paper's own (43) and (48) are lost. The plain numbers treat an excitation that is parametric, (36a) or (36b); those
+with a letter follow the paper's words literally, to a forced resonance, or supply what it leaves out.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from sympy import Derivative, Eq, Expr, Function, I, S, Sum, Symbol, conjugate, cos, exp, integrate, pi, sin, solve
+
+from cra_sym.analysis.boundaries import forced_growth, forced_resonance, general_resonance, plain
+from cra_sym.paper.energy import generalised, inner_mass, phi_i
+from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.evaluation import evaluate, put, termwise
+from cra_sym.paper.excited import excited_system
+from cra_sym.paper.operators import acting, named
+from cra_sym.paper.oracles.shooting import sample, shoot
+from cra_sym.paper.parametric import t, x
+from cra_sym.symbols import Dimension, dimension, symbol
+
+__all__: list[str] = []
+
+epsilon, sigma, varpi, omega_n, T_0, T_1 = (symbol(name) for name in "epsilon sigma varpi omega_n T_0 T_1".split())
+P_ij, P_nn, M_n, Gamma_n, w_1, zeta_n = (symbol(name) for name in "P_ij P_nn M_n Gamma_n w_1 zeta_n".split())
+
+
+@cache
+def principal(order: int = 1, *, damped: bool = False) -> Any:
+    """Return multiple scales at the principal resonance of one mode among any number."""
+    return general_resonance("principal", order, damped=damped)
+
+
+def _step(name: str) -> Any:
+    shown = principal().step(name).expression
+    return tuple(map(plain, shown)) if isinstance(shown, tuple) else plain(shown)
+
+
+# Expansion (37)-(43) --------------------------------------------------------------------------------------------
+
+
+@numbered(37, "two-scale expansion", "assumption", ("36a", "36b"))
+def two_scale_expansion() -> Any:
+    """A solution is sought that depends on fast and slow time."""
+    return _step("expansion")
+
+
+@numbered(38, "derivative operators", "derived", (37,))
+def derivative_operators() -> Any:
+    """The chain rule: D_k is the derivative with respect to T_k = epsilon^k t."""
+    return _step("operators")
+
+
+@numbered(39, "order 0", "derived", (37, 38))
+def order_0() -> Any:
+    """Terms without epsilon."""
+    return _step("order 0")
+
+
+@numbered(40, "order 1", "derived", (37, 38))
+def order_1() -> Any:
+    """Terms with epsilon: the slow derivative and the excitation drive."""
+    return _step("order 1")
+
+
+@numbered(41, "solution of order 0", "derived", (39,))
+def order_0_solution() -> Any:
+    """Each mode swings at its own frequency; its complex amplitude A_n depends on slow time."""
+    return _step("free vibration")
+
+
+@numbered(42, "detuning", "definition")
+def detuning() -> Any:
+    """The paper's text measures the detuning from omega_n; the sources it follows, and a parametric excitation, ask for
+    2 omega_n: here the latter (the former is (42a)). Its own symbols are lost."""
+    return _step("detuning")
+
+
+@numbered("42a", "detuning from the natural frequency", "definition")
+def forced_detuning() -> Eq:
+    """The paper's words taken literally: what the forced system (36) calls for."""
+    return plain(forced_resonance().step("detuning").expression)
+
+
+@numbered(43, "the excitation in slow time", "derived", (42,))
+def excitation_in_exponentials() -> Any:
+    """The paper's equation is lost; from (41) and (42) it can only be this, the excitation at the detuned frequency."""
+    return _step("excitation in exponentials")
+
+
+@numbered(44, "secular terms", "derived", (40, 41, 43))
+def secular_terms() -> Any:
+    """Factor of exp(i omega_n T_0) on the right of order 1."""
+    return _step("secular terms")
+
+
+@numbered(45, "solvability", "derived", (44,))
+def solvability() -> Any:
+    """Order 1 has a bounded solution only if its right-hand side is orthogonal to the free vibration."""
+    return _step("solvability")
+
+
+def residual(rate: Expr | None = None) -> tuple[Expr, Expr]:
+    """Put the expansion into the equation of motion of a single mode; return what is left at orders 0 and 1.
+
+    The slow derivative of the amplitude is that of (48), or ``rate`` if given.
+    """
+    a, b = Function("a")(t), Function("b")(t)
+    names = {named("A_n"): a, named("Abar_n"): b}
+    (written,), (driven,) = order_0_solution(), principal(2).step("order-1 solution").expression
+    zeroth = written.rhs.subs(T_0, t).xreplace(names)
+    first = plain(driven.rhs).subs({T_0: t, T_1: epsilon * t}).xreplace(names)
+    excitation = excitation_in_exponentials().rhs.subs({T_0: t, T_1: epsilon * t})
+    (expanded,) = two_scale_expansion()
+    q = expanded.rhs.xreplace({named("q_n0"): zeroth, named("q_n1"): first})
+    motion = q.diff(t, 2) + omega_n**2 * q + epsilon * excitation * P_nn * q
+    rates = _rates(a, b) if rate is None else {a: epsilon * rate, b: epsilon * conjugate(rate)}
+    for f in (a, b):
+        second = rates[f].diff(t).subs({g.diff(t): r for g, r in rates.items()})
+        motion = motion.subs(f.diff(t, 2), second)
+    motion = motion.subs({g.diff(t): r for g, r in rates.items()})
+    # in slow time the phase is no power of epsilon
+    plain_motion = motion.expand().subs(epsilon * sigma * t, Symbol("phase", real=True)).expand()
+    return tuple((plain_motion.coeff(epsilon, k) * exp(-I * omega_n * t)).expand() for k in (0, 1))
+
+
+def _rates(a: Expr, b: Expr) -> dict[Expr, Expr]:
+    """Return (48) and its conjugate for the functions a and b of t."""
+    drift = amplitude_equation().rhs
+    names = {Function("A_n")(t): a, Function("Abar_n")(t): b}
+    forward = drift.xreplace(names)
+    swapped = {a: b, b: a, I: -I}
+    return {a: forward, b: forward.xreplace(swapped)}
+
+
+_TIMES = {named("D_0"): T_0, named("D_1"): T_1}
+_SLOW = {named("A_n"): Function("a")(T_1), named("Abar_n"): Function("b")(T_1)}
+
+
+@cache
+def _fields() -> dict[Symbol, Expr]:
+    """Return orders 0 and 1 of a single mode, and its amplitudes, as functions of fast and slow time."""
+    (zeroth,), (first,) = order_0_solution(), principal(2).step("order-1 solution").expression
+    orders = {named("q_n0"): zeroth.rhs, named("q_n1"): plain(first.rhs)}
+    return _SLOW | {name: order.xreplace(_SLOW) for name, order in orders.items()}
+
+
+def _acted(expression: Expr) -> Expr:
+    """Return what an expression with operators is for a single mode: in sums over modes, all others rest."""
+    for total in expression.atoms(Sum):
+        own = {s: Symbol(s.name.replace("j", "n"), **s.assumptions0) for s in total.function.free_symbols}
+        expression = expression.xreplace({total: total.function.xreplace(own)})
+    excitation = excitation_in_exponentials()
+    return acting(expression, _fields(), _TIMES).subs(excitation.lhs, excitation.rhs)
+
+
+def _left_over(equation: Eq) -> Expr:
+    """Return what is left of an equation of the expansion when the amplitude follows (48)."""
+    a, b = _SLOW.values()
+    rates = {f.diff(T_1): (rate / epsilon).subs(epsilon * t, T_1) for f, rate in _rates(a, b).items()}
+    return _acted(equation.lhs - equation.rhs).subs(rates)
+
+
+@proves(37)
+def _() -> Proof:
+    """Order 0 without epsilon; with (48) it leaves nothing at orders 0 and 1 in the equation of motion of a mode."""
+    yield two_scale_expansion()[0].rhs.subs(epsilon, 0) == named("q_n0")
+    yield from residual()
+
+
+@proves(38)
+def _() -> Proof:
+    """Any exponential of T_0 and T_1, and so any sum of such, differentiated once and twice as one of t and epsilon t;
+    the second leaves only epsilon^2."""
+    fast, slow = Symbol("a"), Symbol("b")
+    trial, gaps = exp(fast * T_0 + slow * T_1), []
+    for order, operator in enumerate(derivative_operators(), start=1):
+        applied = operator.rhs.subs({Symbol(name): named(name) for name in ("D_0", "D_1")}) * named("trial")
+        found = acting(applied, {named("trial"): trial}, _TIMES)
+        times = {T_0: t, T_1: epsilon * t}
+        gaps.append(trial.subs(times).diff(t, order) - found.subs(times))
+    yield gaps[0]
+    yield gaps[1] - (epsilon * slow) ** 2 * trial.subs(times)
+
+
+@proves(39)
+def _() -> Proof:
+    """Its operators at work on the free vibration (41) leave nothing."""
+    yield _left_over(order_0()[0])
+
+
+@proves(40)
+def _() -> Proof:
+    """Its operators at work on the free vibration (41) and on the bounded response of first order leave nothing when
+    the amplitude follows (48)."""
+    yield _left_over(order_1()[0])
+
+
+@proves(41)
+def _() -> Proof:
+    """Differentiated twice; and it is real: its own complex conjugate."""
+    amplitudes = {named("A_n"): Symbol("a"), named("Abar_n"): Symbol("b")}
+    swap = {Symbol("a"): Symbol("b"), Symbol("b"): Symbol("a"), I: -I}
+    solution = order_0_solution()[0].rhs.xreplace(amplitudes)
+    yield solution.xreplace(swap) - solution
+    yield solution.diff(T_0, 2) + omega_n**2 * solution
+    yield solution.coeff(Symbol("a")) - exp(I * omega_n * T_0)
+
+
+@proves(42)
+def _() -> Proof:
+    """Frequencies; at the exact resonance one excitation period is half a period of the mode, and sigma in slow time
+    is the distance from it."""
+    yield dimension(detuning()) == Dimension(s=-1)
+    yield detuning().lhs == varpi
+    yield detuning().rhs - 2 * omega_n - epsilon * sigma
+
+
+@proves("42a")
+def _() -> Proof:
+    """Frequencies; at the exact resonance both periods are the same, and sigma in slow time is the distance from it."""
+    yield dimension(forced_detuning()) == Dimension(s=-1)
+    yield forced_detuning().lhs == varpi
+    yield forced_detuning().rhs - omega_n - epsilon * sigma
+
+
+@proves(43)
+def _() -> Proof:
+    """Euler's formula for the detuned frequency."""
+    written = excitation_in_exponentials()
+    yield written.lhs - cos(varpi * T_0)
+    yield written.rhs - cos((detuning().rhs * T_0).expand().subs(epsilon * T_0, T_1))
+
+
+@proves(44)
+def _() -> Proof:
+    """Any other slow evolution of the amplitude leaves in the equation of motion just these terms, sign changed."""
+    rate = Symbol("r", real=True)
+    left = [term for term in residual(rate)[1].args if not any(e.args[0].has(t) for e in term.atoms(exp))]
+    slow = {named("A_n"): Function("a")(t), named("Abar_n"): Function("b")(t)}
+    (terms,) = secular_terms()
+    shown = terms.subs(named("D_1") * named("A_n"), rate).xreplace(slow)
+    yield sum(left, S.Zero) + shown.subs(T_1, Symbol("phase", real=True) / sigma)
+
+
+@proves(45)
+def _() -> Proof:
+    """A force of an oscillator's own frequency makes it swing ever wider, t times a harmonic, and the mean of the right
+    of (40) times exp(-i omega_n T_0) over one period tells how much of it there is: just this."""
+    swelling = t * exp(I * omega_n * t)
+    period = 2 * pi / omega_n
+    turned = (_acted(order_1()[0].rhs) * exp(-I * omega_n * T_0)).expand()
+    mean = sum((integrate(term, (T_0, 0, period)) / period for term in turned.args), S.Zero)
+    (condition,) = solvability()
+    yield swelling.diff(t, 2) + omega_n**2 * swelling - 2 * I * omega_n * exp(I * omega_n * t)
+    yield mean - _acted(condition.lhs - condition.rhs)
+
+
+@numbered(46, "inner product", "definition", (6,))
+def inner_product() -> Eq:
+    """For complex functions on (0, L), with the masses of manipulator and end-effector; modes are orthogonal in it."""
+    f, g = (Function(name)(x) for name in "fg")
+    return Eq(Symbol(r"\langle f, g \rangle"), inner_mass(f, conjugate(g)).doit(integrals=False), evaluate=False)
+
+
+@proves(46)
+def _() -> Proof:
+    """For functions with real and imaginary parts it is what the mass of (6) makes of the four pairs of those, the part
+    of the second function conjugate."""
+    f, g = (Function(name)(x) for name in "fg")
+    a, b, c, d = (Function(name)(x) for name in ("Re f", "Im f", "Re g", "Im g"))
+    product = put(inner_product().rhs, {f: a + I * b, g: c + I * d})
+    found = product.replace(conjugate, lambda e: e.xreplace({I: -I}))
+    yield termwise(found - _mass(a, c) - _mass(b, d) - I * (_mass(b, c) - _mass(a, d)))
+
+
+def _mass(first: Expr, second: Expr) -> Expr:
+    """Return the product of two shapes that the mass (6) of one shape goes with."""
+    mass = generalised()[0].rhs
+    return (put(mass, {phi_i: first + second}) - put(mass, {phi_i: first - second})) / 4
+
+
+@samples(46)
+def _() -> bool:
+    """Modes of a random arm found by shooting are orthogonal in it."""
+    f, g = Function("f"), Function("g")
+    values, (one, two, *_rest) = sample(46), shoot(sample(46))
+    real = inner_product().rhs.replace(conjugate, lambda e: e)
+    gram = np.array([[evaluate(real, values, {f(x): a, g(x): b}) for a in (one, two)] for b in (one, two)])
+    return bool(abs(gram[0, 1]) < 1e-8 * np.sqrt(gram[0, 0] * gram[1, 1]))
+
+
+@numbered(47, "solvability, term by term", "derived", (45, 46))
+def distributed() -> Eq:
+    """The inner product with the mode taken of each term: its generalised mass comes in front."""
+    return Eq((M_n * solvability()[0].lhs).expand(), 0, evaluate=False)
+
+
+@proves(47)
+def _() -> Proof:
+    """The inner product (46) of any factor times a real mode with that mode is the factor times the mass of (6); with
+    that mass in front, (45)."""
+    f, g, factor = Function("f")(x), Function("g")(x), Symbol("c")
+    product = put(inner_product().rhs, {f: factor * phi_i, g: phi_i}).replace(conjugate, lambda e: e)
+    before, after = (e.lhs - e.rhs for e in (solvability()[0], distributed()))
+    yield termwise(product - factor * generalised()[0].rhs)
+    yield (after - M_n * before).expand() == 0
+
+
+# Amplitude equation and boundary (48)-(49) ----------------------------------------------------------------------
+
+
+@numbered(48, "amplitude equation", "derived", (47,))
+def amplitude_equation() -> Eq:
+    """The paper's equation is lost. For a parametric excitation the amplitude is driven by its own conjugate; here
+    the derivative is by the time t."""
+    return plain(principal().amplitude_equations[0]).subs(Symbol("Delta", real=True), epsilon * sigma)
+
+
+@proves(48)
+def _() -> Proof:
+    """Put with the expansion into the equation of motion it leaves nothing at orders 0 and 1; another one would."""
+    yield from residual()
+    yield residual(Symbol("r", real=True)) != (0, 0)
+
+
+@numbered("48a", "amplitude equation of the literal route", "derived", (36, "42a"))
+def forced_amplitude_equation() -> Eq:
+    """What (36) gives: no conjugate amplitude, so linear growth at resonance and no boundary of stability."""
+    found = plain(forced_resonance().amplitude_equations[0])
+    return found.subs(Symbol("Delta", real=True), epsilon * sigma)
+
+
+@proves("48a")
+def _() -> Proof:
+    """At resonance the amplitude grows in proportion to time; so made into a motion of the mode, it balances the force
+    of (36). Away from it, it turns with the detuning."""
+    drift = forced_amplitude_equation().rhs
+    motion = 2 * drift.subs(sigma, 0) * t * cos(omega_n * t)
+    force = excited_system().rhs.xreplace({symbol("Gamma_i"): Gamma_n}).subs(varpi, omega_n)
+    yield M_n * (motion.diff(t, 2) + omega_n**2 * motion) - force
+    yield drift - drift.subs(sigma, 0) * exp(I * epsilon * sigma * t)
+
+
+@numbered(49, "stability boundary", "derived", (48,))
+def stability_boundary() -> tuple[Eq, Eq]:
+    """The amplitude of (48) grows between these two frequencies. The paper's boundary, borrowed from axially moving
+    beams, does not follow from its (36); this one follows from (48)."""
+    return _step("boundary")
+
+
+@proves(49)
+def _() -> Proof:
+    """Borders of instability have motions of twice the period of the excitation. With a third harmonic, a sine at one
+    border and a cosine at the other leave nothing at orders 0 and 1 in the equation of motion."""
+    for sign in (1, -1):
+        size, shapes = sign * abs(P_nn), (sin, cos)[::sign]
+        for border, shape in zip(stability_boundary(), shapes, strict=True):
+            yield border.lhs == varpi
+            motion = shape(angle) + epsilon * size / (16 * omega_n**2) * shape(3 * angle)
+            yield from _left_by(motion, size, border.rhs)
+
+
+angle = Symbol("theta")
+
+
+def _left_by(motion: Expr, size: Expr, frequency: Expr, damping: Expr = S.Zero) -> Proof:
+    """Yield what a motion, a function of half the phase of the excitation, leaves at orders 0 and 1 in the equation of
+    a mode whose coupling P_nn is ``size``."""
+    rate = frequency / 2
+    force = rate**2 * motion.diff(angle, 2) + 2 * damping * omega_n * rate * motion.diff(angle)
+    left = (force + (omega_n**2 + epsilon * size * cos(2 * angle)) * motion).expand()
+    for order in (0, 1):
+        yield left.coeff(epsilon, order)
+
+
+@samples(49)
+def _() -> bool:
+    """Mathieu's characteristic values; the error shrinks with the square of epsilon."""
+    from scipy.special import mathieu_a, mathieu_b
+
+    errors = []
+    for size in (0.02, 0.01):
+        numbers = {omega_n: 1.0, P_nn: 1.0, epsilon: size}
+        lower, upper = (float(side.rhs.subs(numbers)) for side in stability_boundary())
+        errors.append(
+            max(abs(4 / v**2 - curve(1, 2 * size / v**2)) for v, curve in ((lower, mathieu_a), (upper, mathieu_b)))
+        )
+    return bool(3.5 < errors[0] / errors[1] < 4.5)
+
+
+@numbered("49a", "growth of the literal route", "derived", ("48a",))
+def forced_measure() -> Eq:
+    """What can be said instead for a base that moves across the arm: how fast the tip's amplitude grows at resonance,
+    for epsilon = 1. It is a velocity, no frequency."""
+    expression, _ = forced_growth()
+    return Eq(Derivative(Symbol("a"), t), expression, evaluate=False)
+
+
+@proves("49a")
+def _() -> Proof:
+    """A velocity that does not change when the mode is scaled; squared it is that of a motion t times a harmonic, which
+    balances the force of (36) at resonance, at the tip."""
+    expression, (_, gamma, tip, mass, _) = forced_growth()
+    shown = forced_measure().rhs
+    yield forced_measure().lhs == Derivative(Symbol("a"), t)
+    yield dimension(shown, {tip: Dimension()}) == Dimension(m=1, s=-1)
+    yield shown - expression
+    yield shown - shown.subs({gamma: 3 * gamma, tip: 3 * tip, mass: 9 * mass}, simultaneous=True)
+    rate = Symbol("r")
+    motion = rate * t * cos(omega_n * t)
+    force = excited_system().rhs.xreplace({symbol("Gamma_i"): gamma}).subs(varpi, omega_n) / epsilon
+    balance = (mass * (motion.diff(t, 2) + omega_n**2 * motion) - force).subs(t, pi / (2 * omega_n))
+    (needed,) = solve(balance, rate)
+    yield shown**2 - (needed * tip) ** 2
+
+
+@numbered("49b", "threshold of damping", "derived", (48,))
+def damping_threshold() -> Eq:
+    """With a damping ratio zeta_n the amplitude grows only above this epsilon."""
+    damped = principal(damped=True)
+    return Eq(epsilon, plain(damped.explicit(damped.border.threshold)), evaluate=False)
+
+
+@proves("49b")
+def _() -> Proof:
+    """With this damping a motion of twice the period of the excitation neither grows nor decays in the middle of the
+    zone: with a third harmonic it leaves nothing at orders 0 and 1 in the equation of motion."""
+    needed = zeta_n * epsilon / damping_threshold().rhs
+    yield damping_threshold().lhs == epsilon
+    yield not needed.has(zeta_n)
+    for sign in (1, -1):
+        size = sign * abs(P_nn)
+        third = epsilon * size / (16 * omega_n**2) * (cos(3 * angle) - sign * sin(3 * angle))
+        yield from _left_by(cos(angle) - sign * sin(angle) + third, size, 2 * omega_n, needed)
+
+
+@samples("49b")
+def _() -> bool:
+    """The Floquet multipliers of one mode in the middle of its zone, just below and just above."""
+    from cra_sym.solvers.floquet import floquet_exponents
+
+    numbers = {omega_n: 1.0, P_nn: 1.0, zeta_n: 0.005}
+    threshold = float(damping_threshold().rhs.subs(numbers))
+    sizes = threshold * np.array([0.995, 1.005])
+    below, above = floquet_exponents([1.0], [[[1.0]]], 2.0 - sizes**2 / 32, sizes, 0.005)[:, 0].real
+    return bool(below < 0 < above)

@@ -1,0 +1,161 @@
+"""Proved enclosures against roots found at 40 digits of the determinant written out by hand."""
+
+from __future__ import annotations
+
+import math
+import sys
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+import cra_sym as cra
+from cra_sym.analysis.certification import _FIELDS, _BallArm
+from cra_sym.solvers.certificates import UndecidedError, decided, enclose
+
+flint = pytest.importorskip("flint", reason="the extra 'certify' brings python-flint")
+
+
+def random_arms(number, seed):
+    rng = np.random.default_rng(seed)
+
+    def spread(low, high, *special):
+        values = 10 ** rng.uniform(low, high, number)
+        chosen = rng.random(number)
+        for k, value in enumerate(special):
+            values[(chosen > 0.15 * k) & (chosen < 0.15 * (k + 1))] = value
+        return values
+
+    return cra.Arm.nominal().replace(
+        k_t=spread(-9, 12, 0.0, np.inf),
+        k_r=spread(-9, 12, 0.0, np.inf),
+        m_e=spread(-6, 5, 0.0),
+        J_e=spread(-9, 5, 0.0),
+        L=10 ** rng.uniform(-1, 1, number),
+    )
+
+
+def determinant(arm, lam):
+    """Determinant of the four boundary conditions, the columns cos, sin, cosh, sinh; exact parameters."""
+    L, b, h, E, rho = (mp.mpf(getattr(arm, name)) for name in ("L", "b", "h", "E", "rho"))
+    EI, mass = E * b * h**3 / 12, rho * b * h * L
+    c, s, C, S = mp.cos(lam), mp.sin(lam), mp.cosh(lam), mp.sinh(lam)
+    kt, kr = (mp.mpf(arm.k_t) * L**3 / EI, mp.mpf(arm.k_r) * L / EI)
+    mu, iota = mp.mpf(arm.m_e) / mass, mp.mpf(arm.J_e) / (mass * L**2)
+    shear = [1, 0, 1, 0] if mp.isinf(kt) else [kt, -(lam**3), kt, lam**3]
+    moment = [0, 1, 0, 1] if mp.isinf(kr) else [-(lam**2), -kr * lam, lam**2, -kr * lam]
+    tip_moment = [lam**2 * f - iota * lam**5 * g for f, g in zip((-c, -s, C, S), (-s, c, S, C), strict=True)]
+    tip_shear = [lam**3 * f + mu * lam**4 * g for f, g in zip((s, -c, S, C), (c, s, C, S), strict=True)]
+    return mp.det(mp.matrix([shear, moment, tip_moment, tip_shear]))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_enclosure_holds_the_root_of_the_hand_written_determinant(seed):
+    arm = random_arms(1, seed)
+    arm = arm.replace(**{name: float(getattr(arm, name)[0]) for name in ("k_t", "k_r", "m_e", "J_e", "L")})
+    certificate = cra.certify(arm, modes=4)
+    assert certificate.complete
+    with mp.workdps(60):
+        L, mass = mp.mpf(arm.L), mp.mpf(arm.rho) * mp.mpf(arm.b) * mp.mpf(arm.h)
+        scale = mp.sqrt(mp.mpf(arm.E) * mp.mpf(arm.b) * mp.mpf(arm.h) ** 3 / 12 / mass) / (2 * mp.pi * L**2)
+        for low, high in zip(certificate.lower, certificate.upper, strict=True):
+            if high == 0:
+                continue
+            width = mp.mpf(high) * mp.mpf(2) ** -52
+            ends = [mp.sqrt((mp.mpf(x) + d) / scale) for x, d in ((low, -width), (high, width))]
+            root = mp.findroot(lambda lam: determinant(arm, lam), ends, solver="anderson", tol=1e-60, verify=False)
+            assert low <= scale * root**2 <= high
+
+
+def test_the_solver_lies_within_the_enclosures():
+    arm = random_arms(60, seed=20261122)
+    certificate = cra.certify(arm, modes=10)
+    assert certificate.complete.all()
+    frequency = cra.natural_frequencies(arm, modes=10)
+    outside = np.maximum(frequency - certificate.upper, certificate.lower - frequency)
+    assert (outside <= 4e-15 * frequency).all()
+    assert (certificate.upper - certificate.lower <= 1e-14 * certificate.lower).all()
+    assert (certificate.upper[:, :-1] <= certificate.lower[:, 1:]).all()
+
+
+def test_three_modes_unless_asked_for_more():
+    certificate = cra.certify(cra.Arm.nominal())
+    assert certificate.lower.shape == certificate.upper.shape == (3,) and certificate.complete.shape == ()
+
+
+def test_rigid_body_modes_are_zero():
+    free = cra.Arm.nominal().replace(k_t=[0.0, 0.0, 1e3], k_r=[0.0, 1e2, 0.0])
+    certificate = cra.certify(free, modes=3)
+    assert ((certificate.upper == 0).sum(axis=-1) == [2, 1, 1]).all()
+    assert ((certificate.lower == 0) == (certificate.upper == 0)).all()
+
+
+def test_the_proved_number_of_zeros_is_the_solvers():
+    """Between and next to the zeros, for joints of every kind: each constraint that is released may change it."""
+    arm = random_arms(40, seed=5)
+    lam = cra.modal_parameters(arm, modes=8).lam
+    values = np.broadcast_arrays(*(getattr(arm, name) for name in _FIELDS))
+    for place, zeros in enumerate(lam):
+        function = _BallArm(flint, {name: float(value[place]) for name, value in zip(_FIELDS, values, strict=True)})
+        near = zeros[zeros > 0] * np.array([[1 - 1e-9], [1 + 1e-9]])
+        for point in [*near.flat, *np.arange(1, 4) * np.pi + 0.1, *np.arange(1, 4) * np.pi - 0.1]:
+            assert function.count(flint.arb(point)) == (zeros < point).sum()
+
+
+def test_zeros_of_the_pinned_beam_next_to_a_floating_point_number():
+    """The number nearest to n pi lies below or above it; both occur, and rounding must not decide."""
+    function = _BallArm(flint, dict.fromkeys(_FIELDS, 1.0))
+    below = 0
+    with mp.workdps(60):
+        for n in range(1, 60):
+            for point in (n * math.pi, np.nextafter(n * math.pi, 0.0)):
+                expected = int(mp.floor(mp.mpf(float(point)) / mp.pi))
+                below += expected != int(point / math.pi)
+                assert function._pinned(flint.arb(float(point))) == expected
+    assert below > 5
+
+
+class Parabola:
+    """Zeros at 1 and at 2 or another place above, the sign that of (-1)**count."""
+
+    zeros = 0
+
+    def __init__(self, other=2):
+        self.other = other
+
+    def count(self, point):
+        return int(point > 1) + int(point > self.other)
+
+    def is_positive(self, point):
+        return bool((point - 1) * (point - self.other) > 0)
+
+
+def test_a_guess_elsewhere_proves_nothing():
+    with pytest.raises(UndecidedError, match="zero 2 is not near"):
+        enclose(flint, Parabola(), [1.0, 1.5])
+    (low, high), _ = enclose(flint, Parabola(), [1.0 + 1e-9, 2.0])
+    assert low <= 1 <= high and float(high - low) < 1e-15
+
+
+def test_close_neighbours_get_enclosures_of_their_own():
+    """Also if both guesses are so far off that the first bracket around them holds the two."""
+    other = flint.arb(1) + flint.arb(2) ** -30
+    (low, high), (low_2, high_2) = enclose(flint, Parabola(other), [1 - 2.0**-21, 1 + 2.0**-21])
+    assert low <= 1 <= high < low_2 <= other <= high_2
+
+
+def test_enclosures_are_as_narrow_as_promised():
+    for root, (low, high) in zip((1, 2), enclose(flint, Parabola(), [1.0, 2.0]), strict=True):
+        assert low <= root <= high
+        assert high - low <= root * flint.arb(2) ** -53
+
+
+def test_zero_has_no_sign():
+    with pytest.raises(UndecidedError, match="12288 bits"):
+        decided(flint, lambda: flint.arb.pi().sin())
+
+
+def test_a_missing_library_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "flint", None)
+    with pytest.raises(ImportError, match=r"'cra_sym\[certify\]'"):
+        cra.certify(cra.Arm.nominal())

@@ -1,0 +1,120 @@
+"""Exact frequency responses against modal series, steady states in time, statics, and the field equation."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import cra_sym as cra
+from cra_sym import Arm, BaseMotion
+from cra_sym.model import forced_waves as forced
+
+OMEGA = np.array([0.01, 1.0, 5.0, 15.2, 30.0, 96.0, 150.0, 300.0, 2000.0])
+JOINTS = [{}, {"k_t": 1e3, "k_r": 50.0}, {"k_t": 1e3, "k_r": 0.0, "J_e": 1e-3}, {"k_t": 50.0}]
+
+
+def series(arm, omega, x, modes, damping):
+    """Return the sum over modes."""
+    p, shapes = cra.modal_parameters(arm, modes), cra.mode_shapes(arm, x, modes)
+    omega = omega[:, None]
+    if damping == "modal":
+        stiffness = p.omega**2 + 2j * arm.zeta * p.omega * omega
+    else:
+        stiffness = p.omega**2 * (1 + 2j * arm.zeta)
+    return ((-p.participation / (stiffness - omega**2)) @ shapes).T
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+@pytest.mark.parametrize("zeta", [0.0, 0.01, 0.4])
+@pytest.mark.parametrize("damping", ["modal", "structural"])
+def test_the_modal_series_converges_to_it(joint, zeta, damping):
+    arm = Arm.nominal().replace(zeta=zeta, **joint)
+    x = [0.2, 1.0]
+    exact = cra.frequency_response(arm, OMEGA, x, damping=damping)
+    gaps = [np.abs(series(arm, OMEGA, x, modes, damping) / exact - 1).max() for modes in (3, 12, 48, 200)]
+    assert gaps[0] > gaps[1] > gaps[2]
+    assert gaps[3] < 1e-8
+
+
+def test_truncation_costs_most_at_the_root_of_a_stiff_joint():
+    arm = Arm.nominal().replace(k_t=1e5, zeta=0.01)
+    exact = cra.frequency_response(arm, 5.0, [0.0, 1.0])
+    cost = np.abs(series(arm, np.array([5.0]), [0.0, 1.0], 5, "modal")[:, 0] / exact - 1)
+    assert cost[0] > 0.05 > 1e-3 > cost[1]
+
+
+def test_it_is_the_steady_state_of_the_time_response():
+    arm, rate = Arm.nominal().replace(k_t=1e3, k_r=50.0, zeta=0.1), 12.0
+    t = 60.0 + np.linspace(0, 0.5, 11)
+    motion = BaseMotion(amplitude=1e-3, angular_frequency=rate)
+    found = cra.tip_response(arm, motion, t, modes=40)
+    complex_amplitude = cra.frequency_response(arm, rate) * (-1e-3 * rate**2)
+    assert found == pytest.approx((complex_amplitude * np.exp(1j * rate * t)).imag, rel=1e-9, abs=1e-12)
+
+
+def test_both_dampings_agree_at_a_resonance_and_differ_at_rest():
+    arm = Arm.nominal().replace(zeta=0.005)
+    resonance = cra.modal_parameters(arm, 1).omega[0]
+    peak, low = (
+        cra.frequency_response(arm, rate) / cra.frequency_response(arm, rate, damping="structural")
+        for rate in (resonance, 0.0)
+    )
+    assert abs(peak - 1) < 1e-3
+    assert low == pytest.approx(1 + 0.01j)
+
+
+def test_statics_and_limits():
+    arm = Arm.nominal().replace(k_t=1e3, k_r=50.0, J_e=1e-3)
+    root = -(arm.rhoA * arm.L + arm.m_e) / arm.k_t
+    turn = (arm.rhoA * arm.L**2 / 2 + arm.m_e * arm.L) / arm.k_r
+    tip = root - turn * arm.L - (arm.rhoA * arm.L**4 / 8 + arm.m_e * arm.L**3 / 3) / arm.EI
+    assert cra.frequency_response(arm, 0.0, [0.0, 1.0]) == pytest.approx([root, tip], rel=1e-12)
+    assert cra.frequency_response(arm.replace(zeta=0.05), [0.0, 5.0])[0] == pytest.approx(tip, rel=1e-12)
+    stiff = cra.frequency_response(arm.replace(k_t=1e14, k_r=1e14), OMEGA)
+    assert stiff == pytest.approx(cra.frequency_response(arm.replace(k_t=np.inf, k_r=np.inf), OMEGA), rel=1e-7)
+    loose = arm.replace(k_t=0.0, k_r=0.0, zeta=0.02)
+    assert cra.frequency_response(loose, OMEGA[1:], 0.4) == pytest.approx(1 / OMEGA[1:] ** 2, rel=1e-8)
+
+
+def test_power_series_and_exponentials_meet():
+    arm = Arm.nominal().replace(k_t=1e3, k_r=50.0)
+    seam = 4.0 * arm.angular_frequency_scale  # lambda = 2
+    below, above = cra.frequency_response(arm, [seam * (1 - 1e-9), seam * (1 + 1e-9)], [0.0, 0.5, 1.0]).T
+    assert above == pytest.approx(below, rel=1e-7)
+    extreme = cra.frequency_response(arm, [1e5, 1e8], [0.0, 1.0])
+    assert np.isfinite(extreme).all()
+
+
+def test_the_bases_solve_the_field_equation():
+    """Symbolic: U'''' - Z U = -1, the power series up to its first term left out."""
+    for derived, wave in ((forced.wave_jets(), forced.Z ** sp.Rational(1, 4)), (forced.series_jets(), forced.Z)):
+        (basis, particular), (xi, argument) = derived
+        for column, load in ((basis, 0), (particular, 1)):
+            for shape in column.row(0):
+                residual = forced.field_residual(shape.subs({argument: wave, xi: forced.x})) + load - 1
+                power = 1 + forced.Z * sp.oo if residual == 0 else sp.LT(sp.expand(residual), forced.Z)
+                assert residual == 0 or sp.degree(power, forced.Z) >= 7
+
+
+def test_batches_broadcast_and_single_values_drop_axes():
+    arms = Arm.nominal().replace(k_t=np.array([[1e3], [np.inf]]), L=[0.8, 1.0], zeta=[0.0, 0.02])
+    whole = cra.frequency_response(arms, OMEGA, [0.0, 0.4])
+    assert whole.shape == (2, 2, 2, OMEGA.size)
+    assert cra.frequency_response(arms, OMEGA).shape == (2, 2, OMEGA.size)
+    assert cra.frequency_response(arms, 3.0).shape == (2, 2)
+    one = cra.frequency_response(Arm.nominal().replace(k_t=1e3, L=0.8), OMEGA, 0.4)
+    assert whole[0, 0, 1] == pytest.approx(one, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "words"),
+    [
+        ({"angular_frequency": -1.0}, ValueError, "angular_frequency = -1"),
+        ({"angular_frequency": [[1.0]]}, ValueError, "angular_frequency has shape"),
+        ({"x": 2.0}, ValueError, "x = 2"),
+        ({"damping": "viscous"}, ValueError, "damping = 'viscous'"),
+        ({"arm": 3}, TypeError, "arm = 3"),
+    ],
+)
+def test_bad_input_is_named(arguments, error, words):
+    with pytest.raises(error, match=words):
+        cra.frequency_response(**({"arm": Arm.nominal(), "angular_frequency": 1.0} | arguments))

@@ -1,0 +1,109 @@
+"""The exact gradient of the residual vibration, against Richardson's extrapolated differences and its limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import cra_sym as cra
+from cra_sym.model.modal import tip_factors
+from cra_sym.model.spectrum import pair
+
+LIMITS = {"distance": 0.2, "v_max": 1.0, "a_max": 2.0, "j_max": 40.0}
+MOVE = cra.BaseMotion.s_curve(**LIMITS, duration=1.234)
+ARM = cra.Arm.nominal().replace(L=0.8, k_t=2e3, k_r=60.0, m_e=0.05, J_e=1e-3)
+NAMES = ("k_t", "k_r", "c_t", "c_r", "m_e", "J_e", "duration")
+
+
+def residual(arm, name, value, **options):
+    if name == "duration":
+        return cra.residual_vibration(arm, cra.BaseMotion.s_curve(**LIMITS, duration=value), **options)
+    if name in ("c_t", "c_r"):
+        name, value = f"k_{name[2]}", 1 / value
+    return cra.residual_vibration(arm.replace(**{name: value}), MOVE, **options)
+
+
+def slope(arm, name, at, step, **options):
+    """Central differences with three steps, extrapolated twice: an error of order step^6."""
+    step = step * at / 2.0 ** np.arange(3)
+    rows = (residual(arm, name, at + step, **options) - residual(arm, name, at - step, **options)) / (2 * step)
+    for order in (4, 16):
+        rows = (order * rows[1:] - rows[:-1]) / (order - 1)
+    return rows[0]
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.005, 0.3])
+def test_the_gradient_is_the_slope(zeta):
+    arm = ARM.replace(zeta=zeta)
+    value, gradient = cra.residual_vibration_gradient(arm, MOVE, NAMES)
+    assert value == cra.residual_vibration(arm, MOVE)
+    at = {"k_t": 2e3, "k_r": 60.0, "c_t": 1 / 2e3, "c_r": 1 / 60.0, "m_e": 0.05, "J_e": 1e-3, "duration": 1.234}
+    expected = [slope(arm, name, at[name], 1e-4 if name == "duration" else 2e-3) for name in NAMES]
+    np.testing.assert_allclose(gradient, expected, rtol=2e-8)
+
+
+def test_a_mode_alone_with_its_own_damping_and_a_record_that_ends_moving():
+    t = np.linspace(0.0, 1.0, 21)
+    motion = cra.BaseMotion.sampled(t, np.sin(3 * t)) + 0.5 * MOVE
+    options = {"modes": 2, "zeta": [0.02, 0.05]}
+    _, gradient = cra.residual_vibration_gradient(ARM, motion, ("k_r",), **options)
+    step = 60e-3 / 2.0 ** np.arange(2)
+    up, down = (cra.residual_vibration(ARM.replace(k_r=60.0 + sign * step), motion, **options) for sign in (1, -1))
+    rows = (up - down) / (2 * step)
+    assert gradient[0] == pytest.approx((4 * rows[1] - rows[0]) / 3, rel=1e-8)
+
+
+@pytest.mark.parametrize("name", ["t", "r"])
+def test_a_rigid_joint_has_a_slope_by_the_compliance_only(name):
+    """One-sided differences from the rigid joint on, extrapolated."""
+    rigid = ARM.replace(**{f"k_{name}": np.inf})
+    value, (by_stiffness, by_compliance) = cra.residual_vibration_gradient(rigid, MOVE, (f"k_{name}", f"c_{name}"))
+    assert by_stiffness == 0
+    step = {"t": 1e-7, "r": 1e-5}[name] / 2.0 ** np.arange(4)
+    rows = (residual(rigid, f"c_{name}", step) - value) / step
+    for order in (2, 4, 8):
+        rows = (order * rows[1:] - rows[:-1]) / (order - 1)
+    assert by_compliance == pytest.approx(rows[0], rel=1e-6)
+
+
+def test_an_absent_spring_leaves_the_slopes_by_the_others():
+    pinned = ARM.replace(k_r=0.0)
+    _, gradient = cra.residual_vibration_gradient(pinned, MOVE, ("k_r", "c_r", "k_t", "duration"))
+    assert np.isnan(gradient[:2]).all()
+    assert gradient[2] == pytest.approx(slope(pinned, "k_t", 2e3, 2e-3), rel=1e-7)
+    assert gradient[3] == pytest.approx(slope(pinned, "duration", 1.234, 1e-4), rel=1e-6)
+    floating = ARM.replace(k_t=0.0)
+    _, gradient = cra.residual_vibration_gradient(floating, MOVE, ("k_t", "duration"))
+    assert np.isnan(gradient[0]) and abs(gradient[1]) < 1e-12  # the base moves nothing
+
+
+def test_a_batch_has_the_gradients_of_its_arms():
+    masses, by = [0.05, 0.1, 0.2], ("m_e", "c_r", "duration")
+    value, gradient = cra.residual_vibration_gradient(ARM.replace(k_t=np.array([[2e3], [5e3]]), m_e=masses), MOVE, by)
+    assert value.shape == (2, 3) and gradient.shape == (2, 3, 3)
+    _, alone = cra.residual_vibration_gradient(ARM.replace(k_t=5e3, m_e=0.1), MOVE, by)
+    np.testing.assert_allclose(gradient[1, 1], alone, rtol=1e-9)
+
+
+def test_what_a_mode_leaves_behind_is_its_participation_times_its_tip():
+    """Of loose arms too, whose rigid bodies are told apart by their number."""
+    k = np.array([[0.0], [50.0], [0.0]])
+    arm = ARM.replace(k_t=k, k_r=k, m_e=[0.05, 0.1, 0.2])
+    p = cra.modal_parameters(arm, 4)
+    groups = [np.broadcast_to(g, arm.shape)[..., None] for g in (arm.kappa_t, arm.kappa_r, arm.mu, arm.iota)]
+    groups = [np.broadcast_to(group, p.lam.shape) for group in groups]
+    pairs = np.array([half for group in groups for half in pair(group)])
+    expected = p.participation * p.tip_displacement
+    np.testing.assert_allclose(tip_factors(p.lam, pairs, *groups[2:]), expected, rtol=1e-11, atol=1e-13)
+
+
+def test_a_stretched_strike_stays_a_strike():
+    """A base that starts at once has no duration to stretch."""
+    _, gradient = cra.residual_vibration_gradient(ARM, cra.BaseMotion(velocity=0.1), ("k_t", "duration"))
+    assert np.isfinite(gradient[0]) and not np.isfinite(gradient[1])
+
+
+def test_unknown_names_are_named():
+    for by in ("k_t", ("k_t", "L"), (3,), 5, None):
+        with pytest.raises(ValueError, match="allowed is a sequence of k_t"):
+            cra.residual_vibration_gradient(ARM, MOVE, by)

@@ -1,0 +1,123 @@
+"""Sensitivities: two routes against each other, finite differences at 30 digits, limits, and the claims that rest on
+them."""
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import cra_sym as cra
+from cra_sym import Arm
+from cra_sym.paper.modes import frequency_function
+
+FIELDS = ("k_t", "k_r", "m_e", "J_e", "L", "b", "h", "E", "rho")
+ELASTIC = Arm.nominal().replace(k_t=2e3, k_r=60.0, m_e=0.02, J_e=2e-4)
+
+
+def frequency(values, near):
+    """Return the root of the frequency equation nearest to a frequency parameter, as a frequency, at working
+    precision."""
+    function, arguments = frequency_function()
+    v = {name: mpmath.mpf(value) for name, value in values.items()}
+    EI, line = v["E"] * v["b"] * v["h"] ** 3 / 12, v["rho"] * v["b"] * v["h"]
+    kappa_t, kappa_r = v["k_t"] * v["L"] ** 3 / EI, v["k_r"] * v["L"] / EI
+    pairs = [x for kappa in (kappa_t, kappa_r) for x in (kappa / (1 + kappa), 1 / (1 + kappa))]
+    numbers = [*pairs, v["m_e"] / (line * v["L"]), v["J_e"] / (line * v["L"] ** 3)]
+    numeric = sp.lambdify(arguments, function, "mpmath")
+    lam = mpmath.findroot(lambda x: numeric(x, *numbers), near)
+    return lam**2 * mpmath.sqrt(EI / line) / (2 * mpmath.pi * v["L"] ** 2)
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_finite_differences_at_30_digits(field):
+    found = cra.sensitivities(ELASTIC)
+    values = {name: getattr(ELASTIC, name) for name in FIELDS}
+    lam = cra.modal_parameters(ELASTIC).lam
+    with mpmath.workdps(45):
+        step = mpmath.mpf(10) ** -15 * mpmath.mpf(values[field])
+        for mode in range(3):
+            up, down = (
+                frequency(values | {field: mpmath.mpf(values[field]) + side * step}, lam[mode]) for side in (1, -1)
+            )
+            slope = float((up - down) / (2 * step))
+            relative = float((up - down) / (2 * step) * values[field] / up)
+            assert getattr(found, f"df_d{field}")[mode] == pytest.approx(slope, rel=1e-10)
+            assert getattr(found, f"log_{field}")[mode] == pytest.approx(relative, rel=1e-10)
+
+
+def stiffnesses(low, high):
+    return st.sampled_from([0.0, np.inf]) | st.floats(low, high).map(lambda power: 10**power)
+
+
+@settings(max_examples=30, deadline=None)
+@given(stiffnesses(0, 7), stiffnesses(-1, 6), st.floats(0, 0.2), st.floats(0, 1e-2))
+def test_the_two_routes_agree_for_every_stiffness(k_t, k_r, m_e, J_e):
+    arm = Arm.nominal().replace(k_t=k_t, k_r=k_r, m_e=m_e, J_e=J_e)
+    modal, implicit = (cra.sensitivities(arm, 4, method=method) for method in ("modal", "implicit"))
+    lam = cra.modal_parameters(arm, 4).lam
+    clear = lam > 0.5  # below, the determinant's derivatives cancel
+    for name in [entry for entry in dir(modal) if entry.startswith(("frequency", "df_", "log_"))]:
+        ours, theirs = (getattr(found, name)[clear] for found in (modal, implicit))
+        assert theirs == pytest.approx(ours, rel=2e-7, abs=1e-9 * np.abs(ours).max(initial=1e-290)), name
+
+
+def test_infinite_stiffness_is_the_limit():
+    rigid = cra.sensitivities(Arm.nominal())
+    for name in ("df_dk_t", "df_dk_r", "log_k_t", "log_k_r"):
+        assert getattr(rigid, name).tolist() == [0.0, 0.0, 0.0]
+    compliance = 1e-9
+    f = cra.natural_frequencies(Arm.nominal())
+    soft = cra.natural_frequencies(Arm.nominal().replace(k_t=1 / compliance)) - f
+    assert rigid.df_dc_t == pytest.approx(soft / compliance, rel=1e-4)
+    assert cra.sensitivities(Arm.nominal().replace(k_r=1e12)).df_dc_r == pytest.approx(rigid.df_dc_r, rel=1e-9)
+
+
+def test_rigid_body_modes_have_the_documented_limits():
+    pinned = cra.sensitivities(Arm.nominal().replace(k_t=1e3, k_r=0.0))
+    assert pinned.df_dk_r[0] == np.inf and pinned.df_dk_t[0] == 0.0
+    assert np.isnan(pinned.log_k_r[0]) and pinned.df_dm_e[0] == pinned.df_dL[0] == pinned.df_drho[0] == 0.0
+    held = cra.natural_frequencies(Arm.nominal().replace(k_t=1e3, k_r=[0.0, 1e-6]))
+    assert pinned.df_dk_r[1] == pytest.approx((held[1] - held[0])[1] / 1e-6, rel=1e-4)
+    sliding = cra.sensitivities(Arm.nominal().replace(k_t=0.0))
+    assert sliding.df_dk_t[0] == np.inf
+    free = cra.sensitivities(Arm.nominal().replace(k_t=0.0, k_r=0.0))
+    for raw in (free.df_dk_t, free.df_dk_r, free.df_dc_t, free.df_dc_r):
+        assert np.isnan(raw[:2]).all() and not np.isnan(raw[2])
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(1, 6), st.floats(0, 5), st.floats(0, 0.2))
+def test_signs_and_sums_of_energy(power_t, power_r, m_e):
+    """Stiffness raises, inertia lowers; the shares of strain energy of joint and manipulator add up to one."""
+    found = cra.sensitivities(Arm.nominal().replace(k_t=10**power_t, k_r=10**power_r, m_e=m_e))
+    assert (found.log_k_t >= 0).all() and (found.log_k_r >= 0).all() and (found.log_m_e <= 0).all()
+    assert found.log_k_t + found.log_k_r + found.log_E == pytest.approx(0.5)
+    assert found.log_m_e + found.log_J_e + found.log_rho == pytest.approx(-0.5)
+    by_dimensions = -2 + 3 * found.log_k_t + found.log_k_r - found.log_m_e - 3 * found.log_J_e
+    assert found.log_L == pytest.approx(by_dimensions)
+
+
+def test_near_the_rigid_joint_every_mode_loses_2_over_kappa_r_and_more_over_kappa_t():
+    kappa = 1e6
+    arm = Arm.nominal().replace(m_e=0.0)
+    stiff = arm.replace(k_t=kappa * arm.EI / arm.L**3, k_r=kappa * arm.EI / arm.L)
+    found = cra.sensitivities(stiff)
+    assert found.log_k_r * kappa == pytest.approx(2.0, rel=1e-3)
+    assert found.log_k_t * kappa == pytest.approx([3.79, 45.7, 123.4], rel=2e-3)
+
+
+def test_batches_broadcast():
+    arms = Arm.nominal().replace(k_t=np.array([[1e3], [np.inf]]), m_e=[0.0, 0.001, 0.005])
+    found = cra.sensitivities(arms, 2)
+    assert found.log_k_t.shape == found.df_dL.shape == (2, 3, 2)
+    one = cra.sensitivities(Arm.nominal().replace(k_t=1e3, m_e=0.005), 2)
+    assert found.df_dk_t[0, 2] == pytest.approx(one.df_dk_t)
+
+
+@pytest.mark.parametrize("arguments", [{"modes": 0}, {"method": "numeric"}])
+def test_bad_input_is_named(arguments):
+    (name,) = arguments
+    with pytest.raises(ValueError, match=f"{name} = "):
+        cra.sensitivities(Arm.nominal(), **arguments)
