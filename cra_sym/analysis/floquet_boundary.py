@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from cra_sym.analysis.stability import AsymptoticWarning, growth_rate, stability_boundary
-from cra_sym.arm.excitations import JointStiffness
-from cra_sym.arm.parameters import Arm
+from cra_sym.model.excitations import Fluctuation
+from cra_sym.model.system import System
 
 __all__ = ["floquet_boundary"]
 
 
 def floquet_boundary(
-    arm: Arm,
+    system: System,
     excitation: Any,
     epsilon: float,
     resonance: tuple[int, int] = (1, 1),
@@ -29,8 +29,8 @@ def floquet_boundary(
 
     Parameters
     ----------
-    arm, excitation
-        One arm and one excitation, no batch.
+    system, excitation
+        One system and one excitation, not a batch.
     epsilon : float
         Positive.
     resonance : (int, int)
@@ -38,7 +38,7 @@ def floquet_boundary(
     modes : int, optional
         How many modes move, by default five more than the highest that takes part.
     residual : bool, optional
-        Whether the others are kept by their statics, by default for a fluctuating joint.
+        Whether the others are kept by their statics, by default for fluctuating stiffnesses of ends.
 
     Returns
     -------
@@ -54,14 +54,16 @@ def floquet_boundary(
     modes = highest + 5 if modes is None else modes
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AsymptoticWarning)
-        sides = stability_boundary(arm, excitation, epsilon, resonance, order=2, modes=highest)
+        sides = stability_boundary(system, excitation, epsilon, resonance, order=2, modes=highest)
     middle, half = np.mean(sides), np.ptp(sides) / 2
-    residual = isinstance(excitation, JointStiffness) if residual is None else residual
+    residual = (
+        isinstance(excitation, Fluctuation) and bool(excitation.springs(system)) if residual is None else residual
+    )
 
     inside, outside = np.full(2, middle), middle + 2.0 * half * np.array([-1.0, 1.0])
     for _ in range(5):  # 16 times closer each
         grid = np.linspace(inside, outside, 17, axis=-1)
-        growing = growth_rate(arm, excitation, grid, epsilon, modes, residual=residual) > 1e-5 * half
+        growing = growth_rate(system, excitation, grid, epsilon, modes, residual=residual) > 1e-5 * half
         if growing.all(axis=-1).any() or not growing[:, 0].all():
             where = (
                 "beyond the zone: it merges with another"

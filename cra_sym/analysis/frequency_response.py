@@ -1,62 +1,80 @@
-"""Frequency response from base acceleration to elastic displacement: exact, from the boundary-value problem."""
+"""Frequency response of a system: exact, from the boundary-value problem; no modes are summed."""
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cra_sym.arm.parameters import Arm
-from cra_sym.checks import choice, instance, real_array
-from cra_sym.kernels import derived_kernel
+from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
+from cra_sym.checks import choice, instance, one_axis, shown
+from cra_sym.model.routes import as_columns
+from cra_sym.model.spatial import SpatialProblem, shares
+from cra_sym.model.system import System
+from cra_sym.solvers.driven import driven_states
+
+if TYPE_CHECKING:
+    from sympy import Expr
+    from sympy.core.function import AppliedUndef
 
 __all__ = ["frequency_response"]
 
-_conditions = derived_kernel("cra_sym.model.forced_waves:end_conditions", backend="numpy")
-_waves = derived_kernel("cra_sym.model.forced_waves:wave_jets", backend="numpy")
-_series = derived_kernel("cra_sym.model.forced_waves:series_jets", backend="numpy")
-
-_NEAR = 2.0  # modulus of lambda below which power series serve
+Complex = NDArray[np.complex128]
 _BELOW, _ABOVE, _DIGITS = 18.0, 14.0, 37.0  # reach of the quadrature in ln y, and minus ln of its error
-
-
 _FASTEST = 1e60  # rad/s, whose fourth power is a number; what is slower than its inverse is static
 
 
 def frequency_response(
-    arm: Arm, angular_frequency: Any, x: Any = None, *, damping: Literal["modal", "structural"] = "modal"
-) -> Any:
-    """Return the elastic displacement v(x) per unit of harmonic base acceleration, exp(i Omega t), m per m/s2 = s2.
+    system: System,
+    angular_frequency: Any,
+    x: Any = None,
+    drive: Expr | None = None,
+    *,
+    kind: Literal["force", "motion"] | None = None,
+    field: AppliedUndef | None = None,
+    damping: Literal["modal", "structural"] = "modal",
+) -> Complex:
+    """Return the complex amplitude of a field for harmonic driving ``exp(i Omega t)``, dampers included.
 
     No modes are summed: the boundary-value problem is solved at each frequency, for any stiffness from zero to
     infinity.
 
     Parameters
     ----------
-    arm : Arm
-        ``arm.zeta`` is the damping.
+    system : System
+        ``system.zeta`` is its modal damping.
     angular_frequency : array_like
         Omega, rad/s, not negative; a number or one axis.
     x : array_like, optional
-        Place or one axis of places in [0, L], m; the tip by default.
+        Place or one axis of places in the domain, m; the right end by default.
+    drive : Expr, optional
+        What drives: a prescribed motion ``w(t)`` by one unit of its acceleration (by default the only one), or a
+        displacement of an end, such as ``v.subs(x, L)``, or a lumped coordinate.
+    kind : {'force', 'motion'}, optional
+        A unit force on that displacement (the default), or one unit of motion of it.
+    field : applied undefined function, optional
+        Default: the first.
     damping : {'modal', 'structural'}
-        'modal': viscous, the same ratio zeta in every mode, as in the time domain. No local damper has this property,
-        but the sum over all modes is known, see Notes. 'structural': a loss factor 2 zeta of manipulator and joint, E
-        (1 + 2 i zeta), k_t (1 + 2 i zeta), k_r (1 + 2 i zeta). Both agree at resonances, to first order in zeta.
+        What zeta means. 'modal': viscous, the same ratio in every mode, as in the time domain. No local damper has this
+        property, but the sum over all modes is known, see Notes. 'structural': a loss factor 2 zeta of every
+        stiffness. Both agree at resonances, to first order in zeta.
 
     Returns
     -------
     complex ndarray, shape (..., x, Omega)
-        A single x or Omega has no axis. Without damping it grows beyond all bounds at a natural frequency.
+        m per unit of the drive; s2 for an acceleration. A single x or Omega has no axis. Without damping it grows
+        beyond all bounds at a natural frequency.
 
     Raises
     ------
     TypeError, ValueError
-        If an argument is out of its range.
+        If an argument is out of its range, an infinite stiffness holds what is driven, the waves are too short to
+        follow, or a model with dampers is given modal damping too.
 
     Notes
     -----
-    Mode i answers with -phi_i Gamma_i f(omega_i), f(z) = 1 / (z^2 + 2 i zeta Omega z - Omega^2) having its poles at
+    Mode i answers with a_i f(omega_i), f(z) = 1 / (z^2 + 2 i zeta Omega z - Omega^2) having its poles at
     alpha = Omega (sqrt(1 - zeta^2) - i zeta) and at -conj(alpha). With V(z), the undamped response at complex
     frequency z, the sum over modes is a sum of residues of 2 z V(z) f(z) in the right half plane, and the residue
     theorem gives
@@ -74,78 +92,118 @@ def frequency_response(
     >>> print(f"{static.real:.4e} s2")
     -6.6053e-03 s2
     """
-    instance("arm", arm, Arm)
-    Omega = real_array("angular_frequency", angular_frequency, low=0.0, high=_FASTEST)
-    Omega = np.where(Omega * _FASTEST < 1.0, 0.0, Omega)
-    places = real_array("x", np.min(arm.L) if x is None else x, low=0.0, high=float(np.min(arm.L)))
-    for name, value in (("angular_frequency", Omega), ("x", places)):
-        if value.ndim > 1:
-            raise ValueError(f"{name} has shape {value.shape}: allowed are a number or one axis")
+    instance("system", system, System)
+    frequencies = one_axis("angular_frequency", angular_frequency, "frequencies", low=0.0, high=_FASTEST)
+    grid = np.where(frequencies * _FASTEST < 1.0, 0.0, np.atleast_1d(frequencies))
+    places = None if x is None else one_axis("x", x, "places")
+    if places is not None:
+        check_places(system, places)
     choice("damping", damping, ("modal", "structural"))
-    scale = _column(arm, arm.angular_frequency_scale)
-    ratio, xi = np.broadcast_to(arm.zeta, arm.shape)[..., None], np.atleast_1d(places) / _column(arm, arm.L)
-    xi = np.where(x is None, 1.0, xi)
-    grid = np.atleast_1d(Omega) / scale  # lambda^2
-    solve = _modal if damping == "modal" else _structural
-    response = solve(arm, grid, ratio, xi) / (scale**2)[..., None]
-    response = response if places.ndim else response[..., 0, :]
-    return response if Omega.ndim else response[..., 0]
+    undamped = _Undamped(system, places, drive, kind, section_place(system, field))
+    zeta = np.broadcast_to(system.zeta, system.shape)[..., None]
+    if np.any(zeta) and undamped.problem_damped:
+        raise ValueError(
+            "zeta: the model has dampers, beside which a frequency response has no modal damping; set it to 0"
+        )
+    if damping == "structural":
+        loss = 1 + 2j * zeta
+        found = undamped(grid / np.sqrt(loss)) / loss[..., None]
+    else:
+        found = _with_modal_damping(undamped, grid, zeta)
+    unbounded = (grid == 0) & undamped.drives_rigid_motion()[..., None]
+    found = np.where(unbounded[..., None, :], np.inf, found)
+    found = found[..., 0, :] if places is None or not places.ndim else found
+    return found if frequencies.ndim else found[..., 0]
 
 
-def _column(arm: Arm, value: Any) -> np.ndarray:
-    return np.broadcast_to(value, arm.shape)[..., None]
-
-
-def _structural(arm: Arm, grid: np.ndarray, ratio: np.ndarray, xi: np.ndarray) -> np.ndarray:
-    loss = 1 + 2j * ratio
-    return _undamped(arm, grid / np.sqrt(loss), xi) / loss[..., None]
-
-
-def _modal(arm: Arm, grid: np.ndarray, ratio: np.ndarray, xi: np.ndarray) -> np.ndarray:
-    cosine = np.sqrt(1 - ratio**2)
+def _with_modal_damping(undamped: _Undamped, grid: NDArray[np.float64], zeta: NDArray[np.float64]) -> Complex:
+    if not np.any(zeta):
+        return undamped(grid + 0.0 * zeta)
+    cosine = np.sqrt(1 - zeta**2)
     static = grid == 0
-    alpha = grid * (cosine - 1j * ratio)
-    weight = np.where(static, 1.0, 1 - 1j * ratio / cosine)
-    response = weight[..., None, :] * _undamped(arm, alpha, xi)
-    if not np.any(ratio) or static.all():
+    alpha = grid * (cosine - 1j * zeta)
+    weight = np.where(static, 1.0, 1 - 1j * zeta / cosine)
+    response = weight[..., None, :] * undamped(alpha)
+    if static.all():
         return response
     moving = grid[~static]
-    step = 2 * np.pi * np.arccos(np.max(ratio)) / _DIGITS
+    step = 2 * np.pi * np.arccos(np.max(zeta)) / _DIGITS
     y = np.exp(np.arange(np.log(moving.min()) - _BELOW, np.log(moving.max()) + _ABOVE, step))
     Omega = np.where(static, 1.0, grid)[..., None, :]
-    factor = ratio[..., None]
+    factor = zeta[..., None]
     integrand = y[:, None] ** 3 / ((y[:, None] ** 2 + Omega**2) ** 2 - (2 * factor * Omega * y[:, None]) ** 2)
-    smooth = _undamped(arm, -1j * y, xi).real
-    return response + np.where(static, 0.0, 4j * ratio * grid * step / np.pi)[..., None, :] * (smooth @ integrand)
+    smooth = undamped(-1j * y + 0.0 * zeta).real
+    smooth = np.where(np.isfinite(smooth), smooth, 0.0)  # next to a rigid-body mode, where the weight is nothing
+    return response + np.where(static, 0.0, 4j * zeta * grid * step / np.pi)[..., None, :] * (smooth @ integrand)
 
 
-def _undamped(arm: Arm, square: np.ndarray, xi: np.ndarray) -> np.ndarray:
-    """Return the undamped response at complex lambda^2 (..., K) and places (..., X), shape (..., X, K).
+class _Undamped:
+    """The response without modal damping at complex frequencies (..., K), shape (..., X, K)."""
 
-    Real part positive or zero and imaginary part negative or zero, where the waves decay.
-    """
-    shape = np.broadcast_shapes(square.shape[:-1], arm.shape)
-    lam = np.broadcast_to(np.sqrt(square + 0j), (*shape, square.shape[-1]))
-    near = np.abs(lam) < _NEAR
-    far = np.where(near, _NEAR, lam)
-    Z = np.where(near, lam, 0.0) ** 4
-    response = np.where(near[..., None, :], _solved(arm, _series, Z, Z, xi), _solved(arm, _waves, far, far**4, xi))
-    return response
+    def __init__(
+        self, system: System, places: NDArray[np.float64] | None, drive: Any, kind: str | None, place: int
+    ) -> None:
+        self._system, self._places, self._place = system, places, place
+        self.motion = _motion_name(system, drive)
+        if self.motion is not None:
+            if kind is not None:
+                raise ValueError(f"kind = {kind!r}: a prescribed motion drives by its acceleration; leave kind out")
+            self._problem: SpatialProblem = system.numerics("driven", self.motion)
+            self._driven = self._problem.displacements + system.numerics("driven_coordinate", self.motion)
+        else:
+            self._problem = system.numerics("damped_spatial")
+            self._driven = system.numerics("driven_displacement", drive)
+        self._kind = "motion" if self.motion is not None else choice("kind", kind or "force", ("force", "motion"))
+        self.by_force = self._kind == "force"
+        self.problem_damped: bool = system.numerics("damped")
+
+    def drives_rigid_motion(self) -> NDArray[np.bool_]:
+        """Return whether a constant drive accelerates a rigid-body mode, shape of the batch."""
+        system = self._system
+        if self.problem_damped or self._kind != ("motion" if self.motion else "force"):
+            return np.zeros(system.shape, dtype=bool)
+        if not (system.natural_frequencies(1) == 0).any():
+            return np.zeros(system.shape, dtype=bool)
+        driven = self._drive_of_modes(2)
+        still = system.natural_frequencies(2) == 0
+        return (still & (np.abs(driven) > 1e-9 * np.abs(driven).max(axis=-1, keepdims=True))).any(axis=-1)
+
+    def _drive_of_modes(self, modes: int) -> NDArray[np.float64]:
+        if self.motion is not None:
+            return participation(self._system, modes, self.motion)
+        found, sizes = self._system.modes(modes), self._system.numerics("sizes")
+        if self._driven < sizes[0]:
+            return found.displacement(0, self._driven)
+        if self._driven < sum(sizes):
+            return found.coordinate(self._driven - sizes[0])
+        return found.displacement(1, self._driven - sum(sizes))
+
+    def __call__(self, frequency: NDArray[Any]) -> Complex:
+        shape = self._system.shape
+        frequency = np.broadcast_to(frequency, (*shape, frequency.shape[-1])).reshape(-1, frequency.shape[-1])
+        columns = as_columns(self._system.parameters, shape)
+        count = 1 if self._places is None else self._places.size
+        found = np.empty((len(frequency), count, frequency.shape[-1]), dtype=complex)
+        for rows, left, problem in self._problem.problems(columns):
+            row = np.repeat(np.arange(len(rows)), frequency.shape[-1])
+            parameter = 1j * frequency[rows].ravel() if self.problem_damped else frequency[rows].ravel() ** 2
+            if not self.problem_damped and not np.imag(parameter).any():
+                parameter = np.real(parameter)
+            if self._places is None:
+                share = np.ones((len(rows), 1))
+            else:
+                share = shares(np.atleast_1d(self._places), left, problem.length)
+            state = driven_states(problem, parameter, row, share[row], self._driven, self._kind)
+            values = state[..., self._place].reshape(len(rows), frequency.shape[-1], count)
+            found[rows] = np.swapaxes(values, 1, 2)
+        return found.reshape(*shape, count, frequency.shape[-1])
 
 
-def _solved(arm: Arm, jets: Any, argument: np.ndarray, Z: np.ndarray, xi: np.ndarray) -> np.ndarray:
-    kappa_t, kappa_r = (np.asarray(value)[..., None] for value in (arm.kappa_t, arm.kappa_r))
-    stiff = [np.where(np.isinf(k), 1.0, k / (1 + np.where(np.isinf(k), 0.0, k))) for k in (kappa_t, kappa_r)]
-    soft = [1 / (1 + k) for k in (kappa_t, kappa_r)]
-    inertia = (np.asarray(value)[..., None] for value in (arm.mu, arm.iota))
-    left, right = _conditions(stiff[0], soft[0], stiff[1], soft[1], *inertia, Z)
-    (root, root_rest), (tip, tip_rest) = jets(0.0, argument), jets(1.0, argument)
-    matrix = left @ np.concatenate([root, tip], -2)
-    load = right - left @ np.concatenate([root_rest, tip_rest], -2)
-    size = np.max(np.abs(matrix), -1, keepdims=True)
-    matrix, load = matrix / size, load / size
-    singular = np.linalg.det(matrix) == 0
-    matrix = np.where(singular[..., None, None], np.eye(4), matrix)
-    amplitudes = np.linalg.solve(matrix, np.where(singular[..., None, None], np.inf, load))
-    basis, rest = jets(xi[..., :, None], argument[..., None, :])
-    return np.einsum("...xkj,...kj->...xk", basis[..., 0, :], amplitudes[..., 0]) + rest[..., 0, 0]
+def _motion_name(system: System, drive: Any) -> str | None:
+    """Return the name of the prescribed motion that drives, or None if a displacement does."""
+    if drive is None:
+        return only_motion(system)
+    motions = [name for name, kind in system.numerics("causes") if kind == "motion"]
+    name = drive if isinstance(drive, str) else getattr(getattr(drive, "func", None), "__name__", shown(drive))
+    arguments = len(getattr(drive, "args", (None,)))
+    return name if name in motions and (isinstance(drive, str) or arguments == 1) else None

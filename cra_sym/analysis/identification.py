@@ -12,12 +12,13 @@ import numpy as np
 
 from cra_sym.analysis.modes import natural_frequencies
 from cra_sym.analysis.sensitivities import Sensitivities, sensitivities
-from cra_sym.arm.parameters import Arm
 from cra_sym.checks import broadcastable, instance, real_array
+from cra_sym.model.system import System
 
 __all__ = ["IdentifiabilityWarning", "JointEstimate", "identify_joint"]
 
 _TOLD = np.log(2.0)  # a stiffness is told if its standard deviation is below a factor of two
+_JOINT = ("k_t", "k_r")
 _STARTS = np.logspace(-2, 6, 13)  # dimensionless stiffnesses among which the search starts
 
 
@@ -58,7 +59,7 @@ class JointEstimate:
     message: str
 
 
-def identify_joint(arm: Arm, measured_frequencies: Any, uncertainty: Any) -> JointEstimate:
+def identify_joint(system: System, measured_frequencies: Any, uncertainty: Any) -> JointEstimate:
     """Return the joint's stiffnesses that fit the first natural frequencies best, with their covariance.
 
     Least squares with exact gradients, weighted by the uncertainty, over ln(1 + 1/kappa) of each dimensionless
@@ -66,8 +67,8 @@ def identify_joint(arm: Arm, measured_frequencies: Any, uncertainty: Any) -> Joi
 
     Parameters
     ----------
-    arm : Arm
-        One arm; its own k_t and k_r do not matter.
+    system : System
+        One set of values, with stiffnesses k_t and k_r of an end; their own values do not matter.
     measured_frequencies : array_like, shape (n,)
         The n lowest natural frequencies, Hz, ascending.
     uncertainty : float or array_like, shape (n,)
@@ -86,7 +87,8 @@ def identify_joint(arm: Arm, measured_frequencies: Any, uncertainty: Any) -> Joi
     Raises
     ------
     TypeError, ValueError
-        If ``arm`` is no :class:`Arm` or a batch, or the data are not positive, ascending and of one shape.
+        If ``system`` is not a :class:`System` with k_t and k_r at an end, or is a batch, or the data are not positive,
+        ascending and of one shape.
 
     Examples
     --------
@@ -98,33 +100,48 @@ def identify_joint(arm: Arm, measured_frequencies: Any, uncertainty: Any) -> Joi
     """
     from scipy.optimize import least_squares
 
-    measured, sigma = _checked(arm, measured_frequencies, uncertainty)
-    units = np.array([arm.EI / arm.L**3, arm.EI / arm.L])
+    measured, sigma = _checked(system, measured_frequencies, uncertainty)
+    units = _units(system)
 
     @cache
-    def at(*place: float) -> tuple[Arm, Sensitivities]:
-        k_t, k_r = _stiffness(np.array(place)) * units
-        joined = arm.replace(k_t=float(k_t), k_r=float(k_r))
-        return joined, sensitivities(joined, measured.size)
+    def at(*place: float) -> tuple[np.ndarray, Sensitivities]:
+        stiffness = _stiffness(np.array(place)) * units
+        joined = system.replace(k_t=float(stiffness[0]), k_r=float(stiffness[1]))
+        return stiffness, sensitivities(joined, measured.size, by=_JOINT)
 
     def misfit(place: np.ndarray) -> np.ndarray:
         return (at(*place)[1].frequency - measured) / sigma
 
     def gradient(place: np.ndarray) -> np.ndarray:
-        return _gradient(*at(*place)) / sigma[:, None]
+        return _gradient(*at(*place), units) / sigma[:, None]
 
     fits = [
         least_squares(misfit, start, gradient, bounds=(0.0, 40.0), xtol=1e-14, ftol=1e-14, gtol=1e-14, x_scale="jac")
-        for start in _starts(arm, units, measured, sigma)
+        for start in _starts(system, units, measured, sigma)
     ]
     best = min(fits, key=lambda fit: fit.cost)
     return _estimate(*at(*np.where(best.x < 1e-12, 0.0, best.x)), measured, sigma)
 
 
-def _checked(arm: Arm, measured_frequencies: Any, uncertainty: Any) -> tuple[np.ndarray, np.ndarray]:
-    instance("arm", arm, Arm)
-    if arm.shape:
-        raise ValueError(f"arm has shape {arm.shape}: allowed is a single arm")
+def _units(system: System) -> np.ndarray:
+    """Return the stiffnesses beside which the structure itself gives as much as the joint, N/m and N m/rad.
+
+    The first give of a rigid joint lowers omega^2 by P^2 times its compliance, P the force of the joint in the first
+    mode; P^2 / omega^2 is the stiffness that would halve it.
+    """
+    rigid = system.replace(k_t=np.inf, k_r=np.inf)
+    ends = system.numerics("stiffnesses")
+    forces = np.array([rigid.modes(1).force(*ends[name])[0] for name in _JOINT])
+    return forces**2 / rigid.natural_frequencies(1) ** 2
+
+
+def _checked(system: System, measured_frequencies: Any, uncertainty: Any) -> tuple[np.ndarray, np.ndarray]:
+    instance("system", system, System)
+    missing = [name for name in _JOINT if name not in system.numerics("stiffnesses")]
+    if missing:
+        raise ValueError(f"system: {missing[0]} must be the stiffness of an end of its model")
+    if system.shape:
+        raise ValueError(f"system has shape {system.shape}: must be a single set of values, not a batch")
     measured = real_array("measured_frequencies", measured_frequencies, low=0.0, open_low=True)
     sigma = real_array("uncertainty", uncertainty, low=1e-60, high=1e60)
     if measured.ndim != 1 or measured.size == 0:
@@ -142,30 +159,32 @@ def _stiffness(place: np.ndarray) -> np.ndarray:
         return 1 / np.expm1(place)
 
 
-def _gradient(arm: Arm, found: Sensitivities) -> np.ndarray:
-    """Return the derivatives of the frequencies by ln(1 + 1/kappa_t) and ln(1 + 1/kappa_r), shape (modes, 2)."""
+def _gradient(stiffness: np.ndarray, found: Sensitivities, units: np.ndarray) -> np.ndarray:
+    """Return the derivatives of the frequencies by ln(1 + 1/kappa) of both stiffnesses, shape (modes, 2)."""
     columns = []
-    for kappa, unit, by_c, log in (
-        (arm.kappa_t, arm.EI / arm.L**3, found.df_dc_t, found.log_k_t),
-        (arm.kappa_r, arm.EI / arm.L, found.df_dc_r, found.log_k_r),
-    ):
-        columns.append(by_c / unit * (1 + 1 / kappa) if kappa > 1 else -found.frequency * log * (1 + kappa))
+    for name, value, unit in zip(_JOINT, stiffness, units, strict=True):
+        kappa = value / unit
+        stiff = kappa > 1
+        columns.append(
+            found.compliance[name] / unit * (1 + 1 / kappa)
+            if stiff
+            else -found.frequency * found.log[name] * (1 + kappa)
+        )
     return np.stack(columns, -1)
 
 
-def _starts(arm: Arm, units: np.ndarray, measured: np.ndarray, sigma: np.ndarray) -> list[np.ndarray]:
+def _starts(system: System, units: np.ndarray, measured: np.ndarray, sigma: np.ndarray) -> list[np.ndarray]:
     """Return the places of the two best joints of a grid."""
     k_t, k_r = _STARTS[:, None] * units[0], _STARTS * units[1]
-    found = natural_frequencies(arm.replace(k_t=k_t, k_r=k_r), measured.size)
+    found = natural_frequencies(system.replace(k_t=k_t, k_r=k_r), measured.size)
     cost = np.sum(((found - measured) / sigma) ** 2, -1)
     best = np.unravel_index(np.argsort(cost, axis=None)[:2], cost.shape)
     return [np.log1p(1 / _STARTS[[i, j]]) for i, j in zip(*best, strict=True)]
 
 
-def _estimate(arm: Arm, found: Sensitivities, measured: np.ndarray, sigma: np.ndarray) -> JointEstimate:
+def _estimate(stiffness: np.ndarray, found: Sensitivities, measured: np.ndarray, sigma: np.ndarray) -> JointEstimate:
     fitted = found.frequency
-    stiffness = np.array([arm.k_t, arm.k_r])
-    jacobian = np.stack([found.df_dc_t, found.df_dc_r], -1) / sigma[:, None]
+    jacobian = np.stack([found.compliance[name] for name in _JOINT], -1) / sigma[:, None]
     spread = _covariance(jacobian)
     rigid = np.isinf(stiffness)
     scale = np.where(rigid, 1.0, stiffness)
@@ -177,9 +196,8 @@ def _estimate(arm: Arm, found: Sensitivities, measured: np.ndarray, sigma: np.nd
         warnings.warn(message, IdentifiabilityWarning, stacklevel=3)
     covariance = relative * np.outer(scale, scale)
     residuals = (measured - fitted) / sigma
-    return JointEstimate(
-        float(arm.k_t), float(arm.k_r), covariance, spread, deviation, fitted, residuals, identifiable, message
-    )
+    k_t, k_r = map(float, stiffness)
+    return JointEstimate(k_t, k_r, covariance, spread, deviation, fitted, residuals, identifiable, message)
 
 
 def _covariance(jacobian: np.ndarray) -> np.ndarray:

@@ -1,313 +1,330 @@
-"""Natural frequencies, mode shapes and modal quantities of the arm, for any batch of parameters."""
+"""Natural frequencies, mode shapes and modal quantities of any system."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cra_sym import checks
-from cra_sym.arm.parameters import Arm
-from cra_sym.model import spectrum
-from cra_sym.model.close_pairs import resolve_close_pairs
-from cra_sym.model.modal import ENDS, STRAIN, Modes, modes_of
+from cra_sym.model.projection import column
+from cra_sym.model.routes import Modes
+from cra_sym.model.system import MOST_MODES, System
 
 __all__ = [
     "ModalParameters",
-    "arm_modes",
-    "frequency_parameters",
     "modal_parameters",
     "mode_shapes",
     "natural_frequencies",
+    "section_place",
 ]
 
-MOST_MODES = 1000
-_SOFTEST = 1e-150  # the product of two stiffnesses of this size is a number yet
+Array = NDArray[np.float64]
+_MOST_DERIVATIVES = 20
 
 
-def frequency_parameters(kappa_t: Any, kappa_r: Any, mu: Any, iota: Any = 0.0, modes: int = 3) -> np.ndarray:
-    """Return the frequency parameters lambda = beta L, the zeros of the characteristic determinant (22).
-
-    Parameters
-    ----------
-    kappa_t, kappa_r : array_like
-        Dimensionless translational and rotational stiffness of the joint, in ``[0, inf]``; below 1e-150 they count as
-        0, for their product has to be a number.
-    mu, iota : array_like
-        Mass and rotary inertia of the end-effector over those of the arm, in ``[0, inf)``.
-    modes : int
-        How many, 1 to 1000; rigid-body modes count, with lambda = 0.
-
-    Returns
-    -------
-    ndarray, shape (..., modes)
-        Ascending; none is missed. The relative error is a few units in the last place.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If an argument is out of its range or the shapes do not broadcast together.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> print(np.round(frequency_parameters(np.inf, np.inf, 0.0), 6))
-    [1.875104 4.694091 7.854757]
-    """
-    modes = checks.count("modes", modes, high=MOST_MODES)
-    stiffness: dict[str, Any] = {"low": 0.0, "allow_infinite": True}
-    arrays = {
-        "kappa_t": checks.real_array("kappa_t", kappa_t, **stiffness),
-        "kappa_r": checks.real_array("kappa_r", kappa_r, **stiffness),
-        "mu": checks.real_array("mu", mu, low=0.0),
-        "iota": checks.real_array("iota", iota, low=0.0),
-    }
-    for name in ("kappa_t", "kappa_r"):
-        arrays[name] = np.where(arrays[name] < _SOFTEST, 0.0, arrays[name])
-    shape = checks.broadcastable(**arrays)
-    groups = [np.broadcast_to(array, shape) for array in arrays.values()]
-    lam = spectrum.frequency_parameters(*groups, modes=modes)
-    resolve_close_pairs(lam, *groups)
-    return lam
-
-
-def natural_frequencies(arm: Arm, modes: int = 3) -> np.ndarray:
+def natural_frequencies(system: System, modes: int = 3) -> Array:
     """Return the natural frequencies (30), Hz.
 
+    Dampers are left out: these are the frequencies of the conservative structure.
+
     Parameters
     ----------
-    arm : Arm
+    system : System
+        An :class:`cra_sym.Arm` or any other.
     modes : int
         How many, 1 to 1000; rigid-body modes count, with frequency 0.
 
     Returns
     -------
     ndarray, shape (..., modes)
-        Ascending and complete; ``...`` is ``arm.shape``.
+        Ascending and complete; ``...`` is ``system.shape``.
 
     Raises
     ------
     TypeError, ValueError
-        If ``arm`` is no :class:`Arm`, or ``modes`` no integer from 1 to 1000.
+        If ``system`` is not a :class:`System`, ``modes`` is not an integer from 1 to 1000, the structure has buckled or
+        has fewer natural frequencies, or its forces are not conservative.
 
     Examples
     --------
+    >>> from cra_sym import Arm
     >>> print(natural_frequencies(Arm.nominal().replace(m_e=0)).round(3))
     [ 2.448 15.339 42.95 ]
     """
-    return _frequencies(arm, _lambda(arm, modes))
+    checks.instance("system", system, System)
+    return system.natural_frequencies(modes) / (2 * np.pi)
 
 
-def mode_shapes(arm: Arm, x: Any, modes: int = 3, derivative: int = 0) -> np.ndarray:
-    """Return the mass-normalised mode shapes (25), or their derivatives by x, with phi(L) >= 0.
+def section_place(system: System, field: Any = None) -> int:
+    """Return the position of a field among the displacements of a section; the first one by default.
+
+    Raises
+    ------
+    ValueError
+        If it is not a field of the model.
+    """
+    if field is None:
+        return 0
+    fields = system.model.equations.fields
+    if field not in fields:
+        raise ValueError(f"field = {checks.shown(field)}: must be one of {', '.join(map(str, fields))}")
+    return list(system.model.conservative.displacements).index(field)
+
+
+def mode_shapes(system: System, x: Any, modes: int = 3, derivative: int = 0, *, field: Any = None) -> Array:
+    """Return the mass-normalised mode shapes (25), or their derivatives by x, positive at the right end.
+
+    Where the first field vanishes at its right end in a mode, the first of its derivatives there that does not is
+    positive.
 
     Parameters
     ----------
-    arm : Arm
+    system : System
     x : array_like
-        Points in ``[0, L]``, m: a number or a row of points, the same for every arm of the batch.
+        Points in the domain, m: a number or one axis of points, the same for the whole batch.
     modes : int
         How many, 1 to 1000, rigid-body modes included.
     derivative : int
-        Order of the derivative by x, 0 to 3.
+        Order of the derivative by x, 0 to 20.
+    field : applied undefined function, optional
+        Default: the first.
 
     Returns
     -------
     ndarray, shape (..., modes) or (..., modes, len(x))
-        In kg^-1/2 m^-derivative.
+        In kg^-1/2 m^-derivative for a displacement in m.
 
     Raises
     ------
     TypeError, ValueError
-        If ``arm`` is no :class:`Arm`, ``x`` does not hold real numbers, has more than one axis or a point outside
-        ``[0, L]`` of any arm, or ``modes`` or ``derivative`` is no integer in its range.
+        If ``x`` does not hold real numbers, has more than one axis or a point outside the domain of any member of the
+        batch, or another argument is out of its range.
     """
-    checks.instance("arm", arm, Arm)
-    derivative = checks.count("derivative", derivative, low=0, high=3)
-    points = checks.real_array("x", x, low=0.0)
-    if points.ndim > 1:
-        raise ValueError(f"x has shape {points.shape}: allowed are a number or a row of points")
-    if points.size and points.max() > np.min(arm.L):
-        raise ValueError(f"x = {points.max():g}: allowed are points in [0, L], L = {np.min(arm.L):g}")
-    length = _column(arm.L, 2)
-    shapes = arm_modes(arm, modes).shape(np.atleast_1d(points) / length, derivative)
-    shapes = shapes / (np.sqrt(_column(arm.rhoA, 2) * length) * length**derivative)
+    checks.instance("system", system, System)
+    derivative = checks.count("derivative", derivative, low=0, high=_MOST_DERIVATIVES)
+    modes = checks.count("modes", modes, high=MOST_MODES)
+    points = checks.one_axis("x", x, "points")
+    check_places(system, points)
+    shapes = system.modes(modes).shape(section_place(system, field), derivative, np.atleast_1d(points))
     return shapes if points.ndim else shapes[..., 0]
 
 
-@dataclass(frozen=True)
-class ModalParameters:
-    """Modal quantities for mass-normalised modes (M_i = 1 kg, so that K_i = omega_i^2) with phi(L) >= 0.
+def check_places(system: System, points: Array, name: str = "x") -> None:
+    """Raise a ValueError unless all points lie in the domain of every member of the batch."""
+    left, length = system.domain.left, system.domain.length
+    low, high = np.max(left), np.min(left + length)
+    slack = 1e-12 * np.max(length)
+    if points.size and not (points.min() >= low - slack and points.max() <= high + slack):
+        bad = points.min() if points.min() < low - slack else points.max()
+        raise ValueError(f"{name} = {bad:g} must be in the domain, [{low:g}, {high:g}]")
 
-    The mode axis is last; ``...`` is the batch shape of the arm. All finite at zero and at infinite stiffness; each is
-    computed when it is first asked for.
+
+class ModalParameters:
+    """Modal quantities of mass-normalised modes (M_i = 1, so that K_i = omega_i^2), positive at the right end.
+
+    The mode axis is last; ``...`` is the batch shape of the system. 'Root' and 'tip' are the left and the right end of
+    the first field v. All are finite at zero and at infinite stiffness; each is computed when it is first asked for.
+    Units are given for v in m.
 
     Attributes
     ----------
-    omega, frequency, lam : ndarray, shape (..., modes)
-        Natural angular frequency (rad/s), natural frequency (Hz) and frequency parameter.
+    omega, frequency : ndarray, shape (..., modes)
+        Natural angular frequency (rad/s) and natural frequency (Hz).
+    lam : ndarray, shape (..., modes)
+        Frequency parameter lambda, wave number times length, of a model with one wave number.
     participation : ndarray, shape (..., modes)
-        Modal participation factor Gamma_i = int rho A phi_i dx + m_e phi_i(L), kg^1/2.
+        Modal participation factor, (6): generalised force of a unit acceleration of the only prescribed motion, with
+        the sign of Gamma_i = int rho A phi_i dx + m_e phi_i(L), kg^1/2.
     root_displacement, root_slope, root_moment, root_shear : ndarray, shape (..., modes)
-        phi(0), kg^-1/2, phi'(0), kg^-1/2/m, EI phi''(0), N kg^-1/2, and EI phi'''(0), N kg^-1/2/m.
+        phi(0), kg^-1/2, phi'(0), kg^-1/2/m, and the natural forces there; of a beam EI phi''(0), N kg^-1/2, and
+        EI phi'''(0), N kg^-1/2/m.
     tip_displacement, tip_slope : ndarray, shape (..., modes)
         phi(L), kg^-1/2, and phi'(L), kg^-1/2/m.
+    left, right, left_force, right_force : ndarray, shape (..., modes, n)
+        All displacements of the end sections, and the natural forces conjugate to them.
+    coordinates : ndarray, shape (..., modes, m)
+        Lumped coordinates.
     axial : ndarray, shape (..., modes, modes)
         G_ij = int (rho A (L - x) + m_e) phi_i' phi_j' dx, 1/m: work of the axial load of a base accelerated along x.
     stiffness_translation, stiffness_rotation : ndarray, shape (..., modes, modes)
         k_t phi_i(0) phi_j(0) and k_r phi_i'(0) phi_j'(0), 1/s2; 0 for infinite stiffness.
     """
 
-    _arm: Arm = field(repr=False)
-    _modes: Modes = field(repr=False)
+    def __init__(self, system: System, modes: int) -> None:
+        self._system, self._number = system, modes
 
     @property
-    def lam(self) -> np.ndarray:
-        """Frequency parameter."""
-        return self._modes.lam
+    def _modes(self) -> Modes:
+        return self._system.modes(self._number)
 
-    @cached_property
-    def omega(self) -> np.ndarray:
+    @property
+    def omega(self) -> Array:
         """Natural angular frequency, rad/s."""
-        return _angular_frequencies(self._arm, self.lam)
+        return self._system.natural_frequencies(self._number)
 
     @cached_property
-    def frequency(self) -> np.ndarray:
+    def frequency(self) -> Array:
         """Natural frequency, Hz."""
-        return _frequencies(self._arm, self.lam)
+        return self.omega / (2 * np.pi)
+
+    @property
+    def lam(self) -> Array:
+        """Frequency parameter, 1."""
+        found: Array | None = getattr(self._modes, "lam", None)
+        if found is None:
+            raise ValueError("lam: a model with more than one wave number has no frequency parameter; use omega")
+        return found
 
     @cached_property
-    def _ends(self) -> np.ndarray:
-        """What the modes are at the tip, in all and at the joint, shape (7, ..., modes)."""
-        length, mass, stiffness = self._arm.L, np.sqrt(self._arm.rhoA * self._arm.L), self._arm.EI
-        here, slope = 1 / mass, 1 / mass / length
-        units = here, slope, mass, here, slope, stiffness * (slope / length), stiffness * (slope / length / length)
-        return self._modes.quantities(ENDS, units)
+    def participation(self) -> Array:
+        """Participation factor, kg^1/2."""
+        return participation(self._system, self._number)
 
     @property
-    def tip_displacement(self) -> np.ndarray:
-        """phi(L), kg^-1/2."""
-        return self._ends[0]
-
-    @property
-    def tip_slope(self) -> np.ndarray:
-        """phi'(L), kg^-1/2/m."""
-        return self._ends[1]
-
-    @property
-    def participation(self) -> np.ndarray:
-        """Modal participation factor, kg^1/2."""
-        return self._ends[2]
-
-    @property
-    def root_displacement(self) -> np.ndarray:
+    def root_displacement(self) -> Array:
         """phi(0), kg^-1/2."""
-        return self._ends[3]
+        return self._modes.displacement(0, 0)
 
     @property
-    def root_slope(self) -> np.ndarray:
+    def root_slope(self) -> Array:
         """phi'(0), kg^-1/2/m."""
-        return self._ends[4]
+        return self._modes.displacement(0, 1)
 
     @property
-    def root_moment(self) -> np.ndarray:
+    def root_moment(self) -> Array:
         """EI phi''(0), N kg^-1/2."""
-        return self._ends[5]
+        return self._modes.force(0, 1)
 
     @property
-    def root_shear(self) -> np.ndarray:
+    def root_shear(self) -> Array:
         """EI phi'''(0), N kg^-1/2/m."""
-        return self._ends[6]
+        return -self._modes.force(0, 0)
+
+    @property
+    def tip_displacement(self) -> Array:
+        """phi(L), kg^-1/2."""
+        return self._modes.displacement(1, 0)
+
+    @property
+    def tip_slope(self) -> Array:
+        """phi'(L), kg^-1/2/m."""
+        return self._modes.displacement(1, 1)
+
+    @property
+    def left(self) -> Array:
+        """Displacements of the left end section."""
+        return self._section(0, force=False)
+
+    @property
+    def right(self) -> Array:
+        """Displacements of the right end section."""
+        return self._section(1, force=False)
+
+    @property
+    def left_force(self) -> Array:
+        """Natural forces of the left end section."""
+        return self._section(0, force=True)
+
+    @property
+    def right_force(self) -> Array:
+        """Natural forces of the right end section."""
+        return self._section(1, force=True)
+
+    def _section(self, end: int, *, force: bool) -> Array:
+        of = self._modes.force if force else self._modes.displacement
+        return np.stack([of(end, place) for place in range(self._system.numerics("sizes")[0])], axis=-1)
+
+    @property
+    def coordinates(self) -> Array:
+        """Lumped coordinates."""
+        found = [self._modes.coordinate(number) for number in range(self._system.numerics("sizes")[1])]
+        return np.stack(found, axis=-1) if found else np.empty((*self.omega.shape, 0))
 
     @cached_property
-    def stiffness_translation(self) -> np.ndarray:
+    def stiffness_translation(self) -> Array:
         """Matrix of k_t phi_i(0) phi_j(0), 1/s2."""
-        return self._joint_matrix(0)
+        return stiffness_coupling(self._system, "k_t", self._number)
 
     @cached_property
-    def stiffness_rotation(self) -> np.ndarray:
+    def stiffness_rotation(self) -> Array:
         """Matrix of k_r phi_i'(0) phi_j'(0), 1/s2."""
-        return self._joint_matrix(1)
-
-    def _joint_matrix(self, spring: int) -> np.ndarray:
-        root_energy = self._modes.quantities(STRAIN)[spring] * _column(self._arm.angular_frequency_scale)
-        return root_energy[..., :, None] * root_energy[..., None, :]
+        return stiffness_coupling(self._system, "k_r", self._number)
 
     @cached_property
-    def axial(self) -> np.ndarray:
+    def axial(self) -> Array:
         """Matrix of int (rho A (L - x) + m_e) phi_i' phi_j' dx, 1/m."""
-        modes = self.lam.shape[-1]
-        nodes, weights = np.polynomial.legendre.leggauss(int(np.ceil(self.lam.max(initial=0.0))) + 24)
-        xi, weights = (1 + nodes) / 2, weights / 2  # more nodes than the product of two modes needs
-        mu = np.broadcast_to(self._arm.mu, self._arm.shape).reshape(-1, 1)
-        result = np.empty((len(mu), modes, modes))
-        share = max(1_000_000 // (modes * xi.size), 1)  # bounds the memory
-        for start in range(0, len(mu), share):
-            part = slice(start, start + share)
-            slopes = self._modes.lanes(part).shape(xi, 1)
-            load = (1 - xi + mu[part, None]) * weights
-            product = (slopes * load) @ slopes.swapaxes(1, 2)
-            result[part] = (product + product.swapaxes(1, 2)) / 2  # to the last digit, as Floquet's shorter way needs
-        return result.reshape(*self.lam.shape, modes) / _column(self._arm.L, 2)
+        return self._system.form("axial", self._number)["axial"]
 
 
-def modal_parameters(arm: Arm, modes: int = 3) -> ModalParameters:
+def modal_parameters(system: System, modes: int = 3) -> ModalParameters:
     """Return the modal quantities of the first modes, by equations (6), (25) and (30).
 
     Parameters
     ----------
-    arm : Arm
+    system : System
     modes : int
         How many, 1 to 1000, rigid-body modes included.
 
     Returns
     -------
     ModalParameters
-        Arrays of shape (..., modes) and (..., modes, modes); ``...`` is ``arm.shape``.
+        Arrays of shape (..., modes) and (..., modes, modes); ``...`` is ``system.shape``.
 
     Raises
     ------
     TypeError, ValueError
-        If ``arm`` is no :class:`Arm`, or ``modes`` no integer from 1 to 1000.
+        As :func:`natural_frequencies`.
 
     Examples
     --------
+    >>> from cra_sym import Arm
     >>> parameters = modal_parameters(Arm.nominal())
     >>> print(parameters.participation.round(4))
     [ 0.3868 -0.2143  0.1257]
     """
-    return ModalParameters(arm, arm_modes(arm, modes))
+    checks.instance("system", system, System)
+    system.natural_frequencies(modes)
+    return ModalParameters(system, modes)
 
 
-def _lambda(arm: Arm, modes: int) -> np.ndarray:
-    kappa_t, kappa_r, mu, iota = _groups(arm)
-    return frequency_parameters(kappa_t, kappa_r, mu, iota, modes)
+def only_motion(system: System) -> str:
+    """Return the name of the only prescribed motion of a model.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or more than one.
+    """
+    motions = [name for name, kind in system.numerics("causes") if kind == "motion"]
+    if len(motions) != 1:
+        found = ", ".join(motions) or "none"
+        raise ValueError(f"the model must have one prescribed motion that acts by its acceleration; it has {found}")
+    return motions[0]
 
 
-def _groups(arm: Arm) -> list[np.ndarray]:
-    checks.instance("arm", arm, Arm)
-    return [np.broadcast_to(value, arm.shape) for value in (arm.kappa_t, arm.kappa_r, arm.mu, arm.iota)]
+def participation(system: System, modes: int, motion: str | None = None) -> Array:
+    """Return the participation of the modes in a prescribed motion, kg^1/2, shape (..., modes)."""
+    return -system.project(system.numerics("load", motion or only_motion(system)), modes)
 
 
-def arm_modes(arm: Arm, modes: int) -> Modes:
-    """Return the dimensionless modes of the arm, from which everything else follows."""
-    return modes_of(*_groups(arm), lam=_lambda(arm, modes))
+def stiffness_coupling(system: System, name: str, modes: int) -> Array:
+    """Return a parameter times the rate of the stiffness by it, between the modes, 1/s2; 0 where it is infinite.
+
+    Raises
+    ------
+    ValueError
+        If the model has no such parameter.
+    """
+    if name not in system.values:
+        raise ValueError(f"{name} is not a parameter of the model; it has {', '.join(system.values)}")
+    value = np.asarray(system.values[name])
+    rate = system.form("rates", modes)[f"{name} stiffness"]
+    return np.where(np.isinf(value), 0.0, value)[..., None, None] * rate
 
 
-def _angular_frequencies(arm: Arm, lam: np.ndarray) -> np.ndarray:
-    omega = lam**2
-    omega *= _column(arm.angular_frequency_scale)  # in place: fresh memory costs more than the product
-    return omega
-
-
-def _frequencies(arm: Arm, lam: np.ndarray) -> np.ndarray:
-    frequency = _angular_frequencies(arm, lam)
-    frequency /= 2 * np.pi
-    return frequency
-
-
-def _column(value: float | np.ndarray, axes: int = 1) -> float | np.ndarray:
-    """Return a parameter with last axes of length one, for modes and points; numbers stay numbers."""
-    return value[(..., *(None,) * axes)] if isinstance(value, np.ndarray) else value
+def parameter_column(system: System, name: str) -> float | Array:
+    """Return a parameter with an axis for the modes."""
+    return column(system.values[name])

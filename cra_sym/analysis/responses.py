@@ -1,44 +1,56 @@
-"""Responses (34) of the arm to the motions of its base, and what is left of them after a stop."""
+"""Responses (34) of a system to prescribed motions, forces and initial states, and what is left after a stop."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cra_sym.analysis.modes import ModalParameters, modal_parameters, mode_shapes
-from cra_sym.arm.parameters import Arm
-from cra_sym.checks import broadcastable, count, instance, one_axis, real_array
+from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
+from cra_sym.checks import broadcastable, count, instance, mapping, one_axis, shown
 from cra_sym.kernels import derived_kernel
+from cra_sym.model.projection import Projected
+from cra_sym.model.system import MOST_MODES, System
+from cra_sym.model.values import checked_damping
 from cra_sym.solvers import modal_response as solver
-from cra_sym.solvers.driven_modes import Start, driven_response, state_at_stop
-from cra_sym.solvers.motion import BaseMotion
+from cra_sym.solvers.coupled_modes import CoupledModes, coupled_response
+from cra_sym.solvers.driven_modes import Start, check_start, driven_response, state_at_stop
+from cra_sym.solvers.motion import BaseMotion, Force
 
-__all__ = ["oscillators", "residual_vibration", "response", "tip_response"]
+if TYPE_CHECKING:
+    from sympy import Expr
+    from sympy.core.function import AppliedUndef
 
-_DAMPING: dict[str, Any] = {"low": 0.0, "high": np.nextafter(1.0, 0.0), "allowed": "real numbers in [0, 1)"}
+__all__ = ["History", "oscillators", "residual_vibration", "response", "tip_response"]
+
+Array = NDArray[np.float64]
+History = BaseMotion | Force
 
 _free = derived_kernel("cra_sym.model.oscillator:free_kernel", backend="numpy")
 _forced = derived_kernel("cra_sym.model.oscillator:forced_kernel", backend="numpy")
 
 
 def tip_response(
-    arm: Arm,
-    motion: BaseMotion,
+    system: System,
+    motion: BaseMotion | Mapping[AppliedUndef, History] | None,
     t: Any,
     modes: int = 5,
     derivative: int = 0,
     *,
     zeta: Any = None,
     start: Start = "inertial",
+    initial: Mapping[Any, Expr] | None = None,
+    field: AppliedUndef | None = None,
 ) -> Any:
-    """Return the elastic displacement v(L, t) of the tip seen from the base, equation (34), m.
+    """Return the displacement of the tip, the right end of the first field, equation (34); of an arm v(L, t), m.
 
-    As :func:`response` at x = L.
+    As :func:`response` at the right end of the domain.
 
     Parameters
     ----------
-    arm, motion, t, modes, derivative, zeta, start
+    system, motion, t, modes, derivative, zeta, start, initial, field
         As in :func:`response`; a velocity is in m/s, an acceleration in m/s2.
 
     Returns
@@ -58,16 +70,16 @@ def tip_response(
     >>> print(*(f"{1e3 * value:.3f} mm" for value in v))
     0.000 mm -0.621 mm -1.337 mm
     """
-    modes = count("modes", modes)
-    parameters = modal_parameters(arm, modes)
-    osc = oscillators(arm, parameters, parameters.tip_displacement[..., None, :], zeta)
-    values = driven_response(osc, motion, t, derivative, start)[..., 0, :]
+    instance("system", system, System)
+    modes = count("modes", modes, high=MOST_MODES)
+    rows = system.modes(modes).displacement(1, section_place(system, field))[..., None, :]
+    values = _oscillation(system, motion, rows, t, modes, derivative, zeta, start, initial)[..., 0, :]
     return values if np.ndim(t) else values[..., 0]
 
 
 def response(
-    arm: Arm,
-    motion: BaseMotion,
+    system: System,
+    motion: BaseMotion | Mapping[AppliedUndef, History] | None,
     t: Any,
     x: Any,
     modes: int = 5,
@@ -75,32 +87,40 @@ def response(
     *,
     zeta: Any = None,
     start: Start = "inertial",
+    initial: Mapping[Any, Expr] | None = None,
+    field: AppliedUndef | None = None,
 ) -> Any:
-    """Return the elastic displacement v(x, t) seen from the base, or its time derivatives, equation (34).
+    """Return a field in time, seen from the moving base, or its time derivatives, equation (34).
 
     The sum over modes of phi_i(x) q_i(t), with Duhamel's integral (12) in closed form: exact at and near every
     resonance, with and without damping, and for rigid-body modes. Uniform times of 64 and more cost a few nanoseconds
-    each.
+    each. Dampers of the model couple the modes; then matrix exponentials take the place of the closed form.
 
     Parameters
     ----------
-    arm : Arm
+    system : System
         Batch axes broadcast with those of the motion.
-    motion : BaseMotion
-        Prescribed motion of the base from t = 0 on.
+    motion : BaseMotion, or mapping of function of t to BaseMotion or Force, or None
+        What the prescribed motions and the forces of the Lagrangian and of the virtual work are, from t = 0 on. A bare
+        BaseMotion is that of the only prescribed motion. A motion must act by its acceleration alone: measure the
+        fields from the frame that moves. Constant loads act from t = 0.
     t : array_like
         Time or one axis of times, s, not negative; any order.
     x : array_like
-        Place or one axis of places in [0, L], m.
+        Place or one axis of places in the domain, m.
     modes : int
         Modes in the sum, 1 to 1000.
     derivative : {0, 1, 2}
         Displacement (m), velocity (m/s) or acceleration (m/s2). A velocity is that to the right of a jump.
     zeta : array_like, optional
-        Damping ratios in [0, 1), a last axis of ``modes`` values or one for all; default is that of the arm.
+        Damping ratios in [0, 1), a last axis of ``modes`` values or one for all; default is that of the system.
     start : {'inertial', 'base'}
         At rest before t = 0 in the inertial frame (a base that starts with a velocity strikes the arm,
         q_i'(0) = -Gamma_i w'(0+)/M_i), or at rest seen from the moving base.
+    initial : mapping of field, coordinate or its first time derivative to an expression in x, optional
+        State at t = 0 beside that of the start, such as ``{v: a*x**2, v.diff(t): 0}``.
+    field : applied undefined function, optional
+        Default: the first.
 
     Returns
     -------
@@ -110,30 +130,30 @@ def response(
     Raises
     ------
     TypeError, ValueError
-        If an argument is out of its range or shapes do not fit; the error names it.
+        Names the argument that is out of its range, the load without a history, the function that is not known.
     """
-    instance("arm", arm, Arm)
-    places = one_axis("x", x, "places", low=0.0, high=float(np.min(arm.L)))
-    modes = count("modes", modes)
-    rows = np.swapaxes(mode_shapes(arm, np.atleast_1d(places), modes), -1, -2)
-    osc = oscillators(arm, modal_parameters(arm, modes), rows, zeta)
-    values = driven_response(osc, motion, t, derivative, start)
+    instance("system", system, System)
+    places = one_axis("x", x, "places")
+    check_places(system, places)
+    modes = count("modes", modes, high=MOST_MODES)
+    shapes = system.modes(modes).shape(section_place(system, field), 0, np.atleast_1d(places))
+    values = _oscillation(system, motion, np.swapaxes(shapes, -1, -2), t, modes, derivative, zeta, start, initial)
     values = values if places.ndim else values[..., 0, :]
     return values if np.ndim(t) else values[..., 0]
 
 
-def residual_vibration(arm: Arm, motion: BaseMotion, modes: int = 5, *, zeta: Any = None) -> Any:
+def residual_vibration(system: System, motion: BaseMotion, modes: int = 5, *, zeta: Any = None) -> Any:
     """Return the peak amplitude of the tip after the base has stopped, m: the sum of the peaks of the modes.
 
     Exact for one mode; without damping the least upper bound over all times (frequencies of modes are
     incommensurable); with damping an upper bound that ignores only that modes do not peak together. Being at rest
-    after the stop is no condition: what counts is that the base does not accelerate any more. A rigid-body mode
+    after the stop is not a condition: what counts is that the base does not accelerate any more. A rigid-body mode
     contributes its final offset.
 
     Parameters
     ----------
-    arm, motion, modes, zeta
-        As in :func:`response`; the arm is at rest before t = 0.
+    system, motion, modes, zeta
+        As in :func:`response`; the motion is that of the only prescribed one, and the system is at rest before t = 0.
 
     Returns
     -------
@@ -142,33 +162,135 @@ def residual_vibration(arm: Arm, motion: BaseMotion, modes: int = 5, *, zeta: An
     Raises
     ------
     TypeError, ValueError
-        If the motion never stops accelerating; otherwise as :func:`response`.
+        If the motion never stops accelerating, or the model has dampers, which couple the modes; otherwise as
+        :func:`response`.
     """
-    instance("motion", motion, BaseMotion)
-    if not np.all(np.isfinite(motion.duration)):
-        raise ValueError("motion never stops accelerating: allowed are moves with a stop, or sampled records")
-    parameters = modal_parameters(arm, count("modes", modes))
-    osc = oscillators(arm, parameters, parameters.tip_displacement[..., None, :], zeta)
+    osc = stopped_oscillators(system, motion, modes, zeta)
     q, u = state_at_stop(osc, motion)
     # a rigid-body mode keeps its inertial momentum: its velocity is the base's, rounding if the base has really stopped
-    drift = -osc.gamma * _column(motion.velocity(np.max(motion.duration)))
+    drift = -osc.gamma * np.asarray(motion.velocity(np.max(motion.duration)), float)[..., None]
     u = np.where(osc.omega > 0, u, np.where(np.abs(drift) > 1e-9 * np.abs(osc.gamma), drift, 0.0))
-    total = np.sum(np.abs(parameters.tip_displacement) * solver.free_peak(osc, q, u), -1)
+    total = np.sum(np.abs(osc.rows[..., 0, :]) * solver.free_peak(osc, q, u), -1)
     return total if total.ndim else float(total)
 
 
-def _column(value: Any) -> np.ndarray:
-    """Return the batch array with an axis for the modes."""
-    return np.asarray(value, float)[..., None]
+def stopped_oscillators(system: System, motion: BaseMotion, modes: int, zeta: Any) -> solver.Oscillators:
+    """Return the modes as oscillators that move the tip, or refuse what never stops or couples the modes."""
+    instance("system", system, System)
+    instance("motion", motion, BaseMotion)
+    if not np.all(np.isfinite(motion.duration)):
+        raise ValueError("motion never stops accelerating: must be a move with a stop, or a sampled record")
+    if system.numerics("damping") is not None:
+        raise ValueError(
+            "the dampers of the model couple its modes: use modal damping (zeta), or response after the stop"
+        )
+    modes = count("modes", modes, high=MOST_MODES)
+    rows = system.modes(modes).displacement(1, 0)[..., None, :]
+    return oscillators(system, participation(system, modes), rows, modes, zeta)
 
 
-def oscillators(arm: Arm, parameters: ModalParameters, rows: np.ndarray, zeta: Any) -> solver.Oscillators:
-    """Return the modes as oscillators driven by the base, with the damping ratios of the arm or the given ones."""
+def oscillators(system: System, gamma: Array, rows: Array, modes: int, zeta: Any) -> solver.Oscillators:
+    """Return the modes as oscillators with q'' + .. = -gamma w'', with the damping ratios of the system or others."""
+    return solver.Oscillators(
+        system.natural_frequencies(modes), _ratios(system, modes, zeta), gamma, rows, _free, _forced
+    )
+
+
+def _ratios(system: System, modes: int, zeta: Any) -> Array:
     if zeta is None:
-        ratios = _column(arm.zeta)
+        ratios = np.asarray(system.zeta, float)[..., None]
     else:
-        ratios = np.atleast_1d(real_array("zeta", zeta, **_DAMPING))
-    shape = broadcastable(modes=parameters.omega, zeta=ratios)
-    if shape[-1] != parameters.omega.shape[-1]:
+        ratios = np.atleast_1d(checked_damping(zeta))
+    omega = system.natural_frequencies(modes)
+    if broadcastable(modes=omega, zeta=ratios)[-1] != modes:
         raise ValueError(f"zeta has shape {ratios.shape}: its last axis must have one value, or one for each mode")
-    return solver.Oscillators(parameters.omega, ratios, parameters.participation, rows, _free, _forced)
+    return ratios
+
+
+def _oscillation(
+    system: System,
+    motion: BaseMotion | Mapping[Any, History] | None,
+    rows: Array,
+    t: Any,
+    modes: int,
+    derivative: int,
+    zeta: Any,
+    start: Start,
+    initial: Mapping[Any, Any] | None,
+) -> Array:
+    """Return the outputs ``rows`` (..., outputs, modes) of the driven modes, shape (..., outputs, times)."""
+    check_start(start)
+    histories = _histories(system, motion)
+    still = np.zeros(modes)
+    damping = system.numerics("damping")
+    matrix = None if damping is None else Projected(system.domain, system.modes(modes), damping)["damping"]
+
+    def answer(gamma: Array, profile: BaseMotion, begin: Start, state: Any = None) -> Array:
+        osc = oscillators(system, gamma, rows, modes, zeta)
+        if matrix is not None and matrix.any():
+            return coupled_response(
+                CoupledModes(osc.omega, osc.zeta, matrix, gamma, rows), profile, t, derivative, begin, state
+            )
+        return driven_response(osc, profile, t, derivative, begin, state)
+
+    total: Array | None = None
+    if initial or not histories:
+        q, u = (_initial_state(system, initial or {}, modes, order) for order in (0, 1))
+        total = answer(still, BaseMotion(), "base", (q, u))
+    for gamma, history in _driven(system, histories, modes):
+        if isinstance(history, Force):
+            added = answer(gamma, history.profile, "base")
+        else:
+            added = answer(gamma, history, start)
+        total = added if total is None else total + added
+    assert total is not None
+    return total
+
+
+def _histories(system: System, motion: Any) -> dict[str, History]:
+    """Return what was given for each function of time that drives the model, by name."""
+    causes = dict(system.numerics("causes"))
+    if isinstance(motion, BaseMotion):
+        return {only_motion(system): motion}
+    if motion is not None and not isinstance(motion, Mapping):
+        raise TypeError(f"motion = {shown(motion)}: must be a BaseMotion, or a mapping from functions of t to motions")
+    given = {
+        key if isinstance(key, str) else getattr(getattr(key, "func", None), "__name__", str(key)): value
+        for key, value in mapping("motion", motion, "functions of t to BaseMotion or Force").items()
+    }
+    for name, history in given.items():
+        if name not in causes:
+            raise ValueError(
+                f"motion: {name} does not drive the model; what drives it is {', '.join(causes) or 'none'}"
+            )
+        if not isinstance(history, BaseMotion | Force):
+            raise TypeError(f"motion: {name} = {shown(history)}: must be a Force or a BaseMotion")
+        kind = "force" if isinstance(history, Force) else "motion"
+        if causes[name] != kind:
+            cure = {"motion": "give a BaseMotion", "force": "give a Force"}.get(
+                causes[name], "a BaseMotion drives by its acceleration: measure the fields from the frame that moves"
+            )
+            raise ValueError(f"motion: the load {causes[name]} is not a multiple of what {name} is as a {kind}; {cure}")
+    missing = [name for name in causes if name not in given]
+    if missing:
+        raise ValueError(f"motion: no history for {', '.join(missing)}; must be a Force or a BaseMotion")
+    return given
+
+
+def _driven(system: System, histories: Mapping[str, History], modes: int) -> Iterator[tuple[Array, History]]:
+    """Yield minus the generalised force of one unit of each cause on every mode, and its history."""
+    for name, history in histories.items():
+        yield -system.project(system.numerics("load", name), modes), history
+    constant = system.numerics("constant")
+    if constant is not None:
+        yield -system.project(constant, modes), Force(1.0)
+
+
+def _initial_state(system: System, initial: Mapping[Any, Any], modes: int, order: int) -> Array:
+    """Return the modal displacements (order 0) or velocities (1) of given fields at t = 0: products with the mass."""
+    if not initial:
+        return np.zeros(modes)
+    from cra_sym.model.derivations import momentum
+
+    load = momentum(system.model, initial, order)
+    return np.zeros(modes) if load is None else system.project(load, modes)

@@ -1,28 +1,39 @@
-"""Sensitivities (31)-(32) of the natural frequencies to the joint and to every other parameter."""
+"""Sensitivities (31)-(32) of the natural frequencies to every parameter of a system."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache, cached_property
-from typing import Any, Literal
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cra_sym.analysis.modes import ModalParameters, arm_modes
-from cra_sym.arm.parameters import Arm
-from cra_sym.checks import choice, count
-from cra_sym.kernels import derived_kernel
-from cra_sym.model.modal import COMPLIANCES, INERTIAS, SPRINGS, Modes
-from cra_sym.model.spectrum import pair
+from cra_sym.checks import count, instance, shown
+from cra_sym.model.projection import Projected, column
+from cra_sym.model.system import MOST_MODES, System
 
-__all__ = ["Sensitivities", "sensitivities", "squared_frequency_rate"]
+__all__ = ["Rates", "Sensitivities", "sensitivities"]
 
-_implicit_rates = derived_kernel("cra_sym.paper.implicit:implicit_kernel", backend="numpy")
-_exponents = derived_kernel("cra_sym.paper.implicit:group_exponents", backend="numpy")
+Array = NDArray[np.float64]
 
 
-_NAMES = ("k_t", "k_r", "c_t", "c_r", "m_e", "J_e")  # what a derivative of omega^2 is known by; the rest follows
-_Known = Callable[[str], np.ndarray]
+class Rates(Mapping[str, Array]):
+    """One kind of derivatives of the natural frequencies, by the name of the parameter; computed when asked for."""
+
+    def __init__(self, found: Sensitivities, kind: str, names: Sequence[str]) -> None:
+        self._found, self._kind, self._names = found, kind, tuple(names)
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self._names:
+            raise KeyError(name)
+        value: Array = getattr(self._found, f"_{self._kind}")(name)
+        return value
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
 
 
 class Sensitivities:
@@ -30,202 +41,150 @@ class Sensitivities:
     computed when it is first asked for.
 
     Raw derivatives have the unit Hz over that of the parameter and cannot be compared with each other. Logarithmic
-    ones, d ln f / d ln p, can: that of a spring is half its share of the strain energy of the mode, that of m_e minus
-    half its share of the kinetic energy.
+    ones, d ln f / d ln p, can: that of a spring is half its share of the strain energy of the mode, that of a mass
+    minus half its share of the kinetic energy.
 
     A rigid-body mode, f = 0, leaves zero like a square root: its raw derivative by the stiffness that would hold it
-    is inf, its other raw derivatives are 0 and its logarithmic ones nan. With both stiffnesses zero there are two
-    such modes, and which is which depends on the direction of change: nan. An infinite stiffness has derivatives 0;
-    ``df_dc_t`` and ``df_dc_r``, by the compliances 1/k_t and 1/k_r, say what the first give of a rigid joint costs.
+    is inf, its other raw derivatives are 0 and its logarithmic ones nan. Where there are several such modes, which is
+    which depends on the direction of change: nan. An infinite stiffness has derivatives 0; those by the compliance
+    1/k say what the first give of a rigid support costs.
 
     Attributes
     ----------
     frequency : ndarray
         f, Hz.
-    df_dk_t, df_dk_r : ndarray
-        Hz per N/m and Hz per N m/rad.
-    df_dc_t, df_dc_r : ndarray
-        Hz per m/N and Hz per rad/(N m).
-    df_dm_e, df_dJ_e, df_dL, df_db, df_dh, df_dE, df_drho : ndarray
-        Hz per SI unit.
-    log_k_t, log_k_r, log_m_e, log_J_e, log_L, log_b, log_h, log_E, log_rho : ndarray
-        d ln f / d ln p.
+    rate, log : mapping of str to ndarray
+        Raw and logarithmic derivatives by every parameter asked for.
+    compliance : mapping of str to ndarray
+        Raw derivatives by 1/k for every stiffness k of an end: Hz N/m for one in N/m.
+    df_dk_t, log_k_t, df_dc_t, ... : ndarray
+        The same by attribute: of a parameter p ``df_dp`` and ``log_p``; ``df_dc_t`` is by the compliance 1/k_t.
     """
 
-    frequency: np.ndarray
-    df_dk_t: np.ndarray
-    df_dk_r: np.ndarray
-    df_dc_t: np.ndarray
-    df_dc_r: np.ndarray
-    df_dm_e: np.ndarray
-    df_dJ_e: np.ndarray
-    df_dL: np.ndarray
-    df_db: np.ndarray
-    df_dh: np.ndarray
-    df_dE: np.ndarray
-    df_drho: np.ndarray
-    log_k_t: np.ndarray
-    log_k_r: np.ndarray
-    log_m_e: np.ndarray
-    log_J_e: np.ndarray
-    log_L: np.ndarray
-    log_b: np.ndarray
-    log_h: np.ndarray
-    log_E: np.ndarray
-    log_rho: np.ndarray
+    frequency: Array
 
-    def __init__(self, arm: Arm, frequency: np.ndarray, known: _Known) -> None:
-        self._arm, self._known = arm, known
-        self.frequency = frequency
+    def __init__(self, system: System, modes: int, by: Sequence[str]) -> None:
+        self._system, self._modes = system, modes
+        self.frequency = system.natural_frequencies(modes) / (2 * np.pi)
+        stiff = [name for name in system.numerics("stiffnesses") if name in by]
+        self.rate, self.log = Rates(self, "raw", by), Rates(self, "logarithmic", by)
+        self.compliance = Rates(self, "by_compliance", stiff)
 
-    def __getattr__(self, name: str) -> np.ndarray:
-        if name not in Sensitivities.__annotations__:
-            raise AttributeError(f"Sensitivities have no {name!r}")
-        logarithmic = name.startswith("log_")
-        parameter = name.removeprefix("log_" if logarithmic else "df_d")
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            value = self._logarithmic(parameter) if logarithmic else self._raw(parameter)
-        setattr(self, name, value)
-        return value
+    def __getattr__(self, name: str) -> Array:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        for prefix, kind in (("df_d", self.rate), ("log_", self.log)):
+            parameter = name.removeprefix(prefix)
+            if name.startswith(prefix) and parameter in kind:
+                return kind[parameter]
+            stiffness = parameter.replace("c_", "k_", 1)
+            if prefix == "df_d" and name.startswith("df_dc_") and stiffness in self.compliance:
+                return self.compliance[stiffness]
+        raise AttributeError(f"Sensitivities have no {name!r}")
 
     def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *Sensitivities.__annotations__]
+        names = [f"{prefix}{name}" for name in self.rate for prefix in ("df_d", "log_")]
+        return [*super().__dir__(), *names, *(f"df_d{name.replace('k_', 'c_', 1)}" for name in self.compliance)]
 
-    def _raw(self, name: str) -> np.ndarray:
-        if name not in _NAMES:
-            value = self.frequency * self._logarithmic(name) / _column(self._arm, getattr(self._arm, name))
-            return np.where(self._still, 0.0, value) if self._rigid else value
-        value = self._known(f"df_d{name}")
-        if self._rigid:
-            spring = name in _NAMES[:4]
-            held = np.where(np.isnan(value), 0.0, value) if spring else 0.0  # 0 over 0: it holds nothing
-            loose = (np.asarray(self._arm.k_t) == 0) & (np.asarray(self._arm.k_r) == 0) & spring
-            value = np.where(self._still, np.where(_column(self._arm, loose), np.nan, held), value)
-        return value
-
-    def _logarithmic(self, name: str) -> np.ndarray:
-        value = self._known(f"log_{name}") if name in _NAMES else self._exponents[name] / 2
-        return np.where(self._still, np.nan, value) if self._rigid else value
+    # ------------------------------------------------------------------------------------------------------------
 
     @cached_property
-    def _exponents(self) -> dict[str, np.ndarray]:
-        """The chain rule over the dimensionless groups."""
-        factors = {"k_t": 2, "k_r": 2, "m_e": -2, "J_e": -2}  # shares of energy, in strain and in motion
-        return _exponents(*(factor * self._known(f"log_{name}") for name, factor in factors.items()))
+    def _forms(self) -> Projected:
+        return self._system.form("rates", self._modes, diagonal=True)
+
+    @property
+    def _omega(self) -> Array:
+        return self._system.natural_frequencies(self._modes)
+
+    def _squared(self, name: str) -> Array:
+        """Return the derivative of omega^2 by a parameter, by first-order perturbation."""
+        rate = self._forms[f"{name} stiffness"] - self._omega**2 * self._forms[f"{name} mass"]
+        return np.where(np.isinf(column(np.asarray(self._system.values[name]))), 0.0, rate)
+
+    def _raw(self, name: str) -> Array:
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            squared = self._squared(name)
+            value = squared / (8 * np.pi**2 * self.frequency)  # d omega^2 = 8 pi^2 f df
+        return self._at_rest(value, squared)
+
+    def _logarithmic(self, name: str) -> Array:
+        given = np.asarray(self._system.values[name])
+        finite = column(np.where(np.isinf(given), 0.0, given))
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            value = finite * self._squared(name) / (2 * self._omega**2)
+        return np.where(self._still, np.nan, value) if self._still.any() else value
+
+    def _by_compliance(self, name: str) -> Array:
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            squared = -self._spring_forces_squared(name)
+            value = squared / (8 * np.pi**2 * self.frequency)
+        return self._at_rest(value, squared)
+
+    def _spring_forces_squared(self, name: str) -> Array:
+        """Return minus the derivative of omega^2 by the compliance: k^2 times that by k, or the support's force."""
+        given = np.asarray(self._system.values[name])
+        rigid = np.isinf(given)
+        stiffness = column(np.where(rigid, 0.0, given))
+        soft = stiffness**2 * self._squared(name)
+        if not rigid.any():
+            return soft
+        end, place = self._system.numerics("stiffnesses")[name]
+        force = self._system.modes(self._modes).force(end, place)
+        return np.where(column(rigid), force**2, soft)
+
+    def _at_rest(self, value: Array, squared: Array) -> Array:
+        """Return the values, squared over f, with those of rigid-body modes put right."""
+        if not self._still.any():
+            return value
+        # 0 over 0 holds nothing, and neither does what is rounding beside the other modes
+        finite = np.where(self._still | ~np.isfinite(value), 0.0, np.abs(value) * self.frequency)
+        holds = np.abs(squared) > 1e-20 * np.maximum(finite, np.abs(squared)).max(axis=-1, keepdims=True)
+        held = np.where(holds, value, 0.0)
+        several = self._still.sum(axis=-1, keepdims=True) > 1
+        return np.where(self._still, np.where(several & (held != 0), np.nan, held), value)
 
     @cached_property
-    def _still(self) -> np.ndarray:
+    def _still(self) -> Array:
         return self.frequency == 0
 
-    @cached_property
-    def _rigid(self) -> bool:
-        return bool(self._still.any())
 
+def sensitivities(system: System, modes: int = 3, by: Sequence[str] | None = None) -> Sensitivities:
+    """Return the sensitivities (31)-(32) of the natural frequencies to the parameters of a system.
 
-def sensitivities(arm: Arm, modes: int = 3, *, method: Literal["modal", "implicit"] = "modal") -> Sensitivities:
-    """Return the sensitivities (31)-(32) of the natural frequencies to every parameter.
+    First-order perturbation with mass-normalised modes: d omega_i^2 is the change of the stiffness minus omega_i^2
+    times that of the mass, between a mode and itself. Displacements are held fixed over the length, so lengths are
+    parameters like others.
 
     Parameters
     ----------
-    arm : Arm
+    system : System
     modes : int
         How many, 1 to 1000, rigid-body modes included.
-    method : {'modal', 'implicit'}
-        By first-order perturbation, d omega_i^2 = phi_i(0)^2 dk_t + phi_i'(0)^2 dk_r + ... with mass-normalised
-        modes; or by implicit differentiation (31) of the frequency equation (23). They agree; the first is exact at
-        low frequencies too, where the derivatives of the determinant cancel.
+    by : sequence of str, optional
+        Names of parameters; all of them by default.
 
     Returns
     -------
     Sensitivities
-        Arrays of shape (..., modes); ``...`` is ``arm.shape``.
+        Arrays of shape (..., modes); ``...`` is ``system.shape``.
 
     Raises
     ------
     TypeError, ValueError
-        If ``arm`` is no :class:`Arm`, ``modes`` no integer from 1 to 1000, or ``method`` neither of the two.
+        If ``system`` is not a :class:`System`, ``modes`` is not an integer from 1 to 1000, or a name is not that
+        of a parameter.
 
     Examples
     --------
     >>> from cra_sym import Arm, sensitivities
     >>> found = sensitivities(Arm.nominal().replace(k_t=1e3, k_r=1e3))
-    >>> print(found.log_k_t.round(4), found.log_k_r.round(4))
+    >>> print(found.log["k_t"].round(4), found.log_k_r.round(4))
     [0.0173 0.2076 0.204 ] [0.0089 0.0047 0.    ]
     """
-    choice("method", method, ("modal", "implicit"))
-    found = arm_modes(arm, count("modes", modes))
-    modal = ModalParameters(arm, found)
-    known = _by_modes(arm, found) if method == "modal" else _by_rates(arm, modal, _implicit(arm, modal))
-    return Sensitivities(arm, modal.frequency, known)
-
-
-def _column(arm: Arm, value: Any) -> np.ndarray:
-    return np.broadcast_to(value, arm.shape)[..., None]
-
-
-def _by_modes(arm: Arm, modes: Modes) -> _Known:
-    """Return what gives the derivatives of f that modes know, each with others that cost next to nothing beside it."""
-    scale = arm.angular_frequency_scale / (4 * np.pi)  # d f = scale / lambda^2 d lambda^4
-    length, stiffness = arm.L, arm.EI
-    force, moment = stiffness / length**3, stiffness / length
-
-    @cache
-    def together(names: tuple[str, ...]) -> dict[str, np.ndarray]:
-        rows, units = groups[names]
-        return dict(zip(names, modes.quantities(rows, units), strict=True))
-
-    mass = arm.rhoA * length
-    groups = {
-        ("df_dk_t", "df_dk_r", "log_k_t", "log_k_r"): (SPRINGS, (scale / force, scale / moment, 1.0, 1.0)),
-        ("df_dc_t", "df_dc_r"): (COMPLIANCES, (scale * force, scale * moment)),
-        ("df_dm_e", "df_dJ_e", "log_m_e", "log_J_e"): (INERTIAS, (scale / mass, scale / (mass * length**2), 1.0, 1.0)),
-    }
-    return lambda name: next(together(names)[name] for names in groups if name in names)
-
-
-def _by_rates(arm: Arm, p: ModalParameters, rates: dict[str, np.ndarray]) -> _Known:
-    """Return what gives the derivatives of f from those of omega^2 by the parameters of the joint and the tip."""
-
-    def known(name: str) -> np.ndarray:
-        parameter = name.removeprefix("df_d").removeprefix("log_")
-        if name.startswith("df_d"):
-            return rates[parameter] / (8 * np.pi**2 * p.frequency)  # d omega^2 = 8 pi^2 f df
-        value = _column(arm, getattr(arm, parameter))
-        return np.where(np.isinf(value), 0.0, value * rates[parameter] / (2 * p.omega**2))
-
-    return known
-
-
-def squared_frequency_rate(arm: Arm, p: ModalParameters, name: str) -> np.ndarray:
-    """Return d omega^2 by k_t, k_r, a compliance c_t = 1/k_t or c_r, m_e or J_e, from the modes."""
-    match name:
-        case "k_t":
-            return p.root_displacement**2
-        case "k_r":
-            return p.root_slope**2
-        case "c_t":
-            return -(p.root_shear**2)
-        case "c_r":
-            return -(p.root_moment**2)
-        case "m_e":
-            return -((p.omega * p.tip_displacement) ** 2)
-        case _:
-            return -((p.omega * p.tip_slope) ** 2)
-
-
-def _implicit(arm: Arm, p: ModalParameters) -> dict[str, np.ndarray]:
-    """Return the same by implicit differentiation, all from one evaluation; omega^2 = scale^2 lambda^4."""
-    pairs = [value for kappa in (arm.kappa_t, arm.kappa_r) for value in pair(_column(arm, kappa))]
-    (s_t, c_t, s_r, c_r), length, EI = pairs, _column(arm, arm.L), _column(arm, arm.EI)
-    stiffness_t, stiffness_r, mass = EI / length**3, EI / length, _column(arm, arm.rhoA) * length
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        rates = _implicit_rates(p.lam, *pairs, *(_column(arm, value) for value in (arm.mu, arm.iota)))
-        by_lam = 4 * _column(arm, arm.angular_frequency_scale) ** 2 * p.lam**3
-        return {
-            "k_t": by_lam * rates["kappa_t"] * c_t**2 / stiffness_t,
-            "k_r": by_lam * rates["kappa_r"] * c_r**2 / stiffness_r,
-            "c_t": -by_lam * rates["kappa_t"] * s_t**2 * stiffness_t,
-            "c_r": -by_lam * rates["kappa_r"] * s_r**2 * stiffness_r,
-            "m_e": by_lam * rates["mu"] / mass,
-            "J_e": by_lam * rates["iota"] / (mass * length**2),
-        }
+    instance("system", system, System)
+    names = tuple(system.values)
+    if by is None:
+        by = names
+    if isinstance(by, str) or not isinstance(by, Sequence) or not all(name in names for name in by):
+        raise ValueError(f"by = {shown(by)}: must be a sequence of names among {', '.join(names)}")
+    return Sensitivities(system, count("modes", modes, high=MOST_MODES), by)

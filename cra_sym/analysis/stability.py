@@ -1,4 +1,4 @@
-"""Parametric stability of the arm: boundaries by multiple scales, growth by Floquet theory."""
+"""Parametric stability of a system: boundaries by multiple scales, growth by Floquet theory."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from cra_sym import checks
-from cra_sym.analysis.modes import modal_parameters
+from cra_sym.analysis.modes import participation
 from cra_sym.analysis.static_corrections import static_terms
-from cra_sym.analysis.zones import Parametric, Zone, first_order_zone, zone_of
-from cra_sym.arm.excitations import AxialBase, Excitation, JointStiffness, TransverseBase
-from cra_sym.arm.parameters import Arm
+from cra_sym.analysis.zones import Zone, first_order_zone, zone_of
 from cra_sym.kernels import Kernel, compiled, derived_kernel, has_compiler
+from cra_sym.model.excitations import Excitation, Fluctuation, Parametric, TransverseBase
 from cra_sym.model.spectrum import wants_compiler
+from cra_sym.model.system import MOST_MODES, System
 from cra_sym.solvers import floquet
 
 __all__ = [
@@ -28,7 +28,7 @@ __all__ = [
     "stability_boundary",
 ]
 
-_FORCED = derived_kernel("cra_sym.analysis.boundaries:forced_growth")
+_FORCED = derived_kernel("cra_sym.mechanics.boundaries:forced_growth")
 _ROOTS = 5  # of the spectrum, for which the compiled path saves as much as for a point of a chart
 _REACH = 0.5  # share of the half-width by which second order may move the zone
 
@@ -42,7 +42,7 @@ class AsymptoticWarning(UserWarning):
 
 
 def stability_boundary(
-    arm: Arm,
+    system: System,
     excitation: Excitation,
     epsilon: Any,
     resonance: tuple[int, int] = (1, 1),
@@ -51,19 +51,19 @@ def stability_boundary(
     *,
     tongue: int = 1,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the excitation frequencies between which a resonance makes the arm unstable, (49).
+    """Return the excitation frequencies between which a resonance makes the system unstable, (49).
 
     Parameters
     ----------
-    arm : Arm
-    excitation : JointStiffness or AxialBase
+    system : System
+    excitation : Fluctuation, JointStiffness or AxialBase
     epsilon : array_like
         Not negative.
     resonance : (int, int)
         ``(n, n)`` principal, ``(m, n)`` sum, ``(m, -n)`` difference; modes are counted from 1.
     order : {1, 2}
         Order in epsilon. The second one moves the zone without changing its width. It contains the response of all
-        modes of the arm, not only of the first ``modes``: those beyond the ones computed enter by their statics.
+        modes of the system, not only of the first ``modes``: those beyond the ones computed enter by their statics.
     modes : int
         How many modes may take part, 1 to 1000; other resonances among them are checked for overlap.
     tongue : {1, 2}
@@ -72,7 +72,7 @@ def stability_boundary(
     Returns
     -------
     lower, upper : ndarray
-        rad/s, shape broadcast from arm, excitation and epsilon; nan where there is no instability.
+        rad/s, shape broadcast from system, excitation and epsilon; nan where there is no instability.
 
     Warns
     -----
@@ -101,10 +101,10 @@ def stability_boundary(
     order, tongue = checks.count("order", order, high=2), checks.count("tongue", tongue, high=2)
     if tongue > order:
         raise ValueError("order = 1: the second tongue appears at order 2")
-    shape = _shape(arm, excitation, epsilon=epsilon)
-    zone = zone_of(arm, excitation, epsilon, first, second, tongue, modes)
+    shape = _shape(system, excitation, epsilon=epsilon)
+    zone = zone_of(system, excitation, epsilon, first, second, tongue, modes)
     _explain(zone, epsilon, excitation, first, second, shape)
-    _doubt(zone, arm, excitation, epsilon, (first, second), modes, rival=tongue == 1)
+    _doubt(zone, system, excitation, epsilon, (first, second), modes, rival=tongue == 1)
     middle = zone.centre + (zone.shift if order == 2 else 0.0)
     sides = (np.broadcast_to(middle + sign * zone.half_width, shape) for sign in (-1.0, 1.0))
     lower, upper = (side[()] + 0.0 for side in sides)
@@ -112,7 +112,7 @@ def stability_boundary(
 
 
 def growth_rate(
-    arm: Arm,
+    system: System,
     excitation: Excitation,
     angular_frequency: Any,
     epsilon: Any,
@@ -122,14 +122,14 @@ def growth_rate(
     tolerance: float = 1e-8,
     backend: str = "auto",
 ) -> np.ndarray:
-    """Return the rate at which the excited arm's vibration grows: max(0, largest real part of its Floquet exponents).
+    """Return the rate at which vibration grows: max(0, largest real part of the Floquet exponents).
 
     The couplings are those of (36a) and (36b); the method is in :mod:`cra_sym.solvers.floquet`.
 
     Parameters
     ----------
-    arm : Arm
-    excitation : JointStiffness or AxialBase
+    system : System
+    excitation : Fluctuation, JointStiffness or AxialBase
     angular_frequency : array_like
         Excitation frequency varpi, rad/s, positive.
     epsilon : array_like
@@ -137,8 +137,8 @@ def growth_rate(
     modes : int
         How many modes move, 1 to 1000.
     residual : bool
-        Whether the static flexibility of the modes left out is kept, for a fluctuating joint: few modes then do for
-        what would take many. Without it the arm is its first modes and nothing else.
+        Whether the static flexibility of the modes left out is kept, for fluctuating stiffnesses of ends: few modes
+        then do for what would take many. Without it the system is its first modes and nothing else.
     tolerance : float
         Relative error of the monodromy matrix.
     backend : {'auto', 'numpy', 'numba'}
@@ -147,13 +147,14 @@ def growth_rate(
     Returns
     -------
     ndarray
-        1/s, shape broadcast from arm, excitation, angular_frequency and epsilon.
+        1/s, shape broadcast from system, excitation, angular_frequency and epsilon.
 
     Raises
     ------
     TypeError, ValueError
-        If an argument is out of its range, as a :class:`TransverseBase`, ``residual`` without a fluctuating joint and
-        'numba' without Numba are; if shapes do not broadcast together; or if a period takes more than 1e7 steps.
+        If an argument is out of its range, as a :class:`TransverseBase`, ``residual`` without fluctuating stiffnesses
+        of ends and 'numba' without Numba are; if shapes do not broadcast together; or if a period takes more than 1e7
+        steps.
 
     Examples
     --------
@@ -162,12 +163,12 @@ def growth_rate(
     >>> print(growth_rate(arm, JointStiffness(), [186.0, 187.15, 188.0], 0.1).round(3))
     [0.    0.102 0.   ]
     """
-    system = _system(arm, excitation, angular_frequency, epsilon, modes, residual)
-    return floquet.growth_rate(**system, tolerance=tolerance, loop=_loop(backend, system))[()]
+    taken = _taken(system, excitation, angular_frequency, epsilon, modes, residual)
+    return floquet.growth_rate(**taken, tolerance=tolerance, loop=_loop(backend, taken))[()]
 
 
 def floquet_exponents(
-    arm: Arm,
+    system: System,
     excitation: Excitation,
     angular_frequency: Any,
     epsilon: Any,
@@ -177,39 +178,39 @@ def floquet_exponents(
     tolerance: float = 1e-8,
     backend: str = "auto",
 ) -> np.ndarray:
-    """Return all Floquet exponents of the excited arm, largest real part first.
+    """Return all Floquet exponents of the excited system, largest real part first.
 
     The first one's real part is the growth rate before it is cut at zero, so with damping it tells the margin.
     Imaginary parts are given between -1/2 and 1/2 of the excitation frequency.
 
     Parameters
     ----------
-    arm, excitation, angular_frequency, epsilon, modes, residual, tolerance, backend
+    system, excitation, angular_frequency, epsilon, modes, residual, tolerance, backend
         As in :func:`growth_rate`.
 
     Returns
     -------
     complex ndarray, shape (..., 2 modes)
-        1/s; ``...`` is broadcast from arm, excitation, angular_frequency and epsilon.
+        1/s; ``...`` is broadcast from system, excitation, angular_frequency and epsilon.
 
     Raises
     ------
     TypeError, ValueError
         As :func:`growth_rate`.
     """
-    system = _system(arm, excitation, angular_frequency, epsilon, modes, residual)
-    return floquet.floquet_exponents(**system, tolerance=tolerance, loop=_loop(backend, system))
+    taken = _taken(system, excitation, angular_frequency, epsilon, modes, residual)
+    return floquet.floquet_exponents(**taken, tolerance=tolerance, loop=_loop(backend, taken))
 
 
-def forced_width(arm: Arm, excitation: TransverseBase, modes: int = 3) -> np.ndarray:
+def forced_width(system: System, excitation: TransverseBase, modes: int = 3) -> np.ndarray:
     """Return the measure |Gamma_n phi_n(L)| omega_n w_1 / (2 M_n) of the forced resonances of a transverse base, (49a).
 
-    It is no boundary. A base that shakes across the arm at a natural frequency makes the tip's amplitude grow in
+    It is not a boundary. A base that shakes across the span at a natural frequency makes the tip's amplitude grow in
     proportion to time, without damping at this rate for epsilon = 1. It does not depend on how modes are scaled.
 
     Parameters
     ----------
-    arm : Arm
+    system : System
         Its damping does not matter.
     excitation : TransverseBase
         Its amplitude is w_1.
@@ -219,39 +220,42 @@ def forced_width(arm: Arm, excitation: TransverseBase, modes: int = 3) -> np.nda
     Returns
     -------
     ndarray, shape (..., modes)
-        m/s; ``...`` is broadcast from arm and excitation.
+        m/s; ``...`` is broadcast from system and excitation.
 
     Raises
     ------
     TypeError, ValueError
-        If ``arm`` is no :class:`Arm`, ``excitation`` no :class:`TransverseBase`, ``modes`` no integer from 1 to 1000,
-        or shapes do not broadcast together.
+        If ``system`` is not a :class:`System`, ``excitation`` not a :class:`TransverseBase`, ``modes`` not an
+        integer from 1 to 1000, or shapes do not broadcast together.
     """
     if not isinstance(excitation, TransverseBase):
         raise TypeError(
             f"excitation = {checks.shown(excitation)}: allowed is a TransverseBase; the others have stability_boundary"
         )
-    checks.instance("arm", arm, Arm)
-    checks.broadcastable(arm=np.empty(arm.shape), amplitude=np.empty(excitation.shape))
-    modal = modal_parameters(arm, checks.count("modes", modes))
+    checks.instance("system", system, System)
+    checks.broadcastable(system=np.empty(system.shape), amplitude=np.empty(excitation.shape))
+    modes = checks.count("modes", modes, high=MOST_MODES)
     amplitude = np.asarray(excitation.amplitude)[..., None]
-    return _FORCED(modal.omega, modal.participation, modal.tip_displacement, 1.0, amplitude)
+    tip = system.modes(modes).displacement(1, 0)
+    return _FORCED(system.natural_frequencies(modes), participation(system, modes), tip, 1.0, amplitude)
 
 
 def _parametric(excitation: Any) -> Parametric:
     if isinstance(excitation, TransverseBase):
         raise ValueError(
-            f"excitation = {excitation!r}: in linear theory a transverse base only forces the arm and has no boundary; "
-            "see forced_width"
+            f"excitation = {excitation!r}: in linear theory a transverse base only forces the system and has no "
+            "boundary; see forced_width"
         )
-    if not isinstance(excitation, JointStiffness | AxialBase):
-        raise TypeError(f"excitation = {checks.shown(excitation)}: allowed are JointStiffness and AxialBase")
+    if not isinstance(excitation, Parametric):
+        raise TypeError(
+            f"excitation = {checks.shown(excitation)}: must be a Fluctuation, such as JointStiffness, or an AxialBase"
+        )
     return excitation
 
 
-def _shape(arm: Any, excitation: Excitation, **arrays: np.ndarray) -> tuple[int, ...]:
-    checks.instance("arm", arm, Arm)
-    return checks.broadcastable(arm=np.empty(arm.shape), excitation=np.empty(excitation.shape), **arrays)
+def _shape(system: Any, excitation: Excitation, **arrays: np.ndarray) -> tuple[int, ...]:
+    checks.instance("system", system, System)
+    return checks.broadcastable(system=np.empty(system.shape), excitation=np.empty(excitation.shape), **arrays)
 
 
 def _resonance(resonance: Any, modes: int) -> tuple[int, int]:
@@ -281,7 +285,7 @@ def _explain(
         (rest, "a rigid-body mode has no frequency to resonate with"),
         (
             ~rest & (zone.strength == 0),
-            f"{excitation!r} does not couple these modes of this arm (a rigid joint, for one)",
+            f"{excitation!r} does not couple these modes (an infinite stiffness does not fluctuate)",
         ),
         (
             ~rest & (zone.strength < 0),
@@ -297,7 +301,7 @@ def _explain(
 
 def _doubt(
     zone: Zone,
-    arm: Arm,
+    system: System,
     excitation: Parametric,
     epsilon: np.ndarray,
     resonance: tuple[int, int],
@@ -315,29 +319,29 @@ def _doubt(
         largest = np.broadcast_to(epsilon, far.shape)[far].min()
         text = f"epsilon = {largest:g} is beyond the reach of the expansion"
         warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=3)
-    if isinstance(excitation, JointStiffness) and np.any(epsilon * np.maximum(excitation.k_t, excitation.k_r) > 1):
-        text = "epsilon times weight exceeds 1: the joint's stiffness is negative in part of the period"
+    weights = excitation.weights.values() if isinstance(excitation, Fluctuation) else ()
+    if any(np.any(epsilon * np.asarray(weight) > 1) for weight in weights):
+        text = "epsilon times weight exceeds 1: a stiffness is negative in part of the period"
         warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=3)
-    for other in _overlapping(zone, arm, excitation, epsilon, resonance, modes):
+    for other in _overlapping(zone, system, excitation, epsilon, resonance, modes):
         text = f"its zone overlaps that of resonance {other}, and each is derived as if it were alone"
         warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=3)
 
 
 def _overlapping(
-    zone: Zone, arm: Arm, excitation: Parametric, epsilon: np.ndarray, resonance: tuple[int, int], modes: int
+    zone: Zone, system: System, excitation: Parametric, epsilon: np.ndarray, resonance: tuple[int, int], modes: int
 ) -> list[str]:
-    modal = modal_parameters(arm, modes)
     found = []
     for m in range(1, modes + 1):
         for n in range(m, modes + 1):
             if (m, n) in (resonance, resonance[::-1]):
                 continue
-            other = first_order_zone(arm, modal, excitation, epsilon, m, n)
+            other = first_order_zone(system, excitation, epsilon, m, n, modes)
             if _touches(zone, other.centre, other.half_width):
                 found.append(f"({m}, {n})")
             # the second tongue, of order epsilon^2, lies at half the frequency; worth its sums only where it is near
             if _touches(zone, other.centre / 2, 2 * zone.half_width):
-                second = zone_of(arm, excitation, epsilon, m, n, 2, modes)
+                second = zone_of(system, excitation, epsilon, m, n, 2, modes)
                 if _touches(zone, second.centre + second.shift, second.half_width):
                     found.append(f"({m}, {n}), second tongue")
     return found
@@ -348,12 +352,12 @@ def _touches(zone: Zone, centre: np.ndarray, half_width: np.ndarray) -> bool:
         return bool(np.any(np.abs(centre - zone.centre - zone.shift) < half_width + zone.half_width))
 
 
-def _loop(backend: str, system: dict[str, Any]) -> floquet.Loop | None:
+def _loop(backend: str, taken: dict[str, Any]) -> floquet.Loop | None:
     """Return the compiled loop of the Floquet solver if it is asked for, or pays."""
     checks.choice("backend", backend, ("auto", "numpy", "numba"))
     if backend == "numba" and not has_compiler():
         raise ValueError("backend = 'numba': Numba is not installed; allowed are 'auto' and 'numpy'")
-    points = np.broadcast(system["angular_frequency"], system["epsilon"], system["omega"][..., 0]).size
+    points = np.broadcast(taken["angular_frequency"], taken["epsilon"], taken["omega"][..., 0]).size
     compile = backend == "auto" and wants_compiler(_ROOTS * points, _template_parts)
     return _template().kick_and_drift if compile or backend == "numba" else None
 
@@ -367,29 +371,31 @@ def _template_parts() -> tuple[str, dict[str, Kernel]]:
     return files("cra_sym.solvers").joinpath("floquet_lanes.py").read_text(encoding="utf-8"), {}
 
 
-def _system(
-    arm: Arm, excitation: Excitation, angular_frequency: Any, epsilon: Any, modes: int, residual: bool
+def _taken(
+    system: System, excitation: Excitation, angular_frequency: Any, epsilon: Any, modes: int, residual: bool
 ) -> dict[str, Any]:
     """Return what the Floquet solver takes."""
     excitation = _parametric(excitation)
     frequency = checks.real_array("angular_frequency", angular_frequency, low=1e-300)
     epsilon = checks.real_array("epsilon", epsilon, low=0.0)
-    _shape(arm, excitation, angular_frequency=frequency, epsilon=epsilon)
-    modal = modal_parameters(arm, checks.count("modes", modes))
-    system: dict[str, Any] = {
-        "omega": modal.omega,
+    _shape(system, excitation, angular_frequency=frequency, epsilon=epsilon)
+    modes = checks.count("modes", modes, high=MOST_MODES)
+    if system.numerics("damping") is not None:
+        raise ValueError("the dampers of the model couple its modes: use modal damping (zeta) for parametric stability")
+    omega = system.natural_frequencies(modes)
+    taken: dict[str, Any] = {
+        "omega": omega,
         "angular_frequency": frequency,
         "epsilon": epsilon,
-        "decay": np.asarray(arm.zeta)[..., None] * modal.omega,
+        "decay": np.asarray(system.zeta)[..., None] * omega,
     }
     if residual:
-        if not isinstance(excitation, JointStiffness):
-            raise ValueError(f"residual = True: allowed with JointStiffness only, not with {excitation!r}")
-        system["coupling"], system["compliance"] = static_terms(modal, excitation)
-    elif isinstance(excitation, AxialBase):
-        # P grows with the frequency squared: that factor goes with epsilon, which varies over a chart anyway
-        unit = AxialBase(1.0).coupling(modal, 1.0)
-        system |= {"coupling": unit[..., None, :, :], "epsilon": epsilon * excitation.amplitude * frequency**2}
+        if not isinstance(excitation, Fluctuation) or not excitation.springs(system):
+            raise ValueError(f"residual = True needs fluctuating stiffnesses of ends, not {excitation!r}")
+        taken["coupling"], taken["compliance"] = static_terms(system, excitation, modes)
     else:
-        system["coupling"] = excitation.coupling(modal, frequency)[..., None, :, :]
-    return system
+        # P grows with a power of the frequency: that factor goes with epsilon, which varies over a chart anyway
+        taken["coupling"] = excitation.unit_coupling(system, modes)[..., None, :, :]
+        if excitation.power:
+            taken["epsilon"] = epsilon * frequency**excitation.power
+    return taken

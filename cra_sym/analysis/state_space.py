@@ -1,33 +1,36 @@
-"""The arm as a linear system for control design: from base acceleration, or from the force on a free base, to the
-tip."""
+"""A system as a linear one for control design: from base acceleration, or from the force on a free base, to the tip."""
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from cra_sym.analysis.modes import modal_parameters
-from cra_sym.arm.parameters import Arm
+from cra_sym.analysis.modes import only_motion, participation
 from cra_sym.checks import choice, count, instance
+from cra_sym.model.projection import Projected
+from cra_sym.model.system import MOST_MODES, System
+
+if TYPE_CHECKING:
+    from scipy.signal import StateSpace
 
 __all__ = ["state_space"]
 
 
 def state_space(
-    arm: Arm, modes: int = 3, input: Literal["base_acceleration", "drive_force"] = "base_acceleration"
-) -> Any:
-    """Return the continuous-time system from the input to the elastic displacement v(L, t) of the tip.
+    system: System, modes: int = 3, input: Literal["base_acceleration", "drive_force"] = "base_acceleration"
+) -> StateSpace:
+    """Return the continuous-time system from the input to the displacement of the tip seen from the base.
 
     Parameters
     ----------
-    arm : Arm
-        One arm, no batch.
+    system : System
+        One set of values, not a batch.
     modes : int
         Modes kept, 1 to 1000.
     input : {'base_acceleration', 'drive_force'}
-        The base acceleration w'' (m/s2) is prescribed: states q_i, q_i', equation (11). Or a force F (N) drives a
-        free base of mass m_b, (m_b + m_e + rho A L) w'' + sum Gamma_i q_i'' = F: states w, q_i, w', q_i'.
+        The base acceleration w'' (m/s2), of the only prescribed motion: states q_i, q_i', equation (11). Or a force F
+        (N) drives the free base; of an arm (m_b + m_e + rho A L) w'' + sum Gamma_i q_i'' = F: states w, q_i, w', q_i'.
 
     Returns
     -------
@@ -38,7 +41,8 @@ def state_space(
     Raises
     ------
     TypeError, ValueError
-        If ``arm`` is no :class:`Arm` or a batch, ``modes`` no integer from 1 to 1000, or ``input`` neither of the two.
+        If ``system`` is not a :class:`System` or is a batch, its model does not have one prescribed motion, ``modes``
+        is not an integer from 1 to 1000, or ``input`` is neither of the two.
 
     Examples
     --------
@@ -48,19 +52,24 @@ def state_space(
     """
     from scipy.signal import StateSpace
 
-    instance("arm", arm, Arm)
+    instance("system", system, System)
     choice("input", input, ("base_acceleration", "drive_force"))
-    if arm.shape:
-        raise ValueError(f"arm has shape {arm.shape}: allowed is a single arm")
-    p = modal_parameters(arm, count("modes", modes))
-    if input == "base_acceleration":
-        mass, stiffness, damping = np.eye(modes), np.diag(p.omega**2), np.diag(2 * float(arm.zeta) * p.omega)
-        push, tip = -p.participation, p.tip_displacement
-    else:
-        whole = arm.m_b + arm.m_e + arm.rhoA * arm.L
-        mass = np.block([[np.array([[whole]]), p.participation[None]], [p.participation[:, None], np.eye(modes)]])
-        stiffness, damping = (np.diag([0.0, *d]) for d in (p.omega**2, 2 * float(arm.zeta) * p.omega))
-        push, tip = np.eye(modes + 1)[0], np.array([0.0, *p.tip_displacement])
+    if system.shape:
+        raise ValueError(f"system has shape {system.shape}: must be a single set of values, not a batch")
+    modes = count("modes", modes, high=MOST_MODES)
+    motion = only_motion(system)
+    omega, gamma = system.natural_frequencies(modes), participation(system, modes, motion)
+    tip = system.modes(modes).displacement(1, 0)
+    mass, stiffness, damping = np.eye(modes), np.diag(omega**2), np.diag(2 * float(system.zeta) * omega)
+    dampers = system.numerics("damping")
+    if dampers is not None:
+        damping = damping + Projected(system.domain, system.modes(modes), dampers)["damping"]
+    push = -gamma
+    if input == "drive_force":
+        whole = float(system.numerics("carried_mass", motion).function(*system.domain.values))
+        mass = np.block([[np.array([[whole]]), gamma[None]], [gamma[:, None], mass]])
+        stiffness, damping = (np.pad(matrix, ((1, 0), (1, 0))) for matrix in (stiffness, damping))
+        push, tip = np.eye(modes + 1)[0], np.array([0.0, *tip])
     size = push.size
     accelerations = np.linalg.solve(mass, np.hstack([-stiffness, -damping, push[:, None]]))
     A = np.vstack([np.hstack([np.zeros((size, size)), np.eye(size)]), accelerations[:, :-1]])

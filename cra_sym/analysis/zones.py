@@ -8,17 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from cra_sym.analysis.modes import ModalParameters, modal_parameters
 from cra_sym.analysis.static_corrections import moments_of_all_modes
-from cra_sym.arm.excitations import AxialBase, JointStiffness
-from cra_sym.arm.parameters import Arm
 from cra_sym.kernels import Kernel, derived_kernel
+from cra_sym.model.excitations import Fluctuation, Parametric
+from cra_sym.model.system import System
 
-__all__ = ["Parametric", "Zone", "first_order_zone", "zone_of"]
+__all__ = ["Zone", "first_order_zone", "zone_of"]
 
-Parametric = JointStiffness | AxialBase
-#: Modes in the sums of second order; those beyond enter by their statics (joint) or not at all (axial base, where the
-#: terms fall off with the sixth power of the mode's number).
+#: Modes in the sums of second order; those beyond enter by their statics (springs of ends) or not at all (what acts
+#: along the span, where the terms fall off with the sixth power of the mode's number).
 _SPECTATORS = 24
 
 
@@ -49,7 +47,7 @@ class Zone:
 
 @cache
 def _kernel(name: str) -> Kernel:
-    return derived_kernel(f"cra_sym.analysis.boundaries:{name}")
+    return derived_kernel(f"cra_sym.mechanics.boundaries:{name}")
 
 
 def _evaluate(name: str, values: dict[str, Any]) -> Any:
@@ -65,75 +63,90 @@ def _kind(first: int, second: int) -> tuple[str, dict[str, int]]:
 
 
 def _quantities(
-    arm: Arm, modal: ModalParameters, excitation: Parametric, epsilon: Any, first: int, second: int, tongue: int
+    system: System, modes: int, excitation: Parametric, epsilon: Any, first: int, second: int, tongue: int
 ) -> tuple[dict[str, Any], np.ndarray, np.ndarray]:
     """Return what the kernels ask for by name, the exact resonance, and the coupling there."""
     _, labels = _kind(first, second)
-    omega = modal.omega
+    omega = system.natural_frequencies(modes)
     centre = (omega[..., first - 1] + np.sign(second) * omega[..., abs(second) - 1]) / tongue
-    coupling, slope = excitation.coupling(modal, centre), excitation.slope(modal, centre)
+    coupling, slope = excitation.coupling(system, modes, centre), excitation.slope(system, modes, centre)
     values: dict[str, Any] = {"epsilon": epsilon}
     for a, i in labels.items():
-        values |= {f"omega_{a}": omega[..., i], f"c_{a}": np.asarray(arm.zeta) * omega[..., i], f"S_{a}": 0.0}
+        values |= {f"omega_{a}": omega[..., i], f"c_{a}": np.asarray(system.zeta) * omega[..., i], f"S_{a}": 0.0}
         for b, k in labels.items():
             values |= {f"P_{a}{b}": coupling[..., i, k], f"dP_{a}{b}": slope[..., i, k], f"W_{a}{b}": 0.0}
     return values, centre, coupling
 
 
 def _sums(
-    arm: Arm,
-    modal: ModalParameters,
+    system: System,
+    omega: np.ndarray,
     excitation: Parametric,
     values: dict[str, Any],
     coupling: np.ndarray,
     labels: dict[str, int],
     name: str,
 ) -> dict[str, np.ndarray]:
-    """Return the sums over all modes of the arm."""
-    spectators = np.setdiff1d(np.arange(modal.omega.shape[-1]), list(labels.values()))
+    """Return the sums over all modes of the system."""
+    spectators = np.setdiff1d(np.arange(omega.shape[-1]), list(labels.values()))
     columns = {key: np.asarray(value)[..., None] for key, value in values.items()}
     kernel = _kernel(name)
     sums = {}
     for which in kernel(*(1.0 for _ in kernel.arguments)):
         row, target = labels[which[2]], labels[which[-1]]
         path = coupling[..., row, :] * coupling[..., :, target]
-        at = columns | {"omega_j": modal.omega[..., spectators], "path": path[..., spectators]}
+        at = columns | {"omega_j": omega[..., spectators], "path": path[..., spectators]}
         table = _evaluate(name, at)[which]
         total = table["resonant"][..., 0] + np.where(at["path"] == 0, 0.0, table["spectator"]).sum(axis=-1)
-        if isinstance(excitation, JointStiffness):
+        if isinstance(excitation, Fluctuation) and excitation.springs(system):
             with np.errstate(divide="ignore", invalid="ignore"):
-                known = [np.where(path == 0, 0.0, path / modal.omega**power).sum(axis=-1) for power in (2, 4)]
-            whole = moments_of_all_modes(arm, modal, excitation, row, target)
+                known = [np.where(path == 0, 0.0, path / omega**power).sum(axis=-1) for power in (2, 4)]
+            whole = _paths_of_all_modes(system, excitation, omega.shape[-1], row, target)
             tails = table["tail"][..., 0], table["tail_2"][..., 0]
             total = total + sum(t * (all_ - some) for t, all_, some in zip(tails, whole, known, strict=True))
         sums[which] = total
     return sums
 
 
+def _paths_of_all_modes(
+    system: System, excitation: Fluctuation, modes: int, row: int, target: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the sums over all modes j of P_rj P_jt / omega_j^2 and / omega_j^4, modes counted from 0."""
+    b = excitation.spring_displacements(system, modes)
+    weights = np.stack(np.broadcast_arrays(*(np.asarray(w) for w in excitation.weights.values())), axis=-1)
+    first, last = (weights * b[..., mode] for mode in (row, target))
+    second, fourth = (
+        ((first[..., None, :] @ moment)[..., 0, :] * last).sum(axis=-1)
+        for moment in moments_of_all_modes(system, excitation)
+    )
+    return second, fourth
+
+
 def zone_of(
-    arm: Arm, excitation: Parametric, epsilon: np.ndarray, first: int, second: int, tongue: int, modes: int
+    system: System, excitation: Parametric, epsilon: np.ndarray, first: int, second: int, tongue: int, modes: int
 ) -> Zone:
     """Return a zone to second order; modes are counted from 1, and ``second`` is negative for a difference."""
     kind, labels = _kind(first, second)
-    modal = modal_parameters(arm, max(modes, _SPECTATORS))
+    modes = max(modes, _SPECTATORS)
+    omega = system.natural_frequencies(modes)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        values, centre, coupling = _quantities(arm, modal, excitation, epsilon, first, second, tongue)
-        values |= _sums(arm, modal, excitation, values, coupling, labels, f"sums_{kind}_{tongue}")
-        zone = _zone(kind, tongue, values, centre, arm)
-        return replace(zone, shift=_with_damping(f"shift_{kind}_{tongue}", values, arm)[0])
+        values, centre, coupling = _quantities(system, modes, excitation, epsilon, first, second, tongue)
+        values |= _sums(system, omega, excitation, values, coupling, labels, f"sums_{kind}_{tongue}")
+        zone = _zone(kind, tongue, values, centre, system)
+        return replace(zone, shift=_with_damping(f"shift_{kind}_{tongue}", values, system)[0])
 
 
 def first_order_zone(
-    arm: Arm, modal: ModalParameters, excitation: Parametric, epsilon: np.ndarray, first: int, second: int
+    system: System, excitation: Parametric, epsilon: np.ndarray, first: int, second: int, modes: int
 ) -> Zone:
-    """Return a zone to first order, from modes already computed."""
+    """Return a zone to first order."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        values, centre, _ = _quantities(arm, modal, excitation, epsilon, first, second, 1)
-        return _zone(_kind(first, second)[0], 1, values, centre, arm)
+        values, centre, _ = _quantities(system, modes, excitation, epsilon, first, second, 1)
+        return _zone(_kind(first, second)[0], 1, values, centre, system)
 
 
-def _zone(kind: str, tongue: int, values: dict[str, Any], centre: np.ndarray, arm: Arm) -> Zone:
-    half_width, free = _with_damping(f"half_width_{kind}_{tongue}", values, arm)
+def _zone(kind: str, tongue: int, values: dict[str, Any], centre: np.ndarray, system: System) -> Zone:
+    half_width, free = _with_damping(f"half_width_{kind}_{tongue}", values, system)
     through = "P" if tongue == 1 else "W"
     strength = values[f"{through}_nn"] ** 2
     if kind != "principal":
@@ -142,7 +155,7 @@ def _zone(kind: str, tongue: int, values: dict[str, Any], centre: np.ndarray, ar
     return Zone(centre, half_width, free, np.zeros_like(free), strength)
 
 
-def _with_damping(name: str, values: dict[str, Any], arm: Arm) -> tuple[np.ndarray, np.ndarray]:
-    """Return a quantity of the boundary, each arm with its damping, and the same without any."""
-    free, damping = _evaluate(name, values), np.asarray(arm.zeta) > 0
+def _with_damping(name: str, values: dict[str, Any], system: System) -> tuple[np.ndarray, np.ndarray]:
+    """Return a quantity of the boundary, each system with its damping, and the same without any."""
+    free, damping = _evaluate(name, values), np.asarray(system.zeta) > 0
     return (np.where(damping, _evaluate(f"damped_{name}", values), free) if damping.any() else free), free

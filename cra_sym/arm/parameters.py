@@ -6,11 +6,16 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from cra_sym.checks import broadcastable, real_array
+from cra_sym.model.numerics import Numerics
+from cra_sym.model.system import System
+
+if TYPE_CHECKING:
+    from cra_sym.model.lagrangian import Model
 
 __all__ = ["Arm", "Provenance"]
 
@@ -60,10 +65,23 @@ _RANGES: dict[str, dict[str, Any]] = {
     "zeta": {"low": 0.0, "high": np.nextafter(1.0, 0.0), "allowed": "real numbers in [0, 1)"},
 }
 
+_MODEL = "cra_sym.arm.lagrangian:arm_model"
+
+
+def _model() -> Model:
+    from cra_sym.arm.lagrangian import arm_model
+
+    return arm_model()
+
+
+_NUMERICS = Numerics(_model, _MODEL)
+
 
 @dataclass(frozen=True, eq=False)
-class Arm:
-    """Parameters of the flexible arm; any of them may be an array, and arrays broadcast as batch axes.
+class Arm(System):
+    """The paper's arm: names and checks for the parameters of :func:`cra_sym.paper_lagrangian`.
+
+    It is a :class:`cra_sym.System`. Any parameter may be an array, and arrays broadcast as batch axes.
 
     Parameters
     ----------
@@ -151,9 +169,21 @@ class Arm:
         return type(self)(**{**self._fields(), **changes})
 
     @property
-    def shape(self) -> tuple[int, ...]:
-        """Batch shape: the common shape of all fields."""
-        return broadcastable(**self._fields())
+    def model(self) -> Model:
+        """The model of the paper's Lagrangian, its base moving as prescribed."""
+        return _model()
+
+    @property
+    def values(self) -> Mapping[str, Number]:
+        """The value of every parameter but the modal damping ratio, by name."""
+        fields = self._fields()
+        del fields["zeta"]
+        return MappingProxyType(fields)
+
+    @property
+    def numerics(self) -> Numerics:
+        """What was derived from the paper's Lagrangian, compiled."""
+        return _NUMERICS
 
     @property
     def A(self) -> Number:
@@ -202,12 +232,6 @@ class Arm:
 
     def _key(self) -> tuple[Any, ...]:
         return tuple((np.shape(value), np.asarray(value).tobytes()) for value in self._fields().values())
-
-    def __eq__(self, other: object) -> bool:
-        return self._key() == other._key() if isinstance(other, Arm) else NotImplemented
-
-    def __hash__(self) -> int:
-        return hash(self._key())
 
     def __reduce__(self) -> tuple[Any, ...]:  # arrays come back read-only and validated
         return type(self), tuple(self._fields().values())

@@ -202,10 +202,11 @@ def _(setting: Setting) -> Finding:
 
 def _energy_of_a_tilt() -> str:
     """Say how much energy the flipped joint holds when the straight arm is turned about it by one radian."""
-    from cra_sym.paper.energy import k_r, lagrangian, v, w, x
+    from cra_sym.arm.lagrangian import paper_lagrangian
+    from cra_sym.paper.energy import k_r, v, w, x
     from cra_sym.paper.evaluation import at, put
 
-    _, left, _ = lagrangian()
+    _, left, _ = paper_lagrangian()
     flipped = 2 * left.coeff(k_r) * k_r - left
     energy = at(put(flipped, {v: x, w: x * 0}), 0).doit()
     folds = ": it would fold by itself" if energy.is_nonpositive else ""
@@ -372,13 +373,14 @@ def _(verdict: Verdict, ax: Axes) -> None:
     "Hamilton's variational principle ... the principle of virtual work is utilized [for the boundary conditions]",
 )
 def _(setting: Setting) -> Finding:
+    from cra_sym.arm.lagrangian import paper_lagrangian
     from cra_sym.mechanics import hamilton
-    from cra_sym.paper.energy import L, lagrangian, t, v, w, x
+    from cra_sym.paper.energy import L, t, v, w, x
     from cra_sym.paper.joint import boundary_conditions
 
     agree = []
     for joint in (True, False):
-        density, left, right = lagrangian(joint=joint)
+        density, left, right = paper_lagrangian(joint=joint)
         result = hamilton(density, fields=[v], prescribed=[w], x=x, domain=(0, L), t=t, left=left, right=right)
         found = [(e.lhs - e.rhs).expand() for e in result.boundary_conditions]
         wanted = [(e.lhs - e.rhs).expand() for e in boundary_conditions()]

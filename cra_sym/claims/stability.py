@@ -130,7 +130,7 @@ def _(verdict: Verdict, ax: Axes) -> None:
 def _(setting: Setting) -> Finding:
     from sympy.core.function import AppliedUndef
 
-    from cra_sym.analysis.boundaries import forced_resonance, general_resonance, n
+    from cra_sym.mechanics.boundaries import forced_resonance, general_resonance, n
     from cra_sym.mechanics.two_scales import conjugate_amplitude
 
     derived = [forced_resonance(), general_resonance("principal", 1, damped=False)]

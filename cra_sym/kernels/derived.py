@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import pickle
 import platform
+from collections.abc import Callable
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -15,10 +17,10 @@ from cra_sym.checks import shown
 from cra_sym.kernels import store
 from cra_sym.kernels.callables import Kernel, kernel
 
-__all__ = ["derived_kernel"]
+__all__ = ["derived", "derived_kernel"]
 
 _PACKAGE = Path(__file__).resolve().parent.parent
-_DERIVING = ("symbols.py", "checks.py", "mechanics", "model", "kernels", "arm", "analysis", "paper")
+_DERIVING = ("symbols.py", "checks.py", "mechanics", "model", "kernels", "solvers", "arm", "analysis", "paper")
 
 
 class _DerivedKernel(Kernel):
@@ -82,12 +84,41 @@ def _source_of(path: str) -> tuple[str, tuple[str, ...]]:
     return source, tuple(arguments)
 
 
-def _derived(path: str) -> Kernel:
+def derived(path: str, *arguments: str) -> Any:
+    """Return what a function of this package derives, from the user's store where it was derived before.
+
+    Parameters
+    ----------
+    path : str
+        ``"cra_sym.room.module:function"``. What the function returns is stored, so it must pickle.
+    *arguments : str
+        Passed on to the function, and part of the key.
+    """
+    storable = _sources_are_what_runs()
+    key = f"{path} {arguments!r} {fingerprint()}"
+    content = store.load(key) if storable else None
+    if content is not None:
+        try:
+            return pickle.loads(content)
+        except Exception:  # whatever is wrong with what this process did not make: make it anew
+            pass
+    made = _narrated(path, lambda function: function(*arguments))
+    if storable and _sources_are_what_runs():
+        store.save(key, pickle.dumps(made))
+    return made
+
+
+def _narrated(path: str, make: Callable[[Callable[..., Any]], Any]) -> Any:
     from tqdm import tqdm
 
     module, _, function = path.partition(":")
     with tqdm(total=0, desc=f"deriving {path}, once", bar_format="{desc}", leave=False, disable=None):
-        return kernel(*getattr(import_module(module), function)())
+        return make(getattr(import_module(module), function))
+
+
+def _derived(path: str) -> Kernel:
+    made: Kernel = _narrated(path, lambda function: kernel(*function()))
+    return made
 
 
 def _sources() -> list[Path]:

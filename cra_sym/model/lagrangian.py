@@ -2,36 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import Any, Literal
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from sympy import Expr, S, Symbol, sympify
+from sympy import Add, Expr, S, Symbol, sympify
 from sympy.core.function import AppliedUndef
 
-from cra_sym.checks import choice, count, one_axis, shown
+from cra_sym.checks import mapping
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics import HamiltonResult, Modal, StateForm, hamilton, ritz, separate, state_form
-from cra_sym.mechanics.jets import Jet, listed
-from cra_sym.mechanics.weak import weak_form
-from cra_sym.model.forced import driven_displacement, steady_states
+from cra_sym.mechanics.jets import listed
 from cra_sym.model.galerkin import Ritz
-from cra_sym.model.modes import Modes, tip_sign
-from cra_sym.model.projection import modal_basis
-from cra_sym.model.response import History, oscillation
-from cra_sym.model.spatial import SpatialProblem, shares
+from cra_sym.model.numerics import Numerics
 from cra_sym.model.symmetry import asymmetry, odd_in_time
+from cra_sym.model.system import System
 from cra_sym.model.units import check_dimensions, named_units
-from cra_sym.model.values import Values, parameters
-from cra_sym.solvers.driven_modes import Start
-from cra_sym.solvers.eigenvalues import lowest, refine
-from cra_sym.solvers.shapes import mode_states
+
+if TYPE_CHECKING:
+    from cra_sym.analysis.modes import ModalParameters
 
 __all__ = ["Model"]
-
-_TAU = 2.0 * np.pi
-_MOST_MODES, _MOST_DERIVATIVES = 1000, 20
 
 
 class Model:
@@ -59,6 +53,9 @@ class Model:
     units : mapping, optional
         Units of symbols of the model that are not those of ``cra_sym.symbols``, such as ``{c: "N s/m"}``. Every term
         whose symbols all have a known unit must be an energy (per length in the density).
+    definitions : mapping of Symbol to Expr, optional
+        Symbols of the pieces above that stand for expressions, such as ``{A: b*h}``: the parameters of the model are
+        then those of the expressions.
 
     Raises
     ------
@@ -98,31 +95,120 @@ class Model:
         prescribed: Sequence[AppliedUndef] = (),
         virtual_work: Sequence[tuple[Expr, Expr, Any]] | None = None,
         units: Mapping[Any, str] | None = None,
+        definitions: Mapping[Symbol, Expr] | None = None,
     ) -> None:
-        self._options: dict[str, Any] = {
+        self._pieces: dict[str, Any] = {
+            "density": density,
             "fields": listed("fields", fields),
-            "coordinates": listed("coordinates", coordinates),
-            "prescribed": listed("prescribed", prescribed),
             "x": x,
             "domain": listed("domain", domain),
             "t": t,
             "left": left,
             "right": right,
             "essential": listed("essential", () if essential is None else essential),
+            "coordinates": listed("coordinates", coordinates),
+            "prescribed": listed("prescribed", prescribed),
+            "virtual_work": tuple(
+                tuple(work) for work in listed("virtual_work", () if virtual_work is None else virtual_work)
+            ),
+            "units": tuple(mapping("units", units, "symbols to units").items()),
+            "definitions": tuple(mapping("definitions", definitions, "symbols to expressions").items()),
         }
-        self._density = density
-        self._virtual_work = listed("virtual_work", () if virtual_work is None else virtual_work)
-        self.equations: HamiltonResult = hamilton(density, virtual_work=self._virtual_work, **self._options)
+        self._options = self._defined()
+        self.equations: HamiltonResult = hamilton(**self._options)
         """Equations of motion, boundary conditions and the steps that led there."""
         stated = ((f"{end} end", self._options[end]) for end in ("left", "right"))
         ends = {label: sympify(term, strict=True) for label, term in stated if term is not None}
         self.equations.variation.elimination.check_homogeneous("Model")
+        density, work = self._options["density"], self._options["virtual_work"]
         given = [density, *self._options["domain"], *self._options["essential"], *ends.values()]
-        given += [part for force, displacement, _ in self._virtual_work for part in (force, displacement)]
+        given += [part for force, displacement, _ in work for part in (force, displacement)]
         self.symbols: tuple[Symbol, ...] = parameters(given, self.equations)
         """The parameters: every symbol but x and t, by name."""
-        units = named_units(units, [*given, *self._options["fields"], *self._options["coordinates"]])
-        check_dimensions(sympify(density, strict=True), ends, units, self._virtual_work)
+        declared = named_units(units, [*given, *self._options["fields"], *self._options["coordinates"]])
+        check_dimensions(sympify(density, strict=True), ends, declared, work)
+
+    def _defined(self) -> dict[str, Any]:
+        """Return what Hamilton's principle takes, definitions put in."""
+        options = {name: piece for name, piece in self._pieces.items() if name not in ("units", "definitions")}
+        definitions = dict(self._pieces["definitions"])
+        if not definitions:
+            return options
+
+        def put(piece: Any) -> Any:
+            if isinstance(piece, tuple):
+                return tuple(put(part) for part in piece)
+            return piece.subs(definitions) if isinstance(piece, Expr) and not isinstance(piece, Symbol) else piece
+
+        return {name: put(piece) for name, piece in options.items()}
+
+    def replace(self, **changes: Any) -> Model:
+        """Return the same model with some of what it was made of replaced.
+
+        Parameters
+        ----------
+        **changes
+            Arguments of :class:`Model`.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If a name is not an argument of :class:`Model`; otherwise as :class:`Model`.
+
+        Examples
+        --------
+        >>> import cra_sym as cra
+        >>> from cra_sym.symbols import v
+        >>> density, left, right = cra.paper_lagrangian()
+        >>> k_f = Symbol("k_f")
+        >>> cra.Arm.nominal().model.replace(density=density - k_f * v**2 / 2)
+        <Model of v(x, t) with parameters E, J_e, L, b, h, k_f, k_r, k_t, m_b, m_e, rho>
+        """
+        unknown = [name for name in changes if name not in self._pieces]
+        if unknown:
+            raise TypeError(f"{unknown[0]!r} is not an argument of Model; it has {', '.join(self._pieces)}")
+        pieces = self._pieces | {"units": dict(self._pieces["units"]), "definitions": dict(self._pieces["definitions"])}
+        return Model(**{**pieces, **changes})
+
+    def at(self, values: Mapping[Any, Any], zeta: Any = 0.0) -> System:
+        """Return the model bound to values.
+
+        Parameters
+        ----------
+        values : mapping of symbol or name to array_like
+        zeta : array_like
+            Modal damping ratio beside the dampers, in [0, 1).
+
+        Returns
+        -------
+        System
+
+        Raises
+        ------
+        TypeError, ValueError
+            Names the parameter that is missing, unknown or out of range.
+        """
+        return System(self, values, zeta)
+
+    def freed(self, name: str) -> Model:
+        """Return the model in which a prescribed motion is a lumped coordinate instead."""
+        motion = next(function for function in self._pieces["prescribed"] if function.func.__name__ == name)
+        prescribed = [function for function in self._pieces["prescribed"] if function != motion]
+        return self.replace(prescribed=prescribed, coordinates=[*self._pieces["coordinates"], motion])
+
+    @cached_property
+    def numerics(self) -> Numerics:
+        """What is derived from the Lagrangian and compiled, each thing when it is first needed."""
+        return Numerics(lambda: self)
+
+    def __eq__(self, other: object) -> bool:
+        return self._pieces == other._pieces if isinstance(other, Model) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(tuple(self._pieces.values()))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _rebuilt, (self._pieces,)
 
     def __repr__(self) -> str:
         unknowns = ", ".join(map(str, (*self.equations.fields, *self.equations.coordinates)))
@@ -139,12 +225,18 @@ class Model:
         return state_form(self.equations)
 
     @cached_property
-    def _conservative(self) -> StateForm:
-        """The same without the forces that are odd in time (dampers)."""
+    def conservative(self) -> StateForm:
+        """The same without the forces that are odd in time (dampers).
+
+        Raises
+        ------
+        ValueError
+            If what remains is not symmetric: gyroscopic terms, forces that follow the motion.
+        """
         if not self.state_form.damped:
             form = self.state_form
         else:
-            form = state_form(hamilton(self._density, virtual_work=self._undamped_work(), **self._options))
+            form = state_form(hamilton(**(self._options | {"virtual_work": self._undamped_work()})))
         problem = asymmetry(form)
         if problem:
             raise ValueError(f"natural frequencies need conservative forces, and {problem}; use eigenvalues")
@@ -157,20 +249,8 @@ class Model:
             terms = sympify(force, strict=True).expand().as_ordered_terms()
             return sum((term for term in terms if not odd_in_time(term, t)), S.Zero)
 
-        kept = ((still(force), displacement, place) for force, displacement, place in self._virtual_work)
+        kept = ((still(force), displacement, place) for force, displacement, place in self._options["virtual_work"])
         return tuple(work for work in kept if work[0] != 0)
-
-    @cached_property
-    def _damped(self) -> SpatialProblem:
-        return SpatialProblem(self.state_form, self.symbols, self._left, self.equations.fields)
-
-    @property
-    def _left(self) -> Expr:
-        return sympify(self._options["domain"][0], strict=True)
-
-    @cached_property
-    def _spatial(self) -> SpatialProblem:
-        return SpatialProblem(self._conservative, self.symbols, self._left, self.equations.fields)
 
     def separate(self, **options: Any) -> Modal:
         """Separate the variables: characteristic matrix and function, mode shapes, in closed form."""
@@ -197,254 +277,76 @@ class Model:
             raise ValueError(f"the wave numbers have no closed form, only {modal.basis.dispersion}")
         return kernel(modal.characteristic_function.xreplace(waves), (modal.frequency, *self.symbols))
 
-    # ------------------------------------------------------------------------------------------------- spectrum
+    # ------------------------------------------------------------------------------- one line each on the analysis
 
     def natural_frequencies(self, values: Mapping[Any, Any], modes: int = 3) -> np.ndarray:
-        """Return the natural frequencies in Hz: ascending, complete, rigid-body motions as zeros.
+        """Return ``cra_sym.natural_frequencies(self.at(values), modes)``."""
+        return _analysis("modes").natural_frequencies(self.at(values), modes)
 
-        Dampers are left out: these are the frequencies of the conservative structure (see `eigenvalues`).
+    def mode_shapes(self, values: Mapping[Any, Any], x_values: Any, modes: int = 3, **options: Any) -> np.ndarray:
+        """Return ``cra_sym.mode_shapes(self.at(values), x_values, modes, **options)``."""
+        return _analysis("modes").mode_shapes(self.at(values), x_values, modes, **options)
 
-        Parameters
-        ----------
-        values : mapping
-        modes : int
-
-        Returns
-        -------
-        ndarray, shape (..., modes)
-
-        Raises
-        ------
-        TypeError, ValueError
-            If a value is missing, unknown or not allowed; if the structure has buckled under its static load; if it
-            has fewer natural frequencies.
-        """
-        modes = count("modes", modes, high=_MOST_MODES)
-        given = Values.read(self.symbols, values)
-        squares = np.empty((given.columns.shape[1], modes))
-        for rows, _, problem in self._spatial.problems(given):
-            squares[rows] = lowest(problem, modes)
-        return (np.sqrt(squares) / _TAU).reshape(*given.shape, modes)
+    def modal_parameters(self, values: Mapping[Any, Any], modes: int = 3) -> ModalParameters:
+        """Return ``cra_sym.modal_parameters(self.at(values), modes)``."""
+        return _analysis("modes").modal_parameters(self.at(values), modes)
 
     def eigenvalues(self, values: Mapping[Any, Any], modes: int = 3, *, oscillating: bool = True) -> np.ndarray:
-        """Return complex eigenvalues s (rad/s) of motions ``exp(s t)``, dampers included, one of each conjugate pair.
-
-        They are guessed by the Ritz matrices and refined on the exact problem. That none is missing is promised only
-        without dampers, where ``s = i omega``.
-
-        Parameters
-        ----------
-        values : mapping
-        modes : int
-        oscillating : bool
-            Leave out real eigenvalues, of motions that decay without oscillating: Kelvin-Voigt damping has infinitely
-            many, which crowd at minus one over the retardation time.
-
-        Returns
-        -------
-        ndarray of complex, shape (..., modes)
-            By ascending modulus.
-
-        Raises
-        ------
-        ArithmeticError
-            If a refinement does not settle.
-        """
-        modes = count("modes", modes, high=_MOST_MODES)
-        if not self.state_form.damped and not asymmetry(self.state_form):
-            return 1j * _TAU * self.natural_frequencies(values, modes)
-        given = Values.read(self.symbols, values)
-        guesses = self.ritz(2 * modes + 10).eigenvalues(values, modes, oscillating=oscillating).reshape(-1, modes)
-        roots = np.empty_like(guesses)
-        for rows, _, problem in self._damped.problems(given):
-            squared = not self.state_form.damped
-            found = refine(problem, -(guesses[rows] ** 2) if squared else guesses[rows])
-            if np.isnan(found).any():
-                raise ArithmeticError("eigenvalues: the refinement of a Ritz value did not settle; ask for fewer modes")
-            found = np.sqrt(-found) if squared else found
-            roots[rows] = np.take_along_axis(found, np.argsort(np.abs(found), axis=1, kind="stable"), axis=1)
-        return roots.reshape(*given.shape, modes)
+        """Return :func:`cra_sym.analysis.eigenvalues.eigenvalues` of the model at the values."""
+        return _analysis("eigenvalues").eigenvalues(self.at(values), modes, oscillating=oscillating)
 
     def damping_ratios(self, values: Mapping[Any, Any], modes: int = 3) -> np.ndarray:
-        """Return ``-Re s / |s|`` of the `eigenvalues`, zero for a rigid motion, shape (..., modes)."""
-        s = self.eigenvalues(values, modes)
-        return -s.real / np.where(s == 0.0, 1.0, np.abs(s))
-
-    def mode_shapes(
-        self,
-        values: Mapping[Any, Any],
-        x_values: Any,
-        modes: int = 3,
-        *,
-        field: AppliedUndef | None = None,
-        derivative: int = 0,
-    ) -> np.ndarray:
-        """Return mass-normalised mode shapes of one field; positive at the right end.
-
-        Parameters
-        ----------
-        values : mapping
-        x_values : array_like, shape (stations,)
-            Within the domain; a single place makes one station.
-        modes : int
-        field : applied undefined function, optional
-            Default: the first.
-        derivative : int
-            Order of the derivative by x.
-
-        Returns
-        -------
-        ndarray, shape (..., modes, stations)
-        """
-        modes, derivative = (
-            count("modes", modes, high=_MOST_MODES),
-            count("derivative", derivative, low=0, high=_MOST_DERIVATIVES),
-        )
-        wanted, given = self._field(field), Values.read(self.symbols, values)
-        x = np.atleast_1d(one_axis("x_values", x_values, "places"))
-        place = self._conservative.displacements.index(wanted)
-        shapes = np.empty((given.columns.shape[1], modes, len(x)))
-        for rows, left, problem in self._spatial.problems(given):
-            z, share = lowest(problem, modes), shares(x, left, problem.length, "x_values")
-            state = mode_states(problem, z, np.concatenate([share, np.ones((len(rows), 1))], axis=1))
-            sign = tip_sign(state[:, :, -1, : problem.displacements])
-            row = self._spatial.derivative_row(place, derivative, z, x, given.take(rows))
-            shapes[rows] = sign * (row * state[:, :, :-1]).sum(axis=-1)
-        return shapes.reshape(*given.shape, modes, len(x))
+        """Return :func:`cra_sym.analysis.eigenvalues.damping_ratios` of the model at the values."""
+        return _analysis("eigenvalues").damping_ratios(self.at(values), modes)
 
     def frequency_response(
-        self,
-        values: Mapping[Any, Any],
-        angular_frequency: Any,
-        x_values: Any,
-        *,
-        drive: Expr,
-        kind: Literal["force", "motion"] = "force",
-        field: AppliedUndef | None = None,
+        self, values: Mapping[Any, Any], angular_frequency: Any, x_values: Any = None, **options: Any
     ) -> np.ndarray:
-        """Return the exact complex amplitude of a field for harmonic driving ``exp(i omega t)``, dampers included.
-
-        Parameters
-        ----------
-        values : mapping
-        angular_frequency : array_like, shape (n,)
-            rad/s.
-        x_values : array_like, shape (stations,)
-        drive : Expr
-            A displacement of an end, such as ``v.subs(x, L)``, or a lumped coordinate.
-        kind : {'force', 'motion'}
-            A generalised force of one unit on that displacement, or one unit of motion of it.
-        field : applied undefined function, optional
-            Default: the first.
-
-        Returns
-        -------
-        ndarray of complex, shape (..., n, stations)
-        """
-        choice("kind", kind, ("force", "motion"))
-        form, given = self.state_form, Values.read(self.symbols, values)
-        place = form.displacements.index(self._field(field))
-        driven = driven_displacement(form, drive, self.equations.domain)
-        omega = np.atleast_1d(one_axis("angular_frequency", angular_frequency, "frequencies", low=-1e60, high=1e60))
-        x = np.atleast_1d(one_axis("x_values", x_values, "places"))
-        found = np.empty((given.columns.shape[1], len(omega), len(x)), dtype=complex)
-        for rows, left, problem in self._damped.problems(given):
-            row = np.repeat(np.arange(len(rows)), len(omega))
-            parameter = np.tile(1j * omega if form.damped else omega**2, len(rows))
-            share = shares(x, left, problem.length, "x_values")[row]
-            state = steady_states(problem, parameter, row, share, driven, kind)
-            found[rows] = state[..., place].reshape(len(rows), len(omega), len(x))
-        return found.reshape(*given.shape, len(omega), len(x))
+        """Return ``cra_sym.frequency_response(self.at(values), angular_frequency, x_values, **options)``."""
+        return _analysis("frequency_response").frequency_response(
+            self.at(values), angular_frequency, x_values, **options
+        )
 
     def response(
         self,
         values: Mapping[Any, Any],
-        motion: Mapping[AppliedUndef, History] | None,
+        motion: Any,
         t: Any,
         x: Any,
         modes: int = 5,
         derivative: int = 0,
-        *,
-        initial: Mapping[Expr, Expr] | None = None,
-        zeta: Any = 0.0,
-        field: AppliedUndef | None = None,
-        start: Start = "inertial",
-    ) -> np.ndarray:
-        """Return a field in time: the modes driven by prescribed motions and forces, or let go from an initial state.
-
-        Parameters
-        ----------
-        values : mapping
-        motion : mapping of function of t to BaseMotion or Force
-            What the prescribed motions and the forces of the Lagrangian and of the virtual work are. A motion must
-            act by its acceleration alone: measure the fields from the frame that moves. Constant loads act from t = 0.
-        t : array_like
-            Times from 0 on, s.
-        x : array_like
-            Place or one axis of places.
-        modes : int
-            Modes in the sum.
-        derivative : {0, 1, 2}
-            By time.
-        initial : mapping of field, coordinate or its first time derivative to an expression in x, optional
-            State at t = 0, such as ``{v: a*x**2, v.diff(t): 0}``; at rest otherwise.
-        zeta : array_like, optional
-            Modal damping ratios in [0, 1) beside the dampers of the model, one or one for each mode.
-        field : applied undefined function, optional
-            Default: the first.
-        start : {'inertial', 'base'}
-            At rest before t = 0 in the inertial frame, or seen from the moving one.
-
-        Returns
-        -------
-        ndarray, shape (..., x, t)
-            A single x or t has no axis.
-
-        Raises
-        ------
-        TypeError, ValueError
-            Names the load without a history, or the function that is not at rest, known or allowed.
-        """
-        modes = count("modes", modes, high=_MOST_MODES)
-        wanted, given = self._field(field), Values.read(self.symbols, values)
-        places = np.empty(()) if x is None else one_axis("x", x, "places")
-        basis = modal_basis(self._spatial, given, modes, None if x is None else np.atleast_1d(places))
-        shape = Jet(self.equations.fields.index(wanted), 0, 0, None)
-        rows = basis.values(shape)[..., basis.places]
-        weak = weak_form(self.equations.variation)
-        found = oscillation(basis, weak, motion, rows, given.shape, t, derivative, zeta, start, initial)
-        found = found if places.ndim else found[..., 0, :]
-        return found if np.ndim(t) else found[..., 0]
-
-    def tip_response(
-        self,
-        values: Mapping[Any, Any],
-        motion: Mapping[AppliedUndef, History] | None,
-        t: Any,
-        modes: int = 5,
-        derivative: int = 0,
         **options: Any,
     ) -> np.ndarray:
-        """Return a field of the right end in time; as `response`, shape (..., t)."""
-        return self.response(values, motion, t, None, modes, derivative, **options)
+        """Return ``cra_sym.response(self.at(values), motion, t, x, modes, derivative, **options)``."""
+        return _analysis("responses").response(self.at(values), motion, t, x, modes, derivative, **options)
 
-    def _field(self, field: AppliedUndef | None) -> AppliedUndef:
-        wanted = self.equations.fields[0] if field is None else field
-        if not isinstance(wanted, AppliedUndef) or wanted not in self.equations.fields:
-            raise ValueError(f"field = {shown(field)}: allowed are {', '.join(map(str, self.equations.fields))}")
-        return wanted
+    def tip_response(
+        self, values: Mapping[Any, Any], motion: Any, t: Any, modes: int = 5, **options: Any
+    ) -> np.ndarray:
+        """Return ``cra_sym.tip_response(self.at(values), motion, t, modes, **options)``."""
+        return _analysis("responses").tip_response(self.at(values), motion, t, modes, **options)
 
-    def modal_parameters(self, values: Mapping[Any, Any], modes: int = 3) -> Modes:
-        """Return frequencies with the mass-normalised displacements and natural forces of both ends."""
-        modes = count("modes", modes, high=_MOST_MODES)
-        given = Values.read(self.symbols, values)
-        n, m = len(self._conservative.displacements), len(self._conservative.coordinates)
-        omega = np.empty((given.columns.shape[1], modes))
-        ends = np.empty((len(omega), modes, 2, 2 * n + m))
-        for rows, _, problem in self._spatial.problems(given):
-            z = lowest(problem, modes)
-            state = mode_states(problem, z, np.tile([0.0, 1.0], (len(rows), 1)))
-            omega[rows], ends[rows] = np.sqrt(z), state * tip_sign(state[:, :, 1, :n])[..., None]
-        ends = ends.reshape(*given.shape, modes, 2, 2 * n + m)
-        q, w, p = ends[..., :n], ends[..., 0, n : n + m], ends[..., n + m :]
-        return Modes(omega.reshape(*given.shape, modes), q[..., 0, :], q[..., 1, :], p[..., 0, :], p[..., 1, :], w)
+
+def _analysis(module: str) -> Any:
+    """Return a module of the analysis: the one import that leads upwards, so that a model has its tools at hand."""
+    return import_module(f"cra_sym.analysis.{module}")
+
+
+def _rebuilt(pieces: dict[str, Any]) -> Model:
+    return Model(**(pieces | {"units": dict(pieces["units"]), "definitions": dict(pieces["definitions"])}))
+
+
+def parameters(given: Iterable[Expr], result: HamiltonResult) -> tuple[Symbol, ...]:
+    """Return every symbol of the expressions but x and t, by name; refuse an undeclared field and two of a name."""
+    expressions = [sympify(part, strict=True) for part in given]
+    own = {result.x, result.t}
+    known = {f.func for f in (*result.fields, *result.coordinates)}
+    for term in (term for e in expressions for term in Add.make_args(e)):
+        for function in term.atoms(AppliedUndef):
+            if function.func not in known and own <= function.free_symbols:
+                raise ValueError(f"term {term}: {function} is not one of the fields {list(map(str, result.fields))}")
+    found = sorted({s for e in expressions for s in e.free_symbols} - own, key=lambda s: (s.name, str(s)))
+    for first, second in itertools.pairwise(found):
+        if first.name == second.name:
+            raise ValueError(f"two different symbols are named {first.name}: their assumptions differ")
+    return tuple(found)

@@ -1,122 +1,263 @@
-"""Loads, initial states and dampers of a model seen by its natural modes: the weak form integrated over mode shapes."""
+"""Loads and bilinear forms of a model seen by its natural modes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple
 
 import numpy as np
-from sympy import Expr, Matrix
+from numpy.typing import NDArray
 
-from cra_sym.kernels import kernel
-from cra_sym.mechanics.jets import END_NAMES, Jet
-from cra_sym.mechanics.weak import Bilinear
-from cra_sym.model.spatial import SpatialProblem, shares
-from cra_sym.model.values import Values
-from cra_sym.solvers.eigenvalues import lowest
-from cra_sym.solvers.shapes import mode_states
+from cra_sym.kernels import Kernel
+from cra_sym.model.routes import Modes, RigidShare
 
-__all__ = ["Load", "ModalBasis", "modal_basis"]
+__all__ = ["Domain", "Form", "Load", "Place", "Projected", "project", "stations"]
 
+Array = NDArray[np.float64]
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 
-Load = Mapping[Jet, Expr]
 
-
-@dataclass(frozen=True, eq=False)
-class ModalBasis:
-    """Mass-normalised modes at the points of a quadrature, at the places asked for and at both ends.
+class Place(NamedTuple):
+    """A displacement: along the interval, of an end section or a lumped coordinate.
 
     Attributes
     ----------
-    spatial : SpatialProblem
-    columns : ndarray, shape (symbols, rows)
-        Parameters, infinite ones replaced by zero.
-    z : ndarray, shape (rows, modes)
-        omega^2
-    x : ndarray, shape (rows, stations)
-        The last stations are the places, the left and the right end.
-    weights : ndarray, shape (rows, points)
-    state : ndarray, shape (rows, modes, stations, 2 n + m)
+    where : {'inside', 'left', 'right', 'lumped'}
+    index : int
+        Of the section's displacement, or of the coordinate.
+    order : int
+        Derivative by x of that displacement; 0 at the ends.
     """
 
-    spatial: SpatialProblem
-    columns: np.ndarray
-    z: np.ndarray
-    x: np.ndarray
-    weights: np.ndarray
-    state: np.ndarray
+    where: Literal["inside", "left", "right", "lumped"]
+    index: int
+    order: int
+
+
+@dataclass(frozen=True)
+class Load:
+    """Generalised forces of one unit of a cause.
+
+    Attributes
+    ----------
+    inside, ends : tuple of Place
+        Displacements they act on: along the interval, and at the ends or on lumped coordinates.
+    density : Kernel
+        Of (x, parameters): forces per length on ``inside``.
+    force : Kernel
+        Of the parameters: forces on ``ends``.
+    uniform : bool
+        Whether the density is constant along x.
+    share : Kernel or None
+        Of the parameters: how much of this load is the inertia of a rigid translation of the first field, if its mass
+        is one uniform density with end masses.
+    rest, rest_ends
+        Then the load is that share and these forces on both ends beside it.
+    """
+
+    inside: tuple[Place, ...]
+    ends: tuple[Place, ...]
+    density: Kernel
+    force: Kernel
+    uniform: bool
+    share: Kernel | None = None
+    rest: Kernel | None = None
+    rest_ends: tuple[Place, ...] = ()
+
+
+@dataclass(frozen=True)
+class Form:
+    """Bilinear forms with common entries, such as the rates of stiffness and mass by every parameter.
+
+    Attributes
+    ----------
+    names : tuple of str
+        One for each form. Those called 'stiffness' and 'mass', if there, are the whole energies.
+    inside, ends : tuple of (Place, Place)
+        Entries, each once.
+    density, points : Kernel
+        Of (x, parameters) and of the parameters: coefficients of all entries of the first form, then of the next.
+    uniform : bool
+        Whether the coefficients inside are constant along x.
+    """
+
+    names: tuple[str, ...]
+    inside: tuple[tuple[Place, Place], ...]
+    ends: tuple[tuple[Place, Place], ...]
+    density: Kernel
+    points: Kernel
+    uniform: bool
+
+
+class Domain(NamedTuple):
+    """Where a batch of modes lives and with which parameters.
+
+    Attributes
+    ----------
+    values : sequence of float or ndarray
+        Parameters in the order of the model's symbols, infinite ones replaced by 0.
+    left, length : float or ndarray
+        m.
+    """
+
+    values: Sequence[float | Array]
+    left: float | Array
+    length: float | Array
+
+
+def column(value: float | Array, axes: int = 1) -> float | Array:
+    """Return a parameter with last axes of length one, for modes and points; numbers stay numbers."""
+    return value[(..., *(None,) * axes)] if isinstance(value, np.ndarray) and value.ndim else value
+
+
+def stations(domain: Domain, modes: Modes) -> tuple[Array, Array]:
+    """Return points and weights of a quadrature along the domain, shape (points,) or (..., points)."""
+    panels = modes.omega.shape[-1] + 8  # ten points each: several to a half-wave of the highest mode
+    share = ((np.arange(panels)[:, None] + 0.5 * (1.0 + _POINTS)) / panels).ravel()
+    length = column(domain.length)
+    return np.asarray(column(domain.left) + share * length), np.tile(0.5 * _WEIGHTS / panels, panels) * length
+
+
+def displaced(modes: Modes, place: Place) -> Array:
+    """Return a displacement of an end or a lumped coordinate of every mode, shape (..., modes)."""
+    if place.where == "lumped":
+        return modes.coordinate(place.index)
+    return modes.displacement(int(place.where == "right"), place.index)
+
+
+def project(domain: Domain, modes: Modes, load: Load) -> Array:
+    """Return the generalised force of a load on every mode, shape (..., modes)."""
+    if load.share is not None and load.rest is not None and isinstance(modes, RigidShare):
+        total = column(load.share.function(*domain.values)) * modes.momentum()
+        return _add_ends(total, modes, load.rest_ends, load.rest.function(*domain.values))
+    total = np.zeros(modes.omega.shape)
+    total = _add_ends(total, modes, load.ends, load.force.function(*domain.values))
+    if not load.inside:
+        return total
+    x, weights = stations(domain, modes)
+    density = load.density.function(x, *map(column, domain.values))
+    for place, factor in zip(load.inside, density, strict=True):
+        shape = modes.shape(place.index, place.order, x)
+        total = total + ((factor * weights)[..., None, :] * shape).sum(axis=-1)
+    return total
+
+
+def _add_ends(total: Array, modes: Modes, places: Sequence[Place], forces: Sequence[float | Array]) -> Array:
+    for place, force in zip(places, forces, strict=True):
+        total = total + column(force) * displaced(modes, place)
+    return total
+
+
+class Projected:
+    """Bilinear forms between modes, or of each mode with itself; the integrals are done once for all forms.
+
+    Parameters
+    ----------
+    domain : Domain
+    modes : Modes
+    form : Form
+    diagonal : bool
+        Whether only a mode with itself is wanted: arrays of shape (..., modes) instead of (..., modes, modes).
+    """
+
+    def __init__(self, domain: Domain, modes: Modes, form: Form, *, diagonal: bool = False) -> None:
+        self._domain, self._modes, self._form, self._diagonal = domain, modes, form, diagonal
+
+    def __getitem__(self, name: str) -> Array:
+        """Return the form of that name.
+
+        Raises
+        ------
+        KeyError
+            If there is none.
+        """
+        if name not in self._form.names:
+            raise KeyError(name)
+        number = self._form.names.index(name)
+        axes = 1 if self._diagonal else 2
+        total: Array = np.zeros(self._shape)
+        for factor, product in zip(self._points[number], self._ends, strict=True):
+            if not _is_zero(factor):
+                total = total + column(factor, axes) * product
+        for entry in range(len(self._form.inside)):
+            total = total + self._inside(number, entry)
+        return total
 
     @property
-    def places(self) -> slice:
-        """The stations that were asked for."""
-        return slice(self.weights.shape[1], -2)
+    def _shape(self) -> tuple[int, ...]:
+        shape = self._modes.omega.shape
+        return shape if self._diagonal else (*shape, shape[-1])
 
-    def values(self, jet: Jet) -> np.ndarray:
-        """Return a displacement of every mode at all stations, shape (rows, modes, stations)."""
-        form = self.spatial.form
-        fields = self.spatial.fields
-        if jet.unknown >= len(fields):
-            return self.state[..., len(form.displacements) + jet.unknown - len(fields)]
-        place = form.displacements.index(fields[jet.unknown])
-        row = self.spatial.derivative_row(place, jet.space, self.z, self.x[:, None], self.columns)
-        return (row * self.state).sum(axis=-1)
+    @cached_property
+    def _points(self) -> list[Sequence[float | Array]]:
+        return self._by_form(self._form.points.function(*self._domain.values), len(self._form.ends))
 
-    def project(self, inside: Load, ends: Load) -> np.ndarray:
-        """Return the generalised force on every mode, shape (rows, modes), of loads on displacements."""
-        total = np.zeros(self.z.shape)
-        points = self.weights.shape[1]
-        for jet, load in inside.items():
-            density = self._evaluate(load, self.x[:, :points])
-            total += ((density * self.weights)[:, None] * self.values(jet)[..., :points]).sum(axis=-1)
-        for jet, load in ends.items():
-            station = -2 if jet.place == END_NAMES[0] else -1
-            force = self._evaluate(load, self.x[:, [station]])
-            total += force * self.values(jet._replace(place=None))[..., station]
-        return total
+    @cached_property
+    def _density(self) -> list[Sequence[float | Array]]:
+        """Coefficients inside, at the stations of the quadrature unless they are constant along x."""
+        if self._form.uniform:
+            values = self._form.density.function(0.0, *self._domain.values)
+        else:
+            values = self._form.density.function(self._stations[0], *map(column, self._domain.values))
+        return self._by_form(values, len(self._form.inside))
 
-    def damping(self, inside: Bilinear, ends: Bilinear) -> np.ndarray:
-        """Return the damping matrix between the modes, shape (rows, modes, modes), of a weak form."""
-        points = self.weights.shape[1]
-        total = np.zeros((*self.z.shape, self.z.shape[1]))
-        for (p, q), entry in inside.items():
-            if 1 in entry:
-                density = self._evaluate(entry[1], self.x[:, :points]) * self.weights
-                first, second = (self.values(jet)[..., :points] for jet in (p, q))
-                total += np.einsum("rs,ris,rjs->rij", density, first, second)
-        for (p, q), entry in ends.items():
-            if 1 in entry:
-                first, second = (
-                    self.values(jet._replace(place=None))[..., -2 if jet.place == END_NAMES[0] else -1]
-                    for jet in (p, q)
-                )
-                factor = self._evaluate(entry[1], self.x[:, [-1]])
-                total += factor[..., None] * first[:, :, None] * second[:, None, :]
-        return total
+    def _by_form(self, values: Sequence[float | Array], entries: int) -> list[Sequence[float | Array]]:
+        return [values[k * entries : (k + 1) * entries] for k in range(len(self._form.names))]
 
-    def _evaluate(self, expression: Expr, x: np.ndarray) -> np.ndarray:
-        """Return an expression in x and the parameters, shape (rows, stations)."""
-        compiled = kernel(Matrix([[expression]]), (self.spatial.form.x, *self.spatial.symbols), backend="numpy")
-        return np.broadcast_to(compiled(x, *self.columns[:, :, None])[..., 0, 0], x.shape)
+    @cached_property
+    def _stations(self) -> tuple[Array, Array]:
+        return stations(self._domain, self._modes)
+
+    @cached_property
+    def _ends(self) -> list[Array]:
+        return [self._product(*(displaced(self._modes, place) for place in pair)) for pair in self._form.ends]
+
+    def _product(self, first: Array, second: Array) -> Array:
+        return first * second if self._diagonal else first[..., :, None] * second[..., None, :]
+
+    def _inside(self, number: int, entry: int) -> Array | float:
+        factor = self._density[number][entry]
+        if _is_zero(factor):
+            return 0.0
+        if self._form.uniform:
+            return column(factor, 1 if self._diagonal else 2) * self._integrals[entry]
+        return self._quadrature(entry, factor)
+
+    def _quadrature(self, entry: int, factor: float | Array) -> Array:
+        """Return the integral of a coefficient times both displacements of an entry."""
+        x, weights = self._stations
+        first, second = (self._modes.shape(place.index, place.order, x) for place in self._form.inside[entry])
+        weighted = np.broadcast_to(factor * weights, np.broadcast_shapes(np.shape(factor), np.shape(weights)))
+        if self._diagonal:
+            return (weighted[..., None, :] * first * second).sum(axis=-1)
+        product = (first * weighted[..., None, :]) @ second.swapaxes(-1, -2)
+        symmetric = self._form.inside[entry][0] == self._form.inside[entry][1]
+        return (product + product.swapaxes(-1, -2)) / 2 if symmetric else product
+
+    @cached_property
+    def _integrals(self) -> list[Array]:
+        """Integrals of the products of every entry, from the normalisation where that determines them."""
+        form = self._form
+        if not form.inside or len(form.inside) > 2 or not {"stiffness", "mass"} <= set(form.names):
+            return [self._quadrature(entry, 1.0) for entry in range(len(form.inside))]
+        k, m = form.names.index("stiffness"), form.names.index("mass")
+        axes = 1 if self._diagonal else 2
+        unit = np.ones(self._modes.omega.shape[-1]) if self._diagonal else np.eye(self._modes.omega.shape[-1])
+        squares = self._modes.omega**2 if self._diagonal else self._modes.omega[..., None] ** 2 * unit
+        left = []
+        for number, whole in ((k, squares), (m, unit + 0 * squares)):
+            for factor, product in zip(self._points[number], self._ends, strict=True):
+                if not _is_zero(factor):
+                    whole = whole - column(factor, axes) * product
+            left.append(whole)
+        (a, *b), (c, *d) = (tuple(column(f, axes) for f in self._density[number]) for number in (k, m))
+        if not b:  # one displacement both bends and moves
+            return [left[1] / c]
+        determinant = a * d[0] - b[0] * c
+        return [(left[0] * d[0] - left[1] * b[0]) / determinant, (left[1] * a - left[0] * c) / determinant]
 
 
-def modal_basis(spatial: SpatialProblem, given: Values, modes: int, places: np.ndarray | None) -> ModalBasis:
-    """Return the modes of all parameter sets, sampled; without ``places`` the right end is the place."""
-    rows = given.columns.shape[1]
-    panels = modes + 8  # ten points each: several to a half-wave of the highest mode
-    points = ((np.arange(panels)[:, None] + 0.5 * (1.0 + _POINTS)) / panels).ravel()
-    number = len(points) + (1 if places is None else len(places)) + 2
-    columns = np.where(np.isinf(given.columns), 0.0, given.columns)
-    z, x, length = np.empty((rows, modes)), np.empty((rows, number)), np.empty(rows)
-    state = np.empty((rows, modes, number, 2 * len(spatial.form.displacements) + len(spatial.form.coordinates)))
-    for members, left, problem in spatial.problems(given):
-        size = len(members)
-        share = np.ones((size, 1)) if places is None else shares(places, left, problem.length)
-        stations = [np.broadcast_to(points, (size, len(points))), share, np.zeros((size, 1)), np.ones((size, 1))]
-        every = np.concatenate(stations, axis=1)
-        z[members] = lowest(problem, modes)
-        state[members] = mode_states(problem, z[members], every)
-        length[members] = problem.length
-        x[members] = left[:, None] + every * problem.length[:, None]
-    weights = np.tile(0.5 * _WEIGHTS / panels, panels)
-    return ModalBasis(spatial, columns, z, x, weights * length[:, None], state)
+def _is_zero(factor: float | Array) -> bool:
+    return np.ndim(factor) == 0 and factor == 0

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from sympy import Expr, Symbol, zeros
+from numpy.typing import NDArray
 
-from cra_sym.kernels import kernel
-from cra_sym.mechanics import StateForm
-from cra_sym.model.values import Values
+from cra_sym.kernels import Kernel, kernel
 from cra_sym.solvers.stiffness import DynamicStiffness, Evaluation
 
-__all__ = ["SpatialProblem", "check_range", "shares"]
+if TYPE_CHECKING:
+    from sympy import Expr, Symbol
+
+    from cra_sym.mechanics import StateForm
+
+__all__ = ["SpatialProblem", "check_range", "infinite_patterns", "shares", "spatial_problem"]
+
+Array = NDArray[np.float64]
+_MOST_DERIVATIVES = 20
 
 
 class _Checked(DynamicStiffness):
@@ -41,7 +47,100 @@ def check_range(*numbers: np.ndarray) -> None:
 
 @dataclass(frozen=True, eq=False)
 class SpatialProblem:
-    """Compiled coefficients of a state form.
+    """Compiled coefficients of a state form; arguments are (x, parameter, *parameters of the model) where they apply.
+
+    Attributes
+    ----------
+    names : tuple of str
+        All parameters of the model.
+    displacements, coordinates : int
+        n and m of the state form.
+    uniform : bool
+        Whether the system is constant along x.
+    system, boundary : Kernel
+        A matrix and its derivative by the parameter z or s.
+    geometry : Kernel
+        Length and coordinate of the left end.
+    free : Kernel or None
+        The motions the essential conditions allow.
+    end_stiffness : dict of int to Kernel
+        What each stiffness of an end, by its position, multiplies in the boundary matrix: it may be infinite.
+    rows : tuple of tuple of Kernel
+        For each displacement, the rows c with ``D^order q = c (q, w, P)``, order 0 and up.
+    """
+
+    names: tuple[str, ...]
+    displacements: int
+    coordinates: int
+    uniform: bool
+    system: Kernel
+    boundary: Kernel
+    geometry: Kernel
+    free: Kernel | None
+    end_stiffness: dict[int, Kernel]
+    rows: tuple[tuple[Kernel, ...], ...]
+
+    def derivative_row(self, place: int, order: int, z: np.ndarray, x: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Return the row c with ``D^order q[place] = c (q, w, P)``, shape (rows, modes, stations, 2 n + m)."""
+        known = self.rows[place]
+        size = 2 * self.displacements + self.coordinates
+        arguments = z[:, :, None], *columns[:, :, None, None]
+        row = known[min(order, len(known) - 1)](x, *arguments)[..., 0, :]
+        if order >= len(known):
+            if not self.uniform:
+                raise ValueError(
+                    f"derivative = {order} must be at most {len(known) - 1} where coefficients vary along x"
+                )
+            matrix = self.system(x, *arguments)[0]
+            for _ in range(order - len(known) + 1):
+                row = (row[..., None, :] @ matrix)[..., 0, :]
+        return row[..., :size]
+
+    def problems(self, columns: Array) -> Iterator[tuple[np.ndarray, np.ndarray, DynamicStiffness]]:
+        """Yield (rows, left ends, problem) for each pattern of infinite stiffness.
+
+        Parameters
+        ----------
+        columns : ndarray, shape (parameters, sets)
+
+        Raises
+        ------
+        ValueError
+            If a parameter is infinite that is not a stiffness of an end, or a coefficient is not finite.
+        """
+        for rows, infinite in infinite_patterns(self.names, columns):
+            some = columns[:, rows].copy()
+            some[list(infinite)] = 0.0
+            yield rows, *self._problem(some, infinite)
+
+    def _problem(self, columns: np.ndarray, infinite: tuple[int, ...]) -> tuple[np.ndarray, DynamicStiffness]:
+        length, left = (np.broadcast_to(value, columns.shape[1:]) for value in self.geometry(*columns))
+        if not (length > 0.0).all() or not np.isfinite(length).all():
+            raise ValueError(f"domain: the length {length[~(length > 0.0)][:1]} must be positive")
+        n, m = self.displacements, self.coordinates
+        free = np.zeros((2 * n + m, 0)) if self.free is None else self.free(*columns)
+        for position in infinite:
+            free = _without(free, self._rigid_directions(position, columns))
+
+        def section(z: np.ndarray, rows: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            x = left[rows, None] + share * length[rows, None] if not self.uniform else 0.0
+            return _finite(self.system(x, z[:, None], *columns[:, rows, None]), "a coefficient of the equations")
+
+        def ends(z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            return _finite(self.boundary(z, *columns[:, rows]), "an end term")
+
+        return left, _Checked(section, ends, length, n, m, free, self.uniform)
+
+    def _rigid_directions(self, position: int, columns: np.ndarray) -> np.ndarray:
+        """Return the end displacements that an infinite stiffness holds still, shape (rows, directions, size)."""
+        if position not in self.end_stiffness:
+            able = ", ".join(self.names[k] for k in self.end_stiffness) or "none here"
+            raise ValueError(f"{self.names[position]} = inf: only the stiffness of an end may be infinite ({able})")
+        return self.end_stiffness[position](*columns)
+
+
+def spatial_problem(form: StateForm, symbols: tuple[Symbol, ...], left: Expr) -> SpatialProblem:
+    """Return the compiled coefficients of a state form.
 
     Parameters
     ----------
@@ -50,90 +149,59 @@ class SpatialProblem:
         All parameters of the model.
     left : Expr
         Coordinate of the left end.
-    fields : tuple of Expr
-        The unknown functions of x, in the order of the model.
     """
+    arguments = (form.parameter, *symbols)
+    system, boundary = (
+        kernel((matrix, matrix.diff(form.parameter)), names, backend="numpy")
+        for matrix, names in ((form.system, (form.x, *arguments)), (form.boundary, arguments))
+    )
+    return SpatialProblem(
+        tuple(symbol.name for symbol in symbols),
+        len(form.displacements),
+        len(form.coordinates),
+        form.uniform,
+        system,
+        boundary,
+        kernel((form.length, left), symbols, backend="numpy"),
+        kernel(form.free, symbols, backend="numpy") if form.free.cols else None,
+        _end_stiffness(form, symbols),
+        tuple(_derivative_rows(form, place, arguments) for place in range(len(form.displacements))),
+    )
 
-    form: StateForm
-    symbols: tuple[Symbol, ...]
-    left: Expr
-    fields: tuple[Expr, ...] = ()
 
-    @cached_property
-    def _kernels(self):
-        form, arguments = self.form, (self.form.parameter, *self.symbols)
-        coefficients = [
-            kernel((matrix, matrix.diff(form.parameter)), names, backend="numpy")
-            for matrix, names in ((form.system, (form.x, *arguments)), (form.boundary, arguments))
-        ]
-        geometry = kernel((form.length, self.left), self.symbols, backend="numpy")
-        free = kernel(form.free, self.symbols, backend="numpy") if form.free.cols else None
-        return *coefficients, geometry, free
+def _end_stiffness(form: StateForm, symbols: tuple[Symbol, ...]) -> dict[int, Kernel]:
+    """Return what each parameter that may be infinite multiplies in the boundary matrix."""
+    inside = form.system.free_symbols | form.length.free_symbols | form.free.free_symbols
+    slopes = {}
+    for position, symbol in enumerate(symbols):
+        slope = form.boundary.diff(symbol)
+        if symbol not in inside and not slope.is_zero_matrix and not slope.has(symbol, form.parameter):
+            slopes[position] = kernel(slope.subs({form.parameter: 0}), symbols, backend="numpy")
+    return slopes
 
-    @cached_property
-    def _end_stiffness(self):
-        """Coefficient of each parameter in the boundary matrix, and whether it may be infinite."""
-        form, at_rest = self.form, {self.form.parameter: 0}
-        inside = form.system.free_symbols | form.length.free_symbols | form.free.free_symbols
-        slopes = {}
-        for symbol in self.symbols:
-            slope = form.boundary.diff(symbol)
-            if symbol not in inside and not slope.is_zero_matrix and not slope.has(symbol, form.parameter):
-                slopes[symbol] = slope.subs(at_rest)
-        return slopes
 
-    def derivative_row(self, place: int, order: int, z: np.ndarray, x: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Return the row c with ``D^order q[place] = c (q, w, P)``, shape (rows, modes, stations, 2 n + m)."""
-        form = self.form
-        size = 2 * len(form.displacements) + len(form.coordinates)
-        row = zeros(1, form.system.rows)
-        row[place] = 1
-        for _ in range(order):
-            row = row.diff(form.x) + row * form.system
-        compiled = kernel(row[:, :size], (form.x, form.parameter, *self.symbols), backend="numpy")
-        return compiled(x, z[:, :, None], *columns[:, :, None, None])[..., 0, :]
+def _derivative_rows(form: StateForm, place: int, arguments: Sequence[Symbol]) -> tuple[Kernel, ...]:
+    from sympy import zeros
 
-    def problems(self, values: Values) -> Iterator[tuple[np.ndarray, np.ndarray, DynamicStiffness]]:
-        """Yield (rows, left ends, problem) for each pattern of infinite stiffness.
+    row = zeros(1, form.system.rows)
+    row[place] = 1
+    kernels = []
+    for _ in range(1 if form.uniform else 2 * len(form.displacements) + 3):
+        kernels.append(kernel(row, (form.x, *arguments), backend="numpy"))
+        row = row.diff(form.x) + row * form.system
+    return tuple(kernels)
 
-        Raises
-        ------
-        ValueError
-            If a parameter is infinite that is no stiffness of an end, or a coefficient is not finite.
-        """
-        for rows, infinite in values.patterns():
-            columns = values.take(rows, infinite)
-            yield rows, *self._problem(columns, infinite)
 
-    def _problem(self, columns: np.ndarray, infinite: tuple[int, ...]) -> tuple[np.ndarray, DynamicStiffness]:
-        system, boundary, geometry, motions = self._kernels
-        length, left = (np.broadcast_to(value, columns.shape[1:]) for value in geometry(*columns))
-        self._check_geometry(length)
-        n, m = len(self.form.displacements), len(self.form.coordinates)
-        free = np.zeros((2 * n + m, 0)) if motions is None else motions(*columns)
-        for position in infinite:
-            free = _without(free, self._rigid_directions(position, columns))
-
-        def section(z: np.ndarray, rows: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            x = left[rows, None] + share * length[rows, None] if not self.form.uniform else 0.0
-            return _finite(system(x, z[:, None], *columns[:, rows, None]), "a coefficient of the equations")
-
-        def ends(z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return _finite(boundary(z, *columns[:, rows]), "an end term")
-
-        return left, _Checked(section, ends, length, n, m, free, self.form.uniform)
-
-    def _check_geometry(self, length: np.ndarray) -> None:
-        if not (length > 0.0).all() or not np.isfinite(length).all():
-            raise ValueError(f"domain: the length {self.form.length} = {length[~(length > 0.0)][:1]} must be positive")
-
-    def _rigid_directions(self, position: int, columns: np.ndarray) -> np.ndarray:
-        """Return the end displacements that an infinite stiffness holds still, shape (rows, directions, size)."""
-        symbol = self.symbols[position]
-        if symbol not in self._end_stiffness:
-            allowed = ", ".join(s.name for s in self._end_stiffness) or "none"
-            raise ValueError(f"{symbol.name} = inf: allowed only for a stiffness of an end ({allowed})")
-        return kernel(self._end_stiffness[symbol], self.symbols, backend="numpy")(*columns)
+def infinite_patterns(names: Sequence[str], columns: Array) -> list[tuple[np.ndarray, tuple[int, ...]]]:
+    """Return, for each pattern of infinite values, the sets and the positions of the infinite parameters."""
+    infinite = np.isinf(columns)
+    if (columns == -np.inf).any():
+        name = names[int(np.nonzero((columns == -np.inf).any(axis=1))[0][0])]
+        raise ValueError(f"{name} = -inf: must be a real number, or inf for the stiffness of an end")
+    kinds, where = np.unique(infinite, axis=1, return_inverse=True)
+    return [
+        (np.nonzero(where.ravel() == k)[0], tuple(np.nonzero(kinds[:, k])[0].tolist())) for k in range(kinds.shape[1])
+    ]
 
 
 def shares(x: np.ndarray, left: np.ndarray, length: np.ndarray, name: str = "x") -> np.ndarray:

@@ -2,19 +2,72 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from sympy import Add, Expr, Symbol, sympify
-from sympy.core.function import AppliedUndef
+from numpy.typing import NDArray
 
 from cra_sym.checks import broadcastable, real_array, shown
-from cra_sym.mechanics import HamiltonResult
 
-__all__ = ["Values", "parameters"]
+__all__ = ["checked_damping", "checked_values", "frozen"]
+
+Value = float | NDArray[np.float64]
+
+
+def checked_values(names: Sequence[str], given: Mapping[Any, Any]) -> dict[str, Value]:
+    """Return the values by name, in the order of the names, as numbers and read-only arrays.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The parameters of the model.
+    given : mapping of symbol or name to array_like
+
+    Raises
+    ------
+    TypeError, ValueError
+        Names the parameter that is missing, unknown, given twice or not made of real numbers, or shapes that do not
+        broadcast together.
+    """
+    if not isinstance(given, Mapping):
+        raise TypeError(f"values = {shown(given)}: must be a mapping from symbols or their names to numbers")
+    found: dict[str, NDArray[np.float64]] = {}
+    for key, value in given.items():
+        name = key if isinstance(key, str) else getattr(key, "name", str(key))
+        if name not in names:
+            raise ValueError(f"values: {name} does not occur in the model; it has {', '.join(names) or 'none'}")
+        if name in found:
+            raise ValueError(f"values: {name} is given twice")
+        try:
+            found[name] = real_array(name, _as_number(value), allow_infinite=True)
+        except TypeError as error:
+            raise ValueError(str(error)) from None
+        if (found[name] == -np.inf).any():
+            raise ValueError(f"{name} = -inf: must be a real number, or inf for the stiffness of an end")
+    missing = [name for name in names if name not in found]
+    if missing:
+        raise ValueError(f"values: no value for {', '.join(missing)}")
+    broadcastable(**found)
+    return {name: frozen(found[name]) for name in names}
+
+
+def _as_number(value: Any) -> Any:
+    """Return a real number of SymPy as a float, everything else as it is."""
+    return float(value) if getattr(value, "is_extended_real", False) and getattr(value, "is_number", False) else value
+
+
+def frozen(array: NDArray[np.float64]) -> Value:
+    """Return a number, or a read-only array; -0.0 becomes 0.0."""
+    array = np.asarray(array + 0.0)
+    array.flags.writeable = False
+    return float(array) if array.ndim == 0 else array
+
+
+def checked_damping(zeta: Any) -> NDArray[np.float64]:
+    """Return damping ratios, or raise an error that says what they must be."""
+    return real_array("zeta", zeta, low=0.0, high=np.nextafter(1.0, 0.0), allowed="real numbers in [0, 1)")
 
 
 @dataclass(frozen=True)
@@ -23,76 +76,35 @@ class Values:
 
     Attributes
     ----------
-    symbols : tuple of Symbol
-    columns : ndarray, shape (symbols, rows)
+    names : tuple of str
+    columns : ndarray, shape (names, rows)
     shape : tuple of int
         Common shape of what was given; its size is the number of rows.
     """
 
-    symbols: tuple[Symbol, ...]
-    columns: np.ndarray
+    names: tuple[str, ...]
+    columns: NDArray[np.float64]
     shape: tuple[int, ...]
 
     @classmethod
-    def read(cls, symbols: Iterable[Symbol], given: Mapping[Any, Any]) -> Values:
+    def read(cls, symbols: Sequence[Any], given: Mapping[Any, Any]) -> Values:
         """Match values to symbols; each error names the symbol."""
-        symbols = tuple(symbols)
-        if not isinstance(given, Mapping):
-            raise TypeError(f"values = {shown(given)}: allowed is a mapping from symbols or their names to numbers")
-        by_name = {symbol.name: symbol for symbol in symbols}
-        found: dict[str, np.ndarray] = {}
-        for key, value in given.items():
-            name = key if isinstance(key, str) else getattr(key, "name", str(key))
-            if name not in by_name:
-                raise ValueError(f"values: {key} does not occur in the model; it has {', '.join(by_name) or 'none'}")
-            if name in found:
-                raise ValueError(f"values: {name} is given twice")
-            if isinstance(value, Expr) and value.is_extended_real:
-                value = float(value)
-            try:
-                found[name] = real_array(name, value, allow_infinite=True)
-            except TypeError as error:
-                raise ValueError(str(error)) from None
-        missing = [name for name in by_name if name not in found]
-        if missing:
-            raise ValueError(f"values: no value for {', '.join(missing)}")
+        names = tuple(symbol.name for symbol in symbols)
+        found = checked_values(names, given)
         shape = broadcastable(**found)
-        rows = int(np.prod(shape))
-        columns = np.empty((len(symbols), rows))
-        for column, symbol in zip(columns, symbols, strict=True):
-            column[:] = np.broadcast_to(found[symbol.name], shape).ravel()
-        return cls(symbols, columns, shape)
+        columns = np.empty((len(names), int(np.prod(shape))))
+        for column, name in zip(columns, names, strict=True):
+            column[:] = np.broadcast_to(found[name], shape).ravel()
+        return cls(names, columns, shape)
 
-    def patterns(self) -> list[tuple[np.ndarray, tuple[int, ...]]]:
+    def patterns(self) -> list[tuple[NDArray[np.intp], tuple[int, ...]]]:
         """Return, for each pattern of infinite values, the rows and the positions of the infinite symbols."""
-        infinite = np.isinf(self.columns)
-        if (self.columns == -np.inf).any():
-            name = self.symbols[int(np.nonzero((self.columns == -np.inf).any(axis=1))[0][0])].name
-            raise ValueError(f"{name} = -inf: allowed are real numbers, and inf for the stiffness of an end")
-        kinds, where = np.unique(infinite, axis=1, return_inverse=True)
-        return [
-            (np.nonzero(where.ravel() == k)[0], tuple(np.nonzero(kinds[:, k])[0].tolist()))
-            for k in range(kinds.shape[1])
-        ]
+        from cra_sym.model.spatial import infinite_patterns
 
-    def take(self, rows: np.ndarray, finite: tuple[int, ...] = ()) -> np.ndarray:
+        return infinite_patterns(self.names, self.columns)
+
+    def take(self, rows: NDArray[np.intp], finite: tuple[int, ...] = ()) -> NDArray[np.float64]:
         """Return the columns of some rows, with zero for the symbols whose infinity is handled elsewhere."""
         columns = self.columns[:, rows].copy()
         columns[list(finite)] = 0.0
         return columns
-
-
-def parameters(given: Iterable[Expr], result: HamiltonResult) -> tuple[Symbol, ...]:
-    """Return every symbol of the expressions but x and t, by name; refuse an undeclared field and two of a name."""
-    expressions = [sympify(part, strict=True) for part in given]
-    own = {result.x, result.t}
-    known = {f.func for f in (*result.fields, *result.coordinates)}
-    for term in (term for e in expressions for term in Add.make_args(e)):
-        for function in term.atoms(AppliedUndef):
-            if function.func not in known and own <= function.free_symbols:
-                raise ValueError(f"term {term}: {function} is not one of the fields {list(map(str, result.fields))}")
-    found = sorted({s for e in expressions for s in e.free_symbols} - own, key=lambda s: (s.name, str(s)))
-    for first, second in itertools.pairwise(found):
-        if first.name == second.name:
-            raise ValueError(f"two different symbols are named {first.name}: their assumptions differ")
-    return tuple(found)

@@ -2,37 +2,24 @@
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
-from sympy import Eq, Expr, Integral, Rational
+from sympy import Eq, Expr, Integral
 
+from cra_sym.arm.lagrangian import kinetic_energy, paper_lagrangian, potential_energy
 from cra_sym.paper.equations import Proof, numbered, proves
 from cra_sym.paper.evaluation import at, evaluate, put, termwise
 from cra_sym.paper.modal_sum import ModalSum, written_out
 from cra_sym.symbols import Dimension, dimension, symbol
 
-__all__ = ["ArmLagrangian", "lagrangian", "single_mode"]
+__all__ = ["single_mode"]
 
 x, t, w, v, y, L = (symbol(name) for name in ("x", "t", "w", "v", "y", "L"))
 E, I_z, rho, A, b, h = (symbol(name) for name in ("E", "I_z", "rho", "A", "b", "h"))
 m_b, m_e, J_e, k_t, k_r = (symbol(name) for name in ("m_b", "m_e", "J_e", "k_t", "k_r"))
 phi_i, phi_j, q_i, q_j = (symbol(name) for name in ("phi_i", "phi_j", "q_i", "q_j"))
 
-HALF = Rational(1, 2)
 ENERGY = Dimension(2, 1, -2)
-
-
-class ArmLagrangian(NamedTuple):
-    """The arm's Lagrangian in the pieces that :func:`cra_sym.mechanics.hamilton` and :class:`cra_sym.Model` take."""
-
-    density: Expr
-    left: Expr
-    right: Expr
-
-    def total(self) -> Expr:
-        """Return the Lagrangian as one expression: the density integrated, the end terms evaluated at their ends."""
-        return Integral(self.density, (x, 0, L)) + at(self.left, 0) + at(self.right, L)
 
 
 # Displacement (1)-(2) -------------------------------------------------------------------------------------------
@@ -81,32 +68,20 @@ def single_mode(expression: Expr, shape: Expr = phi_i * q_i) -> Expr:
 # Energies (3)-(4) -----------------------------------------------------------------------------------------------
 
 
-def _kinetic() -> ArmLagrangian:
-    speed = displacement().rhs.diff(t)
-    base = HALF * m_b * w.diff(t) ** 2
-    tip = HALF * m_e * speed**2 + HALF * J_e * v.diff(x, t) ** 2
-    return ArmLagrangian(HALF * rho * A * speed**2, base, tip)
-
-
-def _potential(joint: bool) -> ArmLagrangian:
-    springs = HALF * k_t * v**2 + HALF * k_r * v.diff(x) ** 2
-    return ArmLagrangian(HALF * E * I_z * v.diff(x, 2) ** 2, springs if joint else springs * 0, springs * 0)
-
-
 @numbered(3, "kinetic energy", "definition", (1,))
-def kinetic_energy() -> Eq:
+def kinetic() -> Eq:
     """Base, end-effector (with the rotary inertia J_e, which the paper leaves out) and manipulator."""
-    return Eq(symbol("T"), _kinetic().total())
+    return Eq(symbol("T"), kinetic_energy().total())
 
 
 @proves(3)
 def _() -> Proof:
     """An energy; an arm that turns rigidly about the root, which moves with the base, has the kinetic energy of its
     mass, its static moment and its moment of inertia."""
-    turned = single_mode(kinetic_energy().rhs, x * q_i).doit()
+    turned = single_mode(kinetic().rhs, x * q_i).doit()
     mass, static, inertia = _rigid_body()
     base, turn = w.diff(t), q_i.diff(t)
-    yield dimension(kinetic_energy()) == ENERGY
+    yield dimension(kinetic()) == ENERGY
     yield turned - (m_b + mass) * base**2 / 2 - static * base * turn - (inertia + J_e) * turn**2 / 2
 
 
@@ -116,10 +91,10 @@ def _rigid_body() -> tuple[Expr, Expr, Expr]:
 
 
 @numbered(4, "potential energy", "definition")
-def potential_energy() -> tuple[Eq, Eq]:
+def potential() -> tuple[Eq, Eq]:
     """First what the paper's words name, the bent manipulator alone; then with the two springs of the joint, without
     which the generalised stiffness (6) would contradict the natural frequency (30)."""
-    return Eq(symbol("U_b"), _potential(False).total()), Eq(symbol("U"), _potential(True).total())
+    return Eq(symbol("U_b"), potential_energy(joint=False).total()), Eq(symbol("U"), potential_energy().total())
 
 
 @proves(4)
@@ -127,9 +102,9 @@ def _() -> Proof:
     """Energies; an arc of radius R stores E I L / (2 R^2) however it is displaced and turned at the joint, which stores
     what springs do."""
     give, turn, radius = symbol("C_1") * L, symbol("C_2"), symbol("h")
-    beam, full = (single_mode(e.rhs, give + turn * x + x**2 / (2 * radius)).doit() for e in potential_energy())
+    beam, full = (single_mode(e.rhs, give + turn * x + x**2 / (2 * radius)).doit() for e in potential())
     arc, springs = E * I_z * L / (2 * radius**2), (k_t * give**2 + k_r * turn**2) / 2
-    yield all(dimension(e) == ENERGY for e in potential_energy())
+    yield all(dimension(e) == ENERGY for e in potential())
     yield beam - arc
     yield full - arc - springs
 
@@ -163,12 +138,12 @@ def generalised() -> tuple[Eq, Eq, Eq]:
 def _() -> Proof:
     """Dimensions; with the base and one mode moving, the energies (3) and (4) have them as coefficients."""
     M, K, Gamma = (e.rhs for e in generalised())
-    kinetic, potential = (single_mode(e.rhs) for e in (kinetic_energy(), potential_energy()[1]))
+    moving, strained = (single_mode(e.rhs) for e in (kinetic(), potential()[1]))
     mass, *_ = _rigid_body()
     base, rate = w.diff(t), q_i.diff(t)
     yield [dimension(e) for e in generalised()] == [Dimension(kg=1), Dimension(kg=1, s=-2), Dimension(kg=1)]
-    yield termwise(kinetic - (m_b + mass) * base**2 / 2 - Gamma * base * rate - M * rate**2 / 2)
-    yield termwise(potential - K * q_i**2 / 2)
+    yield termwise(moving - (m_b + mass) * base**2 / 2 - Gamma * base * rate - M * rate**2 / 2)
+    yield termwise(strained - K * q_i**2 / 2)
 
 
 def tidy(value: Expr) -> Expr:
@@ -184,20 +159,14 @@ def modal_numbers(values: dict[str, float], shape: Any) -> dict[Expr, float]:
 # Lagrangian (7) -------------------------------------------------------------------------------------------------
 
 
-@cache
-def lagrangian(*, joint: bool = True) -> ArmLagrangian:
-    """Return T - U of (3) and (4) as density, root terms and tip terms; ``joint=False`` leaves the springs out."""
-    return ArmLagrangian(*(T - U for T, U in zip(_kinetic(), _potential(joint), strict=True)))
-
-
 @numbered(7, "Lagrangian", "definition", (3, 4))
 def lagrangian_function() -> Eq:
     """Kinetic minus potential energy, the springs of the joint included."""
-    return Eq(symbol("Lcal"), lagrangian().total())
+    return Eq(symbol("Lcal"), paper_lagrangian().total())
 
 
 @proves(7)
 def _() -> Proof:
     """An energy: the difference of (3) and (4), whatever the motion."""
     yield dimension(lagrangian_function()) == ENERGY
-    yield termwise(lagrangian_function().rhs - kinetic_energy().rhs + potential_energy()[1].rhs)
+    yield termwise(lagrangian_function().rhs - kinetic().rhs + potential()[1].rhs)

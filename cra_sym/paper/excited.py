@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from sympy import Eq, Integral, cos, sin
 
-from cra_sym.paper.energy import potential_energy, single_mode, x
+from cra_sym.paper.energy import potential, single_mode, x
 from cra_sym.paper.equations import Proof, numbered, proves, samples
 from cra_sym.paper.evaluation import at, evaluate, termwise, virtual_factors
 from cra_sym.paper.modal_dynamics import dynamic_equation
@@ -66,7 +66,7 @@ def fluctuating_joint() -> Eq:
 def _() -> Proof:
     """An energy: that of the springs of (4), which swings about its mean by epsilon of it, with angular frequency
     varpi."""
-    beam, full = (e.rhs for e in potential_energy())
+    beam, full = (e.rhs for e in potential())
     yield dimension(fluctuating_joint()) == dimension("U")
     yield fluctuating_joint().rhs - (full - beam) * (1 + epsilon * cos(varpi * t))
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from sympy import Eq, Expr, Matrix, Mul, Pow, cancel, limit, oo, pi, solve
 
-from cra_sym.paper.energy import HALF, L, modal_numbers, phi_i
+from cra_sym.arm.lagrangian import HALF
+from cra_sym.paper.energy import L, modal_numbers, phi_i
 from cra_sym.paper.equations import Proof, numbered, proves, samples
 from cra_sym.paper.evaluation import group_numbers, shapes_agree
 from cra_sym.paper.modes import (

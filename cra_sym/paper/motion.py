@@ -8,19 +8,9 @@ from typing import Any
 import numpy as np
 from sympy import Eq, Expr, Function, Integral, lambdify, solve
 
+from cra_sym.arm.lagrangian import paper_lagrangian
 from cra_sym.mechanics.hamilton import hamilton
-from cra_sym.paper.energy import (
-    ENERGY,
-    L,
-    lagrangian,
-    modal_numbers,
-    phi_i,
-    single_mode,
-    t,
-    v,
-    w,
-    x,
-)
+from cra_sym.paper.energy import ENERGY, L, modal_numbers, phi_i, single_mode, t, v, w, x
 from cra_sym.paper.equations import Proof, numbered, proves, samples
 from cra_sym.paper.evaluation import at, put, termwise, virtual_factors
 from cra_sym.paper.joint import boundary_conditions, free_vibration, rayleigh_factors, section_forces
@@ -41,7 +31,7 @@ delta_v, delta_w, delta_L = Function("δv")(x, t), Function("δw")(t), Function(
 def dynamics(*, driven: bool = True) -> Any:
     """Return Hamilton's principle carried out: the base driven by the force F, or its motion w prescribed."""
     base: dict[str, Any] = {"coordinates": [w], "virtual_work": [(F, w, None)]} if driven else {"prescribed": [w]}
-    density, left, right = lagrangian()
+    density, left, right = paper_lagrangian()
     return hamilton(density, fields=[v], x=x, domain=(0, L), t=t, left=left, right=right, **base)
 
 
@@ -64,7 +54,7 @@ def _first_variation() -> Expr:
     """Return the rate at which the Lagrangian (7) changes on the way to v + e delta_v, w + e delta_w."""
     size = symbol("epsilon")
     moved = {v: v + size * delta_v, w: w + size * delta_w}
-    return put(lagrangian().total(), moved).diff(size).subs(size, 0).doit(integrals=False)
+    return put(paper_lagrangian().total(), moved).diff(size).subs(size, 0).doit(integrals=False)
 
 
 def _newton() -> tuple[Expr, ...]:
@@ -130,7 +120,7 @@ def _action(values: dict[str, float], motion: Any, duration: float) -> float:
     named = list(zip(orders, jets, strict=True))
     numbers = {symbol(name): value for name, value in values.items()}
     rates = []
-    for piece, place in zip(lagrangian(), (0.5 * length * (nodes + 1.0), 0.0, length), strict=True):
+    for piece, place in zip(paper_lagrangian(), (0.5 * length * (nodes + 1.0), 0.0, length), strict=True):
         plain = piece.subs(w, 0).doit().subs([(v.diff((x, a), (t, b)), jet) for (a, b), jet in named])
         values_of = lambdify(jets, plain.subs(numbers), "numpy")
         rates.append(values_of(*(motion(place, a, b, instants) for a, b in orders)))

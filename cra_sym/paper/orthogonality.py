@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from sympy import Eq, Expr, Integral, solve
 
+from cra_sym.arm.lagrangian import HALF
 from cra_sym.paper.energy import (
-    HALF,
     E,
     I_z,
     L,
     generalised,
     inner_mass,
     inner_stiffness,
-    kinetic_energy,
+    kinetic,
     modal_numbers,
     phi_i,
     phi_j,
-    potential_energy,
+    potential,
     q_i,
     q_j,
     separation,
@@ -162,7 +162,7 @@ def stiffness_of_manipulator_alone() -> Eq:
 def _() -> Proof:
     """Twice the first energy of (4) differs from it by the work of the forces of the mode, in balance by (10b) and
     (16a), on itself."""
-    energy = single_mode(potential_energy()[0].rhs) / q_i**2
+    energy = single_mode(potential()[0].rhs) / q_i**2
     alone, size, virtual = stiffness_of_manipulator_alone(), symbol("epsilon"), symbol("eta")
     gap = 2 * energy - alone.rhs.subs(_generalised())
     varied = put(gap, {phi_i: phi_i + size * virtual}).diff(size).subs(size, 0).doit(integrals=False)
@@ -213,9 +213,9 @@ def modal_energies() -> tuple[Eq, Eq]:
     """(2) put into (3) and (4): orthogonality leaves no product of two modes."""
     two = separation().rhs.members("i", "j")
     named = {tidy(e.rhs): e.lhs for e in generalised()} | {tidy(e.lhs): e.rhs for e in orthogonality()}
-    kinetic = _modal(single_mode(kinetic_energy().rhs, two), [q_i.diff(t), q_j.diff(t), w.diff(t)], named)
-    potential = _modal(single_mode(potential_energy()[1].rhs, two), [q_i, q_j], named)
-    return Eq(symbol("T"), kinetic.doit()), Eq(symbol("U"), potential)
+    motion = _modal(single_mode(kinetic().rhs, two), [q_i.diff(t), q_j.diff(t), w.diff(t)], named)
+    strain = _modal(single_mode(potential()[1].rhs, two), [q_i, q_j], named)
+    return Eq(symbol("T"), motion.doit()), Eq(symbol("U"), strain)
 
 
 @proves(5)
@@ -224,7 +224,7 @@ def _() -> Proof:
     two = separation().rhs.members("i", "j")
     mass, stiffness = (e.lhs - e.rhs for e in orthogonality())
     products = (mass * q_i.diff(t) * q_j.diff(t), stiffness * q_i * q_j)
-    for e, whole, product in zip(modal_energies(), (kinetic_energy(), potential_energy()[1]), products, strict=True):
+    for e, whole, product in zip(modal_energies(), (kinetic(), potential()[1]), products, strict=True):
         modes = written_out(e.rhs, "i", "j")
         yield e.lhs == whole.lhs
         yield termwise(modes.subs(_generalised() | _generalised("j")) + product - single_mode(whole.rhs, two))

@@ -7,25 +7,9 @@ from typing import Any
 
 from sympy import Dummy, Expr, Integral, cos, factor, integrate, sin, symbols
 
+from cra_sym.arm.lagrangian import HALF, ArmLagrangian, paper_lagrangian
 from cra_sym.mechanics import hamilton
-from cra_sym.paper.energy import (
-    HALF,
-    ArmLagrangian,
-    L,
-    k_r,
-    k_t,
-    lagrangian,
-    phi_i,
-    phi_j,
-    q_i,
-    q_j,
-    single_mode,
-    t,
-    tidy,
-    v,
-    w,
-    x,
-)
+from cra_sym.paper.energy import L, k_r, k_t, phi_i, phi_j, q_i, q_j, single_mode, t, tidy, v, w, x
 from cra_sym.paper.evaluation import put
 from cra_sym.symbols import symbol
 
@@ -54,7 +38,7 @@ def excited_lagrangian(kind: str) -> ArmLagrangian:
     v_x^2 / 2 from the joint on, is the foreshortening. In the kinetic energy the product -u' s' is, up to a total time
     derivative, u'' s; and the mass-weighted integral of s is, by parts, that of the load times v_x^2 / 2.
     """
-    density, left, right = lagrangian()
+    density, left, right = paper_lagrangian()
     if kind == "joint stiffness":
         swing = epsilon * cos(varpi * t)
         springs = HALF * k_t * v**2 + HALF * k_r * v.diff(x) ** 2

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from sympy import Derivative, Eq, Expr, Function, I, S, Sum, Symbol, conjugate, cos, exp, integrate, pi, sin, solve
 
-from cra_sym.analysis.boundaries import forced_growth, forced_resonance, general_resonance, plain
+from cra_sym.mechanics.boundaries import forced_growth, forced_resonance, general_resonance, plain
 from cra_sym.paper.energy import generalised, inner_mass, phi_i
 from cra_sym.paper.equations import Proof, numbered, proves, samples
 from cra_sym.paper.evaluation import evaluate, put, termwise

@@ -8,9 +8,8 @@ import sympy as sp
 from scipy.signal import lsim
 
 import cra_sym as cra
-from cra_sym.arm.instance import model_values
+from cra_sym.arm.lagrangian import paper_lagrangian
 from cra_sym.model.values import Values
-from cra_sym.paper.energy import lagrangian
 from cra_sym.symbols import symbol
 
 x, t = sp.symbols("x t")
@@ -37,7 +36,7 @@ def arm(density=BEAM, **options):
 def test_the_arm_is_an_instance_in_time_too(derivative):
     """Its own Lagrangian with the base prescribed, batch, joint rigid and free to slide, all kinds of motion."""
     symbols = {name: symbol(name) for name in ("v", "w", "x", "t", "L")}
-    density, left, right = lagrangian()
+    density, left, right = paper_lagrangian()
     model = cra.Model(
         density,
         fields=[symbols["v"]],
@@ -52,7 +51,7 @@ def test_the_arm_is_an_instance_in_time_too(derivative):
     motion = cra.BaseMotion(velocity=0.1, acceleration=0.2, amplitude=1e-3, angular_frequency=10.0)
     motion = motion + cra.BaseMotion.trapezoid(0.3, 0.5, 1.0)
     options = {"derivative": derivative, "zeta": 0.01}
-    found = model.response(model_values(own, driven=True), {symbols["w"]: motion}, TIMES, [0.0, 0.4, 1.0], **options)
+    found = model.response(own.values, {symbols["w"]: motion}, TIMES, [0.0, 0.4, 1.0], **options)
     expected = cra.response(own, motion, TIMES, [0.0, 0.4, 1.0], **options)
     np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-11 * np.abs(expected).max())
 

@@ -4,7 +4,8 @@ import pytest
 from sympy import Integral, Rational, oo
 
 from cra_sym import symbols as s
-from cra_sym.paper.energy import inner_stiffness, lagrangian, potential_energy
+from cra_sym.arm.lagrangian import paper_lagrangian
+from cra_sym.paper.energy import inner_stiffness, potential
 from cra_sym.paper.evaluation import evaluate, put
 from cra_sym.paper.modal_sum import ModalSum, member
 from cra_sym.paper.orthogonality import modal_energies
@@ -12,8 +13,8 @@ from cra_sym.symbols import symbol
 
 
 def test_without_the_joint_the_lagrangian_is_the_papers():
-    beam, _ = potential_energy()
-    gap = lagrangian(joint=False).total() - lagrangian().total()
+    beam, _ = potential()
+    gap = paper_lagrangian(joint=False).total() - paper_lagrangian().total()
     springs = s.k_t * s.v.subs(s.x, 0) ** 2 / 2 + s.k_r * s.v.diff(s.x).subs(s.x, 0) ** 2 / 2
     assert (gap - springs).expand() == 0
     assert not beam.rhs.has(s.k_t, s.k_r)

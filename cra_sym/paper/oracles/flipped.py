@@ -24,10 +24,11 @@ __all__ = ["characteristic", "flipped", "flipped_frequencies"]
 @cache
 def flipped() -> Any:
     """Return Hamilton's principle carried out with the sign of the rotational spring's energy flipped."""
+    from cra_sym.arm.lagrangian import paper_lagrangian
     from cra_sym.mechanics import hamilton
-    from cra_sym.paper.energy import L, k_r, lagrangian, t, v, w, x
+    from cra_sym.paper.energy import L, k_r, t, v, w, x
 
-    density, left, right = lagrangian()
+    density, left, right = paper_lagrangian()
     wrong = left - 2 * k_r * left.coeff(k_r)
     return hamilton(density, fields=[v], prescribed=[w], x=x, domain=(0, L), t=t, left=wrong, right=right)
 

@@ -7,7 +7,7 @@ from sympy import Rational
 import cra_sym as cra
 from cra_sym import symbols as s
 from cra_sym.paper import modes
-from cra_sym.paper.energy import potential_energy, single_mode
+from cra_sym.paper.energy import potential, single_mode
 from cra_sym.paper.motion import natural_conditions
 from cra_sym.paper.oracles.flipped import characteristic, flipped, flipped_frequencies
 
@@ -50,7 +50,7 @@ def test_without_a_rotational_spring_there_is_no_sign_to_flip():
 
 
 def test_its_potential_energy_can_be_negative():
-    turn = single_mode(potential_energy()[1].rhs, s.x * s.psi).doit()
+    turn = single_mode(potential()[1].rhs, s.x * s.psi).doit()
     assert turn == Rational(1, 2) * s.k_r * s.psi**2  # so with the flipped sign a rotation releases energy
 
 

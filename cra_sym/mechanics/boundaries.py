@@ -9,9 +9,9 @@ from __future__ import annotations
 from functools import cache, partial
 from typing import Any
 
-from sympy import Dummy, Expr, I, IndexedBase, S, Symbol, expand, series, sin
+from sympy import Expr, I, IndexedBase, S, Symbol, expand, series, sin
 
-from cra_sym.mechanics import MultipleScales, multiple_scales
+from cra_sym.mechanics.multiple_scales import MultipleScales, multiple_scales
 from cra_sym.mechanics.two_scales import EPSILON
 from cra_sym.symbols import symbol
 
@@ -101,19 +101,15 @@ def forced_growth() -> tuple[Expr, tuple[Symbol, ...]]:
 
 @cache
 def forced_resonance() -> MultipleScales:
-    """Return multiple scales for the dynamic equation (11) with a base that shakes across the arm at resonance n."""
-    from cra_sym.paper.modal_dynamics import dynamic_equation
-    from cra_sym.paper.parametric import TRANSVERSE, t, varpi, w
+    """Return multiple scales for a mode M_n (q'' + omega_n^2 q) = -Gamma_n w'' whose base shakes at resonance n.
 
-    named = {symbol(f"{name}_i"): symbol(f"{name}_n") for name in ("Gamma", "M", "omega", "zeta")}
-    force = (dynamic_equation().rhs / symbol("M_i")).subs(w, TRANSVERSE).doit().xreplace(named)
-    swing = Dummy("swing")
-    shaken = force.subs(sin(varpi * t), swing)
-    if shaken.has(t) or shaken.subs(swing, 0) != 0:
-        raise ArithmeticError(f"the force is not in phase with the base: {force}")
-    # sin = Re(-i exp(i varpi t)), and the excitation sits at the resonance
-    strength = (shaken / swing / EPSILON).subs(varpi, symbol("omega_n"))
-    return multiple_scales(OMEGA, None, n, forcing={n: -I * strength.subs(symbol("omega_n"), OMEGA[n])})
+    The base moves by w = epsilon w_1 sin(varpi t), so that its acceleration is -epsilon w_1 varpi^2 sin(varpi t); with
+    sin = Re(-i exp(i varpi t)) and the excitation at the resonance the force is what follows.
+    """
+    t, varpi = symbol("t"), symbol("varpi")
+    shaken = -symbol("Gamma_n") / symbol("M_n") * (symbol("w_1") * sin(varpi * t)).diff(t, 2)
+    strength = (shaken / sin(varpi * t)).subs(varpi, OMEGA[n])
+    return multiple_scales(OMEGA, None, n, forcing={n: -I * strength})
 
 
 _KERNELS = {

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cra_sym.analysis.boundaries import general_resonance
 from cra_sym.kernels import derived_kernel
+from cra_sym.mechanics.boundaries import general_resonance
 from cra_sym.solvers.floquet import floquet_exponents
 
 LABELS = {"principal": {"n": 1}, "sum": {"m": 0, "n": 2}, "difference": {"m": 2, "n": 0}}
@@ -23,7 +23,7 @@ def boundary(kind, omega, coupling, epsilon, decay, power=0, tongue=1, order=2):
         values |= {f"omega_{a}": omega[i], f"c_{a}": decay[i], f"S_{a}": 0.0}
         for b, k in labels.items():
             values |= {f"P_{a}{b}": coupling[i, k], f"dP_{a}{b}": power * coupling[i, k] / centre, f"W_{a}{b}": 0.0}
-    sums = derived_kernel(f"cra_sym.analysis.boundaries:sums_{kind}_{tongue}")
+    sums = derived_kernel(f"cra_sym.mechanics.boundaries:sums_{kind}_{tongue}")
     for name in sums(*(1.0 for _ in sums.arguments)):
         row, target = labels[name[2]], labels[name[-1]]
         total = 0.0
@@ -36,7 +36,7 @@ def boundary(kind, omega, coupling, epsilon, decay, power=0, tongue=1, order=2):
     half_width, shift = (
         kernel(*(values[argument] for argument in kernel.arguments))
         for name in ("half_width", "shift")
-        for kernel in [derived_kernel(f"cra_sym.analysis.boundaries:{damped}{name}_{kind}_{tongue}")]
+        for kernel in [derived_kernel(f"cra_sym.mechanics.boundaries:{damped}{name}_{kind}_{tongue}")]
     )
     middle = centre + (shift if order == 2 else 0.0)
     return np.array([middle - half_width, middle + half_width])

@@ -1,0 +1,318 @@
+"""What analyses need of a Lagrangian: each function takes a model, derives one thing and compiles it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Literal
+
+from sympy import Add, Derivative, Dummy, Expr, S, Symbol, cancel, integrate, sympify
+from sympy.core.function import AppliedUndef
+
+from cra_sym.checks import mapping, shown
+from cra_sym.kernels import Kernel, kernel
+from cra_sym.mechanics.jets import END_NAMES, Jet
+from cra_sym.mechanics.weak import Bilinear, WeakForm, weak_form
+from cra_sym.model.forms import form_of, load_of
+from cra_sym.model.lagrangian import Model
+from cra_sym.model.projection import Form, Load
+from cra_sym.model.routes import GeneralRoute, Route
+from cra_sym.model.spatial import SpatialProblem, spatial_problem
+from cra_sym.model.symmetry import asymmetry
+
+__all__ = ["axial", "causes", "constant", "damping", "geometry", "load", "names", "rates", "route", "spatial"]
+
+
+def names(model: Model) -> tuple[str, ...]:
+    """Return the names of the parameters."""
+    return tuple(symbol.name for symbol in model.symbols)
+
+
+def geometry(model: Model) -> Kernel:
+    """Return length and left end of the domain as functions of the parameters."""
+    left, right = model.equations.domain
+    return kernel((right - left, left), model.symbols, backend="numpy")
+
+
+def spatial(model: Model) -> SpatialProblem:
+    """Return the conservative spatial problem, dampers left out."""
+    return spatial_problem(model.conservative, model.symbols, model.equations.domain[0])
+
+
+def damped_spatial(model: Model) -> SpatialProblem:
+    """Return the spatial problem with everything in it."""
+    return spatial_problem(model.state_form, model.symbols, model.equations.domain[0])
+
+
+def route(model: Model) -> Route:
+    """Return the fastest way to natural frequencies and modes that the Lagrangian allows."""
+    return GeneralRoute(spatial(model))
+
+
+# Loads -----------------------------------------------------------------------------------------------------------
+
+Kind = Literal["motion", "force"]
+
+
+def causes(model: Model) -> tuple[tuple[str, Kind | str], ...]:
+    """Return the functions of time that drive the model, with their kind.
+
+    'motion' acts by its acceleration alone, 'force' by itself; of anything else the kind is the term that is neither.
+    """
+    weak = weak_form(model.equations.variation)
+    found = sorted({f for e in _load_terms(weak) for f in e.atoms(AppliedUndef)}, key=str)
+    return tuple((f.func.__name__, _kind(weak, f)) for f in found)
+
+
+def _load_terms(weak: WeakForm) -> list[Expr]:
+    space = weak.variation.space
+    loads = (*weak.inside_load.values(), *weak.end_load.values())
+    return [term for e in loads for term in Add.make_args(space.restore(e).expand())]
+
+
+def _kind(weak: WeakForm, function: AppliedUndef) -> str:
+    t = weak.variation.space.t
+    terms = [term for term in _load_terms(weak) if term.has(function)]
+    for kind, cause in (("motion", function.diff(t, 2)), ("force", function)):
+        if not any((term / cause).has(t) for term in terms):
+            return kind
+    accelerated = any(term.has(function.diff(t, 2)) for term in terms)
+    cause = function.diff(t, 2) if accelerated else function
+    return str(next(term for term in terms if (term / cause).has(t)))
+
+
+def load(model: Model, name: str) -> Load:
+    """Return the load of one unit of a cause: of the acceleration of a motion, or of a force."""
+    weak = weak_form(model.equations.variation)
+    t = weak.variation.space.t
+    function = next(f for e in _load_terms(weak) for f in e.atoms(AppliedUndef) if f.func.__name__ == name)
+    cause = function.diff(t, 2) if _kind(weak, function) == "motion" else function
+    parts = (_coefficients(weak, part, cause) for part in (weak.inside_load, weak.end_load))
+    return load_of(weak, *parts, model.symbols)
+
+
+def _coefficients(weak: WeakForm, part: dict[Jet, Expr], cause: Expr) -> dict[Jet, Expr]:
+    found = {jet: weak.variation.space.restore(e).expand().coeff(cause) for jet, e in part.items()}
+    return {jet: value for jet, value in found.items() if value != 0}
+
+
+def constant(model: Model) -> Load | None:
+    """Return the loads that are constant in time, or None if there are none."""
+    weak = weak_form(model.equations.variation)
+    still = {f: S.Zero for e in _load_terms(weak) for f in e.atoms(AppliedUndef)}
+
+    def left(part: dict[Jet, Expr]) -> dict[Jet, Expr]:
+        values = {jet: weak.variation.space.restore(e).subs(still).doit() for jet, e in part.items()}
+        return {jet: value for jet, value in values.items() if value != 0}
+
+    inside, ends = left(weak.inside_load), left(weak.end_load)
+    return load_of(weak, inside, ends, model.symbols) if inside or ends else None
+
+
+def momentum(model: Model, initial: Mapping[Expr, Any], order: int) -> Load | None:
+    """Return the momentum of given displacements (order 0) or velocities (1) as a load, or None if there are none.
+
+    Raises
+    ------
+    ValueError
+        Names the function that is not an unknown of the model, or the value that is not an expression in x.
+    """
+    weak = weak_form(model.equations.variation)
+    space = weak.variation.space
+    given: dict[int, Expr] = {}
+    for key, value in mapping("initial", initial, "fields and coordinates to expressions in x").items():
+        function = key.expr if isinstance(key, Derivative) else key
+        if function not in space.unknowns or key not in (function, function.diff(space.t)):
+            known = ", ".join(f"{u}, {u.diff(space.t)}" for u in space.unknowns)
+            raise ValueError(f"initial: {key} must be one of {known}")
+        number, value = space.unknowns.index(function), sympify(value, strict=True)
+        free = {*model.symbols, *([space.x] if space.is_field(number) else [])}
+        if value.free_symbols - free or value.atoms(AppliedUndef):
+            raise ValueError(f"initial: {key} = {value} must be an expression in {', '.join(map(str, free))}")
+        if order == int(isinstance(key, Derivative)):
+            given[number] = value
+
+    def weighed(form: Bilinear) -> dict[Jet, Expr]:
+        loads: dict[Jet, Expr] = {}
+        for (p, q), entry in form.items():
+            if 2 in entry and q.unknown in given:
+                value = given[q.unknown].diff(space.x, q.space)
+                value = value if q.place is None else value.subs(space.x, space.ends[q.place])
+                loads[p] = loads.get(p, S.Zero) + entry[2] * value
+        return {jet: value for jet, value in loads.items() if value != 0}
+
+    inside, ends = weighed(weak.inside), weighed(weak.ends)
+    return load_of(weak, inside, ends, model.symbols) if inside or ends else None
+
+
+# Bilinear forms --------------------------------------------------------------------------------------------------
+
+
+def damping(model: Model) -> Form | None:
+    """Return the damping of a model between its modes, or None if it has none."""
+    weak = weak_form(model.equations.variation)
+    if 1 not in weak.powers:
+        return None
+    parts = tuple({pair: {1: e[1]} for pair, e in part.items() if 1 in e} for part in (weak.inside, weak.ends))
+    return form_of(weak, {"damping": (parts[0], parts[1])}, model.symbols)
+
+
+def rates(model: Model) -> Form:
+    """Return stiffness and mass, and their rates by every parameter ('k_t stiffness', 'k_t mass').
+
+    Displacements are held fixed as functions of the distance from the left end over the length, so that the rate of a
+    squared natural frequency is the difference of the two, mass times omega^2, for every parameter, those of the
+    domain included.
+    """
+    weak = weak_form(model.equations.variation)
+    kinds = {"stiffness": 0, "mass": 2}
+    named: dict[str, tuple[Bilinear, Bilinear]] = {
+        kind: (_power(weak.inside, power), _power(weak.ends, power)) for kind, power in kinds.items()
+    }
+    for symbol in model.symbols:
+        for kind in kinds:
+            inside, ends = named[kind]
+            named[f"{symbol.name} {kind}"] = _rate(weak, inside, symbol, 1), _rate(weak, ends, symbol, 0)
+    return form_of(weak, named, model.symbols)
+
+
+def _power(form: Bilinear, power: int) -> Bilinear:
+    return {pair: {power: entry[power]} for pair, entry in form.items() if power in entry}
+
+
+def _rate(weak: WeakForm, form: Bilinear, symbol: Symbol, dimension: int) -> Bilinear:
+    """Return the derivative of a form by a parameter, displacements fixed as functions of (x - left) / length."""
+    space = weak.variation.space
+    left, right = (space.ends[end] for end in END_NAMES)
+    length = right - left
+    drift = left.diff(symbol) + (space.x - left) / length * length.diff(symbol)
+    found: Bilinear = {}
+    for (p, q), entry in form.items():
+        orders = sum(jet.space for jet in (p, q))
+        for power, value in entry.items():
+            rate = value.diff(symbol) + value * (dimension - orders) * length.diff(symbol) / length
+            rate += value.diff(space.x) * drift if dimension else S.Zero
+            if rate != 0:
+                found[p, q] = {power: rate}
+    return found
+
+
+def axial(model: Model) -> Form:
+    """Return the stiffness that a unit acceleration of the frame along x, towards the right, gives the first field.
+
+    What moves across the domain moves along it too: the inertia of all mass beyond x, at the right end included, acts
+    on the foreshortening v_x^2 / 2 there, so that (36b) follows from the kinetic energy.
+    """
+    weak = weak_form(model.equations.variation)
+    space = weak.variation.space
+    field, tip, slope = Jet(0, 0, 0, None), Jet(0, 0, 0, "right"), Jet(0, 1, 0, None)
+    density = weak.inside.get((field, field), {}).get(2, S.Zero)
+    place = Dummy("x")
+    beyond = integrate(density.subs(space.x, place), (place, space.x, space.ends["right"]))
+    load = beyond + weak.ends.get((tip, tip), {}).get(2, S.Zero)
+    return form_of(weak, {"axial": ({(slope, slope): {0: load}}, {})}, model.symbols)
+
+
+def carried_mass(model: Model, name: str) -> Kernel:
+    """Return the mass that a prescribed motion moves when nothing deforms, as a function of the parameters."""
+    freed = model.freed(name)
+    weak = weak_form(freed.equations.variation)
+    space = weak.variation.space
+    number = next(k for k, u in enumerate(space.unknowns) if u.func.__name__ == name)
+    jet = Jet(number, 0, 0, None)
+    left, right = (space.ends[end] for end in END_NAMES)
+    inside = weak.inside.get((jet, jet), {}).get(2, S.Zero)
+    total = integrate(inside, (space.x, left, right)) + weak.ends.get((jet, jet), {}).get(2, S.Zero)
+    return kernel(total, model.symbols, backend="numpy")
+
+
+def driven(model: Model, name: str) -> SpatialProblem:
+    """Return the spatial problem with the acceleration of a prescribed motion as a lumped coordinate.
+
+    The motion w is freed, and its acceleration a takes its place: w = -a / omega^2, so its column and its row are
+    divided by -omega^2 (by s^2 where the parameter is s). What a does to itself is left out; it is given.
+    """
+    freed = model.freed(name)
+    form = freed.state_form
+    number = next(k for k, c in enumerate(form.coordinates) if c.func.__name__ == name)
+    n, m, z = len(form.displacements), len(form.coordinates), form.parameter
+    factor = 1 / z**2 if form.damped else -1 / z
+    system, boundary = form.system.as_mutable(), form.boundary.as_mutable()
+    for matrix, row, column in ((system, 2 * n + m + number, n + number), (boundary, n + number, n + number)):
+        matrix[row, column] = S.Zero
+        matrix[:, column] = (matrix[:, column] * factor).applyfunc(cancel)
+        matrix[row, :] = (matrix[row, :] * factor).applyfunc(cancel)
+        if matrix.has(1 / z):
+            raise ValueError(f"{name} acts by more than its acceleration")
+    changed = replace(form, system=system.as_immutable(), boundary=boundary.as_immutable())
+    return spatial_problem(changed, model.symbols, model.equations.domain[0])
+
+
+def sizes(model: Model) -> tuple[int, int]:
+    """Return the numbers of displacements of a section and of lumped coordinates."""
+    return len(model.state_form.displacements), len(model.state_form.coordinates)
+
+
+def stiffnesses(model: Model) -> dict[str, tuple[int, int]]:
+    """Return the stiffnesses of an end that hold one of its displacements, with that end (0 or 1) and displacement."""
+    form = model.conservative
+    n, m = len(form.displacements), len(form.coordinates)
+    inside = form.system.free_symbols | form.length.free_symbols | form.free.free_symbols
+    found = {}
+    for symbol in model.symbols:
+        slope = form.boundary.diff(symbol)
+        places = [k for k in range(2 * n + m) if slope[k, k] == 1 and not n <= k < n + m]
+        if symbol not in inside and len(places) == 1 and sum(entry != 0 for entry in slope) == 1:
+            found[symbol.name] = (0, places[0]) if places[0] < n else (1, places[0] - n - m)
+    return found
+
+
+def damped(model: Model) -> bool:
+    """Return whether the Lagrangian or the virtual work has terms of first order in time."""
+    return model.state_form.damped
+
+
+def driven_coordinate(model: Model, name: str) -> int:
+    """Return the position of a prescribed motion among the lumped coordinates once it is freed."""
+    return [c.func.__name__ for c in model.freed(name).state_form.coordinates].index(name)
+
+
+def driven_displacement(model: Model, drive: Expr) -> int:
+    """Return the position of a displacement in the order (q(left), w, q(right)).
+
+    Raises
+    ------
+    ValueError
+        If it is none of them, or an essential condition holds it.
+    """
+    form = model.state_form
+    left, right = (
+        [displacement.subs(form.x, end) for displacement in form.displacements] for end in model.equations.domain
+    )
+    order = [*left, *form.coordinates, *right]
+    if not isinstance(drive, Expr) or drive not in order:
+        raise ValueError(f"drive = {shown(drive)}: must be a prescribed motion or one of {', '.join(map(str, order))}")
+    place = order.index(drive)
+    if form.free[place, :].is_zero_matrix:
+        raise ValueError(f"drive = {drive}: an essential condition holds it still")
+    return place
+
+
+def fluctuation(model: Model, name: str) -> str:
+    """Return why a parameter cannot fluctuate about its value in a parametric excitation, or an empty text."""
+    weak = weak_form(model.equations.variation)
+    symbol = next(s for s in model.symbols if s.name == name)
+    if any(end.has(symbol) for end in weak.variation.space.ends.values()):
+        return "is a length of the domain"
+    entries = [entry for form in (weak.inside, weak.ends) for entry in form.values()]
+    if any(value.diff(symbol) != 0 for entry in entries for power, value in entry.items() if power):
+        return "changes the mass or the damping"
+    rates = [entry[0].diff(symbol) for entry in entries if 0 in entry]
+    if not any(rates):
+        return "changes no stiffness"
+    return "does not enter the stiffness linearly" if any(rate.has(symbol) for rate in rates) else ""
+
+
+def conservative(model: Model) -> bool:
+    """Return whether all forces have a potential and none is of first order in time."""
+    return not model.state_form.damped and not asymmetry(model.state_form)

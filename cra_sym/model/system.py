@@ -1,0 +1,171 @@
+"""A model bound to values: what every analysis takes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.checks import broadcastable, count
+from cra_sym.model.projection import Domain, Load, Projected, project
+from cra_sym.model.routes import Modes
+from cra_sym.model.values import Value, checked_damping, checked_values, frozen
+
+if TYPE_CHECKING:
+    from cra_sym.model.lagrangian import Model
+    from cra_sym.model.numerics import Numerics
+
+__all__ = ["MOST_MODES", "System"]
+
+Array = NDArray[np.float64]
+MOST_MODES = 1000
+_MOST_KEPT = 4  # numbers of modes for which a system keeps what it computed
+
+
+class System:
+    """A :class:`cra_sym.Model` bound to values; make one with :meth:`cra_sym.Model.at`.
+
+    Its natural frequencies and modes are computed when they are first asked for, once for each number of modes.
+
+    Parameters
+    ----------
+    model : Model
+    values : mapping of symbol or name to array_like
+        One for each parameter of the model; arrays broadcast together as batch axes. The stiffness of an end may be
+        inf.
+    zeta : array_like
+        Modal damping ratio beside the dampers of the model, the same for every mode, in [0, 1).
+
+    Raises
+    ------
+    TypeError, ValueError
+        Names the parameter that is missing, unknown or not a real number, or shapes that do not broadcast together.
+
+    Examples
+    --------
+    >>> from sympy import symbols
+    >>> import cra_sym as cra
+    >>> from cra_sym.symbols import L, t, v, x
+    >>> mass, tension = symbols("mass tension")
+    >>> string = cra.Model(mass * v.diff(t)**2 / 2 - tension * v.diff(x)**2 / 2, fields=[v], x=x, domain=(0, L), t=t,
+    ...                    essential=[v.subs(x, 0), v.subs(x, L)])
+    >>> system = string.at({mass: 1.0, tension: [1.0, 4.0], L: 1.0})
+    >>> cra.natural_frequencies(system, modes=2)
+    array([[0.5, 1. ],
+           [1. , 2. ]])
+    """
+
+    def __init__(self, model: Model, values: Mapping[Any, Any], zeta: Any = 0.0) -> None:
+        self._model = model
+        self._values = checked_values([symbol.name for symbol in model.symbols], values)
+        self._zeta = frozen(checked_damping(zeta))
+        broadcastable(zeta=self._zeta, **self._values)
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+        return self._model
+
+    @property
+    def values(self) -> Mapping[str, Value]:
+        """The value of every parameter, by name."""
+        return MappingProxyType(self._values)
+
+    @property
+    def zeta(self) -> Value:
+        """Modal damping ratio."""
+        return self._zeta
+
+    @cached_property
+    def shape(self) -> tuple[int, ...]:
+        """Batch shape: the common shape of all values."""
+        return broadcastable(zeta=self.zeta, **self.values)
+
+    def replace(self, **changes: Any) -> System:
+        """Return a validated copy with some values, or ``zeta``, changed.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As :class:`System`.
+        """
+        zeta = changes.pop("zeta", self.zeta)
+        return System(self.model, {**self.values, **changes}, zeta)
+
+    # ------------------------------------------------------------------------------------------ numbers, once
+
+    @property
+    def numerics(self) -> Numerics:
+        """What was derived from the Lagrangian, compiled."""
+        return self.model.numerics
+
+    @cached_property
+    def parameters(self) -> tuple[Value, ...]:
+        """Values in the order of the model's symbols."""
+        return tuple(self.values[name] for name in self.numerics("names"))
+
+    @cached_property
+    def domain(self) -> Domain:
+        """Values with 0 in place of inf, left end and length of the domain."""
+        finite = [np.where(np.isinf(p), 0.0, p)[()] if np.isinf(p).any() else p for p in self.parameters]
+        length, left = self.numerics("geometry").function(*finite)
+        return Domain(finite, left, length)
+
+    def natural_frequencies(self, modes: int) -> Array:
+        """Return the first natural frequencies, rad/s, shape (..., modes); read-only."""
+        return self._once("omega", count("modes", modes, high=MOST_MODES), self._find_frequencies)
+
+    def _find_frequencies(self, modes: int) -> Array:
+        omega: Array = self.numerics("route").angular_frequencies(self.parameters, self.shape, modes)
+        omega.flags.writeable = False
+        return omega
+
+    def modes(self, modes: int) -> Modes:
+        """Return the first natural modes."""
+        return self._once("modes", modes, lambda n: self._find_modes(n))
+
+    def _find_modes(self, modes: int) -> Modes:
+        omega = self.natural_frequencies(modes)
+        found: Modes = self.numerics("route").modes(self.parameters, self.shape, omega)
+        return found
+
+    def _once(self, kind: str, modes: int, find: Any) -> Any:
+        kept = self.__dict__.setdefault("_kept", {})
+        key = kind, modes
+        if key not in kept:
+            found = find(modes)
+            while len(kept) >= 2 * _MOST_KEPT:
+                kept.pop(next(iter(kept)), None)
+            kept[key] = found
+        return kept[key]
+
+    def project(self, load: Load, modes: int) -> Array:
+        """Return the generalised force of a load on every mode, shape (..., modes)."""
+        return project(self.domain, self.modes(modes), load)
+
+    def form(self, name: str, modes: int, *, diagonal: bool = False) -> Projected:
+        """Return bilinear forms that were derived from the Lagrangian, between the modes."""
+        return Projected(self.domain, self.modes(modes), self.numerics(name), diagonal=diagonal)
+
+    # ------------------------------------------------------------------------------------------ value semantics
+
+    def _key(self) -> tuple[Any, ...]:
+        values = (*self.values.values(), self.zeta)
+        return self.model, tuple((np.shape(value), np.asarray(value).tobytes()) for value in values)
+
+    def __eq__(self, other: object) -> bool:
+        return self._key() == other._key() if isinstance(other, System) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.model, dict(self.values), self.zeta)
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name}={value!r}" for name, value in self.values.items())
+        return f"<System of {self.model!r} at {values}, zeta={self.zeta!r}>"
