@@ -22,6 +22,7 @@ __all__ = ["frequency_response"]
 
 Complex = NDArray[np.complex128]
 _BELOW, _ABOVE, _DIGITS = 18.0, 14.0, 37.0  # reach of the quadrature in ln y, and minus ln of its error
+_KINDS = ("force", "motion")
 _FASTEST = 1e60  # rad/s, whose fourth power is a number; what is slower than its inverse is static
 
 
@@ -144,6 +145,8 @@ class _Undamped:
         self, system: System, places: NDArray[np.float64] | None, drive: Any, kind: str | None, place: int
     ) -> None:
         self._system, self._places, self._place = system, places, place
+        from cra_sym.model.derivations import driven_displacement
+
         self.motion = _motion_name(system, drive)
         if self.motion is not None:
             if kind is not None:
@@ -152,8 +155,8 @@ class _Undamped:
             self._driven = self._problem.displacements + system.numerics("driven_coordinate", self.motion)
         else:
             self._problem = system.numerics("damped_spatial")
-            self._driven = system.numerics("driven_displacement", drive)
-        self._kind = "motion" if self.motion is not None else choice("kind", kind or "force", ("force", "motion"))
+            self._driven = driven_displacement(system.model, drive)
+        self._kind = "motion" if self.motion is not None else choice("kind", "force" if kind is None else kind, _KINDS)
         self.by_force = self._kind == "force"
         self.problem_damped: bool = system.numerics("damped")
 

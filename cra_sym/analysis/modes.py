@@ -69,7 +69,7 @@ def section_place(system: System, field: Any = None) -> int:
     if field is None:
         return 0
     fields = system.model.equations.fields
-    if field not in fields:
+    if not any(field is one or (isinstance(field, type(one)) and field == one) for one in fields):
         raise ValueError(f"field = {checks.shown(field)}: must be one of {', '.join(map(str, fields))}")
     return list(system.model.conservative.displacements).index(field)
 

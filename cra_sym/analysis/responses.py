@@ -201,9 +201,9 @@ def _ratios(system: System, modes: int, zeta: Any) -> Array:
         ratios = np.asarray(system.zeta, float)[..., None]
     else:
         ratios = np.atleast_1d(checked_damping(zeta))
-    omega = system.natural_frequencies(modes)
-    if broadcastable(modes=omega, zeta=ratios)[-1] != modes:
+    if ratios.shape[-1] not in (1, modes):
         raise ValueError(f"zeta has shape {ratios.shape}: its last axis must have one value, or one for each mode")
+    broadcastable(modes=system.natural_frequencies(modes), zeta=ratios)
     return ratios
 
 
@@ -234,6 +234,10 @@ def _oscillation(
         return driven_response(osc, profile, t, derivative, begin, state)
 
     total: Array | None = None
+    if initial is not None and not isinstance(initial, Mapping):
+        raise TypeError(
+            f"initial = {shown(initial)}: must be a mapping from fields and coordinates to expressions in x"
+        )
     if initial or not histories:
         q, u = (_initial_state(system, initial or {}, modes, order) for order in (0, 1))
         total = answer(still, BaseMotion(), "base", (q, u))
@@ -253,7 +257,7 @@ def _histories(system: System, motion: Any) -> dict[str, History]:
     if isinstance(motion, BaseMotion):
         return {only_motion(system): motion}
     if motion is not None and not isinstance(motion, Mapping):
-        raise TypeError(f"motion = {shown(motion)}: must be a BaseMotion, or a mapping from functions of t to motions")
+        raise TypeError(f"motion = {shown(motion)}: must be a BaseMotion or a mapping from functions of t to motions")
     given = {
         key if isinstance(key, str) else getattr(getattr(key, "func", None), "__name__", str(key)): value
         for key, value in mapping("motion", motion, "functions of t to BaseMotion or Force").items()
@@ -266,11 +270,14 @@ def _histories(system: System, motion: Any) -> dict[str, History]:
         if not isinstance(history, BaseMotion | Force):
             raise TypeError(f"motion: {name} = {shown(history)}: must be a Force or a BaseMotion")
         kind = "force" if isinstance(history, Force) else "motion"
+        if causes[name] not in ("force", "motion"):
+            raise ValueError(f"motion: the load {causes[name]} is neither a multiple of {name} nor of its acceleration")
         if causes[name] != kind:
-            cure = {"motion": "give a BaseMotion", "force": "give a Force"}.get(
-                causes[name], "a BaseMotion drives by its acceleration: measure the fields from the frame that moves"
-            )
-            raise ValueError(f"motion: the load {causes[name]} is not a multiple of what {name} is as a {kind}; {cure}")
+            acts, cure = {
+                "motion": ("by its acceleration", "give a BaseMotion"),
+                "force": ("by itself", "give a Force, or measure the fields from the frame that moves"),
+            }[causes[name]]
+            raise ValueError(f"motion: {name} drives the model {acts}; {cure}")
     missing = [name for name in causes if name not in given]
     if missing:
         raise ValueError(f"motion: no history for {', '.join(missing)}; must be a Force or a BaseMotion")

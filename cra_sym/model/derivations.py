@@ -34,6 +34,12 @@ def geometry(model: Model) -> Kernel:
     return kernel((right - left, left), model.symbols, backend="numpy")
 
 
+def length_name(model: Model) -> str:
+    """Return the length of the domain as text."""
+    left, right = model.equations.domain
+    return str(right - left)
+
+
 def spatial(model: Model) -> SpatialProblem:
     """Return the conservative spatial problem, dampers left out."""
     return spatial_problem(model.conservative, model.symbols, model.equations.domain[0])

@@ -127,6 +127,13 @@ def displaced(modes: Modes, place: Place) -> Array:
     return modes.displacement(int(place.where == "right"), place.index)
 
 
+def along(modes: Modes, place: Place, x: Array) -> Array:
+    """Return a displacement of every mode at places along the interval, shape (..., modes, stations)."""
+    if place.where == "lumped":
+        return modes.coordinate(place.index)[..., None]
+    return modes.shape(place.index, place.order, x)
+
+
 def project(domain: Domain, modes: Modes, load: Load) -> Array:
     """Return the generalised force of a load on every mode, shape (..., modes)."""
     if load.share is not None and load.rest is not None and isinstance(modes, RigidShare):
@@ -139,8 +146,7 @@ def project(domain: Domain, modes: Modes, load: Load) -> Array:
     x, weights = stations(domain, modes)
     density = load.density.function(x, *map(column, domain.values))
     for place, factor in zip(load.inside, density, strict=True):
-        shape = modes.shape(place.index, place.order, x)
-        total = total + ((factor * weights)[..., None, :] * shape).sum(axis=-1)
+        total = total + ((factor * weights)[..., None, :] * along(modes, place, x)).sum(axis=-1)
     return total
 
 
@@ -228,10 +234,12 @@ class Projected:
     def _quadrature(self, entry: int, factor: float | Array) -> Array:
         """Return the integral of a coefficient times both displacements of an entry."""
         x, weights = self._stations
-        first, second = (self._modes.shape(place.index, place.order, x) for place in self._form.inside[entry])
+        first, second = (along(self._modes, place, x) for place in self._form.inside[entry])
         weighted = np.broadcast_to(factor * weights, np.broadcast_shapes(np.shape(factor), np.shape(weights)))
         if self._diagonal:
             return (weighted[..., None, :] * first * second).sum(axis=-1)
+        stations = np.broadcast_shapes(first.shape, second.shape)[-1:]
+        second = np.broadcast_to(second, (*second.shape[:-1], *stations))
         product = (first * weighted[..., None, :]) @ second.swapaxes(-1, -2)
         symmetric = self._form.inside[entry][0] == self._form.inside[entry][1]
         return (product + product.swapaxes(-1, -2)) / 2 if symmetric else product

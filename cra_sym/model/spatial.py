@@ -115,8 +115,6 @@ class SpatialProblem:
 
     def _problem(self, columns: np.ndarray, infinite: tuple[int, ...]) -> tuple[np.ndarray, DynamicStiffness]:
         length, left = (np.broadcast_to(value, columns.shape[1:]) for value in self.geometry(*columns))
-        if not (length > 0.0).all() or not np.isfinite(length).all():
-            raise ValueError(f"domain: the length {length[~(length > 0.0)][:1]} must be positive")
         n, m = self.displacements, self.coordinates
         free = np.zeros((2 * n + m, 0)) if self.free is None else self.free(*columns)
         for position in infinite:

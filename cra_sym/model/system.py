@@ -113,6 +113,10 @@ class System:
         """Values with 0 in place of inf, left end and length of the domain."""
         finite = [np.where(np.isinf(p), 0.0, p)[()] if np.isinf(p).any() else p for p in self.parameters]
         length, left = self.numerics("geometry").function(*finite)
+        if not (np.all(length > 0) and np.all(np.isfinite(length))):
+            bad = np.asarray(length)[~(np.asarray(length) > 0)]
+            name = self.numerics("length_name")
+            raise ValueError(f"domain: the length {name} = {bad.flat[0] if bad.size else np.inf:g} must be positive")
         return Domain(finite, left, length)
 
     def natural_frequencies(self, modes: int) -> Array:
@@ -120,6 +124,7 @@ class System:
         return self._once("omega", count("modes", modes, high=MOST_MODES), self._find_frequencies)
 
     def _find_frequencies(self, modes: int) -> Array:
+        _ = self.domain  # refuses a length that is not positive
         omega: Array = self.numerics("route").angular_frequencies(self.parameters, self.shape, modes)
         omega.flags.writeable = False
         return omega

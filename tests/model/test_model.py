@@ -63,8 +63,8 @@ def test_values_by_symbol_or_by_name_and_broadcasting(arm):
         ({"k_t": 1.0}, "k_t is given twice"),
         ({k_t: [1.0, 2.0], k_r: [1.0, 2.0, 3.0]}, "k_t"),
         ({L: -1.0}, "domain: the length L"),
-        ({EI: np.inf}, "EI = inf: allowed only for a stiffness of an end"),
-        ({m_e: np.inf}, "m_e = inf: allowed only for a stiffness of an end"),
+        ({EI: np.inf}, "EI = inf: only the stiffness of an end may be infinite"),
+        ({m_e: np.inf}, "m_e = inf: only the stiffness of an end may be infinite"),
         ({k_t: -np.inf}, "k_t = -inf"),
         ({EI: 0.0}, "infinite"),
         ({rhoA: -0.24, m_e: 0.0}, "negative kinetic energy"),
@@ -134,7 +134,7 @@ def test_mode_shapes_have_their_axes_sign_and_field(arm):
     slope = arm.mode_shapes(VALUES, station, derivative=1)
     near = arm.mode_shapes(VALUES, np.r_[station[2] - 1e-5, station[2] + 1e-5])
     np.testing.assert_allclose((near[:, 1] - near[:, 0]) / 2e-5, slope[:, 2], rtol=1e-6)
-    with pytest.raises(ValueError, match="x_values"):
+    with pytest.raises(ValueError, match=r"x = 1\.2 must be in the domain"):
         arm.mode_shapes(VALUES, [1.2])
     with pytest.raises(ValueError, match="field"):
         arm.mode_shapes(VALUES, station, field=sp.Function("u")(x, t))
@@ -282,19 +282,19 @@ AXIS = "allowed are a number or one axis of"
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda m: m.mode_shapes(VALUES, [[0.1, 0.2]]), rf"x_values has shape \(1, 2\): {AXIS} places"),
+        (lambda m: m.mode_shapes(VALUES, [[0.1, 0.2]]), rf"x has shape \(1, 2\): {AXIS} points"),
         (
             lambda m: m.frequency_response(VALUES, [[1.0]], 0.5, drive=v.subs(x, L)),
             rf"frequency has shape .*: {AXIS} freq",
         ),
         (
             lambda m: m.frequency_response(VALUES, 1.0, [[0.5]], drive=v.subs(x, L)),
-            rf"x_values has shape .*: {AXIS} places",
+            rf"x has shape .*: {AXIS} places",
         ),
         (lambda m: m.response(VALUES, None, 0.0, [[0.5]]), rf"x has shape \(1, 1\): {AXIS} places"),
         (
             lambda m: m.frequency_response(VALUES, 1e20, 0.5, drive=v.subs(x, L)),
-            "angular_frequency: allowed are those whose",
+            "angular_frequency: the waves must not be shorter than a millionth",
         ),
         (
             lambda m: m.frequency_response(VALUES, 1e99, 0.5, drive=v.subs(x, L)),
@@ -307,11 +307,11 @@ AXIS = "allowed are a number or one axis of"
         ),
         (
             lambda m: m.mode_shapes(VALUES, 0.5, field=np.zeros(2)),
-            r"field = array\(\[0., 0.\]\): allowed are v\(x, t\)",
+            r"field = array\(\[0., 0.\]\): must be one of v\(x, t\)",
         ),
         (
             lambda m: m.frequency_response(VALUES, 1.0, 0.5, drive=np.zeros(2)),
-            r"drive = array.*: allowed are v\(0, t\)",
+            r"drive = array.*: must be a prescribed motion or one of v\(0, t\)",
         ),
         (
             lambda m: m.frequency_response(VALUES, 1.0, 0.5, drive=v.subs(x, L), kind=np.zeros(2)),
@@ -319,11 +319,11 @@ AXIS = "allowed are a number or one axis of"
         ),
         (
             lambda m: m.response(VALUES, np.zeros(2), 0.0, 0.5),
-            "motion = array.*: allowed is a mapping from functions of t",
+            "motion = array.*: must be a BaseMotion or a mapping from functions of t",
         ),
         (
             lambda m: m.response(VALUES, None, 0.0, 0.5, initial=np.zeros(2)),
-            "initial = array.*: allowed is a mapping from",
+            "initial = array.*: must be a mapping from",
         ),
     ],
 )
