@@ -41,7 +41,8 @@ def sin(x):
     """Sine; nan where abs(x) exceeds 1e6."""
     r, quadrant = _reduced(x)
     value = _cosine(r) if quadrant & 1 else _sine(r)
-    return -value if quadrant & 2 else value
+    value = -value if quadrant & 2 else value
+    return x if x == 0.0 else value  # the sine of -0.0 is -0.0
 
 
 def cos(x):

@@ -56,6 +56,16 @@ class _Printer(SciPyPrinter):
             return f"1.0/{base}"
         return super()._print_Pow(expr, rational)
 
+    def _print_coth(self, expr: sp.coth) -> str:
+        """Write 1/tanh: SymPy's exponentials cancel near 0 and overflow."""
+        return f"(1.0/{self._print(sp.tanh(*expr.args))})"
+
+    def _print_csch(self, expr: sp.csch) -> str:
+        return f"(1.0/{self._print(sp.sinh(*expr.args))})"
+
+    def _print_sech(self, expr: sp.sech) -> str:
+        return f"(1.0/{self._print(sp.cosh(*expr.args))})"
+
     def _print_Piecewise(self, expr: sp.Piecewise) -> str:
         *branches, (last, condition) = expr.args
         text = self._print(last) if condition == True else self._where(last, condition, "nan")  # noqa: E712
