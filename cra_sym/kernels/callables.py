@@ -139,9 +139,10 @@ def kernel(expression: Any, arguments: Any, *, backend: str | None = None) -> Ke
     -----
     The two ways take the same steps but do not round alike. Each elementary function is within 2 units in the last
     place of its exact value on either way, so that for one argument they differ by at most 4 (largest difference seen:
-    3). A sum of products may be rounded once instead of twice (fused multiply-add). An infinite or undefined value
-    is so on both ways; the sign of a zero that comes out of Max, Min, Mod or sign may differ. What a kernel returns for
-    given values depends on nothing but the way taken: neither on the number of lanes nor on that of threads.
+    3). A sum of products may be rounded once instead of twice (fused multiply-add). Both ways give the same infinities
+    and nan, unless the last place decides on overflow; the sign of a zero that comes out of Max, Min, Mod or sign may
+    differ. Machine code for one pattern of arguments gives a lane the same value whatever the number of lanes and
+    threads.
 
     Raises
     ------
