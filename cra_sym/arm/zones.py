@@ -49,7 +49,7 @@ class Zone:
 
 @cache
 def _kernel(name: str) -> Kernel:
-    return derived_kernel(f"cra_sym.arm.boundaries:{name}")
+    return derived_kernel(f"cra_sym.arm.boundaries:{name}", backend="numpy")
 
 
 def _evaluate(name: str, values: dict[str, Any]) -> Any:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import pairwise, starmap
 from threading import Lock
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -25,7 +27,10 @@ That takes about half a second, Numba's import included, so whoever evaluates le
 `_SHORT` characters take longer, and are compiled later.
 """
 _SHORT = 5000  # characters of source; beyond, the time of the compiler grows nearly with their square
-_SPAN = 1 << 16  # lanes that are worth a thread
+_SPAN = 1 << 16  # lanes that a thread takes at a time
+_WORTH = 1e-3  # seconds of work for each of the threads, which cost a tenth of it to start
+_INLINE = {"ceil", "floor", "maximum", "minimum", "nan", "sign", "sqrt", "where"}  # functions that a processor has
+_BRANCH_FREE = {"cos", "cosh", "exp", "log", "sin", "sinh", "tan", "tanh"}  # of `cra_sym.kernels.elementary`
 
 Array = NDArray[np.float64]
 
@@ -79,16 +84,16 @@ def evaluated(
     results = [np.empty(size) for _ in range(loop.outputs)]
     if _in_threads(fill, results, values) and _is_free(kernel):
         again = np.flatnonzero(np.any([np.isnan(r) for r in results], axis=0))
-        rest = [v[again] if isinstance(v, np.ndarray) else np.float64(v) for v in values]
+        rest = [v[again] if isinstance(v, np.ndarray) else np.asarray(v) for v in values]
         for result, value in zip(results, by_numpy(rest, again.shape), strict=True):
             result[again] = value
     return [result.reshape(shape) for result in results]
 
 
 def _compiled(kernel: Generated, along: Sequence[bool], outputs: int) -> Callable[..., int] | None:
-    """Return the loop in machine code, or None if there is no compiler for it."""
+    """Return the loop in machine code, or None if there is no compiler for it, or no gain unless it is asked for."""
     complex_or_special = "1j" in kernel.source or "\nfrom scipy" in f"\n{kernel.source}"
-    if not outputs or complex_or_special or not has_compiler():
+    if not outputs or complex_or_special or not (kernel.backend == "numba" or _is_quick(kernel)) or not has_compiler():
         return None
     import numba
 
@@ -100,6 +105,15 @@ def _compiled(kernel: Generated, along: Sequence[bool], outputs: int) -> Callabl
     except numba.errors.NumbaError:
         return None
     return fill
+
+
+def _is_quick(kernel: Generated) -> bool:
+    """Return whether all that a kernel calls becomes SIMD code: the platform's functions take one number at a time."""
+    head, _, body = kernel.source.partition("\ndef evaluate(")
+    lines = [line.removeprefix("from numpy import ") for line in head.splitlines() if line.startswith("from numpy ")]
+    names = {name for line in lines for name in line.split(", ")}
+    wanted = _INLINE | _BRANCH_FREE if _is_free(kernel) else _INLINE
+    return names <= wanted and "**" not in body and "%" not in body
 
 
 def _is_free(kernel: Generated) -> bool:
@@ -119,27 +133,38 @@ def _in_a_row(array: np.ndarray, shape: tuple[int, ...]) -> Array:
 
 
 def _in_threads(fill: Callable[..., int], results: Sequence[Array], values: Sequence[Array | float]) -> int:
-    """Fill the results and return how many lanes hold a nan."""
+    """Fill the results and return how many lanes hold a nan; threads help if the first part says that it takes long."""
     size = results[0].size
-    if size < 2 * _SPAN:
+    if size <= _SPAN:
         return fill(*results, *values)
-    import numba
+    left = deque(slice(start, start + _SPAN) for start in range(0, size, _SPAN))
 
-    def part(span: slice) -> int:
+    def part() -> int:
+        span = left.popleft()
         return fill(*(r[span] for r in results), *(v[span] if isinstance(v, np.ndarray) else v for v in values))
 
-    first, *others = _spans(size, numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-    if not others:
-        return part(first)
-    with ThreadPoolExecutor(len(others)) as pool:
-        lost = pool.map(part, others)
-        return part(first) + sum(lost)
+    def rest() -> int:
+        lost = 0
+        with suppress(IndexError):  # nothing is left
+            while True:
+                lost += part()
+        return lost
+
+    start = perf_counter()
+    lost = part()
+    worth = int((perf_counter() - start) * len(left) / _WORTH)
+    others = min(worth, len(left), _threads()) - 1
+    if others < 1:
+        return lost + rest()
+    with ThreadPoolExecutor(others) as pool:
+        helping = [pool.submit(rest) for _ in range(others)]
+        return lost + rest() + sum(helper.result() for helper in helping)
 
 
-def _spans(size: int, threads: int) -> list[slice]:
-    parts = max(1, min(threads, size // _SPAN))
-    edges = np.linspace(0, size, parts + 1).astype(int).tolist()
-    return list(starmap(slice, pairwise(edges)))
+def _threads() -> int:
+    import numba
+
+    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 
 
 def _leaves(layout: Any) -> int:

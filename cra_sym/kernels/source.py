@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 from sympy.printing.codeprinter import PrintMethodNotImplementedError
-from sympy.printing.numpy import NumPyPrinter, SciPyPrinter
+from sympy.printing.numpy import SciPyPrinter
 from sympy.printing.precedence import PRECEDENCE
 from sympy.simplify.cse_main import tree_cse
 
@@ -30,8 +30,6 @@ _LONGEST_CHAIN = 64  # integer powers up to this become products
 class _Printer(SciPyPrinter):
     """SciPy's printer with names of our choosing, and conditions as operators and ``where``: they serve scalars too."""
 
-    _print_Pi = NumPyPrinter._print_Pi
-
     def __init__(self, names: Mapping[sp.Symbol, str]) -> None:
         super().__init__({"fully_qualified_modules": False, "allow_unknown_functions": False})
         self.names = names
@@ -40,6 +38,11 @@ class _Printer(SciPyPrinter):
         return self.names[expr]
 
     _print_Dummy = _print_Symbol
+
+    def _print_NumberSymbol(self, expr: sp.NumberSymbol) -> str:
+        return repr(float(expr))  # SciPy's constants would need SciPy
+
+    _print_Pi = _print_Exp1 = _print_GoldenRatio = _print_EulerGamma = _print_NumberSymbol
 
     def _print_Integer(self, expr: sp.Integer) -> str:
         if abs(expr) < 2**31:

@@ -14,7 +14,8 @@ from cra_sym.kernels import has_compiler, kernel
 pytestmark = pytest.mark.skipif(not has_compiler(), reason="Numba is an option")
 
 x, a = sp.symbols("x a")
-BOUND = 2  # units in the last place between the value of an elementary function and the exact one, on either way
+BOUND = 2  # units in the last place between the value of an elementary function and the exact one, on either way,
+WIDER = {sp.tan: 4, sp.tanh: 4, sp.cot: 4, sp.coth: 4}  # but for these of machine code
 ROUNDING = 2.0**-53
 FUNCTIONS = [
     *(sp.sin, sp.cos, sp.exp, sp.tan, sp.asin, sp.acos, sp.atan, sp.sinh, sp.cosh, sp.tanh, sp.asinh, sp.acosh),
@@ -52,13 +53,13 @@ def assert_close(got: np.ndarray, wanted: np.ndarray, units: float) -> None:
 
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda f: f.__name__)
 def test_elementary_functions(function):
-    assert_close(*pair(function(x), points()), 2 * BOUND)
+    assert_close(*pair(function(x), points()), WIDER.get(function, BOUND) + BOUND)
 
 
 @pytest.mark.parametrize("function", RECIPROCALS, ids=lambda f: f.__name__)
 def test_reciprocals(function):
     # A unit in the last place is at most twice as large a share of the reciprocal, which is rounded once more.
-    assert_close(*pair(function(x), points()), 2 * (2 * BOUND + 0.5))
+    assert_close(*pair(function(x), points()), 2 * (WIDER.get(function, BOUND) + BOUND) + 1)
 
 
 @pytest.mark.parametrize("expression", [x**a, sp.atan2(x, a)], ids=str)

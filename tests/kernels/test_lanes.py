@@ -43,6 +43,7 @@ def test_threads_change_nothing(pair, monkeypatch):
     values = np.linspace(0, 30, 1001), np.linspace(0, 1, 1001)[::-1]
     one = pair[0](*values)
     monkeypatch.setattr(lanes, "_SPAN", 100)
+    monkeypatch.setattr(lanes, "_WORTH", 1e-9)
     monkeypatch.setattr("numba.config.NUMBA_NUM_THREADS", 3)
     several = pair[0](*values)
     for name in one:
@@ -129,6 +130,25 @@ def test_long_sources_wait_for_more_lanes(compilations, monkeypatch):
     f(1.0)
     f([1.0])
     assert compilations == [f]
+
+
+@numba_only
+@pytest.mark.parametrize(
+    "slow", [x**a, sp.sqrt(x) ** 3 / sp.atan(x), sp.Mod(x, a), sp.Piecewise((sp.sin(x), x > 1), (a, True)), sp.cbrt(x)]
+)
+def test_what_machine_code_does_no_faster_is_compiled_on_request(compilations, slow):
+    values = np.linspace(1.0, 9.0, 50), np.full(50, 3.0)
+    default, asked = kernel(slow, (x, a)), kernel(slow, (x, a), backend="numba")
+    np.testing.assert_allclose(default(*values), asked(*values), rtol=8 * 2.0**-52)
+    assert [lanes._loops[f.digest, (True, True)].fill is None for f in (default, asked)] == [True, False]
+
+
+@numba_only
+@pytest.mark.parametrize("quick", [sp.pi * sp.Max(x, sp.sqrt(a)) + sp.Abs(x) * sp.log(a), sp.Heaviside(x - a) * sp.E])
+def test_what_becomes_simd_code_is_compiled(compilations, quick):
+    kernel(quick, (x, a))(np.ones(50), 2.0)
+    assert len(compilations) == 1
+    assert all(loop.fill for loop in lanes._loops.values())
 
 
 @numba_only
