@@ -47,7 +47,7 @@ class Zone:
 
 @cache
 def _kernel(name: str) -> Kernel:
-    return derived_kernel(f"cra_sym.mechanics.boundaries:{name}")
+    return derived_kernel(f"cra_sym.mechanics.boundaries:{name}", backend="numpy")
 
 
 def _evaluate(name: str, values: dict[str, Any]) -> Any:

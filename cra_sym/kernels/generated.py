@@ -14,6 +14,10 @@ class Generated(Protocol):
     backend: str | None
 
     @property
+    def digest(self) -> str:
+        """The hash of source, arguments and backend."""
+
+    @property
     def source(self) -> str:
         """The generated module text."""
 

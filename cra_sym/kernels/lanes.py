@@ -1,69 +1,177 @@
-"""A kernel on large arrays: one compiled loop over lanes, shared out among threads."""
+"""A kernel on many lanes: one compiled loop, made once the calls of a kernel add up, and shared out among threads."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise, starmap
+from contextlib import suppress
+from dataclasses import dataclass, field
+from threading import Lock
+from time import perf_counter
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cra_sym.kernels.generated import Generated
 from cra_sym.kernels.specialise import compiled, has_compiler
 
-__all__ = ["COMPILE_FROM", "evaluated", "suits"]
+__all__ = ["COMPILE_FROM", "evaluated"]
 
-COMPILE_FROM = 1 << 22  # lanes in one call from where on loading or compiling machine code costs less than it saves
-_SPAN = 1 << 16  # lanes that are worth a thread
+COMPILE_FROM = 10_000
+"""Lanes of a kernel, added up over the calls of this process, from where on it is compiled, or loaded from the store.
+
+That takes about half a second, Numba's import included, so whoever evaluates less does without. Kernels of more than
+`_SHORT` characters take longer, and are compiled later.
+"""
+_SHORT = 5000  # characters of source; beyond, the time of the compiler grows nearly with their square
+_SPAN = 1 << 16  # lanes that a thread takes at a time
+_WORTH = 1e-3  # seconds of work for each of the threads, which cost a tenth of it to start
+_INLINE = {"ceil", "floor", "maximum", "minimum", "nan", "sign", "sqrt", "where"}  # functions that a processor has
+_BRANCH_FREE = {"cos", "cosh", "exp", "log", "sin", "sinh", "tan", "tanh"}  # of `cra_sym.kernels.elementary`
+
+Array = NDArray[np.float64]
 
 
-def suits(kernel: Generated, arrays: Sequence[np.ndarray], size: int) -> bool:
-    """Return whether the compiled path is wanted, possible, and meant for these values."""
-    if kernel.backend == "numpy" or (kernel.backend is None and size < COMPILE_FROM):
-        return False
-    real = all(a.dtype == np.float64 for a in arrays) and "1j" not in kernel.source
-    return real and size > 0 and "\nfrom scipy" not in f"\n{kernel.source}" and has_compiler()
+@dataclass
+class _Loop:
+    """The loop of a kernel over one pattern of arguments, each an array of lanes or a number."""
+
+    outputs: int
+    lanes: int = 0  # evaluated without it
+    fill: Callable[..., int] | None = None
+    possible: bool = True
+    turn: Lock = field(default_factory=Lock)
+
+    def wanted(self, kernel: Generated, along: Sequence[bool], size: int) -> Callable[..., int] | None:
+        """Return the compiled function if there is one after a call of this size."""
+        with self.turn:
+            if self.fill is None and self.possible:
+                self.lanes += size
+                if kernel.backend == "numba" or self.lanes >= COMPILE_FROM * max(1, len(kernel.source) / _SHORT) ** 2:
+                    self.fill = _compiled(kernel, along, self.outputs)
+                    self.possible = self.fill is not None
+        return self.fill
+
+
+_loops: dict[tuple[str, tuple[bool, ...]], _Loop] = {}  # by digest and pattern: equal kernels share them
 
 
 def evaluated(
-    kernel: Generated, arrays: Sequence[np.ndarray], shape: tuple[int, ...], outputs: int
-) -> list[np.ndarray] | None:
-    """Return the outputs of the kernel, each of the given shape, or None if Numba cannot compile it.
+    kernel: Generated,
+    arrays: Sequence[np.ndarray],
+    shape: tuple[int, ...],
+    by_numpy: Callable[[Sequence[np.ndarray], tuple[int, ...]], list[np.ndarray]],
+) -> list[np.ndarray]:
+    """Return the outputs of the kernel, each of the given shape: by machine code once it pays, until then by NumPy.
 
     Lanes that come out as nan are evaluated again by NumPy, whose sine and cosine have no limit. A kernel that
     compares numbers could hide such a nan: it is compiled with the platform's functions.
     """
-    import numba
-
-    arrays = [a if a.ndim == 0 else np.ascontiguousarray(np.broadcast_to(a, shape)).reshape(-1) for a in arrays]
-    results = [np.empty(math.prod(shape)) for _ in range(outputs)]
-    free = "where(" not in kernel.source
-    template = _template([a.ndim == 1 for a in arrays], outputs, kernel.layout == ())
-    fill = compiled(template, {"evaluate": kernel}, elementary=free).fill
-
-    def part(span: slice) -> int:
-        return fill(*(r[span] for r in results), *(a[span] if a.ndim else float(a) for a in arrays))
-
-    try:
-        part(slice(0))  # compiles
-    except numba.errors.NumbaError:
-        return None
-    spans = _spans(results[0].size, numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-    with ThreadPoolExecutor(len(spans)) as pool:
-        lost = sum(pool.map(part, spans))
-    if lost and free:
+    size = math.prod(shape)
+    if kernel.backend == "numpy" or not size or any(a.dtype != np.float64 for a in arrays):
+        return by_numpy(arrays, shape)
+    along = tuple(a.ndim > 0 for a in arrays)
+    loop = _loops.get((kernel.digest, along))
+    if loop is None:
+        loop = _loops.setdefault((kernel.digest, along), _Loop(_leaves(kernel.layout)))
+    fill = loop.fill or loop.wanted(kernel, along, size)
+    if fill is None:
+        return by_numpy(arrays, shape)
+    values = [_in_a_row(a, shape) if a.ndim else float(a) for a in arrays]
+    results = [np.empty(size) for _ in range(loop.outputs)]
+    if _in_threads(fill, results, values) and _is_free(kernel):
         again = np.flatnonzero(np.any([np.isnan(r) for r in results], axis=0))
-        values = kernel.function(*(a[again] if a.ndim else a for a in arrays))
-        for result, value in zip(results, values if isinstance(values, tuple) else (values,), strict=True):
+        rest = [v[again] if isinstance(v, np.ndarray) else np.asarray(v) for v in values]
+        for result, value in zip(results, by_numpy(rest, again.shape), strict=True):
             result[again] = value
     return [result.reshape(shape) for result in results]
 
 
-def _spans(size: int, threads: int) -> list[slice]:
-    parts = max(1, min(threads, size // _SPAN))
-    edges = np.linspace(0, size, parts + 1).astype(int).tolist()
-    return list(starmap(slice, pairwise(edges)))
+def _compiled(kernel: Generated, along: Sequence[bool], outputs: int) -> Callable[..., int] | None:
+    """Return the loop in machine code, or None if there is no compiler for it, or no gain unless it is asked for."""
+    complex_or_special = "1j" in kernel.source or "\nfrom scipy" in f"\n{kernel.source}"
+    if not outputs or complex_or_special or not (kernel.backend == "numba" or _is_quick(kernel)) or not has_compiler():
+        return None
+    import numba
+
+    template = _template(along, outputs, kernel.layout == ())
+    fill: Callable[..., int] = compiled(template, {"evaluate": kernel}, elementary=_is_free(kernel)).fill
+    none = np.empty(0)
+    try:
+        fill(*[none] * outputs, *(_in_a_row(none, (0,)) if lanes else 0.0 for lanes in along))  # compiles
+    except numba.errors.NumbaError:
+        return None
+    return fill
+
+
+def _is_quick(kernel: Generated) -> bool:
+    """Return whether all that a kernel calls becomes SIMD code: the platform's functions take one number at a time."""
+    head, _, body = kernel.source.partition("\ndef evaluate(")
+    lines = [line.removeprefix("from numpy import ") for line in head.splitlines() if line.startswith("from numpy ")]
+    names = {name for line in lines for name in line.split(", ")}
+    wanted = _INLINE | _BRANCH_FREE if _is_free(kernel) else _INLINE
+    return names <= wanted and "**" not in body and "%" not in body
+
+
+def _is_free(kernel: Generated) -> bool:
+    """Return whether a kernel compares no numbers, so that a nan on its way is a nan at its end."""
+    return "where(" not in kernel.source
+
+
+def _in_a_row(array: np.ndarray, shape: tuple[int, ...]) -> Array:
+    """Return the lanes of an array, contiguous, aligned and read-only: of one type, compiled once."""
+    if array.shape != shape:
+        array = np.broadcast_to(array, shape)
+    if not array.flags.aligned:
+        array = array.copy()
+    row = np.ascontiguousarray(array).reshape(-1)
+    row.flags.writeable = False
+    return row
+
+
+def _in_threads(fill: Callable[..., int], results: Sequence[Array], values: Sequence[Array | float]) -> int:
+    """Fill the results and return how many lanes hold a nan; threads help if the first part says that it takes long."""
+    size = results[0].size
+    if size <= _SPAN:
+        return fill(*results, *values)
+    left = deque(slice(start, start + _SPAN) for start in range(0, size, _SPAN))
+
+    def part() -> int:
+        span = left.popleft()
+        return fill(*(r[span] for r in results), *(v[span] if isinstance(v, np.ndarray) else v for v in values))
+
+    def rest() -> int:
+        lost = 0
+        with suppress(IndexError):  # nothing is left
+            while True:
+                lost += part()
+        return lost
+
+    start = perf_counter()
+    lost = part()
+    worth = int((perf_counter() - start) * len(left) / _WORTH)
+    others = min(worth, len(left), _threads()) - 1
+    if others < 1:
+        return lost + rest()
+    with ThreadPoolExecutor(others) as pool:
+        helping = [pool.submit(rest) for _ in range(others)]
+        return lost + rest() + sum(helper.result() for helper in helping)
+
+
+def _threads() -> int:
+    import numba
+
+    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+
+
+def _leaves(layout: Any) -> int:
+    """Return how many numbers a lane has."""
+    if isinstance(layout, (dict, list)):
+        return sum(map(_leaves, layout.values() if isinstance(layout, dict) else layout))
+    return math.prod(layout)
 
 
 def _template(along: Sequence[bool], outputs: int, single: bool) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 from sympy.printing.codeprinter import PrintMethodNotImplementedError
-from sympy.printing.numpy import NumPyPrinter, SciPyPrinter
+from sympy.printing.numpy import SciPyPrinter
 from sympy.printing.precedence import PRECEDENCE
 from sympy.simplify.cse_main import tree_cse
 
@@ -30,8 +30,6 @@ _LONGEST_CHAIN = 64  # integer powers up to this become products
 class _Printer(SciPyPrinter):
     """SciPy's printer with names of our choosing, and conditions as operators and ``where``: they serve scalars too."""
 
-    _print_Pi = NumPyPrinter._print_Pi
-
     def __init__(self, names: Mapping[sp.Symbol, str]) -> None:
         super().__init__({"fully_qualified_modules": False, "allow_unknown_functions": False})
         self.names = names
@@ -40,6 +38,11 @@ class _Printer(SciPyPrinter):
         return self.names[expr]
 
     _print_Dummy = _print_Symbol
+
+    def _print_NumberSymbol(self, expr: sp.NumberSymbol) -> str:
+        return repr(float(expr))  # SciPy's constants would need SciPy
+
+    _print_Pi = _print_Exp1 = _print_GoldenRatio = _print_EulerGamma = _print_NumberSymbol
 
     def _print_Integer(self, expr: sp.Integer) -> str:
         if abs(expr) < 2**31:
@@ -55,6 +58,16 @@ class _Printer(SciPyPrinter):
         if expr.exp == -1:
             return f"1.0/{base}"
         return super()._print_Pow(expr, rational)
+
+    def _print_coth(self, expr: sp.coth) -> str:
+        """Write 1/tanh: SymPy's exponentials cancel near 0 and overflow."""
+        return f"(1.0/{self._print(sp.tanh(*expr.args))})"
+
+    def _print_csch(self, expr: sp.csch) -> str:
+        return f"(1.0/{self._print(sp.sinh(*expr.args))})"
+
+    def _print_sech(self, expr: sp.sech) -> str:
+        return f"(1.0/{self._print(sp.cosh(*expr.args))})"
 
     def _print_Piecewise(self, expr: sp.Piecewise) -> str:
         *branches, (last, condition) = expr.args

@@ -52,11 +52,11 @@ def compiled(template: str, kernels: Mapping[str, Generated], *, elementary: boo
 
     The template is plain Python without decorators: loops, arithmetic and arrays, as
     :func:`cra_sym.kernels.writer.call` has it. It calls each kernel by its name in ``kernels`` with scalars (the result
-    is a scalar for one expression, else a flat tuple), and may call ``sin``, ``cos`` and ``exp``, the branch-free
-    functions of :mod:`cra_sym.kernels.elementary`. Everything is inlined, so that a simple loop over the lanes of
-    contiguous arrays becomes SIMD code. Functions with a leading underscore are helpers, all others are entries: an
-    entry is compiled, or loaded from the store, when it is first called with new types. It releases the interpreter
-    lock, so threads scale.
+    is a scalar for one expression, else a flat tuple), and may call ``sin``, ``cos``, ``tan``, ``exp``, ``sinh``,
+    ``cosh``, ``tanh`` and ``log``, the branch-free functions of :mod:`cra_sym.kernels.elementary`. Everything is
+    inlined, so that a simple loop over the lanes of contiguous arrays becomes SIMD code. Functions with a leading
+    underscore are helpers, all others are entries: an entry is compiled, or loaded from the store, when it is first
+    called with new types. It releases the interpreter lock, so threads scale.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def compiled(template: str, kernels: Mapping[str, Generated], *, elementary: boo
     kernels : dict of str to Kernel
         The functions the template takes as given.
     elementary : bool
-        Whether sin, cos and exp are the branch-free ones (sin and cos are nan beyond 1e6) or the platform's.
+        Whether these functions are the branch-free ones (sin, cos and tan are nan beyond 1e6) or the platform's.
 
     Returns
     -------

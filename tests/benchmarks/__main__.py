@@ -13,7 +13,7 @@ from typing import Any
 
 import matplotlib
 
-from tests.benchmarks import cold, frequencies, kernel, machine, nodes, responses, stability, targets
+from tests.benchmarks import calls, cold, frequencies, kernel, machine, nodes, responses, stability, targets
 
 RESULTS = Path(__file__).parent / "results"
 
@@ -24,6 +24,7 @@ def run(quick: bool) -> dict[str, Any]:
     report: dict[str, Any] = {"quick": quick, "seed": frequencies.SEED, "machine": machine.description()}
     report["floor"] = machine.floor()
     report["kernel"] = kernel.main(1 << 14 if quick else 1 << 16)["table"]
+    report["calls"] = calls.measured(calls.SIZES[:2] if quick else calls.SIZES)
     report["frequencies"] = [frequencies.measured(size, 3, rounds), frequencies.measured(size // 3, 10, rounds)]
     report["growth"] = frequencies.growth(100_000 if quick else 10_000_000)
     report["cold start"] = cold.measured()
@@ -73,6 +74,7 @@ def table(report: dict[str, Any]) -> str:
     for name, row in report["kernel"].items():
         low, high = row["quartiles ns"]
         lines.append(f"| {name} | {row['median ns']} | {low} to {high} | {row['ratio to C']} |")
+    lines += ["", "## Calls of a kernel, the determinant again", "", *calls.table(report["calls"])]
     lines += ["", "## Cold start, a new process", "", "| what | processor s | wall s |", "| --- | --: | --: |"]
     lines += [f"| {name} | {row['processor s']} | {row['wall s']} |" for name, row in report["cold start"].items()]
     for kind, routes in report["growth"].items():

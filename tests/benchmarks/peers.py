@@ -28,7 +28,7 @@ def measured(groups: tuple[np.ndarray, ...], lam: np.ndarray, elements: int, rou
     job = {"arms": np.column_stack(groups[:3]).tolist(), "modes": lam.shape[1], "elements": elements, "rounds": rounds}
     command = [str(Path(__file__).with_name("peers_job.py"))]
     try:
-        done = _run([_environment(), *command], input=json.dumps(job), text=True)
+        done = _run([environment(PACKAGES), *command], input=json.dumps(job), text=True)
         rows = json.loads(next(line for line in done.stdout.splitlines() if line.startswith("{")))
     except (subprocess.SubprocessError, OSError, StopIteration) as error:
         return {name: {"failed": f"no environment: {type(error).__name__}"} for name in PACKAGES}
@@ -43,11 +43,18 @@ _folder = tempfile.TemporaryDirectory(prefix="peers")  # goes with the process
 
 
 @cache
-def _environment() -> str:
-    """Make the scratch environment and return its Python."""
-    _run([sys.executable, "-m", "venv", _folder.name])
-    python = str(Path(_folder.name) / ("Scripts" if sys.platform == "win32" else "bin") / "python")
-    _run([python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:", *PACKAGES])
+def environment(packages: tuple[str, ...]) -> str:
+    """Make a scratch environment with these packages and return its Python.
+
+    Raises
+    ------
+    subprocess.SubprocessError, OSError
+        If that is not possible, without a registry for instance.
+    """
+    folder = Path(_folder.name) / packages[0]
+    _run([sys.executable, "-m", "venv", str(folder)])
+    python = str(folder / ("Scripts" if sys.platform == "win32" else "bin") / "python")
+    _run([python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:", *packages])
     return python
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from tests.benchmarks.calls import KERNEL, LEAST_LANES, PEERS
 from tests.benchmarks.frequencies import FREQUENCIES, LOOP
 
 ONE, NUMPY, FIND = "cra_sym, compiled, 1 thread", "cra_sym, NumPy", "scipy elementwise.find_root"
@@ -40,6 +41,15 @@ def rows(report: dict[str, Any]) -> list[dict[str, Any]]:
     kernel = report["kernel"]
     if "Numba, kernel" in kernel and "C, branch-free functions" in kernel:
         add("one evaluation over C", kernel["Numba, kernel"]["ratio to C"], 1.6, least=False)
+    for case in report["calls"]["runs"]:
+        for number, routes in case["lanes"].items():
+            if int(number) >= LEAST_LANES:
+                others = [row["median"] for name, row in routes.items() if name in PEERS]
+                ratio_to_best = routes[KERNEL]["median"] / min(others) if others else None
+                add(
+                    f"a kernel's call over its best peer, {number} lanes, {case['name']}", ratio_to_best, 1, least=False
+                )
+        add(f"overhead of a compiled call, us, {case['name']}", case["overhead us"], 30, least=False)
     cold = {key: row["wall s"] for key, row in report["cold start"].items()}
     add("import, s more than NumPy's", cold["import cra_sym and numpy"] - cold["import numpy"], 0.3, least=False)
     for key, seconds in cold.items():

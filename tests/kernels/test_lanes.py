@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -42,6 +43,7 @@ def test_threads_change_nothing(pair, monkeypatch):
     values = np.linspace(0, 30, 1001), np.linspace(0, 1, 1001)[::-1]
     one = pair[0](*values)
     monkeypatch.setattr(lanes, "_SPAN", 100)
+    monkeypatch.setattr(lanes, "_WORTH", 1e-9)
     monkeypatch.setattr("numba.config.NUMBA_NUM_THREADS", 3)
     several = pair[0](*values)
     for name in one:
@@ -84,14 +86,125 @@ def test_what_numba_refuses_goes_to_numpy():
     np.testing.assert_array_equal(f([2.0, 1.0]), [1.0, 2.0])
 
 
-@numba_only
-def test_only_large_inputs_are_compiled(monkeypatch):
-    f, used = kernel(x + 1, (x,)), []
-    monkeypatch.setattr(lanes, "evaluated", lambda kernel, arrays, shape, n: used.append(shape) or [np.zeros(shape)])
+@pytest.fixture
+def compilations(monkeypatch):
+    """Kernels in the order in which they were compiled, by a process that knows none yet and compiles early."""
+    found, compile = [], lanes._compiled
+    monkeypatch.setattr(lanes, "_loops", {})
     monkeypatch.setattr(lanes, "COMPILE_FROM", 10)
-    assert f(np.ones(9))[0] == 2 and not used
-    f(np.ones(10))
-    assert used == [(10,)]
+    monkeypatch.setattr(lanes, "_compiled", lambda kernel, *rest: found.append(kernel) or compile(kernel, *rest))
+    return found
+
+
+@numba_only
+def test_the_lanes_of_all_calls_add_up(compilations):
+    counts = []
+    for size in (4, 5, 1, 1, 50):
+        np.testing.assert_array_equal(kernel(x + 1, (x,))(np.ones(size)), 2.0)  # equal kernels, made anew
+        counts.append(len(compilations))
+    assert counts == [0, 0, 1, 1, 1]
+
+
+@numba_only
+def test_what_stays_below_the_number_of_lanes_is_never_compiled(compilations):
+    f = kernel(x * a, (x, a))
+    f(np.ones(9), np.ones(9))  # arrays and numbers in this order: a pattern of its own
+    f(np.ones(9), 1.0)
+    f(1.0, np.ones(9))
+    for _ in range(9):
+        f(1.0, 1.0)
+    f(np.ones(99), 1j)
+    f(np.ones(0), np.ones(0))
+    kernel(x * a, (x, a), backend="numpy")(np.ones(99), np.ones(99))
+    assert not compilations
+    f(1.0, 1.0)
+    assert compilations == [f]
+
+
+@numba_only
+def test_long_sources_wait_for_more_lanes(compilations, monkeypatch):
+    f = kernel(x + 2, (x,))
+    monkeypatch.setattr(lanes, "_SHORT", len(f.source) / 2)
+    f(np.ones(39))
+    assert not compilations
+    f(1.0)
+    f([1.0])
+    assert compilations == [f]
+
+
+@numba_only
+@pytest.mark.parametrize(
+    "slow", [x**a, sp.sqrt(x) ** 3 / sp.atan(x), sp.Mod(x, a), sp.Piecewise((sp.sin(x), x > 1), (a, True)), sp.cbrt(x)]
+)
+def test_what_machine_code_does_no_faster_is_compiled_on_request(compilations, slow):
+    values = np.linspace(1.0, 9.0, 50), np.full(50, 3.0)
+    default, asked = kernel(slow, (x, a)), kernel(slow, (x, a), backend="numba")
+    np.testing.assert_allclose(default(*values), asked(*values), rtol=8 * 2.0**-52)
+    assert [lanes._loops[f.digest, (True, True)].fill is None for f in (default, asked)] == [True, False]
+
+
+@numba_only
+@pytest.mark.parametrize("quick", [sp.pi * sp.Max(x, sp.sqrt(a)) + sp.Abs(x) * sp.log(a), sp.Heaviside(x - a) * sp.E])
+def test_what_becomes_simd_code_is_compiled(compilations, quick):
+    kernel(quick, (x, a))(np.ones(50), 2.0)
+    assert len(compilations) == 1
+    assert all(loop.fill for loop in lanes._loops.values())
+
+
+@numba_only
+def test_the_second_call_with_many_lanes_is_machine_code(monkeypatch):
+    f, values = kernel(sp.cos(x) * sp.exp(-a), (x, a)), np.linspace(0.0, 9.0, lanes.COMPILE_FROM)
+    first = f(values, values)
+    monkeypatch.setattr(Kernel, "_by_numpy", None)
+    np.testing.assert_array_equal(f(values, values), first)
+
+
+@numba_only
+def test_threads_that_call_at_once_compile_once(compilations):
+    f, values = kernel(sp.sin(x) / (x + 3), (x,)), np.linspace(0.0, 9.0, 7)
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            found = list(pool.map(lambda _: f(values), range(40)))
+    finally:
+        sys.setswitchinterval(interval)
+    assert compilations == [f]
+    np.testing.assert_allclose(found, np.broadcast_to(np.sin(values) / (values + 3), (40, 7)), rtol=4 * 2.0**-52)
+
+
+@numba_only
+def test_inputs_of_any_kind_share_one_loop(compilations):
+    f, values = kernel(2 * x, (x,), backend="numba"), np.arange(8.0)
+    frozen, bytes_ = values.copy(), b"." + values.tobytes()
+    frozen.flags.writeable = False
+    for given in (values, frozen, values[::2], values[::-1], np.frombuffer(bytes_, offset=1), values.astype(int)):
+        np.testing.assert_array_equal(f(given), 2 * given)
+    assert compilations == [f]
+    assert values.flags.writeable
+    (loop,) = lanes._loops.values()
+    assert len(loop.fill.signatures) == 1
+
+
+@numba_only
+def test_many_lost_lanes_are_left_to_numpy_with_numbers_beside_them():
+    f = [kernel((sp.sin(x) * a, sp.cos(x)), (x, a), backend=backend) for backend in ("numba", "numpy")]
+    values, state = np.linspace(9e5, 3e6, 20_000), np.geterr()
+    np.testing.assert_allclose(f[0](values, 2.0), f[1](values, 2.0), rtol=4 * 2.0**-52)
+    assert np.geterr() == state
+
+
+def test_a_few_small_calls_load_no_compiler():
+    code = (
+        "import sys; import numpy as np, sympy as sp\n"
+        "from cra_sym.kernels import kernel\n"
+        "x = sp.Symbol('x')\n"
+        "for _ in range(99):\n"
+        "    kernel(sp.sin(x), (x,))(np.ones(100)), kernel(sp.sin(x), (x,))(1.0)\n"
+        "print('numba' in sys.modules)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.split() == ["False"]
 
 
 def test_without_numba_everything_runs():
