@@ -13,6 +13,7 @@ from cra_sym.checks import mapping, shown
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics.jets import END_NAMES, Jet
 from cra_sym.mechanics.weak import Bilinear, WeakForm, weak_form
+from cra_sym.model.exact import BallProblem, exact_kernel
 from cra_sym.model.forms import form_of, load_of
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.projection import Form, Load
@@ -322,3 +323,37 @@ def fluctuation(model: Model, name: str) -> str:
 def conservative(model: Model) -> bool:
     """Return whether all forces have a potential and none is of first order in time."""
     return not model.state_form.damped and not asymmetry(model.state_form)
+
+
+def ball_problem(model: Model) -> BallProblem:
+    """Return the uniform conservative problem in a form that is exact for any kind of number.
+
+    Raises
+    ------
+    ValueError
+        If a coefficient varies along x.
+    """
+    form = model.conservative
+    if not form.uniform:
+        raise ValueError("certification needs coefficients that are constant along x")
+    weak = weak_form(model.equations.variation)
+    kinds = {"stiffness": 0, "mass": 2}
+    parts = {kind: (_power(weak.inside, power), _power(weak.ends, power)) for kind, power in kinds.items()}
+    pairs = [pair for pair in dict.fromkeys(p for inside, _ in parts.values() for p in inside)]
+    section, highest, _ = weak.fields()
+    orders = {jet.unknown: jet.space for jet in highest}
+    fields = [pair for pair in pairs if all(jet.unknown in orders for jet in pair)]
+    entries = [parts[kind][0].get(pair, {}).get(power, S.Zero) for pair in fields for kind, power in kinds.items()]
+    left, right = model.equations.domain
+    z = form.parameter
+    return BallProblem(
+        len(form.displacements),
+        len(form.coordinates),
+        tuple(((p.unknown, q.unknown), (p.space, q.space)) for p, q in fields),
+        tuple(orders.values()),
+        exact_kernel(list(form.system), (z, *model.symbols)),
+        exact_kernel(list(form.boundary), (z, *model.symbols)),
+        exact_kernel([right - left, left], model.symbols),
+        exact_kernel(list(form.free), model.symbols),
+        exact_kernel(entries, model.symbols),
+    )
