@@ -261,7 +261,9 @@ class Model:
             found = refine(problem, -(guesses[rows] ** 2) if squared else guesses[rows])
             if np.isnan(found).any():
                 raise ArithmeticError("eigenvalues: the refinement of a Ritz value did not settle; ask for fewer modes")
-            found = np.sqrt(-found) if squared else found
+            if squared:
+                found = np.sqrt(-found)
+                found = np.where((found * guesses[rows].conj()).real < 0.0, -found, found)
             roots[rows] = np.take_along_axis(found, np.argsort(np.abs(found), axis=1, kind="stable"), axis=1)
         return roots.reshape(*given.shape, modes)
 
