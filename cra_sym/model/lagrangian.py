@@ -257,13 +257,9 @@ class Model:
         guesses = self.ritz(2 * modes + 10).eigenvalues(values, modes, oscillating=oscillating).reshape(-1, modes)
         roots = np.empty_like(guesses)
         for rows, _, problem in self._damped.problems(given):
-            squared = not self.state_form.damped
-            found = refine(problem, -(guesses[rows] ** 2) if squared else guesses[rows])
+            found = refine(problem, guesses[rows], squared=not self.state_form.damped)
             if np.isnan(found).any():
                 raise ArithmeticError("eigenvalues: the refinement of a Ritz value did not settle; ask for fewer modes")
-            if squared:
-                found = np.sqrt(-found)
-                found = np.where((found * guesses[rows].conj()).real < 0.0, -found, found)
             roots[rows] = np.take_along_axis(found, np.argsort(np.abs(found), axis=1, kind="stable"), axis=1)
         return roots.reshape(*given.shape, modes)
 
