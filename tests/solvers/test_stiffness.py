@@ -177,7 +177,7 @@ def test_timoshenko_across_the_cut_off(thickness):
 
 @pytest.mark.parametrize(("bending", "tension", "rtol"), [(1e-6, 1.0, 1e-12), (1e-3, 1.0, 1e-13), (1.0, -9.8, 2e-12)])
 def test_axial_force(bending, tension, rtol):
-    """Some eps times sqrt(tension / bending), 1000 or 32 boundary layers long; times pi^2 / (pi^2 - 9.8) in compression.
+    """Some eps times sqrt(tension / bending), 1000 or 32 boundary layers; times pi^2 / (pi^2 - 9.8) in compression.
 
     Near buckling the first square is what 142 times as large ones leave: measured 2 to 11 times eps of these.
     """
