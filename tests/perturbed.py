@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Callable
 
 import numpy as np
-from sympy import Add, Expr, Rational
+from sympy import Add, Expr, Rational, S
 
 import cra_sym as cra
 from cra_sym.arm import lagrangian
@@ -35,7 +35,7 @@ def scaled(end: int, marker: Expr) -> Callable[[ArmLagrangian], ArmLagrangian]:
     return change
 
 
-def added(density: Expr = Rational(0), right: Expr = Rational(0)) -> Callable[[ArmLagrangian], ArmLagrangian]:
+def added(density: Expr = S.Zero, right: Expr = S.Zero) -> Callable[[ArmLagrangian], ArmLagrangian]:
     """Return a change that adds terms the paper does not have."""
     return lambda pieces: ArmLagrangian(pieces.density + density, pieces.left, pieces.right + right)
 

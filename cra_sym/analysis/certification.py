@@ -64,8 +64,8 @@ def certify(system: System, modes: int = 3) -> Certificate:
     Raises
     ------
     TypeError, ValueError
-        If ``system`` is not a :class:`System`, ``modes`` not an integer from 1 to 1000, or the coefficients of the model
-        vary along x or its forces are not conservative.
+        If ``system`` is not a :class:`System`, ``modes`` not an integer from 1 to 1000, or the coefficients of the
+        model vary along x or its forces are not conservative.
     MissingExtraError
         If python-flint is not installed (extra ``certify``).
     """
@@ -159,7 +159,7 @@ def _free_columns(entries: Sequence[Any], size: int, fixed: Sequence[int]) -> li
 
 
 def _rigid_motions(problem: BallProblem, values: Sequence[float], size: int, fixed: Sequence[int]) -> int:
-    """Return the number of rigid-body motions: of polynomials of first degree without strain, by exact rational rank."""
+    """Return the number of rigid-body motions: polynomials of first degree without strain, by rank in fractions."""
 
     def evaluated(kernel: Any, *first: Any) -> list[Fraction]:
         return list(kernel(Fraction, Fraction(0), *first, *map(Fraction, values)))

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
 from cra_sym.checks import choice, instance, one_axis, shown
-from cra_sym.model.routes import as_columns
 from cra_sym.model.spatial import SpatialProblem, shares
 from cra_sym.model.system import System
+from cra_sym.model.values import flat_columns
 from cra_sym.solvers.driven import driven_states
 
 if TYPE_CHECKING:
@@ -184,7 +184,7 @@ class _Undamped:
     def __call__(self, frequency: NDArray[Any]) -> Complex:
         shape = self._system.shape
         frequency = np.broadcast_to(frequency, (*shape, frequency.shape[-1])).reshape(-1, frequency.shape[-1])
-        columns = as_columns(self._system.parameters, shape)
+        columns = flat_columns(self._system.parameters, shape)
         count = 1 if self._places is None else self._places.size
         found = np.empty((len(frequency), count, frequency.shape[-1]), dtype=complex)
         for rows, left, problem in self._problem.problems(columns):

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.model.excitations import Fluctuation
-from cra_sym.model.routes import as_columns
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.system import System
+from cra_sym.model.values import flat_columns
 from cra_sym.solvers.static_moments import static_moments
 
 __all__ = ["moments_of_all_modes", "static_terms"]
@@ -32,7 +32,7 @@ def moments_of_all_modes(system: System, excitation: Fluctuation) -> tuple[Array
     problem: SpatialProblem = system.numerics("spatial")
     ends = [system.numerics("stiffnesses")[name] for name in names]
     places = [place if end == 0 else problem.displacements + problem.coordinates + place for end, place in ends]
-    columns = as_columns(system.parameters, system.shape)
+    columns = flat_columns(system.parameters, system.shape)
     second, fourth = np.zeros((2, columns.shape[1], len(names), len(names)))
     for rows, _, some in problem.problems(columns):
         second[rows], fourth[rows] = static_moments(some, places)

@@ -340,7 +340,7 @@ def ball_problem(model: Model) -> BallProblem:
     kinds = {"stiffness": 0, "mass": 2}
     parts = {kind: (_power(weak.inside, power), _power(weak.ends, power)) for kind, power in kinds.items()}
     pairs = [pair for pair in dict.fromkeys(p for inside, _ in parts.values() for p in inside)]
-    section, highest, _ = weak.fields()
+    _, highest, _ = weak.fields()
     orders = {jet.unknown: jet.space for jet in highest}
     fields = [pair for pair in pairs if all(jet.unknown in orders for jet in pair)]
     entries = [parts[kind][0].get(pair, {}).get(power, S.Zero) for pair in fields for kind, power in kinds.items()]

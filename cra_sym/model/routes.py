@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.model.spatial import SpatialProblem
+from cra_sym.model.values import flat_columns
 from cra_sym.solvers.eigenvalues import lowest
 from cra_sym.solvers.shapes import mode_states
 from cra_sym.solvers.stiffness import DynamicStiffness
@@ -77,7 +78,7 @@ class GeneralRoute:
 
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:
         """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""
-        columns = as_columns(values, shape)
+        columns = flat_columns(values, shape)
         squares = np.empty((columns.shape[1], modes))
         for rows, _, problem in self.spatial.problems(columns):
             squares[rows] = lowest(problem, modes)
@@ -85,15 +86,7 @@ class GeneralRoute:
 
     def modes(self, values: Values, shape: tuple[int, ...], omega: Array) -> GeneralModes:
         """Return the modes of all the first frequencies."""
-        return GeneralModes(omega, self.spatial, as_columns(values, shape))
-
-
-def as_columns(values: Values, shape: tuple[int, ...]) -> Array:
-    """Return parameters as flat columns, shape (parameters, sets)."""
-    columns = np.empty((len(values), int(np.prod(shape))))
-    for column, value in zip(columns, values, strict=True):
-        column[:] = np.broadcast_to(value, shape).ravel()
-    return columns
+        return GeneralModes(omega, self.spatial, flat_columns(values, shape))
 
 
 @dataclass(frozen=True, eq=False)

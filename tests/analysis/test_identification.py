@@ -30,7 +30,7 @@ def test_exact_frequencies_give_the_joint_back(k_t, k_r, length, monkeypatch):
     assert (estimate.k_t, estimate.k_r) == (pytest.approx(k_t, rel=1e-9), pytest.approx(k_r, rel=1e-9))
     assert estimate.identifiable and np.abs(estimate.residuals).max() < 1e-6
     deviation = [number_after(f"{name} to", estimate.message) for name in ("k_t", "k_r")]
-    assert deviation == pytest.approx(estimate.log_standard_deviation, rel=0.06)
+    assert deviation == pytest.approx(estimate.log_standard_deviation, rel=0.06)  # printed with two digits
     assert len(steps) < 30
 
 
@@ -67,6 +67,7 @@ def test_the_covariance_is_that_of_repeated_measurements():
     estimates = [cra.identify_joint(NOMINAL, exact + sigma * rng.normal(size=4), sigma) for _ in range(24)]
     found = np.array([(e.k_t, e.k_r) for e in estimates])
     covariance = cra.identify_joint(NOMINAL, exact, sigma).covariance
+    # of 24: a deviation scatters by 1 / sqrt(48), the mean of chi-squared with 2 freedoms by sqrt(4 / 24) of 2
     assert np.std(found, axis=0) == pytest.approx(np.sqrt(np.diag(covariance)), rel=0.4)
     assert np.mean([np.sum(e.residuals**2) for e in estimates]) == pytest.approx(2.0, rel=0.6)  # 4 data, 2 unknowns
 

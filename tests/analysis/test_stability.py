@@ -30,7 +30,7 @@ JOINT, AXIAL = cra.JointStiffness(), cra.AxialBase(amplitude=0.01)
 
 def test_known_numbers_of_a_soft_joint():
     modal = cra.modal_parameters(SOFT)
-    assert np.allclose(modal.omega / UNIT, [3.4744, 20.8543, 52.8408], rtol=1e-5)
+    assert np.allclose(modal.omega / UNIT, [3.4744, 20.8543, 52.8408], rtol=0, atol=5e-5)  # half of the last digit
     assert np.allclose(np.diag(modal.stiffness_translation) / UNIT**2, [0.09056, 42.163, 856.99], rtol=1e-4)
     centre = 2 * modal.omega[1]
     first = np.array(cra.stability_boundary(SOFT, JOINT, 0.05, (2, 2)))
@@ -171,7 +171,7 @@ def test_the_zone_is_continuous_where_a_spring_vanishes(free, fluctuating):
     arms = [SOFT.replace(**{"k_t": 40.0, "k_r": 3.0, "m_e": 0.05, free: value}) for value in (0.0, 1e-9)]
     for resonance in ((2, 2), (2, 3)):
         none, hardly = (np.array(cra.stability_boundary(arm, fluctuating, 0.01, resonance, order=2)) for arm in arms)
-        assert none == pytest.approx(hardly, rel=1e-10)
+        assert none == pytest.approx(hardly, rel=1e-10)  # a spring of 1e-9 beside others of 3 and 40
     varpi = 2.0 * cra.modal_parameters(arms[0]).omega[1]
     rates = [cra.growth_rate(arm, fluctuating, varpi, 0.3, 2, residual=True) for arm in arms]
     assert rates[0] > 0.1 and rates[0] == pytest.approx(rates[1], rel=1e-6)
