@@ -34,7 +34,8 @@ class Certificate:
         Hz, rounded outward: the natural frequency of the system, its parameters taken as the exact values of their
         floating-point numbers, lies in between. Both are 0 for a rigid-body mode, nan where nothing is proved.
     complete : ndarray of bool, shape (...)
-        Whether every enclosure of the system is proved to hold exactly one frequency, with none between or below them.
+        Whether every enclosure of the system is proved to hold its frequency, with none between or below them. Equal
+        frequencies share an enclosure.
     """
 
     lower: NDArray[np.float64]
