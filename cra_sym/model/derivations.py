@@ -262,13 +262,23 @@ def sizes(model: Model) -> tuple[int, int]:
 
 def stiffnesses(model: Model) -> dict[str, tuple[int, int]]:
     """Return the stiffnesses of an end that hold one of its displacements, with that end (0 or 1) and displacement."""
+    return _end_parameters(model, S.One)
+
+
+def inertias(model: Model) -> dict[str, tuple[int, int]]:
+    """Return the inertias of an end that move with one of its displacements, with that end (0 or 1) and displacement."""
+    return _end_parameters(model, -model.conservative.parameter)
+
+
+def _end_parameters(model: Model, factor: Expr) -> dict[str, tuple[int, int]]:
+    """Return the parameters that add themselves times a factor to one displacement of an end, and nothing else."""
     form = model.conservative
     n, m = len(form.displacements), len(form.coordinates)
     inside = form.system.free_symbols | form.length.free_symbols | form.free.free_symbols
     found = {}
     for symbol in model.symbols:
         slope = form.boundary.diff(symbol)
-        places = [k for k in range(2 * n + m) if slope[k, k] == 1 and not n <= k < n + m]
+        places = [k for k in range(2 * n + m) if slope[k, k] == factor and not n <= k < n + m]
         if symbol not in inside and len(places) == 1 and sum(entry != 0 for entry in slope) == 1:
             found[symbol.name] = (0, places[0]) if places[0] < n else (1, places[0] - n - m)
     return found
