@@ -24,14 +24,14 @@ _DERIVING = ("symbols.py", "checks.py", "mechanics", "model", "kernels", "arm", 
 class _DerivedKernel(Kernel):
     """A kernel that knows where it is derived, and finds its source on first use."""
 
-    def __init__(self, path: str, backend: str | None) -> None:
+    def __init__(self, path: str, given: tuple[Any, ...], backend: str | None) -> None:
         super().__init__("", (), backend)
-        self.path = path
+        self.path, self.given = path, given
 
     @property
     def source(self) -> str:
         if not self._source:
-            self._source, self._arguments = _source_of(self.path)
+            self._source, self._arguments = _source_of(self.path, self.given)
         return self._source
 
     @property
@@ -39,10 +39,10 @@ class _DerivedKernel(Kernel):
         return self._arguments if self.source else ()
 
     def __repr__(self) -> str:
-        return f"<Kernel of {self.path}>"
+        return f"<Kernel of {_called(self.path, self.given)}>"
 
 
-def derived_kernel(path: str, *, backend: str | None = None) -> Kernel:
+def derived_kernel(path: str, *arguments: Any, backend: str | None = None) -> Kernel:
     """Return the kernel of a derivation of this package, to be derived when it is first needed.
 
     Creating it costs nothing. On first use its source comes from the user's store, or else from the derivation, whose
@@ -52,29 +52,42 @@ def derived_kernel(path: str, *, backend: str | None = None) -> Kernel:
     Parameters
     ----------
     path : str
-        ``"cra_sym.room.module:function"``. The function takes nothing and returns ``(expression, arguments)``
+        ``"cra_sym.room.module:function"``. The function takes the arguments and returns ``(expression, arguments)``
         as :func:`cra_sym.kernels.kernel` wants them.
+    arguments : literals
+        Numbers, texts and tuples of them, which are a part of the key.
     backend : {None, 'numpy', 'numba'}
         As in :func:`cra_sym.kernels.kernel`.
 
     Raises
     ------
     ValueError
-        If the path is not of that form or leads out of the package.
+        If the path is not of that form or leads out of the package, or an argument is not a literal.
     """
     module, colon, function = path.partition(":") if isinstance(path, str) else ("", "", "")
     if not (colon and function.isidentifier() and module.startswith("cra_sym.")):
         raise ValueError(f"path = {shown(path)}: allowed is 'cra_sym.room.module:function'")
-    return _DerivedKernel(path, backend)
+    if not _are_literals(arguments):
+        raise ValueError(f"arguments = {shown(arguments)}: must be numbers, texts and tuples of them")
+    return _DerivedKernel(path, arguments, backend)
+
+
+def _are_literals(value: Any) -> bool:
+    """Return whether the text of a value says all about it."""
+    return all(map(_are_literals, value)) if type(value) is tuple else type(value) in (str, int, float, bool)
+
+
+def _called(path: str, given: tuple[Any, ...]) -> str:
+    return f"{path}({', '.join(map(repr, given))})" if given else path
 
 
 @cache
-def _source_of(path: str) -> tuple[str, tuple[str, ...]]:
+def _source_of(path: str, given: tuple[Any, ...] = ()) -> tuple[str, tuple[str, ...]]:
     storable = _sources_are_what_runs()
-    key = f"{path} {fingerprint()}"
+    key = f"{_called(path, given)} {fingerprint()}"
     content = store.load(key) if storable else None
     if content is None:
-        made = _derived(path)
+        made = _derived(path, given)
         content = json.dumps([made.source, made.arguments]).encode()
         if storable and _sources_are_what_runs():
             store.save(key, content)
@@ -82,12 +95,12 @@ def _source_of(path: str) -> tuple[str, tuple[str, ...]]:
     return source, tuple(arguments)
 
 
-def _derived(path: str) -> Kernel:
+def _derived(path: str, given: tuple[Any, ...]) -> Kernel:
     from tqdm import tqdm
 
     module, _, function = path.partition(":")
     with tqdm(total=0, desc=f"deriving {path}, once", bar_format="{desc}", leave=False, disable=None):
-        return kernel(*getattr(import_module(module), function)())
+        return kernel(*getattr(import_module(module), function)(*given))
 
 
 def _sources() -> list[Path]:
