@@ -8,7 +8,7 @@ from importlib.resources import files
 
 __all__ = ["template"]
 
-_MARK = re.compile(r"__([A-Z]+)__")
+_MARK = re.compile(r"__([A-Z]+(?:_[A-Z]+)*)__")
 
 
 def template(module: str, marks: Mapping[str, object]) -> str:

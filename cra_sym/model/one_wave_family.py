@@ -11,6 +11,7 @@ import numpy as np
 
 from cra_sym.kernels import Kernel, compiled, derived_kernel, template
 from cra_sym.kernels.parts import flattened, in_parts, wants_compiler
+from cra_sym.model.one_wave_templates import MODAL, SPECTRUM, modal_marks, spectrum_marks
 from cra_sym.solvers.one_wave import OneWaveCharacteristic, Structure, parameters, wave_number
 from cra_sym.solvers.one_wave_shapes import Table, fill, integral, rate_rows, shape
 from cra_sym.solvers.spectrum import spectrum
@@ -87,7 +88,7 @@ class Family:
     def fill_compiled(self, result: np.ndarray, *groups: np.ndarray) -> int:
         """Fill in a part of the result; return the number of evaluations of the determinant."""
         evaluations = np.zeros(1, dtype=np.int64)
-        if not self._spectrum.frequency_parameters(result, evaluations, *groups):
+        if not self.compiled_spectrum.frequency_parameters(result, evaluations, *groups):
             raise ArithmeticError("a zero was not reached")
         return int(evaluations[0])
 
@@ -109,11 +110,30 @@ class Family:
 
     def spectrum_parts(self) -> tuple[str, dict[str, Kernel]]:
         """Return the template of the compiled spectrum and the functions it takes."""
-        return self._spectrum_parts
+        return self._spectrum_text, {name: self.functions[name] for name in SPECTRUM}
 
     def modal_parts(self) -> tuple[str, dict[str, Kernel]]:
         """Return the template of the compiled modes and the functions it takes."""
-        return self._modal_parts
+        names = (*MODAL, "tip_rows") if self.layout.n == 2 else MODAL
+        return self._modal_text, {name: self.functions[name] for name in names}
+
+    @cached_property
+    def _spectrum_text(self) -> str:
+        return template("cra_sym.solvers.spectrum_lanes", spectrum_marks(self.layout, self.functions))
+
+    @cached_property
+    def _modal_text(self) -> str:
+        return template("cra_sym.solvers.modal_lanes", modal_marks(self.layout, self.functions))
+
+    @cached_property
+    def compiled_spectrum(self) -> Any:
+        """The template of the spectrum as machine code."""
+        return compiled(*self.spectrum_parts())
+
+    @cached_property
+    def compiled_modes(self) -> Any:
+        """The template of the modes as machine code."""
+        return compiled(*self.modal_parts())
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +173,7 @@ class DimensionlessModes:
         by_lane = np.ones((1, shape[0])) if units is None else _columns(units, self.lam.shape[:-1])
         by_lane = np.ascontiguousarray(by_lane.reshape(shape[0], -1).T)
         table = np.empty((shape[0], *lam.shape))
-        fill_compiled = self.family._modal.fill
+        fill_compiled = self.family.compiled_modes.fill
 
         def fill_part(part: slice) -> None:
             fill_compiled(table, rows.start, by_lane, lam, *self.groups, part.start, part.stop)
@@ -170,7 +190,8 @@ class DimensionlessModes:
         def fill_part(part: slice) -> None:
             roots = slice(part.start * modes, part.stop * modes)
             groups = [x[part] for x in self.groups]
-            given = np.repeat(parameters(layout, groups).reshape(len(layout.parameters), -1), modes, axis=1)
+            by_lane = parameters(layout, groups).reshape(len(layout.parameters), part.stop - part.start)
+            given = np.repeat(by_lane, modes, axis=1)
             inertias = [np.repeat(groups[i], modes) for i in layout.inertias]
             fill(table[:, roots], lam[roots], modes, layout, self.family.functions, given, inertias)
 
