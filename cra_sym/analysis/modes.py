@@ -10,9 +10,8 @@ import numpy as np
 
 from cra_sym import checks
 from cra_sym.arm.parameters import Arm
-from cra_sym.model import spectrum
-from cra_sym.model.close_pairs import resolve_close_pairs
-from cra_sym.model.modal import ENDS, STRAIN, Modes, modes_of
+from cra_sym.arm.route import arm_route, route_values
+from cra_sym.model.one_wave import OneWaveModes
 
 __all__ = [
     "ModalParameters",
@@ -24,7 +23,6 @@ __all__ = [
 ]
 
 MOST_MODES = 1000
-_SOFTEST = 1e-150  # the product of two stiffnesses of this size is a number yet
 
 
 def frequency_parameters(kappa_t: Any, kappa_r: Any, mu: Any, iota: Any = 0.0, modes: int = 3) -> np.ndarray:
@@ -64,13 +62,8 @@ def frequency_parameters(kappa_t: Any, kappa_r: Any, mu: Any, iota: Any = 0.0, m
         "mu": checks.real_array("mu", mu, low=0.0),
         "iota": checks.real_array("iota", iota, low=0.0),
     }
-    for name in ("kappa_t", "kappa_r"):
-        arrays[name] = np.where(arrays[name] < _SOFTEST, 0.0, arrays[name])
     shape = checks.broadcastable(**arrays)
-    groups = [np.broadcast_to(array, shape) for array in arrays.values()]
-    lam = spectrum.frequency_parameters(*groups, modes=modes)
-    resolve_close_pairs(lam, *groups)
-    return lam
+    return arm_route().parameters_of_groups(list(arrays.values()), shape, modes)
 
 
 def natural_frequencies(arm: Arm, modes: int = 3) -> np.ndarray:
@@ -97,7 +90,11 @@ def natural_frequencies(arm: Arm, modes: int = 3) -> np.ndarray:
     >>> print(natural_frequencies(Arm.nominal().replace(m_e=0)).round(3))
     [ 2.448 15.339 42.95 ]
     """
-    return _frequencies(arm, _lambda(arm, modes))
+    checks.instance("arm", arm, Arm)
+    modes = checks.count("modes", modes, high=MOST_MODES)
+    frequency = arm_route().angular_frequencies(route_values(arm), arm.shape, modes)
+    frequency /= 2 * np.pi  # in place: fresh memory costs more than the product
+    return frequency
 
 
 def mode_shapes(arm: Arm, x: Any, modes: int = 3, derivative: int = 0) -> np.ndarray:
@@ -131,9 +128,7 @@ def mode_shapes(arm: Arm, x: Any, modes: int = 3, derivative: int = 0) -> np.nda
         raise ValueError(f"x has shape {points.shape}: allowed are a number or a row of points")
     if points.size and points.max() > np.min(arm.L):
         raise ValueError(f"x = {points.max():g}: allowed are points in [0, L], L = {np.min(arm.L):g}")
-    length = _column(arm.L, 2)
-    shapes = arm_modes(arm, modes).shape(np.atleast_1d(points) / length, derivative)
-    shapes = shapes / (np.sqrt(_column(arm.rhoA, 2) * length) * length**derivative)
+    shapes = arm_modes(arm, modes).shape(0, derivative, np.atleast_1d(points))
     return shapes if points.ndim else shapes[..., 0]
 
 
@@ -161,65 +156,57 @@ class ModalParameters:
     """
 
     _arm: Arm = field(repr=False)
-    _modes: Modes = field(repr=False)
+    _modes: OneWaveModes = field(repr=False)
 
     @property
     def lam(self) -> np.ndarray:
         """Frequency parameter."""
         return self._modes.lam
 
-    @cached_property
+    @property
     def omega(self) -> np.ndarray:
         """Natural angular frequency, rad/s."""
-        return _angular_frequencies(self._arm, self.lam)
+        return self._modes.omega
 
     @cached_property
     def frequency(self) -> np.ndarray:
         """Natural frequency, Hz."""
-        return _frequencies(self._arm, self.lam)
-
-    @cached_property
-    def _ends(self) -> np.ndarray:
-        """What the modes are at the tip, in all and at the joint, shape (7, ..., modes)."""
-        length, mass, stiffness = self._arm.L, np.sqrt(self._arm.rhoA * self._arm.L), self._arm.EI
-        here, slope = 1 / mass, 1 / mass / length
-        units = here, slope, mass, here, slope, stiffness * (slope / length), stiffness * (slope / length / length)
-        return self._modes.quantities(ENDS, units)
+        return self.omega / (2 * np.pi)
 
     @property
     def tip_displacement(self) -> np.ndarray:
         """phi(L), kg^-1/2."""
-        return self._ends[0]
+        return self._modes.displacement(1, 0)
 
     @property
     def tip_slope(self) -> np.ndarray:
         """phi'(L), kg^-1/2/m."""
-        return self._ends[1]
+        return self._modes.displacement(1, 1)
 
     @property
     def participation(self) -> np.ndarray:
         """Modal participation factor, kg^1/2."""
-        return self._ends[2]
+        return self._modes.momentum()
 
     @property
     def root_displacement(self) -> np.ndarray:
         """phi(0), kg^-1/2."""
-        return self._ends[3]
+        return self._modes.displacement(0, 0)
 
     @property
     def root_slope(self) -> np.ndarray:
         """phi'(0), kg^-1/2/m."""
-        return self._ends[4]
+        return self._modes.displacement(0, 1)
 
     @property
     def root_moment(self) -> np.ndarray:
         """EI phi''(0), N kg^-1/2."""
-        return self._ends[5]
+        return self._modes.force(0, 1)
 
-    @property
+    @cached_property
     def root_shear(self) -> np.ndarray:
         """EI phi'''(0), N kg^-1/2/m."""
-        return self._ends[6]
+        return 0.0 - self._modes.force(0, 0)
 
     @cached_property
     def stiffness_translation(self) -> np.ndarray:
@@ -232,7 +219,7 @@ class ModalParameters:
         return self._joint_matrix(1)
 
     def _joint_matrix(self, spring: int) -> np.ndarray:
-        root_energy = self._modes.quantities(STRAIN)[spring] * _column(self._arm.angular_frequency_scale)
+        root_energy = self._modes.strain()[spring]
         return root_energy[..., :, None] * root_energy[..., None, :]
 
     @cached_property
@@ -246,7 +233,7 @@ class ModalParameters:
         share = max(1_000_000 // (modes * xi.size), 1)  # bounds the memory
         for start in range(0, len(mu), share):
             part = slice(start, start + share)
-            slopes = self._modes.lanes(part).shape(xi, 1)
+            slopes = self._modes.dimensionless.lanes(part).shape(xi, 1)
             load = (1 - xi + mu[part, None]) * weights
             product = (slopes * load) @ slopes.swapaxes(1, 2)
             result[part] = (product + product.swapaxes(1, 2)) / 2  # to the last digit, as Floquet's shorter way needs
@@ -281,31 +268,13 @@ def modal_parameters(arm: Arm, modes: int = 3) -> ModalParameters:
     return ModalParameters(arm, arm_modes(arm, modes))
 
 
-def _lambda(arm: Arm, modes: int) -> np.ndarray:
-    kappa_t, kappa_r, mu, iota = _groups(arm)
-    return frequency_parameters(kappa_t, kappa_r, mu, iota, modes)
-
-
-def _groups(arm: Arm) -> list[np.ndarray]:
+def arm_modes(arm: Arm, modes: int) -> OneWaveModes:
+    """Return the modes of the arm, from which everything else follows."""
     checks.instance("arm", arm, Arm)
-    return [np.broadcast_to(value, arm.shape) for value in (arm.kappa_t, arm.kappa_r, arm.mu, arm.iota)]
-
-
-def arm_modes(arm: Arm, modes: int) -> Modes:
-    """Return the dimensionless modes of the arm, from which everything else follows."""
-    return modes_of(*_groups(arm), lam=_lambda(arm, modes))
-
-
-def _angular_frequencies(arm: Arm, lam: np.ndarray) -> np.ndarray:
-    omega = lam**2
-    omega *= _column(arm.angular_frequency_scale)  # in place: fresh memory costs more than the product
-    return omega
-
-
-def _frequencies(arm: Arm, lam: np.ndarray) -> np.ndarray:
-    frequency = _angular_frequencies(arm, lam)
-    frequency /= 2 * np.pi
-    return frequency
+    modes = checks.count("modes", modes, high=MOST_MODES)
+    route, values = arm_route(), route_values(arm)
+    lam = route.frequency_parameters(values, arm.shape, modes)
+    return route.modes(values, arm.shape, route.in_radians(values, lam), lam)
 
 
 def _column(value: float | np.ndarray, axes: int = 1) -> float | np.ndarray:

@@ -7,21 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from cra_sym.analysis.modes import ModalParameters, modal_parameters
+from cra_sym.analysis.modes import modal_parameters
 from cra_sym.analysis.responses import oscillators, residual_vibration
-from cra_sym.analysis.sensitivities import squared_frequency_rate
+from cra_sym.analysis.sensitivities import CHANNELS
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import count, shown
-from cra_sym.model.modal import tip_factors
-from cra_sym.model.spectrum import pair
 from cra_sym.solvers.driven_modes import state_at_stop
 from cra_sym.solvers.modal_response import Oscillators, free_peak
 from cra_sym.solvers.motion import BaseMotion
 
 __all__ = ["residual_vibration_gradient"]
 
-_GROUPS = ("k_t", "k_r", "m_e", "J_e")  # in the order of their dimensionless groups kappa_t, kappa_r, mu, iota
-_NAMES = (*_GROUPS, "c_t", "c_r", "duration")
+_NAMES = (*CHANNELS, "duration")
 _TINY = 1e-30  # an imaginary part whose square is nothing
 
 
@@ -82,7 +79,7 @@ def residual_vibration_gradient(
             if name == "duration":
                 rate = np.abs(factor) * stretched / np.asarray(motion.duration)[..., None]
             else:
-                change, logarithmic = _rates(arm, p, name)
+                change, logarithmic = p._modes.product_rates(1, 0, *CHANNELS[name])
                 rate = np.sign(factor) * change * peak + np.abs(factor) * stretched * logarithmic
         gradient[..., column] = rate.sum(axis=-1)
     return value, gradient
@@ -99,41 +96,3 @@ def _unit_peaks(osc: Oscillators, motion: BaseMotion) -> tuple[np.ndarray, np.nd
     peak = free_peak(unit, q, u)
     return peak.real, np.where(osc.omega > 0, peak.imag / _TINY, 0.0)
 
-
-def _rates(arm: Arm, p: ModalParameters, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives of Gamma_i phi_i(L) and of ln omega_i by a parameter."""
-    kind = name.replace("c_", "k_")
-    place, spring = _GROUPS.index(kind), kind in ("k_t", "k_r")
-    held = np.broadcast_to(getattr(arm, kind) == 0, arm.shape)[..., None] & spring
-    with np.errstate(divide="ignore", invalid="ignore"):
-        logarithmic = squared_frequency_rate(arm, p, name) / (2 * p.omega**2)
-    logarithmic = np.where(held, np.nan, np.where(p.omega > 0, logarithmic, 0.0))
-    lam = p.lam * (1 + 0.5j * _TINY * logarithmic)  # along the frequency equation
-    values = (np.broadcast_to(g, arm.shape)[..., None] for g in (arm.kappa_t, arm.kappa_r, arm.mu, arm.iota))
-    groups = [np.broadcast_to(value, lam.shape).astype(complex) for value in values]
-    pairs = np.array([x for group in groups for x in pair(group.real)], complex)
-    unit = np.broadcast_to(_unit(arm, name), arm.shape)[..., None]
-    s, c = pairs[2 * place : 2 * place + 2].real
-    step = 1j * _TINY * unit * (c**2 if name == kind else -(s**2))
-    pairs[2 * place] += step
-    pairs[2 * place + 1] -= step
-    if not spring:
-        groups[place] += 1j * _TINY * unit
-    return tip_factors(lam, pairs, *groups[2:]).imag / _TINY, logarithmic
-
-
-def _unit(arm: Arm, name: str) -> Any:
-    """Return what one unit of the parameter is in its dimensionless group, a compliance being one over it."""
-    match name:
-        case "k_t":
-            return arm.L**3 / arm.EI
-        case "k_r":
-            return arm.L / arm.EI
-        case "c_t":
-            return arm.EI / arm.L**3
-        case "c_r":
-            return arm.EI / arm.L
-        case "m_e":
-            return 1 / (arm.rhoA * arm.L)
-        case _:
-            return 1 / (arm.rhoA * arm.L**3)

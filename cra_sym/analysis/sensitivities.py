@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -12,10 +12,10 @@ from cra_sym.analysis.modes import ModalParameters, arm_modes
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import choice, count
 from cra_sym.kernels import derived_kernel
-from cra_sym.model.modal import COMPLIANCES, INERTIAS, SPRINGS, Modes
-from cra_sym.model.spectrum import pair
+from cra_sym.model.one_wave import Change, OneWaveModes
+from cra_sym.solvers.one_wave import parameters
 
-__all__ = ["Sensitivities", "sensitivities", "squared_frequency_rate"]
+__all__ = ["CHANNELS", "Sensitivities", "sensitivities"]
 
 _implicit_rates = derived_kernel("cra_sym.paper.implicit:implicit_kernel", backend="numpy")
 _exponents = derived_kernel("cra_sym.paper.implicit:group_exponents", backend="numpy")
@@ -155,7 +155,7 @@ def sensitivities(arm: Arm, modes: int = 3, *, method: Literal["modal", "implici
     choice("method", method, ("modal", "implicit"))
     found = arm_modes(arm, count("modes", modes))
     modal = ModalParameters(arm, found)
-    known = _by_modes(arm, found) if method == "modal" else _by_rates(arm, modal, _implicit(arm, modal))
+    known = _by_modes(found) if method == "modal" else _by_rates(arm, modal, _implicit(arm, modal))
     return Sensitivities(arm, modal.frequency, known)
 
 
@@ -163,24 +163,26 @@ def _column(arm: Arm, value: Any) -> np.ndarray:
     return np.broadcast_to(value, arm.shape)[..., None]
 
 
-def _by_modes(arm: Arm, modes: Modes) -> _Known:
+CHANNELS: dict[str, tuple[tuple[int, int], Change]] = {
+    "k_t": ((0, 0), "stiffness"),
+    "k_r": ((0, 1), "stiffness"),
+    "c_t": ((0, 0), "compliance"),
+    "c_r": ((0, 1), "compliance"),
+    "m_e": ((1, 0), "inertia"),
+    "J_e": ((1, 1), "inertia"),
+}
+"""End, place and kind of what each name stands for."""
+
+
+def _by_modes(modes: OneWaveModes) -> _Known:
     """Return what gives the derivatives of f that modes know, each with others that cost next to nothing beside it."""
-    scale = arm.angular_frequency_scale / (4 * np.pi)  # d f = scale / lambda^2 d lambda^4
-    length, stiffness = arm.L, arm.EI
-    force, moment = stiffness / length**3, stiffness / length
 
-    @cache
-    def together(names: tuple[str, ...]) -> dict[str, np.ndarray]:
-        rows, units = groups[names]
-        return dict(zip(names, modes.quantities(rows, units), strict=True))
+    def known(name: str) -> np.ndarray:
+        channel, by = CHANNELS[name.removeprefix("df_d").removeprefix("log_")]
+        found = modes.rates(by, cycles=True) if name.startswith("df_d") else modes.logarithmic_rates(by)
+        return found[channel]
 
-    mass = arm.rhoA * length
-    groups = {
-        ("df_dk_t", "df_dk_r", "log_k_t", "log_k_r"): (SPRINGS, (scale / force, scale / moment, 1.0, 1.0)),
-        ("df_dc_t", "df_dc_r"): (COMPLIANCES, (scale * force, scale * moment)),
-        ("df_dm_e", "df_dJ_e", "log_m_e", "log_J_e"): (INERTIAS, (scale / mass, scale / (mass * length**2), 1.0, 1.0)),
-    }
-    return lambda name: next(together(names)[name] for names in groups if name in names)
+    return known
 
 
 def _by_rates(arm: Arm, p: ModalParameters, rates: dict[str, np.ndarray]) -> _Known:
@@ -196,30 +198,14 @@ def _by_rates(arm: Arm, p: ModalParameters, rates: dict[str, np.ndarray]) -> _Kn
     return known
 
 
-def squared_frequency_rate(arm: Arm, p: ModalParameters, name: str) -> np.ndarray:
-    """Return d omega^2 by k_t, k_r, a compliance c_t = 1/k_t or c_r, m_e or J_e, from the modes."""
-    match name:
-        case "k_t":
-            return p.root_displacement**2
-        case "k_r":
-            return p.root_slope**2
-        case "c_t":
-            return -(p.root_shear**2)
-        case "c_r":
-            return -(p.root_moment**2)
-        case "m_e":
-            return -((p.omega * p.tip_displacement) ** 2)
-        case _:
-            return -((p.omega * p.tip_slope) ** 2)
-
-
 def _implicit(arm: Arm, p: ModalParameters) -> dict[str, np.ndarray]:
     """Return the same by implicit differentiation, all from one evaluation; omega^2 = scale^2 lambda^4."""
-    pairs = [value for kappa in (arm.kappa_t, arm.kappa_r) for value in pair(_column(arm, kappa))]
-    (s_t, c_t, s_r, c_r), length, EI = pairs, _column(arm, arm.L), _column(arm, arm.EI)
+    layout, lanes = p._modes.dimensionless.family.layout, p._modes.dimensionless.groups
+    s_t, c_t, s_r, c_r = parameters(layout, lanes)[:4].reshape(4, *arm.shape, 1)
+    length, EI = _column(arm, arm.L), _column(arm, arm.EI)
     stiffness_t, stiffness_r, mass = EI / length**3, EI / length, _column(arm, arm.rhoA) * length
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        rates = _implicit_rates(p.lam, *pairs, *(_column(arm, value) for value in (arm.mu, arm.iota)))
+        rates = _implicit_rates(p.lam, s_t, c_t, s_r, c_r, *(_column(arm, value) for value in (arm.mu, arm.iota)))
         by_lam = 4 * _column(arm, arm.angular_frequency_scale) ** 2 * p.lam**3
         return {
             "k_t": by_lam * rates["kappa_t"] * c_t**2 / stiffness_t,

@@ -16,7 +16,7 @@ from cra_sym.analysis.zones import Parametric, Zone, first_order_zone, zone_of
 from cra_sym.arm.excitations import AxialBase, Excitation, JointStiffness, TransverseBase
 from cra_sym.arm.parameters import Arm
 from cra_sym.kernels import Kernel, compiled, derived_kernel, has_compiler
-from cra_sym.model.spectrum import wants_compiler
+from cra_sym.kernels.parts import wants_compiler
 from cra_sym.solvers import floquet
 
 __all__ = [

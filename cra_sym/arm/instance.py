@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from functools import cache
 
+from sympy import Expr, Symbol
+
 from cra_sym.arm.parameters import Arm
+from cra_sym.mechanics.one_wave_form import one_wave_scales
 from cra_sym.model import Model
 from cra_sym.paper.energy import L, lagrangian, t, v, w, x
 from cra_sym.paper.motion import F
@@ -37,3 +40,11 @@ def model_values(arm: Arm, *, driven: bool = False) -> dict[str, object]:
     """Return the arm's parameters by symbol name, as the model takes them."""
     names = ["L", "E", "rho", "A", "m_e", "J_e", "k_t", "k_r"] + (["m_b"] if driven else [])
     return {name: getattr(arm, name) for name in names} | {"I_z": arm.I}
+
+
+def arm_scales() -> tuple[dict[str, Expr], tuple[Symbol, ...]]:
+    """Return the scales and dimensionless groups of the arm with their arguments, derived from its Lagrangian."""
+    model = arm_model()
+    scales = one_wave_scales(model.state_form)
+    assert scales is not None, "the arm has one wave number"
+    return scales, model.symbols
