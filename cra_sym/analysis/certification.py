@@ -11,16 +11,13 @@ import numpy as np
 
 from cra_sym.analysis.modes import natural_frequencies
 from cra_sym.arm.parameters import Arm
+from cra_sym.arm.route import arm_route
 from cra_sym.checks import count, instance
 from cra_sym.extras import require
-from cra_sym.kernels import derived_kernel
 from cra_sym.solvers.certificates import UndecidedError, decided, enclose
 
 __all__ = ["Certificate", "certify"]
 
-_CHAIN, _PRODUCTS = (derived_kernel(f"cra_sym.model.characteristic:{name}") for name in ("chain", "products"))
-
-_CHANGES = ((1, -1), (2, 1), (3, 1), (4, 1))  # links of the chain and what each may do to the count
 _FIELDS = ("L", "b", "h", "E", "rho", "m_e", "J_e", "k_t", "k_r")
 
 
@@ -106,7 +103,8 @@ class _BallArm:
     def count(self, point: Any) -> int:
         """Return the proved number of zeros below the point."""
         number = self._pinned(point)
-        for link, change in _CHANGES:
+        for link, change in enumerate(arm_route().layout.changes, start=1):
+            assert isinstance(change, int), "no slope of the arm has both a spring and an inertia"
             if self._is_positive(point, link) != (number % 2 == 0):
                 number += change
         return number
@@ -132,8 +130,9 @@ class _BallArm:
         return decided(self._flint, lambda: self._links(point)[link])
 
     def _links(self, point: Any) -> tuple[Any, ...]:
-        functions = _PRODUCTS.function(point, point.cos(), point.sin(), point.cosh(), point.sinh())
-        return _CHAIN.function(*self._pairs(self._flint.ctx.prec), point**4, self._flint.arb(1), *functions)
+        known = arm_route().family.functions
+        products = known["products"].function(point, point.cos(), point.sin(), point.cosh(), point.sinh())
+        return known["chain"].function(*self._pairs(self._flint.ctx.prec), point**4, self._flint.arb(1), *products)
 
     def _pairs_at(self, precision: int) -> list[Any]:
         """Stiffnesses and inertias as pairs (s, c) at the context's precision; only the ratios matter."""

@@ -99,7 +99,7 @@ def _derived(path: str, given: tuple[Any, ...]) -> Kernel:
     from tqdm import tqdm
 
     module, _, function = path.partition(":")
-    with tqdm(total=0, desc=f"deriving {path}, once", bar_format="{desc}", leave=False, disable=None):
+    with tqdm(total=0, desc=f"deriving {_called(path, given)}, once", bar_format="{desc}", leave=False, disable=None):
         return kernel(*getattr(import_module(module), function)(*given))
 
 

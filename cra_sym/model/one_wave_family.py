@@ -164,6 +164,8 @@ class DimensionlessModes:
         """
         shape = rows.stop - rows.start, *self.lam.shape
         size = self.family.layout.size
+        if not shape[0]:
+            return np.empty(shape)
         if not self.compile:
             first = 0 if rows.stop <= size else size
             table = self._table if first == 0 else self._rates
