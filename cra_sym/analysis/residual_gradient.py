@@ -95,4 +95,3 @@ def _unit_peaks(osc: Oscillators, motion: BaseMotion) -> tuple[np.ndarray, np.nd
     u = np.where(osc.omega > 0, u, 0.0)  # what a rigid-body mode does is the same at any frequency near
     peak = free_peak(unit, q, u)
     return peak.real, np.where(osc.omega > 0, peak.imag / _TINY, 0.0)
-

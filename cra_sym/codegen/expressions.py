@@ -80,7 +80,9 @@ def modal_functions() -> tuple[Function, ...]:
     arm, pairs, shapes = (arm_route().family.structure,), _pairs(), one_wave_shapes
     return (
         _make("Solutions with one unit derivative at the root, for small z.", shapes.polynomials, of=(2,)),
-        _make("Tip conditions: entries in (alpha, beta) and their magnitudes.", shapes.tip_rows, pairs, _KRYLOV, of=arm),
+        _make(
+            "Tip conditions: entries in (alpha, beta) and their magnitudes.", shapes.tip_rows, pairs, _KRYLOV, of=arm
+        ),
         _make("Shape and derivatives at the tip, for small z.", shapes.tip_near, pairs, _KRYLOV, of=arm),
         _make("alpha, beta and the wave amplitudes.", shapes.amplitudes_far, pairs, circle, of=arm),
         _make("Shape and derivatives at the tip from the wave amplitudes.", shapes.tip_far, _WAVES, circle, of=(2,)),

@@ -1,4 +1,4 @@
-"""The characteristic function of a line with one wave number, in the forms a solver evaluates: scaled, derived, counted.
+"""The characteristic function of a line with one wave number, as a solver evaluates it: scaled, derived, counted.
 
 A line is a string (n = 1) or a beam (n = 2): one field v with the density ``a v_t^2 / 2 - c (d^n v / dx^n)^2 / 2``. In
 ``xi = x / L`` its motions of angular frequency omega obey ``(d/dxi)^(2n) phi = (-1)^n z phi`` with

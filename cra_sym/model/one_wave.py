@@ -77,7 +77,7 @@ class OneWave:
         return OneWave, (self.scales,)
 
     def __repr__(self) -> str:
-        return f"<OneWave {list(self.scales.layout)[0]}>"
+        return f"<OneWave {next(iter(self.scales.layout))}>"
 
     @property
     def layout(self) -> Layout:
@@ -257,9 +257,13 @@ class OneWaveModes:
         return self._ends[self._table.momentum - self._table.right.start]
 
     def shape(self, place: int, derivative: int, x: np.ndarray) -> np.ndarray:
-        """Return a derivative of a displacement at places x, m, shape (..., modes, len(x))."""
+        """Return a derivative of a displacement at places x, m, shape (..., modes, stations).
+
+        The places have the shape (stations,) or (..., stations) of the batch.
+        """
         length, order = _column(self._length, 2), place + derivative
-        xi = (np.asarray(x, dtype=np.float64) - _column(self._left, 2)) / length
+        x = np.asarray(x, dtype=np.float64)
+        xi = ((x if x.ndim < 2 else x[..., None, :]) - _column(self._left, 2)) / length
         return self.dimensionless.shape(np.clip(xi, 0.0, 1.0), order) * _column(self._unit(order), 2)
 
     def integral(self, place: int) -> np.ndarray:

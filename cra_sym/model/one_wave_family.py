@@ -55,7 +55,7 @@ class Family:
         return family, (self.structure,)
 
     def characteristic(self, *groups: np.ndarray, lanes: int | None = None) -> OneWaveCharacteristic:
-        """Return the characteristic functions for groups of shape (lanes,), as `cra_sym.solvers.spectrum` takes them."""
+        """Return the functions for groups of shape (lanes,), as `cra_sym.solvers.spectrum` takes them."""
         lanes = groups[0].size if lanes is None else lanes
         return OneWaveCharacteristic(self.layout, self.functions, groups, lanes)
 

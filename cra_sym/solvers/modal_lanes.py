@@ -1,6 +1,6 @@
-# ruff: noqa: F821
+# ruff: noqa: B007, B018, F821, F841, RUF059
 # mypy: ignore-errors
-"""Template of the compiled twin of `cra_sym.solvers.one_wave_shapes`: the same steps, for blocks of lanes, mode by mode.
+"""Template of the compiled twin of `cra_sym.solvers.one_wave_shapes`: the same, for blocks of lanes, mode by mode.
 
 This text is specialised by `cra_sym.kernels.compiled` with the functions it leaves open, those of one structure. Sizes
 and lists of arguments replace the marks: capital letters between double underscores.

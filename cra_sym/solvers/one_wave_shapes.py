@@ -229,7 +229,9 @@ def near_shape(start: np.ndarray, z: np.ndarray, xi: np.ndarray, derivative: int
     return np.asarray(sum(terms))
 
 
-def shape(lam: np.ndarray, state: np.ndarray, xi: np.ndarray, derivative: int, n: int, functions: Functions) -> np.ndarray:
+def shape(
+    lam: np.ndarray, state: np.ndarray, xi: np.ndarray, derivative: int, n: int, functions: Functions
+) -> np.ndarray:
     """Return a derivative of every shape by xi at points that broadcast on a new last axis.
 
     Parameters

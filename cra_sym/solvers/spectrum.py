@@ -1,8 +1,8 @@
 """Complete spectra: the first zeros of an entire function with real zeros only, none missed and none doubled.
 
 An exact count says how many zeros lie below any point; Ostrowski's square-root step then climbs from a point next to
-a zero to that zero, at cubic order and without ever passing it. The functions are those of lines with one wave number: in
-z = lambda^4 for beams, lambda^2 for strings, with zeros about pi apart in lambda.
+a zero to that zero, at cubic order and without ever passing it. The functions are those of lines with one wave number,
+in z = lambda^4 for beams and lambda^2 for strings, with zeros about pi apart in lambda.
 """
 
 from __future__ import annotations

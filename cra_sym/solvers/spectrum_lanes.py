@@ -1,4 +1,4 @@
-# ruff: noqa: F821
+# ruff: noqa: B018, F821, F841
 # mypy: ignore-errors
 """Template of the compiled twin of `cra_sym.solvers.spectrum`: the same steps, for blocks of lanes at once.
 
@@ -29,7 +29,10 @@ def frequency_parameters(out, evaluations, __GROUPS__):
         values_k = lam, z_k, __BASIS__
         for i in range(2 + __BASIS_SIZE__):
             tables[k, i] = values_k[i]
-    pairs, k = np.empty((__PARAMETERS__, _LANES)), np.zeros((2 * _ROWS, _LANES))  # of all lanes; then of those still on their way
+    pairs, k = (
+        np.empty((__PARAMETERS__, _LANES)),
+        np.zeros((2 * _ROWS, _LANES)),
+    )  # of all lanes; then of those still on their way
     counts, values = np.empty((points, _LANES), np.int64), np.empty((points, _LANES))
     fewest, most = np.empty(points, np.int64), np.empty(points, np.int64)  # zeros below a point in any lane
     right, zeros = np.empty(_LANES, np.int64), np.empty(_LANES, np.int64)

@@ -220,7 +220,9 @@ def test_bad_input(arguments, error, message):
 @pytest.mark.parametrize("modes", [1, 3, 12])
 def test_compiled_and_numpy_paths_agree(modes):
     arms = random_arms(4, 1500)
-    one, two = (arm_route().family.frequency_parameters(*arms, modes=modes, compile=c, threads=2) for c in (True, False))
+    one, two = (
+        arm_route().family.frequency_parameters(*arms, modes=modes, compile=c, threads=2) for c in (True, False)
+    )
     assert ((one == 0) == (two == 0)).all()
     np.testing.assert_allclose(one, two, rtol=2e-15)
 
@@ -232,4 +234,3 @@ def test_every_digit_of_the_compiled_path():
     assert reference.relative_errors(lam, *arms).max() < 1e-15
     high = arm_route().family.frequency_parameters(*(x[:3] for x in arms), modes=1000, compile=True)[:, [300, 999]]
     assert reference.relative_errors(high, *(x[:3] for x in arms)).max() < 1e-15
-
