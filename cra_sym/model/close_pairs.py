@@ -8,6 +8,7 @@ eps / g only. The energies of the two motions have no such loss.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cra_sym.model.one_wave_family import Family
 from cra_sym.solvers.one_wave import Layout, parameters, power, wave_number
@@ -16,6 +17,7 @@ from cra_sym.solvers.rayleigh import stationary_values
 
 __all__ = ["CLOSE", "resolve_close_pairs"]
 
+Array = NDArray[np.float64]
 CLOSE = 0.1
 """Relative distance of two frequency parameters below which their zeros are replaced by Rayleigh-Ritz values."""
 
@@ -25,7 +27,7 @@ _ALMOST_RIGID = 5.0
 _SOFT = 10.0  # springs of the other end that are stiffer leave rounding errors larger than what is corrected
 
 
-def resolve_close_pairs(family: Family, lam: np.ndarray, *groups: np.ndarray) -> None:
+def resolve_close_pairs(family: Family, lam: Array, *groups: Array) -> None:
     """Correct, in place, low frequency parameters of every beam in which two neighbours lie close to each other.
 
     Parameters
@@ -57,7 +59,7 @@ def _is_sprung(layout: Layout, end: int) -> bool:
     return any("k" in kind or kind == "h" for kind in layout.structure[end])
 
 
-def _is_stiff(layout: Layout, end: int, groups: list[np.ndarray], lanes: int) -> np.ndarray:
+def _is_stiff(layout: Layout, end: int, groups: list[Array], lanes: int) -> Array:
     """Return where an end has a support or a stiff spring."""
     found = np.full(lanes, "h" in layout.structure[end])
     for (channel, letter), value in zip(layout.groups, groups, strict=True):
@@ -66,7 +68,7 @@ def _is_stiff(layout: Layout, end: int, groups: list[np.ndarray], lanes: int) ->
     return found
 
 
-def _ritz_values(family: Family, base: int, z: np.ndarray, groups: list[np.ndarray]) -> np.ndarray:
+def _ritz_values(family: Family, base: int, z: Array, groups: list[Array]) -> Array:
     """Return both stationary values of strain over kinetic energy among the solutions that meet one end's conditions.
 
     Those for the given z hold the mode up to the error of z, which enters squared.
@@ -84,7 +86,7 @@ def _ritz_values(family: Family, base: int, z: np.ndarray, groups: list[np.ndarr
     start = derivatives(state, 2)[:, :, None]
     shapes = [near_shape(start, z, _XI, order, family.functions) for order in range(3)]
 
-    def integral(shape: np.ndarray) -> np.ndarray:
+    def integral(shape: Array) -> Array:
         return np.einsum("apn,bpn,p->nab", shape[:, :-1], shape[:, :-1], _WEIGHTS / 2)
 
     strain, kinetic = strain + integral(shapes[2]), kinetic + integral(shapes[0])

@@ -11,12 +11,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.model.close_pairs import resolve_close_pairs
 from cra_sym.model.one_wave_family import DimensionlessModes, family
 from cra_sym.solvers.one_wave import Layout, parameters
-from cra_sym.solvers.one_wave_shapes import fill
+from cra_sym.solvers.one_wave_shapes import Table, fill
 
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
@@ -25,8 +26,10 @@ if TYPE_CHECKING:
 
 __all__ = ["OneWave", "OneWaveModes", "one_wave_route"]
 
-Value = float | np.ndarray
+Array = NDArray[np.float64]
+Value = float | Array
 Channel = tuple[int, int]
+Rates = dict[Channel, Array]
 Change = Literal["stiffness", "compliance", "inertia"]
 
 _SOFTEST = 1e-150  # the product of two stiffnesses of this size is a number yet
@@ -88,7 +91,7 @@ class OneWave:
         """Return whether every stiffness and inertia is in its range, so that the count of zeros is exact."""
         return self._are_covered(self._numbers(values))
 
-    def _are_covered(self, numbers: list[np.ndarray]) -> bool:
+    def _are_covered(self, numbers: list[Array]) -> bool:
         line, groups = numbers[2:4], numbers[_SCALES - 1 :]
         letters = (letter for _, letter in self.layout.groups)
         return all((np.isfinite(x) & (x > 0)).all() for x in line) and all(
@@ -96,13 +99,13 @@ class OneWave:
             for x, letter in zip(groups, letters, strict=True)
         )
 
-    def _numbers(self, values: Sequence[Value]) -> list[np.ndarray]:
+    def _numbers(self, values: Sequence[Value]) -> list[Array]:
         """Return the scales and the groups, not broadcast."""
         with np.errstate(all="ignore"):
             found = self.scales.function(*(np.asarray(value, dtype=np.float64) for value in values))
         return [np.asarray(x, dtype=np.float64) for x in found[1:]]
 
-    def _groups(self, numbers: list[np.ndarray]) -> list[np.ndarray]:
+    def _groups(self, numbers: list[Array]) -> list[Array]:
         """Return kappa and mu of the channels, as the layout has them; not broadcast.
 
         Stiffnesses below 1e-150 count as 0, for their product has to be a number.
@@ -115,10 +118,10 @@ class OneWave:
         return [self._felt(x, letter) for x, (_, letter) in groups]
 
     @staticmethod
-    def _felt(value: np.ndarray, letter: str) -> np.ndarray:
+    def _felt(value: Array, letter: str) -> Array:
         return np.where(value < _SOFTEST, 0.0, value) if letter == "k" and np.any(value < _SOFTEST) else value
 
-    def groups(self, values: Sequence[Value]) -> list[np.ndarray]:
+    def groups(self, values: Sequence[Value]) -> list[Array]:
         """Return kappa and mu of the channels, as the layout has them; not broadcast.
 
         Stiffnesses below 1e-150 count as 0, for their product has to be a number.
@@ -130,11 +133,11 @@ class OneWave:
         """
         return self._groups(self._numbers(values))
 
-    def frequency_parameters(self, values: Sequence[Value], shape: tuple[int, ...], modes: int) -> np.ndarray:
+    def frequency_parameters(self, values: Sequence[Value], shape: tuple[int, ...], modes: int) -> Array:
         """Return lambda of the first modes, shape (*shape, modes): ascending, complete, 0 for rigid-body modes."""
         return self.parameters_of_groups(self.groups(values), shape, modes)
 
-    def parameters_of_groups(self, groups: Sequence[np.ndarray], shape: tuple[int, ...], modes: int) -> np.ndarray:
+    def parameters_of_groups(self, groups: Sequence[Array], shape: tuple[int, ...], modes: int) -> Array:
         """Return lambda of the first modes from the dimensionless groups themselves, shape (*shape, modes)."""
         groups = [self._felt(x, letter) for x, (_, letter) in zip(groups, self.layout.groups, strict=True)]
         common = np.broadcast_shapes(*(x.shape for x in groups)) if groups else ()
@@ -143,18 +146,18 @@ class OneWave:
         resolve_close_pairs(self.family, lam, *broadcast)
         return lam if common == shape else np.ascontiguousarray(np.broadcast_to(lam, (*shape, modes)))
 
-    def angular_frequencies(self, values: Sequence[Value], shape: tuple[int, ...], modes: int) -> np.ndarray:
+    def angular_frequencies(self, values: Sequence[Value], shape: tuple[int, ...], modes: int) -> Array:
         """Return the natural angular frequencies, rad/s, shape (*shape, modes)."""
         return self.in_radians(values, self.frequency_parameters(values, shape, modes))
 
-    def in_radians(self, values: Sequence[Value], lam: np.ndarray) -> np.ndarray:
+    def in_radians(self, values: Sequence[Value], lam: Array) -> Array:
         """Return ``scale lambda^n``, rad/s."""
         omega = lam.copy() if self.layout.n == 1 else lam**2
         omega *= _column(self._numbers(values)[4])  # in place: fresh memory costs more than the product
         return omega
 
     def modes(
-        self, values: Sequence[Value], shape: tuple[int, ...], omega: np.ndarray, lam: np.ndarray | None = None
+        self, values: Sequence[Value], shape: tuple[int, ...], omega: Array, lam: Array | None = None
     ) -> OneWaveModes:
         """Return the modes, given all their first angular frequencies.
 
@@ -191,41 +194,41 @@ class OneWaveModes:
     def __init__(
         self,
         dimensionless: DimensionlessModes,
-        omega: np.ndarray,
-        left: np.ndarray,
-        length: np.ndarray,
-        inertia: np.ndarray,
-        stiffness: np.ndarray,
-        scale: np.ndarray,
+        omega: Array,
+        left: Array,
+        length: Array,
+        inertia: Array,
+        stiffness: Array,
+        scale: Array,
     ) -> None:
         self.dimensionless, self.omega = dimensionless, omega
         self._left, self._length, self._inertia, self._stiffness, self._scale = left, length, inertia, stiffness, scale
 
     @property
-    def lam(self) -> np.ndarray:
+    def lam(self) -> Array:
         """The frequency parameter lambda, shape (..., modes)."""
         return self.dimensionless.lam
 
     @property
-    def _table(self) -> Any:
+    def _table(self) -> Table:
         return self.dimensionless.family.layout
 
     @cached_property
-    def _root_mass(self) -> np.ndarray:
+    def _root_mass(self) -> Array:
         return np.sqrt(self._inertia * self._length)
 
-    def _unit(self, order: int) -> Any:
+    def _unit(self, order: int) -> Array:
         """Return the unit of a derivative of the shapes."""
         unit = 1 / self._root_mass
         for _ in range(order):
             unit = unit / self._length
         return unit
 
-    def _force_unit(self, place: int) -> Any:
+    def _force_unit(self, place: int) -> Array:
         return self._stiffness * self._unit(2 * self._table.n - 1 - place)
 
     @cached_property
-    def _ends(self) -> np.ndarray:
+    def _ends(self) -> Array:
         """Rows of the table from q of the right end to P of the left end, in SI units."""
         n = self._table.n
         q = [self._unit(j) for j in range(n)]
@@ -233,30 +236,35 @@ class OneWaveModes:
         return self.dimensionless.quantities(slice(self._table.right.start, self._table.left_force.stop), units)
 
     @cached_property
-    def _right_forces(self) -> np.ndarray:
+    def _right_forces(self) -> Array:
         units = [self._force_unit(j) for j in range(self._table.n)]
         return self.dimensionless.quantities(self._table.right_force, units)
 
-    def displacement(self, end: int, place: int) -> np.ndarray:
+    def displacement(self, end: int, place: int) -> Array:
         """Return a displacement of the left (0) or the right end (1), shape (..., modes)."""
         rows = self._table.right if end else self._table.left
-        return self._ends[rows.start - self._table.right.start + place]
+        return self._end_row(rows.start + place)
 
-    def force(self, end: int, place: int) -> np.ndarray:
+    def force(self, end: int, place: int) -> Array:
         """Return a natural force P of the left (0) or the right end (1), shape (..., modes)."""
         if end:
-            return self._right_forces[place]
-        return self._ends[self._table.left_force.start - self._table.right.start + place]
+            found: Array = self._right_forces[place]
+            return found
+        return self._end_row(self._table.left_force.start + place)
 
-    def coordinate(self, number: int) -> np.ndarray:
+    def _end_row(self, row: int) -> Array:
+        found: Array = self._ends[row - self._table.right.start]
+        return found
+
+    def coordinate(self, number: int) -> Array:
         """Raise an IndexError: these lines have no lumped coordinates."""
         raise IndexError(f"coordinate {number}: this model has no lumped coordinates")
 
-    def momentum(self) -> np.ndarray:
+    def momentum(self) -> Array:
         """Return the integral of a phi over the line, with the masses of both ends, kg^(1/2), shape (..., modes)."""
-        return self._ends[self._table.momentum - self._table.right.start]
+        return self._end_row(self._table.momentum)
 
-    def shape(self, place: int, derivative: int, x: np.ndarray) -> np.ndarray:
+    def shape(self, place: int, derivative: int, x: Array) -> Array:
         """Return a derivative of a displacement at places x, m, shape (..., modes, stations).
 
         The places have the shape (stations,) or (..., stations) of the batch.
@@ -266,7 +274,7 @@ class OneWaveModes:
         xi = ((x if x.ndim < 2 else x[..., None, :]) - _column(self._left, 2)) / length
         return self.dimensionless.shape(np.clip(xi, 0.0, 1.0), order) * _column(self._unit(order), 2)
 
-    def integral(self, place: int) -> np.ndarray:
+    def integral(self, place: int) -> Array:
         """Return the integral of a displacement over the line, shape (..., modes)."""
         if place:
             return self.displacement(1, place - 1) - self.displacement(0, place - 1)
@@ -283,37 +291,37 @@ class OneWaveModes:
     def _channels(self, letter: str) -> list[Channel]:
         return [divmod(channel, self._table.n) for channel, kind in self._table.groups if kind == letter]
 
-    def strain(self) -> np.ndarray:
+    def strain(self) -> Array:
         """Return sqrt(k) q of each spring, signed, 1/s, shape (springs, ..., modes): 0 for infinite stiffness."""
         return self.dimensionless.quantities(self._table.strain, [self._scale] * len(self.springs()))
 
-    def rates(self, by: Change, *, cycles: bool = False) -> dict[Channel, np.ndarray]:
+    def rates(self, by: Change, *, cycles: bool = False) -> dict[Channel, Array]:
         """Return d omega by the stiffnesses, compliances or inertias of the ends, by (end, place), rad/s over SI unit.
 
         With ``cycles`` they are those of the frequency in Hz. Others of the same kind cost nothing more.
         """
         return self._rates(by, cycles)[0]
 
-    def logarithmic_rates(self, by: Change) -> dict[Channel, np.ndarray]:
+    def logarithmic_rates(self, by: Change) -> dict[Channel, Array]:
         """Return d ln omega by the logarithms of the stiffnesses or inertias of the ends."""
         signs = {"stiffness": 1.0, "compliance": -1.0, "inertia": 1.0}
         found = self._rates("stiffness" if by == "compliance" else by, True)[1]
         return found if signs[by] > 0 else {channel: -value for channel, value in found.items()}
 
-    def _rates(self, by: Change, cycles: bool) -> tuple[dict[Channel, np.ndarray], dict[Channel, np.ndarray]]:
-        known: dict[Any, Any] = self.__dict__.setdefault("_known", {})
+    def _rates(self, by: Change, cycles: bool) -> tuple[Rates, Rates]:
+        known: dict[tuple[Change, bool], tuple[Rates, Rates]] = self.__dict__.setdefault("_known", {})
         if (by, cycles) not in known:
             channels = self.inertias() if by == "inertia" else self.springs()
             rows = {"stiffness": self._table.by_springs, "compliance": self._table.by_compliances}
             scale = self._scale / (4 * np.pi if cycles else 2)  # d omega = scale / (2 sqrt(z)) dz
             units = [scale * self.group_unit(channel, by) for channel in channels]
-            units += [1.0] * (len(channels) if by != "compliance" else 0)
+            units += [np.ones(())] * (len(channels) if by != "compliance" else 0)
             found = self.dimensionless.quantities(rows.get(by, self._table.by_inertias), units)
             first, second = found[: len(channels)], found[len(channels) :]
             known[by, cycles] = dict(zip(channels, first, strict=True)), dict(zip(channels, second, strict=False))
         return known[by, cycles]
 
-    def group_unit(self, channel: Channel, by: Change) -> Any:
+    def group_unit(self, channel: Channel, by: Change) -> Array:
         """Return what one unit of a stiffness, a compliance or an inertia is in its dimensionless group."""
         n, place = self._table.n, channel[1]
         if by == "inertia":
@@ -321,7 +329,7 @@ class OneWaveModes:
         unit = self._length ** (2 * (n - place) - 1) / self._stiffness
         return unit if by == "stiffness" else 1 / unit
 
-    def product_rates(self, end: int, place: int, channel: Channel, by: Change) -> tuple[np.ndarray, np.ndarray]:
+    def product_rates(self, end: int, place: int, channel: Channel, by: Change) -> tuple[Array, Array]:
         """Return the derivatives of momentum times a displacement of an end, and of ln omega, by a group of an end.
 
         Both follow the mode along the frequency equation; no difference is taken. By a stiffness that is 0, or a
@@ -355,12 +363,10 @@ class OneWaveModes:
         rows = np.empty((table.size, lam.size), complex)
         fill(rows, lam, count, table, modes.family.functions, given, inertias)
         displacement = rows[(table.right if end else table.left).start + place]
-        change = (rows[table.momentum] * displacement).imag / _TINY
-        return (change * _column(self._unit(place) * self._root_mass).reshape(-1) if place else change).reshape(
-            shape
-        ), logarithmic.reshape(shape)
+        change = ((rows[table.momentum] * displacement).imag / _TINY).reshape(shape)
+        return change * _column(self._unit(place) * self._root_mass), logarithmic.reshape(shape)
 
-    def _logarithmic(self, channel: Channel, by: Change) -> np.ndarray:
+    def _logarithmic(self, channel: Channel, by: Change) -> Array:
         """Return d ln omega by a dimensionless group, 0 for a rigid-body mode."""
         rows = {"stiffness": self._table.by_springs, "compliance": self._table.by_compliances}
         start = rows.get(by, self._table.by_inertias).start
@@ -372,8 +378,8 @@ class OneWaveModes:
 
 
 def _parameter_changes(
-    layout: Layout, given: np.ndarray, groups: Sequence[np.ndarray], number: int, by: Change
-) -> dict[int, np.ndarray]:
+    layout: Layout, given: Array, groups: Sequence[Array], number: int, by: Change
+) -> dict[int, Array]:
     """Return the derivatives of s, i and c of a channel by its kappa, 1 / kappa or mu, by row."""
     row = {letter: i for i, (channel, letter) in enumerate(layout.parameters) if channel == number}
     s, i, c = (given[row[letter]] if letter in row else 0.0 for letter in "sic")
@@ -387,6 +393,6 @@ def _parameter_changes(
     return {row[letter]: np.asarray(value) for letter, value in found.items() if letter in row}
 
 
-def _column(value: Any, axes: int = 1) -> Any:
+def _column(value: Value, axes: int = 1) -> Value:
     """Return a parameter with last axes of length one, for modes and points; numbers stay numbers."""
-    return value[(..., *(None,) * axes)] if np.ndim(value) else value
+    return np.asarray(value)[(..., *(None,) * axes)] if np.ndim(value) else value

@@ -8,6 +8,7 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cra_sym.kernels import Kernel, compiled, derived_kernel, template
 from cra_sym.kernels.parts import flattened, in_parts, wants_compiler
@@ -18,6 +19,7 @@ from cra_sym.solvers.spectrum import spectrum
 
 __all__ = ["DimensionlessModes", "Family", "family"]
 
+Array = NDArray[np.float64]
 _CHARACTERISTIC = ("coefficients", "power_series", "chain", "derivatives")
 _OF_STRUCTURE = (
     "tip_rows", "tip_near", "amplitudes_far", "invariant_near", "prepared", "end_state", "generalised_mass", "rows",
@@ -54,14 +56,14 @@ class Family:
     def __reduce__(self) -> tuple[Any, ...]:
         return family, (self.structure,)
 
-    def characteristic(self, *groups: np.ndarray, lanes: int | None = None) -> OneWaveCharacteristic:
+    def characteristic(self, *groups: Array, lanes: int | None = None) -> OneWaveCharacteristic:
         """Return the functions for groups of shape (lanes,), as `cra_sym.solvers.spectrum` takes them."""
         lanes = groups[0].size if lanes is None else lanes
         return OneWaveCharacteristic(self.layout, self.functions, groups, lanes)
 
     def frequency_parameters(
-        self, *groups: np.ndarray, modes: int, compile: bool | None = None, threads: int | None = None
-    ) -> np.ndarray:
+        self, *groups: Array, modes: int, compile: bool | None = None, threads: int | None = None
+    ) -> Array:
         """Return lambda of the first modes for checked arrays of one shape; the mode axis is last.
 
         Both paths take the same steps. The compiled one is taken where it saves more than loading it costs, unless
@@ -80,12 +82,12 @@ class Family:
         in_parts(fill_part, len(result), modes, threads=threads, compiled=compile)
         return result.reshape(*shape, modes)
 
-    def _fill(self, result: np.ndarray, *groups: np.ndarray) -> None:
+    def _fill(self, result: Array, *groups: Array) -> None:
         """Fill in a part of the result, vectorised by NumPy."""
         zeros = spectrum(self.characteristic(*groups, lanes=len(result)), result.shape[1], power=2 * self.layout.n)
         result[...] = wave_number(zeros, self.layout.n)
 
-    def fill_compiled(self, result: np.ndarray, *groups: np.ndarray) -> int:
+    def fill_compiled(self, result: Array, *groups: Array) -> int:
         """Fill in a part of the result; return the number of evaluations of the determinant."""
         evaluations = np.zeros(1, dtype=np.int64)
         if not self.compiled_spectrum.frequency_parameters(result, evaluations, *groups):
@@ -93,7 +95,7 @@ class Family:
         return int(evaluations[0])
 
     def modes(
-        self, *groups: np.ndarray, lam: np.ndarray, compile: bool | None = None, threads: int | None = None
+        self, *groups: Array, lam: Array, compile: bool | None = None, threads: int | None = None
     ) -> DimensionlessModes:
         """Return the modes, given all their first frequency parameters.
 
@@ -152,12 +154,12 @@ class DimensionlessModes:
     """
 
     family: Family
-    lam: np.ndarray
-    groups: tuple[np.ndarray, ...]
+    lam: Array
+    groups: tuple[Array, ...]
     compile: bool
     threads: int | None
 
-    def quantities(self, rows: slice, units: Sequence[float | np.ndarray] | None = None) -> np.ndarray:
+    def quantities(self, rows: slice, units: Sequence[float | Array] | None = None) -> Array:
         """Return some rows of the family's table, each times its unit: a number, or an array of the batch's shape.
 
         What the rows are says `cra_sym.solvers.one_wave_shapes.Table`.
@@ -184,7 +186,7 @@ class DimensionlessModes:
         return table.reshape(shape)
 
     @cached_property
-    def _table(self) -> np.ndarray:
+    def _table(self) -> Array:
         """All quantities by NumPy, block by block."""
         modes, lam, layout = self.lam.shape[-1], self.lam.reshape(-1), self.family.layout
         table = np.empty((layout.size, self.lam.size))
@@ -201,12 +203,12 @@ class DimensionlessModes:
         return table
 
     @cached_property
-    def _rates(self) -> np.ndarray:
+    def _rates(self) -> Array:
         inertias = [np.repeat(self.groups[i], self.lam.shape[-1]) for i in self.family.layout.inertias]
         return rate_rows(self._table, self.lam.reshape(-1), self.family.layout, self.family.functions, inertias)
 
     @cached_property
-    def state(self) -> np.ndarray:
+    def state(self) -> Array:
         """The rows that describe the shapes."""
         return self.quantities(self.family.layout.state)
 
@@ -220,16 +222,16 @@ class DimensionlessModes:
             some.__dict__["_table"] = self._table.reshape(size, -1, modes)[:, part].reshape(size, -1)
         return some
 
-    def shape(self, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
+    def shape(self, xi: Array, derivative: int = 0) -> Array:
         """Return a derivative of every shape by xi at points that broadcast on a new last axis."""
         return shape(self.lam, self.state, xi, derivative, self.family.layout.n, self.family.functions)
 
-    def integral(self) -> np.ndarray:
+    def integral(self) -> Array:
         """Return the integral of every shape from 0 to 1."""
         return integral(self.lam, self.state, self.family.layout.n, self.family.functions)
 
 
-def _columns(units: Sequence[float | np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
+def _columns(units: Sequence[float | Array], shape: tuple[int, ...]) -> Array:
     """Return the units of rows as an array (rows, ..., 1), or (rows, 1) if they are the same for the whole batch."""
     if all(np.ndim(unit) == 0 for unit in units):
         return np.array(units).reshape(-1, *(1 for _ in shape), 1)

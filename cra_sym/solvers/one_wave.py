@@ -12,11 +12,14 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cra_sym.solvers.spectrum import Lanes
 
 __all__ = ["NEAR", "Functions", "Layout", "OneWaveCharacteristic", "Structure", "parameters", "power"]
 
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
 Structure = tuple[tuple[str, ...], tuple[str, ...]]
 
 NEAR = {1: 2.0, 2: 5.0}
@@ -100,14 +103,14 @@ class Layout:
         """How many zeros there may be below `NEAR`: the reference has none, and so many links may raise the count."""
         return sum(change != -1 for change in self.changes)
 
-    def is_held(self, groups: Sequence[np.ndarray], channel: int) -> np.ndarray | bool:
+    def is_held(self, groups: Sequence[Array], channel: int) -> NDArray[np.bool] | bool:
         """Return where a spring or a support resists the displacement of a channel."""
         if "k" not in self.kinds[channel]:
             return self.kinds[channel] == "h"
-        held: np.ndarray = groups[self.groups.index((channel, "k"))] > 0
+        held: NDArray[np.bool] = groups[self.groups.index((channel, "k"))] > 0
         return held
 
-    def rigid_body_modes(self, groups: Sequence[np.ndarray], lanes: int) -> np.ndarray:
+    def rigid_body_modes(self, groups: Sequence[Array], lanes: int) -> Counts:
         """Return how many rigid-body motions no spring and no support resists, shape (lanes,)."""
         n = self.n
         resisted = [np.asarray(self.is_held(groups, i)).astype(np.int64) for i in range(2 * n)]
@@ -128,25 +131,25 @@ def wave_number(z: Any, n: int) -> Any:
     return np.sqrt(z) if n == 1 else np.sqrt(np.sqrt(z))
 
 
-def parameters(layout: Layout, groups: Sequence[np.ndarray]) -> np.ndarray:
+def parameters(layout: Layout, groups: Sequence[Array]) -> Array:
     """Return ``(s, i, c) = (kappa, mu, 1) / (1 + kappa + mu)`` of every channel, shape (parameters, lanes).
 
     An infinite stiffness gives (1, 0, 0). Only what the structure has is there.
     """
     by_group = dict(zip(layout.groups, groups, strict=True))
-    rows: list[np.ndarray] = []
+    rows: list[Array] = []
     for channel, kind in enumerate(layout.kinds):
         if kind in ("", "h"):
             continue
         members = [by_group[channel, letter] for letter in kind]
-        total = sum(members, np.float64(1.0))
+        total = np.asarray(sum(members, np.float64(1.0)))
         with np.errstate(invalid="ignore"):
             rows += [np.where(np.isinf(x), 1.0, x / total) for x in members]
         rows.append(1.0 / total)
     return np.array(rows)
 
 
-def stacked(values: Sequence[Any], lanes: int) -> np.ndarray:
+def stacked(values: Sequence[Any], lanes: int) -> Array:
     """Return values, arrays of lanes or numbers, as rows of one array."""
     result = np.empty((len(values), lanes), np.result_type(np.float64, *values))
     for row, value in zip(result, values, strict=True):
@@ -167,14 +170,14 @@ class OneWaveCharacteristic:
     lanes : int
     """
 
-    def __init__(self, layout: Layout, functions: Functions, groups: Sequence[np.ndarray], lanes: int) -> None:
+    def __init__(self, layout: Layout, functions: Functions, groups: Sequence[Array], lanes: int) -> None:
         self.layout, self._functions = layout, functions
         self._parameters = parameters(layout, groups).reshape(-1, lanes)
         self._coefficients = stacked(functions["coefficients"].function(*self._parameters), lanes)
         self.zeros = layout.rigid_body_modes(groups, lanes)
 
     @cached_property
-    def _power_series(self) -> np.ndarray:
+    def _power_series(self) -> Array:
         """Coefficients of the power series in z with the zeros at z = 0 divided out, shape (terms, lanes)."""
         powers = stacked(self._functions["power_series"].function(*self._coefficients), len(self.zeros))
         for multiplicity in range(1, self.layout.n + 1):
@@ -182,7 +185,7 @@ class OneWaveCharacteristic:
             powers[:-1, shifted], powers[-1, shifted] = powers[1:, shifted], 0.0
         return powers
 
-    def count(self, z: float | np.ndarray, lanes: Lanes) -> tuple[np.ndarray, np.ndarray]:
+    def count(self, z: float | Array, lanes: Lanes) -> tuple[Counts, Array]:
         """Return the exact number of zeros below z, rigid-body zeros included, and the scaled determinant."""
         of = self._parameters[:, lanes]
         lam, *basis = self._basis(np.asarray(z, dtype=np.float64))
@@ -190,13 +193,12 @@ class OneWaveCharacteristic:
         number = np.floor(lam / np.pi).astype(np.int64)
         number = _with_parity(value, number, np.where(lam / np.pi - number < 0.5, -1, 1))
         for value, change in zip(links, self.layout.changes, strict=True):
-            if isinstance(change, tuple):
-                change = np.where(of[change[0]] > z * of[change[1]], -1, 1)
-            number = _with_parity(value, number, change)
+            by = change if isinstance(change, int) else np.where(of[change[0]] > z * of[change[1]], -1, 1)
+            number = _with_parity(value, number, by)
         shape = self.zeros[lanes].shape
         return np.broadcast_to(number, shape), np.broadcast_to(value, shape)
 
-    def evaluate(self, z: np.ndarray, lanes: Lanes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def evaluate(self, z: Array, lanes: Lanes) -> tuple[Array, Array, Array]:
         """Return the determinant and its derivatives by z, scaled; rigid-body zeros divided out for small z."""
         near = z < NEAR[self.layout.n]
         if not near.any():
@@ -209,12 +211,12 @@ class OneWaveCharacteristic:
         result[:, ~near] = self._evaluate_far(z[~near], lanes[~near])
         return result[0], result[1], result[2]
 
-    def _evaluate_far(self, z: np.ndarray, lanes: Lanes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _evaluate_far(self, z: Array, lanes: Lanes) -> tuple[Array, Array, Array]:
         _, *basis = self._basis_far(z)
         value, first, second = self._functions["derivatives"].function(*self._coefficients[:, lanes], z, *basis)
         return value, first / z, second / z**2
 
-    def _evaluate_near(self, z: np.ndarray, lanes: Lanes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _evaluate_near(self, z: Array, lanes: Lanes) -> tuple[Array, Array, Array]:
         powers = self._power_series[:, lanes]
         value, first, second = powers[-1], np.zeros_like(z), np.zeros_like(z)
         for term in powers[-2::-1]:
@@ -223,12 +225,12 @@ class OneWaveCharacteristic:
             value = value * z + term
         return value, first, 2 * second
 
-    def _basis_far(self, z: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _basis_far(self, z: Array) -> tuple[Array, ...]:
         lam = wave_number(z, self.layout.n)
         decay = np.exp(-lam) if self.layout.n == 2 else 1.0
         return lam, *self._functions["basis"].function(lam, decay)
 
-    def _basis(self, z: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _basis(self, z: Array) -> tuple[Array, ...]:
         """Return lambda and the basis, scaled, for any z."""
         limit = NEAR[self.layout.n]
         near = self._functions["basis_near"].function(np.minimum(z, limit))
@@ -236,6 +238,6 @@ class OneWaveCharacteristic:
         return lam, *(np.where(z < limit, a, b) for a, b in zip(near, far, strict=True))
 
 
-def _with_parity(value: np.ndarray, number: np.ndarray, change: int | np.ndarray) -> np.ndarray:
+def _with_parity(value: Array, number: Counts, change: int | Counts) -> Counts:
     """Return the number, changed where the sign of the value is not that of ``(-1)**number``."""
     return np.where((value > 0) == (number % 2 == 0), number, number + change)

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cra_sym.solvers.one_wave import Functions, Layout, power, stacked
 
 __all__ = ["NEAR", "Table", "fill", "integral", "near_shape", "rate_rows", "shape"]
 
+Array = NDArray[np.float64]
 NEAR = {1: 2.0, 2: 25.0}
 """Below this z a shape is a power series from the left end; a test holds it and the derivation's together."""
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(16)  # exact to rounding up to `NEAR`
@@ -69,7 +71,7 @@ class Table(Layout):
     @cached_property
     def size(self) -> int:
         """Rows of a table without the rates."""
-        return self.strain.stop + self.kinds.count("km")
+        return 6 * self.n + 1 + len(self.springs) + self.kinds.count("km")
 
     @property
     def by_springs(self) -> slice:
@@ -88,13 +90,13 @@ class Table(Layout):
 
 
 def fill(
-    table: np.ndarray,
-    lam: np.ndarray,
+    table: Array,
+    lam: Array,
     modes: int,
     layout: Table,
     functions: Functions,
-    parameters: np.ndarray,
-    inertias: Sequence[np.ndarray],
+    parameters: Array,
+    inertias: Sequence[Array],
 ) -> None:
     """Fill the rows of a table for modes of unit generalised mass.
 
@@ -148,9 +150,7 @@ def fill(
     table += 0.0  # -0.0 becomes 0.0
 
 
-def _near(
-    layout: Table, functions: Functions, parameters: np.ndarray, z: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _near(layout: Table, functions: Functions, parameters: Array, z: Array) -> tuple[Array, Array, Array]:
     """Return the amplitudes of the left end, the raw state of the right end and the invariant."""
     krylov = functions["polynomials"].function(np.ones_like(z), z)
     if layout.n == 1:
@@ -163,7 +163,7 @@ def _near(
     return left, stacked(tip, z.size), invariant
 
 
-def _amplitudes_near(rows: np.ndarray) -> np.ndarray:
+def _amplitudes_near(rows: Array) -> Array:
     """Return the amplitudes from whichever condition of the right end cancels less."""
     rows = rows.reshape(2, 2, 2, -1)  # condition, amplitude, (entry, magnitude)
     entry, magnitude = rows[:, :, 0], rows[:, :, 1]
@@ -176,8 +176,8 @@ def _amplitudes_near(rows: np.ndarray) -> np.ndarray:
 
 
 def _far(
-    layout: Table, functions: Functions, parameters: np.ndarray, lam: np.ndarray, z: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    layout: Table, functions: Functions, parameters: Array, lam: Array, z: Array
+) -> tuple[Array, Array, Array, Array]:
     """Return the amplitudes of the left end, the raw state of the right end, the wave amplitudes and the invariant."""
     n = layout.n
     waving = lam, np.cos(lam), np.sin(lam), np.exp(-lam)
@@ -189,7 +189,7 @@ def _far(
     return left, tip, waves, invariant
 
 
-def _rigid(functions: Functions, parameters: np.ndarray, inertias: list[np.ndarray], first: np.ndarray) -> np.ndarray:
+def _rigid(functions: Functions, parameters: Array, inertias: list[Array], first: Array) -> Array:
     """Return shape and slope at the right end, amplitudes of the left end, mass and momentum of rigid-body modes."""
     with np.errstate(divide="ignore", invalid="ignore"):
         found = functions["rigid_body"].function(*parameters, *inertias, first.astype(np.float64))
@@ -199,9 +199,7 @@ def _rigid(functions: Functions, parameters: np.ndarray, inertias: list[np.ndarr
     return result
 
 
-def rate_rows(
-    table: np.ndarray, lam: np.ndarray, layout: Table, functions: Functions, inertias: Sequence[np.ndarray]
-) -> np.ndarray:
+def rate_rows(table: Array, lam: Array, layout: Table, functions: Functions, inertias: Sequence[Array]) -> Array:
     """Return the rows of rates from those of a table, shape (rates, size)."""
     root = lam if layout.n == 1 else lam * lam
     inner = layout.waves
@@ -211,13 +209,13 @@ def rate_rows(
     return stacked(found, lam.size)
 
 
-def derivatives(state: np.ndarray, n: int) -> np.ndarray:
+def derivatives(state: Array, n: int) -> Array:
     """Return the shape and its derivatives at the left end from q and P there."""
     forces = [(-1) ** (n - 1 - j) * state[n + j] for j in reversed(range(n))]
     return np.array([*state[:n], *forces])
 
 
-def near_shape(start: np.ndarray, z: np.ndarray, xi: np.ndarray, derivative: int, functions: Functions) -> np.ndarray:
+def near_shape(start: Array, z: Array, xi: Array, derivative: int, functions: Functions) -> Array:
     """Return a derivative by xi, below the 2n-th, of the solution with the given derivatives at the left end."""
     size = len(start)
     signed = (-1) ** (size // 2) * z
@@ -229,9 +227,7 @@ def near_shape(start: np.ndarray, z: np.ndarray, xi: np.ndarray, derivative: int
     return np.asarray(sum(terms))
 
 
-def shape(
-    lam: np.ndarray, state: np.ndarray, xi: np.ndarray, derivative: int, n: int, functions: Functions
-) -> np.ndarray:
+def shape(lam: Array, state: Array, xi: Array, derivative: int, n: int, functions: Functions) -> Array:
     """Return a derivative of every shape by xi at points that broadcast on a new last axis.
 
     Parameters
@@ -256,7 +252,7 @@ def shape(
     return result * ((-1) ** n * z) ** turns if turns else result
 
 
-def integral(lam: np.ndarray, state: np.ndarray, n: int, functions: Functions) -> np.ndarray:
+def integral(lam: Array, state: Array, n: int, functions: Functions) -> Array:
     """Return the integral of every shape from 0 to 1, shape (..., modes)."""
     z = power(lam, n)
     near = z < NEAR[n]
