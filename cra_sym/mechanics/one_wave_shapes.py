@@ -8,6 +8,7 @@ alpha_j each open, and with them the state there is exact for any stiffness and 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import chain
 
 import sympy as sp
@@ -89,9 +90,21 @@ def _state_symbols(name: str, structure: Structure) -> tuple[sp.Symbol, ...]:
     return tuple(sp.Symbol(f"{name}_{j}", real=True) for j in range(_n(structure)))
 
 
+def _whole(structure: Structure) -> dict[sp.Symbol, sp.Expr]:
+    """Return a symbol for each S of a spring with an inertia beside it: expanded, its terms would cancel apart."""
+    pairs = enumerate(conditions(structure)[0])
+    return {sp.Symbol(f"S_{i}", real=True): stiff for i, (stiff, _) in pairs if stiff.is_Add}
+
+
+def _pairs(structure: Structure) -> list[tuple[sp.Expr, sp.Expr]]:
+    """Return (S, c) of every channel, with the symbols of `_whole`."""
+    names = {stiff: name for name, stiff in _whole(structure).items()}
+    return [(names.get(stiff, stiff), soft) for stiff, soft in conditions(structure)[0]]
+
+
 def _left(structure: Structure) -> tuple[list[sp.Expr], list[sp.Expr]]:
     """Return q and P at the left end in the amplitudes."""
-    pairs = conditions(structure)[0][: _n(structure)]
+    pairs = _pairs(structure)[: _n(structure)]
     both = [(c * a, s * a) for (s, c), a in zip(pairs, ALPHA, strict=False)]
     return [q for q, _ in both], [p for _, p in both]
 
@@ -130,7 +143,7 @@ def _right_conditions(structure: Structure, derivatives: list[sp.Expr]) -> list[
     """Return what has to vanish at the right end, given the shape and its derivatives there."""
     n = _n(structure)
     state = force_rows(sp.Matrix(derivatives))
-    pairs = conditions(structure)[0][n:]
+    pairs = _pairs(structure)[n:]
     return [(-1) ** (n - 1 - j) * (s * state[j] + c * state[n + j]) for j, (s, c) in enumerate(pairs)]
 
 
@@ -142,14 +155,15 @@ def tip_rows(structure: Structure) -> Derivation:
         for amplitude in ALPHA[: _n(structure)]:
             entry = sp.expand(condition).coeff(amplitude)
             entries += [entry, sum(abs(term) for term in sp.Add.make_args(entry))]
-    return tuple(entries), (*parameters(structure), z, *KRYLOV[:size])
+    return _written_out(entries, structure), (*parameters(structure), z, *KRYLOV[:size])
 
 
 def tip_near(structure: Structure) -> Derivation:
     """Return the shape and its derivatives at the right end from the amplitudes and the Krylov functions there."""
     size = 2 * _n(structure)
     left = _left_parameters(structure)
-    return tuple(_near(structure, d) for d in range(size)), (*left, *ALPHA[: _n(structure)], z, *KRYLOV[:size])
+    tip = [_near(structure, d) for d in range(size)]
+    return _written_out(tip, structure), (*left, *ALPHA[: _n(structure)], z, *KRYLOV[:size])
 
 
 def _waves(n: int, order: int, cosine: sp.Expr, sine: sp.Expr, from_left: sp.Expr, from_right: sp.Expr) -> sp.Expr:
@@ -179,7 +193,8 @@ def amplitudes_far(structure: Structure) -> Derivation:
     unknown, left = list(WAVES[: 2 * n]), _left_derivatives(structure)
     if n == 1:
         solution = sp.solve([a - s for a, s in zip(_at_left(1), left, strict=True)], unknown, dict=True)[0]
-        return (sp.Integer(1), *(_in_b(solution[x].subs(ALPHA[0], 1), n) for x in unknown)), arguments
+        found = [sp.Integer(1), *(solution[x].subs(ALPHA[0], 1) for x in unknown)]
+        return tuple(_in_b(x, 1) for x in _written_out(found, structure)), arguments
     growing = sp.Symbol("growing")  # D times its decay
     equations = [sp.expand(a - s).subs(D, growing / decay) for a, s in zip(_at_left(2), left, strict=True)]
     waves = sp.solve([sp.expand(e) for e in equations], [A, B, C, growing], dict=True)[0]
@@ -189,7 +204,11 @@ def amplitudes_far(structure: Structure) -> Derivation:
     ratio = {ALPHA[0]: sp.diff(remainder, ALPHA[1]), ALPHA[1]: -sp.diff(remainder, ALPHA[0])}
     amplitudes = [*ratio.values(), *(waves[x].subs(ratio, simultaneous=True) for x in (A, B, C))]
     amplitudes.append(held.subs(ratio, simultaneous=True))
-    return tuple(_in_b(x, n) for x in amplitudes), arguments
+    return tuple(_in_b(x, n) for x in _written_out(amplitudes, structure)), arguments
+
+
+def _written_out(expressions: Sequence[sp.Expr], structure: Structure) -> tuple[sp.Expr, ...]:
+    return tuple(x.xreplace(_whole(structure)) for x in expressions)
 
 
 def _in_b(expression: sp.Expr, n: int) -> sp.Expr:
@@ -205,7 +224,7 @@ def _from_the_right(structure: Structure, waves: dict[sp.Symbol, sp.Expr]) -> sp
     rows = [sp.expand(_in_b(row, 2) / b**3) for row in _right_conditions(structure, _at_right(2))]
     for row in rows:
         terms = sp.Add.make_args(sp.expand(row.coeff(D)))
-        if len({sp.sign(term.as_coeff_Mul()[0]) for term in terms}) == 1:
+        if not row.has(*_whole(structure)) and len({sp.sign(term.as_coeff_Mul()[0]) for term in terms}) == 1:
             return -row.subs(D, 0).subs(waves) / row.coeff(D)
     above, below = [], []
     for row in rows:
@@ -305,7 +324,7 @@ def _invariant(derivatives: list[sp.Expr]) -> sp.Expr:
 def invariant_near(structure: Structure) -> Derivation:
     """Return the invariant of `generalised_mass` from the amplitudes of the left end."""
     left = _left_parameters(structure)
-    return (_invariant(_left_derivatives(structure)),), (*left, *ALPHA[: _n(structure)], z)
+    return _written_out([_invariant(_left_derivatives(structure))], structure), (*left, *ALPHA[: _n(structure)], z)
 
 
 def invariant_far(n: int) -> Derivation:
@@ -353,7 +372,7 @@ def rows(structure: Structure) -> Derivation:
     The momentum, the integral of phi with the masses of both ends, is that of the springs and supports over z.
     """
     n = _n(structure)
-    q, p = _left(structure)
+    q, p = (_written_out(x, structure) for x in _left(structure))
     right_q, right_p = (_state_symbols(name, structure) for name in ("q", "p"))
     amplitudes = dict(enumerate(ALPHA[:n])) | _amplitudes(structure)
     _, roots = _prepared_symbols(structure)

@@ -1,8 +1,9 @@
-"""Neighbouring low modes whose frequencies nearly coincide: Rayleigh-Ritz values keep digits a determinant loses.
+"""Neighbouring modes whose frequencies nearly coincide: Rayleigh-Ritz values keep digits that a determinant loses.
 
-A heavy end-effector on a soft joint moves as a rigid body, along and about itself. Tuned alike, the two motions have
-frequencies as close as their coupling is weak, and zeros of the determinant at a relative distance g are known to
-eps / g only. The energies of the two motions have no such loss.
+A heavy end-effector on a soft joint moves as a rigid body, along and about itself; two heavy ends on springs take no
+notice of each other. Tuned alike, such motions have frequencies as close as their coupling is weak, and zeros of the
+determinant at a relative distance g are known to eps / g only. The energies of the two motions have no such loss: the
+shapes at approximate frequencies span those of the pair up to the error, which enters the values squared.
 """
 
 from __future__ import annotations
@@ -10,25 +11,23 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.model.one_wave_family import Family
-from cra_sym.solvers.one_wave import Layout, parameters, power, wave_number
-from cra_sym.solvers.one_wave_shapes import derivatives, near_shape
+from cra_sym.model.one_wave_family import DimensionlessModes, Family
 from cra_sym.solvers.rayleigh import stationary_values
 
 __all__ = ["CLOSE", "resolve_close_pairs"]
 
 Array = NDArray[np.float64]
-CLOSE = 0.1
-"""Relative distance of two frequency parameters below which their zeros are replaced by Rayleigh-Ritz values."""
 
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(12)  # exact to rounding up to z of 5, where all such pairs lie
-_XI = np.append((1 + _POINTS) / 2, 1.0)[:, None]
-_ALMOST_RIGID = 5.0
-_SOFT = 10.0  # springs of the other end that are stiffer leave rounding errors larger than what is corrected
+CLOSE = 0.1
+"""Distance of two frequency parameters, relative below 1, under which Rayleigh-Ritz values replace the zeros."""
+
+_APART = 1e-9  # relative distance of what spans the pair at least: its square is nothing
+_TURNS = 3  # the first may start from shapes that are nearly parallel
+_LANES = 1000  # at once, which bounds the memory
 
 
 def resolve_close_pairs(family: Family, lam: Array, *groups: Array) -> None:
-    """Correct, in place, low frequency parameters of every beam in which two neighbours lie close to each other.
+    """Correct, in place, the frequency parameters of neighbours that lie close to each other.
 
     Parameters
     ----------
@@ -37,62 +36,48 @@ def resolve_close_pairs(family: Family, lam: Array, *groups: Array) -> None:
         Ascending frequency parameters.
     groups : ndarray, shape (...)
     """
-    layout = family.layout
-    if layout.n != 2 or lam.shape[-1] < 2 or not groups:
-        return
     rows = lam.reshape(-1, lam.shape[-1])
-    flat = [value.reshape(-1) for value in groups]
-    base = int(not _is_sprung(layout, 0) and _is_sprung(layout, 1))
-    for lower in range(min(rows.shape[1] - 1, layout.most_near - 1)):
+    flat = [np.broadcast_to(value, lam.shape[:-1]).reshape(-1) for value in groups]
+    for lower in range(rows.shape[1] - 1):
         low, high = rows[:, lower], rows[:, lower + 1]
-        close = np.flatnonzero((low > (1 - CLOSE) * high) & (power(high, 2) < _ALMOST_RIGID))
-        close = close[~_is_stiff(layout, 1 - base, [value[close] for value in flat], close.size)]
-        for mode in (lower, lower + 1) if close.size else ():
-            z = power(rows[close, mode], 2)
-            ritz = _ritz_values(family, base, z, [value[close] for value in flat])
-            near = np.abs(ritz - z[:, None]) < CLOSE * z[:, None]
-            wanted = ritz[:, mode - lower]
-            rows[close, mode] = np.where(near.all(axis=1), wave_number(wanted, 2), rows[close, mode])
+        close = np.flatnonzero((high - low < CLOSE * np.minimum(high, 1.0)) & (low > 0))
+        for start in range(0, close.size, _LANES):
+            some = close[start : start + _LANES]
+            rows[some, lower : lower + 2] = _resolved(family, rows[some, lower : lower + 2], [x[some] for x in flat])
 
 
-def _is_sprung(layout: Layout, end: int) -> bool:
-    return any("k" in kind or kind == "h" for kind in layout.structure[end])
+def _resolved(family: Family, pairs: Array, groups: list[Array]) -> Array:
+    """Return pairs of frequency parameters, shape (lanes, 2), from the energies of their shapes."""
+    for _ in range(_TURNS):
+        middle, half = pairs.mean(axis=1), np.maximum(np.diff(pairs)[:, 0], _APART * pairs[:, 1]) / 2
+        apart = np.stack([middle - half, middle + half], axis=1)
+        modes = family.modes(*groups, lam=np.where(np.diff(pairs) < _APART * pairs[:, 1:], apart, pairs), compile=False)
+        strain, kinetic = _energies(modes, groups)
+        pairs = stationary_values(strain, kinetic) ** (0.5 / family.layout.n)
+    return pairs
 
 
-def _is_stiff(layout: Layout, end: int, groups: list[Array], lanes: int) -> Array:
-    """Return where an end has a support or a stiff spring."""
-    found = np.full(lanes, "h" in layout.structure[end])
-    for (channel, letter), value in zip(layout.groups, groups, strict=True):
-        if letter == "k" and channel // 2 == end:
-            found |= value > _SOFT
-    return found
+def _energies(modes: DimensionlessModes, groups: list[Array]) -> tuple[Array, Array]:
+    """Return the matrices of twice the strain and twice the kinetic energy, each of shape (lanes, modes, modes).
 
-
-def _ritz_values(family: Family, base: int, z: Array, groups: list[Array]) -> Array:
-    """Return both stationary values of strain over kinetic energy among the solutions that meet one end's conditions.
-
-    Those for the given z hold the mode up to the error of z, which enters squared.
+    The end values are those that the conditions of the right end give; the shapes are bent to them.
     """
-    layout = family.layout
-    given = {name: row for name, row in zip(layout.parameters, parameters(layout, groups), strict=True)}
-    known = dict(zip(layout.groups, groups, strict=True))
-    state = np.zeros((4, 2, z.size))
-    strain, kinetic = np.zeros((2, z.size, 2, 2))
-    for j, kind in enumerate(layout.structure[base]):
-        s, i, c = (given.get((2 * base + j, letter), np.zeros_like(z)) for letter in "sic")
-        s, c = s + float(kind == "h"), c + float(kind == "")
-        state[j, j], state[2 + j, j] = c, s - z * i
-        strain[:, j, j], kinetic[:, j, j] = s * c, i * c
-    start = derivatives(state, 2)[:, :, None]
-    shapes = [near_shape(start, z, _XI, order, family.functions) for order in range(3)]
-
-    def integral(shape: Array) -> Array:
-        return np.einsum("apn,bpn,p->nab", shape[:, :-1], shape[:, :-1], _WEIGHTS / 2)
-
-    strain, kinetic = strain + integral(shapes[2]), kinetic + integral(shapes[0])
-    for j in range(2):
-        square = np.einsum("an,bn->nab", shapes[j][:, -1], shapes[j][:, -1])
-        for letter, total in (("k", strain), ("m", kinetic)):
-            if (2 * (1 - base) + j, letter) in known:
-                total += known[2 * (1 - base) + j, letter][:, None, None] * square
-    return stationary_values(strain, kinetic)
+    table, n = modes.family.layout, modes.family.layout.n
+    points, weights = np.polynomial.legendre.leggauss(int(np.ceil(modes.lam.max())) + 24)  # more than products need
+    xi, weights = (1 + points) / 2, weights / 2
+    rows = modes.quantities(slice(0, table.size))
+    ends = np.array([1.0])
+    missing = [rows[table.right][j][..., None] - modes.shape(ends, j) for j in range(n)]
+    beam = [(xi**2 * (3 - 2 * xi), 6 - 12 * xi), (xi**2 * (xi - 1), 6 * xi - 2)]
+    hermite = beam if n == 2 else [(xi, np.ones_like(xi))]
+    shape, bent = modes.shape(xi, 0), modes.shape(xi, n)
+    for gap, (value, curved) in zip(missing, hermite, strict=True):
+        shape, bent = shape + gap * value, bent + gap * curved
+    strain, kinetic = ((f * weights) @ np.swapaxes(f, 1, 2) for f in (bent, shape))
+    for root in rows[table.strain]:
+        strain = strain + root[:, :, None] * root[:, None, :]
+    for position in table.inertias:
+        end, j = divmod(table.groups[position][0], n)
+        q = rows[table.right if end else table.left][j]
+        kinetic = kinetic + groups[position][:, None, None] * (q[:, :, None] * q[:, None, :])
+    return strain, kinetic
