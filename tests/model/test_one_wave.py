@@ -227,10 +227,9 @@ x, t, a, c, l, k, m, h = symbols("x t a c l k m h", positive=True)
 y = Function("y")(x, t)
 
 
-def line(n, **ends):
-    return cra.Model(
-        a * y.diff(t) ** 2 / 2 - c * y.diff(x, n) ** 2 / 2, fields=[y], x=x, domain=(h, h + l), t=t, **ends
-    )
+def line(n, further=0, **ends):
+    density = a * y.diff(t) ** 2 / 2 - c * y.diff(x, n) ** 2 / 2 + further
+    return cra.Model(density, fields=[y], x=x, domain=(h, h + l), t=t, **ends)
 
 
 def route_of(model):
