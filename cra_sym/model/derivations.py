@@ -16,6 +16,7 @@ from cra_sym.mechanics.weak import Bilinear, WeakForm, weak_form
 from cra_sym.model.exact import BallProblem, exact_kernel
 from cra_sym.model.forms import form_of, load_of
 from cra_sym.model.lagrangian import Model
+from cra_sym.model.one_wave import one_wave_route
 from cra_sym.model.projection import Form, Load
 from cra_sym.model.routes import GeneralRoute, Route
 from cra_sym.model.spatial import SpatialProblem, spatial_problem
@@ -53,7 +54,8 @@ def damped_spatial(model: Model) -> SpatialProblem:
 
 def route(model: Model) -> Route:
     """Return the fastest way to natural frequencies and modes that the Lagrangian allows."""
-    return GeneralRoute(spatial(model))
+    left = model.equations.domain[0]
+    return one_wave_route(model.conservative, model.symbols, left) or GeneralRoute(spatial(model))
 
 
 # Loads -----------------------------------------------------------------------------------------------------------
