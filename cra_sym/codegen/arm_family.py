@@ -24,6 +24,7 @@ def arm_family() -> Family:
     route = Arm.nominal().numerics("route")
     if not isinstance(route, OneWave) or route.family.structure != _STRUCTURE:
         raise ValueError(
-            "the arm's Lagrangian must be that of a beam with springs at x = 0 and inertias at x = L; export it as a model"
+            "the arm's Lagrangian must be that of a beam with springs at x = 0 and inertias at x = L; "
+            "export it as a model"
         )
     return route.family

@@ -268,7 +268,7 @@ def stiffnesses(model: Model) -> dict[str, tuple[int, int]]:
 
 
 def inertias(model: Model) -> dict[str, tuple[int, int]]:
-    """Return the inertias of an end that move with one of its displacements, with that end (0 or 1) and displacement."""
+    """Return the inertias of an end that move with one of its displacements, that end (0 or 1) and displacement."""
     return _end_parameters(model, -model.conservative.parameter)
 
 
