@@ -1,0 +1,237 @@
+"""Uniform problems with two waves a section: their determinant and exact count in NumPy, and rigid-body motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import waves_kernel as kernel
+
+__all__ = ["Determinant", "UniformProblem", "negative_energy", "rigid_motions"]
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+_A, _B, _RIGHT, _LEFT, _POLYNOMIALS = 0, 8, 16, 22, 28
+_DEPENDENT = 1e-14  # a row of unit size that rounding leaves of a dependent one
+
+
+@dataclass(frozen=True)
+class UniformProblem:
+    """Problems of motions ``cos(omega t)`` with ``z = omega^2``, constant along x and even under ``x -> -x``.
+
+    The state of a section has n displacements q and their natural forces P (positive at the right end). Displacement i
+    and its force are partners ``E[i]`` and ``O[i]``: the first ``even`` displacements are even under reflection, with
+    ``E[i] = q_i`` and ``O[i] = P_i``; the others are odd, with ``E[i] = P_i`` and ``O[i] = q_i``. Then ``O' = A_OE E``
+    and ``E' = A_EO O``.
+
+    Parameters
+    ----------
+    length : ndarray, shape (rows,)
+        In (0, inf).
+    odd_by_even, even_by_odd : ndarray, shape (2, rows, n, n)
+        A_OE and A_EO: the part without z, and the factor of z.
+    stiffness, mass : ndarray, shape (2, rows, n)
+        Of the end conditions at the left (first) and right end, in the units of P over those of q: ``P + (k - z m) q = 0``
+        at the right end, ``-P + (k - z m) q = 0`` at the left. Stiffness in [0, inf], inf holds the displacement;
+        masses in [0, inf).
+    even : int
+        Number of even displacements, 1 to n. (If all are odd, call them even.)
+    """
+
+    length: Floats
+    odd_by_even: Floats
+    even_by_odd: Floats
+    stiffness: Floats
+    mass: Floats
+    even: int = 1
+
+    def __post_init__(self) -> None:
+        rows, n = len(self.length), self.odd_by_even.shape[-1]
+        shapes = {"odd_by_even": (2, rows, n, n), "even_by_odd": (2, rows, n, n)}
+        shapes |= {"stiffness": (2, rows, n), "mass": (2, rows, n)}
+        for name, shape in shapes.items():
+            if getattr(self, name).shape != shape:
+                raise ValueError(f"{name}: the shape {getattr(self, name).shape} must be {shape}")
+        if n != 2:
+            raise ValueError(f"odd_by_even: the number of displacements {n} must be 2")
+        if not 1 <= self.even <= n:
+            raise ValueError(f"even = {self.even}: must be from 1 to {n}")
+
+    def take(self, rows: NDArray[np.int64] | slice) -> UniformProblem:
+        """Return the problem of some of the parameter sets."""
+        matrices = self.odd_by_even[:, rows], self.even_by_odd[:, rows]
+        return UniformProblem(self.length[rows], *matrices, self.stiffness[:, rows], self.mass[:, rows], self.even)
+
+    def coefficients(self) -> Floats:
+        """Return what `waves_kernel` takes, shape (34, rows): matrices times half the length, ends, dispersion."""
+        rows = len(self.length)
+        k = np.empty((34, rows))
+        for first, matrix in ((_A, self.odd_by_even), (_B, self.even_by_odd)):
+            k[first : first + 8] = np.moveaxis(matrix, 1, -1).reshape(8, rows) * (0.5 * self.length)
+        for first, end in ((_RIGHT, 1), (_LEFT, 0)):
+            for i in range(2):
+                stiffness, mass = self.stiffness[end, :, i], self.mass[end, :, i]
+                share = 1.0 / (1.0 + stiffness + mass)
+                held = np.isinf(stiffness)
+                k[first + 3 * i] = np.where(held, 1.0, np.where(held, 1.0, stiffness) * share)
+                k[first + 3 * i + 1], k[first + 3 * i + 2] = mass * share, share
+        k[_POLYNOMIALS:] = _dispersion(*k[: _RIGHT].reshape(4, 4, rows))
+        return k
+
+
+def _dispersion(a0: Floats, a1: Floats, b0: Floats, b1: Floats) -> Floats:
+    """Return the coefficients of 1, z and z^2 in the trace and the determinant of ``A_EO A_OE``."""
+
+    def trace(b: Floats, a: Floats) -> Floats:
+        return b[0] * a[0] + b[1] * a[2] + b[2] * a[1] + b[3] * a[3]
+
+    def determinant(m0: Floats, m1: Floats) -> tuple[Floats, Floats, Floats]:
+        mixed = m0[0] * m1[3] + m1[0] * m0[3] - m0[1] * m1[2] - m1[1] * m0[2]
+        return m0[0] * m0[3] - m0[1] * m0[2], mixed, m1[0] * m1[3] - m1[1] * m1[2]
+
+    d, e = determinant(a0, a1), determinant(b0, b1)
+    product = d[0] * e[0], d[0] * e[1] + d[1] * e[0], d[0] * e[2] + d[1] * e[1] + d[2] * e[0]
+    return np.array([trace(b0, a0), trace(b1, a0) + trace(b0, a1), trace(b1, a1), *product])
+
+
+class Determinant:
+    """The determinant of the end conditions, entire in z up to a positive factor, with the exact count.
+
+    Parameters
+    ----------
+    k : ndarray, shape (34, rows)
+        From `UniformProblem.coefficients`.
+    odd : bool
+        Whether the second displacement is odd under reflection.
+    zeros : ndarray of int, shape (rows,)
+        Multiplicity of the zero at z = 0, which is divided out of the values.
+    """
+
+    def __init__(self, k: Floats, odd: bool, zeros: Integers) -> None:
+        self.k, self.odd, self.zeros = k, odd, zeros
+
+    def value(self, z: Floats, rows: Integers) -> Floats:
+        """Return the determinant over ``z**zeros``, in the rows asked for."""
+        result = np.empty(z.size)
+        for part, k, z_part, _, columns, basis in self.regimes(z, self.k[:, rows]):
+            right, left = (kernel.pairs(k, z_part, first, self.odd) for first in (_RIGHT, _LEFT))
+            ends = kernel.minors(*right, columns), kernel.minors(*left, columns)
+            result[part] = kernel.joined(*ends) / basis
+        return self._deflated(result, z, rows)
+
+    def count(self, z: Floats, rows: Integers) -> tuple[Integers, Floats]:
+        """Return the exact number of zeros below z (for z > 0 those at 0 included), and the value."""
+        number, result = np.empty(z.size, dtype=np.int64), np.empty(z.size)
+        for part, k, z_part, waves, columns, basis in self.regimes(z, self.k[:, rows]):
+            right, left = (kernel.pairs(k, z_part, first, self.odd) for first in (_RIGHT, _LEFT))
+            number[part], result[part] = kernel.chain(
+                columns, right, left, basis, *waves[:3], *self._slopes(k, z_part), self._shears(k, z_part), self.odd
+            )
+        return number, self._deflated(result, z, rows)
+
+    def branch(self, turns: float, rows: Integers) -> Floats:
+        """Return the lowest z of free waves of ``turns`` half waves along the length."""
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            return kernel.branch((0.5 * np.pi * turns) ** 2, *self.k[_POLYNOMIALS:, rows])
+
+    def _deflated(self, value: Floats, z: Floats, rows: Integers) -> Floats:
+        zeros = self.zeros[rows]
+        return value / z**zeros if zeros.any() else value
+
+    @staticmethod
+    def _slopes(k: Floats, z: Floats) -> tuple[Floats, Floats]:
+        return 0.5 * k[29] + z * k[30], k[32] + 2.0 * z * k[33]
+
+    def _shears(self, k: Floats, z: Floats) -> NDArray[np.bool_]:
+        b11, b12, b21, b22 = kernel.linear(k, z, _B)
+        return self.odd & (b11 * b22 - b12 * b21 < 0.0)
+
+    @staticmethod
+    def regimes(z: Floats, k: Floats) -> Iterator[tuple[Integers | slice, Floats, Floats, tuple, tuple, Floats]]:
+        """Yield, for each regime: which members, k, z, the wave numbers, the columns at the right end and their basis."""
+        a, b = kernel.linear(k, z, _A), kernel.linear(k, z, _B)
+        waves = kernel.wave_numbers(a, b)
+        near, close = kernel.regime(*waves[:3])
+        for name, mask in (("near", near), ("close", close & ~near), ("distant", ~(near | close))):
+            part: Integers | slice = slice(None)
+            if not mask.all():
+                part = np.flatnonzero(mask)
+                if not part.size:
+                    continue
+            chosen = [tuple(entry[part] for entry in group) for group in (a, b, waves)]
+            if name == "distant":
+                *columns, basis = kernel.distant_columns(chosen[0], chosen[1], *chosen[2])
+            else:
+                *series, scale = getattr(kernel, f"{name}_waves")(*chosen[2][:3])
+                columns, basis = kernel.close_columns(chosen[0], chosen[1], *chosen[2], *series), 1.0 / scale
+            yield part, k[:, part], z[part], chosen[2], tuple(columns), basis
+
+
+def rigid_motions(problem: UniformProblem) -> Integers:
+    """Return how many independent motions without strain energy and without deflected springs each row has.
+
+    Exact: such a motion has P = 0, so ``q' = A_qq q`` with ``A_Pq q = 0``, and is zero where an end has stiffness. Only
+    linear dependence of a few rows of numbers decides.
+    """
+    rows, n = problem.stiffness.shape[1:]
+    result = np.zeros(rows, dtype=np.int64)
+    sprung = problem.stiffness > 0.0
+    open_ = np.flatnonzero(~sprung.all(axis=2).any(axis=0))
+    if not open_.size:
+        return result
+    gradient, force = _static_blocks(problem, open_)
+    right, left = np.eye(n), np.eye(n)
+    power = term = np.broadcast_to(np.eye(n), gradient.shape)
+    conditions = [force]
+    for j in range(1, n):
+        power = power @ gradient
+        conditions.append(force @ power)
+        term = power / float(np.prod(range(1, j + 1)))
+        right, left = right + term, left + (-1.0) ** j * term
+    for end, motion in ((0, left), (1, right)):
+        conditions.append(np.where(sprung[end, open_, :, None], np.broadcast_to(motion, gradient.shape), 0.0))
+    result[open_] = n - _ranks(np.concatenate(conditions, axis=1))
+    return result
+
+
+def _static_blocks(problem: UniformProblem, rows: Integers) -> tuple[Floats, Floats]:
+    """Return A_qq and A_Pq at z = 0 times half the length, shape (rows, n, n) each."""
+    n, even = problem.stiffness.shape[2], problem.even
+    h = 0.5 * problem.length[rows, None, None]
+    a, b = problem.odd_by_even[0, rows] * h, problem.even_by_odd[0, rows] * h
+    first, second = slice(0, even), slice(even, n)
+    gradient, force = np.zeros(a.shape), np.zeros(a.shape)
+    gradient[:, first, second], gradient[:, second, first] = b[:, first, second], a[:, second, first]
+    force[:, first, first], force[:, second, second] = a[:, first, first], b[:, second, second]
+    return gradient, force
+
+
+def _ranks(matrix: Floats) -> Integers:
+    """Return the rank of each matrix of a stack with few columns, by elimination with rows of unit size."""
+    rest = matrix.copy()
+    rank = np.zeros(len(rest), dtype=np.int64)
+    every = np.arange(len(rest))
+    for _ in range(matrix.shape[2]):
+        size = np.abs(rest).max(axis=2)
+        rest = rest / np.where(size > 0.0, size, 1.0)[:, :, None]
+        best = np.abs(rest).max(axis=1).argmax(axis=1)
+        pivot_row = np.abs(rest[every, :, best]).argmax(axis=1)
+        pivot = rest[every, pivot_row, best]
+        rank += pivot != 0.0
+        factor = rest[every, :, best] / np.where(pivot == 0.0, 1.0, pivot)[:, None]
+        rest = rest - factor[:, :, None] * rest[every, pivot_row][:, None, :]
+        rest = np.where(np.abs(rest) < _DEPENDENT, 0.0, rest)
+    return rank
+
+
+def negative_energy(problem: UniformProblem) -> NDArray[np.bool_]:
+    """Return where static strain energy may be negative: compression, springs that push; only there can a row buckle."""
+    _, force = _static_blocks(problem, np.arange(len(problem.length)))
+    off = force[:, 0, 1]
+    scale = np.abs(force[:, 0, 0] * force[:, 1, 1])
+    definite = force[:, 0, 0] * force[:, 1, 1] - off * force[:, 1, 0] >= -1e-15 * scale
+    return ~((force[:, 0, 0] >= 0.0) & (force[:, 1, 1] >= 0.0) & definite)
