@@ -19,7 +19,7 @@ _MOST_STEPS = 400
 _EPS = float(np.finfo(float).eps)
 
 
-def lowest_waves(problem: UniformProblem, modes: int) -> Floats:
+def lowest_waves(problem: UniformProblem, modes: int, *, compile: bool | None = None, threads: int | None = None) -> Floats:
     """Return the ``modes`` smallest squared frequencies of every row: ascending, complete, double roots twice.
 
     Parameters
