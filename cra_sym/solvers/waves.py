@@ -14,7 +14,7 @@ from .waves_count import Determinant, Floats, Integers, UniformProblem, negative
 
 __all__ = ["UniformProblem", "lowest_waves"]
 
-_BLOCK = 4096  # rows whose temporaries stay in the processor's cache
+_BLOCK = 1024  # rows whose temporaries stay in the processor's cache
 _MOST_STEPS = 400
 _EPS = float(np.finfo(float).eps)
 
@@ -72,8 +72,9 @@ def determinant(problem: UniformProblem) -> Determinant:
     function = Determinant(problem.coefficients(), problem.even == 1, rigid_motions(problem))
     unsafe = np.flatnonzero(negative_energy(problem))
     if unsafe.size:
-        z = function.branch(1.0, unsafe)
-        unstable, _ = function.count(-1e-12 * np.where(z > 0.0, z, 1.0), unsafe)
+        suspects = function.take(unsafe)
+        z = suspects.branch(1.0)
+        unstable, _ = suspects.count(-1e-12 * np.where(z > 0.0, z, 1.0))
         if unstable.any():
             number, sets = int(unstable.max()), len(problem.length)
             where = f", in {np.count_nonzero(unstable)} of {sets} parameter sets" if sets > 1 else ""
@@ -98,16 +99,17 @@ def _counted(function: Determinant, modes: int) -> tuple[Floats, Integers, Float
     """Return points z, up to one with enough roots below it in every row, the counts there and the values."""
     rows = len(function.zeros)
     every = np.arange(rows)
-    values = np.where(function.zeros == 0, function.value(np.zeros(rows), every), np.nan)
+    values = np.where(function.zeros == 0, function.value(np.zeros(rows)), np.nan)
     points, counts, found = [np.zeros(rows)], [function.zeros], [np.where(values > 0.0, values, np.nan)]
     pending = every
     for step in range(1, _MOST_STEPS + 1):
         z, number, value = points[-1].copy(), np.full(rows, modes, dtype=np.int64), found[-1].copy()
-        at = function.branch(step + 0.0625, pending)
+        rest = function.take(pending) if pending.size < rows else function
+        at = rest.branch(step + 0.0625)
         last = points[-1][pending]
         at = np.where((at > last) & (at < np.inf), at, np.where(last > 0.0, 4.0 * last, 1.0))
         z[pending] = at
-        number[pending], value[pending] = function.count(at, pending)
+        number[pending], value[pending] = rest.count(at)
         points, counts, found = [*points, z], [*counts, number], [*found, value]
         pending = pending[number[pending] < modes]
         if not pending.size:
@@ -122,7 +124,7 @@ def _isolate(function: Determinant, number: Integers, row: Integers, brackets: F
     while crowded.size:
         bottom, top = low[crowded], high[crowded]
         middle = np.where(bottom > 0.0, np.sqrt(bottom * top), top / 64.0)
-        counted, value = function.count(middle, row[crowded])
+        counted, value = function.take(row[crowded]).count(middle)
         left = counted <= number[crowded]
         up, down = crowded[left], crowded[~left]
         low[up], below[up], at_low[up] = middle[left], counted[left], value[left]
@@ -138,7 +140,7 @@ def _open_from_zero(function: Determinant, number: Integers, row: Integers, brac
     share = 1e-3
     while pending.size and share > 1e-300:
         z = share * high[pending]
-        value = function.value(z, row[pending])
+        value = function.take(row[pending]).value(z)
         before = (value > 0.0) == (number[pending] % 2 == 0)
         done, rest = pending[before], pending[~before]
         low[done], at_low[done] = z[before], value[before]
@@ -158,12 +160,12 @@ def _roots(function: Determinant, number: Integers, row: Integers, brackets: Flo
     alone = (below == number) & (above == number + 1) & (at_low > 0.0) & (at_high < 0.0)
     wanted = np.flatnonzero(alone)
     ends = tuple(values[wanted] for values in (low, high, at_low, at_high))
-    z[wanted] = _interpolated(function, row[wanted], sign[wanted], *ends)
+    z[wanted] = _interpolated(function.take(row[wanted]), sign[wanted], *ends)
     return z
 
 
 def _interpolated(
-    function: Determinant, row: Integers, sign: Floats, low: Floats, high: Floats, at_low: Floats, at_high: Floats
+    function: Determinant, sign: Floats, low: Floats, high: Floats, at_low: Floats, at_high: Floats
 ) -> Floats:
     """Return one root in each bracket; ``sign`` times the function is positive at its lower end."""
     z = np.empty(low.size)
@@ -175,7 +177,7 @@ def _interpolated(
     for _ in range(_MOST_STEPS):
         step = share * (x2 - x1)
         x = x1 + step
-        f = sign * function.value(x, row)
+        f = sign * function.value(x)
         same = (f > 0.0) == (f1 > 0.0)
         x3, f3 = np.where(same, x1, x2), np.where(same, f1, f2)
         x2, f2 = np.where(same, x2, x1), np.where(same, f2, f1)
@@ -188,13 +190,14 @@ def _interpolated(
         share = np.clip(np.where(quadratic, smooth, 0.5), least, 1.0 - least)
         following = np.abs(share * width)
         settled = quadratic & (following < 0.1 * np.abs(x1)) & (following * following <= 1e-15 * x1 * np.abs(step))
-        done = settled | (f1 == 0.0) | (np.abs(width) <= 2.0 * _EPS * np.abs(x1))
+        done = (settled | (f1 == 0.0) | (np.abs(width) <= 2.0 * _EPS * np.abs(x1))) & (place < z.size)
         end = np.where(f1 == 0.0, x1, x1 + share * width)
         z[place[done]] = end[done]
-        on = ~done
-        if not on.any():
+        place[done] = z.size
+        on = np.flatnonzero(place < z.size)
+        if not on.size:
             return z
-        if done.any():
-            place, row, sign, share = place[on], row[on], sign[on], share[on]
+        if on.size < 0.8 * place.size:
+            function, place, sign, share = function.take(on), place[on], sign[on], share[on]
             x1, x2, f1, f2 = x1[on], x2[on], f1[on], f2[on]
     raise ArithmeticError("the search for natural frequencies did not settle")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,61 +115,55 @@ class Determinant:
     def __init__(self, k: Floats, odd: bool, zeros: Integers) -> None:
         self.k, self.odd, self.zeros = k, odd, zeros
 
-    def value(self, z: Floats, rows: Integers) -> Floats:
-        """Return the determinant over ``z**zeros``, in the rows asked for."""
+    def take(self, rows: Integers) -> Determinant:
+        """Return the functions of some of the rows."""
+        return Determinant(self.k[:, rows], self.odd, self.zeros[rows])
+
+    def value(self, z: Floats) -> Floats:
+        """Return the determinant over ``z**zeros``."""
         result = np.empty(z.size)
-        for part, k, z_part, _, columns, basis in self.regimes(z, self.k[:, rows]):
-            right, left = (kernel.pairs(k, z_part, first, self.odd) for first in (_RIGHT, _LEFT))
+        for part, _, columns, basis, (right, left) in self._regimes(z):
             ends = kernel.minors(*right, columns), kernel.minors(*left, columns)
             result[part] = kernel.joined(*ends) / basis
-        return self._deflated(result, z, rows)
+        return self._deflated(result, z)
 
-    def count(self, z: Floats, rows: Integers) -> tuple[Integers, Floats]:
+    def count(self, z: Floats) -> tuple[Integers, Floats]:
         """Return the exact number of zeros below z (for z > 0 those at 0 included), and the value."""
         number, result = np.empty(z.size, dtype=np.int64), np.empty(z.size)
-        for part, k, z_part, waves, columns, basis in self.regimes(z, self.k[:, rows]):
-            right, left = (kernel.pairs(k, z_part, first, self.odd) for first in (_RIGHT, _LEFT))
-            number[part], result[part] = kernel.chain(
-                columns, right, left, basis, *waves[:3], *self._slopes(k, z_part), self._shears(k, z_part), self.odd
-            )
-        return number, self._deflated(result, z, rows)
+        slopes = 0.5 * self.k[29] + z * self.k[30], self.k[32] + 2.0 * z * self.k[33], self._shears(z)
+        for part, waves, columns, basis, (right, left) in self._regimes(z):
+            more = (entry[part] for entry in slopes)
+            number[part], result[part] = kernel.chain(columns, right, left, basis, *waves[:3], *more, self.odd)
+        return number, self._deflated(result, z)
 
-    def branch(self, turns: float, rows: Integers) -> Floats:
+    def branch(self, turns: float) -> Floats:
         """Return the lowest z of free waves of ``turns`` half waves along the length."""
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            return kernel.branch((0.5 * np.pi * turns) ** 2, *self.k[_POLYNOMIALS:, rows])
+        return kernel.branch((0.5 * np.pi * turns) ** 2, *self.k[_POLYNOMIALS:])
 
-    def _deflated(self, value: Floats, z: Floats, rows: Integers) -> Floats:
-        zeros = self.zeros[rows]
-        return value / z**zeros if zeros.any() else value
+    def _deflated(self, value: Floats, z: Floats) -> Floats:
+        return value / z**self.zeros if self.zeros.any() else value
 
-    @staticmethod
-    def _slopes(k: Floats, z: Floats) -> tuple[Floats, Floats]:
-        return 0.5 * k[29] + z * k[30], k[32] + 2.0 * z * k[33]
-
-    def _shears(self, k: Floats, z: Floats) -> NDArray[np.bool_]:
-        b11, b12, b21, b22 = kernel.linear(k, z, _B)
+    def _shears(self, z: Floats) -> NDArray[np.bool_]:
+        b11, b12, b21, b22 = kernel.linear(self.k, z, _B)
         return self.odd & (b11 * b22 - b12 * b21 < 0.0)
 
-    @staticmethod
-    def regimes(z: Floats, k: Floats) -> Iterator[tuple[Integers | slice, Floats, Floats, tuple, tuple, Floats]]:
-        """Yield, for each regime: which members, k, z, the wave numbers, the columns at the right end and their basis."""
-        a, b = kernel.linear(k, z, _A), kernel.linear(k, z, _B)
-        waves = kernel.wave_numbers(a, b)
-        near, close = kernel.regime(*waves[:3])
+    def _regimes(self, z: Floats) -> Iterator[tuple[Any, Any, Any, Floats, Any]]:
+        """Yield, for each regime: its members, wave numbers, columns at the right end, their basis, end conditions."""
+        a, b = kernel.linear(self.k, z, _A), kernel.linear(self.k, z, _B)
+        groups = a, b, kernel.wave_numbers(a, b), *(kernel.pairs(self.k, z, at, self.odd) for at in (_RIGHT, _LEFT))
+        near, close = kernel.regime(*groups[2][:3])
         for name, mask in (("near", near), ("close", close & ~near), ("distant", ~(near | close))):
-            part: Integers | slice = slice(None)
-            if not mask.all():
-                part = np.flatnonzero(mask)
-                if not part.size:
-                    continue
-            chosen = [tuple(entry[part] for entry in group) for group in (a, b, waves)]
+            members = np.flatnonzero(mask)
+            if not members.size:
+                continue
+            part = slice(None) if members.size == z.size else members
+            a, b, waves, *ends = (tuple(entry[part] for entry in group) for group in groups)
             if name == "distant":
-                *columns, basis = kernel.distant_columns(chosen[0], chosen[1], *chosen[2])
+                *columns, basis = kernel.distant_columns(a, b, *waves)
             else:
-                *series, scale = getattr(kernel, f"{name}_waves")(*chosen[2][:3])
-                columns, basis = kernel.close_columns(chosen[0], chosen[1], *chosen[2], *series), 1.0 / scale
-            yield part, k[:, part], z[part], chosen[2], tuple(columns), basis
+                *series, scale = getattr(kernel, f"{name}_waves")(*waves[:3])
+                columns, basis = kernel.close_columns(a, b, *waves, *series), 1.0 / scale
+            yield part, waves, tuple(columns), basis, ends
 
 
 def rigid_motions(problem: UniformProblem) -> Integers:
