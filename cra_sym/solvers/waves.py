@@ -8,24 +8,42 @@ Advances in Engineering Software 28, 1997).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from importlib.resources import files
+
 import numpy as np
 
 from .waves_count import Determinant, Floats, Integers, UniformProblem, negative_energy, rigid_motions
 
-__all__ = ["UniformProblem", "lowest_waves"]
+__all__ = ["Search", "UniformProblem", "determinant", "lowest_waves", "template"]
 
 _BLOCK = 1024  # rows whose temporaries stay in the processor's cache
+_COMPILED_BLOCK = 8192
 _MOST_STEPS = 400
+_MARKER = "# the text that is compiled too begins here\n"
 _EPS = float(np.finfo(float).eps)
 
 
-def lowest_waves(problem: UniformProblem, modes: int, *, compile: bool | None = None, threads: int | None = None) -> Floats:
+Search = Callable[[Floats, Integers, Floats, Integers, int], int]
+"""The compiled twin: entry `lowest_waves` of what `cra_sym.kernels.compiled` makes of `template`."""
+
+
+def template() -> str:
+    """Return the text of the compiled twin: the formulas, and the search over blocks of lanes."""
+    folder = files("cra_sym.solvers")
+    formulas = folder.joinpath("waves_kernel.py").read_text(encoding="utf-8").partition(_MARKER)[2]
+    return formulas + folder.joinpath("waves_lanes.py").read_text(encoding="utf-8")
+
+
+def lowest_waves(problem: UniformProblem, modes: int, search: Search | None = None) -> Floats:
     """Return the ``modes`` smallest squared frequencies of every row: ascending, complete, double roots twice.
 
     Parameters
     ----------
     problem : UniformProblem
     modes : int
+    search : callable, optional
+        The compiled twin; without it NumPy does the same steps.
 
     Returns
     -------
@@ -51,16 +69,29 @@ def lowest_waves(problem: UniformProblem, modes: int, *, compile: bool | None = 
     array([[1., 2., 3.]])
     """
     result = np.empty((len(problem.length), modes))
-    for start in range(0, len(result), _BLOCK):
-        part = slice(start, start + _BLOCK)
+    size = _COMPILED_BLOCK if search else _BLOCK
+    for start in range(0, len(result), size):
+        part = slice(start, start + size)
         with np.errstate(all="ignore"):
-            result[part] = _block(problem.take(part), modes)
+            function = determinant(problem.take(part))
+            if search is None:
+                result[part] = _block(function, modes)
+            else:
+                _searched(search, function, result[part])
     return result
 
 
-def _block(problem: UniformProblem, modes: int) -> Floats:
-    function = determinant(problem)
-    number, row = (index.ravel() for index in np.indices((modes, len(problem.length))))
+def _searched(search: Search, function: Determinant, result: Floats) -> None:
+    """Fill in a part of the result by the compiled twin."""
+    code = search(result, np.zeros(2, dtype=np.int64), function.k, function.zeros, int(function.odd))
+    if code < 0:
+        raise ArithmeticError("the search for natural frequencies did not settle")
+    if code > 0:
+        result[...] = _block(function, result.shape[1])
+
+
+def _block(function: Determinant, modes: int) -> Floats:
+    number, row = (index.ravel() for index in np.indices((modes, len(function.zeros))))
     z = np.zeros(number.size)
     wanted = np.flatnonzero(number >= function.zeros[row])
     z[wanted] = _roots(function, number[wanted], row[wanted], _brackets(function, modes, number[wanted], row[wanted]))

@@ -158,11 +158,15 @@ class Determinant:
                 continue
             part = slice(None) if members.size == z.size else members
             a, b, waves, *ends = (tuple(entry[part] for entry in group) for group in groups)
+            if name != "near":
+                pair = (kernel.half_sums if name == "close" else kernel.eigenvalues)(*waves[:3])
+                functions = *kernel.wave(pair[0]), *kernel.wave(pair[1])
             if name == "distant":
-                *columns, basis = kernel.distant_columns(a, b, *waves)
+                *columns, basis = kernel.distant_columns(a, b, *waves, *functions)
             else:
-                *series, scale = getattr(kernel, f"{name}_waves")(*waves[:3])
-                columns, basis = kernel.close_columns(a, b, *waves, *series), 1.0 / scale
+                series = kernel.close_series(*pair, *functions) if name == "close" else kernel.near_series(*waves[:3])
+                *factors, exponent = series
+                columns, basis = kernel.close_columns(a, b, *waves, *factors), np.exp(-exponent)
             yield part, waves, tuple(columns), basis, ends
 
 

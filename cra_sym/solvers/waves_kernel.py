@@ -16,8 +16,8 @@ import numpy as np
 from numpy import cos, exp, sin, where
 
 __all__ = [
-    "adaptable", "branch", "chain", "close_columns", "close_waves", "distant_columns", "joined", "linear", "minors",
-    "near_waves", "pairs", "reference", "regime", "wave_numbers",
+    "branch", "chain", "close_columns", "close_series", "distant_columns", "eigenvalues", "half_sums", "joined",
+    "linear", "minors", "near_series", "pairs", "regime", "wave", "wave_numbers",
 ]  # fmt: skip
 # the text that is compiled too begins here
 
@@ -49,11 +49,15 @@ def wave_numbers(a, b):
     return half, product, e * e + e12 * e21, e, e12, e21, o, o12, o21
 
 
+def positive_root(value):
+    """Return the square root, of a negative value 0."""
+    return np.sqrt(where(value > 0.0, value, 0.0))
+
+
 def regime(half, product, square):
     """Return whether both mu are small, and whether they are complex or close to each other."""
     near = (abs(half) < 0.5) & (abs(product) < 1.0)
-    root = np.sqrt(where(product > 0.0, product, 0.0))
-    small = 0.5 * square / (half + where(half < 0.0, -root, root))
+    _, small = half_sums(half, product, square)
     close = (square < 0.25 * half * half) & ((half < 0.0) | (small < 4.0))
     return near, close | (square < 0.0)
 
@@ -70,34 +74,32 @@ def wave(m):
     return where(m > 0.0, 0.5 + twice, cos(size)), where((m < 0.25) & (m > -0.25), decay * series, apart)
 
 
-def near_waves(half, product, square):
-    """Return C = c0 + c1 (G - p) and S = s0 + s1 (G - p) by their power series, and what scales the determinant."""
-    c0, c1, s0, s1 = _COSH[9], 0.0 * half, _SINH[9], 0.0 * half
-    c0, s0 = c0 + 0.0 * half, s0 + 0.0 * half
+def near_series(half, product, square):
+    """Return C = c0 + c1 (G - p) and S = s0 + s1 (G - p) by power series, and the exponent that scales a determinant."""
+    c0, c1, s0, s1 = _COSH[9] + 0.0 * half, 0.0 * half, _SINH[9] + 0.0 * half, 0.0 * half
     for k in range(8, -1, -1):
         c0, c1 = _COSH[k] - product * c1, c0 + 2.0 * half * c1
         s0, s1 = _SINH[k] - product * s1, s0 + 2.0 * half * s1
-    root = np.sqrt(where(square > 0.0, square, 0.0))
-    high, low = half + root, half - root
-    growth = np.sqrt(where(high > 0.0, high, 0.0)) + np.sqrt(where(low > 0.0, low, 0.0))
-    both = np.sqrt(2.0 * (half + np.sqrt(where(product > 0.0, product, 0.0))))
-    growth = where(square < 0.0, both, growth)
-    return c0 + half * c1, c1, s0 + half * s1, s1, exp(-2.0 * growth)
+    root = positive_root(square)
+    together = positive_root(half + root) + positive_root(half - root)
+    growth = where(square < 0.0, positive_root(2.0 * (half + positive_root(product))), together)
+    return c0 + half * c1, c1, s0 + half * s1, s1, -2.0 * growth
 
 
-def close_waves(half, product, square):
-    """Return the same for complex or neighbouring mu: their square roots are a sum and a difference, sigma +- d."""
-    root = np.sqrt(where(product > 0.0, product, 0.0))
+def half_sums(half, product, square):
+    """Return sigma^2 and d^2, in order of size, of square roots sigma +- d of complex or neighbouring mu."""
+    root = positive_root(product)
     big = 0.5 * (half + where(half < 0.0, -root, root))
-    small = 0.25 * square / big
-    big_c, big_s = wave(big)
-    small_c, small_s = wave(small)
+    return big, 0.25 * square / big
+
+
+def close_series(big, small, big_c, big_s, small_c, small_s):
+    """Return what `near_series` does from the cosh and sinh of sigma and d."""
     gap = big - small
     s0 = (big * big_s * small_c - small * big_c * small_s) / gap
     s1 = 0.5 * (big_c * small_s - big_s * small_c) / gap
-    both_positive = (big > 0.0) & (small > 0.0)
-    scale = exp(4.0 * np.sqrt(where(both_positive, small, 0.0)))
-    return big_c * small_c, 0.5 * big_s * small_s, s0, s1, scale
+    both = where(big > 0.0, small, 0.0)
+    return big_c * small_c, 0.5 * big_s * small_s, s0, s1, 4.0 * positive_root(both)
 
 
 def close_columns(a, b, half, product, square, e, e12, e21, o, o12, o21, c0, c1, s0, s1):
@@ -116,9 +118,9 @@ def close_columns(a, b, half, product, square, e, e12, e21, o, o12, o21, c0, c1,
 
 def eigenvalues(half, product, square):
     """Return the mu of larger size and the other one, without cancellation."""
-    root = np.sqrt(where(square > 0.0, square, 0.0))
+    root = positive_root(square)
     big = half + where(half < 0.0, -root, root)
-    return root, big, product / where(big == 0.0, 1.0, big)
+    return big, product / where(big == 0.0, 1.0, big)
 
 
 def multiple(m, v1, v2, u1, u2):
@@ -130,11 +132,9 @@ def multiple(m, v1, v2, u1, u2):
     return where(take_first, first, second) / where(take_first, u1, u2)
 
 
-def distant_columns(a, b, half, product, square, e, e12, e21, o, o12, o21):
+def distant_columns(a, b, half, product, square, e, e12, e21, o, o12, o21, big_c, big_s, small_c, small_s):
     """Return the columns in the basis of eigenvectors, each over its exponential, and the basis' determinant."""
-    root, big, small = eigenvalues(half, product, square)
-    big_c, big_s = wave(big)
-    small_c, small_s = wave(small)
+    root = positive_root(square)
     same = (e < 0.0) == (half < 0.0)
     c1, s1 = where(same, big_c, small_c), where(same, big_s, small_s)
     c2, s2 = where(same, small_c, big_c), where(same, small_s, big_s)
@@ -172,7 +172,7 @@ def joined(right, left):
 
 def adaptable(value, number, change):
     """Return the number, changed where the sign of the value is not that of ``(-1)**number``."""
-    return where((value == 0.0) | ((value > 0.0) == (number % 2 == 0)), number, number + change)
+    return where((value == 0.0) | ((value > 0.0) == ((number & 1) == 0)), number, number + change)
 
 
 def reference(half, product, square, slope, product_slope, shear, value):
@@ -180,10 +180,10 @@ def reference(half, product, square, slope, product_slope, shear, value):
 
     ``slope`` and ``product_slope`` are the derivatives of p and q by z: a branch omega(k) that falls takes away.
     """
-    root, big, small = eigenvalues(half, product, square)
+    big, small = eigenvalues(half, product, square)
     real = square >= 0.0
-    turns1 = np.sqrt(where(real & (big < 0.0), -big, 0.0)) * (2 / np.pi)
-    turns2 = np.sqrt(where(real & (small < 0.0), -small, 0.0)) * (2 / np.pi)
+    turns1 = positive_root(where(real, -big, 0.0)) * (2 / np.pi)
+    turns2 = positive_root(where(real, -small, 0.0)) * (2 / np.pi)
     whole1, whole2 = np.int64(turns1), np.int64(turns2)
     rest1, rest2 = turns1 - whole1, turns2 - whole2
     sign = where(half < 0.0, -1.0, 1.0)
@@ -223,7 +223,7 @@ def branch(wave, trace0, trace1, trace2, product0, product1, product2):
     c0 = (wave + trace0) * wave + product0
     c1, c2 = wave * trace1 + product1, wave * trace2 + product2
     inside = c1 * c1 - 4.0 * c0 * c2
-    return 2.0 * c0 / (-c1 + np.sqrt(where(inside > 0.0, inside, 0.0)))
+    return 2.0 * c0 / (-c1 + positive_root(inside))
 
 
 _COSH = (
