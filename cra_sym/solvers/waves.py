@@ -17,7 +17,7 @@ from .waves_count import Determinant, Floats, Integers, UniformProblem, negative
 
 __all__ = ["Search", "UniformProblem", "determinant", "lowest_waves", "template"]
 
-_BLOCK = 1024  # rows whose temporaries stay in the processor's cache
+_BLOCK = 8192  # rows whose temporaries stay in the processor's cache
 _COMPILED_BLOCK = 8192
 _MOST_STEPS = 400
 _MARKER = "# the text that is compiled too begins here\n"

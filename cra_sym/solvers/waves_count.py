@@ -99,6 +99,53 @@ def _dispersion(a0: Floats, a1: Floats, b0: Floats, b1: Floats) -> Floats:
     return np.array([trace(b0, a0), trace(b1, a0) + trace(b0, a1), trace(b1, a1), *product])
 
 
+class _Zero:
+    """The number 0 as an entry of all rows: NumPy spends no time on products with it."""
+
+    __array_ufunc__ = None
+
+    def __mul__(self, other: Any) -> _Zero:
+        return self
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> float:
+        return 0.0
+
+    def __add__(self, other: Any) -> Any:
+        return other
+
+    __radd__ = __add__
+
+    def __rsub__(self, other: Any) -> Any:
+        return other
+
+    def __sub__(self, other: Any) -> Any:
+        return -other
+
+    def __neg__(self) -> _Zero:
+        return self
+
+    __abs__ = __neg__
+
+    def __gt__(self, other: float) -> bool:
+        return other < 0.0
+
+    def __lt__(self, other: float) -> bool:
+        return other > 0.0
+
+    def __eq__(self, other: object) -> Any:
+        return other == 0.0 if isinstance(other, float) else NotImplemented
+
+    __hash__ = object.__hash__
+
+    def __getitem__(self, members: Any) -> _Zero:
+        return self
+
+
+_ZERO = _Zero()
+
+
 class Determinant:
     """The determinant of the end conditions, entire in z up to a positive factor, with the exact count.
 
@@ -114,6 +161,10 @@ class Determinant:
 
     def __init__(self, k: Floats, odd: bool, zeros: Integers) -> None:
         self.k, self.odd, self.zeros = k, odd, zeros
+        used = k.any(axis=1)
+        for first in (*range(_A, _A + 4, 2), *range(_B, _B + 4, 2)):  # no row of a matrix is left out
+            used[first : first + 2] |= not used[[first, first + 1, first + 4, first + 5]].any()
+        self._entries = [row if entry else _ZERO for row, entry in zip(k, used, strict=True)]
 
     def take(self, rows: Integers) -> Determinant:
         """Return the functions of some of the rows."""
@@ -123,7 +174,7 @@ class Determinant:
         """Return the determinant over ``z**zeros``."""
         result = np.empty(z.size)
         for part, _, columns, basis, (right, left) in self._regimes(z):
-            ends = kernel.minors(*right, columns), kernel.minors(*left, columns)
+            ends = (kernel.minors(*kernel.conditions(end, columns)) for end in (right, left))
             result[part] = kernel.joined(*ends) / basis
         return self._deflated(result, z)
 
@@ -143,14 +194,18 @@ class Determinant:
     def _deflated(self, value: Floats, z: Floats) -> Floats:
         return value / z**self.zeros if self.zeros.any() else value
 
+    def _pairs(self, z: Floats, first: int) -> tuple[Any, Any, Any, Any]:
+        s1, c1, s2, c2 = kernel.pairs(self._entries, z, first)
+        return (s1, c1, c2, s2) if self.odd else (s1, c1, s2, c2)
+
     def _shears(self, z: Floats) -> NDArray[np.bool_]:
-        b11, b12, b21, b22 = kernel.linear(self.k, z, _B)
+        b11, b12, b21, b22 = kernel.linear(self._entries, z, _B)
         return self.odd & (b11 * b22 - b12 * b21 < 0.0)
 
     def _regimes(self, z: Floats) -> Iterator[tuple[Any, Any, Any, Floats, Any]]:
         """Yield, for each regime: its members, wave numbers, columns at the right end, their basis, end conditions."""
-        a, b = kernel.linear(self.k, z, _A), kernel.linear(self.k, z, _B)
-        groups = a, b, kernel.wave_numbers(a, b), *(kernel.pairs(self.k, z, at, self.odd) for at in (_RIGHT, _LEFT))
+        a, b = kernel.linear(self._entries, z, _A), kernel.linear(self._entries, z, _B)
+        groups = a, b, kernel.wave_numbers(a, b), *(self._pairs(z, at) for at in (_RIGHT, _LEFT))
         near, close = kernel.regime(*groups[2][:3])
         for name, mask in (("near", near), ("close", close & ~near), ("distant", ~(near | close))):
             members = np.flatnonzero(mask)

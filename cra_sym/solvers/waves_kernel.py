@@ -16,7 +16,7 @@ import numpy as np
 from numpy import cos, exp, sin, where
 
 __all__ = [
-    "branch", "chain", "close_columns", "close_series", "distant_columns", "eigenvalues", "half_sums", "joined",
+    "branch", "chain", "close_columns", "close_series", "conditions", "distant_columns", "eigenvalues", "half_sums", "joined",
     "linear", "minors", "near_series", "pairs", "regime", "wave", "wave_numbers",
 ]  # fmt: skip
 # the text that is compiled too begins here
@@ -30,11 +30,9 @@ def linear(k, z, first):
     )  # fmt: skip
 
 
-def pairs(k, z, first, odd):
-    """Return what multiplies E and O in both conditions of an end; the second displacement is odd where asked."""
-    s1, c1 = k[first] - z * k[first + 1], k[first + 2]
-    s2, c2 = k[first + 3] - z * k[first + 4], k[first + 5]
-    return s1, c1, where(odd, c2, s2), where(odd, s2, c2)
+def pairs(k, z, first):
+    """Return what multiplies the displacement and the force in both conditions of an end."""
+    return k[first] - z * k[first + 1], k[first + 2], k[first + 3] - z * k[first + 4], k[first + 5]
 
 
 def wave_numbers(a, b):
@@ -152,11 +150,20 @@ def distant_columns(a, b, half, product, square, e, e12, e21, o, o12, o21, big_c
     )  # fmt: skip
 
 
-def minors(e1, o1, e2, o2, columns):
-    """Return the six 2 x 2 minors of the two conditions of an end on the four columns."""
+def conditions(pair, columns):
+    """Return the two conditions of an end on the four columns, from what multiplies E[0], O[0], E[1] and O[1]."""
+    e1, o1, e2, o2 = pair
     e11, e12, e21, e22, o11, o12, o21, o22, p11, p12, p21, p22, q11, q12, q21, q22 = columns
-    x11, x12, x21, x22 = e1 * e11 + o1 * o11, e1 * e12 + o1 * o12, e2 * e21 + o2 * o21, e2 * e22 + o2 * o22
-    y11, y12, y21, y22 = o1 * p11 + e1 * q11, o1 * p12 + e1 * q12, o2 * p21 + e2 * q21, o2 * p22 + e2 * q22
+    return (
+        (e1 * e11 + o1 * o11, e1 * e12 + o1 * o12, o1 * p11 + e1 * q11, o1 * p12 + e1 * q12),
+        (e2 * e21 + o2 * o21, e2 * e22 + o2 * o22, o2 * p21 + e2 * q21, o2 * p22 + e2 * q22),
+    )
+
+
+def minors(first, second):
+    """Return the six 2 x 2 minors of the two conditions of an end on the four columns."""
+    x11, x12, y11, y12 = first
+    x21, x22, y21, y22 = second
     return (
         x11 * x22 - x12 * x21, y11 * y22 - y12 * y21,
         x11 * y21 - x21 * y11, x11 * y22 - x21 * y12, x12 * y21 - x22 * y11, x12 * y22 - x22 * y12,
@@ -203,19 +210,18 @@ def chain(columns, right, left, basis, half, product, square, slope, product_slo
     From E = 0 at both ends, one condition at a time becomes what it is: fixed to sprung gives 0 or 1 more, free to sprung
     takes 0 or 1 away, or adds it where inertia outweighs the spring.
     """
-    e1, o1, e2, o2 = right
-    f1, p1, f2, p2 = left
-    held = minors(1.0, 0.0, 1.0, 0.0, columns)
-    half_right = minors(e1, o1, 1.0, 0.0, columns)
-    whole_right = minors(e1, o1, e2, o2, columns)
-    half_left = minors(f1, p1, 1.0, 0.0, columns)
-    whole_left = minors(f1, p1, f2, p2, columns)
+    e11, e12, e21, e22, o11, o12, o21, o22, p11, p12, p21, p22, q11, q12, q21, q22 = columns
+    fixed1, fixed2 = (e11, e12, q11, q12), (e21, e22, q21, q22)
+    right1, right2 = conditions(right, columns)
+    left1, left2 = conditions(left, columns)
+    held, half_right, whole_right = minors(fixed1, fixed2), minors(right1, fixed2), minors(right1, right2)
+    half_left, whole_left = minors(left1, fixed2), minors(left1, left2)
     number = reference(half, product, square, slope, product_slope, shear, joined(held, held) * basis)
     number = adaptable(joined(half_right, held) * basis, number, 1)
-    number = adaptable(joined(whole_right, held) * basis, number, where(odd & (o2 > 0.0), -1, 1))
+    number = adaptable(joined(whole_right, held) * basis, number, where(odd & (right[3] > 0.0), -1, 1))
     number = adaptable(joined(whole_right, half_left) * basis, number, 1)
     value = joined(whole_right, whole_left)
-    return adaptable(value * basis, number, where(odd & (p2 > 0.0), -1, 1)), value / basis
+    return adaptable(value * basis, number, where(odd & (left[3] > 0.0), -1, 1)), value / basis
 
 
 def branch(wave, trace0, trace1, trace2, product0, product1, product2):

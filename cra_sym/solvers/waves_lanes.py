@@ -86,13 +86,19 @@ def _columns(a, b, waves):
     return where(near | close, together, apart), where(near | close, scale, basis)
 
 
+def _pairs(k, z, first, odd):
+    """Return what multiplies E and O in both conditions of an end."""
+    s1, c1, s2, c2 = pairs(k, z, first)
+    return s1, c1, where(odd, c2, s2), where(odd, s2, c2)
+
+
 def _value(k, z, odd, zeros):
     """Return the determinant over z**zeros."""
     a, b = linear(k, z, 0), linear(k, z, 8)
     columns, basis = _columns(a, b, wave_numbers(a, b))
-    e1, o1, e2, o2 = pairs(k, z, 16, odd)
-    f1, p1, f2, p2 = pairs(k, z, 22, odd)
-    value = joined(minors(e1, o1, e2, o2, columns), minors(f1, p1, f2, p2, columns)) / basis
+    right1, right2 = conditions(_pairs(k, z, 16, odd), columns)
+    left1, left2 = conditions(_pairs(k, z, 22, odd), columns)
+    value = joined(minors(right1, right2), minors(left1, left2)) / basis
     return _deflated(value, z, zeros)
 
 
@@ -109,7 +115,7 @@ def _count(k, z, odd, zeros):
     shear = (odd > 0) & (b11 * b22 - b12 * b21 < 0.0)
     slope, product_slope = 0.5 * k[29] + z * k[30], k[32] + 2.0 * z * k[33]
     number, value = chain(
-        columns, pairs(k, z, 16, odd), pairs(k, z, 22, odd), basis, waves[0], waves[1], waves[2], slope,
+        columns, _pairs(k, z, 16, odd), _pairs(k, z, 22, odd), basis, waves[0], waves[1], waves[2], slope,
         product_slope, shear, odd > 0,
     )  # fmt: skip
     return number, _deflated(value, z, zeros)
