@@ -170,6 +170,7 @@ class Determinant:
         """Return the functions of some of the rows."""
         return Determinant(self.k[:, rows], self.odd, self.zeros[rows])
 
+    @np.errstate(all="ignore")
     def value(self, z: Floats) -> Floats:
         """Return the determinant over ``z**zeros``."""
         result = np.empty(z.size)
@@ -178,6 +179,7 @@ class Determinant:
             result[part] = kernel.joined(*ends) / basis
         return self._deflated(result, z)
 
+    @np.errstate(all="ignore")
     def count(self, z: Floats) -> tuple[Integers, Floats]:
         """Return the exact number of zeros below z (for z > 0 those at 0 included), and the value."""
         number, result = np.empty(z.size, dtype=np.int64), np.empty(z.size)
