@@ -80,7 +80,7 @@ class UniformProblem:
                 held = np.isinf(stiffness)
                 k[first + 3 * i] = np.where(held, 1.0, np.where(held, 1.0, stiffness) * share)
                 k[first + 3 * i + 1], k[first + 3 * i + 2] = mass * share, share
-        k[_POLYNOMIALS:] = _dispersion(*k[: _RIGHT].reshape(4, 4, rows))
+        k[_POLYNOMIALS:] = _dispersion(*k[:_RIGHT].reshape(4, 4, rows))
         return k
 
 

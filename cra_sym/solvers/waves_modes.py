@@ -20,6 +20,13 @@ __all__ = ["wave_states"]
 
 Complexes = NDArray[np.complex128]
 
+_PLACES = np.array([1.0, 0.83, 0.57, 0.29])
+"""Places, in half lengths from mid-span, which no wave has all nodes at."""
+
+_TINY_SHARE = 1e-45
+"""What is less is the square of the complex step."""
+
+_TINY = 1e-100
 _STEP = 1e-30  # of the lowest frequency of half a wave along the length
 
 
@@ -47,15 +54,19 @@ def wave_states(problem: UniformProblem, z: Floats, share: Floats) -> Floats:
         unit = kernel.branch((0.5 * np.pi) ** 2, *k[28:])
         step = _STEP * np.where(np.isfinite(unit) & (unit > 0.0), unit, 1.0)
         moved = joined.ravel() + 1j * step
-        ends = _columns(k, moved, np.ones((row.size, 1)))[..., 0]
-        null = _null_vectors(_conditions(k, joined.ravel(), ends.real, problem.even), place.ravel())
+        columns = _columns(k, moved, np.broadcast_to(_PLACES, (row.size, len(_PLACES))))
+        conditions = [_conditions(k, joined.ravel(), at, problem.even) for at in np.moveaxis(columns.real, 2, 0)]
+        null = _null_vectors(np.array(conditions), place.ravel())
+        ends = columns[..., 0]
         null = _normalised(null.reshape(rows, modes, 4), place, _mass(problem, row, ends, step, null.shape[0] // modes))
         along = _columns(k, moved, 2.0 * share[row] - 1.0).real
     even, odd = _parts(along, null.reshape(row.size, 4)[..., None])
     order = problem.even
     q = np.concatenate([even[:order], odd[order:]])
     force = np.concatenate([odd[:order], even[order:]])
-    return np.moveaxis(np.concatenate([q, force]), 0, -1).reshape(rows, modes, -1, 4)
+    states = np.moveaxis(np.concatenate([q, force]), 0, -1)
+    size = np.abs(states).max(axis=(1, 2), keepdims=True, initial=0.0)
+    return np.where(np.abs(states) > _TINY_SHARE * size, states, 0.0).reshape(rows, modes, -1, 4)
 
 
 def _columns(k: Floats, z: Complexes, place: Floats) -> Complexes:
@@ -72,7 +83,8 @@ def _columns(k: Floats, z: Complexes, place: Floats) -> Complexes:
         part = np.flatnonzero(mask)
         if not part.size:
             continue
-        x, square = place[part], place[part] ** 2
+        x = np.where(place[part] == 0.0, _TINY, place[part])  # quotients of sizes that vanish at mid-span
+        square = x * x
         a_part, b_part, w = (tuple(entry[part] for entry in group) for group in (a, b, waves))
         if name == "near":
             c0, c1, s0, s1, _ = kernel.near_series(w[0] * square, w[1] * square * square, w[2] * square * square)
@@ -114,13 +126,21 @@ def _conditions(k: Floats, z: Floats, columns: Floats, even: int) -> Floats:
     return np.moveaxis(np.array(rows), -1, 0)
 
 
-def _null_vectors(matrix: Floats, place: NDArray[np.int64]) -> Floats:
-    """Return the null vector of each matrix, of several of an equal root the one in its place."""
-    scale = 1.0 / np.sqrt((matrix**2).sum(axis=1))
-    balanced = matrix * scale[:, None, :]
-    balanced /= np.abs(balanced).max(axis=2, keepdims=True)
+def _null_vectors(matrices: Floats, place: NDArray[np.int64]) -> Floats:
+    """Return the null vector of the first of some matrices, shape (places, roots, 4, 4), in all of which it is balanced.
+
+    A column that meets the conditions at the ends by itself is rounding there, but not elsewhere. Of several vectors of
+    an equal root it is the one in its place.
+    """
+    size = np.abs(matrices).max(axis=0)
+    columns = size.max(axis=1)
+    zero = columns <= _TINY_SHARE * columns.max(axis=1, keepdims=True)
+    scale = np.where(zero, 0.0, 1.0) / np.where(zero, 1.0, columns)
+    rows = (size * scale[:, None, :]).max(axis=2)
+    rows = np.where(rows > 0.0, rows, 1.0)
+    balanced = matrices[0] * scale[:, None, :] / rows[:, :, None]
     vectors = np.linalg.svd(balanced)[2]
-    return vectors[np.arange(len(place)), 3 - place] * scale
+    return vectors[np.arange(len(place)), 3 - place] * np.where(zero, 1.0, scale)
 
 
 def _mass(problem: UniformProblem, row: NDArray[np.int64], ends: Complexes, step: Floats, rows: int) -> Any:

@@ -140,7 +140,9 @@ def test_below_at_and_above_the_cut_off(foundation):
 
 
 def test_a_heavy_end_on_a_foundation():
-    np.testing.assert_allclose(one(beams(HELD, foundation=100.0, right_mass=(10.0, 0.0)), 1) ** 0.5, 1.49597602, rtol=1e-8)
+    np.testing.assert_allclose(
+        one(beams(HELD, foundation=100.0, right_mass=(10.0, 0.0)), 1) ** 0.5, 1.49597602, rtol=1e-8
+    )
 
 
 def test_uniform_but_extreme():
