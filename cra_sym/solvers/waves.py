@@ -1,8 +1,8 @@
-"""Complete spectra of uniform problems with two waves a section: exact counts isolate each root, interpolation finds it.
+"""Complete spectra of uniform problems with two waves a section: counts isolate each root, interpolation finds it.
 
-Formulas: `waves_kernel`. The determinant F is real at, below and above every cut-off and has the sign of (-1)**N, where N
-is the number of roots below z. N is exact and costs a few evaluations of F at the same z, so no root is missed and none
-doubled. A root alone in its bracket is found by inverse quadratic interpolation, or bisection (Chandrupatla,
+Formulas: `waves_kernel`. The determinant F is real at, below and above every cut-off and has the sign of (-1)**N, where
+N is the number of roots below z. N is exact and costs a few evaluations of F at the same z, so no root is missed and
+none doubled. A root alone in its bracket is found by inverse quadratic interpolation, or bisection (Chandrupatla,
 Advances in Engineering Software 28, 1997).
 """
 
@@ -184,7 +184,7 @@ def _roots(function: Determinant, number: Integers, row: Integers, brackets: Flo
     _isolate(function, number, row, brackets)
     _open_from_zero(function, number, row, brackets)
     low, high, below, above, at_low, at_high = brackets
-    z = 0.5 * (low + high)
+    z: Floats = 0.5 * (low + high)
     sign = np.where(number % 2 == 0, 1.0, -1.0)
     at_low, at_high = at_low * sign, at_high * sign
     z = np.where(at_low <= 0.0, low, np.where(at_high >= 0.0, high, z))

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import waves_kernel as kernel
+from . import waves_kernel
 
 __all__ = ["Determinant", "UniformProblem", "negative_energy", "rigid_motions"]
+
+kernel: Any = waves_kernel  # formulas of arrays, without types: they are compiled text too
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -36,9 +38,9 @@ class UniformProblem:
     odd_by_even, even_by_odd : ndarray, shape (2, rows, n, n)
         A_OE and A_EO: the part without z, and the factor of z.
     stiffness, mass : ndarray, shape (2, rows, n)
-        Of the end conditions at the left (first) and right end, in the units of P over those of q: ``P + (k - z m) q = 0``
-        at the right end, ``-P + (k - z m) q = 0`` at the left. Stiffness in [0, inf], inf holds the displacement;
-        masses in [0, inf).
+        Of the end conditions at the left (first) and right end, in the units of P over those of q:
+        ``P + (k - z m) q = 0`` at the right end, ``-P + (k - z m) q = 0`` at the left. Stiffness in [0, inf], inf holds
+        the displacement; masses in [0, inf).
     even : int
         Number of even displacements, 1 to n. (If all are odd, call them even.)
     """
@@ -52,7 +54,7 @@ class UniformProblem:
 
     def __post_init__(self) -> None:
         rows, n = len(self.length), self.odd_by_even.shape[-1]
-        shapes = {"odd_by_even": (2, rows, n, n), "even_by_odd": (2, rows, n, n)}
+        shapes: dict[str, tuple[int, ...]] = {"odd_by_even": (2, rows, n, n), "even_by_odd": (2, rows, n, n)}
         shapes |= {"stiffness": (2, rows, n), "mass": (2, rows, n)}
         for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
@@ -88,7 +90,8 @@ def _dispersion(a0: Floats, a1: Floats, b0: Floats, b1: Floats) -> Floats:
     """Return the coefficients of 1, z and z^2 in the trace and the determinant of ``A_EO A_OE``."""
 
     def trace(b: Floats, a: Floats) -> Floats:
-        return b[0] * a[0] + b[1] * a[2] + b[2] * a[1] + b[3] * a[3]
+        products: Floats = b[0] * a[0] + b[1] * a[2] + b[2] * a[1] + b[3] * a[3]
+        return products
 
     def determinant(m0: Floats, m1: Floats) -> tuple[Floats, Floats, Floats]:
         mixed = m0[0] * m1[3] + m1[0] * m0[3] - m0[1] * m1[2] - m1[1] * m0[2]
@@ -161,7 +164,7 @@ class Determinant:
 
     def __init__(self, k: Floats, odd: bool, zeros: Integers) -> None:
         self.k, self.odd, self.zeros = k, odd, zeros
-        used = k.any(axis=1)
+        used: NDArray[np.bool_] = np.any(k, axis=1)
         for first in (*range(_A, _A + 4, 2), *range(_B, _B + 4, 2)):  # no row of a matrix is left out
             used[first : first + 2] |= not used[[first, first + 1, first + 4, first + 5]].any()
         self._entries = [row if entry else _ZERO for row, entry in zip(k, used, strict=True)]
@@ -191,7 +194,8 @@ class Determinant:
 
     def branch(self, turns: float) -> Floats:
         """Return the lowest z of free waves of ``turns`` half waves along the length."""
-        return kernel.branch((0.5 * np.pi * turns) ** 2, *self.k[_POLYNOMIALS:])
+        z: Floats = kernel.branch((0.5 * np.pi * turns) ** 2, *self.k[_POLYNOMIALS:])
+        return z
 
     def _deflated(self, value: Floats, z: Floats) -> Floats:
         return value / z**self.zeros if self.zeros.any() else value
@@ -202,7 +206,8 @@ class Determinant:
 
     def _shears(self, z: Floats) -> NDArray[np.bool_]:
         b11, b12, b21, b22 = kernel.linear(self._entries, z, _B)
-        return self.odd & (b11 * b22 - b12 * b21 < 0.0)
+        found: NDArray[np.bool_] = self.odd & (b11 * b22 - b12 * b21 < 0.0)
+        return found
 
     def _regimes(self, z: Floats) -> Iterator[tuple[Any, Any, Any, Floats, Any]]:
         """Yield, for each regime: its members, wave numbers, columns at the right end, their basis, end conditions."""
@@ -285,7 +290,7 @@ def _ranks(matrix: Floats) -> Integers:
 
 
 def negative_energy(problem: UniformProblem) -> NDArray[np.bool_]:
-    """Return where static strain energy may be negative: compression, springs that push; only there can a row buckle."""
+    """Return where static strain energy may be negative, as in compression: only there can a row buckle."""
     _, force = _static_blocks(problem, np.arange(len(problem.length)))
     off = force[:, 0, 1]
     scale = np.abs(force[:, 0, 0] * force[:, 1, 1])

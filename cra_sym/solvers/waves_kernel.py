@@ -1,13 +1,14 @@
+# mypy: ignore-errors
 """Two waves a section as numbers: their columns at the ends, the determinant of the end conditions, and its count.
 
 The functions hold nothing but arithmetic and selections. They take arrays of lanes, real or complex (NumPy), and this
 text from the marker on is also a part of a compiled template, where they take numbers (`waves_lanes`).
 
 State and convention. A section has the even part E and the odd part O of its state, ``E' = b O`` and ``O' = a E``, with
-x in half lengths from mid-span. Then ``(a b)`` and ``(b a)`` have the same two eigenvalues mu; a wave number k has
-``mu = -k^2``. E-columns are ``E = C v``, ``O = a S v`` and O-columns ``O = C u``, ``E = b S u`` with ``C = cosh(sqrt mu)``
-and ``S = sinh(sqrt mu) / sqrt mu``, which are real at any mu; at the left end one part of each column has the other
-sign. Matrices are tuples of their entries row by row.
+x in half lengths from mid-span. Then ``G = b a`` and ``a b`` have the same two eigenvalues mu; a wave number k has
+``mu = -k^2``. E-columns are ``E = C v``, ``O = a S v`` and O-columns ``O = C u``, ``E = b S u`` with
+``C = cosh(sqrt mu)`` and ``S = sinh(sqrt mu) / sqrt mu``, which are real at any mu; at the left end one part of each
+column has the other sign. Matrices are tuples of their entries row by row.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ import numpy as np
 from numpy import cos, exp, sin, where
 
 __all__ = [
-    "branch", "chain", "close_columns", "close_series", "conditions", "distant_columns", "eigenvalues", "half_sums", "joined",
-    "linear", "minors", "near_series", "pairs", "regime", "wave", "wave_numbers",
+    "branch", "chain", "close_columns", "close_series", "conditions", "distant_columns", "eigenvalues", "half_sums",
+    "joined", "linear", "minors", "near_series", "pairs", "positive_root", "regime", "wave", "wave_numbers",
 ]  # fmt: skip
 # the text that is compiled too begins here
 
@@ -73,7 +74,7 @@ def wave(m):
 
 
 def near_series(half, product, square):
-    """Return C = c0 + c1 (G - p) and S = s0 + s1 (G - p) by power series, and the exponent that scales a determinant."""
+    """Return C = c0 + c1 (G - p), S = s0 + s1 (G - p) by power series, and the exponent that scales a determinant."""
     c0, c1, s0, s1 = _COSH[9] + 0.0 * half, 0.0 * half, _SINH[9] + 0.0 * half, 0.0 * half
     for k in range(8, -1, -1):
         c0, c1 = _COSH[k] - product * c1, c0 + 2.0 * half * c1
@@ -207,11 +208,11 @@ def reference(half, product, square, slope, product_slope, shear, value):
 def chain(columns, right, left, basis, half, product, square, slope, product_slope, shear, odd):
     """Return the count of an undisturbed chain of end conditions and the last determinant.
 
-    From E = 0 at both ends, one condition at a time becomes what it is: fixed to sprung gives 0 or 1 more, free to sprung
-    takes 0 or 1 away, or adds it where inertia outweighs the spring.
+    From E = 0 at both ends, one condition at a time becomes what it is: fixed to sprung gives 0 or 1 more, free to
+    sprung takes 0 or 1 away, or adds it where inertia outweighs the spring.
     """
-    e11, e12, e21, e22, o11, o12, o21, o22, p11, p12, p21, p22, q11, q12, q21, q22 = columns
-    fixed1, fixed2 = (e11, e12, q11, q12), (e21, e22, q21, q22)
+    fixed1 = columns[0], columns[1], columns[12], columns[13]
+    fixed2 = columns[2], columns[3], columns[14], columns[15]
     right1, right2 = conditions(right, columns)
     left1, left2 = conditions(left, columns)
     held, half_right, whole_right = minors(fixed1, fixed2), minors(right1, fixed2), minors(right1, right2)

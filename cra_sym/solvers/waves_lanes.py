@@ -79,9 +79,8 @@ def _columns(a, b, waves):
     s0, s1 = where(near, near_s0, close_s0), where(near, near_s1, close_s1)
     together = close_columns(a, b, half, product, square, e, e12, e21, o, o12, o21, c0, c1, s0, s1)
     scale = exp(-where(near, near_exponent, close_exponent))
-    (
-        d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15, basis
-    ) = distant_columns(a, b, half, product, square, e, e12, e21, o, o12, o21, big_c, big_s, small_c, small_s)  # fmt: skip
+    far = distant_columns(a, b, half, product, square, e, e12, e21, o, o12, o21, big_c, big_s, small_c, small_s)
+    d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15, basis = far
     apart = (d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15)
     return where(near | close, together, apart), where(near | close, scale, basis)
 
@@ -165,7 +164,7 @@ def _is_crowded(bracket, at, number, lane):
 
 
 def _isolated(bracket, at, place, left, moved, k, zeros, odd, number, size):
-    """Shrink brackets until each holds its root alone, or no number between its ends; return how many counts it took."""
+    """Shrink brackets until each holds its root alone, or no number between its ends; return the number of counts."""
     many, counted = 0, 0
     for lane in range(size):
         place[many] = lane

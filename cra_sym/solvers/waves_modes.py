@@ -1,8 +1,8 @@
 """Mode shapes of uniform problems with two waves a section, in closed form from the columns of the determinant.
 
-The modal mass is exact without quadrature: for motions ``y(x; z)`` with ``y' = A(z) y``, the kinetic energy of a section
-is the derivative of ``q_z P - P_z q`` along x, so its integral is what that has at the ends. The derivative by z is that
-of a complex step, which loses nothing (Squire and Trapp, SIAM Review 40, 1998).
+The modal mass is exact without quadrature: for motions ``y(x; z)`` with ``y' = A(z) y``, the kinetic energy of a
+section is the derivative of ``q_z P - P_z q`` along x, so its integral is what that has at the ends. The derivative by
+z is that of a complex step, which loses nothing (Squire and Trapp, SIAM Review 40, 1998).
 """
 
 from __future__ import annotations
@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import waves_kernel as kernel
+from . import waves_kernel
 from .shapes import clusters
 from .waves_count import Floats, UniformProblem
 
 __all__ = ["wave_states"]
+
+kernel: Any = waves_kernel  # formulas of arrays, without types: they are compiled text too
 
 Complexes = NDArray[np.complex128]
 
@@ -127,7 +129,7 @@ def _conditions(k: Floats, z: Floats, columns: Floats, even: int) -> Floats:
 
 
 def _null_vectors(matrices: Floats, place: NDArray[np.int64]) -> Floats:
-    """Return the null vector of the first of some matrices, shape (places, roots, 4, 4), in all of which it is balanced.
+    """Return the null vectors of the first of some matrices, shape (places, roots, 4, 4), all of which set the scale.
 
     A column that meets the conditions at the ends by itself is rounding there, but not elsewhere. Of several vectors of
     an equal root it is the one in its place.

@@ -1,4 +1,4 @@
-"""Mode shapes of two waves a section: orthonormal by quadrature, solutions of equations and end conditions, known ones."""
+"""Mode shapes of two waves a section: orthonormal by quadrature, solutions of the equations, known ones."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def stiffness(problem: UniformProblem) -> DynamicStiffness:
 
 
 def determinant(problem: UniformProblem, row: int, z: Any) -> Any:
-    """Return the determinant of the end conditions on the transfer matrix of the whole length, in extended precision."""
+    """Return the determinant of the end conditions on the transfer matrix of the whole length, in many digits."""
     e, o = positions(problem)
     system = mp.zeros(4)
     for rows, columns, part in ((o, e, problem.odd_by_even), (e, o, problem.even_by_odd)):
