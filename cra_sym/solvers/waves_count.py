@@ -18,7 +18,7 @@ kernel: Any = waves_kernel  # formulas of arrays, without types: they are compil
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-_A, _B, _RIGHT, _LEFT, _POLYNOMIALS = 0, 8, 16, 22, 28
+_A, _B, _RIGHT, _LEFT, _POLYNOMIALS, _COUPLINGS = 0, 8, 16, 22, 28, 34
 _DEPENDENT = 1e-14  # a row of unit size that rounding leaves of a dependent one
 
 
@@ -41,6 +41,9 @@ class UniformProblem:
         Of the end conditions at the left (first) and right end, in the units of P over those of q:
         ``P + (k - z m) q = 0`` at the right end, ``-P + (k - z m) q = 0`` at the left. Stiffness in [0, inf], inf holds
         the displacement; masses in [0, inf).
+    couplings : ndarray, shape (2, 2, rows), optional
+        Off-diagonal entries of the end matrices: stiffness and mass, of the left and the right end. An offset mass m at
+        the distance e has m e. The end matrices must be positive semidefinite.
     even : int
         Number of even displacements, 1 to n. (If all are odd, call them even.)
     """
@@ -51,11 +54,14 @@ class UniformProblem:
     stiffness: Floats
     mass: Floats
     even: int = 1
+    couplings: Floats | None = None
 
     def __post_init__(self) -> None:
         rows, n = len(self.length), self.odd_by_even.shape[-1]
         shapes: dict[str, tuple[int, ...]] = {"odd_by_even": (2, rows, n, n), "even_by_odd": (2, rows, n, n)}
         shapes |= {"stiffness": (2, rows, n), "mass": (2, rows, n)}
+        if self.couplings is not None:
+            shapes["couplings"] = (2, 2, rows)
         for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
                 raise ValueError(f"{name}: the shape {getattr(self, name).shape} must be {shape}")
@@ -67,12 +73,14 @@ class UniformProblem:
     def take(self, rows: NDArray[np.int64] | slice) -> UniformProblem:
         """Return the problem of some of the parameter sets."""
         matrices = self.odd_by_even[:, rows], self.even_by_odd[:, rows]
-        return UniformProblem(self.length[rows], *matrices, self.stiffness[:, rows], self.mass[:, rows], self.even)
+        couplings = None if self.couplings is None else self.couplings[:, :, rows]
+        ends = self.stiffness[:, rows], self.mass[:, rows]
+        return UniformProblem(self.length[rows], *matrices, *ends, self.even, couplings)
 
     def coefficients(self) -> Floats:
-        """Return what `waves_kernel` takes, shape (34, rows): matrices times half the length, ends, dispersion."""
+        """Return what `waves_kernel` takes, shape (42, rows): matrices times half the length, ends, dispersion."""
         rows = len(self.length)
-        k = np.empty((34, rows))
+        k = np.empty((42, rows))
         for first, matrix in ((_A, self.odd_by_even), (_B, self.even_by_odd)):
             k[first : first + 8] = np.moveaxis(matrix, 1, -1).reshape(8, rows) * (0.5 * self.length)
         for first, end in ((_RIGHT, 1), (_LEFT, 0)):
@@ -82,7 +90,12 @@ class UniformProblem:
                 held = np.isinf(stiffness)
                 k[first + 3 * i] = np.where(held, 1.0, np.where(held, 1.0, stiffness) * share)
                 k[first + 3 * i + 1], k[first + 3 * i + 2] = mass * share, share
-        k[_POLYNOMIALS:] = _dispersion(*k[:_RIGHT].reshape(4, 4, rows))
+        k[_COUPLINGS:] = 0.0
+        if self.couplings is not None:
+            for first, end in ((_COUPLINGS, 1), (_COUPLINGS + 4, 0)):
+                for i in range(4):
+                    k[first + i] = self.couplings[i % 2, end] * k[(_RIGHT, _LEFT)[1 - end] + 3 * (i // 2) + 2]
+        k[_POLYNOMIALS:_COUPLINGS] = _dispersion(*k[:_RIGHT].reshape(4, 4, rows))
         return k
 
 
@@ -149,12 +162,26 @@ class _Zero:
 _ZERO = _Zero()
 
 
+def end_conditions(k: Any, z: Any, end: int, odd: bool) -> tuple[Any, Any]:
+    """Return what multiplies E[0], O[0], E[1], O[1] in both conditions of an end, and what couples displacements."""
+    s1, c1, s2, c2 = kernel.pairs(k, z, _RIGHT if end else _LEFT)
+    t1, t2 = kernel.couplings(k, z, _COUPLINGS + (0 if end else 4))
+    if not odd:
+        return (s1, c1, s2, c2), (t1, t2)
+    return (s1, c1, c2, s2), ((t1, t2) if end else (-t1, -t2))  # O is reflected
+
+
+def second_displacement(columns: Any, odd: bool) -> tuple[Any, ...]:
+    """Return the second displacement on the four columns."""
+    return (*columns[6:8], *columns[10:12]) if odd else (*columns[2:4], *columns[14:16])
+
+
 class Determinant:
     """The determinant of the end conditions, entire in z up to a positive factor, with the exact count.
 
     Parameters
     ----------
-    k : ndarray, shape (34, rows)
+    k : ndarray, shape (42, rows)
         From `UniformProblem.coefficients`.
     odd : bool
         Whether the second displacement is odd under reflection.
@@ -177,8 +204,9 @@ class Determinant:
     def value(self, z: Floats) -> Floats:
         """Return the determinant over ``z**zeros``."""
         result = np.empty(z.size)
-        for part, _, columns, basis, (right, left) in self._regimes(z):
-            ends = (kernel.minors(*kernel.conditions(end, columns)) for end in (right, left))
+        for part, _, columns, basis, ends in self._regimes(z):
+            second = self._second(columns)
+            ends = (kernel.minors(*kernel.conditions(*end, columns, second)) for end in ends)
             result[part] = kernel.joined(*ends) / basis
         return self._deflated(result, z)
 
@@ -189,20 +217,24 @@ class Determinant:
         slopes = 0.5 * self.k[29] + z * self.k[30], self.k[32] + 2.0 * z * self.k[33], self._shears(z)
         for part, waves, columns, basis, (right, left) in self._regimes(z):
             more = (entry[part] for entry in slopes)
-            number[part], result[part] = kernel.chain(columns, right, left, basis, *waves[:3], *more, self.odd)
+            count = kernel.chain(columns, self._second(columns), right, left, basis, *waves[:3], *more, self.odd)
+            number[part], result[part] = count
         return number, self._deflated(result, z)
 
     def branch(self, turns: float) -> Floats:
         """Return the lowest z of free waves of ``turns`` half waves along the length."""
-        z: Floats = kernel.branch((0.5 * np.pi * turns) ** 2, *self.k[_POLYNOMIALS:])
+        z: Floats = kernel.branch((0.5 * np.pi * turns) ** 2, *self.k[_POLYNOMIALS:_COUPLINGS])
         return z
 
     def _deflated(self, value: Floats, z: Floats) -> Floats:
         return value / z**self.zeros if self.zeros.any() else value
 
-    def _pairs(self, z: Floats, first: int) -> tuple[Any, Any, Any, Any]:
-        s1, c1, s2, c2 = kernel.pairs(self._entries, z, first)
-        return (s1, c1, c2, s2) if self.odd else (s1, c1, s2, c2)
+    def _end(self, z: Floats, end: int) -> tuple[Any, ...]:
+        """Return what multiplies E and O in both conditions of an end, and what couples the displacements."""
+        return end_conditions(self._entries, z, end, self.odd)
+
+    def _second(self, columns: tuple[Any, ...]) -> tuple[Any, ...]:
+        return second_displacement(columns, self.odd)
 
     def _shears(self, z: Floats) -> NDArray[np.bool_]:
         b11, b12, b21, b22 = kernel.linear(self._entries, z, _B)
@@ -212,7 +244,7 @@ class Determinant:
     def _regimes(self, z: Floats) -> Iterator[tuple[Any, Any, Any, Floats, Any]]:
         """Yield, for each regime: its members, wave numbers, columns at the right end, their basis, end conditions."""
         a, b = kernel.linear(self._entries, z, _A), kernel.linear(self._entries, z, _B)
-        groups = a, b, kernel.wave_numbers(a, b), *(self._pairs(z, at) for at in (_RIGHT, _LEFT))
+        groups = a, b, kernel.wave_numbers(a, b), *(entry for end in (1, 0) for entry in self._end(z, end))
         near, close = kernel.regime(*groups[2][:3])
         for name, mask in (("near", near), ("close", close & ~near), ("distant", ~(near | close))):
             members = np.flatnonzero(mask)
@@ -229,7 +261,7 @@ class Determinant:
                 series = kernel.close_series(*pair, *functions) if name == "close" else kernel.near_series(*waves[:3])
                 *factors, exponent = series
                 columns, basis = kernel.close_columns(a, b, *waves, *factors), np.exp(-exponent)
-            yield part, waves, tuple(columns), basis, ends
+            yield part, waves, tuple(columns), basis, (ends[:2], ends[2:])
 
 
 def rigid_motions(problem: UniformProblem) -> Integers:
@@ -241,7 +273,8 @@ def rigid_motions(problem: UniformProblem) -> Integers:
     rows, n = problem.stiffness.shape[1:]
     result = np.zeros(rows, dtype=np.int64)
     sprung = problem.stiffness > 0.0
-    open_ = np.flatnonzero(~sprung.all(axis=2).any(axis=0))
+    coupled = np.zeros(rows, dtype=bool) if problem.couplings is None else problem.couplings[0].any(axis=0)
+    open_ = np.flatnonzero(coupled | ~sprung.all(axis=2).any(axis=0))
     if not open_.size:
         return result
     gradient, force = _static_blocks(problem, open_)
@@ -254,7 +287,7 @@ def rigid_motions(problem: UniformProblem) -> Integers:
         term = power / float(np.prod(range(1, j + 1)))
         right, left = right + term, left + (-1.0) ** j * term
     for end, motion in ((0, left), (1, right)):
-        conditions.append(np.where(sprung[end, open_, :, None], np.broadcast_to(motion, gradient.shape), 0.0))
+        conditions.append(_end_stiffness(problem, end, open_) @ motion)
     result[open_] = n - _ranks(np.concatenate(conditions, axis=1))
     return result
 
@@ -269,6 +302,17 @@ def _static_blocks(problem: UniformProblem, rows: Integers) -> tuple[Floats, Flo
     gradient[:, first, second], gradient[:, second, first] = b[:, first, second], a[:, second, first]
     force[:, first, first], force[:, second, second] = a[:, first, first], b[:, second, second]
     return gradient, force
+
+
+def _end_stiffness(problem: UniformProblem, end: int, rows: Integers) -> Floats:
+    """Return the stiffness matrices of an end, each row over its size; an infinite one holds its displacement."""
+    stiffness = problem.stiffness[end, rows]
+    held = np.isinf(stiffness)
+    matrix = np.where(held, 1.0, stiffness)[:, :, None] * np.eye(2)
+    if problem.couplings is not None:
+        matrix[:, [0, 1], [1, 0]] = np.where(held, 0.0, problem.couplings[0, end, rows, None])
+    size = np.abs(matrix).max(axis=2, keepdims=True)
+    return matrix / np.where(size > 0.0, size, 1.0)
 
 
 def _ranks(matrix: Floats) -> Integers:
@@ -289,10 +333,15 @@ def _ranks(matrix: Floats) -> Integers:
     return rank
 
 
+@np.errstate(invalid="ignore", over="ignore", divide="ignore")
 def negative_energy(problem: UniformProblem) -> NDArray[np.bool_]:
     """Return where static strain energy may be negative, as in compression: only there can a row buckle."""
     _, force = _static_blocks(problem, np.arange(len(problem.length)))
     off = force[:, 0, 1]
     scale = np.abs(force[:, 0, 0] * force[:, 1, 1])
     definite = force[:, 0, 0] * force[:, 1, 1] - off * force[:, 1, 0] >= -1e-15 * scale
-    return ~((force[:, 0, 0] >= 0.0) & (force[:, 1, 1] >= 0.0) & definite)
+    if problem.couplings is not None:
+        for stiffness, coupling in zip(problem.stiffness, problem.couplings[0], strict=True):
+            definite &= (coupling == 0.0) | (stiffness[:, 0] * stiffness[:, 1] >= (1.0 - 1e-14) * coupling**2)
+    found: NDArray[np.bool_] = ~((force[:, 0, 0] >= 0.0) & (force[:, 1, 1] >= 0.0) & definite)
+    return found

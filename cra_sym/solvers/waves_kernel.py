@@ -17,8 +17,9 @@ import numpy as np
 from numpy import cos, exp, sin, where
 
 __all__ = [
-    "branch", "chain", "close_columns", "close_series", "conditions", "distant_columns", "eigenvalues", "half_sums",
-    "joined", "linear", "minors", "near_series", "pairs", "positive_root", "regime", "wave", "wave_numbers",
+    "branch", "chain", "close_columns", "close_series", "conditions", "couplings", "distant_columns", "eigenvalues",
+    "half_sums", "joined", "linear", "minors", "near_series", "pairs", "positive_root", "regime", "wave",
+    "wave_numbers",
 ]  # fmt: skip
 # the text that is compiled too begins here
 
@@ -34,6 +35,11 @@ def linear(k, z, first):
 def pairs(k, z, first):
     """Return what multiplies the displacement and the force in both conditions of an end."""
     return k[first] - z * k[first + 1], k[first + 2], k[first + 3] - z * k[first + 4], k[first + 5]
+
+
+def couplings(k, z, first):
+    """Return what multiplies the other displacement in both conditions of an end."""
+    return k[first] - z * k[first + 1], k[first + 2] - z * k[first + 3]
 
 
 def wave_numbers(a, b):
@@ -151,13 +157,29 @@ def distant_columns(a, b, half, product, square, e, e12, e21, o, o12, o21, big_c
     )  # fmt: skip
 
 
-def conditions(pair, columns):
-    """Return the two conditions of an end on the four columns, from what multiplies E[0], O[0], E[1] and O[1]."""
+def conditions(pair, couplings, columns, second):
+    """Return the two conditions of an end on the four columns.
+
+    ``pair`` is what multiplies E[0], O[0], E[1] and O[1] there, ``couplings`` what multiplies the other displacement in
+    each condition, and ``second`` the second displacement on the columns.
+    """
     e1, o1, e2, o2 = pair
+    t1, t2 = couplings
     e11, e12, e21, e22, o11, o12, o21, o22, p11, p12, p21, p22, q11, q12, q21, q22 = columns
+    x1, x2, y1, y2 = second
     return (
-        (e1 * e11 + o1 * o11, e1 * e12 + o1 * o12, o1 * p11 + e1 * q11, o1 * p12 + e1 * q12),
-        (e2 * e21 + o2 * o21, e2 * e22 + o2 * o22, o2 * p21 + e2 * q21, o2 * p22 + e2 * q22),
+        (
+            e1 * e11 + o1 * o11 + t1 * x1,
+            e1 * e12 + o1 * o12 + t1 * x2,
+            o1 * p11 + e1 * q11 + t1 * y1,
+            o1 * p12 + e1 * q12 + t1 * y2,
+        ),
+        (
+            e2 * e21 + o2 * o21 + t2 * e11,
+            e2 * e22 + o2 * o22 + t2 * e12,
+            o2 * p21 + e2 * q21 + t2 * q11,
+            o2 * p22 + e2 * q22 + t2 * q12,
+        ),
     )
 
 
@@ -205,24 +227,25 @@ def reference(half, product, square, slope, product_slope, shear, value):
     return adaptable(value, number, up * where(first, way1, way2))
 
 
-def chain(columns, right, left, basis, half, product, square, slope, product_slope, shear, odd):
-    """Return the count of an undisturbed chain of end conditions and the last determinant.
+def chain(columns, second, right, left, basis, half, product, square, slope, product_slope, shear, odd):
+    """Return the count by a chain of end conditions, and the last determinant.
 
-    From E = 0 at both ends, one condition at a time becomes what it is: fixed to sprung gives 0 or 1 more, free to
-    sprung takes 0 or 1 away, or adds it where inertia outweighs the spring.
+    From E = 0 at both ends, one condition at a time becomes what it is, the second of an end first: where the other
+    displacement is held, their coupling is idle. Free to sprung takes 0 or 1 away, or adds it where inertia outweighs
+    the spring; held to whatever it is gives 0 or 1 more.
     """
     fixed1 = columns[0], columns[1], columns[12], columns[13]
     fixed2 = columns[2], columns[3], columns[14], columns[15]
-    right1, right2 = conditions(right, columns)
-    left1, left2 = conditions(left, columns)
-    held, half_right, whole_right = minors(fixed1, fixed2), minors(right1, fixed2), minors(right1, right2)
-    half_left, whole_left = minors(left1, fixed2), minors(left1, left2)
+    right1, right2 = conditions(right[0], right[1], columns, second)
+    left1, left2 = conditions(left[0], left[1], columns, second)
+    held, half_right, whole_right = minors(fixed1, fixed2), minors(fixed1, right2), minors(right1, right2)
+    half_left, whole_left = minors(fixed1, left2), minors(left1, left2)
     number = reference(half, product, square, slope, product_slope, shear, joined(held, held) * basis)
-    number = adaptable(joined(half_right, held) * basis, number, 1)
-    number = adaptable(joined(whole_right, held) * basis, number, where(odd & (right[3] > 0.0), -1, 1))
-    number = adaptable(joined(whole_right, half_left) * basis, number, 1)
+    number = adaptable(joined(half_right, held) * basis, number, where(odd & (right[0][3] > 0.0), -1, 1))
+    number = adaptable(joined(whole_right, held) * basis, number, 1)
+    number = adaptable(joined(whole_right, half_left) * basis, number, where(odd & (left[0][3] > 0.0), -1, 1))
     value = joined(whole_right, whole_left)
-    return adaptable(value * basis, number, where(odd & (left[3] > 0.0), -1, 1)), value / basis
+    return adaptable(value * basis, number, 1), value / basis
 
 
 def branch(wave, trace0, trace1, trace2, product0, product1, product2):

@@ -9,13 +9,13 @@ and one is taken, so that loops over lanes have no branch.
 import numpy as np
 
 _LANES = 128
-_ENTRIES = 34
+_ENTRIES = 42
 _MOST_STEPS = 400
 _EPS = 2.220446049250313e-16
 
 
 def lowest_waves(out, evaluations, k, zeros, odd):
-    """Fill ``out`` (lanes, modes) with the lowest roots from coefficients ``k`` (34, lanes).
+    """Fill ``out`` (lanes, modes) with the lowest roots from coefficients ``k`` (42, lanes).
 
     Returns 0, or one more than a lane in which the points did not reach enough roots, or -1 if a search did not settle.
     """
@@ -61,6 +61,7 @@ def _lane(k, i):
         k[0, i], k[1, i], k[2, i], k[3, i], k[4, i], k[5, i], k[6, i], k[7, i], k[8, i], k[9, i], k[10, i], k[11, i],
         k[12, i], k[13, i], k[14, i], k[15, i], k[16, i], k[17, i], k[18, i], k[19, i], k[20, i], k[21, i], k[22, i],
         k[23, i], k[24, i], k[25, i], k[26, i], k[27, i], k[28, i], k[29, i], k[30, i], k[31, i], k[32, i], k[33, i],
+        k[34, i], k[35, i], k[36, i], k[37, i], k[38, i], k[39, i], k[40, i], k[41, i],
     )  # fmt: skip
 
 
@@ -85,18 +86,29 @@ def _columns(a, b, waves):
     return where(near | close, together, apart), where(near | close, scale, basis)
 
 
-def _pairs(k, z, first, odd):
-    """Return what multiplies E and O in both conditions of an end."""
+def _end(k, z, first, coupling, odd, side):
+    """Return what multiplies E and O in both conditions of an end, and what couples the displacements."""
     s1, c1, s2, c2 = pairs(k, z, first)
-    return s1, c1, where(odd, c2, s2), where(odd, s2, c2)
+    t1, t2 = couplings(k, z, coupling)
+    sign = where(odd, side, 1.0)
+    return (s1, c1, where(odd, c2, s2), where(odd, s2, c2)), (sign * t1, sign * t2)
+
+
+def _second(columns, odd):
+    """Return the second displacement on the columns."""
+    odd_one = columns[6], columns[7], columns[10], columns[11]
+    return where(odd, odd_one, (columns[2], columns[3], columns[14], columns[15]))
 
 
 def _value(k, z, odd, zeros):
     """Return the determinant over z**zeros."""
     a, b = linear(k, z, 0), linear(k, z, 8)
     columns, basis = _columns(a, b, wave_numbers(a, b))
-    right1, right2 = conditions(_pairs(k, z, 16, odd), columns)
-    left1, left2 = conditions(_pairs(k, z, 22, odd), columns)
+    second = _second(columns, odd)
+    right_pair, right_couplings = _end(k, z, 16, 34, odd, 1.0)
+    left_pair, left_couplings = _end(k, z, 22, 38, odd, -1.0)
+    right1, right2 = conditions(right_pair, right_couplings, columns, second)
+    left1, left2 = conditions(left_pair, left_couplings, columns, second)
     value = joined(minors(right1, right2), minors(left1, left2)) / basis
     return _deflated(value, z, zeros)
 
@@ -114,8 +126,8 @@ def _count(k, z, odd, zeros):
     shear = (odd > 0) & (b11 * b22 - b12 * b21 < 0.0)
     slope, product_slope = 0.5 * k[29] + z * k[30], k[32] + 2.0 * z * k[33]
     number, value = chain(
-        columns, _pairs(k, z, 16, odd), _pairs(k, z, 22, odd), basis, waves[0], waves[1], waves[2], slope,
-        product_slope, shear, odd > 0,
+        columns, _second(columns, odd), _end(k, z, 16, 34, odd, 1.0), _end(k, z, 22, 38, odd, -1.0), basis,
+        waves[0], waves[1], waves[2], slope, product_slope, shear, odd > 0,
     )  # fmt: skip
     return number, _deflated(value, z, zeros)
 

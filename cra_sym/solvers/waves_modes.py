@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from . import waves_kernel
 from .shapes import clusters
-from .waves_count import Floats, UniformProblem
+from .waves_count import Floats, UniformProblem, end_conditions, second_displacement
 
 __all__ = ["wave_states"]
 
@@ -53,7 +53,7 @@ def wave_states(problem: UniformProblem, z: Floats, share: Floats) -> Floats:
     place, joined = clusters(z)
     with np.errstate(all="ignore"):
         k = problem.coefficients()[:, row]
-        unit = kernel.branch((0.5 * np.pi) ** 2, *k[28:])
+        unit = kernel.branch((0.5 * np.pi) ** 2, *k[28:34])
         step = _STEP * np.where(np.isfinite(unit) & (unit > 0.0), unit, 1.0)
         moved = joined.ravel() + 1j * step
         columns = _columns(k, moved, np.broadcast_to(_PLACES, (row.size, len(_PLACES))))
@@ -121,10 +121,11 @@ def _parts(columns: Any, null: Any) -> tuple[Any, Any]:
 def _conditions(k: Floats, z: Floats, columns: Floats, even: int) -> Floats:
     """Return the matrix of the end conditions on the four columns, shape (roots, 4, 4)."""
     rows = []
-    for first, sign in ((16, 1.0), (22, -1.0)):
-        s1, c1, s2, c2 = kernel.pairs(k, z, first)
-        pair = (s1, c1, c2, s2) if even == 1 else (s1, c1, s2, c2)
-        rows += [[x1, x2, sign * y1, sign * y2] for x1, x2, y1, y2 in kernel.conditions(pair, columns)]
+    for end, sign in ((1, 1.0), (0, -1.0)):
+        found = kernel.conditions(
+            *end_conditions(k, z, end, even == 1), columns, second_displacement(columns, even == 1)
+        )
+        rows += [[x1, x2, sign * y1, sign * y2] for x1, x2, y1, y2 in found]
     return np.moveaxis(np.array(rows), -1, 0)
 
 
@@ -163,6 +164,8 @@ def _mass(problem: UniformProblem, row: NDArray[np.int64], ends: Complexes, step
             total += side * (sign * (e_rate * o2 - side * o_rate * e2)).sum(axis=0)
             q1, q2 = (np.where(sign > 0.0, e, o) for e, o in ((e1, o1), (e2, o2)))
             total += (problem.mass[end].T * q1 * q2).sum(axis=0)
+            if problem.couplings is not None:
+                total += problem.couplings[1, end] * (q1[0] * q2[1] + q1[1] * q2[0])
         return total
 
     return mass

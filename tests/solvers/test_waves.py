@@ -211,6 +211,30 @@ def test_counts_at_random_points(seed):
     np.testing.assert_array_equal(np.sign(value), (-1.0) ** count)
 
 
+@pytest.mark.parametrize("offset", [-0.7, -1e-6, 1e-3, 0.1, 5.0])
+@pytest.mark.parametrize("family", [{}, {"tension": 30.0}, {"foundation": 2e3}, {"shear": 50.0, "rotary": 0.01}])
+def test_offset_end_masses(family, offset):
+    problem = beams((2.0, 3.0), right_mass=(0.8, 1e-3), offset=offset, **family)
+    z = one(problem, 5)
+    np.testing.assert_allclose(z, lowest(stiffness(problem), 5)[0], rtol=1e-10)
+    assert max(distance(problem, 0, value) for value in z[:3]) < ROUNDING
+    count = determinant(problem).take(np.zeros(5, dtype=int)).count(z * 1.01)[0]
+    np.testing.assert_array_equal(count, (z[:, None] < z * 1.01).sum(axis=0))
+
+
+def test_coupled_end_springs():
+    """A spring at an arm beyond the end: one direction of the end stays free, and the beam turns about the spring."""
+    problem = beams(FREE, (4.0, 4.0 * 0.3**2))
+    couplings = np.zeros((2, 2, 1))
+    couplings[0, 1] = 4.0 * 0.3
+    parts = problem.length, problem.odd_by_even, problem.even_by_odd, problem.stiffness, problem.mass
+    problem = UniformProblem(*parts, couplings=couplings)
+    assert rigid_motions(problem)[0] == 1
+    z = one(problem, 4)
+    assert z[0] == 0.0 and (z[1:] > 0.0).all()
+    assert max(distance(problem, 0, value) for value in z[1:]) < ROUNDING
+
+
 def test_rows_keep_apart():
     rng = np.random.default_rng(3)
     tension, springs = 10 ** rng.uniform(-3, 6, 50), 10 ** rng.uniform(-3, 6, (50, 2))

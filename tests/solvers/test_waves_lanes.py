@@ -67,6 +67,11 @@ def test_two_even_displacements(search):
     np.testing.assert_allclose(lowest_waves(problem, 6, search), lowest_waves(problem, 6), rtol=ROUNDING)
 
 
+def test_offset_end_masses(search):
+    problem = beams((2.0, 3.0), right_mass=(0.8, 1e-3), offset=0.3, tension=np.array([0.0, 10.0, 1e5]))
+    np.testing.assert_allclose(lowest_waves(problem, 4, search), lowest_waves(problem, 4), rtol=ROUNDING)
+
+
 def test_refusals_are_those_of_numpy(search):
     with pytest.raises(ValueError, match="has buckled"):
         lowest_waves(beams(FREE, (INF, 0.0), tension=-50.0), 2, search)

@@ -24,7 +24,12 @@ def inner_products(problem, states):
     q = states[..., :2]
     inside, left, right = q[:, :-2], q[:, -2], q[:, -1]
     total = np.einsum("isa,ab,jsb,s->ij", inside, mass, inside, WEIGHTS * problem.length[0] / 2)
-    return total + (left * problem.mass[0, 0]) @ left.T + (right * problem.mass[1, 0]) @ right.T
+    for end, motion in enumerate((left, right)):
+        matrix = np.diag(problem.mass[end, 0])
+        if problem.couplings is not None:
+            matrix[[0, 1], [1, 0]] = problem.couplings[1, end, 0]
+        total += motion @ matrix @ motion.T
+    return total
 
 
 @pytest.mark.parametrize("seed", range(30))
@@ -106,6 +111,7 @@ def test_rigid_and_equal_roots_have_orthogonal_shapes():
         beams(FREE, foundation=3.0),
         coupled_strings((0.0, 0.0, 0.0), [[0.0, 0.0], [0.0, 0.0]], [[0.0, 0.5], [0.3, 0.0]]),
         beams((0.0, INF), tension=5.0),
+        beams((0.0, 2.0), tension=5.0, right_mass=(0.7, 0.1), offset=-0.4),
     ):
         states = wave_states(problem, lowest_waves(problem, 4), share)[0]
         np.testing.assert_allclose(inner_products(problem, states), np.eye(4), atol=1e-12)

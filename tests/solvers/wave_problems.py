@@ -26,8 +26,12 @@ def beams(
     rotary: Any = 0.0,
     left_mass: Any = (0.0, 0.0),
     right_mass: Any = (0.0, 0.0),
+    offset: Any = None,
 ) -> UniformProblem:
-    """Return beams with E = (v, M), O = (V, theta): ends are pairs of stiffness, and of mass and inertia."""
+    """Return beams with E = (v, M), O = (V, theta): ends are pairs of stiffness, and of mass and inertia.
+
+    ``offset`` moves the mass at the right end outward: its inertia is then about its own centre.
+    """
     sections = EI, rhoA, length, tension, foundation, shear, rotary
     ends = [np.atleast_2d(np.asarray(end, dtype=float)) for end in (left, right, left_mass, right_mass)]
     shape = np.broadcast_shapes(*(np.shape(value) for value in sections), *(end.shape[:1] for end in ends))
@@ -39,7 +43,12 @@ def beams(
     a[0, :, 0, 0], a[1, :, 0, 0], a[0, :, 1, 1] = foundation, -rhoA, 1.0 / EI
     b[0, :, 0, 0], b[0, :, 0, 1], b[0, :, 1, 0], b[0, :, 1, 1] = 1.0 / shear, 1.0, -1.0, tension
     b[1, :, 1, 1] = -rotary
-    return UniformProblem(length.copy(), a, b, springs[:2], springs[2:])
+    couplings = None
+    if offset is not None:
+        springs[3, :, 1] += springs[3, :, 0] * offset**2
+        couplings = np.zeros((2, 2, *shape))
+        couplings[1, 1] = springs[3, :, 0] * offset
+    return UniformProblem(length.copy(), a, b, springs[:2], springs[2:], couplings=couplings)
 
 
 def positions(problem: UniformProblem) -> tuple[list[int], list[int]]:
@@ -62,9 +71,12 @@ def stiffness(problem: UniformProblem) -> DynamicStiffness:
         return (system[0, rows] + z[:, None, None] * system[1, rows])[:, None], system[1, rows][:, None]
 
     def ends(z, rows):
-        return tuple(
-            values[:, :, None] * np.eye(4) for values in (springs[rows] - z[:, None] * masses[rows], -masses[rows])
-        )
+        stiff, heavy = springs[rows, :, None] * np.eye(4), masses[rows, :, None] * np.eye(4)
+        if problem.couplings is not None:
+            for matrix, coupling in zip((stiff, heavy), problem.couplings, strict=True):
+                for end, (i, j) in enumerate(((0, 1), (2, 3))):
+                    matrix[:, i, j] = matrix[:, j, i] = coupling[end, rows]
+        return stiff - z[:, None, None] * heavy, -heavy
 
     return DynamicStiffness(at, ends, problem.length, 2, 0, np.eye(4)[:, ~held])
 
@@ -84,9 +96,13 @@ def determinant(problem: UniformProblem, row: int, z: Any) -> Any:
         return (mpf(1), mpf(0)) if np.isinf(spring) else (mpf(spring) - z * mpf(mass), mpf(1))
 
     left, right = ([pair(end, i) for i in range(2)] for end in (0, 1))
+    off = mpf(0)
+    if problem.couplings is not None:
+        assert not problem.couplings[:, 0, row].any()
+        off = mpf(problem.couplings[0, 1, row]) - z * mpf(problem.couplings[1, 1, row])
     # motions that meet the conditions s q = c P at the left end, and what they leave of s q + c P at the right
     ends = [left[j][1] * transfer[:, j] + left[j][0] * transfer[:, 2 + j] for j in range(2)]
-    rest = [[right[i][0] * end[i] + right[i][1] * end[2 + i] for end in ends] for i in range(2)]
+    rest = [[right[i][0] * end[i] + right[i][1] * (end[2 + i] + off * end[1 - i]) for end in ends] for i in range(2)]
     return rest[0][0] * rest[1][1] - rest[0][1] * rest[1][0]
 
 
