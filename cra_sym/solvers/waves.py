@@ -195,6 +195,12 @@ def _roots(function: Determinant, number: Integers, row: Integers, brackets: Flo
     return z
 
 
+def _middle(low: Floats, high: Floats) -> Floats:
+    """Return the z half-way in the fourth root: in the wave number, or nearly so."""
+    z: Floats = (0.5 * (low**0.25 + high**0.25)) ** 4
+    return z
+
+
 def _interpolated(
     function: Determinant, sign: Floats, low: Floats, high: Floats, at_low: Floats, at_high: Floats
 ) -> Floats:
@@ -204,7 +210,7 @@ def _interpolated(
     nearest = at_low < -at_high
     x1, x2 = np.where(nearest, low, high), np.where(nearest, high, low)
     f1, f2 = np.where(nearest, at_low, at_high), np.where(nearest, at_high, at_low)
-    share = f1 / (f1 - f2)
+    share = np.where(low > 0.0, (_middle(low, high) - x1) / (x2 - x1), f1 / (f1 - f2))
     for _ in range(_MOST_STEPS):
         step = share * (x2 - x1)
         x = x1 + step

@@ -237,7 +237,8 @@ def _started(z, state, bracket, at, place, zeros, number, size):
         x2, f2 = high if nearest else low, at_high if nearest else at_low
         place[many] = lane
         state[0, many], state[1, many], state[2, many], state[3, many] = x1, x2, f1, f2
-        state[4, many] = f1 / (f1 - f2)
+        wave = 0.5 * (np.sqrt(np.sqrt(low)) + np.sqrt(np.sqrt(high)))
+        state[4, many] = (wave**4 - x1) / (x2 - x1) if low > 0.0 else f1 / (f1 - f2)
         many += alone & (zeros[lane] <= number)
     return many
 
