@@ -165,9 +165,11 @@ def _bracketed(bracket, at, points, counts, values, number, last, size):
     for lane in range(size):
         right = at[0, lane]
         left = max(right - 1, 0)
-        bracket[0, lane], bracket[1, lane] = points[left, lane], points[right, lane]
-        bracket[2, lane], bracket[3, lane] = values[left, lane], values[right, lane]
-        at[0, lane], at[1, lane] = counts[left, lane], counts[right, lane]
+        low, high, before = points[left, lane], points[right, lane], bracket[1, lane]
+        closer = (number > 0) & (at[1, lane] == number) & (low < before) & (before < high)  # where the last root ended
+        bracket[0, lane], bracket[1, lane] = before if closer else low, high
+        bracket[2, lane], bracket[3, lane] = bracket[3, lane] if closer else values[left, lane], values[right, lane]
+        at[0, lane], at[1, lane] = number if closer else counts[left, lane], counts[right, lane]
 
 
 def _is_crowded(bracket, at, number, lane):
