@@ -2,12 +2,13 @@
 
 The loop is that of `frequencies`: SciPy's brentq root by root, handed brackets that hold exactly one root each, on the
 characteristic function of the model that SymPy's lambdify makes of it, in complex arithmetic: a wave number is real or
-imaginary.
+imaginary. Without brackets, a user has to scan first.
 """
 
 from __future__ import annotations
 
 import cmath
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -24,8 +25,8 @@ from cra_sym.solvers.waves import Search, UniformProblem, lowest_waves, template
 from tests.benchmarks.machine import in_rounds, processors, summary
 
 SEED = 20261130
-LOOP = "brentq loop"
-MODES = 3
+LOOP, SCAN = "brentq loop", "scan and brentq loop"
+MODES, POINTS = 3, 120
 
 x, t = sp.symbols("x t")
 L, T, K, G, I, k_t, k_r, m_e = sp.symbols("L T K G I k_t k_r m_e", positive=True)
@@ -122,6 +123,19 @@ class Case:
                     continue
         return result
 
+    def scan(self, number: int) -> np.ndarray:
+        """Solve as one has to without a count: brackets from the signs at many points, up to the last root."""
+        names = [symbol.name for symbol in self.family.model.symbols]
+        columns = [self.family.values[name][:number].tolist() for name in names]
+        result = np.full((number, MODES), np.nan)
+        for i, arguments in enumerate(zip(*columns, strict=True)):
+            points = (np.linspace(0.0, math.sqrt(self.brackets[1][i, -1]), POINTS + 1)[1:] ** 2).tolist()
+            signs = [self.determinant(omega, *arguments) > 0.0 for omega in points]
+            changes = [j for j in range(POINTS - 1) if signs[j] != signs[j + 1]][:MODES]
+            for mode, j in enumerate(changes):
+                result[i, mode] = brentq(self.determinant, points[j], points[j + 1], args=arguments, xtol=1e-14)
+        return result
+
     def ours(self, number: int) -> np.ndarray:
         """Solve by this package in NumPy."""
         return np.sqrt(lowest_waves(self.problem.take(slice(0, number)), MODES))
@@ -141,6 +155,7 @@ class Case:
         size = len(self.problem.length)
         found: dict[str, tuple[int, Callable[[int], np.ndarray]]] = {
             LOOP: (min(size, 300), self.loop),
+            SCAN: (min(size, 100), self.scan),
             "cra_sym, NumPy": (min(size, 20_000), self.ours),
         }
         if has_compiler():
