@@ -130,7 +130,7 @@ class Sensitivities:
         moves = np.abs(squared) > 1e-20 * np.abs(squared).max(axis=-1, keepdims=True)  # more than by rounding
         several = self._still.sum(axis=-1, keepdims=True) > 1
         directed = several & (moves & self._still).any(axis=-1, keepdims=True)
-        return np.where(self._still, np.where(directed, np.nan, np.where(moves, value, 0.0)), value)
+        return np.where(self._still, np.where(directed, np.nan, np.where(moves & ~np.isnan(value), value, 0.0)), value)
 
     @cached_property
     def _still(self) -> Array:

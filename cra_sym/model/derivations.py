@@ -21,6 +21,7 @@ from cra_sym.model.projection import Form, Load
 from cra_sym.model.routes import GeneralRoute, Route
 from cra_sym.model.spatial import SpatialProblem, spatial_problem
 from cra_sym.model.symmetry import asymmetry
+from cra_sym.model.two_waves import two_waves_route
 
 __all__ = ["axial", "causes", "constant", "damping", "geometry", "load", "names", "rates", "route", "spatial"]
 
@@ -54,8 +55,12 @@ def damped_spatial(model: Model) -> SpatialProblem:
 
 def route(model: Model) -> Route:
     """Return the fastest way to natural frequencies and modes that the Lagrangian allows."""
-    left = model.equations.domain[0]
-    return one_wave_route(model.conservative, model.symbols, left) or GeneralRoute(spatial(model))
+    form, left = model.conservative, model.equations.domain[0]
+    fast = one_wave_route(form, model.symbols, left)
+    if fast is not None:
+        return fast
+    compiled = spatial(model)
+    return two_waves_route(form, compiled, model.symbols) or GeneralRoute(compiled)
 
 
 # Loads -----------------------------------------------------------------------------------------------------------

@@ -19,8 +19,8 @@ import sympy as sp
 from scipy.optimize import brentq
 
 import cra_sym as cra
-from cra_sym.arm.spectrum import in_parts
 from cra_sym.kernels import compiled, has_compiler
+from cra_sym.kernels.parts import in_parts
 from cra_sym.solvers.waves import Search, UniformProblem, lowest_waves, template
 from tests.benchmarks.machine import in_rounds, processors, summary
 
