@@ -9,7 +9,6 @@ import sympy as sp
 from numpy.polynomial.legendre import leggauss
 
 import cra_sym as cra
-from cra_sym.analysis.modes import arm_modes
 from cra_sym.codegen.arm_family import arm_family
 from cra_sym.kernels import has_compiler
 from cra_sym.mechanics import one_wave as derived
@@ -93,7 +92,7 @@ def test_participation(arm, parameters, quadrature):
 
 
 def test_the_waves_are_those_of_the_shapes():
-    modes = arm_modes(NOMINAL.replace(k_t=1e3, k_r=50.0), MODES).dimensionless
+    modes = NOMINAL.replace(k_t=1e3, k_r=50.0).modes(MODES).dimensionless
     far = modes.lam**4 > one_wave_shapes.NEAR[2]
     lam, xi = modes.lam[far, None], np.linspace(0, 1, 7)
     waves = np.array([np.cos(lam * xi), np.sin(lam * xi), np.exp(-lam * xi), np.exp(-lam * (1 - xi))])
