@@ -11,7 +11,7 @@ import sympy as sp
 from cra_sym.codegen.arm_family import arm_family
 from cra_sym.codegen.complex_parts import complex_parts
 from cra_sym.codegen.program import Function, function, scalars
-from cra_sym.mechanics import multiple_scales, one_wave, one_wave_shapes
+from cra_sym.mechanics import multiple_scales, one_wave, one_wave_rows, one_wave_shapes
 from cra_sym.model import oscillator
 from cra_sym.symbols import symbol
 
@@ -95,8 +95,8 @@ def modal_functions() -> tuple[Function, ...]:
 def _mass() -> Any:
     """Return the modal mass with the tip's inertias by their own names."""
     structure = arm_family().structure
-    (mass,), arguments = one_wave_shapes.generalised_mass(structure)
-    names = dict(zip(one_wave_shapes.inertias(structure).values(), map(symbol, ("mu", "iota")), strict=True))
+    (mass,), arguments = one_wave_rows.generalised_mass(structure)
+    names = dict(zip(one_wave_rows.inertias(structure).values(), map(symbol, ("mu", "iota")), strict=True))
     return mass.xreplace(names), [names.get(x, x) for x in arguments]
 
 

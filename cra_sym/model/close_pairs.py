@@ -40,7 +40,8 @@ def resolve_close_pairs(family: Family, lam: Array, *groups: Array) -> None:
     flat = [np.broadcast_to(value, lam.shape[:-1]).reshape(-1) for value in groups]
     for lower in range(rows.shape[1] - 1):
         low, high = rows[:, lower], rows[:, lower + 1]
-        close = np.flatnonzero((high - low < CLOSE * np.minimum(high, 1.0)) & (low > 0))
+        close = np.flatnonzero(low > (1 - CLOSE) * high)  # few enough for a closer look
+        close = close[high[close] - low[close] < CLOSE * np.minimum(high[close], 1.0)]
         for start in range(0, close.size, _LANES):
             some = close[start : start + _LANES]
             rows[some, lower : lower + 2] = _resolved(family, rows[some, lower : lower + 2], [x[some] for x in flat])

@@ -21,11 +21,16 @@ __all__ = ["DimensionlessModes", "Family", "family"]
 
 Array = NDArray[np.float64]
 _CHARACTERISTIC = ("coefficients", "power_series", "chain", "derivatives")
-_OF_STRUCTURE = (
-    "tip_rows", "tip_near", "amplitudes_far", "invariant_near", "prepared", "end_state", "generalised_mass", "rows",
-    "rates", "rigid_body", "leading",
+_SHAPES = ("tip_rows", "tip_near", "amplitudes_far")
+_ROWS = (
+    "invariant_near", "prepared", "end_state", "generalised_mass", "rows", "rates", "rigid_body", "leading",
 )  # fmt: skip
-_OF_ORDER = ("polynomials", "tip_far", "shape_far", "invariant_far", "integral_far")
+_OF_ORDER = {
+    "one_wave": ("basis", "basis_near", "products"),
+    "one_wave_shapes": ("polynomials", "tip_far", "shape_far", "integral_far"),
+    "one_wave_rows": ("invariant_far",),
+}
+_OF_STRUCTURE = {"one_wave": _CHARACTERISTIC, "one_wave_shapes": _SHAPES, "one_wave_rows": _ROWS}
 
 
 @cache
@@ -45,13 +50,12 @@ class Family:
 
     def __init__(self, structure: Structure) -> None:
         self.structure, self.layout = structure, Table(structure)
-        n = self.layout.n
-        room = "cra_sym.mechanics.one_wave"
-        found = {name: derived_kernel(f"{room}:{name}", structure) for name in _CHARACTERISTIC}
-        found |= {name: derived_kernel(f"{room}:{name}", n) for name in ("basis", "basis_near", "products")}
-        found |= {name: derived_kernel(f"{room}_shapes:{name}", structure) for name in _OF_STRUCTURE}
-        found |= {name: derived_kernel(f"{room}_shapes:{name}", n) for name in _OF_ORDER}
-        self.functions: dict[str, Kernel] = found
+        self.functions: dict[str, Kernel] = {
+            name: derived_kernel(f"cra_sym.mechanics.{module}:{name}", given)
+            for table, given in ((_OF_STRUCTURE, structure), (_OF_ORDER, self.layout.n))
+            for module, names in table.items()
+            for name in names
+        }
 
     def __reduce__(self) -> tuple[Any, ...]:
         return family, (self.structure,)

@@ -110,7 +110,7 @@ def fill(
         Of each lane.
     layout : Table
     functions : mapping of str to Function
-        Those of `cra_sym.mechanics.one_wave_shapes`.
+        Those of `cra_sym.mechanics.one_wave_shapes` and ``one_wave_rows``.
     parameters : ndarray, shape (parameters, size)
     inertias : sequence of ndarray, shape (size,)
         mu of the channels that have one.
