@@ -63,6 +63,11 @@ def route(model: Model) -> Route:
     return two_waves_route(form, compiled, model.symbols) or GeneralRoute(compiled)
 
 
+def general_route(model: Model) -> Route:
+    """Return the route that serves all values."""
+    return GeneralRoute(spatial(model))
+
+
 # Loads -----------------------------------------------------------------------------------------------------------
 
 Kind = Literal["motion", "force"]

@@ -62,6 +62,9 @@ class RigidShare(Protocol):
 class Route(Protocol):
     """How frequencies and modes of a model are computed."""
 
+    def covers(self, values: Values) -> bool:
+        """Return whether the route serves these values; the general one serves all."""
+
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:
         """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""
 
@@ -74,6 +77,10 @@ class GeneralRoute:
     """Dynamic stiffness: any linear conservative model, with coefficients that vary along x too."""
 
     spatial: SpatialProblem
+
+    def covers(self, values: Values) -> bool:
+        """Return True: what is not allowed is refused by name."""
+        return True
 
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:
         """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""

@@ -67,6 +67,10 @@ class TwoWaves:
     def _general(self) -> GeneralRoute:
         return GeneralRoute(self.spatial)
 
+    def covers(self, values: Values) -> bool:
+        """Return True: sets of values without closed forms take the dynamic stiffness one by one."""
+        return True
+
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:
         """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""
         columns = flat_columns(values, shape)
