@@ -162,8 +162,9 @@ def _stiffness(place: np.ndarray) -> np.ndarray:
 def _gradient(stiffness: np.ndarray, found: Sensitivities, units: np.ndarray) -> np.ndarray:
     """Return the derivatives of the frequencies by ln(1 + 1/kappa) of both stiffnesses, shape (modes, 2)."""
     columns = []
-    for name, value, unit in zip(_JOINT, stiffness, units, strict=True):
-        kappa = value / unit
+    with np.errstate(over="ignore"):
+        kappas = stiffness / units
+    for name, kappa, unit in zip(_JOINT, kappas, units, strict=True):
         stiff = kappa > 1
         columns.append(
             found.compliance[name] / unit * (1 + 1 / kappa)

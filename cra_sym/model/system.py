@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from cra_sym.checks import broadcastable, count
 from cra_sym.model.projection import Domain, Load, Projected, project
 from cra_sym.model.routes import Modes, Route
+from cra_sym.model.spatial import check_range
 from cra_sym.model.values import Value, checked_damping, checked_values, frozen
 
 if TYPE_CHECKING:
@@ -125,7 +126,9 @@ class System:
 
     def _find_frequencies(self, modes: int) -> Array:
         _ = self.domain  # refuses a length that is not positive
-        omega: Array = self._route.angular_frequencies(self.parameters, self.shape, modes)
+        with np.errstate(all="ignore"):
+            omega: Array = self._route.angular_frequencies(self.parameters, self.shape, modes)
+        check_range(omega)
         omega.flags.writeable = False
         return omega
 

@@ -187,6 +187,8 @@ def two_waves_route(form: StateForm, spatial: SpatialProblem, symbols: Sequence[
     ends = _end_entries(form, order, n)
     if None in entries or ends is None:
         return None
+    if not any((*(entry[1] for entry in entries), *ends[2 * n : 4 * n])):  # type: ignore[index]
+        return None  # nothing has mass: the general route says so
     matrices = tuple(entry[power] for power in (0, 1) for entry in entries)  # type: ignore[index]
     place = {displacement: position for position, displacement in enumerate(order)}
     held = tuple((i // n, place[i % n]) for i in range(2 * n) if i not in free)
