@@ -7,6 +7,7 @@ import pytest
 
 import cra_sym as cra
 from cra_sym.figures import stability as figures
+from cra_sym.model.one_wave import OneWave
 
 
 @pytest.mark.parametrize("draw", [figures.figure_11, figures.figure_12])
@@ -23,6 +24,21 @@ def test_principal_zones(draw, excitation):
     drawn = [line.get_xdata()[-1] for line in panels[1].lines]
     assert np.allclose(drawn, [*first, *second])
     assert "$\\varpi - 2\\omega_3$" in panels[-1].get_xlabel()
+
+
+@pytest.mark.parametrize("excitation", [figures.JOINT, figures.AXIAL])
+def test_a_chart_computes_the_modes_of_an_arm_once(excitation, monkeypatch):
+    """For each number of modes: a few for the first order and for Floquet theory, more for sums and statics."""
+    asked = []
+    for name in ("angular_frequencies", "modes"):
+
+        def counted(self, values, shape, last, original=getattr(OneWave, name), name=name):
+            asked.append((name, last if name == "angular_frequencies" else last.shape[-1]))
+            return original(self, values, shape, last)
+
+        monkeypatch.setattr(OneWave, name, counted)
+    figures.figure_zones(excitation=excitation, points=5)
+    assert len(asked) == len(set(asked)) <= 10
 
 
 def test_combinations_are_named():
