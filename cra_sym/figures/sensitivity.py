@@ -40,7 +40,9 @@ def figure_5(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     (raw_t, raw_r), (log_t, log_r) = np.asarray(axes)
     for name, raw, log, low in (("k_t", raw_t, log_t, 0), ("k_r", raw_r, log_r, -1)):
         stiffness = np.logspace(low, 6, 281)
-        found, marked = (sensitivities(arm.replace(**{name: values}), by=[name]) for values in (stiffness, _MARKED[name]))
+        found, marked = (
+            sensitivities(arm.replace(**{name: values}), by=[name]) for values in (stiffness, _MARKED[name])
+        )
         _curves(raw, name, stiffness, found.rate[name], marked.rate[name])
         _curves(log, name, stiffness, found.log[name], marked.log[name])
         raw.set_yscale("log")

@@ -30,13 +30,18 @@ def test_principal_zones(draw, excitation):
 def test_a_chart_computes_the_modes_of_an_arm_once(excitation, monkeypatch):
     """For each number of modes: a few for the first order and for Floquet theory, more for sums and statics."""
     asked = []
-    for name in ("angular_frequencies", "modes"):
+    frequencies, modes = OneWave.angular_frequencies, OneWave.modes
 
-        def counted(self, values, shape, last, original=getattr(OneWave, name), name=name):
-            asked.append((name, last if name == "angular_frequencies" else last.shape[-1]))
-            return original(self, values, shape, last)
+    def counted_frequencies(self, values, shape, number):
+        asked.append(("frequencies", number))
+        return frequencies(self, values, shape, number)
 
-        monkeypatch.setattr(OneWave, name, counted)
+    def counted_modes(self, values, shape, omega):
+        asked.append(("modes", omega.shape[-1]))
+        return modes(self, values, shape, omega)
+
+    monkeypatch.setattr(OneWave, "angular_frequencies", counted_frequencies)
+    monkeypatch.setattr(OneWave, "modes", counted_modes)
     figures.figure_zones(excitation=excitation, points=5)
     assert len(asked) == len(set(asked)) <= 10
 
