@@ -216,7 +216,7 @@ def spoiled(part):
 def test_the_proof_notices_one_per_cent(e, monkeypatch):
     module, name = e.source.split(":")
     builder, right = getattr(import_module(module), name), parts(e.expression)
-    holders = [m for key, m in sys.modules.items() if key.startswith("cra_sym.arm") and vars(m).get(name) is builder]
+    holders = [m for key, m in sys.modules.items() if key.startswith("cra_sym.paper") and vars(m).get(name) is builder]
     missed = []
     for place, part in enumerate(right):
         found = [spoil for spoil in spoiled(part) if e.number not in WRITTEN_OUT or spoil[0] == "whole"]
