@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cra_sym.arm.excitations import AxialBase, JointStiffness
+from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import instance, real_array, shown
 from cra_sym.extras import MissingExtraError, require
@@ -21,6 +21,7 @@ from cra_sym.figures.live import LiveFigure
 from cra_sym.figures.modes import figure_mode_shapes
 from cra_sym.figures.responses import figure_response
 from cra_sym.figures.stability import AXIAL, JOINT, figure_zones
+from cra_sym.model.excitations import AxialBase
 from cra_sym.solvers.motion import BaseMotion
 from cra_sym.symbols import row
 

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from cra_sym.analysis.modes import frequency_parameters, natural_frequencies
+from cra_sym.analysis.modes import natural_frequencies
+from cra_sym.arm.frequency_parameters import frequency_parameters
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import mapping, one_axis, real_array, shown
 from cra_sym.claims.setting import Setting

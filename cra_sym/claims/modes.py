@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cra_sym.analysis.modes import frequency_parameters, modal_parameters, mode_shapes, natural_frequencies
+from cra_sym.analysis.modes import modal_parameters, mode_shapes, natural_frequencies
+from cra_sym.arm.frequency_parameters import frequency_parameters
 from cra_sym.arm.parameters import Arm
 from cra_sym.claims.family import common_scale
 from cra_sym.claims.pictures import PALETTE, STYLES, by_mode, note, stiffness_axis

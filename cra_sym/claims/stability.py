@@ -9,13 +9,14 @@ import numpy as np
 
 from cra_sym.analysis.modes import modal_parameters
 from cra_sym.analysis.stability import AsymptoticWarning, growth_rate, stability_boundary
-from cra_sym.arm.excitations import AxialBase, JointStiffness
+from cra_sym.arm.excitations import JointStiffness
 from cra_sym.claims.motions import tip
 from cra_sym.claims.pictures import PALETTE, STYLES, note
 from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
 from cra_sym.claims.verdict import Finding, Quantity, Verdict, outcome
 from cra_sym.claims.words import listed, number, percent
+from cra_sym.model.excitations import AxialBase
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cra_sym.analysis.stability import forced_width
-from cra_sym.arm.excitations import AxialBase, JointStiffness, TransverseBase
+from cra_sym.arm.excitations import JointStiffness
 from cra_sym.claims.pictures import PALETTE, by_mode, note, stiffness_axis, strip
 from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
 from cra_sym.claims.stability import KINDS, zone
 from cra_sym.claims.verdict import Finding, Quantity, Verdict, outcome
 from cra_sym.claims.words import listed, number, percent, span
+from cra_sym.model.excitations import AxialBase, TransverseBase
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

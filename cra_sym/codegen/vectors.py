@@ -12,13 +12,15 @@ import numpy as np
 
 import cra_sym as cra
 from cra_sym.analysis import state_space as state_space_module
-from cra_sym.analysis.modes import frequency_parameters, modal_parameters, mode_shapes, natural_frequencies
+from cra_sym.analysis.modes import modal_parameters, mode_shapes, natural_frequencies
 from cra_sym.analysis.responses import tip_response
 from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.analysis.zones import first_order_zone
-from cra_sym.arm.excitations import AxialBase, JointStiffness
+from cra_sym.arm.excitations import JointStiffness
+from cra_sym.arm.frequency_parameters import frequency_parameters
 from cra_sym.arm.parameters import Arm
 from cra_sym.codegen.characteristic import characteristic
+from cra_sym.model.excitations import AxialBase
 
 __all__ = ["SEED", "TOLERANCE", "Check", "arm_checks", "extreme_arms", "random_arms", "written"]
 

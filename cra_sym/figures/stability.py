@@ -17,8 +17,9 @@ from cra_sym.analysis.stability import (
     growth_rate,
     stability_boundary,
 )
-from cra_sym.arm.excitations import AxialBase, JointStiffness, TransverseBase
+from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
+from cra_sym.model.excitations import AxialBase, TransverseBase
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

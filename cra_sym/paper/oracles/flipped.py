@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize.elementwise import find_root
 
 from cra_sym import checks
-from cra_sym.analysis.modes import frequency_parameters
+from cra_sym.arm.frequency_parameters import frequency_parameters
 from cra_sym.arm.parameters import Arm
 from cra_sym.kernels import derived_kernel
 
