@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from sympy import Add, Derivative, Dummy, Expr, Function, Integral, Matrix, S, Subs, lambdify, sympify
 
+from cra_sym.paper.groups import GROUPS
 from cra_sym.paper.oracles.shooting import ShotMode, integrate, sample, shoot
 from cra_sym.symbols import symbol
 
@@ -25,10 +26,7 @@ __all__ = [
 ]
 
 x, t, L = symbol("x"), symbol("t"), symbol("L")
-C_1, beta, c_r, c_t, iota, kappa_r, kappa_t, lamda, mu, r_2, s_r, s_t = (
-    symbol(name)
-    for name in ("C_1", "beta", "c_r", "c_t", "iota", "kappa_r", "kappa_t", "lamda", "mu", "r_2", "s_r", "s_t")
-)
+C_1, beta, lamda, r_2 = (symbol(name) for name in ("C_1", "beta", "lamda", "r_2"))
 
 
 def at(expression: Expr, place: Any) -> Expr:
@@ -183,21 +181,13 @@ def evaluate(expression: Expr, values: Mapping[str, float], shapes: Mapping[Expr
 
 def group_numbers(values: dict[str, float], mode_beta: float) -> dict[Expr, float]:
     """Return lamda and the dimensionless groups of an arm with a finite joint."""
-    bending, mass, length = values["E"] * values["I_z"], values["rho"] * values["A"] * values["L"], values["L"]
-    stiff_t, stiff_r = values["k_t"] * length**3 / bending, values["k_r"] * length / bending
-    weights = {
-        s_t: stiff_t / (1 + stiff_t),
-        c_t: 1 / (1 + stiff_t),
-        s_r: stiff_r / (1 + stiff_r),
-        c_r: 1 / (1 + stiff_r),
+    groups = {group: evaluate(value, values) for group, value in GROUPS.values()}
+    pairs = {
+        symbol(f"{letter}_{end}"): part / (1 + groups[symbol(f"kappa_{end}")])
+        for end in "tr"
+        for letter, part in (("s", groups[symbol(f"kappa_{end}")]), ("c", 1.0))
     }
-    return weights | {
-        lamda: mode_beta * length,
-        kappa_t: stiff_t,
-        kappa_r: stiff_r,
-        mu: values["m_e"] / mass,
-        iota: values["J_e"] / (mass * length**2),
-    }
+    return groups | pairs | {lamda: mode_beta * values["L"]}
 
 
 def shot_coefficients(mode: ShotMode) -> Matrix:

@@ -9,12 +9,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from sympy import Eq, Integral, cos, sin
+from sympy import Eq, S, cos, sin
 
 from cra_sym.paper.energy import potential, single_mode, x
 from cra_sym.paper.equations import Proof, numbered, proves, samples
 from cra_sym.paper.evaluation import at, evaluate, termwise, virtual_factors
 from cra_sym.paper.modal_dynamics import dynamic_equation
+from cra_sym.paper.oracles import forces
 from cra_sym.paper.oracles.shooting import integrate, sample, shoot
 from cra_sym.paper.parametric import AXIAL, TRANSVERSE, coupling, excited_lagrangian, phi_i, phi_j, t, u, w
 from cra_sym.symbols import Dimension, dimension, symbol
@@ -118,11 +119,12 @@ def axial_coupling() -> Eq:
 
 @proves("36a")
 def _() -> Proof:
-    """The energy (35b) of two modes, differentiated by both coordinates and by the fluctuation: the work of the extra
-    spring forces of one on the other."""
+    """The energy (35b) of two modes, differentiated by both coordinates and by the fluctuation; the work of the extra
+    spring forces of one on the other, written down by hand."""
     q_i, q_j, swing = symbol("q_i"), symbol("q_j"), epsilon * cos(varpi * t)
     energy = single_mode(fluctuating_joint().rhs, phi_i * q_i + phi_j * q_j)
     yield energy.diff(q_i).diff(q_j).diff(epsilon) * epsilon / swing - joint_coupling().rhs
+    yield joint_coupling().rhs - forces.spring_product(phi_i, phi_j)
     yield joint_coupling().lhs == P_ij
 
 
@@ -140,8 +142,8 @@ def _() -> bool:
 def _() -> Proof:
     """The axial momentum of a bent arm: the foreshortening of every point, whose slope is the product of the slopes of
     the two modes, grows from the joint on and carries the masses of manipulator and end-effector."""
-    shortening, (rho, A, L, m_e) = symbol("eta"), (symbol(name) for name in ("rho", "A", "L", "m_e"))
-    momentum = Integral(rho * A * shortening, (x, 0, L)) + at(m_e * shortening, L)
+    shortening = symbol("eta")
+    momentum = forces.mass_product(shortening, S.One)
     found = axial_coupling().rhs / (u_0 * varpi**2)
     found = found.xreplace({phi_i.diff(x): shortening.diff(x) / phi_j.diff(x)})
     along, _, *others = virtual_factors(termwise(found) - momentum, shortening)

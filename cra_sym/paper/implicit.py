@@ -9,13 +9,14 @@ import sympy as sp
 
 from cra_sym.paper.energy import modal_numbers
 from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.groups import GROUPS
 from cra_sym.paper.limits import natural_frequency
 from cra_sym.paper.modes import frequency_function, group_numbers
 from cra_sym.paper.oracles import by_hand
 from cra_sym.paper.oracles.shooting import sample, shoot
 from cra_sym.symbols import symbol
 
-__all__ = ["frequency_sensitivities", "group_exponents", "implicit_derivatives", "sensitivity_function"]
+__all__ = ["frequency_sensitivities", "implicit_derivatives", "implicit_kernel", "sensitivity_function"]
 
 lamda, L, E, I_z = (symbol(name) for name in ("lamda", "L", "E", "I_z"))
 _PAIRS = {name: tuple(symbol(f"{letter}_{name}") for letter in ("s", "c")) for name in ("t", "r")}
@@ -57,10 +58,11 @@ def implicit_derivatives() -> dict[str, sp.Expr]:
 
 def _in_hertz(rates: dict[str, sp.Expr]) -> tuple[sp.Eq, sp.Eq]:
     """Turn d lamda / d kappa for each stiffness into hertz per unit of the stiffness, by (30)."""
-    frequency, hertz = sp.Function("f_i")(symbol("k_t"), symbol("k_r")), natural_frequency().rhs
+    stiffnesses = {name: symbol(f"k_{name}") for name in rates}
+    frequency, hertz = sp.Function("f_i")(*stiffnesses.values()), natural_frequency().rhs
     by_k_t, by_k_r = (
-        sp.Eq(frequency.diff(symbol(f"k_{name}")), hertz.diff(lamda) * L**power / (E * I_z) * rates[name])
-        for name, power in (("t", 3), ("r", 1))
+        sp.Eq(frequency.diff(k), hertz.diff(lamda) * GROUPS[k][1].diff(k) * rates[name])
+        for name, k in stiffnesses.items()
     )
     return by_k_t, by_k_r
 
@@ -135,28 +137,3 @@ def _scaled(expression: sp.Expr, scaled: dict[sp.Expr, sp.Expr], decay: sp.Expr)
     expanded = expression.expand()
     grown = sum(expanded.coeff(function) * value for function, value in scaled.items())
     return grown + decay * expanded.subs(dict.fromkeys(scaled, 0))
-
-
-def group_exponents() -> tuple[dict[str, sp.Expr], tuple[sp.Symbol, ...]]:
-    """Return d ln omega^2 / d ln p for the parameters that enter several groups, from the shares of energy in a mode.
-
-    The shares are d ln omega^2 / d ln kappa_t and d ln kappa_r, and minus those by mu and iota: of the two springs in
-    the strain energy and of the end-effector's mass and rotary inertia in the kinetic energy. The rest is the chain
-    rule.
-    """
-    b, h, rho, m_e, J_e = (symbol(name) for name in ("b", "h", "rho", "m_e", "J_e"))
-    k_t, k_r, A = symbol("k_t"), symbol("k_r"), b * h
-    bending, line = E * b * h**3 / 12, rho * A
-    groups = {k_t * L**3 / bending: 1, k_r * L / bending: 1, m_e / (line * L): -1, J_e / (line * L**3): -1}
-    shares = sp.symbols("share_t share_r share_m share_j", nonnegative=True)
-
-    def logarithmic(expression: sp.Expr, p: sp.Symbol) -> sp.Expr:
-        return sp.cancel(expression.diff(p) * p / expression)
-
-    exponents = {}
-    for p in (L, b, h, E, rho):
-        total = logarithmic(bending / (line * L**4), p)
-        for share, (group, sign) in zip(shares, groups.items(), strict=True):
-            total += sign * share * logarithmic(group, p)
-        exponents[p.name] = total
-    return exponents, shares

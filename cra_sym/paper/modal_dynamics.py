@@ -12,19 +12,20 @@ from cra_sym.paper.energy import (
     L,
     generalised,
     inner_mass,
-    inner_stiffness,
     modal_numbers,
     phi_i,
     q_i,
     separation,
     t,
     tidy,
+    v,
     w,
     x,
 )
 from cra_sym.paper.equations import Proof, numbered, proves, samples
-from cra_sym.paper.evaluation import termwise
+from cra_sym.paper.evaluation import put, termwise
 from cra_sym.paper.modal_sum import ModalSum, member, written_out
+from cra_sym.paper.oracles import forces
 from cra_sym.paper.oracles.shooting import integrate, sample, shoot
 from cra_sym.paper.orthogonality import modal_energies, orthogonality, stiffness_identity
 from cra_sym.symbols import symbol
@@ -58,13 +59,14 @@ def _one_mode(energy: Expr) -> Expr:
 
 @proves(11)
 def _() -> Proof:
-    """D'Alembert: without damping it is the virtual work of all forces along mode i while any two modes move, by (6),
-    (16b) and (16c); with damping, a free vibration that decays by exp(-zeta_i omega_i t) solves it."""
+    """D'Alembert: without damping it is the virtual work of all forces, written down by hand, along mode i while any
+    two modes move, by (6), (16b) and (16c); with damping, a free vibration that decays by exp(-zeta_i omega_i t)
+    solves it."""
     equation = dynamic_equation().lhs - dynamic_equation().rhs
     two = separation().rhs.members("i", "j")
     mass, stiffness = (e.lhs - e.rhs for e in orthogonality())
     q_j = member(q_i, "j")
-    work = inner_mass(w + two, phi_i).diff(t, 2) + inner_stiffness(two, phi_i)
+    work = -put(forces.virtual_work(phi_i), {v: two})
     zero = mass * q_j.diff(t, 2) + stiffness * q_j + (K_i - omega_i**2 * M_i) * q_i
     named = {e.lhs: e.rhs for e in generalised()}
     yield stiffness_identity()[1].lhs - stiffness_identity()[1].rhs - (K_i - omega_i**2 * M_i)

@@ -27,9 +27,10 @@ from sympy import (
 )
 
 from cra_sym.mechanics import HamiltonResult, separate
-from cra_sym.paper.energy import A, E, I_z, J_e, L, k_r, k_t, m_e, phi_i, rho, x
+from cra_sym.paper.energy import A, E, I_z, L, phi_i, rho, x
 from cra_sym.paper.equations import Proof, numbered, proves, samples
 from cra_sym.paper.evaluation import annihilates, group_numbers, put, shapes_agree, shot_coefficients
+from cra_sym.paper.groups import in_groups
 from cra_sym.paper.joint import mode_conditions
 from cra_sym.paper.motion import dynamics, mode_field_equation
 from cra_sym.paper.oracles import by_hand
@@ -57,7 +58,7 @@ def basis() -> tuple[Expr, ...]:
     """Return four real solutions of the field equation of a mode, from the roots of its characteristic polynomial."""
     r = Symbol("r")
     balance = put(mode_field_equation().lhs, {phi_i: exp(r * x)}) / exp(r * x)
-    quartic = Poly(balance.subs(omega_i, beta**2 * sqrt(E * I_z / (rho * A))).expand(), r)
+    quartic = Poly(balance.subs(omega_i, _frequency()).expand(), r)
     circular: list[Expr] = []
     hyperbolic: list[Expr] = []
     for root in roots(quartic):
@@ -72,15 +73,29 @@ def mode_form() -> tuple[Eq, Eq]:
     """The field equation of a mode has four exponential solutions, here in real form; the boundary conditions
     determine the coefficients."""
     shape = sum(coefficient * function for coefficient, function in zip(coefficients, basis(), strict=True))
+    return Eq(phi_i, shape), _wave()
+
+
+@cache
+def _wave() -> Eq:
+    """Return what the field equation makes of the wave number: of shapes whose fourth derivative is beta^4 of them."""
     balance = mode_field_equation().lhs.subs(phi_i.diff(x, 4), beta**4 * phi_i) / phi_i
     (square,) = solve(balance.expand(), beta**4, simplify=False, check=False)
-    return Eq(phi_i, shape), Eq(beta**4, square)
+    return Eq(beta**4, square)
+
+
+def _frequency() -> Expr:
+    """Return the angular frequency that belongs to a wave number."""
+    (square,) = solve(_wave(), omega_i**2)
+    return sqrt(square)
 
 
 @proves(17)
 def _() -> Proof:
-    """It satisfies the field equation, and its four functions are independent."""
+    """It satisfies the field equation, and its four functions are independent; the wave number is that of a beam in
+    textbooks."""
     shape, wave = mode_form()
+    yield wave.rhs - rho * A * omega_i**2 / (E * I_z)
     residual = put(mode_field_equation().lhs, {phi_i: shape.rhs})
     yield residual.subs(omega_i, sqrt(solve(wave, omega_i**2)[0]))
     yield Matrix(4, 4, lambda row, column: basis()[column].diff(x, row)).subs(x, 0).det().expand() != 0
@@ -104,15 +119,7 @@ def _() -> bool:
 
 def dimensionless(expression: Expr) -> Expr:
     """Write an expression in lamda = beta L and the dimensionless groups."""
-    bending = E * I_z
-    groups = {
-        omega_i: beta**2 * sqrt(bending / (rho * A)),
-        k_t: kappa_t * bending / L**3,
-        k_r: kappa_r * bending / L,
-        m_e: mu * rho * A * L,
-        J_e: iota * rho * A * L**3,
-    }
-    return expression.subs(groups).subs(beta, lamda / L)
+    return expression.subs({omega_i: _frequency(), **in_groups()}).subs(beta, lamda / L)
 
 
 @cache
@@ -312,21 +319,18 @@ def by_power(coefficient: Expr) -> Expr:
 
 def separated(result: HamiltonResult) -> Expr:
     """Return the characteristic function that :func:`cra_sym.mechanics.separate` finds, in the table's symbols."""
-    groups = {
-        k_t: E * I_z / L**3 * s_t / c_t,
-        k_r: E * I_z / L * s_r / c_r,
-        m_e: mu * rho * A * L,
-        J_e: iota * rho * A * L**3,
-    }
-    modal = separate(result, parameters=groups)
+    pairs = {kappa_t: s_t / c_t, kappa_r: s_r / c_r}
+    modal = separate(result, parameters={name: value.subs(pairs) for name, value in in_groups().items()})
     (wave,) = modal.basis.wave_numbers
     return modal.characteristic_function.subs(wave, lamda)
 
 
 @proves(23)
 def _() -> Proof:
-    """The four conditions of Hamilton's principle in one determinant."""
-    yield separated(dynamics(driven=False)) - frequency_equation().lhs + frequency_equation().rhs
+    """The four conditions of Hamilton's principle in one determinant, and the four written down by hand."""
+    function = frequency_equation().lhs - frequency_equation().rhs
+    yield separated(dynamics(driven=False)) - function
+    yield by_hand.determinant() - 2 * lamda**6 * function
 
 
 @samples(23)

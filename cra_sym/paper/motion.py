@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from sympy import Eq, Expr, Function, Integral, lambdify, solve
+from sympy import Eq, Expr, Function, Integral, lambdify
 
 from cra_sym.arm.lagrangian import paper_lagrangian
 from cra_sym.mechanics.hamilton import hamilton
@@ -14,6 +14,7 @@ from cra_sym.paper.energy import ENERGY, L, modal_numbers, phi_i, single_mode, t
 from cra_sym.paper.equations import Proof, numbered, proves, samples
 from cra_sym.paper.evaluation import at, put, termwise, virtual_factors
 from cra_sym.paper.joint import boundary_conditions, free_vibration, rayleigh_factors, section_forces
+from cra_sym.paper.oracles import forces
 from cra_sym.paper.oracles.shooting import sample, shoot
 from cra_sym.symbols import dimension, symbol
 
@@ -57,23 +58,6 @@ def _first_variation() -> Expr:
     return put(paper_lagrangian().total(), moved).diff(size).subs(size, 0).doit(integrals=False)
 
 
-def _newton() -> tuple[Expr, ...]:
-    """Return the force on a slice, force and moment on the joint and on the end-effector, and the force on the arm,
-    inertia forces included: by hand, with shear and moment (15)."""
-    E, I_z, m_e, J_e, k_r = (symbol(name) for name in ("E", "I_z", "m_e", "J_e", "k_r"))
-    shear, moment = E * I_z * v.diff(x, 3), E * I_z * v.diff(x, 2)
-    acceleration = (w + v).diff(t, 2)
-    arm = Integral(rho * A * acceleration, (x, 0, L)) + at(m_e * acceleration, L)
-    return (
-        -shear.diff(x) - rho * A * acceleration,
-        at(-shear - k_t * v, 0),
-        at(moment - k_r * v.diff(x), 0),
-        at(shear - m_e * acceleration, L),
-        at(-moment - J_e * v.diff(x, t, t), L),
-        F - m_b * w.diff(t, 2) - arm,
-    )
-
-
 @proves(8)
 def _() -> Proof:
     """Dimensions; for any motion and any virtual displacement that vanishes at both instants, the integral is the work
@@ -81,7 +65,7 @@ def _() -> Proof:
     known = {"δLcal": ENERGY, "δw": dimension("w")}
     yield dimension(hamiltons_principle().lhs.function, known) == ENERGY
     rate = hamiltons_principle().lhs.function.subs(delta_L, _first_variation())
-    *elastic, base = _newton()
+    *elastic, base = forces.newton()
     for found, force in zip(virtual_factors(put(rate, {delta_w: x * 0}), delta_v), elastic, strict=True):
         yield termwise(found - force)
     (found,) = virtual_factors(put(rate, {delta_v: x * 0}), delta_w)
@@ -174,20 +158,21 @@ def natural_conditions() -> tuple[Eq, ...]:
 
 @proves(16)
 def _() -> Proof:
-    """Hamilton's principle gives the same four conditions."""
-    for ours, theirs in zip(boundary_conditions(), natural_conditions(), strict=True):
-        yield ours.lhs - ours.rhs - theirs.lhs + theirs.rhs
+    """Hamilton's principle gives the same four conditions, and so do Newton's forces on joint and end-effector."""
+    _, *newton, _ = forces.newton()
+    for e, theirs, force, sign in zip(boundary_conditions(), natural_conditions(), newton, (-1, 1, 1, -1), strict=True):
+        yield e.lhs - e.rhs - theirs.lhs + theirs.rhs
+        yield e.lhs - e.rhs - sign * force
 
 
 @proves("10a")
 def _() -> Proof:
-    """Newton: a slice accelerates under the slope of the shear force (15); the whole arm is one momentum balance."""
+    """Newton: a slice accelerates under the slope of the shear force, and the whole arm under the force that drives
+    it."""
     field, base = field_and_base()
-    shear, _ = (law.rhs for law in section_forces())
-    momentum = m_b * w.diff(t) + symbol("m_e") * (w + at(v, L)).diff(t)
-    line = Integral(rho * A * (w + v).diff(t), (x, 0, L))
-    yield field.lhs - field.rhs - rho * A * (w + v).diff(t, 2) - shear.diff(x)
-    yield termwise((base.lhs - base.rhs + F - (momentum + line).diff(t)).doit(integrals=False))
+    on_slice, *_, on_arm = forces.newton()
+    yield field.lhs - field.rhs + on_slice
+    yield termwise(base.lhs - base.rhs + on_arm)
 
 
 @numbered("10b", "field equation of a mode", "derived", (2, "10a"))
@@ -199,7 +184,7 @@ def mode_field_equation() -> Eq:
 
 @proves("10b")
 def _() -> Proof:
-    """Rayleigh: among all shapes, that of a mode makes K_i - ω_i² M_i of (6) stationary."""
+    """Rayleigh: among all shapes, that of a mode makes K_i - ω_i² M_i, written down by hand, stationary."""
     along, *_ = rayleigh_factors()
     yield mode_field_equation().lhs - mode_field_equation().rhs - along
 
@@ -223,17 +208,11 @@ def base_free_body() -> Eq:
     """The field equation integrated along the manipulator turns all inertia beyond the joint into the force of the
     translational spring: the base feels its own inertia, the spring and the drive."""
     field, base = field_and_base()
-    inertia = rho * A * (v + w).diff(t, 2)
-    (stiff,) = solve(Eq(field.lhs.expand(), 0), v.diff(x, 4))
-    force = symbol("E") * symbol("I_z") * v.diff(x, 3)
-    if (symbol("E") * symbol("I_z") * stiff + inertia).expand() != 0:
-        raise ArithmeticError("the slice does not balance")
-    at_ends = at(force, 0) - at(force, L)
-    for condition in natural_conditions():
-        at_ends = at_ends.subs(condition.lhs, condition.rhs)
-    spread = Integral(rho * A * v.diff(t, 2), (x, 0, L)) + rho * A * L * w.diff(t, 2)
-    left = (base.lhs - base.rhs + F).expand() - spread + at_ends
-    return Eq(left.expand(), F)
+    shear, _ = (law.rhs for law in section_forces())
+    inertia = Integral((field.lhs - field.rhs - shear.diff(x)).expand(), (x, 0, L))
+    known = {e.lhs: e.rhs for e in boundary_conditions()}
+    at_ends = at(shear, 0).subs(known) - at(shear, L).subs(known)
+    return Eq(termwise(base.lhs - base.rhs + F - inertia) + at_ends.expand(), F)
 
 
 @proves("10c")

@@ -6,8 +6,6 @@ from sympy import Eq, Expr, Integral, solve
 
 from cra_sym.arm.lagrangian import HALF
 from cra_sym.paper.energy import (
-    E,
-    I_z,
     L,
     generalised,
     inner_mass,
@@ -28,7 +26,7 @@ from cra_sym.paper.energy import (
 )
 from cra_sym.paper.equations import Proof, numbered, proves, samples
 from cra_sym.paper.evaluation import at, evaluate, put, termwise, virtual_factors
-from cra_sym.paper.joint import mode_conditions
+from cra_sym.paper.joint import end_values, mode_conditions, section_forces
 from cra_sym.paper.modal_sum import ModalSum, member, written_out
 from cra_sym.paper.motion import mode_field_equation
 from cra_sym.paper.oracles.shooting import integrate, sample, shoot
@@ -44,31 +42,33 @@ def stiffness_identity() -> tuple[Eq, Eq]:
     """Integrating by parts twice moves two derivatives from mode j to mode i, where the field equation and the four
     end conditions replace them: the stiffness product is ω_i² times the mass product, springs, tip mass and
     rotary inertia included; for i = j it is K_i = ω_i² M_i."""
-    by_parts = phi_i.diff(x, 2) * phi_j.diff(x) - phi_i.diff(x, 3) * phi_j
-    if (by_parts.diff(x) + phi_i.diff(x, 4) * phi_j - phi_i.diff(x, 2) * phi_j.diff(x, 2)).expand() != 0:
-        raise ArithmeticError("integration by parts went wrong")
-    (fourth,) = solve(mode_field_equation(), phi_i.diff(x, 4))
-    interior = Integral((E * I_z * fourth * phi_j).expand(), (x, 0, L))
-    ends = E * I_z * (at(by_parts, L) - at(by_parts, 0))
-    for condition in mode_conditions():
-        ends = ends.subs(condition.lhs / (E * I_z), condition.rhs / (E * I_z))
-    springs = inner_stiffness(phi_i, phi_j) - Integral(E * I_z * phi_i.diff(x, 2) * phi_j.diff(x, 2), (x, 0, L))
+    shear, moment = (single_mode(law.rhs, phi_i) for law in section_forces())
+    by_parts = moment * phi_j.diff(x) - shear * phi_j
+    along = inner_stiffness(phi_i, phi_j, joint=False) - Integral(by_parts.diff(x) + shear.diff(x) * phi_j, (x, 0, L))
+    if termwise(along.doit(integrals=False)) != 0:
+        raise ArithmeticError(f"integration by parts leaves {along}")
+    known = _balance("i")
+    interior = Integral(shear.diff(x).xreplace(known) * phi_j, (x, 0, L))
+    ends = (at(by_parts, L) - at(by_parts, 0)).xreplace(known)
+    springs = inner_stiffness(phi_i, phi_j) - inner_stiffness(phi_i, phi_j, joint=False)
     mass = inner_mass(phi_i, phi_j)
-    integral = mass.atoms(Integral).pop()
-    rest = interior + ends + springs - omega_i**2 * mass
-    if (
-        rest.subs(interior, omega_i**2 * integral).expand() != 0
-        or (interior.function - omega_i**2 * integral.function).expand()
-    ):
+    rest = termwise(interior + ends + springs - omega_i**2 * mass)
+    if rest != 0:
         raise ArithmeticError(f"stiffness and mass products differ by {rest}")
     return Eq(inner_stiffness(phi_i, phi_j), omega_i**2 * mass), Eq(K_i, omega_i**2 * M_i)
 
 
+def _balance(index: str) -> dict[Expr, Expr]:
+    """Return what (10b) and (16a) say of the highest derivatives of mode ``index``, along it and at both ends."""
+    equations = (mode_field_equation(), *mode_conditions())
+    highest = (phi_i.diff(x, 4), *end_values(phi_i))
+    pairs = zip(highest, equations, strict=True)
+    return {member(value, index): member(solve(e, value)[0], index) for value, e in pairs}
+
+
 def _is_mode(factors: tuple[Expr, ...], index: str) -> Proof:
     """Yield what is left of five factors of a virtual shape when mode ``index`` satisfies (10b) and (16a)."""
-    equations = (member(mode_field_equation(), index), *(member(condition, index) for condition in mode_conditions()))
-    tops = (member(phi_i, index).diff(x, 4), *(e.lhs / (E * I_z) for e in equations[1:]))
-    known = {top: solve(e, top)[0] for top, e in zip(tops, equations, strict=True)}
+    known = _balance(index)
     for factor in factors:
         yield factor.xreplace(known)
 
