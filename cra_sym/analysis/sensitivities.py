@@ -137,7 +137,7 @@ class Sensitivities:
         if not self._still.any():
             return value
         # 0 over 0 holds nothing, and neither does what is rounding beside the other modes
-        finite = np.where(self._still | ~np.isfinite(value), 0.0, np.abs(value) * self.frequency)
+        finite = np.abs(np.where(self._still | ~np.isfinite(value), 0.0, value)) * self.frequency
         holds = np.abs(squared) > 1e-20 * np.maximum(finite, np.abs(squared)).max(axis=-1, keepdims=True)
         held = np.where(holds, value, 0.0)
         several = self._still.sum(axis=-1, keepdims=True) > 1

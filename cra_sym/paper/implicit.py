@@ -16,10 +16,11 @@ from cra_sym.paper.oracles import by_hand
 from cra_sym.paper.oracles.shooting import sample, shoot
 from cra_sym.symbols import symbol
 
-__all__ = ["frequency_sensitivities", "implicit_derivatives", "implicit_kernel", "sensitivity_function"]
+__all__ = ["PAIRS", "frequency_sensitivities", "implicit_derivatives", "sensitivity_function"]
 
 lamda, L, E, I_z = (symbol(name) for name in ("lamda", "L", "E", "I_z"))
-_PAIRS = {name: tuple(symbol(f"{letter}_{name}") for letter in ("s", "c")) for name in ("t", "r")}
+#: The pair (s, c) of each stiffness.
+PAIRS = {name: tuple(symbol(f"{letter}_{name}") for letter in ("s", "c")) for name in ("t", "r")}
 
 
 @numbered(31, "sensitivity function", "derived", (23,))
@@ -51,7 +52,7 @@ def implicit_derivatives() -> dict[str, sp.Expr]:
     """
     function, _ = frequency_function()
     slope = function.diff(lamda)
-    parts = {f"kappa_{name}": function.diff(s) - function.diff(c) for name, (s, c) in _PAIRS.items()}
+    parts = {f"kappa_{name}": function.diff(s) - function.diff(c) for name, (s, c) in PAIRS.items()}
     parts |= {name: function.diff(symbol(name)) for name in ("mu", "iota")}
     return {name: -part / slope for name, part in parts.items()}
 
@@ -69,7 +70,7 @@ def _in_hertz(rates: dict[str, sp.Expr]) -> tuple[sp.Eq, sp.Eq]:
 
 def _by_parts() -> tuple[sp.Eq, sp.Eq]:
     kappa_t = symbol("kappa_t")
-    return _in_hertz({name: sensitivity_function().rhs.subs(kappa_t, symbol(f"kappa_{name}")) for name in _PAIRS})
+    return _in_hertz({name: sensitivity_function().rhs.subs(kappa_t, symbol(f"kappa_{name}")) for name in PAIRS})
 
 
 @numbered(32, "sensitivities of the frequencies", "derived", (23, 30, 31), shown=_by_parts)
@@ -77,7 +78,7 @@ def frequency_sensitivities() -> tuple[sp.Eq, sp.Eq]:
     """(31) for the two stiffnesses, turned into hertz per N/m and hertz per N m/rad by (30); f_i is proportional to the
     square of λ. Raw sensitivities have different units: only logarithmic ones can be compared. The expression has
     Δ of (23) written out, which fills a page."""
-    return _in_hertz({name: implicit_derivatives()[f"kappa_{name}"] * c**2 for name, (_, c) in _PAIRS.items()})
+    return _in_hertz({name: implicit_derivatives()[f"kappa_{name}"] * c**2 for name, (_, c) in PAIRS.items()})
 
 
 @proves(32)
@@ -93,7 +94,7 @@ def _() -> Proof:
     root, tip = shape.subs(xi, 0), shape.subs(xi, 1)
     mass = integral.subs(xi, 1) - integral.subs(xi, 0) - 4 * tip[0] * tip[3] + 4 * tip[1] * tip[2]
     below = frequency_function()[0].diff(lamda)
-    for e, rate, power, pair in zip(frequency_sensitivities(), root, (1, -1), _PAIRS.values(), strict=False):
+    for e, rate, power, pair in zip(frequency_sensitivities(), root, (1, -1), PAIRS.values(), strict=False):
         above, units = e.rhs.as_independent(L, E, I_z, rho, A, as_Add=False)
         yield units - L**power / sp.sqrt(E * I_z * rho * A)
         sides = [above * below, below]
@@ -117,23 +118,3 @@ def _() -> bool:
             if abs(found / expected - 1) > 1e-6:
                 return False
     return True
-
-
-def implicit_kernel() -> tuple[dict[str, sp.Expr], tuple[sp.Symbol, ...]]:
-    """Return the implicit derivatives with scaled exponentials, and their arguments, as the kernel wants them."""
-    _, arguments = frequency_function()
-    decay = sp.exp(-lamda)
-    scaled = {sp.cosh(lamda): (1 + decay**2) / 2, sp.sinh(lamda): (1 - decay**2) / 2}
-
-    def ratio(expression: sp.Expr) -> sp.Expr:
-        above, below = sp.fraction(expression)
-        return _scaled(above, scaled, decay) / _scaled(below, scaled, decay)
-
-    return {name: ratio(expression) for name, expression in implicit_derivatives().items()}, arguments
-
-
-def _scaled(expression: sp.Expr, scaled: dict[sp.Expr, sp.Expr], decay: sp.Expr) -> sp.Expr:
-    """Multiply an expression linear in cosh and sinh by exp(-lamda)."""
-    expanded = expression.expand()
-    grown = sum(expanded.coeff(function) * value for function, value in scaled.items())
-    return grown + decay * expanded.subs(dict.fromkeys(scaled, 0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from sympy import Dummy, Expr, Integral, cos, factor, integrate, sin, symbols
+from sympy import Add, Dummy, Expr, Integral, Mul, cos, factor, integrate, sin, symbols
 
 from cra_sym.arm.lagrangian import ArmLagrangian, kinetic_energy, paper_lagrangian, potential_energy
 from cra_sym.mechanics import hamilton
@@ -87,6 +87,7 @@ def _together(expression: Expr) -> Expr:
     inside = factor(sum(c * integral.function for c, integral in whole))
     outside, along = inside.as_independent(x, as_Add=False)
     if outside.could_extract_minus_sign():
-        outside, along = -outside, -along
+        sums = [part for part in Mul.make_args(along) if isinstance(part, Add)]
+        outside, along = -outside, along.xreplace({sums[0]: -sums[0]}) if sums else -along
     rest = parts - sum(c * integral for c, integral in whole)
     return rest + outside * Integral(along, *whole[0][1].limits)
