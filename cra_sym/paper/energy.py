@@ -34,7 +34,7 @@ def displacement() -> Eq:
 
 
 @proves(1)
-def _() -> Proof:
+def prove_displacement() -> Proof:
     """Both sides are lengths; an arm that does not deform moves as its base, a base at rest leaves the deformation."""
     seen = displacement().rhs
     yield dimension(displacement()) == Dimension(m=1)
@@ -49,7 +49,7 @@ def separation() -> Eq:
 
 
 @proves(2)
-def _() -> Proof:
+def prove_separation() -> Proof:
     """Both sides are lengths; one term is separable, v v_xt = v_x v_t, and a sum of two is not."""
     one, two = written_out(separation().rhs, "i"), written_out(separation().rhs, "i", "j")
 
@@ -77,7 +77,7 @@ def kinetic() -> Eq:
 
 
 @proves(3)
-def _() -> Proof:
+def prove_kinetic() -> Proof:
     """An energy; an arm that turns rigidly about the root, which moves with the base, has the kinetic energy of its
     mass, its static moment and its moment of inertia."""
     turned = single_mode(kinetic().rhs, x * q_i).doit()
@@ -95,7 +95,7 @@ def potential() -> tuple[Eq, Eq]:
 
 
 @proves(4)
-def _() -> Proof:
+def prove_potential() -> Proof:
     """Energies; an arc of radius R stores E I L / (2 R^2) however it is displaced and turned at the joint, which stores
     what springs do."""
     give, turn, radius = symbol("C_1") * L, symbol("C_2"), symbol("h")
@@ -155,7 +155,7 @@ def generalised() -> tuple[Eq, Eq, Eq]:
 
 
 @proves(6)
-def _() -> Proof:
+def prove_generalised() -> Proof:
     """Dimensions; the work that the forces of inertia and elasticity of a mode do on the mode itself, and the inertia
     of the mode on the base, written down by hand."""
     M, K, Gamma = (e.rhs for e in generalised())
@@ -185,7 +185,7 @@ def lagrangian_function() -> Eq:
 
 
 @proves(7)
-def _() -> Proof:
+def prove_lagrangian_function() -> Proof:
     """An energy: the difference of (3) and (4), whatever the motion."""
     yield dimension(lagrangian_function()) == ENERGY
     yield termwise(lagrangian_function().rhs - kinetic().rhs + potential()[1].rhs)

@@ -8,17 +8,21 @@ A section's module writes one small function an equation, and one each for a pro
         return Eq(y, w + v)
 
     @proves(1)
-    def _():
+    def prove_displacement():
         '''The independent route, in words.'''
         yield displacement().rhs.subs(v, 0) - w
 
     @samples(1)
-    def _():
+    def sample_displacement():
         '''The independent route, in words.'''
         return isclose(...)
 
 A proof yields what has to vanish, and :func:`cra_sym.mechanics.identities.vanishes` decides: that an equation is proved
 is its answer, not the author's.
+
+What is derived comes from the Lagrangian in :mod:`cra_sym.arm.lagrangian` and from the engines in
+:mod:`cra_sym.mechanics`; what it is compared with is written down by hand, or found by shooting, in
+:mod:`cra_sym.paper.oracles`. Change a term of the Lagrangian, and the equations follow while their proofs fail.
 """
 
 from __future__ import annotations
@@ -48,7 +52,8 @@ _HOMES: dict[str, range] = {
     "cra_sym.paper.modal_dynamics": range(11, 14),
     "cra_sym.paper.joint": range(14, 17),
     "cra_sym.paper.orthogonality": range(16, 17),
-    "cra_sym.paper.modes": range(17, 27),
+    "cra_sym.paper.modes": range(17, 24),
+    "cra_sym.paper.shapes": range(24, 27),
     "cra_sym.paper.limits": range(27, 31),
     "cra_sym.paper.implicit": range(31, 33),
     "cra_sym.paper.driven": range(33, 35),

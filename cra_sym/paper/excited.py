@@ -32,7 +32,7 @@ def disturbed_base() -> Eq:
 
 
 @proves(35)
-def _() -> Proof:
+def prove_disturbed_base() -> Proof:
     """A length; it starts at w_0 with the speed epsilon w_1 varpi and swings about w_0 with angular frequency varpi."""
     motion = disturbed_base().rhs
     yield dimension(disturbed_base()) == Dimension(m=1)
@@ -48,7 +48,7 @@ def axial_base() -> Eq:
 
 
 @proves("35a")
-def _() -> Proof:
+def prove_axial_base() -> Proof:
     """A length; it starts at rest, epsilon u_0 away, and swings about zero with angular frequency varpi."""
     motion = axial_base().rhs
     yield dimension(axial_base()) == Dimension(m=1)
@@ -64,7 +64,7 @@ def fluctuating_joint() -> Eq:
 
 
 @proves("35b")
-def _() -> Proof:
+def prove_fluctuating_joint() -> Proof:
     """An energy: that of the springs of (4), which swings about its mean by epsilon of it, with angular frequency
     varpi."""
     beam, full = (e.rhs for e in potential())
@@ -80,7 +80,7 @@ def excited_system() -> Eq:
 
 
 @proves(36)
-def _() -> Proof:
+def prove_excited_system() -> Proof:
     """Equation (11) on the left, whose coefficients do not depend on time, and on the right -Gamma_i times the
     acceleration of (35)."""
     equation, q = excited_system(), symbol("q_i")
@@ -90,7 +90,7 @@ def _() -> Proof:
 
 
 @samples(36)
-def _() -> bool:
+def sample_excited_system() -> bool:
     """The work of the inertia forces of a random arm, carried rigidly by the base, on modes found by shooting."""
     values, equation = sample(36), excited_system()
     length, instant = values["L"], {t: 0.37, varpi: 2.1, w_1: 0.6, epsilon: 0.01}
@@ -118,7 +118,7 @@ def axial_coupling() -> Eq:
 
 
 @proves("36a")
-def _() -> Proof:
+def prove_joint_coupling() -> Proof:
     """The energy (35b) of two modes, differentiated by both coordinates and by the fluctuation; the work of the extra
     spring forces of one on the other, written down by hand."""
     q_i, q_j, swing = symbol("q_i"), symbol("q_j"), epsilon * cos(varpi * t)
@@ -129,7 +129,7 @@ def _() -> Proof:
 
 
 @samples("36a")
-def _() -> bool:
+def sample_joint_coupling() -> bool:
     """The work of the two extra spring forces of a mode found by shooting on another."""
     values = sample(361)
     first, second = shoot(values)[:2]
@@ -139,7 +139,7 @@ def _() -> bool:
 
 
 @proves("36b")
-def _() -> Proof:
+def prove_axial_coupling() -> Proof:
     """The axial momentum of a bent arm: the foreshortening of every point, whose slope is the product of the slopes of
     the two modes, grows from the joint on and carries the masses of manipulator and end-effector."""
     shortening = symbol("eta")
@@ -153,7 +153,7 @@ def _() -> Proof:
 
 
 @samples("36b")
-def _() -> bool:
+def sample_axial_coupling() -> bool:
     """The axial momentum of a bent arm, with the foreshortening of every point by its own quadrature from
     the joint on, its second derivative by two modes found by shooting."""
     values = sample(362)

@@ -9,9 +9,10 @@ import sympy as sp
 
 from cra_sym.paper.energy import modal_numbers
 from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.evaluation import group_numbers
 from cra_sym.paper.groups import GROUPS
 from cra_sym.paper.limits import natural_frequency
-from cra_sym.paper.modes import frequency_function, group_numbers
+from cra_sym.paper.modes import frequency_function
 from cra_sym.paper.oracles import by_hand
 from cra_sym.paper.oracles.shooting import sample, shoot
 from cra_sym.symbols import symbol
@@ -33,7 +34,7 @@ def sensitivity_function() -> sp.Eq:
 
 
 @proves(31)
-def _() -> Proof:
+def prove_sensitivity_function() -> Proof:
     """The chain rule: whatever the function, its change along the path is none; on the unit circle, a curve known in
     closed form, the slope of the ordinate is minus abscissa over ordinate."""
     kappa, Delta, slope = symbol("kappa_t"), sp.Function("Delta"), sensitivity_function()
@@ -82,7 +83,7 @@ def frequency_sensitivities() -> tuple[sp.Eq, sp.Eq]:
 
 
 @proves(32)
-def _() -> Proof:
+def prove_frequency_sensitivities() -> Proof:
     """Another principle, first-order perturbation: ω_i² changes by φ_i(0)² / M_i per k_t and by φ_i'(0)² / M_i per k_r.
     Any shape that satisfies the conditions at the joint will do: it is a mode of the arm whose end-effector balances
     its tip. The integral of its square is known from its ends."""
@@ -104,7 +105,7 @@ def _() -> Proof:
 
 
 @samples(32)
-def _() -> bool:
+def sample_frequency_sensitivities() -> bool:
     """Another principle, first-order perturbation. ω_i² changes by φ_i(0)² / M_i per k_t and by
     φ_i'(0)² / M_i per k_r, for modes of a random arm found by shooting."""
     values = sample(32)

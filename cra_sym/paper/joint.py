@@ -54,7 +54,7 @@ def _with_section_forces(expression: Expr) -> Expr:
 
 
 @proves(14)
-def _() -> Proof:
+def prove_virtual_work() -> Proof:
     """With (15): for any motion and any virtual displacement, the virtual work of the whole arm, written down by hand,
     is the work (14) at the two ends plus that of Newton's force on every slice of the manipulator."""
     ends = sum((_with_section_forces(e.lhs - e.rhs) for e in virtual_work()), S.Zero)
@@ -67,7 +67,7 @@ def _() -> Proof:
 
 
 @proves(15)
-def _() -> Proof:
+def prove_section_forces() -> Proof:
     """Dimensions; an arc of radius R carries the moment E I / R and no shear; a tip load F gives the shear -F
     everywhere, no moment at the tip and the textbook deflection F L^3 / (3 E I)."""
     radius, load = symbol("h"), symbol("C_1")
@@ -135,7 +135,7 @@ def rayleigh_factors() -> tuple[Expr, ...]:
 
 
 @proves("16a")
-def _() -> Proof:
+def prove_mode_conditions() -> Proof:
     """Rayleigh: among all shapes, that of a mode makes K_i - ω_i² M_i, written down by hand, stationary, so these are
     its natural conditions."""
     _, *factors = rayleigh_factors()
@@ -144,7 +144,7 @@ def _() -> Proof:
 
 
 @samples("16a")
-def _() -> bool:
+def sample_mode_conditions() -> bool:
     """The end values of a mode of a random arm, found by shooting, satisfy all four."""
     values = sample(16)
     for mode in shoot(values):

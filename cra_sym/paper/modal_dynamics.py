@@ -58,7 +58,7 @@ def _one_mode(energy: Expr) -> Expr:
 
 
 @proves(11)
-def _() -> Proof:
+def prove_dynamic_equation() -> Proof:
     """D'Alembert: without damping it is the virtual work of all forces, written down by hand, along mode i while any
     two modes move, by (6), (16b) and (16c); with damping, a free vibration that decays by exp(-zeta_i omega_i t)
     solves it."""
@@ -76,7 +76,7 @@ def _() -> Proof:
 
 
 @samples(11)
-def _() -> bool:
+def sample_dynamic_equation() -> bool:
     """The virtual work of all forces on a random arm, for a virtual displacement along a mode found by shooting while
     three modes move, by quadrature."""
     values = sample(11)
@@ -121,7 +121,7 @@ def duhamel() -> Eq:
 
 
 @proves(12)
-def _() -> Proof:
+def prove_duhamel() -> Proof:
     """Put into (11) it leaves nothing, and it starts with the initial values."""
     solution, equation = duhamel().rhs, dynamic_equation()
     yield duhamel().lhs == q_i
@@ -131,7 +131,7 @@ def _() -> Proof:
 
 
 @samples(12)
-def _() -> bool:
+def sample_duhamel() -> bool:
     """A Runge-Kutta solution of (11) for a base motion."""
     from scipy.integrate import quad, solve_ivp
 
@@ -165,7 +165,7 @@ def initial_values() -> tuple[Eq, Eq]:
 
 
 @proves(13)
-def _() -> Proof:
+def prove_initial_values() -> Proof:
     """Among all modal velocities these leave the least kinetic energy (5) in the inertial frame: its derivative by each
     vanishes. Nothing is displaced."""
     (still, rate), start = initial_values(), {w.diff(t): w.diff(t).subs(t, 0)}
@@ -176,7 +176,7 @@ def _() -> Proof:
 
 
 @samples(13)
-def _() -> bool:
+def sample_initial_values() -> bool:
     """Among all modal velocities these leave the least kinetic energy (3) in the inertial frame, found by
     least squares over quadrature points of a random arm."""
     values, speed = sample(13), 0.7

@@ -59,7 +59,7 @@ def _first_variation() -> Expr:
 
 
 @proves(8)
-def _() -> Proof:
+def prove_hamiltons_principle() -> Proof:
     """Dimensions; for any motion and any virtual displacement that vanishes at both instants, the integral is the work
     of Newton's forces on slices, joint, end-effector and base: zero for all when those balance."""
     known = {"δLcal": ENERGY, "δw": dimension("w")}
@@ -73,7 +73,7 @@ def _() -> Proof:
 
 
 @samples(8)
-def _() -> bool:
+def sample_hamiltons_principle() -> bool:
     """The action of a random arm swinging in a mode found by shooting is stationary for a
     virtual displacement that vanishes at both instants, and is not when the mode swings one per cent too fast."""
     values, duration, step = sample(8), 2.0, 1e-4
@@ -119,7 +119,7 @@ def variation() -> Eq:
 
 
 @proves(9)
-def _() -> Proof:
+def prove_variation() -> Proof:
     """Another route to the first variation: the Lagrangian of v + e delta_v, w + e delta_w differentiated by e."""
     yield variation().lhs - delta_L - F * delta_w
     yield termwise(variation().rhs - F * delta_w - _first_variation())
@@ -133,7 +133,7 @@ def integrated_by_parts() -> Eq:
 
 
 @proves(10)
-def _() -> Proof:
+def prove_integrated_by_parts() -> Proof:
     """For all motions, and all variations that vanish at both instants, the time integrals of (9) and of (10) agree:
     they have the same factor of each variation."""
     for kept, other in ((delta_v, delta_w), (delta_w, delta_v)):
@@ -157,7 +157,7 @@ def natural_conditions() -> tuple[Eq, ...]:
 
 
 @proves(16)
-def _() -> Proof:
+def prove_boundary_conditions() -> Proof:
     """Hamilton's principle gives the same four conditions, and so do Newton's forces on joint and end-effector."""
     _, *newton, _ = forces.newton()
     for e, theirs, force, sign in zip(boundary_conditions(), natural_conditions(), newton, (-1, 1, 1, -1), strict=True):
@@ -166,7 +166,7 @@ def _() -> Proof:
 
 
 @proves("10a")
-def _() -> Proof:
+def prove_field_and_base() -> Proof:
     """Newton: a slice accelerates under the slope of the shear force, and the whole arm under the force that drives
     it."""
     field, base = field_and_base()
@@ -183,14 +183,14 @@ def mode_field_equation() -> Eq:
 
 
 @proves("10b")
-def _() -> Proof:
+def prove_mode_field_equation() -> Proof:
     """Rayleigh: among all shapes, that of a mode makes K_i - ω_i² M_i, written down by hand, stationary."""
     along, *_ = rayleigh_factors()
     yield mode_field_equation().lhs - mode_field_equation().rhs - along
 
 
 @samples("10b")
-def _() -> bool:
+def sample_mode_field_equation() -> bool:
     """Modes of a random arm found by shooting satisfy it along the manipulator."""
     values = sample(102)
     numbers = {symbol(name): value for name, value in values.items()}
@@ -216,13 +216,13 @@ def base_free_body() -> Eq:
 
 
 @proves("10c")
-def _() -> Proof:
+def prove_base_free_body() -> Proof:
     """Written down from the free body of the base."""
     yield base_free_body().lhs - base_free_body().rhs - (m_b * w.diff(t, 2) - k_t * at(v, 0) - F)
 
 
 @samples("10c")
-def _() -> bool:
+def sample_base_free_body() -> bool:
     """Both forms agree on modes of a random arm found by shooting, ω_i² Γ_i = k_t φ_i(0)."""
     values = sample(103)
     gaps = [

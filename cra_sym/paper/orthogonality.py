@@ -74,7 +74,7 @@ def _is_mode(factors: tuple[Expr, ...], index: str) -> Proof:
 
 
 @proves("16b")
-def _() -> Proof:
+def prove_stiffness_identity() -> Proof:
     """The difference of both sides is the virtual work of the forces of mode i, in balance by (10b) and (16a), on any
     mode j; mode i for mode j and (6) make it the second equation."""
     pair, single = stiffness_identity()
@@ -89,7 +89,7 @@ def _generalised(index: str = "i") -> dict[Expr, Expr]:
 
 
 @samples("16b")
-def _() -> bool:
+def sample_stiffness_identity() -> bool:
     """Both products of all pairs of modes of a random arm, found by shooting, by quadrature."""
     values = sample(161)
     shapes = shoot(values)
@@ -128,7 +128,7 @@ def _swap(expression: Expr) -> Expr:
 
 
 @proves("16c")
-def _() -> Proof:
+def prove_orthogonality() -> Proof:
     """The forces of each mode balance by (10b) and (16a): stiffness minus ω_i² times mass product is no work on mode j,
     and with ω_j² none on mode i. So ω_i² - ω_j² times the mass product is zero, and with it the stiffness product."""
     mass, stiffness = (e.lhs - e.rhs for e in orthogonality())
@@ -137,7 +137,7 @@ def _() -> Proof:
 
 
 @samples("16c")
-def _() -> bool:
+def sample_orthogonality() -> bool:
     """Both products of different modes of a random arm vanish; without the end-effector they would not."""
     values = sample(163)
     first, second, third = shoot(values)
@@ -159,7 +159,7 @@ def stiffness_of_manipulator_alone() -> Eq:
 
 
 @proves("16d")
-def _() -> Proof:
+def prove_stiffness_of_manipulator_alone() -> Proof:
     """Twice the first energy of (4) differs from it by the work of the forces of the mode, in balance by (10b) and
     (16a), on itself."""
     energy = single_mode(potential()[0].rhs) / q_i**2
@@ -171,7 +171,7 @@ def _() -> Proof:
 
 
 @samples("16d")
-def _() -> bool:
+def sample_stiffness_of_manipulator_alone() -> bool:
     """The strain energy of modes found by shooting; it falls short of ω_i² M_i by the springs' share."""
     values, alone = sample(164), stiffness_of_manipulator_alone().rhs
     for mode in shoot(values):
@@ -219,7 +219,7 @@ def modal_energies() -> tuple[Eq, Eq]:
 
 
 @proves(5)
-def _() -> Proof:
+def prove_modal_energies() -> Proof:
     """Both energies (3) and (4) of any two modes, with (6); what is left is their products of (16c)."""
     two = separation().rhs.members("i", "j")
     mass, stiffness = (e.lhs - e.rhs for e in orthogonality())
@@ -231,7 +231,7 @@ def _() -> Proof:
 
 
 @samples(5)
-def _() -> bool:
+def sample_modal_energies() -> bool:
     """The energies of a random arm moving in three modes found by shooting, by quadrature of (3) and (4)."""
     values = sample(5)
     shapes, length = shoot(values), values["L"]
