@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from sympy import Add, Derivative, Dummy, Expr, Function, Integral, Matrix, S, Subs, lambdify, sympify
 
 from cra_sym.paper.groups import GROUPS
@@ -25,6 +26,8 @@ __all__ = [
     "virtual_factors",
 ]
 
+Array = NDArray[np.float64]
+Shape = Callable[..., Any]  # a mode shape in numbers, called with places and the order of the derivative
 x, t, L = symbol("x"), symbol("t"), symbol("L")
 C_1, beta, lamda, r_2 = (symbol(name) for name in ("C_1", "beta", "lamda", "r_2"))
 
@@ -50,14 +53,20 @@ def put(expression: Expr, values: Mapping[Expr, Expr]) -> Expr:
         variables, aside = function.args, Function("aside")
         value = value.replace(function.func, aside)
 
-        def local(place: tuple, counts: dict, function=function, value=value, variables=variables) -> Expr:
+        def local(
+            place: tuple[Expr, ...],
+            counts: dict[Expr, int],
+            function: Expr = function,
+            value: Expr = value,
+            variables: tuple[Expr, ...] = variables,
+        ) -> Expr:
             moved = dict(zip(variables, place, strict=True))
             for variable, position in moved.items():
                 value = value.diff(variable, counts.pop(position, 0)) if position.is_Symbol else value
             assert not counts, f"derivative of {function} by {counts}"
             return value.subs(moved, simultaneous=True)
 
-        def derivative(e: Derivative, local=local) -> Expr:
+        def derivative(e: Derivative, local: Callable[..., Expr] = local) -> Expr:
             return local(e.expr.args, dict(e.variable_count))
 
         head = function.func
@@ -140,7 +149,9 @@ def _linear(work: Expr, virtual: Expr) -> list[tuple[Expr, int, int]]:
 
 
 @cache
-def _integrand(integral: Integral, functions: tuple[Expr, ...]) -> tuple[Callable, list[str], list[tuple[Expr, int]]]:
+def _integrand(
+    integral: Integral, functions: tuple[Expr, ...]
+) -> tuple[Callable[..., Array], list[str], list[tuple[Expr, int]]]:
     """Return the integrand as a function of x, the named parameters and the listed derivatives of the shapes."""
     jets = [(f, k) for f in functions for k in range(4, -1, -1) if integral.function.has(f.diff(x, k))]
     stand_ins = {f.diff(x, k): Dummy() for f, k in jets}
@@ -149,7 +160,7 @@ def _integrand(integral: Integral, functions: tuple[Expr, ...]) -> tuple[Callabl
     return lambdify([x, *parameters, *stand_ins.values()], plain, "numpy"), [p.name for p in parameters], jets
 
 
-def evaluate(expression: Expr, values: Mapping[str, float], shapes: Mapping[Expr, Callable] | None = None) -> float:
+def evaluate(expression: Expr, values: Mapping[str, float], shapes: Mapping[Expr, Shape] | None = None) -> float:
     """Return the number an expression has for given parameters and numeric mode shapes.
 
     Parameters
@@ -166,17 +177,22 @@ def evaluate(expression: Expr, values: Mapping[str, float], shapes: Mapping[Expr
     table: dict[Expr, float] = {}
     expression = sympify(expression, strict=True)
     for integral in expression.atoms(Integral):
-        function, names, jets = _integrand(integral, tuple(shapes))
-        parameters = [values[name] for name in names]
-
-        def along(place: np.ndarray, function=function, parameters=parameters, jets=jets) -> np.ndarray:
-            return function(place, *parameters, *(shapes[f](place, k) for f, k in jets)) + 0.0 * place
-
-        table[integral] = integrate(along, length)
+        table[integral] = integrate(_along(integral, values, shapes), length)
     for function, shape in shapes.items():
         for place, number in ((S.Zero, 0.0), (L, length)):
             table |= {at(function.diff(x, k), place): float(shape(number, k)) for k in range(4)}
     return float(sympify(expression.xreplace(table), strict=True).subs(numbers))
+
+
+def _along(integral: Integral, values: Mapping[str, float], shapes: Mapping[Expr, Shape]) -> Callable[[Array], Array]:
+    """Return the integrand as a function of the place."""
+    function, names, jets = _integrand(integral, tuple(shapes))
+    parameters = [values[name] for name in names]
+
+    def along(place: Array) -> Array:
+        return function(place, *parameters, *(shapes[f](place, k) for f, k in jets)) + 0.0 * place
+
+    return along
 
 
 def group_numbers(values: dict[str, float], mode_beta: float) -> dict[Expr, float]:

@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 from sympy import Eq, S, cos, sin
 
-from cra_sym.paper.energy import potential, single_mode, x
+from cra_sym.paper.energy import phi_i, phi_j, potential, single_mode, t, w, x
 from cra_sym.paper.equations import Proof, numbered, proves, samples
 from cra_sym.paper.evaluation import at, evaluate, termwise, virtual_factors
 from cra_sym.paper.modal_dynamics import dynamic_equation
 from cra_sym.paper.oracles import forces
 from cra_sym.paper.oracles.shooting import integrate, sample, shoot
-from cra_sym.paper.parametric import AXIAL, TRANSVERSE, coupling, excited_lagrangian, phi_i, phi_j, t, u, w
+from cra_sym.paper.parametric import AXIAL, TRANSVERSE, coupling, excited_lagrangian
 from cra_sym.symbols import Dimension, dimension, symbol
 
 __all__: list[str] = []
 
-epsilon, varpi, P_ij, w_0, w_1, u_0 = (symbol(n) for n in ("epsilon", "varpi", "P_ij", "w_0", "w_1", "u_0"))
+epsilon, varpi, P_ij, w_0, w_1, u, u_0 = (symbol(n) for n in "epsilon varpi P_ij w_0 w_1 u u_0".split())
 
 
 @numbered(35, "disturbed base", "assumption")
@@ -96,8 +96,7 @@ def sample_excited_system() -> bool:
     length, instant = values["L"], {t: 0.37, varpi: 2.1, w_1: 0.6, epsilon: 0.01}
     acceleration = float(disturbed_base().rhs.diff(t, 2).subs(instant))
     for mode in shoot(values):
-        line = integrate(lambda p, mode=mode: values["rho"] * values["A"] * mode(p), length)
-        gamma = line + values["m_e"] * mode(length)
+        gamma = values["rho"] * values["A"] * integrate(mode, length) + values["m_e"] * mode(length)
         force = equation.rhs.subs(symbol("Gamma_i"), gamma).subs(instant)
         if abs(float(force) + gamma * acceleration) > 1e-9 * abs(gamma):
             return False
@@ -161,9 +160,7 @@ def sample_axial_coupling() -> bool:
     length, line_mass = values["L"], values["rho"] * values["A"]
 
     def shortening(place: Any, a: float, b: float) -> Any:
-        shares = [
-            integrate(lambda p, end=end: (a * first(p, 1) + b * second(p, 1)) ** 2 / 2, end) for end in np.ravel(place)
-        ]
+        shares = [integrate(lambda p: (a * first(p, 1) + b * second(p, 1)) ** 2 / 2, end) for end in np.ravel(place)]
         return np.reshape(shares, np.shape(place))
 
     def moment(a: float, b: float) -> float:

@@ -139,7 +139,7 @@ def sample_duhamel() -> bool:
     omega, start, rate, ratio = 3.1, 0.2, -0.4, 0.8
 
     def push(time: float) -> float:
-        return -ratio * (0.3 * time + np.cos(1.7 * time))
+        return float(-ratio * (0.3 * time + np.cos(1.7 * time)))
 
     reference = solve_ivp(lambda s, q: (q[1], push(s) - omega**2 * q[0]), (0, 2), (start, rate), rtol=1e-10, atol=1e-12)
     numbers = {Gamma_i: ratio, M_i: 1, omega_i: omega, q_i.subs(t, 0): start, q_i.diff(t).subs(t, 0): rate}

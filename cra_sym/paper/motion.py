@@ -153,7 +153,8 @@ def field_and_base() -> tuple[Eq, Eq]:
 
 def natural_conditions() -> tuple[Eq, ...]:
     """Return the four end conditions that Hamilton's principle leaves: root force and moment, tip force and moment."""
-    return dynamics().boundary_conditions
+    conditions: tuple[Eq, ...] = dynamics().boundary_conditions
+    return conditions
 
 
 @proves(16)

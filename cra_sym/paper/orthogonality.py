@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from sympy import Eq, Expr, Integral, solve
 
 from cra_sym.arm.lagrangian import HALF
@@ -237,7 +239,7 @@ def sample_modal_energies() -> bool:
     shapes, length = shoot(values), values["L"]
     q, q_dot, w_dot = [0.3, -0.5, 0.2], [0.7, 0.4, -0.6], 0.9
 
-    def elastic(place, amplitudes, derivative=0):
+    def elastic(place: Any, amplitudes: list[float], derivative: int = 0) -> Any:
         return sum(a * shape(place, derivative) for a, shape in zip(amplitudes, shapes, strict=True))
 
     line_mass, bending = values["rho"] * values["A"], values["E"] * values["I_z"]
@@ -261,4 +263,4 @@ def sample_modal_energies() -> bool:
                 sums[s] += float(s.function.subs(numbers).subs(modal_numbers(values, shape)))
         total = e.rhs.subs(sums).subs(w.diff(t), w_dot)
         found.append(float(total.subs({symbol(name): value for name, value in values.items()})))
-    return abs(found[0] / kinetic - 1) < 1e-10 and abs(found[1] / potential - 1) < 1e-10
+    return bool(abs(found[0] / kinetic - 1) < 1e-10 and abs(found[1] / potential - 1) < 1e-10)

@@ -13,7 +13,7 @@ from cra_sym.paper.energy import L, phi_i, phi_j, q_i, q_j, single_mode, t, tidy
 from cra_sym.paper.evaluation import put
 from cra_sym.symbols import symbol
 
-__all__ = ["axial_load", "coupling", "excited_lagrangian", "excited_motion"]
+__all__ = ["AXIAL", "TRANSVERSE", "axial_load", "coupling", "excited_lagrangian", "excited_motion"]
 
 u, u_0, w_0, w_1, varpi, epsilon = (symbol(name) for name in ("u", "u_0", "w_0", "w_1", "varpi", "epsilon"))
 
@@ -52,7 +52,7 @@ def excited_lagrangian(kind: str) -> ArmLagrangian:
         return ArmLagrangian(*(part.subs(w, 0).doit() for part in (density, left, right)))
     if kind == "transverse base":
         return ArmLagrangian(density, left, right)
-    raise ValueError(f"kind = {kind!r}: allowed are {', '.join(KINDS)}")
+    raise ValueError(f"kind = {kind!r}: must be one of {', '.join(KINDS)}")
 
 
 @cache

@@ -13,13 +13,12 @@ import numpy as np
 from sympy import Derivative, Eq, Expr, Function, I, S, Sum, Symbol, conjugate, cos, exp, integrate, pi, sin, solve
 
 from cra_sym.mechanics.boundaries import forced_growth, forced_resonance, general_resonance, plain
-from cra_sym.paper.energy import generalised, inner_mass, phi_i
+from cra_sym.paper.energy import generalised, inner_mass, phi_i, t, x
 from cra_sym.paper.equations import Proof, numbered, proves, samples
 from cra_sym.paper.evaluation import evaluate, put, termwise
 from cra_sym.paper.excited import excited_system
 from cra_sym.paper.operators import acting, named
 from cra_sym.paper.oracles.shooting import sample, shoot
-from cra_sym.paper.parametric import t, x
 from cra_sym.symbols import Dimension, dimension, symbol
 
 __all__: list[str] = []
@@ -349,7 +348,8 @@ def prove_forced_amplitude_equation() -> Proof:
 def stability_boundary() -> tuple[Eq, Eq]:
     """The amplitude of (48) grows between these two frequencies. The paper's boundary, borrowed from axially moving
     beams, does not follow from its (36); this one follows from (48)."""
-    return _step("boundary")
+    lower, upper = _step("boundary")
+    return lower, upper
 
 
 @proves(49)
