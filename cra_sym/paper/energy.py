@@ -17,7 +17,7 @@ from cra_sym.symbols import Dimension, dimension, symbol
 __all__ = ["inner_mass", "inner_stiffness", "single_mode"]
 
 x, t, w, v, y, L = (symbol(name) for name in ("x", "t", "w", "v", "y", "L"))
-E, I_z, rho, A, b, h = (symbol(name) for name in ("E", "I_z", "rho", "A", "b", "h"))
+E, I_z, rho, A = (symbol(name) for name in ("E", "I_z", "rho", "A"))
 m_b, m_e, J_e, k_t, k_r = (symbol(name) for name in ("m_b", "m_e", "J_e", "k_t", "k_r"))
 phi_i, phi_j, q_i, q_j = (symbol(name) for name in ("phi_i", "phi_j", "q_i", "q_j"))
 

@@ -46,7 +46,7 @@ s_t, c_t, s_r, c_r = (symbol(name) for name in ("s_t", "c_t", "s_r", "c_r"))
 coefficients = C_1, C_2, C_3, C_4 = tuple(symbol(f"C_{k}") for k in (1, 2, 3, 4))
 
 #: Placeholders for cos, sin, cosh, sinh of lamda: polynomials in these are decided exactly.
-_CIRCULAR = _c, _s, _ch, _sh = symbols("c s C S")
+_c, _s, _ch, _sh = symbols("c s C S")
 VALUES = {_c: cos(lamda), _s: sin(lamda), _ch: cosh(lamda), _sh: sinh(lamda)}
 
 

@@ -20,9 +20,7 @@ from cra_sym.symbols import dimension, symbol
 
 __all__ = ["dynamics", "mode_field_equation", "natural_conditions"]
 
-F, tau, rho, A, m_b, k_t = (symbol(name) for name in ("F", "tau", "rho", "A", "m_b", "k_t"))
-M_i, K_i, Gamma_i, omega_i, zeta_i = (symbol(name) for name in ("M_i", "K_i", "Gamma_i", "omega_i", "zeta_i"))
-Lcal, t_1, t_2 = (symbol(name) for name in ("Lcal", "t_1", "t_2"))
+F, m_b, k_t, t_1, t_2, Gamma_i, omega_i = (symbol(name) for name in "F m_b k_t t_1 t_2 Gamma_i omega_i".split())
 
 #: The virtual displacements as :func:`cra_sym.mechanics.hamilton` writes them.
 delta_v, delta_w, delta_L = Function("δv")(x, t), Function("δw")(t), Function("δLcal")(t)

@@ -24,7 +24,7 @@ from cra_sym.symbols import Dimension, dimension, symbol
 __all__: list[str] = []
 
 epsilon, sigma, varpi, omega_n, T_0, T_1 = (symbol(name) for name in "epsilon sigma varpi omega_n T_0 T_1".split())
-P_ij, P_nn, M_n, Gamma_n, w_1, zeta_n = (symbol(name) for name in "P_ij P_nn M_n Gamma_n w_1 zeta_n".split())
+P_nn, M_n, Gamma_n, zeta_n = (symbol(name) for name in ("P_nn", "M_n", "Gamma_n", "zeta_n"))
 
 
 @cache

@@ -38,9 +38,10 @@ def implicit_rates(arm: Arm, modes: int = 3) -> dict[str, NDArray[np.float64]]:
 
     Examples
     --------
-    >>> arm = Arm.nominal().replace(k_t=1e4)
-    >>> print(implicit_rates(arm)["k_t"].round(4))
-    [0.     0.0424 0.6361]
+    >>> arm = Arm.nominal().replace(k_t=1e3, k_r=1e3)
+    >>> logarithmic = arm.k_t * implicit_rates(arm)["k_t"] / (2 * arm.natural_frequencies(3) ** 2)
+    >>> print(logarithmic.round(4))
+    [0.0173 0.2076 0.204 ]
     """
 
     def column(value: Any) -> NDArray[np.float64]:
@@ -99,4 +100,4 @@ def _decaying(ratio: Expr, lamda: Symbol) -> Expr:
     return scaled(above) / scaled(below)
 
 
-_rates = derived_kernel(f"{__name__}:squared_frequency_rates", backend="numpy")
+_rates = derived_kernel("cra_sym.paper.oracles.implicit_rates:squared_frequency_rates", backend="numpy")
