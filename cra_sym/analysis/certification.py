@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cra_sym.analysis.modes import natural_frequencies
-from cra_sym.arm.parameters import Arm
 from cra_sym.checks import count, instance
 from cra_sym.extras import require
-from cra_sym.kernels import derived_kernel
-from cra_sym.solvers.certificates import UndecidedError, decided, enclose
+from cra_sym.model.exact import BallProblem
+from cra_sym.model.projection import EndParameter
+from cra_sym.model.system import MOST_MODES, System
+from cra_sym.solvers.ball_stiffness import BallStiffness, Term
+from cra_sym.solvers.certificates import UndecidedError, enclose
 
 __all__ = ["Certificate", "certify"]
 
-_CHAIN, _PRODUCTS = (derived_kernel(f"cra_sym.model.characteristic:{name}") for name in ("chain", "products"))
-
-_CHANGES = ((1, -1), (2, 1), (3, 1), (4, 1))  # links of the chain and what each may do to the count
-_FIELDS = ("L", "b", "h", "E", "rho", "m_e", "J_e", "k_t", "k_r")
+Number = Callable[[Any], Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,28 +32,29 @@ class Certificate:
     Attributes
     ----------
     lower, upper : ndarray, shape (..., modes)
-        Hz, rounded outward: the natural frequency of the arm, its parameters taken as the exact values of their
+        Hz, rounded outward: the natural frequency of the system, its parameters taken as the exact values of their
         floating-point numbers, lies in between. Both are 0 for a rigid-body mode, nan where nothing is proved.
     complete : ndarray of bool, shape (...)
-        Whether every enclosure of the arm is proved to hold exactly one frequency, with none between or below them.
+        Whether every enclosure of the system is proved to hold its frequency, with none between or below them. Equal
+        frequencies share an enclosure.
     """
 
-    lower: np.ndarray
-    upper: np.ndarray
-    complete: np.ndarray
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    complete: NDArray[np.bool_]
 
 
-def certify(arm: Arm, modes: int = 3) -> Certificate:
-    """Prove the first natural frequencies of an arm, (23) and (30).
+def certify(system: System, modes: int = 3) -> Certificate:
+    """Prove the first natural frequencies of a system with coefficients that are constant along x; (23) and (30).
 
-    The number of frequencies below a point is exact: from the beam pinned at both ends, one constraint after another
-    is released, each step changes the number by at most one, and the sign of a determinant, proved in ball
-    arithmetic, says whether it does. Two such numbers a zero make the enclosure and its completeness.
+    The number of frequencies below a point is that of the negative eigenvalues of its dynamic stiffness, and of the
+    parts that are eliminated on the way, each proved in ball arithmetic. Two such numbers a frequency make the
+    enclosure and its completeness.
 
     Parameters
     ----------
-    arm : Arm
-        Any parameters in range, arrays too; infinite and zero stiffness are ordinary.
+    system : System
+        Any values, arrays too; infinite and zero stiffness are ordinary.
     modes : int
         How many, 1 to 1000, rigid-body modes included.
 
@@ -64,104 +66,161 @@ def certify(arm: Arm, modes: int = 3) -> Certificate:
     Raises
     ------
     TypeError, ValueError
-        If ``arm`` is no :class:`Arm`, or ``modes`` no integer from 1 to 1000.
+        If ``system`` is not a :class:`System`, ``modes`` not an integer from 1 to 1000, or the coefficients of the
+        model vary along x or its forces are not conservative.
     MissingExtraError
         If python-flint is not installed (extra ``certify``).
     """
-    instance("arm", arm, Arm)
-    modes = count("modes", modes)
+    instance("system", system, System)
+    modes = count("modes", modes, high=MOST_MODES)
     flint = require("flint", "certify")
-    values = np.broadcast_arrays(*(getattr(arm, name) for name in _FIELDS))
-    guesses = np.asarray(natural_frequencies(arm, modes=modes))
-    shape = guesses.shape[:-1]
+    problem: BallProblem = system.numerics("ball_problem")
+    held: dict[str, EndParameter] = system.numerics("stiffnesses")
+    guesses = system.natural_frequencies(modes) / (2 * math.pi)
+    values = np.broadcast_arrays(*system.parameters, np.empty(system.shape))[:-1]
+    names = tuple(system.values)
+    order = system.numerics("names")
+    assert set(order) == set(names)
     lower, upper = np.full((2, *guesses.shape), np.nan)
-    complete = np.zeros(shape, dtype=bool)
-    for index in np.ndindex(shape):
-        function = _BallArm(flint, dict(zip(_FIELDS, (float(value[index]) for value in values), strict=True)))
+    complete = np.zeros(system.shape, dtype=bool)
+    for index in np.ndindex(system.shape):
+        given = dict(zip(order, (float(value[index]) for value in values), strict=True))
+        counted = _counted(flint, problem, held, given)
         try:
-            lower[index], upper[index] = _enclosed(flint, function, guesses[index])
-            complete[index] = True
+            ends = enclose(flint, counted, guesses[index])
         except UndecidedError:
             continue
+        with flint.ctx.workprec(128):
+            lower[index] = [_outward(low, -np.inf) for low, _ in ends]
+            upper[index] = [_outward(high, np.inf) for _, high in ends]
+        complete[index] = True
     return Certificate(lower, upper, complete)
 
 
-class _BallArm:
-    """The arm's determinant and count at a point, in lambda, for one set of parameters."""
+def _counted(
+    flint: Any, problem: BallProblem, held: dict[str, EndParameter], values: dict[str, float]
+) -> BallStiffness:
+    """Return the problem of one set of values in ball arithmetic; infinite stiffnesses hold their displacement."""
+    n, m = problem.displacements, problem.coordinates
+    size = 2 * n + m
+    fixed = []
+    for name in (name for name, value in values.items() if math.isinf(value)):
+        if name not in held:
+            raise ValueError(
+                f"{name} = inf: only the stiffness of an end may be infinite ({', '.join(held) or 'none'})"
+            )
+        end, place, _ = held[name]
+        fixed.append(place if end == 0 else n + m + place)
+    exact = [0.0 if math.isinf(value) else value for value in values.values()]
 
-    def __init__(self, flint: Any, parameters: dict[str, float]) -> None:
-        self._flint, self._parameters = flint, parameters
-        self.zeros = (parameters["k_t"] == 0.0) + (parameters["k_r"] == 0.0)
-        self._pairs = cache(self._pairs_at)
+    def evaluated(kernel: Any, *first: Any) -> Sequence[Any]:
+        return kernel(flint.arb, flint.arb.pi(), *first, *map(flint.arb, exact))
 
-    def frequency(self, lam: Any) -> Any:
-        """Frequency in Hz at lambda, (30)."""
-        exact = self._exact()
-        return lam**2 * (exact["EI"] / exact["rhoA"]).sqrt() / (2 * self._flint.arb.pi() * exact["L"] ** 2)
+    def matrix(kernel: Any, columns: int) -> Callable[[Any], list[list[Any]]]:
+        def rows(z: Any) -> list[list[Any]]:
+            entries = evaluated(kernel, z)
+            return [list(entries[i : i + columns]) for i in range(0, len(entries), columns)]
 
-    def guess(self, frequency: float) -> float:
-        """Lambda at a frequency, to the last digits or so: where a search begins."""
-        return float((self._flint.arb(frequency) / self.frequency(self._flint.arb(1))).sqrt())
+        return rows
 
-    def count(self, point: Any) -> int:
-        """Return the proved number of zeros below the point."""
-        number = self._pinned(point)
-        for link, change in _CHANGES:
-            if self._is_positive(point, link) != (number % 2 == 0):
-                number += change
-        return number
+    def terms() -> list[Term]:
+        entries = evaluated(problem.energy)
+        gaps = [tuple(problem.orders[f] - o for f, o in zip(*jet, strict=True)) for jet in problem.jets]
+        return [
+            Term(fields, (gap[0], gap[1]), entries[2 * k], entries[2 * k + 1])
+            for k, ((fields, _), gap) in enumerate(zip(problem.jets, gaps, strict=True))
+        ]
 
-    def is_positive(self, point: Any) -> bool:
-        """Return the proved sign of the arm's own determinant."""
-        return self._is_positive(point, -1)
+    @cache
+    def columns(precision: int) -> list[list[Any]]:
+        return _free_columns(evaluated(problem.free), size, fixed)
 
-    def _pinned(self, point: Any) -> int:
-        """Number of zeros n pi, n = 1, 2, ..., of the pinned beam below the point."""
-
-        def beyond(number: int) -> bool:
-            return decided(self._flint, lambda: point - number * self._flint.arb.pi())
-
-        number = int(float(point) / math.pi)
-        while number > 0 and not beyond(number):
-            number -= 1
-        while beyond(number + 1):
-            number += 1
-        return number
-
-    def _is_positive(self, point: Any, link: int) -> bool:
-        return decided(self._flint, lambda: self._links(point)[link])
-
-    def _links(self, point: Any) -> tuple[Any, ...]:
-        functions = _PRODUCTS.function(point, point.cos(), point.sin(), point.cosh(), point.sinh())
-        return _CHAIN.function(*self._pairs(self._flint.ctx.prec), point**4, self._flint.arb(1), *functions)
-
-    def _pairs_at(self, precision: int) -> list[Any]:
-        """Stiffnesses and inertias as pairs (s, c) at the context's precision; only the ratios matter."""
-        exact, zero, one = self._exact(), self._flint.arb(0), self._flint.arb(1)
-        mass = exact["rhoA"] * exact["L"]
-        ratios = {
-            "k_t": (exact["L"] ** 3, exact["EI"]),
-            "k_r": (exact["L"], exact["EI"]),
-            "m_e": (one, mass),
-            "J_e": (one, mass * exact["L"] ** 2),
-        }
-        pairs = []
-        for name, (factor, denominator) in ratios.items():
-            infinite = self._parameters[name] == math.inf
-            pairs += [one, zero] if infinite else [exact[name] * factor, denominator]
-        return pairs
-
-    def _exact(self) -> dict[str, Any]:
-        exact = {name: self._flint.arb(value) for name, value in self._parameters.items()}
-        area = exact["b"] * exact["h"]
-        return {**exact, "EI": exact["E"] * area * exact["h"] ** 2 / 12, "rhoA": exact["rho"] * area}
+    return BallStiffness(
+        flint,
+        matrix(problem.system, 2 * (n + m)),
+        matrix(problem.boundary, size),
+        lambda: evaluated(problem.geometry)[0],
+        n,
+        m,
+        lambda: columns(flint.ctx.prec),
+        terms,
+        _rigid_motions(problem, exact, size, fixed),
+    )
 
 
-def _enclosed(flint: Any, function: _BallArm, guesses: np.ndarray) -> tuple[list[float], list[float]]:
-    enclosures = enclose(flint, function, [function.guess(frequency) for frequency in guesses])
-    with flint.ctx.workprec(128):
-        ends = [(function.frequency(low), function.frequency(high)) for low, high in enclosures]
-    return [_outward(low, -np.inf) for low, _ in ends], [_outward(high, np.inf) for _, high in ends]
+def _free_columns(entries: Sequence[Any], size: int, fixed: Sequence[int]) -> list[list[Any]]:
+    """Return the columns of free motions that leave the fixed coordinates at rest."""
+    number = len(entries) // size
+    columns = [[entries[i * number + j] for i in range(size)] for j in range(number)]
+    for place in fixed:
+        moving = [column for column in columns if column[place] != 0]
+        if len(moving) > 1:
+            raise ValueError("certification needs an infinite stiffness to act on one free displacement")
+        columns = [column for column in columns if column[place] == 0]
+    return columns
+
+
+def _rigid_motions(problem: BallProblem, values: Sequence[float], size: int, fixed: Sequence[int]) -> int:
+    """Return the number of rigid-body motions: polynomials of first degree without strain, by rank in fractions."""
+
+    def evaluated(kernel: Any, *first: Any) -> list[Fraction]:
+        return list(kernel(Fraction, Fraction(0), *first, *map(Fraction, values)))
+
+    n, m, fields = problem.displacements, problem.coordinates, len(problem.orders)
+    unknowns = 2 * fields + m  # value at the left end and slope of each field, then coordinates
+    length, _ = evaluated(problem.geometry)
+
+    def jet(field: int, order: int) -> list[tuple[int, int]]:
+        """Unknowns and the power of x they are multiplied by."""
+        return [[(2 * field, 0), (2 * field + 1, 1)], [(2 * field + 1, 0)]][order] if order < 2 else []
+
+    energy = [[Fraction(0)] * unknowns for _ in range(unknowns)]
+    entries = evaluated(problem.energy)
+    for k, ((p, q), (i, j)) in enumerate(problem.jets):
+        for first, power in jet(p, i):
+            for second, other in jet(q, j):
+                degree = power + other + 1
+                energy[first][second] += Fraction(entries[2 * k]) * length**degree / degree
+    ends = [[Fraction(0)] * unknowns for _ in range(size)]  # displacements of the left end, w, of the right end
+    place = 0
+    for field, order in enumerate(problem.orders):
+        for derivative in range(order):
+            for unknown, power in jet(field, derivative):
+                ends[place][unknown] += Fraction(int(power == 0))
+                ends[n + m + place][unknown] += length**power
+            place += 1
+    for number in range(m):
+        ends[n + number][2 * fields + number] = Fraction(1)
+    boundary = evaluated(problem.boundary, Fraction(0))
+    springs = [[boundary[i * size + j] for j in range(size)] for i in range(size)]
+    moved = [
+        [
+            energy[a][b]
+            + sum((ends[i][a] * springs[i][j] * ends[j][b] for i in range(size) for j in range(size)), Fraction(0))
+            for b in range(unknowns)
+        ]
+        for a in range(unknowns)
+    ]
+    columns = _free_columns(evaluated(problem.free), size, fixed)
+    rows = [row + [Fraction(0)] * len(columns) for row in moved]
+    rows += [ends[i] + [-column[i] for column in columns] for i in range(size)]
+    return unknowns + len(columns) - _rank(rows)
+
+
+def _rank(rows: list[list[Fraction]]) -> int:
+    """Return the rank of a matrix of fractions."""
+    rank = 0
+    for column in range(len(rows[0]) if rows else 0):
+        pivot = next((i for i in range(rank, len(rows)) if rows[i][column] != 0), None)
+        if pivot is None:
+            continue
+        rows[rank], rows[pivot] = rows[pivot], rows[rank]
+        for i in range(rank + 1, len(rows)):
+            factor = rows[i][column] / rows[rank][column]
+            if factor:
+                rows[i] = [a - factor * b for a, b in zip(rows[i], rows[rank], strict=True)]
+        rank += 1
+    return rank
 
 
 def _outward(ball: Any, towards: float) -> float:

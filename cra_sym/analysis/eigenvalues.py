@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.checks import count, instance
-from cra_sym.model.routes import as_columns
 from cra_sym.model.system import MOST_MODES, System
+from cra_sym.model.values import flat_columns
 from cra_sym.solvers.eigenvalues import refine
 
 __all__ = ["damping_ratios", "eigenvalues"]
@@ -43,14 +43,13 @@ def eigenvalues(system: System, modes: int = 3, *, oscillating: bool = True) -> 
         return 1j * system.natural_frequencies(modes)
     ritz = system.model.ritz(2 * modes + 10)
     guesses = ritz.eigenvalues(system.values, modes, oscillating=oscillating).reshape(-1, modes)
-    columns, squared = as_columns(system.parameters, system.shape), not system.numerics("damped")
+    columns, squared = flat_columns(system.parameters, system.shape), not system.numerics("damped")
     guesses = np.broadcast_to(guesses, (columns.shape[1], modes))
     roots = np.empty(guesses.shape, dtype=complex)
     for rows, _, problem in system.numerics("damped_spatial").problems(columns):
-        found = refine(problem, -(guesses[rows] ** 2) if squared else guesses[rows])
+        found = refine(problem, guesses[rows], squared=squared)
         if np.isnan(found).any():
             raise ArithmeticError("eigenvalues: the refinement of a Ritz value did not settle; ask for fewer modes")
-        found = np.sqrt(-found) if squared else found
         roots[rows] = np.take_along_axis(found, np.argsort(np.abs(found), axis=1, kind="stable"), axis=1)
     return roots.reshape(*system.shape, modes)
 

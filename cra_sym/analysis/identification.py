@@ -131,8 +131,10 @@ def _units(system: System) -> np.ndarray:
     """
     rigid = system.replace(k_t=np.inf, k_r=np.inf)
     ends = system.numerics("stiffnesses")
-    forces = np.array([rigid.modes(1).force(*ends[name])[0] for name in _JOINT])
-    return forces**2 / rigid.natural_frequencies(1) ** 2
+    springs = [ends[name] for name in _JOINT]
+    forces = np.array([rigid.modes(1).force(spring.end, spring.place)[0] for spring in springs])
+    factors = np.array([spring.factor.function(*rigid.domain.values) for spring in springs])
+    return forces**2 / (factors * rigid.natural_frequencies(1) ** 2)
 
 
 def _checked(system: System, measured_frequencies: Any, uncertainty: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -155,15 +157,16 @@ def _checked(system: System, measured_frequencies: Any, uncertainty: Any) -> tup
 
 def _stiffness(place: np.ndarray) -> np.ndarray:
     """Return kappa from ln(1 + 1/kappa)."""
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         return 1 / np.expm1(place)
 
 
 def _gradient(stiffness: np.ndarray, found: Sensitivities, units: np.ndarray) -> np.ndarray:
     """Return the derivatives of the frequencies by ln(1 + 1/kappa) of both stiffnesses, shape (modes, 2)."""
     columns = []
-    for name, value, unit in zip(_JOINT, stiffness, units, strict=True):
-        kappa = value / unit
+    with np.errstate(over="ignore"):
+        kappas = stiffness / units
+    for name, kappa, unit in zip(_JOINT, kappas, units, strict=True):
         stiff = kappa > 1
         columns.append(
             found.compliance[name] / unit * (1 + 1 / kappa)

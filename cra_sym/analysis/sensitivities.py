@@ -115,33 +115,23 @@ class Sensitivities:
         return np.where(self._still, np.nan, value) if self._still.any() else value
 
     def _by_compliance(self, name: str) -> Array:
+        end, place, kernel = self._system.numerics("stiffnesses")[name]
+        modes = self._system.modes(self._modes)
+        factor = column(np.asarray(kernel.function(*self._system.domain.values)))
+        stiffness = factor * column(np.asarray(self._system.values[name]))
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            squared = -self._spring_forces_squared(name)
-            value = squared / (8 * np.pi**2 * self.frequency)
-        return self._at_rest(value, squared)
-
-    def _spring_forces_squared(self, name: str) -> Array:
-        """Return minus the derivative of omega^2 by the compliance: k^2 times that by k, or the support's force."""
-        given = np.asarray(self._system.values[name])
-        rigid = np.isinf(given)
-        stiffness = column(np.where(rigid, 0.0, given))
-        soft = stiffness**2 * self._squared(name)
-        if not rigid.any():
-            return soft
-        end, place = self._system.numerics("stiffnesses")[name]
-        force = self._system.modes(self._modes).force(end, place)
-        return np.where(column(rigid), force**2, soft)
+            force = np.where(np.isinf(stiffness), modes.force(end, place), stiffness * modes.displacement(end, place))
+            value = -(force**2) / (8 * np.pi**2 * self.frequency * factor)
+        return self._at_rest(value, self._squared(name))
 
     def _at_rest(self, value: Array, squared: Array) -> Array:
-        """Return the values, squared over f, with those of rigid-body modes put right."""
+        """Return the values with those of rigid-body modes put right; ``squared`` are the rates of omega^2."""
         if not self._still.any():
             return value
-        # 0 over 0 holds nothing, and neither does what is rounding beside the other modes
-        finite = np.abs(np.where(self._still | ~np.isfinite(value), 0.0, value)) * self.frequency
-        holds = np.abs(squared) > 1e-20 * np.maximum(finite, np.abs(squared)).max(axis=-1, keepdims=True)
-        held = np.where(holds, value, 0.0)
+        moves = np.abs(squared) > 1e-20 * np.abs(squared).max(axis=-1, keepdims=True)  # more than by rounding
         several = self._still.sum(axis=-1, keepdims=True) > 1
-        return np.where(self._still, np.where(several & (held != 0), np.nan, held), value)
+        directed = several & (moves & self._still).any(axis=-1, keepdims=True)
+        return np.where(self._still, np.where(directed, np.nan, np.where(moves & ~np.isnan(value), value, 0.0)), value)
 
     @cached_property
     def _still(self) -> Array:

@@ -205,7 +205,7 @@ def _stability_checks(arms: list[Arm], together: Arm) -> Iterator[Check]:
     excitations = ("joint", (1.0, 0.5), JointStiffness(1.0, 0.5)), ("axial", (1e-3, 0.0), AxialBase(1e-3))
     for name, numbers, excitation in excitations:
         for resonance in ((1, 1), (2, 2), (1, 2)):
-            zone = first_order_zone(together, modal, excitation, np.asarray(0.2), *resonance)
+            zone = first_order_zone(together, excitation, np.asarray(0.2), *resonance, modes=3)
             for arm, centre, half_width in zip(arms, zone.centre, zone.half_width, strict=True):
                 if np.isfinite(half_width):
                     inputs = _numbers(arm, *numbers, 0.2, *resonance)

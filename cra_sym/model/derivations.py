@@ -13,12 +13,15 @@ from cra_sym.checks import mapping, shown
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics.jets import END_NAMES, Jet
 from cra_sym.mechanics.weak import Bilinear, WeakForm, weak_form
+from cra_sym.model.exact import BallProblem, exact_kernel
 from cra_sym.model.forms import form_of, load_of
 from cra_sym.model.lagrangian import Model
-from cra_sym.model.projection import Form, Load
+from cra_sym.model.one_wave import one_wave_route
+from cra_sym.model.projection import EndParameter, Form, Load
 from cra_sym.model.routes import GeneralRoute, Route
 from cra_sym.model.spatial import SpatialProblem, spatial_problem
 from cra_sym.model.symmetry import asymmetry
+from cra_sym.model.two_waves import two_waves_route
 
 __all__ = ["axial", "causes", "constant", "damping", "geometry", "load", "names", "rates", "route", "spatial"]
 
@@ -52,6 +55,16 @@ def damped_spatial(model: Model) -> SpatialProblem:
 
 def route(model: Model) -> Route:
     """Return the fastest way to natural frequencies and modes that the Lagrangian allows."""
+    form, left = model.conservative, model.equations.domain[0]
+    fast = one_wave_route(form, model.symbols, left)
+    if fast is not None:
+        return fast
+    compiled = spatial(model)
+    return two_waves_route(form, compiled, model.symbols) or GeneralRoute(compiled)
+
+
+def general_route(model: Model) -> Route:
+    """Return the route that serves all values."""
     return GeneralRoute(spatial(model))
 
 
@@ -259,17 +272,31 @@ def sizes(model: Model) -> tuple[int, int]:
     return len(model.state_form.displacements), len(model.state_form.coordinates)
 
 
-def stiffnesses(model: Model) -> dict[str, tuple[int, int]]:
-    """Return the stiffnesses of an end that hold one of its displacements, with that end (0 or 1) and displacement."""
+def stiffnesses(model: Model) -> dict[str, EndParameter]:
+    """Return the parameters that are, up to a factor, the stiffness of one displacement of an end, by name."""
+    return _end_parameters(model, S.One)
+
+
+def inertias(model: Model) -> dict[str, EndParameter]:
+    """Return the parameters that are, up to a factor, the inertia of one displacement of an end, by name."""
+    return _end_parameters(model, -model.conservative.parameter)
+
+
+def _end_parameters(model: Model, unit: Expr) -> dict[str, EndParameter]:
+    """Return the parameters that add a positive multiple of themselves, times ``unit``, to one entry of an end."""
     form = model.conservative
     n, m = len(form.displacements), len(form.coordinates)
     inside = form.system.free_symbols | form.length.free_symbols | form.free.free_symbols
     found = {}
     for symbol in model.symbols:
-        slope = form.boundary.diff(symbol)
-        places = [k for k in range(2 * n + m) if slope[k, k] == 1 and not n <= k < n + m]
-        if symbol not in inside and len(places) == 1 and sum(entry != 0 for entry in slope) == 1:
-            found[symbol.name] = (0, places[0]) if places[0] < n else (1, places[0] - n - m)
+        entries = [(k, entry / unit) for k, entry in enumerate(form.boundary.diff(symbol)) if entry != 0]
+        if symbol in inside or len(entries) != 1:
+            continue
+        (row, column), factor = divmod(entries[0][0], 2 * n + m), cancel(entries[0][1])
+        if row != column or n <= row < n + m or factor.has(symbol, form.parameter) or factor.is_negative:
+            continue
+        end, place = (0, row) if row < n else (1, row - n - m)
+        found[symbol.name] = EndParameter(end, place, kernel(factor, model.symbols, backend="numpy"))
     return found
 
 
@@ -322,3 +349,37 @@ def fluctuation(model: Model, name: str) -> str:
 def conservative(model: Model) -> bool:
     """Return whether all forces have a potential and none is of first order in time."""
     return not model.state_form.damped and not asymmetry(model.state_form)
+
+
+def ball_problem(model: Model) -> BallProblem:
+    """Return the uniform conservative problem in a form that is exact for any kind of number.
+
+    Raises
+    ------
+    ValueError
+        If a coefficient varies along x.
+    """
+    form = model.conservative
+    if not form.uniform:
+        raise ValueError("certification needs coefficients that are constant along x")
+    weak = weak_form(model.equations.variation)
+    kinds = {"stiffness": 0, "mass": 2}
+    parts = {kind: (_power(weak.inside, power), _power(weak.ends, power)) for kind, power in kinds.items()}
+    pairs = [pair for pair in dict.fromkeys(p for inside, _ in parts.values() for p in inside)]
+    _, highest, _ = weak.fields()
+    orders = {jet.unknown: jet.space for jet in highest}
+    fields = [pair for pair in pairs if all(jet.unknown in orders for jet in pair)]
+    entries = [parts[kind][0].get(pair, {}).get(power, S.Zero) for pair in fields for kind, power in kinds.items()]
+    left, right = model.equations.domain
+    z = form.parameter
+    return BallProblem(
+        len(form.displacements),
+        len(form.coordinates),
+        tuple(((p.unknown, q.unknown), (p.space, q.space)) for p, q in fields),
+        tuple(orders.values()),
+        exact_kernel(list(form.system), (z, *model.symbols)),
+        exact_kernel(list(form.boundary), (z, *model.symbols)),
+        exact_kernel([right - left, left], model.symbols),
+        exact_kernel(list(form.free), model.symbols),
+        exact_kernel(entries, model.symbols),
+    )

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.model.spatial import SpatialProblem
+from cra_sym.model.values import flat_columns
 from cra_sym.solvers.eigenvalues import lowest
 from cra_sym.solvers.shapes import mode_states
-from cra_sym.solvers.stiffness import DynamicStiffness
 
-__all__ = ["GeneralRoute", "Modes", "RigidShare", "Route", "tip_sign"]
+__all__ = ["GeneralRoute", "Modes", "RigidShare", "Route", "StateModes", "tip_sign"]
 
 Array = NDArray[np.float64]
 Values = Sequence[float | Array]
@@ -62,6 +62,9 @@ class RigidShare(Protocol):
 class Route(Protocol):
     """How frequencies and modes of a model are computed."""
 
+    def covers(self, values: Values) -> bool:
+        """Return whether the route serves these values; the general one serves all."""
+
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:
         """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""
 
@@ -75,59 +78,75 @@ class GeneralRoute:
 
     spatial: SpatialProblem
 
+    def covers(self, values: Values) -> bool:
+        """Return True: what is not allowed is refused by name."""
+        return True
+
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:
         """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""
-        columns = as_columns(values, shape)
+        columns = flat_columns(values, shape)
         squares = np.empty((columns.shape[1], modes))
         for rows, _, problem in self.spatial.problems(columns):
             squares[rows] = lowest(problem, modes)
         return np.sqrt(squares).reshape(*shape, modes)
 
-    def modes(self, values: Values, shape: tuple[int, ...], omega: Array) -> GeneralModes:
+    def modes(self, values: Values, shape: tuple[int, ...], omega: Array) -> StateModes:
         """Return the modes of all the first frequencies."""
-        return GeneralModes(omega, self.spatial, as_columns(values, shape))
+        columns = flat_columns(values, shape)
+        return StateModes(omega, self.spatial, columns, partial(self._states, columns))
+
+    def _states(self, columns: Array, z: Array, x: Array) -> Array:
+        """Return the state of every mode at places x (rows, stations), shape (rows, modes, stations, 2 n + m)."""
+        state = np.empty((*z.shape, x.shape[-1], 2 * self.spatial.displacements + self.spatial.coordinates))
+        for rows, left, problem in self.spatial.problems(columns):
+            share = np.clip((x[rows] - left[:, None]) / problem.length[:, None], 0.0, 1.0)
+            state[rows] = mode_states(problem, z[rows], share)
+        return state
 
 
-def as_columns(values: Values, shape: tuple[int, ...]) -> Array:
-    """Return parameters as flat columns, shape (parameters, sets)."""
-    columns = np.empty((len(values), int(np.prod(shape))))
-    for column, value in zip(columns, values, strict=True):
-        column[:] = np.broadcast_to(value, shape).ravel()
-    return columns
+States = Callable[[Array, Array], Array]
 
 
 @dataclass(frozen=True, eq=False)
-class GeneralModes:
-    """Modes from the dynamic stiffness; ``omega`` has the shape of the batch, ``columns`` are flat."""
+class StateModes:
+    """Modes given by the state (q, w, P) of a section.
+
+    Attributes
+    ----------
+    omega : ndarray, shape (..., modes)
+    spatial : SpatialProblem
+    columns : ndarray, shape (parameters, rows)
+        Parameters of the flat batch.
+    states : callable
+        ``states(z, x)`` returns the states of the modes with omega^2 = z (rows, modes) at places x (rows, stations).
+    """
 
     omega: Array
     spatial: SpatialProblem
     columns: Array
+    states: States
 
     @cached_property
-    def _problems(self) -> list[tuple[Array, Array, DynamicStiffness]]:
-        return list(self.spatial.problems(self.columns))
-
-    @cached_property
-    def _ends(self) -> Array:
-        """State (q, w, P) at both ends, shape (rows, modes, 2, 2 n + m), and the sign of every mode."""
-        n, m = self.spatial.displacements, self.spatial.coordinates
-        z = self._z
-        state = np.empty((*z.shape, 2, 2 * n + m))
-        for rows, _, problem in self._problems:
-            state[rows] = mode_states(problem, z[rows], np.tile([0.0, 1.0], (len(rows), 1)))
-        return state
-
-    @cached_property
-    def _sign(self) -> Array:
-        return tip_sign(self._ends[:, :, 1, : self.spatial.displacements])
-
-    @property
     def _z(self) -> Array:
         return self.omega.reshape(-1, self.omega.shape[-1]) ** 2
 
+    @cached_property
+    def _finite(self) -> Array:
+        return np.where(np.isinf(self.columns), 0.0, self.columns)
+
+    @cached_property
+    def _ends(self) -> Array:
+        """States at both ends, signed, shape (rows, modes, 2, 2 n + m)."""
+        length, left = (np.broadcast_to(g, len(self._z)) for g in self.spatial.geometry.function(*self._finite))
+        return self._signed(self.states(self._z, np.stack([left, left + length], axis=-1)))
+
+    def _signed(self, states: Array) -> Array:
+        if "_sign" not in self.__dict__:  # the last station of the first call is the right end
+            self.__dict__["_sign"] = tip_sign(states[:, :, -1, : self.spatial.displacements])
+        return states * self.__dict__["_sign"][..., None]
+
     def _end(self, end: int, entry: int) -> Array:
-        return (self._sign[..., 0] * self._ends[:, :, end, entry]).reshape(self.omega.shape)
+        return self._ends[:, :, end, entry].reshape(self.omega.shape)
 
     def displacement(self, end: int, place: int) -> Array:
         """Return a displacement of an end section, shape (..., modes)."""
@@ -143,25 +162,18 @@ class GeneralModes:
 
     def shape(self, place: int, derivative: int, x: Array) -> Array:
         """Return a derivative of a displacement of the section at places, shape (..., modes, stations)."""
-        z = self._z
-        x = np.broadcast_to(x, (*self.omega.shape[:-1], x.shape[-1])).reshape(len(z), -1)
-        state = self._states(x)
-        finite = np.where(np.isinf(self.columns), 0.0, self.columns)
-        row = self.spatial.derivative_row(place, derivative, z, x[:, None], finite)
-        found = self._sign * (row * state).sum(axis=-1)
-        return found.reshape(*self.omega.shape, x.shape[-1])
+        x = np.broadcast_to(x, (*self.omega.shape[:-1], x.shape[-1])).reshape(len(self._z), -1)
+        row = self.spatial.derivative_row(place, derivative, self._z, x[:, None], self._finite)
+        return (row * self._at(x)).sum(axis=-1).reshape(*self.omega.shape, x.shape[-1])
 
-    def _states(self, x: Array) -> Array:
+    def _at(self, x: Array) -> Array:
         key = x.tobytes()
         kept: dict[bytes, Array] = self.__dict__.setdefault("_kept", {})
         if key not in kept:
-            n, m = self.spatial.displacements, self.spatial.coordinates
-            state = np.empty((*self._z.shape, x.shape[-1], 2 * n + m))
-            for rows, left, problem in self._problems:
-                share = np.clip((x[rows] - left[:, None]) / problem.length[:, None], 0.0, 1.0)
-                state[rows] = mode_states(problem, self._z[rows], share)
+            _ = self._ends  # fixes the sign
+            found = self._signed(self.states(self._z, x))
             kept.clear()  # one set of stations at a time: those of a quadrature serve many forms
-            kept[key] = state
+            kept[key] = found
         return kept[key]
 
     def integral(self, place: int) -> None:

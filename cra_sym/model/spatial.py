@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.kernels import Kernel, kernel
+from cra_sym.model.values import infinite_patterns
 from cra_sym.solvers.stiffness import DynamicStiffness, Evaluation
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
     from cra_sym.mechanics import StateForm
 
-__all__ = ["SpatialProblem", "check_range", "infinite_patterns", "shares", "spatial_problem"]
+__all__ = ["SpatialProblem", "check_range", "shares", "spatial_problem"]
 
 Array = NDArray[np.float64]
 _MOST_DERIVATIVES = 20
@@ -108,7 +109,7 @@ class SpatialProblem:
         ValueError
             If a parameter is infinite that is not a stiffness of an end, or a coefficient is not finite.
         """
-        for rows, infinite in infinite_patterns(self.names, columns):
+        for rows, infinite in infinite_patterns(columns):
             some = columns[:, rows].copy()
             some[list(infinite)] = 0.0
             yield rows, *self._problem(some, infinite)
@@ -188,18 +189,6 @@ def _derivative_rows(form: StateForm, place: int, arguments: Sequence[Symbol]) -
         kernels.append(kernel(row, (form.x, *arguments), backend="numpy"))
         row = row.diff(form.x) + row * form.system
     return tuple(kernels)
-
-
-def infinite_patterns(names: Sequence[str], columns: Array) -> list[tuple[np.ndarray, tuple[int, ...]]]:
-    """Return, for each pattern of infinite values, the sets and the positions of the infinite parameters."""
-    infinite = np.isinf(columns)
-    if (columns == -np.inf).any():
-        name = names[int(np.nonzero((columns == -np.inf).any(axis=1))[0][0])]
-        raise ValueError(f"{name} = -inf: must be a real number, or inf for the stiffness of an end")
-    kinds, where = np.unique(infinite, axis=1, return_inverse=True)
-    return [
-        (np.nonzero(where.ravel() == k)[0], tuple(np.nonzero(kinds[:, k])[0].tolist())) for k in range(kinds.shape[1])
-    ]
 
 
 def shares(x: np.ndarray, left: np.ndarray, length: np.ndarray, name: str = "x") -> np.ndarray:

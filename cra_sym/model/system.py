@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from cra_sym.checks import broadcastable, count
 from cra_sym.model.projection import Domain, Load, Projected, project
-from cra_sym.model.routes import Modes
+from cra_sym.model.routes import Modes, Route
+from cra_sym.model.spatial import check_range
 from cra_sym.model.values import Value, checked_damping, checked_values, frozen
 
 if TYPE_CHECKING:
@@ -125,7 +126,9 @@ class System:
 
     def _find_frequencies(self, modes: int) -> Array:
         _ = self.domain  # refuses a length that is not positive
-        omega: Array = self.numerics("route").angular_frequencies(self.parameters, self.shape, modes)
+        with np.errstate(all="ignore"):
+            omega: Array = self._route.angular_frequencies(self.parameters, self.shape, modes)
+        check_range(omega)
         omega.flags.writeable = False
         return omega
 
@@ -135,8 +138,13 @@ class System:
 
     def _find_modes(self, modes: int) -> Modes:
         omega = self.natural_frequencies(modes)
-        found: Modes = self.numerics("route").modes(self.parameters, self.shape, omega)
-        return found
+        return self._route.modes(self.parameters, self.shape, omega)
+
+    @cached_property
+    def _route(self) -> Route:
+        """The fastest route that covers the values, such as a mass that is not negative."""
+        route: Route = self.numerics("route")
+        return route if route.covers(self.parameters) else self.numerics("general_route")
 
     def _once(self, kind: str, modes: int, find: Any) -> Any:
         kept = self.__dict__.setdefault("_kept", {})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from cra_sym.checks import broadcastable, real_array, shown
 
-__all__ = ["checked_damping", "checked_values", "frozen"]
+__all__ = ["checked_damping", "checked_values", "flat_columns", "frozen", "infinite_patterns"]
 
 Value = float | NDArray[np.float64]
 
@@ -70,41 +69,17 @@ def checked_damping(zeta: Any) -> NDArray[np.float64]:
     return real_array("zeta", zeta, low=0.0, high=np.nextafter(1.0, 0.0), allowed="real numbers in [0, 1)")
 
 
-@dataclass(frozen=True)
-class Values:
-    """Flat arrays of all parameter sets.
+def flat_columns(values: Sequence[Value], shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return parameters that broadcast to a shape as flat columns, shape (parameters, sets)."""
+    columns = np.empty((len(values), int(np.prod(shape))))
+    for column, value in zip(columns, values, strict=True):
+        column[:] = np.broadcast_to(value, shape).ravel()
+    return columns
 
-    Attributes
-    ----------
-    names : tuple of str
-    columns : ndarray, shape (names, rows)
-    shape : tuple of int
-        Common shape of what was given; its size is the number of rows.
-    """
 
-    names: tuple[str, ...]
-    columns: NDArray[np.float64]
-    shape: tuple[int, ...]
-
-    @classmethod
-    def read(cls, symbols: Sequence[Any], given: Mapping[Any, Any]) -> Values:
-        """Match values to symbols; each error names the symbol."""
-        names = tuple(symbol.name for symbol in symbols)
-        found = checked_values(names, given)
-        shape = broadcastable(**found)
-        columns = np.empty((len(names), int(np.prod(shape))))
-        for column, name in zip(columns, names, strict=True):
-            column[:] = np.broadcast_to(found[name], shape).ravel()
-        return cls(names, columns, shape)
-
-    def patterns(self) -> list[tuple[NDArray[np.intp], tuple[int, ...]]]:
-        """Return, for each pattern of infinite values, the rows and the positions of the infinite symbols."""
-        from cra_sym.model.spatial import infinite_patterns
-
-        return infinite_patterns(self.names, self.columns)
-
-    def take(self, rows: NDArray[np.intp], finite: tuple[int, ...] = ()) -> NDArray[np.float64]:
-        """Return the columns of some rows, with zero for the symbols whose infinity is handled elsewhere."""
-        columns = self.columns[:, rows].copy()
-        columns[list(finite)] = 0.0
-        return columns
+def infinite_patterns(columns: NDArray[np.float64]) -> list[tuple[NDArray[np.intp], tuple[int, ...]]]:
+    """Return, for each pattern of infinite values, the sets and the positions of the infinite parameters."""
+    kinds, where = np.unique(np.isinf(columns), axis=1, return_inverse=True)
+    return [
+        (np.nonzero(where.ravel() == k)[0], tuple(np.nonzero(kinds[:, k])[0].tolist())) for k in range(kinds.shape[1])
+    ]

@@ -1,4 +1,4 @@
-"""Enclosures of zeros that an exact count proves: in each exactly one, between them none.
+"""Enclosures of natural frequencies that an exact count proves: each holds its own, and none is missed.
 
 The arithmetic is that of balls (Arb through python-flint): every operation returns a ball that holds the exact
 result, so a ball away from zero has a proved sign. Nothing here rests upon the floating-point solver: its values are
@@ -8,117 +8,124 @@ only where the search begins.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
-__all__ = ["BallCharacteristic", "UndecidedError", "decided", "enclose"]
+__all__ = ["Counted", "UndecidedError", "decided", "enclose", "negatives"]
 
-_FIRST_PRECISION = 192
+FIRST_PRECISION = 192
 _LARGEST_PRECISION = 12_288
 _NEAREST = -53  # the first width tried, relative, as a power of two; the width wanted is half of it
 _WIDEST = -8
+_EQUAL = -40  # of the width wanted: frequencies that are closer share an enclosure
+
+Result = TypeVar("Result")
 
 
 class UndecidedError(ArithmeticError):
     """A sign could not be proved at the largest precision: the point is a zero, or as good as one."""
 
 
-class BallCharacteristic(Protocol):
-    """An entire function of one variable, with real zeros only, in ball arithmetic; points are exact balls."""
+class Counted(Protocol):
+    """A problem with natural frequencies that can be counted; points are exact balls.
+
+    Attributes
+    ----------
+    zeros : int
+        How many natural frequencies are exactly 0.
+    """
 
     zeros: int
 
     def count(self, point: Any) -> int:
-        """Return the proved number of zeros below the point, those at 0 included."""
-
-    def is_positive(self, point: Any) -> bool:
-        """Return the proved sign of the function at the point, which is that of ``(-1)**count``."""
+        """Return the proved number of natural frequencies below the point, those at 0 included."""
 
 
-def decided(flint: Any, sign: Callable[[], Any]) -> bool:
-    """Return whether a ball is positive, raising the working precision until it excludes zero.
+def decided(flint: Any, attempt: Callable[[], Result]) -> Result:
+    """Return what an attempt returns at the first working precision at which it raises no :class:`UndecidedError`.
 
     Parameters
     ----------
     flint : module
         ``flint`` of python-flint; its context's precision is restored at the end.
-    sign : callable
-        Makes the ball at the precision of the moment.
+    attempt : callable
 
     Raises
     ------
     UndecidedError
-        If the ball still holds zero at 12288 bits.
+        If 12288 bits are not enough.
     """
-    precision = _FIRST_PRECISION
+    precision = FIRST_PRECISION
     while precision <= _LARGEST_PRECISION:
         with flint.ctx.workprec(precision):
-            ball = sign()
-        if ball > 0:
-            return True
-        if ball < 0:
-            return False
-        precision *= 2
+            try:
+                return attempt()
+            except (UndecidedError, ZeroDivisionError):
+                precision *= 2
     raise UndecidedError(f"a sign is not decided at {_LARGEST_PRECISION} bits")
 
 
-def enclose(flint: Any, function: BallCharacteristic, guesses: Sequence[float]) -> list[tuple[Any, Any]]:
-    """Return a proved enclosure of each of the first zeros.
+def negatives(matrix: Sequence[Sequence[Any]]) -> int:
+    """Return the proved number of negative eigenvalues of a symmetric matrix of balls, by Sylvester's law of inertia.
+
+    Raises
+    ------
+    UndecidedError
+        If a pivot holds zero.
+    """
+    rows = [list(row) for row in matrix]
+    number = 0
+    while rows:
+        size = len(rows)
+        k = max(range(size), key=lambda i: abs(float(rows[i][i].mid())))
+        pivot = rows[k][k]
+        if pivot < 0:
+            number += 1
+        elif not pivot > 0:
+            raise UndecidedError("a pivot holds zero")
+        others = [i for i in range(size) if i != k]
+        rows = [[rows[i][j] - rows[i][k] * rows[k][j] / pivot for j in others] for i in others]
+    return number
+
+
+def enclose(flint: Any, problem: Counted, guesses: Sequence[float]) -> list[tuple[Any, Any]]:
+    """Return a proved enclosure of each of the first natural frequencies.
 
     Parameters
     ----------
     flint : module
         ``flint`` of python-flint.
-    function : BallCharacteristic
-        The function and its count.
+    problem : Counted
     guesses : sequence of float
-        Where zero 1, 2, ... is expected; the better, the faster. They carry no weight in the proof.
+        Where frequency 1, 2, ... is expected; the better, the faster. They carry no weight in the proof.
 
     Returns
     -------
     list of (arb, arb)
-        Exact lower and upper ends, ascending and disjoint; (0, 0) for a zero at 0. Below the lower end lie exactly as
-        many zeros as come before, below the upper end one more: the count makes the set complete. Each is at most
-        2**-53 wide relative to its zero.
+        Exact lower and upper ends, ascending; (0, 0) for a frequency of 0. Below the lower end lie exactly as many as
+        come before, below the upper end one more: the count makes the set complete. Each is at most 2**-53 wide
+        relative to its frequency. Frequencies that agree to 28 digits share an enclosure, with so many in it.
 
     Raises
     ------
     UndecidedError
-        If a sign cannot be proved, or no enclosure is found: two zeros lie closer together than their enclosures.
+        If a sign cannot be proved, or a frequency is not near its guess.
     """
     zero = flint.arb(0)
-    with flint.ctx.workprec(_FIRST_PRECISION):
+    with flint.ctx.workprec(FIRST_PRECISION):
         return [
-            (zero, zero) if number < function.zeros else _enclosure(flint, function, number, guess)
+            (zero, zero) if number < problem.zeros else _enclosure(flint, problem, number, guess)
             for number, guess in enumerate(guesses)
         ]
 
 
-def _enclosure(flint: Any, function: BallCharacteristic, number: int, guess: float) -> tuple[Any, Any]:
-    low, high = _bracket(flint, function, number, guess)
+def _enclosure(flint: Any, problem: Counted, number: int, guess: float) -> tuple[Any, Any]:
+    low, high, below, above = _bracket(flint, problem, number, guess)
     width = flint.arb(guess) * flint.arb(2) ** (_NEAREST - 1)
-    while high - low > width:
-        middle = _exact((low + high) / 2)
-        if function.is_positive(middle) == (number % 2 == 0):
-            low = middle
-        else:
-            high = middle
-    return low, high
-
-
-def _bracket(flint: Any, function: BallCharacteristic, number: int, guess: float) -> tuple[Any, Any]:
-    """Return two points around the guess with ``number`` and ``number + 1`` zeros below them."""
-    centre = flint.arb(guess)
-    for exponent in range(_NEAREST, _WIDEST + 1, 3):
-        reach = centre * flint.arb(2) ** exponent
-        low, high = _exact(centre - reach), _exact(centre + reach)
-        below, above = function.count(low), function.count(high)
-        if below <= number < above:
-            break
-    else:
-        raise UndecidedError(f"zero {number + 1} is not near {guess!r}")
-    while below < number or above > number + 1:  # a neighbour lies in between too
-        middle = _exact((low + high) / 2)
-        counted = function.count(middle)
+    while high - low > width or below < number or above > number + 1:
+        if high - low < width * flint.arb(2) ** _EQUAL:
+            break  # a multiple one: it is enclosed with its equals
+        middle = ((low + high) / 2).mid()  # any point will do, and an exact one costs no width
+        counted = problem.count(middle)
         if counted <= number:
             low, below = middle, counted
         else:
@@ -126,6 +133,13 @@ def _bracket(flint: Any, function: BallCharacteristic, number: int, guess: float
     return low, high
 
 
-def _exact(ball: Any) -> Any:
-    """Return the ball's midpoint as an exact ball: any point will do, and an exact one costs no width."""
-    return ball.mid()
+def _bracket(flint: Any, problem: Counted, number: int, guess: float) -> tuple[Any, Any, int, int]:
+    """Return two points around the guess, with at most ``number`` and with more frequencies below, and how many."""
+    centre = flint.arb(guess)
+    for exponent in range(_NEAREST, _WIDEST + 1, 3):
+        reach = centre * flint.arb(2) ** exponent
+        low, high = (centre - reach).mid(), (centre + reach).mid()
+        below, above = problem.count(low), problem.count(high)
+        if below <= number < above:
+            return low, high, below, above
+    raise UndecidedError(f"frequency {number + 1} is not near {guess!r}")

@@ -179,21 +179,26 @@ def _tighten(low, high, below, above, row, z, count, wanted) -> None:
         low[r], below[r] = np.where(is_low, point, low[r]), np.where(is_low, found, below[r])
 
 
-def refine(problem: DynamicStiffness, guesses: np.ndarray, *, tolerance: float = 1e-12) -> np.ndarray:
+def refine(
+    problem: DynamicStiffness, guesses: np.ndarray, *, squared: bool = False, tolerance: float = 1e-12
+) -> np.ndarray:
     """Refine complex eigenvalues of a damped problem, all modes of a row at once (Ehrlich-Aberth on exact F'/F).
 
     Parameters
     ----------
     problem : DynamicStiffness
-        Coefficients analytic in the complex parameter s.
+        Coefficients analytic in the complex parameter s, or in ``z = -s^2``.
     guesses : ndarray of complex, shape (rows, modes)
+        Of s.
+    squared : bool
+        The parameter is z. Of the two s of a root the one near the guess is returned.
 
     Returns
     -------
     ndarray of complex, shape (rows, modes)
         Roots of the characteristic function; nan where the iteration did not settle.
     """
-    s = np.array(guesses, dtype=complex)
+    s = -(guesses**2) if squared else np.array(guesses, dtype=complex)
     rows, modes = s.shape
     row = np.repeat(np.arange(rows), modes)
     moving = np.isfinite(s)
@@ -211,4 +216,8 @@ def refine(problem: DynamicStiffness, guesses: np.ndarray, *, tolerance: float =
         step = np.where(np.isfinite(step), step, 0.0)
         s -= step
         moving &= np.abs(step) > tolerance * np.abs(s)
-    return np.where(moving, np.nan, s)
+    found = np.where(moving, np.nan, s)
+    if not squared:
+        return found
+    root = np.sqrt(-found)
+    return np.where((root * guesses.conj()).real < 0.0, -root, root)

@@ -24,19 +24,19 @@ def number_after(words, text):
 def test_exact_frequencies_give_the_joint_back(k_t, k_r, length, monkeypatch):
     """After some steps, as with exact gradients; with others, of twice the size say, it takes 80 and more."""
     steps, counted = [], identification.sensitivities
-    monkeypatch.setattr(identification, "sensitivities", lambda *given: steps.append(1) or counted(*given))
+    monkeypatch.setattr(identification, "sensitivities", lambda *a, **b: steps.append(1) or counted(*a, **b))
     arm = NOMINAL.replace(L=length)
     estimate = cra.identify_joint(arm, cra.natural_frequencies(arm.replace(k_t=k_t, k_r=k_r), 4), 1e-3)
     assert (estimate.k_t, estimate.k_r) == (pytest.approx(k_t, rel=1e-9), pytest.approx(k_r, rel=1e-9))
     assert estimate.identifiable and np.abs(estimate.residuals).max() < 1e-6
     deviation = [number_after(f"{name} to", estimate.message) for name in ("k_t", "k_r")]
-    assert deviation == pytest.approx(estimate.log_standard_deviation, rel=0.06)
+    assert deviation == pytest.approx(estimate.log_standard_deviation, rel=0.06)  # printed with two digits
     assert len(steps) < 30
 
 
 def test_the_search_starts_from_the_joint_of_the_grid_that_fits_best():
     arm = NOMINAL.replace(L=0.3)
-    units = np.array([arm.EI / arm.L**3, arm.EI / arm.L])
+    units = identification._units(arm)
     kappa = identification._STARTS[[4, 7]]
     measured = cra.natural_frequencies(arm.replace(k_t=kappa[0] * units[0], k_r=kappa[1] * units[1]), 4)
     best, _ = identification._starts(arm, units, measured, np.full(4, 0.1))
@@ -45,13 +45,14 @@ def test_the_search_starts_from_the_joint_of_the_grid_that_fits_best():
 
 def test_the_gradient_is_exact():
     arm = NOMINAL.replace(L=0.8)
+    units = identification._units(arm)
 
     def at(place):
-        kappa = 1 / np.expm1(place)
-        return arm.replace(k_t=kappa[0] * arm.EI / arm.L**3, k_r=kappa[1] * arm.EI / arm.L)
+        k_t, k_r = units / np.expm1(place)
+        return arm.replace(k_t=k_t, k_r=k_r)
 
     for place in (np.array([2e-3, 0.1]), np.array([1.5, 3.0])):
-        found = _gradient(at(place), cra.sensitivities(at(place), 4))
+        found = _gradient(units / np.expm1(place), cra.sensitivities(at(place), 4), units)
         for i, direction in enumerate(np.eye(2) * 1e-6 * place):
             slope = cra.natural_frequencies(at(place + direction), 4) - cra.natural_frequencies(
                 at(place - direction), 4
@@ -66,6 +67,7 @@ def test_the_covariance_is_that_of_repeated_measurements():
     estimates = [cra.identify_joint(NOMINAL, exact + sigma * rng.normal(size=4), sigma) for _ in range(24)]
     found = np.array([(e.k_t, e.k_r) for e in estimates])
     covariance = cra.identify_joint(NOMINAL, exact, sigma).covariance
+    # of 24: a deviation scatters by 1 / sqrt(48), the mean of chi-squared with 2 freedoms by sqrt(4 / 24) of 2
     assert np.std(found, axis=0) == pytest.approx(np.sqrt(np.diag(covariance)), rel=0.4)
     assert np.mean([np.sum(e.residuals**2) for e in estimates]) == pytest.approx(2.0, rel=0.6)  # 4 data, 2 unknowns
 
@@ -133,12 +135,12 @@ def test_two_frequencies_tell_two_stiffnesses_until_a_factor_of_two():
         ({"measured_frequencies": ["f"]}, TypeError, "measured_frequencies"),
         ({"uncertainty": 0.0}, ValueError, "uncertainty = 0"),
         ({"uncertainty": [0.1, 0.1, 0.1]}, ValueError, "broadcast"),
-        ({"arm": NOMINAL.replace(L=[1.0, 2.0])}, ValueError, "single arm"),
+        ({"system": NOMINAL.replace(L=[1.0, 2.0])}, ValueError, "single set of values"),
     ],
 )
 def test_bad_input_is_named(arguments, error, words):
     with pytest.raises(error, match=words):
-        cra.identify_joint(**({"arm": NOMINAL, "measured_frequencies": [2.4, 15.0], "uncertainty": 0.1} | arguments))
+        cra.identify_joint(**({"system": NOMINAL, "measured_frequencies": [2.4, 15.0], "uncertainty": 0.1} | arguments))
 
 
 @pytest.mark.parametrize("sigma", [[0.01], [0.01, 1e3, 1e3], [0.01, 1e20]])

@@ -243,11 +243,11 @@ def test_a_pinned_arm_is_left_behind_by_a_move():
         ({"zeta": -0.05}, ValueError, "zeta = -0.05"),
         ({"zeta": [0.1, 0.2]}, ValueError, "zeta"),
         ({"motion": 3.0}, TypeError, "motion = 3.0"),
-        ({"motion": BaseMotion([1.0, 2.0]), "arm": NOMINAL.replace(k_t=[1, 2, 3])}, ValueError, "broadcast"),
+        ({"motion": BaseMotion([1.0, 2.0]), "system": NOMINAL.replace(k_t=[1, 2, 3])}, ValueError, "broadcast"),
     ],
 )
 def test_bad_input_is_named(arguments, error, words):
-    good = {"arm": NOMINAL, "motion": BaseMotion(0.1), "t": GRID, "x": 0.5, "modes": 3}
+    good = {"system": NOMINAL, "motion": BaseMotion(0.1), "t": GRID, "x": 0.5, "modes": 3}
     with pytest.raises(error, match=words):
         cra.response(**(good | arguments))
 

@@ -28,7 +28,7 @@ def test_more_derivatives_forgive_a_wrong_frequency():
             shaped = MOVE.shaped(*cra.input_shaper(omega * (1 + error), order=order))
             ratios.append(cra.residual_vibration(arm, shaped, modes=1))
     orders = np.log2(np.array(ratios[1::2]) / ratios[::2])
-    assert orders == pytest.approx([1, 2, 3], abs=0.1)
+    assert orders == pytest.approx([1, 2, 3], abs=0.1)  # relative to the first term the next is 2 to 4 %, times order
 
 
 def test_two_equal_impulses_half_a_period_apart_unless_asked_for_more():

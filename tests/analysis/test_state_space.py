@@ -86,9 +86,9 @@ def test_a_light_base_meets_the_spring_force_of_the_root():
     [
         ({"input": "force"}, "input = 'force'"),
         ({"modes": 0}, "modes = 0"),
-        ({"arm": ARM.replace(k_t=[1, 2])}, "single"),
+        ({"system": ARM.replace(k_t=[1, 2])}, "single"),
     ],
 )
 def test_bad_input_is_named(arguments, words):
     with pytest.raises(ValueError, match=words):
-        cra.state_space(**({"arm": ARM} | arguments))
+        cra.state_space(**({"system": ARM} | arguments))

@@ -39,12 +39,9 @@ def test_the_arm_written_by_hand_gives_its_numbers(k_t, k_r):
     system = model.at({**values, "A": arm.A, "I_z": arm.I})
     expected = cra.natural_frequencies(arm, modes=5)
     np.testing.assert_allclose(cra.natural_frequencies(system, 5), expected, rtol=1e-13, atol=1e-9)
-    np.testing.assert_allclose(
-        np.abs(cra.modal_parameters(system, 5).participation),
-        np.abs(cra.modal_parameters(arm, 5).participation),
-        rtol=1e-9,
-        atol=1e-12,
-    )
+    elastic = expected > 0  # two rigid-body modes may be combined at will
+    ours, theirs = (cra.modal_parameters(one, 5).participation[elastic] for one in (system, arm))
+    np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
 
 
 def test_equations_of_the_freed_base_are_those_of_the_derivation():

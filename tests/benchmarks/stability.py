@@ -25,8 +25,8 @@ def chart(arm):
 
 def monodromy(arm, excitation, varpi, epsilon, **options):
     """The monodromy matrix of one point as anyone would write it."""
-    modal = cra.modal_parameters(arm, MODES)
-    omega, coupling = modal.omega, excitation.coupling(modal, varpi)
+    omega = cra.modal_parameters(arm, MODES).omega
+    coupling = excitation.coupling(arm, MODES, varpi)
 
     def rates(time, y):
         q, p = y.reshape(2, MODES, 2 * MODES)

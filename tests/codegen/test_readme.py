@@ -25,6 +25,7 @@ PACKAGES = {
     "cc": "gcc", "make": "make", "cmake": "cmake", "gfortran": "gfortran", "fpm": "fpm (from PyPI)", "octave": "octave",
     "cargo": "cargo", "node": "nodejs", "npm": "npm", "python": "python3", "pip": "pip and a package index",
 }  # fmt: skip
+COMPILERS = ("cc", "gfortran")
 LANGUAGES = ("c", "fortran", "python", "rust", "javascript", "octave")
 BLOCK = re.compile(r"(?:Save as `([^`]+)`:\n\n)?```(\w+)\n(.*?)```\n", re.DOTALL)
 
@@ -81,12 +82,15 @@ def follow(folder: Path, environment: dict[str, str]) -> str:
     printed, missing = "", set()
     todo = steps((folder / "README.md").read_text())
     assert sum(not step.file for step in todo) >= 2
+    without = any(text.split()[0] in COMPILERS and not has(text, environment) for file, text in todo if not file)
     for file, text in todo:
         if file:
             (folder / file).parent.mkdir(exist_ok=True)
             (folder / file).write_text(text)
         elif not has(text, environment):
             missing.add(PACKAGES[text.split()[0]])
+        elif without and text.split()[0] in ("make", "cmake"):
+            pass  # they call the compiler
         elif not (text.startswith("./") and not (folder / text[2:]).exists()):
             quiet = environment | ({"PYTHONWARNINGS": "default"} if text.startswith("pip") else {})
             done = subprocess.run(text, shell=True, cwd=folder, env=quiet, capture_output=True, text=True, timeout=300)

@@ -1,4 +1,4 @@
-"""Complex eigenvalues of damped models against closed forms and high precision; Ritz matrices as the second route."""
+"""Complex eigenvalues of damped models against closed forms and high precision, and against Ritz matrices."""
 
 from __future__ import annotations
 
@@ -53,7 +53,8 @@ def test_viscous_joint_damper(damped_joint, damper):
             slope = (joint_determinant(s + step, damper) - joint_determinant(s - step, damper)) / (2 * step)
             assert abs(joint_determinant(s, damper) / slope / s) < 1e-11
     second = damped_joint.ritz(elements=16).eigenvalues({**VALUES, c: damper}, 4)
-    np.testing.assert_allclose(second, found, rtol=2e-4)
+    # cubic elements: h^4 |v_xxxx|^2 / (1440 |v_xx|^2) = h^4 rhoA |s|^2 / (1440 EI) at most; twice that for complex s
+    assert (np.abs(second / found - 1) < 2 * np.abs(found) ** 2 * (0.24 * 1.1**4 / 4.6) / 16**4 / 1440 + 1e-10).all()
 
 
 def test_damper_between_its_limits(damped_joint):
@@ -98,7 +99,8 @@ def test_strong_damping_leaves_no_oscillation(damped_joint):
 
 def test_without_dampers_the_eigenvalues_are_the_frequencies():
     model = arm()
-    np.testing.assert_array_equal(model.eigenvalues(VALUES), 2j * np.pi * model.natural_frequencies(VALUES))
+    expected = 2j * np.pi * model.natural_frequencies(VALUES)
+    np.testing.assert_allclose(model.eigenvalues(VALUES), expected, rtol=4 * np.finfo(float).eps)  # 2 pi comes and goes
     np.testing.assert_array_equal(model.damping_ratios(VALUES), 0.0)
 
 
@@ -135,69 +137,6 @@ def test_gyroscopic_lagrangian_is_sent_to_eigenvalues():
         moving.natural_frequencies({U: 0.3})
     found = moving.eigenvalues({U: 0.3}, modes=4)
     np.testing.assert_allclose(found, 1j * np.pi * np.arange(1, 5) * (1 - 0.3**2), rtol=1e-10)
-
-
-# Ritz -----------------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("mode", [0, 1, 2])
-def test_ritz_converges_from_above_at_the_theoretical_rate(mode):
-    """Cubic elements, second derivatives in the energy: the eigenvalue error falls as h^4."""
-    model = arm()
-    exact = model.natural_frequencies(VALUES)[mode]
-    elements = np.array([4, 8, 16])
-    error = np.array([model.ritz(elements=int(n)).natural_frequencies(VALUES)[mode] for n in elements]) / exact - 1
-    assert (error > 0).all()
-    rate = np.log2(error[:-1] / error[1:])
-    np.testing.assert_allclose(rate[-1], 4.0, atol=0.15)
-
-
-def test_ritz_of_a_string_converges_faster():
-    """The same cubics for a first derivative: h^6."""
-    T, rho = sp.symbols("T rho")
-    y = sp.Function("y")(x, t)
-    string = cra.Model(
-        HALF * rho * y.diff(t) ** 2 - HALF * T * y.diff(x) ** 2,
-        fields=[y],
-        x=x,
-        domain=(0, L),
-        t=t,
-        left=-HALF * k_t * y**2,
-        right=HALF * m_e * y.diff(t) ** 2,
-    )
-    values = {T: 3.0, rho: 0.5, L: 1.0, k_t: 7.0, m_e: 0.2}
-    exact = string.natural_frequencies(values)[2]
-    error = [string.ritz(elements=n).natural_frequencies(values)[2] / exact - 1 for n in (4, 8, 16)]
-    np.testing.assert_allclose(np.log2(error[1] / error[2]), 6.0, atol=0.3)
-
-
-def test_ritz_bounds_the_exact_solver_for_varying_coefficients():
-    """A hanging, tapered arm with a tip mass: no closed form, two routes."""
-    g, a = sp.symbols("g a")
-    thickness = 1 - a * x / L
-    area = rhoA * thickness
-    below = sp.integrate(area, (x, x, L)) + m_e
-    density = (
-        HALF * area * v.diff(t) ** 2
-        - HALF * EI * thickness**3 * v.diff(x, 2) ** 2
-        - HALF * g * sp.expand(below) * v.diff(x) ** 2
-    )
-    model = arm(density)
-    values = {**VALUES, g: 9.81, a: 0.6}
-    exact = model.natural_frequencies(values, modes=4)
-    bound = model.ritz(elements=40).natural_frequencies(values, modes=4)
-    assert (bound > exact * (1 - 1e-9)).all()
-    np.testing.assert_allclose(bound, exact, rtol=2e-6)
-
-
-def test_ritz_treats_infinite_stiffness_like_the_exact_solver():
-    model = arm()
-    values = {**VALUES, k_t: [np.inf, np.inf, 900.0], k_r: [np.inf, 40.0, np.inf]}
-    np.testing.assert_allclose(
-        model.ritz(elements=30).natural_frequencies(values), model.natural_frequencies(values), rtol=1e-5
-    )
-    with pytest.raises(ValueError, match="EI = inf"):
-        model.ritz(elements=2).natural_frequencies({**VALUES, EI: np.inf})
 
 
 # steady vibration -----------------------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ EXEMPT = {
 _LAWS = "tests/test_properties.py"
 _LAMBDA, _MODAL = "tests/analysis/test_frequency_parameters.py", "tests/analysis/test_modal_parameters.py"
 _COUNTS = [
-    f"tests/model/test_characteristic.py::test_count_{name}"
+    f"tests/mechanics/test_one_wave.py::test_count_{name}"
     for name in ("steps_by_one_at_every_zero", "where_zeros_of_the_limits_are")
 ]
 _SEAMS = f"{_MODAL}::test_ranges_of_the_numbers_are_those_of_the_derivation"
@@ -156,7 +156,6 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "paper/oracles/by_hand": [["tests/paper/oracles/test_by_hand.py"]],
     "paper/oracles/forces": [],
     "paper/oracles/implicit_rates": [["tests/analysis/test_sensitivities.py"]],
-    "model/characteristic": [_FREQUENCIES, _MODES, _DIGITS, ["tests/model/test_characteristic.py", _SEAMS]],
     "paper/driven": [["tests/analysis/test_responses.py"]],
     "analysis/floquet_boundary": [
         [*_stability("the_search_finds_the_borders_of_what_grows"), *_ZONES[:1], *_SYSTEM[1:2]],
@@ -174,14 +173,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "paper/implicit": [["tests/analysis/test_sensitivities.py"]],
     "paper/joint": _PHYSICS,
     "paper/limits": [],
-    "model/modal": [
-        [*_MODES, f"{_MODAL}::test_a_textbook_cantilever", "tests/analysis/test_sensitivities.py"],
-        [f"{_LANES[0]}::test_modes", "tests/analysis/test_residual_gradient.py", _MODAL],
-    ],
     "paper/modal_dynamics": [],
-    "model/modal_lanes": [
-        [f"{_LANES[0]}::test_{name}" for name in ("a_mode_that_needs_another_basis_than_those_beside_it", "modes")]
-    ],
     "paper/modal_sum": [["tests/paper/test_energy.py"]],
     "paper/motion": [["tests/paper/test_motion.py"]],
     "paper/orthogonality": [],
@@ -195,9 +187,8 @@ _ROUNDS: dict[str, list[list[str]]] = {
         ["tests/analysis/test_sensitivities.py"],
         [f"{_LAWS}::test_sensitivities_are_slopes_at_any_length", "tests/analysis/test_residual_gradient.py"],
     ],
-    "model/shapes": [_MODES, [_MODAL]],
     "paper/oracles/shooting": [],
-    "model/spectrum": [["tests/model/test_spectrum.py", *_FREQUENCIES, _SEAMS], _DIGITS, _COUNTS, [_LAMBDA]],
+    "arm/route": [_MODES],
     "analysis/stability": [[*_ZONES, *_FORCED, *_SYSTEM], [*_LOOPED, *_DOUBTS, *_FEW_MODES]],
     "analysis/zones": [[*_ZONES, *_SUMMED], [*_LOOPED, *_DAMPED, *_DOUBTS], _ORDER],
     "model/oscillator": [["tests/model/test_oscillator.py"], ["tests/analysis/test_responses.py"]],
@@ -211,6 +202,14 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "solvers/modal_response": [
         ["tests/solvers/test_modal_response.py", *_COUPLED],
         ["tests/analysis/test_responses.py"],
+    ],
+    "solvers/modal_lanes": [
+        [f"{_LANES[0]}::test_{name}" for name in ("a_mode_that_needs_another_basis_than_those_beside_it", "modes")]
+    ],
+    "solvers/one_wave": [["tests/solvers/test_spectrum.py", *_FREQUENCIES, _SEAMS], _DIGITS, _COUNTS, [_LAMBDA]],
+    "solvers/one_wave_shapes": [
+        [*_MODES, f"{_MODAL}::test_a_textbook_cantilever", "tests/analysis/test_sensitivities.py"],
+        [f"{_LANES[0]}::test_modes", "tests/analysis/test_residual_gradient.py", _MODAL],
     ],
     "solvers/motion": [
         ["tests/solvers/test_motion.py", f"{_LAWS}::test_a_harmonic_of_no_size_or_speed_is_over_at_once"]

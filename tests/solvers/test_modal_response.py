@@ -179,6 +179,7 @@ def test_free_peak_with_damping_and_of_rigid_modes():
     unit = fading(t, OMEGA[:, None], zeta[:, None])
     for q, u in rng.normal(size=(20, 2, 2)) * np.array([[1.0], [8.0]]):
         history = np.abs(unit["displacement"] * q[:, None] + unit["impulse"] * u[:, None]).max(-1)
-        assert free_peak(fade, q, u) == pytest.approx(history, rel=1e-6)
+        missed = (OMEGA * t[1]).max() ** 2 / 8  # of a maximum halfway between two samples
+        assert free_peak(fade, q, u) == pytest.approx(history, rel=missed)
     rigid = fade._replace(omega=np.zeros(2))
     assert free_peak(rigid, np.array([-0.3, 0.2]), np.array([0.0, 1e-3])).tolist() == [0.3, np.inf]

@@ -175,8 +175,12 @@ def test_timoshenko_across_the_cut_off(thickness):
     np.testing.assert_allclose(z, exact, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("bending", "tension", "rtol"), [(1e-6, 1.0, 1e-12), (1e-3, 1.0, 1e-13), (1.0, -9.8, 1e-12)])
+@pytest.mark.parametrize(("bending", "tension", "rtol"), [(1e-6, 1.0, 1e-12), (1e-3, 1.0, 1e-13), (1.0, -9.8, 2e-12)])
 def test_axial_force(bending, tension, rtol):
+    """Some eps times sqrt(tension / bending), 1000 or 32 boundary layers; times pi^2 / (pi^2 - 9.8) in compression.
+
+    Near buckling the first square is what 142 times as large ones leave: measured 2 to 11 times eps of these.
+    """
     k = np.arange(1, 51) * np.pi
     z = lowest(beam(bending, tension=tension, free=PINNED), 50)[0]
     np.testing.assert_allclose(z, bending * k**4 + tension * k**2, rtol=rtol)
@@ -304,8 +308,8 @@ def test_steps_through_varying_coefficients_are_of_sixth_order(rod, basis):
             t, dt = (a[0, 0] for a in exponential(*rod.exponent(z, row, start, share)))
             total, slope = t @ total, dt @ total + t @ slope
         errors.append([np.abs(a - b).max() for a, b in zip((total, slope), carried(basis, 9.0), strict=True)])
-    assert max(errors[-1]) < 1e-9
-    np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 6.0, atol=0.1)
+    assert max(errors[-1]) < 1e-9  # of order h^6: of the size of 32^-6 = 1e-9, far above rounding
+    np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 6.0, atol=0.1)  # the next term is h^8
 
 
 def test_a_varying_part_is_cut_finer_than_a_uniform_one():
@@ -445,7 +449,9 @@ def test_mode_shapes_are_orthonormal_and_satisfy_the_equation():
     np.testing.assert_allclose(state[:, 0, :2], 0.0, atol=1e-10)
     np.testing.assert_allclose(state[:, -1, 2:] / z[0, :, None] ** 0.75, 0.0, atol=1e-9)
     force = np.gradient(state[:, :, 2], x, axis=1, edge_order=2)
-    np.testing.assert_allclose(force[:3], -z[0, :3, None] * v[:3], rtol=1e-4, atol=1e-2)
+    # differences at the ends are off by h^2 Q''' / 3, and Q''' = -z v'' with |v''| <= 2 sqrt(z)
+    error = (force[:3] + z[0, :3, None] * v[:3]) / z[0, :3, None] ** 1.5
+    np.testing.assert_allclose(error, 0.0, atol=1.01 * 2 * x[1] ** 2 / 3)
 
 
 @pytest.mark.parametrize("damper", [0.3, 0.9, 5.0])

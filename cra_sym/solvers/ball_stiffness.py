@@ -1,0 +1,158 @@
+"""The exact number of natural frequencies below a point, proved in ball arithmetic, for uniform problems of any kind.
+
+The interval is halved until no piece has a natural frequency of its own with its ends clamped: then the dynamic
+stiffness of the whole, condensed piece by piece, has as many negative eigenvalues, those eliminated on the way
+included, as frequencies lie below (Wittrick and Williams, 1971).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from .certificates import UndecidedError, decided, negatives
+
+__all__ = ["BallStiffness", "Term"]
+
+_MOST_LEVELS = 40
+
+
+class Term(NamedTuple):
+    """A term ``value p q`` of the energy density, p and q derivatives of fields.
+
+    Attributes
+    ----------
+    fields : (int, int)
+    gaps : (int, int)
+        How many orders p and q lie below the highest derivative of their field.
+    stiffness, mass : arb
+        ``value = stiffness - omega^2 mass``.
+    """
+
+    fields: tuple[int, int]
+    gaps: tuple[int, int]
+    stiffness: Any
+    mass: Any
+
+
+@dataclass(frozen=True)
+class BallStiffness:
+    """A uniform conservative problem ``y' = A y``, ``y = (q, w, P, r)``, in ball arithmetic.
+
+    Parameters
+    ----------
+    flint : module
+    system, boundary : callable
+        Matrices A and B at z = omega^2 (arb), as rows.
+    length : callable
+        Returns the length (arb).
+    displacements, coordinates : int
+        n and m.
+    free : callable
+        Returns the columns that span the motions the supports allow.
+    terms : callable
+        Returns the terms of the energy density.
+    zeros : int
+        Number of rigid-body motions.
+    """
+
+    flint: Any
+    system: Callable[[Any], Sequence[Sequence[Any]]]
+    boundary: Callable[[Any], Sequence[Sequence[Any]]]
+    length: Callable[[], Any]
+    displacements: int
+    coordinates: int
+    free: Callable[[], Sequence[Sequence[Any]]]
+    terms: Callable[[], Sequence[Term]]
+    zeros: int
+
+    def count(self, point: Any) -> int:
+        """Return the proved number of natural frequencies below a frequency in Hz (exact arb)."""
+        return decided(self.flint, lambda: self._count((2 * self.flint.arb.pi() * point) ** 2))
+
+    def _count(self, z: Any) -> int:
+        arb_mat, n, m = self.flint.arb_mat, self.displacements, self.coordinates
+        length = self.length()
+        levels = self._levels(z, length)
+        step = length / 2**levels
+        matrix = arb_mat([[entry * step for entry in row] for row in self.system(z)]).exp()
+        stiffness = self._piece(matrix)
+        fixed = 0
+        for _ in range(levels):
+            stiffness, eliminated = self._joined(stiffness)
+            fixed = 2 * fixed + eliminated
+        total = stiffness + arb_mat([list(row) for row in self.boundary(z)])
+        columns = self.free()
+        if not columns:
+            return fixed
+        basis = arb_mat([[column[i] for column in columns] for i in range(2 * n + m)])
+        return fixed + negatives((basis.transpose() * total * basis).table())
+
+    def _levels(self, z: Any, length: Any) -> int:
+        """Return how often to halve, so that no piece vibrates between clamped ends below z.
+
+        Functions that vanish at both ends of a piece of length h, with all derivatives but the highest, obey
+        |p| <= (h / pi)^gap |highest derivative| in the norm of square integrals (Poincare's inequality), so the energy
+        is positive where the highest derivatives outweigh all other terms.
+        """
+        terms = [(t.fields, t.gaps, t.stiffness - z * t.mass) for t in self.terms()]
+        own = {f[0]: value for f, gaps, value in terms if gaps == (0, 0) and f[0] == f[1]}
+        if not all(value > 0 for value in own.values()):
+            raise UndecidedError("the stiffness of a highest derivative is not positive")
+        size = {field: value.sqrt() for field, value in own.items()}
+        others = [
+            (sum(gaps), abs(value) / (size[f[0]] * size[f[1]]))
+            for f, gaps, value in terms
+            if not (gaps == (0, 0) and f[0] == f[1]) and not (f[0] == f[1] and gaps[0] == gaps[1] and value >= 0)
+        ]
+        share = length / self.flint.arb.pi()
+        for levels in range(_MOST_LEVELS):
+            if sum((value * share**gap for gap, value in others), self.flint.arb(0)) < 1:
+                return levels
+            share = share / 2
+        raise UndecidedError("the waves are too short")
+
+    def _piece(self, transfer: Any) -> Any:
+        """Return the dynamic stiffness of a piece in the order (q(0), w, q(h)) from its transfer matrix."""
+        n, m = self.displacements, self.coordinates
+        size = n + m
+
+        def block(rows: range, columns: range) -> Any:
+            return self.flint.arb_mat([[transfer[i, j] for j in columns] for i in rows])
+
+        q, force, lumped = range(n), range(size, size + n), range(size + n, 2 * size)
+        flexible = block(q, force).inv()
+        identity = self.flint.arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+        start = -1 * (flexible * block(q, range(size)))  # P(0) = start (q(0), w) + flexible q(h)
+        rows: list[list[Any]] = [[None] * (2 * n + m) for _ in range(2 * n + m)]
+
+        def put(index: range, left: Any, right: Any) -> None:
+            for i, row in enumerate(index):
+                for j in range(size):
+                    rows[row][j] = left[i, j]
+                for j in range(n):
+                    rows[row][size + j] = right[i, j]
+
+        put(range(n), -1 * start, -1 * flexible * identity)
+        ends = [(range(size, size + n), force)] + ([(range(n, size), lumped)] if m else [])
+        for target, source in ends:
+            by_force = block(source, force)
+            put(target, block(source, range(size)) + by_force * start, by_force * flexible)
+        return self.flint.arb_mat(rows)
+
+    def _joined(self, matrix: Any) -> tuple[Any, int]:
+        """Return the stiffness of two like pieces, their common section eliminated, and its negative eigenvalues."""
+        n, m = self.displacements, self.coordinates
+        size = 2 * n + m
+        left = [*range(n), *range(n, n + m), *range(size, size + n)]  # q(0), w, middle
+        right = [*range(size, size + n), *range(n, n + m), *range(n + m, size)]  # middle, w, q(2 h)
+        total = [[self.flint.arb(0)] * (size + n) for _ in range(size + n)]
+        for places in (left, right):
+            for i, row in enumerate(places):
+                for j, column in enumerate(places):
+                    total[row][column] = total[row][column] + matrix[i, j]
+        middle = self.flint.arb_mat([row[size:] for row in total[size:]])
+        across = self.flint.arb_mat([row[:size] for row in total[size:]])
+        outer = self.flint.arb_mat([row[:size] for row in total[:size]])
+        return outer - across.transpose() * middle.solve(across), negatives(middle.table())
