@@ -154,6 +154,8 @@ _ROUNDS: dict[str, list[list[str]]] = {
         [*_FORCED, *_SUMMED, _BORDERS],
     ],
     "paper/oracles/by_hand": [["tests/paper/oracles/test_by_hand.py"]],
+    "paper/oracles/forces": [],
+    "paper/oracles/implicit_rates": [["tests/analysis/test_sensitivities.py"]],
     "paper/driven": [["tests/analysis/test_responses.py"]],
     "analysis/floquet_boundary": [
         [*_stability("the_search_finds_the_borders_of_what_grows"), *_ZONES[:1], *_SYSTEM[1:2]],
@@ -167,6 +169,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     ],
     "paper/excited": [],
     "model/forced_waves": [["tests/analysis/test_frequency_response.py"]],
+    "paper/groups": [],
     "paper/implicit": [["tests/analysis/test_sensitivities.py"]],
     "paper/joint": _PHYSICS,
     "paper/limits": [],
@@ -179,6 +182,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "paper/parametric": [["tests/paper/test_parametric.py"], _FORCED],
     "analysis/static_corrections": [_STATICS, _SUMMED + _FEW_MODES, _LOOPED],
     "paper/resonance": [],
+    "paper/shapes": [],
     "analysis/sensitivities": [
         ["tests/analysis/test_sensitivities.py"],
         [f"{_LAWS}::test_sensitivities_are_slopes_at_any_length", "tests/analysis/test_residual_gradient.py"],
