@@ -131,8 +131,10 @@ def _units(system: System) -> np.ndarray:
     """
     rigid = system.replace(k_t=np.inf, k_r=np.inf)
     ends = system.numerics("stiffnesses")
-    forces = np.array([rigid.modes(1).force(*ends[name])[0] for name in _JOINT])
-    return forces**2 / rigid.natural_frequencies(1) ** 2
+    springs = [ends[name] for name in _JOINT]
+    forces = np.array([rigid.modes(1).force(spring.end, spring.place)[0] for spring in springs])
+    factors = np.array([spring.factor.function(*rigid.domain.values) for spring in springs])
+    return forces**2 / (factors * rigid.natural_frequencies(1) ** 2)
 
 
 def _checked(system: System, measured_frequencies: Any, uncertainty: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -155,7 +157,7 @@ def _checked(system: System, measured_frequencies: Any, uncertainty: Any) -> tup
 
 def _stiffness(place: np.ndarray) -> np.ndarray:
     """Return kappa from ln(1 + 1/kappa)."""
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         return 1 / np.expm1(place)
 
 

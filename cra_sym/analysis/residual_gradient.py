@@ -139,10 +139,12 @@ def _along_the_mode(system: System, name: str, modes: int, *, compliance: bool) 
         return None
     if name not in springs and (compliance or name not in inertias):
         return None
-    channel = springs.get(name) or inertias[name]
+    end, place, factor = springs.get(name) or inertias[name]
     by = "compliance" if compliance else "stiffness" if name in springs else "inertia"
-    change, _ = found.product_rates(1, 0, channel, by)
-    return -column(load.share.function(*system.domain.values)) * change
+    change, _ = found.product_rates(1, 0, (end, place), by)
+    unit = np.asarray(factor.function(*system.domain.values))
+    share = load.share.function(*system.domain.values) * (1 / unit if compliance else unit)
+    return -column(np.asarray(share)) * change
 
 
 def _by_differences(system: System, found: Sensitivities, name: str, modes: int, *, compliance: bool) -> Array:
@@ -164,9 +166,10 @@ def _by_differences(system: System, found: Sensitivities, name: str, modes: int,
 def _own_stiffness(system: System, name: str) -> Array:
     """Return the stiffness beside which the structure gives as much as a spring of an end, shape of the batch."""
     rigid = system.replace(**{name: np.inf})
-    force = rigid.modes(1).force(*system.numerics("stiffnesses")[name])[..., 0]
+    end, place, factor = system.numerics("stiffnesses")[name]
+    force, unit = rigid.modes(1).force(end, place)[..., 0], factor.function(*rigid.domain.values)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.broadcast_to((force / rigid.natural_frequencies(1)[..., 0]) ** 2, system.shape)
+        return np.broadcast_to((force / rigid.natural_frequencies(1)[..., 0]) ** 2 / unit, system.shape)
 
 
 def _reach(frequency: Array, rate: Array, place: Array) -> Array:

@@ -115,12 +115,13 @@ class Sensitivities:
         return np.where(self._still, np.nan, value) if self._still.any() else value
 
     def _by_compliance(self, name: str) -> Array:
-        end, place = self._system.numerics("stiffnesses")[name]
+        end, place, kernel = self._system.numerics("stiffnesses")[name]
         modes = self._system.modes(self._modes)
-        stiffness = column(np.asarray(self._system.values[name]))
+        factor = column(np.asarray(kernel.function(*self._system.domain.values)))
+        stiffness = factor * column(np.asarray(self._system.values[name]))
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             force = np.where(np.isinf(stiffness), modes.force(end, place), stiffness * modes.displacement(end, place))
-            value = -(force**2) / (8 * np.pi**2 * self.frequency)
+            value = -(force**2) / (8 * np.pi**2 * self.frequency * factor)
         return self._at_rest(value, self._squared(name))
 
     def _at_rest(self, value: Array, squared: Array) -> Array:

@@ -33,7 +33,7 @@ def moments_of_other_modes(system: System, excitation: Fluctuation, modes: int) 
     names = excitation.springs(system)
     problem: SpatialProblem = system.numerics("spatial")
     ends = [system.numerics("stiffnesses")[name] for name in names]
-    places = [place if end == 0 else problem.displacements + problem.coordinates + place for end, place in ends]
+    places = [place if end == 0 else problem.displacements + problem.coordinates + place for end, place, _ in ends]
     columns = flat_columns(system.parameters, system.shape)
     rows = columns.shape[1]
     squares = system.natural_frequencies(modes + 1).reshape(rows, -1) ** 2
@@ -47,11 +47,14 @@ def moments_of_other_modes(system: System, excitation: Fluctuation, modes: int) 
         load = here.tree.scale[:, places, None] * here.unit[:, places, :]
         found = load @ np.linalg.solve(here.matrix, load.swapaxes(-1, -2))
         receptance[members] = found.reshape(len(members), z.shape[1], len(names), len(names))
-    shapes = [system.modes(modes).displacement(end, place) for end, place in ends]
+    shapes = [system.modes(modes).displacement(end, place) for end, place, _ in ends]
     b = np.stack([shape.reshape(rows, modes) for shape in shapes], axis=-1)
     second, fourth = moments(receptance, squares[:, :-1], b[..., :, None] * b[..., None, :], limit)
-    values = [np.broadcast_to(system.values[name], system.shape).ravel() for name in names]
-    root = np.sqrt(np.stack([np.where(np.isinf(value), 0.0, value) for value in values], axis=-1))
+    values = [
+        system.values[name] * end.factor.function(*system.domain.values) for name, end in zip(names, ends, strict=True)
+    ]
+    flat = [np.broadcast_to(value, system.shape).ravel() for value in values]
+    root = np.sqrt(np.stack([np.where(np.isinf(value), 0.0, value) for value in flat], axis=-1))
     scale = root[:, :, None] * root[:, None, :]
     shape = (*system.shape, len(names), len(names))
     return (scale * second).reshape(shape), (scale * fourth).reshape(shape)

@@ -77,6 +77,7 @@ def left_derivatives(structure: Structure) -> list[sp.Expr]:
 
 
 def left_parameters(structure: Structure) -> tuple[sp.Symbol, ...]:
+    """Return the parameters of the left end's channels, as arguments of the derived functions."""
     return parameters((structure[0], ("",) * _n(structure)))
 
 

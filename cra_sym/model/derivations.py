@@ -17,7 +17,7 @@ from cra_sym.model.exact import BallProblem, exact_kernel
 from cra_sym.model.forms import form_of, load_of
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.one_wave import one_wave_route
-from cra_sym.model.projection import Form, Load
+from cra_sym.model.projection import EndParameter, Form, Load
 from cra_sym.model.routes import GeneralRoute, Route
 from cra_sym.model.spatial import SpatialProblem, spatial_problem
 from cra_sym.model.symmetry import asymmetry
@@ -272,27 +272,31 @@ def sizes(model: Model) -> tuple[int, int]:
     return len(model.state_form.displacements), len(model.state_form.coordinates)
 
 
-def stiffnesses(model: Model) -> dict[str, tuple[int, int]]:
-    """Return the stiffnesses of an end that hold one of its displacements, with that end (0 or 1) and displacement."""
+def stiffnesses(model: Model) -> dict[str, EndParameter]:
+    """Return the parameters that are, up to a factor, the stiffness of one displacement of an end, by name."""
     return _end_parameters(model, S.One)
 
 
-def inertias(model: Model) -> dict[str, tuple[int, int]]:
-    """Return the inertias of an end that move with one of its displacements, that end (0 or 1) and displacement."""
+def inertias(model: Model) -> dict[str, EndParameter]:
+    """Return the parameters that are, up to a factor, the inertia of one displacement of an end, by name."""
     return _end_parameters(model, -model.conservative.parameter)
 
 
-def _end_parameters(model: Model, factor: Expr) -> dict[str, tuple[int, int]]:
-    """Return the parameters that add themselves times a factor to one displacement of an end, and nothing else."""
+def _end_parameters(model: Model, unit: Expr) -> dict[str, EndParameter]:
+    """Return the parameters that add a positive multiple of themselves, times ``unit``, to one entry of an end."""
     form = model.conservative
     n, m = len(form.displacements), len(form.coordinates)
     inside = form.system.free_symbols | form.length.free_symbols | form.free.free_symbols
     found = {}
     for symbol in model.symbols:
-        slope = form.boundary.diff(symbol)
-        places = [k for k in range(2 * n + m) if slope[k, k] == factor and not n <= k < n + m]
-        if symbol not in inside and len(places) == 1 and sum(entry != 0 for entry in slope) == 1:
-            found[symbol.name] = (0, places[0]) if places[0] < n else (1, places[0] - n - m)
+        entries = [(k, entry / unit) for k, entry in enumerate(form.boundary.diff(symbol)) if entry != 0]
+        if symbol in inside or len(entries) != 1:
+            continue
+        (row, column), factor = divmod(entries[0][0], 2 * n + m), cancel(entries[0][1])
+        if row != column or n <= row < n + m or factor.has(symbol, form.parameter) or factor.is_negative:
+            continue
+        end, place = (0, row) if row < n else (1, row - n - m)
+        found[symbol.name] = EndParameter(end, place, kernel(factor, model.symbols, backend="numpy"))
     return found
 
 

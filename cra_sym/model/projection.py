@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cra_sym.kernels import Kernel
 from cra_sym.model.routes import Modes, RigidShare
 
-__all__ = ["Domain", "Form", "Load", "Place", "Projected", "project", "stations"]
+__all__ = ["Domain", "EndParameter", "Form", "Load", "Place", "Projected", "project", "stations"]
 
 Array = NDArray[np.float64]
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
@@ -89,6 +89,22 @@ class Form:
     density: Kernel
     points: Kernel
     uniform: bool
+
+
+class EndParameter(NamedTuple):
+    """A parameter that adds itself, times a factor, to the stiffness or to the inertia of one displacement of an end.
+
+    Attributes
+    ----------
+    end, place : int
+        Left (0) or right (1), and which displacement.
+    factor : Kernel
+        Of the parameters.
+    """
+
+    end: int
+    place: int
+    factor: Kernel
 
 
 class Domain(NamedTuple):

@@ -260,5 +260,5 @@ def _only_entry(form: StateForm, symbol: Symbol) -> int | None:
     """Return the displacement of an end that a stiffness alone holds, None if there is none or it does more."""
     inside = form.system.free_symbols | form.length.free_symbols | form.free.free_symbols
     slope = form.boundary.diff(symbol)
-    places = [i for i in range(slope.rows) if slope[i, i] == 1]
+    places = [i for i in range(slope.rows) if slope[i, i] != 0 and not slope[i, i].has(symbol, form.parameter)]
     return places[0] if symbol not in inside and len(places) == 1 and sum(e != 0 for e in slope) == 1 else None

@@ -151,6 +151,8 @@ _PHYSICS = [_FREQUENCIES, _MODES]
 _ROUNDS: dict[str, list[list[str]]] = {
     "analysis/modes": [_MODES, [_MODAL, _LAMBDA]],
     "paper/oracles/by_hand": [["tests/paper/oracles/test_by_hand.py"]],
+    "paper/oracles/forces": [],
+    "paper/oracles/implicit_rates": [["tests/analysis/test_sensitivities.py"]],
     "paper/driven": [["tests/analysis/test_responses.py"]],
     "analysis/floquet_boundary": [
         [*_stability("the_search_finds_the_borders_of_what_grows"), *_ZONES[:1], *_SYSTEM[1:2]],
@@ -166,6 +168,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
         [*_stability("excitations_compare_hash_and_pickle"), *_LOOPED, *_ORDER],
     ],
     "paper/excited": [],
+    "paper/groups": [],
     "paper/implicit": [["tests/analysis/test_sensitivities.py"]],
     "paper/joint": _PHYSICS,
     "paper/limits": [],
@@ -178,6 +181,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "paper/parametric": [["tests/paper/test_parametric.py"], _FORCED],
     "analysis/static_corrections": [_STATICS, _SUMMED + _FEW_MODES, _LOOPED],
     "paper/resonance": [],
+    "paper/shapes": [],
     "analysis/sensitivities": [
         ["tests/analysis/test_sensitivities.py"],
         [f"{_LAWS}::test_sensitivities_are_slopes_at_any_length", "tests/analysis/test_residual_gradient.py"],
