@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import broadcastable, count
+from cra_sym.checks import broadcastable, count, instance
 from cra_sym.model.projection import Domain, Load, Projected, project
 from cra_sym.model.routes import Modes, Route
 from cra_sym.model.spatial import check_range
@@ -61,6 +61,9 @@ class System:
     """
 
     def __init__(self, model: Model, values: Mapping[Any, Any], zeta: Any = 0.0) -> None:
+        from cra_sym.model.lagrangian import Model
+
+        instance("model", model, Model)
         self._model = model
         self._values = checked_values([symbol.name for symbol in model.symbols], values)
         self._zeta = frozen(checked_damping(zeta))
