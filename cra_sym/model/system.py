@@ -24,7 +24,7 @@ __all__ = ["MOST_MODES", "System"]
 
 Array = NDArray[np.float64]
 MOST_MODES = 1000
-_MOST_KEPT = 4  # numbers of modes for which a system keeps what it computed
+_MOST_KEPT = 8  # numbers of modes for which a system keeps what it computed
 
 
 class System:

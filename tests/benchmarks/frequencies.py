@@ -142,22 +142,25 @@ class Case:
         return found
 
     def quantities(self) -> dict[str, tuple[int, Callable[[int], Any]]]:
-        """Return the public functions over all arms, on as many threads as they take, every array of ours looked at."""
+        """Return the public functions over all arms, on as many threads as they take, every array of ours looked at.
+
+        An arm keeps its modes: each call gets a new one.
+        """
 
         if has_compiler():
             few, family = [x[:3] for x in self.groups], arm_family()
             family.modes(*few, lam=self.lam[:3], compile=True).quantities(family.layout.left)  # makes machine code
 
         def modal(_: int) -> list[np.ndarray]:
-            found = cra.modal_parameters(self.arms, self.modes)
+            found = cra.modal_parameters(self.arms.replace(), self.modes)
             return [getattr(found, name) for name in MODAL]
 
         def sensitive(_: int) -> list[np.ndarray]:
-            found = cra.sensitivities(self.arms, self.modes)
+            found = cra.sensitivities(self.arms.replace(), self.modes)
             return [getattr(found, name) for name in SENSITIVITIES]
 
         return {
-            FREQUENCIES: (self.size, lambda n: cra.natural_frequencies(self.arms, self.modes)),
+            FREQUENCIES: (self.size, lambda n: cra.natural_frequencies(self.arms.replace(), self.modes)),
             "modal_parameters": (self.size, modal),
             "sensitivities": (self.size, sensitive),
         }

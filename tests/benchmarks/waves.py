@@ -1,8 +1,9 @@
-"""Frequencies of beams with two wave numbers: this package's routes against a brentq loop on their own determinants.
+"""Frequencies of any Lagrangian: beams with two wave numbers against a brentq loop, others against the paper's arm.
 
-The loop is that of `frequencies`: SciPy's brentq root by root, handed brackets that hold exactly one root each, on the
-characteristic function of the model that SymPy's lambdify makes of it, in complex arithmetic: a wave number is real or
-imaginary. Without brackets, a user has to scan first.
+The beams are solved by the solver itself and by the public function of a System. The loop is that of `frequencies`:
+SciPy's brentq root by root, handed brackets that hold exactly one root each, on the characteristic function of the
+model that SymPy's lambdify makes of it, in complex arithmetic: a wave number is real or imaginary. Without brackets, a
+user has to scan first.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import sympy as sp
 from scipy.optimize import brentq
 
 import cra_sym as cra
+from cra_sym import symbols as s
 from cra_sym.kernels import compiled, has_compiler
 from cra_sym.kernels.parts import in_parts
 from cra_sym.solvers.waves import Search, UniformProblem, lowest_waves, template
@@ -26,6 +29,8 @@ from tests.benchmarks.machine import in_rounds, processors, summary
 
 SEED = 20261130
 LOOP, SCAN = "brentq loop", "scan and brentq loop"
+PUBLIC, PUBLIC_NUMPY = "natural_frequencies", "natural_frequencies, NumPy"
+ARM, ARM_AS_MODEL, STRING = "cra.Arm", "the arm's Lagrangian as a Model", "a string"
 MODES, POINTS = 3, 120
 
 x, t = sp.symbols("x t")
@@ -60,11 +65,11 @@ def families(size: int, seed: int = SEED) -> dict[str, Family]:
             model(KINETIC - BENDING - HALF * T * v.diff(x) ** 2, v.diff(x), (v,)),
             {**joints, "T": 10 ** rng.uniform(-2, 4, size)},
         ),
-        "foundation, end mass": Family(
+        "foundation with end mass": Family(
             model(KINETIC - BENDING - HALF * K * v**2, v.diff(x), (v,)),
             {**joints, "K": 10 ** rng.uniform(-2, 4, size)},
         ),
-        "Timoshenko, end mass and spring": Family(
+        "Timoshenko with end mass and spring": Family(
             model(thick, theta, (v, theta)), {**joints, "I": inertia, "G": 1 / (3 * inertia)}
         ),
     }
@@ -150,6 +155,16 @@ class Case:
         in_parts(fill, number, MODES, threads=threads, compiled=True)
         return result
 
+    def public(self, number: int) -> np.ndarray:
+        """Solve as a user does."""
+        system = self.family.model.at({name: values[:number] for name, values in self.family.values.items()})
+        return 2 * np.pi * cra.natural_frequencies(system, MODES)
+
+    def public_numpy(self, number: int) -> np.ndarray:
+        """Solve as a user without a compiler does."""
+        with mock.patch("cra_sym.model.two_waves.wants_compiler", return_value=False):
+            return self.public(number)
+
     def routes(self) -> dict[str, tuple[int, Callable[[int], np.ndarray]]]:
         """Return name -> (number of sets, function of that number)."""
         size = len(self.problem.length)
@@ -157,6 +172,8 @@ class Case:
             LOOP: (min(size, 300), self.loop),
             SCAN: (min(size, 100), self.scan),
             "cra_sym, NumPy": (min(size, 20_000), self.ours),
+            PUBLIC_NUMPY: (min(size, 20_000), self.public_numpy),
+            PUBLIC: (size, self.public),
         }
         if has_compiler():
             for threads in sorted({1, processors()}):
@@ -172,9 +189,14 @@ def measured(size: int, rounds: int) -> dict[str, dict[str, Any]]:
         case = Case(family)
         routes = case.routes()
         times = in_rounds({route: (lambda f=f, n=n: f(n)) for route, (n, f) in routes.items()}, rounds)  # type: ignore[misc]
-        rows: dict[str, Any] = {route: summary([1e6 * s for s in times[route]], n) for route, (n, _) in routes.items()}
+        rows: dict[str, Any] = {}
+        for route, (number, _) in routes.items():
+            rows[route] = {**summary([1e6 * seconds for seconds in times[route]], number), "sets": number}
         for row in rows.values():
             row["times the loop"] = rows[LOOP]["median"] / row["median"]
+        for route in (PUBLIC, PUBLIC_NUMPY):
+            found = case.public(len(case.omega)) if route == PUBLIC else case.public_numpy(len(case.omega))
+            rows[route]["differs by"] = float(np.max(np.abs(found / case.omega - 1)))
         found = case.loop(min(size, 300))
         different = np.abs(found / case.omega[: len(found)] - 1)
         rows[LOOP]["differs by"] = float(np.nanmax(different))
@@ -183,12 +205,54 @@ def measured(size: int, rounds: int) -> dict[str, dict[str, Any]]:
     return report
 
 
+def models(size: int, rounds: int, seed: int = SEED) -> dict[str, dict[str, float]]:
+    """Return microseconds a set for the arm, for its Lagrangian as a Model and for a string, with random ends."""
+    rng = np.random.default_rng(seed)
+    ends = {"k_t": 10 ** rng.uniform(-1, 6, size), "m_e": rng.uniform(0, 1, size)}
+    turning = {"k_r": 10 ** rng.uniform(-2, 4, size)}
+    arm = cra.Arm.nominal()
+    density, left, right = cra.paper_lagrangian()
+    as_model = cra.Model(density, fields=[s.v], prescribed=[s.w], x=s.x, domain=(0, s.L), t=s.t, left=left, right=right)
+    numbers = {"E": arm.E, "I_z": arm.I, "rho": arm.rho, "A": arm.A, "L": arm.L, "m_b": arm.m_b, "J_e": arm.J_e}
+    string = cra.Model(KINETIC - HALF * T * v.diff(x) ** 2, fields=[v], x=x, domain=(0, L), t=t, left=JOINT, right=TIP)
+    systems: dict[str, Callable[[], cra.System]] = {
+        ARM: lambda: arm.replace(**ends, **turning),
+        ARM_AS_MODEL: lambda: as_model.at({**numbers, **ends, **turning}),
+        STRING: lambda: string.at({"T": 1.0, "L": 1.0, **ends}),
+    }
+    found = cra.natural_frequencies(systems[ARM](), MODES)
+    different = np.abs(cra.natural_frequencies(systems[ARM_AS_MODEL](), MODES) / found - 1)
+    assert different.max() < 1e-12
+    routes = {name: (lambda make=make: cra.natural_frequencies(make(), MODES)) for name, make in systems.items()}  # type: ignore[misc]
+    times = in_rounds(routes, rounds)
+    report = {name: summary([1e6 * seconds for seconds in times[name]], size) for name in systems}
+    for row in report.values():
+        row["times the arm"] = row["median"] / report[ARM]["median"]
+    return report
+
+
+def table(waves: dict[str, dict[str, Any]], others: dict[str, dict[str, float]]) -> list[str]:
+    """Return both reports as lines of Markdown."""
+    lines = []
+    for title, rows in waves.items():
+        lines += ["", f"| {title}: route | sets | µs a set | quartiles | times the loop | differs by |"]
+        lines += ["| --- " + "| --: " * 5 + "|"]
+        for route, row in rows.items():
+            differs = f"{row['differs by']:.0e}" if "differs by" in row else ""
+            lines.append(
+                f"| {route} | {row['sets']} | {row['median']:.3g} | {row['low']:.3g} to {row['high']:.3g} "
+                f"| {row['times the loop']:.1f} | {differs} |"
+            )
+    lines += ["", "| model, natural_frequencies | µs a set | quartiles | times the arm |", "| --- | --: | --: | --: |"]
+    for name, other in others.items():
+        low, high = other["low"], other["high"]
+        lines.append(f"| {name} | {other['median']:.3g} | {low:.3g} to {high:.3g} | {other['times the arm']:.2f} |")
+    return lines[1:]
+
+
 def main() -> None:
     """Measure and print."""
-    for title, rows in measured(1_000_000, 5).items():
-        print(title)
-        for route, row in rows.items():
-            print(f"  {route}: {row['median']:.3g} us a set, {row['times the loop']:.1f} times the loop")
+    print("\n".join(table(measured(1_000_000, 5), models(1_000_000, 7))))
 
 
 if __name__ == "__main__":

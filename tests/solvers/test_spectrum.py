@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cra_sym.arm.instance import arm_model, model_values
 
 import cra_sym as cra
 from cra_sym.model.one_wave_family import family
-from cra_sym.model.values import Values
+from cra_sym.model.values import flat_columns
 from cra_sym.solvers.spectrum import Characteristic, _quarters, spectrum
 
 ARM = family((("k", "k"), ("m", "m")))
@@ -126,9 +125,8 @@ def test_counts_of_the_arm_are_those_of_the_dynamic_stiffness():
     )
     z = rng.uniform(0.2, 40.0, 40) ** 4
     special, _ = ARM.characteristic(arm.kappa_t, arm.kappa_r, arm.mu, arm.iota).count(z, slice(None))
-    model = arm_model()
     omega = np.sqrt(z * arm.EI / arm.rhoA) / arm.L**2
-    for rows, _, problem in model._spatial.problems(Values.read(model.symbols, model_values(arm))):
+    for rows, _, problem in arm.numerics("spatial").problems(flat_columns(arm.parameters, arm.shape)):
         generic = problem.evaluate(omega[rows] ** 2, np.arange(len(rows))).count
         np.testing.assert_array_equal(generic, special[rows])
 
@@ -188,7 +186,7 @@ def test_one_driver_finds_the_same_zeros_by_the_arms_pair_and_by_the_generic_one
     sprung = {"k_t": 10 ** rng.uniform(1, 7, 12), "k_r": 10 ** rng.uniform(-1, 4, 12)}
     arm = cra.Arm.nominal().replace(m_e=10 ** rng.uniform(-4, 0, 12), J_e=10 ** rng.uniform(-6, -2, 12), **sprung)
     special = spectrum(ARM.characteristic(arm.kappa_t, arm.kappa_r, arm.mu, arm.iota), 6)
-    model, unit = arm_model(), np.full(12, float(arm.EI / (arm.rhoA * arm.L**4)))
-    for rows, _, problem in model._spatial.problems(Values.read(model.symbols, model_values(arm))):
+    unit = np.full(12, float(arm.EI / (arm.rhoA * arm.L**4)))
+    for rows, _, problem in arm.numerics("spatial").problems(flat_columns(arm.parameters, arm.shape)):
         generic: Characteristic = Generic(problem, unit[rows])
         np.testing.assert_allclose(spectrum(generic, 6), special[rows], rtol=1e-8)
