@@ -151,8 +151,6 @@ class _Undamped:
         self, system: System, places: NDArray[np.float64] | None, drive: Any, kind: str | None, place: int
     ) -> None:
         self._system, self._places, self._place = system, places, place
-        from cra_sym.model.derivations import driven_displacement
-
         self.motion = _motion_name(system, drive)
         if self.motion is not None:
             if kind is not None:
@@ -161,6 +159,8 @@ class _Undamped:
             self._driven = self._problem.displacements + system.numerics("driven_coordinate", self.motion)
         else:
             self._problem = system.numerics("damped_spatial")
+            from cra_sym.model.derivations import driven_displacement  # SymPy is there: the drive is an expression
+
             self._driven = driven_displacement(system.model, drive)
         self._kind = "motion" if self.motion is not None else choice("kind", "force" if kind is None else kind, _KINDS)
         self.by_force = self._kind == "force"

@@ -139,6 +139,7 @@ def _at_right(n: int) -> list[sp.Expr]:
 
 
 def at_left(n: int) -> list[sp.Expr]:
+    """Return a shape and its derivatives at the left end in waves."""
     one, zero = sp.Integer(1), sp.Integer(0)
     return [_waves(n, d, one, zero, one, decay) for d in range(2 * n)]
 
@@ -169,6 +170,7 @@ def amplitudes_far(structure: Structure) -> Derivation:
 
 
 def written_out(expressions: Sequence[sp.Expr], structure: Structure) -> tuple[sp.Expr, ...]:
+    """Return expressions in the parameters of the channels that a structure has."""
     return tuple(x.xreplace(_whole(structure)) for x in expressions)
 
 
