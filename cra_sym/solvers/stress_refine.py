@@ -1,0 +1,234 @@
+"""From a continuum to modes of stated accuracy: quadrature mesh, then elements and degrees until the estimate says so."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .stress import Columns, Continuum
+from .stress_mesh import Mesh, TooFineError, cells, resolved
+from .stress_modes import ModeFields
+from .stress_spectrum import EPS, Spectrum, spectrum
+
+__all__ = ["Found", "solved"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+_ROUNDS, _MOST_UNKNOWNS, _MOST_DEGREE = 24, 1500, 40
+_MOST_ELEMENTS = 12  # to begin with: more spans than that share elements
+_LANES = 4_000_000  # numbers in the largest array of a chunk
+
+
+@dataclass(frozen=True)
+class Found:
+    """Modes of some of the rows.
+
+    Attributes
+    ----------
+    rows : ndarray of int
+    fields : ModeFields
+    accuracy : ndarray, shape (rows,)
+        Estimated relative error of the frequencies, the largest of the modes.
+    """
+
+    rows: Index
+    fields: ModeFields
+    accuracy: Array
+
+
+def solved(problem: Continuum, modes: int, tolerance: float, target: float) -> list[Found]:
+    """Return the lowest modes of every row.
+
+    Parameters
+    ----------
+    problem : Continuum
+    modes : int
+    tolerance : float
+        Relative error of the squared frequencies that must be reached.
+    target : float
+        What is aimed at; a smaller one gives better mode shapes, whose error is as its square root.
+
+    Raises
+    ------
+    ValueError
+        If the structure has buckled, has fewer modes, or does not reach the tolerance: names the place and the figure.
+    """
+    found: list[Found] = []
+    for rows, ends in _alike(problem):
+        found += _group(problem.take(rows), rows, ends, modes, tolerance, target)
+    return found
+
+
+def _alike(problem: Continuum) -> Iterator[tuple[Index, tuple[bool, bool]]]:
+    """Yield sets whose stiffness vanishes at the same ends."""
+    kinds = np.stack([_vanishes(problem, end) for end in (0, 1)], axis=1)
+    for kind in np.unique(kinds, axis=0):
+        yield np.nonzero((kinds == kind).all(axis=1))[0], (bool(kind[0]), bool(kind[1]))
+
+
+def _vanishes(problem: Continuum, end: int) -> NDArray[np.bool_]:
+    """Return in which rows a stiffness vanishes at an end; refuse one with a continuous spectrum."""
+    edges = problem.edges
+    width = edges[:, 1] - edges[:, 0] if end == 0 else edges[:, -1] - edges[:, -2]
+    inward = np.array([1e-7, 2e-7])
+    at = edges[:, :1] + width[:, None] * inward if end == 0 else edges[:, -1:] - width[:, None] * inward
+    rows = np.arange(len(edges))
+    found = problem.coefficients(at, rows)
+
+    def exponent(entry: Array) -> Array:
+        entry = np.broadcast_to(entry, at.shape)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            power = np.log2(np.abs(entry[:, 1] / entry[:, 0]))
+        return np.where(np.isfinite(power), power, 0.0)
+
+    tops = problem.tops()
+    vanishes = np.zeros(len(edges), dtype=bool)
+    for field, order in enumerate(problem.orders):
+        power = exponent(found["W"][field, field])
+        place = tops[field] - order + 1
+        weight = exponent(found["M"][place, place]) if (place, place) in found["M"] else np.zeros(len(edges))
+        vanishes |= power > 0.05
+        steep = power - weight > 2 * order - 1e-3
+        if steep.any():
+            name, value = ("left", "right")[end], float((power - weight)[steep][0])
+            raise ValueError(
+                f"the stiffness vanishes at the {name} end by {value:.3g} powers of the distance more than the mass: "
+                f"from {2 * order} on there are no natural frequencies but a continuous spectrum; use ritz"
+            )
+    return vanishes
+
+
+def _group(
+    problem: Continuum, rows: Index, ends: tuple[bool, bool], modes: int, tolerance: float, target: float
+) -> list[Found]:
+    spans = problem.edges.shape[1] - 1
+    if ends[0] and not ends[1]:
+        from dataclasses import replace
+
+        problem = replace(problem, origin=1)
+    elements = cells(spans, max(_MOST_ELEMENTS, int(np.ceil(modes / 12))))
+    if spans == 1 and modes > 20:
+        elements = np.linspace(0.0, 1.0, int(np.ceil(modes / 12)) + 1)
+    strained = np.zeros(len(elements) - 1, dtype=bool)
+    strained[0] |= ends[0]
+    strained[-1] |= ends[1]
+    try:
+        pieces, unresolved = _quadrature(problem, elements, strained)
+    except TooFineError as error:
+        if error.sets == 1:
+            raise
+        half = len(rows) // 2
+        parts = (np.arange(half), np.arange(half, len(rows)))
+        return [
+            item for part in parts for item in _group(problem.take(part), rows[part], ends, modes, tolerance, target)
+        ]
+    degree = 8 + int(np.ceil(1.8 * modes / (len(elements) - 1)))
+    mesh = Mesh(pieces, elements, degree, strained)
+    return _refined(problem, rows, mesh, unresolved, modes, tolerance, target)
+
+
+def _quadrature(problem: Continuum, elements: Array, strained: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Return the pieces of the quadrature: the compliance is resolved, or the stiffness where the strain is expanded."""
+    whole = np.union1d(elements, np.arange(problem.edges.shape[1]))
+    parts, unresolved = [], np.zeros(len(problem.edges))
+    for kind in np.unique(strained):
+        for left, right, is_strained in zip(elements[:-1], elements[1:], strained, strict=True):
+            if is_strained != kind or (not strained.any() and left > 0.0):
+                continue
+            if not strained.any():
+                right = elements[-1]
+            inner = whole[(whole >= left) & (whole <= right)]
+            part, rest = resolved(problem.sample(bool(kind)), problem.edges, inner, "coefficients")
+            parts.append(part)
+            unresolved = np.maximum(unresolved, rest)
+    return np.unique(np.concatenate(parts)), unresolved
+
+
+def _refined(
+    problem: Continuum, rows: Index, mesh: Mesh, unresolved: Array, modes: int, tolerance: float, target: float
+) -> list[Found]:
+    found: list[Found] = []
+    every = np.arange(len(rows))
+    before, degree_before = np.inf, 0
+    for turn in range(_ROUNDS):
+        marks = np.zeros(len(mesh.elements) - 1)
+        open_: list[Index] = []
+        worst = 0.0
+        best: list[tuple[Found, Array, Array]] = []
+        for part in _chunks(problem, mesh, every):
+            columns = Columns(problem.take(part), mesh)
+            result = spectrum(columns, modes)
+            fields = ModeFields(columns, result.z, result.vectors)
+            error, share = _error(result, fields)
+            good = error.max(axis=1) <= target
+            accuracy = 0.5 * np.maximum(error.max(axis=1), result.rounding.max(axis=1)) + unresolved[part]
+            best.append((Found(rows[part], fields, accuracy), error, good))
+            if not good.all():
+                open_.append(part[~good])
+                marks = np.maximum(marks, share[~good].max(axis=(0, 1)))
+                worst = max(worst, float(error[~good].max()))
+        last = turn == _ROUNDS - 1 or columns.size > _MOST_UNKNOWNS or worst > 0.5 * before and turn > 8
+        for item, error, good in best:
+            settled = good | (error.max(axis=1) <= tolerance) if last else good
+            if settled.any():
+                found.append(_some(item, settled))
+            if last and not settled.all():
+                _refuse(item, error, settled, mesh, marks)
+        if not open_ or last:
+            return found
+        every = np.concatenate(open_)
+        rising = mesh.degree > degree_before and worst < 1e-3 * before
+        if (rising or turn == 0) and mesh.degree < _MOST_DEGREE - 6 and len(mesh.elements) < 20:
+            degree_before, mesh = mesh.degree, _raised(mesh, 6)
+        else:
+            degree_before = mesh.degree
+            mesh = mesh.split(marks >= 0.03 * marks.max())
+        before = worst
+    return found
+
+
+def _raised(mesh: Mesh, by: int) -> Mesh:
+    return Mesh(mesh.pieces, mesh.elements, mesh.degree + by, mesh.strained)
+
+
+def _chunks(problem: Continuum, mesh: Mesh, every: Index) -> Iterator[Index]:
+    size = problem.displacements + len(problem.orders) * (len(mesh.elements) - 1) * (mesh.degree + 1)
+    lanes = size * max(size, (len(mesh.pieces) - 1) * mesh.points)
+    step = max(1, _LANES // lanes)
+    for start in range(0, len(every), step):
+        yield every[start : start + step]
+
+
+def _error(result: Spectrum, fields: ModeFields) -> tuple[Array, Array]:
+    """Return the estimated relative error of z, (sets, modes), and by element."""
+    share = 2.0 * fields.residual
+    return share.sum(axis=-1), share
+
+
+def _some(item: Found, chosen: NDArray[np.bool_]) -> Found:
+    if chosen.all():
+        return item
+    index = np.nonzero(chosen)[0]
+    fields = item.fields
+    columns = Columns(fields.problem.take(index), fields.columns.mesh)
+    return Found(
+        item.rows[index], ModeFields(columns, fields.z[index], fields.vectors[index]), item.accuracy[index]
+    )
+
+
+def _refuse(item: Found, error: Array, settled: NDArray[np.bool_], mesh: Mesh, marks: Array) -> None:
+    worst = np.unravel_index(np.argmax(np.where(settled[:, None], 0.0, error)), error.shape)
+    element = int(np.argmax(marks))
+    piece = np.searchsorted(mesh.pieces, mesh.elements[element : element + 2])
+    ends = item.fields.columns.grid.ends
+    ends = ends[min(int(worst[0]), len(ends) - 1)]
+    raise ValueError(
+        f"modes = {error.shape[1]}: the relative error of frequency {int(worst[1]) + 1} stays at "
+        f"{0.5 * error[worst]:.1g}, from the coefficients at x = {ends[piece[0]]:.6g} to {ends[piece[1]]:.6g}"
+    )
+
+
+_ = EPS
