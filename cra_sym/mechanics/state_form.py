@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sympy import Expr, Matrix, S, Symbol, eye, zeros
+from sympy import Expr, Matrix, S, Symbol, diag, eye, zeros
 from sympy.core.function import AppliedUndef
 
 from cra_sym import checks
@@ -132,7 +132,7 @@ def _system(weak: WeakForm, parameter: Symbol) -> Matrix:
         if jet.space:
             pick_top[row, n + m + section.index(jet._replace(space=jet.space - 1))] = S.One
     motion = eye(n + m).row_join(zeros(n + m))
-    top = leading.inv() * (pick_top - stiffness(highest, state) * motion)
+    top = _inverse(leading) * (pick_top - stiffness(highest, state) * motion)
     slope, lower = zeros(n, width), zeros(n + m, width)
     for row, jet in enumerate(section):
         raised = jet._replace(space=jet.space + 1)
@@ -142,6 +142,11 @@ def _system(weak: WeakForm, parameter: Symbol) -> Matrix:
             slope[row, :] = top[highest.index(raised), :]
     rate = stiffness(state, state) * motion + stiffness(state, highest) * top - lower
     return Matrix.vstack(slope, zeros(m, width), rate)
+
+
+def _inverse(matrix: Matrix) -> Matrix:
+    """Return the inverse; of a diagonal matrix entry by entry, as it stands: 1 + exp(-x) stays bounded."""
+    return diag(*(1 / entry for entry in matrix.diagonal())) if matrix.is_diagonal() else matrix.inv()
 
 
 def _boundary(weak: WeakForm, parameter: Symbol) -> Matrix:

@@ -19,6 +19,7 @@ from cra_sym.model.lagrangian import Model
 from cra_sym.model.projection import Form, Load
 from cra_sym.model.routes import GeneralRoute, Route
 from cra_sym.model.spatial import SpatialProblem, spatial_problem
+from cra_sym.model.stress_route import stress_route
 from cra_sym.model.symmetry import asymmetry
 
 __all__ = ["axial", "causes", "constant", "damping", "geometry", "load", "names", "rates", "route", "spatial"]
@@ -53,7 +54,8 @@ def damped_spatial(model: Model) -> SpatialProblem:
 
 def route(model: Model) -> Route:
     """Return the fastest way to natural frequencies and modes that the Lagrangian allows."""
-    return GeneralRoute(spatial(model))
+    general = spatial(model)
+    return (None if general.uniform else stress_route(model, general)) or GeneralRoute(general)
 
 
 # Loads -----------------------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.kernels import Kernel
-from cra_sym.model.routes import Modes, RigidShare
+from cra_sym.model.routes import Modes, RigidShare, Stations
 
 __all__ = ["Domain", "Form", "Load", "Place", "Projected", "project", "stations"]
 
@@ -114,6 +114,8 @@ def column(value: float | Array, axes: int = 1) -> float | Array:
 
 def stations(domain: Domain, modes: Modes) -> tuple[Array, Array]:
     """Return points and weights of a quadrature along the domain, shape (points,) or (..., points)."""
+    if isinstance(modes, Stations):
+        return modes.stations()
     panels = modes.omega.shape[-1] + 8  # ten points each: several to a half-wave of the highest mode
     share = ((np.arange(panels)[:, None] + 0.5 * (1.0 + _POINTS)) / panels).ravel()
     length = column(domain.length)

@@ -16,7 +16,7 @@ from cra_sym.solvers.eigenvalues import lowest
 from cra_sym.solvers.shapes import mode_states
 from cra_sym.solvers.stiffness import DynamicStiffness
 
-__all__ = ["GeneralRoute", "Modes", "RigidShare", "Route", "tip_sign"]
+__all__ = ["Estimated", "GeneralRoute", "Modes", "RigidShare", "Route", "Stations", "tip_sign"]
 
 Array = NDArray[np.float64]
 Values = Sequence[float | Array]
@@ -58,6 +58,22 @@ class RigidShare(Protocol):
 
     def momentum(self) -> Array:
         """Return the integral of mass per length times shape, end masses included, shape (..., modes)."""
+
+
+@runtime_checkable
+class Estimated(Protocol):
+    """A route that estimates its own error."""
+
+    def estimated(self, values: Values, shape: tuple[int, ...], modes: int) -> tuple[Array, Array]:
+        """Return the first natural frequencies and the estimated largest relative error of them, shape ``shape``."""
+
+
+@runtime_checkable
+class Stations(Protocol):
+    """Modes that know where a quadrature must have its points."""
+
+    def stations(self) -> tuple[Array, Array]:
+        """Return points and weights of a quadrature along the domain, shape (..., points)."""
 
 
 class Route(Protocol):

@@ -1,0 +1,143 @@
+"""Breakpoints of a batch of parameter sets: in closed form where they are affine in x, else by bisection."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.kernels import Kernel, kernel
+from cra_sym.mechanics.breakpoints import switches
+
+if TYPE_CHECKING:
+    from sympy import Expr, Symbol
+
+__all__ = ["Breaks", "breaks"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+_SAMPLES = 513
+_MOST = 4000  # breakpoints of one switch
+_HALVINGS = 80  # from any sampled interval to the last bit
+
+
+@dataclass(frozen=True)
+class Breaks:
+    """Compiled switches of the coefficients of a model; see :mod:`cra_sym.mechanics.breakpoints`.
+
+    Attributes
+    ----------
+    affine : Kernel
+        Of (x, parameters): value and slope of each switch that is affine in x.
+    others : Kernel
+        Of (x, parameters): values of the other switches.
+    levels : tuple of bool
+        Of the affine ones, then of the others: whether all integer values count.
+    """
+
+    affine: Kernel
+    others: Kernel
+    levels: tuple[bool, ...]
+
+    def edges(self, columns: Array, left: Array, length: Array) -> list[tuple[Index, Array]]:
+        """Return (rows, left end, breakpoints, right end) of the sets, grouped by the number of breakpoints.
+
+        Parameters
+        ----------
+        columns : ndarray, shape (parameters, sets)
+        left, length : ndarray, shape (sets,)
+        """
+        right = left + length
+        found = np.concatenate([left[:, None], *self._candidates(columns, left, length), right[:, None]], axis=1)
+        inside = (found > left[:, None]) & (found < right[:, None])
+        inside[:, 0] = inside[:, -1] = True
+        found = np.sort(np.where(inside, found, np.inf), axis=1)
+        gap = 4 * np.spacing(np.maximum(np.abs(left), np.abs(right)))[:, None]
+        kept = np.isfinite(found)
+        with np.errstate(invalid="ignore"):
+            kept[:, 1:] &= np.diff(found, axis=1) > gap
+        count = kept.sum(axis=1)
+        groups = []
+        for number in np.unique(count):
+            rows = np.nonzero(count == number)[0]
+            edges = found[rows][kept[rows]].reshape(len(rows), number)
+            edges[:, -1] = right[rows]
+            groups.append((rows, edges))
+        return groups
+
+    def _candidates(self, columns: Array, left: Array, length: Array) -> Iterator[Array]:
+        arguments = columns[..., None]
+        ends = left[:, None] + length[:, None] * np.array([0.0, 1.0])
+        with np.errstate(all="ignore"):
+            values = self.affine.function(ends, *arguments)
+            for k in range(0, len(values), 2):
+                value, slope = (np.broadcast_to(v, ends.shape) for v in values[k : k + 2])
+                if self.levels[k // 2]:
+                    level = _integers(value)
+                    yield ends[:, :1] + (level - value[:, :1]) / slope[:, :1]
+                else:
+                    yield np.where(np.isfinite(value[:, :1]), ends[:, :1] - value[:, :1] / slope[:, :1], np.inf)
+            yield from self._sampled(columns, left, length)
+
+    def _sampled(self, columns: Array, left: Array, length: Array) -> Iterator[Array]:
+        number = len(self.others.layout)
+        if not number:
+            return
+        grid = left[:, None] + length[:, None] * np.linspace(0.0, 1.0, _SAMPLES)
+        sampled = self.others.function(grid, *columns[..., None])
+        for k in range(number):
+            value = np.broadcast_to(sampled[k], grid.shape)
+            levels = _integers(value) if self.levels[len(self.levels) - number + k] else np.zeros((1, 1))
+            found = [self._roots(k, level, columns, grid, value) for level in np.unique(levels[np.isfinite(levels)])]
+            yield from found
+
+    def _roots(self, number: int, level: float, columns: Array, grid: Array, value: Array) -> Array:
+        """Return where a switch passes a level between samples, (sets, roots), filled up with inf."""
+        above = value >= level
+        row, cell = np.nonzero(above[:, 1:] != above[:, :-1])
+        low, high, start = grid[row, cell], grid[row, cell + 1], above[row, cell]
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            here = self.others.function(middle, *columns[:, row])[number] >= level
+            low, high = np.where(here == start, middle, low), np.where(here == start, high, middle)
+        found = np.full((len(grid), int(np.bincount(row, minlength=1).max(initial=0))), np.inf)
+        found[row, np.arange(len(row)) - np.searchsorted(row, row)] = high
+        return found
+
+
+def _integers(value: Array) -> Array:
+    """Return the integers within the range of each row, (sets, integers), filled up with inf."""
+    low, high = np.ceil(np.nanmin(value, axis=1)), np.floor(np.nanmax(value, axis=1))
+    count = int(np.max(high - low, initial=-1.0)) + 1
+    if count > _MOST:
+        raise ValueError(f"coefficients: {count} jumps along x must be at most {_MOST}")
+    found = low[:, None] + np.arange(max(count, 0))
+    return np.where(found <= high[:, None], found, np.inf)
+
+
+def breaks(expressions: Sequence[Expr], x: Symbol, symbols: Sequence[Symbol]) -> Breaks:
+    """Return the compiled switches of coefficients.
+
+    Raises
+    ------
+    HamiltonError
+        Names what cannot be located.
+    """
+    affine, others = [], []
+    for switch in switches(expressions, x):
+        slope = switch.slope(x)
+        if slope is None:
+            others.append(switch)
+        else:
+            affine.append((switch, slope))
+    pairs = tuple(part for switch, slope in affine for part in (switch.expression, slope))
+    values = tuple(switch.expression for switch in others)
+    arguments = (x, *symbols)
+    return Breaks(
+        kernel(pairs, arguments, backend="numpy"),
+        kernel(values, arguments, backend="numpy"),
+        (*(switch.levels for switch, _ in affine), *(switch.levels for switch in others)),
+    )

@@ -1,0 +1,320 @@
+"""Frequencies and modes of models whose coefficients vary along x: Ritz's method on the stresses, with an estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from sympy import Expr, Matrix, S, expand, zeros
+
+from cra_sym.kernels import Kernel, kernel
+from cra_sym.mechanics.jets import Jet
+from cra_sym.mechanics.weak import WeakForm, weak_form
+from cra_sym.model.breaks import Breaks, breaks
+from cra_sym.model.routes import Values, tip_sign
+from cra_sym.model.spatial import SpatialProblem
+from cra_sym.model.values import flat_columns, infinite_patterns
+from cra_sym.solvers.stress import Continuum, Entries
+from cra_sym.solvers.stress_refine import Found, solved
+
+if TYPE_CHECKING:
+    from cra_sym.model.lagrangian import Model
+
+__all__ = ["StressModes", "StressRoute", "stress_route"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+TOLERANCE = 1e-10
+"""Relative error of a frequency beyond which it is refused."""
+_TARGET = 2e-11
+"""What is aimed at for squared frequencies; their error is that of the frequencies twice."""
+_SHAPES = 1e-20
+"""The same for mode shapes, whose relative error is as its square root."""
+
+
+@dataclass(frozen=True, eq=False)
+class StressRoute:
+    """Coefficients of the energies, compiled.
+
+    Attributes
+    ----------
+    spatial : SpatialProblem
+        For the ends, and for derivatives of shapes.
+    orders : tuple of int
+        Order of the highest derivative of each field.
+    coefficients : Kernel
+        Of (x, parameters): the entries, named by ``entries``.
+    entries : tuple of (str, int, int)
+        Which entry of 'W', 'B', 'D', 'R' or 'M' each is; see `cra_sym.solvers.stress.Continuum`.
+    breaks : Breaks
+    """
+
+    spatial: SpatialProblem
+    orders: tuple[int, ...]
+    coefficients: Kernel
+    entries: tuple[tuple[str, int, int], ...]
+    breaks: Breaks
+
+    def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:
+        """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""
+        return self.estimated(values, shape, modes)[0]
+
+    def estimated(self, values: Values, shape: tuple[int, ...], modes: int) -> tuple[Array, Array]:
+        """Return the frequencies, and the estimated largest relative error of them, of shape ``shape``."""
+        columns = flat_columns(values, shape)
+        omega, accuracy = np.empty((columns.shape[1], modes)), np.empty(columns.shape[1])
+        for found in self.found(columns, modes, _TARGET):
+            omega[found.rows], accuracy[found.rows] = np.sqrt(found.fields.z), found.accuracy
+        return omega.reshape(*shape, modes), accuracy.reshape(shape)
+
+    def modes(self, values: Values, shape: tuple[int, ...], omega: Array) -> StressModes:
+        """Return the modes of all the first frequencies."""
+        columns = flat_columns(values, shape)
+        return StressModes(omega, self.spatial, columns, list(self.found(columns, omega.shape[-1], _SHAPES)))
+
+    def found(self, columns: Array, modes: int, target: float) -> Iterator[Found]:
+        """Yield the modes of all sets, some at a time, ``rows`` being their positions among the columns."""
+        for rows, infinite in infinite_patterns(columns):
+            some = columns[:, rows].copy()
+            some[list(infinite)] = 0.0
+            length, left = (np.broadcast_to(v, len(rows)) for v in self.spatial.geometry(*some))
+            directions, springs, mass = self._ends(some, infinite)
+            for members, edges in self.breaks.edges(some, left, length):
+                problem = Continuum(
+                    self.orders,
+                    self.spatial.coordinates,
+                    self._evaluated(some[:, members]),
+                    edges,
+                    directions[members],
+                    springs[members],
+                    mass[members],
+                )
+                for found in solved(problem, modes, 2.0 * TOLERANCE, target):
+                    yield Found(rows[members][found.rows], found.fields, found.accuracy)
+
+    def _evaluated(self, columns: Array) -> Callable[[Array, Index], dict[str, Entries]]:
+        alike = np.ptp(columns, axis=1) == 0.0 if columns.size else np.ones(len(columns), dtype=bool)
+
+        def coefficients(x: Array, rows: Index) -> dict[str, Entries]:
+            values = [c[0] if same else c[rows][:, None] for c, same in zip(columns, alike, strict=True)]
+            with np.errstate(all="ignore"):
+                found = self.coefficients.function(x, *values)
+            parts: dict[str, dict[tuple[int, int], Array]] = {name: {} for name in "WBDRM"}
+            for (name, i, j), entry in zip(self.entries, found, strict=True):
+                parts[name][i, j] = np.asarray(entry, dtype=float)
+            return parts  # type: ignore[return-value]
+
+        return coefficients
+
+    # ------------------------------------------------------------------------------------------ the ends
+
+    def _ends(self, columns: Array, infinite: tuple[int, ...]) -> tuple[Array, Array, Array]:
+        """Return directions and stiffnesses of the springs at the ends, conditions included, and the masses there."""
+        spatial, sets = self.spatial, columns.shape[1]
+        size = 2 * spatial.displacements + spatial.coordinates
+        parts = [_held(spatial.free, columns, size)]
+        bare = columns.copy()
+        for position in spatial.end_stiffness:
+            bare[position] = 0.0
+        for position in infinite:
+            held = spatial._rigid_directions(position, columns)
+            parts.append(_springs(np.broadcast_to(held, (sets, size, size)), np.full(sets, np.inf)))
+        for position, rate in spatial.end_stiffness.items():
+            if position not in infinite and columns[position].any():
+                parts.append(_springs(np.broadcast_to(rate(*columns), (sets, size, size)), columns[position]))
+        stiffness, mass = (np.broadcast_to(m, (sets, size, size)) for m in spatial.boundary(np.zeros(sets), *bare))
+        parts.append(_springs(stiffness, np.ones(sets)))
+        directions = np.concatenate([np.broadcast_to(d, (sets, *d.shape[1:])) for d, _ in parts], axis=1)
+        springs = np.concatenate([np.broadcast_to(k, (sets, *k.shape[1:])) for _, k in parts], axis=1)
+        _, full = spatial.boundary(np.zeros(sets), *columns)
+        return directions, springs, -np.broadcast_to(full, mass.shape)
+
+
+def _held(free: Kernel | None, columns: Array, size: int) -> tuple[Array, Array]:
+    """Return the directions that the essential conditions hold, with infinite stiffness."""
+    if free is None:
+        return np.eye(size)[None], np.full((1, size), np.inf)
+    motions = np.asarray(free(*columns))
+    motions = _once(motions.reshape(-1, *motions.shape[-2:]))
+    frame = np.linalg.svd(motions)[0]
+    directions = frame[..., motions.shape[-1] :].swapaxes(-1, -2)
+    return directions, np.full(directions.shape[:2], np.inf)
+
+
+def _springs(matrix: Array, factor: Array) -> tuple[Array, Array]:
+    """Return a stiffness matrix times a factor as springs on directions."""
+    value, frame = np.linalg.eigh(_once(np.asarray(matrix)))
+    with np.errstate(invalid="ignore"):
+        there = np.abs(value) > 1e-14 * np.abs(value).max(axis=-1, keepdims=True)
+    springs = np.where(there, value, 0.0)
+    kept = there.any(axis=0)
+    with np.errstate(invalid="ignore"):
+        stiff = np.where(springs[:, kept] == 0.0, 0.0, springs[:, kept] * _once(factor[:, None]))
+    return frame.swapaxes(-1, -2)[:, kept], stiff
+
+
+def _once(values: Array) -> Array:
+    """Return values with one set instead of many that are alike."""
+    return values[:1] if len(values) > 1 and (values == values[:1]).all() else values
+
+
+# Modes -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class StressModes:
+    """Modes of a batch; ``omega`` has the shape of the batch, ``columns`` are flat."""
+
+    omega: Array
+    spatial: SpatialProblem
+    columns: Array
+    found: list[Found]
+
+    @property
+    def _z(self) -> Array:
+        return self.omega.reshape(-1, self.omega.shape[-1]) ** 2
+
+    def _collected(self, part: Callable[[Found], Array]) -> Array:
+        """Return one array of what each group has, its first axis the sets."""
+        first = part(self.found[0])
+        whole = np.empty((len(self._z), *first.shape[1:]))
+        for found in self.found:
+            whole[found.rows] = part(found)
+        return whole
+
+    @cached_property
+    def _ends(self) -> Array:
+        """(q(left), w, q(right)), (sets, modes, 2 n + m)."""
+        return self._collected(lambda found: found.fields.ends)
+
+    @cached_property
+    def _forces(self) -> Array:
+        """Natural forces of both ends, (sets, modes, 2, n)."""
+        return self._collected(
+            lambda found: np.stack([f[..., [0, -1]] for f in found.fields.force_ends], axis=-1)
+        )
+
+    @cached_property
+    def _sign(self) -> Array:
+        right = self._ends[..., self.spatial.displacements + self.spatial.coordinates :]
+        return tip_sign(right)
+
+    def _signed(self, values: Array) -> Array:
+        return (self._sign[..., 0] * values).reshape(self.omega.shape)
+
+    def displacement(self, end: int, place: int) -> Array:
+        """Return a displacement of an end section, shape (..., modes)."""
+        offset = end * (self.spatial.displacements + self.spatial.coordinates)
+        return self._signed(self._ends[..., offset + place])
+
+    def force(self, end: int, place: int) -> Array:
+        """Return the natural force conjugate to it, shape (..., modes)."""
+        return self._signed(self._forces[..., end, place])
+
+    def coordinate(self, number: int) -> Array:
+        """Return a lumped coordinate, shape (..., modes)."""
+        return self._signed(self._ends[..., self.spatial.displacements + number])
+
+    def shape(self, place: int, derivative: int, x: Array) -> Array:
+        """Return a derivative of a displacement of the section at places, shape (..., modes, stations)."""
+        z = self._z
+        x = np.broadcast_to(x, (*self.omega.shape[:-1], x.shape[-1])).reshape(len(z), -1)
+        state = self._states(x)
+        finite = np.where(np.isinf(self.columns), 0.0, self.columns)
+        row = self.spatial.derivative_row(place, derivative, z, x[:, None], finite)
+        found = self._sign * (row * state).sum(axis=-1)
+        return found.reshape(*self.omega.shape, x.shape[-1])
+
+    def _states(self, x: Array) -> Array:
+        key = x.tobytes()
+        kept: dict[bytes, Array] = self.__dict__.setdefault("_kept", {})
+        if key not in kept:
+            kept.clear()  # one set of stations at a time: those of a quadrature serve many forms
+            kept[key] = self._collected(lambda found: found.fields.states(x[found.rows]))
+        return kept[key]
+
+    def stations(self) -> tuple[Array, Array]:
+        """Return points and weights of a quadrature that respects the breakpoints, shape (..., points)."""
+        most = max(found.fields.columns.weights.shape[1] for found in self.found)
+        x, weights = np.empty((len(self._z), most)), np.zeros((len(self._z), most))
+        for found in self.found:
+            columns = found.fields.columns
+            number = columns.weights.shape[1]
+            x[found.rows, :number] = columns.grid.x.reshape(-1, number)
+            x[found.rows, number:] = x[found.rows, number - 1 : number]
+            weights[found.rows, :number] = columns.weights
+        shape = (*self.omega.shape[:-1], most)
+        return x.reshape(shape), weights.reshape(shape)
+
+    def integral(self, place: int) -> Array:
+        """Return the integral of a displacement over the domain, shape (..., modes)."""
+
+        def part(found: Found) -> Array:
+            columns = found.fields.columns
+            values = found.fields.displaced[place]
+            return (values.reshape(*values.shape[:2], -1) * columns.weights[:, None]).sum(axis=-1)
+
+        return self._signed(self._collected(part))
+
+
+# From the Lagrangian ---------------------------------------------------------------------------------------------
+
+
+def stress_route(model: Model, spatial: SpatialProblem) -> StressRoute | None:
+    """Return the route of a model by its energies, or None if a field has derivatives of other orders than 1 and 2."""
+    weak = weak_form(model.equations.variation)
+    section, highest, lumped = weak.fields()
+    orders = tuple(weak.variation.orders)
+    if not set(orders) <= {1, 2} or any(jet in highest for pair, e in weak.inside.items() for jet in pair if 2 in e):
+        return None
+    state = [*section, *lumped]
+    leading, coupled = _matrix(weak, highest, highest, 0), _matrix(weak, highest, state, 0)
+    strain = leading.inv() * coupled if not coupled.is_zero_matrix else coupled
+    cross = zeros(*coupled.shape)
+    if not _one_after_the_other(strain, section, highest):
+        strain, cross = cross, coupled
+    rest = _matrix(weak, state, state, 0) - (coupled.T * strain if cross.is_zero_matrix else zeros(len(state)))
+    named = {"W": leading, "B": strain, "D": cross, "R": rest, "M": _matrix(weak, state, state, 2)}
+    entries: dict[tuple[str, int, int], Expr] = {}
+    for name, matrix in named.items():
+        for i in range(matrix.rows):
+            for j in range(matrix.cols):
+                value = matrix[i, j]
+                if (j >= i or name in "BD") and value != 0 and (name != "R" or expand(value) != 0):
+                    entries[name, i, j] = value
+    x = weak.variation.space.x
+    values = tuple(entries.values())
+    return StressRoute(
+        spatial,
+        orders,
+        kernel(values, (x, *model.symbols), backend="numpy"),
+        tuple(entries),
+        breaks(values, x, model.symbols),
+    )
+
+
+def _matrix(weak: WeakForm, rows: list[Jet], columns: list[Jet], power: int) -> Matrix:
+    return Matrix(
+        len(rows), len(columns), [weak.inside.get((p, q), {}).get(power, S.Zero) for p in rows for q in columns]
+    )
+
+
+def _one_after_the_other(strain: Matrix, section: list[Jet], highest: list[Jet]) -> bool:
+    """Return whether the strains give the displacements by integration, one after the other."""
+    waiting = list(range(len(section)))
+    while waiting:
+        for place in waiting:
+            raised = section[place]._replace(space=section[place].space + 1)
+            needed = [section.index(raised)] if raised in section else [
+                j for j in range(len(section)) if strain[highest.index(raised), j] != 0
+            ]
+            if not set(needed) & set(waiting):
+                waiting.remove(place)
+                break
+        else:
+            return False
+    return True
