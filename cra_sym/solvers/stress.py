@@ -106,23 +106,26 @@ def compliance(stiffness: Entries, size: int) -> Entries:
 class Columns:
     """What each unknown displaces and strains, at the Gauss points of a mesh; then the matrices.
 
-    The unknowns are the displacements of the origin, the lumped coordinates and the Legendre coefficients: degree by
-    degree, in each degree element by element, in each element field by field.
+    The unknowns are the displacements of the origin, the lumped coordinates, the amplitudes of further stresses and the
+    Legendre coefficients: degree by degree, in each degree element by element, in each element field by field.
 
     Parameters
     ----------
     problem : Continuum
     mesh : Mesh
+    further : ndarray, shape (sets, functions, fields, Q, G), optional
+        Further functions at the points of the mesh beside the Legendre functions.
     """
 
-    def __init__(self, problem: Continuum, mesh: Mesh) -> None:
-        self.problem, self.mesh = problem, mesh
+    def __init__(self, problem: Continuum, mesh: Mesh, further: Array | None = None) -> None:
+        self.problem, self.mesh, self.further = problem, mesh, further
         self.gauss = rule(mesh.points)
         self.grid = Grid.of(mesh, problem.edges, mesh.points)
         self.sets = len(problem.edges)
         self.rigid = problem.displacements + problem.lumped
         fields, elements = len(problem.orders), len(mesh.elements) - 1
-        self.size = self.rigid + fields * elements * (mesh.degree + 1)
+        self.offset = self.rigid + (0 if further is None else further.shape[1])
+        self.size = self.offset + fields * elements * (mesh.degree + 1)
         self.elastic = (mesh.degree + 1, elements, fields)
         rows = np.arange(self.sets)
         shape = self.grid.x.shape
@@ -168,13 +171,20 @@ class Columns:
         found = []
         for i in range(fields):
             parts = {j: self._factor[i, j] for j in range(fields) if (i, j) in self._factor}
-            sets = max(len(self.legendre), *(len(part) for part in parts.values()))
-            total = np.zeros((sets, self.size, *self.legendre.shape[-2:]))
-            view = total[:, self.rigid :].reshape(sets, *self.elastic, *total.shape[-2:])
-            for j, part in parts.items():
-                np.multiply(self.legendre, part[:, None, None], out=view[:, :, :, j])
-            found.append(total)
+            found.append(self._expanded(parts))
         return found
+
+    def _expanded(self, factors: Mapping[int, Array]) -> Array:
+        """Return the sum of factors times the functions of each field, for each unknown, (sets or 1, size, Q, G)."""
+        further = () if self.further is None else (self.sets,)
+        sets = max(len(self.legendre), *further, *(len(part) for part in factors.values()))
+        total = np.zeros((sets, self.size, *self.legendre.shape[-2:]))
+        view = total[:, self.offset :].reshape(sets, *self.elastic, *total.shape[-2:])
+        for j, part in factors.items():
+            np.multiply(self.legendre, part[:, None, None], out=view[:, :, :, j])
+            if self.further is not None:
+                total[:, self.rigid : self.offset] += part[:, None] * self.further[:, :, j]
+        return total
 
     @cached_property
     def displaced(self) -> tuple[list[Array], list[Array]]:
@@ -244,23 +254,35 @@ class Columns:
         """Integral of stress times strain, (sets, size, size)."""
         fields, found = self.elastic[2], np.zeros((self.sets, self.size, self.size))
         table = self.legendre.reshape(len(self.legendre), -1, *self.legendre.shape[-2:])
-        block = found[:, self.rigid :, self.rigid :].reshape(
-            self.sets, self.elastic[0] * self.elastic[1], fields, self.elastic[0] * self.elastic[1], fields
-        )
+        size = self.size - self.offset
+        block = np.zeros((self.sets, size // fields, fields, size // fields, fields))
+        for (i, j), entry in self._density.items():
+            block[:, :, i, :, j] = self._product(entry, table, table)
+        found[:, self.offset :, self.offset :] = block.reshape(self.sets, size, size)
+        if self.further is not None:
+            for j in range(fields):
+                functions = self._expanded({j: np.ones((1, 1, 1))})
+                for i in range(fields):
+                    if (i, j) in self._density:
+                        product = self._product(self._density[i, j], self.further[:, :, i], functions)
+                        found[:, self.rigid : self.offset] += product
+            cross = found[:, self.rigid : self.offset, self.offset :]
+            found[:, self.offset :, self.rigid : self.offset] = cross.swapaxes(-1, -2)
+        return found
+
+    @cached_property
+    def _density(self) -> dict[tuple[int, int], Array]:
+        """Strain energy of a unit function of one field with that of another: compliance, or stiffness."""
         strained = self.mesh.strained[self.mesh.owner][:, None]
-        for i in range(fields):
-            for j in range(i, fields):
-                soft, stiff = self.compliance.get((i, j)), self.coefficient["W"].get((i, j))
-                entry = soft
+        found = {}
+        for i in range(self.elastic[2]):
+            for j in range(self.elastic[2]):
+                pair = min(i, j), max(i, j)
+                soft, stiff = self.compliance.get(pair), self.coefficient["W"].get(pair)
                 if strained.any():
-                    entry = np.where(strained, 0.0 if stiff is None else stiff, 0.0 if soft is None else soft)
-                if entry is not None:
-                    product = self._product(entry, table, table)
-                    block[:, :, i, :, j] = product
-                    block[:, :, j, :, i] = product
-        found[:, self.rigid :, self.rigid :] = block.reshape(
-            self.sets, self.size - self.rigid, self.size - self.rigid
-        )
+                    soft = np.where(strained, 0.0 if stiff is None else stiff, 0.0 if soft is None else soft)
+                if soft is not None:
+                    found[i, j] = soft
         return found
 
     @cached_property

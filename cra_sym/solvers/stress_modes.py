@@ -32,6 +32,14 @@ class ModeFields:
         self.columns, self.z, self.vectors = columns, z, vectors
         self.problem = columns.problem
 
+    def take(self, sets: NDArray[np.intp]) -> ModeFields:
+        """Return the modes of some of the sets."""
+        if len(sets) == len(self.z):
+            return self
+        further = self.columns.further
+        columns = Columns(self.problem.take(sets), self.columns.mesh, None if further is None else further[sets])
+        return ModeFields(columns, self.z[sets], self.vectors[sets])
+
     def _of(self, values: Array) -> Array:
         """Return what the modes have of a quantity of the unknowns at the points, (sets, modes, Q, G)."""
         shape = self.columns.grid.x.shape[1:]
@@ -133,7 +141,7 @@ class ModeFields:
                 value_ends = value_ends + sum(gain[p][..., None] * free_nodes[p][:, None] for p in parts)
                 forces.append(values)
                 ends.append(value_ends)
-            residuals.append((forces[-1] - stress) ** 2 * weight)
+            residuals.append(forces[-1] - stress)
             place += order
         return forces, ends, residuals
 
@@ -178,6 +186,21 @@ class ModeFields:
         """Natural forces P at the ends of the pieces, each (sets, modes, Q + 1)."""
         return self._balanced[1]
 
+    @property
+    def unbalanced(self) -> list[Array]:
+        """What equilibrium adds to the highest natural force of each field, (sets, modes, Q, G)."""
+        return self._balanced[2]
+
+    def further(self) -> Array:
+        """Return the same as functions of unit strain energy to expand modes in, (sets, modes, fields, Q, G)."""
+        strained = self.columns.mesh.strained[self.columns.mesh.owner][:, None]
+        found = []
+        for field, force in enumerate(self.unbalanced):
+            soft = self.columns.compliance[field, field][:, None]
+            found.append(np.where(strained, force * soft, force) if strained.any() else force)
+        size = np.sqrt(self.residual.sum(axis=-1) * self.z)[..., None, None, None]
+        return np.stack(found, axis=2) / np.where(size > 0.0, size, 1.0)
+
     @cached_property
     def residual(self) -> Array:
         """Strain energy of the stresses that break equilibrium relative to that of the mode, (sets, modes, elements).
@@ -185,7 +208,8 @@ class ModeFields:
         The sum over the elements, divided by the relative distance to the next compliance, bounds the relative error
         of z (Temple's inequality). Rigid-body modes have none.
         """
-        per_piece = sum(residual.sum(axis=-1) for residual in self._balanced[2])
+        energies = ((r**2 * self._softness(field)).sum(axis=-1) for field, r in enumerate(self.unbalanced))
+        per_piece = sum(energies)
         elements = len(self.columns.mesh.elements) - 1
         share = np.zeros((*self.z.shape, elements))
         owner = self.columns.mesh.owner

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .stress import Columns, Continuum
 from .stress_mesh import Mesh, TooFineError, cells, resolved
 from .stress_modes import ModeFields
-from .stress_spectrum import EPS, Spectrum, spectrum
+from .stress_spectrum import BuckledError, spectrum
 
 __all__ = ["Found", "solved"]
 
@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 _ROUNDS, _MOST_UNKNOWNS, _MOST_DEGREE = 24, 1500, 40
 _MOST_ELEMENTS = 12  # to begin with: more spans than that share elements
+_FURTHER = 3  # times that the stresses which equilibrium asks for are added
 _LANES = 4_000_000  # numbers in the largest array of a chunk
 
 
@@ -106,8 +107,6 @@ def _group(
 ) -> list[Found]:
     spans = problem.edges.shape[1] - 1
     if ends[0] and not ends[1]:
-        from dataclasses import replace
-
         problem = replace(problem, origin=1)
     elements = cells(spans, max(_MOST_ELEMENTS, int(np.ceil(modes / 12))))
     if spans == 1 and modes > 20:
@@ -150,48 +149,74 @@ def _quadrature(problem: Continuum, elements: Array, strained: NDArray[np.bool_]
 def _refined(
     problem: Continuum, rows: Index, mesh: Mesh, unresolved: Array, modes: int, tolerance: float, target: float
 ) -> list[Found]:
+    """Solve on finer and finer meshes the sets that have not reached the target."""
     found: list[Found] = []
-    every = np.arange(len(rows))
-    before, degree_before = np.inf, 0
+    open_, before, degree_before = np.arange(len(rows)), np.inf, 0
     for turn in range(_ROUNDS):
-        marks = np.zeros(len(mesh.elements) - 1)
-        open_: list[Index] = []
-        worst = 0.0
-        best: list[tuple[Found, Array, Array]] = []
-        for part in _chunks(problem, mesh, every):
-            columns = Columns(problem.take(part), mesh)
-            result = spectrum(columns, modes)
-            fields = ModeFields(columns, result.z, result.vectors)
-            error, share = _error(result, fields)
-            good = error.max(axis=1) <= target
-            accuracy = 0.5 * np.maximum(error.max(axis=1), result.rounding.max(axis=1)) + unresolved[part]
-            best.append((Found(rows[part], fields, accuracy), error, good))
-            if not good.all():
-                open_.append(part[~good])
-                marks = np.maximum(marks, share[~good].max(axis=(0, 1)))
-                worst = max(worst, float(error[~good].max()))
-        last = turn == _ROUNDS - 1 or columns.size > _MOST_UNKNOWNS or worst > 0.5 * before and turn > 8
-        for item, error, good in best:
-            settled = good | (error.max(axis=1) <= tolerance) if last else good
-            if settled.any():
-                found.append(_some(item, settled))
-            if last and not settled.all():
-                _refuse(item, error, settled, mesh, marks)
-        if not open_ or last:
+        solutions = [_solved(problem, part, mesh, modes, target) for part in _chunks(problem, mesh, open_)]
+        worst = max(solution.error.max(initial=0.0) for solution in solutions)
+        size = solutions[0].fields.columns.size
+        last = turn == _ROUNDS - 1 or size > _MOST_UNKNOWNS or (turn > 8 and worst > 0.5 * before)
+        for solution in solutions:
+            good = solution.error.max(axis=1) <= (tolerance if last else target)
+            if last and not good.all():
+                _refuse(solution, good)
+            if good.any():
+                found.append(_settled(solution, good, rows, unresolved))
+        still = [solution.part[solution.error.max(axis=1) > target] for solution in solutions]
+        if last or not sum(map(len, still)):
             return found
-        every = np.concatenate(open_)
-        rising = mesh.degree > degree_before and worst < 1e-3 * before
-        if (rising or turn == 0) and mesh.degree < _MOST_DEGREE - 6 and len(mesh.elements) < 20:
-            degree_before, mesh = mesh.degree, _raised(mesh, 6)
+        shares = [s.share[s.error.max(axis=1) > target].max(axis=(0, 1), initial=0.0) for s in solutions]
+        marks, open_ = np.max(shares, axis=0), np.concatenate(still)
+        degree = mesh.degree
+        falling = turn == 0 or (degree > degree_before and worst < 1e-3 * before)
+        if falling and degree < _MOST_DEGREE - 6 and len(mesh.elements) < 20:
+            mesh = replace(mesh, degree=degree + 6)
         else:
-            degree_before = mesh.degree
             mesh = mesh.split(marks >= 0.03 * marks.max())
-        before = worst
+        before, degree_before = worst, degree
     return found
 
 
-def _raised(mesh: Mesh, by: int) -> Mesh:
-    return Mesh(mesh.pieces, mesh.elements, mesh.degree + by, mesh.strained)
+@dataclass(frozen=True)
+class _Solution:
+    """Modes of a chunk on one mesh, with the estimated relative error of z, in all and by element."""
+
+    part: Index
+    fields: ModeFields
+    rounding: Array
+    error: Array
+    share: Array
+
+
+def _solved(problem: Continuum, part: Index, mesh: Mesh, modes: int, target: float) -> _Solution:
+    """Return the modes of a chunk; fine detail within an element is met by the stresses that equilibrium asks for."""
+    chosen = problem.take(part)
+    further: Array | None = None
+    most = _FURTHER if len(mesh.pieces) > 4 * len(mesh.elements) else 0
+    best: _Solution | None = None
+    for turn in range(most + 1):
+        columns = Columns(chosen, mesh, further)
+        try:
+            result = spectrum(columns, modes)
+        except BuckledError:
+            raise
+        except ValueError:
+            if best is None:
+                raise
+            return best  # the further stresses depend on the others to rounding
+        fields = ModeFields(columns, result.z, result.vectors)
+        share = 2.0 * fields.residual
+        solution = _Solution(part, fields, result.rounding, share.sum(axis=-1), share)
+        if best is not None and solution.error.max() > best.error.max():
+            return best
+        best = solution
+        if solution.error.max() <= target or turn == most:
+            break
+        more = fields.further()[:, ((solution.error > 0.01 * target) & (result.z > 0.0)).any(axis=0)]
+        further = more if further is None else np.concatenate([further, more], axis=1)
+    assert best is not None
+    return best
 
 
 def _chunks(problem: Continuum, mesh: Mesh, every: Index) -> Iterator[Index]:
@@ -202,33 +227,21 @@ def _chunks(problem: Continuum, mesh: Mesh, every: Index) -> Iterator[Index]:
         yield every[start : start + step]
 
 
-def _error(result: Spectrum, fields: ModeFields) -> tuple[Array, Array]:
-    """Return the estimated relative error of z, (sets, modes), and by element."""
-    share = 2.0 * fields.residual
-    return share.sum(axis=-1), share
+def _settled(solution: _Solution, good: NDArray[np.bool_], rows: Index, unresolved: Array) -> Found:
+    """Return the sets of a solution that are good enough."""
+    part = solution.part[good]
+    error = np.maximum(solution.error, solution.rounding).max(axis=1)[good]
+    return Found(rows[part], solution.fields.take(np.nonzero(good)[0]), 0.5 * error + unresolved[part])
 
 
-def _some(item: Found, chosen: NDArray[np.bool_]) -> Found:
-    if chosen.all():
-        return item
-    index = np.nonzero(chosen)[0]
-    fields = item.fields
-    columns = Columns(fields.problem.take(index), fields.columns.mesh)
-    return Found(
-        item.rows[index], ModeFields(columns, fields.z[index], fields.vectors[index]), item.accuracy[index]
-    )
-
-
-def _refuse(item: Found, error: Array, settled: NDArray[np.bool_], mesh: Mesh, marks: Array) -> None:
-    worst = np.unravel_index(np.argmax(np.where(settled[:, None], 0.0, error)), error.shape)
-    element = int(np.argmax(marks))
+def _refuse(solution: _Solution, good: NDArray[np.bool_]) -> None:
+    error = np.where(good[:, None], 0.0, solution.error)
+    row, mode = (int(k) for k in np.unravel_index(np.argmax(error), error.shape))
+    mesh = solution.fields.columns.mesh
+    element = int(np.argmax(solution.share[row, mode]))
     piece = np.searchsorted(mesh.pieces, mesh.elements[element : element + 2])
-    ends = item.fields.columns.grid.ends
-    ends = ends[min(int(worst[0]), len(ends) - 1)]
+    ends = solution.fields.columns.grid.ends[row]
     raise ValueError(
-        f"modes = {error.shape[1]}: the relative error of frequency {int(worst[1]) + 1} stays at "
-        f"{0.5 * error[worst]:.1g}, from the coefficients at x = {ends[piece[0]]:.6g} to {ends[piece[1]]:.6g}"
+        f"modes = {error.shape[1]}: the relative error of frequency {mode + 1} stays at {0.5 * error[row, mode]:.1g}; "
+        f"it comes from the coefficients at x = {ends[piece[0]]:.6g} to {ends[piece[1]]:.6g}"
     )
-
-
-_ = EPS

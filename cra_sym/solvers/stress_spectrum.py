@@ -47,9 +47,6 @@ class Spectrum:
         Squared natural frequencies; those of rigid-body motions are 0.
     vectors : ndarray, shape (sets, modes, size)
         Unknowns of each mode, mass-normalised.
-    share : ndarray, shape (sets, modes, elements)
-        What the two highest degrees of each element hold of the strain energy: their sum estimates the relative error
-        of z for a basis of two degrees less.
     rounding : ndarray, shape (sets, modes)
         Estimated relative rounding of z.
     compliances : ndarray, shape (sets, more than modes)
@@ -58,7 +55,6 @@ class Spectrum:
 
     z: Array
     vectors: Array
-    share: Array
     rounding: Array
     compliances: Array
 
@@ -171,8 +167,7 @@ class _Problem:
             values, vectors = self._singular(operator, wanted)
         unknowns = vectors @ operator  # x = L^-T u
         kinetic = self._kinetic(unknowns)
-        stretched = self._in_base(unknowns, inverse, scale, base)
-        return self._spectrum(unknowns, kinetic, stretched, values, loading, number)
+        return self._spectrum(unknowns, kinetic, values, loading, number)
 
     @property
     def _loaded(self) -> bool:
@@ -319,15 +314,8 @@ class _Problem:
             total += ((ends @ columns.problem.end_mass[self.sets]) * ends).sum(axis=-1)
         return total
 
-    def _in_base(self, unknowns: Array, inverse: Array, scale: Array, base: Array) -> Array:
-        """Return L' x of the base stiffness: its trailing entries are those of the highest degrees."""
-        del base
-        return np.linalg.solve(inverse.swapaxes(-1, -2), (unknowns / scale[:, None, :]).swapaxes(-1, -2)).swapaxes(
-            -1, -2
-        )
-
     def _spectrum(
-        self, unknowns: Array, kinetic: Array, stretched: Array, values: Array, loading: Array, number: int
+        self, unknowns: Array, kinetic: Array, values: Array, loading: Array, number: int
     ) -> Spectrum:
         with np.errstate(divide="ignore", invalid="ignore"):
             compliances = np.where(kinetic > 0.0, kinetic, values)
@@ -335,10 +323,6 @@ class _Problem:
             compliances = np.take_along_axis(compliances, order, axis=1)
             z = 1.0 / compliances[:, :number] if number > 0 else np.zeros((len(self.sets), 0))
         unknowns = np.take_along_axis(unknowns, order[..., None], axis=1)[:, : max(number, 0)]
-        stretched = np.take_along_axis(stretched, order[..., None], axis=1)[:, : max(number, 0)]
-        degrees, elements, fields = self.columns.elastic
-        tail = stretched[..., self.columns.rigid :].reshape(*stretched.shape[:2], degrees, elements, fields)[:, :, -2:]
-        share = (tail**2).sum(axis=(2, 4))
         spread = compliances[:, :1] / compliances[:, : max(number, 0)]
         rounding = EPS * (8.0 * loading + np.sqrt(spread))
         vectors = unknowns * np.sqrt(z)[..., None]
@@ -347,6 +331,5 @@ class _Problem:
             keep = max(number, 0) + min(rigid, number + rigid)
             pad = ((0, 0), (rigid, 0))
             z, rounding = np.pad(z, pad)[:, :keep], np.pad(rounding, pad)[:, :keep]
-            share = np.pad(share, (*pad, (0, 0)))[:, :keep]
             vectors = np.concatenate([self.still, vectors], axis=1)[:, :keep]
-        return Spectrum(z, vectors, share, rounding, compliances)
+        return Spectrum(z, vectors, rounding, compliances)
