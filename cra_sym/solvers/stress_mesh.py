@@ -84,12 +84,15 @@ class Mesh:
         Highest degree of the Legendre functions on an element.
     strained : ndarray of bool, shape (E,)
         Elements on which the strain itself is expanded, not the stress: those where a stiffness vanishes at an end.
+    smoothness : int
+        Degree of the polynomials that the coefficients are on every piece.
     """
 
     pieces: Array
     elements: Array
     degree: int
     strained: NDArray[np.bool_]
+    smoothness: int = NODES - 1
 
     @property
     def owner(self) -> NDArray[np.intp]:
@@ -100,9 +103,10 @@ class Mesh:
     @property
     def points(self) -> int:
         """Gauss points of a piece, for the integrals of products of two displacements."""
-        share = np.diff(self.pieces) / np.diff(self.elements)[self.owner]
-        swing = min(1.0, 2.0 * float(np.sqrt(share.max(initial=1.0))))  # of the angle arccos, at an end of an element
-        return int(np.ceil(self.degree * swing)) + 12
+        share = float((np.diff(self.pieces) / np.diff(self.elements)[self.owner]).max())
+        swing = np.arccos(max(1.0 - 2.0 * share, -1.0)) / np.pi  # share of the oscillations of a Legendre function
+        oscillations = self.degree if share > 0.99 else min(self.degree, int(np.ceil(self.degree * swing)) + 8)
+        return oscillations + (self.smoothness + 1) // 2 + 4
 
     def split(self, marked: NDArray[np.bool_]) -> Mesh:
         """Return the mesh with some elements halved; where one spans several breakpoints, at one of them."""
@@ -158,8 +162,9 @@ def places(reference: Array, edges: Array) -> Array:
     return np.where(share < 0.5, left + share * (right - left), right - (1.0 - share) * (right - left))
 
 
-def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[Array, Array]:
-    """Return pieces on which every coefficient is resolved, and the relative size of what is not, shape (sets,).
+def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[Array, Array, int]:
+    """Return pieces on which every coefficient is resolved, the relative size of what is not, shape (sets,), and the
+    highest degree of the coefficients there.
 
     Parameters
     ----------
@@ -184,7 +189,7 @@ def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[A
     off = np.linspace(-0.987, 0.983, 37)
     table = np.polynomial.legendre.legvander(off, NODES - 1) @ gauss.spectrum
     total = peak = np.zeros(0)
-    unresolved = np.zeros(len(edges))
+    unresolved, degree = np.zeros(len(edges)), 0
     done: list[Array] = []
     todo = np.stack([pieces[:-1], pieces[1:]], axis=1)
     most = MOST_PIECES + len(pieces)
@@ -201,8 +206,8 @@ def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[A
         peak = np.maximum(peak, size.max(axis=-1, keepdims=True)) if total.size else size.max(axis=-1, keepdims=True)
         if not total.size:  # integrals of the magnitudes, from the first sweep
             total = (np.abs(known) @ gauss.weights * half).sum(axis=-1, keepdims=True)
-        tail = np.abs((known @ gauss.spectrum.T)[..., -2:]).sum(axis=-1)
-        error = np.maximum(tail, np.abs(known @ table.T - beyond).max(axis=-1))
+        series = np.abs(known @ gauss.spectrum.T)
+        error = np.maximum(series[..., -2:].sum(axis=-1), np.abs(known @ table.T - beyond).max(axis=-1))
         smooth = error <= TAIL * size + ROUNDING * peak
         mass = size * half
         speck = mass <= SPECK * total
@@ -213,6 +218,8 @@ def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[A
         good |= narrow
         unresolved += share[:, :, good].max(axis=0).sum(axis=1)
         done.append(todo[good])
+        large = (series[:, :, good] > (TAIL * size + ROUNDING * peak)[:, :, good, None]).any(axis=(0, 1, 2))
+        degree = max(degree, int(np.max(np.nonzero(large)[0], initial=0)))
         todo = todo[~good]
         if sum(map(len, done)) + 2 * len(todo) > most:
             piece = places(todo[:1].ravel(), edges[:1])[0]
@@ -223,7 +230,7 @@ def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[A
             )
         middle = todo.mean(axis=1, keepdims=True)
         todo = np.concatenate([np.hstack([todo[:, :1], middle]), np.hstack([middle, todo[:, 1:]])])
-    return np.unique(np.concatenate(done)), unresolved
+    return np.unique(np.concatenate(done)), unresolved, degree
 
 
 def cells(edges: int, most: int) -> Array:

@@ -20,7 +20,7 @@ Index = NDArray[np.intp]
 _ROUNDS, _MOST_UNKNOWNS, _MOST_DEGREE = 24, 1500, 40
 _MOST_ELEMENTS = 12  # to begin with: more spans than that share elements
 _FURTHER = 3  # times that the stresses which equilibrium asks for are added
-_LANES = 4_000_000  # numbers in the largest array of a chunk
+_LANES = 1_000_000  # numbers in the largest array of a chunk
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def _group(
     strained[0] |= ends[0]
     strained[-1] |= ends[1]
     try:
-        pieces, unresolved = _quadrature(problem, elements, strained)
+        pieces, unresolved, smoothness = _quadrature(problem, elements, strained)
     except TooFineError as error:
         if error.sets == 1:
             raise
@@ -125,14 +125,14 @@ def _group(
             item for part in parts for item in _group(problem.take(part), rows[part], ends, modes, tolerance, target)
         ]
     degree = 8 + int(np.ceil(1.8 * modes / (len(elements) - 1)))
-    mesh = Mesh(pieces, elements, degree, strained)
+    mesh = Mesh(pieces, elements, degree, strained, smoothness)
     return _refined(problem, rows, mesh, unresolved, modes, tolerance, target)
 
 
-def _quadrature(problem: Continuum, elements: Array, strained: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _quadrature(problem: Continuum, elements: Array, strained: NDArray[np.bool_]) -> tuple[Array, Array, int]:
     """Return the pieces of the quadrature: the compliance is resolved, or the stiffness where the strain is expanded."""
     whole = np.union1d(elements, np.arange(problem.edges.shape[1]))
-    parts, unresolved = [], np.zeros(len(problem.edges))
+    parts, unresolved, smoothness = [], np.zeros(len(problem.edges)), 0
     for kind in np.unique(strained):
         for left, right, is_strained in zip(elements[:-1], elements[1:], strained, strict=True):
             if is_strained != kind or (not strained.any() and left > 0.0):
@@ -140,10 +140,10 @@ def _quadrature(problem: Continuum, elements: Array, strained: NDArray[np.bool_]
             if not strained.any():
                 right = elements[-1]
             inner = whole[(whole >= left) & (whole <= right)]
-            part, rest = resolved(problem.sample(bool(kind)), problem.edges, inner, "coefficients")
+            part, rest, degree = resolved(problem.sample(bool(kind)), problem.edges, inner, "coefficients")
             parts.append(part)
-            unresolved = np.maximum(unresolved, rest)
-    return np.unique(np.concatenate(parts)), unresolved
+            unresolved, smoothness = np.maximum(unresolved, rest), max(smoothness, degree)
+    return np.unique(np.concatenate(parts)), unresolved, smoothness
 
 
 def _refined(

@@ -92,27 +92,31 @@ def spectrum(columns: Columns, modes: int) -> Spectrum:
 
 def _rigid_motions(columns: Columns, rows: Array, springs: Array) -> list[Array]:
     """Return, for each set, the motions without energy in the rigid unknowns, (motions, rigid)."""
-    rigid = columns.rigid
-    potential = columns.potential
+    held, active = rows[..., : columns.rigid], springs != 0.0
+    alike = bool((held == held[:1]).all() and (active == active[:1]).all())
+    if alike:
+        free = _not_held(held[0, active[0]])
+        if not len(free) or columns.potential is None:
+            return [free] * columns.sets
     found = []
-    alike = rows.shape[1] == 0 and potential is None
     for k in range(columns.sets):
-        if alike and k:
-            found.append(found[0])
-            continue
-        held = rows[k, springs[k] != 0.0, :rigid]
-        if potential is not None:
-            size, frame = np.linalg.eigh(potential[k, :rigid, :rigid])
-            at_work = np.abs(size) > 1e-12 * max(float(np.abs(potential[k]).max()), np.finfo(float).tiny)
-            held = np.concatenate([held, frame.T[at_work]])
-        length = np.sqrt((held**2).sum(axis=1, keepdims=True))
-        held = held[length[:, 0] > 0.0] / length[length[:, 0] > 0.0]
-        if not len(held):
-            found.append(np.eye(rigid))
-            continue
-        _, size, adjoint = np.linalg.svd(held)
-        found.append(adjoint[int((size > 1e-10).sum()) :])
+        mine = held[k, active[k]]
+        if columns.potential is not None:
+            size, frame = np.linalg.eigh(columns.potential[k, : columns.rigid, : columns.rigid])
+            largest = max(float(np.abs(columns.potential[k]).max()), np.finfo(float).tiny)
+            mine = np.concatenate([mine, frame.T[np.abs(size) > 1e-12 * largest]])
+        found.append(_not_held(mine))
     return found
+
+
+def _not_held(directions: Array) -> Array:
+    """Return an orthonormal basis of what moves none of the directions, (motions, unknowns)."""
+    length = np.sqrt((directions**2).sum(axis=1))
+    directions = directions[length > 0.0] / length[length > 0.0, None]
+    if not len(directions):
+        return np.eye(directions.shape[1])
+    _, size, adjoint = np.linalg.svd(directions)
+    return adjoint[int((size > 1e-10).sum()) :]
 
 
 class _Problem:
