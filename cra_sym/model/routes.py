@@ -10,11 +10,10 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.model.spatial import SpatialProblem
+from cra_sym.model.spatial import SpatialProblem, Stiffness
 from cra_sym.model.values import flat_columns
 from cra_sym.solvers.eigenvalues import lowest
 from cra_sym.solvers.shapes import mode_states
-from cra_sym.solvers.stiffness import DynamicStiffness
 
 __all__ = ["Estimated", "GeneralRoute", "Modes", "RigidShare", "Route", "Stations", "tip_sign"]
 
@@ -114,7 +113,7 @@ class GeneralModes:
     columns: Array
 
     @cached_property
-    def _problems(self) -> list[tuple[Array, Array, DynamicStiffness]]:
+    def _problems(self) -> list[tuple[NDArray[np.intp], Array, Stiffness]]:
         return list(self.spatial.problems(self.columns))
 
     @cached_property
@@ -167,8 +166,7 @@ class GeneralModes:
             n, m = self.spatial.displacements, self.spatial.coordinates
             state = np.empty((*self._z.shape, x.shape[-1], 2 * n + m))
             for rows, left, problem in self._problems:
-                share = np.clip((x[rows] - left[:, None]) / problem.length[:, None], 0.0, 1.0)
-                state[rows] = mode_states(problem, self._z[rows], share)
+                state[rows] = mode_states(problem, self._z[rows], problem.shares(x[rows], left))
             kept.clear()  # one set of stations at a time: those of a quadrature serve many forms
             kept[key] = state
         return kept[key]

@@ -14,7 +14,6 @@ from sympy import Expr, Matrix, S, expand, zeros
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics.jets import Jet
 from cra_sym.mechanics.weak import WeakForm, weak_form
-from cra_sym.model.breaks import Breaks, breaks
 from cra_sym.model.routes import Values, tip_sign
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.values import flat_columns, infinite_patterns
@@ -50,14 +49,12 @@ class StressRoute:
         Of (x, parameters): the entries, named by ``entries``.
     entries : tuple of (str, int, int)
         Which entry of 'W', 'B', 'D', 'R' or 'M' each is; see `cra_sym.solvers.stress.Continuum`.
-    breaks : Breaks
     """
 
     spatial: SpatialProblem
     orders: tuple[int, ...]
     coefficients: Kernel
     entries: tuple[tuple[str, int, int], ...]
-    breaks: Breaks
 
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:
         """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""
@@ -83,7 +80,7 @@ class StressRoute:
             some[list(infinite)] = 0.0
             length, left = (np.broadcast_to(v, len(rows)) for v in self.spatial.geometry(*some))
             directions, springs, mass = self._ends(some, infinite)
-            for members, edges in self.breaks.edges(some, left, length):
+            for members, edges in self._edges(some, left, length):
                 problem = Continuum(
                     self.orders,
                     self.spatial.coordinates,
@@ -95,6 +92,11 @@ class StressRoute:
                 )
                 for found in solved(problem, modes, 2.0 * TOLERANCE, target):
                     yield Found(rows[members][found.rows], found.fields, found.accuracy)
+
+    def _edges(self, columns: Array, left: Array, length: Array) -> list[tuple[Index, Array]]:
+        if self.spatial.breaks is None:
+            return [(np.arange(len(left)), np.stack([left, left + length], axis=1))]
+        return self.spatial.breaks.edges(columns, left, length)
 
     def _evaluated(self, columns: Array) -> Callable[[Array, Index], dict[str, Entries]]:
         alike = np.ptp(columns, axis=1) == 0.0 if columns.size else np.ones(len(columns), dtype=bool)
@@ -293,7 +295,6 @@ def stress_route(model: Model, spatial: SpatialProblem) -> StressRoute | None:
         orders,
         kernel(values, (x, *model.symbols), backend="numpy"),
         tuple(entries),
-        breaks(values, x, model.symbols),
     )
 
 
