@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import sympy
-from sympy import Abs, DiracDelta, Expr, Heaviside, Max, Min, Mod, Piecewise, Pow, SingularityFunction, Symbol, sign
+from sympy import Abs, DiracDelta, Dummy, Expr, S, Subs, Heaviside, Max, Min, Mod, Piecewise, Pow, SingularityFunction, Symbol, sign
 from sympy import ceiling, floor, frac, log, preorder_traversal
-from sympy.core.function import AppliedUndef, Function
+from sympy.core.function import AppliedUndef, Derivative, Function
 from sympy.core.relational import Relational
 from sympy.logic.boolalg import Boolean, BooleanAtom, BooleanFunction
 
 from cra_sym.mechanics.jets import HamiltonError
 
-__all__ = ["Switch", "switches"]
+__all__ = ["Switch", "derivative", "switches"]
 
 _SMOOTH = tuple(
     getattr(sympy, name)
@@ -45,7 +45,7 @@ class Switch:
         """Return the derivative by x if the expression is affine in x, or None."""
         if not self.expression.is_polynomial(x):
             return None
-        slope = self.expression.diff(x)
+        slope = derivative(self.expression, x)
         return None if slope.has(x) else slope
 
 
@@ -62,14 +62,37 @@ def switches(expressions: Iterable[Expr], x: Symbol) -> tuple[Switch, ...]:
     >>> from sympy import Abs, Heaviside, symbols
     >>> x, a, b = symbols("x a b")
     >>> switches([3 + 2 * Heaviside(x - a), Abs(x**2 - b)], x)
-    (Switch(expression=-a + x, levels=False), Switch(expression=-b + x**2, levels=False))
+    (Switch(expression=a - x, levels=False), Switch(expression=b - x**2, levels=False))
     """
     found: dict[Switch, None] = {}
     for expression in expressions:
         for node in preorder_traversal(expression):
             if isinstance(node, (Expr, Boolean)) and node.has(x):
-                found |= dict.fromkeys(switch for switch in _of(node, x) if switch.expression.has(x))
+                found |= dict.fromkeys(_signed(switch) for switch in _of(node, x) if switch.expression.has(x))
     return tuple(found)
+
+
+def _signed(switch: Switch) -> Switch:
+    """Return the same zeros with one of the two signs, so that they are found once."""
+    return Switch(-switch.expression, switch.levels) if switch.expression.could_extract_minus_sign() else switch
+
+
+def derivative(expression: Expr, symbol: Symbol) -> Expr:
+    """Return the derivative by a symbol between breakpoints: all symbols are real, and what a jump adds is left out.
+
+    Examples
+    --------
+    >>> from sympy import Abs, Heaviside, symbols
+    >>> x, a = symbols("x a")
+    >>> derivative(Abs(x - a) + x * Heaviside(x - a), x)
+    Heaviside(-a + x) + sign(-a + x)
+    """
+    real = {s: Dummy(s.name, real=True) for s in (expression.free_symbols | {symbol}) if isinstance(s, Symbol)}
+    rate = expression.xreplace(real).diff(real[symbol])
+    if rate.has(DiracDelta, Derivative, Subs):
+        flat = {node: S.Zero for node in rate.atoms(Derivative, Subs) if node.atoms(floor, ceiling, frac)}
+        rate = rate.xreplace(flat).replace(DiracDelta, lambda *arguments: S.Zero)
+    return rate.xreplace({dummy: s for s, dummy in real.items()})
 
 
 def _of(node: Expr | Boolean, x: Symbol) -> Iterator[Switch]:

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.kernels import Kernel, kernel
-from cra_sym.mechanics.breakpoints import switches
 
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
@@ -36,11 +35,14 @@ class Breaks:
         Of (x, parameters): values of the other switches.
     levels : tuple of bool
         Of the affine ones, then of the others: whether all integer values count.
+    rates : tuple of Kernel
+        Of (x, parameters), in the same order: derivatives by x and by every parameter.
     """
 
     affine: Kernel
     others: Kernel
     levels: tuple[bool, ...]
+    rates: tuple[Kernel, ...]
 
     def edges(self, columns: Array, left: Array, length: Array) -> list[tuple[Index, Array]]:
         """Return (rows, left end, breakpoints, right end) of the sets, grouped by the number of breakpoints.
@@ -51,10 +53,11 @@ class Breaks:
         left, length : ndarray, shape (sets,)
         """
         right = left + length
-        found = np.concatenate([left[:, None], *self._candidates(columns, left, length), right[:, None]], axis=1)
+        roots = [root for _, root in self._candidates(columns, left, length)]
+        found = np.concatenate([left[:, None], *roots, right[:, None]], axis=1)
         inside = (found > left[:, None]) & (found < right[:, None])
         inside[:, 0] = inside[:, -1] = True
-        found = np.sort(np.where(inside, found, np.inf), axis=1)
+        found = np.sort(np.where(inside, found, np.inf), axis=1)  # nan is outside
         gap = 4 * np.spacing(np.maximum(np.abs(left), np.abs(right)))[:, None]
         kept = np.isfinite(found)
         with np.errstate(invalid="ignore"):
@@ -68,7 +71,29 @@ class Breaks:
             groups.append((rows, edges))
         return groups
 
-    def _candidates(self, columns: Array, left: Array, length: Array) -> Iterator[Array]:
+    def moving(self, columns: Array, left: Array, length: Array) -> tuple[Array, Array]:
+        """Return every breakpoint in the domain, (sets, breakpoints), and its rates by every parameter.
+
+        Where a set has fewer breakpoints the places are the left end, and the rates zero; their shape is
+        (parameters, sets, breakpoints).
+        """
+        places, rates = [np.zeros((len(left), 0))], [np.zeros((len(columns), len(left), 0))]
+        for number, root in self._candidates(columns, left, length):
+            inside = (root > left[:, None]) & (root < (left + length)[:, None])
+            if not inside.any():
+                continue
+            at = np.where(inside, root, left[:, None])
+            with np.errstate(all="ignore"):
+                found = self.rates[number].function(at, *columns[..., None])
+                rate = np.stack([np.broadcast_to(-part / found[0], at.shape) for part in found[1:]])
+            places.append(at)
+            rates.append(np.where(inside & np.isfinite(rate), rate, 0.0))
+        place, rate = np.concatenate(places, axis=1), np.concatenate(rates, axis=2)
+        alike = np.abs(place[:, :, None] - place[:, None, :]) <= 1e-12 * length[:, None, None]
+        return place, rate / alike.sum(axis=-1)  # each jump once, also where two switches meet
+
+    def _candidates(self, columns: Array, left: Array, length: Array) -> Iterator[tuple[int, Array]]:
+        """Yield the number of each switch with its zeros, (sets, zeros), some of them outside or infinite."""
         arguments = columns[..., None]
         ends = left[:, None] + length[:, None] * np.array([0.0, 1.0])
         with np.errstate(all="ignore"):
@@ -77,12 +102,12 @@ class Breaks:
                 value, slope = (np.broadcast_to(v, ends.shape) for v in values[k : k + 2])
                 if self.levels[k // 2]:
                     level = _integers(value)
-                    yield ends[:, :1] + (level - value[:, :1]) / slope[:, :1]
+                    yield k // 2, ends[:, :1] + (level - value[:, :1]) / slope[:, :1]
                 else:
-                    yield np.where(np.isfinite(value[:, :1]), ends[:, :1] - value[:, :1] / slope[:, :1], np.inf)
+                    yield k // 2, ends[:, :1] - value[:, :1] / slope[:, :1]
             yield from self._sampled(columns, left, length)
 
-    def _sampled(self, columns: Array, left: Array, length: Array) -> Iterator[Array]:
+    def _sampled(self, columns: Array, left: Array, length: Array) -> Iterator[tuple[int, Array]]:
         number = len(self.others.layout)
         if not number:
             return
@@ -90,9 +115,10 @@ class Breaks:
         sampled = self.others.function(grid, *columns[..., None])
         for k in range(number):
             value = np.broadcast_to(sampled[k], grid.shape)
-            levels = _integers(value) if self.levels[len(self.levels) - number + k] else np.zeros((1, 1))
-            found = [self._roots(k, level, columns, grid, value) for level in np.unique(levels[np.isfinite(levels)])]
-            yield from found
+            switch = len(self.levels) - number + k
+            levels = _integers(value) if self.levels[switch] else np.zeros((1, 1))
+            for level in np.unique(levels[np.isfinite(levels)]):
+                yield switch, self._roots(k, level, columns, grid, value)
 
     def _roots(self, number: int, level: float, columns: Array, grid: Array, value: Array) -> Array:
         """Return where a switch passes a level between samples, (sets, roots), filled up with inf."""
@@ -126,6 +152,8 @@ def breaks(expressions: Sequence[Expr], x: Symbol, symbols: Sequence[Symbol]) ->
     HamiltonError
         Names what cannot be located.
     """
+    from cra_sym.mechanics.breakpoints import derivative, switches
+
     affine, others = [], []
     for switch in switches(expressions, x):
         slope = switch.slope(x)
@@ -136,8 +164,13 @@ def breaks(expressions: Sequence[Expr], x: Symbol, symbols: Sequence[Symbol]) ->
     pairs = tuple(part for switch, slope in affine for part in (switch.expression, slope))
     values = tuple(switch.expression for switch in others)
     arguments = (x, *symbols)
+    every = [*(switch for switch, _ in affine), *others]
     return Breaks(
         kernel(pairs, arguments, backend="numpy"),
         kernel(values, arguments, backend="numpy"),
-        (*(switch.levels for switch, _ in affine), *(switch.levels for switch in others)),
+        tuple(switch.levels for switch in every),
+        tuple(
+            kernel(tuple(derivative(switch.expression, symbol) for symbol in arguments), arguments, backend="numpy")
+            for switch in every
+        ),
     )

@@ -11,15 +11,17 @@ from sympy.core.function import AppliedUndef
 
 from cra_sym.checks import mapping, shown
 from cra_sym.kernels import Kernel, kernel
+from cra_sym.mechanics.breakpoints import derivative
 from cra_sym.mechanics.jets import END_NAMES, Jet
 from cra_sym.mechanics.weak import Bilinear, WeakForm, weak_form
+from cra_sym.model.energies import stress_route
 from cra_sym.model.exact import BallProblem, exact_kernel
 from cra_sym.model.forms import form_of, load_of
 from cra_sym.model.lagrangian import Model
+from cra_sym.model.moving import jumps
 from cra_sym.model.projection import Form, Load
 from cra_sym.model.routes import GeneralRoute, Route
 from cra_sym.model.spatial import SpatialProblem, spatial_problem
-from cra_sym.model.stress_route import stress_route
 from cra_sym.model.symmetry import asymmetry
 
 __all__ = ["axial", "causes", "constant", "damping", "geometry", "load", "names", "rates", "route", "spatial"]
@@ -182,7 +184,11 @@ def rates(model: Model) -> Form:
         for kind in kinds:
             inside, ends = named[kind]
             named[f"{symbol.name} {kind}"] = _rate(weak, inside, symbol, 1), _rate(weak, ends, symbol, 0)
-    return form_of(weak, named, model.symbols)
+    form, found = form_of(weak, named, model.symbols), model.numerics("spatial").breaks
+    if found is None:
+        return form
+    left, right = model.equations.domain
+    return replace(form, jumps=jumps(found, left, right - left, model.symbols))
 
 
 def _power(form: Bilinear, power: int) -> Bilinear:
@@ -199,8 +205,8 @@ def _rate(weak: WeakForm, form: Bilinear, symbol: Symbol, dimension: int) -> Bil
     for (p, q), entry in form.items():
         orders = sum(jet.space for jet in (p, q))
         for power, value in entry.items():
-            rate = value.diff(symbol) + value * (dimension - orders) * length.diff(symbol) / length
-            rate += value.diff(space.x) * drift if dimension else S.Zero
+            rate = derivative(value, symbol) + value * (dimension - orders) * length.diff(symbol) / length
+            rate += derivative(value, space.x) * drift if dimension else S.Zero
             if rate != 0:
                 found[p, q] = {power: rate}
     return found

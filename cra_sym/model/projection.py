@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.kernels import Kernel
+from cra_sym.model.moving import Jumps
 from cra_sym.model.routes import Modes, RigidShare, Stations
 
 __all__ = ["Domain", "Form", "Load", "Place", "Projected", "project", "stations"]
@@ -81,6 +82,9 @@ class Form:
         Of (x, parameters) and of the parameters: coefficients of all entries of the first form, then of the next.
     uniform : bool
         Whether the coefficients inside are constant along x.
+    jumps : Jumps or None
+        Of the coefficients inside, if the forms are rates by the parameters: then 'stiffness' and 'mass' are there,
+        and '<parameter> stiffness' and '<parameter> mass' in the order of the parameters.
     """
 
     names: tuple[str, ...]
@@ -89,6 +93,7 @@ class Form:
     density: Kernel
     points: Kernel
     uniform: bool
+    jumps: Jumps | None = None
 
 
 class Domain(NamedTuple):
@@ -191,6 +196,32 @@ class Projected:
                 total = total + column(factor, axes) * product
         for entry in range(len(self._form.inside)):
             total = total + self._inside(number, entry)
+        if self._form.jumps is not None and number > 1:
+            total = total + self._moved(self._form.jumps, *divmod(number - 2, 2))
+        return total
+
+    def _moved(self, jumps: Jumps, parameter: int, kind: int) -> Array | float:
+        """Return the rate of stiffness (0) or mass (1) that comes from the jumps which a parameter moves.
+
+        Of what jumps there itself, such as a curvature, the two sides are multiplied with each other: the force that
+        belongs to it does not jump.
+        """
+        shape = self._modes.omega.shape[:-1]
+        values = [np.broadcast_to(value, shape).ravel() for value in self._domain.values]
+        *sides, rate = jumps.sides(np.array(values).reshape(len(values), -1))
+        if not rate[parameter].any():
+            return 0.0
+        entries = len(self._form.inside)
+        before, after = (side.reshape(*shape, -1) for side in sides)
+        density = [self._form.density.function(x, *map(column, self._domain.values)) for x in (before, after)]
+        total: Array = np.zeros(self._shape)
+        for entry, (first, second) in enumerate(self._form.inside):
+            k = kind * entries + entry
+            factor = (density[0][k] - density[1][k]) * rate[parameter].reshape(*shape, -1)
+            for one, other in ((before, after), (after, before)):
+                left, right = along(self._modes, first, one), along(self._modes, second, other)
+                weighted = left * (0.5 * factor)[..., None, :]
+                total += (weighted * right).sum(axis=-1) if self._diagonal else weighted @ right.swapaxes(-1, -2)
         return total
 
     @property

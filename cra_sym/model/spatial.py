@@ -15,7 +15,7 @@ from cra_sym.model.values import infinite_patterns
 from cra_sym.solvers.stiffness import GOLDEN, DynamicStiffness, Evaluation
 
 if TYPE_CHECKING:
-    from sympy import Expr, Matrix, Symbol
+    from sympy import Expr, Symbol
 
     from cra_sym.mechanics import StateForm
 
@@ -270,35 +270,22 @@ def _end_stiffness(form: StateForm, symbols: tuple[Symbol, ...]) -> dict[int, Ke
 
 def _derivative_rows(form: StateForm, place: int, arguments: Sequence[Symbol]) -> tuple[Kernel, ...]:
     """Return the rows of `SpatialProblem`; where coefficients vary, as many as have derivatives between breakpoints."""
-    from sympy import Dummy, zeros
+    from sympy import zeros
+
+    from cra_sym.mechanics.breakpoints import derivative
 
     row = zeros(1, form.system.rows)
     row[place] = 1
-    x, system = form.x, form.system
-    if not form.uniform:  # real symbols: the derivative of Abs is sign
-        real = {symbol: Dummy(symbol.name, real=True) for symbol in (x, *arguments)}
-        x, system, arguments = real[x], system.xreplace(real), [real[symbol] for symbol in arguments]
     kernels = []
     for _ in range(1 if form.uniform else 2 * len(form.displacements) + 3):
         try:
-            kernels.append(kernel(row, (x, *arguments), backend="numpy"))
+            kernels.append(kernel(row, (form.x, *arguments), backend="numpy"))
         except ValueError:
             if not kernels or form.uniform:
                 raise
             break  # the derivative of such a coefficient has no function
-        row = _between_breakpoints(row.diff(x)) + row * system
+        row = row.applyfunc(lambda entry: derivative(entry, form.x)) + row * form.system
     return tuple(kernels)
-
-
-def _between_breakpoints(row: Matrix) -> Matrix:
-    """Return derivatives by x as they are where nothing jumps: those of a jump are left out."""
-    from sympy import DiracDelta, S, ceiling, floor
-    from sympy.core.function import Derivative, Subs
-
-    if not row.has(DiracDelta, Derivative, Subs):
-        return row
-    flat = {node: S.Zero for node in row.atoms(Derivative, Subs) if node.atoms(floor, ceiling)}
-    return row.applyfunc(lambda entry: entry.xreplace(flat).replace(DiracDelta, lambda *arguments: S.Zero))
 
 
 def shares(x: np.ndarray, left: np.ndarray, length: np.ndarray, name: str = "x") -> np.ndarray:
