@@ -92,7 +92,8 @@ def derivative(expression: Expr, symbol: Symbol) -> Expr:
     if rate.has(DiracDelta, Derivative, Subs):
         flat = {node: S.Zero for node in rate.atoms(Derivative, Subs) if node.atoms(floor, ceiling, frac)}
         rate = rate.xreplace(flat).replace(DiracDelta, lambda *arguments: S.Zero)
-    return rate.xreplace({dummy: s for s, dummy in real.items()})
+    points = {node: S.Zero for node in rate.atoms(SingularityFunction) if node.args[2].is_negative}
+    return rate.xreplace(points).xreplace({dummy: s for s, dummy in real.items()})
 
 
 def _of(node: Expr | Boolean, x: Symbol) -> Iterator[Switch]:

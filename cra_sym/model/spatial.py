@@ -238,6 +238,7 @@ def spatial_problem(form: StateForm, symbols: tuple[Symbol, ...], left: Expr) ->
         Coordinate of the left end.
     """
     arguments = (form.parameter, *symbols)
+    found = None if form.uniform else breaks(list(form.system), form.x, symbols)
     system, boundary = (
         kernel((matrix, matrix.diff(form.parameter)), names, backend="numpy")
         for matrix, names in ((form.system, (form.x, *arguments)), (form.boundary, arguments))
@@ -253,7 +254,7 @@ def spatial_problem(form: StateForm, symbols: tuple[Symbol, ...], left: Expr) ->
         kernel(form.free, symbols, backend="numpy") if form.free.cols else None,
         _end_stiffness(form, symbols),
         tuple(_derivative_rows(form, place, arguments) for place in range(len(form.displacements))),
-        None if form.uniform else breaks(list(form.system), form.x, symbols),
+        found,
     )
 
 

@@ -20,8 +20,9 @@ __all__ = ["BuckledError", "Spectrum", "spectrum"]
 Array = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
 EXTRA = 5  # eigenvalues beyond those asked for, for the gap that completeness needs
-_NOTHING = 1e-14
-"""Compliance relative to the largest below which there is no motion: the rounding of the matrix."""
+_NOTHING = 1e-29
+"""Compliance relative to the largest below which there is no motion: the square of what rounding leaves of a singular
+value."""
 _SPREAD = 1e-8
 """Ratio of compliances below which eigenvectors of the matrix have lost half their digits: singular values then."""
 
@@ -165,10 +166,10 @@ class _Problem:
         wanted = min(max(number, 0) + EXTRA, matrix.shape[-1])
         values, vectors = np.linalg.eigh(matrix)
         values, vectors = values[:, ::-1][:, :wanted], vectors.swapaxes(-1, -2)[:, ::-1][:, :wanted]
-        self._check(values, number)
-        wide = number > 0 and (values[:, max(number, 1) - 1] < _SPREAD * values[:, 0]).any()
-        if wide:
+        self._check_sign(values, number)
+        if number > 0 and (values[:, min(number, wanted) - 1] < _SPREAD * values[:, 0]).any():
             values, vectors = self._singular(operator, wanted)
+        self._check_number(values, number)
         unknowns = vectors @ operator  # x = L^-T u
         kinetic = self._kinetic(unknowns)
         return self._spectrum(unknowns, kinetic, values, loading, number)
@@ -259,16 +260,20 @@ class _Problem:
 
     # ------------------------------------------------------------------------------------------ the modes
 
-    def _check(self, values: Array, number: int) -> None:
-        floor = -1e-9 * np.abs(values).max(axis=1)
+    @staticmethod
+    def _check_sign(values: Array, number: int) -> None:
         if (values[:, 0] <= 0.0).any() and number > 0:
             raise ValueError("values: no motion of the structure has kinetic energy")
-        if (values < floor[:, None]).any():
+        if (values < -1e-9 * np.abs(values).max(axis=1, keepdims=True)).any():
             raise ValueError("values: a static deflection has negative kinetic energy; masses must be at least 0")
-        there = (values > _NOTHING * values[:, :1]).sum(axis=1) + self.still.shape[1]
-        if number > values.shape[1] or (there < number + self.still.shape[1]).any():
-            found = int(there.min())
-            raise ValueError(f"modes = {number + self.still.shape[1]}: the model has only {found} natural frequencies")
+
+    def _check_number(self, values: Array, number: int) -> None:
+        there = (values > _NOTHING * values[:, :1]).sum(axis=1)
+        if number > 0 and (there < number).any():
+            rigid = self.still.shape[1]
+            raise ValueError(
+                f"modes = {number + rigid}: the model has only {int(there.min()) + rigid} natural frequencies"
+            )
 
     def _singular(self, operator: Array, wanted: int) -> tuple[Array, Array]:
         """Return the largest compliances and their vectors from singular values of a factor of the mass."""

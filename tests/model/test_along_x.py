@@ -77,7 +77,7 @@ def two_part_string(place, mass):
         k = w * np.sqrt(mass)
         return np.sqrt(mass) * np.sin(w * place) * np.cos(k * (1 - place)) + np.cos(w * place) * np.sin(k * (1 - place))
 
-    grid = np.linspace(1e-3, 12.0, 4001)
+    grid = np.linspace(1e-3, 40.0, 20001)
     signs = np.sign([condition(w) for w in grid])
     return [brentq(condition, *grid[k : k + 2], xtol=1e-15) for k in np.nonzero(np.diff(signs))[0]]
 
