@@ -7,7 +7,23 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import sympy
-from sympy import Abs, DiracDelta, Dummy, Expr, S, Subs, Heaviside, Max, Min, Mod, Piecewise, Pow, SingularityFunction, Symbol, sign
+from sympy import (
+    Abs,
+    DiracDelta,
+    Dummy,
+    Expr,
+    S,
+    Subs,
+    Heaviside,
+    Max,
+    Min,
+    Mod,
+    Piecewise,
+    Pow,
+    SingularityFunction,
+    Symbol,
+    sign,
+)
 from sympy import ceiling, floor, frac, log, preorder_traversal
 from sympy.core.function import AppliedUndef, Derivative, Function
 from sympy.core.relational import Relational

@@ -62,9 +62,11 @@ def _one_after_the_other(strain: Matrix, section: list[Jet], highest: list[Jet])
     while waiting:
         for place in waiting:
             raised = section[place]._replace(space=section[place].space + 1)
-            needed = [section.index(raised)] if raised in section else [
-                j for j in range(len(section)) if strain[highest.index(raised), j] != 0
-            ]
+            needed = (
+                [section.index(raised)]
+                if raised in section
+                else [j for j in range(len(section)) if strain[highest.index(raised), j] != 0]
+            )
             if not set(needed) & set(waiting):
                 waiting.remove(place)
                 break

@@ -189,9 +189,7 @@ class StressModes:
     @cached_property
     def _forces(self) -> Array:
         """Natural forces of both ends, (sets, modes, 2, n)."""
-        return self._collected(
-            lambda found: np.stack([f[..., [0, -1]] for f in found.fields.force_ends], axis=-1)
-        )
+        return self._collected(lambda found: np.stack([f[..., [0, -1]] for f in found.fields.force_ends], axis=-1))
 
     @cached_property
     def _sign(self) -> Array:

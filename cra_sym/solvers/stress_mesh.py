@@ -116,9 +116,7 @@ class Mesh:
         inner = middle[marked]
         elements = np.union1d(self.elements, inner)
         parents = np.searchsorted(self.elements, 0.5 * (elements[1:] + elements[:-1])) - 1
-        return replace(
-            self, elements=elements, pieces=np.union1d(self.pieces, inner), strained=self.strained[parents]
-        )
+        return replace(self, elements=elements, pieces=np.union1d(self.pieces, inner), strained=self.strained[parents])
 
 
 @dataclass(frozen=True)

@@ -178,9 +178,7 @@ class _Problem:
     def _loaded(self) -> bool:
         """Whether some potential energy may be negative: tensions below zero, coupling."""
         parts = self.columns.coefficient
-        return bool(parts["D"]) or any(
-            bool((entry < 0.0).any()) or i != j for (i, j), entry in parts["R"].items()
-        )
+        return bool(parts["D"]) or any(bool((entry < 0.0).any()) or i != j for (i, j), entry in parts["R"].items())
 
     def _base(self) -> tuple[Array, Array]:
         """Return a positive stiffness with springs up to the size of what is there, and what it has of each spring."""
@@ -323,9 +321,7 @@ class _Problem:
             total += ((ends @ columns.problem.end_mass[self.sets]) * ends).sum(axis=-1)
         return total
 
-    def _spectrum(
-        self, unknowns: Array, kinetic: Array, values: Array, loading: Array, number: int
-    ) -> Spectrum:
+    def _spectrum(self, unknowns: Array, kinetic: Array, values: Array, loading: Array, number: int) -> Spectrum:
         with np.errstate(divide="ignore", invalid="ignore"):
             compliances = np.where(kinetic > 0.0, kinetic, values)
             order = np.argsort(-compliances, axis=1, kind="stable")

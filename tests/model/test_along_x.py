@@ -125,7 +125,10 @@ def test_stepped_cells(cells):
 
     def condition(w):
         h = 0.5 / cells
-        parts = [np.array([[np.cos(k), np.sin(k) / q], [-q * np.sin(k), np.cos(k)]]) for q, k in ((w, w * h), (2 * w, 2 * w * h))]
+        parts = [
+            np.array([[np.cos(k), np.sin(k) / q], [-q * np.sin(k), np.cos(k)]])
+            for q, k in ((w, w * h), (2 * w, 2 * w * h))
+        ]
         return np.linalg.matrix_power(parts[1] @ parts[0], cells)[0, 1]
 
     for k, w in enumerate(found):
@@ -159,9 +162,7 @@ def test_tension_that_vanishes_at_the_tip(tension, expected):
     np.testing.assert_allclose(omega(mirrored, 3), expected, rtol=CLOSE)
 
 
-@pytest.mark.parametrize(
-    ("power", "expected"), [(1, 5.31509942365365), (2, 8.71925885507992)], ids=["wedge", "cone"]
-)
+@pytest.mark.parametrize(("power", "expected"), [(1, 5.31509942365365), (2, 8.71925885507992)], ids=["wedge", "cone"])
 def test_beams_with_a_sharp_tip(power, expected):
     """Closed forms with Bessel functions (Kirchhoff 1882), in 30 digits."""
     sharp = beam((1 - x) ** (power + 2), (1 - x) ** power)
@@ -234,9 +235,7 @@ def test_shapes_of_two_routes_agree(stepped):
     places = np.linspace(0.0, 1.0, 11)
     for derivative in range(4):
         expected = other.shape(0, derivative, places)
-        np.testing.assert_allclose(
-            found.shape(0, derivative, places), expected, atol=1e-8 * np.abs(expected).max()
-        )
+        np.testing.assert_allclose(found.shape(0, derivative, places), expected, atol=1e-8 * np.abs(expected).max())
     for end in (0, 1):
         for place in (0, 1):
             size = np.abs(other.force(0, place)).max()
@@ -244,7 +243,9 @@ def test_shapes_of_two_routes_agree(stepped):
             np.testing.assert_allclose(
                 found.displacement(end, place), other.displacement(end, place), rtol=1e-8, atol=1e-8
             )
-    np.testing.assert_allclose(found.integral(0), np.trapezoid(found.shape(0, 0, np.linspace(0, 1, 20001))) / 20000, rtol=1e-6)
+    np.testing.assert_allclose(
+        found.integral(0), np.trapezoid(found.shape(0, 0, np.linspace(0, 1, 20001))) / 20000, rtol=1e-6
+    )
 
 
 def test_static_response_of_a_stepped_beam(stepped):

@@ -82,9 +82,7 @@ def test_random_stepped_beams_against_transfer_matrices(number):
     def pick(values):
         return lambda x: values[np.clip(np.searchsorted(edges, x) - 1, 0, len(values) - 1)]
 
-    problem = continuum(
-        {("W", 0): pick(bendings), ("M", 0): pick(masses)}, edges, [*spring, 0, 0], [0, 0, tip, 0]
-    )
+    problem = continuum({("W", 0): pick(bendings), ("M", 0): pick(masses)}, edges, [*spring, 0, 0], [0, 0, tip, 0])
     found, accuracy, _ = frequencies(problem, 3)
     with mp.workdps(30):
         data = (*map(list, (np.diff(edges), bendings, masses)), list(map(mpf, spring)), mpf(tip))
@@ -133,9 +131,7 @@ def shot(omega, bending, mass, tension):
 def test_random_smooth_profiles_against_shooting(number):
     bending, mass, tension = smooth(np.random.default_rng(SEED + 100 + number))
     inf = np.inf
-    problem = continuum(
-        {("W", 0): bending, ("M", 0): mass, ("R", 1): tension}, [0.0, 1.0], [inf, inf, 0, 0], [0.0] * 4
-    )
+    problem = continuum({("W", 0): bending, ("M", 0): mass, ("R", 1): tension}, [0.0, 1.0], [inf, inf, 0, 0], [0.0] * 4)
     found, accuracy, _ = frequencies(problem, 3)
     assert accuracy < 1e-10
     grid = np.linspace(0.02 * found[0], found[2] * 1.001, 40)
@@ -187,7 +183,10 @@ def test_compliances_far_apart_keep_their_digits():
 
                 def condition(omega, spring=spring, tip=tip):
                     last = segment(mpf(1), mpf(1), mpf(1), omega) * mp.matrix([[1, 0], [0, 0], [0, 1], [spring, 0]])
-                    (a, b), (c, d) = ([last[3, k] - tip * omega**2 * last[0, k] for k in (0, 1)], [last[2, k] for k in (0, 1)])
+                    (a, b), (c, d) = (
+                        [last[3, k] - tip * omega**2 * last[0, k] for k in (0, 1)],
+                        [last[2, k] for k in (0, 1)],
+                    )
                     return a * d - b * c
 
                 h = w * mpf(10) ** -15
