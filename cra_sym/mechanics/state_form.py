@@ -40,6 +40,9 @@ class StateForm:
         Whether the parameter is s.
     x : Symbol
     length : Expr
+    points : tuple of (place, Matrix, held)
+        At interior places the forces P and r grow by the matrix, (n + m, n + m), times (q, w); the displacements of a
+        section with the numbers held vanish there.
     """
 
     displacements: tuple[Expr, ...]
@@ -52,11 +55,12 @@ class StateForm:
     damped: bool
     x: Symbol
     length: Expr
+    points: tuple[tuple[Expr, Matrix, tuple[int, ...]], ...] = ()
 
     @property
     def uniform(self) -> bool:
-        """Whether the system is constant along x."""
-        return not self.system.has(self.x)
+        """Whether the system is constant along x, with nothing at interior places."""
+        return not self.points and not self.system.has(self.x)
 
 
 def state_form(result: HamiltonResult) -> StateForm:
@@ -107,6 +111,24 @@ def state_form(result: HamiltonResult) -> StateForm:
         not weak.even,
         result.x,
         result.domain[1] - result.domain[0],
+        _points(weak, parameter),
+    )
+
+
+def _points(weak: WeakForm, parameter: Symbol) -> tuple[tuple[Expr, Matrix, tuple[int, ...]], ...]:
+    section, _, lumped = weak.fields()
+    rows = [*section, *lumped]
+    return tuple(
+        (
+            place,
+            Matrix(
+                len(rows),
+                len(rows),
+                [polynomial(form.get((p, q), {}).items(), parameter, weak.even) for p in rows for q in rows],
+            ),
+            tuple(section.index(jet) for jet in held),
+        )
+        for place, form, held in weak.points
     )
 
 

@@ -29,6 +29,8 @@ class WeakForm:
         ``s**0``, damping (and gyroscopic forces) of ``s**1``, mass of ``s**2``.
     inside_load, end_load : dict of Jet to Expr
         What does not depend on the unknowns: prescribed motions and applied forces.
+    points : tuple of (place, form, held)
+        The same at interior places, and the displacements that are held there.
     """
 
     variation: Variation
@@ -36,11 +38,13 @@ class WeakForm:
     ends: Bilinear
     inside_load: dict[Jet, Expr]
     end_load: dict[Jet, Expr]
+    points: tuple[tuple[Expr, Bilinear, tuple[Jet, ...]], ...] = ()
 
     @property
     def powers(self) -> set[int]:
         """Powers of s that occur."""
-        return {power for form in (self.inside, self.ends) for entry in form.values() for power in entry}
+        forms = (self.inside, self.ends, *(form for _, form, _ in self.points))
+        return {power for form in forms for entry in form.values() for power in entry}
 
     @property
     def even(self) -> bool:
@@ -51,7 +55,7 @@ class WeakForm:
     def uniform(self) -> bool:
         """Whether no coefficient depends on x."""
         x = self.variation.space.x
-        return not any(value.has(x) for entry in self.inside.values() for value in entry.values())
+        return not self.points and not any(v.has(x) for entry in self.inside.values() for v in entry.values())
 
     def fields(self) -> tuple[list[Jet], list[Jet], list[Jet]]:
         """Return the displacements of a section, the highest derivative of each field, and the coordinates."""
@@ -81,7 +85,15 @@ def weak_form(variation: Variation) -> WeakForm:
             _accumulate(form, displacement, jet, -factor)
         still = force.xreplace({space.symbol(jet): S.Zero for jet in space.jets(force)})
         load[displacement] = load.get(displacement, S.Zero) + still
-    return WeakForm(variation, _cleaned(inside), _cleaned(ends), _nonzero(inside_load), _nonzero(end_load))
+    points = tuple((p.place, _at_point(space, p.place, p.lagrangian), p.held) for p in variation.points)
+    return WeakForm(variation, _cleaned(inside), _cleaned(ends), _nonzero(inside_load), _nonzero(end_load), points)
+
+
+def _at_point(space: JetSpace, place: Expr, lagrangian: Expr) -> Bilinear:
+    form, load = _quadratic(space, lagrangian, f"term inside at {space.x} = {place}")
+    if _nonzero(load):
+        raise HamiltonError(f"term inside at {space.x} = {place}: a force there belongs in the density or at an end")
+    return _cleaned(form)
 
 
 def _quadratic(space: JetSpace, lagrangian: Expr, label: str) -> tuple[Bilinear, dict[Jet, Expr]]:

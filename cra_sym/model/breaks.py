@@ -37,15 +37,21 @@ class Breaks:
         Of the affine ones, then of the others: whether all integer values count.
     rates : tuple of Kernel
         Of (x, parameters), in the same order: derivatives by x and by every parameter.
+    places : Kernel
+        Of the parameters: interior places of terms.
     """
 
     affine: Kernel
     others: Kernel
     levels: tuple[bool, ...]
     rates: tuple[Kernel, ...]
+    places: Kernel
 
-    def edges(self, columns: Array, left: Array, length: Array) -> list[tuple[Index, Array]]:
-        """Return (rows, left end, breakpoints, right end) of the sets, grouped by the number of breakpoints.
+    def edges(self, columns: Array, left: Array, length: Array) -> list[tuple[Index, Array, tuple[int, ...]]]:
+        """Return groups of sets that have as many breakpoints, and the interior places of terms at the same of them.
+
+        Of each group the rows, (left end, breakpoints, right end) of shape (sets, breakpoints + 2) and the number of
+        the breakpoint of each interior place, -1 if it is not in the domain.
 
         Parameters
         ----------
@@ -54,7 +60,12 @@ class Breaks:
         """
         right = left + length
         roots = [root for _, root in self._candidates(columns, left, length)]
-        found = np.concatenate([left[:, None], *roots, right[:, None]], axis=1)
+        stated = np.empty((len(left), len(self.places.layout)))
+        for k, place in enumerate(self.places.function(*columns)):
+            stated[:, k] = place
+        if ((stated == left[:, None]) | (stated == right[:, None])).any():
+            raise ValueError("inside: a place is at an end of the domain; state its term with left or right")
+        found = np.concatenate([left[:, None], *roots, stated, right[:, None]], axis=1)
         inside = (found > left[:, None]) & (found < right[:, None])
         inside[:, 0] = inside[:, -1] = True
         found = np.sort(np.where(inside, found, np.inf), axis=1)  # nan is outside
@@ -68,7 +79,11 @@ class Breaks:
             rows = np.nonzero(count == number)[0]
             edges = found[rows][kept[rows]].reshape(len(rows), number)
             edges[:, -1] = right[rows]
-            groups.append((rows, edges))
+            nodes = np.abs(edges[:, :, None] - stated[rows, None, :]).argmin(axis=1)
+            nodes[(stated[rows] < left[rows, None]) | (stated[rows] > right[rows, None])] = -1
+            for kind in np.unique(nodes, axis=0):
+                alike = (nodes == kind).all(axis=1)
+                groups.append((rows[alike], edges[alike], tuple(int(k) for k in kind)))
         return groups
 
     def moving(self, columns: Array, left: Array, length: Array) -> tuple[Array, Array]:
@@ -144,8 +159,10 @@ def _integers(value: Array) -> Array:
     return np.where(found <= high[:, None], found, np.inf)
 
 
-def breaks(expressions: Sequence[Expr], x: Symbol, symbols: Sequence[Symbol]) -> Breaks:
-    """Return the compiled switches of coefficients.
+def breaks(
+    expressions: Sequence[Expr], x: Symbol, symbols: Sequence[Symbol], places: Sequence[Expr] = ()
+) -> Breaks:
+    """Return the compiled switches of coefficients, with interior places of terms.
 
     Raises
     ------
@@ -173,4 +190,5 @@ def breaks(expressions: Sequence[Expr], x: Symbol, symbols: Sequence[Symbol]) ->
             kernel(tuple(derivative(switch.expression, symbol) for symbol in arguments), arguments, backend="numpy")
             for switch in every
         ),
+        kernel(tuple(places), tuple(symbols), backend="numpy"),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -35,14 +35,52 @@ class Stiffness(DynamicStiffness):
     ----------
     spans : Spans or None
         Where the coefficients vary along x.
+    at_nodes : callable or None
+        ``at_nodes(z, rows)`` returns (share, matrix, derivative) of what acts at interior places.
     """
 
     spans: Spans | None = None
+    at_nodes: Callable[[np.ndarray, np.ndarray], list[tuple[float, np.ndarray, np.ndarray]]] | None = None
 
     def take(self, rows: np.ndarray) -> DynamicStiffness:
         """Return the problem of some of the parameter sets."""
         spans = None if self.spans is None else self.spans.take(rows)
-        return replace(super().take(rows), spans=spans)  # type: ignore[call-arg]
+        at = self.at_nodes
+        at_nodes = None if at is None else lambda z, index: at(z, rows[index])
+        return replace(super().take(rows), spans=spans, at_nodes=at_nodes)  # type: ignore[call-arg]
+
+    def _transfer(self, z: np.ndarray, rows: np.ndarray, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the transfer matrices of all pieces; those right of an interior place begin with what acts there."""
+        whole, slope = super()._transfer(z, rows, levels)
+        for part, piece, jump, rate in self._entered(z, rows, int(levels.max(initial=0))):
+            first, first_slope = whole[part, :, piece], slope[part, :, piece]
+            slope[part, :, piece] = first_slope @ jump + first @ rate
+            whole[part, :, piece] = first @ jump
+        return whole, slope
+
+    def behind(self, start: np.ndarray, z: np.ndarray, row: np.ndarray, level: int) -> np.ndarray:
+        """Return states left of the pieces, (part, row, piece, state), behind what acts there."""
+        found = start
+        for part, piece, jump, _ in self._entered(z, row, level):
+            found = found.copy() if found is start else found
+            found[part, :, piece] = (jump @ start[part, :, piece, :, None])[..., 0]
+        return found
+
+    def _entered(
+        self, z: np.ndarray, rows: np.ndarray, level: int
+    ) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:
+        """Yield part and piece right of each interior place, with the transfer matrix there and its derivative."""
+        if self.at_nodes is None:
+            return
+        size = self.displacements + self.coordinates
+        for share, matrix, rate in self.at_nodes(z, rows):
+            part = int(share > GOLDEN - 1e-9)
+            width = 1.0 - GOLDEN if part else GOLDEN
+            piece = round((share - part * GOLDEN) / width * 2**level)
+            jump = np.broadcast_to(np.eye(2 * size, dtype=matrix.dtype), (len(z), 2 * size, 2 * size)).copy()
+            slope = np.zeros_like(jump)
+            jump[:, size:, :size], slope[:, size:, :size] = matrix, rate
+            yield part, piece, jump, slope
 
     def shares(self, x: Array, left: Array) -> Array:
         """Return the shares of places x of shape (stations,) or (rows, stations), in shape (rows, stations)."""
@@ -60,6 +98,27 @@ class Stiffness(DynamicStiffness):
         if not np.iscomplexobj(here.matrix):  # a guess of a complex eigenvalue may be far off
             check_range(here.matrix, here.derivative)
         return here
+
+
+@dataclass(frozen=True)
+class PointTerms:
+    """Compiled terms at interior places.
+
+    Attributes
+    ----------
+    matrices : Kernel
+        Of (parameter, parameters): for each place what the forces (P, r) grow by, times (q, w), and its derivative.
+    held : tuple of tuple of int
+        Displacements of a section that vanish at each place.
+    """
+
+    matrices: Kernel
+    held: tuple[tuple[int, ...], ...]
+
+    def at(self, z: Array, columns: Array) -> list[tuple[Array, Array]]:
+        """Return matrix and derivative of each place, (len(z), n + m, n + m)."""
+        found = self.matrices(z, *columns)
+        return [(found[k], found[k + 1]) for k in range(0, len(found), 2)]
 
 
 @dataclass(frozen=True)
@@ -140,6 +199,8 @@ class SpatialProblem:
         For each displacement, the rows c with ``D^order q = c (q, w, P)``, order 0 and up.
     breaks : Breaks or None
         Where the system is not smooth along x, unless it is uniform.
+    points : PointTerms or None
+        What acts at interior places.
     """
 
     names: tuple[str, ...]
@@ -153,6 +214,7 @@ class SpatialProblem:
     end_stiffness: dict[int, Kernel]
     rows: tuple[tuple[Kernel, ...], ...]
     breaks: Breaks | None = None
+    points: PointTerms | None = None
 
     def derivative_row(self, place: int, order: int, z: np.ndarray, x: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Return the row c with ``D^order q[place] = c (q, w, P)``, shape (rows, modes, stations, 2 n + m)."""
@@ -189,12 +251,13 @@ class SpatialProblem:
             if self.breaks is None:
                 yield rows, left, self._problem(some, infinite, left, length, None)
                 continue
-            for members, edges in self.breaks.edges(some, left, length):
-                part = self._problem(some[:, members], infinite, left[members], length[members], edges)
+            for members, edges, nodes in self.breaks.edges(some, left, length):
+                part = self._problem(some[:, members], infinite, left[members], length[members], edges, nodes)
                 yield rows[members], left[members], part
 
     def _problem(
-        self, columns: np.ndarray, infinite: tuple[int, ...], left: Array, length: Array, edges: Array | None
+        self, columns: np.ndarray, infinite: tuple[int, ...], left: Array, length: Array, edges: Array | None,
+        nodes: tuple[int, ...] = (),
     ) -> Stiffness:
         n, m = self.displacements, self.coordinates
         free = np.zeros((2 * n + m, 0)) if self.free is None else self.free(*columns)
@@ -213,7 +276,15 @@ class SpatialProblem:
         def ends(z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return _finite(self.boundary(z, *columns[:, rows]), "an end term")
 
-        return Stiffness(section, ends, length, n, m, free, self.uniform, halvings, spans)
+        def at_nodes(z: np.ndarray, rows: np.ndarray) -> list[tuple[float, np.ndarray, np.ndarray]]:
+            assert self.points is not None and spans is not None
+            terms = zip(self.points.at(z, columns[:, rows]), nodes, strict=True)
+            return [(float(spans.knots[node]), *pair) for pair, node in terms if node >= 0]
+
+        if self.points is not None and any(self.points.held):
+            raise ValueError("essential: supports at interior places are known to natural frequencies and modes alone")
+        jumps = None if self.points is None else at_nodes
+        return Stiffness(section, ends, length, n, m, free, self.uniform, halvings, spans, jumps)
 
     def _coefficients(self, x: Array | float, z: np.ndarray, columns: Array) -> tuple[np.ndarray, np.ndarray]:
         return _finite(self.system(x, z[:, None], *columns[..., None]), "a coefficient of the equations")
@@ -238,7 +309,11 @@ def spatial_problem(form: StateForm, symbols: tuple[Symbol, ...], left: Expr) ->
         Coordinate of the left end.
     """
     arguments = (form.parameter, *symbols)
-    found = None if form.uniform else breaks(list(form.system), form.x, symbols)
+    places = [place for place, _, _ in form.points]
+    found = None if form.uniform else breaks(list(form.system), form.x, symbols, places)
+    matrices = [part for _, matrix, _ in form.points for part in (matrix, matrix.diff(form.parameter))]
+    held = tuple(held for _, _, held in form.points)
+    points = PointTerms(kernel(tuple(matrices), arguments, backend="numpy"), held) if places else None
     system, boundary = (
         kernel((matrix, matrix.diff(form.parameter)), names, backend="numpy")
         for matrix, names in ((form.system, (form.x, *arguments)), (form.boundary, arguments))
@@ -255,6 +330,7 @@ def spatial_problem(form: StateForm, symbols: tuple[Symbol, ...], left: Expr) ->
         _end_stiffness(form, symbols),
         tuple(_derivative_rows(form, place, arguments) for place in range(len(form.displacements))),
         found,
+        points,
     )
 
 

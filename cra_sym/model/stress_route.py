@@ -13,7 +13,7 @@ from cra_sym.kernels import Kernel
 from cra_sym.model.routes import Values, tip_sign
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.values import flat_columns, infinite_patterns
-from cra_sym.solvers.stress import Continuum, Entries
+from cra_sym.solvers.stress import Continuum, Entries, PointTerm
 from cra_sym.solvers.stress_refine import Found, solved
 
 __all__ = ["StressModes", "StressRoute"]
@@ -73,7 +73,7 @@ class StressRoute:
             some[list(infinite)] = 0.0
             length, left = (np.broadcast_to(v, len(rows)) for v in self.spatial.geometry(*some))
             directions, springs, mass = self._ends(some, infinite)
-            for members, edges in self._edges(some, left, length):
+            for members, edges, nodes in self._edges(some, left, length):
                 problem = Continuum(
                     self.orders,
                     self.spatial.coordinates,
@@ -82,13 +82,14 @@ class StressRoute:
                     directions[members],
                     springs[members],
                     mass[members],
+                    points=self._points(some[:, members], nodes),
                 )
                 for found in solved(problem, modes, 2.0 * TOLERANCE, target):
                     yield Found(rows[members][found.rows], found.fields, found.accuracy)
 
-    def _edges(self, columns: Array, left: Array, length: Array) -> list[tuple[Index, Array]]:
+    def _edges(self, columns: Array, left: Array, length: Array) -> list[tuple[Index, Array, tuple[int, ...]]]:
         if self.spatial.breaks is None:
-            return [(np.arange(len(left)), np.stack([left, left + length], axis=1))]
+            return [(np.arange(len(left)), np.stack([left, left + length], axis=1), ())]
         return self.spatial.breaks.edges(columns, left, length)
 
     def _evaluated(self, columns: Array) -> Callable[[Array, Index], dict[str, Entries]]:
@@ -104,6 +105,20 @@ class StressRoute:
             return parts  # type: ignore[return-value]
 
         return coefficients
+
+    def _points(self, columns: Array, nodes: tuple[int, ...]) -> tuple[PointTerm, ...]:
+        points = self.spatial.points
+        if points is None:
+            return ()
+        sets = columns.shape[1]
+        found = []
+        terms = points.at(np.zeros(sets), columns)
+        for node, (stiffness, rate), held in zip(nodes, terms, points.held, strict=True):
+            if node >= 0:
+                shape = (sets, *np.shape(stiffness)[-2:])
+                springs = _springs_and_supports(np.broadcast_to(stiffness, shape), held)
+                found.append(PointTerm(node, *springs, -np.broadcast_to(rate, shape)))
+        return tuple(found)
 
     # ------------------------------------------------------------------------------------------ the ends
 
@@ -127,6 +142,18 @@ class StressRoute:
         springs = np.concatenate([np.broadcast_to(k, (sets, *k.shape[1:])) for _, k in parts], axis=1)
         _, full = spatial.boundary(np.zeros(sets), *columns)
         return directions, springs, -np.broadcast_to(full, mass.shape)
+
+
+def _springs_and_supports(matrix: Array, held: tuple[int, ...]) -> tuple[Array, Array]:
+    """Return a stiffness matrix of an interior place as springs, with an infinite one for each displacement held."""
+    directions, springs = _springs(matrix, np.ones(len(matrix)))
+    sets = len(matrix)
+    rows = np.broadcast_to(np.eye(matrix.shape[-1])[list(held)], (sets, len(held), matrix.shape[-1]))
+    directions = np.broadcast_to(directions, (sets, *directions.shape[1:]))
+    springs = np.broadcast_to(springs, (sets, springs.shape[1]))
+    return np.concatenate([directions, rows], axis=1), np.concatenate(
+        [springs, np.full((sets, len(held)), np.inf)], axis=1
+    )
 
 
 def _held(free: Kernel | None, columns: Array, size: int) -> tuple[Array, Array]:

@@ -16,11 +16,34 @@ from numpy.typing import NDArray
 
 from .stress_mesh import Grid, Mesh, rule
 
-__all__ = ["Columns", "Continuum", "Entries"]
+__all__ = ["Columns", "Continuum", "Entries", "PointTerm"]
 
 Array = NDArray[np.float64]
 Entries = Mapping[tuple[int, int], Array]
 Coefficients = Callable[[Array, NDArray[np.intp]], dict[str, Entries]]
+
+
+@dataclass(frozen=True)
+class PointTerm:
+    """Springs and masses at a breakpoint.
+
+    Attributes
+    ----------
+    node : int
+        Number of the breakpoint among the edges.
+    directions, springs : ndarray, shape (rows, springs, n + m), (rows, springs)
+        Each spring, which may be infinite, acts on ``directions @ (q, w)``.
+    mass : ndarray, shape (rows, n + m, n + m)
+    """
+
+    node: int
+    directions: Array
+    springs: Array
+    mass: Array
+
+    def take(self, rows: NDArray[np.intp]) -> PointTerm:
+        """Return those of some of the parameter sets."""
+        return PointTerm(self.node, self.directions[rows], self.springs[rows], self.mass[rows])
 
 
 @dataclass(frozen=True)
@@ -47,6 +70,8 @@ class Continuum:
     end_mass : ndarray, shape (rows, 2 n + m, 2 n + m)
     origin : int
         The end from which displacements are integrated, 0 or 1: not one at which a stiffness vanishes.
+    points : tuple of PointTerm
+        What acts at breakpoints.
     """
 
     orders: tuple[int, ...]
@@ -57,6 +82,7 @@ class Continuum:
     springs: Array
     end_mass: Array
     origin: int = 0
+    points: tuple[PointTerm, ...] = ()
 
     @property
     def displacements(self) -> int:
@@ -72,6 +98,7 @@ class Continuum:
             directions=self.directions[rows],
             springs=self.springs[rows],
             end_mass=self.end_mass[rows],
+            points=tuple(point.take(rows) for point in self.points),
         )
 
     def tops(self) -> list[int]:
@@ -304,6 +331,8 @@ class Columns:
         total = self._quadratic(self.coefficient["M"], np.zeros((self.sets, self.size, self.size)))
         if np.any(self.problem.end_mass):
             total += self.ends.swapaxes(-1, -2) @ self.problem.end_mass @ self.ends
+        for point, there in zip(self.problem.points, self.at_points, strict=True):
+            total += there.swapaxes(-1, -2) @ point.mass @ there
         return total
 
     def _quadratic(self, entries: Entries, total: Array) -> Array:
@@ -326,6 +355,25 @@ class Columns:
     def _flat(self, values: Array) -> Array:
         shape = self.grid.x.shape[1:]
         return np.broadcast_to(values, (*values.shape[:2], *shape)).reshape(*values.shape[:2], -1)
+
+    @cached_property
+    def at_points(self) -> list[Array]:
+        """(q, w) at each point, (sets, n + m, size)."""
+        found = []
+        for point in self.problem.points:
+            index = int(np.searchsorted(self.mesh.pieces, point.node))
+            rows = [end[..., index] if end.shape[-1] > 1 else end[..., 0] for end in self.displaced[1]]
+            found.append(np.stack([np.broadcast_to(row, (self.sets, self.size)) for row in rows], axis=1))
+        return found
+
+    @cached_property
+    def held(self) -> tuple[Array, Array]:
+        """What each spring acts on, (sets, springs, size), and the springs, (sets, springs)."""
+        rows, springs = [self.problem.directions @ self.ends], [self.problem.springs]
+        for point, there in zip(self.problem.points, self.at_points, strict=True):
+            rows.append(point.directions @ there)
+            springs.append(point.springs)
+        return np.concatenate(rows, axis=1), np.concatenate(springs, axis=1)
 
     @cached_property
     def ends(self) -> Array:

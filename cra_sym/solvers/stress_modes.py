@@ -110,40 +110,52 @@ class ModeFields:
         ends: list[Array] = []
         residuals = []
         place = 0
-        grid = self.columns.grid
-        centre = 0.5 * (grid.ends[:, :1] + grid.ends[:, -1:])
-        half = 0.5 * (grid.ends[:, -1:] - grid.ends[:, :1])
-        at, nodes = ((x - centre.reshape(-1, *[1] * (x.ndim - 1))) for x in (grid.x, grid.ends))
-        scale = half[:, :, None]
-        free = [np.ones_like(at), -at / scale]  # solutions of the homogeneous equilibrium, lowest order last
-        free_nodes = [np.ones_like(nodes), -nodes / half]
         for field, order in enumerate(self.problem.orders):
-            if order > 2:
-                raise ValueError("a field must not have a third derivative by x in the density")
-            lower: tuple[Array, Array] | None = None
-            chain = []
+            chain: list[tuple[Array, Array]] = []
             for k in range(order):
                 rate = self._force(place + k)
-                if lower is not None:
-                    rate = rate - lower[0]
-                lower = self._integral(rate)
-                chain.append(lower)
+                chain.append(self._integral(rate - chain[-1][0] if chain else rate))
             stress = self.stress[field]
-            weight = self._softness(field)
-            shift = self._fit(stress - chain[-1][0], [f[:, None] for f in free[:order]], weight)
-            # P_top gains shift_0 + shift_1 (-x / scale), so the one below gains shift_1 / scale
-            for k in range(order):
-                values, value_ends = chain[k]
-                gain = shift[: order - k] if k == order - 1 else [shift[1] / scale[:, 0]]
-                parts = range(order) if k == order - 1 else range(1)
-                gain = shift if k == order - 1 else gain
-                values = values + sum(gain[p][..., None, None] * free[p][:, None] for p in parts)
-                value_ends = value_ends + sum(gain[p][..., None] * free_nodes[p][:, None] for p in parts)
+            free = self._free(order)
+            shift = self._fit(stress - chain[-1][0], [levels[-1][0] for levels in free], self._softness(field))
+            for k, (values, value_ends) in enumerate(chain):
+                for part, levels in zip(np.moveaxis(shift, -1, 0), free, strict=True):
+                    values = values + part[..., None, None] * levels[k][0][:, None]
+                    value_ends = value_ends + part[..., None] * levels[k][1][:, None]
                 forces.append(values)
                 ends.append(value_ends)
             residuals.append(forces[-1] - stress)
             place += order
         return forces, ends, residuals
+
+    def _free(self, order: int) -> list[list[tuple[Array, Array]]]:
+        """Return forces of a field that need no load: of each, at the points and at the ends of pieces, lowest first.
+
+        One constant, and for a field with second derivatives one moment that grows along x; beside them what each
+        interior place may add to the right of it.
+        """
+        grid = self.columns.grid
+        points = sorted({point.node for point in self.problem.points})
+        kinks = grid.ends[:, np.searchsorted(self.columns.mesh.pieces, points)]
+        scale = 0.5 * (grid.ends[:, -1] - grid.ends[:, 0])
+        starts = [(0.5 * (grid.ends[:, 0] + grid.ends[:, -1]), np.full(len(scale), -np.inf))]
+        starts += [(kink, kink) for kink in kinks.T]
+        found = []
+        for centre, start in starts:
+            steps, ramps = [], []
+            for x in (grid.x, grid.ends):
+                shape = (-1, *[1] * (x.ndim - 1))
+                there = np.where(x > start.reshape(shape), 1.0, 0.0)
+                steps.append(there)
+                ramps.append(there * (centre.reshape(shape) - x) / scale.reshape(shape))
+            step = steps[0], steps[1]
+            if order == 1:
+                found.append([step])
+                continue
+            lower = steps[0] / scale[:, None, None], steps[1] / scale[:, None]
+            found.append([(np.zeros_like(steps[0]), np.zeros_like(steps[1])), step])
+            found.append([lower, (ramps[0], ramps[1])])
+        return found
 
     def _softness(self, field: int) -> Array:
         """Return weights of the integral of a squared stress times its compliance, (sets, 1, Q, G)."""
@@ -152,20 +164,12 @@ class ModeFields:
         return (soft * grid.half[..., None] * self.columns.gauss.weights)[:, None]
 
     @staticmethod
-    def _fit(values: Array, basis: list[Array], weight: Array) -> list[Array]:
-        """Return coefficients of one or two functions that fit values in the weighted mean square."""
-
-        def product(first: Array, second: Array) -> Array:
-            return (first * second * weight).sum(axis=(-1, -2))
-
-        first = basis[0]
-        norm = product(first, first)
-        if len(basis) == 1:
-            return [product(values, first) / norm]
-        mean = product(basis[1], first) / norm
-        second = basis[1] - mean[..., None, None] * first
-        slope = product(values, second) / product(second, second)
-        return [product(values, first) / norm - slope * mean, slope]
+    def _fit(values: Array, basis: list[Array], weight: Array) -> Array:
+        """Return coefficients of functions that fit values in the weighted mean square, (sets, modes, functions)."""
+        root = np.sqrt(weight.reshape(len(weight), -1, 1))
+        frame, upper = np.linalg.qr(np.stack([f.reshape(len(f), -1) for f in basis], axis=-1) * root)
+        load = frame.swapaxes(-1, -2) @ (values.reshape(*values.shape[:2], -1).swapaxes(-1, -2) * root)
+        return np.linalg.solve(upper, load).swapaxes(-1, -2)
 
     def _integral(self, rate: Array) -> tuple[Array, Array]:
         """Return the integral from the left end at the points and at the ends of the pieces."""

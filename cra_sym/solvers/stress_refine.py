@@ -111,6 +111,7 @@ def _group(
     elements = cells(spans, max(_MOST_ELEMENTS, int(np.ceil(modes / 12))))
     if spans == 1 and modes > 20:
         elements = np.linspace(0.0, 1.0, int(np.ceil(modes / 12)) + 1)
+    elements = np.union1d(elements, [float(point.node) for point in problem.points])
     strained = np.zeros(len(elements) - 1, dtype=bool)
     strained[0] |= ends[0]
     strained[-1] |= ends[1]

@@ -70,8 +70,7 @@ def spectrum(columns: Columns, modes: int) -> Spectrum:
     ValueError
         If there are fewer modes, or no motion has kinetic energy.
     """
-    directions, springs = columns.problem.directions, columns.problem.springs
-    rows = directions @ columns.ends
+    rows, springs = columns.held
     free = _rigid_motions(columns, rows, springs)
     sizes = np.array([len(motion) for motion in free])
     parts = []
@@ -294,10 +293,10 @@ class _Problem:
         parts = []
         for k in range(len(places)):
             parts.append(sum(root[:, :, a, k][:, None] * moved[place] for a, place in enumerate(places)))
-        size, frame = np.linalg.eigh(columns.problem.end_mass)
-        ends = np.sqrt(np.maximum(size, 0.0))[..., None] * (frame.swapaxes(-1, -2) @ columns.ends)
+        ends = _root(columns.problem.end_mass) @ columns.ends
         inside = [np.broadcast_to(part, (columns.sets, columns.size, points)).swapaxes(-1, -2) for part in parts]
-        return np.concatenate([*inside, ends], axis=1)[self.sets]
+        at = [_root(point.mass) @ there for point, there in zip(columns.problem.points, columns.at_points, strict=True)]
+        return np.concatenate([*inside, ends, *at], axis=1)[self.sets]
 
     def _kinetic(self, unknowns: Array) -> Array:
         """Return x' M x from the displacements themselves: no eigenvalue is lost in the rounding of larger ones."""
@@ -319,6 +318,9 @@ class _Problem:
         if np.any(columns.problem.end_mass):
             ends = unknowns @ columns.ends[self.sets].swapaxes(-1, -2)
             total += ((ends @ columns.problem.end_mass[self.sets]) * ends).sum(axis=-1)
+        for point, there in zip(columns.problem.points, columns.at_points, strict=True):
+            moved_there = unknowns @ there[self.sets].swapaxes(-1, -2)
+            total += ((moved_there @ point.mass[self.sets]) * moved_there).sum(axis=-1)
         return total
 
     def _spectrum(self, unknowns: Array, kinetic: Array, values: Array, loading: Array, number: int) -> Spectrum:
@@ -338,3 +340,10 @@ class _Problem:
             z, rounding = np.pad(z, pad)[:, :keep], np.pad(rounding, pad)[:, :keep]
             vectors = np.concatenate([self.still, vectors], axis=1)[:, :keep]
         return Spectrum(z, vectors, rounding, compliances)
+
+
+def _root(mass: Array) -> Array:
+    """Return F with F' F = a mass matrix, (sets, size, size)."""
+    size, frame = np.linalg.eigh(mass)
+    root: Array = np.sqrt(np.maximum(size, 0.0))[..., None] * frame.swapaxes(-1, -2)
+    return root
