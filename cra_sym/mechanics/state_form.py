@@ -120,15 +120,15 @@ def _points(weak: WeakForm, parameter: Symbol) -> tuple[tuple[Expr, Matrix, tupl
     rows = [*section, *lumped]
     return tuple(
         (
-            place,
+            point.place,
             Matrix(
                 len(rows),
                 len(rows),
-                [polynomial(form.get((p, q), {}).items(), parameter, weak.even) for p in rows for q in rows],
+                [polynomial(point.form.get((p, q), {}).items(), parameter, weak.even) for p in rows for q in rows],
             ),
-            tuple(section.index(jet) for jet in held),
+            tuple(section.index(jet) for jet in point.held),
         )
-        for place, form, held in weak.points
+        for point in weak.points
     )
 
 

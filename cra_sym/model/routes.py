@@ -93,6 +93,8 @@ class GeneralRoute:
 
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:
         """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""
+        if self.spatial.points is not None:
+            raise ValueError("inside: terms at interior places need fields with first or second derivatives by x")
         columns = flat_columns(values, shape)
         squares = np.empty((columns.shape[1], modes))
         for rows, _, problem in self.spatial.problems(columns):
