@@ -90,9 +90,7 @@ def read_points(
         (jet,) = space.jets(read)
         _check(space, jet, orders, f"essential inside at {space.x} = {place}")
         found.setdefault(_place(space, place), ([], []))[1].append(jet)
-    return tuple(
-        Point(place, Add(*terms).subs(space.x, place), tuple(jets)) for place, (terms, jets) in found.items()
-    )
+    return tuple(Point(place, Add(*terms).subs(space.x, place), tuple(jets)) for place, (terms, jets) in found.items())
 
 
 def _place(space: JetSpace, place: Expr) -> Expr:

@@ -127,7 +127,9 @@ def weak_form(variation: Variation) -> WeakForm:
     for point in variation.points:
         form, load = _quadratic(space, point.lagrangian, f"term inside at {space.x} = {point.place}")
         points.append(PointForm(point.place, _cleaned(form), _nonzero(load), point.held))
-    return WeakForm(variation, _cleaned(inside), _cleaned(ends), _nonzero(inside_load), _nonzero(end_load), tuple(points))
+    return WeakForm(
+        variation, _cleaned(inside), _cleaned(ends), _nonzero(inside_load), _nonzero(end_load), tuple(points)
+    )
 
 
 def _quadratic(space: JetSpace, lagrangian: Expr, label: str) -> tuple[Bilinear, dict[Jet, Expr]]:

@@ -159,9 +159,7 @@ def _integers(value: Array) -> Array:
     return np.where(found <= high[:, None], found, np.inf)
 
 
-def breaks(
-    expressions: Sequence[Expr], x: Symbol, symbols: Sequence[Symbol], places: Sequence[Expr] = ()
-) -> Breaks:
+def breaks(expressions: Sequence[Expr], x: Symbol, symbols: Sequence[Symbol], places: Sequence[Expr] = ()) -> Breaks:
     """Return the compiled switches of coefficients, with interior places of terms.
 
     Raises

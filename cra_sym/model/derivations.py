@@ -268,7 +268,10 @@ def driven(model: Model, name: str) -> SpatialProblem:
     system, boundary = form.system.as_mutable(), form.boundary.as_mutable()
     points = [matrix.as_mutable() for _, matrix, _ in form.points]
     own = n + number
-    for matrix, row, column in ((system, 2 * n + m + number, own), *((other, own, own) for other in (boundary, *points))):
+    for matrix, row, column in (
+        (system, 2 * n + m + number, own),
+        *((other, own, own) for other in (boundary, *points)),
+    ):
         matrix[row, column] = S.Zero
         matrix[:, column] = (matrix[:, column] * factor).applyfunc(cancel)
         matrix[row, :] = (matrix[row, :] * factor).applyfunc(cancel)

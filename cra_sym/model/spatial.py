@@ -256,7 +256,12 @@ class SpatialProblem:
                 yield rows[members], left[members], part
 
     def _problem(
-        self, columns: np.ndarray, infinite: tuple[int, ...], left: Array, length: Array, edges: Array | None,
+        self,
+        columns: np.ndarray,
+        infinite: tuple[int, ...],
+        left: Array,
+        length: Array,
+        edges: Array | None,
         nodes: tuple[int, ...] = (),
     ) -> Stiffness:
         n, m = self.displacements, self.coordinates
