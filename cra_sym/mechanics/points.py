@@ -47,7 +47,8 @@ def in_points(density: Expr, x: Symbol) -> tuple[Expr, list[tuple[Expr, Expr]]]:
     >>> in_points(k + m * DiracDelta(2 * x - a), x)
     (k, [(a/2, m/2)])
     """
-    density = sympify(density)
+    if not isinstance(density, Expr):
+        return density, []
     steps = {n: DiracDelta(n.args[0] - n.args[1]) for n in density.atoms(SingularityFunction) if n.args[2] == -1}
     density = density.xreplace(steps)
     found = []
@@ -81,7 +82,7 @@ def read_points(
             raise HamiltonError(f"inside: {shown(given)} must be a pair (place, term)") from None
         place = _place(space, place)
         label = f"term inside at {space.x} = {place}"
-        read = space.read(_moved(sympify(term), space.x, place), "domain", label)
+        read = space.read(_moved(sympify(term, strict=True), space.x, place), "domain", label)
         for jet in space.jets(read):
             _check(space, jet, orders, label)
         found.setdefault(place, ([], []))[0].append(read)
@@ -94,7 +95,7 @@ def read_points(
 
 
 def _place(space: JetSpace, place: Expr) -> Expr:
-    place = sympify(place)
+    place = sympify(place, strict=True)
     if place in space.ends.values():
         raise HamiltonError(f"inside: {space.x} = {place} is an end; use left or right")
     if place.has(space.x, space.t):
@@ -131,10 +132,9 @@ def supports(
     """
     ends, inside = [], []
     for condition in essential:
-        expression = sympify(condition)
-        found = _displacement(expression, x)
+        found = _displacement(condition, x)
         if found is None or found[0] in domain:
-            ends.append(expression)
+            ends.append(condition)
         else:
             inside.append(found)
     return tuple(ends), tuple(inside)

@@ -130,7 +130,7 @@ class Model:
         self.equations.variation.elimination.check_homogeneous("Model")
         density, work = self._options["density"], self._options["virtual_work"]
         ends |= {f"term inside at {x} = {place}": sympify(term, strict=True) for place, term in self._stated_inside}
-        places = [sympify(place) for place, _ in self._options["inside"]]
+        places = [sympify(place, strict=True) for place, _ in self._options["inside"]]
         given = [density, *self._options["domain"], *self._options["essential"], *ends.values(), *places]
         given += [term for _, term in self._options["inside"]]
         given += [part for force, displacement, _ in work for part in (force, displacement)]
