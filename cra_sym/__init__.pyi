@@ -25,6 +25,7 @@ from .arm.parameters import Arm as Arm
 from .codegen import export as export
 from .explorer import explore as explore
 from .kernels import kernel as kernel
+from .mechanics.stations import stations as stations
 from .model import Model as Model
 from .paper.equations import equation as equation
 from .paper.equations import equations as equations
