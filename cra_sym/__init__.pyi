@@ -24,6 +24,7 @@ from .arm.parameters import Arm as Arm
 from .codegen import export as export
 from .explorer import explore as explore
 from .kernels import kernel as kernel
+from .mechanics.stations import stations as stations
 from .model import Model as Model
 from .model import System as System
 from .model.excitations import AxialBase as AxialBase

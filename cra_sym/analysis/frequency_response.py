@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
 from cra_sym.checks import choice, instance, one_axis, shown
-from cra_sym.model.spatial import SpatialProblem, shares
+from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.system import System
 from cra_sym.model.values import flat_columns
 from cra_sym.solvers.driven import driven_states
@@ -209,7 +209,7 @@ class _Undamped:
             if self._places is None:
                 share = np.ones((len(rows), 1))
             else:
-                share = shares(np.atleast_1d(self._places), left, problem.length)
+                share = problem.shares(np.atleast_1d(self._places), left)
             state = driven_states(problem, here, row, share[row], self._driven, self._kind)
             values = state[..., self._place].reshape(len(rows), parameter.shape[-1], count)
             found[rows] = np.swapaxes(values, 1, 2)

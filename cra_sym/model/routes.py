@@ -15,7 +15,7 @@ from cra_sym.model.values import flat_columns
 from cra_sym.solvers.eigenvalues import lowest
 from cra_sym.solvers.shapes import mode_states
 
-__all__ = ["GeneralRoute", "Modes", "RigidShare", "Route", "StateModes", "tip_sign"]
+__all__ = ["Estimated", "GeneralRoute", "Modes", "RigidShare", "Route", "StateModes", "Stations", "tip_sign"]
 
 Array = NDArray[np.float64]
 Values = Sequence[float | Array]
@@ -59,6 +59,22 @@ class RigidShare(Protocol):
         """Return the integral of mass per length times shape, end masses included, shape (..., modes)."""
 
 
+@runtime_checkable
+class Estimated(Protocol):
+    """A route that estimates its own error."""
+
+    def estimated(self, values: Values, shape: tuple[int, ...], modes: int) -> tuple[Array, Array]:
+        """Return the first natural frequencies and the estimated largest relative error of them, shape ``shape``."""
+
+
+@runtime_checkable
+class Stations(Protocol):
+    """Modes that know where a quadrature must have its points."""
+
+    def stations(self) -> tuple[Array, Array]:
+        """Return points and weights of a quadrature along the domain, shape (..., points)."""
+
+
 class Route(Protocol):
     """How frequencies and modes of a model are computed."""
 
@@ -84,6 +100,8 @@ class GeneralRoute:
 
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:
         """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""
+        if self.spatial.points is not None:
+            raise ValueError("inside: terms at interior places need fields with first or second derivatives by x")
         columns = flat_columns(values, shape)
         squares = np.empty((columns.shape[1], modes))
         for rows, _, problem in self.spatial.problems(columns):
@@ -99,8 +117,7 @@ class GeneralRoute:
         """Return the state of every mode at places x (rows, stations), shape (rows, modes, stations, 2 n + m)."""
         state = np.empty((*z.shape, x.shape[-1], 2 * self.spatial.displacements + self.spatial.coordinates))
         for rows, left, problem in self.spatial.problems(columns):
-            share = np.clip((x[rows] - left[:, None]) / problem.length[:, None], 0.0, 1.0)
-            state[rows] = mode_states(problem, z[rows], share)
+            state[rows] = mode_states(problem, z[rows], problem.shares(x[rows], left))
         return state
 
 

@@ -162,6 +162,7 @@ def _carry(problem: DynamicStiffness, z, row, start, level: int, share) -> np.nd
     index = np.clip(((share - origin) / piece).astype(int), 0, start.shape[2] - 1)
     node = origin + index * piece
     exponent, _ = problem.exponent(z, row, node, share - node)
+    start = problem.behind(start, z, row, level)
     total = term = start[part, np.arange(len(row))[:, None], index][..., None]
     for j in range(1, TERMS + 1):
         term = exponent @ term / j
