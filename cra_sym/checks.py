@@ -1,4 +1,4 @@
-"""Argument checks shared by every room: each error names the field, the value and what is allowed."""
+"""Argument checks shared by every room: each error names the field, the value and what it must be."""
 
 from __future__ import annotations
 
@@ -59,16 +59,16 @@ def real_array(
     try:
         raw = np.asarray(value)
     except Exception as error:  # whatever an object does when it is asked for its numbers
-        raise TypeError(f"{name} = {shown(value)}: allowed are {allowed}") from error
+        raise TypeError(f"{name} = {shown(value)}: must be {allowed}") from error
     if raw.dtype.kind not in "iuf" or np.ma.is_masked(value):
-        raise TypeError(f"{name} = {shown(value)}: allowed are {allowed}")
+        raise TypeError(f"{name} = {shown(value)}: must be {allowed}")
     with np.errstate(over="ignore"):
         array = raw.astype(np.float64)
     good = (array > low if open_low else array >= low) & (array <= high)  # NaN fails both
     if not allow_infinite:
         good &= np.isfinite(array)
     if not good.all():
-        raise ValueError(f"{name} = {shown(array[~good].flat[0].item())}: allowed are {allowed}")
+        raise ValueError(f"{name} = {shown(array[~good].flat[0].item())}: must be {allowed}")
     return array
 
 
@@ -76,7 +76,7 @@ def one_axis(name: str, value: Any, of: str, **limits: Any) -> np.ndarray:
     """Return a number or one axis of numbers as :func:`real_array` does, or raise an error that names the field."""
     array = real_array(name, value, **limits)
     if array.ndim > 1:
-        raise ValueError(f"{name} has shape {array.shape}: allowed are a number or one axis of {of}")
+        raise ValueError(f"{name} has shape {array.shape}: must be a number or one axis of {of}")
     return array
 
 
@@ -84,14 +84,14 @@ def count(name: str, value: Any, *, low: int = 1, high: int | None = None) -> in
     """Return ``value`` as an int within ``[low, high]``, or raise an error that names the field."""
     allowed = f"an integer of at least {low}" if high is None else f"an integer from {low} to {high}"
     if isinstance(value, (bool, np.bool_)):
-        raise TypeError(f"{name} = {shown(value)}: allowed is {allowed}")
+        raise TypeError(f"{name} = {shown(value)}: must be {allowed}")
     try:
         number = operator.index(value)
     except TypeError:
         kind = ValueError if isinstance(value, (float, np.floating)) else TypeError
-        raise kind(f"{name} = {shown(value)}: allowed is {allowed}") from None
+        raise kind(f"{name} = {shown(value)}: must be {allowed}") from None
     if number < low or (high is not None and number > high):
-        raise ValueError(f"{name} = {shown(number)}: allowed is {allowed}")
+        raise ValueError(f"{name} = {shown(number)}: must be {allowed}")
     return number
 
 
@@ -99,21 +99,21 @@ def instance(name: str, value: Any, kind: type) -> None:
     """Raise a ``TypeError`` that names the field unless ``value`` is of the class ``kind``."""
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
-        raise TypeError(f"{name} = {shown(value)}: allowed is {article} {kind.__name__}")
+        raise TypeError(f"{name} = {shown(value)}: must be {article} {kind.__name__}")
 
 
 def choice(name: str, value: Any, allowed: Collection[str]) -> str:
     """Return ``value``, which is one of some words, or raise an error that names the field and the words."""
     if isinstance(value, str) and value in allowed:
         return value
-    words = " and ".join(map(repr, allowed)) if len(allowed) < 3 else ", ".join(allowed)
-    raise (ValueError if isinstance(value, str) else TypeError)(f"{name} = {shown(value)}: allowed are {words}")
+    words = " or ".join(map(repr, allowed)) if len(allowed) < 3 else f"one of {', '.join(allowed)}"
+    raise (ValueError if isinstance(value, str) else TypeError)(f"{name} = {shown(value)}: must be {words}")
 
 
 def mapping(name: str, value: Any, entries: str) -> Mapping[Any, Any]:
     """Return a mapping, an empty one for None, or raise an error that names the field and its entries."""
     if value is not None and not isinstance(value, Mapping):
-        raise TypeError(f"{name} = {shown(value)}: allowed is a mapping from {entries}")
+        raise TypeError(f"{name} = {shown(value)}: must be a mapping from {entries}")
     return {} if value is None else value
 
 

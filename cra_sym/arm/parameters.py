@@ -165,7 +165,7 @@ class Arm(System):
         """
         unknown = [name for name in changes if name not in self._names()]
         if unknown:
-            raise TypeError(f"{unknown[0]!r} is no parameter of Arm: allowed are {', '.join(self._names())}")
+            raise TypeError(f"{unknown[0]!r} is not a parameter of Arm: must be one of {', '.join(self._names())}")
         return type(self)(**{**self._fields(), **changes})
 
     @property

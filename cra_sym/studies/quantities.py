@@ -54,7 +54,7 @@ class Quantity:
         for key in given:
             if key not in allowed:
                 names = ", ".join([*ARM_FIELDS, *allowed])
-                raise TypeError(f"{key!r} is no parameter of {self.name}: allowed are {names}")
+                raise TypeError(f"{key!r} is not a parameter of {self.name}: must be one of {names}")
         for p in parameters:
             if p.default is p.empty and p.name not in given:
                 raise TypeError(f"{self.name} needs the option {p.name}")
