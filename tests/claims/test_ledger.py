@@ -121,7 +121,7 @@ def test_outcomes():
         (("C99",), {}, "must be one of C01"),
         (("C01", 3.0), {}, "must be an Arm"),
         (("C01", cra.Arm.nominal().replace(k_t=[1.0, 2.0])), {}, "must be one arm"),
-        (("C01",), {"speed": 1.0}, "no number of a setting"),
+        (("C01",), {"speed": 1.0}, "not a number of a setting"),
         (("C01",), {"amplitude": -1.0}, "amplitude"),
         (("C01",), {"modes": 1.5}, "modes = 1.5"),
         (("C01",), {"phase": [0.0, 1.0]}, r"phase has shape \(2,\): must be one number"),
