@@ -26,7 +26,13 @@ FLOORS = [
     {"report"},
     {"__main__"},
 ]
-OPEN_TO_ALL = {"checks", "ending", "extras", "files"}  # checks, signals, optional libraries, safe writing: no rooms
+OPEN_TO_ALL = {
+    "checks",
+    "ending",
+    "extras",
+    "files",
+    "si",
+}  # checks, signals, optional libraries, safe writing: no rooms
 RANK = {room: rank for rank, floor in enumerate(FLOORS) for room in floor}
 
 

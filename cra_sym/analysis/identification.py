@@ -145,11 +145,11 @@ def _checked(system: System, measured_frequencies: Any, uncertainty: Any) -> tup
     measured = real_array("measured_frequencies", measured_frequencies, low=0.0, open_low=True)
     sigma = real_array("uncertainty", uncertainty, low=1e-60, high=1e60)
     if measured.ndim != 1 or measured.size == 0:
-        raise ValueError(f"measured_frequencies has shape {measured.shape}: allowed is one axis of frequencies")
+        raise ValueError(f"measured_frequencies has shape {measured.shape}: must be one axis of frequencies")
     if np.any(np.diff(measured) <= 0):
         raise ValueError("measured_frequencies must ascend: they are the lowest natural frequencies, in order")
     if broadcastable(measured_frequencies=measured, uncertainty=sigma) != measured.shape:
-        raise ValueError(f"uncertainty has shape {sigma.shape}: allowed are a number or {measured.shape}")
+        raise ValueError(f"uncertainty has shape {sigma.shape}: must be a number or {measured.shape}")
     return measured, np.broadcast_to(sigma, measured.shape)
 
 

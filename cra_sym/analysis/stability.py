@@ -230,7 +230,7 @@ def forced_width(system: System, excitation: TransverseBase, modes: int = 3) -> 
     """
     if not isinstance(excitation, TransverseBase):
         raise TypeError(
-            f"excitation = {checks.shown(excitation)}: allowed is a TransverseBase; the others have stability_boundary"
+            f"excitation = {checks.shown(excitation)}: must be a TransverseBase; the others have stability_boundary"
         )
     checks.instance("system", system, System)
     checks.broadcastable(system=np.empty(system.shape), amplitude=np.empty(excitation.shape))
@@ -259,7 +259,7 @@ def _shape(system: Any, excitation: Excitation, **arrays: np.ndarray) -> tuple[i
 
 
 def _resonance(resonance: Any, modes: int) -> tuple[int, int]:
-    allowed = f"allowed are (n, n), (m, n) and (m, -n) with modes from 1 to {modes}"
+    allowed = f"must be (n, n), (m, n) or (m, -n) with modes from 1 to {modes}"
     try:
         first, second = resonance
     except (TypeError, ValueError):
@@ -356,7 +356,7 @@ def _loop(backend: str, taken: dict[str, Any]) -> floquet.Loop | None:
     """Return the compiled loop of the Floquet solver if it is asked for, or pays."""
     checks.choice("backend", backend, ("auto", "numpy", "numba"))
     if backend == "numba" and not has_compiler():
-        raise ValueError("backend = 'numba': Numba is not installed; allowed are 'auto' and 'numpy'")
+        raise ValueError("backend = 'numba': Numba is not installed; backend must be 'auto' or 'numpy'")
     points = np.broadcast(taken["angular_frequency"], taken["epsilon"], taken["omega"][..., 0]).size
     compile = backend == "auto" and wants_compiler(_ROOTS * points, _template_parts)
     return _template().kick_and_drift if compile or backend == "numba" else None

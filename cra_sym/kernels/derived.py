@@ -66,7 +66,7 @@ def derived_kernel(path: str, *, backend: str | None = None) -> Kernel:
     """
     module, colon, function = path.partition(":") if isinstance(path, str) else ("", "", "")
     if not (colon and function.isidentifier() and module.startswith("cra_sym.")):
-        raise ValueError(f"path = {shown(path)}: allowed is 'cra_sym.room.module:function'")
+        raise ValueError(f"path = {shown(path)}: must be 'cra_sym.room.module:function'")
     return _DerivedKernel(path, backend)
 
 

@@ -61,7 +61,7 @@ class System:
 
     def __init__(self, model: Model, values: Mapping[Any, Any], zeta: Any = 0.0) -> None:
         self._model = model
-        self._values = checked_values([symbol.name for symbol in model.symbols], values)
+        self._values = checked_values([symbol.name for symbol in model.symbols], values, model.units)
         self._zeta = frozen(checked_damping(zeta))
         broadcastable(zeta=self._zeta, **self._values)
 

@@ -243,12 +243,12 @@ def equation(number: Number) -> Equation:
     ('definition', (2, 3, 4, 6, '16c'))
     """
     if isinstance(number, bool):
-        raise TypeError(f"number = {number}: allowed are integers, or strings such as '11a'")
+        raise TypeError(f"number = {number}: must be an integer, or a string such as '11a'")
     if not isinstance(number, str):
         try:
             number = index(number)
         except TypeError:
-            raise TypeError(f"number = {shown(number)}: allowed are integers, or strings such as '11a'") from None
+            raise TypeError(f"number = {shown(number)}: must be an integer, or a string such as '11a'") from None
     elif number.isdecimal():
         number = int(number)
     if number not in _EQUATIONS:
@@ -259,7 +259,7 @@ def equation(number: Number) -> Equation:
         companions = [key for key in _EQUATIONS if isinstance(key, str)]
         whole = [key for key in _EQUATIONS if isinstance(key, int)]
         also = f", and {', '.join(map(repr, sorted(companions, key=_order)))}" if companions else ""
-        raise ValueError(f"number = {shown(number)}: allowed are {min(whole)} to {max(whole)}{also}") from None
+        raise ValueError(f"number = {shown(number)}: must be from {min(whole)} to {max(whole)}{also}") from None
 
 
 def equations(*, companions: bool = False) -> tuple[Equation, ...]:

@@ -157,7 +157,7 @@ class BaseMotion:
         times, a = real_array("t", t, low=0.0), real_array("acceleration", acceleration)
         v = real_array("velocity", velocity)
         if times.ndim != 1 or times.size < 2:
-            raise ValueError(f"t has shape {times.shape}: allowed is one axis of at least two sample times")
+            raise ValueError(f"t has shape {times.shape}: must be one axis of at least two sample times")
         if a.ndim == 0 or a.shape[-1] != times.size:
             raise ValueError(f"acceleration has shape {a.shape}: its last axis must have the {times.size} sample times")
         span = np.diff(times)
@@ -223,9 +223,7 @@ class BaseMotion:
         t_j, t_a, t_v = (np.broadcast_to(value, shape) for value in _fastest(np.abs(d), v_max, a_max, j_max))
         least = 2 * (2 * t_j + t_a) + t_v
         if not np.isfinite(least).all():
-            raise ValueError(
-                "v_max, a_max, j_max: the move never ends; allowed are limits that are not next to nothing"
-            )
+            raise ValueError("v_max, a_max, j_max: the move never ends; must not be next to nothing")
         peak = _quotient(d, (t_j + t_a) * (2 * t_j + t_a + t_v))
         if wanted is not None:
             _feasible(wanted, least, {"v_max": t_v > 0, "a_max": (t_a > 0) | np.isinf(j_max), "j_max": t_j > 0})
@@ -253,7 +251,7 @@ class BaseMotion:
         """
         A, delays = real_array("amplitudes", amplitudes), real_array("times", times, low=0.0)
         if A.ndim == 0 or A.shape[-1:] != delays.shape[-1:]:
-            raise ValueError(f"amplitudes {A.shape} and times {delays.shape}: allowed is one time an impulse")
+            raise ValueError(f"amplitudes {A.shape} and times {delays.shape}: must be one time for each impulse")
         if not all(isinstance(term, Piecewise) and not np.any(term.velocity) for term in self.terms):
             raise ValueError("only a motion that starts from rest and has no harmonic can be shaped")
         shape = broadcastable(motion=np.empty(self.shape), amplitudes=A[..., 0], times=delays[..., 0])

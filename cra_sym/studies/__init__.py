@@ -77,5 +77,5 @@ def sweep(
 
         return sweep_into(study, path_of("store", store), chunks or _CHUNKS, client)
     if client is not None:
-        raise ValueError("client: allowed with a store only, whose regions it computes")
+        raise ValueError("client: must be given together with a store, whose regions it computes")
     return study.dataset(study.evaluate() if chunks is None else study.lazy(chunks))

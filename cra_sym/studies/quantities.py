@@ -50,11 +50,11 @@ class Quantity:
             return
         if any(p.kind is p.VAR_KEYWORD for p in parameters):
             return
-        allowed = [p.name for p in parameters]
+        known = [p.name for p in parameters]
         for key in given:
-            if key not in allowed:
-                names = ", ".join([*ARM_FIELDS, *allowed])
-                raise TypeError(f"{key!r} is no parameter of {self.name}: allowed are {names}")
+            if key not in known:
+                names = ", ".join([*ARM_FIELDS, *known])
+                raise TypeError(f"{key!r} is not a parameter of {self.name}: must be one of {names}")
         for p in parameters:
             if p.default is p.empty and p.name not in given:
                 raise TypeError(f"{self.name} needs the option {p.name}")

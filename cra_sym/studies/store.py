@@ -80,7 +80,7 @@ def _opened(zarr: Any, study: Study, path: Path) -> Any:
     except (OSError, ValueError, KeyError):
         same = False
     if not same:
-        raise ValueError(f"store = {str(path)!r}: holds something else; allowed are a new path or the same sweep")
+        raise ValueError(f"store = {str(path)!r}: holds something else; must be a new path or the same sweep")
     return group[study.quantity.name]
 
 

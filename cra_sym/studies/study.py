@@ -107,7 +107,7 @@ def make_study(arm: Arm, quantity: str | Callable[..., Any], parameters: Mapping
     """
     instance("arm", arm, Arm)
     if arm.shape:
-        raise ValueError(f"arm: its fields have shape {arm.shape}; allowed are numbers, arrays belong to the axes")
+        raise ValueError(f"arm: its fields have shape {arm.shape}; must be numbers, since arrays are axes of the sweep")
     chosen = named_quantity(quantity)
     fields = {name: value for name, value in parameters.items() if name in ARM_FIELDS}
     options = {name: value for name, value in parameters.items() if name not in fields}
@@ -117,7 +117,7 @@ def make_study(arm: Arm, quantity: str | Callable[..., Any], parameters: Mapping
     axes = {name: np.asarray(swept[name]) for name in parameters if np.ndim(swept.get(name, 0.0))}
     for name, values in axes.items():
         if values.ndim != 1 or values.size == 0:
-            raise ValueError(f"{name}: an array of shape {values.shape}; allowed are one-dimensional, not empty")
+            raise ValueError(f"{name}: an array of shape {values.shape}; must be one-dimensional, not empty")
     arm = arm.replace(**{name: np.ravel(swept[name])[0] for name in fields})
     options = {name: value for name, value in options.items() if name not in axes}
     corner = _evaluated(arm, chosen, {name: axis[:1] for name, axis in axes.items()}, options)

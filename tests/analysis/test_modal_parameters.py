@@ -254,15 +254,15 @@ def test_ranges_of_the_numbers_are_those_of_the_derivation():
 @pytest.mark.parametrize(
     ("call", "error", "message"),
     [
-        (lambda: cra.mode_shapes(NOMINAL, 1.001), ValueError, r"x = 1.001: allowed are points in \[0, L\], L = 1"),
+        (lambda: cra.mode_shapes(NOMINAL, 1.001), ValueError, r"x = 1.001: must be points in \[0, L\], L = 1"),
         (lambda: cra.mode_shapes(NOMINAL, -0.1), ValueError, "x = -0.1"),
         (lambda: cra.mode_shapes(NOMINAL, [[0.1]]), ValueError, r"x has shape \(1, 1\)"),
         (lambda: cra.mode_shapes(NOMINAL, "tip"), TypeError, "x = 'tip'"),
         (lambda: cra.mode_shapes(NOMINAL, 0.5, derivative=4), ValueError, "derivative = 4"),
         (lambda: cra.mode_shapes(NOMINAL, 0.5, derivative=-1), ValueError, "derivative = -1"),
         (lambda: cra.mode_shapes(NOMINAL, 0.5, modes=0), ValueError, "modes = 0"),
-        (lambda: cra.mode_shapes(NOMINAL, 0.5, modes=1001), ValueError, "modes = 1001: allowed is .* 1 to 1000"),
-        (lambda: cra.natural_frequencies(1.0), TypeError, "arm = 1.0: allowed is an Arm"),
+        (lambda: cra.mode_shapes(NOMINAL, 0.5, modes=1001), ValueError, "modes = 1001: must be .* 1 to 1000"),
+        (lambda: cra.natural_frequencies(1.0), TypeError, "arm = 1.0: must be an Arm"),
         (lambda: cra.modal_parameters(NOMINAL, 1.5), ValueError, "modes = 1.5"),
     ],
 )
