@@ -7,6 +7,7 @@ none of them is imported.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from decimal import Decimal
 from numbers import Real
 from typing import Any
@@ -15,7 +16,7 @@ import numpy as np
 
 from cra_sym.symbols import Dimension, unit_dimension
 
-__all__ = ["plain_numbers", "real_number"]
+__all__ = ["paired", "plain_numbers", "real_number"]
 
 _EXACT = {int, float}
 _BASE = {"[length]": "meter", "[mass]": "kilogram", "[time]": "second"}
@@ -55,7 +56,7 @@ def plain_numbers(name: str, value: Any, unit: str | None = None) -> Any:
         return plain_numbers(name, _from_pint(name, value, unit))
     if hasattr(kind, "decompose") and hasattr(kind, "unit"):
         return plain_numbers(name, _from_astropy(name, value, unit))
-    if hasattr(kind, "dims") and hasattr(kind, "attrs"):
+    if _is_labelled(value):
         _check_stated(name, value.attrs.get("units"), unit)
         return plain_numbers(name, value.data, unit)
     if hasattr(kind, "units") or hasattr(kind, "in_units"):
@@ -65,6 +66,58 @@ def plain_numbers(name: str, value: Any, unit: str | None = None) -> Any:
     if unit == "s" and hasattr(kind, "total_seconds"):
         return value.total_seconds()
     return value if isinstance(value, bool) else real_number(value)
+
+
+def paired(values: Mapping[str, Any], units: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """Return arguments that make a batch with labelled arrays paired by dimension, not by position.
+
+    The axes of the batch are the dimensions in the order of their first appearance.
+
+    Raises
+    ------
+    ValueError
+        If a dimension has two lengths or two coordinates, arrays without names are given beside labelled ones, or a
+        unit is not that of ``units``.
+    """
+    labelled = {name: value for name, value in values.items() if _is_labelled(value) and value.dims}
+    if not labelled:
+        return dict(values)
+    order = tuple(dict.fromkeys(dimension for value in labelled.values() for dimension in value.dims))
+    for dimension in order:
+        _check_dimension(dimension, {name: value for name, value in labelled.items() if dimension in value.dims})
+    found = {}
+    for name, value in values.items():
+        if name not in labelled:
+            if np.ndim(value):
+                other = next(iter(labelled))
+                raise ValueError(
+                    f"{name} has axes without names, and {other} has the dimensions {labelled[other].dims}: "
+                    "must have names too"
+                )
+            found[name] = value
+            continue
+        numbers = np.asarray(plain_numbers(name, value, (units or {}).get(name)))
+        numbers = numbers.transpose([value.dims.index(dimension) for dimension in order if dimension in value.dims])
+        sizes = dict(zip(value.dims, value.shape, strict=True))
+        found[name] = numbers.reshape([sizes.get(dimension, 1) for dimension in order])
+    return found
+
+
+def _is_labelled(value: Any) -> bool:
+    return all(hasattr(type(value), attribute) for attribute in ("dims", "attrs", "data"))
+
+
+def _check_dimension(dimension: Any, values: Mapping[str, Any]) -> None:
+    (first, one), *others = values.items()
+    for name, other in others:
+        sizes = [value.shape[value.dims.index(dimension)] for value in (one, other)]
+        if sizes[0] != sizes[1]:
+            raise ValueError(f"dimension {dimension!r}: {first} has {sizes[0]} entries, {name} has {sizes[1]}")
+        labels = [getattr(value, "coords", {}) for value in (one, other)]
+        if all(dimension in known for known in labels):
+            both = [np.asarray(known[dimension]) for known in labels]
+            if not np.array_equal(*both):
+                raise ValueError(f"dimension {dimension!r}: its coordinate in {first} is not that in {name}")
 
 
 def real_number(value: Any) -> Any:

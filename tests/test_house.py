@@ -26,13 +26,7 @@ FLOORS = [
     {"report"},
     {"__main__"},
 ]
-OPEN_TO_ALL = {
-    "checks",
-    "ending",
-    "extras",
-    "files",
-    "si",
-}  # checks, signals, optional libraries, safe writing: no rooms
+OPEN_TO_ALL = {"checks", "ending", "extras", "files", "si"}  # checks, signals, extras, safe writing, units
 RANK = {room: rank for rank, floor in enumerate(FLOORS) for room in floor}
 
 

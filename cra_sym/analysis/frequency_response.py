@@ -94,9 +94,9 @@ def frequency_response(
     -6.6053e-03 s2
     """
     instance("system", system, System)
-    frequencies = one_axis("angular_frequency", angular_frequency, "frequencies", low=0.0, high=_FASTEST)
+    frequencies = one_axis("angular_frequency", angular_frequency, "frequencies", low=0.0, high=_FASTEST, unit="rad/s")
     grid = np.where(frequencies * _FASTEST < 1.0, 0.0, np.atleast_1d(frequencies))
-    places = None if x is None else one_axis("x", x, "places")
+    places = None if x is None else one_axis("x", x, "places", unit="m")
     if places is not None:
         check_places(system, places)
     choice("damping", damping, ("modal", "structural"))

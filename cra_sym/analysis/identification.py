@@ -142,8 +142,8 @@ def _checked(system: System, measured_frequencies: Any, uncertainty: Any) -> tup
         raise ValueError(f"system: {missing[0]} must be the stiffness of an end of its model")
     if system.shape:
         raise ValueError(f"system has shape {system.shape}: must be a single set of values, not a batch")
-    measured = real_array("measured_frequencies", measured_frequencies, low=0.0, open_low=True)
-    sigma = real_array("uncertainty", uncertainty, low=1e-60, high=1e60)
+    measured = real_array("measured_frequencies", measured_frequencies, low=0.0, open_low=True, unit="Hz")
+    sigma = real_array("uncertainty", uncertainty, low=1e-60, high=1e60, unit="Hz")
     if measured.ndim != 1 or measured.size == 0:
         raise ValueError(f"measured_frequencies has shape {measured.shape}: must be one axis of frequencies")
     if np.any(np.diff(measured) <= 0):

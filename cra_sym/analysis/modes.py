@@ -106,7 +106,7 @@ def mode_shapes(system: System, x: Any, modes: int = 3, derivative: int = 0, *, 
     checks.instance("system", system, System)
     derivative = checks.count("derivative", derivative, low=0, high=_MOST_DERIVATIVES)
     modes = checks.count("modes", modes, high=MOST_MODES)
-    points = checks.one_axis("x", x, "points")
+    points = checks.one_axis("x", x, "points", unit="m")
     check_places(system, points)
     shapes = system.modes(modes).shape(section_place(system, field), derivative, np.atleast_1d(points))
     return shapes if points.ndim else shapes[..., 0]

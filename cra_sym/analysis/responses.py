@@ -133,7 +133,7 @@ def response(
         Names the argument that is out of its range, the load without a history, the function that is not known.
     """
     instance("system", system, System)
-    places = one_axis("x", x, "places")
+    places = one_axis("x", x, "places", unit="m")
     check_places(system, places)
     modes = count("modes", modes, high=MOST_MODES)
     shapes = system.modes(modes).shape(section_place(system, field), 0, np.atleast_1d(places))

@@ -48,7 +48,7 @@ def input_shaper(angular_frequency: Any, zeta: Any = 0.0, order: int = 1) -> tup
     >>> print(amplitudes, times)
     [0.25 0.5  0.25] [0.  0.5 1. ]
     """
-    omega = real_array("angular_frequency", angular_frequency, low=1e-300)
+    omega = real_array("angular_frequency", angular_frequency, low=1e-300, unit="rad/s")
     ratio = real_array("zeta", zeta, low=0.0, high=np.nextafter(1.0, 0.0), unit="1", must="real numbers in [0, 1)")
     broadcastable(angular_frequency=omega, zeta=ratio)
     order = count("order", order, high=_MOST_IMPULSES)

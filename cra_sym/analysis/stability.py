@@ -95,7 +95,7 @@ def stability_boundary(
     186.938 187.346
     """
     excitation = _parametric(excitation)
-    epsilon = checks.real_array("epsilon", epsilon, low=0.0)
+    epsilon = checks.real_array("epsilon", epsilon, low=0.0, unit="1")
     modes = checks.count("modes", modes)
     first, second = _resonance(resonance, modes)
     order, tongue = checks.count("order", order, high=2), checks.count("tongue", tongue, high=2)
@@ -376,8 +376,8 @@ def _taken(
 ) -> dict[str, Any]:
     """Return what the Floquet solver takes."""
     excitation = _parametric(excitation)
-    frequency = checks.real_array("angular_frequency", angular_frequency, low=1e-300)
-    epsilon = checks.real_array("epsilon", epsilon, low=0.0)
+    frequency = checks.real_array("angular_frequency", angular_frequency, low=1e-300, unit="rad/s")
+    epsilon = checks.real_array("epsilon", epsilon, low=0.0, unit="1")
     _shape(system, excitation, angular_frequency=frequency, epsilon=epsilon)
     modes = checks.count("modes", modes, high=MOST_MODES)
     if system.numerics("damping") is not None:

@@ -13,6 +13,7 @@ import numpy as np
 from cra_sym.checks import broadcastable, real_array
 from cra_sym.model.numerics import Numerics
 from cra_sym.model.system import System
+from cra_sym.si import paired
 from cra_sym.symbols import row
 
 if TYPE_CHECKING:
@@ -132,8 +133,9 @@ class Arm(System):
     provenance: ClassVar[Mapping[str, Provenance]] = _NOMINAL
 
     def __post_init__(self) -> None:
-        for name in self._names():
-            given = real_array(name, getattr(self, name), unit=row(name).unit, **_RANGES[name])
+        units = {name: row(name).unit for name in self._names()}
+        for name, value in paired(self._fields(), units).items():
+            given = real_array(name, value, unit=units[name], **_RANGES[name])
             array = np.asarray(given + 0.0)  # -0.0 becomes 0.0
             array.flags.writeable = False
             object.__setattr__(self, name, float(array) if array.ndim == 0 else array)

@@ -82,7 +82,7 @@ def vanishes(expression: Expr) -> bool:
     nodes = {node for part in (plain, *relations.values()) for node in preorder_traversal(part)}
     if not expression.is_commutative or not all(map(_is_rational, nodes)):
         raise ValueError(
-            f"{expression}: must be made of exact numbers and circular, hyperbolic and exponential functions"
+            f"{expression}: must be exact numbers and circular, hyperbolic and exponential functions"
         )
     if any(_is_zero(node.base, relations) for node in nodes if node.is_Pow and node.exp.is_negative):
         raise ValueError(f"{expression}: must be free of divisions by zero")

@@ -21,7 +21,10 @@ class Excitation:
     """What excitations share: named numbers that may be arrays, compared by value."""
 
     def __init__(self, **numbers: Any) -> None:
-        checked = {name: frozen(real_array(name, value, low=0.0)) for name, value in numbers.items()}
+        units = {"amplitude": "m"}  # the others are weights
+        checked = {
+            name: frozen(real_array(name, value, low=0.0, unit=units.get(name, "1"))) for name, value in numbers.items()
+        }
         broadcastable(**{name: np.asarray(value) for name, value in checked.items()})
         self._numbers: dict[str, Value] = checked
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.checks import broadcastable, real_array, shown
+from cra_sym.si import paired
 
 __all__ = ["checked_damping", "checked_values", "flat_columns", "frozen", "infinite_patterns"]
 
@@ -36,13 +37,16 @@ def checked_values(
     """
     if not isinstance(given, Mapping):
         raise TypeError(f"values = {shown(given)}: must be a mapping from symbols or their names to numbers")
-    found: dict[str, NDArray[np.float64]] = {}
+    named: dict[str, Any] = {}
     for key, value in given.items():
         name = key if isinstance(key, str) else getattr(key, "name", str(key))
         if name not in names:
             raise ValueError(f"values: {name} does not occur in the model; it has {', '.join(names) or 'none'}")
-        if name in found:
+        if name in named:
             raise ValueError(f"values: {name} is given twice")
+        named[name] = value
+    found: dict[str, NDArray[np.float64]] = {}
+    for name, value in paired(named, units).items():
         try:
             found[name] = real_array(name, value, allow_infinite=True, unit=(units or {}).get(name))
         except TypeError as error:

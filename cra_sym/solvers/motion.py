@@ -114,9 +114,9 @@ class BaseMotion:
         angular_frequency: Any = 0.0,
         phase: Any = 0.0,
     ) -> None:
-        v, a = real_array("velocity", velocity), real_array("acceleration", acceleration)
-        B, psi = real_array("amplitude", amplitude), real_array("phase", phase)
-        varpi = real_array("angular_frequency", angular_frequency, low=0.0, high=_FASTEST)
+        v, a = real_array("velocity", velocity, unit="m/s"), real_array("acceleration", acceleration, unit="m/s^2")
+        B, psi = real_array("amplitude", amplitude, unit="m"), real_array("phase", phase, unit="rad")
+        varpi = real_array("angular_frequency", angular_frequency, low=0.0, high=_FASTEST, unit="rad/s")
         broadcastable(velocity=v, acceleration=a, amplitude=B, angular_frequency=varpi, phase=psi)
         v, a = np.broadcast_arrays(v, a)
         terms: list[Term] = []
@@ -214,10 +214,10 @@ class BaseMotion:
             As :meth:`trapezoid`.
         """
         limit: dict[str, Any] = {"low": 0.0, "open_low": True}
-        d, a_max = real_array("distance", distance), real_array("a_max", a_max, **limit)
-        v_max = real_array("v_max", v_max, allow_infinite=True, **limit)
-        j_max = real_array("j_max", j_max, allow_infinite=True, **limit)
-        wanted = None if duration is None else real_array("duration", duration, **limit)
+        d, a_max = real_array("distance", distance, unit="m"), real_array("a_max", a_max, unit="m/s^2", **limit)
+        v_max = real_array("v_max", v_max, unit="m/s", allow_infinite=True, **limit)
+        j_max = real_array("j_max", j_max, unit="m/s^3", allow_infinite=True, **limit)
+        wanted = None if duration is None else real_array("duration", duration, unit="s", **limit)
         shapes = {"distance": d, "v_max": v_max, "a_max": a_max, "j_max": j_max}
         shape = broadcastable(**shapes, **({} if wanted is None else {"duration": wanted}))
         t_j, t_a, t_v = (np.broadcast_to(value, shape) for value in _fastest(np.abs(d), v_max, a_max, j_max))
@@ -249,7 +249,7 @@ class BaseMotion:
             If the motion holds a harmonic or does not start from rest, an argument is out of its range, or the shapes
             do not fit.
         """
-        A, delays = real_array("amplitudes", amplitudes), real_array("times", times, low=0.0)
+        A, delays = real_array("amplitudes", amplitudes, unit="1"), real_array("times", times, low=0.0, unit="s")
         if A.ndim == 0 or A.shape[-1:] != delays.shape[-1:]:
             raise ValueError(f"amplitudes {A.shape} and times {delays.shape}: must be one time for each impulse")
         if not all(isinstance(term, Piecewise) and not np.any(term.velocity) for term in self.terms):
@@ -298,7 +298,7 @@ class BaseMotion:
         TypeError, ValueError
             If ``t`` holds no real numbers, a negative one, or has more than one axis.
         """
-        times = one_axis("t", t, "times", low=0.0)
+        times = one_axis("t", t, "times", low=0.0, unit="s")
         total = [np.zeros((*self.shape, times.size)) for _ in range(3)]
         for term in self.terms:
             for i, part in enumerate(term.kinematics(np.atleast_1d(times))):
@@ -361,8 +361,8 @@ class Force:
 
     def __init__(self, level: Any = 0.0, amplitude: Any = 0.0, angular_frequency: Any = 0.0, phase: Any = 0.0) -> None:
         constant, size = real_array("level", level), real_array("amplitude", amplitude)
-        varpi = real_array("angular_frequency", angular_frequency, low=0.0, high=_FASTEST)
-        psi = real_array("phase", phase)
+        varpi = real_array("angular_frequency", angular_frequency, low=0.0, high=_FASTEST, unit="rad/s")
+        psi = real_array("phase", phase, unit="rad")
         broadcastable(level=constant, amplitude=size, angular_frequency=varpi, phase=psi)
         constant = constant + np.where(varpi == 0.0, size * np.sin(psi), 0.0)
         with np.errstate(all="ignore"):

@@ -230,7 +230,7 @@ def test_two_workers_one_killed(tmp_path):
         ("natural_frequencies", {"k_x": [1.0]}, "'k_x' is not a parameter of natural_frequencies"),
         ("natural_frequencies", {"k_t": [[1.0]]}, r"k_t: an array of shape \(1, 1\)"),
         ("natural_frequencies", {"k_t": []}, "k_t: an array of shape"),
-        ("natural_frequencies", {"m_e": [0.0, -1.0]}, "m_e\[1\] = -1.0"),
+        ("natural_frequencies", {"m_e": [0.0, -1.0]}, r"m_e\[1\] = -1.0"),
         ("natural_frequencies", {"k_t": [1.0], "chunks": 0}, "chunks = 0"),
         ("peak_response", {}, "peak_response needs the option motion"),
         ("natural_frequencies", {"k_t": [1.0], "chunks": 2**70}, "chunks = 1180591620717411303424: must be"),
