@@ -10,7 +10,23 @@ import numpy as np
 
 from cra_sym.si import plain_numbers
 
-__all__ = ["broadcastable", "choice", "common_shape", "count", "instance", "mapping", "one_axis", "real_array", "shown"]
+__all__ = [
+    "broadcastable",
+    "choice",
+    "common_shape",
+    "count",
+    "default_floating_point",
+    "equal",
+    "instance",
+    "mapping",
+    "one_axis",
+    "real_array",
+    "shown",
+]
+
+
+default_floating_point = np.errstate(all="warn", under="ignore")
+"""Decorator: NumPy's own treatment of overflow and underflow, whatever the caller's thread has set."""
 
 
 def shown(value: Any) -> str:
@@ -127,6 +143,18 @@ def mapping(name: str, value: Any, entries: str) -> Mapping[Any, Any]:
     if value is not None and not isinstance(value, Mapping):
         raise TypeError(f"{name} = {shown(value)}: must be a mapping from {entries}")
     return {} if value is None else value
+
+
+def equal(one: Any, other: Any) -> bool:
+    """Tell whether two values are equal, arrays and what holds arrays by their elements; nan equals nan."""
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        arrays = isinstance(one, np.ndarray) and isinstance(other, np.ndarray)
+        return arrays and np.array_equal(one, other, equal_nan=one.dtype.kind in "fc" and other.dtype.kind in "fc")
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        return one.keys() == other.keys() and all(equal(one[key], other[key]) for key in one)
+    if isinstance(one, (list, tuple)):
+        return type(one) is type(other) and len(one) == len(other) and all(map(equal, one, other))
+    return bool(one == other) or (isinstance(one, float) and isinstance(other, float) and one != one and other != other)
 
 
 def broadcastable(**arrays: np.ndarray) -> tuple[int, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
-from cra_sym.checks import choice, instance, one_axis, shown
+from cra_sym.checks import choice, default_floating_point, instance, one_axis, shown
 from cra_sym.model.spatial import SpatialProblem, shares
 from cra_sym.model.system import System
 from cra_sym.model.values import flat_columns
@@ -26,6 +26,7 @@ _KINDS = ("force", "motion")
 _FASTEST = 1e60  # rad/s, whose fourth power is a number; what is slower than its inverse is static
 
 
+@default_floating_point
 def frequency_response(
     system: System,
     angular_frequency: Any,

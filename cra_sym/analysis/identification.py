@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cra_sym.analysis import fit_words
 from cra_sym.analysis.fit_search import Data, Search, Unknown, unknowns
-from cra_sym.checks import broadcastable, count, instance, mapping, real_array, shown
+from cra_sym.checks import broadcastable, count, default_floating_point, instance, mapping, real_array, shown
 from cra_sym.model.system import MOST_MODES, System
 
 __all__ = [
@@ -227,6 +227,7 @@ def identify_joint(
     return found
 
 
+@default_floating_point
 def _identified(
     kind: type[Identification],
     name: str,

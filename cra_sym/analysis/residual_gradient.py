@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cra_sym.analysis.modes import participation
 from cra_sym.analysis.responses import residual_vibration, stopped_oscillators
 from cra_sym.analysis.sensitivities import Sensitivities, sensitivities
-from cra_sym.checks import count, shown
+from cra_sym.checks import count, default_floating_point, shown
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.solvers.driven_modes import state_at_stop
 from cra_sym.solvers.modal_response import Oscillators, free_peak
@@ -25,6 +25,7 @@ _STEP = 2e-3  # relative change of omega^2 in a step of the differences
 _POINTS = 8  # on one side of a parameter that cannot be negative, or four on each side
 
 
+@default_floating_point
 def residual_vibration_gradient(
     system: System,
     motion: BaseMotion,

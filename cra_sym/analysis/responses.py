@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
-from cra_sym.checks import broadcastable, count, instance, mapping, one_axis, shown
+from cra_sym.checks import broadcastable, count, default_floating_point, instance, mapping, one_axis, shown
 from cra_sym.kernels import derived_kernel
 from cra_sym.model.projection import Projected
 from cra_sym.model.system import MOST_MODES, System
@@ -32,6 +32,7 @@ _free = derived_kernel("cra_sym.model.oscillator:free_kernel", backend="numpy")
 _forced = derived_kernel("cra_sym.model.oscillator:forced_kernel", backend="numpy")
 
 
+@default_floating_point
 def tip_response(
     system: System,
     motion: BaseMotion | Mapping[AppliedUndef, History] | None,
@@ -77,6 +78,7 @@ def tip_response(
     return values if np.ndim(t) else values[..., 0]
 
 
+@default_floating_point
 def response(
     system: System,
     motion: BaseMotion | Mapping[AppliedUndef, History] | None,
@@ -142,6 +144,7 @@ def response(
     return values if np.ndim(t) else values[..., 0]
 
 
+@default_floating_point
 def residual_vibration(system: System, motion: BaseMotion, modes: int = 5, *, zeta: Any = None) -> Any:
     """Return the peak amplitude of the tip after the base has stopped, m: the sum of the peaks of the modes.
 

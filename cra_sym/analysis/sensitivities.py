@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import count, instance, shown
+from cra_sym.checks import count, default_floating_point, instance, shown
 from cra_sym.model.projection import Projected, column
 from cra_sym.model.system import MOST_MODES, System
 
@@ -28,6 +29,14 @@ class Rates(Mapping[str, Array]):
             raise KeyError(name)
         value: Array = getattr(self._found, f"_{self._kind}")(name)
         return value
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Rates):
+            return NotImplemented
+        return (self._found, self._kind, self._names) == (other._found, other._kind, other._names)
+
+    def __hash__(self) -> int:
+        return hash((self._kind, self._names))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
@@ -64,11 +73,22 @@ class Sensitivities:
     frequency: Array
 
     def __init__(self, system: System, modes: int, by: Sequence[str]) -> None:
-        self._system, self._modes = system, modes
+        self._system, self._modes, self._by = system, modes, tuple(by)
         self.frequency = system.natural_frequencies(modes) / (2 * np.pi)
         stiff = [name for name in system.numerics("stiffnesses") if name in by]
         self.rate, self.log = Rates(self, "raw", by), Rates(self, "logarithmic", by)
         self.compliance = Rates(self, "by_compliance", stiff)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Sensitivities):
+            return NotImplemented
+        return (self._modes, self._by, self._system) == (other._modes, other._by, other._system)
+
+    def __hash__(self) -> int:
+        return hash((self._modes, self._by, self._system))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self._system, self._modes, self._by)
 
     def __getattr__(self, name: str) -> Array:
         if name.startswith("_"):
@@ -101,12 +121,14 @@ class Sensitivities:
         rate = self._forms[f"{name} stiffness"] - self._omega**2 * self._forms[f"{name} mass"]
         return np.where(np.isinf(column(np.asarray(self._system.values[name]))), 0.0, rate)
 
+    @default_floating_point
     def _raw(self, name: str) -> Array:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             squared = self._squared(name)
             value = squared / (8 * np.pi**2 * self.frequency)  # d omega^2 = 8 pi^2 f df
         return self._at_rest(value, squared)
 
+    @default_floating_point
     def _logarithmic(self, name: str) -> Array:
         given = np.asarray(self._system.values[name])
         finite = column(np.where(np.isinf(given), 0.0, given))
@@ -114,6 +136,7 @@ class Sensitivities:
             value = finite * self._squared(name) / (2 * self._omega**2)
         return np.where(self._still, np.nan, value) if self._still.any() else value
 
+    @default_floating_point
     def _by_compliance(self, name: str) -> Array:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             squared = -self._spring_forces_squared(name)
@@ -137,7 +160,8 @@ class Sensitivities:
         if not self._still.any():
             return value
         # 0 over 0 holds nothing, and neither does what is rounding beside the other modes
-        finite = np.where(self._still | ~np.isfinite(value), 0.0, np.abs(value) * self.frequency)
+        with np.errstate(invalid="ignore"):  # inf of a rigid-body mode, times 0
+            finite = np.where(self._still | ~np.isfinite(value), 0.0, np.abs(value) * self.frequency)
         holds = np.abs(squared) > 1e-20 * np.maximum(finite, np.abs(squared)).max(axis=-1, keepdims=True)
         held = np.where(holds, value, 0.0)
         several = self._still.sum(axis=-1, keepdims=True) > 1
@@ -148,6 +172,7 @@ class Sensitivities:
         return self.frequency == 0
 
 
+@default_floating_point
 def sensitivities(system: System, modes: int = 3, by: Sequence[str] | None = None) -> Sensitivities:
     """Return the sensitivities (31)-(32) of the natural frequencies to the parameters of a system.
 

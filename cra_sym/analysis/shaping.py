@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from cra_sym.checks import broadcastable, count, real_array
+from cra_sym.checks import broadcastable, count, default_floating_point, real_array
 
 __all__ = ["input_shaper"]
 
 _MOST_IMPULSES = 50
 
 
+@default_floating_point
 def input_shaper(angular_frequency: Any, zeta: Any = 0.0, order: int = 1) -> tuple[np.ndarray, np.ndarray]:
     """Return amplitudes and times of the zero-vibration shaper of a mode, for :meth:`BaseMotion.shaped`.
 

@@ -41,6 +41,7 @@ class AsymptoticWarning(UserWarning):
     """A boundary is returned where its expansion in epsilon cannot be trusted."""
 
 
+@checks.default_floating_point
 def stability_boundary(
     system: System,
     excitation: Excitation,
@@ -111,6 +112,7 @@ def stability_boundary(
     return lower, upper
 
 
+@checks.default_floating_point
 def growth_rate(
     system: System,
     excitation: Excitation,
@@ -167,6 +169,7 @@ def growth_rate(
     return floquet.growth_rate(**taken, tolerance=tolerance, loop=_loop(backend, taken))[()]
 
 
+@checks.default_floating_point
 def floquet_exponents(
     system: System,
     excitation: Excitation,
@@ -202,6 +205,7 @@ def floquet_exponents(
     return floquet.floquet_exponents(**taken, tolerance=tolerance, loop=_loop(backend, taken))
 
 
+@checks.default_floating_point
 def forced_width(system: System, excitation: TransverseBase, modes: int = 3) -> np.ndarray:
     """Return the measure |Gamma_n phi_n(L)| omega_n w_1 / (2 M_n) of the forced resonances of a transverse base, (49a).
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import broadcastable, count
+from cra_sym.checks import broadcastable, count, default_floating_point
 from cra_sym.model.projection import Domain, Load, Projected, project
 from cra_sym.model.routes import Modes
 from cra_sym.model.values import Value, checked_damping, checked_values, frozen
@@ -138,6 +138,7 @@ class System:
         found: Modes = self.numerics("route").modes(self.parameters, self.shape, omega)
         return found
 
+    @default_floating_point
     def _once(self, kind: str, modes: int, find: Any) -> Any:
         kept = self.__dict__.setdefault("_kept", {})
         key = kind, modes

@@ -31,7 +31,7 @@ from importlib import import_module
 from operator import index
 from typing import Any, Literal
 
-from cra_sym.checks import shown
+from cra_sym.checks import default_floating_point, shown
 
 __all__ = ["Equation", "Proof", "equation", "equations", "numbered", "proves", "samples"]
 
@@ -112,6 +112,7 @@ class Equation:
         """
         return "proved" if self.number in _PROOFS else "sampled"
 
+    @default_floating_point
     def check(self) -> bool:
         """Tell whether the independent routes confirm the equation: the proof if there is one, then the numbers.
 

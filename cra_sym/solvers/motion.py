@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..checks import broadcastable, one_axis, real_array
+from ..checks import broadcastable, equal, one_axis, real_array
 from .modal_response import pick, segment
 
 __all__ = ["BaseMotion", "Force", "Harmonic", "Piecewise"]
@@ -326,6 +326,14 @@ class BaseMotion:
             longest = np.maximum(longest, term.duration)
         return longest if longest.ndim else float(longest)
 
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, BaseMotion):
+            return NotImplemented
+        return self.shape == other.shape and equal(self.terms, other.terms)
+
+    def __hash__(self) -> int:
+        return hash((self.shape, tuple(type(term) for term in self.terms)))
+
     def __repr__(self) -> str:
         kinds = ", ".join(type(term).__name__.lower() for term in self.terms) or "at rest"
         return f"<BaseMotion of shape {self.shape}: {kinds}>"
@@ -402,6 +410,12 @@ class Force:
         total = Force()
         total.profile = self.profile + other.profile
         return total
+
+    def __eq__(self, other: object) -> bool:
+        return self.profile == other.profile if isinstance(other, Force) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash((Force, self.profile))
 
     def __repr__(self) -> str:
         return f"<Force of shape {self.profile.shape}>"

@@ -256,10 +256,14 @@ def test_any_parameters_of_any_system():
     waves = [brentq(end, a, b, xtol=1e-15) for a, b in itertools.pairwise(grid) if end(a) * end(b) < 0][:4]
     measured = np.sqrt(T) * np.array(waves) / (2 * np.pi)
     start = string.at({"tension": 1.0, "mass": 0.0, "spring": 1.0})
-    fit = cra.identify(start, measured, 1e-4, unknown=("tension", "mass", "spring"))
-    assert list(fit.values) == ["tension", "mass", "spring"] and fit.fits
-    np.testing.assert_allclose(list(fit.values.values()), [T, m, k], rtol=1e-6)
-    assert fit.covariance.shape == (3, 3) and fit.degrees_of_freedom == 1
+    with pytest.warns(AmbiguityWarning, match="2 sets of values"):  # k b T and m swap their roles: (m, k), (T/k, T/m)
+        both = cra.identify(start, measured, 1e-4, unknown=("tension", "mass", "spring"))
+    found = sorted(list(solution.values.values()) for solution in both.solutions)
+    np.testing.assert_allclose(found, [[T, T / k, T / m], [T, m, k]], rtol=1e-6)
+    fit = cra.identify(start, measured, 1e-4, unknown=("tension", "spring"), prior={"mass": (m, 0.01 * m)})
+    assert list(fit.values) == ["tension", "spring", "mass"] and fit.fits
+    np.testing.assert_allclose(list(fit.values.values()), [T, k, m], rtol=1e-6)
+    assert fit.covariance.shape == (3, 3) and fit.degrees_of_freedom == 2
 
 
 def test_a_prior_of_what_is_known_better_than_the_data_stays():
