@@ -16,7 +16,7 @@ import numpy as np
 
 from cra_sym.symbols import Dimension, unit_dimension
 
-__all__ = ["paired", "plain_numbers", "real_number"]
+__all__ = ["dimensions", "paired", "plain_numbers", "real_number"]
 
 _EXACT = {int, float}
 _BASE = {"[length]": "meter", "[mass]": "kilogram", "[time]": "second"}
@@ -101,6 +101,11 @@ def paired(values: Mapping[str, Any], units: Mapping[str, str] | None = None) ->
         sizes = dict(zip(value.dims, value.shape, strict=True))
         found[name] = numbers.reshape([sizes.get(dimension, 1) for dimension in order])
     return found
+
+
+def dimensions(value: Any) -> tuple[str, ...] | None:
+    """Return the names of the dimensions of a labelled array, None of anything else."""
+    return tuple(value.dims) if _is_labelled(value) else None
 
 
 def _is_labelled(value: Any) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,11 @@ class Excitation:
     def shape(self) -> tuple[int, ...]:
         """Batch shape: the common shape of all numbers."""
         return np.broadcast_shapes(*(np.shape(value) for value in self._numbers.values()))
+
+    def __getitem__(self, index: Any) -> Self:
+        """Return one of a batch, or some."""
+        shape = self.shape
+        return type(self)(**{name: np.broadcast_to(value, shape)[index] for name, value in self._numbers.items()})
 
     def _key(self) -> tuple[Any, ...]:
         numbers = sorted(self._numbers.items())

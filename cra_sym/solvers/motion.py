@@ -23,6 +23,10 @@ class Harmonic(NamedTuple):
     angular_frequency: Array
     phase: Array
 
+    def picked(self, shape: tuple[int, ...], index: Any) -> Harmonic:
+        """Return some of a batch of a shape."""
+        return Harmonic(*(np.asarray(np.broadcast_to(value, shape)[index]) for value in self))
+
     def kinematics(self, t: Array) -> tuple[Array, Array, Array]:
         """Return displacement, velocity and acceleration at the times ``t``, which become the last axis."""
         B, varpi, psi = (value[..., None] for value in self)
@@ -46,6 +50,16 @@ class Piecewise(NamedTuple):
     knots: Array
     acceleration: Array
     jerk: Array
+
+    def picked(self, shape: tuple[int, ...], index: Any) -> Piecewise:
+        """Return some of a batch of a shape."""
+
+        def rows(values: Array) -> Array:
+            return np.broadcast_to(values, (*shape, values.shape[-1]))[index]
+
+        knots = self.knots if self.knots.ndim == 1 else rows(self.knots)
+        velocity = np.asarray(np.broadcast_to(self.velocity, shape)[index])
+        return Piecewise(velocity, knots, rows(self.acceleration), rows(self.jerk))
 
     def kinematics(self, t: Array) -> tuple[Array, Array, Array]:
         """Return displacement, velocity and acceleration at the times ``t``, which become the last axis."""
@@ -326,6 +340,13 @@ class BaseMotion:
             longest = np.maximum(longest, term.duration)
         return longest if longest.ndim else float(longest)
 
+    def __getitem__(self, index: Any) -> BaseMotion:
+        """Return one of a batch, or some."""
+        if not self.shape:
+            raise IndexError("a single motion has no batch axis")
+        terms = [term.picked(self.shape, index) for term in self.terms]
+        return self._of(terms, np.empty(self.shape)[index].shape)
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, BaseMotion):
             return NotImplemented
@@ -410,6 +431,17 @@ class Force:
         total = Force()
         total.profile = self.profile + other.profile
         return total
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Batch shape."""
+        return self.profile.shape
+
+    def __getitem__(self, index: Any) -> Force:
+        """Return one of a batch, or some."""
+        chosen = Force()
+        chosen.profile = self.profile[index]
+        return chosen
 
     def __eq__(self, other: object) -> bool:
         return self.profile == other.profile if isinstance(other, Force) else NotImplemented
