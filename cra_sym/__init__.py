@@ -22,6 +22,7 @@ _HOME = {
     "modal_parameters": "analysis.modes",
     "BaseMotion": "solvers.motion",
     "Force": "solvers.motion",
+    "UndersamplingWarning": "analysis.responses",
     "response": "analysis.responses",
     "tip_response": "analysis.responses",
     "residual_vibration": "analysis.responses",

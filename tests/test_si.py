@@ -1,4 +1,4 @@
-"""Numbers as users bring them: units converted or refused, exact numbers, masked and labelled arrays, extreme values."""
+"""Numbers as users bring them: units converted or refused, exact numbers, masked and labelled arrays, extremes."""
 
 import warnings
 from datetime import timedelta
@@ -69,7 +69,9 @@ class AstropyQuantity(np.ndarray):
         return np.asarray(self)
 
     def decompose(self):
-        return self.of(self.value * self.scale, 1.0, **{b.name: p for b, p in zip(self.unit.bases, self.unit.powers)})
+        return self.of(
+            self.value * self.scale, 1.0, **{b.name: p for b, p in zip(self.unit.bases, self.unit.powers, strict=True)}
+        )
 
 
 class UnknownQuantity:

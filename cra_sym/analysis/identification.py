@@ -249,14 +249,14 @@ def _identified(
         hints = _hints(search, data, modes is None)
         numbers = (data.modes + 1).tolist()
         text = fit_words.misfit(best.chi2, best.degrees_of_freedom, best.p_value, best.residuals, numbers, hints)
-        warnings.warn(text, MisfitWarning, stacklevel=3)
+        warnings.warn(text, MisfitWarning, stacklevel=4)
         messages = [text, *messages]
     if len(estimates) > 1:
         text = fit_words.ambiguity([estimate.values for estimate in estimates])
-        warnings.warn(text, AmbiguityWarning, stacklevel=3)
+        warnings.warn(text, AmbiguityWarning, stacklevel=4)
         messages = [text, *messages]
     if not (best.log_standard_deviation < fit_words.TOLD).all():
-        warnings.warn(best.message, IdentifiabilityWarning, stacklevel=3)
+        warnings.warn(best.message, IdentifiabilityWarning, stacklevel=4)
     return replace(best, message="; ".join(messages), solutions=tuple(estimates))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -23,10 +24,15 @@ if TYPE_CHECKING:
     from sympy import Expr
     from sympy.core.function import AppliedUndef
 
-__all__ = ["History", "oscillators", "residual_vibration", "response", "tip_response"]
+__all__ = ["History", "UndersamplingWarning", "oscillators", "residual_vibration", "response", "tip_response"]
 
 Array = NDArray[np.float64]
 History = BaseMotion | Force
+
+
+class UndersamplingWarning(UserWarning):
+    """Modes lie above half the sampling rate of a record, which does not tell what excites them."""
+
 
 _free = derived_kernel("cra_sym.model.oscillator:free_kernel", backend="numpy")
 _forced = derived_kernel("cra_sym.model.oscillator:forced_kernel", backend="numpy")
@@ -129,6 +135,11 @@ def response(
     ndarray, shape (..., x, t)
         A single x or t has no axis.
 
+    Warns
+    -----
+    UndersamplingWarning
+        If a mode lies above half the sampling rate of a record.
+
     Raises
     ------
     TypeError, ValueError
@@ -162,6 +173,11 @@ def residual_vibration(system: System, motion: BaseMotion, modes: int = 5, *, ze
     -------
     float or ndarray, shape (...)
 
+    Warns
+    -----
+    UndersamplingWarning
+        As :func:`response`.
+
     Raises
     ------
     TypeError, ValueError
@@ -189,6 +205,7 @@ def stopped_oscillators(system: System, motion: BaseMotion, modes: int, zeta: An
         )
     modes = count("modes", modes, high=MOST_MODES)
     rows = system.modes(modes).displacement(1, 0)[..., None, :]
+    _check_sampling(motion, system.natural_frequencies(modes))
     return oscillators(system, participation(system, modes), rows, modes, zeta)
 
 
@@ -230,6 +247,7 @@ def _oscillation(
 
     def answer(gamma: Array, profile: BaseMotion, begin: Start, state: Any = None) -> Array:
         osc = oscillators(system, gamma, rows, modes, zeta)
+        _check_sampling(profile, osc.omega)
         if matrix is not None and matrix.any():
             return coupled_response(
                 CoupledModes(osc.omega, osc.zeta, matrix, gamma, rows), profile, t, derivative, begin, state
@@ -252,6 +270,23 @@ def _oscillation(
         total = added if total is None else total + added
     assert total is not None
     return total
+
+
+def _check_sampling(motion: BaseMotion, omega: Array) -> None:
+    """Warn of modes above half the sampling rate of a record."""
+    if motion.sample_step is None:
+        return
+    most = float(np.pi / motion.sample_step)
+    beyond = np.flatnonzero((omega > most).reshape(-1, omega.shape[-1]).any(axis=0))
+    if beyond.size:
+        first = int(beyond[0]) + 1
+        frequency = np.max(omega[..., first - 1]) / (2 * np.pi)
+        warnings.warn(
+            f"the record is sampled at {1 / motion.sample_step:.4g} Hz and tells nothing above half of that: mode "
+            f"{first} has {frequency:.4g} Hz; take fewer than {first} modes, or sample faster",
+            UndersamplingWarning,
+            stacklevel=6,
+        )
 
 
 def _histories(system: System, motion: Any) -> dict[str, History]:

@@ -300,7 +300,7 @@ def _explain(
     for where, reason in reasons:
         if np.any(where):
             scope = "" if np.all(where) else f" for {np.count_nonzero(where)} of {np.size(where)} parameter sets"
-            warnings.warn(f"{name}: no instability{scope}: {reason}", ResonanceWarning, stacklevel=3)
+            warnings.warn(f"{name}: no instability{scope}: {reason}", ResonanceWarning, stacklevel=4)
 
 
 def _doubt(
@@ -322,14 +322,14 @@ def _doubt(
     if np.any(far):
         largest = np.broadcast_to(epsilon, far.shape)[far].min()
         text = f"epsilon = {largest:g} is beyond the reach of the expansion"
-        warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=3)
+        warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=4)
     weights = excitation.weights.values() if isinstance(excitation, Fluctuation) else ()
     if any(np.any(epsilon * np.asarray(weight) > 1) for weight in weights):
         text = "epsilon times weight exceeds 1: a stiffness is negative in part of the period"
-        warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=3)
+        warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=4)
     for other in _overlapping(zone, system, excitation, epsilon, resonance, modes):
         text = f"its zone overlaps that of resonance {other}, and each is derived as if it were alone"
-        warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=3)
+        warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=4)
 
 
 def _overlapping(
