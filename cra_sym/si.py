@@ -120,8 +120,8 @@ def _check_dimension(dimension: Any, values: Mapping[str, Any]) -> None:
             raise ValueError(f"dimension {dimension!r}: {first} has {sizes[0]} entries, {name} has {sizes[1]}")
         labels = [getattr(value, "coords", {}) for value in (one, other)]
         if all(dimension in known for known in labels):
-            both = [np.asarray(known[dimension]) for known in labels]
-            if not np.array_equal(*both):
+            first_label, other_label = (np.asarray(known[dimension]) for known in labels)
+            if not np.array_equal(first_label, other_label):
                 raise ValueError(f"dimension {dimension!r}: its coordinate in {first} is not that in {name}")
 
 

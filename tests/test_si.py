@@ -283,3 +283,42 @@ def test_tiny_values_give_numbers(changes):
     # both come from one solver, to its accuracy; rigid-body modes that share a frequency may mix
     np.testing.assert_allclose(found.frequency[elastic], limit.frequency[elastic], rtol=1e-12)
     np.testing.assert_allclose(np.abs(found.tip_displacement[elastic]), limit.tip_displacement[elastic], rtol=1e-6)
+
+
+# Signs ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("held", "free"),
+    [
+        ([(v, 0), (v.diff(x), 0)], ("right", 0)),
+        ([(v, 1), (v.diff(x), 1)], ("left", 0)),
+        ([(v, 0), (v, 1)], ("right", 1)),
+        ([(v, 0), (v.diff(x), 0), (v.diff(x), 1)], ("right", 0)),
+        ([(v, 0), (v.diff(x), 0), (v, 1)], ("right", 1)),
+        ([(v, 0), (v, 1), (v.diff(x), 1)], ("left", 1)),
+        ([(v.diff(x), 0), (v, 1), (v.diff(x), 1)], ("left", 0)),
+    ],
+)
+def test_the_sign_of_a_mode_is_that_of_its_end(held, free):
+    """Clamped, pinned and guided ends: the first displacement of the right end that moves, or else of the left one."""
+    model = cra.Model(
+        v.diff(t) ** 2 / 2 - v.diff(x, 2) ** 2 / 2, fields=[v], x=x, domain=(0, 1), t=t,
+        essential=[displacement.subs(x, end) for displacement, end in held],
+    )  # fmt: skip
+    end, derivative = free
+    place = 1.0 if end == "right" else 0.0
+    assert (cra.mode_shapes(model.at({}), place, 4, derivative) > 0).all()
+
+
+def test_the_sign_of_a_clamped_clamped_mode_is_that_of_the_shear_force():
+    held = [v.subs(x, 0), v.diff(x).subs(x, 0), v.subs(x, 1), v.diff(x).subs(x, 1)]
+    model = cra.Model(v.diff(t) ** 2 / 2 - v.diff(x, 2) ** 2 / 2, fields=[v], x=x, domain=(0, 1), t=t, essential=held)
+    assert (cra.modal_parameters(model.at({}), 4).right_force[..., 0] > 0).all()
+
+
+def test_labelled_fields_of_a_motion_pair_by_dimension():
+    motion = cra.BaseMotion(velocity=labelled([0.1, 0.2], "a"), amplitude=labelled([1e-3, 2e-3, 3e-3], "b"))
+    assert motion.shape == (2, 3)
+    with pytest.raises(ValueError, match="velocity has units 'km/h': must be in m/s"):
+        cra.BaseMotion(velocity=labelled([0.1], "a", units="km/h"))

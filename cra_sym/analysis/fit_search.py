@@ -159,7 +159,7 @@ class Data:
 
     def without(self, entry: int) -> Data:
         """Return the data without one of the frequencies."""
-        return Data(*(np.delete(part, entry) for part in (self.measured, self.sigma, self.modes)))
+        return Data(np.delete(self.measured, entry), np.delete(self.sigma, entry), np.delete(self.modes, entry))
 
 
 @dataclass
@@ -194,7 +194,8 @@ class Search:
         misfit = (frequency - data.measured) / data.sigma
         values = self.values(place)
         prior = [(values[u.name] - u.prior[0]) / u.prior[1] for u in self.unknowns if u.prior is not None]
-        return np.clip(np.concatenate([misfit, prior]), -_LARGEST, _LARGEST)
+        found: Array = np.clip(np.concatenate([misfit, prior]), -_LARGEST, _LARGEST)
+        return found
 
     def gradient(self, place: Array, data: Data) -> Array:
         """Return the derivatives of the residuals by the coordinates."""
@@ -207,7 +208,8 @@ class Search:
                 if u.prior is not None
             ]
         ).reshape(-1, len(self.unknowns))
-        return np.clip(np.vstack([np.stack(rows, -1), prior]), -_LARGEST, _LARGEST)
+        slopes: Array = np.clip(np.vstack([np.stack(rows, -1), prior]), -_LARGEST, _LARGEST)
+        return slopes
 
     def chi2(self, place: Array, data: Data) -> float:
         """Return the sum of the squared residuals."""

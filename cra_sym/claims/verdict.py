@@ -125,7 +125,8 @@ class Verdict:
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return the values of one quantity of the evidence."""
-        return self.evidence[name].values
+        values: np.ndarray = self.evidence[name].values
+        return values
 
     def draw(self, ax: Axes | None = None) -> Figure:
         """Draw the evidence into one pair of axes, by default a new figure in the house style."""

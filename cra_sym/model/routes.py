@@ -16,9 +16,10 @@ from cra_sym.solvers.eigenvalues import lowest
 from cra_sym.solvers.shapes import mode_states
 from cra_sym.solvers.stiffness import DynamicStiffness
 
-__all__ = ["GeneralRoute", "Modes", "RigidShare", "Route", "tip_sign"]
+__all__ = ["GeneralRoute", "Modes", "RigidShare", "Route", "end_sign"]
 
 Array = NDArray[np.float64]
+_STATIONS = (0.0, 0.22, 0.53, 0.81, 1.0)  # ends, and places that are no node of the first modes
 Values = Sequence[float | Array]
 """Parameters in the order of the model's symbols; they broadcast to the shape of the batch."""
 
@@ -103,24 +104,28 @@ class GeneralModes:
 
     @cached_property
     def _ends(self) -> Array:
-        """State (q, w, P) at both ends, shape (rows, modes, 2, 2 n + m), and the sign of every mode."""
+        """State (q, w, P) at both ends and some places between, shape (rows, modes, stations, 2 n + m)."""
         n, m = self.spatial.displacements, self.spatial.coordinates
         z = self._z
-        state = np.empty((*z.shape, 2, 2 * n + m))
+        state = np.empty((*z.shape, len(_STATIONS), 2 * n + m))
         for rows, _, problem in self._problems:
-            state[rows] = mode_states(problem, z[rows], np.tile([0.0, 1.0], (len(rows), 1)))
+            state[rows] = mode_states(problem, z[rows], np.tile(_STATIONS, (len(rows), 1)))
         return state
 
     @cached_property
     def _sign(self) -> Array:
-        return tip_sign(self._ends[:, :, 1, : self.spatial.displacements])
+        n, m = self.spatial.displacements, self.spatial.coordinates
+        left, right = self._ends[:, :, 0], self._ends[:, :, -1]
+        size = np.abs(self._ends).max(axis=(1, 2), initial=0.0)[:, None]
+        entries = np.concatenate([right[..., :n], left[..., :n], right[..., n + m :]], axis=-1)
+        return end_sign(entries, np.concatenate([size[..., :n], size[..., :n], size[..., n + m :]], axis=-1))
 
     @property
     def _z(self) -> Array:
         return self.omega.reshape(-1, self.omega.shape[-1]) ** 2
 
     def _end(self, end: int, entry: int) -> Array:
-        return (self._sign[..., 0] * self._ends[:, :, end, entry]).reshape(self.omega.shape)
+        return (self._sign[..., 0] * self._ends[:, :, -end, entry]).reshape(self.omega.shape)
 
     def displacement(self, end: int, place: int) -> Array:
         """Return a displacement of an end section, shape (..., modes)."""
@@ -162,9 +167,16 @@ class GeneralModes:
         return None
 
 
-def tip_sign(tip: Array) -> Array:
-    """Return the sign that makes the first tip displacement which is not zero positive, shape (..., 1)."""
-    scale = np.abs(tip).max(axis=-2, keepdims=True)
-    moving = np.abs(tip) > 1e-7 * np.where(scale > 0.0, scale, 1.0)
-    first = np.take_along_axis(tip, moving.argmax(axis=-1)[..., None], axis=-1)
+def end_sign(entries: Array, size: Array) -> Array:
+    """Return the sign that makes the first entry of every mode positive that is not zero, shape (..., modes, 1).
+
+    Parameters
+    ----------
+    entries : ndarray, shape (..., modes, n)
+        Displacements of the right end, then those of the left end, then forces of the right end.
+    size : ndarray, shape (..., 1, n)
+        What is large for each: the most in the domain and all modes.
+    """
+    moving = np.abs(entries) > 1e-7 * np.where(size > 0.0, size, np.inf)
+    first = np.take_along_axis(entries, moving.argmax(axis=-1)[..., None], axis=-1)
     return np.where(first < 0.0, -1.0, 1.0)

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..checks import broadcastable, choice, equal, one_axis, real_array
+from ..si import paired
 from .motion_terms import Harmonic, Piecewise, Term
 from .moves import check_feasible, fastest, quotient
 from .records import KINDS, spline_motion, uniform_times
@@ -60,9 +61,18 @@ class BaseMotion:
         angular_frequency: Any = 0.0,
         phase: Any = 0.0,
     ) -> None:
-        v, a = real_array("velocity", velocity, unit="m/s"), real_array("acceleration", acceleration, unit="m/s^2")
-        B, psi = real_array("amplitude", amplitude, unit="m"), real_array("phase", phase, unit="rad")
-        varpi = real_array("angular_frequency", angular_frequency, low=0.0, high=_FASTEST, unit="rad/s")
+        given = {
+            "velocity": velocity,
+            "acceleration": acceleration,
+            "amplitude": amplitude,
+            "angular_frequency": angular_frequency,
+            "phase": phase,
+        }
+        units = dict(zip(given, ("m/s", "m/s^2", "m", "rad/s", "rad"), strict=True))
+        v, a, B, varpi, psi = (
+            real_array(name, value, unit=units[name]) for name, value in paired(given, units).items()
+        )
+        varpi = real_array("angular_frequency", varpi, low=0.0, high=_FASTEST)
         broadcastable(velocity=v, acceleration=a, amplitude=B, angular_frequency=varpi, phase=psi)
         v, a = np.broadcast_arrays(v, a)
         terms: list[Term] = []

@@ -65,11 +65,13 @@ def _seconds(t: Any) -> tuple[Array, float]:
     if isinstance(given, np.ndarray) and given.dtype.kind == "M":
         if np.isnat(given).any():
             raise ValueError(f"t[{int(np.argmax(np.isnat(given).ravel()))}] is not a time (NaT)")
-        unit = np.timedelta64(1, np.datetime_data(given.dtype)[0])  # the clock's own
-        return (given - given.ravel()[0]) / np.timedelta64(1, "s"), float(unit / np.timedelta64(1, "s"))
+        one = np.ones(1, given.dtype.str.replace("M8", "m8"))  # what the clock tells
+        return (given - given.ravel()[0]) / np.timedelta64(1, "s"), float((one / np.timedelta64(1, "s"))[0])
     times = real_array("t", t, low=0.0, unit="s")
-    kept = given.dtype if isinstance(given, np.ndarray) and given.dtype.kind == "f" else np.dtype(float)
-    resolution = float(np.finfo(kept).eps * np.max(np.abs(times), initial=0.0))
+    eps = np.finfo(np.float64).eps
+    if isinstance(given, np.ndarray) and given.dtype.kind == "f":
+        eps = np.spacing(given.dtype.type(1))
+    resolution = float(eps) * float(np.max(np.abs(times), initial=0.0))
     if times.ndim and times.size and times.ravel()[0] > _CLOCK:
         times = times - times.ravel()[0]
     return times, resolution

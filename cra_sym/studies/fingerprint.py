@@ -61,7 +61,8 @@ def _text(value: Any, above: tuple[int, ...]) -> str:
 
 def _state(value: Any) -> Any:
     """Return what an object is rebuilt from when it is pickled."""
-    if type(value).__reduce__ is object.__reduce__ and type(value).__reduce_ex__ is object.__reduce_ex__:
+    own = any("__reduce__" in vars(kind) or "__reduce_ex__" in vars(kind) for kind in type(value).__mro__[:-1])
+    if not own:
         state = value.__getstate__()  # of classes that are not importable too
         return state if state is not None else ()
     return tuple(value.__reduce_ex__(2)[1:3])

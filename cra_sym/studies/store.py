@@ -135,7 +135,7 @@ def _regions(shape: tuple[int, ...], chunks: tuple[int, ...]) -> Iterator[Region
 def _is_there(stored: Any, path: Path, region: Region) -> bool:
     index = [part.start // piece for part, piece in zip(region, stored.chunks, strict=False)]
     index += [0] * (len(stored.shape) - len(index))
-    return (path / stored.name.strip("/") / stored.metadata.encode_chunk_key(tuple(index))).exists()
+    return bool((path / stored.name.strip("/") / stored.metadata.encode_chunk_key(tuple(index))).exists())
 
 
 def _written(study: Study, path: Path, regions: list[Region], client: Any) -> Iterator[None]:

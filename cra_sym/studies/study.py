@@ -200,24 +200,26 @@ def make_study(system: System, quantity: str | Callable[..., Any], parameters: M
     chosen.check_options([name for name in parameters if name not in known], known)
     units = {**system.model.units, "zeta": "1", **chosen.axes}
     labels: dict[str, Any] = {}
-    swept: tuple[dict[str, Swept], ...] = ({}, {}, {})
+    fields: dict[str, Swept] = {}
+    numbers: dict[str, Swept] = {}
+    objects: dict[str, Swept] = {}
     options = {}
     for name, value in parameters.items():
         if name in known or name in chosen.axes:
             axis = _axis(system, name, value, units.get(name, ""), labels, name in known)
             if axis is not None:
-                swept[0 if name in known else 1][name] = axis
+                (fields if name in known else numbers)[name] = axis
             elif name in known:
                 system = system.replace(**{name: value})
             else:
                 options[name] = value
         elif _is_batch(value):
-            swept[2][name] = _batch(name, value, labels)
+            objects[name] = _batch(name, value, labels)
         else:
             options[name] = value
-    first = {name: np.ravel(s.values)[0] for name, s in swept[0].items()}
+    first = {name: np.ravel(s.values)[0] for name, s in fields.items()}
     system = system.replace(**first) if first else system
-    study = Study(system, chosen, labels, *swept, options, {}, np.dtype(float))
+    study = Study(system, chosen, labels, fields, numbers, objects, options, {}, np.dtype(float))
     corner = study._evaluated({name: np.zeros(1, dtype=np.intp) for name in labels})
     return _with_axes(study, corner)
 
