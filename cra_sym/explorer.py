@@ -68,7 +68,7 @@ class Explorer:
     def __init__(self, arm: Arm, excitation: Any, values: dict[str, Any]) -> None:
         self._given, self._excitations = arm, dict(_EXCITATIONS)
         if not isinstance(excitation, JointStiffness | AxialBase) or excitation.shape:
-            raise TypeError(f"excitation = {shown(excitation)}: allowed is a single JointStiffness or AxialBase")
+            raise TypeError(f"excitation = {shown(excitation)}: must be a single JointStiffness or AxialBase")
         if excitation not in self._excitations.values():
             self._excitations["as given"] = excitation
         self.excitation, self.swing = excitation, 0.0
@@ -122,11 +122,11 @@ class Explorer:
     def _check(self, values: dict[str, Any]) -> None:
         unknown = set(values) - set(_RANGES)
         if unknown:
-            raise TypeError(f"{', '.join(sorted(unknown))}: allowed names are {', '.join(_RANGES)}")
+            raise TypeError(f"{', '.join(sorted(unknown))}: must be among {', '.join(_RANGES)}")
         for name, value in values.items():
             shape = real_array(name, value, allow_infinite=True).shape
             if shape:
-                raise ValueError(f"{name} has shape {shape}: allowed is one number")
+                raise ValueError(f"{name} has shape {shape}: must be one number")
         self._given.replace(**{name: values[name] for name in _ARM if name in values})
         BaseMotion(**{_MOTION[name]: values[name] for name in _MOTION if name in values})
         if "epsilon" in values:
@@ -264,5 +264,5 @@ def explore(arm: Arm | None = None, *, excitation: Any = JOINT, **values: Any) -
     arm = Arm.nominal().replace(k_t=1e4, k_r=1e3) if arm is None else arm
     instance("arm", arm, Arm)
     if arm.shape:
-        raise ValueError(f"arm has shape {arm.shape}: allowed is a single one")
+        raise ValueError(f"arm has shape {arm.shape}: must be a single one")
     return Explorer(arm, excitation, values)

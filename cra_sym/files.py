@@ -100,7 +100,7 @@ def _check_replaceable(target: Path, keep: bool) -> None:
     if foreign is not None and not keep:
         raise OutputError(
             f"output = {str(target)!r}: holds {foreign!r}, which cra_sym did not write;"
-            " allowed are a new or empty directory and an earlier output"
+            " must be a new or empty directory, or an earlier output"
         )
 
 
@@ -186,7 +186,7 @@ def path_of(name: str, path: str | Path) -> Path:
         pass
     except (TypeError, ValueError) as error:
         kind = TypeError if isinstance(error, TypeError) else ValueError
-        raise kind(f"{name} = {brief(path)}: allowed is a path ({error})") from None
+        raise kind(f"{name} = {brief(path)}: must be a path ({error})") from None
     return made
 
 

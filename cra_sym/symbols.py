@@ -221,7 +221,7 @@ def __dir__() -> list[str]:
 def unit_dimension(unit: str) -> Dimension:
     """Return the dimension of a unit such as ``N m/rad``; a ValueError names one that is not known."""
     if not isinstance(unit, str):
-        raise TypeError(f"unit = {unit!r}: allowed is a text such as 'N m/rad'")
+        raise TypeError(f"unit = {unit!r}: must be a text such as 'N m/rad'")
     above, _, below = unit.partition("/")
     total = Dimension()
     for part, sign in ((above, 1), (below, -1)):

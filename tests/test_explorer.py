@@ -145,13 +145,13 @@ def test_without_the_extra_a_picture_and_an_error_that_names_it(monkeypatch):
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        ({"k": 1.0}, "k: allowed names"),
+        ({"k": 1.0}, "k: must be among"),
         ({"k_t": -1.0}, "k_t"),
         ({"k_t": [1.0, 2.0]}, r"k_t has shape \(2,\)"),
         ({"B": np.nan}, "B = nan"),
         ({"epsilon": 0.0}, "epsilon"),
         ({"epsilon": 1e3}, "epsilon"),
-        ({"excitation": "x" * 1000}, r"^excitation = 'x{70,76}\.\.\.: allowed is a single"),
+        ({"excitation": "x" * 1000}, r"^excitation = 'x{70,76}\.\.\.: must be a single"),
         ({"arm": cra.Arm.nominal().replace(k_t=[1.0, 2.0])}, r"arm has shape \(2,\)"),
         ({"arm": 3}, "arm"),
         ({"excitation": cra.TransverseBase(0.001)}, "TransverseBase"),

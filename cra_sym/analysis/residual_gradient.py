@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cra_sym.analysis.modes import only_motion, participation
 from cra_sym.analysis.responses import residual_vibration, stopped_oscillators
 from cra_sym.analysis.sensitivities import Sensitivities, sensitivities
-from cra_sym.checks import count, shown
+from cra_sym.checks import count, default_floating_point, shown
 from cra_sym.model.one_wave import OneWaveModes
 from cra_sym.model.projection import column
 from cra_sym.model.system import MOST_MODES, System
@@ -27,6 +27,7 @@ _STEP = 0.02  # of the differences, over the change of the parameter at which tw
 _POINTS = 8  # on one side of a parameter that cannot be negative, or four on each side
 
 
+@default_floating_point
 def residual_vibration_gradient(
     system: System,
     motion: BaseMotion,

@@ -96,7 +96,7 @@ class Setting:
     def __post_init__(self) -> None:
         instance("arm", self.arm, Arm)
         if self.arm.shape:
-            raise ValueError(f"arm has the batch shape {self.arm.shape}: allowed is one arm")
+            raise ValueError(f"arm has the batch shape {self.arm.shape}: must be one arm")
         object.__setattr__(self, "modes", count("modes", self.modes, high=100))
         for entry in dataclasses.fields(self):
             name, value = entry.name, getattr(self, entry.name)
@@ -106,7 +106,7 @@ class Setting:
             length = _LENGTHS.get(name, ())
             if array.ndim != (name in _LENGTHS) or array.size == 0 or (length and array.size != length):
                 one = f"{length or 'some'} numbers in a row" if name in _LENGTHS else "one number"
-                raise ValueError(f"{name} has shape {array.shape}: allowed is {one}")
+                raise ValueError(f"{name} has shape {array.shape}: must be {one}")
             object.__setattr__(self, name, tuple(map(float, array)) if array.ndim else float(array))
 
     @classmethod
@@ -114,7 +114,7 @@ class Setting:
         """Return a setting, nominal but for what is given."""
         unknown = [name for name in numbers if name not in cls.provenance]
         if unknown:
-            raise TypeError(f"{unknown[0]!r} is no number of a setting: allowed are {', '.join(cls.provenance)}")
+            raise TypeError(f"{unknown[0]!r} is not a number of a setting: must be one of {', '.join(cls.provenance)}")
         return cls(**numbers) if arm is None else cls(arm, **numbers)
 
     @cached_property

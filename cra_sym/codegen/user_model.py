@@ -28,7 +28,7 @@ def model_texts(name: str, model: Model) -> dict[str, str]:
         If its characteristic function has no real closed form: dampers, several wave numbers or varying coefficients.
     """
     if not isinstance(model, Model):
-        raise TypeError(f"model = {model!r}: allowed is a Model")
+        raise TypeError(f"model = {model!r}: must be a Model")
     language = LANGUAGES[name]
     expressions, arguments = _characteristic(model)
     made = function(

@@ -178,11 +178,11 @@ def _numeric(name: str, value: Any) -> np.ndarray:
     try:
         array = np.asarray(value)
     except Exception:  # whatever an object does when it is asked for its numbers
-        raise TypeError(f"{name} = {shown(value)}: allowed are real or complex numbers") from None
+        raise TypeError(f"{name} = {shown(value)}: must be real or complex numbers") from None
     if array.dtype == np.float64 and type(value) in (np.ndarray, float):
         return array
     if array.dtype.kind not in "iufc" or np.ma.is_masked(value):
-        raise TypeError(f"{name} = {shown(value)}: allowed are real or complex numbers")
+        raise TypeError(f"{name} = {shown(value)}: must be real or complex numbers")
     return array.astype(np.result_type(array.dtype, np.float64), copy=False)
 
 

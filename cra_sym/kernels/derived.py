@@ -69,7 +69,7 @@ def derived_kernel(path: str, *arguments: Any, backend: str | None = None) -> Ke
     """
     module, colon, function = path.partition(":") if isinstance(path, str) else ("", "", "")
     if not (colon and function.isidentifier() and module.startswith("cra_sym.")):
-        raise ValueError(f"path = {shown(path)}: allowed is 'cra_sym.room.module:function'")
+        raise ValueError(f"path = {shown(path)}: must be 'cra_sym.room.module:function'")
     if not _are_literals(arguments):
         raise ValueError(f"arguments = {shown(arguments)}: must be numbers, texts and tuples of them")
     return _DerivedKernel(path, arguments, backend)

@@ -124,11 +124,11 @@ def check_arguments(arguments: Any) -> tuple[sp.Symbol, ...]:
     if isinstance(arguments, sp.Symbol):
         return (arguments,)
     if not isinstance(arguments, Iterable) or isinstance(arguments, str) or getattr(arguments, "ndim", 1) != 1:
-        raise TypeError(f"arguments = {shown(arguments)}: allowed is a sequence of SymPy symbols")
+        raise TypeError(f"arguments = {shown(arguments)}: must be a sequence of SymPy symbols")
     symbols: tuple[sp.Symbol, ...] = ()
     for symbol in arguments:  # one by one: there may be no end of them
         if not isinstance(symbol, sp.Symbol):
-            raise TypeError(f"arguments: {shown(symbol)} is none; allowed are SymPy symbols; substitute one for it")
+            raise TypeError(f"arguments: {shown(symbol)} must be a SymPy symbol; substitute one for it")
         symbols += (symbol,)
     twice = {s.name for k, s in enumerate(symbols) if s in symbols[:k]}
     if twice:
@@ -186,7 +186,7 @@ def _flatten(expression: Any) -> tuple[Layout, list[sp.Expr]]:
         expression = sp.sympify(expression, strict=True)
     if not isinstance(expression, sp.Expr):
         raise TypeError(
-            f"expression = {shown(expression)}: allowed are SymPy expressions, matrices, sequences or dicts of them"
+            f"expression = {shown(expression)}: must be SymPy expressions, matrices, sequences or dicts of them"
         )
     return (), [expression]
 

@@ -45,7 +45,7 @@ class Elimination:
         for jet, offset in self.offsets.items():
             if offset != 0:
                 given = f"{self.space.form(jet)} = {self.space.write(self.value(jet) or S.Zero)}"
-                raise HamiltonError(f"{label}: essential, {given}: allowed is 0; measure the displacement from there")
+                raise HamiltonError(f"{label}: essential, {given}: must be 0; measure the displacement from there")
 
     def check_effective(self, term: Expr, label: str) -> None:
         """Refuse an end term that the essential conditions make constant: it contradicts them."""

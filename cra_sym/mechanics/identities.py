@@ -81,9 +81,9 @@ def vanishes(expression: Expr) -> bool:
     plain, relations = _without_roots(_without_functions(plain))
     nodes = {node for part in (plain, *relations.values()) for node in preorder_traversal(part)}
     if not expression.is_commutative or not all(map(_is_rational, nodes)):
-        raise ValueError(f"{expression}: allowed are exact numbers and circular, hyperbolic and exponential functions")
+        raise ValueError(f"{expression}: must be exact numbers and circular, hyperbolic and exponential functions")
     if any(_is_zero(node.base, relations) for node in nodes if node.is_Pow and node.exp.is_negative):
-        raise ValueError(f"{expression}: allowed are no divisions by zero")
+        raise ValueError(f"{expression}: must be free of divisions by zero")
     return _is_zero(plain, relations)
 
 
@@ -155,7 +155,7 @@ def _terms(argument: Expr) -> list[tuple[Rational, Expr, bool]]:
         quotient = known and any(p.base.is_Add and not 0 < p.exp < 1 for p in monomial.atoms(Pow))
         constant = turns and monomial.free_symbols <= {_PI}
         if not known or not factor.is_Rational or monomial.has(I) or constant or quotient:
-            raise ValueError(f"{argument}: allowed are no arguments but polynomials without an imaginary constant")
+            raise ValueError(f"{argument}: must be a polynomial without an imaginary constant")
         if factor != 0:
             terms.append((factor, monomial, turns))
     return terms
@@ -187,7 +187,7 @@ def _without_roots(expression: Expr) -> tuple[Expr, dict[Dummy, Expr]]:
 
 def _is_root(power: Expr) -> bool:
     if not power.exp.is_Rational:
-        raise ValueError(f"{power}: allowed are no symbolic powers")
+        raise ValueError(f"{power}: must be free of symbolic powers")
     return not power.exp.is_Integer
 
 

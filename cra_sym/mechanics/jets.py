@@ -62,10 +62,10 @@ class HamiltonError(ValueError):
 def listed(name: str, values: Any) -> tuple[Any, ...]:
     """Return ``values`` as a tuple, or raise an error that names the argument."""
     if isinstance(values, str | bytes) or not isinstance(values, Iterable) or getattr(values, "ndim", 1) != 1:
-        raise TypeError(f"{name} = {shown(values)}: allowed is a sequence such as [{shown(values)}]")
+        raise TypeError(f"{name} = {shown(values)}: must be a sequence such as [{shown(values)}]")
     found = tuple(islice(values, _MOST_LISTED + 1))
     if len(found) > _MOST_LISTED:
-        raise ValueError(f"{name} = {shown(values)}: allowed are at most {_MOST_LISTED} entries")
+        raise ValueError(f"{name} = {shown(values)}: must have at most {_MOST_LISTED} entries")
     return found
 
 
@@ -77,7 +77,7 @@ def scalar(name: str, value: Any) -> Expr:
     except Exception:  # whatever an object does when it is asked for its number, or has too many levels to be read
         is_scalar = False
     if not is_scalar:
-        raise TypeError(f"{name} = {shown(value)}: allowed is a scalar SymPy expression")
+        raise TypeError(f"{name} = {shown(value)}: must be a scalar SymPy expression")
     return expression
 
 
@@ -121,7 +121,7 @@ class JetSpace:
         self.unknowns = (*self.fields, *self.coordinates)
         ends = tuple(scalar("domain", end) for end in listed("domain", domain))
         if len(ends) != 2 or ends[0] == ends[1] or any(end.has(x, t) for end in ends):
-            raise HamiltonError(f"domain = {domain}: allowed are two different end coordinates free of {x} and {t}")
+            raise HamiltonError(f"domain = {domain}: must be two different end coordinates free of {x} and {t}")
         self.ends: dict[End, Expr] = dict(zip(END_NAMES, ends, strict=True))
         self.known = {function.func for function in prescribed}
         self._heads = {unknown.func: number for number, unknown in enumerate(self.unknowns)}
@@ -133,16 +133,16 @@ class JetSpace:
     def _check_symbols(self, prescribed: tuple[Any, ...]) -> None:
         for name, value in (("x", self.x), ("t", self.t)):
             if not isinstance(value, Symbol):
-                raise TypeError(f"{name} = {shown(value)}: allowed is a SymPy symbol")
+                raise TypeError(f"{name} = {shown(value)}: must be a SymPy symbol")
         for function in prescribed:
             if not isinstance(function, AppliedUndef):
-                raise TypeError(f"prescribed: {shown(function)}: allowed is an undefined function, such as w(t)")
+                raise TypeError(f"prescribed: {shown(function)}: must be an undefined function, such as w(t)")
         kinds = (("fields", self.fields, {self.x, self.t}), ("coordinates", self.coordinates, {self.t}))
         for name, functions, allowed in kinds:
             for function in functions:
                 if not isinstance(function, AppliedUndef):
                     raise TypeError(
-                        f"{name}: {shown(function)}: allowed is an undefined function of {allowed}, such as v(x, t)"
+                        f"{name}: {shown(function)}: must be an undefined function of {allowed}, such as v(x, t)"
                     )
                 if set(function.args) != allowed or len(function.args) != len(allowed):
                     raise HamiltonError(
@@ -347,7 +347,7 @@ class JetSpace:
             if argument == variable:
                 continue
             if variable == self.t:
-                raise HamiltonError(f"{function} is not local in time: allowed is {own}")
+                raise HamiltonError(f"{function} is not local in time: must be {own}")
             where = self._end_at(argument, place, function)
         if not self.is_field(number):
             where = None

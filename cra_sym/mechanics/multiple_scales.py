@@ -75,7 +75,7 @@ class MultipleScales:
         for step in self.steps:
             if step.name == name:
                 return step
-        raise ValueError(f"name = {name!r}: allowed are {', '.join(step.name for step in self.steps)}")
+        raise ValueError(f"name = {name!r}: must be one of {', '.join(step.name for step in self.steps)}")
 
     def _repr_latex_(self) -> str:
         if self.border is None:
@@ -143,12 +143,12 @@ def multiple_scales(
     (-epsilon*p/(2*omega) + 2*omega, epsilon*p/(2*omega) + 2*omega)
     """
     if order not in (1, 2):
-        raise ValueError(f"order = {order!r}: allowed are 1 and 2")
+        raise ValueError(f"order = {order!r}: must be 1 or 2")
     about = Resonance.of(resonance, tongue)
     if order < about.tongue:
         raise ValueError(f"order = {order}: the second tongue appears at order 2")
     if order == 2 and (cubic is not None or about.sign == 0):
-        raise ValueError("order = 2: allowed is 1 for a forced resonance or with a cubic term")
+        raise ValueError("order = 2: must be 1 for a forced resonance or with a cubic term")
     system = ParametricSystem.of(
         about,
         frequencies,

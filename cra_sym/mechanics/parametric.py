@@ -43,8 +43,8 @@ class Resonance:
         ('difference', 'principal', 'forced')
         """
         if tongue not in (1, 2):
-            raise ValueError(f"tongue = {tongue!r}: allowed are 1 and 2")
-        allowed = "allowed are (n, n), (m, n), (m, -n) with modes counted from 1, or a single n for a forced resonance"
+            raise ValueError(f"tongue = {tongue!r}: must be 1 or 2")
+        allowed = "must be (n, n), (m, n) or (m, -n) with modes counted from 1, or n alone for a forced resonance"
         pair = tuple(spec) if isinstance(spec, tuple | list | Tuple) else (spec,)
         if len(pair) not in (1, 2):
             raise ValueError(f"resonance = {spec!r}: {allowed}")
@@ -60,7 +60,7 @@ class Resonance:
         if sign == -1 and labels[0] == labels[1]:
             raise ValueError(f"resonance = {spec!r}: the difference of a mode with itself is no frequency")
         if sign == 0 and tongue != 1:
-            raise ValueError(f"tongue = {tongue!r}: allowed is 1 for a forced resonance")
+            raise ValueError(f"tongue = {tongue!r}: must be 1 for a forced resonance")
         return cls(labels[0], labels[-1], sign, tongue)
 
     @property
@@ -127,7 +127,7 @@ class ParametricSystem:
             rows = tuple(Integer(i + 1) for i in range(len(frequencies)))
             for mode in resonance.modes:
                 if mode not in rows:
-                    raise ValueError(f"resonance with mode {mode}: allowed are modes 1 to {len(rows)}")
+                    raise ValueError(f"resonance with mode {mode}: must be a mode from 1 to {len(rows)}")
         given = {"coupling": coupling, **quantities}
         for name, value in given.items():
             given[name] = _checked(name, value, size, symbolic)
@@ -180,11 +180,11 @@ def _checked(name: str, value: Any, size: Expr, symbolic: bool) -> Any:
     if name in ("coupling", "coupling_slope"):
         if symbolic or not isinstance(value, MatrixBase) or value.shape != (size, size):
             allowed = "an IndexedBase" if symbolic else f"a {size} x {size} Matrix"
-            raise ValueError(f"{name} = {value!r}: allowed is {allowed}")
+            raise ValueError(f"{name} = {value!r}: must be {allowed}")
         return value.as_immutable()
     if isinstance(value, Mapping):
         return value
     if symbolic or not isinstance(value, Sequence) or len(value) != size:
         allowed = "an IndexedBase or a dict" if symbolic else f"a sequence of {size} entries or a dict"
-        raise ValueError(f"{name} = {value!r}: allowed is {allowed}")
+        raise ValueError(f"{name} = {value!r}: must be {allowed}")
     return tuple(value)

@@ -100,7 +100,7 @@ def _read_work(space: JetSpace, triple: VirtualWork) -> list[tuple[Expr, Jet, bo
     except (TypeError, ValueError):
         raise HamiltonError(f"virtual_work: {shown(triple)} is not a triple (force, displacement, place)") from None
     if not (place is None or isinstance(place, str)) or place not in (*END_NAMES, "domain", None):
-        raise HamiltonError(f"virtual_work: place = {shown(place)}: allowed are 'left', 'right', 'domain' and None")
+        raise HamiltonError(f"virtual_work: place = {shown(place)}: must be 'left', 'right', 'domain' or None")
     where = "ends" if place is None else place
     label = f"virtual work of {shown(force)} on {shown(displacement)}"
     moved = space.read(displacement, where, label)  # type: ignore[arg-type]

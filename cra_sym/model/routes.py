@@ -15,9 +15,10 @@ from cra_sym.model.values import flat_columns
 from cra_sym.solvers.eigenvalues import lowest
 from cra_sym.solvers.shapes import mode_states
 
-__all__ = ["Estimated", "GeneralRoute", "Modes", "RigidShare", "Route", "StateModes", "Stations", "tip_sign"]
+__all__ = ["Estimated", "GeneralRoute", "Modes", "RigidShare", "Route", "StateModes", "Stations", "end_sign"]
 
 Array = NDArray[np.float64]
+_STATIONS = (0.0, 0.22, 0.53, 0.81, 1.0)  # ends, and places that are no node of the first modes
 Values = Sequence[float | Array]
 """Parameters in the order of the model's symbols; they broadcast to the shape of the batch."""
 
@@ -153,17 +154,20 @@ class StateModes:
 
     @cached_property
     def _ends(self) -> Array:
-        """States at both ends, signed, shape (rows, modes, 2, 2 n + m)."""
+        """State (q, w, P) at both ends and some places between, shape (rows, modes, stations, 2 n + m)."""
         length, left = (np.broadcast_to(g, len(self._z)) for g in self.spatial.geometry.function(*self._finite))
-        return self._signed(self.states(self._z, np.stack([left, left + length], axis=-1)))
+        return self.states(self._z, left[:, None] + np.array(_STATIONS) * length[:, None])
 
-    def _signed(self, states: Array) -> Array:
-        if "_sign" not in self.__dict__:  # the last station of the first call is the right end
-            self.__dict__["_sign"] = tip_sign(states[:, :, -1, : self.spatial.displacements])
-        return states * self.__dict__["_sign"][..., None]
+    @cached_property
+    def _sign(self) -> Array:
+        n, m = self.spatial.displacements, self.spatial.coordinates
+        left, right = self._ends[:, :, 0], self._ends[:, :, -1]
+        size = np.abs(self._ends).max(axis=(1, 2), initial=0.0)[:, None]
+        entries = np.concatenate([right[..., :n], left[..., :n], right[..., n + m :]], axis=-1)
+        return end_sign(entries, np.concatenate([size[..., :n], size[..., :n], size[..., n + m :]], axis=-1))
 
     def _end(self, end: int, entry: int) -> Array:
-        return self._ends[:, :, end, entry].reshape(self.omega.shape)
+        return (self._sign[..., 0] * self._ends[:, :, -end, entry]).reshape(self.omega.shape)
 
     def displacement(self, end: int, place: int) -> Array:
         """Return a displacement of an end section, shape (..., modes)."""
@@ -187,8 +191,7 @@ class StateModes:
         key = x.tobytes()
         kept: dict[bytes, Array] = self.__dict__.setdefault("_kept", {})
         if key not in kept:
-            _ = self._ends  # fixes the sign
-            found = self._signed(self.states(self._z, x))
+            found = self._sign[..., None] * self.states(self._z, x)
             kept.clear()  # one set of stations at a time: those of a quadrature serve many forms
             kept[key] = found
         return kept[key]
@@ -198,9 +201,16 @@ class StateModes:
         return None
 
 
-def tip_sign(tip: Array) -> Array:
-    """Return the sign that makes the first tip displacement which is not zero positive, shape (..., 1)."""
-    scale = np.abs(tip).max(axis=-2, keepdims=True)
-    moving = np.abs(tip) > 1e-7 * np.where(scale > 0.0, scale, 1.0)
-    first = np.take_along_axis(tip, moving.argmax(axis=-1)[..., None], axis=-1)
+def end_sign(entries: Array, size: Array) -> Array:
+    """Return the sign that makes the first entry of every mode positive that is not zero, shape (..., modes, 1).
+
+    Parameters
+    ----------
+    entries : ndarray, shape (..., modes, n)
+        Displacements of the right end, then those of the left end, then forces of the right end.
+    size : ndarray, shape (..., 1, n)
+        What is large for each: the most in the domain and all modes.
+    """
+    moving = np.abs(entries) > 1e-7 * np.where(size > 0.0, size, np.inf)
+    first = np.take_along_axis(entries, moving.argmax(axis=-1)[..., None], axis=-1)
     return np.where(first < 0.0, -1.0, 1.0)

@@ -374,13 +374,13 @@ def shares(x: np.ndarray, left: np.ndarray, length: np.ndarray, name: str = "x")
     """Return places as shares of the length, shape (rows, stations)."""
     share = (x - left[:, None]) / length[:, None]
     if (share < -1e-12).any() or (share > 1.0 + 1e-12).any():
-        raise ValueError(f"{name} = {x}: allowed is the domain, {left.max():g} to {(left + length).min():g}")
+        raise ValueError(f"{name} = {x}: must be in the domain, {left.max():g} to {(left + length).min():g}")
     return np.clip(share, 0.0, 1.0)
 
 
 def _finite(matrices: tuple[np.ndarray, np.ndarray], what: str) -> tuple[np.ndarray, np.ndarray]:
     if not np.isfinite(matrices[0]).all():
-        raise ValueError(f"values: they make {what} infinite; allowed is inf for the stiffness of an end")
+        raise ValueError(f"values: they make {what} infinite; only the stiffness of an end may be inf")
     return matrices
 
 

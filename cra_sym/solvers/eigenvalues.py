@@ -136,7 +136,7 @@ def _static_bounds(static: Evaluation) -> np.ndarray:
     """Return the Rayleigh-Ritz values of the static deflections of the free coordinates."""
     mass, frame = np.linalg.eigh(-static.derivative)
     if (mass[:, 0] < -1e-6 * np.abs(mass).max(axis=1)).any():
-        raise ValueError("values: a static deflection has negative kinetic energy; allowed are masses of at least 0")
+        raise ValueError("values: a static deflection has negative kinetic energy; masses must be at least 0")
     if (mass[:, -1] <= 0.0).any():
         raise ValueError("values: no motion of the structure has kinetic energy")
     whitener = frame / np.sqrt(np.maximum(mass, 1e-14 * mass.max(axis=1, keepdims=True)))[:, None, :]

@@ -263,7 +263,7 @@ def test_ranges_of_the_numbers_are_those_of_the_derivation():
         (lambda: cra.mode_shapes(NOMINAL, 0.5, derivative=21), ValueError, "derivative = 21"),
         (lambda: cra.mode_shapes(NOMINAL, 0.5, derivative=-1), ValueError, "derivative = -1"),
         (lambda: cra.mode_shapes(NOMINAL, 0.5, modes=0), ValueError, "modes = 0"),
-        (lambda: cra.mode_shapes(NOMINAL, 0.5, modes=1001), ValueError, "modes = 1001: allowed is .* 1 to 1000"),
+        (lambda: cra.mode_shapes(NOMINAL, 0.5, modes=1001), ValueError, "modes = 1001: must be .* 1 to 1000"),
         (lambda: cra.natural_frequencies(1.0), TypeError, "system = 1.0"),
         (lambda: cra.modal_parameters(NOMINAL, 1.5), ValueError, "modes = 1.5"),
     ],

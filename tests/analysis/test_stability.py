@@ -353,7 +353,7 @@ def test_overlap_with_a_second_tongue_is_said():
         (lambda: cra.stability_boundary(SOFT, cra.TransverseBase(0.01), 0.1), ValueError, "forced_width"),
         (lambda: cra.growth_rate(SOFT, cra.TransverseBase(0.01), 3.0, 0.1), ValueError, "forced_width"),
         (lambda: cra.floquet_exponents(SOFT, cra.TransverseBase(0.01), 3.0, 0.1), ValueError, "forced_width"),
-        (lambda: cra.forced_width(SOFT, JOINT), TypeError, "allowed is a TransverseBase"),
+        (lambda: cra.forced_width(SOFT, JOINT), TypeError, "must be a TransverseBase"),
         (lambda: cra.stability_boundary(SOFT, "joint", 0.1), TypeError, "excitation = 'joint'"),
         (lambda: cra.stability_boundary(1.0, JOINT, 0.1), TypeError, "system = 1.0"),
         (lambda: cra.stability_boundary(SOFT, JOINT, -0.05), ValueError, "epsilon = -0.05"),

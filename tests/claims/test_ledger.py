@@ -118,15 +118,15 @@ def test_outcomes():
 @pytest.mark.parametrize(
     ("arguments", "numbers", "message"),
     [
-        (("C99",), {}, "allowed are C01"),
-        (("C01", 3.0), {}, "allowed is an Arm"),
-        (("C01", cra.Arm.nominal().replace(k_t=[1.0, 2.0])), {}, "allowed is one arm"),
+        (("C99",), {}, "must be one of C01"),
+        (("C01", 3.0), {}, "must be an Arm"),
+        (("C01", cra.Arm.nominal().replace(k_t=[1.0, 2.0])), {}, "must be one arm"),
         (("C01",), {"speed": 1.0}, "no number of a setting"),
         (("C01",), {"amplitude": -1.0}, "amplitude"),
         (("C01",), {"modes": 1.5}, "modes = 1.5"),
-        (("C01",), {"phase": [0.0, 1.0]}, r"phase has shape \(2,\): allowed is one number"),
-        (("C01",), {"k_r": []}, r"k_r has shape \(0,\): allowed is some numbers in a row"),
-        (("C01",), {"frequencies": [1.0]}, r"frequencies has shape \(1,\): allowed is 3 numbers"),
+        (("C01",), {"phase": [0.0, 1.0]}, r"phase has shape \(2,\): must be one number"),
+        (("C01",), {"k_r": []}, r"k_r has shape \(0,\): must be some numbers in a row"),
+        (("C01",), {"frequencies": [1.0]}, r"frequencies has shape \(1,\): must be 3 numbers"),
         (("C01",), {"masses": [[0.0]]}, r"masses has shape \(1, 1\)"),
         (("C01",), {"k_t": None}, "k_t = None"),
         (("C01",), {"duration": 1e300}, r"duration = 1e\+300"),
@@ -138,9 +138,9 @@ def test_bad_input_is_refused(arguments, numbers, message):
     for theme, error in (("colours", ValueError), (3, TypeError), (np.zeros(2), TypeError)):
         with pytest.raises(error, match="theme"):
             claims(theme=theme)
-    with pytest.raises((TypeError, ValueError), match="verdict = 3: allowed is a Verdict"):
+    with pytest.raises((TypeError, ValueError), match="verdict = 3: must be a Verdict"):
         figure_claims("modes", [3])
-    with pytest.raises(TypeError, match="family = 3: allowed is an ArmFamily"):
+    with pytest.raises(TypeError, match="family = 3: must be an ArmFamily"):
         figure_family(3)
 
 
@@ -158,7 +158,7 @@ def test_command_prints_the_table(capsys):
     (only,) = json.loads(capsys.readouterr().out)
     assert only["outcome"] == "holds" and np.shape(only["evidence"]["frequency"]["values"]) == (61, 3)
     assert main(["claims", "C77"]) == 2
-    assert "allowed are" in capsys.readouterr().err
+    assert "must be" in capsys.readouterr().err
 
 
 def test_the_table_of_a_page_has_three_cells_a_row():

@@ -86,6 +86,6 @@ def test_a_failed_export_leaves_everything_as_it_was(short, tmp_path, monkeypatc
 
 
 def test_unknown_language_is_refused(tmp_path):
-    with pytest.raises(ValueError, match=r"language = 'cobol': allowed are c, fortran"):
+    with pytest.raises(ValueError, match=r"language = 'cobol': must be one of c, fortran"):
         cra.export("cobol", tmp_path / "out")
     assert not list(tmp_path.iterdir())

@@ -152,6 +152,6 @@ def test_a_model_without_real_form_is_refused(tmp_path):
     )  # fmt: skip
     with pytest.raises(ValueError, match=r"wave numbers .*, .*: with one in closed form"):
         cra.export("c", tmp_path / "model", model=pair)
-    with pytest.raises(TypeError, match="allowed is a Model"):
+    with pytest.raises(TypeError, match="must be a Model"):
         cra.export("c", tmp_path / "model", model="beam")  # type: ignore[arg-type]
     assert not list(tmp_path.iterdir())

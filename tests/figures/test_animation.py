@@ -74,5 +74,5 @@ def test_modes_swing_through_their_shapes():
 
 
 def test_a_wrong_name_is_refused():
-    with pytest.raises(ValueError, match="allowed are 'moving_arm' and 'moving_modes'"):
+    with pytest.raises(ValueError, match="must be 'moving_arm' or 'moving_modes'"):
         animate("dance")

@@ -421,7 +421,7 @@ def test_text_and_wrong_kinds_are_type_errors():
     ("name", "value"), [("fields", v), ("coordinates", w), ("domain", L), ("essential", at(v, 0)), ("virtual_work", F)]
 )
 def test_a_single_thing_for_a_sequence_is_named(name, value):
-    with pytest.raises(TypeError, match=f"{name} = .*allowed is a sequence"):
+    with pytest.raises(TypeError, match=f"{name} = .*must be a sequence"):
         hamilton(BEAM, **{"fields": [v], "x": x, "domain": (0, L), "t": t, name: value})
 
 

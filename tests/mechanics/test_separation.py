@@ -289,18 +289,18 @@ def test_what_has_no_closed_form_says_so(density, words):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"parameters": {k_t: "__import__('os')"}}, "parameters: k_t = .*allowed is a scalar"),
-        ({"parameters": {k_t: ["k_t"]}}, "parameters: k_t = .*allowed is a scalar"),
-        ({"parameters": {"k_t": 1}}, "'k_t': allowed is a Symbol"),
-        ({"parameters": [1]}, "parameters = .*allowed is a mapping"),
-        ({"basis": "exponential"}, "basis = 'exponential': allowed are 'hyperbolic' and 'decaying'"),
-        ({"frequency": 3.0}, "3.0: allowed is a Symbol"),
+        ({"parameters": {k_t: "__import__('os')"}}, "parameters: k_t = .*must be a scalar"),
+        ({"parameters": {k_t: ["k_t"]}}, "parameters: k_t = .*must be a scalar"),
+        ({"parameters": {"k_t": 1}}, "'k_t': must be a Symbol"),
+        ({"parameters": [1]}, "parameters = .*must be a mapping"),
+        ({"basis": "exponential"}, "basis = 'exponential': must be 'hyperbolic' or 'decaying'"),
+        ({"frequency": 3.0}, "3.0: must be a Symbol"),
     ],
 )
 def test_options_are_checked_and_no_text_is_read(options, message):
     with pytest.raises((TypeError, ValueError), match=message):
         separate(derive(BEAM, left=ROOT, right=TIP), **options)
-    with pytest.raises(TypeError, match="result = 'text': allowed is a HamiltonResult"):
+    with pytest.raises(TypeError, match="result = 'text': must be a HamiltonResult"):
         separate("text")
 
 
