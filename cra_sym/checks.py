@@ -157,7 +157,7 @@ def equal(one: Any, other: Any) -> bool:
     return bool(one == other) or (isinstance(one, float) and isinstance(other, float) and one != one and other != other)
 
 
-def broadcastable(**arrays: np.ndarray) -> tuple[int, ...]:
+def broadcastable(**arrays: Any) -> tuple[int, ...]:
     """Return the common shape of the named arrays, or raise an error that names those that do not fit."""
     return common_shape(tuple(arrays), tuple(arrays.values()))
 

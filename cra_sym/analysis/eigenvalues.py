@@ -41,7 +41,7 @@ def eigenvalues(system: System, modes: int = 3, *, oscillating: bool = True) -> 
     instance("system", system, System)
     modes = count("modes", modes, high=MOST_MODES)
     if system.numerics("conservative"):
-        return 1j * system.natural_frequencies(modes)
+        return np.asarray(1j * system.natural_frequencies(modes))
     ritz = system.model.ritz(2 * modes + 10)
     guesses = ritz.eigenvalues(system.values, modes, oscillating=oscillating).reshape(-1, modes)
     columns, squared = flat_columns(system.parameters, system.shape), not system.numerics("damped")

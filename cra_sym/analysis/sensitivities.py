@@ -149,10 +149,12 @@ class Sensitivities:
         """Return what gives the rates by a spring or an inertia of an end in one pass, for one wave number."""
         modes = self._system.modes(self._modes)
         kinds: tuple[tuple[str, Change], ...] = (("stiffnesses", "stiffness"), ("inertias", "inertia"))
-        for which, kind in kinds if isinstance(modes, OneWaveModes) else ():
+        if not isinstance(modes, OneWaveModes):
+            return None
+        for which, kind in kinds:
             found = self._system.numerics(which).get(name)
             if found is not None:
-                factor = column(np.asarray(found.factor.function(*self._system.domain.values)))
+                factor = np.asarray(column(np.asarray(found.factor.function(*self._system.domain.values))))
                 return modes, kind, (found.end, found.place), factor
         return None
 

@@ -28,13 +28,11 @@ class Modes(Protocol):
 
     Where the displacement of the first field vanishes there, its first derivative that does not is positive.
 
-    Attributes
-    ----------
-    omega : ndarray, shape (..., modes)
-        rad/s.
     """
 
-    omega: Array
+    @property
+    def omega(self) -> Array:
+        """Natural frequencies, rad/s, shape (..., modes)."""
 
     def displacement(self, end: int, place: int) -> Array:
         """Return a displacement of the left (0) or right (1) end section, shape (..., modes)."""

@@ -7,7 +7,7 @@ only where the search begins.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from threading import RLock
 from typing import Any, Protocol, TypeVar
@@ -36,15 +36,11 @@ def precision(flint: Any, bits: int) -> Iterator[None]:
 
 
 class Counted(Protocol):
-    """A problem with natural frequencies that can be counted; points are exact balls.
+    """A problem with natural frequencies that can be counted; points are exact balls."""
 
-    Attributes
-    ----------
-    zeros : int
-        How many natural frequencies are exactly 0.
-    """
-
-    zeros: int
+    @property
+    def zeros(self) -> int:
+        """Number of natural frequencies that are exactly 0."""
 
     def count(self, point: Any) -> int:
         """Return the proved number of natural frequencies below the point, those at 0 included."""
@@ -97,7 +93,7 @@ def negatives(matrix: Sequence[Sequence[Any]]) -> int:
     return number
 
 
-def enclose(flint: Any, problem: Counted, guesses: Sequence[float]) -> list[tuple[Any, Any]]:
+def enclose(flint: Any, problem: Counted, guesses: Iterable[float]) -> list[tuple[Any, Any]]:
     """Return a proved enclosure of each of the first natural frequencies.
 
     Parameters
@@ -105,7 +101,7 @@ def enclose(flint: Any, problem: Counted, guesses: Sequence[float]) -> list[tupl
     flint : module
         ``flint`` of python-flint.
     problem : Counted
-    guesses : sequence of float
+    guesses : iterable of float
         Where frequency 1, 2, ... is expected; the better, the faster. They carry no weight in the proof.
 
     Returns
