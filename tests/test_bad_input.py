@@ -13,6 +13,7 @@ import pytest
 import sympy as sp
 
 import cra_sym as cra
+from cra_sym import symbols as s
 from cra_sym.__main__ import COMMANDS, main
 from cra_sym.mechanics import multiple_scales, ritz
 
@@ -53,43 +54,52 @@ STRANGERS = (
 )
 ANYTHING = (*ATTACKS, *NUMBERS, *SHAPES, *OBJECTS, *STRANGERS)
 
+TENSION, MASS = sp.symbols("T mass")
+WIRE = cra.Model(
+    MASS * (s.v + s.w).diff(s.t) ** 2 / 2 - TENSION * s.v.diff(s.x) ** 2 / 2, fields=[s.v], prescribed=[s.w], x=s.x,
+    domain=(0, s.L), t=s.t, left=-s.k_t * s.v**2 / 2, right=s.m_e * (s.v + s.w).diff(s.t) ** 2 / 2,
+)  # fmt: skip
 ARM = cra.Arm.nominal().replace(k_t=1e3, k_r=50.0, zeta=0.01)
 SPRING = cra.JointStiffness(k_t=1.0)
 MOTION = cra.BaseMotion(velocity=0.1)
+OF_WIRE = {"T": 4.0, "L": 1.0, "mass": 1.0, "k_t": 1e3, "m_e": 0.1}
 GOOD = {
+    "System": dict(model=WIRE, values=OF_WIRE, zeta=0.01),
     "Arm": dict(L=1.0, b=0.03, h=0.003, E=7e10, rho=2700.0, m_b=5.0, m_e=0.1, J_e=0.0, k_t=1e3, k_r=1e2, zeta=0.0),
     "equation": dict(number=1),
     "equations": {},
-    "natural_frequencies": dict(arm=ARM, modes=2),
+    "natural_frequencies": dict(system=ARM, modes=2),
     "frequency_parameters": dict(kappa_t=1.0, kappa_r=2.0, mu=0.1, iota=0.0, modes=2),
-    "mode_shapes": dict(arm=ARM, x=0.5, modes=2, derivative=1),
-    "modal_parameters": dict(arm=ARM, modes=2),
+    "mode_shapes": dict(system=ARM, x=0.5, modes=2, derivative=1),
+    "modal_parameters": dict(system=ARM, modes=2),
     "BaseMotion": dict(velocity=0.1, acceleration=0.1, amplitude=1e-3, angular_frequency=10.0, phase=0.0),
     "Force": dict(level=1.0, amplitude=0.5, angular_frequency=10.0, phase=0.0),
-    "response": dict(arm=ARM, motion=MOTION, t=[0.0, 0.1], x=0.5, modes=2, derivative=0, zeta=0.01, start="base"),
-    "tip_response": dict(arm=ARM, motion=MOTION, t=0.1, modes=2, derivative=0, zeta=0.01, start="inertial"),
-    "residual_vibration": dict(arm=ARM, motion=cra.BaseMotion.trapezoid(0.1, 0.2, 1.0), modes=2, zeta=0.0),
+    "response": dict(system=ARM, motion=MOTION, t=[0.0, 0.1], x=0.5, modes=2, derivative=0, zeta=0.01, start="base"),
+    "tip_response": dict(system=ARM, motion=MOTION, t=0.1, modes=2, derivative=0, zeta=0.01, start="inertial"),
+    "residual_vibration": dict(system=ARM, motion=cra.BaseMotion.trapezoid(0.1, 0.2, 1.0), modes=2, zeta=0.0),
     "residual_vibration_gradient": dict(
-        arm=ARM, motion=cra.BaseMotion.trapezoid(0.1, 0.2, 1.0), by=("k_r", "duration"), modes=2, zeta=0.0
+        system=ARM, motion=cra.BaseMotion.trapezoid(0.1, 0.2, 1.0), by=("k_r", "duration"), modes=2, zeta=0.0
     ),
-    "state_space": dict(arm=ARM, modes=2, input="base_acceleration"),
-    "frequency_response": dict(arm=ARM, angular_frequency=[5.0, 9.0], x=0.5),
-    "sensitivities": dict(arm=ARM, modes=2, method="modal"),
-    "identify_joint": dict(arm=ARM, measured_frequencies=[2.3, 14.0], uncertainty=0.01),
+    "state_space": dict(system=ARM, modes=2, input="base_acceleration"),
+    "frequency_response": dict(system=ARM, angular_frequency=[5.0, 9.0], x=0.5, damping="structural"),
+    "sensitivities": dict(system=ARM, modes=2, by=("k_t", "m_e")),
+    "identify_joint": dict(system=ARM, measured_frequencies=[2.3, 14.0], uncertainty=0.01),
     "input_shaper": dict(angular_frequency=10.0, zeta=0.01, order=1),
-    "certify": dict(arm=ARM, modes=1),
+    "certify": dict(system=ARM, modes=1),
     "AxialBase": dict(amplitude=0.01),
     "JointStiffness": dict(k_t=1.0, k_r=0.5),
+    "Fluctuation": dict(weights={"k_t": 1.0}),
     "TransverseBase": dict(amplitude=0.01),
-    "floquet_exponents": dict(arm=ARM, excitation=SPRING, angular_frequency=28.0, epsilon=0.05, modes=2),
-    "forced_width": dict(arm=ARM, excitation=cra.TransverseBase(amplitude=0.01), modes=2),
-    "growth_rate": dict(arm=ARM, excitation=SPRING, angular_frequency=28.0, epsilon=0.05, modes=2),
+    "floquet_exponents": dict(system=ARM, excitation=SPRING, angular_frequency=28.0, epsilon=0.05, modes=2),
+    "forced_width": dict(system=ARM, excitation=cra.TransverseBase(amplitude=0.01), modes=2),
+    "growth_rate": dict(system=ARM, excitation=SPRING, angular_frequency=28.0, epsilon=0.05, modes=2),
     "stability_boundary": dict(
-        arm=ARM.replace(zeta=0.0), excitation=SPRING, epsilon=0.01, resonance=(1, 1), order=1, modes=2
+        system=ARM.replace(zeta=0.0), excitation=SPRING, epsilon=0.01, resonance=(1, 1), order=1, modes=2
     ),
     "sweep": dict(arm=ARM, quantity="natural_frequencies", k_t=[1e3, 1e4]),
 }
 ELSEWHERE = {
+    "paper_lagrangian",  # takes no values
     "AsymptoticWarning", "ResonanceWarning",  # nothing to call with values
     "Model", "kernel",  # take SymPy expressions: their own tests
     "export",  # writes a folder: below
@@ -111,6 +121,18 @@ def test_every_public_function_is_attacked():
 @pytest.mark.parametrize("name", GOOD)
 def test_the_good_values_are_good(name):
     call(name)
+
+
+@pytest.mark.parametrize("name", [name for name, arguments in GOOD.items() if "system" in arguments])
+def test_what_is_good_for_an_arm_is_good_for_any_system(name):
+    changes = {"by": ("k_t", "m_e")} if "by" in GOOD[name] else {}
+    if GOOD[name].get("excitation") == SPRING:
+        changes["excitation"] = cra.Fluctuation(k_t=1.0, T=0.5)
+    if name == "identify_joint":
+        with pytest.raises(ValueError, match="k_r must be the stiffness of an end"):
+            call(name, system=WIRE.at(OF_WIRE))
+    else:
+        call(name, system=WIRE.at(OF_WIRE, GOOD[name]["system"].zeta), **changes)
 
 
 def refused_or_done(name, argument, value):

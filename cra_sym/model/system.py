@@ -63,6 +63,9 @@ class System:
     """
 
     def __init__(self, model: Model, values: Mapping[Any, Any], zeta: Any = 0.0) -> None:
+        from cra_sym.model.lagrangian import Model
+
+        instance("model", model, Model)
         self._model = model
         self._values = checked_values([symbol.name for symbol in model.symbols], values, model.units)
         self._zeta = frozen(checked_damping(zeta))
