@@ -162,8 +162,12 @@ def _held(free: Kernel | None, columns: Array, size: int) -> tuple[Array, Array]
         return np.eye(size)[None], np.full((1, size), np.inf)
     motions = np.asarray(free(*columns))
     motions = _once(motions.reshape(-1, *motions.shape[-2:]))
-    frame = np.linalg.svd(motions)[0]
-    directions = frame[..., motions.shape[-1] :].swapaxes(-1, -2)
+    still = (motions == 0.0).all(axis=(0, 2))  # held by themselves: exactly, so that they stay exactly zero
+    units = np.broadcast_to(np.eye(size)[still], (len(motions), int(still.sum()), size))
+    frame = np.linalg.svd(motions[:, ~still])[0][..., motions.shape[-1] :].swapaxes(-1, -2)
+    others = np.zeros((*frame.shape[:2], size))
+    others[..., ~still] = frame
+    directions = np.concatenate([units, others], axis=1)
     return directions, np.full(directions.shape[:2], np.inf)
 
 
@@ -220,8 +224,8 @@ class StressModes:
 
     @cached_property
     def _sign(self) -> Array:
-        right = self._ends[..., self.spatial.displacements + self.spatial.coordinates :]
-        return tip_sign(right)
+        n, m = self.spatial.displacements, self.spatial.coordinates
+        return tip_sign(np.concatenate([self._ends[..., n + m :], self._ends[..., n : n + m]], axis=-1))
 
     def _signed(self, values: Array) -> Array:
         return (self._sign[..., 0] * values).reshape(self.omega.shape)
