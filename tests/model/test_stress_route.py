@@ -79,6 +79,25 @@ MODELS = {
 }
 
 
+class _Aligned:
+    """Modes with the signs of others: where an end is held, those of the dynamic stiffness hang on its rounding."""
+
+    def __init__(self, modes, others):
+        self.modes = modes
+        places = np.linspace(0.0, 1.0, 7)
+        product = (modes.shape(0, 0, places) * others.shape(0, 0, places)).sum(axis=-1)
+        self.sign = np.where(product < 0.0, -1.0, 1.0)
+
+    def shape(self, *arguments):
+        return self.sign[..., None] * self.modes.shape(*arguments)
+
+    def force(self, *arguments):
+        return self.sign * self.modes.force(*arguments)
+
+    def coordinate(self, *arguments):
+        return self.sign * self.modes.coordinate(*arguments)
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_two_routes_agree(name):
     """Frequencies, shapes and forces; the dynamic stiffness has eight digits of the latter."""
@@ -91,7 +110,7 @@ def test_two_routes_agree(name):
     squares = general.angular_frequencies(system.parameters, system.shape, 4)
     np.testing.assert_allclose(found, squares, rtol=1e-9, atol=1e-12)
     assert (system.accuracy < 1e-10).all()
-    one, other = system.modes(4), general.modes(system.parameters, system.shape, squares)
+    one, other = system.modes(4), _Aligned(general.modes(system.parameters, system.shape, squares), system.modes(4))
     places = np.linspace(0.0, 1.0, 6)
     for place in range(len(model.state_form.displacements)):
         expected = other.shape(place, 0, places)
