@@ -151,6 +151,30 @@ def test_an_unlocated_jump_is_found_by_bisection():
     np.testing.assert_allclose(omega(beam(bending, mass), 3), STEPPED, rtol=CLOSE)
 
 
+@pytest.mark.parametrize("width", [1e-3, 1e-5, 1e-7])
+def test_a_narrow_bump_of_mass_is_a_point_mass(width):
+    """Their difference falls with the square of the width; a bump between samples would not be seen at all."""
+    small, place = sp.Rational(str(width)), sp.Rational(37, 100)
+    bump = sp.exp(-(((x - place) / small) ** 2)) / small / sp.sqrt(sp.pi)
+    point = omega(beam(1, inside=[(place, v.diff(t) ** 2 / 2)]), 2)
+    np.testing.assert_allclose(omega(beam(1, 1 + bump), 2), point, rtol=10 * width**2 + CLOSE)
+
+
+@pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-6])
+def test_a_steep_layer_becomes_a_step(width):
+    """EI from 1 to 1/10 by tanh: the difference to the step falls with the width."""
+    low = sp.Rational(1, 10)
+    layer = (1 + low) / 2 - (1 - low) / 2 * sp.tanh((x - HALF) / sp.Rational(str(width)))
+    jump = omega(beam(step(1, low)), 2)
+    np.testing.assert_allclose(omega(beam(layer), 2), jump, rtol=2 * width)
+
+
+def test_a_thousand_cells():
+    """A string of cells, half light and half heavy, is one of the mean mass, but for the square of a cell."""
+    mass = 1 + 3 * sp.floor(2000 * x - 2 * sp.floor(1000 * x))
+    np.testing.assert_allclose(omega(string(1, mass), 2), np.pi * np.array([1, 2]) / np.sqrt(2.5), rtol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("tension", "expected"),
     [(1 - x, jn_zeros(0, 3) / 2), ((1 - x**2) / 2, np.sqrt([1.0, 6.0, 15.0]))],
