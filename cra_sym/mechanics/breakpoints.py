@@ -15,19 +15,23 @@ from sympy import (
     DiracDelta,
     Dummy,
     Expr,
-    S,
-    Subs,
     Heaviside,
     Max,
     Min,
     Mod,
     Piecewise,
     Pow,
+    S,
     SingularityFunction,
+    Subs,
     Symbol,
+    ceiling,
+    floor,
+    frac,
+    log,
+    preorder_traversal,
     sign,
 )
-from sympy import ceiling, floor, frac, log, preorder_traversal
 from sympy.core.function import AppliedUndef, Derivative, Function
 from sympy.core.relational import Relational
 from sympy.logic.boolalg import Boolean, BooleanAtom, BooleanFunction

@@ -250,8 +250,9 @@ class StressModes:
         state = self._states(x)
         finite = np.where(np.isinf(self.columns), 0.0, self.columns)
         row = self.spatial.derivative_row(place, derivative, z, x[:, None], finite)
-        found = self._sign * (row * state).sum(axis=-1)
-        return found.reshape(*self.omega.shape, x.shape[-1])
+        found: Array = self._sign * (row * state).sum(axis=-1)
+        shape: Array = found.reshape(*self.omega.shape, x.shape[-1])
+        return shape
 
     def _states(self, x: Array) -> Array:
         key = x.tobytes()
@@ -280,6 +281,7 @@ class StressModes:
         def part(found: Found) -> Array:
             columns = found.fields.columns
             values = found.fields.displaced[place]
-            return (values.reshape(*values.shape[:2], -1) * columns.weights[:, None]).sum(axis=-1)
+            integral: Array = (values.reshape(*values.shape[:2], -1) * columns.weights[:, None]).sum(axis=-1)
+            return integral
 
         return self._signed(self._collected(part))

@@ -157,7 +157,8 @@ def places(reference: Array, edges: Array) -> Array:
     span = np.minimum(reference.astype(int), edges.shape[1] - 2)
     share = reference - span
     left, right = edges[:, span], edges[:, span + 1]
-    return np.where(share < 0.5, left + share * (right - left), right - (1.0 - share) * (right - left))
+    found: Array = np.where(share < 0.5, left + share * (right - left), right - (1.0 - share) * (right - left))
+    return found
 
 
 def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[Array, Array, int]:

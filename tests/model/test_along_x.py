@@ -1,4 +1,4 @@
-"""Coefficients that vary along x: jumps, kinks, layers, cells and vanishing ends, each against a value from elsewhere."""
+"""Coefficients that vary along x: jumps, kinks, layers, cells and vanishing ends, against values from elsewhere."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def test_periodic_cells():
 
 @pytest.mark.parametrize("cells", [7, 40, 150])
 def test_stepped_cells(cells):
-    """A string of equal cells, each half light and half heavy: Chebyshev's polynomials of the cell's transfer matrix."""
+    """A string of equal cells, each half light and half heavy: powers of the transfer matrix of a cell."""
     mass = 1 + 3 * sp.floor(2 * cells * x - 2 * sp.floor(cells * x))
     found = omega(string(1, mass), 2)
 

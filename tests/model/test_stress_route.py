@@ -151,7 +151,7 @@ def test_buckling_of_a_tapered_column(share):
     if share < 1.0:
         assert 0.0 < system.natural_frequencies(1)[0] < 15.0 * np.sqrt(1.0 - share) * 1.5
     else:
-        with pytest.raises(ValueError, match="the structure has buckled: [12] unstable mode"):
+        with pytest.raises(ValueError, match=r"the structure has buckled: [12] unstable mode"):
             system.natural_frequencies(1)
 
 
