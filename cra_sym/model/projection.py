@@ -172,9 +172,11 @@ def _at_place(domain: Domain, modes: Modes, place: Place, places: Kernel) -> Arr
     there = (at > left) & (at < right)
     at = np.where(there, at, left)
     if not place.order:
-        return np.where(there, modes.shape(place.entry, 0, at)[..., 0], 0.0)
-    before, after = (modes.shape(place.entry, place.order, at + np.where(there, s * aside, 0.0)) for s in (-1, 1))
-    return np.where(there, 0.5 * (before + after)[..., 0], 0.0)
+        return np.where(there[..., 0, None], modes.shape(place.entry, 0, at)[..., 0], 0.0)
+    before, after = (
+        modes.shape(place.entry, place.order, at + np.where(there, side * aside, 0.0))[..., 0] for side in (-1, 1)
+    )
+    return np.where(there[..., 0, None], 0.5 * (before + after), 0.0)
 
 
 def along(modes: Modes, place: Place, x: Array) -> Array:
