@@ -55,8 +55,8 @@ lint: .venv/.ready
 	$(RUN) -m ruff format --check .
 	$(RUN) -m mypy
 
-# Seven hours on one processor: every mutant of every module, or those left by the run before; ARGS="--sample 10" takes
-# three quarters of one, ARGS=arm/energy a few minutes, and --again starts anew.
+# Hours on one processor: every mutant of every module, or those left by the run before. ARGS="--sample 10" takes the
+# first ten of each, ARGS=arm/lagrangian one module, and --again starts anew. The record stays out of version control.
 mutation: .venv/.ready
 	$(RUN) -m tests.mutation $(ARGS)
 

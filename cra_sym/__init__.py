@@ -47,6 +47,7 @@ _HOME = {
     "growth_rate": "analysis.stability",
     "stability_boundary": "analysis.stability",
     "Model": "model",
+    "stations": "mechanics.stations",
     "sweep": "studies",
     "kernel": "kernels",
     "export": "codegen",

@@ -20,14 +20,22 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 FLOORS = [
     {"symbols", "mechanics", "kernels", "solvers"},
     {"model"},
-    {"arm"},
-    {"studies", "codegen", "figures"},
-    {"claims", "explorer"},
+    {"analysis", "arm"},
+    {"paper"},
+    {"studies", "codegen", "figures", "explorer"},
+    {"claims"},
     {"report"},
     {"__main__"},
 ]
 OPEN_TO_ALL = {"checks", "ending", "extras", "files", "si"}  # checks, signals, extras, safe writing, units
 RANK = {room: rank for rank, floor in enumerate(FLOORS) for room in floor}
+STRANGERS = ({"mechanics", "kernels", "solvers"}, {"analysis", "arm"})  # rooms that do not know each other
+# A module that names one of a higher room, to load it when a function asks for it: the only ways up.
+UPWARDS = {
+    ("cra_sym/model/lagrangian.py", "analysis"),  # a model has its tools at hand
+    ("cra_sym/figures/__init__.py", "claims"),  # Fig. 4 sets a second route beside the derived result
+}
+KNOW_ORACLES = {"paper", "claims"}
 
 
 def name_of(module: Path) -> str:
@@ -59,15 +67,38 @@ def trespasses(module: Path) -> list[str]:
         room = parts[1] if parts[0] == "cra_sym" and len(parts) > 1 else None
         if room is None or room == home or room in OPEN_TO_ALL or room not in RANK:
             continue
-        across = RANK[room] == RANK.get(home, -1) == 0 and room != "symbols"
-        if across or RANK[room] > RANK.get(home, -1):
+        across = any({home, room} <= rooms for rooms in STRANGERS)
+        upwards = RANK[room] > RANK.get(home, -1) and (name_of(module), room) not in UPWARDS
+        if across or upwards:
             bad.append(name)
     return bad
+
+
+def named_in_text(module: Path) -> set[str]:
+    """Dotted names of the package in strings, from which a module is loaded on demand."""
+    texts = (n.value for n in ast.walk(ast.parse(module.read_text(encoding="utf-8"))) if isinstance(n, ast.Constant))
+    names = (re.fullmatch(r"(cra_sym\.[\w.]+)(:\w+)?", text) for text in texts if isinstance(text, str))
+    return {name[1] for name in names if name}
 
 
 @pytest.mark.parametrize("module", MODULES, ids=name_of)
 def test_imports_lead_downwards(module):
     assert trespasses(module) == []
+
+
+def test_loading_on_demand_leads_downwards_but_for_the_ways_up():
+    up = set()
+    for module in MODULES:
+        home = module.relative_to(PACKAGE).parts[0].removesuffix(".py")
+        rooms = {name.split(".")[1] for name in named_in_text(module)}
+        up |= {(name_of(module), room) for room in rooms if home in RANK and RANK.get(room, -1) > RANK[home]}
+    assert up == UPWARDS
+
+
+@pytest.mark.parametrize("module", MODULES, ids=name_of)
+def test_second_routes_serve_proofs_and_claims_only(module):
+    used = {name for name in imported(module) | named_in_text(module) if name.startswith("cra_sym.paper.oracles")}
+    assert not used or module.relative_to(PACKAGE).parts[0] in KNOW_ORACLES
 
 
 def test_every_room_has_a_floor():
@@ -80,10 +111,24 @@ def test_the_import_rule_sees_a_trespass(tmp_path, monkeypatch):
     planted.parent.mkdir(parents=True)
     planted.write_text(
         "def f():\n    from ..mechanics import hamilton\n    from cra_sym import figures, checks, symbols\n"
+        "    return derived_kernel('cra_sym.paper.oracles.flipped:characteristic'), f'cra_sym.report.{f}'\n"
     )
     monkeypatch.setitem(globals(), "ROOT", tmp_path)
     monkeypatch.setitem(globals(), "PACKAGE", tmp_path / "cra_sym")
     assert sorted(trespasses(planted)) == ["cra_sym.figures", "cra_sym.mechanics.hamilton"]
+    assert named_in_text(planted) == {"cra_sym.paper.oracles.flipped", "cra_sym.report."}
+    with pytest.raises(AssertionError):
+        test_second_routes_serve_proofs_and_claims_only(planted)
+
+
+def test_the_import_rule_sees_rooms_that_must_not_know_each_other(tmp_path, monkeypatch):
+    monkeypatch.setitem(globals(), "ROOT", tmp_path)
+    monkeypatch.setitem(globals(), "PACKAGE", tmp_path / "cra_sym")
+    for home, other in (("analysis", "arm"), ("arm", "analysis"), ("kernels", "solvers")):
+        planted = tmp_path / "cra_sym" / home / "planted.py"
+        planted.parent.mkdir(parents=True)
+        planted.write_text(f"from cra_sym.{other}.modes import modes\n")
+        assert trespasses(planted) == [f"cra_sym.{other}.modes.modes"]
 
 
 @pytest.mark.parametrize("module", [m for m in MODULES if m.parent.name == "solvers"], ids=name_of)

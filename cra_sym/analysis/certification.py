@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from cra_sym.checks import count, default_floating_point, equal, instance
 from cra_sym.extras import require
 from cra_sym.model.exact import BallProblem
+from cra_sym.model.projection import EndParameter
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.solvers.ball_stiffness import BallStiffness, Term
 from cra_sym.solvers.certificates import UndecidedError, enclose, precision
@@ -80,7 +81,7 @@ def certify(system: System, modes: int = 3) -> Certificate:
     modes = count("modes", modes, high=MOST_MODES)
     flint = require("flint", "certify")
     problem: BallProblem = system.numerics("ball_problem")
-    held: dict[str, tuple[int, int]] = system.numerics("stiffnesses")
+    held: dict[str, EndParameter] = system.numerics("stiffnesses")
     guesses = system.natural_frequencies(modes) / (2 * math.pi)
     values = np.broadcast_arrays(*system.parameters, np.empty(system.shape))[:-1]
     names = tuple(system.values)
@@ -103,7 +104,7 @@ def certify(system: System, modes: int = 3) -> Certificate:
 
 
 def _counted(
-    flint: Any, problem: BallProblem, held: dict[str, tuple[int, int]], values: dict[str, float]
+    flint: Any, problem: BallProblem, held: dict[str, EndParameter], values: dict[str, float]
 ) -> BallStiffness:
     """Return the problem of one set of values in ball arithmetic; infinite stiffnesses hold their displacement."""
     n, m = problem.displacements, problem.coordinates
@@ -114,7 +115,7 @@ def _counted(
             raise ValueError(
                 f"{name} = inf: only the stiffness of an end may be infinite ({', '.join(held) or 'none'})"
             )
-        end, place = held[name]
+        end, place, _ = held[name]
         fixed.append(place if end == 0 else n + m + place)
     exact = [0.0 if math.isinf(value) else value for value in values.values()]
 

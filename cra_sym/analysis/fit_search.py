@@ -127,7 +127,9 @@ def natural_stiffnesses(system: System, names: Sequence[str]) -> dict[str, float
     modes, omega = rigid.modes(number), rigid.natural_frequencies(number)
     units = {}
     for name in names:
-        ratio = modes.force(*system.numerics("stiffnesses")[name])[omega > 0] ** 2 / omega[omega > 0] ** 2
+        spring = system.numerics("stiffnesses")[name]
+        factor = float(spring.factor.function(*rigid.domain.values))
+        ratio = modes.force(spring.end, spring.place)[omega > 0] ** 2 / (factor * omega[omega > 0] ** 2)
         units[name] = float(ratio[0] if ratio[0] > 1e-6 * ratio.max() else ratio.max())
     return units
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from cra_sym import checks
 from cra_sym.model.projection import column
 from cra_sym.model.routes import Modes
+from cra_sym.model.spatial import check_range
 from cra_sym.model.system import MOST_MODES, System
 
 __all__ = [
@@ -111,7 +112,9 @@ def mode_shapes(system: System, x: Any, modes: int = 3, derivative: int = 0, *, 
     modes = checks.count("modes", modes, high=MOST_MODES)
     points = checks.one_axis("x", x, "points", unit="m")
     check_places(system, points)
-    shapes = system.modes(modes).shape(section_place(system, field), derivative, np.atleast_1d(points))
+    with np.errstate(all="ignore"):
+        shapes = system.modes(modes).shape(section_place(system, field), derivative, np.atleast_1d(points))
+    check_range(shapes)
     return shapes if points.ndim else shapes[..., 0]
 
 

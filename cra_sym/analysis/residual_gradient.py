@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.analysis.modes import participation
+from cra_sym.analysis.modes import only_motion, participation
 from cra_sym.analysis.responses import residual_vibration, stopped_oscillators
 from cra_sym.analysis.sensitivities import Sensitivities, sensitivities
 from cra_sym.checks import count, default_floating_point, shown
+from cra_sym.model.one_wave import OneWaveModes
+from cra_sym.model.projection import column
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.solvers.driven_modes import state_at_stop
 from cra_sym.solvers.modal_response import Oscillators, free_peak
@@ -21,7 +23,7 @@ __all__ = ["residual_vibration_gradient"]
 
 Array = NDArray[np.float64]
 _TINY = 1e-30  # an imaginary part whose square is nothing
-_STEP = 2e-3  # relative change of omega^2 in a step of the differences
+_STEP = 0.02  # of the differences, over the change of the parameter at which two modes would meet
 _POINTS = 8  # on one side of a parameter that cannot be negative, or four on each side
 
 
@@ -38,7 +40,8 @@ def residual_vibration_gradient(
 
     Mode i leaves :math:`|\Gamma_i \phi_i(L)| A(\omega_i T)` behind. The sensitivities (31)-(32) tell how the frequency
     follows a parameter, and the exact states of the oscillator at the stop how the peak A follows the frequency. How
-    :math:`\Gamma_i \phi_i(L)` follows a parameter is a difference of eighth order, whose error is about 1e-11 of it.
+    :math:`\Gamma_i \phi_i(L)` follows a spring or an inertia of an end of a model with one wave number is a closed form
+    along the frequency equation; otherwise it is a difference of eighth order, whose error is about 1e-11 of it.
 
     Parameters
     ----------
@@ -81,7 +84,7 @@ def residual_vibration_gradient(
     value = residual_vibration(system, motion, modes, zeta=zeta)
     peak, stretched = _unit_peaks(osc, motion)
     factor = osc.gamma * osc.rows[..., 0, :]
-    found = sensitivities(system, modes)
+    found = sensitivities(system, modes + 1)  # the next mode may be close to the last one
     gradient = np.empty((*np.shape(value), len(by)))
     for place, name in enumerate(by):
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -109,35 +112,102 @@ def _unit_peaks(osc: Oscillators, motion: BaseMotion) -> tuple[Array, Array]:
 
 def _rates(system: System, found: Sensitivities, name: str, modes: int, *, compliance: bool) -> tuple[Array, Array]:
     """Return the derivatives of Gamma_i phi_i(L) and of ln omega_i by a parameter or by one over it."""
-    by_frequency = found.compliance[name] if compliance else found.rate[name]
-    still = found.frequency == 0
+    rate = found.compliance[name] if compliance else found.rate[name]
+    by_frequency, frequency = rate[..., :modes], found.frequency[..., :modes]
+    still = frequency == 0
     with np.errstate(divide="ignore", invalid="ignore"):
-        logarithmic = np.where(still, np.where(by_frequency == 0, 0.0, np.nan), by_frequency / found.frequency)
+        logarithmic = np.where(still, np.where(by_frequency == 0, 0.0, np.nan), by_frequency / frequency)
     given = np.broadcast_to(system.values[name], system.shape)
-    place = 1 / given if compliance else given
-    fixed = np.isinf(place)
+    change = _along_the_mode(system, name, modes, compliance=compliance)
+    if change is None:
+        change = _by_differences(system, found, name, modes, compliance=compliance)
+    held = np.isinf(given)[..., None] & (not compliance)
+    absent = (given == 0)[..., None] & compliance
+    return np.where(held, 0.0, np.where(absent, np.nan, change)), np.where(held, 0.0, logarithmic)
+
+
+def _along_the_mode(system: System, name: str, modes: int, *, compliance: bool) -> Array | None:
+    """Return the derivative of Gamma_i phi_i(L) in closed form, or None where there is none.
+
+    There is one for a spring or an inertia of an end of a model with one wave number whose participation is that of a
+    rigid translation.
+    """
+    motion = only_motion(system)
+    load = system.numerics("load", motion)
+    springs, inertias = system.numerics("stiffnesses"), system.numerics("inertias")
+    found = system.modes(modes)
+    if not isinstance(found, OneWaveModes) or load.share is None or load.rest_ends:
+        return None
+    if name not in springs and (compliance or name not in inertias):
+        return None
+    end, place, factor = springs.get(name) or inertias[name]
+    by = "compliance" if compliance else "stiffness" if name in springs else "inertia"
+    change, _ = found.product_rates(1, 0, (end, place), by)
+    unit = np.asarray(factor.function(*system.domain.values))
+    share = load.share.function(*system.domain.values) * (1 / unit if compliance else unit)
+    return -column(np.asarray(share)) * change
+
+
+def _by_differences(system: System, found: Sensitivities, name: str, modes: int, *, compliance: bool) -> Array:
+    """Return the derivative of Gamma_i phi_i(L) by differences, of a stiff spring in its compliance."""
+    given = np.broadcast_to(system.values[name], system.shape)
+    if compliance or name not in found.compliance:
+        return _differences(system, found, name, modes, compliance=compliance)
+    stiff = given > _own_stiffness(system, name)
+    total = np.zeros((*system.shape, modes))
+    if not stiff.all():
+        total = _differences(system, found, name, modes, compliance=False)
+    if stiff.any():
+        with np.errstate(divide="ignore"):
+            slope = -((1 / given) ** 2)[..., None]
+        total = np.where(stiff[..., None], slope * _differences(system, found, name, modes, compliance=True), total)
+    return total
+
+
+def _own_stiffness(system: System, name: str) -> Array:
+    """Return the stiffness beside which the structure gives as much as a spring of an end, shape of the batch."""
+    rigid = system.replace(**{name: np.inf})
+    end, place, factor = system.numerics("stiffnesses")[name]
+    force, unit = rigid.modes(1).force(end, place)[..., 0], factor.function(*rigid.domain.values)
     with np.errstate(divide="ignore", invalid="ignore"):
-        steepest = np.nanmax(np.abs(2 * np.where(still, 0.0, logarithmic)), axis=-1)
-        step = np.where(steepest > 0, _STEP / steepest, _STEP * np.where(place > 0, place, 1.0))
-    step = np.where(fixed, 1.0, step)
-    change = _differences(system, name, np.where(fixed, 1.0, place), step, modes, compliance=compliance)
-    change = np.where(fixed[..., None], np.nan if compliance else 0.0, change)
-    nothing = np.isinf(given)[..., None] & (not compliance)
-    return np.where(nothing, 0.0, change), np.where(nothing, 0.0, logarithmic)
+        return np.broadcast_to((force / rigid.natural_frequencies(1)[..., 0]) ** 2 / unit, system.shape)
 
 
-def _differences(system: System, name: str, place: Array, step: Array, modes: int, *, compliance: bool) -> Array:
+def _reach(frequency: Array, rate: Array, place: Array) -> Array:
+    """Return how far a parameter may go before modes meet or become rigid-body motions, to first order.
+
+    In the complex plane of the parameter the modes are analytic up to about there.
+    """
+    squares = frequency**2
+    slopes = np.where(np.isfinite(rate), np.abs(2 * frequency * rate), 0.0)
+    gaps = np.abs(squares[..., :, None] - squares[..., None, :])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        meeting = gaps / (slopes[..., :, None] + slopes[..., None, :])
+        falling = squares / slopes
+    own = np.eye(squares.shape[-1], dtype=bool)
+    meeting = np.where(own | ~(gaps > 0) | np.isnan(meeting), np.inf, meeting)
+    falling = np.where(squares > 0, falling, np.inf)
+    reach = np.minimum(meeting.min(axis=(-2, -1)), falling.min(axis=-1))
+    return np.where(np.isfinite(reach), reach, np.where(place > 0, place, 1.0))
+
+
+def _differences(system: System, found: Sensitivities, name: str, modes: int, *, compliance: bool) -> Array:
     """Return the derivative of Gamma_i phi_i(L) by differences: central where the parameter allows, else one-sided."""
+    given = np.broadcast_to(system.values[name], system.shape)
+    with np.errstate(divide="ignore"):
+        place = 1 / given if compliance else given
+    fixed = np.isinf(place)  # nothing to differ from; the caller knows the answer
+    place = np.where(fixed, 1.0, place)
+    step = _STEP * _reach(found.frequency, found.compliance[name] if compliance else found.rate[name], place)
     half = _POINTS // 2
-    one_sided = place < half * step
-    nodes = np.arange(-half, half + 1)
-    offsets = nodes[:, *(None,) * place.ndim] + np.where(one_sided, half - np.floor(place / step).clip(0, half), 0)
+    room = np.floor(place / step).clip(0, half)
+    offsets = np.arange(-half, half + 1)[:, *(None,) * place.ndim] + (half - room)
     values = place + offsets * step
     with np.errstate(divide="ignore"):
         moved = system.replace(**{name: 1 / values if compliance else values})
     products = participation(moved, modes) * moved.modes(modes).displacement(1, 0)
     weights = _weights(offsets)
-    return (weights[..., None] * products).sum(axis=0) / step[..., None]
+    return np.asarray((weights[..., None] * products).sum(axis=0) / step[..., None])
 
 
 def _weights(offsets: Array) -> Array:

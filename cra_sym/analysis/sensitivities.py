@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.checks import count, default_floating_point, instance, shown
+from cra_sym.model.one_wave import Change, OneWaveModes
 from cra_sym.model.projection import Projected, column
 from cra_sym.model.system import MOST_MODES, System
 
@@ -123,49 +124,62 @@ class Sensitivities:
 
     @default_floating_point
     def _raw(self, name: str) -> Array:
+        direct = self._at_an_end(name)
+        if direct is not None:
+            modes, kind, channel, factor = direct
+            return self._at_rest(factor * modes.rates(kind, cycles=True)[channel], name)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            squared = self._squared(name)
-            value = squared / (8 * np.pi**2 * self.frequency)  # d omega^2 = 8 pi^2 f df
-        return self._at_rest(value, squared)
+            value = self._squared(name) / (8 * np.pi**2 * self.frequency)  # d omega^2 = 8 pi^2 f df
+        return self._at_rest(value, name)
 
     @default_floating_point
     def _logarithmic(self, name: str) -> Array:
-        given = np.asarray(self._system.values[name])
-        finite = column(np.where(np.isinf(given), 0.0, given))
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            value = finite * self._squared(name) / (2 * self._omega**2)
-        return np.where(self._still, np.nan, value) if self._still.any() else value
+        direct = self._at_an_end(name)
+        if direct is not None:
+            modes, kind, channel, _ = direct
+            value = modes.logarithmic_rates(kind)[channel]
+        else:
+            given = np.asarray(self._system.values[name])
+            finite = column(np.where(np.isinf(given), 0.0, given))
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                value = finite * self._squared(name) / (2 * self._omega**2)
+        return np.where(self._still, np.nan, value) if self._loose else value
+
+    def _at_an_end(self, name: str) -> tuple[OneWaveModes, Change, tuple[int, int], Array] | None:
+        """Return what gives the rates by a spring or an inertia of an end in one pass, for one wave number."""
+        modes = self._system.modes(self._modes)
+        kinds: tuple[tuple[str, Change], ...] = (("stiffnesses", "stiffness"), ("inertias", "inertia"))
+        for which, kind in kinds if isinstance(modes, OneWaveModes) else ():
+            found = self._system.numerics(which).get(name)
+            if found is not None:
+                factor = column(np.asarray(found.factor.function(*self._system.domain.values)))
+                return modes, kind, (found.end, found.place), factor
+        return None
 
     @default_floating_point
     def _by_compliance(self, name: str) -> Array:
+        end, place, kernel = self._system.numerics("stiffnesses")[name]
+        modes = self._system.modes(self._modes)
+        factor = column(np.asarray(kernel.function(*self._system.domain.values)))
+        stiffness = factor * column(np.asarray(self._system.values[name]))
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            squared = -self._spring_forces_squared(name)
-            value = squared / (8 * np.pi**2 * self.frequency)
-        return self._at_rest(value, squared)
+            force = np.where(np.isinf(stiffness), modes.force(end, place), stiffness * modes.displacement(end, place))
+            value = -(force**2) / (8 * np.pi**2 * self.frequency * factor)
+        return self._at_rest(value, name)
 
-    def _spring_forces_squared(self, name: str) -> Array:
-        """Return minus the derivative of omega^2 by the compliance: k^2 times that by k, or the support's force."""
-        given = np.asarray(self._system.values[name])
-        rigid = np.isinf(given)
-        stiffness = column(np.where(rigid, 0.0, given))
-        soft = stiffness**2 * self._squared(name)
-        if not rigid.any():
-            return soft
-        end, place = self._system.numerics("stiffnesses")[name]
-        force = self._system.modes(self._modes).force(end, place)
-        return np.where(column(rigid), force**2, soft)
-
-    def _at_rest(self, value: Array, squared: Array) -> Array:
-        """Return the values, squared over f, with those of rigid-body modes put right."""
-        if not self._still.any():
+    def _at_rest(self, value: Array, name: str) -> Array:
+        """Return the values with those of rigid-body modes put right."""
+        if not self._loose:
             return value
-        # 0 over 0 holds nothing, and neither does what is rounding beside the other modes
-        with np.errstate(invalid="ignore"):  # inf of a rigid-body mode, times 0
-            finite = np.where(self._still | ~np.isfinite(value), 0.0, np.abs(value) * self.frequency)
-        holds = np.abs(squared) > 1e-20 * np.maximum(finite, np.abs(squared)).max(axis=-1, keepdims=True)
-        held = np.where(holds, value, 0.0)
+        squared = self._squared(name)
+        moves = np.abs(squared) > 1e-20 * np.abs(squared).max(axis=-1, keepdims=True)  # more than by rounding
         several = self._still.sum(axis=-1, keepdims=True) > 1
-        return np.where(self._still, np.where(several & (held != 0), np.nan, held), value)
+        directed = several & (moves & self._still).any(axis=-1, keepdims=True)
+        return np.where(self._still, np.where(directed, np.nan, np.where(moves & ~np.isnan(value), value, 0.0)), value)
+
+    @cached_property
+    def _loose(self) -> bool:
+        return bool(self._still.any())
 
     @cached_property
     def _still(self) -> Array:

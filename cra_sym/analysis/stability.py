@@ -14,8 +14,8 @@ from cra_sym.analysis.modes import participation
 from cra_sym.analysis.static_corrections import static_terms
 from cra_sym.analysis.zones import Zone, first_order_zone, zone_of
 from cra_sym.kernels import Kernel, compiled, derived_kernel, has_compiler
+from cra_sym.kernels.parts import wants_compiler
 from cra_sym.model.excitations import Excitation, Fluctuation, Parametric, TransverseBase
-from cra_sym.model.spectrum import wants_compiler
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.solvers import floquet
 

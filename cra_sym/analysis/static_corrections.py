@@ -1,7 +1,7 @@
 """What the modes left out contribute by their statics, when the stiffness of an end fluctuates.
 
-The sums over all modes of the products of displacements at the springs over omega^2 and over omega^4 are those of a
-static problem; what the first modes leave of them is known exactly.
+What the modes beyond the first ones add to the receptance at the springs is analytic up to the next natural frequency,
+so its value and slope at rest follow from the exact receptance where it is well conditioned.
 """
 
 from __future__ import annotations
@@ -13,15 +13,17 @@ from cra_sym.model.excitations import Fluctuation
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.system import System
 from cra_sym.model.values import flat_columns
-from cra_sym.solvers.static_moments import static_moments
+from cra_sym.solvers.remainder import moments, nodes
 
-__all__ = ["moments_of_all_modes", "static_terms"]
+__all__ = ["moments_of_other_modes", "static_terms"]
 
 Array = NDArray[np.float64]
 
 
-def moments_of_all_modes(system: System, excitation: Fluctuation) -> tuple[Array, Array]:
-    """Return the sums over all modes j of b_sj b_rj / omega_j^2 and / omega_j^4, b as in `spring_displacements`.
+def moments_of_other_modes(system: System, excitation: Fluctuation, modes: int) -> tuple[Array, Array]:
+    """Return the sums over the modes j beyond the first ones of b_sj b_rj / omega_j^2 and / omega_j^4.
+
+    b is as in `Fluctuation.spring_displacements`.
 
     Returns
     -------
@@ -31,15 +33,31 @@ def moments_of_all_modes(system: System, excitation: Fluctuation) -> tuple[Array
     names = excitation.springs(system)
     problem: SpatialProblem = system.numerics("spatial")
     ends = [system.numerics("stiffnesses")[name] for name in names]
-    places = [place if end == 0 else problem.displacements + problem.coordinates + place for end, place in ends]
+    places = [place if end == 0 else problem.displacements + problem.coordinates + place for end, place, _ in ends]
     columns = flat_columns(system.parameters, system.shape)
-    second, fourth = np.zeros((2, columns.shape[1], len(names), len(names)))
-    for rows, _, some in problem.problems(columns):
-        second[rows], fourth[rows] = static_moments(some, places)
-    values = [np.broadcast_to(system.values[name], system.shape) for name in names]
-    root = np.sqrt(np.stack([np.where(np.isinf(value), 0.0, value) for value in values], axis=-1))
-    scale = root[..., :, None] * root[..., None, :]
-    return scale * second.reshape(scale.shape), scale * fourth.reshape(scale.shape)
+    rows = columns.shape[1]
+    squares = system.natural_frequencies(modes + 1).reshape(rows, -1) ** 2
+    limit = squares[:, -1]
+    z = nodes(limit)
+    receptance = np.zeros((*z.shape, len(names), len(names)))
+    for members, _, some in problem.problems(columns):
+        row = np.repeat(np.arange(len(members)), z.shape[1])
+        here = some.evaluate(z[members].ravel(), row, keep_tree=True)
+        assert here.tree is not None
+        load = here.tree.scale[:, places, None] * here.unit[:, places, :]
+        found = load @ np.linalg.solve(here.matrix, load.swapaxes(-1, -2))
+        receptance[members] = found.reshape(len(members), z.shape[1], len(names), len(names))
+    shapes = [system.modes(modes).displacement(end, place) for end, place, _ in ends]
+    b = np.stack([shape.reshape(rows, modes) for shape in shapes], axis=-1)
+    second, fourth = moments(receptance, squares[:, :-1], b[..., :, None] * b[..., None, :], limit)
+    values = [
+        system.values[name] * end.factor.function(*system.domain.values) for name, end in zip(names, ends, strict=True)
+    ]
+    flat = [np.broadcast_to(value, system.shape).ravel() for value in values]
+    root = np.sqrt(np.stack([np.where(np.isinf(value), 0.0, value) for value in flat], axis=-1))
+    scale = root[:, :, None] * root[:, None, :]
+    shape = (*system.shape, len(names), len(names))
+    return (scale * second).reshape(shape), (scale * fourth).reshape(shape)
 
 
 def static_terms(system: System, excitation: Fluctuation, modes: int) -> tuple[Array, Array]:
@@ -56,11 +74,7 @@ def static_terms(system: System, excitation: Fluctuation, modes: int) -> tuple[A
         P_r and lambda_r of :mod:`cra_sym.solvers.floquet`.
     """
     b = excitation.spring_displacements(system, modes)
-    omega = system.natural_frequencies(modes)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        shares = np.where(b == 0, 0.0, b / omega[..., None, :])
-    second, _ = moments_of_all_modes(system, excitation)
-    remaining = second - shares @ shares.swapaxes(-1, -2)
+    remaining, _ = moments_of_other_modes(system, excitation, modes)
     weights = [np.asarray(excitation.weights[name]) for name in excitation.springs(system)]
     root = np.sqrt(np.stack(np.broadcast_arrays(*weights), axis=-1))
     compliance, vectors = np.linalg.eigh(root[..., :, None] * remaining * root[..., None, :])

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cra_sym.analysis.static_corrections import moments_of_all_modes
+from cra_sym.analysis.static_corrections import moments_of_other_modes
 from cra_sym.kernels import Kernel, derived_kernel
 from cra_sym.model.excitations import Fluctuation, Parametric
 from cra_sym.model.system import System
@@ -99,25 +99,23 @@ def _sums(
         table = _evaluate(name, at)[which]
         total = table["resonant"][..., 0] + np.where(at["path"] == 0, 0.0, table["spectator"]).sum(axis=-1)
         if isinstance(excitation, Fluctuation) and excitation.springs(system):
-            with np.errstate(divide="ignore", invalid="ignore"):
-                known = [np.where(path == 0, 0.0, path / omega**power).sum(axis=-1) for power in (2, 4)]
-            whole = _paths_of_all_modes(system, excitation, omega.shape[-1], row, target)
+            others = _paths_of_other_modes(system, excitation, omega.shape[-1], row, target)
             tails = table["tail"][..., 0], table["tail_2"][..., 0]
-            total = total + sum(t * (all_ - some) for t, all_, some in zip(tails, whole, known, strict=True))
+            total = total + sum(tail * path for tail, path in zip(tails, others, strict=True))
         sums[which] = total
     return sums
 
 
-def _paths_of_all_modes(
+def _paths_of_other_modes(
     system: System, excitation: Fluctuation, modes: int, row: int, target: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the sums over all modes j of P_rj P_jt / omega_j^2 and / omega_j^4, modes counted from 0."""
+    """Return the sums over the modes j beyond the first ones of P_rj P_jt / omega_j^2 and / omega_j^4."""
     b = excitation.spring_displacements(system, modes)
     weights = np.stack(np.broadcast_arrays(*(np.asarray(w) for w in excitation.weights.values())), axis=-1)
     first, last = (weights * b[..., mode] for mode in (row, target))
     second, fourth = (
         ((first[..., None, :] @ moment)[..., 0, :] * last).sum(axis=-1)
-        for moment in moments_of_all_modes(system, excitation)
+        for moment in moments_of_other_modes(system, excitation, modes)
     )
     return second, fourth
 

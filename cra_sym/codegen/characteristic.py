@@ -4,31 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from cra_sym.kernels import derived_kernel
-from cra_sym.model.spectrum import NEAR, pair
+from cra_sym.codegen.arm_family import arm_family
+from cra_sym.solvers.one_wave import NEAR, parameters
 
 __all__ = ["characteristic"]
-
-_COEFFICIENTS, _POWER_SERIES, _BASIS, _DERIVATIVES = (
-    derived_kernel(f"cra_sym.model.characteristic:{name}")
-    for name in ("coefficients", "power_series", "basis", "derivatives")
-)
 
 
 def characteristic(
     kappa_t: float, kappa_r: float, mu: float, iota: float, lam: float
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the determinant and its first two derivatives by z = lambda^4, times exp(-lambda), and their scales."""
-    pairs = [x for value in (kappa_t, kappa_r, mu, iota) for x in pair(np.asarray(value))]
-    coefficients = _COEFFICIENTS.function(*pairs)
+    family = arm_family()
+    functions = {name: kernel.function for name, kernel in family.functions.items()}
+    pairs = parameters(family.layout, [np.asarray(value) for value in (kappa_t, kappa_r, mu, iota)])
+    coefficients = functions["coefficients"](*pairs)
     z, decay = lam**4, np.exp(-lam)
-    if z < NEAR:
-        series = np.polynomial.Polynomial(_POWER_SERIES.function(*coefficients))
+    if z < NEAR[2]:
+        series = np.polynomial.Polynomial(functions["power_series"](*coefficients))
         values = [decay * derivative(z) for derivative in (series, series.deriv(), series.deriv(2))]
         sizes = [float(np.polynomial.Polynomial(np.abs(p.coef))(z)) for p in (series, series.deriv(), series.deriv(2))]
     else:
-        basis = _BASIS.function(lam, decay)
-        scaled = _DERIVATIVES.function(*coefficients, z, *basis)
+        basis = functions["basis"](lam, decay)
+        scaled = functions["derivatives"](*coefficients, z, *basis)
         values = [value / z**order for order, value in enumerate(scaled)]
         size = max(abs(k) for k in coefficients) * z**2 * max(abs(x) for x in basis)
         sizes = [float(size) / z**order for order in range(3)]

@@ -139,21 +139,21 @@ def arm_sources(name: str) -> dict[str, str]:
 
 
 def _spectrum_values(language: Language) -> dict[str, Any]:
-    from cra_sym.model.characteristic import NEAR
+    from cra_sym.solvers.one_wave import NEAR
 
     functions = spectrum_functions()
     terms = next(f.size for f in functions if f.name == "power_series")
-    return {"spectrum_functions": _texts(language, functions), "near": NEAR, "terms": terms}
+    return {"spectrum_functions": _texts(language, functions), "near": int(NEAR[2]), "terms": terms}
 
 
 def _modal_values(language: Language) -> dict[str, Any]:
-    from cra_sym.model.shapes import NEAR
+    from cra_sym.solvers.one_wave_shapes import NEAR
 
     widths = stability_functions()
     nodes, weights = gauss_rule()
     return {
         "modal_functions": _texts(language, (*modal_functions(), *widths)),
-        "near_shape": NEAR,
+        "near_shape": int(NEAR[2]),
         "nodes": [repr(x) for x in nodes],
         "weights": [repr(x) for x in weights],
         "call": caller({f.name: f for f in widths}),

@@ -8,19 +8,18 @@ from typing import Any
 
 import sympy as sp
 
+from cra_sym.codegen.arm_family import arm_family
 from cra_sym.codegen.complex_parts import complex_parts
 from cra_sym.codegen.program import Function, function, scalars
-from cra_sym.mechanics import multiple_scales
-from cra_sym.model import characteristic, oscillator, shapes
-from cra_sym.model.characteristic import BASIS, PARAMETERS
+from cra_sym.mechanics import multiple_scales, one_wave, one_wave_rows, one_wave_shapes
+from cra_sym.model import oscillator
 from cra_sym.symbols import symbol
 
 __all__ = ["gauss_rule", "modal_functions", "spectrum_functions", "stability_functions"]
 
-_PAIRS = ("pairs", PARAMETERS)
-_BASIS = ("basis_row", BASIS)
-_KRYLOV = ("krylov", shapes.KRYLOV)
-_WAVES = ("waves", shapes.WAVES)
+_BASIS = ("basis_row", one_wave.BASIS[2])
+_KRYLOV = ("krylov", one_wave_shapes.KRYLOV)
+_WAVES = ("waves", one_wave_shapes.WAVES)
 _CIRCLE = sp.symbols("cos_lambda sin_lambda decay", real=True)
 
 
@@ -29,8 +28,12 @@ def _row(prefix: str, arguments: Sequence[sp.Symbol]) -> tuple[str, list[sp.Symb
     return prefix, [s for s in arguments if s.name[:1] == prefix and s.name[1:].isdigit()]
 
 
-def _make(summary: str, derivation: Any, *arguments: Any) -> Function:
-    expression, names = derivation()
+def _pairs() -> Any:
+    return "pairs", one_wave.parameters(arm_family().structure)
+
+
+def _make(summary: str, derivation: Any, *arguments: Any, of: Any = ()) -> Function:
+    expression, names = derivation(*of)
     given = {s for _, symbols in arguments for s in ((symbols,) if isinstance(symbols, sp.Symbol) else symbols)}
     rest = [s for s in names if s not in given]
     signature = [*arguments, *scalars(rest)]
@@ -47,20 +50,21 @@ def _first(symbols: Any, order: dict[sp.Symbol, int]) -> list[int]:
 @cache
 def spectrum_functions() -> tuple[Function, ...]:
     """Return the functions behind the complete frequencies of the arm."""
-    k = _row("k", characteristic.derivatives()[1])
+    arm, pairs = (arm_family().structure,), _pairs()
+    k = _row("k", one_wave.derivatives(*arm)[1])
     return (
-        _make("Coefficients of the characteristic determinant.", characteristic.coefficients, _PAIRS),
-        _make("Coefficients of its power series in z.", characteristic.power_series, k),
+        _make("Coefficients of the characteristic determinant.", one_wave.coefficients, pairs, of=arm),
+        _make("Coefficients of its power series in z.", one_wave.power_series, k, of=arm),
         _make("Basis of the determinant at lambda, scaled by exp(-lambda).", _basis, ("circle", _CIRCLE)),
-        _make("The same basis for small z, not scaled.", characteristic.basis_near),
-        _make("Determinants whose signs count the zeros below z.", characteristic.chain, _PAIRS, _BASIS),
-        _make("Determinant D, z D' and z^2 D'', scaled alike.", characteristic.derivatives, k, _BASIS),
+        _make("The same basis for small z, not scaled.", one_wave.basis_near, of=(2,)),
+        _make("Determinants whose signs count the zeros below z.", one_wave.chain, pairs, _BASIS, of=arm),
+        _make("Determinant D, z D' and z^2 D'', scaled alike.", one_wave.derivatives, k, _BASIS, of=arm),
     )
 
 
 def _basis() -> Any:
     """Return the scaled basis as a polynomial in cos, sin and exp(-lambda), which each caller computes its own way."""
-    scaled, (lamda, decay) = characteristic.basis()
+    scaled, (lamda, decay) = one_wave.basis(2)
     c, s, e = _CIRCLE
     polynomials = [x.xreplace({sp.cos(lamda): c, sp.sin(lamda): s, decay: e}) for x in scaled]
     return polynomials, (lamda, *_CIRCLE)
@@ -72,22 +76,28 @@ _basis.__name__ = "basis"
 @cache
 def modal_functions() -> tuple[Function, ...]:
     """Return the functions behind mode shapes, modal quantities and responses."""
-    circle = ("circle", shapes.tip_far()[1][-3:])  # cos, sin and decay at lambda
+    circle = ("circle", one_wave_shapes.tip_far(2)[1][-3:])  # cos, sin and decay at lambda
+    arm, pairs, shapes = (arm_family().structure,), _pairs(), one_wave_shapes
     return (
-        _make("Solutions with one unit derivative at the root, for small z.", shapes.polynomials),
-        _make("Tip conditions: entries in (alpha, beta) and their magnitudes.", shapes.tip_rows, _PAIRS, _KRYLOV),
-        _make("Shape and derivatives at the tip, for small z.", shapes.tip_near, _PAIRS, _KRYLOV),
-        _make("alpha, beta and the wave amplitudes.", shapes.amplitudes_far, _PAIRS, circle),
-        _make("Shape and derivatives at the tip from the wave amplitudes.", shapes.tip_far, _WAVES, circle),
-        _make("Shape and its three derivatives at xi from the wave amplitudes.", shapes.shape_far, _WAVES),
-        _make("Modal mass over rho A L, for z > 0.", _mass, _PAIRS),
+        _make("Solutions with one unit derivative at the root, for small z.", shapes.polynomials, of=(2,)),
+        _make(
+            "Tip conditions: entries in (alpha, beta) and their magnitudes.", shapes.tip_rows, pairs, _KRYLOV, of=arm
+        ),
+        _make("Shape and derivatives at the tip, for small z.", shapes.tip_near, pairs, _KRYLOV, of=arm),
+        _make("alpha, beta and the wave amplitudes.", shapes.amplitudes_far, pairs, circle, of=arm),
+        _make("Shape and derivatives at the tip from the wave amplitudes.", shapes.tip_far, _WAVES, circle, of=(2,)),
+        _make("Shape and its three derivatives at xi from the wave amplitudes.", shapes.shape_far, _WAVES, of=(2,)),
+        _make("Modal mass over rho A L, for z > 0.", _mass, pairs),
         *_responses(),
     )
 
 
 def _mass() -> Any:
-    (mass,), arguments = shapes.generalised_mass()
-    return mass, arguments
+    """Return the modal mass with the tip's inertias by their own names."""
+    structure = arm_family().structure
+    (mass,), arguments = one_wave_rows.generalised_mass(structure)
+    names = dict(zip(one_wave_rows.inertias(structure).values(), map(symbol, ("mu", "iota")), strict=True))
+    return mass.xreplace(names), [names.get(x, x) for x in arguments]
 
 
 _mass.__name__ = "modal_mass"

@@ -22,7 +22,7 @@ FIGURES = {
     "fig01": "cra_sym.figures.robot:figure_1",
     "fig02": "cra_sym.figures.joint:figure_2",
     "fig03": "cra_sym.figures.modes:figure_3",
-    "fig04": "cra_sym.figures.modes:figure_4",
+    "fig04": "cra_sym.claims.figure_4:figure_4",
     "fig05": "cra_sym.figures.sensitivity:figure_5",
     "fig06": "cra_sym.figures.responses:figure_6",
     "fig07": "cra_sym.figures.responses:figure_7",

@@ -1,4 +1,4 @@
-"""Natural frequencies against the two stiffnesses of the joint (Figs. 3 and 4) and the first mode shapes."""
+"""Natural frequencies against a stiffness of the joint (Fig. 3) and the first mode shapes."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ from matplotlib.figure import Figure
 from cra_sym.analysis.modes import mode_shapes, natural_frequencies
 from cra_sym.arm.parameters import Arm
 from cra_sym.figures.drawing import BLUE, ORANGE
-from cra_sym.paper.oracles.flipped import flipped_frequencies
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["figure_3", "figure_4", "figure_mode_shapes"]
+__all__ = ["draw_in_hertz", "draw_relative", "figure_3", "figure_mode_shapes", "panels"]
 
 _UNITS = {"k_t": "N/m", "k_r": "N m/rad"}
 _QUANTITIES = {"k_t": "translational stiffness", "k_r": "rotational stiffness"}
@@ -35,46 +34,12 @@ def figure_3(arm: Arm | None = None, k_t: Any = None, *, axes: Any = None) -> Fi
     """
     arm = arm or Arm.nominal()
     k_t = np.logspace(0, 6, 301) if k_t is None else np.asarray(k_t, dtype=float)
-    figure, (left, right) = _axes(axes, 1, 2, (8.6, 3.9))
+    figure, (left, right) = panels(axes, 1, 2, (8.6, 3.9))
     found, rigid = natural_frequencies(arm.replace(k_t=k_t)), natural_frequencies(arm.replace(k_t=np.inf))
-    _in_hertz(left, k_t, found, rigid, "k_t")
-    _relative(right, k_t, found / rigid, "k_t")
+    draw_in_hertz(left, k_t, found, rigid, "k_t")
+    draw_relative(right, k_t, found / rigid, "k_t")
     left.set_title("Fig. 3  A softer joint lowers every mode")
     right.set_title("higher modes feel it first", fontweight="normal")
-    return figure
-
-
-def figure_4(arm: Arm | None = None, k_r: Any = None, *, axes: Any = None) -> Figure:
-    """Draw f1, f2, f3 against the joint's rotational stiffness: as derived, and with the spring's sign flipped.
-
-    The left column follows from the Lagrangian. The right one from the same Lagrangian with the sign of the rotational
-    spring's energy flipped, EI v_xx(0) = -k_r v_x(0): it shows the rising f2 and f3 and the seemingly flat f1 that the
-    paper reports.
-
-    Parameters
-    ----------
-    arm : Arm, optional
-        By default the nominal one.
-    k_r : array_like, optional
-        Stiffnesses in N m/rad, by default 1e2 to 1e5.
-    axes : 2 x 2 array of Axes, optional
-    """
-    arm = arm or Arm.nominal()
-    k_r = np.logspace(2, 5, 301) if k_r is None else np.asarray(k_r, dtype=float)
-    figure, grid = _axes(axes, 2, 2, (8.6, 6.6), sharey="row")
-    (top_left, top_right), (low_left, low_right) = grid
-    rigid = natural_frequencies(arm.replace(k_r=np.inf))
-    derived, flipped = natural_frequencies(arm.replace(k_r=k_r)), flipped_frequencies(arm.replace(k_r=k_r))
-    for upper, lower, found in ((top_left, low_left, derived), (top_right, low_right, flipped)):
-        _in_hertz(upper, k_r, found, rigid, "k_r")
-        _relative(lower, k_r, found / rigid, "k_r")
-        upper.set_xlabel("")
-    for ax in (top_right, low_right):
-        ax.set_ylabel("")
-    top_left.set_title("Fig. 4  Derived: $EI\\,v_{xx}(0)=+k_r\\,v_x(0)$")
-    top_right.set_title("Sign flipped: $EI\\,v_{xx}(0)=-k_r\\,v_x(0)$")
-    low_left.set_title("all fall, near the rigid joint by the same fraction", fontweight="normal")
-    low_right.set_title("all rise; in hertz f1 only seems unchanged", fontweight="normal")
     return figure
 
 
@@ -95,12 +60,12 @@ def figure_mode_shapes(
     axes : three Axes, optional
     """
     arm = arm or Arm.nominal()
-    figure, panels = _axes(axes, 1, 3, (8.6, 3.4), sharey=True)
+    figure, grid = panels(axes, 1, 3, (8.6, 3.4), sharey=True)
     x = np.linspace(0.0, float(arm.L), 301)
     rigid, elastic = arm.replace(k_t=np.inf, k_r=np.inf), arm.replace(k_t=k_t, k_r=k_r)
     pairs = [(mode_shapes(a, x), natural_frequencies(a)) for a in (rigid, elastic)]
     swing = 1.0 if phase is None else np.cos(phase)
-    for mode, ax in enumerate(panels):
+    for mode, ax in enumerate(grid):
         ax.axhline(0.0, color="0.75", linewidth=0.8)
         for (shapes, hertz), colour, name in zip(pairs, (BLUE, ORANGE), ("rigid", "elastic"), strict=True):
             line: dict[str, Any] = {"color": colour, "linestyle": "-" if name == "elastic" else (0, (4, 2))}
@@ -111,12 +76,13 @@ def figure_mode_shapes(
         ax.margins(x=0.02, y=0.12)
         ax.legend(loc=("upper left", "upper center", "upper center")[mode], fontsize=8)
     largest = max(np.abs(shapes).max() for shapes, _ in pairs)
-    panels[0].set_ylim(None if phase is None else -1.15 * largest, 1.35 * largest)
-    panels[0].set_ylabel("mass-normalised shape $\\phi$ / kg$^{-1/2}$")
+    grid[0].set_ylim(None if phase is None else -1.15 * largest, 1.35 * largest)
+    grid[0].set_ylabel("mass-normalised shape $\\phi$ / kg$^{-1/2}$")
     return figure
 
 
-def _axes(axes: Any, rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Figure, Any]:
+def panels(axes: Any, rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Figure, Any]:
+    """Return a figure and its grid of axes: those given, or new ones."""
     if axes is not None:
         grid = np.asarray(axes)
         return grid.flat[0].figure, grid
@@ -124,7 +90,8 @@ def _axes(axes: Any, rows: int, columns: int, size: tuple[float, float], **optio
     return figure, figure.subplots(rows, columns, **options)
 
 
-def _in_hertz(ax: Axes, stiffness: np.ndarray, found: np.ndarray, rigid: np.ndarray, name: str) -> None:
+def draw_in_hertz(ax: Axes, stiffness: np.ndarray, found: np.ndarray, rigid: np.ndarray, name: str) -> None:
+    """Draw frequencies, shape (len(stiffness), modes), against a stiffness, with those of the rigid joint."""
     for mode in range(found.shape[-1]):
         ax.axhline(rigid[mode], **_RIGID)
         (line,) = ax.plot(stiffness, found[:, mode])
@@ -136,7 +103,8 @@ def _in_hertz(ax: Axes, stiffness: np.ndarray, found: np.ndarray, rigid: np.ndar
     ax.set_ylabel("natural frequency / Hz")
 
 
-def _relative(ax: Axes, stiffness: np.ndarray, ratio: np.ndarray, name: str) -> None:
+def draw_relative(ax: Axes, stiffness: np.ndarray, ratio: np.ndarray, name: str) -> None:
+    """Draw frequencies over those of the rigid joint, shape (len(stiffness), modes), against a stiffness."""
     ax.axhline(1.0, **_RIGID)
     for mode in range(ratio.shape[-1]):
         ax.plot(stiffness, ratio[:, mode], label=f"$f_{mode + 1}$")

@@ -123,10 +123,11 @@ def figure_6(arm: Arm | None = None, *, axes: Any = None) -> Figure:
 def _against_rigid(axes: Any, arm: Arm | None, quantity: Any, label: str, title: str) -> Figure:
     arm, t = arm or Arm.nominal(), _TIME
     panels = _panels(axes, 1, 2, (8.6, 3.9), sharex=True, sharey=True)
-    joints = ((np.inf, "rigid joint", BLUE, "-"), (SOFT, "$k_t$ = 1000 N/m", ORANGE, "--"))
+    rigid, soft = arm.replace(k_t=np.inf), arm.replace(k_t=SOFT)
+    joints = ((rigid, "rigid joint", BLUE, "-"), (soft, "$k_t$ = 1000 N/m", ORANGE, "--"))
     for ax, rate in zip(panels[0], (RATE, 2 * RATE), strict=True):
-        for k_t, name, color, style in joints:
-            v = quantity(arm.replace(k_t=k_t), t, rate)
+        for joined, name, color, style in joints:
+            v = quantity(joined, t, rate)
             peak = _peak(ax, t, v, color)
             ax.plot(t, v, color=color, linestyle=style, label=f"{name}, peak {peak:.2f} mm")
         ax.legend(loc="lower left", bbox_to_anchor=(0.0, 0.98), borderaxespad=0)

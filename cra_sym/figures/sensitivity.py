@@ -40,8 +40,11 @@ def figure_5(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     (raw_t, raw_r), (log_t, log_r) = np.asarray(axes)
     for name, raw, log, low in (("k_t", raw_t, log_t, 0), ("k_r", raw_r, log_r, -1)):
         stiffness = np.logspace(low, 6, 281)
-        _curves(raw, arm, name, stiffness, f"df_d{name}")
-        _curves(log, arm, name, stiffness, f"log_{name}")
+        found, marked = (
+            sensitivities(arm.replace(**{name: values}), by=[name]) for values in (stiffness, _MARKED[name])
+        )
+        _curves(raw, name, stiffness, found.rate[name], marked.rate[name])
+        _curves(log, name, stiffness, found.log[name], marked.log[name])
         raw.set_yscale("log")
         raw.set_ylabel(f"$\\partial f/\\partial {name}$ / (Hz per {_UNITS[name]})")
         log.set_ylabel(f"$\\partial\\ln f/\\partial\\ln {name}$")
@@ -57,9 +60,7 @@ def figure_5(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     return raw_t.figure
 
 
-def _curves(ax: Axes, arm: Arm, name: str, stiffness: np.ndarray, quantity: str) -> None:
-    found = getattr(sensitivities(arm.replace(**{name: stiffness})), quantity)
-    marked = getattr(sensitivities(arm.replace(**{name: _MARKED[name]})), quantity)
+def _curves(ax: Axes, name: str, stiffness: np.ndarray, found: np.ndarray, marked: np.ndarray) -> None:
     for mode in range(3):
         (line,) = ax.semilogx(stiffness, found[:, mode], label=f"mode {mode + 1}")
         ax.plot(_MARKED[name], marked[:, mode], "o", color=line.get_color(), markersize=4.5, markerfacecolor="white")

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cra_sym.analysis.floquet_boundary import floquet_boundary
-from cra_sym.analysis.modes import modal_parameters
 from cra_sym.analysis.stability import (
     AsymptoticWarning,
     ResonanceWarning,
@@ -87,7 +86,7 @@ def _zone(
     ax: Axes, arm: Arm, excitation: Any, mode: int, epsilon: np.ndarray, points: int, tolerance: float = 1e-7
 ) -> None:
     """Draw one principal zone against its detuning."""
-    centre = 2 * modal_parameters(arm, mode).omega[mode - 1]
+    centre = 2 * arm.natural_frequencies(3)[mode - 1]
     second = _boundary(arm, excitation, epsilon, (mode, mode), order=2)
     width = second[1] - second[0]  # to second order the zone moves and keeps its width
     first, half = (centre - width / 2, centre + width / 2), width[-1] / 2
@@ -311,7 +310,7 @@ def figure_combinations(
     """
     arm = arm or Arm.nominal().replace(k_t=1e3)
     ax = _grid(None, 1, 1, (9.4, 5.0))[0, 0] if ax is None else ax
-    omega = modal_parameters(arm).omega
+    omega = arm.natural_frequencies(3)
     frequency = np.linspace(0.5 * omega[0], 2.2 * omega[2], points)
     sizes = np.linspace(0.0, epsilon, points // 3)
     rates = _growth(arm, excitation, frequency, sizes, 4)

@@ -3,5 +3,6 @@
 from cra_sym.kernels.callables import Kernel, kernel
 from cra_sym.kernels.derived import derived_kernel
 from cra_sym.kernels.specialise import compiled, has_compiler, is_compiled
+from cra_sym.kernels.templates import template
 
-__all__ = ["Kernel", "compiled", "derived_kernel", "has_compiler", "is_compiled", "kernel"]
+__all__ = ["Kernel", "compiled", "derived_kernel", "has_compiler", "is_compiled", "kernel", "template"]

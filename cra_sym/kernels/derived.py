@@ -7,6 +7,7 @@ import json
 import pickle
 import platform
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -26,14 +27,14 @@ _DERIVING = ("symbols.py", "checks.py", "mechanics", "model", "kernels", "solver
 class _DerivedKernel(Kernel):
     """A kernel that knows where it is derived, and finds its source on first use."""
 
-    def __init__(self, path: str, backend: str | None) -> None:
+    def __init__(self, path: str, given: tuple[Any, ...], backend: str | None) -> None:
         super().__init__("", (), backend)
-        self.path = path
+        self.path, self.given = path, given
 
     @property
     def source(self) -> str:
         if not self._source:
-            self._source, self._arguments = _source_of(self.path)
+            self._source, self._arguments = _source_of(self.path, self.given)
         return self._source
 
     @property
@@ -41,10 +42,10 @@ class _DerivedKernel(Kernel):
         return self._arguments if self.source else ()
 
     def __repr__(self) -> str:
-        return f"<Kernel of {self.path}>"
+        return f"<Kernel of {_called(self.path, self.given)}>"
 
 
-def derived_kernel(path: str, *, backend: str | None = None) -> Kernel:
+def derived_kernel(path: str, *arguments: Any, backend: str | None = None) -> Kernel:
     """Return the kernel of a derivation of this package, to be derived when it is first needed.
 
     Creating it costs nothing. On first use its source comes from the user's store, or else from the derivation, whose
@@ -54,29 +55,42 @@ def derived_kernel(path: str, *, backend: str | None = None) -> Kernel:
     Parameters
     ----------
     path : str
-        ``"cra_sym.room.module:function"``. The function takes nothing and returns ``(expression, arguments)``
+        ``"cra_sym.room.module:function"``. The function takes the arguments and returns ``(expression, arguments)``
         as :func:`cra_sym.kernels.kernel` wants them.
+    arguments : literals
+        Numbers, texts and tuples of them, which are a part of the key.
     backend : {None, 'numpy', 'numba'}
         As in :func:`cra_sym.kernels.kernel`.
 
     Raises
     ------
     ValueError
-        If the path is not of that form or leads out of the package.
+        If the path is not of that form or leads out of the package, or an argument is not a literal.
     """
     module, colon, function = path.partition(":") if isinstance(path, str) else ("", "", "")
     if not (colon and function.isidentifier() and module.startswith("cra_sym.")):
         raise ValueError(f"path = {shown(path)}: must be 'cra_sym.room.module:function'")
-    return _DerivedKernel(path, backend)
+    if not _are_literals(arguments):
+        raise ValueError(f"arguments = {shown(arguments)}: must be numbers, texts and tuples of them")
+    return _DerivedKernel(path, arguments, backend)
+
+
+def _are_literals(value: Any) -> bool:
+    """Return whether the text of a value says all about it."""
+    return all(map(_are_literals, value)) if type(value) is tuple else type(value) in (str, int, float, bool)
+
+
+def _called(path: str, given: tuple[Any, ...]) -> str:
+    return f"{path}({', '.join(map(repr, given))})" if given else path
 
 
 @cache
-def _source_of(path: str) -> tuple[str, tuple[str, ...]]:
+def _source_of(path: str, given: tuple[Any, ...] = ()) -> tuple[str, tuple[str, ...]]:
     storable = _sources_are_what_runs()
-    key = f"{path} {fingerprint()}"
+    key = f"{_called(path, given)} {fingerprint()}"
     content = store.load(key) if storable else None
     if content is None:
-        made = _derived(path)
+        made = _derived(path, given)
         content = json.dumps([made.source, made.arguments]).encode()
         if storable and _sources_are_what_runs():
             store.save(key, content)
@@ -95,30 +109,29 @@ def derived(path: str, *arguments: str) -> Any:
         Passed on to the function, and part of the key.
     """
     storable = _sources_are_what_runs()
-    key = f"{path} {arguments!r} {fingerprint()}"
+    key = f"{_called(path, arguments)} {fingerprint()}"
     content = store.load(key) if storable else None
     if content is not None:
-        try:
+        with suppress(Exception):  # whatever is wrong with what this process did not make: make it anew
             return pickle.loads(content)
-        except Exception:  # whatever is wrong with what this process did not make: make it anew
-            pass
-    made = _narrated(path, lambda function: function(*arguments))
+    made = _narrated(path, arguments, lambda result: result)
     if storable and _sources_are_what_runs():
         store.save(key, pickle.dumps(made))
     return made
 
 
-def _narrated(path: str, make: Callable[[Callable[..., Any]], Any]) -> Any:
+def _derived(path: str, given: tuple[Any, ...]) -> Kernel:
+    made: Kernel = _narrated(path, given, lambda result: kernel(*result))
+    return made
+
+
+def _narrated(path: str, given: tuple[Any, ...], finish: Callable[[Any], Any]) -> Any:
+    """Return what a derivation yields, finished; a terminal says that it is under way."""
     from tqdm import tqdm
 
     module, _, function = path.partition(":")
-    with tqdm(total=0, desc=f"deriving {path}, once", bar_format="{desc}", leave=False, disable=None):
-        return make(getattr(import_module(module), function))
-
-
-def _derived(path: str) -> Kernel:
-    made: Kernel = _narrated(path, lambda function: kernel(*function()))
-    return made
+    with tqdm(total=0, desc=f"deriving {_called(path, given)}, once", bar_format="{desc}", leave=False, disable=None):
+        return finish(getattr(import_module(module), function)(*given))
 
 
 def _sources() -> list[Path]:

@@ -83,6 +83,7 @@ def hamilton(
     virtual_work: Sequence[VirtualWork] | None = None,
     essential: Sequence[Expr] | None = None,
     prescribed: Sequence[AppliedUndef] = (),
+    inside: Sequence[tuple[Expr, Expr]] = (),
 ) -> HamiltonResult:
     r"""Derive equations of motion and boundary conditions from :math:`\delta\int L\,dt + \int\delta W\,dt = 0`.
 
@@ -107,6 +108,9 @@ def hamilton(
         Linear combinations of end displacements (and coordinates) that vanish, in evaluated form.
     prescribed : sequence of applied undefined functions, optional
         Known functions of x and t that occur with derivatives.
+    inside : sequence of (place, Expr), optional
+        Lagrangian terms at interior places, in displacements of a section there. The field equations hold between
+        them. An essential condition at an interior place is one displacement in evaluated form.
 
     Returns
     -------
@@ -134,7 +138,7 @@ def hamilton(
     left, right = _optional(left), _optional(right)
     virtual_work = listed("virtual_work", () if virtual_work is None else virtual_work)
     essential = listed("essential", () if essential is None else essential)
-    variation = vary(space, density, {"left": left, "right": right}, virtual_work, essential)
+    variation = vary(space, density, {"left": left, "right": right}, virtual_work, essential, inside)
     forces = GeneralisedForces.of(variation)
     field_equations = tuple(forces.field_equation(number) for number in range(len(space.fields)))
     boundary_conditions = forces.boundary_conditions()

@@ -87,7 +87,7 @@ class Jet(NamedTuple):
     unknown: int
     space: int
     time: int
-    place: End | None
+    place: End | int | None
 
 
 class JetSpace:

@@ -189,6 +189,9 @@ class _Mesh:
         if max(weak.powers, default=0) > 2:
             raise HamiltonError("ritz: more than two time derivatives; there is no mass matrix")
         weak.variation.elimination.check_homogeneous("ritz")
+        if weak.points:
+            place = weak.points[0].place
+            raise HamiltonError(f"ritz: the term at the interior place {weak.variation.space.x} = {place} needs a node")
         self.space = weak.variation.space
         self.step, self.begin = step, begin
         self.sizes = [max(order, 2) for order in weak.variation.orders]

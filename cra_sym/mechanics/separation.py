@@ -9,6 +9,7 @@ from typing import Literal
 
 from sympy import (
     Add,
+    DiracDelta,
     Eq,
     Expr,
     Function,
@@ -218,6 +219,8 @@ def separate(
 
 def _varying(weak: WeakForm) -> Expr:
     x = weak.variation.space.x
+    if weak.points:
+        return DiracDelta(x - weak.points[0].place)
     return next(value for entry in weak.inside.values() for value in entry.values() if value.has(x))
 
 

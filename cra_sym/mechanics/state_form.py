@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sympy import Expr, Matrix, S, Symbol, eye, zeros
+from sympy import Expr, Matrix, S, Symbol, diag, eye, zeros
 from sympy.core.function import AppliedUndef
 
 from cra_sym import checks
@@ -40,6 +40,9 @@ class StateForm:
         Whether the parameter is s.
     x : Symbol
     length : Expr
+    points : tuple of (place, Matrix, held)
+        At interior places the forces P and r grow by the matrix, (n + m, n + m), times (q, w); the displacements of a
+        section with the numbers held vanish there.
     """
 
     displacements: tuple[Expr, ...]
@@ -52,11 +55,12 @@ class StateForm:
     damped: bool
     x: Symbol
     length: Expr
+    points: tuple[tuple[Expr, Matrix, tuple[int, ...]], ...] = ()
 
     @property
     def uniform(self) -> bool:
-        """Whether the system is constant along x."""
-        return not self.system.has(self.x)
+        """Whether the system is constant along x, with nothing at interior places."""
+        return not self.points and not self.system.has(self.x)
 
 
 def state_form(result: HamiltonResult) -> StateForm:
@@ -107,6 +111,24 @@ def state_form(result: HamiltonResult) -> StateForm:
         not weak.even,
         result.x,
         result.domain[1] - result.domain[0],
+        _points(weak, parameter),
+    )
+
+
+def _points(weak: WeakForm, parameter: Symbol) -> tuple[tuple[Expr, Matrix, tuple[int, ...]], ...]:
+    section, _, lumped = weak.fields()
+    rows = [*section, *lumped]
+    return tuple(
+        (
+            point.place,
+            Matrix(
+                len(rows),
+                len(rows),
+                [polynomial(point.form.get((p, q), {}).items(), parameter, weak.even) for p in rows for q in rows],
+            ),
+            tuple(section.index(jet) for jet in point.held),
+        )
+        for point in weak.points
     )
 
 
@@ -139,7 +161,7 @@ def _system(weak: WeakForm, parameter: Symbol) -> Matrix:
         if jet.space:
             pick_top[row, n + m + section.index(jet._replace(space=jet.space - 1))] = S.One
     motion = eye(n + m).row_join(zeros(n + m))
-    top = leading.inv() * (pick_top - stiffness(highest, state) * motion)
+    top = _inverse(leading) * (pick_top - stiffness(highest, state) * motion)
     slope, lower = zeros(n, width), zeros(n + m, width)
     for row, jet in enumerate(section):
         raised = jet._replace(space=jet.space + 1)
@@ -149,6 +171,11 @@ def _system(weak: WeakForm, parameter: Symbol) -> Matrix:
             slope[row, :] = top[highest.index(raised), :]
     rate = stiffness(state, state) * motion + stiffness(state, highest) * top - lower
     return Matrix.vstack(slope, zeros(m, width), rate)
+
+
+def _inverse(matrix: Matrix) -> Matrix:
+    """Return the inverse; of a diagonal matrix entry by entry, as it stands: 1 + exp(-x) stays bounded."""
+    return diag(*(1 / entry for entry in matrix.diagonal())) if matrix.is_diagonal() else matrix.inv()
 
 
 def _boundary(weak: WeakForm, parameter: Symbol) -> Matrix:

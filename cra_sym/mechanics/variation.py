@@ -11,6 +11,7 @@ from sympy import Add, Expr, S, expand_mul
 from cra_sym.checks import shown
 from cra_sym.mechanics.constraints import Elimination, eliminate
 from cra_sym.mechanics.jets import END_NAMES, End, HamiltonError, Jet, JetSpace
+from cra_sym.mechanics.points import Point, read_points, supports
 
 __all__ = ["Forces", "Variation", "VirtualWork", "lagrange_forces", "vary"]
 
@@ -34,6 +35,8 @@ class Variation:
         Highest x derivative of each field: as many displacements exist at each end.
     elimination : Elimination
         End displacements fixed by the essential conditions.
+    points : tuple of Point
+        What acts at interior places.
     """
 
     space: JetSpace
@@ -42,6 +45,7 @@ class Variation:
     applied: tuple[tuple[Expr, Jet, bool], ...]
     orders: tuple[int, ...]
     elimination: Elimination
+    points: tuple[Point, ...] = ()
 
 
 def vary(
@@ -50,12 +54,14 @@ def vary(
     ends: Mapping[End, Expr],
     virtual_work: Sequence[VirtualWork],
     essential: Sequence[Expr],
+    inside: Sequence[tuple[Expr, Expr]] = (),
 ) -> Variation:
     """Read what is given into jet symbols and check that every end term can do work."""
-    inside = space.read(density, "domain", "density")
+    along = space.read(density, "domain", "density")
+    essential, held = supports(essential, space.x, tuple(space.ends.values()))
     terms = {end: space.read(ends[end], end, f"{end} end") for end in END_NAMES}
     applied = tuple(work for triple in virtual_work for work in _read_work(space, triple))
-    varied = [*space.jets(inside), *(jet for _, jet, everywhere in applied if everywhere)]
+    varied = [*space.jets(along), *(jet for _, jet, everywhere in applied if everywhere)]
     orders = tuple(
         max((jet.space for jet in varied if jet.unknown == number), default=0) for number in range(len(space.fields))
     )
@@ -72,7 +78,8 @@ def vary(
             label = f"virtual work of {space.write(force)} on {space.form(jet)}"
             _check_end_term(space, label, [jet], orders)
             elimination.check_effective(space.symbol(jet), label)
-    return Variation(space, inside, terms["left"] + terms["right"], applied, orders, elimination)
+    points = read_points(space, inside, held, orders)
+    return Variation(space, along, terms["left"] + terms["right"], applied, orders, elimination, points)
 
 
 def _check_end_term(space: JetSpace, label: str, jets: Sequence[Jet], orders: Sequence[int]) -> None:

@@ -19,6 +19,16 @@ Bilinear = dict[tuple[Jet, Jet], dict[int, Expr]]
 
 
 @dataclass(frozen=True)
+class PointForm:
+    """The weak form at an interior place, in the jets of the interval, and the displacements that are held there."""
+
+    place: Expr
+    form: Bilinear
+    load: dict[Jet, Expr]
+    held: tuple[Jet, ...]
+
+
+@dataclass(frozen=True)
 class WeakForm:
     r"""``sum W[p, q](s) q  =  load`` on every varied displacement p; jets without time derivative name displacements.
 
@@ -29,6 +39,8 @@ class WeakForm:
         ``s**0``, damping (and gyroscopic forces) of ``s**1``, mass of ``s**2``.
     inside_load, end_load : dict of Jet to Expr
         What does not depend on the unknowns: prescribed motions and applied forces.
+    points : tuple of PointForm
+        The same at interior places.
     """
 
     variation: Variation
@@ -36,11 +48,13 @@ class WeakForm:
     ends: Bilinear
     inside_load: dict[Jet, Expr]
     end_load: dict[Jet, Expr]
+    points: tuple[PointForm, ...] = ()
 
     @property
     def powers(self) -> set[int]:
         """Powers of s that occur."""
-        return {power for form in (self.inside, self.ends) for entry in form.values() for power in entry}
+        forms = (self.inside, self.ends, *(point.form for point in self.points))
+        return {power for form in forms for entry in form.values() for power in entry}
 
     @property
     def even(self) -> bool:
@@ -51,7 +65,35 @@ class WeakForm:
     def uniform(self) -> bool:
         """Whether no coefficient depends on x."""
         x = self.variation.space.x
-        return not any(value.has(x) for entry in self.inside.values() for value in entry.values())
+        return not self.points and not any(v.has(x) for entry in self.inside.values() for v in entry.values())
+
+    @property
+    def discrete(self) -> Bilinear:
+        """What acts at the ends, on the lumped coordinates and at interior places, these with their number as place."""
+        found = dict(self.ends)
+        for number, point in enumerate(self.points):
+            for (p, q), entry in point.form.items():
+                pair = self._numbered(p, number), self._numbered(q, number)
+                sums = found.setdefault(pair, {})
+                found[pair] = {k: sums.get(k, S.Zero) + entry.get(k, S.Zero) for k in {*sums, *entry}}
+        return found
+
+    @property
+    def discrete_load(self) -> dict[Jet, Expr]:
+        """The same of the loads."""
+        found = dict(self.end_load)
+        for number, point in enumerate(self.points):
+            for jet, value in point.load.items():
+                jet = self._numbered(jet, number)
+                found[jet] = found.get(jet, S.Zero) + value
+        return found
+
+    def place(self, jet: Jet) -> Expr:
+        """Return the place of a jet of an end or of an interior place."""
+        return self.points[jet.place].place if isinstance(jet.place, int) else self.variation.space.ends[jet.place]
+
+    def _numbered(self, jet: Jet, number: int) -> Jet:
+        return jet._replace(place=number) if self.variation.space.is_field(jet.unknown) else jet
 
     def fields(self) -> tuple[list[Jet], list[Jet], list[Jet]]:
         """Return the displacements of a section, the highest derivative of each field, and the coordinates."""
@@ -81,7 +123,13 @@ def weak_form(variation: Variation) -> WeakForm:
             _accumulate(form, displacement, jet, -factor)
         still = force.xreplace({space.symbol(jet): S.Zero for jet in space.jets(force)})
         load[displacement] = load.get(displacement, S.Zero) + still
-    return WeakForm(variation, _cleaned(inside), _cleaned(ends), _nonzero(inside_load), _nonzero(end_load))
+    points = []
+    for point in variation.points:
+        form, load = _quadratic(space, point.lagrangian, f"term inside at {space.x} = {point.place}")
+        points.append(PointForm(point.place, _cleaned(form), _nonzero(load), point.held))
+    return WeakForm(
+        variation, _cleaned(inside), _cleaned(ends), _nonzero(inside_load), _nonzero(end_load), tuple(points)
+    )
 
 
 def _quadratic(space: JetSpace, lagrangian: Expr, label: str) -> tuple[Bilinear, dict[Jet, Expr]]:

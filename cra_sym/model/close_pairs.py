@@ -1,66 +1,84 @@
-"""The first two modes where their frequencies nearly coincide: Rayleigh-Ritz values keep digits a determinant loses.
+"""Neighbouring modes whose frequencies nearly coincide: Rayleigh-Ritz values keep digits that a determinant loses.
 
-A heavy end-effector on a soft joint moves as a rigid body, along and about itself. Tuned alike, the two motions have
-frequencies as close as their coupling is weak, and zeros of the determinant at a relative distance g are known to
-eps / g only. The energies of the two motions have no such loss. All other neighbours are well apart.
+A heavy end-effector on a soft joint moves as a rigid body, along and about itself; two heavy ends on springs take no
+notice of each other. Tuned alike, such motions have frequencies as close as their coupling is weak, and zeros of the
+determinant at a relative distance g are known to eps / g only. The energies of the two motions have no such loss: the
+shapes at approximate frequencies span those of the pair up to the error, which enters the values squared.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cra_sym.model.modal import near_shape
-from cra_sym.model.spectrum import pair
+from cra_sym.model.one_wave_family import DimensionlessModes, Family
 from cra_sym.solvers.rayleigh import stationary_values
 
 __all__ = ["CLOSE", "resolve_close_pairs"]
 
+Array = NDArray[np.float64]
+
 CLOSE = 0.1
-"""Relative distance of two frequencies below which their zeros are replaced by Rayleigh-Ritz values."""
+"""Distance of two frequency parameters, relative below 1, under which Rayleigh-Ritz values replace the zeros."""
 
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(12)  # exact to rounding up to z of 5, where all close pairs lie
-_XI = np.append((1 + _POINTS) / 2, 1.0)[:, None]
-_ALMOST_RIGID = 5.0**0.25
+_APART = 1e-9  # relative distance of what spans the pair at least: its square is nothing
+_TURNS = 3  # the first may start from shapes that are nearly parallel
+_LANES = 1000  # at once, which bounds the memory
 
 
-def resolve_close_pairs(
-    lam: np.ndarray, kappa_t: np.ndarray, kappa_r: np.ndarray, mu: np.ndarray, iota: np.ndarray
-) -> None:
-    """Correct, in place, the first two frequency parameters of every arm in which they lie close to each other.
+def resolve_close_pairs(family: Family, lam: Array, *groups: Array) -> None:
+    """Correct, in place, the frequency parameters of neighbours that lie close to each other.
 
     Parameters
     ----------
+    family : Family
     lam : ndarray, shape (..., modes), contiguous
         Ascending frequency parameters.
-    kappa_t, kappa_r, mu, iota : ndarray, shape (...)
+    groups : ndarray, shape (...)
     """
-    if lam.shape[-1] < 2:
-        return
     rows = lam.reshape(-1, lam.shape[-1])
-    close = np.flatnonzero((rows[:, 0] > (1 - CLOSE) * rows[:, 1]) & (rows[:, 1] < _ALMOST_RIGID))
-    groups = [value.reshape(-1)[close] for value in (kappa_t, kappa_r, mu, iota)]
-    for mode in (0, 1) if close.size else ():
-        rows[close, mode] = _ritz_values(rows[close, mode] ** 4, *groups)[:, mode] ** 0.25
+    flat = [np.broadcast_to(value, lam.shape[:-1]).reshape(-1) for value in groups]
+    for lower in range(rows.shape[1] - 1):
+        low, high = rows[:, lower], rows[:, lower + 1]
+        close = np.flatnonzero(low > (1 - CLOSE) * high)  # few enough for a closer look
+        close = close[high[close] - low[close] < CLOSE * np.minimum(high[close], 1.0)]
+        for start in range(0, close.size, _LANES):
+            some = close[start : start + _LANES]
+            rows[some, lower : lower + 2] = _resolved(family, rows[some, lower : lower + 2], [x[some] for x in flat])
 
 
-def _ritz_values(
-    z: np.ndarray, kappa_t: np.ndarray, kappa_r: np.ndarray, mu: np.ndarray, iota: np.ndarray
-) -> np.ndarray:
-    """Return both stationary values of strain over kinetic energy among the solutions that meet the root's conditions.
+def _resolved(family: Family, pairs: Array, groups: list[Array]) -> Array:
+    """Return pairs of frequency parameters, shape (lanes, 2), from the energies of their shapes."""
+    for _ in range(_TURNS):
+        middle, half = pairs.mean(axis=1), np.maximum(np.diff(pairs)[:, 0], _APART * pairs[:, 1]) / 2
+        apart = np.stack([middle - half, middle + half], axis=1)
+        modes = family.modes(*groups, lam=np.where(np.diff(pairs) < _APART * pairs[:, 1:], apart, pairs), compile=False)
+        strain, kinetic = _energies(modes, groups)
+        pairs = stationary_values(strain, kinetic) ** (0.5 / family.layout.n)
+    return pairs
 
-    Those for the given z hold the mode up to the error of z, which enters squared.
+
+def _energies(modes: DimensionlessModes, groups: list[Array]) -> tuple[Array, Array]:
+    """Return the matrices of twice the strain and twice the kinetic energy, each of shape (lanes, modes, modes).
+
+    The end values are those that the conditions of the right end give; the shapes are bent to them.
     """
-    (s_t, c_t), (s_r, c_r) = pair(kappa_t), pair(kappa_r)
-    states = np.array([[c_t, 0 * z], [0 * z, c_r], [0 * z, s_r], [-s_t, 0 * z]])[:, :, None]  # for each amplitude
-    displacement, slope, curvature = (near_shape(states, z, _XI, order) for order in range(3))
-
-    def integral(shape: np.ndarray) -> np.ndarray:
-        return np.einsum("apn,bpn,p->nab", shape[:, :-1], shape[:, :-1], _WEIGHTS / 2)
-
-    def at_tip(shape: np.ndarray, inertia: np.ndarray) -> np.ndarray:
-        return np.einsum("an,bn,n->nab", shape[:, -1], shape[:, -1], inertia)
-
-    strain = integral(curvature)
-    strain[:, 0, 0] += s_t * c_t
-    strain[:, 1, 1] += s_r * c_r
-    return stationary_values(strain, integral(displacement) + at_tip(displacement, mu) + at_tip(slope, iota))
+    table, n = modes.family.layout, modes.family.layout.n
+    points, weights = np.polynomial.legendre.leggauss(int(np.ceil(modes.lam.max())) + 24)  # more than products need
+    xi, weights = (1 + points) / 2, weights / 2
+    rows = modes.quantities(slice(0, table.size))
+    ends = np.array([1.0])
+    missing = [rows[table.right][j][..., None] - modes.shape(ends, j) for j in range(n)]
+    beam = [(xi**2 * (3 - 2 * xi), 6 - 12 * xi), (xi**2 * (xi - 1), 6 * xi - 2)]
+    hermite = beam if n == 2 else [(xi, np.ones_like(xi))]
+    shape, bent = modes.shape(xi, 0), modes.shape(xi, n)
+    for gap, (value, curved) in zip(missing, hermite, strict=True):
+        shape, bent = shape + gap * value, bent + gap * curved
+    strain, kinetic = ((f * weights) @ np.swapaxes(f, 1, 2) for f in (bent, shape))
+    for root in rows[table.strain]:
+        strain = strain + root[:, :, None] * root[:, None, :]
+    for position in table.inertias:
+        end, j = divmod(table.groups[position][0], n)
+        q = rows[table.right if end else table.left][j]
+        kinetic = kinetic + groups[position][:, None, None] * (q[:, :, None] * q[:, None, :])
+    return strain, kinetic

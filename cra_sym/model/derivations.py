@@ -11,15 +11,20 @@ from sympy.core.function import AppliedUndef
 
 from cra_sym.checks import mapping, shown
 from cra_sym.kernels import Kernel, kernel
+from cra_sym.mechanics.breakpoints import derivative
 from cra_sym.mechanics.jets import END_NAMES, Jet
 from cra_sym.mechanics.weak import Bilinear, WeakForm, weak_form
+from cra_sym.model.energies import stress_route
 from cra_sym.model.exact import BallProblem, exact_kernel
 from cra_sym.model.forms import form_of, load_of
 from cra_sym.model.lagrangian import Model
-from cra_sym.model.projection import Form, Load
+from cra_sym.model.moving import jumps
+from cra_sym.model.one_wave import one_wave_route
+from cra_sym.model.projection import EndParameter, Form, Load
 from cra_sym.model.routes import GeneralRoute, Route
 from cra_sym.model.spatial import SpatialProblem, spatial_problem
 from cra_sym.model.symmetry import asymmetry
+from cra_sym.model.two_waves import two_waves_route
 
 __all__ = ["axial", "causes", "constant", "damping", "geometry", "load", "names", "rates", "route", "spatial"]
 
@@ -53,6 +58,16 @@ def damped_spatial(model: Model) -> SpatialProblem:
 
 def route(model: Model) -> Route:
     """Return the fastest way to natural frequencies and modes that the Lagrangian allows."""
+    form, left = model.conservative, model.equations.domain[0]
+    compiled = spatial(model)
+    if not compiled.uniform:
+        return stress_route(model, compiled) or GeneralRoute(compiled)
+    fast = one_wave_route(form, model.symbols, left) or two_waves_route(form, compiled, model.symbols)
+    return fast or GeneralRoute(compiled)
+
+
+def general_route(model: Model) -> Route:
+    """Return the route that serves all values."""
     return GeneralRoute(spatial(model))
 
 
@@ -73,7 +88,7 @@ def causes(model: Model) -> tuple[tuple[str, Kind | str], ...]:
 
 def _load_terms(weak: WeakForm) -> list[Expr]:
     space = weak.variation.space
-    loads = (*weak.inside_load.values(), *weak.end_load.values())
+    loads = (*weak.inside_load.values(), *weak.discrete_load.values())
     return [term for e in loads for term in Add.make_args(space.restore(e).expand())]
 
 
@@ -94,7 +109,7 @@ def load(model: Model, name: str) -> Load:
     t = weak.variation.space.t
     function = next(f for e in _load_terms(weak) for f in e.atoms(AppliedUndef) if f.func.__name__ == name)
     cause = function.diff(t, 2) if _kind(weak, function) == "motion" else function
-    parts = (_coefficients(weak, part, cause) for part in (weak.inside_load, weak.end_load))
+    parts = (_coefficients(weak, part, cause) for part in (weak.inside_load, weak.discrete_load))
     return load_of(weak, *parts, model.symbols)
 
 
@@ -112,7 +127,7 @@ def constant(model: Model) -> Load | None:
         values = {jet: weak.variation.space.restore(e).subs(still).doit() for jet, e in part.items()}
         return {jet: value for jet, value in values.items() if value != 0}
 
-    inside, ends = left(weak.inside_load), left(weak.end_load)
+    inside, ends = left(weak.inside_load), left(weak.discrete_load)
     return load_of(weak, inside, ends, model.symbols) if inside or ends else None
 
 
@@ -144,11 +159,11 @@ def momentum(model: Model, initial: Mapping[Expr, Any], order: int) -> Load | No
         for (p, q), entry in form.items():
             if 2 in entry and q.unknown in given:
                 value = given[q.unknown].diff(space.x, q.space)
-                value = value if q.place is None else value.subs(space.x, space.ends[q.place])
+                value = value if q.place is None else value.subs(space.x, weak.place(q))
                 loads[p] = loads.get(p, S.Zero) + entry[2] * value
         return {jet: value for jet, value in loads.items() if value != 0}
 
-    inside, ends = weighed(weak.inside), weighed(weak.ends)
+    inside, ends = weighed(weak.inside), weighed(weak.discrete)
     return load_of(weak, inside, ends, model.symbols) if inside or ends else None
 
 
@@ -160,7 +175,7 @@ def damping(model: Model) -> Form | None:
     weak = weak_form(model.equations.variation)
     if 1 not in weak.powers:
         return None
-    parts = tuple({pair: {1: e[1]} for pair, e in part.items() if 1 in e} for part in (weak.inside, weak.ends))
+    parts = tuple({pair: {1: e[1]} for pair, e in part.items() if 1 in e} for part in (weak.inside, weak.discrete))
     return form_of(weak, {"damping": (parts[0], parts[1])}, model.symbols)
 
 
@@ -174,13 +189,17 @@ def rates(model: Model) -> Form:
     weak = weak_form(model.equations.variation)
     kinds = {"stiffness": 0, "mass": 2}
     named: dict[str, tuple[Bilinear, Bilinear]] = {
-        kind: (_power(weak.inside, power), _power(weak.ends, power)) for kind, power in kinds.items()
+        kind: (_power(weak.inside, power), _power(weak.discrete, power)) for kind, power in kinds.items()
     }
     for symbol in model.symbols:
         for kind in kinds:
             inside, ends = named[kind]
             named[f"{symbol.name} {kind}"] = _rate(weak, inside, symbol, 1), _rate(weak, ends, symbol, 0)
-    return form_of(weak, named, model.symbols)
+    form, found = form_of(weak, named, model.symbols), model.numerics("spatial").breaks
+    if found is None:
+        return form
+    left, right = model.equations.domain
+    return replace(form, jumps=jumps(found, left, right - left, model.symbols))
 
 
 def _power(form: Bilinear, power: int) -> Bilinear:
@@ -197,11 +216,22 @@ def _rate(weak: WeakForm, form: Bilinear, symbol: Symbol, dimension: int) -> Bil
     for (p, q), entry in form.items():
         orders = sum(jet.space for jet in (p, q))
         for power, value in entry.items():
-            rate = value.diff(symbol) + value * (dimension - orders) * length.diff(symbol) / length
-            rate += value.diff(space.x) * drift if dimension else S.Zero
+            rate = derivative(value, symbol) + value * (dimension - orders) * length.diff(symbol) / length
+            rate += derivative(value, space.x) * drift if dimension else S.Zero
             if rate != 0:
-                found[p, q] = {power: rate}
+                _add(found, (p, q), power, rate)
+            if isinstance(p.place, int) or isinstance(q.place, int):
+                place = weak.place(p if isinstance(p.place, int) else q)
+                moved = value * (place.diff(symbol) - drift.subs(space.x, place))
+                if moved != 0:
+                    for pair in ((p._replace(space=p.space + 1), q), (p, q._replace(space=q.space + 1))):
+                        _add(found, pair, power, moved)
     return found
+
+
+def _add(form: Bilinear, pair: tuple[Jet, Jet], power: int, value: Expr) -> None:
+    entry = form.setdefault(pair, {})
+    entry[power] = entry.get(power, S.Zero) + value
 
 
 def axial(model: Model) -> Form:
@@ -212,6 +242,8 @@ def axial(model: Model) -> Form:
     """
     weak = weak_form(model.equations.variation)
     space = weak.variation.space
+    if weak.points:
+        raise ValueError("axial: the inertia of what is at interior places must be stated in the Lagrangian")
     field, tip, slope = Jet(0, 0, 0, None), Jet(0, 0, 0, "right"), Jet(0, 1, 0, None)
     density = weak.inside.get((field, field), {}).get(2, S.Zero)
     place = Dummy("x")
@@ -229,7 +261,7 @@ def carried_mass(model: Model, name: str) -> Kernel:
     jet = Jet(number, 0, 0, None)
     left, right = (space.ends[end] for end in END_NAMES)
     inside = weak.inside.get((jet, jet), {}).get(2, S.Zero)
-    total = integrate(inside, (space.x, left, right)) + weak.ends.get((jet, jet), {}).get(2, S.Zero)
+    total = integrate(inside, (space.x, left, right)) + weak.discrete.get((jet, jet), {}).get(2, S.Zero)
     return kernel(total, model.symbols, backend="numpy")
 
 
@@ -245,13 +277,21 @@ def driven(model: Model, name: str) -> SpatialProblem:
     n, m, z = len(form.displacements), len(form.coordinates), form.parameter
     factor = 1 / z**2 if form.damped else -1 / z
     system, boundary = form.system.as_mutable(), form.boundary.as_mutable()
-    for matrix, row, column in ((system, 2 * n + m + number, n + number), (boundary, n + number, n + number)):
+    points = [matrix.as_mutable() for _, matrix, _ in form.points]
+    own = n + number
+    for matrix, row, column in (
+        (system, 2 * n + m + number, own),
+        *((other, own, own) for other in (boundary, *points)),
+    ):
         matrix[row, column] = S.Zero
         matrix[:, column] = (matrix[:, column] * factor).applyfunc(cancel)
         matrix[row, :] = (matrix[row, :] * factor).applyfunc(cancel)
         if matrix.has(1 / z):
             raise ValueError(f"{name} acts by more than its acceleration")
-    changed = replace(form, system=system.as_immutable(), boundary=boundary.as_immutable())
+    there = tuple(
+        (place, matrix.as_immutable(), held) for (place, _, held), matrix in zip(form.points, points, strict=True)
+    )
+    changed = replace(form, system=system.as_immutable(), boundary=boundary.as_immutable(), points=there)
     return spatial_problem(changed, model.symbols, model.equations.domain[0])
 
 
@@ -260,17 +300,31 @@ def sizes(model: Model) -> tuple[int, int]:
     return len(model.state_form.displacements), len(model.state_form.coordinates)
 
 
-def stiffnesses(model: Model) -> dict[str, tuple[int, int]]:
-    """Return the stiffnesses of an end that hold one of its displacements, with that end (0 or 1) and displacement."""
+def stiffnesses(model: Model) -> dict[str, EndParameter]:
+    """Return the parameters that are, up to a factor, the stiffness of one displacement of an end, by name."""
+    return _end_parameters(model, S.One)
+
+
+def inertias(model: Model) -> dict[str, EndParameter]:
+    """Return the parameters that are, up to a factor, the inertia of one displacement of an end, by name."""
+    return _end_parameters(model, -model.conservative.parameter)
+
+
+def _end_parameters(model: Model, unit: Expr) -> dict[str, EndParameter]:
+    """Return the parameters that add a positive multiple of themselves, times ``unit``, to one entry of an end."""
     form = model.conservative
     n, m = len(form.displacements), len(form.coordinates)
     inside = form.system.free_symbols | form.length.free_symbols | form.free.free_symbols
     found = {}
     for symbol in model.symbols:
-        slope = form.boundary.diff(symbol)
-        places = [k for k in range(2 * n + m) if slope[k, k] == 1 and not n <= k < n + m]
-        if symbol not in inside and len(places) == 1 and sum(entry != 0 for entry in slope) == 1:
-            found[symbol.name] = (0, places[0]) if places[0] < n else (1, places[0] - n - m)
+        entries = [(k, entry / unit) for k, entry in enumerate(form.boundary.diff(symbol)) if entry != 0]
+        if symbol in inside or len(entries) != 1:
+            continue
+        (row, column), factor = divmod(entries[0][0], 2 * n + m), cancel(entries[0][1])
+        if row != column or n <= row < n + m or factor.has(symbol, form.parameter) or factor.is_negative:
+            continue
+        end, place = (0, row) if row < n else (1, row - n - m)
+        found[symbol.name] = EndParameter(end, place, kernel(factor, model.symbols, backend="numpy"))
     return found
 
 
@@ -311,7 +365,7 @@ def fluctuation(model: Model, name: str) -> str:
     symbol = next(s for s in model.symbols if s.name == name)
     if any(end.has(symbol) for end in weak.variation.space.ends.values()):
         return "is a length of the domain"
-    entries = [entry for form in (weak.inside, weak.ends) for entry in form.values()]
+    entries = [entry for form in (weak.inside, weak.discrete) for entry in form.values()]
     if any(value.diff(symbol) != 0 for entry in entries for power, value in entry.items() if power):
         return "changes the mass or the damping"
     rates = [entry[0].diff(symbol) for entry in entries if 0 in entry]

@@ -155,8 +155,9 @@ class Fluctuation(Parametric):
         for name in self.springs(system):
             value = np.asarray(system.values[name])
             finite = np.where(np.isinf(value), 0.0, value)
-            end, place = system.numerics("stiffnesses")[name]
-            found.append(np.sqrt(finite)[..., None] * system.modes(modes).displacement(end, place) * moving)
+            end, place, factor = system.numerics("stiffnesses")[name]
+            size = np.sqrt(finite * factor.function(*system.domain.values))
+            found.append(size[..., None] * system.modes(modes).displacement(end, place) * moving)
         return np.stack(np.broadcast_arrays(*found), axis=-2)
 
 

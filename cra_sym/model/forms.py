@@ -7,7 +7,7 @@ from typing import Literal, cast
 
 from sympy import Expr, S, Symbol, cancel
 
-from cra_sym.kernels import kernel
+from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics.jets import END_NAMES, Jet
 from cra_sym.mechanics.weak import Bilinear, WeakForm
 from cra_sym.model.projection import Form, Load, Place
@@ -39,6 +39,7 @@ def load_of(weak: WeakForm, inside: Mapping[Jet, Expr], ends: Mapping[Jet, Expr]
         share,
         rest,
         tuple(_place(weak, jet) for jet in others),
+        places=_places(weak, symbols),
     )
 
 
@@ -68,7 +69,14 @@ def form_of(weak: WeakForm, named: Mapping[str, tuple[Bilinear, Bilinear]], symb
         kernel(values[0], (x, *symbols), backend="numpy"),
         kernel(values[1], symbols, backend="numpy"),
         not any(value.has(x) for value in values[0]),
+        places=_places(weak, symbols),
     )
+
+
+def _places(weak: WeakForm, symbols: Symbols) -> Kernel | None:
+    """Return the interior places as functions of the parameters, if there are any."""
+    places = tuple(point.place for point in weak.points)
+    return kernel(places, symbols, backend="numpy") if places else None
 
 
 def _place(weak: WeakForm, jet: Jet) -> Place:
@@ -77,4 +85,6 @@ def _place(weak: WeakForm, jet: Jet) -> Place:
         return Place("lumped", [coordinate.unknown for coordinate in lumped].index(jet.unknown), 0)
     if jet.place is None:
         return Place("inside", section.index(jet._replace(space=0)), jet.space)
+    if isinstance(jet.place, int):
+        return Place("point", section.index(jet._replace(place=None, space=0)), jet.space, jet.place)
     return Place(cast(Literal["left", "right"], jet.place), section.index(jet._replace(place=None)), 0)

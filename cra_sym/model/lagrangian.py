@@ -16,6 +16,7 @@ from cra_sym.checks import mapping
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics import HamiltonResult, Modal, StateForm, hamilton, ritz, separate, state_form
 from cra_sym.mechanics.jets import listed
+from cra_sym.mechanics.points import in_points
 from cra_sym.model.galerkin import Ritz
 from cra_sym.model.numerics import Numerics
 from cra_sym.model.symmetry import asymmetry, odd_in_time
@@ -43,7 +44,12 @@ class Model:
     left, right : Expr, optional
         Lagrangian of each end, in ``v(x, t)`` and its derivatives, understood at that end. Nothing means a free end.
     essential : sequence of Expr, optional
-        What vanishes at an end, such as ``v.subs(x, 0)``. Measure a field from a displacement that is given.
+        What vanishes at an end, such as ``v.subs(x, 0)``. Measure a field from a displacement that is given. At an
+        interior place, ``v.subs(x, a)`` or ``v.diff(x).subs(x, a)``, it is a support.
+    inside : sequence of (place, Expr), optional
+        Lagrangian terms of interior places: point masses, springs, rotary inertias, in ``v(x, t)`` and its derivatives
+        as at an end. ``DiracDelta(x - a)`` times a term in the density means the same. A place that lies beyond the
+        domain for some values is not there.
     coordinates : sequence of applied undefined functions, optional
         Lumped coordinates ``w(t)``.
     prescribed : sequence of applied undefined functions, optional
@@ -91,6 +97,7 @@ class Model:
         left: Expr | None = None,
         right: Expr | None = None,
         essential: Sequence[Expr] = (),
+        inside: Sequence[tuple[Expr, Expr]] = (),
         coordinates: Sequence[AppliedUndef] = (),
         prescribed: Sequence[AppliedUndef] = (),
         virtual_work: Sequence[tuple[Expr, Expr, Any]] | None = None,
@@ -106,6 +113,7 @@ class Model:
             "left": left,
             "right": right,
             "essential": listed("essential", () if essential is None else essential),
+            "inside": tuple(tuple(pair) for pair in listed("inside", () if inside is None else inside)),
             "coordinates": listed("coordinates", coordinates),
             "prescribed": listed("prescribed", prescribed),
             "virtual_work": tuple(
@@ -121,7 +129,10 @@ class Model:
         ends = {label: sympify(term, strict=True) for label, term in stated if term is not None}
         self.equations.variation.elimination.check_homogeneous("Model")
         density, work = self._options["density"], self._options["virtual_work"]
-        given = [density, *self._options["domain"], *self._options["essential"], *ends.values()]
+        ends |= {f"term inside at {x} = {place}": sympify(term, strict=True) for place, term in self._stated_inside}
+        places = [sympify(place, strict=True) for place, _ in self._options["inside"]]
+        given = [density, *self._options["domain"], *self._options["essential"], *ends.values(), *places]
+        given += [term for _, term in self._options["inside"]]
         given += [part for force, displacement, _ in work for part in (force, displacement)]
         self.symbols: tuple[Symbol, ...] = parameters(given, self.equations)
         """The parameters: every symbol but x and t, by name."""
@@ -134,14 +145,20 @@ class Model:
         options = {name: piece for name, piece in self._pieces.items() if name not in ("units", "definitions")}
         definitions = dict(self._pieces["definitions"])
         if not definitions:
-            return options
+            return self._with_points(options)
 
         def put(piece: Any) -> Any:
             if isinstance(piece, tuple):
                 return tuple(put(part) for part in piece)
             return piece.subs(definitions) if isinstance(piece, Expr) and not isinstance(piece, Symbol) else piece
 
-        return {name: put(piece) for name, piece in options.items()}
+        return self._with_points({name: put(piece) for name, piece in options.items()})
+
+    def _with_points(self, options: dict[str, Any]) -> dict[str, Any]:
+        """Return the options with point loads of the density among the terms at interior places."""
+        density, points = in_points(options["density"], options["x"])
+        self._stated_inside = options["inside"]
+        return {**options, "density": density, "inside": (*options["inside"], *points)} if points else options
 
     def replace(self, **changes: Any) -> Model:
         """Return the same model with some of what it was made of replaced.

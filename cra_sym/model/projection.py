@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.kernels import Kernel
-from cra_sym.model.routes import Modes, RigidShare
+from cra_sym.model.moving import Jumps
+from cra_sym.model.routes import Modes, RigidShare, Stations
 
-__all__ = ["Domain", "Form", "Load", "Place", "Projected", "project", "stations"]
+__all__ = ["Domain", "EndParameter", "Form", "Load", "Place", "Projected", "project", "stations"]
 
 Array = NDArray[np.float64]
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
@@ -24,16 +25,19 @@ class Place(NamedTuple):
 
     Attributes
     ----------
-    where : {'inside', 'left', 'right', 'lumped'}
+    where : {'inside', 'left', 'right', 'lumped', 'point'}
     index : int
         Of the section's displacement, or of the coordinate.
     order : int
         Derivative by x of that displacement; 0 at the ends.
+    number : int
+        Of the interior place.
     """
 
-    where: Literal["inside", "left", "right", "lumped"]
+    where: Literal["inside", "left", "right", "lumped", "point"]
     index: int
     order: int
+    number: int = 0
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,8 @@ class Load:
         is one uniform density with end masses.
     rest, rest_ends
         Then the load is that share and these forces on both ends beside it.
+    places : Kernel or None
+        Of the parameters: interior places, if there are any.
     """
 
     inside: tuple[Place, ...]
@@ -65,6 +71,7 @@ class Load:
     share: Kernel | None = None
     rest: Kernel | None = None
     rest_ends: tuple[Place, ...] = ()
+    places: Kernel | None = None
 
 
 @dataclass(frozen=True)
@@ -81,6 +88,11 @@ class Form:
         Of (x, parameters) and of the parameters: coefficients of all entries of the first form, then of the next.
     uniform : bool
         Whether the coefficients inside are constant along x.
+    jumps : Jumps or None
+        Of the coefficients inside, if the forms are rates by the parameters: then 'stiffness' and 'mass' are there,
+        and '<parameter> stiffness' and '<parameter> mass' in the order of the parameters.
+    places : Kernel or None
+        Of the parameters: interior places, if there are any.
     """
 
     names: tuple[str, ...]
@@ -89,6 +101,24 @@ class Form:
     density: Kernel
     points: Kernel
     uniform: bool
+    jumps: Jumps | None = None
+    places: Kernel | None = None
+
+
+class EndParameter(NamedTuple):
+    """A parameter that adds itself, times a factor, to the stiffness or to the inertia of one displacement of an end.
+
+    Attributes
+    ----------
+    end, place : int
+        Left (0) or right (1), and which displacement.
+    factor : Kernel
+        Of the parameters.
+    """
+
+    end: int
+    place: int
+    factor: Kernel
 
 
 class Domain(NamedTuple):
@@ -114,17 +144,37 @@ def column(value: float | Array, axes: int = 1) -> float | Array:
 
 def stations(domain: Domain, modes: Modes) -> tuple[Array, Array]:
     """Return points and weights of a quadrature along the domain, shape (points,) or (..., points)."""
+    if isinstance(modes, Stations):
+        return modes.stations()
     panels = modes.omega.shape[-1] + 8  # ten points each: several to a half-wave of the highest mode
     share = ((np.arange(panels)[:, None] + 0.5 * (1.0 + _POINTS)) / panels).ravel()
     length = column(domain.length)
     return np.asarray(column(domain.left) + share * length), np.tile(0.5 * _WEIGHTS / panels, panels) * length
 
 
-def displaced(modes: Modes, place: Place) -> Array:
-    """Return a displacement of an end or a lumped coordinate of every mode, shape (..., modes)."""
+_ASIDE = 1e-10  # lengths; what has two values at a place is taken there on both sides
+
+
+def displaced(domain: Domain, modes: Modes, place: Place, places: Kernel | None) -> Array:
+    """Return a displacement of an end, an interior place or a lumped coordinate of every mode, shape (..., modes)."""
+    if place.where == "point" and places is not None:
+        return _at_place(domain, modes, place, places)
     if place.where == "lumped":
         return modes.coordinate(place.index)
     return modes.displacement(int(place.where == "right"), place.index)
+
+
+def _at_place(domain: Domain, modes: Modes, place: Place, places: Kernel) -> Array:
+    shape = (*modes.omega.shape[:-1], 1)
+    at = np.broadcast_to(column(places.function(*domain.values)[place.number]), shape)
+    left = column(domain.left)
+    right, aside = left + column(domain.length), _ASIDE * column(domain.length)
+    there = (at > left) & (at < right)
+    at = np.where(there, at, left)
+    if not place.order:
+        return np.where(there, modes.shape(place.index, 0, at)[..., 0], 0.0)
+    both = (modes.shape(place.index, place.order, at + np.where(there, s * aside, 0.0)) for s in (-1, 1))
+    return np.where(there, 0.5 * sum(both)[..., 0], 0.0)
 
 
 def along(modes: Modes, place: Place, x: Array) -> Array:
@@ -138,9 +188,9 @@ def project(domain: Domain, modes: Modes, load: Load) -> Array:
     """Return the generalised force of a load on every mode, shape (..., modes)."""
     if load.share is not None and load.rest is not None and isinstance(modes, RigidShare):
         total = column(load.share.function(*domain.values)) * modes.momentum()
-        return _add_ends(total, modes, load.rest_ends, load.rest.function(*domain.values))
+        return _add_ends(total, domain, modes, load, load.rest_ends, load.rest.function(*domain.values))
     total = np.zeros(modes.omega.shape)
-    total = _add_ends(total, modes, load.ends, load.force.function(*domain.values))
+    total = _add_ends(total, domain, modes, load, load.ends, load.force.function(*domain.values))
     if not load.inside:
         return total
     x, weights = stations(domain, modes)
@@ -150,9 +200,11 @@ def project(domain: Domain, modes: Modes, load: Load) -> Array:
     return total
 
 
-def _add_ends(total: Array, modes: Modes, places: Sequence[Place], forces: Sequence[float | Array]) -> Array:
+def _add_ends(
+    total: Array, domain: Domain, modes: Modes, load: Load, places: Sequence[Place], forces: Sequence[float | Array]
+) -> Array:
     for place, force in zip(places, forces, strict=True):
-        total = total + column(force) * displaced(modes, place)
+        total = total + column(force) * displaced(domain, modes, place, load.places)
     return total
 
 
@@ -189,6 +241,32 @@ class Projected:
                 total = total + column(factor, axes) * product
         for entry in range(len(self._form.inside)):
             total = total + self._inside(number, entry)
+        if self._form.jumps is not None and number > 1:
+            total = total + self._moved(self._form.jumps, *divmod(number - 2, 2))
+        return total
+
+    def _moved(self, jumps: Jumps, parameter: int, kind: int) -> Array | float:
+        """Return the rate of stiffness (0) or mass (1) that comes from the jumps which a parameter moves.
+
+        Of what jumps there itself, such as a curvature, the two sides are multiplied with each other: the force that
+        belongs to it does not jump.
+        """
+        shape = self._modes.omega.shape[:-1]
+        values = [np.broadcast_to(value, shape).ravel() for value in self._domain.values]
+        *sides, rate = jumps.sides(np.array(values).reshape(len(values), -1))
+        if not rate[parameter].any():
+            return 0.0
+        entries = len(self._form.inside)
+        before, after = (side.reshape(*shape, -1) for side in sides)
+        density = [self._form.density.function(x, *map(column, self._domain.values)) for x in (before, after)]
+        total: Array = np.zeros(self._shape)
+        for entry, (first, second) in enumerate(self._form.inside):
+            k = kind * entries + entry
+            factor = (density[0][k] - density[1][k]) * rate[parameter].reshape(*shape, -1)
+            for one, other in ((before, after), (after, before)):
+                left, right = along(self._modes, first, one), along(self._modes, second, other)
+                weighted = left * (0.5 * factor)[..., None, :]
+                total += (weighted * right).sum(axis=-1) if self._diagonal else weighted @ right.swapaxes(-1, -2)
         return total
 
     @property
@@ -218,7 +296,11 @@ class Projected:
 
     @cached_property
     def _ends(self) -> list[Array]:
-        return [self._product(*(displaced(self._modes, place) for place in pair)) for pair in self._form.ends]
+        places = self._form.places
+        return [
+            self._product(*(displaced(self._domain, self._modes, place, places) for place in pair))
+            for pair in self._form.ends
+        ]
 
     def _product(self, first: Array, second: Array) -> Array:
         return first * second if self._diagonal else first[..., :, None] * second[..., None, :]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -14,12 +14,21 @@ from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.values import flat_columns
 from cra_sym.solvers.eigenvalues import lowest
 from cra_sym.solvers.shapes import mode_states
-from cra_sym.solvers.stiffness import DynamicStiffness
 
-__all__ = ["GeneralRoute", "Modes", "RigidShare", "Route", "end_sign"]
+__all__ = [
+    "Estimated",
+    "GeneralRoute",
+    "Modes",
+    "RigidShare",
+    "Route",
+    "StateModes",
+    "Stations",
+    "end_sign",
+    "tip_sign",
+]
 
 Array = NDArray[np.float64]
-_STATIONS = (0.0, 0.22, 0.53, 0.81, 1.0)  # ends, and places that are no node of the first modes
+_SHARES = (0.0, 0.22, 0.53, 0.81, 1.0)  # ends, and places that are no node of the first modes
 Values = Sequence[float | Array]
 """Parameters in the order of the model's symbols; they broadcast to the shape of the batch."""
 
@@ -61,8 +70,27 @@ class RigidShare(Protocol):
         """Return the integral of mass per length times shape, end masses included, shape (..., modes)."""
 
 
+@runtime_checkable
+class Estimated(Protocol):
+    """A route that estimates its own error."""
+
+    def estimated(self, values: Values, shape: tuple[int, ...], modes: int) -> tuple[Array, Array]:
+        """Return the first natural frequencies and the estimated largest relative error of them, shape ``shape``."""
+
+
+@runtime_checkable
+class Stations(Protocol):
+    """Modes that know where a quadrature must have its points."""
+
+    def stations(self) -> tuple[Array, Array]:
+        """Return points and weights of a quadrature along the domain, shape (..., points)."""
+
+
 class Route(Protocol):
     """How frequencies and modes of a model are computed."""
+
+    def covers(self, values: Values) -> bool:
+        """Return whether the route serves these values; the general one serves all."""
 
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:
         """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""
@@ -77,55 +105,87 @@ class GeneralRoute:
 
     spatial: SpatialProblem
 
+    def covers(self, values: Values) -> bool:
+        """Return True: what is not allowed is refused by name."""
+        return True
+
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:
         """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""
+        if self.spatial.points is not None:
+            raise ValueError("inside: terms at interior places need fields with first or second derivatives by x")
         columns = flat_columns(values, shape)
         squares = np.empty((columns.shape[1], modes))
         for rows, _, problem in self.spatial.problems(columns):
             squares[rows] = lowest(problem, modes)
         return np.sqrt(squares).reshape(*shape, modes)
 
-    def modes(self, values: Values, shape: tuple[int, ...], omega: Array) -> GeneralModes:
+    def modes(self, values: Values, shape: tuple[int, ...], omega: Array) -> StateModes:
         """Return the modes of all the first frequencies."""
-        return GeneralModes(omega, self.spatial, flat_columns(values, shape))
+        columns = flat_columns(values, shape)
+        return StateModes(omega, self.spatial, columns, partial(self._states, columns))
+
+    def _states(self, columns: Array, z: Array, x: Array) -> Array:
+        """Return the state of every mode at places x (rows, stations), shape (rows, modes, stations, 2 n + m)."""
+        state = np.empty((*z.shape, x.shape[-1], 2 * self.spatial.displacements + self.spatial.coordinates))
+        for rows, left, problem in self.spatial.problems(columns):
+            state[rows] = mode_states(problem, z[rows], problem.shares(x[rows], left))
+        return state
+
+
+States = Callable[[Array, Array], Array]
 
 
 @dataclass(frozen=True, eq=False)
-class GeneralModes:
-    """Modes from the dynamic stiffness; ``omega`` has the shape of the batch, ``columns`` are flat."""
+class StateModes:
+    """Modes given by the state (q, w, P) of a section.
+
+    Attributes
+    ----------
+    omega : ndarray, shape (..., modes)
+    spatial : SpatialProblem
+    columns : ndarray, shape (parameters, rows)
+        Parameters of the flat batch.
+    states : callable
+        ``states(z, x)`` returns the states of the modes with omega^2 = z (rows, modes) at places x (rows, stations).
+    """
 
     omega: Array
     spatial: SpatialProblem
     columns: Array
+    states: States
 
     @cached_property
-    def _problems(self) -> list[tuple[Array, Array, DynamicStiffness]]:
-        return list(self.spatial.problems(self.columns))
+    def _z(self) -> Array:
+        return self.omega.reshape(-1, self.omega.shape[-1]) ** 2
+
+    @cached_property
+    def _finite(self) -> Array:
+        return np.where(np.isinf(self.columns), 0.0, self.columns)
 
     @cached_property
     def _ends(self) -> Array:
-        """State (q, w, P) at both ends and some places between, shape (rows, modes, stations, 2 n + m)."""
-        n, m = self.spatial.displacements, self.spatial.coordinates
-        z = self._z
-        state = np.empty((*z.shape, len(_STATIONS), 2 * n + m))
-        for rows, _, problem in self._problems:
-            state[rows] = mode_states(problem, z[rows], np.tile(_STATIONS, (len(rows), 1)))
-        return state
+        """States at both ends, signed, shape (rows, modes, 2, 2 n + m)."""
+        return self._signed(self._overview[:, :, [0, -1]])
+
+    @cached_property
+    def _overview(self) -> Array:
+        """States at both ends and some places between, shape (rows, modes, stations, 2 n + m)."""
+        length, left = (np.broadcast_to(g, len(self._z)) for g in self.spatial.geometry.function(*self._finite))
+        return self.states(self._z, left[:, None] + np.multiply.outer(length, _SHARES))
 
     @cached_property
     def _sign(self) -> Array:
         n, m = self.spatial.displacements, self.spatial.coordinates
-        left, right = self._ends[:, :, 0], self._ends[:, :, -1]
-        size = np.abs(self._ends).max(axis=(1, 2), initial=0.0)[:, None]
+        size = np.abs(self._overview).max(axis=(1, 2))[:, None]
+        left, right = self._overview[:, :, 0], self._overview[:, :, -1]
         entries = np.concatenate([right[..., :n], left[..., :n], right[..., n + m :]], axis=-1)
         return end_sign(entries, np.concatenate([size[..., :n], size[..., :n], size[..., n + m :]], axis=-1))
 
-    @property
-    def _z(self) -> Array:
-        return self.omega.reshape(-1, self.omega.shape[-1]) ** 2
+    def _signed(self, states: Array) -> Array:
+        return states * self._sign[..., None]
 
     def _end(self, end: int, entry: int) -> Array:
-        return (self._sign[..., 0] * self._ends[:, :, -end, entry]).reshape(self.omega.shape)
+        return self._ends[:, :, end, entry].reshape(self.omega.shape)
 
     def displacement(self, end: int, place: int) -> Array:
         """Return a displacement of an end section, shape (..., modes)."""
@@ -141,25 +201,17 @@ class GeneralModes:
 
     def shape(self, place: int, derivative: int, x: Array) -> Array:
         """Return a derivative of a displacement of the section at places, shape (..., modes, stations)."""
-        z = self._z
-        x = np.broadcast_to(x, (*self.omega.shape[:-1], x.shape[-1])).reshape(len(z), -1)
-        state = self._states(x)
-        finite = np.where(np.isinf(self.columns), 0.0, self.columns)
-        row = self.spatial.derivative_row(place, derivative, z, x[:, None], finite)
-        found = self._sign * (row * state).sum(axis=-1)
-        return found.reshape(*self.omega.shape, x.shape[-1])
+        x = np.broadcast_to(x, (*self.omega.shape[:-1], x.shape[-1])).reshape(len(self._z), -1)
+        row = self.spatial.derivative_row(place, derivative, self._z, x[:, None], self._finite)
+        return (row * self._at(x)).sum(axis=-1).reshape(*self.omega.shape, x.shape[-1])
 
-    def _states(self, x: Array) -> Array:
+    def _at(self, x: Array) -> Array:
         key = x.tobytes()
         kept: dict[bytes, Array] = self.__dict__.setdefault("_kept", {})
         if key not in kept:
-            n, m = self.spatial.displacements, self.spatial.coordinates
-            state = np.empty((*self._z.shape, x.shape[-1], 2 * n + m))
-            for rows, left, problem in self._problems:
-                share = np.clip((x[rows] - left[:, None]) / problem.length[:, None], 0.0, 1.0)
-                state[rows] = mode_states(problem, self._z[rows], share)
+            found = self._signed(self.states(self._z, x))
             kept.clear()  # one set of stations at a time: those of a quadrature serve many forms
-            kept[key] = state
+            kept[key] = found
         return kept[key]
 
     def integral(self, place: int) -> None:
@@ -179,4 +231,12 @@ def end_sign(entries: Array, size: Array) -> Array:
     """
     moving = np.abs(entries) > 1e-7 * np.where(size > 0.0, size, np.inf)
     first = np.take_along_axis(entries, moving.argmax(axis=-1)[..., None], axis=-1)
+    return np.where(first < 0.0, -1.0, 1.0)
+
+
+def tip_sign(tip: Array) -> Array:
+    """Return the sign that makes the first tip displacement which is not zero positive, shape (..., 1)."""
+    scale = np.abs(tip).max(axis=-2, keepdims=True)
+    moving = np.abs(tip) > 1e-7 * np.where(scale > 0.0, scale, 1.0)
+    first = np.take_along_axis(tip, moving.argmax(axis=-1)[..., None], axis=-1)
     return np.where(first < 0.0, -1.0, 1.0)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.kernels import Kernel, kernel
+from cra_sym.model.breaks import Breaks, breaks
 from cra_sym.model.values import infinite_patterns
-from cra_sym.solvers.stiffness import DynamicStiffness, Evaluation
+from cra_sym.solvers.stiffness import GOLDEN, DynamicStiffness, Evaluation
 
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
@@ -24,8 +25,67 @@ Array = NDArray[np.float64]
 _MOST_DERIVATIVES = 20
 
 
-class _Checked(DynamicStiffness):
-    """The dynamic stiffness for parameters of any size, refused where doubles do not reach."""
+@dataclass(frozen=True)
+class Stiffness(DynamicStiffness):
+    """The dynamic stiffness for parameters of any size, refused where doubles do not reach.
+
+    Its coordinate ``share`` runs through the domain span by span, so that every breakpoint is a node of its pieces.
+
+    Attributes
+    ----------
+    spans : Spans or None
+        Where the coefficients vary along x.
+    at_nodes : callable or None
+        ``at_nodes(z, rows)`` returns (share, matrix, derivative) of what acts at interior places.
+    """
+
+    spans: Spans | None = None
+    at_nodes: Callable[[np.ndarray, np.ndarray], list[tuple[float, np.ndarray, np.ndarray]]] | None = None
+
+    def take(self, rows: np.ndarray) -> DynamicStiffness:
+        """Return the problem of some of the parameter sets."""
+        spans = None if self.spans is None else self.spans.take(rows)
+        at = self.at_nodes
+        at_nodes = None if at is None else lambda z, index: at(z, rows[index])
+        return replace(super().take(rows), spans=spans, at_nodes=at_nodes)  # type: ignore[call-arg]
+
+    def _transfer(self, z: np.ndarray, rows: np.ndarray, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the transfer matrices of all pieces; those right of an interior place begin with what acts there."""
+        whole, slope = super()._transfer(z, rows, levels)
+        for part, piece, jump, rate in self._entered(z, rows, int(levels.max(initial=0))):
+            first, first_slope = whole[part, :, piece], slope[part, :, piece]
+            slope[part, :, piece] = first_slope @ jump + first @ rate
+            whole[part, :, piece] = first @ jump
+        return whole, slope
+
+    def behind(self, start: np.ndarray, z: np.ndarray, row: np.ndarray, level: int) -> np.ndarray:
+        """Return states left of the pieces, (part, row, piece, state), behind what acts there."""
+        found = start
+        for part, piece, jump, _ in self._entered(z, row, level):
+            found = found.copy() if found is start else found
+            found[part, :, piece] = (jump @ start[part, :, piece, :, None])[..., 0]
+        return found
+
+    def _entered(
+        self, z: np.ndarray, rows: np.ndarray, level: int
+    ) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:
+        """Yield part and piece right of each interior place, with the transfer matrix there and its derivative."""
+        if self.at_nodes is None:
+            return
+        size = self.displacements + self.coordinates
+        for share, matrix, rate in self.at_nodes(z, rows):
+            part = int(share > GOLDEN - 1e-9)
+            width = 1.0 - GOLDEN if part else GOLDEN
+            piece = round((share - part * GOLDEN) / width * 2**level)
+            jump = np.broadcast_to(np.eye(2 * size, dtype=matrix.dtype), (len(z), 2 * size, 2 * size)).copy()
+            slope = np.zeros_like(jump)
+            jump[:, size:, :size], slope[:, size:, :size] = matrix, rate
+            yield part, piece, jump, slope
+
+    def shares(self, x: Array, left: Array) -> Array:
+        """Return the shares of places x of shape (stations,) or (rows, stations), in shape (rows, stations)."""
+        share = shares(x, left, self.length)
+        return share if self.spans is None else self.spans.shares(left[:, None] + share * self.length[:, None])
 
     def evaluate(
         self, z: np.ndarray, rows: np.ndarray, *, keep_tree: bool = False, levels: np.ndarray | None = None
@@ -38,6 +98,75 @@ class _Checked(DynamicStiffness):
         if not np.iscomplexobj(here.matrix):  # a guess of a complex eigenvalue may be far off
             check_range(here.matrix, here.derivative)
         return here
+
+
+@dataclass(frozen=True)
+class PointTerms:
+    """Compiled terms at interior places.
+
+    Attributes
+    ----------
+    matrices : Kernel
+        Of (parameter, parameters): for each place what the forces (P, r) grow by, times (q, w), and its derivative.
+    held : tuple of tuple of int
+        Displacements of a section that vanish at each place.
+    """
+
+    matrices: Kernel
+    held: tuple[tuple[int, ...], ...]
+
+    def at(self, z: Array, columns: Array) -> list[tuple[Array, Array]]:
+        """Return matrix and derivative of each place, (len(z), n + m, n + m)."""
+        found = self.matrices(z, *columns)
+        return [(found[k], found[k + 1]) for k in range(0, len(found), 2)]
+
+
+@dataclass(frozen=True)
+class Spans:
+    """A coordinate s from 0 to 1 that passes through breakpoints at nodes of the dynamic stiffness.
+
+    Attributes
+    ----------
+    knots : ndarray, shape (spans + 1,)
+        Nodes.
+    edges : ndarray, shape (rows, spans + 1)
+        Left end, breakpoints, right end.
+    """
+
+    knots: Array
+    edges: Array
+
+    @classmethod
+    def of(cls, edges: Array) -> tuple[Spans, int]:
+        """Return the coordinate for breakpoints, and how often a part must be halved to have these nodes."""
+        number = edges.shape[1]
+        halvings = max(6, int(np.ceil(np.log2(2 * number))))
+        cells = np.arange(2**halvings + 1) / 2**halvings
+        nodes = np.unique(np.concatenate([GOLDEN * cells, GOLDEN + (1.0 - GOLDEN) * cells]))
+        share = ((edges - edges[:, :1]) / (edges[:, -1:] - edges[:, :1])).mean(axis=0)
+        place = np.searchsorted(nodes, share)
+        for k in range(1, number):  # one after the other, from the left and then from the right
+            place[k] = max(place[k], place[k - 1] + 1)
+        place[-1] = len(nodes) - 1
+        for k in range(number - 2, -1, -1):
+            place[k] = min(place[k], place[k + 1] - 1)
+        return cls(nodes[place], edges), halvings
+
+    def take(self, rows: np.ndarray) -> Spans:
+        """Return those of some rows."""
+        return Spans(self.knots, self.edges[rows])
+
+    def places(self, share: Array, rows: np.ndarray) -> tuple[Array, Array]:
+        """Return x and dx/ds at shares of shape (rows or 1, stations)."""
+        share = np.broadcast_to(share, (len(rows), share.shape[-1]))
+        span = np.clip(np.searchsorted(self.knots, share, side="right") - 1, 0, len(self.knots) - 2)
+        left, right = (self.edges[rows[:, None], span + k] for k in (0, 1))
+        slope = (right - left) / (self.knots[span + 1] - self.knots[span])
+        return left + (share - self.knots[span]) * slope, slope
+
+    def shares(self, x: Array) -> Array:
+        """Return the shares of places, shape (rows, stations)."""
+        return np.stack([np.interp(at, row, self.knots) for at, row in zip(x, self.edges, strict=True)])
 
 
 def check_range(*numbers: np.ndarray) -> None:
@@ -68,6 +197,10 @@ class SpatialProblem:
         What each stiffness of an end, by its position, multiplies in the boundary matrix: it may be infinite.
     rows : tuple of tuple of Kernel
         For each displacement, the rows c with ``D^order q = c (q, w, P)``, order 0 and up.
+    breaks : Breaks or None
+        Where the system is not smooth along x, unless it is uniform.
+    points : PointTerms or None
+        What acts at interior places.
     """
 
     names: tuple[str, ...]
@@ -80,6 +213,8 @@ class SpatialProblem:
     free: Kernel | None
     end_stiffness: dict[int, Kernel]
     rows: tuple[tuple[Kernel, ...], ...]
+    breaks: Breaks | None = None
+    points: PointTerms | None = None
 
     def derivative_row(self, place: int, order: int, z: np.ndarray, x: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Return the row c with ``D^order q[place] = c (q, w, P)``, shape (rows, modes, stations, 2 n + m)."""
@@ -97,7 +232,7 @@ class SpatialProblem:
                 row = (row[..., None, :] @ matrix)[..., 0, :]
         return row[..., :size]
 
-    def problems(self, columns: Array) -> Iterator[tuple[np.ndarray, np.ndarray, DynamicStiffness]]:
+    def problems(self, columns: Array) -> Iterator[tuple[np.ndarray, np.ndarray, Stiffness]]:
         """Yield (rows, left ends, problem) for each pattern of infinite stiffness.
 
         Parameters
@@ -112,23 +247,52 @@ class SpatialProblem:
         for rows, infinite in infinite_patterns(columns):
             some = columns[:, rows].copy()
             some[list(infinite)] = 0.0
-            yield rows, *self._problem(some, infinite)
+            length, left = (np.broadcast_to(value, some.shape[1:]) for value in self.geometry(*some))
+            if self.breaks is None:
+                yield rows, left, self._problem(some, infinite, left, length, None)
+                continue
+            for members, edges, nodes in self.breaks.edges(some, left, length):
+                part = self._problem(some[:, members], infinite, left[members], length[members], edges, nodes)
+                yield rows[members], left[members], part
 
-    def _problem(self, columns: np.ndarray, infinite: tuple[int, ...]) -> tuple[np.ndarray, DynamicStiffness]:
-        length, left = (np.broadcast_to(value, columns.shape[1:]) for value in self.geometry(*columns))
+    def _problem(
+        self,
+        columns: np.ndarray,
+        infinite: tuple[int, ...],
+        left: Array,
+        length: Array,
+        edges: Array | None,
+        nodes: tuple[int, ...] = (),
+    ) -> Stiffness:
         n, m = self.displacements, self.coordinates
         free = np.zeros((2 * n + m, 0)) if self.free is None else self.free(*columns)
         for position in infinite:
             free = _without(free, self._rigid_directions(position, columns))
+        spans, halvings = (None, 6) if edges is None else Spans.of(edges)
 
         def section(z: np.ndarray, rows: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            x = left[rows, None] + share * length[rows, None] if not self.uniform else 0.0
-            return _finite(self.system(x, z[:, None], *columns[:, rows, None]), "a coefficient of the equations")
+            if spans is None:
+                return self._coefficients(0.0, z, columns[:, rows])
+            x, slope = spans.places(share, rows)
+            matrix, rate = self._coefficients(x, z, columns[:, rows])
+            stretch = (slope / length[rows, None])[..., None, None]
+            return matrix * stretch, rate * stretch
 
         def ends(z: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return _finite(self.boundary(z, *columns[:, rows]), "an end term")
 
-        return left, _Checked(section, ends, length, n, m, free, self.uniform)
+        def at_nodes(z: np.ndarray, rows: np.ndarray) -> list[tuple[float, np.ndarray, np.ndarray]]:
+            assert self.points is not None and spans is not None
+            terms = zip(self.points.at(z, columns[:, rows]), nodes, strict=True)
+            return [(float(spans.knots[node]), *pair) for pair, node in terms if node >= 0]
+
+        if self.points is not None and any(self.points.held):
+            raise ValueError("essential: supports at interior places are known to natural frequencies and modes alone")
+        jumps = None if self.points is None else at_nodes
+        return Stiffness(section, ends, length, n, m, free, self.uniform, halvings, spans, jumps)
+
+    def _coefficients(self, x: Array | float, z: np.ndarray, columns: Array) -> tuple[np.ndarray, np.ndarray]:
+        return _finite(self.system(x, z[:, None], *columns[..., None]), "a coefficient of the equations")
 
     def _rigid_directions(self, position: int, columns: np.ndarray) -> np.ndarray:
         """Return the end displacements that an infinite stiffness holds still, shape (rows, directions, size)."""
@@ -150,6 +314,11 @@ def spatial_problem(form: StateForm, symbols: tuple[Symbol, ...], left: Expr) ->
         Coordinate of the left end.
     """
     arguments = (form.parameter, *symbols)
+    places = [place for place, _, _ in form.points]
+    found = None if form.uniform else breaks(list(form.system), form.x, symbols, places)
+    matrices = [part for _, matrix, _ in form.points for part in (matrix, matrix.diff(form.parameter))]
+    held = tuple(held for _, _, held in form.points)
+    points = PointTerms(kernel(tuple(matrices), arguments, backend="numpy"), held) if places else None
     system, boundary = (
         kernel((matrix, matrix.diff(form.parameter)), names, backend="numpy")
         for matrix, names in ((form.system, (form.x, *arguments)), (form.boundary, arguments))
@@ -165,6 +334,8 @@ def spatial_problem(form: StateForm, symbols: tuple[Symbol, ...], left: Expr) ->
         kernel(form.free, symbols, backend="numpy") if form.free.cols else None,
         _end_stiffness(form, symbols),
         tuple(_derivative_rows(form, place, arguments) for place in range(len(form.displacements))),
+        found,
+        points,
     )
 
 
@@ -180,14 +351,22 @@ def _end_stiffness(form: StateForm, symbols: tuple[Symbol, ...]) -> dict[int, Ke
 
 
 def _derivative_rows(form: StateForm, place: int, arguments: Sequence[Symbol]) -> tuple[Kernel, ...]:
+    """Return the rows of `SpatialProblem`; where coefficients vary, as many as have derivatives between breakpoints."""
     from sympy import zeros
+
+    from cra_sym.mechanics.breakpoints import derivative
 
     row = zeros(1, form.system.rows)
     row[place] = 1
     kernels = []
     for _ in range(1 if form.uniform else 2 * len(form.displacements) + 3):
-        kernels.append(kernel(row, (form.x, *arguments), backend="numpy"))
-        row = row.diff(form.x) + row * form.system
+        try:
+            kernels.append(kernel(row, (form.x, *arguments), backend="numpy"))
+        except ValueError:
+            if not kernels or form.uniform:
+                raise
+            break  # the derivative of such a coefficient has no function
+        row = row.applyfunc(lambda entry: derivative(entry, form.x)) + row * form.system
     return tuple(kernels)
 
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from cra_sym.checks import broadcastable, count, default_floating_point
 from cra_sym.model.projection import Domain, Load, Projected, project
-from cra_sym.model.routes import Modes
+from cra_sym.model.routes import Estimated, Modes, Route
+from cra_sym.model.spatial import check_range
 from cra_sym.model.values import Value, checked_damping, checked_values, frozen
 
 if TYPE_CHECKING:
@@ -23,7 +24,9 @@ __all__ = ["MOST_MODES", "System"]
 
 Array = NDArray[np.float64]
 MOST_MODES = 1000
-_MOST_KEPT = 4  # numbers of modes for which a system keeps what it computed
+ROUNDING = 1e-11
+"""Bound of the relative rounding of frequencies from closed forms and from the dynamic stiffness."""
+_MOST_KEPT = 8  # numbers of modes for which a system keeps what it computed
 
 
 class System:
@@ -125,9 +128,29 @@ class System:
 
     def _find_frequencies(self, modes: int) -> Array:
         _ = self.domain  # refuses a length that is not positive
-        omega: Array = self.numerics("route").angular_frequencies(self.parameters, self.shape, modes)
+        route = self._route
+        with np.errstate(all="ignore"):
+            if isinstance(route, Estimated):
+                omega, accuracy = route.estimated(self.parameters, self.shape, modes)
+            else:
+                omega = route.angular_frequencies(self.parameters, self.shape, modes)
+                accuracy = np.full(self.shape, ROUNDING)
+        check_range(omega)
+        self.__dict__["_accuracy"] = np.maximum(self.__dict__.get("_accuracy", 0.0), accuracy)
         omega.flags.writeable = False
         return omega
+
+    @property
+    def accuracy(self) -> Array:
+        """Estimated relative error of the natural frequencies, the largest of those computed so far, shape (...).
+
+        Of the first three if none was computed. Where coefficients vary along x it is estimated from the stresses that
+        break equilibrium; a frequency whose error would be beyond 1e-10 is refused. Where they are constant along x
+        frequencies are exact but for rounding, and this is a bound of that, 1e-11.
+        """
+        if "_accuracy" not in self.__dict__:
+            self.natural_frequencies(3)
+        return np.asarray(self.__dict__["_accuracy"])
 
     def modes(self, modes: int) -> Modes:
         """Return the first natural modes."""
@@ -135,8 +158,13 @@ class System:
 
     def _find_modes(self, modes: int) -> Modes:
         omega = self.natural_frequencies(modes)
-        found: Modes = self.numerics("route").modes(self.parameters, self.shape, omega)
-        return found
+        return self._route.modes(self.parameters, self.shape, omega)
+
+    @cached_property
+    def _route(self) -> Route:
+        """The fastest route that covers the values, such as a mass that is not negative."""
+        route: Route = self.numerics("route")
+        return route if route.covers(self.parameters) else self.numerics("general_route")
 
     @default_floating_point
     def _once(self, kind: str, modes: int, find: Any) -> Any:

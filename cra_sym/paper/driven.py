@@ -28,7 +28,7 @@ def base_motion() -> Eq:
 
 
 @proves(33)
-def _() -> Proof:
+def prove_base_motion() -> Proof:
     """Dimensions; without disturbance the motion starts at zero with the mean velocity and the mean acceleration; the
     disturbance alone is a free vibration of angular frequency varpi, largest B."""
     mean, alone = base_motion().rhs.subs(B, 0), base_motion().rhs.subs({v_m: 0, a_m: 0})
@@ -72,7 +72,7 @@ def _integrated(term: Expr) -> Expr:
 
 
 @proves(34)
-def _() -> Proof:
+def prove_modal_response() -> Proof:
     """It solves (11) with the motion (33), starts undisplaced, and starts with the speed that leaves the arm at rest:
     where varpi is not omega_i, and since both sides are entire in varpi, where it is."""
     plain = modal_response().rhs.replace(sinc, lambda angle: sin(angle) / angle)
@@ -85,7 +85,7 @@ def _() -> Proof:
 
 
 @samples(34)
-def _() -> bool:
+def sample_modal_response() -> bool:
     """Another derivation, by divided differences of the exponential function: the unit responses of
     :mod:`cra_sym.model.oscillator` without damping, away from resonance, near it and at it."""
     unit, push, start = unit_responses(), -Gamma_i / M_i, base_motion().rhs.diff(t).subs(t, 0)

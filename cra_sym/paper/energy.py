@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
-from sympy import Eq, Expr, Integral
+from sympy import Eq, Expr, Function, Integral, S, symbols
 
-from cra_sym.arm.lagrangian import kinetic_energy, paper_lagrangian, potential_energy
+from cra_sym.arm.lagrangian import ArmLagrangian, kinetic_energy, paper_lagrangian, potential_energy
 from cra_sym.paper.equations import Proof, numbered, proves
-from cra_sym.paper.evaluation import at, evaluate, put, termwise
+from cra_sym.paper.evaluation import evaluate, put, termwise
 from cra_sym.paper.modal_sum import ModalSum, written_out
+from cra_sym.paper.oracles import forces
 from cra_sym.symbols import Dimension, dimension, symbol
 
-__all__ = ["single_mode"]
+__all__ = ["inner_mass", "inner_stiffness", "single_mode"]
 
 x, t, w, v, y, L = (symbol(name) for name in ("x", "t", "w", "v", "y", "L"))
-E, I_z, rho, A, b, h = (symbol(name) for name in ("E", "I_z", "rho", "A", "b", "h"))
+E, I_z, rho, A = (symbol(name) for name in ("E", "I_z", "rho", "A"))
 m_b, m_e, J_e, k_t, k_r = (symbol(name) for name in ("m_b", "m_e", "J_e", "k_t", "k_r"))
 phi_i, phi_j, q_i, q_j = (symbol(name) for name in ("phi_i", "phi_j", "q_i", "q_j"))
 
@@ -32,7 +34,7 @@ def displacement() -> Eq:
 
 
 @proves(1)
-def _() -> Proof:
+def prove_displacement() -> Proof:
     """Both sides are lengths; an arm that does not deform moves as its base, a base at rest leaves the deformation."""
     seen = displacement().rhs
     yield dimension(displacement()) == Dimension(m=1)
@@ -47,7 +49,7 @@ def separation() -> Eq:
 
 
 @proves(2)
-def _() -> Proof:
+def prove_separation() -> Proof:
     """Both sides are lengths; one term is separable, v v_xt = v_x v_t, and a sum of two is not."""
     one, two = written_out(separation().rhs, "i"), written_out(separation().rhs, "i", "j")
 
@@ -75,19 +77,14 @@ def kinetic() -> Eq:
 
 
 @proves(3)
-def _() -> Proof:
+def prove_kinetic() -> Proof:
     """An energy; an arm that turns rigidly about the root, which moves with the base, has the kinetic energy of its
     mass, its static moment and its moment of inertia."""
     turned = single_mode(kinetic().rhs, x * q_i).doit()
-    mass, static, inertia = _rigid_body()
+    mass, static, inertia = forces.rigid_body()
     base, turn = w.diff(t), q_i.diff(t)
     yield dimension(kinetic()) == ENERGY
     yield turned - (m_b + mass) * base**2 / 2 - static * base * turn - (inertia + J_e) * turn**2 / 2
-
-
-def _rigid_body() -> tuple[Expr, Expr, Expr]:
-    """Return mass, static moment and moment of inertia about the root of a strip with a point mass, by hand."""
-    return tuple(rho * A * L**n / n + m_e * L ** (n - 1) for n in (1, 2, 3))
 
 
 @numbered(4, "potential energy", "definition")
@@ -98,7 +95,7 @@ def potential() -> tuple[Eq, Eq]:
 
 
 @proves(4)
-def _() -> Proof:
+def prove_potential() -> Proof:
     """Energies; an arc of radius R stores E I L / (2 R^2) however it is displaced and turned at the joint, which stores
     what springs do."""
     give, turn, radius = symbol("C_1") * L, symbol("C_2"), symbol("h")
@@ -113,37 +110,59 @@ def _() -> Proof:
 
 
 def inner_mass(first: Expr, second: Expr) -> Expr:
-    """Inner product of two shapes with the masses of manipulator and end-effector."""
-    tip = m_e * first * second + J_e * first.diff(x) * second.diff(x)
-    return Integral(rho * A * first * second, (x, 0, L)) + at(tip, L)
+    """Return the inner product of two shapes in which (3), the base at rest, is half a square."""
+    return put(_inertia()[0], dict(zip(_SHAPES, (first, second), strict=True)))
 
 
 def inner_stiffness(first: Expr, second: Expr, joint: bool = True) -> Expr:
-    """Inner product of two shapes with the stiffness of manipulator and, unless switched off, joint."""
-    root = k_t * first * second + k_r * first.diff(x) * second.diff(x)
-    return Integral(E * I_z * first.diff(x, 2) * second.diff(x, 2), (x, 0, L)) + (at(root, 0) if joint else 0)
+    """Return the inner product of two shapes in which (4), unless asked without the joint, is half a square."""
+    return put(_elasticity(joint), dict(zip(_SHAPES, (first, second), strict=True)))
 
 
-@numbered(6, "generalised mass, stiffness, participation", "definition", (2,))
+_SHAPES = tuple(Function(name)(x) for name in ("first", "second"))
+_SIZES = symbols("first_size second_size")
+_COMBINED = sum(size * shape for size, shape in zip(_SIZES, _SHAPES, strict=True))
+
+
+@cache
+def _inertia() -> tuple[Expr, Expr]:
+    """Return the coefficients in (3) of the speeds of two shapes, and of that of the first with the base's."""
+    base = symbol("C_1")
+    motion = {v: _COMBINED * t, w: base * t}
+    return _coefficient(kinetic_energy(), motion, *_SIZES), _coefficient(kinetic_energy(), motion, _SIZES[0], base)
+
+
+@cache
+def _elasticity(joint: bool) -> Expr:
+    """Return the coefficient in (4) of two shapes."""
+    return _coefficient(potential_energy(joint=joint), {v: _COMBINED}, *_SIZES)
+
+
+def _coefficient(energy: ArmLagrangian, motion: dict[Expr, Expr], *sizes: Expr) -> Expr:
+    """Return the coefficient of a product of two amplitudes in the energy of a motion."""
+    return ArmLagrangian(*(put(part, motion).diff(*sizes).expand() for part in energy)).total()
+
+
+@numbered(6, "generalised mass, stiffness, participation", "derived", (2, 3, 4))
 def generalised() -> tuple[Eq, Eq, Eq]:
-    """Mass and stiffness of a mode, and how strongly the base's acceleration drives it."""
+    """Mass and stiffness of a mode, and how strongly the base's acceleration drives it: in (3) and (4), one mode and
+    the base moving, the coefficients of the squares of the mode's speed and displacement and of both speeds."""
     return (
         Eq(symbol("M_i"), inner_mass(phi_i, phi_i)),
         Eq(symbol("K_i"), inner_stiffness(phi_i, phi_i)),
-        Eq(symbol("Gamma_i"), Integral(rho * A * phi_i, (x, 0, L)) + at(m_e * phi_i, L)),
+        Eq(symbol("Gamma_i"), put(_inertia()[1], {_SHAPES[0]: phi_i})),
     )
 
 
 @proves(6)
-def _() -> Proof:
-    """Dimensions; with the base and one mode moving, the energies (3) and (4) have them as coefficients."""
+def prove_generalised() -> Proof:
+    """Dimensions; the work that the forces of inertia and elasticity of a mode do on the mode itself, and the inertia
+    of the mode on the base, written down by hand."""
     M, K, Gamma = (e.rhs for e in generalised())
-    moving, strained = (single_mode(e.rhs) for e in (kinetic(), potential()[1]))
-    mass, *_ = _rigid_body()
-    base, rate = w.diff(t), q_i.diff(t)
     yield [dimension(e) for e in generalised()] == [Dimension(kg=1), Dimension(kg=1, s=-2), Dimension(kg=1)]
-    yield termwise(moving - (m_b + mass) * base**2 / 2 - Gamma * base * rate - M * rate**2 / 2)
-    yield termwise(strained - K * q_i**2 / 2)
+    yield termwise(M - forces.mass_product(phi_i, phi_i))
+    yield termwise(K - forces.stiffness_product(phi_i, phi_i))
+    yield termwise(Gamma - forces.mass_product(phi_i, S.One))
 
 
 def tidy(value: Expr) -> Expr:
@@ -166,7 +185,7 @@ def lagrangian_function() -> Eq:
 
 
 @proves(7)
-def _() -> Proof:
+def prove_lagrangian_function() -> Proof:
     """An energy: the difference of (3) and (4), whatever the motion."""
     yield dimension(lagrangian_function()) == ENERGY
     yield termwise(lagrangian_function().rhs - kinetic().rhs + potential()[1].rhs)

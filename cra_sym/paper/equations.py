@@ -8,34 +8,39 @@ A section's module writes one small function an equation, and one each for a pro
         return Eq(y, w + v)
 
     @proves(1)
-    def _():
+    def prove_displacement():
         '''The independent route, in words.'''
         yield displacement().rhs.subs(v, 0) - w
 
     @samples(1)
-    def _():
+    def sample_displacement():
         '''The independent route, in words.'''
         return isclose(...)
 
 A proof yields what has to vanish, and :func:`cra_sym.mechanics.identities.vanishes` decides: that an equation is proved
 is its answer, not the author's.
+
+What is derived comes from the Lagrangian in :mod:`cra_sym.arm.lagrangian` and from the engines in
+:mod:`cra_sym.mechanics`; what it is compared with is written down by hand, or found by shooting, in
+:mod:`cra_sym.paper.oracles`. Change a term of the Lagrangian, and the equations follow while their proofs fail.
 """
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
 from operator import index
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from cra_sym.checks import default_floating_point, shown
 
 __all__ = ["Equation", "Proof", "equation", "equations", "numbered", "proves", "samples"]
 
 Number = int | str
+R = TypeVar("R")
 Kind = Literal["definition", "assumption", "derived"]
 Evidence = Literal["proved", "sampled"]
 #: What a proof yields: expressions that vanish identically, and truths without numbers, such as equal dimensions.
@@ -48,7 +53,8 @@ _HOMES: dict[str, range] = {
     "cra_sym.paper.modal_dynamics": range(11, 14),
     "cra_sym.paper.joint": range(14, 17),
     "cra_sym.paper.orthogonality": range(16, 17),
-    "cra_sym.paper.modes": range(17, 27),
+    "cra_sym.paper.modes": range(17, 24),
+    "cra_sym.paper.shapes": range(24, 27),
     "cra_sym.paper.limits": range(27, 31),
     "cra_sym.paper.implicit": range(31, 33),
     "cra_sym.paper.driven": range(33, 35),
@@ -101,7 +107,7 @@ class Equation:
     def checked_by(self) -> str:
         """The independent routes :meth:`check` takes, in words."""
         exact = "Proved" if self.kind == "derived" else "Exact"
-        routes: dict[str, dict[Number, Callable]] = {exact: _PROOFS, "Sampled": _SAMPLES}
+        routes: dict[str, Mapping[Number, Callable[[], Any]]] = {exact: _PROOFS, "Sampled": _SAMPLES}
         return " ".join(f"{how}: {_text(of[self.number])}" for how, of in routes.items() if self.number in of)
 
     @property
@@ -165,7 +171,7 @@ def _typeset(part: Any, width: int = 260) -> str:
     return rf"\begin{{aligned}} {head}&{lines}{tail} \end{{aligned}}"
 
 
-def _text(function: Callable) -> str:
+def _text(function: Callable[..., Any]) -> str:
     return " ".join((inspect.getdoc(function) or "").split())
 
 
@@ -182,13 +188,13 @@ def numbered(
     kind: Kind,
     derived_from: tuple[Number, ...] = (),
     shown: Callable[[], Any] | None = None,
-) -> Callable:
+) -> Callable[[Callable[[], R]], Callable[[], R]]:
     """Register the decorated function, whose docstring is the statement, as the builder of an equation.
 
     ``shown`` builds what is displayed in place of an expression that fills a page.
     """
 
-    def register(function: Callable[[], Any]) -> Callable[[], Any]:
+    def register(function: Callable[[], R]) -> Callable[[], R]:
         source = f"{function.__module__}:{function.__qualname__}"
         if number in _EQUATIONS and _EQUATIONS[number].source != source:
             raise ValueError(f"equation ({number}) is already built by {_EQUATIONS[number].source}")
@@ -199,18 +205,18 @@ def numbered(
     return register
 
 
-def proves(number: Number) -> Callable:
+def proves(number: Number) -> Callable[[Callable[[], Proof]], Callable[[], Proof]]:
     """Register the decorated generator, whose docstring names the route, as the proof of an equation."""
     return _registered(_PROOFS, number)
 
 
-def samples(number: Number) -> Callable:
+def samples(number: Number) -> Callable[[Callable[[], bool]], Callable[[], bool]]:
     """Register the decorated function, whose docstring names the route, as the trial of an equation in numbers."""
     return _registered(_SAMPLES, number)
 
 
-def _registered(routes: dict[Number, Callable], number: Number) -> Callable:
-    def register(function: Callable) -> Callable:
+def _registered(routes: dict[Number, Callable[[], R]], number: Number) -> Callable[[Callable[[], R]], Callable[[], R]]:
+    def register(function: Callable[[], R]) -> Callable[[], R]:
         routes[number] = function
         return function
 
@@ -260,7 +266,7 @@ def equation(number: Number) -> Equation:
         companions = [key for key in _EQUATIONS if isinstance(key, str)]
         whole = [key for key in _EQUATIONS if isinstance(key, int)]
         also = f", and {', '.join(map(repr, sorted(companions, key=_order)))}" if companions else ""
-        raise ValueError(f"number = {shown(number)}: must be from {min(whole)} to {max(whole)}{also}") from None
+        raise ValueError(f"number = {shown(number)}: must be one of {min(whole)} to {max(whole)}{also}") from None
 
 
 def equations(*, companions: bool = False) -> tuple[Equation, ...]:

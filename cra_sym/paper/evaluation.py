@@ -7,8 +7,10 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from sympy import Add, Derivative, Dummy, Expr, Function, Integral, Matrix, S, Subs, lambdify, sympify
 
+from cra_sym.paper.groups import GROUPS
 from cra_sym.paper.oracles.shooting import ShotMode, integrate, sample, shoot
 from cra_sym.symbols import symbol
 
@@ -24,11 +26,10 @@ __all__ = [
     "virtual_factors",
 ]
 
+Array = NDArray[np.float64]
+Shape = Callable[..., Any]  # a mode shape in numbers, called with places and the order of the derivative
 x, t, L = symbol("x"), symbol("t"), symbol("L")
-C_1, beta, c_r, c_t, iota, kappa_r, kappa_t, lamda, mu, r_2, s_r, s_t = (
-    symbol(name)
-    for name in ("C_1", "beta", "c_r", "c_t", "iota", "kappa_r", "kappa_t", "lamda", "mu", "r_2", "s_r", "s_t")
-)
+C_1, beta, lamda, r_2 = (symbol(name) for name in ("C_1", "beta", "lamda", "r_2"))
 
 
 def at(expression: Expr, place: Any) -> Expr:
@@ -52,14 +53,20 @@ def put(expression: Expr, values: Mapping[Expr, Expr]) -> Expr:
         variables, aside = function.args, Function("aside")
         value = value.replace(function.func, aside)
 
-        def local(place: tuple, counts: dict, function=function, value=value, variables=variables) -> Expr:
+        def local(
+            place: tuple[Expr, ...],
+            counts: dict[Expr, int],
+            function: Expr = function,
+            value: Expr = value,
+            variables: tuple[Expr, ...] = variables,
+        ) -> Expr:
             moved = dict(zip(variables, place, strict=True))
             for variable, position in moved.items():
                 value = value.diff(variable, counts.pop(position, 0)) if position.is_Symbol else value
             assert not counts, f"derivative of {function} by {counts}"
             return value.subs(moved, simultaneous=True)
 
-        def derivative(e: Derivative, local=local) -> Expr:
+        def derivative(e: Derivative, local: Callable[..., Expr] = local) -> Expr:
             return local(e.expr.args, dict(e.variable_count))
 
         head = function.func
@@ -142,7 +149,9 @@ def _linear(work: Expr, virtual: Expr) -> list[tuple[Expr, int, int]]:
 
 
 @cache
-def _integrand(integral: Integral, functions: tuple[Expr, ...]) -> tuple[Callable, list[str], list[tuple[Expr, int]]]:
+def _integrand(
+    integral: Integral, functions: tuple[Expr, ...]
+) -> tuple[Callable[..., Array], list[str], list[tuple[Expr, int]]]:
     """Return the integrand as a function of x, the named parameters and the listed derivatives of the shapes."""
     jets = [(f, k) for f in functions for k in range(4, -1, -1) if integral.function.has(f.diff(x, k))]
     stand_ins = {f.diff(x, k): Dummy() for f, k in jets}
@@ -151,7 +160,7 @@ def _integrand(integral: Integral, functions: tuple[Expr, ...]) -> tuple[Callabl
     return lambdify([x, *parameters, *stand_ins.values()], plain, "numpy"), [p.name for p in parameters], jets
 
 
-def evaluate(expression: Expr, values: Mapping[str, float], shapes: Mapping[Expr, Callable] | None = None) -> float:
+def evaluate(expression: Expr, values: Mapping[str, float], shapes: Mapping[Expr, Shape] | None = None) -> float:
     """Return the number an expression has for given parameters and numeric mode shapes.
 
     Parameters
@@ -168,36 +177,33 @@ def evaluate(expression: Expr, values: Mapping[str, float], shapes: Mapping[Expr
     table: dict[Expr, float] = {}
     expression = sympify(expression, strict=True)
     for integral in expression.atoms(Integral):
-        function, names, jets = _integrand(integral, tuple(shapes))
-        parameters = [values[name] for name in names]
-
-        def along(place: np.ndarray, function=function, parameters=parameters, jets=jets) -> np.ndarray:
-            return function(place, *parameters, *(shapes[f](place, k) for f, k in jets)) + 0.0 * place
-
-        table[integral] = integrate(along, length)
+        table[integral] = integrate(_along(integral, values, shapes), length)
     for function, shape in shapes.items():
         for place, number in ((S.Zero, 0.0), (L, length)):
             table |= {at(function.diff(x, k), place): float(shape(number, k)) for k in range(4)}
     return float(sympify(expression.xreplace(table), strict=True).subs(numbers))
 
 
+def _along(integral: Integral, values: Mapping[str, float], shapes: Mapping[Expr, Shape]) -> Callable[[Array], Array]:
+    """Return the integrand as a function of the place."""
+    function, names, jets = _integrand(integral, tuple(shapes))
+    parameters = [values[name] for name in names]
+
+    def along(place: Array) -> Array:
+        return function(place, *parameters, *(shapes[f](place, k) for f, k in jets)) + 0.0 * place
+
+    return along
+
+
 def group_numbers(values: dict[str, float], mode_beta: float) -> dict[Expr, float]:
     """Return lamda and the dimensionless groups of an arm with a finite joint."""
-    bending, mass, length = values["E"] * values["I_z"], values["rho"] * values["A"] * values["L"], values["L"]
-    stiff_t, stiff_r = values["k_t"] * length**3 / bending, values["k_r"] * length / bending
-    weights = {
-        s_t: stiff_t / (1 + stiff_t),
-        c_t: 1 / (1 + stiff_t),
-        s_r: stiff_r / (1 + stiff_r),
-        c_r: 1 / (1 + stiff_r),
+    groups = {group: evaluate(value, values) for group, value in GROUPS.values()}
+    pairs = {
+        symbol(f"{letter}_{end}"): part / (1 + groups[symbol(f"kappa_{end}")])
+        for end in "tr"
+        for letter, part in (("s", groups[symbol(f"kappa_{end}")]), ("c", 1.0))
     }
-    return weights | {
-        lamda: mode_beta * length,
-        kappa_t: stiff_t,
-        kappa_r: stiff_r,
-        mu: values["m_e"] / mass,
-        iota: values["J_e"] / (mass * length**2),
-    }
+    return groups | pairs | {lamda: mode_beta * values["L"]}
 
 
 def shot_coefficients(mode: ShotMode) -> Matrix:

@@ -9,19 +9,20 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from sympy import Eq, Integral, cos, sin
+from sympy import Eq, S, cos, sin
 
-from cra_sym.paper.energy import potential, single_mode, x
+from cra_sym.paper.energy import phi_i, phi_j, potential, single_mode, t, w, x
 from cra_sym.paper.equations import Proof, numbered, proves, samples
 from cra_sym.paper.evaluation import at, evaluate, termwise, virtual_factors
 from cra_sym.paper.modal_dynamics import dynamic_equation
+from cra_sym.paper.oracles import forces
 from cra_sym.paper.oracles.shooting import integrate, sample, shoot
-from cra_sym.paper.parametric import AXIAL, TRANSVERSE, coupling, excited_lagrangian, phi_i, phi_j, t, u, w
+from cra_sym.paper.parametric import AXIAL, TRANSVERSE, coupling, excited_lagrangian
 from cra_sym.symbols import Dimension, dimension, symbol
 
 __all__: list[str] = []
 
-epsilon, varpi, P_ij, w_0, w_1, u_0 = (symbol(n) for n in ("epsilon", "varpi", "P_ij", "w_0", "w_1", "u_0"))
+epsilon, varpi, P_ij, w_0, w_1, u, u_0 = (symbol(n) for n in "epsilon varpi P_ij w_0 w_1 u u_0".split())
 
 
 @numbered(35, "disturbed base", "assumption")
@@ -31,7 +32,7 @@ def disturbed_base() -> Eq:
 
 
 @proves(35)
-def _() -> Proof:
+def prove_disturbed_base() -> Proof:
     """A length; it starts at w_0 with the speed epsilon w_1 varpi and swings about w_0 with angular frequency varpi."""
     motion = disturbed_base().rhs
     yield dimension(disturbed_base()) == Dimension(m=1)
@@ -47,7 +48,7 @@ def axial_base() -> Eq:
 
 
 @proves("35a")
-def _() -> Proof:
+def prove_axial_base() -> Proof:
     """A length; it starts at rest, epsilon u_0 away, and swings about zero with angular frequency varpi."""
     motion = axial_base().rhs
     yield dimension(axial_base()) == Dimension(m=1)
@@ -63,7 +64,7 @@ def fluctuating_joint() -> Eq:
 
 
 @proves("35b")
-def _() -> Proof:
+def prove_fluctuating_joint() -> Proof:
     """An energy: that of the springs of (4), which swings about its mean by epsilon of it, with angular frequency
     varpi."""
     beam, full = (e.rhs for e in potential())
@@ -79,7 +80,7 @@ def excited_system() -> Eq:
 
 
 @proves(36)
-def _() -> Proof:
+def prove_excited_system() -> Proof:
     """Equation (11) on the left, whose coefficients do not depend on time, and on the right -Gamma_i times the
     acceleration of (35)."""
     equation, q = excited_system(), symbol("q_i")
@@ -89,14 +90,13 @@ def _() -> Proof:
 
 
 @samples(36)
-def _() -> bool:
+def sample_excited_system() -> bool:
     """The work of the inertia forces of a random arm, carried rigidly by the base, on modes found by shooting."""
     values, equation = sample(36), excited_system()
     length, instant = values["L"], {t: 0.37, varpi: 2.1, w_1: 0.6, epsilon: 0.01}
     acceleration = float(disturbed_base().rhs.diff(t, 2).subs(instant))
     for mode in shoot(values):
-        line = integrate(lambda p, mode=mode: values["rho"] * values["A"] * mode(p), length)
-        gamma = line + values["m_e"] * mode(length)
+        gamma = values["rho"] * values["A"] * integrate(mode, length) + values["m_e"] * mode(length)
         force = equation.rhs.subs(symbol("Gamma_i"), gamma).subs(instant)
         if abs(float(force) + gamma * acceleration) > 1e-9 * abs(gamma):
             return False
@@ -117,17 +117,18 @@ def axial_coupling() -> Eq:
 
 
 @proves("36a")
-def _() -> Proof:
-    """The energy (35b) of two modes, differentiated by both coordinates and by the fluctuation: the work of the extra
-    spring forces of one on the other."""
+def prove_joint_coupling() -> Proof:
+    """The energy (35b) of two modes, differentiated by both coordinates and by the fluctuation; the work of the extra
+    spring forces of one on the other, written down by hand."""
     q_i, q_j, swing = symbol("q_i"), symbol("q_j"), epsilon * cos(varpi * t)
     energy = single_mode(fluctuating_joint().rhs, phi_i * q_i + phi_j * q_j)
     yield energy.diff(q_i).diff(q_j).diff(epsilon) * epsilon / swing - joint_coupling().rhs
+    yield joint_coupling().rhs - forces.spring_product(phi_i, phi_j)
     yield joint_coupling().lhs == P_ij
 
 
 @samples("36a")
-def _() -> bool:
+def sample_joint_coupling() -> bool:
     """The work of the two extra spring forces of a mode found by shooting on another."""
     values = sample(361)
     first, second = shoot(values)[:2]
@@ -137,11 +138,11 @@ def _() -> bool:
 
 
 @proves("36b")
-def _() -> Proof:
+def prove_axial_coupling() -> Proof:
     """The axial momentum of a bent arm: the foreshortening of every point, whose slope is the product of the slopes of
     the two modes, grows from the joint on and carries the masses of manipulator and end-effector."""
-    shortening, (rho, A, L, m_e) = symbol("eta"), (symbol(name) for name in ("rho", "A", "L", "m_e"))
-    momentum = Integral(rho * A * shortening, (x, 0, L)) + at(m_e * shortening, L)
+    shortening = symbol("eta")
+    momentum = forces.mass_product(shortening, S.One)
     found = axial_coupling().rhs / (u_0 * varpi**2)
     found = found.xreplace({phi_i.diff(x): shortening.diff(x) / phi_j.diff(x)})
     along, _, *others = virtual_factors(termwise(found) - momentum, shortening)
@@ -151,7 +152,7 @@ def _() -> Proof:
 
 
 @samples("36b")
-def _() -> bool:
+def sample_axial_coupling() -> bool:
     """The axial momentum of a bent arm, with the foreshortening of every point by its own quadrature from
     the joint on, its second derivative by two modes found by shooting."""
     values = sample(362)
@@ -159,9 +160,7 @@ def _() -> bool:
     length, line_mass = values["L"], values["rho"] * values["A"]
 
     def shortening(place: Any, a: float, b: float) -> Any:
-        shares = [
-            integrate(lambda p, end=end: (a * first(p, 1) + b * second(p, 1)) ** 2 / 2, end) for end in np.ravel(place)
-        ]
+        shares = [integrate(lambda p: (a * first(p, 1) + b * second(p, 1)) ** 2 / 2, end) for end in np.ravel(place)]
         return np.reshape(shares, np.shape(place))
 
     def moment(a: float, b: float) -> float:

@@ -9,16 +9,19 @@ import sympy as sp
 
 from cra_sym.paper.energy import modal_numbers
 from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.evaluation import group_numbers
+from cra_sym.paper.groups import GROUPS
 from cra_sym.paper.limits import natural_frequency
-from cra_sym.paper.modes import frequency_function, group_numbers
+from cra_sym.paper.modes import frequency_function
 from cra_sym.paper.oracles import by_hand
 from cra_sym.paper.oracles.shooting import sample, shoot
 from cra_sym.symbols import symbol
 
-__all__ = ["frequency_sensitivities", "group_exponents", "implicit_derivatives", "sensitivity_function"]
+__all__ = ["PAIRS", "frequency_sensitivities", "implicit_derivatives", "sensitivity_function"]
 
 lamda, L, E, I_z = (symbol(name) for name in ("lamda", "L", "E", "I_z"))
-_PAIRS = {name: tuple(symbol(f"{letter}_{name}") for letter in ("s", "c")) for name in ("t", "r")}
+#: The pair (s, c) of each stiffness.
+PAIRS = {name: tuple(symbol(f"{letter}_{name}") for letter in ("s", "c")) for name in ("t", "r")}
 
 
 @numbered(31, "sensitivity function", "derived", (23,))
@@ -31,7 +34,7 @@ def sensitivity_function() -> sp.Eq:
 
 
 @proves(31)
-def _() -> Proof:
+def prove_sensitivity_function() -> Proof:
     """The chain rule: whatever the function, its change along the path is none; on the unit circle, a curve known in
     closed form, the slope of the ordinate is minus abscissa over ordinate."""
     kappa, Delta, slope = symbol("kappa_t"), sp.Function("Delta"), sensitivity_function()
@@ -50,24 +53,25 @@ def implicit_derivatives() -> dict[str, sp.Expr]:
     """
     function, _ = frequency_function()
     slope = function.diff(lamda)
-    parts = {f"kappa_{name}": function.diff(s) - function.diff(c) for name, (s, c) in _PAIRS.items()}
+    parts = {f"kappa_{name}": function.diff(s) - function.diff(c) for name, (s, c) in PAIRS.items()}
     parts |= {name: function.diff(symbol(name)) for name in ("mu", "iota")}
     return {name: -part / slope for name, part in parts.items()}
 
 
 def _in_hertz(rates: dict[str, sp.Expr]) -> tuple[sp.Eq, sp.Eq]:
     """Turn d lamda / d kappa for each stiffness into hertz per unit of the stiffness, by (30)."""
-    frequency, hertz = sp.Function("f_i")(symbol("k_t"), symbol("k_r")), natural_frequency().rhs
+    stiffnesses = {name: symbol(f"k_{name}") for name in rates}
+    frequency, hertz = sp.Function("f_i")(*stiffnesses.values()), natural_frequency().rhs
     by_k_t, by_k_r = (
-        sp.Eq(frequency.diff(symbol(f"k_{name}")), hertz.diff(lamda) * L**power / (E * I_z) * rates[name])
-        for name, power in (("t", 3), ("r", 1))
+        sp.Eq(frequency.diff(k), hertz.diff(lamda) * GROUPS[k][1].diff(k) * rates[name])
+        for name, k in stiffnesses.items()
     )
     return by_k_t, by_k_r
 
 
 def _by_parts() -> tuple[sp.Eq, sp.Eq]:
     kappa_t = symbol("kappa_t")
-    return _in_hertz({name: sensitivity_function().rhs.subs(kappa_t, symbol(f"kappa_{name}")) for name in _PAIRS})
+    return _in_hertz({name: sensitivity_function().rhs.subs(kappa_t, symbol(f"kappa_{name}")) for name in PAIRS})
 
 
 @numbered(32, "sensitivities of the frequencies", "derived", (23, 30, 31), shown=_by_parts)
@@ -75,11 +79,11 @@ def frequency_sensitivities() -> tuple[sp.Eq, sp.Eq]:
     """(31) for the two stiffnesses, turned into hertz per N/m and hertz per N m/rad by (30); f_i is proportional to the
     square of λ. Raw sensitivities have different units: only logarithmic ones can be compared. The expression has
     Δ of (23) written out, which fills a page."""
-    return _in_hertz({name: implicit_derivatives()[f"kappa_{name}"] * c**2 for name, (_, c) in _PAIRS.items()})
+    return _in_hertz({name: implicit_derivatives()[f"kappa_{name}"] * c**2 for name, (_, c) in PAIRS.items()})
 
 
 @proves(32)
-def _() -> Proof:
+def prove_frequency_sensitivities() -> Proof:
     """Another principle, first-order perturbation: ω_i² changes by φ_i(0)² / M_i per k_t and by φ_i'(0)² / M_i per k_r.
     Any shape that satisfies the conditions at the joint will do: it is a mode of the arm whose end-effector balances
     its tip. The integral of its square is known from its ends."""
@@ -91,7 +95,7 @@ def _() -> Proof:
     root, tip = shape.subs(xi, 0), shape.subs(xi, 1)
     mass = integral.subs(xi, 1) - integral.subs(xi, 0) - 4 * tip[0] * tip[3] + 4 * tip[1] * tip[2]
     below = frequency_function()[0].diff(lamda)
-    for e, rate, power, pair in zip(frequency_sensitivities(), root, (1, -1), _PAIRS.values(), strict=False):
+    for e, rate, power, pair in zip(frequency_sensitivities(), root, (1, -1), PAIRS.values(), strict=False):
         above, units = e.rhs.as_independent(L, E, I_z, rho, A, as_Add=False)
         yield units - L**power / sp.sqrt(E * I_z * rho * A)
         sides = [above * below, below]
@@ -101,7 +105,7 @@ def _() -> Proof:
 
 
 @samples(32)
-def _() -> bool:
+def sample_frequency_sensitivities() -> bool:
     """Another principle, first-order perturbation. ω_i² changes by φ_i(0)² / M_i per k_t and by
     φ_i'(0)² / M_i per k_r, for modes of a random arm found by shooting."""
     values = sample(32)
@@ -115,48 +119,3 @@ def _() -> bool:
             if abs(found / expected - 1) > 1e-6:
                 return False
     return True
-
-
-def implicit_kernel() -> tuple[dict[str, sp.Expr], tuple[sp.Symbol, ...]]:
-    """Return the implicit derivatives with scaled exponentials, and their arguments, as the kernel wants them."""
-    _, arguments = frequency_function()
-    decay = sp.exp(-lamda)
-    scaled = {sp.cosh(lamda): (1 + decay**2) / 2, sp.sinh(lamda): (1 - decay**2) / 2}
-
-    def ratio(expression: sp.Expr) -> sp.Expr:
-        above, below = sp.fraction(expression)
-        return _scaled(above, scaled, decay) / _scaled(below, scaled, decay)
-
-    return {name: ratio(expression) for name, expression in implicit_derivatives().items()}, arguments
-
-
-def _scaled(expression: sp.Expr, scaled: dict[sp.Expr, sp.Expr], decay: sp.Expr) -> sp.Expr:
-    """Multiply an expression linear in cosh and sinh by exp(-lamda)."""
-    expanded = expression.expand()
-    grown = sum(expanded.coeff(function) * value for function, value in scaled.items())
-    return grown + decay * expanded.subs(dict.fromkeys(scaled, 0))
-
-
-def group_exponents() -> tuple[dict[str, sp.Expr], tuple[sp.Symbol, ...]]:
-    """Return d ln omega^2 / d ln p for the parameters that enter several groups, from the shares of energy in a mode.
-
-    The shares are d ln omega^2 / d ln kappa_t and d ln kappa_r, and minus those by mu and iota: of the two springs in
-    the strain energy and of the end-effector's mass and rotary inertia in the kinetic energy. The rest is the chain
-    rule.
-    """
-    b, h, rho, m_e, J_e = (symbol(name) for name in ("b", "h", "rho", "m_e", "J_e"))
-    k_t, k_r, A = symbol("k_t"), symbol("k_r"), b * h
-    bending, line = E * b * h**3 / 12, rho * A
-    groups = {k_t * L**3 / bending: 1, k_r * L / bending: 1, m_e / (line * L): -1, J_e / (line * L**3): -1}
-    shares = sp.symbols("share_t share_r share_m share_j", nonnegative=True)
-
-    def logarithmic(expression: sp.Expr, p: sp.Symbol) -> sp.Expr:
-        return sp.cancel(expression.diff(p) * p / expression)
-
-    exponents = {}
-    for p in (L, b, h, E, rho):
-        total = logarithmic(bending / (line * L**4), p)
-        for share, (group, sign) in zip(shares, groups.items(), strict=True):
-            total += sign * share * logarithmic(group, p)
-        exponents[p.name] = total
-    return exponents, shares

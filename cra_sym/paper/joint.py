@@ -1,59 +1,51 @@
-"""The elastic joint by the principle of virtual work: equations (14)-(16), a route that does not use Hamilton's."""
+"""The elastic joint by the principle of virtual work: equations (14)-(16).
+
+What works at the ends is read from the Lagrangian; the same work written down by hand confirms it.
+"""
 
 from __future__ import annotations
 
 from sympy import Eq, Expr, Integral, Rational, S
 
-from cra_sym.paper.energy import (
-    E,
-    I_z,
-    J_e,
-    L,
-    displacement,
-    generalised,
-    k_r,
-    k_t,
-    m_e,
-    phi_i,
-    q_i,
-    single_mode,
-    t,
-    v,
-    w,
-    x,
-)
+from cra_sym.arm.lagrangian import paper_lagrangian, potential_energy
+from cra_sym.mechanics.jets import End, JetSpace
+from cra_sym.mechanics.variation import lagrange_forces
+from cra_sym.paper.energy import E, I_z, L, phi_i, q_i, single_mode, t, v, w, x
 from cra_sym.paper.equations import Proof, numbered, proves, samples
 from cra_sym.paper.evaluation import at, evaluate, put, virtual_factors
+from cra_sym.paper.oracles import forces
 from cra_sym.paper.oracles.shooting import sample, shoot
 from cra_sym.symbols import Dimension, dimension, symbol
 
-__all__ = ["boundary_conditions", "mode_conditions"]
+__all__ = ["boundary_conditions", "end_values", "mode_conditions", "section_forces"]
 
-eta, Q, M_z, rho, A, omega_i = (symbol(name) for name in ("eta", "Q", "M_z", "rho", "A", "omega_i"))
-
-
-def _work() -> tuple[Expr, Expr]:
-    """Virtual work at root and tip, not yet evaluated there."""
-    tip_force = m_e * displacement().rhs.diff(t, 2)
-    tip_moment = J_e * v.diff(x, t, t)
-    root = -(Q + k_t * v) * eta + (M_z - k_r * v.diff(x)) * eta.diff(x)
-    tip = (Q - tip_force) * eta - (M_z + tip_moment) * eta.diff(x)
-    return root, tip
+eta, Q, M_z, omega_i = (symbol(name) for name in ("eta", "Q", "M_z", "omega_i"))
 
 
-@numbered(14, "virtual work at the ends", "assumption", (1,))
+@numbered(14, "virtual work at the ends", "derived", (7,))
 def virtual_work() -> tuple[Eq, Eq]:
     """At the joint the manipulator's shear force and moment work against the two springs, at the tip against the
     inertia of the end-effector; for any virtual displacement the sum is zero."""
-    root, tip = _work()
-    return Eq(at(root, 0), 0), Eq(at(tip, L), 0)
+    _, root, tip = paper_lagrangian()
+    section = Q * eta - M_z * eta.diff(x)
+    return Eq(_work(root, "left") - at(section, 0), 0), Eq(_work(tip, "right") + at(section, L), 0)
 
 
-@numbered(15, "shear force and bending moment", "assumption")
+def _work(lagrangian: Expr, end: End) -> Expr:
+    """Return the virtual work of the forces that the Lagrangian of an end stands for."""
+    space = JetSpace([v], [], x, t, (S.Zero, L), [w])
+    work = lagrange_forces(space, space.read(lagrangian, end, f"{end} end"))
+    return sum(
+        (space.restore(force) * at(eta.diff(x, jet.space), space.ends[end]) for jet, force in work.items()), S.Zero
+    )
+
+
+@numbered(15, "shear force and bending moment", "derived", (4,))
 def section_forces() -> tuple[Eq, Eq]:
     """Small deflections of a Bernoulli-Euler beam: moment is curvature times bending stiffness, shear its slope."""
-    moment = E * I_z * v.diff(x, 2)
-    return Eq(Q, moment.diff(x)), Eq(M_z, moment)
+    strain = potential_energy(joint=False).density
+    moment = strain.diff(v.diff(x, 2))
+    return Eq(Q, moment.diff(x) - strain.diff(v.diff(x))), Eq(M_z, moment)
 
 
 def _with_section_forces(expression: Expr) -> Expr:
@@ -62,24 +54,20 @@ def _with_section_forces(expression: Expr) -> Expr:
 
 
 @proves(14)
-def _() -> Proof:
-    """With (15): for any motion and any virtual displacement, the virtual work of the whole arm is the work (14) at the
-    two ends plus that of the field equation along the manipulator."""
-    acceleration, bending = w.diff(t, 2) + v.diff(t, 2), E * I_z
-    inertia = rho * A * acceleration
-    at_root = k_t * v * eta + k_r * v.diff(x) * eta.diff(x)
-    at_tip = m_e * acceleration * eta + J_e * v.diff(x, t, t) * eta.diff(x)
-    density = bending * v.diff(x, 2) * eta.diff(x, 2) + inertia * eta
-    whole = -Integral(density, (x, 0, L)) - at(at_root, 0) - at(at_tip, L)
+def prove_virtual_work() -> Proof:
+    """With (15): for any motion and any virtual displacement, the virtual work of the whole arm, written down by hand,
+    is the work (14) at the two ends plus that of Newton's force on every slice of the manipulator."""
     ends = sum((_with_section_forces(e.lhs - e.rhs) for e in virtual_work()), S.Zero)
-    along = -Integral((bending * v.diff(x, 4) + inertia) * eta, (x, 0, L))
+    along = Integral(forces.newton()[0] * eta, (x, 0, L))
     yield all(dimension(e) == dimension("U") for e in virtual_work())
-    for one, other in zip(virtual_factors(whole, eta), virtual_factors(ends + along, eta), strict=True):
+    for one, other in zip(
+        virtual_factors(forces.virtual_work(eta), eta), virtual_factors(ends + along, eta), strict=True
+    ):
         yield one - other
 
 
 @proves(15)
-def _() -> Proof:
+def prove_section_forces() -> Proof:
     """Dimensions; an arc of radius R carries the moment E I / R and no shear; a tip load F gives the shear -F
     everywhere, no moment at the tip and the textbook deflection F L^3 / (3 E I)."""
     radius, load = symbol("h"), symbol("C_1")
@@ -97,24 +85,25 @@ def _() -> Proof:
 def boundary_conditions() -> tuple[Eq, Eq, Eq, Eq]:
     """(15) in (14): the virtual displacement and the virtual slope at each end are arbitrary, so each one's factor
     vanishes on its own. Root force, root moment, tip force, tip moment."""
-    root, tip = _work()
-
-    def factor(work: Expr, choice: Expr, place: Expr) -> Expr:
-        return at(_with_section_forces(put(work, {eta: choice})), place)
-
-    return (
-        _solved(factor(root, S.One, S.Zero), at(v.diff(x, 3), 0)),
-        _solved(factor(root, x, S.Zero), at(v.diff(x, 2), 0)),
-        _solved(factor(tip, S.One, L), at(v.diff(x, 3), L)),
-        _solved(factor(tip, x - L, L), at(v.diff(x, 2), L)),
+    shear, moment = (law.rhs for law in section_forces())
+    works = ((virtual_work()[0].lhs, S.Zero), (virtual_work()[1].lhs, L))
+    return tuple(
+        _solved(_with_section_forces(put(work, {eta: choice})), at(force, place), value)
+        for (work, place), values in zip(works, (end_values(v)[:2], end_values(v)[2:]), strict=True)
+        for choice, force, value in zip((S.One, x - place), (shear, moment), values, strict=True)
     )
 
 
-def _solved(condition: Expr, derivative: Expr) -> Eq:
-    """Write a condition linear in an end value as ``E I end value = rest``."""
+def end_values(shape: Expr) -> tuple[Expr, ...]:
+    """Return what the four conditions of (16) determine of a shape: v_xxx and v_xx at the root, then at the tip."""
+    return tuple(at(shape.diff(x, order), place) for place in (S.Zero, L) for order in (3, 2))
+
+
+def _solved(condition: Expr, force: Expr, value: Expr) -> Eq:
+    """Write a condition linear in a force of the section as ``force = rest``; ``value`` is what it depends on."""
     condition = condition.expand()
-    sign = condition.coeff(derivative) / (E * I_z)
-    return Eq(E * I_z * derivative, (-(condition - sign * E * I_z * derivative) / sign).expand())
+    sign = condition.coeff(value) / force.coeff(value)
+    return Eq(force, ((sign * force - condition) / sign).expand())
 
 
 @numbered("16a", "boundary conditions of a mode", "derived", (2, 16))
@@ -135,27 +124,27 @@ def free_vibration(expression: Expr) -> Expr:
 
 
 def rayleigh_factors() -> tuple[Expr, ...]:
-    """Return what a virtual change of a mode's shape is multiplied by in that of (K_i - omega_i^2 M_i) / 2, by (6).
+    """Return what a virtual change of a mode's shape is multiplied by in that of (K_i - omega_i^2 M_i) / 2, by hand.
 
     Along the manipulator, displacement and slope at the root, displacement and slope at the tip.
     """
     size = symbol("epsilon")
-    M, K, _ = (e.rhs for e in generalised())
-    varied = put(K - omega_i**2 * M, {phi_i: phi_i + size * eta}).diff(size).subs(size, 0)
-    return virtual_factors(varied.doit(integrals=False) / 2, eta)
+    varied = phi_i + size * eta
+    energy = forces.stiffness_product(varied, varied) - omega_i**2 * forces.mass_product(varied, varied)
+    return virtual_factors(energy.diff(size).subs(size, 0).doit(integrals=False) / 2, eta)
 
 
 @proves("16a")
-def _() -> Proof:
-    """Rayleigh: among all shapes, that of a mode makes K_i - ω_i² M_i of (6) stationary, so these are its natural
-    conditions."""
+def prove_mode_conditions() -> Proof:
+    """Rayleigh: among all shapes, that of a mode makes K_i - ω_i² M_i, written down by hand, stationary, so these are
+    its natural conditions."""
     _, *factors = rayleigh_factors()
     for e, factor, sign in zip(mode_conditions(), factors, (1, -1, -1, 1), strict=True):
         yield e.lhs - e.rhs - sign * factor
 
 
 @samples("16a")
-def _() -> bool:
+def sample_mode_conditions() -> bool:
     """The end values of a mode of a random arm, found by shooting, satisfy all four."""
     values = sample(16)
     for mode in shoot(values):

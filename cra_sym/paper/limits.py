@@ -17,8 +17,6 @@ from cra_sym.paper.modes import (
     by_power,
     c_r,
     c_t,
-    circular_ratio,
-    coefficients_of,
     frequency_function,
     frequency_polynomial,
     iota,
@@ -26,7 +24,6 @@ from cra_sym.paper.modes import (
     kappa_t,
     lamda,
     mode_form,
-    mode_shape,
     mu,
     omega_i,
     r_2,
@@ -35,6 +32,7 @@ from cra_sym.paper.modes import (
 )
 from cra_sym.paper.oracles.by_hand import tip_rows
 from cra_sym.paper.oracles.shooting import sample, shoot
+from cra_sym.paper.shapes import circular_ratio, coefficients_of, mode_shape
 from cra_sym.symbols import Dimension, dimension, symbol
 
 __all__ = ["cantilever_frequency", "cantilever_shape", "natural_frequency", "rigid_joint"]
@@ -111,7 +109,7 @@ def _clamped(shape: Expr, ratio: Expr, frequency: Expr, tip: Matrix) -> Proof:
 
 
 @proves(27)
-def _() -> Proof:
+def prove_rigid_joint() -> Proof:
     """By hand, the two shapes that neither move nor turn at the joint: in this ratio they balance the force at the tip,
     and this is the determinant of force and moment. The other way of being rigid, (s, c) = (1, 0) in (23)."""
     frequency, shape, ratio = rigid_joint()
@@ -121,7 +119,7 @@ def _() -> Proof:
 
 
 @samples(27)
-def _() -> bool:
+def sample_rigid_joint() -> bool:
     """Modes found by shooting for a very stiff joint."""
     frequency, shape, ratio = rigid_joint()
     values = sample(27) | _RIGID
@@ -130,7 +128,7 @@ def _() -> bool:
 
 
 @proves(28)
-def _() -> Proof:
+def prove_cantilever_shape() -> Proof:
     """By hand, the two shapes that neither move nor turn at the joint: in this ratio no force acts at the tip, and with
     (29) no moment."""
     shape, ratio = cantilever_shape()
@@ -140,14 +138,14 @@ def _() -> Proof:
 
 
 @samples(28)
-def _() -> bool:
+def sample_cantilever_shape() -> bool:
     """Modes found by shooting for a very stiff joint and no end-effector."""
     shape, ratio = cantilever_shape()
     return shapes_agree((28,), shape.rhs, ratio.rhs, **_RIGID, m_e=0.0, J_e=0.0)
 
 
 @proves(29)
-def _() -> Proof:
+def prove_cantilever_frequency() -> Proof:
     """The determinant of the free end for the two shapes that neither move nor turn at the joint, by hand."""
     clamped = Matrix([[1, 0], [0, 1], [-1, 0], [0, -1]])
     determinant = (tip_rows().subs(_BARE) * clamped).det() / (2 * lamda**5)
@@ -164,7 +162,7 @@ def natural_frequency() -> Eq:
 
 
 @proves(30)
-def _() -> Proof:
+def prove_natural_frequency() -> Proof:
     """Dimensions; a sine of this wave number balances stiffness and inertia."""
     bending, inertia = (symbol(a) * symbol(b) for a, b in (("E", "I_z"), ("rho", "A")))
     yield dimension(natural_frequency()) == Dimension(s=-1)
@@ -173,7 +171,7 @@ def _() -> Proof:
 
 
 @samples(30)
-def _() -> bool:
+def sample_natural_frequency() -> bool:
     """The frequency of modes of a random arm, from the energies of shapes found by shooting (Rayleigh's quotient)."""
     values = sample(30)
     names = {symbol(name): value for name, value in values.items()}

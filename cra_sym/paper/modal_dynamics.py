@@ -12,19 +12,20 @@ from cra_sym.paper.energy import (
     L,
     generalised,
     inner_mass,
-    inner_stiffness,
     modal_numbers,
     phi_i,
     q_i,
     separation,
     t,
     tidy,
+    v,
     w,
     x,
 )
 from cra_sym.paper.equations import Proof, numbered, proves, samples
-from cra_sym.paper.evaluation import termwise
+from cra_sym.paper.evaluation import put, termwise
 from cra_sym.paper.modal_sum import ModalSum, member, written_out
+from cra_sym.paper.oracles import forces
 from cra_sym.paper.oracles.shooting import integrate, sample, shoot
 from cra_sym.paper.orthogonality import modal_energies, orthogonality, stiffness_identity
 from cra_sym.symbols import symbol
@@ -57,14 +58,15 @@ def _one_mode(energy: Expr) -> Expr:
 
 
 @proves(11)
-def _() -> Proof:
-    """D'Alembert: without damping it is the virtual work of all forces along mode i while any two modes move, by (6),
-    (16b) and (16c); with damping, a free vibration that decays by exp(-zeta_i omega_i t) solves it."""
+def prove_dynamic_equation() -> Proof:
+    """D'Alembert: without damping it is the virtual work of all forces, written down by hand, along mode i while any
+    two modes move, by (6), (16b) and (16c); with damping, a free vibration that decays by exp(-zeta_i omega_i t)
+    solves it."""
     equation = dynamic_equation().lhs - dynamic_equation().rhs
     two = separation().rhs.members("i", "j")
     mass, stiffness = (e.lhs - e.rhs for e in orthogonality())
     q_j = member(q_i, "j")
-    work = inner_mass(w + two, phi_i).diff(t, 2) + inner_stiffness(two, phi_i)
+    work = -put(forces.virtual_work(phi_i), {v: two})
     zero = mass * q_j.diff(t, 2) + stiffness * q_j + (K_i - omega_i**2 * M_i) * q_i
     named = {e.lhs: e.rhs for e in generalised()}
     yield stiffness_identity()[1].lhs - stiffness_identity()[1].rhs - (K_i - omega_i**2 * M_i)
@@ -74,7 +76,7 @@ def _() -> Proof:
 
 
 @samples(11)
-def _() -> bool:
+def sample_dynamic_equation() -> bool:
     """The virtual work of all forces on a random arm, for a virtual displacement along a mode found by shooting while
     three modes move, by quadrature."""
     values = sample(11)
@@ -119,7 +121,7 @@ def duhamel() -> Eq:
 
 
 @proves(12)
-def _() -> Proof:
+def prove_duhamel() -> Proof:
     """Put into (11) it leaves nothing, and it starts with the initial values."""
     solution, equation = duhamel().rhs, dynamic_equation()
     yield duhamel().lhs == q_i
@@ -129,7 +131,7 @@ def _() -> Proof:
 
 
 @samples(12)
-def _() -> bool:
+def sample_duhamel() -> bool:
     """A Runge-Kutta solution of (11) for a base motion."""
     from scipy.integrate import quad, solve_ivp
 
@@ -137,7 +139,7 @@ def _() -> bool:
     omega, start, rate, ratio = 3.1, 0.2, -0.4, 0.8
 
     def push(time: float) -> float:
-        return -ratio * (0.3 * time + np.cos(1.7 * time))
+        return float(-ratio * (0.3 * time + np.cos(1.7 * time)))
 
     reference = solve_ivp(lambda s, q: (q[1], push(s) - omega**2 * q[0]), (0, 2), (start, rate), rtol=1e-10, atol=1e-12)
     numbers = {Gamma_i: ratio, M_i: 1, omega_i: omega, q_i.subs(t, 0): start, q_i.diff(t).subs(t, 0): rate}
@@ -163,7 +165,7 @@ def initial_values() -> tuple[Eq, Eq]:
 
 
 @proves(13)
-def _() -> Proof:
+def prove_initial_values() -> Proof:
     """Among all modal velocities these leave the least kinetic energy (5) in the inertial frame: its derivative by each
     vanishes. Nothing is displaced."""
     (still, rate), start = initial_values(), {w.diff(t): w.diff(t).subs(t, 0)}
@@ -174,7 +176,7 @@ def _() -> Proof:
 
 
 @samples(13)
-def _() -> bool:
+def sample_initial_values() -> bool:
     """Among all modal velocities these leave the least kinetic energy (3) in the inertial frame, found by
     least squares over quadrature points of a random arm."""
     values, speed = sample(13), 0.7

@@ -27,7 +27,7 @@ def written_out(expression: Any, *indices: str) -> Any:
     return expression.replace(lambda part: isinstance(part, ModalSum), lambda part: part.members(*indices))
 
 
-class ModalSum(Sum):
+class ModalSum(Sum):  # type: ignore[misc]  # SymPy has no types
     """Sum over all modes of a term written for mode i.
 
     SymPy's own ``Sum`` would take names such as ``phi_i`` for constants and multiply them by the number of terms, so

@@ -1,4 +1,4 @@
-"""Mode shapes and the frequency equation, for every stiffness from zero to infinity: equations (17)-(26)."""
+"""Mode shapes and the frequency equation, for every stiffness from zero to infinity: equations (17)-(23)."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ from sympy import (
 )
 
 from cra_sym.mechanics import HamiltonResult, separate
-from cra_sym.paper.energy import A, E, I_z, J_e, L, k_r, k_t, m_e, phi_i, rho, x
+from cra_sym.paper.energy import A, E, I_z, L, phi_i, rho, x
 from cra_sym.paper.equations import Proof, numbered, proves, samples
-from cra_sym.paper.evaluation import annihilates, group_numbers, put, shapes_agree, shot_coefficients
+from cra_sym.paper.evaluation import annihilates, group_numbers, put
+from cra_sym.paper.groups import in_groups
 from cra_sym.paper.joint import mode_conditions
 from cra_sym.paper.motion import dynamics, mode_field_equation
 from cra_sym.paper.oracles import by_hand
@@ -45,7 +46,7 @@ s_t, c_t, s_r, c_r = (symbol(name) for name in ("s_t", "c_t", "s_r", "c_r"))
 coefficients = C_1, C_2, C_3, C_4 = tuple(symbol(f"C_{k}") for k in (1, 2, 3, 4))
 
 #: Placeholders for cos, sin, cosh, sinh of lamda: polynomials in these are decided exactly.
-_CIRCULAR = _c, _s, _ch, _sh = symbols("c s C S")
+_c, _s, _ch, _sh = symbols("c s C S")
 VALUES = {_c: cos(lamda), _s: sin(lamda), _ch: cosh(lamda), _sh: sinh(lamda)}
 
 
@@ -57,7 +58,7 @@ def basis() -> tuple[Expr, ...]:
     """Return four real solutions of the field equation of a mode, from the roots of its characteristic polynomial."""
     r = Symbol("r")
     balance = put(mode_field_equation().lhs, {phi_i: exp(r * x)}) / exp(r * x)
-    quartic = Poly(balance.subs(omega_i, beta**2 * sqrt(E * I_z / (rho * A))).expand(), r)
+    quartic = Poly(balance.subs(omega_i, _frequency()).expand(), r)
     circular: list[Expr] = []
     hyperbolic: list[Expr] = []
     for root in roots(quartic):
@@ -72,15 +73,29 @@ def mode_form() -> tuple[Eq, Eq]:
     """The field equation of a mode has four exponential solutions, here in real form; the boundary conditions
     determine the coefficients."""
     shape = sum(coefficient * function for coefficient, function in zip(coefficients, basis(), strict=True))
+    return Eq(phi_i, shape), _wave()
+
+
+@cache
+def _wave() -> Eq:
+    """Return what the field equation makes of the wave number: of shapes whose fourth derivative is beta^4 of them."""
     balance = mode_field_equation().lhs.subs(phi_i.diff(x, 4), beta**4 * phi_i) / phi_i
     (square,) = solve(balance.expand(), beta**4, simplify=False, check=False)
-    return Eq(phi_i, shape), Eq(beta**4, square)
+    return Eq(beta**4, square)
+
+
+def _frequency() -> Expr:
+    """Return the angular frequency that belongs to a wave number."""
+    (square,) = solve(_wave(), omega_i**2)
+    return sqrt(square)
 
 
 @proves(17)
-def _() -> Proof:
-    """It satisfies the field equation, and its four functions are independent."""
+def prove_mode_form() -> Proof:
+    """It satisfies the field equation, and its four functions are independent; the wave number is that of a beam in
+    textbooks."""
     shape, wave = mode_form()
+    yield wave.rhs - rho * A * omega_i**2 / (E * I_z)
     residual = put(mode_field_equation().lhs, {phi_i: shape.rhs})
     yield residual.subs(omega_i, sqrt(solve(wave, omega_i**2)[0]))
     yield Matrix(4, 4, lambda row, column: basis()[column].diff(x, row)).subs(x, 0).det().expand() != 0
@@ -88,7 +103,7 @@ def _() -> Proof:
 
 
 @samples(17)
-def _() -> bool:
+def sample_mode_form() -> bool:
     """Modes of a random arm found by shooting with power series are combinations of its functions."""
     places = np.linspace(0.0, 1.0, 30)
     for mode in shoot(sample(17)):
@@ -104,15 +119,7 @@ def _() -> bool:
 
 def dimensionless(expression: Expr) -> Expr:
     """Write an expression in lamda = beta L and the dimensionless groups."""
-    bending = E * I_z
-    groups = {
-        omega_i: beta**2 * sqrt(bending / (rho * A)),
-        k_t: kappa_t * bending / L**3,
-        k_r: kappa_r * bending / L,
-        m_e: mu * rho * A * L,
-        J_e: iota * rho * A * L**3,
-    }
-    return expression.subs(groups).subs(beta, lamda / L)
+    return expression.subs({omega_i: _frequency(), **in_groups()}).subs(beta, lamda / L)
 
 
 @cache
@@ -166,25 +173,25 @@ def tip_system() -> Eq:
 
 
 @proves(18)
-def _() -> Proof:
+def prove_root_system() -> Proof:
     """Written down by hand."""
     yield from minors(root_system().lhs.args[0], by_hand.root_rows())
 
 
 @samples(18)
-def _() -> bool:
+def sample_root_system() -> bool:
     """The coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
     return annihilates(root_system().lhs.args[0], 18)
 
 
 @proves(19)
-def _() -> Proof:
+def prove_tip_system() -> Proof:
     """Written down by hand."""
     yield from minors(tip_system().lhs.args[0], by_hand.tip_rows())
 
 
 @samples(19)
-def _() -> bool:
+def sample_tip_system() -> bool:
     """The coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
     return annihilates(tip_system().lhs.args[0], 19)
 
@@ -230,13 +237,13 @@ def reduced_system() -> Eq:
 
 
 @proves(20)
-def _() -> Proof:
+def prove_reduced_system() -> Proof:
     """With (21), Cramer's rule for the conditions written down by hand."""
     yield from minors(reduced_system().subs(_named_entries()).lhs.args[0], by_hand.eliminated())
 
 
 @samples(20)
-def _() -> bool:
+def sample_reduced_system() -> bool:
     """The coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
     return annihilates(reduced_system().subs(_named_entries()).lhs.args[0], 20)
 
@@ -253,7 +260,7 @@ def reduced_coefficients() -> tuple[Eq, ...]:
 
 
 @proves(21)
-def _() -> Proof:
+def prove_reduced_coefficients() -> Proof:
     """Cramer's rule for the conditions written down by hand: C_1 or C_2 with the two hyperbolic coefficients."""
     yield from minors(Matrix(2, 2, [e.rhs for e in reduced_coefficients()]), by_hand.eliminated())
 
@@ -265,7 +272,7 @@ def determinant() -> Eq:
 
 
 @proves(22)
-def _() -> Proof:
+def prove_determinant() -> Proof:
     """The determinant of (18) and (19) together, all four coefficients at once, times that of the elimination."""
     matrix, factor = _elimination()
     whole = Matrix.vstack(root_matrix(), _tip()).det(method="berkowitz")
@@ -312,25 +319,22 @@ def by_power(coefficient: Expr) -> Expr:
 
 def separated(result: HamiltonResult) -> Expr:
     """Return the characteristic function that :func:`cra_sym.mechanics.separate` finds, in the table's symbols."""
-    groups = {
-        k_t: E * I_z / L**3 * s_t / c_t,
-        k_r: E * I_z / L * s_r / c_r,
-        m_e: mu * rho * A * L,
-        J_e: iota * rho * A * L**3,
-    }
-    modal = separate(result, parameters=groups)
+    pairs = {kappa_t: s_t / c_t, kappa_r: s_r / c_r}
+    modal = separate(result, parameters={name: value.subs(pairs) for name, value in in_groups().items()})
     (wave,) = modal.basis.wave_numbers
     return modal.characteristic_function.subs(wave, lamda)
 
 
 @proves(23)
-def _() -> Proof:
-    """The four conditions of Hamilton's principle in one determinant."""
-    yield separated(dynamics(driven=False)) - frequency_equation().lhs + frequency_equation().rhs
+def prove_frequency_equation() -> Proof:
+    """The four conditions of Hamilton's principle in one determinant, and the four written down by hand."""
+    function = frequency_equation().lhs - frequency_equation().rhs
+    yield separated(dynamics(driven=False)) - function
+    yield by_hand.determinant() - 2 * lamda**6 * function
 
 
 @samples(23)
-def _() -> bool:
+def sample_frequency_equation() -> bool:
     """It changes sign at every frequency parameter of random arms found by shooting and nowhere between."""
     function = frequency_equation().lhs
     for seed in (23, 24):
@@ -341,107 +345,5 @@ def _() -> bool:
         places = [0.1, *(place for root in found for place in (root * (1 - 1e-9), root * (1 + 1e-9)))]
         signs = [float(numeric.subs(lamda, place)) > 0 for place in places]
         if signs != [k // 2 % 2 == 0 for k in range(len(places))]:
-            return False
-    return True
-
-
-# Mode shape (24)-(26) -------------------------------------------------------------------------------------------
-
-
-@numbered(24, "coefficient ratios", "derived", (18,))
-def coefficient_ratios() -> tuple[Eq, Eq]:
-    """The root system solved for the hyperbolic coefficients."""
-    root = root_matrix()
-    solved = -root[:, 2:].adjugate() * root[:, :2] * Matrix(coefficients[:2]) / root[:, 2:].det()
-    return tuple(
-        Eq(name, sum(cancel(value.expand().coeff(c)) * c for c in (C_1, C_2)))
-        for name, value in zip((C_3, C_4), solved.applyfunc(cancel), strict=True)
-    )
-
-
-@proves(24)
-def _() -> Proof:
-    """They satisfy the conditions at the joint written down by hand; by hand, a rigid joint mirrors C_1, C_2."""
-    third, fourth = coefficient_ratios()
-    rigid = {s_t: 1, c_t: 0, s_r: 1, c_r: 0}
-    yield (third.lhs, fourth.lhs) == (C_3, C_4)
-    yield from by_hand.root_rows() * Matrix([C_1, C_2, third.rhs, fourth.rhs])
-    yield third.rhs.subs(rigid) + C_1
-    yield fourth.rhs.subs(rigid) + C_2
-
-
-@samples(24)
-def _() -> bool:
-    """Modes of a random arm found by shooting have them."""
-    found = {e.lhs: e.rhs for e in coefficient_ratios()}
-    values = sample(26)
-    for mode in shoot(values):
-        known = dict(zip(coefficients, shot_coefficients(mode), strict=True))
-        numbers = group_numbers(values, mode.beta)
-        for name, ratio in found.items():
-            if abs(float(ratio.subs(numbers).subs(known)) - known[name]) > 1e-8 * max(map(abs, known.values())):
-                return False
-    return True
-
-
-@numbered(25, "mode shape", "derived", (17, 24))
-def mode_shape() -> Eq:
-    """(24) in (17), with C_2 / C_1 = r_2; the scale C_1 stays free."""
-    shape = mode_form()[0].rhs.subs({e.lhs: e.rhs for e in coefficient_ratios()}).subs(C_2, r_2 * C_1)
-    inside = (shape / C_1).expand()
-    plain, second = inside.coeff(r_2, 0), inside.coeff(r_2, 1)
-    return Eq(phi_i, C_1 * (_gather(plain) + r_2 * _gather(second)))
-
-
-def _gather(shape: Expr) -> Expr:
-    return sum(cancel(shape.coeff(function)) * function for function in basis())
-
-
-@numbered(26, "ratio of the circular coefficients", "derived", (20, 21))
-def circular_ratio() -> Eq:
-    """The first row of the reduced system, which the second repeats at a natural frequency."""
-    first, second = reduced_matrix()[0, :]
-    return Eq(r_2, -first / second)
-
-
-@proves(25)
-def _() -> Proof:
-    """Whatever r_2, the functions of (17) with coefficients that satisfy the conditions at the joint written down by
-    hand, the second r_2 times the first."""
-    row = coefficients_of(mode_shape().rhs)
-    yield from by_hand.root_rows() * row
-    yield row[1] - r_2 * row[0]
-    yield row[0] != 0
-
-
-def coefficients_of(shape: Expr) -> Matrix:
-    """Return what the functions of (17) are multiplied by in a mode shape."""
-    expanded = shape.expand()
-    return Matrix([expanded.coeff(function) for function in basis()])
-
-
-@samples(25)
-def _() -> bool:
-    """With (26), the shape of modes of a random arm found by shooting."""
-    return shapes_agree((25,), mode_shape().rhs, circular_ratio().rhs)
-
-
-@proves(26)
-def _() -> Proof:
-    """With it the force at the tip balances, written down by hand."""
-    yield circular_ratio().lhs == r_2
-    yield (by_hand.eliminated() * Matrix([1, circular_ratio().rhs]))[0]
-
-
-@samples(26)
-def _() -> bool:
-    """The ratio of modes of a random arm found by shooting, and the second row of the reduced system."""
-    values = sample(28)
-    for mode in shoot(values):
-        numbers = group_numbers(values, mode.beta)
-        known = shot_coefficients(mode)
-        third, fourth = reduced_matrix().subs(numbers)[1, :]
-        found, expected = float(circular_ratio().rhs.subs(numbers)), float(known[1] / known[0])
-        if max(abs(found - expected), abs(-third / fourth - expected)) > 1e-7 * abs(expected):
             return False
     return True

@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from sympy import Eq, Expr, Function, Integral, lambdify, solve
+from sympy import Eq, Expr, Function, Integral, lambdify
 
 from cra_sym.arm.lagrangian import paper_lagrangian
 from cra_sym.mechanics.hamilton import hamilton
@@ -14,14 +14,13 @@ from cra_sym.paper.energy import ENERGY, L, modal_numbers, phi_i, single_mode, t
 from cra_sym.paper.equations import Proof, numbered, proves, samples
 from cra_sym.paper.evaluation import at, put, termwise, virtual_factors
 from cra_sym.paper.joint import boundary_conditions, free_vibration, rayleigh_factors, section_forces
+from cra_sym.paper.oracles import forces
 from cra_sym.paper.oracles.shooting import sample, shoot
 from cra_sym.symbols import dimension, symbol
 
 __all__ = ["dynamics", "mode_field_equation", "natural_conditions"]
 
-F, tau, rho, A, m_b, k_t = (symbol(name) for name in ("F", "tau", "rho", "A", "m_b", "k_t"))
-M_i, K_i, Gamma_i, omega_i, zeta_i = (symbol(name) for name in ("M_i", "K_i", "Gamma_i", "omega_i", "zeta_i"))
-Lcal, t_1, t_2 = (symbol(name) for name in ("Lcal", "t_1", "t_2"))
+F, m_b, k_t, t_1, t_2, Gamma_i, omega_i = (symbol(name) for name in "F m_b k_t t_1 t_2 Gamma_i omega_i".split())
 
 #: The virtual displacements as :func:`cra_sym.mechanics.hamilton` writes them.
 delta_v, delta_w, delta_L = Function("δv")(x, t), Function("δw")(t), Function("δLcal")(t)
@@ -57,31 +56,14 @@ def _first_variation() -> Expr:
     return put(paper_lagrangian().total(), moved).diff(size).subs(size, 0).doit(integrals=False)
 
 
-def _newton() -> tuple[Expr, ...]:
-    """Return the force on a slice, force and moment on the joint and on the end-effector, and the force on the arm,
-    inertia forces included: by hand, with shear and moment (15)."""
-    E, I_z, m_e, J_e, k_r = (symbol(name) for name in ("E", "I_z", "m_e", "J_e", "k_r"))
-    shear, moment = E * I_z * v.diff(x, 3), E * I_z * v.diff(x, 2)
-    acceleration = (w + v).diff(t, 2)
-    arm = Integral(rho * A * acceleration, (x, 0, L)) + at(m_e * acceleration, L)
-    return (
-        -shear.diff(x) - rho * A * acceleration,
-        at(-shear - k_t * v, 0),
-        at(moment - k_r * v.diff(x), 0),
-        at(shear - m_e * acceleration, L),
-        at(-moment - J_e * v.diff(x, t, t), L),
-        F - m_b * w.diff(t, 2) - arm,
-    )
-
-
 @proves(8)
-def _() -> Proof:
+def prove_hamiltons_principle() -> Proof:
     """Dimensions; for any motion and any virtual displacement that vanishes at both instants, the integral is the work
     of Newton's forces on slices, joint, end-effector and base: zero for all when those balance."""
     known = {"δLcal": ENERGY, "δw": dimension("w")}
     yield dimension(hamiltons_principle().lhs.function, known) == ENERGY
     rate = hamiltons_principle().lhs.function.subs(delta_L, _first_variation())
-    *elastic, base = _newton()
+    *elastic, base = forces.newton()
     for found, force in zip(virtual_factors(put(rate, {delta_w: x * 0}), delta_v), elastic, strict=True):
         yield termwise(found - force)
     (found,) = virtual_factors(put(rate, {delta_v: x * 0}), delta_w)
@@ -89,7 +71,7 @@ def _() -> Proof:
 
 
 @samples(8)
-def _() -> bool:
+def sample_hamiltons_principle() -> bool:
     """The action of a random arm swinging in a mode found by shooting is stationary for a
     virtual displacement that vanishes at both instants, and is not when the mode swings one per cent too fast."""
     values, duration, step = sample(8), 2.0, 1e-4
@@ -135,7 +117,7 @@ def variation() -> Eq:
 
 
 @proves(9)
-def _() -> Proof:
+def prove_variation() -> Proof:
     """Another route to the first variation: the Lagrangian of v + e delta_v, w + e delta_w differentiated by e."""
     yield variation().lhs - delta_L - F * delta_w
     yield termwise(variation().rhs - F * delta_w - _first_variation())
@@ -149,7 +131,7 @@ def integrated_by_parts() -> Eq:
 
 
 @proves(10)
-def _() -> Proof:
+def prove_integrated_by_parts() -> Proof:
     """For all motions, and all variations that vanish at both instants, the time integrals of (9) and of (10) agree:
     they have the same factor of each variation."""
     for kept, other in ((delta_v, delta_w), (delta_w, delta_v)):
@@ -169,25 +151,27 @@ def field_and_base() -> tuple[Eq, Eq]:
 
 def natural_conditions() -> tuple[Eq, ...]:
     """Return the four end conditions that Hamilton's principle leaves: root force and moment, tip force and moment."""
-    return dynamics().boundary_conditions
+    conditions: tuple[Eq, ...] = dynamics().boundary_conditions
+    return conditions
 
 
 @proves(16)
-def _() -> Proof:
-    """Hamilton's principle gives the same four conditions."""
-    for ours, theirs in zip(boundary_conditions(), natural_conditions(), strict=True):
-        yield ours.lhs - ours.rhs - theirs.lhs + theirs.rhs
+def prove_boundary_conditions() -> Proof:
+    """Hamilton's principle gives the same four conditions, and so do Newton's forces on joint and end-effector."""
+    _, *newton, _ = forces.newton()
+    for e, theirs, force, sign in zip(boundary_conditions(), natural_conditions(), newton, (-1, 1, 1, -1), strict=True):
+        yield e.lhs - e.rhs - theirs.lhs + theirs.rhs
+        yield e.lhs - e.rhs - sign * force
 
 
 @proves("10a")
-def _() -> Proof:
-    """Newton: a slice accelerates under the slope of the shear force (15); the whole arm is one momentum balance."""
+def prove_field_and_base() -> Proof:
+    """Newton: a slice accelerates under the slope of the shear force, and the whole arm under the force that drives
+    it."""
     field, base = field_and_base()
-    shear, _ = (law.rhs for law in section_forces())
-    momentum = m_b * w.diff(t) + symbol("m_e") * (w + at(v, L)).diff(t)
-    line = Integral(rho * A * (w + v).diff(t), (x, 0, L))
-    yield field.lhs - field.rhs - rho * A * (w + v).diff(t, 2) - shear.diff(x)
-    yield termwise((base.lhs - base.rhs + F - (momentum + line).diff(t)).doit(integrals=False))
+    on_slice, *_, on_arm = forces.newton()
+    yield field.lhs - field.rhs + on_slice
+    yield termwise(base.lhs - base.rhs + on_arm)
 
 
 @numbered("10b", "field equation of a mode", "derived", (2, "10a"))
@@ -198,14 +182,14 @@ def mode_field_equation() -> Eq:
 
 
 @proves("10b")
-def _() -> Proof:
-    """Rayleigh: among all shapes, that of a mode makes K_i - ω_i² M_i of (6) stationary."""
+def prove_mode_field_equation() -> Proof:
+    """Rayleigh: among all shapes, that of a mode makes K_i - ω_i² M_i, written down by hand, stationary."""
     along, *_ = rayleigh_factors()
     yield mode_field_equation().lhs - mode_field_equation().rhs - along
 
 
 @samples("10b")
-def _() -> bool:
+def sample_mode_field_equation() -> bool:
     """Modes of a random arm found by shooting satisfy it along the manipulator."""
     values = sample(102)
     numbers = {symbol(name): value for name, value in values.items()}
@@ -223,27 +207,21 @@ def base_free_body() -> Eq:
     """The field equation integrated along the manipulator turns all inertia beyond the joint into the force of the
     translational spring: the base feels its own inertia, the spring and the drive."""
     field, base = field_and_base()
-    inertia = rho * A * (v + w).diff(t, 2)
-    (stiff,) = solve(Eq(field.lhs.expand(), 0), v.diff(x, 4))
-    force = symbol("E") * symbol("I_z") * v.diff(x, 3)
-    if (symbol("E") * symbol("I_z") * stiff + inertia).expand() != 0:
-        raise ArithmeticError("the slice does not balance")
-    at_ends = at(force, 0) - at(force, L)
-    for condition in natural_conditions():
-        at_ends = at_ends.subs(condition.lhs, condition.rhs)
-    spread = Integral(rho * A * v.diff(t, 2), (x, 0, L)) + rho * A * L * w.diff(t, 2)
-    left = (base.lhs - base.rhs + F).expand() - spread + at_ends
-    return Eq(left.expand(), F)
+    shear, _ = (law.rhs for law in section_forces())
+    inertia = Integral((field.lhs - field.rhs - shear.diff(x)).expand(), (x, 0, L))
+    known = {e.lhs: e.rhs for e in boundary_conditions()}
+    at_ends = at(shear, 0).subs(known) - at(shear, L).subs(known)
+    return Eq(termwise(base.lhs - base.rhs + F - inertia) + at_ends.expand(), F)
 
 
 @proves("10c")
-def _() -> Proof:
+def prove_base_free_body() -> Proof:
     """Written down from the free body of the base."""
     yield base_free_body().lhs - base_free_body().rhs - (m_b * w.diff(t, 2) - k_t * at(v, 0) - F)
 
 
 @samples("10c")
-def _() -> bool:
+def sample_base_free_body() -> bool:
     """Both forms agree on modes of a random arm found by shooting, ω_i² Γ_i = k_t φ_i(0)."""
     values = sample(103)
     gaps = [

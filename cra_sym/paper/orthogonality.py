@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from sympy import Eq, Expr, Integral, solve
 
 from cra_sym.arm.lagrangian import HALF
 from cra_sym.paper.energy import (
-    E,
-    I_z,
     L,
     generalised,
     inner_mass,
@@ -28,7 +28,7 @@ from cra_sym.paper.energy import (
 )
 from cra_sym.paper.equations import Proof, numbered, proves, samples
 from cra_sym.paper.evaluation import at, evaluate, put, termwise, virtual_factors
-from cra_sym.paper.joint import mode_conditions
+from cra_sym.paper.joint import end_values, mode_conditions, section_forces
 from cra_sym.paper.modal_sum import ModalSum, member, written_out
 from cra_sym.paper.motion import mode_field_equation
 from cra_sym.paper.oracles.shooting import integrate, sample, shoot
@@ -44,37 +44,39 @@ def stiffness_identity() -> tuple[Eq, Eq]:
     """Integrating by parts twice moves two derivatives from mode j to mode i, where the field equation and the four
     end conditions replace them: the stiffness product is ω_i² times the mass product, springs, tip mass and
     rotary inertia included; for i = j it is K_i = ω_i² M_i."""
-    by_parts = phi_i.diff(x, 2) * phi_j.diff(x) - phi_i.diff(x, 3) * phi_j
-    if (by_parts.diff(x) + phi_i.diff(x, 4) * phi_j - phi_i.diff(x, 2) * phi_j.diff(x, 2)).expand() != 0:
-        raise ArithmeticError("integration by parts went wrong")
-    (fourth,) = solve(mode_field_equation(), phi_i.diff(x, 4))
-    interior = Integral((E * I_z * fourth * phi_j).expand(), (x, 0, L))
-    ends = E * I_z * (at(by_parts, L) - at(by_parts, 0))
-    for condition in mode_conditions():
-        ends = ends.subs(condition.lhs / (E * I_z), condition.rhs / (E * I_z))
-    springs = inner_stiffness(phi_i, phi_j) - Integral(E * I_z * phi_i.diff(x, 2) * phi_j.diff(x, 2), (x, 0, L))
+    shear, moment = (single_mode(law.rhs, phi_i) for law in section_forces())
+    by_parts = moment * phi_j.diff(x) - shear * phi_j
+    along = inner_stiffness(phi_i, phi_j, joint=False) - Integral(by_parts.diff(x) + shear.diff(x) * phi_j, (x, 0, L))
+    if termwise(along.doit(integrals=False)) != 0:
+        raise ArithmeticError(f"integration by parts leaves {along}")
+    known = _balance("i")
+    interior = Integral(shear.diff(x).xreplace(known) * phi_j, (x, 0, L))
+    ends = (at(by_parts, L) - at(by_parts, 0)).xreplace(known)
+    springs = inner_stiffness(phi_i, phi_j) - inner_stiffness(phi_i, phi_j, joint=False)
     mass = inner_mass(phi_i, phi_j)
-    integral = mass.atoms(Integral).pop()
-    rest = interior + ends + springs - omega_i**2 * mass
-    if (
-        rest.subs(interior, omega_i**2 * integral).expand() != 0
-        or (interior.function - omega_i**2 * integral.function).expand()
-    ):
+    rest = termwise(interior + ends + springs - omega_i**2 * mass)
+    if rest != 0:
         raise ArithmeticError(f"stiffness and mass products differ by {rest}")
     return Eq(inner_stiffness(phi_i, phi_j), omega_i**2 * mass), Eq(K_i, omega_i**2 * M_i)
 
 
+def _balance(index: str) -> dict[Expr, Expr]:
+    """Return what (10b) and (16a) say of the highest derivatives of mode ``index``, along it and at both ends."""
+    equations = (mode_field_equation(), *mode_conditions())
+    highest = (phi_i.diff(x, 4), *end_values(phi_i))
+    pairs = zip(highest, equations, strict=True)
+    return {member(value, index): member(solve(e, value)[0], index) for value, e in pairs}
+
+
 def _is_mode(factors: tuple[Expr, ...], index: str) -> Proof:
     """Yield what is left of five factors of a virtual shape when mode ``index`` satisfies (10b) and (16a)."""
-    equations = (member(mode_field_equation(), index), *(member(condition, index) for condition in mode_conditions()))
-    tops = (member(phi_i, index).diff(x, 4), *(e.lhs / (E * I_z) for e in equations[1:]))
-    known = {top: solve(e, top)[0] for top, e in zip(tops, equations, strict=True)}
+    known = _balance(index)
     for factor in factors:
         yield factor.xreplace(known)
 
 
 @proves("16b")
-def _() -> Proof:
+def prove_stiffness_identity() -> Proof:
     """The difference of both sides is the virtual work of the forces of mode i, in balance by (10b) and (16a), on any
     mode j; mode i for mode j and (6) make it the second equation."""
     pair, single = stiffness_identity()
@@ -89,7 +91,7 @@ def _generalised(index: str = "i") -> dict[Expr, Expr]:
 
 
 @samples("16b")
-def _() -> bool:
+def sample_stiffness_identity() -> bool:
     """Both products of all pairs of modes of a random arm, found by shooting, by quadrature."""
     values = sample(161)
     shapes = shoot(values)
@@ -128,7 +130,7 @@ def _swap(expression: Expr) -> Expr:
 
 
 @proves("16c")
-def _() -> Proof:
+def prove_orthogonality() -> Proof:
     """The forces of each mode balance by (10b) and (16a): stiffness minus ω_i² times mass product is no work on mode j,
     and with ω_j² none on mode i. So ω_i² - ω_j² times the mass product is zero, and with it the stiffness product."""
     mass, stiffness = (e.lhs - e.rhs for e in orthogonality())
@@ -137,7 +139,7 @@ def _() -> Proof:
 
 
 @samples("16c")
-def _() -> bool:
+def sample_orthogonality() -> bool:
     """Both products of different modes of a random arm vanish; without the end-effector they would not."""
     values = sample(163)
     first, second, third = shoot(values)
@@ -159,7 +161,7 @@ def stiffness_of_manipulator_alone() -> Eq:
 
 
 @proves("16d")
-def _() -> Proof:
+def prove_stiffness_of_manipulator_alone() -> Proof:
     """Twice the first energy of (4) differs from it by the work of the forces of the mode, in balance by (10b) and
     (16a), on itself."""
     energy = single_mode(potential()[0].rhs) / q_i**2
@@ -171,7 +173,7 @@ def _() -> Proof:
 
 
 @samples("16d")
-def _() -> bool:
+def sample_stiffness_of_manipulator_alone() -> bool:
     """The strain energy of modes found by shooting; it falls short of ω_i² M_i by the springs' share."""
     values, alone = sample(164), stiffness_of_manipulator_alone().rhs
     for mode in shoot(values):
@@ -219,7 +221,7 @@ def modal_energies() -> tuple[Eq, Eq]:
 
 
 @proves(5)
-def _() -> Proof:
+def prove_modal_energies() -> Proof:
     """Both energies (3) and (4) of any two modes, with (6); what is left is their products of (16c)."""
     two = separation().rhs.members("i", "j")
     mass, stiffness = (e.lhs - e.rhs for e in orthogonality())
@@ -231,13 +233,13 @@ def _() -> Proof:
 
 
 @samples(5)
-def _() -> bool:
+def sample_modal_energies() -> bool:
     """The energies of a random arm moving in three modes found by shooting, by quadrature of (3) and (4)."""
     values = sample(5)
     shapes, length = shoot(values), values["L"]
     q, q_dot, w_dot = [0.3, -0.5, 0.2], [0.7, 0.4, -0.6], 0.9
 
-    def elastic(place, amplitudes, derivative=0):
+    def elastic(place: Any, amplitudes: list[float], derivative: int = 0) -> Any:
         return sum(a * shape(place, derivative) for a, shape in zip(amplitudes, shapes, strict=True))
 
     line_mass, bending = values["rho"] * values["A"], values["E"] * values["I_z"]
@@ -261,4 +263,4 @@ def _() -> bool:
                 sums[s] += float(s.function.subs(numbers).subs(modal_numbers(values, shape)))
         total = e.rhs.subs(sums).subs(w.diff(t), w_dot)
         found.append(float(total.subs({symbol(name): value for name, value in values.items()})))
-    return abs(found[0] / kinetic - 1) < 1e-10 and abs(found[1] / potential - 1) < 1e-10
+    return bool(abs(found[0] / kinetic - 1) < 1e-10 and abs(found[1] / potential - 1) < 1e-10)

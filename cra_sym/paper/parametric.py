@@ -5,18 +5,17 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from sympy import Dummy, Expr, Integral, cos, factor, integrate, sin, symbols
+from sympy import Add, Dummy, Expr, Integral, Mul, cos, factor, integrate, sin, symbols
 
-from cra_sym.arm.lagrangian import HALF, ArmLagrangian, paper_lagrangian
+from cra_sym.arm.lagrangian import ArmLagrangian, kinetic_energy, paper_lagrangian, potential_energy
 from cra_sym.mechanics import hamilton
-from cra_sym.paper.energy import L, k_r, k_t, phi_i, phi_j, q_i, q_j, single_mode, t, tidy, v, w, x
+from cra_sym.paper.energy import L, phi_i, phi_j, q_i, q_j, single_mode, t, tidy, v, w, x
 from cra_sym.paper.evaluation import put
 from cra_sym.symbols import symbol
 
-__all__ = ["axial_load", "coupling", "excited_lagrangian", "excited_motion"]
+__all__ = ["AXIAL", "TRANSVERSE", "axial_load", "coupling", "excited_lagrangian", "excited_motion"]
 
 u, u_0, w_0, w_1, varpi, epsilon = (symbol(name) for name in ("u", "u_0", "w_0", "w_1", "varpi", "epsilon"))
-rho, A, m_e = (symbol(name) for name in ("rho", "A", "m_e"))
 
 KINDS = ("joint stiffness", "axial base", "transverse base")
 #: Base motions along and across the arm.
@@ -25,9 +24,13 @@ AXIAL, TRANSVERSE = epsilon * u_0 * cos(varpi * t), w_0 + epsilon * w_1 * sin(va
 
 @cache
 def axial_load() -> Expr:
-    """Return the mass beyond x: the axial force it needs per unit of axial acceleration of the base."""
-    place = Dummy("x")
-    return integrate(rho * A, (place, x, L)) + m_e
+    """Return the mass beyond x: the axial force it needs per unit of axial acceleration of the base.
+
+    What moves across the arm moves along it too: it is the mass that the kinetic energy (3) gives a speed across.
+    """
+    place, across = Dummy("x"), v.diff(t)
+    density, tip = (part.diff(across, across) for part in kinetic_energy()[::2])
+    return integrate(density.subs(x, place), (place, x, L)) + tip
 
 
 @cache
@@ -41,14 +44,15 @@ def excited_lagrangian(kind: str) -> ArmLagrangian:
     density, left, right = paper_lagrangian()
     if kind == "joint stiffness":
         swing = epsilon * cos(varpi * t)
-        springs = HALF * k_t * v**2 + HALF * k_r * v.diff(x) ** 2
-        return ArmLagrangian(density.subs(w, 0).doit(), -springs * (1 + swing), right.subs(w, 0).doit())
+        springs = potential_energy().left - potential_energy(joint=False).left
+        left = left + springs - springs * (1 + swing)
+        return ArmLagrangian(*(part.subs(w, 0).doit() for part in (density, left, right)))
     if kind == "axial base":
         density = density + u.diff(t, 2) * axial_load() * v.diff(x) ** 2 / 2
         return ArmLagrangian(*(part.subs(w, 0).doit() for part in (density, left, right)))
     if kind == "transverse base":
         return ArmLagrangian(density, left, right)
-    raise ValueError(f"kind = {kind!r}: allowed are {', '.join(KINDS)}")
+    raise ValueError(f"kind = {kind!r}: must be one of {', '.join(KINDS)}")
 
 
 @cache
@@ -83,6 +87,7 @@ def _together(expression: Expr) -> Expr:
     inside = factor(sum(c * integral.function for c, integral in whole))
     outside, along = inside.as_independent(x, as_Add=False)
     if outside.could_extract_minus_sign():
-        outside, along = -outside, -along
+        sums = [part for part in Mul.make_args(along) if isinstance(part, Add)]
+        outside, along = -outside, along.xreplace({sums[0]: -sums[0]}) if sums else -along
     rest = parts - sum(c * integral for c, integral in whole)
     return rest + outside * Integral(along, *whole[0][1].limits)

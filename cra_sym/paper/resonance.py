@@ -13,19 +13,18 @@ import numpy as np
 from sympy import Derivative, Eq, Expr, Function, I, S, Sum, Symbol, conjugate, cos, exp, integrate, pi, sin, solve
 
 from cra_sym.mechanics.boundaries import forced_growth, forced_resonance, general_resonance, plain
-from cra_sym.paper.energy import generalised, inner_mass, phi_i
+from cra_sym.paper.energy import generalised, inner_mass, phi_i, t, x
 from cra_sym.paper.equations import Proof, numbered, proves, samples
 from cra_sym.paper.evaluation import evaluate, put, termwise
 from cra_sym.paper.excited import excited_system
 from cra_sym.paper.operators import acting, named
 from cra_sym.paper.oracles.shooting import sample, shoot
-from cra_sym.paper.parametric import t, x
 from cra_sym.symbols import Dimension, dimension, symbol
 
 __all__: list[str] = []
 
 epsilon, sigma, varpi, omega_n, T_0, T_1 = (symbol(name) for name in "epsilon sigma varpi omega_n T_0 T_1".split())
-P_ij, P_nn, M_n, Gamma_n, w_1, zeta_n = (symbol(name) for name in "P_ij P_nn M_n Gamma_n w_1 zeta_n".split())
+P_nn, M_n, Gamma_n, zeta_n = (symbol(name) for name in ("P_nn", "M_n", "Gamma_n", "zeta_n"))
 
 
 @cache
@@ -165,14 +164,14 @@ def _left_over(equation: Eq) -> Expr:
 
 
 @proves(37)
-def _() -> Proof:
+def prove_two_scale_expansion() -> Proof:
     """Order 0 without epsilon; with (48) it leaves nothing at orders 0 and 1 in the equation of motion of a mode."""
     yield two_scale_expansion()[0].rhs.subs(epsilon, 0) == named("q_n0")
     yield from residual()
 
 
 @proves(38)
-def _() -> Proof:
+def prove_derivative_operators() -> Proof:
     """Any exponential of T_0 and T_1, and so any sum of such, differentiated once and twice as one of t and epsilon t;
     the second leaves only epsilon^2."""
     fast, slow = Symbol("a"), Symbol("b")
@@ -187,20 +186,20 @@ def _() -> Proof:
 
 
 @proves(39)
-def _() -> Proof:
+def prove_order_0() -> Proof:
     """Its operators at work on the free vibration (41) leave nothing."""
     yield _left_over(order_0()[0])
 
 
 @proves(40)
-def _() -> Proof:
+def prove_order_1() -> Proof:
     """Its operators at work on the free vibration (41) and on the bounded response of first order leave nothing when
     the amplitude follows (48)."""
     yield _left_over(order_1()[0])
 
 
 @proves(41)
-def _() -> Proof:
+def prove_order_0_solution() -> Proof:
     """Differentiated twice; and it is real: its own complex conjugate."""
     amplitudes = {named("A_n"): Symbol("a"), named("Abar_n"): Symbol("b")}
     swap = {Symbol("a"): Symbol("b"), Symbol("b"): Symbol("a"), I: -I}
@@ -211,7 +210,7 @@ def _() -> Proof:
 
 
 @proves(42)
-def _() -> Proof:
+def prove_detuning() -> Proof:
     """Frequencies; at the exact resonance one excitation period is half a period of the mode, and sigma in slow time
     is the distance from it."""
     yield dimension(detuning()) == Dimension(s=-1)
@@ -220,7 +219,7 @@ def _() -> Proof:
 
 
 @proves("42a")
-def _() -> Proof:
+def prove_forced_detuning() -> Proof:
     """Frequencies; at the exact resonance both periods are the same, and sigma in slow time is the distance from it."""
     yield dimension(forced_detuning()) == Dimension(s=-1)
     yield forced_detuning().lhs == varpi
@@ -228,7 +227,7 @@ def _() -> Proof:
 
 
 @proves(43)
-def _() -> Proof:
+def prove_excitation_in_exponentials() -> Proof:
     """Euler's formula for the detuned frequency."""
     written = excitation_in_exponentials()
     yield written.lhs - cos(varpi * T_0)
@@ -236,7 +235,7 @@ def _() -> Proof:
 
 
 @proves(44)
-def _() -> Proof:
+def prove_secular_terms() -> Proof:
     """Any other slow evolution of the amplitude leaves in the equation of motion just these terms, sign changed."""
     rate = Symbol("r", real=True)
     left = [term for term in residual(rate)[1].args if not any(e.args[0].has(t) for e in term.atoms(exp))]
@@ -247,7 +246,7 @@ def _() -> Proof:
 
 
 @proves(45)
-def _() -> Proof:
+def prove_solvability() -> Proof:
     """A force of an oscillator's own frequency makes it swing ever wider, t times a harmonic, and the mean of the right
     of (40) times exp(-i omega_n T_0) over one period tells how much of it there is: just this."""
     swelling = t * exp(I * omega_n * t)
@@ -267,7 +266,7 @@ def inner_product() -> Eq:
 
 
 @proves(46)
-def _() -> Proof:
+def prove_inner_product() -> Proof:
     """For functions with real and imaginary parts it is what the mass of (6) makes of the four pairs of those, the part
     of the second function conjugate."""
     f, g = (Function(name)(x) for name in "fg")
@@ -284,7 +283,7 @@ def _mass(first: Expr, second: Expr) -> Expr:
 
 
 @samples(46)
-def _() -> bool:
+def sample_inner_product() -> bool:
     """Modes of a random arm found by shooting are orthogonal in it."""
     f, g = Function("f"), Function("g")
     values, (one, two, *_rest) = sample(46), shoot(sample(46))
@@ -300,7 +299,7 @@ def distributed() -> Eq:
 
 
 @proves(47)
-def _() -> Proof:
+def prove_distributed() -> Proof:
     """The inner product (46) of any factor times a real mode with that mode is the factor times the mass of (6); with
     that mass in front, (45)."""
     f, g, factor = Function("f")(x), Function("g")(x), Symbol("c")
@@ -321,7 +320,7 @@ def amplitude_equation() -> Eq:
 
 
 @proves(48)
-def _() -> Proof:
+def prove_amplitude_equation() -> Proof:
     """Put with the expansion into the equation of motion it leaves nothing at orders 0 and 1; another one would."""
     yield from residual()
     yield residual(Symbol("r", real=True)) != (0, 0)
@@ -335,7 +334,7 @@ def forced_amplitude_equation() -> Eq:
 
 
 @proves("48a")
-def _() -> Proof:
+def prove_forced_amplitude_equation() -> Proof:
     """At resonance the amplitude grows in proportion to time; so made into a motion of the mode, it balances the force
     of (36). Away from it, it turns with the detuning."""
     drift = forced_amplitude_equation().rhs
@@ -349,11 +348,12 @@ def _() -> Proof:
 def stability_boundary() -> tuple[Eq, Eq]:
     """The amplitude of (48) grows between these two frequencies. The paper's boundary, borrowed from axially moving
     beams, does not follow from its (36); this one follows from (48)."""
-    return _step("boundary")
+    lower, upper = _step("boundary")
+    return lower, upper
 
 
 @proves(49)
-def _() -> Proof:
+def prove_stability_boundary() -> Proof:
     """Borders of instability have motions of twice the period of the excitation. With a third harmonic, a sine at one
     border and a cosine at the other leave nothing at orders 0 and 1 in the equation of motion."""
     for sign in (1, -1):
@@ -378,7 +378,7 @@ def _left_by(motion: Expr, size: Expr, frequency: Expr, damping: Expr = S.Zero) 
 
 
 @samples(49)
-def _() -> bool:
+def sample_stability_boundary() -> bool:
     """Mathieu's characteristic values; the error shrinks with the square of epsilon."""
     from scipy.special import mathieu_a, mathieu_b
 
@@ -401,7 +401,7 @@ def forced_measure() -> Eq:
 
 
 @proves("49a")
-def _() -> Proof:
+def prove_forced_measure() -> Proof:
     """A velocity that does not change when the mode is scaled; squared it is that of a motion t times a harmonic, which
     balances the force of (36) at resonance, at the tip."""
     expression, (_, gamma, tip, mass, _) = forced_growth()
@@ -426,7 +426,7 @@ def damping_threshold() -> Eq:
 
 
 @proves("49b")
-def _() -> Proof:
+def prove_damping_threshold() -> Proof:
     """With this damping a motion of twice the period of the excitation neither grows nor decays in the middle of the
     zone: with a third harmonic it leaves nothing at orders 0 and 1 in the equation of motion."""
     needed = zeta_n * epsilon / damping_threshold().rhs
@@ -439,7 +439,7 @@ def _() -> Proof:
 
 
 @samples("49b")
-def _() -> bool:
+def sample_damping_threshold() -> bool:
     """The Floquet multipliers of one mode in the middle of its zone, just below and just above."""
     from cra_sym.solvers.floquet import floquet_exponents
 

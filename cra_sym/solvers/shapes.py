@@ -8,7 +8,7 @@ import numpy as np
 
 from .stiffness import GOLDEN, TERMS, DynamicStiffness, Evaluation, Tree, form
 
-__all__ = ["mode_states", "mode_vectors", "nodes", "states"]
+__all__ = ["clusters", "mode_states", "mode_vectors", "nodes", "states"]
 
 
 def mode_states(problem: DynamicStiffness, z: np.ndarray, share: np.ndarray) -> np.ndarray:
@@ -30,7 +30,7 @@ def mode_states(problem: DynamicStiffness, z: np.ndarray, share: np.ndarray) -> 
     """
     rows, modes = z.shape
     here, u, row = mode_vectors(problem, z)
-    state = states(problem, here, u, _clusters(z)[1].ravel(), row, share[row])
+    state = states(problem, here, u, clusters(z)[1].ravel(), row, share[row])
     return state.reshape(rows, modes, *state.shape[1:])
 
 
@@ -43,7 +43,7 @@ def mode_vectors(
     """
     rows, modes = z.shape
     row = np.repeat(np.arange(rows), modes)
-    place, z = _clusters(z)
+    place, z = clusters(z)
     levels = problem.levels(z.ravel(), row)
     if common_levels:
         levels = np.repeat(levels.reshape(rows, modes).max(axis=1), modes)
@@ -91,7 +91,7 @@ def states(
     return state
 
 
-def _clusters(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def clusters(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return each root's position among equal neighbours, and the roots with those neighbours made identical."""
     place, joined = np.zeros(z.shape, dtype=int), z.copy()
     for i in range(1, z.shape[1]):
@@ -162,6 +162,7 @@ def _carry(problem: DynamicStiffness, z, row, start, level: int, share) -> np.nd
     index = np.clip(((share - origin) / piece).astype(int), 0, start.shape[2] - 1)
     node = origin + index * piece
     exponent, _ = problem.exponent(z, row, node, share - node)
+    start = problem.behind(start, z, row, level)
     total = term = start[part, np.arange(len(row))[:, None], index][..., None]
     for j in range(1, TERMS + 1):
         term = exponent @ term / j

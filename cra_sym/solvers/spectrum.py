@@ -1,8 +1,8 @@
 """Complete spectra: the first zeros of an entire function with real zeros only, none missed and none doubled.
 
 An exact count says how many zeros lie below any point; Ostrowski's square-root step then climbs from a point next to
-a zero to that zero, at cubic order and without ever passing it. The functions are those of beams: in z = lambda^4, with
-zeros about pi apart in lambda.
+a zero to that zero, at cubic order and without ever passing it. The functions are those of lines with one wave number,
+in z = lambda^4 for beams and lambda^2 for strings, with zeros about pi apart in lambda.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Characteristic(Protocol):
         """
 
 
-def spectrum(characteristic: Characteristic, modes: int, offset: float = 1 / 16) -> np.ndarray:
+def spectrum(characteristic: Characteristic, modes: int, offset: float = 1 / 16, power: int = 4) -> np.ndarray:
     """Return the first zeros of every lane.
 
     Parameters
@@ -54,6 +54,8 @@ def spectrum(characteristic: Characteristic, modes: int, offset: float = 1 / 16)
     offset : float
         Zeros are counted where lambda is ``(k / 2 + offset) pi``, k = 0, 1, ...; best a value that keeps away from
         where zeros gather.
+    power : int
+        z is this power of lambda.
 
     Returns
     -------
@@ -66,25 +68,27 @@ def spectrum(characteristic: Characteristic, modes: int, offset: float = 1 / 16)
         If a zero is not reached: the function is not of this kind.
     """
     lanes = len(characteristic.zeros)
-    points, counts, values = _counted(characteristic, modes, offset)
+    points, counts, values = _counted(characteristic, modes, offset, power)
     number, lane = (index.ravel() for index in np.indices((modes, lanes)))
     right = _first_point_with(counts, modes)[number, lane]
     z = np.zeros(modes * lanes)
     wanted = np.flatnonzero(number >= characteristic.zeros[lane])
     number, lane, right = number[wanted], lane[wanted], right[wanted]
-    start = _start(characteristic, number, lane, right, points, counts, values)
+    start = _start(characteristic, number, lane, right, points, counts, values, power)
     z[wanted] = _climbed(characteristic, number, lane, start)
     return z.reshape(modes, lanes).T
 
 
-def _counted(characteristic: Characteristic, modes: int, offset: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _counted(
+    characteristic: Characteristic, modes: int, offset: float, power: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return points lambda, up to one with enough zeros below it, the counts there and the functions."""
     points, counts, values = [0.0], [characteristic.zeros], [np.full(len(characteristic.zeros), np.nan)]
     while counts[-1].min(initial=modes) < modes:
         if len(points) > 2 * modes + 40:
             raise ArithmeticError(f"{counts[-1].min()} zeros lie below lambda = {points[-1]:g}, {modes} are wanted")
         points.append(np.pi * ((len(points) - 1) / 2 + offset))
-        number, value = characteristic.count(points[-1] ** 4, slice(None))
+        number, value = characteristic.count(points[-1] ** power, slice(None))
         counts.append(number)
         values.append(value)
     return np.array(points), np.array(counts), np.array(values)
@@ -107,15 +111,16 @@ def _start(
     points: np.ndarray,
     counts: np.ndarray,
     values: np.ndarray,
+    power: int,
 ) -> np.ndarray:
     """Return points next to the wanted zeros: with ``number`` zeros below, or one more."""
-    low, high = points[right - 1] ** 4, points[right] ** 4
+    low, high = points[right - 1] ** power, points[right] ** power
     below, above = counts[right - 1, lane], counts[right, lane]
     _separate(characteristic, number, lane, low, high, below, above)
     first = number == characteristic.zeros[lane]
     alone = ~first & (below == number) & (above == number + 1) & (right > 1)
     z = np.where(below == number, low, high)
-    z[alone] = _by_phase(lane[alone], right[alone], points, values) ** 4
+    z[alone] = _by_phase(lane[alone], right[alone], points, values) ** power
     z[first] = _from_zero(characteristic, lane[first], high[first])
     second = np.flatnonzero((number == characteristic.zeros[lane] + 1) & (right < 3) & (above == number + 1))
     guess = _second_from_zero(characteristic, lane[second])

@@ -1,30 +1,38 @@
-# ruff: noqa: F821
+# ruff: noqa: B018, F821, F841
 # mypy: ignore-errors
 """Template of the compiled twin of `cra_sym.solvers.spectrum`: the same steps, for blocks of lanes at once.
 
 This text is specialised by `cra_sym.kernels.compiled` with the functions it leaves open: ``coefficients``,
-``power_series``, ``basis``, ``basis_near``, ``chain`` and ``derivatives`` of one family of functions.
+``power_series``, ``basis``, ``basis_near``, ``chain`` and ``derivatives`` of one family of functions. What else depends
+on the family, sizes and lists of arguments, replaces the marks: capital letters between double underscores.
 """
 
 import numpy as np
 
 _LANES = 128
-_NEAR = 5.0
-_TERMS = 10  # of the power series
-_ROWS = 12 + _TERMS  # what describes a lane: the determinant's coefficients, and those of its power series
+_NEAR = __NEAR__
+_MOST_NEAR = __MOST_NEAR__  # zeros below that
+_SERIES = __COEFFICIENTS__  # from here on a lane's rows hold its power series; before, the determinant's coefficients
+_ROWS = _SERIES + __TERMS__
 _MOST_STEPS = 80
 
 
-def frequency_parameters(out, evaluations, kappa_t, kappa_r, mu, iota):
-    """Fill ``out`` (lanes, modes) with the fourth roots of the zeros; return whether every zero was reached."""
+def frequency_parameters(out, evaluations, __GROUPS__):
+    """Fill ``out`` (lanes, modes) with lambda of the zeros; return whether every zero was reached."""
     modes = out.shape[1]
     points = 2 * modes + 42
-    tables = np.empty((points, 7))  # lambda, z and the basis at the points where zeros are counted
+    tables = np.empty((points, 2 + __BASIS_SIZE__))  # lambda, z and the basis at the points where zeros are counted
     for k in range(points):
         lam = np.pi * ((k - 1) / 2 + 0.0625) if k else 0.0
-        tables[k, 0], tables[k, 1] = lam, lam**4
-        tables[k, 2], tables[k, 3], tables[k, 4], tables[k, 5], tables[k, 6] = _scaled_basis(lam, lam**4)
-    pairs, k = np.empty((8, _LANES)), np.zeros((2 * _ROWS, _LANES))  # of all lanes; then of those still on their way
+        z_k = _power(lam)
+        __BASIS__ = _scaled_basis(lam, z_k)
+        values_k = lam, z_k, __BASIS__
+        for i in range(2 + __BASIS_SIZE__):
+            tables[k, i] = values_k[i]
+    pairs, k = (
+        np.empty((__PARAMETERS__, _LANES)),
+        np.zeros((2 * _ROWS, _LANES)),
+    )  # of all lanes; then of those still on their way
     counts, values = np.empty((points, _LANES), np.int64), np.empty((points, _LANES))
     fewest, most = np.empty(points, np.int64), np.empty(points, np.int64)  # zeros below a point in any lane
     right, zeros = np.empty(_LANES, np.int64), np.empty(_LANES, np.int64)
@@ -35,7 +43,7 @@ def frequency_parameters(out, evaluations, kappa_t, kappa_r, mu, iota):
     reached = True
     for first in range(0, out.shape[0], _LANES):
         size = min(_LANES, out.shape[0] - first)
-        _prepare(pairs, k, zeros, kappa_t, kappa_r, mu, iota, first, size)
+        _prepare(pairs, k, zeros, __GROUPS__, first, size)
         last = _counted(counts, values, fewest, most, pairs, zeros, tables, modes, size)
         reached &= fewest[last] >= modes
         low = high = 0
@@ -48,64 +56,74 @@ def frequency_parameters(out, evaluations, kappa_t, kappa_r, mu, iota):
             _start(z, crowded, around, number, right, counts, values, tables, pairs, k, zeros, last, size)
             reached &= _climb(z, place, lower, step, previous, active, left, evaluations, number, zeros, k, size)
             for lane in range(size):
-                z[lane] = np.sqrt(np.sqrt(z[lane]))
+                z[lane] = _root(z[lane])
             for lane in range(size):
                 out[first + lane, number] = z[lane]
     return reached
 
 
+def _root(z):
+    return __ROOT__
+
+
+def _power(lam):
+    return __POWER__
+
+
 def _scaled_basis(lam, z):
-    unit, p, q, r, s = basis(lam, exp(-lam))
-    unit_near, p_near, q_near, r_near, s_near = basis_near(min(z, _NEAR))
+    __BASIS__ = basis(lam, exp(-lam))
+    __BASIS_NEAR__ = basis_near(min(z, _NEAR))
     if z < _NEAR:
-        return unit_near, p_near, q_near, r_near, s_near
-    return unit, p, q, r, s
+        return __BASIS_NEAR__
+    return __BASIS__
 
 
-def _prepare(pairs, k, zeros, kappa_t, kappa_r, mu, iota, first, size):
-    """Fill in the pairs (kappa, 1) / (1 + kappa), the determinant's coefficients and its power series."""
+def _stiff(kappa):
+    return 1.0 if kappa == np.inf else kappa / (1.0 + kappa), 1.0 / (1.0 + kappa)
+
+
+def _heavy(mu):
+    return mu / (1.0 + mu), 1.0 / (1.0 + mu)
+
+
+def _both(kappa, mu):
+    total = 1.0 + (kappa + mu)
+    return 1.0 if kappa == np.inf else kappa / total, mu / total, 1.0 / total
+
+
+def _prepare(pairs, k, zeros, __GROUPS__, first, size):
+    """Fill in (kappa, mu, 1) / (1 + kappa + mu), the determinant's coefficients and its power series."""
     for lane in range(size):
-        t, r, m, j = kappa_t[first + lane], kappa_r[first + lane], mu[first + lane], iota[first + lane]
-        pairs[0, lane], pairs[1, lane] = 1.0 if t == np.inf else t / (1.0 + t), 1.0 / (1.0 + t)
-        pairs[2, lane], pairs[3, lane] = 1.0 if r == np.inf else r / (1.0 + r), 1.0 / (1.0 + r)
-        pairs[4, lane], pairs[5, lane] = m / (1.0 + m), 1.0 / (1.0 + m)
-        pairs[6, lane], pairs[7, lane] = j / (1.0 + j), 1.0 / (1.0 + j)
-        zeros[lane] = (t == 0.0) + (r == 0.0)
+        i = first + lane
+        __PREPARE__
+        zeros[lane] = __RIGID_BODY_MODES__
     for lane in range(size):
-        a = coefficients(
-            pairs[0, lane], pairs[1, lane], pairs[2, lane], pairs[3, lane],
-            pairs[4, lane], pairs[5, lane], pairs[6, lane], pairs[7, lane],
-        )  # fmt: skip
-        for i in range(12):
+        a = coefficients(__OF_COEFFICIENTS__)
+        for i in range(_SERIES):
             k[i, lane] = a[i]
     for lane in range(size):
-        a = power_series(
-            k[0, lane], k[1, lane], k[2, lane], k[3, lane], k[4, lane], k[5, lane],
-            k[6, lane], k[7, lane], k[8, lane], k[9, lane], k[10, lane], k[11, lane],
-        )  # fmt: skip
-        for i in range(_TERMS):
-            k[12 + i, lane] = a[i]
+        a = power_series(__OF_POWER_SERIES__)
+        for i in range(__TERMS__):
+            k[_SERIES + i, lane] = a[i]
     for lane in range(size):
         for _ in range(zeros[lane]):
-            for i in range(12, _ROWS - 1):
+            for i in range(_SERIES, _ROWS - 1):
                 k[i, lane] = k[i + 1, lane]
             k[_ROWS - 1, lane] = 0.0
 
 
-def _count(pairs, lane, lam, z, unit, p, q, r, s):
-    both_pinned, sprung, massive, translating, rotating = chain(
-        pairs[0, lane], pairs[1, lane], pairs[2, lane], pairs[3, lane],
-        pairs[4, lane], pairs[5, lane], pairs[6, lane], pairs[7, lane], z, unit, p, q, r, s,
-    )  # fmt: skip
+def _count(pairs, lane, lam, z, __BASIS__):
+    __LINKS__ = chain(__OF_CHAIN__)
     turns = lam * (1 / np.pi)
     number = np.int64(turns)
-    change = -1 if turns - number < 0.5 else 1
-    number += 0 if (both_pinned > 0) == (number & 1 == 0) else change
-    number -= 0 if (sprung > 0) == (number & 1 == 0) else 1
-    number += 0 if (massive > 0) == (number & 1 == 0) else 1
-    number += 0 if (translating > 0) == (number & 1 == 0) else 1
-    number += 0 if (rotating > 0) == (number & 1 == 0) else 1
-    return number, rotating
+    number = _linked(number, link_0, -1 if turns - number < 0.5 else 1)
+    __COUNT__
+    return number, __LAST_LINK__
+
+
+def _linked(number, value, change):
+    """Return the number, changed where the sign of the value is not that of ``(-1)**number``."""
+    return number + (0 if (value > 0) == (number & 1 == 0) else change)
 
 
 def _counted(counts, values, fewest, most, pairs, zeros, tables, modes, size):
@@ -115,10 +133,10 @@ def _counted(counts, values, fewest, most, pairs, zeros, tables, modes, size):
         counts[0, lane], values[0, lane] = zeros[lane], np.nan
         fewest[0], most[0] = min(fewest[0], zeros[lane]), max(most[0], zeros[lane])
     for point in range(1, tables.shape[0]):
-        lam, z, unit, p, q, r, s = tables[point]
+        lam, z, __BASIS__ = tables[point]
         least, largest = modes, 0
         for lane in range(size):
-            number, value = _count(pairs, lane, lam, z, unit, p, q, r, s)
+            number, value = _count(pairs, lane, lam, z, __BASIS__)
             counts[point, lane], values[point, lane] = number, value
             least, largest = min(least, number), max(largest, number)
         fewest[point], most[point] = least, largest
@@ -164,9 +182,9 @@ def _between(pairs, lane, number, point, counts, tables):
     below, above, low, high = counts[point - 1, lane], counts[point, lane], tables[point - 1, 1], tables[point, 1]
     while below < number and number + 1 < above:
         middle = np.sqrt(low * high) if low > 0 else high / 16
-        lam = np.sqrt(np.sqrt(middle))
-        unit, p, q, r, s = _scaled_basis(lam, middle)
-        counted, _ = _count(pairs, lane, lam, middle, unit, p, q, r, s)
+        lam = _root(middle)
+        __BASIS__ = _scaled_basis(lam, middle)
+        counted, _ = _count(pairs, lane, lam, middle, __BASIS__)
         if counted <= number:
             low, below = middle, counted
         else:
@@ -176,14 +194,14 @@ def _between(pairs, lane, number, point, counts, tables):
 
 def _first(k, lane):
     """Return where the first step from z = 0 ends."""
-    return abs(k[12, lane]) / np.sqrt(k[13, lane] ** 2 - 2.0 * k[12, lane] * k[14, lane])
+    return abs(k[_SERIES, lane]) / np.sqrt(k[_SERIES + 1, lane] ** 2 - 2.0 * k[_SERIES, lane] * k[_SERIES + 2, lane])
 
 
 def _second(k, low, high, lane):
     """Return the larger zero of the first three terms of the power series if it is apart from the other, else 0."""
-    square = k[13, lane] ** 2
-    discriminant = square - 4.0 * k[12, lane] * k[14, lane]
-    z = (abs(k[13, lane]) + np.sqrt(max(discriminant, 0.0))) / (2.0 * abs(k[14, lane]))
+    square = k[_SERIES + 1, lane] ** 2
+    discriminant = square - 4.0 * k[_SERIES, lane] * k[_SERIES + 2, lane]
+    z = (abs(k[_SERIES + 1, lane]) + np.sqrt(max(discriminant, 0.0))) / (2.0 * abs(k[_SERIES + 2, lane]))
     return z if (discriminant > 0.1 * square) & (low < z) & (z < high) else 0.0
 
 
@@ -197,20 +215,16 @@ def _by_phase(around, right, last, lane):
     product = share * (1.0 - share)
     turn = share + product * (1.0 - 2.0 * share) * (-0.3664 - product * (0.3404 + product * 1.5))
     lam = around[4, lane] + turn * (np.pi / 2)
-    return (lam * lam) * (lam * lam)
+    return _power(lam)
 
 
 def _step(z, lower, even, k, row, lane):
     """Return Ostrowski's step towards the zero, less what lower zeros take from it; k from ``row`` on is the lane's."""
-    lam = np.sqrt(np.sqrt(z))
-    unit, p, q, r, s = basis(lam, exp(-lam))
-    value, first, second = derivatives(
-        k[row, lane], k[row + 1, lane], k[row + 2, lane], k[row + 3, lane], k[row + 4, lane], k[row + 5, lane],
-        k[row + 6, lane], k[row + 7, lane], k[row + 8, lane], k[row + 9, lane], k[row + 10, lane], k[row + 11, lane],
-        z, unit, p, q, r, s,
-    )  # fmt: skip
+    lam = _root(z)
+    __BASIS__ = basis(lam, exp(-lam))
+    value, first, second = derivatives(__OF_DERIVATIVES__)
     near_value, near_first, near_second = k[row + _ROWS - 1, lane], 0.0, 0.0
-    for i in range(_ROWS - 2, 11, -1):
+    for i in range(_ROWS - 2, _SERIES - 1, -1):
         near_second = near_second * z + near_first
         near_first = near_first * z + near_value
         near_value = near_value * z + k[row + i, lane]
@@ -230,7 +244,7 @@ def _climb(z, place, lower, step, previous, active, left, evaluations, number, z
     """Climb to the zeros: twice with all lanes, then with those that are not there yet, moved side by side."""
     for lane in range(size):
         place[lane], lower[lane], active[lane] = z[lane], number - zeros[lane], lane
-    rows = 12 if number > 3 else _ROWS  # the power series is for points with three zeros below at most
+    rows = _SERIES if number > _MOST_NEAR else _ROWS
     many, row = size, 0
     for turn in range(_MOST_STEPS):
         for i in range(many):

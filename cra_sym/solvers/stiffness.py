@@ -212,6 +212,10 @@ class DynamicStiffness:
         inner = _commutator(_combine((-20.0, b1), (-1.0, b3), (1.0, c1)), _combine((1.0, b2), (1.0, c2)))
         return _combine((1.0, b1), (1.0 / 12.0, b3), (1.0 / 240.0, inner))
 
+    def behind(self, start: np.ndarray, z: np.ndarray, row: np.ndarray, level: int) -> np.ndarray:
+        """Return states left of the pieces, (part, row, piece, state), as they enter the pieces."""
+        return start
+
     def _assemble(self, z, rows, matrix, slope, unit, fixed, growth, tree) -> Evaluation:
         """Join the two parts at a node that stays, add the ends, keep the free coordinates, balance."""
         n, m = self.displacements, self.coordinates

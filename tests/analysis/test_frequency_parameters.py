@@ -1,7 +1,6 @@
 """Frequency parameters: every digit against mpmath, completeness against finite elements, limits and theorems."""
 
 import importlib.util
-from collections import Counter
 from pathlib import Path
 
 import mpmath as mp
@@ -12,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.linalg import eigh
 
 from cra_sym import frequency_parameters
+from cra_sym.codegen.arm_family import arm_family
 from cra_sym.kernels import has_compiler
-from cra_sym.model import spectrum
 
 _spec = importlib.util.spec_from_file_location("reference", Path(__file__).with_name("reference.py"))
 reference = importlib.util.module_from_spec(_spec)
@@ -222,7 +221,7 @@ def test_bad_input(arguments, error, message):
 @pytest.mark.parametrize("modes", [1, 3, 12])
 def test_compiled_and_numpy_paths_agree(modes):
     arms = random_arms(4, 1500)
-    one, two = (spectrum.frequency_parameters(*arms, modes=modes, compile=c, threads=2) for c in (True, False))
+    one, two = (arm_family().frequency_parameters(*arms, modes=modes, compile=c, threads=2) for c in (True, False))
     assert ((one == 0) == (two == 0)).all()
     np.testing.assert_allclose(one, two, rtol=2e-15)
 
@@ -230,36 +229,7 @@ def test_compiled_and_numpy_paths_agree(modes):
 @pytest.mark.skipif(not has_compiler(), reason="Numba is an option")
 def test_every_digit_of_the_compiled_path():
     arms = random_arms(6, 40)
-    lam = spectrum.frequency_parameters(*arms, modes=4, compile=True)
+    lam = arm_family().frequency_parameters(*arms, modes=4, compile=True)
     assert reference.relative_errors(lam, *arms).max() < 1e-15
-    high = spectrum.frequency_parameters(*(x[:3] for x in arms), modes=1000, compile=True)[:, [300, 999]]
+    high = arm_family().frequency_parameters(*(x[:3] for x in arms), modes=1000, compile=True)[:, [300, 999]]
     assert reference.relative_errors(high, *(x[:3] for x in arms)).max() < 1e-15
-
-
-def test_the_path_is_chosen_by_what_it_costs(monkeypatch):
-    """Machine code is loaded for a large call, and made when this process has done enough without it."""
-    calls, made = [], []
-    monkeypatch.setattr(spectrum, "_fill_compiled", lambda result, *groups: calls.append("compiled"))
-    monkeypatch.setattr(spectrum, "_fill", lambda result, *groups: calls.append("numpy"))
-    monkeypatch.setattr(spectrum, "has_compiler", lambda: True)
-    monkeypatch.setattr(spectrum, "is_compiled", lambda *parts: bool(made))
-    monkeypatch.setattr(spectrum, "_done", Counter())
-    monkeypatch.setattr(spectrum, "COMPILE_FROM", 2.5 * spectrum.LOAD_FROM)
-    large = np.ones(spectrum.LOAD_FROM), 1.0, 0.0
-
-    def path(*arguments):
-        calls.clear()
-        frequency_parameters(*arguments, modes=1)
-        (taken,) = set(calls)
-        return taken
-
-    assert path(np.ones(10), 1.0, 0.0) == "numpy"
-    assert [path(*large) for _ in range(3)] == ["numpy", "numpy", "compiled"]
-    monkeypatch.setattr(spectrum, "_done", Counter())
-    assert path(np.ones(3 * spectrum.LOAD_FROM), 1.0, 0.0) == "compiled"  # at once, if one call is worth it
-    monkeypatch.setattr(spectrum, "_done", Counter())
-    assert {path(np.ones(spectrum.LOAD_FROM // 2), 1.0, 0.0) for _ in range(9)} == {"numpy"}
-    made.append(True)
-    assert path(*large) == "compiled" and path(np.ones(10), 1.0, 0.0) == "numpy"
-    monkeypatch.setattr(spectrum, "has_compiler", lambda: False)
-    assert path(*large) == "numpy"

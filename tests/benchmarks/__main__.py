@@ -13,7 +13,7 @@ from typing import Any
 
 import matplotlib
 
-from tests.benchmarks import calls, cold, frequencies, kernel, machine, nodes, responses, stability, targets
+from tests.benchmarks import calls, cold, frequencies, kernel, machine, nodes, responses, stability, targets, waves
 
 RESULTS = Path(__file__).parent / "results"
 
@@ -26,6 +26,7 @@ def run(quick: bool) -> dict[str, Any]:
     report["kernel"] = kernel.main(1 << 14 if quick else 1 << 16)["table"]
     report["calls"] = calls.measured(calls.SIZES[:2] if quick else calls.SIZES)
     report["frequencies"] = [frequencies.measured(size, 3, rounds), frequencies.measured(size // 3, 10, rounds)]
+    report["waves"], report["models"] = waves.measured(size, rounds), waves.models(size, rounds)
     report["growth"] = frequencies.growth(100_000 if quick else 10_000_000)
     report["cold start"] = cold.measured()
     report["responses"], report["stability"] = responses.measured(), stability.measured()
@@ -64,6 +65,7 @@ def table(report: dict[str, Any]) -> str:
         ]
         lines[-1] += "'Differs by' is the largest relative difference from ours."
         lines += ["", *(f"- not run: {name}: {why}" for name, why in case["absent"].items())]
+    lines += ["", "## 3 frequencies of other Lagrangians", "", *waves.table(report["waves"], report["models"])]
     lines += [
         "",
         "## One evaluation of the determinant",

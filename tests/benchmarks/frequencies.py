@@ -16,9 +16,9 @@ import numpy as np
 from scipy.optimize import brentq, elementwise
 
 import cra_sym as cra
+from cra_sym.codegen.arm_family import arm_family
 from cra_sym.kernels import has_compiler
-from cra_sym.model import spectrum
-from cra_sym.model.modal import ENDS, modes_of
+from cra_sym.kernels.parts import in_parts
 from tests.benchmarks import c_twin, elements, peers
 from tests.benchmarks.machine import in_rounds, processors, summary
 
@@ -74,7 +74,7 @@ class Case:
 
     def __init__(self, size: int, modes: int, folder: Path) -> None:
         self.size, self.modes, self.groups = size, modes, random_arms(size)
-        lam = spectrum.frequency_parameters(*self.groups, modes=modes + 1)
+        lam = arm_family().frequency_parameters(*self.groups, modes=modes + 1)
         self.lam, self.brackets = lam[:, :modes], brackets(lam)
         kappa_t, kappa_r, mu, _ = self.groups
         self.compliant = 1 / kappa_t, 1 / kappa_r, mu
@@ -108,7 +108,7 @@ class Case:
 
     def ours(self, number: int, **options: Any) -> np.ndarray:
         """Solve by this package."""
-        return spectrum.frequency_parameters(*(x[:number] for x in self.groups), modes=self.modes, **options)
+        return arm_family().frequency_parameters(*(x[:number] for x in self.groups), modes=self.modes, **options)
 
     def in_c(self, number: int, fill: c_twin.Fill, threads: int = 1) -> np.ndarray:
         """Solve by exported C."""
@@ -117,7 +117,7 @@ class Case:
         def part(lanes: slice) -> None:
             fill(result[lanes], *(x[lanes] for x in self.groups))
 
-        spectrum.in_parts(part, number, self.modes, threads=threads, compiled=True)
+        in_parts(part, number, self.modes, threads=threads, compiled=True)
         return result
 
     def routes(self) -> dict[str, tuple[int, Callable[[int], Any]]]:
@@ -142,22 +142,25 @@ class Case:
         return found
 
     def quantities(self) -> dict[str, tuple[int, Callable[[int], Any]]]:
-        """Return the public functions over all arms, on as many threads as they take, every array of ours looked at."""
+        """Return the public functions over all arms, on as many threads as they take, every array of ours looked at.
+
+        An arm keeps its modes: each call gets a new one.
+        """
 
         if has_compiler():
-            few = [x[:3] for x in self.groups]
-            modes_of(*few, lam=self.lam[:3], compile=True).quantities(ENDS)  # machine code is there from now on
+            few, family = [x[:3] for x in self.groups], arm_family()
+            family.modes(*few, lam=self.lam[:3], compile=True).quantities(family.layout.left)  # makes machine code
 
         def modal(_: int) -> list[np.ndarray]:
-            found = cra.modal_parameters(self.arms, self.modes)
+            found = cra.modal_parameters(self.arms.replace(), self.modes)
             return [getattr(found, name) for name in MODAL]
 
         def sensitive(_: int) -> list[np.ndarray]:
-            found = cra.sensitivities(self.arms, self.modes)
+            found = cra.sensitivities(self.arms.replace(), self.modes)
             return [getattr(found, name) for name in SENSITIVITIES]
 
         return {
-            FREQUENCIES: (self.size, lambda n: cra.natural_frequencies(self.arms, self.modes)),
+            FREQUENCIES: (self.size, lambda n: cra.natural_frequencies(self.arms.replace(), self.modes)),
             "modal_parameters": (self.size, modal),
             "sensitivities": (self.size, sensitive),
         }
@@ -204,7 +207,8 @@ def growth(most: int) -> dict[str, dict[str, list[list[float]]]]:
     for name, compile in paths.items():
 
         def spent(groups: tuple[np.ndarray, ...], modes: int, compile: bool = compile) -> list[float]:
-            route = {"": lambda: spectrum.frequency_parameters(*groups, modes=modes, compile=compile, threads=1)}
+            solve = arm_family().frequency_parameters
+            route = {"": lambda: solve(*groups, modes=modes, compile=compile, threads=1)}
             return list(summary(in_rounds(route, 3)[""]).values())
 
         affordable = [n for n in numbers if compile or n <= 1_000_000]
@@ -215,4 +219,5 @@ def growth(most: int) -> dict[str, dict[str, list[list[float]]]]:
 
 def evaluations_per_root(size: int, modes: int, inert: bool) -> float:
     """Return how often the determinant is evaluated for a root, counts at fixed points left out."""
-    return spectrum._fill_compiled(np.empty((size, modes)), *random_arms(size, inert=inert)) / (size * modes)
+    found = arm_family().fill_compiled(np.empty((size, modes)), *random_arms(size, inert=inert))
+    return found / (size * modes)

@@ -6,6 +6,7 @@ from typing import Any
 
 from tests.benchmarks.calls import KERNEL, LEAST_LANES, PEERS
 from tests.benchmarks.frequencies import FREQUENCIES, LOOP
+from tests.benchmarks.waves import ARM_AS_MODEL, PUBLIC, PUBLIC_NUMPY, STRING
 
 ONE, NUMPY, FIND = "cra_sym, compiled, 1 thread", "cra_sym, NumPy", "scipy elementwise.find_root"
 
@@ -38,6 +39,15 @@ def rows(report: dict[str, Any]) -> list[dict[str, Any]]:
             add(f"{name}: {quantity} over frequencies", ratio(quantity, FREQUENCIES), 2.0, least=False)
         for arms, value in case["evaluations a root"].items():
             add(f"{name}: evaluations a root, {arms}", value, 2.5, least=False)
+    for family, routes in report["waves"].items():
+        for route, least in ((PUBLIC_NUMPY, 15), (PUBLIC, 150)):
+            add(
+                f"{family}: {route}, {routes[route]['sets']} sets, times the loop",
+                routes[route]["times the loop"],
+                least,
+            )
+    for model, most in ((ARM_AS_MODEL, 1.3), (STRING, 2.0)):
+        add(f"{model} over the arm", report["models"][model]["times the arm"], most, least=False)
     kernel = report["kernel"]
     if "Numba, kernel" in kernel and "C, branch-free functions" in kernel:
         add("one evaluation over C", kernel["Numba, kernel"]["ratio to C"], 1.6, least=False)

@@ -7,6 +7,7 @@ import pytest
 
 import cra_sym as cra
 from cra_sym.figures import stability as figures
+from cra_sym.model.one_wave import OneWave
 
 
 @pytest.mark.parametrize("draw", [figures.figure_11, figures.figure_12])
@@ -23,6 +24,26 @@ def test_principal_zones(draw, excitation):
     drawn = [line.get_xdata()[-1] for line in panels[1].lines]
     assert np.allclose(drawn, [*first, *second])
     assert "$\\varpi - 2\\omega_3$" in panels[-1].get_xlabel()
+
+
+@pytest.mark.parametrize("excitation", [figures.JOINT, figures.AXIAL])
+def test_a_chart_computes_the_modes_of_an_arm_once(excitation, monkeypatch):
+    """For each number of modes: a few for the first order and for Floquet theory, more for sums and statics."""
+    asked = []
+    frequencies, modes = OneWave.angular_frequencies, OneWave.modes
+
+    def counted_frequencies(self, values, shape, number):
+        asked.append(("frequencies", number))
+        return frequencies(self, values, shape, number)
+
+    def counted_modes(self, values, shape, omega):
+        asked.append(("modes", omega.shape[-1]))
+        return modes(self, values, shape, omega)
+
+    monkeypatch.setattr(OneWave, "angular_frequencies", counted_frequencies)
+    monkeypatch.setattr(OneWave, "modes", counted_modes)
+    figures.figure_zones(excitation=excitation, points=5)
+    assert len(asked) == len(set(asked)) <= 10
 
 
 def test_combinations_are_named():

@@ -109,3 +109,13 @@ def test_a_derived_kernel_pickles_as_what_it_is(private, monkeypatch):
 def test_only_derivations_of_the_package(path):
     with pytest.raises(ValueError, match="must be"):
         derived_kernel(path)
+
+
+def test_a_derivation_takes_literals_which_are_a_part_of_its_key():
+    string, beam = (derived_kernel("cra_sym.mechanics.one_wave:basis", n) for n in (1, 2))
+    assert len(string.layout) == 2 and len(beam.layout) == 5
+    assert repr(beam) == "<Kernel of cra_sym.mechanics.one_wave:basis(2)>"
+    ends = derived_kernel("cra_sym.mechanics.one_wave:coefficients", (("k",), ("m",)))
+    assert ends.arguments == ("s_0", "c_0", "i_1", "c_1")
+    with pytest.raises(ValueError, match="must be numbers, texts and tuples of them"):
+        derived_kernel("cra_sym.mechanics.one_wave:basis", [1])

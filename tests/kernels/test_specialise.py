@@ -201,7 +201,9 @@ def on_a_terminal(code):
 
 @pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="the subprocess finds its cache by XDG_CACHE_HOME")
 def test_a_terminal_is_told_what_takes_long(private):
-    derive = "from cra_sym.kernels import derived_kernel\nderived_kernel('cra_sym.model.characteristic:basis').source\n"
+    derive = (
+        "from cra_sym.kernels import derived_kernel\nderived_kernel('cra_sym.mechanics.one_wave:basis', 2).source\n"
+    )
     shown = on_a_terminal(derive + PROCESS)
-    assert "deriving cra_sym.model.characteristic:basis, once" in shown and "compiling at, once" in shown
+    assert "deriving cra_sym.mechanics.one_wave:basis(2), once" in shown and "compiling at, once" in shown
     assert on_a_terminal(derive + PROCESS) == ""

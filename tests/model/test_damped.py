@@ -99,7 +99,8 @@ def test_strong_damping_leaves_no_oscillation(damped_joint):
 
 def test_without_dampers_the_eigenvalues_are_the_frequencies():
     model = arm()
-    np.testing.assert_array_equal(model.eigenvalues(VALUES), 2j * np.pi * model.natural_frequencies(VALUES))
+    expected = 2j * np.pi * model.natural_frequencies(VALUES)
+    np.testing.assert_allclose(model.eigenvalues(VALUES), expected, rtol=4 * np.finfo(float).eps)  # 2 pi comes and goes
     np.testing.assert_array_equal(model.damping_ratios(VALUES), 0.0)
 
 

@@ -8,19 +8,32 @@ import pytest
 import cra_sym as cra
 from cra_sym.analysis import stability
 from cra_sym.kernels import specialise
-from cra_sym.model import modal, spectrum
+from cra_sym.model.one_wave_family import Family
 from cra_sym.solvers import floquet
 
+BEAMS = ("k", "k"), ("m", "m")
+STRUCTURES = [
+    BEAMS, (("km", "km"), ("km", "km")), (("h", "k"), ("m", "")), (("", "m"), ("h", "k")), (("k",), ("m",)),
+    (("h",), ("km",)), (("m",), ("m",)),
+]  # fmt: skip
 
-def plain(template, kernels):
+
+def plain(module, text, kernels):
     """Return the template's functions as Python reads them, in the name of its file."""
-    files = Path(cra.__file__).parent.glob("*/*_lanes.py")
-    file = next(file for file in files if file.read_text(encoding="utf-8") == template)
+    file = Path(cra.__file__).parent / f"{module}.py"
     names = {}
     with np.errstate(all="ignore"):
         exec(specialise._prelude(kernels, True), names)
-        exec(compile(template, file, "exec"), names)
+        exec(compile(text, file, "exec"), names)
     return type("Template", (), {name: staticmethod(value) for name, value in names.items() if callable(value)})
+
+
+def family(structure):
+    """Return a family whose templates are not compiled."""
+    made = Family(structure)
+    made.__dict__["compiled_spectrum"] = plain("solvers/spectrum_lanes", *made.spectrum_parts())
+    made.__dict__["compiled_modes"] = plain("solvers/modal_lanes", *made.modal_parts())
+    return made
 
 
 def arms(seed, size, stiffness=(-3, 6), inertia=(-3, 3)):
@@ -32,26 +45,50 @@ def arms(seed, size, stiffness=(-3, 6), inertia=(-3, 3)):
     return draw(*stiffness, 0.0, np.inf), draw(*stiffness, 0.0, np.inf), draw(*inertia, 0.0), draw(*inertia, 0.0)
 
 
-@pytest.fixture
-def groups(monkeypatch):
-    for module in (spectrum, modal):
-        template = plain(*module._template_parts())
-        monkeypatch.setattr(module, "_template", lambda template=template: template)
+def lines(structure, seed, size):
+    """Stiffnesses and inertias of random lines of a structure."""
+    rng = np.random.default_rng(seed)
+
+    def draw(letter):
+        low, high, *ends = (-3, 6, 0.0, np.inf) if letter == "k" else (-3, 3, 0.0)
+        return np.where(rng.random(size) < 0.3, rng.choice(ends, size), 10.0 ** rng.uniform(low, high, size))
+
+    return [draw(letter) for _, letter in Family(structure).layout.groups]
+
+
+@pytest.fixture(scope="module")
+def beams():
     with np.errstate(all="ignore"):
-        yield arms(11, 65)
+        yield family(BEAMS)
 
 
-def test_spectrum(groups):
+@pytest.fixture(scope="module", params=STRUCTURES, ids=str)
+def some(request):
+    with np.errstate(all="ignore"):
+        yield family(request.param)
+
+
+def test_spectrum(beams):
     """More lanes than are kept side by side; starts and steps are as good as those of the NumPy path."""
     groups, one = arms(12, 150), np.empty((150, 6))
-    evaluations = spectrum._fill_compiled(one, *groups)
+    with np.errstate(all="ignore"):
+        evaluations = beams.fill_compiled(one, *groups)
     assert 2.0 < evaluations / np.count_nonzero(one) < 2.45
-    two = spectrum.frequency_parameters(*groups, modes=6, compile=False, threads=1)
+    two = beams.frequency_parameters(*groups, modes=6, compile=False, threads=1)
     assert ((one == 0) == (two == 0)).all()
     np.testing.assert_allclose(one, two, rtol=2e-15)
 
 
-def test_spectrum_of_extreme_arms(groups):
+def test_spectrum_of_any_ends(some):
+    groups, one = lines(some.structure, 18, 140), np.empty((140, 5))
+    with np.errstate(all="ignore"):
+        some.fill_compiled(one, *groups)
+    two = some.frequency_parameters(*groups, modes=5, compile=False, threads=1)
+    assert ((one == 0) == (two == 0)).all()
+    np.testing.assert_allclose(one, two, rtol=1e-13)
+
+
+def test_spectrum_of_extreme_arms(beams):
     """First zeros orders below all points where zeros are counted, and two of about one size in one interval."""
     rng = np.random.default_rng(15)
     z = 10.0 ** rng.uniform(-2.8, 0.2, 80)
@@ -64,24 +101,31 @@ def test_spectrum_of_extreme_arms(groups):
         np.array(some),
     ):
         one = np.empty((len(extreme[0]), 2))
-        spectrum._fill_compiled(one, *extreme)
-        two = spectrum.frequency_parameters(*extreme, modes=2, compile=False, threads=1)
+        with np.errstate(all="ignore"):
+            beams.fill_compiled(one, *extreme)
+        two = beams.frequency_parameters(*extreme, modes=2, compile=False, threads=1)
         np.testing.assert_allclose(one, two, rtol=1e-10)
 
 
-def test_spectrum_of_many_modes(groups):
+def test_spectrum_of_many_modes(beams):
     groups, one = arms(16, 2), np.empty((2, 60))
-    spectrum._fill_compiled(one, *groups)
-    two = spectrum.frequency_parameters(*groups, modes=60, compile=False, threads=1)
+    with np.errstate(all="ignore"):
+        beams.fill_compiled(one, *groups)
+    two = beams.frequency_parameters(*groups, modes=60, compile=False, threads=1)
     np.testing.assert_allclose(one, two, rtol=2e-15)
 
 
-def test_the_count_does_not_jump_at_multiples_of_pi(groups):
+def rows(made):
+    """Rows of coefficients and power series, twice."""
+    return 2 * sum(len(made.functions[name].layout) for name in ("coefficients", "power_series"))
+
+
+def test_the_count_does_not_jump_at_multiples_of_pi(beams):
     """There the beam pinned at both ends, whose zeros they are, has one more; rounding must not decide for the arm."""
-    template, pairs = spectrum._template(), np.empty((8, 12))
+    template, pairs = beams.compiled_spectrum, np.empty((8, 12))
     rng = np.random.default_rng(17)
-    arms = (10.0 ** rng.uniform(*ends, 12) for ends in ((0, 5), (-1, 3), (-2, 0), (-3, -1)))
-    template._prepare(pairs, np.zeros((44, 12)), np.empty(12, dtype=np.int64), *arms, 0, 12)
+    groups = (10.0 ** rng.uniform(*ends, 12) for ends in ((0, 5), (-1, 3), (-2, 0), (-3, -1)))
+    template._prepare(pairs, np.zeros((rows(beams), 12)), np.empty(12, dtype=np.int64), *groups, 0, 12)
 
     def count(lane, lam):
         return template._count(pairs, lane, lam, lam**4, *template._scaled_basis(lam, lam**4))[0]
@@ -93,43 +137,50 @@ def test_the_count_does_not_jump_at_multiples_of_pi(groups):
             assert around == {count(lane, lam * (1.0 - 1e-9))} == {count(lane, lam * (1.0 + 1e-9))}
 
 
-def test_zeros_are_counted_anywhere(groups):
+def test_zeros_are_counted_anywhere(some):
     """Not only at the points that the search begins with, and by another arithmetic than the NumPy path's."""
-    template, groups = spectrum._template(), arms(13, 120)
-    pairs, zeros = np.empty((8, 120)), np.empty(120, dtype=np.int64)
+    template, groups = some.compiled_spectrum, lines(some.structure, 13, 120)
+    pairs, zeros = np.empty((len(some.layout.parameters), 120)), np.empty(120, dtype=np.int64)
     # plain numbers: two truths of NumPy add up to one truth, those of Python and of Numba to two
-    template._prepare(pairs, np.zeros((44, 120)), zeros, *(group.tolist() for group in groups), 0, 120)
-    np.testing.assert_array_equal(zeros, (groups[0] == 0.0).astype(int) + (groups[1] == 0.0))
+    with np.errstate(all="ignore"):
+        template._prepare(pairs, np.zeros((rows(some), 120)), zeros, *(group.tolist() for group in groups), 0, 120)
+    characteristic, power = some.characteristic(*groups), 2 * some.layout.n
+    np.testing.assert_array_equal(zeros, characteristic.zeros)
     lam = np.random.default_rng(14).uniform(0.05, 20.0, 120)
-    found = [template._count(pairs, lane, x, x**4, *template._scaled_basis(x, x**4))[0] for lane, x in enumerate(lam)]
-    np.testing.assert_array_equal(found, spectrum.ArmCharacteristic(*groups).count(lam**4, slice(None))[0])
+    points = [(lane, x, x**power) for lane, x in enumerate(lam)]
+    found = [template._count(pairs, lane, x, z, *template._scaled_basis(x, z))[0] for lane, x, z in points]
+    np.testing.assert_array_equal(found, characteristic.count(lam**power, slice(None))[0])
 
 
-def test_modes(groups):
-    """More arms than are kept side by side, by one."""
-    groups = [group.reshape(5, 13) for group in groups]
-    lam = cra.frequency_parameters(*groups, modes=4)
-    one, two = (modal.modes_of(*groups, lam=lam, compile=c, threads=1) for c in (True, False))
-    for order in range(4):
-        size = np.maximum(lam[..., None], 1) ** order
-        xi = np.linspace(0, 1, 5)
-        np.testing.assert_allclose(one.shape(xi, order) / size, two.shape(xi, order) / size, atol=1e-12)
-    for rows in (modal.ENDS, modal.STATE, modal.STRAIN, modal.SPRINGS, modal.COMPLIANCES, modal.INERTIAS):
-        np.testing.assert_allclose(one.quantities(rows), two.quantities(rows), rtol=1e-10, atol=1e-13)
-    units = np.linspace(1, 2, 4 * 65).reshape(4, 5, 13)
-    np.testing.assert_allclose(
-        one.quantities(modal.SPRINGS, units), two.quantities(modal.SPRINGS, units), rtol=1e-10, atol=1e-13
-    )
+def test_modes(some):
+    """More lanes than are kept side by side, by one."""
+    groups = [group.reshape(5, 13) for group in lines(some.structure, 11, 65)]
+    lam, table = some.frequency_parameters(*groups, modes=4, compile=False), some.layout
+    one, two = (some.modes(*groups, lam=lam, compile=c, threads=1) for c in (True, False))
+    units = np.linspace(1, 2, table.by_inertias.stop * 65).reshape(-1, 5, 13)
+    with np.errstate(all="ignore"):
+        for order in range(2 * table.n):
+            size = np.maximum(lam[..., None], 1) ** order
+            xi = np.linspace(0, 1, 5)
+            np.testing.assert_allclose(one.shape(xi, order) / size, two.shape(xi, order) / size, atol=1e-11)
+        for first, last in ((0, table.state.start), (table.strain.start, table.size), (table.size, len(units))):
+            wanted = slice(first, last)
+            expected = two.quantities(wanted)
+            size = 1e-12 * np.nanmax(np.abs(np.where(np.isfinite(expected), expected, 0)), initial=1.0)
+            np.testing.assert_allclose(one.quantities(wanted), expected, rtol=1e-9, atol=size)
+            scaled = two.quantities(wanted, units[wanted])
+            np.testing.assert_allclose(one.quantities(wanted, units[wanted]), scaled, rtol=1e-9, atol=2 * size)
 
 
 @pytest.mark.parametrize("loose", [1, 15])
-def test_a_mode_that_needs_another_basis_than_those_beside_it(loose, groups):
+def test_a_mode_that_needs_another_basis_than_those_beside_it(loose, beams):
     """The second mode of a loose arm is a rigid body's, in power series, and that of a rigid joint in waves."""
     stiffness = np.where(np.arange(16) < loose, 0.0, np.inf)
     groups = stiffness, stiffness, np.full(16, 0.1), np.zeros(16)
-    lam = cra.frequency_parameters(*groups, modes=2)
-    one, two = (modal.modes_of(*groups, lam=lam, compile=c, threads=1).quantities(modal.ENDS) for c in (True, False))
-    np.testing.assert_allclose(one, two, rtol=1e-12, atol=1e-13)
+    lam, ends = cra.frequency_parameters(*groups, modes=2), slice(0, beams.layout.size)
+    with np.errstate(all="ignore"):
+        one, two = (beams.modes(*groups, lam=lam, compile=c, threads=1).quantities(ends) for c in (True, False))
+    np.testing.assert_allclose(one, two, rtol=1e-12, atol=1e-10)
 
 
 def test_floquet():
@@ -137,6 +188,6 @@ def test_floquet():
     system = (np.array([1.0, 2.2]), coupling, np.array([1.9, 3.1, 4.2, 5.0]), 0.3, np.array([0.01, 0.03]))
     one, two = (
         floquet.monodromy(*system, compliance=np.array([0.5, 0.2, 0.3]), tolerance=1e-4, loop=loop)
-        for loop in (plain(*stability._template_parts()).kick_and_drift, None)
+        for loop in (plain("solvers/floquet_lanes", *stability._template_parts()).kick_and_drift, None)
     )
     np.testing.assert_allclose(one, two, rtol=1e-11, atol=1e-13)

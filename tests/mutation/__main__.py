@@ -1,8 +1,9 @@
 """Does the suite notice every wrong sign, exponent and constant? ``python -m tests.mutation --help``.
 
 Each mutant runs the checks and tests that watch over its module, quickest first, in a process of its own. What became
-of them goes to ``results``, a file a module: counts with the seed, and every survivor with the reason why it may
-survive. One without a reason is a hole in the suite, and the exit code says so. A run continues the one before it;
+of them goes to ``results`` (not under version control), a file a module: counts with the seed, and every survivor,
+beside which the reason why it may survive can be written. One without a reason is a hole in the suite, and the exit
+code says so. A run continues the one before it;
 ``--sites`` ends when every sign, exponent and constant was changed once, the whole run changes the constants the other
 way too. A mutant takes some 2 s of processor time, a survivor more.
 """
@@ -26,7 +27,7 @@ RESULTS = Path(__file__).with_name("results")
 def main() -> int:
     """Run and record; return 1 if a mutant survives without a reason."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__)
-    parser.add_argument("modules", nargs="*", metavar="MODULE", help="such as arm/energy (all)")
+    parser.add_argument("modules", nargs="*", metavar="MODULE", help="such as arm/lagrangian (all)")
     parser.add_argument("--sample", type=int, metavar="N", help="the first N of a module, in random order (all)")
     parser.add_argument("--sites", action="store_true", help="one change at every site, not every change")
     parser.add_argument("--seed", type=int, default=20261122, help="of the order (%(default)s)")

@@ -27,11 +27,12 @@ if TYPE_CHECKING:
 __all__ = ["Laboratory", "Verdict"]
 
 LIKELY = 3
-SECONDS = {"arm": 90, "model": 90, "solvers": 30}  # of processor time; several times what the tests of a module need
+SECONDS = 90  # of processor time; several times what the tests of a module need
 BYTES = 8 << 30
 _LIBRARIES = ("mpmath", "scipy.integrate", "scipy.linalg", "scipy.optimize", "scipy.special", "scipy.stats")
 _REGISTRY = "cra_sym.paper.equations"  # names the homes of the equations, and is the same whatever they hold
 _DERIVED = re.compile(r"cra_sym(\.\w+)+(?=:|$)")
+_KEYED = re.compile(r"\bcra_sym(?:\.\w+)+(?=:)")  # the modules that the key of a stored derivation names
 
 
 class Verdict(Enum):
@@ -83,7 +84,7 @@ class Laboratory:
                 or ""
             )
 
-        verdict, by = _in_a_fork(noticed, _seconds(module))
+        verdict, by = _in_a_fork(noticed, SECONDS)
         if by:
             self._confirm(by)
             self._noticed.setdefault(module, []).insert(0, (mutant.function, by))
@@ -113,10 +114,6 @@ class Laboratory:
         """Return what noticed the latest mutants of the same function, or else of the same module."""
         latest = sorted(self._noticed.get(module, []), key=lambda entry: entry[0] != function)
         return list(dict.fromkeys(by for _, by in latest))[:LIKELY]
-
-
-def _seconds(module: str) -> int:
-    return SECONDS[module.partition("/")[0]]
 
 
 def _file(module: str) -> Path:
@@ -217,18 +214,19 @@ def _replace(module: str, source: str, affected: frozenset[str]) -> None:
     from cra_sym.paper import equations
 
     sys.meta_path.insert(0, _Finder(_dotted(module), source, _file(module)))
-    original, read_text = derived._source_of, Path.read_text
+    kept, read_text, load = derived._source_of, Path.read_text, store.load
+    anew = kept.__wrapped__
 
-    def source_of(path: str) -> tuple[str, tuple[str, ...]]:  # of a kernel: never from the store, never into it
-        if path.partition(":")[0] not in affected:
-            return original(path)
-        made = derived._derived(path)
-        return made.source, tuple(made.arguments)
+    def source_of(path: str, given: tuple[Any, ...] = ()) -> tuple[str, tuple[str, ...]]:
+        return (anew if path.partition(":")[0] in affected else kept)(path, given)
+
+    def unaffected(key: str) -> bytes | None:
+        return load(key) if affected.isdisjoint(_KEYED.findall(key)) else None
 
     def read(path: Path, *args: Any, **options: Any) -> str:  # templates are read, not imported
         return source if path == _file(module) else read_text(path, *args, **options)
 
-    store.save = lambda key, content: False
+    store.load, store.save = unaffected, lambda key, content: False
     derived._source_of, Path.read_text = cache(source_of), read
     for number in [n for n, e in equations._EQUATIONS.items() if e.source.partition(":")[0] in affected]:
         del equations._EQUATIONS[number]

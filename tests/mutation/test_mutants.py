@@ -100,6 +100,7 @@ def test_a_record_is_continued_and_keeps_reasons_and_closed_holes(tmp_path, pack
 def test_every_test_that_watches_is_there(package):
     from tests.mutation import watch
 
+    assert set(watch._ROUNDS) <= set(watch.watched_modules())
     for module in watch.watched_modules():
         for name in (name for part in watch.rounds(module) for name in part):
             file, _, test = name.partition("::")

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["EXEMPT", "PACKAGE", "rounds", "watched_modules"]
+__all__ = ["EXEMPT", "PACKAGE", "ROOMS", "rounds", "watched_modules"]
 
 PACKAGE = Path(__file__).resolve().parents[2] / "cra_sym"
+
+ROOMS = ("analysis", "arm", "model", "paper", "solvers")
 
 #: Modules in which nothing stands for physics.
 EXEMPT = {
@@ -19,7 +21,7 @@ EXEMPT = {
 _LAWS = "tests/test_properties.py"
 _LAMBDA, _MODAL = "tests/analysis/test_frequency_parameters.py", "tests/analysis/test_modal_parameters.py"
 _COUNTS = [
-    f"tests/model/test_characteristic.py::test_count_{name}"
+    f"tests/mechanics/test_one_wave.py::test_count_{name}"
     for name in ("steps_by_one_at_every_zero", "where_zeros_of_the_limits_are")
 ]
 _SEAMS = f"{_MODAL}::test_ranges_of_the_numbers_are_those_of_the_derivation"
@@ -82,7 +84,6 @@ _STATICS = _stability(
     "the_statics_of_a_rigid_spring_do_not_mix_with_those_of_the_other",
     "rank_one_terms_make_up_springs_in_series_with_what_is_left_out",
 )
-_BORDERS = "tests/analysis/test_boundaries.py"
 _LANES = ["tests/model/test_templates.py"]
 _STIFFNESS = [
     [
@@ -149,12 +150,9 @@ _PHYSICS = [_FREQUENCIES, _MODES]
 
 _ROUNDS: dict[str, list[list[str]]] = {
     "analysis/modes": [_MODES, [_MODAL, _LAMBDA]],
-    "analysis/boundaries": [
-        [f"{_BORDERS}::test_a_difference_with_symmetric_coupling_has_no_border", *_ZONES[:1]],
-        [*_FORCED, *_SUMMED, _BORDERS],
-    ],
     "paper/oracles/by_hand": [["tests/paper/oracles/test_by_hand.py"]],
-    "model/characteristic": [_FREQUENCIES, _MODES, _DIGITS, ["tests/model/test_characteristic.py", _SEAMS]],
+    "paper/oracles/forces": [],
+    "paper/oracles/implicit_rates": [["tests/analysis/test_sensitivities.py"]],
     "paper/driven": [["tests/analysis/test_responses.py"]],
     "analysis/floquet_boundary": [
         [*_stability("the_search_finds_the_borders_of_what_grows"), *_ZONES[:1], *_SYSTEM[1:2]],
@@ -162,23 +160,19 @@ _ROUNDS: dict[str, list[list[str]]] = {
     ],
     "paper/energy": [["tests/paper/test_energy.py"], *_PHYSICS],
     "paper/evaluation": [],
-    "arm/excitations": [
+    "arm/frequency_parameters": [_FREQUENCIES, _DIGITS, [_LAMBDA]],
+    "arm/lagrangian": [["tests/paper/test_energy.py"], *_PHYSICS],
+    "arm/excitations": [["tests/analysis/test_stability.py"]],
+    "model/excitations": [
         [*_ZONES[:3], *_FORCED, *_SYSTEM[:3]],
         [*_stability("excitations_compare_hash_and_pickle"), *_LOOPED, *_ORDER],
     ],
     "paper/excited": [],
-    "model/forced_waves": [["tests/analysis/test_frequency_response.py"]],
+    "paper/groups": [],
     "paper/implicit": [["tests/analysis/test_sensitivities.py"]],
     "paper/joint": _PHYSICS,
     "paper/limits": [],
-    "model/modal": [
-        [*_MODES, f"{_MODAL}::test_a_textbook_cantilever", "tests/analysis/test_sensitivities.py"],
-        [f"{_LANES[0]}::test_modes", "tests/analysis/test_residual_gradient.py", _MODAL],
-    ],
     "paper/modal_dynamics": [],
-    "model/modal_lanes": [
-        [f"{_LANES[0]}::test_{name}" for name in ("a_mode_that_needs_another_basis_than_those_beside_it", "modes")]
-    ],
     "paper/modal_sum": [["tests/paper/test_energy.py"]],
     "paper/motion": [["tests/paper/test_motion.py"]],
     "paper/orthogonality": [],
@@ -187,13 +181,12 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "paper/parametric": [["tests/paper/test_parametric.py"], _FORCED],
     "analysis/static_corrections": [_STATICS, _SUMMED + _FEW_MODES, _LOOPED],
     "paper/resonance": [],
+    "paper/shapes": [],
     "analysis/sensitivities": [
         ["tests/analysis/test_sensitivities.py"],
         [f"{_LAWS}::test_sensitivities_are_slopes_at_any_length", "tests/analysis/test_residual_gradient.py"],
     ],
-    "model/shapes": [_MODES, [_MODAL]],
     "paper/oracles/shooting": [],
-    "model/spectrum": [["tests/model/test_spectrum.py", *_FREQUENCIES, _SEAMS], _DIGITS, _COUNTS, [_LAMBDA]],
     "analysis/stability": [[*_ZONES, *_FORCED, *_SYSTEM], [*_LOOPED, *_DOUBTS, *_FEW_MODES]],
     "analysis/zones": [[*_ZONES, *_SUMMED], [*_LOOPED, *_DAMPED, *_DOUBTS], _ORDER],
     "model/oscillator": [["tests/model/test_oscillator.py"], ["tests/analysis/test_responses.py"]],
@@ -207,6 +200,14 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "solvers/modal_response": [
         ["tests/solvers/test_modal_response.py", *_COUPLED],
         ["tests/analysis/test_responses.py"],
+    ],
+    "solvers/modal_lanes": [
+        [f"{_LANES[0]}::test_{name}" for name in ("a_mode_that_needs_another_basis_than_those_beside_it", "modes")]
+    ],
+    "solvers/one_wave": [["tests/solvers/test_spectrum.py", *_FREQUENCIES, _SEAMS], _DIGITS, _COUNTS, [_LAMBDA]],
+    "solvers/one_wave_shapes": [
+        [*_MODES, f"{_MODAL}::test_a_textbook_cantilever", "tests/analysis/test_sensitivities.py"],
+        [f"{_LANES[0]}::test_modes", "tests/analysis/test_residual_gradient.py", _MODAL],
     ],
     "solvers/motion": [
         ["tests/solvers/test_motion.py", f"{_LAWS}::test_a_harmonic_of_no_size_or_speed_is_over_at_once"]
@@ -231,13 +232,14 @@ _ROUNDS: dict[str, list[list[str]]] = {
 
 
 def watched_modules() -> tuple[str, ...]:
-    """Return the oscillators and all modules of the arm and of the solvers, as ``arm/energy``, but those exempt."""
-    files = sorted(file for room in ("arm", "solvers") for file in (PACKAGE / room).glob("*.py"))
-    names = (file.relative_to(PACKAGE).with_suffix("").as_posix() for file in files if file.stem != "__init__")
-    return ("model/oscillator", *(name for name in names if name not in EXEMPT))
+    """Return all modules of the rooms from the solvers up to the paper, as ``arm/lagrangian``, but those exempt."""
+    files = sorted(file for room in ROOMS for file in (PACKAGE / room).rglob("*.py") if file.stem != "__init__")
+    names = (file.relative_to(PACKAGE).with_suffix("").as_posix() for file in files)
+    return tuple(name for name in names if name not in EXEMPT)
 
 
 def rounds(module: str) -> list[list[str]]:
-    """Return the rounds of a module; without an entry, the tests of the same name."""
-    room, _, name = module.partition("/")
-    return _ROUNDS.get(module, [[f"tests/{room}/test_{name}.py"]])
+    """Return the rounds of a module; without an entry, the tests of the same name, or else all those of its room."""
+    room, _, name = module.rpartition("/")
+    own = f"tests/{room}/test_{name}.py"
+    return _ROUNDS.get(module, [[own if (PACKAGE.parent / own).exists() else f"tests/{room}"]])

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import cra_sym as cra
-from cra_sym.arm.instance import arm_model, model_values
-from cra_sym.model.spectrum import ArmCharacteristic
-from cra_sym.model.values import Values
+from cra_sym.model.one_wave_family import family
+from cra_sym.model.values import flat_columns
 from cra_sym.solvers.spectrum import Characteristic, _quarters, spectrum
+
+ARM = family((("k", "k"), ("m", "m")))
 
 
 class Product:
@@ -43,7 +44,7 @@ def regular(shift, number=60):
 
 def test_the_arm_and_the_products_speak_the_protocol():
     products: Characteristic = Product(regular(0.6))
-    arm: Characteristic = ArmCharacteristic(*np.ones((4, 1)))
+    arm: Characteristic = ARM.characteristic(*np.ones((4, 1)))
     for pair in (products, arm):
         number, value = pair.count(np.array([50.0]), slice(None))
         same, _, _ = pair.evaluate(np.array([50.0]), np.zeros(1, dtype=int))
@@ -123,10 +124,9 @@ def test_counts_of_the_arm_are_those_of_the_dynamic_stiffness():
         k_t=k_t, k_r=k_r, m_e=10 ** rng.uniform(-4, 1, 40), J_e=10 ** rng.uniform(-6, 0, 40)
     )
     z = rng.uniform(0.2, 40.0, 40) ** 4
-    special, _ = ArmCharacteristic(arm.kappa_t, arm.kappa_r, arm.mu, arm.iota).count(z, slice(None))
-    model = arm_model()
+    special, _ = ARM.characteristic(arm.kappa_t, arm.kappa_r, arm.mu, arm.iota).count(z, slice(None))
     omega = np.sqrt(z * arm.EI / arm.rhoA) / arm.L**2
-    for rows, _, problem in model._spatial.problems(Values.read(model.symbols, model_values(arm))):
+    for rows, _, problem in arm.numerics("spatial").problems(flat_columns(arm.parameters, arm.shape)):
         generic = problem.evaluate(omega[rows] ** 2, np.arange(len(rows))).count
         np.testing.assert_array_equal(generic, special[rows])
 
@@ -171,7 +171,7 @@ def test_a_zero_costs_little_more_than_two_evaluations(iota, budget):
     """Starts next to the zeros and steps of third order: what makes the driver fast, counted instead of timed."""
     rng = np.random.default_rng(0)
     groups = [10 ** rng.uniform(*ends, 300) for ends in ((-2, 6), (-2, 6), (-3, 3), (-3, 3))]
-    arms: Characteristic = Counted(ArmCharacteristic(*groups[:3], iota * groups[3]))
+    arms: Characteristic = Counted(ARM.characteristic(*groups[:3], iota * groups[3]))
     assert (spectrum(arms, 10) > 0).all()
     assert arms.values < budget * 3000
 
@@ -185,8 +185,8 @@ def test_one_driver_finds_the_same_zeros_by_the_arms_pair_and_by_the_generic_one
     rng = np.random.default_rng(12)
     sprung = {"k_t": 10 ** rng.uniform(1, 7, 12), "k_r": 10 ** rng.uniform(-1, 4, 12)}
     arm = cra.Arm.nominal().replace(m_e=10 ** rng.uniform(-4, 0, 12), J_e=10 ** rng.uniform(-6, -2, 12), **sprung)
-    special = spectrum(ArmCharacteristic(arm.kappa_t, arm.kappa_r, arm.mu, arm.iota), 6)
-    model, unit = arm_model(), np.full(12, float(arm.EI / (arm.rhoA * arm.L**4)))
-    for rows, _, problem in model._spatial.problems(Values.read(model.symbols, model_values(arm))):
+    special = spectrum(ARM.characteristic(arm.kappa_t, arm.kappa_r, arm.mu, arm.iota), 6)
+    unit = np.full(12, float(arm.EI / (arm.rhoA * arm.L**4)))
+    for rows, _, problem in arm.numerics("spatial").problems(flat_columns(arm.parameters, arm.shape)):
         generic: Characteristic = Generic(problem, unit[rows])
         np.testing.assert_allclose(spectrum(generic, 6), special[rows], rtol=1e-8)

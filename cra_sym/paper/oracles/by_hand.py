@@ -13,7 +13,7 @@ from sympy import Expr, Matrix, cos, cosh, sin, sinh
 
 from cra_sym.symbols import symbol
 
-__all__ = ["eliminated", "jets", "joined", "minors", "root_rows", "tip_rows"]
+__all__ = ["determinant", "eliminated", "jets", "joined", "minors", "root_rows", "tip_rows"]
 
 lamda, mu, iota = (symbol(name) for name in ("lamda", "mu", "iota"))
 s_t, c_t, s_r, c_r = (symbol(name) for name in ("s_t", "c_t", "s_r", "c_r"))
@@ -51,6 +51,11 @@ def eliminated() -> Matrix:
     """Return the two conditions on C_1 and C_2 alone, by Cramer's rule: force and moment at the tip."""
     systems = [Matrix.vstack(root_rows(), tip_rows()[row, :]) for row in (0, 1)]
     return Matrix([[system[:, [first, 2, 3]].det() for first in (0, 1)] for system in systems])
+
+
+def determinant() -> Expr:
+    """Return the determinant of the four conditions."""
+    return Matrix.vstack(root_rows(), tip_rows()).det(method="berkowitz")
 
 
 def minors(rows: Matrix, others: Matrix) -> Iterator[Expr | bool]:

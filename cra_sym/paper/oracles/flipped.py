@@ -17,6 +17,7 @@ from cra_sym import checks
 from cra_sym.arm.frequency_parameters import frequency_parameters
 from cra_sym.arm.parameters import Arm
 from cra_sym.kernels import derived_kernel
+from cra_sym.paper.oracles.implicit_rates import weights
 
 __all__ = ["characteristic", "flipped", "flipped_frequencies"]
 
@@ -63,14 +64,11 @@ def flipped_frequencies(arm: Arm, modes: int = 3) -> np.ndarray:
     kappa_t, kappa_r, mu, iota = np.broadcast_arrays(arm.kappa_t, arm.kappa_r, arm.mu, arm.iota)
     low = frequency_parameters(kappa_t, np.inf, mu, iota, modes)
     high = frequency_parameters(kappa_t, 0.0, mu, iota, modes + 1)[..., 1:]
-    weights = []
-    for stiffness in (kappa_t, kappa_r):
-        rigid = np.isinf(stiffness)
-        soft = 1.0 / (1.0 + np.where(rigid, 0.0, stiffness))
-        weights += [np.where(rigid, 1.0, 1.0 - soft), np.where(rigid, 0.0, soft)]
-    arguments = tuple(np.broadcast_to(a[..., None], low.shape) for a in (*weights, mu, iota))
+    groups = (*weights(kappa_t), *weights(kappa_r), mu, iota)
+    arguments = tuple(np.broadcast_to(group[..., None], low.shape) for group in groups)
     root = find_root(_function, (low * (1 - 1e-12), high * (1 + 1e-12)), args=arguments)
     if not np.all(root.success):
         raise ArithmeticError("a root of the flipped arm was not bracketed")
     scale = np.asarray(arm.angular_frequency_scale)[..., None]
-    return root.x**2 * scale / (2.0 * np.pi)
+    found: np.ndarray = root.x**2 * scale / (2.0 * np.pi)
+    return found

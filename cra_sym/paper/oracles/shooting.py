@@ -6,6 +6,7 @@ series, so an error in the derived trigonometric forms cannot hide.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from math import factorial
@@ -42,7 +43,10 @@ class ShotMode:
 
     def __call__(self, x: float | np.ndarray, derivative: int = 0) -> np.ndarray:
         """Return the mode shape, or a derivative of it, at ``x``."""
-        return np.sum([value * _krylov(self.beta, x, k, derivative) for k, value in enumerate(self.start)], axis=0)
+        found: np.ndarray = np.sum(
+            [value * _krylov(self.beta, x, k, derivative) for k, value in enumerate(self.start)], axis=0
+        )
+        return found
 
 
 def _krylov(beta: Any, x: Any, k: int, derivative: int) -> np.ndarray:
@@ -51,7 +55,8 @@ def _krylov(beta: Any, x: Any, k: int, derivative: int) -> np.ndarray:
     kept = power >= 0
     power, order = power[kept], 4 * _ORDERS[kept]
     beta, x = np.asarray(beta, dtype=float)[..., None], np.asarray(x, dtype=float)[..., None]
-    return np.sum(beta**order * x**power / _FACTORIAL[power], axis=-1)
+    found: np.ndarray = np.sum(beta**order * x**power / _FACTORIAL[power], axis=-1)
+    return found
 
 
 def shoot(values: dict[str, float], modes: int = 3) -> list[ShotMode]:
@@ -60,7 +65,7 @@ def shoot(values: dict[str, float], modes: int = 3) -> list[ShotMode]:
 
 
 @cache
-def _shoot(items: tuple, modes: int) -> tuple[ShotMode, ...]:
+def _shoot(items: tuple[tuple[str, float], ...], modes: int) -> tuple[ShotMode, ...]:
     values = dict(items)
     bending, line_mass, length = values["E"] * values["I_z"], values["rho"] * values["A"], values["L"]
     starts = np.array([[1.0, 0.0, 0.0, -values["k_t"] / bending], [0.0, 1.0, values["k_r"] / bending, 0.0]])
@@ -92,7 +97,7 @@ def _shoot(items: tuple, modes: int) -> tuple[ShotMode, ...]:
     return tuple(found)
 
 
-def integrate(function, length: float, points: int = 40) -> float:
+def integrate(function: Callable[[np.ndarray], Any], length: float, points: int = 40) -> float:
     """Return the integral over (0, length) by Gauss-Legendre quadrature."""
     nodes, weights = leggauss(points)
     return float(0.5 * length * np.sum(weights * function(0.5 * length * (nodes + 1.0))))

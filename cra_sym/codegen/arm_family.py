@@ -1,0 +1,30 @@
+"""The arm's family of determinants and shapes, which the exports of the arm print."""
+
+from __future__ import annotations
+
+from cra_sym.arm.parameters import Arm
+from cra_sym.model.one_wave import OneWave
+from cra_sym.model.one_wave_family import Family
+
+__all__ = ["arm_family"]
+
+_STRUCTURE = (("k", "k"), ("m", "m"))
+"""Springs at the left end, inertias at the right one: what the words around the printed functions speak of."""
+
+
+def arm_family() -> Family:
+    """Return the family of the paper's Lagrangian.
+
+    Raises
+    ------
+    ValueError
+        If the Lagrangian has changed so that the exports, which are written for springs at the joint and inertias at
+        the tip, do not say what it says.
+    """
+    route = Arm.nominal().numerics("route")
+    if not isinstance(route, OneWave) or route.family.structure != _STRUCTURE:
+        raise ValueError(
+            "the arm's Lagrangian must be that of a beam with springs at x = 0 and inertias at x = L; "
+            "export it as a model"
+        )
+    return route.family

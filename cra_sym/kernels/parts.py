@@ -1,0 +1,69 @@
+"""How the work on a large batch is shared out: in blocks for NumPy, among threads for machine code, and when which."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from cra_sym.kernels.callables import Kernel
+from cra_sym.kernels.specialise import has_compiler, is_compiled
+
+__all__ = ["COMPILE_FROM", "LOAD_FROM", "flattened", "in_parts", "wants_compiler"]
+
+# A root costs NumPy about 2 microseconds and compiled code 0.1; to load machine code, Numba included, takes as long as
+# LOAD_FROM roots by NumPy, to make it as long as COMPILE_FROM. The benchmark of cold starts measures both.
+LOAD_FROM = 400_000
+"""Roots in one call from where on loading machine code costs less than it saves."""
+COMPILE_FROM = 1_200_000
+"""Roots in such calls of this process from where on making machine code costs less than going on without it."""
+_ROOTS_PER_PART = 30_000  # that are worth handing out
+_PARTS_PER_THREAD = 8  # so that a thread on a busy processor keeps nobody waiting
+_BLOCK = 32_768  # points and roots whose temporaries stay in the processor's cache
+_FEWEST = 256  # lanes in a block, below which a call of NumPy costs more than its work
+
+Parts = Callable[[], tuple[str, Mapping[str, Kernel]]]
+_done: Counter[Parts] = Counter()  # roots in large calls, by template
+
+
+def flattened(*values: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return arrays of lanes, all contiguous and read-only: of one type, for which machine code is made once."""
+    lanes = tuple(np.ascontiguousarray(value).reshape(-1).view() for value in values)
+    for array in lanes:
+        array.flags.writeable = False
+    return lanes
+
+
+def wants_compiler(roots: int, parts: Parts) -> bool:
+    """Return whether the compiled path of a template pays for a call: the policy of the package.
+
+    Small calls never compile and never load. A call of `LOAD_FROM` roots takes machine code that is there. If there is
+    none, it is made for a call of more than `COMPILE_FROM` roots, or as soon as such calls of this process have come to
+    that number: nobody waits more than twice as long as whoever knew what comes next.
+    """
+    if roots < LOAD_FROM or not has_compiler():
+        return False
+    _done[parts] += roots
+    return _done[parts] > COMPILE_FROM or is_compiled(*parts())
+
+
+def in_parts(fill: Callable[[slice], Any], lanes: int, modes: int, *, threads: int | None, compiled: bool) -> None:
+    """Call ``fill`` for all lanes, part by part: in threads if compiled, else in blocks that fit the cache."""
+    threads = (threads or _processors()) if compiled else 1
+    fair = -(-lanes // (threads if threads == 1 else _PARTS_PER_THREAD * threads))
+    share = max(fair, _ROOTS_PER_PART // modes, 1) if compiled else max(_BLOCK // (modes + 4), _FEWEST)
+    parts = [slice(start, min(start + share, lanes)) for start in range(0, lanes, share)]
+    if threads == 1 or len(parts) <= 1:
+        for part in parts:
+            fill(part)
+    else:
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(fill, parts))
+
+
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,151 @@
+"""Where coefficients are not smooth along x: the expressions whose zeros are jumps, kinks and branch points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import combinations
+
+import sympy
+from sympy import (
+    Abs,
+    DiracDelta,
+    Dummy,
+    Expr,
+    Heaviside,
+    Max,
+    Min,
+    Mod,
+    Piecewise,
+    Pow,
+    S,
+    SingularityFunction,
+    Subs,
+    Symbol,
+    ceiling,
+    floor,
+    frac,
+    log,
+    preorder_traversal,
+    sign,
+)
+from sympy.core.function import AppliedUndef, Derivative, Function
+from sympy.core.relational import Relational
+from sympy.logic.boolalg import Boolean, BooleanAtom, BooleanFunction
+
+from cra_sym.mechanics.jets import HamiltonError
+
+__all__ = ["Switch", "derivative", "switches"]
+
+_SMOOTH = tuple(
+    getattr(sympy, name)
+    for name in (
+        "sin cos tan cot sec csc sinc asin acos atan acot atan2 exp sinh cosh tanh coth sech csch asinh acosh atanh "
+        "erf erfc gamma loggamma besselj bessely besseli besselk airyai airybi legendre chebyshevt chebyshevu LambertW"
+    ).split()
+)
+_KNOWN = (*_SMOOTH, Abs, sign, Heaviside, floor, ceiling, frac, Mod, log, Max, Min, SingularityFunction, Piecewise)
+
+
+@dataclass(frozen=True)
+class Switch:
+    """An expression in x and the parameters whose zeros are breakpoints.
+
+    Attributes
+    ----------
+    expression : Expr
+    levels : bool
+        Whether every integer value counts, not zero alone.
+    """
+
+    expression: Expr
+    levels: bool = False
+
+    def slope(self, x: Symbol) -> Expr | None:
+        """Return the derivative by x if the expression is affine in x, or None."""
+        if not self.expression.is_polynomial(x):
+            return None
+        slope = derivative(self.expression, x)
+        return None if slope.has(x) else slope
+
+
+def switches(expressions: Iterable[Expr], x: Symbol) -> tuple[Switch, ...]:
+    """Return the expressions whose zeros are where the given ones may not be smooth in x, each once.
+
+    Raises
+    ------
+    HamiltonError
+        Names what cannot be located: a condition that is not made of relations, an unknown function, a point load.
+
+    Examples
+    --------
+    >>> from sympy import Abs, Heaviside, symbols
+    >>> x, a, b = symbols("x a b")
+    >>> switches([3 + 2 * Heaviside(x - a), Abs(x**2 - b)], x)
+    (Switch(expression=a - x, levels=False), Switch(expression=b - x**2, levels=False))
+    """
+    found: dict[Switch, None] = {}
+    for expression in expressions:
+        for node in preorder_traversal(expression):
+            if isinstance(node, (Expr, Boolean)) and node.has(x):
+                found |= dict.fromkeys(_signed(switch) for switch in _of(node, x) if switch.expression.has(x))
+    return tuple(found)
+
+
+def _signed(switch: Switch) -> Switch:
+    """Return the same zeros with one of the two signs, so that they are found once."""
+    return Switch(-switch.expression, switch.levels) if switch.expression.could_extract_minus_sign() else switch
+
+
+def derivative(expression: Expr, symbol: Symbol) -> Expr:
+    """Return the derivative by a symbol between breakpoints: all symbols are real, and what a jump adds is left out.
+
+    Examples
+    --------
+    >>> from sympy import Heaviside, symbols
+    >>> x, a = symbols("x a")
+    >>> derivative(x * Heaviside(x - a), x)
+    Heaviside(-a + x)
+    """
+    real = {s: Dummy(s.name, real=True) for s in (expression.free_symbols | {symbol}) if isinstance(s, Symbol)}
+    rate = expression.xreplace(real).diff(real[symbol])
+    if rate.has(DiracDelta, Derivative, Subs):
+        flat = {node: S.Zero for node in rate.atoms(Derivative, Subs) if node.atoms(floor, ceiling, frac)}
+        rate = rate.xreplace(flat).replace(DiracDelta, lambda *arguments: S.Zero)
+    points = {node: S.Zero for node in rate.atoms(SingularityFunction) if node.args[2].is_negative}
+    return rate.xreplace(points).xreplace({dummy: s for s, dummy in real.items()})
+
+
+def _of(node: Expr | Boolean, x: Symbol) -> Iterator[Switch]:
+    if isinstance(node, Piecewise):
+        for _, condition in node.args:
+            yield from (Switch(side) for side in _sides(condition, node))
+    elif isinstance(node, (Heaviside, sign, Abs, log)):
+        yield Switch(node.args[0])
+    elif isinstance(node, SingularityFunction):
+        if node.args[2].is_negative or node.args[2].is_nonnegative is None:
+            raise HamiltonError(f"{node} acts at a point; state its term there with `inside`")
+        yield Switch(node.args[0] - node.args[1])
+    elif isinstance(node, DiracDelta):
+        raise HamiltonError(f"{node} acts at a point; state its term there with `inside`")
+    elif isinstance(node, (Max, Min)):
+        yield from (Switch(first - second) for first, second in combinations(node.args, 2))
+    elif isinstance(node, (floor, ceiling, frac)):
+        yield Switch(node.args[0], levels=True)
+    elif isinstance(node, Mod):
+        yield Switch(node.args[0] / node.args[1], levels=True)
+    elif isinstance(node, Pow):
+        if not node.exp.is_integer and node.base.has(x):
+            yield Switch(node.base)
+    elif isinstance(node, AppliedUndef) or (isinstance(node, Function) and not isinstance(node, _KNOWN)):
+        raise HamiltonError(f"{node}: where this function of {x} is not smooth cannot be located")
+
+
+def _sides(condition: Boolean, node: Expr) -> Iterator[Expr]:
+    if isinstance(condition, Relational):
+        yield condition.lhs - condition.rhs
+    elif isinstance(condition, BooleanFunction):
+        for part in condition.args:
+            yield from _sides(part, node)
+    elif not isinstance(condition, BooleanAtom):
+        raise HamiltonError(f"{node}: the condition {condition} is not made of relations, so it cannot be located")

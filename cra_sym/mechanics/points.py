@@ -1,0 +1,154 @@
+"""Terms of a Lagrangian at interior places, and displacements held there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from sympy import Abs, Add, DiracDelta, Dummy, Expr, SingularityFunction, Subs, Symbol, expand, sympify
+from sympy.core.function import AppliedUndef, Derivative
+
+from cra_sym.checks import shown
+from cra_sym.mechanics.jets import HamiltonError, Jet, JetSpace
+
+__all__ = ["Point", "in_points", "read_points", "supports"]
+
+
+@dataclass(frozen=True)
+class Point:
+    """What acts at an interior place.
+
+    Attributes
+    ----------
+    place : Expr
+    lagrangian : Expr
+        In the jet symbols of the interval, taken at that place.
+    held : tuple of Jet
+        Displacements that vanish there.
+    """
+
+    place: Expr
+    lagrangian: Expr
+    held: tuple[Jet, ...]
+
+
+def in_points(density: Expr, x: Symbol) -> tuple[Expr, list[tuple[Expr, Expr]]]:
+    """Return a density without its point loads, and these as (place, term).
+
+    Raises
+    ------
+    HamiltonError
+        If the argument of a DiracDelta is not affine in x, or it is differentiated or multiplied with another.
+
+    Examples
+    --------
+    >>> from sympy import DiracDelta, symbols
+    >>> x, a, k, m = symbols("x a k m")
+    >>> in_points(k + m * DiracDelta(2 * x - a), x)
+    (k, [(a/2, m/2)])
+    """
+    if not isinstance(density, Expr):
+        return density, []
+    steps = {n: DiracDelta(n.args[0] - n.args[1]) for n in density.atoms(SingularityFunction) if n.args[2] == -1}
+    density = density.xreplace(steps)
+    found = []
+    for delta in sorted(density.atoms(DiracDelta), key=str):
+        argument = delta.args[0]
+        if not argument.has(x):
+            continue
+        slope = argument.diff(x)
+        if len(delta.args) > 1 or slope.has(x):
+            raise HamiltonError(f"density: {delta} must be DiracDelta of an expression that is linear in {x}")
+        mark = Dummy()
+        marked = density.xreplace({delta: mark})
+        factor = marked.diff(mark)
+        if expand(factor.diff(mark)) != 0 or factor.has(DiracDelta):
+            raise HamiltonError(f"density: {delta} is multiplied with another DiracDelta")
+        place = -argument.subs(x, 0) / slope
+        found.append((place, factor.subs(mark, 0) / Abs(slope)))
+        density = marked.subs(mark, 0)
+    return density, found
+
+
+def read_points(
+    space: JetSpace, inside: Sequence[tuple[Expr, Expr]], held: Iterable[tuple[Expr, Expr]], orders: Sequence[int]
+) -> tuple[Point, ...]:
+    """Read terms and supports at interior places into jet symbols, one point for each place."""
+    found: dict[Expr, tuple[list[Expr], list[Jet]]] = {}
+    for given in inside:
+        try:
+            place, term = given
+        except (TypeError, ValueError):
+            raise HamiltonError(f"inside: {shown(given)} must be a pair (place, term)") from None
+        place = _place(space, place)
+        label = f"term inside at {space.x} = {place}"
+        read = space.read(_moved(sympify(term, strict=True), space.x, place), "domain", label)
+        for jet in space.jets(read):
+            _check(space, jet, orders, label)
+        found.setdefault(place, ([], []))[0].append(read)
+    for place, displacement in held:
+        read = space.read(displacement, "domain", f"essential inside at {space.x} = {place}")
+        (jet,) = space.jets(read)
+        _check(space, jet, orders, f"essential inside at {space.x} = {place}")
+        found.setdefault(_place(space, place), ([], []))[1].append(jet)
+    return tuple(Point(place, Add(*terms).subs(space.x, place), tuple(jets)) for place, (terms, jets) in found.items())
+
+
+def _place(space: JetSpace, place: Expr) -> Expr:
+    place = sympify(place, strict=True)
+    if place in space.ends.values():
+        raise HamiltonError(f"inside: {space.x} = {place} is an end; use left or right")
+    if place.has(space.x, space.t):
+        raise HamiltonError(f"inside: the place {place} must be free of {space.x} and {space.t}")
+    return place
+
+
+def _check(space: JetSpace, jet: Jet, orders: Sequence[int], label: str) -> None:
+    if space.is_field(jet.unknown) and jet.space >= orders[jet.unknown]:
+        raise HamiltonError(f"{label}: {space.form(jet)} is not a displacement of a section, so it may jump there")
+
+
+def _moved(term: Expr, x: Symbol, place: Expr) -> Expr:
+    """Return a term with evaluated forms such as v(a, t) written as v(x, t)."""
+    evaluated = {
+        node: node.expr.xreplace({node.variables[0]: x})
+        for node in term.atoms(Subs)
+        if len(node.variables) == 1 and node.point[0] == place
+    }
+    term = term.xreplace(evaluated)
+    functions = {f: f.xreplace({place: x}) for f in term.atoms(AppliedUndef) if place in f.args}
+    return term.xreplace(functions)
+
+
+def supports(
+    essential: Sequence[Expr], x: Symbol, domain: Sequence[Expr]
+) -> tuple[tuple[Expr, ...], tuple[tuple[Expr, Expr], ...]]:
+    """Return the essential conditions of the ends, and those of interior places as (place, displacement).
+
+    Raises
+    ------
+    HamiltonError
+        If a condition of an interior place is not that one displacement vanishes.
+    """
+    ends, inside = [], []
+    for condition in essential:
+        found = _displacement(condition, x)
+        if found is None or found[0] in domain:
+            ends.append(condition)
+        else:
+            inside.append(found)
+    return tuple(ends), tuple(inside)
+
+
+def _displacement(condition: Expr, x: Symbol) -> tuple[Expr, Expr] | None:
+    """Return place and displacement of a condition such as v(a, t) = 0 or v_x(a, t) = 0, or None."""
+    if isinstance(condition, Subs) and len(condition.variables) == 1:
+        return condition.point[0], condition.expr.xreplace({condition.variables[0]: x})
+    if isinstance(condition, AppliedUndef) and len(condition.args) == 2 and condition.args[0] != x:
+        return condition.args[0], condition.func(x, condition.args[1])
+    if isinstance(condition, Derivative) and isinstance(condition.expr, AppliedUndef):
+        place, time = condition.expr.args[0], condition.expr.args[-1]
+        if isinstance(place, Symbol) and place != x and place in condition.variables:
+            orders = [x if variable == place else variable for variable in condition.variables]
+            return place, condition.expr.func(x, time).diff(*orders)
+    return None

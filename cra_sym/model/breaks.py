@@ -1,0 +1,192 @@
+"""Breakpoints of a batch of parameter sets: in closed form where they are affine in x, else by bisection."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.kernels import Kernel, kernel
+
+if TYPE_CHECKING:
+    from sympy import Expr, Symbol
+
+__all__ = ["Breaks", "breaks"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+_SAMPLES = 513
+_MOST = 4000  # breakpoints of one switch
+_HALVINGS = 80  # from any sampled interval to the last bit
+
+
+@dataclass(frozen=True)
+class Breaks:
+    """Compiled switches of the coefficients of a model; see :mod:`cra_sym.mechanics.breakpoints`.
+
+    Attributes
+    ----------
+    affine : Kernel
+        Of (x, parameters): value and slope of each switch that is affine in x.
+    others : Kernel
+        Of (x, parameters): values of the other switches.
+    levels : tuple of bool
+        Of the affine ones, then of the others: whether all integer values count.
+    rates : tuple of Kernel
+        Of (x, parameters), in the same order: derivatives by x and by every parameter.
+    places : Kernel
+        Of the parameters: interior places of terms.
+    """
+
+    affine: Kernel
+    others: Kernel
+    levels: tuple[bool, ...]
+    rates: tuple[Kernel, ...]
+    places: Kernel
+
+    def edges(self, columns: Array, left: Array, length: Array) -> list[tuple[Index, Array, tuple[int, ...]]]:
+        """Return groups of sets that have as many breakpoints, and the interior places of terms at the same of them.
+
+        Of each group the rows, (left end, breakpoints, right end) of shape (sets, breakpoints + 2) and the number of
+        the breakpoint of each interior place, -1 if it is not in the domain.
+
+        Parameters
+        ----------
+        columns : ndarray, shape (parameters, sets)
+        left, length : ndarray, shape (sets,)
+        """
+        right = left + length
+        roots = [root for _, root in self._candidates(columns, left, length)]
+        stated = np.empty((len(left), len(self.places.layout)))
+        for k, place in enumerate(self.places.function(*columns)):
+            stated[:, k] = place
+        if ((stated == left[:, None]) | (stated == right[:, None])).any():
+            raise ValueError("inside: a place is at an end of the domain; state its term with left or right")
+        found = np.concatenate([left[:, None], *roots, stated, right[:, None]], axis=1)
+        inside = (found > left[:, None]) & (found < right[:, None])
+        inside[:, 0] = inside[:, -1] = True
+        found = np.sort(np.where(inside, found, np.inf), axis=1)  # nan is outside
+        gap = 4 * np.spacing(np.maximum(np.abs(left), np.abs(right)))[:, None]
+        kept = np.isfinite(found)
+        with np.errstate(invalid="ignore"):
+            kept[:, 1:] &= np.diff(found, axis=1) > gap
+        count = kept.sum(axis=1)
+        groups = []
+        for number in np.unique(count):
+            rows = np.nonzero(count == number)[0]
+            edges = found[rows][kept[rows]].reshape(len(rows), number)
+            edges[:, -1] = right[rows]
+            nodes = np.abs(edges[:, :, None] - stated[rows, None, :]).argmin(axis=1)
+            nodes[(stated[rows] < left[rows, None]) | (stated[rows] > right[rows, None])] = -1
+            for kind in np.unique(nodes, axis=0):
+                alike = (nodes == kind).all(axis=1)
+                groups.append((rows[alike], edges[alike], tuple(int(k) for k in kind)))
+        return groups
+
+    def moving(self, columns: Array, left: Array, length: Array) -> tuple[Array, Array]:
+        """Return every breakpoint in the domain, (sets, breakpoints), and its rates by every parameter.
+
+        Where a set has fewer breakpoints the places are the left end, and the rates zero; their shape is
+        (parameters, sets, breakpoints).
+        """
+        places, rates = [np.zeros((len(left), 0))], [np.zeros((len(columns), len(left), 0))]
+        for number, root in self._candidates(columns, left, length):
+            inside = (root > left[:, None]) & (root < (left + length)[:, None])
+            if not inside.any():
+                continue
+            at = np.where(inside, root, left[:, None])
+            with np.errstate(all="ignore"):
+                found = self.rates[number].function(at, *columns[..., None])
+                rate = np.stack([np.broadcast_to(-part / found[0], at.shape) for part in found[1:]])
+            places.append(at)
+            rates.append(np.where(inside & np.isfinite(rate), rate, 0.0))
+        place, rate = np.concatenate(places, axis=1), np.concatenate(rates, axis=2)
+        alike = np.abs(place[:, :, None] - place[:, None, :]) <= 1e-12 * length[:, None, None]
+        return place, rate / alike.sum(axis=-1)  # each jump once, also where two switches meet
+
+    def _candidates(self, columns: Array, left: Array, length: Array) -> Iterator[tuple[int, Array]]:
+        """Yield the number of each switch with its zeros, (sets, zeros), some of them outside or infinite."""
+        arguments = columns[..., None]
+        ends = left[:, None] + length[:, None] * np.array([0.0, 1.0])
+        with np.errstate(all="ignore"):
+            values = self.affine.function(ends, *arguments)
+            for k in range(0, len(values), 2):
+                value, slope = (np.broadcast_to(v, ends.shape) for v in values[k : k + 2])
+                if self.levels[k // 2]:
+                    level = _integers(value)
+                    yield k // 2, ends[:, :1] + (level - value[:, :1]) / slope[:, :1]
+                else:
+                    yield k // 2, ends[:, :1] - value[:, :1] / slope[:, :1]
+            yield from self._sampled(columns, left, length)
+
+    def _sampled(self, columns: Array, left: Array, length: Array) -> Iterator[tuple[int, Array]]:
+        number = len(self.others.layout)
+        if not number:
+            return
+        grid = left[:, None] + length[:, None] * np.linspace(0.0, 1.0, _SAMPLES)
+        sampled = self.others.function(grid, *columns[..., None])
+        for k in range(number):
+            value = np.broadcast_to(sampled[k], grid.shape)
+            switch = len(self.levels) - number + k
+            levels = _integers(value) if self.levels[switch] else np.zeros((1, 1))
+            for level in np.unique(levels[np.isfinite(levels)]):
+                yield switch, self._roots(k, level, columns, grid, value)
+
+    def _roots(self, number: int, level: float, columns: Array, grid: Array, value: Array) -> Array:
+        """Return where a switch passes a level between samples, (sets, roots), filled up with inf."""
+        above = value >= level
+        row, cell = np.nonzero(above[:, 1:] != above[:, :-1])
+        low, high, start = grid[row, cell], grid[row, cell + 1], above[row, cell]
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            here = self.others.function(middle, *columns[:, row])[number] >= level
+            low, high = np.where(here == start, middle, low), np.where(here == start, high, middle)
+        found = np.full((len(grid), int(np.bincount(row, minlength=1).max(initial=0))), np.inf)
+        found[row, np.arange(len(row)) - np.searchsorted(row, row)] = high
+        return found
+
+
+def _integers(value: Array) -> Array:
+    """Return the integers within the range of each row, (sets, integers), filled up with inf."""
+    low, high = np.ceil(np.nanmin(value, axis=1)), np.floor(np.nanmax(value, axis=1))
+    count = int(np.max(high - low, initial=-1.0)) + 1
+    if count > _MOST:
+        raise ValueError(f"coefficients: {count} jumps along x must be at most {_MOST}")
+    found = low[:, None] + np.arange(max(count, 0))
+    return np.where(found <= high[:, None], found, np.inf)
+
+
+def breaks(expressions: Sequence[Expr], x: Symbol, symbols: Sequence[Symbol], places: Sequence[Expr] = ()) -> Breaks:
+    """Return the compiled switches of coefficients, with interior places of terms.
+
+    Raises
+    ------
+    HamiltonError
+        Names what cannot be located.
+    """
+    from cra_sym.mechanics.breakpoints import derivative, switches
+
+    affine, others = [], []
+    for switch in switches(expressions, x):
+        slope = switch.slope(x)
+        if slope is None:
+            others.append(switch)
+        else:
+            affine.append((switch, slope))
+    pairs = tuple(part for switch, slope in affine for part in (switch.expression, slope))
+    values = tuple(switch.expression for switch in others)
+    arguments = (x, *symbols)
+    every = [*(switch for switch, _ in affine), *others]
+    return Breaks(
+        kernel(pairs, arguments, backend="numpy"),
+        kernel(values, arguments, backend="numpy"),
+        tuple(switch.levels for switch in every),
+        tuple(
+            kernel(tuple(derivative(switch.expression, symbol) for symbol in arguments), arguments, backend="numpy")
+            for switch in every
+        ),
+        kernel(tuple(places), tuple(symbols), backend="numpy"),
+    )

@@ -1,0 +1,75 @@
+"""The energies of a model with coefficients that vary along x, as Ritz's method on the stresses takes them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sympy import Expr, Matrix, S, expand, zeros
+
+from cra_sym.kernels import kernel
+from cra_sym.mechanics.jets import Jet
+from cra_sym.mechanics.weak import WeakForm, weak_form
+from cra_sym.model.spatial import SpatialProblem
+from cra_sym.model.stress_route import StressRoute
+
+if TYPE_CHECKING:
+    from cra_sym.model.lagrangian import Model
+
+__all__ = ["stress_route"]
+
+
+def stress_route(model: Model, spatial: SpatialProblem) -> StressRoute | None:
+    """Return the route of a model by its energies, or None if a field has derivatives of other orders than 1 and 2."""
+    weak = weak_form(model.equations.variation)
+    section, highest, lumped = weak.fields()
+    orders = tuple(weak.variation.orders)
+    if not set(orders) <= {1, 2} or any(jet in highest for pair, e in weak.inside.items() for jet in pair if 2 in e):
+        return None
+    state = [*section, *lumped]
+    leading, coupled = _matrix(weak, highest, highest, 0), _matrix(weak, highest, state, 0)
+    strain = leading.inv() * coupled if not coupled.is_zero_matrix else coupled
+    cross = zeros(*coupled.shape)
+    if not _one_after_the_other(strain, section, highest):
+        strain, cross = cross, coupled
+    rest = _matrix(weak, state, state, 0) - (coupled.T * strain if cross.is_zero_matrix else zeros(len(state)))
+    named = {"W": leading, "B": strain, "D": cross, "R": rest, "M": _matrix(weak, state, state, 2)}
+    entries: dict[tuple[str, int, int], Expr] = {}
+    for name, matrix in named.items():
+        for i in range(matrix.rows):
+            for j in range(matrix.cols):
+                value = matrix[i, j]
+                if (j >= i or name in "BD") and value != 0 and (name != "R" or expand(value) != 0):
+                    entries[name, i, j] = value
+    x = weak.variation.space.x
+    values = tuple(entries.values())
+    return StressRoute(
+        spatial,
+        orders,
+        kernel(values, (x, *model.symbols), backend="numpy"),
+        tuple(entries),
+    )
+
+
+def _matrix(weak: WeakForm, rows: list[Jet], columns: list[Jet], power: int) -> Matrix:
+    return Matrix(
+        len(rows), len(columns), [weak.inside.get((p, q), {}).get(power, S.Zero) for p in rows for q in columns]
+    )
+
+
+def _one_after_the_other(strain: Matrix, section: list[Jet], highest: list[Jet]) -> bool:
+    """Return whether the strains give the displacements by integration, one after the other."""
+    waiting = list(range(len(section)))
+    while waiting:
+        for place in waiting:
+            raised = section[place]._replace(space=section[place].space + 1)
+            needed = (
+                [section.index(raised)]
+                if raised in section
+                else [j for j in range(len(section)) if strain[highest.index(raised), j] != 0]
+            )
+            if not set(needed) & set(waiting):
+                waiting.remove(place)
+                break
+        else:
+            return False
+    return True

@@ -1,0 +1,393 @@
+"""Natural frequencies by Ritz's method on the stresses: for coefficients that vary along x in any way.
+
+Unknown are, element by element, the natural forces of highest order (moment of a beam, tension of a string, moment and
+shear of Timoshenko's beam) as Legendre series, and the displacements of one end. Displacements follow by integration
+from that end, so nothing needs to be continuous, and a jump of a stiffness costs nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .stress_mesh import Grid, Mesh, rule
+
+__all__ = ["Columns", "Continuum", "Entries", "PointTerm"]
+
+Array = NDArray[np.float64]
+Entries = Mapping[tuple[int, int], Array]
+Coefficients = Callable[[Array, NDArray[np.intp]], dict[str, Entries]]
+
+
+@dataclass(frozen=True)
+class PointTerm:
+    """Springs and masses at a breakpoint.
+
+    Attributes
+    ----------
+    node : int
+        Number of the breakpoint among the edges.
+    directions, springs : ndarray, shape (rows, springs, n + m), (rows, springs)
+        Each spring, which may be infinite, acts on ``directions @ (q, w)``.
+    mass : ndarray, shape (rows, n + m, n + m)
+    """
+
+    node: int
+    directions: Array
+    springs: Array
+    mass: Array
+
+    def take(self, rows: NDArray[np.intp]) -> PointTerm:
+        """Return those of some of the parameter sets."""
+        return PointTerm(self.node, self.directions[rows], self.springs[rows], self.mass[rows])
+
+
+@dataclass(frozen=True)
+class Continuum:
+    """A spatial problem by its energies, batched over rows (parameter sets).
+
+    With the highest derivatives h of the fields and the displacements s = (q, w) of a section and of the lumped
+    coordinates, twice the potential energy per length is ``e' W e + 2 e' D s + s' R s``, with the strains
+    ``e = h + B s``; twice the kinetic energy is ``z s' M s``.
+
+    Attributes
+    ----------
+    orders : tuple of int
+        Order of the highest derivative of each field.
+    lumped : int
+        Number of lumped coordinates m.
+    coefficients : callable
+        ``coefficients(x, rows)`` with x of shape (len(rows), points): 'W', 'B', 'D', 'R' and 'M' by entry, each entry
+        broadcasting to the shape of x. Entries that are not there are zero; of symmetric ones the upper half is there.
+    edges : ndarray, shape (rows, spans + 1)
+        Left end, breakpoints, right end.
+    directions, springs : ndarray, shape (rows, springs, 2 n + m), (rows, springs)
+        Each spring, which may be infinite, acts on ``directions @ (q(left), w, q(right))``.
+    end_mass : ndarray, shape (rows, 2 n + m, 2 n + m)
+    origin : int
+        The end from which displacements are integrated, 0 or 1: not one at which a stiffness vanishes.
+    points : tuple of PointTerm
+        What acts at breakpoints.
+    """
+
+    orders: tuple[int, ...]
+    lumped: int
+    coefficients: Coefficients
+    edges: Array
+    directions: Array
+    springs: Array
+    end_mass: Array
+    origin: int = 0
+    points: tuple[PointTerm, ...] = ()
+
+    @property
+    def displacements(self) -> int:
+        """Displacements of a section, n."""
+        return sum(self.orders)
+
+    def take(self, rows: NDArray[np.intp]) -> Continuum:
+        """Return the problem of some of the parameter sets."""
+        return replace(
+            self,
+            coefficients=lambda x, index: self.coefficients(x, rows[index]),
+            edges=self.edges[rows],
+            directions=self.directions[rows],
+            springs=self.springs[rows],
+            end_mass=self.end_mass[rows],
+            points=tuple(point.take(rows) for point in self.points),
+        )
+
+    def tops(self) -> list[int]:
+        """Return the position of the highest displacement of each field in a section."""
+        return [sum(self.orders[: k + 1]) - 1 for k in range(len(self.orders))]
+
+    def sample(self, strained: bool) -> Callable[[Array], Array]:
+        """Return all coefficients as one array: the compliances, or the stiffnesses where the strain is expanded."""
+        rows = np.arange(len(self.edges))
+
+        def values(x: Array) -> Array:
+            found = self.coefficients(x, rows)
+            parts = [found["W"]] if strained else [compliance(found["W"], len(self.orders))]
+            parts += [found[name] for name in "BDRM"]
+            return np.stack([np.broadcast_to(entry, x.shape) for part in parts for entry in part.values()])
+
+        return values
+
+
+def compliance(stiffness: Entries, size: int) -> Entries:
+    """Return the inverse of a symmetric matrix given by entries, upper half."""
+    if all(i == j for i, j in stiffness):
+        with np.errstate(divide="ignore"):
+            return {pair: 1.0 / entry for pair, entry in stiffness.items()}
+    matrix = np.zeros((*np.broadcast_shapes(*(np.shape(e) for e in stiffness.values())), size, size))
+    for (i, j), entry in stiffness.items():
+        matrix[..., i, j] = matrix[..., j, i] = entry
+    inverse = np.linalg.inv(matrix)
+    return {(i, j): inverse[..., i, j] for i in range(size) for j in range(i, size) if np.any(inverse[..., i, j])}
+
+
+class Columns:
+    """What each unknown displaces and strains, at the Gauss points of a mesh; then the matrices.
+
+    The unknowns are the displacements of the origin, the lumped coordinates, the amplitudes of further stresses and the
+    Legendre coefficients: degree by degree, in each degree element by element, in each element field by field.
+
+    Parameters
+    ----------
+    problem : Continuum
+    mesh : Mesh
+    further : ndarray, shape (sets, functions, fields, Q, G), optional
+        Further functions at the points of the mesh beside the Legendre functions.
+    """
+
+    def __init__(self, problem: Continuum, mesh: Mesh, further: Array | None = None) -> None:
+        self.problem, self.mesh, self.further = problem, mesh, further
+        self.gauss = rule(mesh.points)
+        self.grid = Grid.of(mesh, problem.edges, mesh.points)
+        self.sets = len(problem.edges)
+        self.rigid = problem.displacements + problem.lumped
+        fields, elements = len(problem.orders), len(mesh.elements) - 1
+        self.offset = self.rigid + (0 if further is None else further.shape[1])
+        self.size = self.offset + fields * elements * (mesh.degree + 1)
+        self.elastic = (mesh.degree + 1, elements, fields)
+        rows = np.arange(self.sets)
+        shape = self.grid.x.shape
+        found = problem.coefficients(self.grid.x.reshape(len(self.grid.x), -1), rows)
+        self.coefficient = {
+            name: {pair: _on_points(entry, self.sets, shape[1:]) for pair, entry in part.items()}
+            for name, part in found.items()
+        }
+
+    # ------------------------------------------------------------------------------------------ the unknowns
+
+    @cached_property
+    def legendre(self) -> Array:
+        """Legendre functions at the points, each in its element: (sets or 1, degree + 1, elements, Q, G)."""
+        local = self.grid.local
+        values = np.moveaxis(np.polynomial.legendre.legvander(local, self.mesh.degree), -1, 1)
+        inside = self.mesh.owner == np.arange(self.elastic[1])[:, None]
+        return values[:, :, None] * inside[:, :, None]
+
+    @cached_property
+    def compliance(self) -> Entries:
+        """Inverse of the stiffnesses W at the points."""
+        return compliance(self.coefficient["W"], self.elastic[2])
+
+    @cached_property
+    def _factor(self) -> dict[tuple[int, int], Array]:
+        """Strain of field i for a unit Legendre function of field j: the compliance, or one where that is expanded."""
+        strained = self.mesh.strained[self.mesh.owner][:, None]
+        found = {}
+        for i in range(self.elastic[2]):
+            for j in range(self.elastic[2]):
+                entry = self.compliance.get((min(i, j), max(i, j)))
+                if strained.any():
+                    entry = np.where(strained, float(i == j), 0.0 if entry is None else entry)
+                if entry is not None:
+                    found[i, j] = entry
+        return found
+
+    @cached_property
+    def strain(self) -> list[Array]:
+        """Strain of each field for each unknown, (sets or 1, size, Q, G)."""
+        fields = self.elastic[2]
+        found = []
+        for i in range(fields):
+            parts = {j: self._factor[i, j] for j in range(fields) if (i, j) in self._factor}
+            found.append(self._expanded(parts))
+        return found
+
+    def _expanded(self, factors: Mapping[int, Array]) -> Array:
+        """Return the sum of factors times the functions of each field, for each unknown, (sets or 1, size, Q, G)."""
+        further = () if self.further is None else (self.sets,)
+        sets = max(len(self.legendre), *further, *(len(part) for part in factors.values()))
+        total = np.zeros((sets, self.size, *self.legendre.shape[-2:]))
+        view = total[:, self.offset :].reshape(sets, *self.elastic, *total.shape[-2:])
+        for j, part in factors.items():
+            np.multiply(self.legendre, part[:, None, None], out=view[:, :, :, j])
+            if self.further is not None:
+                total[:, self.rigid : self.offset] += part[:, None] * self.further[:, :, j]
+        return total
+
+    @cached_property
+    def displaced(self) -> tuple[list[Array], list[Array]]:
+        """Displacements s = (q, w) of each unknown at the points, (sets or 1, size, Q, G), and at the ends of pieces."""
+        n, m = self.problem.displacements, self.problem.lumped
+        one = np.zeros((1, self.size, 1, 1))
+        values: list[Array | None] = [None] * (n + m)
+        ends: list[Array | None] = [None] * (n + m)
+        for number in range(n, n + m):
+            unit = one.copy()
+            unit[:, number] = 1.0
+            values[number], ends[number] = unit, unit[..., 0]
+        waiting = list(range(n))
+        tops = self.problem.tops()
+        while waiting:
+            for place in reversed(waiting):
+                rate = self._rate(place, tops, values)
+                if rate is not None:
+                    start = np.zeros(self.size)
+                    start[place] = 1.0
+                    values[place], ends[place] = self._integral(rate, start)
+                    waiting.remove(place)
+                    break
+            else:
+                raise ValueError("the strains do not give the displacements one after the other")
+        return [v for v in values if v is not None], [e for e in ends if e is not None]
+
+    def _rate(self, place: int, tops: list[int], values: list[Array | None]) -> Array | None:
+        """Return the derivative of a displacement by x, or None if it waits for another."""
+        if place not in tops:
+            return values[place + 1]
+        field = tops.index(place)
+        coupled = {j: entry for (i, j), entry in self.coefficient["B"].items() if i == field}
+        if any(values[j] is None for j in coupled):
+            return None
+        rate = self.strain[field]
+        for j, entry in coupled.items():
+            rate = rate - entry[:, None] * values[j]
+        return rate
+
+    def _integral(self, rate: Array, start: Array) -> tuple[Array, Array]:
+        """Return the integral from the origin at the points and at the ends of the pieces."""
+        half = self.grid.half[:, None]
+        rate = np.broadcast_to(rate, (*rate.shape[:2], *self.grid.x.shape[1:]))
+        if len(half) > 1 and np.ptp(self.grid.half, axis=0).max() == 0.0:
+            half = half[:1]
+        local = (rate.reshape(-1, rate.shape[-1]) @ self.gauss.integral.T).reshape(rate.shape) * half[..., None]
+        pieces = rate @ self.gauss.weights * half
+        nothing = np.zeros((*pieces.shape[:2], 1))
+        if self.problem.origin == 0:
+            ends = np.concatenate([nothing, np.cumsum(pieces, axis=-1)], axis=-1)
+        else:
+            ends = np.concatenate([-np.cumsum(pieces[..., ::-1], axis=-1)[..., ::-1], nothing], axis=-1)
+        ends = ends + start[:, None]
+        local += ends[..., :-1, None]
+        return local, ends
+
+    @cached_property
+    def weights(self) -> Array:
+        """Weights of the quadrature, (sets, Q G)."""
+        return (self.grid.half[..., None] * self.gauss.weights).reshape(len(self.grid.half), -1)
+
+    # ------------------------------------------------------------------------------------------ the matrices
+
+    @cached_property
+    def elastic_stiffness(self) -> Array:
+        """Integral of stress times strain, (sets, size, size)."""
+        fields, found = self.elastic[2], np.zeros((self.sets, self.size, self.size))
+        table = self.legendre.reshape(len(self.legendre), -1, *self.legendre.shape[-2:])
+        size = self.size - self.offset
+        block = np.zeros((self.sets, size // fields, fields, size // fields, fields))
+        for (i, j), entry in self._density.items():
+            block[:, :, i, :, j] = self._product(entry, table, table)
+        found[:, self.offset :, self.offset :] = block.reshape(self.sets, size, size)
+        if self.further is not None:
+            for j in range(fields):
+                functions = self._expanded({j: np.ones((1, 1, 1))})
+                for i in range(fields):
+                    if (i, j) in self._density:
+                        product = self._product(self._density[i, j], self.further[:, :, i], functions)
+                        found[:, self.rigid : self.offset] += product
+            cross = found[:, self.rigid : self.offset, self.offset :]
+            found[:, self.offset :, self.rigid : self.offset] = cross.swapaxes(-1, -2)
+        return found
+
+    @cached_property
+    def _density(self) -> dict[tuple[int, int], Array]:
+        """Strain energy of a unit function of one field with that of another: compliance, or stiffness."""
+        strained = self.mesh.strained[self.mesh.owner][:, None]
+        found = {}
+        for i in range(self.elastic[2]):
+            for j in range(self.elastic[2]):
+                pair = min(i, j), max(i, j)
+                soft, stiff = self.compliance.get(pair), self.coefficient["W"].get(pair)
+                if strained.any():
+                    soft = np.where(strained, 0.0 if stiff is None else stiff, 0.0 if soft is None else soft)
+                if soft is not None:
+                    found[i, j] = soft
+        return found
+
+    @cached_property
+    def potential(self) -> Array | None:
+        """What the displacements themselves add to the stiffness, (sets, size, size), or None if nothing."""
+        cross, direct = self.coefficient["D"], self.coefficient["R"]
+        if not cross and not direct:
+            return None
+        moved = self.displaced[0]
+        total = np.zeros((self.sets, self.size, self.size))
+        for (i, j), entry in cross.items():
+            product = self._product(entry, self.strain[i], moved[j])
+            total += product + product.swapaxes(-1, -2)
+        return self._quadratic(direct, total)
+
+    @cached_property
+    def mass(self) -> Array:
+        """Mass matrix, (sets, size, size)."""
+        total = self._quadratic(self.coefficient["M"], np.zeros((self.sets, self.size, self.size)))
+        if np.any(self.problem.end_mass):
+            total += self.ends.swapaxes(-1, -2) @ self.problem.end_mass @ self.ends
+        for point, there in zip(self.problem.points, self.at_points, strict=True):
+            total += there.swapaxes(-1, -2) @ point.mass @ there
+        return total
+
+    def _quadratic(self, entries: Entries, total: Array) -> Array:
+        moved = self.displaced[0]
+        for (i, j), entry in entries.items():
+            product = self._product(entry, moved[i], moved[j])
+            total += product if i == j else product + product.swapaxes(-1, -2)
+        return total
+
+    def _product(self, entry: Array, first: Array, second: Array) -> Array:
+        """Return the integrals of a coefficient times two functions of every pair of unknowns."""
+        first, second = (self._flat(side) for side in (first, second))
+        weighted = first * (entry.reshape(len(entry), -1) * self.weights)[:, None]
+        if len(second) == 1:
+            product = (weighted.reshape(-1, weighted.shape[-1]) @ second[0].T).reshape(*weighted.shape[:2], -1)
+        else:
+            product = weighted @ second.swapaxes(-1, -2)
+        return product
+
+    def _flat(self, values: Array) -> Array:
+        shape = self.grid.x.shape[1:]
+        return np.broadcast_to(values, (*values.shape[:2], *shape)).reshape(*values.shape[:2], -1)
+
+    @cached_property
+    def at_points(self) -> list[Array]:
+        """(q, w) at each point, (sets, n + m, size)."""
+        found = []
+        for point in self.problem.points:
+            index = int(np.searchsorted(self.mesh.pieces, point.node))
+            rows = [end[..., index] if end.shape[-1] > 1 else end[..., 0] for end in self.displaced[1]]
+            found.append(np.stack([np.broadcast_to(row, (self.sets, self.size)) for row in rows], axis=1))
+        return found
+
+    @cached_property
+    def held(self) -> tuple[Array, Array]:
+        """What each spring acts on, (sets, springs, size), and the springs, (sets, springs)."""
+        rows, springs = [self.problem.directions @ self.ends], [self.problem.springs]
+        for point, there in zip(self.problem.points, self.at_points, strict=True):
+            rows.append(point.directions @ there)
+            springs.append(point.springs)
+        return np.concatenate(rows, axis=1), np.concatenate(springs, axis=1)
+
+    @cached_property
+    def ends(self) -> Array:
+        """(q(left), w, q(right)) of every unknown, (sets, 2 n + m, size)."""
+        n = self.problem.displacements
+        at = self.displaced[1]
+        rows = [*(at[k][..., 0] for k in range(n)), *(a[..., 0] for a in at[n:]), *(at[k][..., -1] for k in range(n))]
+        return np.stack([np.broadcast_to(row, (self.sets, self.size)) for row in rows], axis=1)
+
+
+def _on_points(entry: Array, sets: int, shape: tuple[int, ...]) -> Array:
+    """Return a coefficient at the points, (sets or 1, Q, G)."""
+    entry = np.asarray(entry, dtype=float)
+    if entry.ndim < 2 or entry.shape[-1] == 1:
+        entry = entry.reshape(-1, 1, 1) if entry.ndim else entry[None, None, None]
+        return np.broadcast_to(entry, (len(entry), *shape))
+    return entry.reshape(len(entry), *shape)

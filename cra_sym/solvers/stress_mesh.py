@@ -1,0 +1,236 @@
+"""Two meshes along x: quadrature pieces on which every coefficient is a polynomial to rounding, and basis elements.
+
+Pieces are stated in a reference coordinate: the i-th span between neighbouring breakpoints is (i, i + 1). Parameter
+sets whose breakpoints differ then share a mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Grid", "Mesh", "Rule", "Sampler", "TooFineError", "cells", "resolved", "rule"]
+
+Array = NDArray[np.float64]
+Sampler = Callable[[Array], Array]
+"""Coefficients at places of shape (sets, points), as an array of shape (coefficients, sets, points)."""
+
+NODES = 16
+"""Gauss points of the test whether a piece is resolved: a coefficient must be a polynomial of that degree there."""
+TAIL = 1e-11
+"""Relative size of what a resolved coefficient may hold beyond. Gauss's rule integrates twice that degree, so what is
+left out of an integral is far below; sin(1e3 x) has only this many digits anyway."""
+SPECK = 2e-16
+"""Share of its own integral that a coefficient may have on a piece which is left unresolved."""
+ROUNDING = 8 * np.finfo(float).eps
+"""The same relative to the largest value anywhere: a coefficient that passes zero has no more digits."""
+MOST_PIECES = 8000
+
+
+class TooFineError(ValueError):
+    """Coefficients that vary too finely to be resolved; ``sets`` is how many parameter sets were treated together."""
+
+    def __init__(self, message: str, sets: int) -> None:
+        super().__init__(message)
+        self.sets = sets
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Gauss's rule on (-1, 1) with the matrices that go with it.
+
+    Attributes
+    ----------
+    points, weights : ndarray, shape (G,)
+    integral : ndarray, shape (G, G)
+        Row i: integral from -1 to point i, exact for polynomials below degree G.
+    spectrum : ndarray, shape (G, G)
+        From values to Legendre coefficients.
+    """
+
+    points: Array
+    weights: Array
+    integral: Array
+    spectrum: Array
+
+
+@lru_cache
+def rule(number: int) -> Rule:
+    """Return Gauss's rule with that many points."""
+    points, weights = np.polynomial.legendre.leggauss(number)
+    table = np.polynomial.legendre.legvander(points, number)  # P_0 .. P_number at the points
+    degree = np.arange(number)
+    spectrum = (degree[:, None] + 0.5) * (weights[:, None] * table[:, :number]).T
+    below = np.concatenate([-np.ones((number, 1)), table[:, : number - 1]], axis=1)  # P_(k-1); -1 for k = 0
+    antiderivative = (table[:, 1:] - below) / (2 * degree + 1)
+    return Rule(points, weights, antiderivative @ spectrum, spectrum)
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Pieces and elements in the reference coordinate.
+
+    Attributes
+    ----------
+    pieces : ndarray, shape (Q + 1,)
+        Ends of the quadrature pieces; whole numbers are breakpoints.
+    elements : ndarray, shape (E + 1,)
+        Ends of the basis elements, some of the ends of the pieces.
+    degree : int
+        Highest degree of the Legendre functions on an element.
+    strained : ndarray of bool, shape (E,)
+        Elements on which the strain itself is expanded, not the stress: those where a stiffness vanishes at an end.
+    smoothness : int
+        Degree of the polynomials that the coefficients are on every piece.
+    """
+
+    pieces: Array
+    elements: Array
+    degree: int
+    strained: NDArray[np.bool_]
+    smoothness: int = NODES - 1
+
+    @property
+    def owner(self) -> NDArray[np.intp]:
+        """The element of each piece."""
+        middle = 0.5 * (self.pieces[1:] + self.pieces[:-1])
+        return np.searchsorted(self.elements, middle) - 1
+
+    @property
+    def points(self) -> int:
+        """Gauss points of a piece, for the integrals of products of two displacements."""
+        share = float((np.diff(self.pieces) / np.diff(self.elements)[self.owner]).max())
+        swing = np.arccos(max(1.0 - 2.0 * share, -1.0)) / np.pi  # share of the oscillations of a Legendre function
+        oscillations = self.degree if share > 0.99 else min(self.degree, int(np.ceil(self.degree * swing)) + 8)
+        return oscillations + (self.smoothness + 1) // 2 + 4
+
+    def split(self, marked: NDArray[np.bool_]) -> Mesh:
+        """Return the mesh with some elements halved; where one spans several breakpoints, at one of them."""
+        left, right = self.elements[:-1], self.elements[1:]
+        middle = 0.5 * (left + right)
+        middle = np.where(right - left > 1.5, np.round(middle), middle)
+        inner = middle[marked]
+        elements = np.union1d(self.elements, inner)
+        parents = np.searchsorted(self.elements, 0.5 * (elements[1:] + elements[:-1])) - 1
+        return replace(self, elements=elements, pieces=np.union1d(self.pieces, inner), strained=self.strained[parents])
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A mesh in physical places: shape (sets, ...), or one set if all are alike.
+
+    Attributes
+    ----------
+    x : ndarray, shape (sets, Q, G)
+    half : ndarray, shape (sets, Q)
+        Half the length of each piece.
+    local : ndarray, shape (sets, Q, G)
+        Coordinate of each point in its element, -1 to 1.
+    ends : ndarray, shape (sets, Q + 1)
+    """
+
+    x: Array
+    half: Array
+    local: Array
+    ends: Array
+
+    @classmethod
+    def of(cls, mesh: Mesh, edges: Array, points: int) -> Grid:
+        """Return the places of a mesh between breakpoints of shape (sets, spans + 1)."""
+        ends, bounds = places(mesh.pieces, edges), places(mesh.elements, edges)
+        half = 0.5 * np.diff(ends, axis=1)
+        x = ends[:, :-1, None] + half[..., None] * (1.0 + rule(points).points)
+        left, right = bounds[:, :-1][:, mesh.owner], bounds[:, 1:][:, mesh.owner]
+        local = ((x - left[..., None]) - (right[..., None] - x)) / (right - left)[..., None]
+        shares = (ends - ends[:, :1]) / (ends[:, -1:] - ends[:, :1])
+        if len(local) > 1 and np.ptp(shares, axis=0).max() < 1e-14:  # the same picture for every length
+            local = local[:1]
+        return cls(x, half, local, ends)
+
+
+def places(reference: Array, edges: Array) -> Array:
+    """Return the physical places of reference coordinates, shape (sets, len(reference))."""
+    span = np.minimum(reference.astype(int), edges.shape[1] - 2)
+    share = reference - span
+    left, right = edges[:, span], edges[:, span + 1]
+    return np.where(share < 0.5, left + share * (right - left), right - (1.0 - share) * (right - left))
+
+
+def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[Array, Array, int]:
+    """Return pieces on which every coefficient is resolved, the relative size of what is not, shape (sets,), and the
+    highest degree of the coefficients there.
+
+    Parameters
+    ----------
+    sample : callable
+    edges : ndarray, shape (sets, spans + 1)
+    pieces : ndarray, shape (Q + 1,)
+        To begin with, in the reference coordinate.
+    what : str
+        What the coefficients are, for errors.
+
+    Raises
+    ------
+    TooFineError
+        If some piece is not resolved when there are 8000 of them.
+
+    Notes
+    -----
+    A piece is resolved if the last Legendre coefficients of 16 vanish and the polynomial meets the coefficient at
+    places between the points. One that holds a jump is halved until it does not matter.
+    """
+    gauss = rule(NODES)
+    off = np.linspace(-0.987, 0.983, 37)
+    table = np.polynomial.legendre.legvander(off, NODES - 1) @ gauss.spectrum
+    total = peak = np.zeros(0)
+    unresolved, degree = np.zeros(len(edges)), 0
+    done: list[Array] = []
+    todo = np.stack([pieces[:-1], pieces[1:]], axis=1)
+    most = MOST_PIECES + len(pieces)
+    while len(todo):
+        ends = np.stack([places(todo[:, k], edges) for k in (0, 1)], axis=-1)  # (sets, Q, 2)
+        half = 0.5 * (ends[..., 1] - ends[..., 0])
+        at = ends[..., :1] + half[..., None] * (1.0 + np.concatenate([gauss.points, off]))
+        values = sample(at.reshape(len(edges), -1)).reshape(-1, *at.shape)
+        if not np.isfinite(values).all():
+            bad = np.argwhere(~np.isfinite(values))[0]
+            raise ValueError(f"values: they make a coefficient infinite at x = {at[tuple(bad[1:])]:.6g}")
+        known, beyond = values[..., :NODES], values[..., NODES:]
+        size = np.abs(values).max(axis=-1)
+        peak = np.maximum(peak, size.max(axis=-1, keepdims=True)) if total.size else size.max(axis=-1, keepdims=True)
+        if not total.size:  # integrals of the magnitudes, from the first sweep
+            total = (np.abs(known) @ gauss.weights * half).sum(axis=-1, keepdims=True)
+        series = np.abs(known @ gauss.spectrum.T)
+        error = np.maximum(series[..., -2:].sum(axis=-1), np.abs(known @ table.T - beyond).max(axis=-1))
+        smooth = error <= TAIL * size + ROUNDING * peak
+        mass = size * half
+        speck = mass <= SPECK * total
+        total = np.maximum(total, mass.max(axis=-1, keepdims=True))
+        good = (smooth | speck).all(axis=(0, 1))
+        share = np.where(smooth, 0.0, mass / np.where(total > 0.0, total, 1.0))
+        narrow = todo[:, 1] - todo[:, 0] <= 4 * np.spacing(todo[:, 1])
+        good |= narrow
+        unresolved += share[:, :, good].max(axis=0).sum(axis=1)
+        done.append(todo[good])
+        large = (series[:, :, good] > (TAIL * size + ROUNDING * peak)[:, :, good, None]).any(axis=(0, 1, 2))
+        degree = max(degree, int(np.max(np.nonzero(large)[0], initial=0)))
+        todo = todo[~good]
+        if sum(map(len, done)) + 2 * len(todo) > most:
+            piece = places(todo[:1].ravel(), edges[:1])[0]
+            raise TooFineError(
+                f"{what} vary too finely along x to be resolved, at x = {piece[0]:.6g} to {piece[1]:.6g}: "
+                f"{most} pieces do not suffice; relative error there {error[..., ~good].max():.1g}",
+                len(edges),
+            )
+        middle = todo.mean(axis=1, keepdims=True)
+        todo = np.concatenate([np.hstack([todo[:, :1], middle]), np.hstack([middle, todo[:, 1:]])])
+    return np.unique(np.concatenate(done)), unresolved, degree
+
+
+def cells(edges: int, most: int) -> Array:
+    """Return the ends of basis elements for that many spans: one for each, or groups of neighbours if they are many."""
+    return np.unique(np.round(np.linspace(0.0, edges, min(edges, most) + 1)))

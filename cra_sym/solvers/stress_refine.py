@@ -1,0 +1,248 @@
+"""From a continuum to modes of stated accuracy: quadrature mesh, then elements and degrees until the estimate says so."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .stress import Columns, Continuum
+from .stress_mesh import Mesh, TooFineError, cells, resolved
+from .stress_modes import ModeFields
+from .stress_spectrum import BuckledError, spectrum
+
+__all__ = ["Found", "solved"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+_ROUNDS, _MOST_UNKNOWNS, _MOST_DEGREE = 24, 1500, 40
+_MOST_ELEMENTS = 12  # to begin with: more spans than that share elements
+_FURTHER = 3  # times that the stresses which equilibrium asks for are added
+_LANES = 1_000_000  # numbers in the largest array of a chunk
+
+
+@dataclass(frozen=True)
+class Found:
+    """Modes of some of the rows.
+
+    Attributes
+    ----------
+    rows : ndarray of int
+    fields : ModeFields
+    accuracy : ndarray, shape (rows,)
+        Estimated relative error of the frequencies, the largest of the modes.
+    """
+
+    rows: Index
+    fields: ModeFields
+    accuracy: Array
+
+
+def solved(problem: Continuum, modes: int, tolerance: float, target: float) -> list[Found]:
+    """Return the lowest modes of every row.
+
+    Parameters
+    ----------
+    problem : Continuum
+    modes : int
+    tolerance : float
+        Relative error of the squared frequencies that must be reached.
+    target : float
+        What is aimed at; a smaller one gives better mode shapes, whose error is as its square root.
+
+    Raises
+    ------
+    ValueError
+        If the structure has buckled, has fewer modes, or does not reach the tolerance: names the place and the figure.
+    """
+    found: list[Found] = []
+    for rows, ends in _alike(problem):
+        found += _group(problem.take(rows), rows, ends, modes, tolerance, target)
+    return found
+
+
+def _alike(problem: Continuum) -> Iterator[tuple[Index, tuple[bool, bool]]]:
+    """Yield sets whose stiffness vanishes at the same ends."""
+    kinds = np.stack([_vanishes(problem, end) for end in (0, 1)], axis=1)
+    for kind in np.unique(kinds, axis=0):
+        yield np.nonzero((kinds == kind).all(axis=1))[0], (bool(kind[0]), bool(kind[1]))
+
+
+def _vanishes(problem: Continuum, end: int) -> NDArray[np.bool_]:
+    """Return in which rows a stiffness vanishes at an end; refuse one with a continuous spectrum."""
+    edges = problem.edges
+    width = edges[:, 1] - edges[:, 0] if end == 0 else edges[:, -1] - edges[:, -2]
+    inward = np.array([1e-7, 2e-7])
+    at = edges[:, :1] + width[:, None] * inward if end == 0 else edges[:, -1:] - width[:, None] * inward
+    rows = np.arange(len(edges))
+    found = problem.coefficients(at, rows)
+
+    def exponent(entry: Array) -> Array:
+        entry = np.broadcast_to(entry, at.shape)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            power = np.log2(np.abs(entry[:, 1] / entry[:, 0]))
+        return np.where(np.isfinite(power), power, 0.0)
+
+    tops = problem.tops()
+    vanishes = np.zeros(len(edges), dtype=bool)
+    for field, order in enumerate(problem.orders):
+        power = exponent(found["W"][field, field])
+        place = tops[field] - order + 1
+        weight = exponent(found["M"][place, place]) if (place, place) in found["M"] else np.zeros(len(edges))
+        vanishes |= power > 0.05
+        steep = power - weight > 2 * order - 1e-3
+        if steep.any():
+            name, value = ("left", "right")[end], float((power - weight)[steep][0])
+            raise ValueError(
+                f"the stiffness vanishes at the {name} end by {value:.3g} powers of the distance more than the mass: "
+                f"from {2 * order} on there are no natural frequencies but a continuous spectrum; use ritz"
+            )
+    return vanishes
+
+
+def _group(
+    problem: Continuum, rows: Index, ends: tuple[bool, bool], modes: int, tolerance: float, target: float
+) -> list[Found]:
+    spans = problem.edges.shape[1] - 1
+    if ends[0] and not ends[1]:
+        problem = replace(problem, origin=1)
+    elements = cells(spans, max(_MOST_ELEMENTS, int(np.ceil(modes / 12))))
+    if spans == 1 and modes > 20:
+        elements = np.linspace(0.0, 1.0, int(np.ceil(modes / 12)) + 1)
+    elements = np.union1d(elements, [float(point.node) for point in problem.points])
+    strained = np.zeros(len(elements) - 1, dtype=bool)
+    strained[0] |= ends[0]
+    strained[-1] |= ends[1]
+    try:
+        pieces, unresolved, smoothness = _quadrature(problem, elements, strained)
+    except TooFineError as error:
+        if error.sets == 1:
+            raise
+        half = len(rows) // 2
+        parts = (np.arange(half), np.arange(half, len(rows)))
+        return [
+            item for part in parts for item in _group(problem.take(part), rows[part], ends, modes, tolerance, target)
+        ]
+    degree = 8 + int(np.ceil(1.8 * modes / (len(elements) - 1)))
+    mesh = Mesh(pieces, elements, degree, strained, smoothness)
+    return _refined(problem, rows, mesh, unresolved, modes, tolerance, target)
+
+
+def _quadrature(problem: Continuum, elements: Array, strained: NDArray[np.bool_]) -> tuple[Array, Array, int]:
+    """Return the pieces of the quadrature: the compliance is resolved, or the stiffness where the strain is expanded."""
+    whole = np.union1d(elements, np.arange(problem.edges.shape[1]))
+    parts, unresolved, smoothness = [], np.zeros(len(problem.edges)), 0
+    for kind in np.unique(strained):
+        for left, right, is_strained in zip(elements[:-1], elements[1:], strained, strict=True):
+            if is_strained != kind or (not strained.any() and left > 0.0):
+                continue
+            if not strained.any():
+                right = elements[-1]
+            inner = whole[(whole >= left) & (whole <= right)]
+            part, rest, degree = resolved(problem.sample(bool(kind)), problem.edges, inner, "coefficients")
+            parts.append(part)
+            unresolved, smoothness = np.maximum(unresolved, rest), max(smoothness, degree)
+    return np.unique(np.concatenate(parts)), unresolved, smoothness
+
+
+def _refined(
+    problem: Continuum, rows: Index, mesh: Mesh, unresolved: Array, modes: int, tolerance: float, target: float
+) -> list[Found]:
+    """Solve on finer and finer meshes the sets that have not reached the target."""
+    found: list[Found] = []
+    open_, before, degree_before = np.arange(len(rows)), np.inf, 0
+    for turn in range(_ROUNDS):
+        solutions = [_solved(problem, part, mesh, modes, target) for part in _chunks(problem, mesh, open_)]
+        worst = max(solution.error.max(initial=0.0) for solution in solutions)
+        size = solutions[0].fields.columns.size
+        last = turn == _ROUNDS - 1 or size > _MOST_UNKNOWNS or (turn > 8 and worst > 0.5 * before)
+        for solution in solutions:
+            good = solution.error.max(axis=1) <= (tolerance if last else target)
+            if last and not good.all():
+                _refuse(solution, good)
+            if good.any():
+                found.append(_settled(solution, good, rows, unresolved))
+        still = [solution.part[solution.error.max(axis=1) > target] for solution in solutions]
+        if last or not sum(map(len, still)):
+            return found
+        shares = [s.share[s.error.max(axis=1) > target].max(axis=(0, 1), initial=0.0) for s in solutions]
+        marks, open_ = np.max(shares, axis=0), np.concatenate(still)
+        degree = mesh.degree
+        falling = turn == 0 or (degree > degree_before and worst < 1e-3 * before)
+        if falling and degree < _MOST_DEGREE - 6 and len(mesh.elements) < 20:
+            mesh = replace(mesh, degree=degree + 6)
+        else:
+            mesh = mesh.split(marks >= 0.03 * marks.max())
+        before, degree_before = worst, degree
+    return found
+
+
+@dataclass(frozen=True)
+class _Solution:
+    """Modes of a chunk on one mesh, with the estimated relative error of z, in all and by element."""
+
+    part: Index
+    fields: ModeFields
+    rounding: Array
+    error: Array
+    share: Array
+
+
+def _solved(problem: Continuum, part: Index, mesh: Mesh, modes: int, target: float) -> _Solution:
+    """Return the modes of a chunk; fine detail within an element is met by the stresses that equilibrium asks for."""
+    chosen = problem.take(part)
+    further: Array | None = None
+    most = _FURTHER if len(mesh.pieces) > 4 * len(mesh.elements) else 0
+    best: _Solution | None = None
+    for turn in range(most + 1):
+        columns = Columns(chosen, mesh, further)
+        try:
+            result = spectrum(columns, modes)
+        except BuckledError:
+            raise
+        except ValueError:
+            if best is None:
+                raise
+            return best  # the further stresses depend on the others to rounding
+        fields = ModeFields(columns, result.z, result.vectors)
+        share = 2.0 * fields.residual
+        solution = _Solution(part, fields, result.rounding, share.sum(axis=-1), share)
+        if best is not None and solution.error.max() > best.error.max():
+            return best
+        best = solution
+        if solution.error.max() <= target or turn == most:
+            break
+        more = fields.further()[:, ((solution.error > 0.01 * target) & (result.z > 0.0)).any(axis=0)]
+        further = more if further is None else np.concatenate([further, more], axis=1)
+    assert best is not None
+    return best
+
+
+def _chunks(problem: Continuum, mesh: Mesh, every: Index) -> Iterator[Index]:
+    size = problem.displacements + len(problem.orders) * (len(mesh.elements) - 1) * (mesh.degree + 1)
+    lanes = size * max(size, (len(mesh.pieces) - 1) * mesh.points)
+    step = max(1, _LANES // lanes)
+    for start in range(0, len(every), step):
+        yield every[start : start + step]
+
+
+def _settled(solution: _Solution, good: NDArray[np.bool_], rows: Index, unresolved: Array) -> Found:
+    """Return the sets of a solution that are good enough."""
+    part = solution.part[good]
+    error = np.maximum(solution.error, solution.rounding).max(axis=1)[good]
+    return Found(rows[part], solution.fields.take(np.nonzero(good)[0]), 0.5 * error + unresolved[part])
+
+
+def _refuse(solution: _Solution, good: NDArray[np.bool_]) -> None:
+    error = np.where(good[:, None], 0.0, solution.error)
+    row, mode = (int(k) for k in np.unravel_index(np.argmax(error), error.shape))
+    mesh = solution.fields.columns.mesh
+    element = int(np.argmax(solution.share[row, mode]))
+    piece = np.searchsorted(mesh.pieces, mesh.elements[element : element + 2])
+    ends = solution.fields.columns.grid.ends[row]
+    raise ValueError(
+        f"modes = {error.shape[1]}: the relative error of frequency {mode + 1} stays at {0.5 * error[row, mode]:.1g}; "
+        f"it comes from the coefficients at x = {ends[piece[0]]:.6g} to {ends[piece[1]]:.6g}"
+    )

@@ -1,0 +1,349 @@
+"""The eigenvalues of a Ritz basis on the stresses, as those of its compliance: the largest come out best.
+
+With K = L L' the compliance operator is ``L^-1 M L^-T``; its largest eigenvalues are 1 / omega^2. A spring k on ``b x``
+changes K by ``k b b'``, which is a multiplication by a symmetric matrix of rank one beside L: that of an infinite
+spring is a projection, and no stiffness is too large. A rigid-body motion is kept out like a displacement that an
+infinite spring holds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .stress import Columns
+
+__all__ = ["BuckledError", "Spectrum", "spectrum"]
+
+Array = NDArray[np.float64]
+EPS = float(np.finfo(float).eps)
+EXTRA = 5  # eigenvalues beyond those asked for, for the gap that completeness needs
+_NOTHING = 1e-29
+"""Compliance relative to the largest below which there is no motion: the square of what rounding leaves of a singular
+value."""
+_SPREAD = 1e-8
+"""Ratio of compliances below which eigenvectors of the matrix have lost half their digits: singular values then."""
+
+
+class BuckledError(ValueError):
+    """Statically unstable structure; ``unstable`` is the number of unstable modes of each parameter set."""
+
+    def __init__(self, unstable: NDArray[np.intp]) -> None:
+        number, sets = int(unstable.max()), len(unstable)
+        where = f", in {np.count_nonzero(unstable)} of {sets} parameter sets" if sets > 1 else ""
+        plural = "s" if number > 1 else ""
+        super().__init__(f"the structure has buckled: {number} unstable mode{plural} (omega^2 < 0){where}")
+        self.unstable = unstable
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Lowest modes of a basis.
+
+    Attributes
+    ----------
+    z : ndarray, shape (sets, modes)
+        Squared natural frequencies; those of rigid-body motions are 0.
+    vectors : ndarray, shape (sets, modes, size)
+        Unknowns of each mode, mass-normalised.
+    rounding : ndarray, shape (sets, modes)
+        Estimated relative rounding of z.
+    compliances : ndarray, shape (sets, more than modes)
+        1 / z of elastic modes as far as computed, descending, of each set.
+    """
+
+    z: Array
+    vectors: Array
+    rounding: Array
+    compliances: Array
+
+
+def spectrum(columns: Columns, modes: int) -> Spectrum:
+    """Return the lowest modes of a basis.
+
+    Raises
+    ------
+    BuckledError
+        If a parameter set is statically unstable.
+    ValueError
+        If there are fewer modes, or no motion has kinetic energy.
+    """
+    rows, springs = columns.held
+    free = _rigid_motions(columns, rows, springs)
+    sizes = np.array([len(motion) for motion in free])
+    parts = []
+    for size in np.unique(sizes):
+        sets = np.nonzero(sizes == size)[0]
+        still = np.stack([free[k] for k in sets])
+        parts.append((sets, _Problem(columns, sets, rows[sets], springs[sets], still).solved(modes)))
+    if len(parts) == 1:
+        return parts[0][1]
+    shape = {name: getattr(parts[0][1], name).shape[1:] for name in Spectrum.__dataclass_fields__}
+    joined = {name: np.zeros((len(sizes), *tail)) for name, tail in shape.items()}
+    for sets, part in parts:
+        for name, whole in joined.items():
+            found = getattr(part, name)
+            width = min(found.shape[1], whole.shape[1])
+            whole[sets, :width] = found[:, :width]
+    return Spectrum(**joined)
+
+
+def _rigid_motions(columns: Columns, rows: Array, springs: Array) -> list[Array]:
+    """Return, for each set, the motions without energy in the rigid unknowns, (motions, rigid)."""
+    held, active = rows[..., : columns.rigid], springs != 0.0
+    alike = bool((held == held[:1]).all() and (active == active[:1]).all())
+    if alike:
+        free = _not_held(held[0, active[0]])
+        if not len(free) or columns.potential is None:
+            return [free] * columns.sets
+    found = []
+    for k in range(columns.sets):
+        mine = held[k, active[k]]
+        if columns.potential is not None:
+            size, frame = np.linalg.eigh(columns.potential[k, : columns.rigid, : columns.rigid])
+            largest = max(float(np.abs(columns.potential[k]).max()), np.finfo(float).tiny)
+            mine = np.concatenate([mine, frame.T[np.abs(size) > 1e-12 * largest]])
+        found.append(_not_held(mine))
+    return found
+
+
+def _not_held(directions: Array) -> Array:
+    """Return an orthonormal basis of what moves none of the directions, (motions, unknowns)."""
+    length = np.sqrt((directions**2).sum(axis=1))
+    directions = directions[length > 0.0] / length[length > 0.0, None]
+    if not len(directions):
+        return np.eye(directions.shape[1])
+    _, size, adjoint = np.linalg.svd(directions)
+    return adjoint[int((size > 1e-10).sum()) :]
+
+
+class _Problem:
+    """The eigenvalue problem of sets with equally many rigid-body motions."""
+
+    def __init__(self, columns: Columns, sets: NDArray[np.intp], rows: Array, springs: Array, still: Array) -> None:
+        self.columns, self.sets = columns, sets
+        self.mass = columns.mass[sets]
+        self.still = self._normalised(still)
+        held = self.still @ self.mass
+        self.rows = np.concatenate([rows, held], axis=1)
+        self.springs = np.concatenate([springs, np.full(held.shape[:2], np.inf)], axis=1)
+        self.elastic = columns.elastic_stiffness[sets]
+        self.potential = None if columns.potential is None else columns.potential[sets]
+
+    def _normalised(self, still: Array) -> Array:
+        """Return rigid-body motions as vectors of all unknowns, orthonormal with respect to the mass."""
+        full = np.zeros((len(self.sets), still.shape[1], self.columns.size))
+        full[..., : self.columns.rigid] = still
+        if not still.shape[1]:
+            return full
+        mass = full @ self.mass @ full.swapaxes(-1, -2)
+        size, frame = np.linalg.eigh(mass)
+        if (size[:, -1] <= 0.0).any() or (size[:, 0] < -1e-6 * size[:, -1]).any():
+            raise ValueError("values: a static deflection has negative kinetic energy; masses must be at least 0")
+        if (size[:, 0] < 1e-14 * size[:, -1]).any():
+            raise ValueError("values: a rigid-body motion has no kinetic energy")
+        return (frame.swapaxes(-1, -2) / np.sqrt(size)[..., None]) @ full
+
+    # ------------------------------------------------------------------------------------------ the factors
+
+    def solved(self, modes: int) -> Spectrum:
+        """Return the lowest modes, those of rigid-body motions first."""
+        base, taken = self._base()
+        inverse, scale = self._inverse_factor(base)
+        projected = inverse @ (scale[:, :, None] * self.rows.swapaxes(-1, -2))  # L^-1 b, (sets, size, rows)
+        factor = self._springs(projected, taken)
+        operator = inverse * scale[:, None, :]  # L^-1
+        operator = factor.swapaxes(-1, -2) @ operator if factor is not None else operator
+        if self.potential is not None and self._loaded:
+            operator, loading = self._loaded_factor(operator)
+        else:
+            loading = np.ones((len(self.sets), 1))
+        matrix = operator @ self.mass @ operator.swapaxes(-1, -2)
+        number = modes - self.still.shape[1]
+        wanted = min(max(number, 0) + EXTRA, matrix.shape[-1])
+        values, vectors = np.linalg.eigh(matrix)
+        values, vectors = values[:, ::-1][:, :wanted], vectors.swapaxes(-1, -2)[:, ::-1][:, :wanted]
+        self._check_sign(values, number)
+        if number > 0 and (values[:, min(number, wanted) - 1] < _SPREAD * values[:, 0]).any():
+            values, vectors = self._singular(operator, wanted)
+        self._check_number(values, number)
+        unknowns = vectors @ operator  # x = L^-T u
+        kinetic = self._kinetic(unknowns)
+        return self._spectrum(unknowns, kinetic, values, loading, number)
+
+    @property
+    def _loaded(self) -> bool:
+        """Whether some potential energy may be negative: tensions below zero, coupling."""
+        parts = self.columns.coefficient
+        return bool(parts["D"]) or any(bool((entry < 0.0).any()) or i != j for (i, j), entry in parts["R"].items())
+
+    def _base(self) -> tuple[Array, Array]:
+        """Return a positive stiffness with springs up to the size of what is there, and what it has of each spring."""
+        total = self.elastic.copy()
+        if self.potential is not None and not self._loaded:
+            total += self.potential
+        taken = np.zeros(self.springs.shape)
+        order = np.argsort(np.where(self.springs < 0.0, np.inf, self.springs).min(axis=0, initial=np.inf))
+        for k in order:
+            row = self.rows[:, k]
+            diagonal = np.einsum("sii->si", total)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                ratio = np.where((diagonal > 0.0) & (row != 0.0), row**2 / diagonal, 0.0).max(axis=1)
+                moderate = np.where(ratio > 0.0, 1.0 / ratio, np.inf)
+            alone = np.where(np.isinf(self.springs[:, k]), 1.0, self.springs[:, k])
+            part = np.clip(np.minimum(self.springs[:, k], np.where(np.isinf(moderate), alone, moderate)), 0.0, None)
+            taken[:, k] = part
+            total += part[:, None, None] * row[:, :, None] * row[:, None, :]
+        return total, taken
+
+    def _inverse_factor(self, base: Array) -> tuple[Array, Array]:
+        """Return the inverse Cholesky factor of a stiffness scaled to a unit diagonal, and the scale."""
+        diagonal = np.einsum("sii->si", base)
+        scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+        scaled = base * scale[:, :, None] * scale[:, None, :]
+        try:
+            return np.linalg.inv(np.linalg.cholesky(scaled)), scale
+        except np.linalg.LinAlgError:
+            smallest = np.linalg.eigvalsh(scaled)[:, 0]
+            lift = np.where(smallest < 1e-12, 1e-12 - 2.0 * np.minimum(smallest, 0.0), 0.0)
+            if self.potential is not None and lift.max() > 1e-6:
+                total = self._whole()
+                raise BuckledError((np.linalg.eigvalsh(total) < -1e-12).sum(axis=1)) from None
+            raise ValueError(
+                "values: the stiffnesses lie too far apart for double precision along x; use ritz"
+            ) from None
+
+    def _whole(self) -> Array:
+        finite = np.where(np.isinf(self.springs), 0.0, self.springs)
+        total = self.elastic + (0.0 if self.potential is None else self.potential)
+        total = total + np.einsum("sr,sri,srj->sij", finite, self.rows, self.rows)
+        diagonal = np.abs(np.einsum("sii->si", total))
+        scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+        return total * scale[:, :, None] * scale[:, None, :]
+
+    def _springs(self, projected: Array, taken: Array) -> Array | None:
+        """Return S with S' (I + sum (k - taken) n n') S = I, one spring after the other, or None if it is I."""
+        left = np.where(np.isinf(self.springs), np.inf, self.springs - taken)
+        if not (np.abs(left) > 0.0).any():
+            return None
+        size = projected.shape[1]
+        factor = np.broadcast_to(np.eye(size), (len(left), size, size)).copy()
+        for k in np.argsort(np.isinf(left).any(axis=0), kind="stable"):
+            row = (projected[:, :, k][:, None, :] @ factor)[:, 0]
+            square = (row**2).sum(axis=1)
+            with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+                growth = 1.0 + left[:, k] * square
+                if (growth < -1e-12).any():
+                    raise BuckledError((growth < 0.0).astype(int))
+                shrink = np.where(np.isinf(growth), 0.0, 1.0 / np.sqrt(np.maximum(growth, 1e-300)))
+                pull = np.where(square > 0.0, (1.0 - shrink) / square, 0.0)
+            factor -= pull[:, None, None] * (factor @ row[:, :, None]) * row[:, None, :]
+        return factor
+
+    def _loaded_factor(self, operator: Array) -> tuple[Array, Array]:
+        """Return the operator of the loaded structure, and how much stiffer the unloaded one is at most."""
+        assert self.potential is not None
+        matrix = operator @ self.potential @ operator.swapaxes(-1, -2)
+        matrix = matrix + np.eye(matrix.shape[-1])
+        values, frame = np.linalg.eigh(matrix)
+        unstable = (values < -64 * EPS).sum(axis=1)
+        if unstable.any():
+            raise BuckledError(unstable)
+        values = np.maximum(values, EPS)
+        loaded = (frame / np.sqrt(values)[:, None, :]) @ frame.swapaxes(-1, -2)
+        return loaded @ operator, 1.0 / values[:, :1]
+
+    # ------------------------------------------------------------------------------------------ the modes
+
+    @staticmethod
+    def _check_sign(values: Array, number: int) -> None:
+        if (values[:, 0] <= 0.0).any() and number > 0:
+            raise ValueError("values: no motion of the structure has kinetic energy")
+        if (values < -1e-9 * np.abs(values).max(axis=1, keepdims=True)).any():
+            raise ValueError("values: a static deflection has negative kinetic energy; masses must be at least 0")
+
+    def _check_number(self, values: Array, number: int) -> None:
+        there = (values > _NOTHING * values[:, :1]).sum(axis=1)
+        if number > 0 and (there < number).any():
+            rigid = self.still.shape[1]
+            raise ValueError(
+                f"modes = {number + rigid}: the model has only {int(there.min()) + rigid} natural frequencies"
+            )
+
+    def _singular(self, operator: Array, wanted: int) -> tuple[Array, Array]:
+        """Return the largest compliances and their vectors from singular values of a factor of the mass."""
+        factor = self._mass_factor()
+        _, size, adjoint = np.linalg.svd(factor @ operator.swapaxes(-1, -2), full_matrices=False)
+        return size[:, :wanted] ** 2, adjoint[:, :wanted]
+
+    def _mass_factor(self) -> Array:
+        """Return F with F' F = M, from the points of the quadrature, (sets, points, size)."""
+        columns, entries = self.columns, self.columns.coefficient["M"]
+        moved = [columns._flat(side) for side in columns.displaced[0]]
+        places = sorted({k for pair in entries for k in pair})
+        points = moved[0].shape[-1]
+        density = np.zeros((columns.sets, points, len(places), len(places)))
+        for (i, j), entry in entries.items():
+            a, b = places.index(i), places.index(j)
+            density[..., a, b] = density[..., b, a] = entry.reshape(len(entry), -1) * columns.weights
+        size, frame = np.linalg.eigh(density)
+        root = np.sqrt(np.maximum(size, 0.0))[..., None, :] * frame  # density = root root'
+        parts = []
+        for k in range(len(places)):
+            parts.append(sum(root[:, :, a, k][:, None] * moved[place] for a, place in enumerate(places)))
+        ends = _root(columns.problem.end_mass) @ columns.ends
+        inside = [np.broadcast_to(part, (columns.sets, columns.size, points)).swapaxes(-1, -2) for part in parts]
+        at = [_root(point.mass) @ there for point, there in zip(columns.problem.points, columns.at_points, strict=True)]
+        return np.concatenate([*inside, ends, *at], axis=1)[self.sets]
+
+    def _kinetic(self, unknowns: Array) -> Array:
+        """Return x' M x from the displacements themselves: no eigenvalue is lost in the rounding of larger ones."""
+        columns = self.columns
+        moved = {}
+
+        def shape(place: int) -> Array:
+            if place not in moved:
+                values = columns._flat(columns.displaced[0][place])
+                values = values[self.sets] if len(values) > 1 else values
+                moved[place] = unknowns @ values
+            return moved[place]
+
+        total = np.zeros(unknowns.shape[:2])
+        for (i, j), entry in columns.coefficient["M"].items():
+            weight = entry.reshape(len(entry), -1) * columns.weights
+            weight = weight[self.sets] if len(weight) > 1 else weight
+            total += (1 if i == j else 2) * ((shape(i) * shape(j)) @ weight[..., None])[..., 0]
+        if np.any(columns.problem.end_mass):
+            ends = unknowns @ columns.ends[self.sets].swapaxes(-1, -2)
+            total += ((ends @ columns.problem.end_mass[self.sets]) * ends).sum(axis=-1)
+        for point, there in zip(columns.problem.points, columns.at_points, strict=True):
+            moved_there = unknowns @ there[self.sets].swapaxes(-1, -2)
+            total += ((moved_there @ point.mass[self.sets]) * moved_there).sum(axis=-1)
+        return total
+
+    def _spectrum(self, unknowns: Array, kinetic: Array, values: Array, loading: Array, number: int) -> Spectrum:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            compliances = np.where(kinetic > 0.0, kinetic, values)
+            order = np.argsort(-compliances, axis=1, kind="stable")
+            compliances = np.take_along_axis(compliances, order, axis=1)
+            z = 1.0 / compliances[:, :number] if number > 0 else np.zeros((len(self.sets), 0))
+        unknowns = np.take_along_axis(unknowns, order[..., None], axis=1)[:, : max(number, 0)]
+        spread = compliances[:, :1] / compliances[:, : max(number, 0)]
+        rounding = EPS * (8.0 * loading + np.sqrt(spread))
+        vectors = unknowns * np.sqrt(z)[..., None]
+        rigid = self.still.shape[1]
+        if rigid:
+            keep = max(number, 0) + min(rigid, number + rigid)
+            pad = ((0, 0), (rigid, 0))
+            z, rounding = np.pad(z, pad)[:, :keep], np.pad(rounding, pad)[:, :keep]
+            vectors = np.concatenate([self.still, vectors], axis=1)[:, :keep]
+        return Spectrum(z, vectors, rounding, compliances)
+
+
+def _root(mass: Array) -> Array:
+    """Return F with F' F = a mass matrix, (sets, size, size)."""
+    size, frame = np.linalg.eigh(mass)
+    root: Array = np.sqrt(np.maximum(size, 0.0))[..., None] * frame.swapaxes(-1, -2)
+    return root

@@ -1,0 +1,299 @@
+# ruff: noqa: F821
+# mypy: ignore-errors
+"""Template of the compiled twin of `cra_sym.solvers.waves`: the same steps, for blocks of lanes at once.
+
+The text of `cra_sym.solvers.waves_kernel` stands before it (see `waves.template`). All regimes of a lane are evaluated
+and one is taken, so that loops over lanes have no branch.
+"""
+
+import numpy as np
+
+_LANES = 128
+_ENTRIES = 42
+_MOST_STEPS = 400
+_EPS = 2.220446049250313e-16
+
+
+def lowest_waves(out, evaluations, k, zeros, odd):
+    """Fill ``out`` (lanes, modes) with the lowest roots from coefficients ``k`` (42, lanes).
+
+    Returns 0, or one more than a lane in which the points did not reach enough roots, or -1 if a search did not settle.
+    """
+    modes = out.shape[1]
+    most = 2 * modes + 64
+    own, moved = np.empty((_ENTRIES, _LANES)), np.empty((_ENTRIES, _LANES))
+    points, values = np.empty((most, _LANES)), np.empty((most, _LANES))
+    counts, rigid = np.empty((most, _LANES), np.int64), np.empty(_LANES, np.int64)
+    state = np.empty((8, _LANES))  # of roots on their way
+    bracket, at = np.empty((4, _LANES)), np.empty((2, _LANES), np.int64)
+    place, left = np.empty(_LANES, np.int64), np.empty(_LANES, np.int64)
+    z = np.empty(_LANES)
+    for first in range(0, out.shape[0], _LANES):
+        size = min(_LANES, out.shape[0] - first)
+        for entry in range(_ENTRIES):
+            for lane in range(size):
+                own[entry, lane] = k[entry, first + lane]
+        for lane in range(size):
+            rigid[lane] = zeros[first + lane]
+        last = _counted(points, counts, values, own, rigid, odd, modes, most, size)
+        evaluations[1] += last * size
+        if last == most:
+            return 1 + first
+        for number in range(modes):
+            _bracketed(bracket, at, points, counts, values, number, last, size)
+            evaluations[1] += _isolated(bracket, at, place, left, moved, own, rigid, odd, number, size)
+            _opened(bracket, own, rigid, odd, number, size)
+            many = _started(z, state, bracket, at, place, rigid, number, size)
+            for entry in range(_ENTRIES):
+                for i in range(many):
+                    moved[entry, i] = own[entry, place[i]]
+            steps = _interpolated(z, state, place, left, moved, rigid, odd, number, many, evaluations)
+            if steps == _MOST_STEPS:
+                return -1
+            for lane in range(size):
+                out[first + lane, number] = z[lane]
+    _sort(out)
+    return 0
+
+
+def _lane(k, i):
+    return (
+        k[0, i], k[1, i], k[2, i], k[3, i], k[4, i], k[5, i], k[6, i], k[7, i], k[8, i], k[9, i], k[10, i], k[11, i],
+        k[12, i], k[13, i], k[14, i], k[15, i], k[16, i], k[17, i], k[18, i], k[19, i], k[20, i], k[21, i], k[22, i],
+        k[23, i], k[24, i], k[25, i], k[26, i], k[27, i], k[28, i], k[29, i], k[30, i], k[31, i], k[32, i], k[33, i],
+        k[34, i], k[35, i], k[36, i], k[37, i], k[38, i], k[39, i], k[40, i], k[41, i],
+    )  # fmt: skip
+
+
+def _columns(a, b, waves):
+    """Return the columns of whichever regime it is, and their basis."""
+    half, product, square, e, e12, e21, o, o12, o21 = waves
+    near, close = regime(half, product, square)
+    close_big, close_small = half_sums(half, product, square)
+    distant_big, distant_small = eigenvalues(half, product, square)
+    big, small = where(close, close_big, distant_big), where(close, close_small, distant_small)
+    big_c, big_s = wave(big)
+    small_c, small_s = wave(small)
+    near_c0, near_c1, near_s0, near_s1, near_exponent = near_series(half, product, square)
+    close_c0, close_c1, close_s0, close_s1, close_exponent = close_series(big, small, big_c, big_s, small_c, small_s)
+    c0, c1 = where(near, near_c0, close_c0), where(near, near_c1, close_c1)
+    s0, s1 = where(near, near_s0, close_s0), where(near, near_s1, close_s1)
+    together = close_columns(a, b, half, product, square, e, e12, e21, o, o12, o21, c0, c1, s0, s1)
+    scale = exp(-where(near, near_exponent, close_exponent))
+    far = distant_columns(a, b, half, product, square, e, e12, e21, o, o12, o21, big_c, big_s, small_c, small_s)
+    d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15, basis = far
+    apart = (d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15)
+    return where(near | close, together, apart), where(near | close, scale, basis)
+
+
+def _end(k, z, first, coupling, odd, side):
+    """Return what multiplies E and O in both conditions of an end, and what couples the displacements."""
+    s1, c1, s2, c2 = pairs(k, z, first)
+    t1, t2 = couplings(k, z, coupling)
+    sign = where(odd, side, 1.0)
+    return (s1, c1, where(odd, c2, s2), where(odd, s2, c2)), (sign * t1, sign * t2)
+
+
+def _second(columns, odd):
+    """Return the second displacement on the columns."""
+    odd_one = columns[6], columns[7], columns[10], columns[11]
+    return where(odd, odd_one, (columns[2], columns[3], columns[14], columns[15]))
+
+
+def _value(k, z, odd, zeros):
+    """Return the determinant over z**zeros."""
+    a, b = linear(k, z, 0), linear(k, z, 8)
+    columns, basis = _columns(a, b, wave_numbers(a, b))
+    second = _second(columns, odd)
+    right_pair, right_couplings = _end(k, z, 16, 34, odd, 1.0)
+    left_pair, left_couplings = _end(k, z, 22, 38, odd, -1.0)
+    right1, right2 = conditions(right_pair, right_couplings, columns, second)
+    left1, left2 = conditions(left_pair, left_couplings, columns, second)
+    value = joined(minors(right1, right2), minors(left1, left2)) / basis
+    return _deflated(value, z, zeros)
+
+
+def _deflated(value, z, zeros):
+    value = value / where(zeros > 0, z, 1.0)
+    return value / where(zeros > 1, z, 1.0)
+
+
+def _count(k, z, odd, zeros):
+    a, b = linear(k, z, 0), linear(k, z, 8)
+    waves = wave_numbers(a, b)
+    columns, basis = _columns(a, b, waves)
+    b11, b12, b21, b22 = b
+    shear = (odd > 0) & (b11 * b22 - b12 * b21 < 0.0)
+    slope, product_slope = 0.5 * k[29] + z * k[30], k[32] + 2.0 * z * k[33]
+    number, value = chain(
+        columns, _second(columns, odd), _end(k, z, 16, 34, odd, 1.0), _end(k, z, 22, 38, odd, -1.0), basis,
+        waves[0], waves[1], waves[2], slope, product_slope, shear, odd > 0,
+    )  # fmt: skip
+    return number, _deflated(value, z, zeros)
+
+
+def _counted(points, counts, values, k, zeros, odd, modes, most, size):
+    """Count at one point after the other until every lane has enough roots; return the last point."""
+    for lane in range(size):
+        value = _value(_lane(k, lane), 0.0, odd, 0)
+        points[0, lane], counts[0, lane] = 0.0, zeros[lane]
+        values[0, lane] = value if (zeros[lane] == 0) & (value > 0.0) else np.nan
+    for point in range(1, most):
+        wave = (0.5 * np.pi * (point + 0.0625)) ** 2
+        for lane in range(size):
+            z = branch(wave, k[28, lane], k[29, lane], k[30, lane], k[31, lane], k[32, lane], k[33, lane])
+            before = points[point - 1, lane]
+            points[point, lane] = z if (z > before) & (z < np.inf) else (4.0 * before if before > 0.0 else 1.0)
+        least = modes
+        for lane in range(size):
+            z = points[point, lane]
+            number, value = _count(_lane(k, lane), z, odd, zeros[lane])
+            counts[point, lane], values[point, lane] = number, value
+            least = min(least, number)
+        if least >= modes:
+            return point
+    return most
+
+
+def _bracketed(bracket, at, points, counts, values, number, last, size):
+    """Gather the points around the wanted root, the counts and the values there."""
+    for lane in range(size):
+        at[0, lane] = 0
+    for point in range(last):
+        for lane in range(size):
+            at[0, lane] += counts[point, lane] <= number
+    for lane in range(size):
+        right = at[0, lane]
+        left = max(right - 1, 0)
+        low, high, before = points[left, lane], points[right, lane], bracket[1, lane]
+        closer = (number > 0) & (at[1, lane] == number) & (low < before) & (before < high)  # where the last root ended
+        bracket[0, lane], bracket[1, lane] = before if closer else low, high
+        bracket[2, lane], bracket[3, lane] = bracket[3, lane] if closer else values[left, lane], values[right, lane]
+        at[0, lane], at[1, lane] = number if closer else counts[left, lane], counts[right, lane]
+
+
+def _is_crowded(bracket, at, number, lane):
+    wide = bracket[1, lane] - bracket[0, lane] > 4.0 * _EPS * bracket[1, lane]
+    return wide & ((at[0, lane] < number) | (at[1, lane] > number + 1))
+
+
+def _isolated(bracket, at, place, left, moved, k, zeros, odd, number, size):
+    """Shrink brackets until each holds its root alone, or no number between its ends; return the number of counts."""
+    many, counted = 0, 0
+    for lane in range(size):
+        place[many] = lane
+        many += _is_crowded(bracket, at, number, lane) & (zeros[lane] <= number)
+    for entry in range(_ENTRIES):
+        for i in range(many):
+            moved[entry, i] = k[entry, place[i]]
+    while many > 0:
+        counted += many
+        for i in range(many):
+            lane = place[i]
+            low, high = bracket[0, lane], bracket[1, lane]
+            middle = np.sqrt(low * high) if low > 0.0 else high / 64.0
+            found, value = _count(_lane(moved, i), middle, odd, zeros[lane])
+            up = found <= number
+            bracket[0, lane], bracket[1, lane] = middle if up else low, high if up else middle
+            bracket[2, lane], bracket[3, lane] = value if up else bracket[2, lane], bracket[3, lane] if up else value
+            at[0, lane], at[1, lane] = found if up else at[0, lane], at[1, lane] if up else found
+        still = 0
+        for i in range(many):
+            left[still] = i
+            still += _is_crowded(bracket, at, number, place[i])
+        for i in range(still):
+            place[i] = place[left[i]]
+        for entry in range(_ENTRIES):
+            for i in range(still):
+                moved[entry, i] = moved[entry, left[i]]
+        many = still
+    return counted
+
+
+def _opened(bracket, k, zeros, odd, number, size):
+    """Replace lower ends at z = 0 where the value is not known by small z on the same side of the root."""
+    for lane in range(size):
+        if (bracket[0, lane] == 0.0) & (not bracket[2, lane] == bracket[2, lane]) & (zeros[lane] <= number):
+            share, before = 1e-3, 0
+            while (before == 0) & (share > 1e-300):
+                z = share * bracket[1, lane]
+                value = _value(_lane(k, lane), z, odd, zeros[lane])
+                side = 0 if (value > 0.0) == ((number & 1) == 0) else 2
+                before = 1 - side // 2
+                bracket[side // 2, lane], bracket[2 + side // 2, lane] = z, value
+                share *= 1e-3
+
+
+def _started(z, state, bracket, at, place, zeros, number, size):
+    """Set the searches of roots that are alone in their brackets side by side; return how many there are."""
+    many = 0
+    sign = 1.0 if (number & 1) == 0 else -1.0
+    for lane in range(size):
+        low, high = bracket[0, lane], bracket[1, lane]
+        at_low, at_high = sign * bracket[2, lane], sign * bracket[3, lane]
+        found = low if at_low <= 0.0 else (high if at_high >= 0.0 else 0.5 * (low + high))
+        z[lane] = 0.0 if zeros[lane] > number else found
+        alone = (at[0, lane] == number) & (at[1, lane] == number + 1) & (at_low > 0.0) & (at_high < 0.0)
+        nearest = at_low < -at_high
+        x1, f1 = low if nearest else high, at_low if nearest else at_high
+        x2, f2 = high if nearest else low, at_high if nearest else at_low
+        place[many] = lane
+        state[0, many], state[1, many], state[2, many], state[3, many] = x1, x2, f1, f2
+        wave = 0.5 * (np.sqrt(np.sqrt(low)) + np.sqrt(np.sqrt(high)))
+        state[4, many] = (wave**4 - x1) / (x2 - x1) if low > 0.0 else f1 / (f1 - f2)
+        many += alone & (zeros[lane] <= number)
+    return many
+
+
+def _interpolated(z, state, place, left, k, zeros, odd, number, many, evaluations):
+    """Search all roots at once, then those that are not found yet, moved side by side; return the number of steps."""
+    sign = 1.0 if (number & 1) == 0 else -1.0
+    steps = 0
+    while (many > 0) & (steps < _MOST_STEPS):
+        steps += 1
+        evaluations[0] += many
+        for i in range(many):
+            x1, x2, f1, f2 = state[0, i], state[1, i], state[2, i], state[3, i]
+            step = state[4, i] * (x2 - x1)
+            x = x1 + step
+            f = sign * _value(_lane(k, i), x, odd, zeros[place[i]])
+            same = (f > 0.0) == (f1 > 0.0)
+            x3, f3 = x1 if same else x2, f1 if same else f2
+            x2, f2 = x2 if same else x1, f2 if same else f1
+            width = x2 - x
+            xi, phi = (x - x2) / (x3 - x2), (f - f2) / (f3 - f2)
+            quadratic = (phi * phi < xi) & ((1.0 - phi) ** 2 < 1.0 - xi)
+            smooth = f / (f2 - f) * f3 / (f2 - f3) + (x3 - x) / width * f / (f3 - f) * f2 / (f3 - f2)
+            least = min(_EPS * abs(x) / abs(width), 0.5)
+            share = max(min(smooth if quadratic else 0.5, 1.0 - least), least)
+            following = abs(share * width)
+            settled = quadratic & (following < 0.1 * abs(x)) & (following * following <= 1e-15 * x * abs(step))
+            done = settled | (f == 0.0) | (abs(width) <= 2.0 * _EPS * abs(x))
+            state[0, i], state[1, i], state[2, i], state[3, i], state[4, i] = x, x2, f, f2, share
+            state[5, i] = x if f == 0.0 else x + share * width
+            state[6, i] = done
+        still = 0
+        for i in range(many):
+            z[place[i]] = state[5, i]
+            left[still] = i
+            still += state[6, i] == 0.0
+        if still < many:
+            for i in range(still):
+                j = left[i]
+                place[i] = place[j]
+                state[0, i], state[1, i], state[2, i] = state[0, j], state[1, j], state[2, j]
+                state[3, i], state[4, i] = state[3, j], state[4, j]
+            for entry in range(_ENTRIES):
+                for i in range(still):
+                    k[entry, i] = k[entry, left[i]]
+        many = still
+    return steps
+
+
+def _sort(out):
+    """Put neighbours in order that rounding exchanged."""
+    for lane in range(out.shape[0]):
+        for number in range(1, out.shape[1]):
+            for back in range(number, 0, -1):
+                low, high = out[lane, back - 1], out[lane, back]
+                out[lane, back - 1], out[lane, back] = min(low, high), max(low, high)

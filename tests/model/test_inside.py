@@ -1,0 +1,203 @@
+"""What acts at interior places: masses, springs, rotary inertias and supports, against closed forms and two fields."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.optimize import brentq
+
+import cra_sym as cra
+
+x, t = sp.symbols("x t")
+a, m, k, L = sp.symbols("a m k L")
+v = sp.Function("v")(x, t)
+HALF = sp.Rational(1, 2)
+CLAMPED = (v.subs(x, 0), v.diff(x).subs(x, 0))
+PINNED = (v.subs(x, 0), v.subs(x, 1))
+CLOSE = 1e-10
+
+
+def beam(mass=1, essential=CLAMPED, length=1, **options):
+    density = mass * v.diff(t) ** 2 / 2 - v.diff(x, 2) ** 2 / 2
+    return cra.Model(density, fields=[v], x=x, domain=(0, length), t=t, essential=essential, **options)
+
+
+def string(**options):
+    density = v.diff(t) ** 2 / 2 - v.diff(x) ** 2 / 2
+    return cra.Model(density, fields=[v], x=x, domain=(0, 1), t=t, essential=PINNED, **options)
+
+
+KINETIC = v.diff(t) ** 2 / 2
+AT_THE_MIDDLE = (2.891238395691, 14.225428316769)  # transfer matrices in 30 digits
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        beam(1 + sp.DiracDelta(x - HALF)),
+        beam(1 + 2 * sp.DiracDelta(2 * x - 1)),
+        beam(1 + sp.SingularityFunction(x, HALF, -1)),
+        beam(inside=[(HALF, KINETIC)]),
+        beam(inside=[(HALF, KINETIC / 4), (HALF, 3 * KINETIC / 4)]),
+        beam(inside=[(HALF, v.subs(x, HALF).diff(t) ** 2 / 2)]),
+    ],
+    ids=["DiracDelta", "scaled", "SingularityFunction", "inside", "in two parts", "evaluated form"],
+)
+def test_a_mass_at_the_middle_of_a_cantilever(model):
+    np.testing.assert_allclose(model.at({}).natural_frequencies(2), AT_THE_MIDDLE, rtol=CLOSE)
+
+
+@pytest.mark.parametrize("place", [0.1, 0.5, 0.73])
+def test_a_string_with_a_bead_and_a_spring(place):
+    """sin w + (m w^2 - k) / w sin(w a) sin(w (1 - a)) * (-1) = 0 by joining two sines."""
+    model = string(inside=[(a, m * KINETIC - k * v**2 / 2)])
+    found = model.at({a: place, m: 0.7, k: 3.0}).natural_frequencies(3)
+
+    def condition(w):
+        return w * np.sin(w) - (0.7 * w**2 - 3.0) * np.sin(w * place) * np.sin(w * (1 - place))
+
+    grid = np.linspace(1e-3, 20.0, 4001)
+    signs = np.sign([condition(w) for w in grid])
+    exact = [brentq(condition, *grid[i : i + 2], xtol=1e-15) for i in np.nonzero(np.diff(signs))[0]]
+    np.testing.assert_allclose(found, exact[:3], rtol=CLOSE)
+
+
+def test_supports_and_springs_that_become_supports():
+    """A pinned beam held at its middle: two spans, omega = (2 pi)^2 and 4 (3.9266...)^2."""
+    exact = [(2 * np.pi) ** 2, 4 * 3.92660231204792**2]
+    held = beam(essential=(*PINNED, v.subs(x, HALF)))
+    np.testing.assert_allclose(held.at({}).natural_frequencies(2), exact, rtol=CLOSE)
+    sprung = beam(essential=PINNED, inside=[(HALF, -k * v**2 / 2)]).at({k: [1e14, 1e18]})
+    np.testing.assert_allclose(sprung.natural_frequencies(2), np.tile(exact, (2, 1)), rtol=1e-9)
+    clamped = beam(essential=(*PINNED, v.subs(x, HALF), v.diff(x).subs(x, HALF)))
+    np.testing.assert_allclose(clamped.at({}).natural_frequencies(2), [4 * 3.92660231204792**2] * 2, rtol=CLOSE)
+
+
+def test_a_place_that_moves_passes_the_node_of_a_mode():
+    """The second mode of a pinned beam has its node at the middle: the frequency is smooth and even there."""
+    model = beam(essential=PINNED, inside=[(a, m * KINETIC)])
+    places = HALF.evalf(30) + np.array([-1e-3, -1e-6, 0.0, 1e-6, 1e-3])
+    second = model.at({a: places.astype(float), m: 3.0}).natural_frequencies(2)[:, 1]
+    np.testing.assert_allclose(second[2], (2 * np.pi) ** 2, rtol=CLOSE)
+    np.testing.assert_allclose(second, second[::-1], rtol=1e-10)
+    assert second[0] < second[1] <= second[2] * (1 + 1e-12)
+
+
+def test_places_beyond_the_domain_hold_nothing_and_ends_are_refused():
+    model = beam(inside=[(a, m * KINETIC)])
+    bare = np.array([1.87510406871196, 4.69409113297417]) ** 2
+    found = model.at({a: [-0.3, 1.4], m: 5.0}).natural_frequencies(2)
+    np.testing.assert_allclose(found, [bare, bare], rtol=CLOSE)
+    with pytest.raises(ValueError, match="at an end of the domain"):
+        model.at({a: 1.0, m: 5.0}).natural_frequencies(1)
+    with pytest.raises(ValueError, match="use left or right"):
+        beam(inside=[(0, KINETIC)])
+    with pytest.raises(ValueError, match="may jump there"):
+        beam(inside=[(HALF, v.diff(x, 2) ** 2)])
+    with pytest.raises(ValueError, match="linear in x"):
+        beam(1 + sp.DiracDelta(x**2 - HALF))
+
+
+def test_rotary_inertia_is_a_heavy_short_piece_in_the_limit():
+    """Against the uniform beam with one end: the place goes to the tip."""
+    right = beam(right=m * v.diff(x, t) ** 2 / 2).at({m: 0.3}).natural_frequencies(3)
+    near = beam(inside=[(a, m * v.diff(x, t) ** 2 / 2)]).at({a: 1 - 1e-9, m: 0.3}).natural_frequencies(3)
+    np.testing.assert_allclose(near, right, rtol=1e-7)
+
+
+def test_modes_and_responses_see_the_mass():
+    """Orthonormal with the mass; static response to a base acceleration by hand; dynamic by the sum over modes."""
+    w = sp.Function("w")(t)
+    density = (v.diff(t) + w.diff(t)) ** 2 / 2 - v.diff(x, 2) ** 2 / 2
+    model = cra.Model(
+        density,
+        fields=[v],
+        x=x,
+        domain=(0, 1),
+        t=t,
+        essential=CLAMPED,
+        prescribed=[w],
+        inside=[(a, m * (v.diff(t) + w.diff(t)) ** 2 / 2)],
+    )
+    system = model.at({a: 0.6, m: 2.0})
+    modes = system.modes(12)
+    points, weights = modes.stations()
+    shapes, there = modes.shape(0, 0, points), modes.shape(0, 0, np.array([0.6]))
+    np.testing.assert_allclose((shapes * weights) @ shapes.T + 2.0 * there @ there.T, np.eye(12), atol=1e-11)
+    static = -(1 / 8 + 2.0 * 0.6**2 * (3 - 0.6) / 6)
+    # the dynamic stiffness has 128 pieces, whose stiffness is 2e6 times that of the beam: eight digits
+    np.testing.assert_allclose(cra.frequency_response(system, 0.0), static, rtol=1e-7)
+    share = cra.modal_parameters(system, 12).participation
+    tip, omega = modes.displacement(1, 0), system.natural_frequencies(12)
+    for Omega in (1.0, 5.0):
+        summed = -(tip * share / (omega**2 - Omega**2)).sum()
+        np.testing.assert_allclose(cra.frequency_response(system, Omega), summed, rtol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["beam", "string"])
+def test_rates_of_frequencies_by_everything_at_interior_places(kind):
+    if kind == "beam":
+        term = m * KINETIC + m * v.diff(x, t) ** 2 / 20
+        model = beam(length=L, inside=[(a, term), (a / 2, -k * v**2 / 2)])
+    else:
+        density = v.diff(t) ** 2 / 2 - v.diff(x) ** 2 / 2
+        ends = {"fields": [v], "x": x, "domain": (0, L), "t": t, "essential": [v.subs(x, 0)]}
+        model = cra.Model(density, inside=[(a, m * KINETIC - k * v**2 / 2)], **ends)
+    values = {"a": 0.7, "m": 1.0, "k": 30.0, "L": 1.1}
+    system = model.at(values)
+    found = cra.sensitivities(system, 3)
+    for name, value in values.items():
+        small = 1e-5 * value
+        high, low = (cra.natural_frequencies(system.replace(**{name: value + d}), 3) for d in (small, -small))
+        # the difference loses digits of the frequency, not of the rate
+        rounding = 1e-12 * cra.natural_frequencies(system, 3) / small
+        assert (
+            np.abs(found.rate[name] - (high - low) / (2 * small)) < 1e-7 * np.abs(found.rate[name]) + rounding
+        ).all()
+
+
+def test_what_knows_no_interior_places_says_so():
+    model = beam(inside=[(HALF, m * KINETIC)])
+    with pytest.raises(ValueError, match="needs a node"):
+        model.ritz(4)
+    with pytest.raises(ValueError, match="varies along x"):
+        model.separate()
+    held = beam(essential=(*PINNED, v.subs(x, HALF))).at({})
+    with pytest.raises(ValueError, match="supports at interior places"):
+        cra.frequency_response(held, 1.0, drive=v.diff(x).subs(x, 1))
+
+
+# tables ---------------------------------------------------------------------------------------------------------------
+
+
+def test_tables_as_coefficients():
+    steps = cra.stations(x, [(0, 1), (HALF, sp.Rational(1, 10))], kind="step")
+    masses = cra.stations(x, [(0, 1), (HALF, sp.Rational(46, 100))], kind="step")
+    density = masses * v.diff(t) ** 2 / 2 - steps * v.diff(x, 2) ** 2 / 2
+    model = cra.Model(density, fields=[v], x=x, domain=(0, 1), t=t, essential=CLAMPED)
+    np.testing.assert_allclose(model.at({}).natural_frequencies(2), [4.189753101299, 14.287900445799], rtol=CLOSE)
+    linear = cra.stations(x, [(0, 2), (HALF, 1), (1, 2)])
+    roof = 1 + sp.Abs(2 * x - 1)
+    found = [
+        cra.Model(KINETIC - tension * v.diff(x) ** 2 / 2, fields=[v], x=x, domain=(0, 1), t=t, essential=PINNED)
+        .at({})
+        .natural_frequencies(3)
+        for tension in (linear, roof)
+    ]
+    np.testing.assert_allclose(found[0], found[1], rtol=CLOSE)
+
+
+@pytest.mark.parametrize(
+    ("table", "error", "words"),
+    [
+        ([(0, 1)], ValueError, "at least two"),
+        ([(0, 1), (0, 2)], ValueError, "must be greater"),
+        ([(1, 1), (0, 2)], ValueError, "must be greater"),
+        ([(0, 1), (1,)], TypeError, "must be a pair"),
+        ([(0, "1"), (1, 2)], TypeError, "must be a pair"),
+    ],
+)
+def test_tables_that_are_refused(table, error, words):
+    with pytest.raises(error, match=words):
+        cra.stations(x, table)
