@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.kernels import Kernel
-from cra_sym.model.routes import Values, tip_sign
+from cra_sym.model.routes import Values, mode_sign, overview_places
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.values import flat_columns, infinite_patterns
 from cra_sym.solvers.stress import Continuum, Entries, PointTerm
@@ -224,8 +224,10 @@ class StressModes:
 
     @cached_property
     def _sign(self) -> Array:
-        right = self._ends[..., self.spatial.displacements + self.spatial.coordinates :]
-        return tip_sign(right)
+        finite = np.where(np.isinf(self.columns), 0.0, self.columns)
+        places = overview_places(self.spatial, finite, len(self._z))
+        states = self._collected(lambda found: found.fields.states(places[found.rows]))
+        return mode_sign(states[..., : self.spatial.displacements])
 
     def _signed(self, values: Array) -> Array:
         return (self._sign[..., 0] * values).reshape(self.omega.shape)
