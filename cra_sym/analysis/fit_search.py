@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,11 @@ _RANGE = 1e3  # factor by which other parameters may differ from where the searc
 _MOST_POINTS = 20_000
 _SAMPLES = 8_192  # where a grid would have more points
 _LINKED = 4.0  # chi2 on the way between two minima, above theirs, up to which they are one: two standard deviations
+_LOWEST = 200  # places of a grid that are starts whatever is beside them
+_STEPS = 25
+_APART = 1e-2  # of a coordinate: ends of a descent that are closer are one
+_FEW = 40
+_MOST_KEPT = 1000
 _LARGEST = 1e150  # of a residual, whose square is a number
 
 
@@ -59,7 +64,7 @@ class Unknown:
         if self.prior is not None:
             return np.array([self.coordinate(self.prior[0])])
         if self.kind == "stiffness":
-            return np.log1p(1 / np.logspace(-4.0, 6.0, 31))
+            return np.log1p(1 / np.logspace(-4.0, 6.0, 41))
         return np.linspace(*self.bounds, 13)
 
     def coordinate(self, value: float) -> float:
@@ -76,23 +81,25 @@ class Unknown:
             return np.where(rigid, np.inf, soft)
         return self.unit * (np.exp(coordinate) if self.kind == "signed" else np.expm1(coordinate))
 
-    def rate(self, coordinate: float) -> float:
+    def rate(self, coordinate: Array) -> Array:
         """Return the derivative by the coordinate of what has a finite one everywhere: 1/k of a stiffness, p else."""
-        return float(np.exp(coordinate) / self.unit if self.kind == "stiffness" else np.exp(coordinate) * self.unit)
+        return np.exp(coordinate) / self.unit if self.kind == "stiffness" else np.exp(coordinate) * self.unit
 
     def slopes(self, found: Sensitivities) -> Array:
         """Return the derivatives of the frequencies by 1/k of a stiffness, by p itself otherwise."""
         return found.compliance[self.name] if self.kind == "stiffness" else found.rate[self.name]
 
-    def gradient(self, found: Sensitivities, coordinate: float) -> Array:
-        """Return the derivatives of the frequencies by the coordinate."""
-        if self.kind == "stiffness" and np.expm1(coordinate) > 1:  # soft: the rate by k is the exact one
-            slope: Array = -found.frequency * found.log[self.name] * (1 + 1 / np.expm1(coordinate))
-        else:
-            slope = self.slopes(found) * self.rate(coordinate)
+    def gradient(self, found: Sensitivities, coordinate: Array) -> Array:
+        """Return the derivatives of the frequencies by the coordinate, shape (..., modes)."""
+        column = np.asarray(coordinate)[..., None]
+        slope = self.slopes(found) * self.rate(column)
+        if self.kind == "stiffness":
+            with np.errstate(divide="ignore", invalid="ignore"):
+                soft = -found.frequency * found.log[self.name] * (1 + 1 / np.expm1(column))
+            slope = np.where(np.expm1(column) > 1, soft, slope)  # soft: the rate by k is the exact one
         return np.where(np.isfinite(slope), slope, 0.0)
 
-    def prior_row(self, value: float) -> float:
+    def prior_row(self, value: Any) -> Any:
         """Return the derivative of the prior's residual by 1/k of a stiffness, by p itself otherwise."""
         assert self.prior is not None
         return (-(value**2) if self.kind == "stiffness" else 1.0) / self.prior[1]
@@ -127,9 +134,9 @@ def natural_stiffnesses(system: System, names: Sequence[str]) -> dict[str, float
     modes, omega = rigid.modes(number), rigid.natural_frequencies(number)
     units = {}
     for name in names:
-        end, place, factor = system.numerics("stiffnesses")[name]
-        unit = factor.function(*rigid.domain.values)
-        ratio = modes.force(end, place)[omega > 0] ** 2 / (unit * omega[omega > 0] ** 2)
+        spring = system.numerics("stiffnesses")[name]
+        factor = float(spring.factor.function(*rigid.domain.values))
+        ratio = modes.force(spring.end, spring.place)[omega > 0] ** 2 / (factor * omega[omega > 0] ** 2)
         units[name] = float(ratio[0] if ratio[0] > 1e-6 * ratio.max() else ratio.max())
     return units
 
@@ -174,14 +181,16 @@ class Search:
     _known: dict[bytes, Sensitivities] = field(default_factory=dict)
     _table: tuple[Array, Array, tuple[int, ...]] | None = None
 
-    def values(self, place: Array) -> dict[str, float]:
-        """Return the values of the unknowns at a place."""
-        return {unknown.name: float(unknown.value(c)) for unknown, c in zip(self.unknowns, place, strict=True)}
+    def values(self, place: Array) -> dict[str, Any]:
+        """Return the values of the unknowns at a place, or arrays of them at places (..., unknowns)."""
+        return {unknown.name: unknown.value(place[..., i])[()] for i, unknown in enumerate(self.unknowns)}
 
     def found(self, place: Array) -> Sensitivities:
-        """Return frequencies and sensitivities at a place; they are kept."""
+        """Return frequencies and sensitivities at a place, or at places; the last ones are kept."""
         key = place.tobytes()
         if key not in self._known:
+            if len(self._known) > _MOST_KEPT:
+                self._known.clear()
             names = tuple(unknown.name for unknown in self.unknowns)
             found = sensitivities(self.system.replace(**self.values(place)), self.most_modes, by=names)
             self._known[key] = found
@@ -190,27 +199,24 @@ class Search:
     def residuals(self, place: Array, data: Data) -> Array:
         """Return computed minus measured frequencies, and values minus priors, in units of their uncertainty."""
         try:
-            frequency = self.found(place).frequency[data.modes]
+            frequency = self.found(place).frequency[..., data.modes]
         except ValueError:  # of a structure that has buckled or is none
-            frequency = np.full(data.modes.shape, np.nan)
-        misfit = (frequency - data.measured) / data.sigma
+            frequency = np.full((*place.shape[:-1], data.modes.size), np.nan)
         values = self.values(place)
         prior = [(values[u.name] - u.prior[0]) / u.prior[1] for u in self.unknowns if u.prior is not None]
-        found: Array = np.clip(np.concatenate([misfit, prior]), -_LARGEST, _LARGEST)
+        rows = [(frequency - data.measured) / data.sigma, *(np.asarray(one)[..., None] for one in prior)]
+        found: Array = np.clip(np.concatenate(rows, axis=-1), -_LARGEST, _LARGEST)
         return found
 
     def gradient(self, place: Array, data: Data) -> Array:
-        """Return the derivatives of the residuals by the coordinates."""
+        """Return the derivatives of the residuals by the coordinates, shape (..., residuals, unknowns)."""
         found, values = self.found(place), self.values(place)
-        rows = [u.gradient(found, c)[data.modes] / data.sigma for u, c in zip(self.unknowns, place, strict=True)]
-        prior = np.array(
-            [
-                [u.prior_row(values[u.name]) * u.rate(c) if i == j else 0.0 for j in range(len(self.unknowns))]
-                for i, (u, c) in enumerate(zip(self.unknowns, place, strict=True))
-                if u.prior is not None
-            ]
-        ).reshape(-1, len(self.unknowns))
-        slopes: Array = np.clip(np.vstack([np.stack(rows, -1), prior]), -_LARGEST, _LARGEST)
+        columns = [u.gradient(found, place[..., i])[..., data.modes] / data.sigma for i, u in enumerate(self.unknowns)]
+        known = [(i, u) for i, u in enumerate(self.unknowns) if u.prior is not None]
+        prior = np.zeros((*place.shape[:-1], len(known), len(self.unknowns)))
+        for row, (i, u) in enumerate(known):
+            prior[..., row, i] = u.prior_row(values[u.name]) * u.rate(place[..., i])
+        slopes: Array = np.clip(np.concatenate([np.stack(columns, -1), prior], axis=-2), -_LARGEST, _LARGEST)
         return slopes
 
     def chi2(self, place: Array, data: Data) -> float:
@@ -221,7 +227,7 @@ class Search:
 
     def minima(self, data: Data) -> list[Array]:
         """Return the local minima that are distinct, best first."""
-        places = [self._polished(start, data) for start in self._starts(data)]
+        places = [self._polished(start, data) for start in self._descended(self._starts(data), data)]
         places.sort(key=lambda place: self.chi2(place, data))
         return places
 
@@ -258,8 +264,9 @@ class Search:
         stiff = np.array([unknown.kind != "signed" for unknown in self.unknowns])
         return np.where(stiff & (place < 1e-12), 0.0, place)
 
-    def _starts(self, data: Data) -> list[Array]:
-        """Return the local minima of the misfit on the grid, weighted by the uncertainties and relative."""
+    def _starts(self, data: Data) -> Array:
+        """Return the local minima of the misfit on the grid, weighted by the uncertainties and relative, and the lowest
+        of its places."""
         places, frequencies, shape = self._grid()
         with np.errstate(all="ignore"):
             off = frequencies[:, data.modes] - data.measured
@@ -269,8 +276,42 @@ class Search:
             finite = np.where(np.isfinite(cost), cost, np.inf)
             if not np.isfinite(finite).any():
                 raise ValueError("system: it has no natural frequencies for any values of the unknown parameters")
-            found |= set(_lowest(finite.reshape(shape)) if shape else np.argsort(finite)[:16].tolist())
-        return [places[entry] for entry in sorted(found)]
+            found |= set(np.argsort(finite)[:_LOWEST].tolist())
+            found |= set(_lowest(finite.reshape(shape))) if shape else set()
+        return places[sorted(found)]
+
+    def _descended(self, places: Array, data: Data) -> Array:
+        """Follow all starts at once by damped Gauss-Newton steps; return those that end apart, the lowest of each.
+
+        Where some start leads to values without natural frequencies, the starts are returned as they are.
+        """
+        low, high = np.array([unknown.bounds for unknown in self.unknowns]).T
+        places = np.clip(places, low + 1e-9, high - 1e-9)
+        residuals = self.residuals(places, data)
+        if not np.isfinite(residuals).all():
+            return places[np.argsort(np.nan_to_num(np.sum(residuals**2, -1), nan=np.inf))][:_FEW]
+        damping = np.full(len(places), 1e-2)
+        with np.errstate(all="ignore"):
+            cost = np.sum(residuals**2, -1)
+            for _ in range(_STEPS):
+                jacobian = self.gradient(places, data)
+                normal = np.swapaxes(jacobian, -1, -2) @ jacobian
+                size = np.einsum("...ii->...i", normal)
+                floor = 1e-12 * size.max(axis=-1, keepdims=True) + np.finfo(float).tiny
+                normal += np.eye(len(low)) * (damping[:, None] * np.maximum(size, floor) + floor)[:, None]
+                push = np.swapaxes(jacobian, -1, -2) @ residuals[..., None]
+                tried = np.clip(places - np.linalg.solve(normal, push)[..., 0], low + 1e-9, high - 1e-9)
+                there = self.residuals(tried, data)
+                lower = np.sum(there**2, -1) < cost
+                places = np.where(lower[:, None], tried, places)
+                residuals = np.where(lower[:, None], there, residuals)
+                cost = np.sum(residuals**2, -1)
+                damping = np.clip(np.where(lower, damping / 5, damping * 4), 1e-12, 1e12)
+        kept: list[Array] = []
+        for place in places[np.argsort(cost)]:
+            if all(np.max(np.abs(place - other)) > _APART for other in kept):
+                kept.append(place)
+        return np.array(kept[:_FEW])
 
     def _grid(self) -> tuple[Array, Array, tuple[int, ...]]:
         """Return places (P, unknowns), their frequencies (P, modes) and the shape of the grid, () for a sample."""

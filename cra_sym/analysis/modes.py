@@ -80,9 +80,8 @@ def section_place(system: System, field: Any = None) -> int:
 def mode_shapes(system: System, x: Any, modes: int = 3, derivative: int = 0, *, field: Any = None) -> Array:
     """Return the mass-normalised mode shapes (25), or their derivatives by x, positive at the right end.
 
-    Where the first field vanishes at its right end in a mode, the first of its derivatives there that does not, and of
-    the other fields, is positive; where all do (a clamped right end), the same of the left end; where these do too, the
-    first force of the right end.
+    Where the first field vanishes at its right end in a mode, the first of its derivatives there that does not is
+    positive; where all do (a clamped right end), the field beside that end is.
 
     Parameters
     ----------

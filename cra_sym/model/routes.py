@@ -15,10 +15,20 @@ from cra_sym.model.values import flat_columns
 from cra_sym.solvers.eigenvalues import lowest
 from cra_sym.solvers.shapes import mode_states
 
-__all__ = ["Estimated", "GeneralRoute", "Modes", "RigidShare", "Route", "StateModes", "Stations", "end_sign"]
+__all__ = [
+    "Estimated",
+    "GeneralRoute",
+    "Modes",
+    "RigidShare",
+    "Route",
+    "StateModes",
+    "Stations",
+    "mode_sign",
+    "overview_places",
+]
 
 Array = NDArray[np.float64]
-_STATIONS = (0.0, 0.22, 0.53, 0.81, 1.0)  # ends, and places that are no node of the first modes
+_SHARES = (0.0, 0.22, 0.53, 0.81, 1.0 - 1e-4, 1.0)  # ends, and places that are no node of the first modes
 Values = Sequence[float | Array]
 """Parameters in the order of the model's symbols; they broadcast to the shape of the batch."""
 
@@ -152,20 +162,23 @@ class StateModes:
 
     @cached_property
     def _ends(self) -> Array:
-        """State (q, w, P) at both ends and some places between, shape (rows, modes, stations, 2 n + m)."""
-        length, left = (np.broadcast_to(g, len(self._z)) for g in self.spatial.geometry.function(*self._finite))
-        return self.states(self._z, left[:, None] + np.array(_STATIONS) * length[:, None])
+        """States at both ends, signed, shape (rows, modes, 2, 2 n + m)."""
+        return self._signed(self._overview[:, :, [0, -1]])
+
+    @cached_property
+    def _overview(self) -> Array:
+        """States at both ends and some places between, shape (rows, modes, stations, 2 n + m)."""
+        return self.states(self._z, overview_places(self.spatial, self._finite, len(self._z)))
 
     @cached_property
     def _sign(self) -> Array:
-        n, m = self.spatial.displacements, self.spatial.coordinates
-        left, right = self._ends[:, :, 0], self._ends[:, :, -1]
-        size = np.abs(self._ends).max(axis=(1, 2), initial=0.0)[:, None]
-        entries = np.concatenate([right[..., :n], left[..., :n], right[..., n + m :]], axis=-1)
-        return end_sign(entries, np.concatenate([size[..., :n], size[..., :n], size[..., n + m :]], axis=-1))
+        return mode_sign(self._overview[..., : self.spatial.displacements])
+
+    def _signed(self, states: Array) -> Array:
+        return states * self._sign[..., None]
 
     def _end(self, end: int, entry: int) -> Array:
-        return (self._sign[..., 0] * self._ends[:, :, -end, entry]).reshape(self.omega.shape)
+        return self._ends[:, :, end, entry].reshape(self.omega.shape)
 
     def displacement(self, end: int, place: int) -> Array:
         """Return a displacement of an end section, shape (..., modes)."""
@@ -189,7 +202,7 @@ class StateModes:
         key = x.tobytes()
         kept: dict[bytes, Array] = self.__dict__.setdefault("_kept", {})
         if key not in kept:
-            found = self._sign[..., None] * self.states(self._z, x)
+            found = self._signed(self.states(self._z, x))
             kept.clear()  # one set of stations at a time: those of a quadrature serve many forms
             kept[key] = found
         return kept[key]
@@ -199,16 +212,24 @@ class StateModes:
         return None
 
 
-def end_sign(entries: Array, size: Array) -> Array:
-    """Return the sign that makes the first entry of every mode positive that is not zero, shape (..., modes, 1).
+def overview_places(spatial: SpatialProblem, values: Array, rows: int) -> Array:
+    """Return the places at which :func:`mode_sign` looks, shape (rows, stations)."""
+    length, left = (np.broadcast_to(g, rows) for g in spatial.geometry.function(*values))
+    return np.asarray(left[:, None] + np.multiply.outer(length, _SHARES))
+
+
+def mode_sign(displacements: Array) -> Array:
+    """Return the sign of every mode, shape (rows, modes, 1).
+
+    It makes positive the first displacement of the right end that is not zero, or else the first one beside that end.
 
     Parameters
     ----------
-    entries : ndarray, shape (..., modes, n)
-        Displacements of the right end, then those of the left end, then forces of the right end.
-    size : ndarray, shape (..., 1, n)
-        What is large for each: the most in the domain and all modes.
+    displacements : ndarray, shape (rows, modes, stations, n)
+        At the places of :func:`overview_places`.
     """
-    moving = np.abs(entries) > 1e-7 * np.where(size > 0.0, size, np.inf)
+    size = np.abs(displacements).max(axis=(1, 2), initial=0.0)[:, None]
+    entries = np.concatenate([displacements[:, :, -1], displacements[:, :, -2]], axis=-1)
+    moving = np.abs(entries) > np.concatenate([1e-7 * size, 1e-12 * size], axis=-1)  # more than rounding there
     first = np.take_along_axis(entries, moving.argmax(axis=-1)[..., None], axis=-1)
     return np.where(first < 0.0, -1.0, 1.0)

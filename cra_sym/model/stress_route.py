@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.kernels import Kernel
-from cra_sym.model.routes import Values, end_sign
+from cra_sym.model.routes import Values, mode_sign, overview_places
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.values import flat_columns, infinite_patterns
 from cra_sym.solvers.stress import Continuum, Entries, PointTerm
@@ -228,11 +228,10 @@ class StressModes:
 
     @cached_property
     def _sign(self) -> Array:
-        n, m = self.spatial.displacements, self.spatial.coordinates
-        left, right, force = self._ends[..., :n], self._ends[..., n + m :], self._forces[..., 1, :]
-        ends = np.maximum(np.abs(left), np.abs(right)).max(axis=1, keepdims=True)  # the most of all modes at the ends
-        size = np.concatenate([ends, ends, np.abs(self._forces).max(axis=(1, 2))[:, None]], axis=-1)
-        return end_sign(np.concatenate([right, left, force], axis=-1), size)
+        finite = np.where(np.isinf(self.columns), 0.0, self.columns)
+        places = overview_places(self.spatial, finite, len(self._z))
+        states = self._collected(lambda found: found.fields.states(places[found.rows]))
+        return mode_sign(states[..., : self.spatial.displacements])
 
     def _signed(self, values: Array) -> Array:
         return (self._sign[..., 0] * values).reshape(self.omega.shape)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import broadcastable, count, default_floating_point
+from cra_sym.checks import broadcastable, count, default_floating_point, instance
 from cra_sym.model.projection import Domain, Load, Projected, project
 from cra_sym.model.routes import Estimated, Modes, Route
 from cra_sym.model.spatial import check_range
