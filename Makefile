@@ -9,7 +9,7 @@ RUN = .venv/bin/python
 NOTEBOOKS = --nbval --nbval-current-env --nbval-sanitize-with tests/notebooks/sanitize.cfg notebooks
 SHARED = -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
-.PHONY: reproduce test coverage lab notebooks oldest newest lint mutation clean
+.PHONY: reproduce test coverage lab notebooks oldest newest lint mutation campaign clean
 
 reproduce: .venv/.ready
 	$(RUN) -m cra_sym reproduce --output "$(OUTPUT)"
@@ -59,6 +59,10 @@ lint: .venv/.ready
 # first ten of each, ARGS=arm/lagrangian one module, and --again starts anew. The record stays out of version control.
 mutation: .venv/.ready
 	$(RUN) -m tests.mutation $(ARGS)
+
+# Random joints against their own frequencies; it goes on where it was stopped.
+campaign: .venv/.ready
+	$(RUN) -m tests.campaigns.joints $(ARGS)
 
 clean:
 	rm -rf .venv .venv-oldest .venv-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage .coverage.*

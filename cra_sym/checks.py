@@ -8,7 +8,25 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["broadcastable", "choice", "common_shape", "count", "instance", "mapping", "one_axis", "real_array", "shown"]
+from cra_sym.si import plain_numbers
+
+__all__ = [
+    "broadcastable",
+    "choice",
+    "common_shape",
+    "count",
+    "default_floating_point",
+    "equal",
+    "instance",
+    "mapping",
+    "one_axis",
+    "real_array",
+    "shown",
+]
+
+
+default_floating_point = np.errstate(all="warn", under="ignore")
+"""Decorator: NumPy's own treatment of overflow and underflow, whatever the caller's thread has set."""
 
 
 def shown(value: Any) -> str:
@@ -28,7 +46,8 @@ def real_array(
     high: float = np.inf,
     open_low: bool = False,
     allow_infinite: bool = False,
-    allowed: str | None = None,
+    must: str | None = None,
+    unit: str | None = None,
 ) -> np.ndarray:
     """Return ``value`` as a float64 array, or raise an error that names the field.
 
@@ -37,38 +56,47 @@ def real_array(
     name : str
         Field name used in the error.
     value : array_like
-        Real numbers; strings, booleans, complex numbers, ragged sequences and masked elements are refused.
+        Real numbers, exact ones too, or quantities with units; strings, booleans, complex numbers, ragged sequences and
+        masked elements are refused.
     low, high : float
         Inclusive bounds (``open_low`` excludes ``low`` itself).
     allow_infinite : bool
         Whether infinity within the bounds is a value.
-    allowed : str, optional
-        What the error says is allowed; written from the bounds if not given.
+    must : str, optional
+        What the error says the value must be; written from the bounds if not given.
+    unit : str, optional
+        Unit of SI that a quantity is converted to.
 
     Raises
     ------
     TypeError
         If ``value`` does not hold real numbers.
     ValueError
-        If an element is NaN or out of bounds.
+        If an element is NaN or out of bounds, or a unit cannot be converted.
     """
     bracket = "(" if open_low else "["
-    allowed = (
-        allowed or f"real numbers in {bracket}{low:g}, {high:g}{']' if allow_infinite or np.isfinite(high) else ')'}"
-    )
+    must = must or f"real numbers in {bracket}{low:g}, {high:g}{']' if allow_infinite or np.isfinite(high) else ')'}"
     try:
-        raw = np.asarray(value)
+        given = plain_numbers(name, value, unit)
+    except (TypeError, ValueError):
+        raise
+    except Exception as error:  # an integer of too many digits, a list of too many levels
+        raise TypeError(f"{name} = {shown(value)}: must be {must}") from error
+    try:
+        raw = np.asarray(given)
     except Exception as error:  # whatever an object does when it is asked for its numbers
-        raise TypeError(f"{name} = {shown(value)}: must be {allowed}") from error
-    if raw.dtype.kind not in "iuf" or np.ma.is_masked(value):
-        raise TypeError(f"{name} = {shown(value)}: must be {allowed}")
-    with np.errstate(over="ignore"):
+        raise TypeError(f"{name} = {shown(value)}: must be {must}") from error
+    if raw.dtype.kind not in "iuf":
+        raise TypeError(f"{name} = {shown(value)}: must be {must}")
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
         array = raw.astype(np.float64)
-    good = (array > low if open_low else array >= low) & (array <= high)  # NaN fails both
+        good = (array > low if open_low else array >= low) & (array <= high)  # NaN fails both
     if not allow_infinite:
         good &= np.isfinite(array)
     if not good.all():
-        raise ValueError(f"{name} = {shown(array[~good].flat[0].item())}: must be {allowed}")
+        place = np.unravel_index(int(np.argmin(good)), good.shape)
+        at = f"[{', '.join(map(str, place))}]" if place else ""
+        raise ValueError(f"{name}{at} = {shown(array[place].item())}: must be {must}")
     return array
 
 
@@ -82,16 +110,16 @@ def one_axis(name: str, value: Any, of: str, **limits: Any) -> np.ndarray:
 
 def count(name: str, value: Any, *, low: int = 1, high: int | None = None) -> int:
     """Return ``value`` as an int within ``[low, high]``, or raise an error that names the field."""
-    allowed = f"an integer of at least {low}" if high is None else f"an integer from {low} to {high}"
+    must = f"an integer of at least {low}" if high is None else f"an integer from {low} to {high}"
     if isinstance(value, (bool, np.bool_)):
-        raise TypeError(f"{name} = {shown(value)}: must be {allowed}")
+        raise TypeError(f"{name} = {shown(value)}: must be {must}")
     try:
         number = operator.index(value)
     except TypeError:
         kind = ValueError if isinstance(value, (float, np.floating)) else TypeError
-        raise kind(f"{name} = {shown(value)}: must be {allowed}") from None
+        raise kind(f"{name} = {shown(value)}: must be {must}") from None
     if number < low or (high is not None and number > high):
-        raise ValueError(f"{name} = {shown(number)}: must be {allowed}")
+        raise ValueError(f"{name} = {shown(number)}: must be {must}")
     return number
 
 
@@ -117,7 +145,19 @@ def mapping(name: str, value: Any, entries: str) -> Mapping[Any, Any]:
     return {} if value is None else value
 
 
-def broadcastable(**arrays: np.ndarray) -> tuple[int, ...]:
+def equal(one: Any, other: Any) -> bool:
+    """Tell whether two values are equal, arrays and what holds arrays by their elements; nan equals nan."""
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        arrays = isinstance(one, np.ndarray) and isinstance(other, np.ndarray)
+        return arrays and np.array_equal(one, other, equal_nan=one.dtype.kind in "fc" and other.dtype.kind in "fc")
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        return one.keys() == other.keys() and all(equal(one[key], other[key]) for key in one)
+    if isinstance(one, (list, tuple)):
+        return type(one) is type(other) and len(one) == len(other) and all(map(equal, one, other))
+    return bool(one == other) or (isinstance(one, float) and isinstance(other, float) and one != one and other != other)
+
+
+def broadcastable(**arrays: Any) -> tuple[int, ...]:
     """Return the common shape of the named arrays, or raise an error that names those that do not fit."""
     return common_shape(tuple(arrays), tuple(arrays.values()))
 

@@ -100,7 +100,7 @@ def _check_replaceable(target: Path, keep: bool) -> None:
     if foreign is not None and not keep:
         raise OutputError(
             f"output = {str(target)!r}: holds {foreign!r}, which cra_sym did not write;"
-            " must be a new or empty directory or an earlier output"
+            " must be a new or empty directory, or an earlier output"
         )
 
 

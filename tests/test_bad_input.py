@@ -170,7 +170,7 @@ def test_two_springs_of_next_to_nothing_count_as_none(low):
     [("growth_rate", "angular_frequency", 1e-9), ("growth_rate", "epsilon", 1e20)],
 )
 def test_work_without_end_is_refused(function, argument, value):
-    with pytest.raises(ValueError, match="steps, more than"):
+    with pytest.raises(ValueError, match="steps, must be at most"):
         call(function, **{argument: value})
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from fractions import Fraction
 from functools import cache
 from typing import Any
@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import count, instance
+from cra_sym.checks import count, default_floating_point, equal, instance
 from cra_sym.extras import require
 from cra_sym.model.exact import BallProblem
 from cra_sym.model.projection import EndParameter
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.solvers.ball_stiffness import BallStiffness, Term
-from cra_sym.solvers.certificates import UndecidedError, enclose
+from cra_sym.solvers.certificates import UndecidedError, enclose, precision
 
 __all__ = ["Certificate", "certify"]
 
@@ -43,7 +43,13 @@ class Certificate:
     upper: NDArray[np.float64]
     complete: NDArray[np.bool_]
 
+    def __eq__(self, other: object) -> bool:
+        return equal(astuple(self), astuple(other)) if isinstance(other, Certificate) else NotImplemented
 
+    __hash__ = None  # type: ignore[assignment]
+
+
+@default_floating_point
 def certify(system: System, modes: int = 3) -> Certificate:
     """Prove the first natural frequencies of a system with coefficients that are constant along x; (23) and (30).
 
@@ -90,7 +96,7 @@ def certify(system: System, modes: int = 3) -> Certificate:
             ends = enclose(flint, counted, guesses[index])
         except UndecidedError:
             continue
-        with flint.ctx.workprec(128):
+        with precision(flint, 128):
             lower[index] = [_outward(low, -np.inf) for low, _ in ends]
             upper[index] = [_outward(high, np.inf) for _, high in ends]
         complete[index] = True

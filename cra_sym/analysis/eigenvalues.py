@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import count, instance
+from cra_sym.checks import count, default_floating_point, instance
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.model.values import flat_columns
 from cra_sym.solvers.eigenvalues import refine
@@ -13,6 +13,7 @@ from cra_sym.solvers.eigenvalues import refine
 __all__ = ["damping_ratios", "eigenvalues"]
 
 
+@default_floating_point
 def eigenvalues(system: System, modes: int = 3, *, oscillating: bool = True) -> NDArray[np.complex128]:
     """Return complex eigenvalues s (rad/s) of motions ``exp(s t)``, dampers included, one of each conjugate pair.
 
@@ -40,7 +41,7 @@ def eigenvalues(system: System, modes: int = 3, *, oscillating: bool = True) -> 
     instance("system", system, System)
     modes = count("modes", modes, high=MOST_MODES)
     if system.numerics("conservative"):
-        return 1j * system.natural_frequencies(modes)
+        return np.asarray(1j * system.natural_frequencies(modes))
     ritz = system.model.ritz(2 * modes + 10)
     guesses = ritz.eigenvalues(system.values, modes, oscillating=oscillating).reshape(-1, modes)
     columns, squared = flat_columns(system.parameters, system.shape), not system.numerics("damped")
@@ -54,6 +55,7 @@ def eigenvalues(system: System, modes: int = 3, *, oscillating: bool = True) -> 
     return roots.reshape(*system.shape, modes)
 
 
+@default_floating_point
 def damping_ratios(system: System, modes: int = 3) -> NDArray[np.float64]:
     """Return ``-Re s / |s|`` of the :func:`eigenvalues`, zero for a rigid motion, shape (..., modes)."""
     s = eigenvalues(system, modes)

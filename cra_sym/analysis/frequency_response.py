@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
-from cra_sym.checks import choice, instance, one_axis, shown
+from cra_sym.checks import choice, default_floating_point, instance, one_axis, shown
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.system import System
 from cra_sym.model.values import flat_columns
@@ -30,6 +30,7 @@ _KINDS = ("force", "motion")
 _FASTEST = 1e60  # rad/s, whose fourth power is a number; what is slower than its inverse is static
 
 
+@default_floating_point
 def frequency_response(
     system: System,
     angular_frequency: Any,
@@ -98,9 +99,9 @@ def frequency_response(
     -6.6053e-03 s2
     """
     instance("system", system, System)
-    frequencies = one_axis("angular_frequency", angular_frequency, "frequencies", low=0.0, high=_FASTEST)
+    frequencies = one_axis("angular_frequency", angular_frequency, "frequencies", low=0.0, high=_FASTEST, unit="rad/s")
     grid = np.where(frequencies * _FASTEST < 1.0, 0.0, np.atleast_1d(frequencies))
-    places = None if x is None else one_axis("x", x, "places")
+    places = None if x is None else one_axis("x", x, "places", unit="m")
     if places is not None:
         check_places(system, places)
     choice("damping", damping, ("modal", "structural"))

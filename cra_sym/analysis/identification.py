@@ -1,94 +1,213 @@
-"""The stiffness of a bolted joint from measured natural frequencies, and whether they can tell its two springs
-apart."""
+"""Parameters of a system from measured natural frequencies: every set of values that fits, and what the data say."""
 
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cra_sym.analysis.modes import natural_frequencies
-from cra_sym.analysis.sensitivities import Sensitivities, sensitivities
-from cra_sym.checks import broadcastable, instance, real_array
-from cra_sym.model.system import System
+from cra_sym.analysis import fit_words
+from cra_sym.analysis.fit_search import Data, Search, Unknown, unknowns
+from cra_sym.checks import broadcastable, count, default_floating_point, instance, mapping, real_array, shown
+from cra_sym.model.system import MOST_MODES, System
 
-__all__ = ["IdentifiabilityWarning", "JointEstimate", "identify_joint"]
+__all__ = [
+    "AmbiguityWarning",
+    "IdentifiabilityWarning",
+    "Identification",
+    "JointEstimate",
+    "MisfitWarning",
+    "identify",
+    "identify_joint",
+]
 
-_TOLD = np.log(2.0)  # a stiffness is told if its standard deviation is below a factor of two
+Array = NDArray[np.float64]
 _JOINT = ("k_t", "k_r")
-_STARTS = np.logspace(-2, 6, 13)  # dimensionless stiffnesses among which the search starts
+_SMALLEST_P = 0.01
+_LARGEST_RESIDUAL = 3.0  # sigma, where there are no degrees of freedom
+_MOST_UNKNOWN = 6
 
 
 class IdentifiabilityWarning(UserWarning):
-    """The measured frequencies do not tell the two stiffnesses of the joint apart."""
+    """The measured frequencies do not tell the unknown parameters apart."""
 
 
-@dataclass(frozen=True)
-class JointEstimate:
-    """Stiffnesses of the joint that fit measured frequencies, and what the measurement says about them.
+class MisfitWarning(UserWarning):
+    """No values of the unknown parameters fit the measured frequencies."""
+
+
+class AmbiguityWarning(UserWarning):
+    """Several sets of values fit the measured frequencies."""
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Parameters that fit measured natural frequencies, and what the measurement says about them.
 
     Attributes
     ----------
-    k_t, k_r : float
-        N/m and N m/rad; inf where the joint is best taken as rigid.
-    covariance : ndarray, shape (2, 2)
-        Of (k_t, k_r) to first order, SI; inf where the data do not fix them.
-    compliance_covariance : ndarray, shape (2, 2)
-        Of (1/k_t, 1/k_r), SI: what stays meaningful near a rigid joint.
-    log_standard_deviation : ndarray, shape (2,)
-        Standard deviations of (ln k_t, ln k_r): about the relative uncertainty where it is small.
-    frequencies, residuals : ndarray
+    values : mapping of str to float
+        SI; the stiffness of an end is inf where it is best taken as rigid.
+    covariance : ndarray, shape (n, n)
+        Of the values to first order, SI; inf where the data do not fix them. Where they do not fit, it is multiplied by
+        chi2 over the degrees of freedom, and inf if there are none: what is wrong is then the model.
+    compliance_covariance : ndarray, shape (n, n)
+        The same with 1/k in place of each stiffness k of an end: what stays meaningful near a rigid one.
+    log_standard_deviation : ndarray, shape (n,)
+        Standard deviations of the logarithms of the values: about the relative uncertainty where it is small.
+    frequencies, residuals : ndarray, shape (m,)
         Fitted frequencies (Hz), and measured minus fitted in units of the uncertainty.
+    chi2 : float
+        Sum of the squared residuals, those of the priors included.
+    degrees_of_freedom : int
+        Data and priors less unknowns.
+    p_value : float
+        Probability of a larger chi2 if the model is right; nan without degrees of freedom.
+    fits : bool
+        Whether p_value is at least 0.01; without degrees of freedom, whether every residual is below 3.
     identifiable : bool
-        Whether both stiffnesses are known to better than a factor of two (one standard deviation).
+        Whether every value is known to better than a factor of two (one standard deviation), and fits.
     message : str
         What the data do and do not say.
+    solutions : tuple of Identification
+        Every distinct set of values that fits, best first, this one included; this one alone if none fits.
     """
 
-    k_t: float
-    k_r: float
-    covariance: np.ndarray
-    compliance_covariance: np.ndarray
-    log_standard_deviation: np.ndarray
-    frequencies: np.ndarray
-    residuals: np.ndarray
+    values: Mapping[str, float]
+    covariance: Array
+    compliance_covariance: Array
+    log_standard_deviation: Array
+    frequencies: Array
+    residuals: Array
+    chi2: float
+    degrees_of_freedom: int
+    p_value: float
+    fits: bool
     identifiable: bool
     message: str
+    solutions: tuple[Identification, ...] = ()
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        pairs = ((getattr(self, name), getattr(other, name)) for name in self.__dataclass_fields__)
+        return all(np.array_equal(a, b, equal_nan=True) if _is_number(a) else a == b for a, b in pairs)
+
+    __hash__ = None  # type: ignore[assignment]
 
 
-def identify_joint(system: System, measured_frequencies: Any, uncertainty: Any) -> JointEstimate:
-    """Return the joint's stiffnesses that fit the first natural frequencies best, with their covariance.
+def _is_number(value: object) -> bool:
+    return isinstance(value, (float, np.ndarray))
 
-    Least squares with exact gradients, weighted by the uncertainty, over ln(1 + 1/kappa) of each dimensionless
-    stiffness, in which a rigid joint is the ordinary value 0; started from the best of a grid.
+
+class JointEstimate(Identification):
+    """Stiffnesses of the bolted joint, with names of their own."""
+
+    @property
+    def k_t(self) -> float:
+        """Translational stiffness, N/m."""
+        return self.values["k_t"]
+
+    @property
+    def k_r(self) -> float:
+        """Rotational stiffness, N m/rad."""
+        return self.values["k_r"]
+
+
+def identify(
+    system: System,
+    measured: Any,
+    uncertainty: Any,
+    unknown: Sequence[str] = _JOINT,
+    modes: Sequence[int] | None = None,
+    prior: Mapping[str, tuple[float, float]] | None = None,
+) -> Identification:
+    """Return the values of some parameters that fit measured natural frequencies, with every other set that does.
+
+    Least squares with exact gradients, weighted by the uncertainties, from every local minimum of a grid; the stiffness
+    of an end is searched in ln(1 + unit/k), in which a rigid one is the ordinary value 0, others within a factor of
+    1000 of their value in ``system`` (or their prior).
+
+    Parameters
+    ----------
+    system : System
+        One set of values; those of unknown stiffnesses do not matter.
+    measured : array_like, shape (m,)
+        Natural frequencies, Hz, ascending.
+    uncertainty : float or array_like, shape (m,)
+        Standard deviation of each, Hz; 1e-60 to 1e60.
+    unknown : sequence of str
+        Names of parameters of the system.
+    modes : sequence of int, shape (m,), optional
+        Which modes were measured, from 1, rigid-body modes included; by default the lowest m.
+    prior : mapping of str to (value, uncertainty), optional
+        Parameters that are roughly known, with standard deviation: they are estimated too.
+
+    Returns
+    -------
+    Identification
+
+    Warns
+    -----
+    MisfitWarning
+        If no values fit; the message tells the mode without which, or the missed mode with which, some do.
+    AmbiguityWarning
+        If several sets of values fit that differ by more than their uncertainty.
+    IdentifiabilityWarning
+        If the data do not tell the parameters apart.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is out of its range; it is named.
+
+    Examples
+    --------
+    >>> from cra_sym import Arm, identify, natural_frequencies
+    >>> loose = Arm.nominal().replace(k_t=2e3, k_r=40.0, m_e=0.02)
+    >>> fit = identify(Arm.nominal(), natural_frequencies(loose, 5), 0.001, unknown=("k_t", "k_r", "m_e"))
+    >>> print({name: float(f"{value:.4g}") for name, value in fit.values.items()}, fit.fits)
+    {'k_t': 2000.0, 'k_r': 40.0, 'm_e': 0.02} True
+    """
+    return _identified(Identification, "measured", system, measured, uncertainty, unknown, modes, prior)
+
+
+def identify_joint(
+    system: System,
+    measured_frequencies: Any,
+    uncertainty: Any,
+    modes: Sequence[int] | None = None,
+    prior: Mapping[str, tuple[float, float]] | None = None,
+) -> JointEstimate:
+    """Return the joint's stiffnesses that fit measured natural frequencies, with every other pair that does.
+
+    :func:`identify` with the unknowns ``k_t`` and ``k_r``.
 
     Parameters
     ----------
     system : System
         One set of values, with stiffnesses k_t and k_r of an end; their own values do not matter.
-    measured_frequencies : array_like, shape (n,)
-        The n lowest natural frequencies, Hz, ascending.
-    uncertainty : float or array_like, shape (n,)
-        Standard deviation of each, Hz; 1e-60 to 1e60.
+    measured_frequencies, uncertainty, modes, prior
+        As in :func:`identify`.
 
     Returns
     -------
     JointEstimate
+        An :class:`Identification` with ``k_t`` and ``k_r``.
 
     Warns
     -----
-    IdentifiabilityWarning
-        If the data do not tell the two stiffnesses apart: fewer than two frequencies, a joint so stiff or frequencies
-        so uncertain that only a combination of both is fixed.
+    MisfitWarning, AmbiguityWarning, IdentifiabilityWarning
+        As :func:`identify`.
 
     Raises
     ------
     TypeError, ValueError
-        If ``system`` is not a :class:`System` with k_t and k_r at an end, or is a batch, or the data are not positive,
-        ascending and of one shape.
+        As :func:`identify`, or if k_t or k_r is not the stiffness of an end.
 
     Examples
     --------
@@ -98,142 +217,194 @@ def identify_joint(system: System, measured_frequencies: Any, uncertainty: Any) 
     >>> print(f"{estimate.k_t:.1f} N/m, {estimate.k_r:.3f} N m/rad")
     2000.0 N/m, 40.000 N m/rad
     """
-    from scipy.optimize import least_squares
-
-    measured, sigma = _checked(system, measured_frequencies, uncertainty)
-    units = _units(system)
-
-    @cache
-    def at(*place: float) -> tuple[np.ndarray, Sensitivities]:
-        stiffness = _stiffness(np.array(place)) * units
-        joined = system.replace(k_t=float(stiffness[0]), k_r=float(stiffness[1]))
-        return stiffness, sensitivities(joined, measured.size, by=_JOINT)
-
-    def misfit(place: np.ndarray) -> np.ndarray:
-        return (at(*place)[1].frequency - measured) / sigma
-
-    def gradient(place: np.ndarray) -> np.ndarray:
-        return _gradient(*at(*place), units) / sigma[:, None]
-
-    fits = [
-        least_squares(misfit, start, gradient, bounds=(0.0, 40.0), xtol=1e-14, ftol=1e-14, gtol=1e-14, x_scale="jac")
-        for start in _starts(system, units, measured, sigma)
-    ]
-    best = min(fits, key=lambda fit: fit.cost)
-    return _estimate(*at(*np.where(best.x < 1e-12, 0.0, best.x)), measured, sigma)
-
-
-def _units(system: System) -> np.ndarray:
-    """Return the stiffnesses beside which the structure itself gives as much as the joint, N/m and N m/rad.
-
-    The first give of a rigid joint lowers omega^2 by P^2 times its compliance, P the force of the joint in the first
-    mode; P^2 / omega^2 is the stiffness that would halve it.
-    """
-    rigid = system.replace(k_t=np.inf, k_r=np.inf)
-    ends = system.numerics("stiffnesses")
-    springs = [ends[name] for name in _JOINT]
-    forces = np.array([rigid.modes(1).force(spring.end, spring.place)[0] for spring in springs])
-    factors = np.array([spring.factor.function(*rigid.domain.values) for spring in springs])
-    return forces**2 / (factors * rigid.natural_frequencies(1) ** 2)
-
-
-def _checked(system: System, measured_frequencies: Any, uncertainty: Any) -> tuple[np.ndarray, np.ndarray]:
     instance("system", system, System)
     missing = [name for name in _JOINT if name not in system.numerics("stiffnesses")]
     if missing:
         raise ValueError(f"system: {missing[0]} must be the stiffness of an end of its model")
+    arguments = (system, measured_frequencies, uncertainty, _JOINT, modes, prior)
+    found = _identified(JointEstimate, "measured_frequencies", *arguments)
+    assert isinstance(found, JointEstimate)
+    return found
+
+
+@default_floating_point
+def _identified(
+    kind: type[Identification],
+    name: str,
+    system: System,
+    measured: Any,
+    uncertainty: Any,
+    unknown: Sequence[str],
+    modes: Any,
+    prior: Any,
+) -> Identification:
+    data = _checked_data(system, name, measured, uncertainty, modes)
+    priors = _checked_priors(system, prior)
+    parameters = unknowns(system, _checked_names(system, unknown, priors), priors)
+    search = Search(system, parameters, int(data.modes.max()) + 2)
+    estimates = _estimates(kind, search, data)
+    best = estimates[0]
+    messages = [best.message]
+    if not best.fits:
+        hints = _hints(search, data, modes is None)
+        numbers = (data.modes + 1).tolist()
+        text = fit_words.misfit(best.chi2, best.degrees_of_freedom, best.p_value, best.residuals, numbers, hints)
+        warnings.warn(text, MisfitWarning, stacklevel=4)
+        messages = [text, *messages]
+    if len(estimates) > 1:
+        text = fit_words.ambiguity([estimate.values for estimate in estimates])
+        warnings.warn(text, AmbiguityWarning, stacklevel=4)
+        messages = [text, *messages]
+    if not (best.log_standard_deviation < fit_words.TOLD).all():
+        warnings.warn(best.message, IdentifiabilityWarning, stacklevel=4)
+    return replace(best, message="; ".join(messages), solutions=tuple(estimates))
+
+
+def _estimates(kind: type[Identification], search: Search, data: Data) -> list[Identification]:
+    """Return the distinct fits, or the best of what does not fit."""
+    places = search.minima(data)
+    best = _estimate(kind, search, data, places[0])
+    if not best.fits:
+        return [best]
+    good = [place for place in places if _goodness(search, data, place)[-1]]
+    return [_estimate(kind, search, data, place) for place in search.distinct(good, data)]
+
+
+def _goodness(search: Search, data: Data, place: Array) -> tuple[float, int, float, bool]:
+    """Return chi2, degrees of freedom, p value and whether the place fits."""
+    from scipy.special import chdtrc
+
+    residuals = search.residuals(place, data)
+    freedom = residuals.size - len(search.unknowns)
+    chi2 = float(np.sum(residuals**2))
+    if freedom <= 0:
+        return chi2, freedom, float("nan"), bool(np.abs(residuals).max() < _LARGEST_RESIDUAL)
+    p_value = float(chdtrc(freedom, chi2))
+    return chi2, freedom, p_value, p_value >= _SMALLEST_P
+
+
+def _estimate(kind: type[Identification], search: Search, data: Data, place: Array) -> Identification:
+    found, values = search.found(place), search.values(place)
+    chi2, freedom, p_value, fits = _goodness(search, data, place)
+    stiff = [unknown.kind == "stiffness" for unknown in search.unknowns]
+    jacobian = _jacobian(search.unknowns, values, found, data)
+    spread = _covariance(jacobian)
+    if not fits:
+        spread = spread * (chi2 / freedom if freedom > 0 else np.inf)
+    size = np.array([abs(value) for value in values.values()])
+    rigid = np.isinf(size)
+    with np.errstate(all="ignore"):
+        scale = np.where(rigid, 1.0, np.where(stiff, size, np.where(size > 0, 1 / size, np.inf)))
+        relative = np.where(rigid | rigid[:, None], np.inf, spread * np.outer(scale, scale))
+        by_value = np.where(rigid, 1.0, np.where(stiff, -(size**2), 1.0))
+        covariance = np.where(rigid | rigid[:, None], np.inf, spread * np.outer(by_value, by_value))
+        covariance = np.where(np.isinf(spread), np.inf, covariance)
+        deviation = np.sqrt(np.diag(relative))
+    message = fit_words.knowledge(values, stiff, search.system.model.units, deviation, spread, jacobian)
+    identifiable = fits and bool((deviation < fit_words.TOLD).all())
+    frequencies = found.frequency[data.modes]
+    residuals = (data.measured - frequencies) / data.sigma
+    return kind(
+        values, covariance, spread, deviation, frequencies, residuals, chi2, freedom, p_value, fits, identifiable,
+        message,
+    )  # fmt: skip
+
+
+def _jacobian(parameters: Iterable[Unknown], values: Mapping[str, float], found: Any, data: Data) -> Array:
+    """Return the derivatives of the weighted residuals by 1/k of each stiffness and by other values themselves."""
+    parameters = tuple(parameters)
+    rows = np.stack([unknown.slopes(found)[data.modes] for unknown in parameters], -1) / data.sigma[:, None]
+    known = [(i, unknown) for i, unknown in enumerate(parameters) if unknown.prior is not None]
+    prior = np.zeros((len(known), len(parameters)))
+    for row, (i, unknown) in zip(prior, known, strict=True):
+        row[i] = unknown.prior_row(values[unknown.name])
+    return np.nan_to_num(np.vstack([rows, prior]), nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def _covariance(jacobian: Array) -> Array:
+    """Return the inverse of the Fisher information of weighted residuals; inf where it is singular."""
+    rows, columns = jacobian.shape
+    size = np.linalg.norm(jacobian, axis=0)
+    if rows < columns or not size.all():
+        return np.full((columns, columns), np.inf)
+    _, values, basis = np.linalg.svd(jacobian / size)
+    if values[-1] <= 1e-12 * values[0]:
+        return np.full((columns, columns), np.inf)
+    return np.asarray((basis.T / values**2) @ basis / np.outer(size, size))
+
+
+def _hints(search: Search, data: Data, lowest: bool) -> list[str]:
+    """Say which single frequency is in the way, and which single mode may have been missed."""
+    spare = data.measured.size + sum(unknown.prior is not None for unknown in search.unknowns) - len(search.unknowns)
+    hints = []
+    if spare >= 2:
+        p_values = [_best_p(search, data.without(entry)) for entry in range(data.measured.size)]
+        if max(p_values) >= _SMALLEST_P:
+            hints.append(f"without mode {data.modes[int(np.argmax(p_values))] + 1} they fit")
+    if spare >= 1 and lowest:
+        number = data.measured.size
+        trials = [np.delete(np.arange(number + 1), skipped) for skipped in range(number)]
+        p_values = [_best_p(search, replace(data, modes=trial)) for trial in trials]
+        if max(p_values) >= _SMALLEST_P:
+            modes = tuple((trials[int(np.argmax(p_values))] + 1).tolist())
+            hints.append(f"taken as modes {', '.join(map(str, modes))} they fit: give modes={modes}")
+    return hints
+
+
+def _best_p(search: Search, data: Data) -> float:
+    return max(_goodness(search, data, place)[2] for place in search.minima(data))
+
+
+# Arguments --------------------------------------------------------------------------------------------------------
+
+
+def _checked_data(system: System, name: str, measured: Any, uncertainty: Any, modes: Any) -> Data:
+    instance("system", system, System)
     if system.shape:
         raise ValueError(f"system has shape {system.shape}: must be a single set of values, not a batch")
-    measured = real_array("measured_frequencies", measured_frequencies, low=0.0, open_low=True)
-    sigma = real_array("uncertainty", uncertainty, low=1e-60, high=1e60)
-    if measured.ndim != 1 or measured.size == 0:
-        raise ValueError(f"measured_frequencies has shape {measured.shape}: must be one axis of frequencies")
-    if np.any(np.diff(measured) <= 0):
-        raise ValueError("measured_frequencies must ascend: they are the lowest natural frequencies, in order")
-    if broadcastable(measured_frequencies=measured, uncertainty=sigma) != measured.shape:
-        raise ValueError(f"uncertainty has shape {sigma.shape}: must be a number or {measured.shape}")
-    return measured, np.broadcast_to(sigma, measured.shape)
+    frequencies = real_array(name, measured, low=0.0, open_low=True, unit="Hz")
+    sigma = real_array("uncertainty", uncertainty, low=1e-60, high=1e60, unit="Hz")
+    if frequencies.ndim != 1 or frequencies.size == 0:
+        raise ValueError(f"{name} has shape {frequencies.shape}: must be one axis of frequencies")
+    if np.any(np.diff(frequencies) <= 0):
+        at = int(np.argmax(np.diff(frequencies) <= 0)) + 1
+        raise ValueError(f"{name}[{at}] = {frequencies[at]:g}: must ascend, as natural frequencies do")
+    if broadcastable(**{name: frequencies, "uncertainty": sigma}) != frequencies.shape:
+        raise ValueError(f"uncertainty has shape {sigma.shape}: must be a number or {frequencies.shape}")
+    if modes is None:
+        numbers = np.arange(frequencies.size)
+    else:
+        if isinstance(modes, str) or not isinstance(modes, Iterable):
+            raise TypeError(f"modes = {shown(modes)}: must be a sequence of mode numbers from 1")
+        listed = [count("modes", mode, high=MOST_MODES) for mode in modes]
+        if len(listed) != frequencies.size or sorted(set(listed)) != listed:
+            raise ValueError(f"modes = {shown(modes)}: must be {frequencies.size} different modes, ascending")
+        numbers = np.array(listed) - 1
+    return Data(frequencies, np.broadcast_to(sigma, frequencies.shape).copy(), numbers)
 
 
-def _stiffness(place: np.ndarray) -> np.ndarray:
-    """Return kappa from ln(1 + 1/kappa)."""
-    with np.errstate(divide="ignore", over="ignore"):
-        return 1 / np.expm1(place)
+def _checked_names(system: System, unknown: Any, prior: Mapping[str, Any]) -> tuple[str, ...]:
+    if isinstance(unknown, str) or not isinstance(unknown, Iterable):
+        raise TypeError(f"unknown = {shown(unknown)}: must be a sequence of names of parameters")
+    names = tuple(dict.fromkeys([*unknown, *prior]))
+    for name in names:
+        if name not in system.values:
+            raise ValueError(f"unknown = {shown(name)}: must be among {', '.join(system.values)}")
+    if not 1 <= len(names) <= _MOST_UNKNOWN:
+        raise ValueError(f"unknown = {shown(unknown)}: must be 1 to {_MOST_UNKNOWN} names, those with priors included")
+    return names
 
 
-def _gradient(stiffness: np.ndarray, found: Sensitivities, units: np.ndarray) -> np.ndarray:
-    """Return the derivatives of the frequencies by ln(1 + 1/kappa) of both stiffnesses, shape (modes, 2)."""
-    columns = []
-    with np.errstate(over="ignore"):
-        kappas = stiffness / units
-    for name, kappa, unit in zip(_JOINT, kappas, units, strict=True):
-        stiff = kappa > 1
-        columns.append(
-            found.compliance[name] / unit * (1 + 1 / kappa)
-            if stiff
-            else -found.frequency * found.log[name] * (1 + kappa)
-        )
-    return np.stack(columns, -1)
-
-
-def _starts(system: System, units: np.ndarray, measured: np.ndarray, sigma: np.ndarray) -> list[np.ndarray]:
-    """Return the places of the two best joints of a grid."""
-    k_t, k_r = _STARTS[:, None] * units[0], _STARTS * units[1]
-    found = natural_frequencies(system.replace(k_t=k_t, k_r=k_r), measured.size)
-    cost = np.sum(((found - measured) / sigma) ** 2, -1)
-    best = np.unravel_index(np.argsort(cost, axis=None)[:2], cost.shape)
-    return [np.log1p(1 / _STARTS[[i, j]]) for i, j in zip(*best, strict=True)]
-
-
-def _estimate(stiffness: np.ndarray, found: Sensitivities, measured: np.ndarray, sigma: np.ndarray) -> JointEstimate:
-    fitted = found.frequency
-    jacobian = np.stack([found.compliance[name] for name in _JOINT], -1) / sigma[:, None]
-    spread = _covariance(jacobian)
-    rigid = np.isinf(stiffness)
-    scale = np.where(rigid, 1.0, stiffness)
-    relative = np.where(rigid | rigid[:, None], np.inf, spread * np.outer(scale, scale))
-    deviation = np.sqrt(np.diag(relative))
-    identifiable = bool(np.all(deviation < _TOLD))
-    message = _verdict(stiffness, deviation, spread, jacobian)
-    if not identifiable:
-        warnings.warn(message, IdentifiabilityWarning, stacklevel=3)
-    covariance = relative * np.outer(scale, scale)
-    residuals = (measured - fitted) / sigma
-    k_t, k_r = map(float, stiffness)
-    return JointEstimate(k_t, k_r, covariance, spread, deviation, fitted, residuals, identifiable, message)
-
-
-def _covariance(jacobian: np.ndarray) -> np.ndarray:
-    """Return the inverse of the Fisher information of weighted residuals; inf where it is singular."""
-    size = np.linalg.norm(jacobian, axis=0)
-    if jacobian.shape[0] < 2 or not size.all():
-        return np.full((2, 2), np.inf)
-    _, values, basis = np.linalg.svd(jacobian / size)
-    if values[1] <= 1e-12 * values[0]:
-        return np.full((2, 2), np.inf)
-    return (basis.T / values**2) @ basis / np.outer(size, size)
-
-
-def _verdict(stiffness: np.ndarray, deviation: np.ndarray, spread: np.ndarray, jacobian: np.ndarray) -> str:
-    """Say in words what is known."""
-    names, units = ("k_t", "k_r"), ("N/m", "N m/rad")
-    told = deviation < _TOLD
-    if told.all():
-        return f"both stiffnesses are told: k_t to {deviation[0]:.2g} and k_r to {deviation[1]:.2g} of itself"
-    least = 1 / (1 / stiffness + 2 * np.sqrt(np.diag(spread)))
-    if told.any() or (np.isfinite(spread).all() and np.isinf(stiffness).any()):
-        known = [f"{name} is told to {d:.2g} of itself" for name, d in zip(names, deviation, strict=True)]
-        bounds = [
-            f"{name} is only known to exceed {k:.3g} {unit} (2 sigma)"
-            for name, k, unit in zip(names, least, units, strict=True)
-        ]
-        return "; ".join(np.where(told, known, bounds).tolist())
-    size = np.linalg.norm(jacobian, axis=0)
-    _, values, basis = np.linalg.svd(jacobian / np.where(size > 0, size, 1.0))
-    weights = basis[0] * size
-    ratio, error = weights[1] / weights[0], 1 / (values[0] * abs(weights[0]))
-    give = 1 / stiffness[0] + ratio / stiffness[1]
-    return (
-        "the frequencies do not tell k_t and k_r apart: what they tell is "
-        f"1/k_t + {ratio:.3g} m2 / k_r = ({give:.3g} +- {error:.2g}) m/N"
-    )
+def _checked_priors(system: System, prior: Any) -> dict[str, tuple[float, float]]:
+    found = {}
+    for name, pair in mapping("prior", prior, "names to (value, uncertainty)").items():
+        if name not in system.values:
+            raise ValueError(f"prior: {shown(name)} must be among {', '.join(system.values)}")
+        numbers = real_array(f"prior: {name}", pair, unit=system.model.units.get(name))
+        if numbers.shape != (2,) or not numbers[1] > 0:
+            raise ValueError(f"prior: {name} = {shown(pair)}: must be a value and its positive uncertainty")
+        value, deviation = map(float, numbers)
+        if value == 0 or (value < 0 and name in system.numerics("stiffnesses")):
+            raise ValueError(f"prior: {name} = {shown(pair)}: the value must be positive")
+        found[name] = value, deviation
+    return found

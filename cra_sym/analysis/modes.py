@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 _MOST_DERIVATIVES = 20
 
 
+@checks.default_floating_point
 def natural_frequencies(system: System, modes: int = 3) -> Array:
     """Return the natural frequencies (30), Hz.
 
@@ -75,11 +76,12 @@ def section_place(system: System, field: Any = None) -> int:
     return list(system.model.conservative.displacements).index(field)
 
 
+@checks.default_floating_point
 def mode_shapes(system: System, x: Any, modes: int = 3, derivative: int = 0, *, field: Any = None) -> Array:
     """Return the mass-normalised mode shapes (25), or their derivatives by x, positive at the right end.
 
     Where the first field vanishes at its right end in a mode, the first of its derivatives there that does not is
-    positive.
+    positive; where all do (a clamped right end), the field beside that end is.
 
     Parameters
     ----------
@@ -107,7 +109,7 @@ def mode_shapes(system: System, x: Any, modes: int = 3, derivative: int = 0, *, 
     checks.instance("system", system, System)
     derivative = checks.count("derivative", derivative, low=0, high=_MOST_DERIVATIVES)
     modes = checks.count("modes", modes, high=MOST_MODES)
-    points = checks.one_axis("x", x, "points")
+    points = checks.one_axis("x", x, "points", unit="m")
     check_places(system, points)
     with np.errstate(all="ignore"):
         shapes = system.modes(modes).shape(section_place(system, field), derivative, np.atleast_1d(points))
@@ -159,6 +161,17 @@ class ModalParameters:
     def __init__(self, system: System, modes: int) -> None:
         self._system, self._number = system, modes
 
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, ModalParameters):
+            return NotImplemented
+        return (self._number, self._system) == (other._number, other._system)
+
+    def __hash__(self) -> int:
+        return hash((self._number, self._system))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self._system, self._number)
+
     @property
     def _modes(self) -> Modes:
         return self._system.modes(self._number)
@@ -182,6 +195,7 @@ class ModalParameters:
         return found
 
     @cached_property
+    @checks.default_floating_point
     def participation(self) -> Array:
         """Participation factor, kg^1/2."""
         return participation(self._system, self._number)
@@ -262,6 +276,7 @@ class ModalParameters:
         return self._system.form("axial", self._number)["axial"]
 
 
+@checks.default_floating_point
 def modal_parameters(system: System, modes: int = 3) -> ModalParameters:
     """Return the modal quantities of the first modes, by equations (6), (25) and (30).
 
@@ -313,6 +328,7 @@ def participation(system: System, modes: int, motion: str | None = None) -> Arra
     return -system.project(system.numerics("load", motion or only_motion(system)), modes)
 
 
+@checks.default_floating_point
 def stiffness_coupling(system: System, name: str, modes: int) -> Array:
     """Return a parameter times the rate of the stiffness by it, between the modes, 1/s2; 0 where it is infinite.
 

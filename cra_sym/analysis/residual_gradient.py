@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from cra_sym.analysis.modes import only_motion, participation
 from cra_sym.analysis.responses import residual_vibration, stopped_oscillators
 from cra_sym.analysis.sensitivities import Sensitivities, sensitivities
-from cra_sym.checks import count, shown
-from cra_sym.model.one_wave import OneWaveModes
+from cra_sym.checks import count, default_floating_point, shown
+from cra_sym.model.one_wave import Change, OneWaveModes
 from cra_sym.model.projection import column
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.solvers.driven_modes import state_at_stop
@@ -27,6 +27,7 @@ _STEP = 0.02  # of the differences, over the change of the parameter at which tw
 _POINTS = 8  # on one side of a parameter that cannot be negative, or four on each side
 
 
+@default_floating_point
 def residual_vibration_gradient(
     system: System,
     motion: BaseMotion,
@@ -140,7 +141,7 @@ def _along_the_mode(system: System, name: str, modes: int, *, compliance: bool) 
     if name not in springs and (compliance or name not in inertias):
         return None
     end, place, factor = springs.get(name) or inertias[name]
-    by = "compliance" if compliance else "stiffness" if name in springs else "inertia"
+    by: Change = "compliance" if compliance else "stiffness" if name in springs else "inertia"
     change, _ = found.product_rates(1, 0, (end, place), by)
     unit = np.asarray(factor.function(*system.domain.values))
     share = load.share.function(*system.domain.values) * (1 / unit if compliance else unit)
@@ -212,7 +213,8 @@ def _differences(system: System, found: Sensitivities, name: str, modes: int, *,
 def _weights(offsets: Array) -> Array:
     """Return the weights of the derivative at 0 of the polynomial through values at offsets (points, ...)."""
     points = len(offsets)
-    powers = np.moveaxis(offsets[None] ** np.arange(points)[:, *(None,) * offsets.ndim], (0, 1), (-2, -1))
+    orders = np.arange(points, dtype=float).reshape(-1, *(1,) * offsets.ndim)
+    powers = np.moveaxis(np.power(offsets, orders), (0, 1), (-2, -1))
     slope = np.zeros((*powers.shape[:-2], points, 1))
     slope[..., 1, 0] = 1.0
     return np.moveaxis(np.linalg.solve(powers, slope)[..., 0], -1, 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
-from cra_sym.checks import broadcastable, count, instance, mapping, one_axis, shown
+from cra_sym.checks import broadcastable, count, default_floating_point, instance, mapping, one_axis, shown
 from cra_sym.kernels import derived_kernel
 from cra_sym.model.projection import Projected
 from cra_sym.model.system import MOST_MODES, System
@@ -23,15 +24,21 @@ if TYPE_CHECKING:
     from sympy import Expr
     from sympy.core.function import AppliedUndef
 
-__all__ = ["History", "oscillators", "residual_vibration", "response", "tip_response"]
+__all__ = ["History", "UndersamplingWarning", "oscillators", "residual_vibration", "response", "tip_response"]
 
 Array = NDArray[np.float64]
 History = BaseMotion | Force
+
+
+class UndersamplingWarning(UserWarning):
+    """Modes lie above half the sampling rate of a record, which does not tell what excites them."""
+
 
 _free = derived_kernel("cra_sym.model.oscillator:free_kernel", backend="numpy")
 _forced = derived_kernel("cra_sym.model.oscillator:forced_kernel", backend="numpy")
 
 
+@default_floating_point
 def tip_response(
     system: System,
     motion: BaseMotion | Mapping[AppliedUndef, History] | None,
@@ -77,6 +84,7 @@ def tip_response(
     return values if np.ndim(t) else values[..., 0]
 
 
+@default_floating_point
 def response(
     system: System,
     motion: BaseMotion | Mapping[AppliedUndef, History] | None,
@@ -127,13 +135,18 @@ def response(
     ndarray, shape (..., x, t)
         A single x or t has no axis.
 
+    Warns
+    -----
+    UndersamplingWarning
+        If a mode lies above half the sampling rate of a record.
+
     Raises
     ------
     TypeError, ValueError
         Names the argument that is out of its range, the load without a history, the function that is not known.
     """
     instance("system", system, System)
-    places = one_axis("x", x, "places")
+    places = one_axis("x", x, "places", unit="m")
     check_places(system, places)
     modes = count("modes", modes, high=MOST_MODES)
     shapes = system.modes(modes).shape(section_place(system, field), 0, np.atleast_1d(places))
@@ -142,6 +155,7 @@ def response(
     return values if np.ndim(t) else values[..., 0]
 
 
+@default_floating_point
 def residual_vibration(system: System, motion: BaseMotion, modes: int = 5, *, zeta: Any = None) -> Any:
     """Return the peak amplitude of the tip after the base has stopped, m: the sum of the peaks of the modes.
 
@@ -158,6 +172,11 @@ def residual_vibration(system: System, motion: BaseMotion, modes: int = 5, *, ze
     Returns
     -------
     float or ndarray, shape (...)
+
+    Warns
+    -----
+    UndersamplingWarning
+        As :func:`response`.
 
     Raises
     ------
@@ -186,6 +205,7 @@ def stopped_oscillators(system: System, motion: BaseMotion, modes: int, zeta: An
         )
     modes = count("modes", modes, high=MOST_MODES)
     rows = system.modes(modes).displacement(1, 0)[..., None, :]
+    _check_sampling(motion, system.natural_frequencies(modes))
     return oscillators(system, participation(system, modes), rows, modes, zeta)
 
 
@@ -227,6 +247,7 @@ def _oscillation(
 
     def answer(gamma: Array, profile: BaseMotion, begin: Start, state: Any = None) -> Array:
         osc = oscillators(system, gamma, rows, modes, zeta)
+        _check_sampling(profile, osc.omega)
         if matrix is not None and matrix.any():
             return coupled_response(
                 CoupledModes(osc.omega, osc.zeta, matrix, gamma, rows), profile, t, derivative, begin, state
@@ -249,6 +270,23 @@ def _oscillation(
         total = added if total is None else total + added
     assert total is not None
     return total
+
+
+def _check_sampling(motion: BaseMotion, omega: Array) -> None:
+    """Warn of modes above half the sampling rate of a record."""
+    if motion.sample_step is None:
+        return
+    most = float(np.pi / motion.sample_step)
+    beyond = np.flatnonzero((omega > most).reshape(-1, omega.shape[-1]).any(axis=0))
+    if beyond.size:
+        first = int(beyond[0]) + 1
+        frequency = np.max(omega[..., first - 1]) / (2 * np.pi)
+        warnings.warn(
+            f"the record is sampled at {1 / motion.sample_step:.4g} Hz and tells nothing above half of that: mode "
+            f"{first} has {frequency:.4g} Hz; take fewer than {first} modes, or sample faster",
+            UndersamplingWarning,
+            stacklevel=6,
+        )
 
 
 def _histories(system: System, motion: Any) -> dict[str, History]:

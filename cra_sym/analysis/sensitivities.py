@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import count, instance, shown
+from cra_sym.checks import count, default_floating_point, instance, shown
 from cra_sym.model.one_wave import Change, OneWaveModes
 from cra_sym.model.projection import Projected, column
 from cra_sym.model.system import MOST_MODES, System
@@ -29,6 +30,14 @@ class Rates(Mapping[str, Array]):
             raise KeyError(name)
         value: Array = getattr(self._found, f"_{self._kind}")(name)
         return value
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Rates):
+            return NotImplemented
+        return (self._found, self._kind, self._names) == (other._found, other._kind, other._names)
+
+    def __hash__(self) -> int:
+        return hash((self._kind, self._names))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
@@ -65,11 +74,22 @@ class Sensitivities:
     frequency: Array
 
     def __init__(self, system: System, modes: int, by: Sequence[str]) -> None:
-        self._system, self._modes = system, modes
+        self._system, self._modes, self._by = system, modes, tuple(by)
         self.frequency = system.natural_frequencies(modes) / (2 * np.pi)
         stiff = [name for name in system.numerics("stiffnesses") if name in by]
         self.rate, self.log = Rates(self, "raw", by), Rates(self, "logarithmic", by)
         self.compliance = Rates(self, "by_compliance", stiff)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Sensitivities):
+            return NotImplemented
+        return (self._modes, self._by, self._system) == (other._modes, other._by, other._system)
+
+    def __hash__(self) -> int:
+        return hash((self._modes, self._by, self._system))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self._system, self._modes, self._by)
 
     def __getattr__(self, name: str) -> Array:
         if name.startswith("_"):
@@ -102,6 +122,7 @@ class Sensitivities:
         rate = self._forms[f"{name} stiffness"] - self._omega**2 * self._forms[f"{name} mass"]
         return np.where(np.isinf(column(np.asarray(self._system.values[name]))), 0.0, rate)
 
+    @default_floating_point
     def _raw(self, name: str) -> Array:
         direct = self._at_an_end(name)
         if direct is not None:
@@ -111,6 +132,7 @@ class Sensitivities:
             value = self._squared(name) / (8 * np.pi**2 * self.frequency)  # d omega^2 = 8 pi^2 f df
         return self._at_rest(value, name)
 
+    @default_floating_point
     def _logarithmic(self, name: str) -> Array:
         direct = self._at_an_end(name)
         if direct is not None:
@@ -127,13 +149,16 @@ class Sensitivities:
         """Return what gives the rates by a spring or an inertia of an end in one pass, for one wave number."""
         modes = self._system.modes(self._modes)
         kinds: tuple[tuple[str, Change], ...] = (("stiffnesses", "stiffness"), ("inertias", "inertia"))
-        for which, kind in kinds if isinstance(modes, OneWaveModes) else ():
+        if not isinstance(modes, OneWaveModes):
+            return None
+        for which, kind in kinds:
             found = self._system.numerics(which).get(name)
             if found is not None:
-                factor = column(np.asarray(found.factor.function(*self._system.domain.values)))
+                factor = np.asarray(column(np.asarray(found.factor.function(*self._system.domain.values))))
                 return modes, kind, (found.end, found.place), factor
         return None
 
+    @default_floating_point
     def _by_compliance(self, name: str) -> Array:
         end, place, kernel = self._system.numerics("stiffnesses")[name]
         modes = self._system.modes(self._modes)
@@ -163,6 +188,7 @@ class Sensitivities:
         return self.frequency == 0
 
 
+@default_floating_point
 def sensitivities(system: System, modes: int = 3, by: Sequence[str] | None = None) -> Sensitivities:
     """Return the sensitivities (31)-(32) of the natural frequencies to the parameters of a system.
 

@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from cra_sym.checks import broadcastable, count, real_array
+from cra_sym.checks import broadcastable, count, default_floating_point, real_array
 
 __all__ = ["input_shaper"]
 
 _MOST_IMPULSES = 50
 
 
+@default_floating_point
 def input_shaper(angular_frequency: Any, zeta: Any = 0.0, order: int = 1) -> tuple[np.ndarray, np.ndarray]:
     """Return amplitudes and times of the zero-vibration shaper of a mode, for :meth:`BaseMotion.shaped`.
 
@@ -48,8 +49,8 @@ def input_shaper(angular_frequency: Any, zeta: Any = 0.0, order: int = 1) -> tup
     >>> print(amplitudes, times)
     [0.25 0.5  0.25] [0.  0.5 1. ]
     """
-    omega = real_array("angular_frequency", angular_frequency, low=1e-300)
-    ratio = real_array("zeta", zeta, low=0.0, high=np.nextafter(1.0, 0.0), allowed="real numbers in [0, 1)")
+    omega = real_array("angular_frequency", angular_frequency, low=1e-300, unit="rad/s")
+    ratio = real_array("zeta", zeta, low=0.0, high=np.nextafter(1.0, 0.0), unit="1", must="real numbers in [0, 1)")
     broadcastable(angular_frequency=omega, zeta=ratio)
     order = count("order", order, high=_MOST_IMPULSES)
     root = np.sqrt(1 - ratio**2)

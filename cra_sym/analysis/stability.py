@@ -41,6 +41,7 @@ class AsymptoticWarning(UserWarning):
     """A boundary is returned where its expansion in epsilon cannot be trusted."""
 
 
+@checks.default_floating_point
 def stability_boundary(
     system: System,
     excitation: Excitation,
@@ -95,7 +96,7 @@ def stability_boundary(
     186.938 187.346
     """
     excitation = _parametric(excitation)
-    epsilon = checks.real_array("epsilon", epsilon, low=0.0)
+    epsilon = checks.real_array("epsilon", epsilon, low=0.0, unit="1")
     modes = checks.count("modes", modes)
     first, second = _resonance(resonance, modes)
     order, tongue = checks.count("order", order, high=2), checks.count("tongue", tongue, high=2)
@@ -111,6 +112,7 @@ def stability_boundary(
     return lower, upper
 
 
+@checks.default_floating_point
 def growth_rate(
     system: System,
     excitation: Excitation,
@@ -167,6 +169,7 @@ def growth_rate(
     return floquet.growth_rate(**taken, tolerance=tolerance, loop=_loop(backend, taken))[()]
 
 
+@checks.default_floating_point
 def floquet_exponents(
     system: System,
     excitation: Excitation,
@@ -202,6 +205,7 @@ def floquet_exponents(
     return floquet.floquet_exponents(**taken, tolerance=tolerance, loop=_loop(backend, taken))
 
 
+@checks.default_floating_point
 def forced_width(system: System, excitation: TransverseBase, modes: int = 3) -> np.ndarray:
     """Return the measure |Gamma_n phi_n(L)| omega_n w_1 / (2 M_n) of the forced resonances of a transverse base, (49a).
 
@@ -296,7 +300,7 @@ def _explain(
     for where, reason in reasons:
         if np.any(where):
             scope = "" if np.all(where) else f" for {np.count_nonzero(where)} of {np.size(where)} parameter sets"
-            warnings.warn(f"{name}: no instability{scope}: {reason}", ResonanceWarning, stacklevel=3)
+            warnings.warn(f"{name}: no instability{scope}: {reason}", ResonanceWarning, stacklevel=4)
 
 
 def _doubt(
@@ -318,14 +322,14 @@ def _doubt(
     if np.any(far):
         largest = np.broadcast_to(epsilon, far.shape)[far].min()
         text = f"epsilon = {largest:g} is beyond the reach of the expansion"
-        warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=3)
+        warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=4)
     weights = excitation.weights.values() if isinstance(excitation, Fluctuation) else ()
     if any(np.any(epsilon * np.asarray(weight) > 1) for weight in weights):
         text = "epsilon times weight exceeds 1: a stiffness is negative in part of the period"
-        warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=3)
+        warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=4)
     for other in _overlapping(zone, system, excitation, epsilon, resonance, modes):
         text = f"its zone overlaps that of resonance {other}, and each is derived as if it were alone"
-        warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=3)
+        warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=4)
 
 
 def _overlapping(
@@ -356,7 +360,7 @@ def _loop(backend: str, taken: dict[str, Any]) -> floquet.Loop | None:
     """Return the compiled loop of the Floquet solver if it is asked for, or pays."""
     checks.choice("backend", backend, ("auto", "numpy", "numba"))
     if backend == "numba" and not has_compiler():
-        raise ValueError("backend = 'numba': Numba is not installed; must be 'auto' or 'numpy'")
+        raise ValueError("backend = 'numba': Numba is not installed; backend must be 'auto' or 'numpy'")
     points = np.broadcast(taken["angular_frequency"], taken["epsilon"], taken["omega"][..., 0]).size
     compile = backend == "auto" and wants_compiler(_ROOTS * points, _template_parts)
     return _template().kick_and_drift if compile or backend == "numba" else None
@@ -376,8 +380,8 @@ def _taken(
 ) -> dict[str, Any]:
     """Return what the Floquet solver takes."""
     excitation = _parametric(excitation)
-    frequency = checks.real_array("angular_frequency", angular_frequency, low=1e-300)
-    epsilon = checks.real_array("epsilon", epsilon, low=0.0)
+    frequency = checks.real_array("angular_frequency", angular_frequency, low=1e-300, unit="rad/s")
+    epsilon = checks.real_array("epsilon", epsilon, low=0.0, unit="1")
     _shape(system, excitation, angular_frequency=frequency, epsilon=epsilon)
     modes = checks.count("modes", modes, high=MOST_MODES)
     if system.numerics("damping") is not None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from cra_sym.analysis.modes import only_motion, participation
-from cra_sym.checks import choice, count, instance
+from cra_sym.checks import choice, count, default_floating_point, instance
 from cra_sym.model.projection import Projected
 from cra_sym.model.system import MOST_MODES, System
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["state_space"]
 
 
+@default_floating_point
 def state_space(
     system: System, modes: int = 3, input: Literal["base_acceleration", "drive_force"] = "base_acceleration"
 ) -> StateSpace:

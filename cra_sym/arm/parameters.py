@@ -13,6 +13,8 @@ import numpy as np
 from cra_sym.checks import broadcastable, real_array
 from cra_sym.model.numerics import Numerics
 from cra_sym.model.system import System
+from cra_sym.si import paired
+from cra_sym.symbols import row
 
 if TYPE_CHECKING:
     from cra_sym.model.lagrangian import Model
@@ -62,7 +64,7 @@ _RANGES: dict[str, dict[str, Any]] = {
     **{name: {"low": 0.0, "open_low": True} for name in ("L", "b", "h", "E", "rho")},
     **{name: {"low": 0.0} for name in ("m_b", "m_e", "J_e")},
     **{name: {"low": 0.0, "allow_infinite": True} for name in ("k_t", "k_r")},
-    "zeta": {"low": 0.0, "high": np.nextafter(1.0, 0.0), "allowed": "real numbers in [0, 1)"},
+    "zeta": {"low": 0.0, "high": np.nextafter(1.0, 0.0), "must": "real numbers in [0, 1)"},
 }
 
 _MODEL = "cra_sym.arm.lagrangian:arm_model"
@@ -131,8 +133,10 @@ class Arm(System):
     provenance: ClassVar[Mapping[str, Provenance]] = _NOMINAL
 
     def __post_init__(self) -> None:
-        for name in self._names():
-            array = np.asarray(real_array(name, getattr(self, name), **_RANGES[name]) + 0.0)  # -0.0 becomes 0.0
+        units = {name: row(name).unit for name in self._names()}
+        for name, value in paired(self._fields(), units).items():
+            given = real_array(name, value, unit=units[name], **_RANGES[name])
+            array = np.asarray(given + 0.0)  # -0.0 becomes 0.0
             array.flags.writeable = False
             object.__setattr__(self, name, float(array) if array.ndim == 0 else array)
         broadcastable(**self._fields())
@@ -161,7 +165,7 @@ class Arm(System):
         Raises
         ------
         TypeError, ValueError
-            If a name is no field, or as :class:`Arm`.
+            If a name is not a field, or as :class:`Arm`.
         """
         unknown = [name for name in changes if name not in self._names()]
         if unknown:

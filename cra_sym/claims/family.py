@@ -117,7 +117,7 @@ def provenance_family(
     rows = list(mapping("materials", materials, "names to modulus and density").values())
     numbers = real_array("materials", rows, low=1e-12, high=1e30)
     if numbers.ndim != 2 or numbers.shape[1] != 2:
-        raise ValueError(f"materials = {shown(materials)}: must be a modulus and a density each")
+        raise ValueError(f"materials = {shown(materials)}: must be pairs of a modulus and a density")
     modulus, density = numbers.T[:, :, None]
     thickness = (low + high) / 2 * length**2 * np.sqrt(12 * density / modulus)
     bare = Arm.nominal().replace(m_e=0.0, J_e=0.0, k_t=np.inf, k_r=np.inf)

@@ -7,12 +7,14 @@ from importlib import import_module
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from cra_sym.checks import choice
+from cra_sym.checks import choice, default_floating_point
 from cra_sym.claims.registry import ENTRIES, Entry
 from cra_sym.claims.setting import Setting
 from cra_sym.claims.verdict import OUTCOMES, THEMES, Verdict
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from cra_sym.arm.parameters import Arm
 
 __all__ = ["claim", "claims"]
@@ -30,6 +32,11 @@ def _load() -> tuple[str, ...]:
 
 def _entry(id: str) -> Entry:
     return ENTRIES[choice("claim", id, _load())]
+
+
+def picture_of(id: str) -> Callable[[Verdict, Any], None] | None:
+    """Return the function that draws the evidence of a claim; None for what is not one of the ledger's."""
+    return ENTRIES[id].picture if id in _load() else None
 
 
 @cache
@@ -55,6 +62,7 @@ def _verdict(id: str, setting: Setting) -> Verdict:
     )
 
 
+@default_floating_point
 def claim(id: str, arm: Arm | None = None, **numbers: Any) -> Verdict:
     """Return the verdict on one claim.
 

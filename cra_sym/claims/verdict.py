@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field, fields
 from functools import partial
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
+
+from cra_sym.checks import equal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +26,7 @@ OUTCOMES: tuple[str, ...] = get_args(Outcome)
 THEMES = ("modes", "responses", "stability")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Quantity:
     """An array of the evidence.
 
@@ -45,6 +48,11 @@ class Quantity:
         values = np.array(self.values)
         values.flags.writeable = False
         object.__setattr__(self, "values", values)
+
+    def __eq__(self, other: object) -> bool:
+        return equal(astuple(self), astuple(other)) if isinstance(other, Quantity) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
 
 
 @dataclass(frozen=True)
@@ -108,9 +116,17 @@ class Verdict:
     remedy: str | None = None
     missing: str | None = None
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "evidence", MappingProxyType(dict(self.evidence)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        return _rebuilt, (values | {"evidence": dict(self.evidence), "picture": None},)
+
     def __getitem__(self, name: str) -> np.ndarray:
         """Return the values of one quantity of the evidence."""
-        return self.evidence[name].values
+        values: np.ndarray = self.evidence[name].values
+        return values
 
     def draw(self, ax: Axes | None = None) -> Figure:
         """Draw the evidence into one pair of axes, by default a new figure in the house style."""
@@ -134,6 +150,13 @@ class Verdict:
         lines += [f"*Smallest change that reproduces the paper:* {self.remedy}"] if self.remedy else []
         lines += [f"*Missing:* {self.missing}"] if self.missing else []
         return "\n\n".join(lines)
+
+
+def _rebuilt(values: dict[str, Any]) -> Verdict:
+    """Return a verdict that comes from a pickle, with the picture of its claim."""
+    from cra_sym.claims.ledger import picture_of
+
+    return Verdict(**(values | {"picture": picture_of(values["id"])}))
 
 
 def _plain(values: np.ndarray) -> Any:

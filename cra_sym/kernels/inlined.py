@@ -72,7 +72,7 @@ def _plain(kind: Any) -> Any:
         return kind
     if isinstance(kind, (types.Integer, types.Float)):
         return types.int64 if isinstance(kind, types.Integer) else types.float64
-    raise errors.TypingError(f"{kind}: must be a number or a contiguous array of doubles or integers")
+    raise errors.TypingError(f"{kind}: arguments must be numbers or contiguous arrays of doubles and integers")
 
 
 def _argument(context: Any, builder: Any, kind: Any, value: Any) -> Any:

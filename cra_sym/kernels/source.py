@@ -128,7 +128,7 @@ def check_arguments(arguments: Any) -> tuple[sp.Symbol, ...]:
     symbols: tuple[sp.Symbol, ...] = ()
     for symbol in arguments:  # one by one: there may be no end of them
         if not isinstance(symbol, sp.Symbol):
-            raise TypeError(f"arguments: {shown(symbol)} is not a SymPy symbol; substitute one for it")
+            raise TypeError(f"arguments: {shown(symbol)} must be a SymPy symbol; substitute one for it")
         symbols += (symbol,)
     twice = {s.name for k, s in enumerate(symbols) if s in symbols[:k]}
     if twice:
@@ -186,7 +186,7 @@ def _flatten(expression: Any) -> tuple[Layout, list[sp.Expr]]:
         expression = sp.sympify(expression, strict=True)
     if not isinstance(expression, sp.Expr):
         raise TypeError(
-            f"expression = {shown(expression)}: must be a SymPy expression, a matrix, or a sequence or dict of them"
+            f"expression = {shown(expression)}: must be SymPy expressions, matrices, sequences or dicts of them"
         )
     return (), [expression]
 

@@ -1,4 +1,7 @@
-"""Where coefficients are not smooth along x: the expressions whose zeros are jumps, kinks and branch points."""
+"""Where coefficients are not smooth along x: the expressions whose zeros are jumps, kinks and branch points.
+
+The middle of a narrow bump and of a steep layer counts as such a place too, where it shows.
+"""
 
 from __future__ import annotations
 
@@ -44,6 +47,7 @@ _SMOOTH = tuple(
         "erf erfc gamma loggamma besselj bessely besseli besselk airyai airybi legendre chebyshevt chebyshevu LambertW"
     ).split()
 )
+_STEEP = (sympy.exp, sympy.tanh, sympy.erf, sympy.atan, sympy.cosh, sympy.sech)
 _KNOWN = (*_SMOOTH, Abs, sign, Heaviside, floor, ceiling, frac, Mod, log, Max, Min, SingularityFunction, Piecewise)
 
 
@@ -137,6 +141,10 @@ def _of(node: Expr | Boolean, x: Symbol) -> Iterator[Switch]:
     elif isinstance(node, Pow):
         if not node.exp.is_integer and node.base.has(x):
             yield Switch(node.base)
+        elif node.exp.is_integer and node.exp.is_even and node.base.is_polynomial(x):
+            yield Switch(node.base)  # smooth, but what is narrow is narrow about such a place
+    elif isinstance(node, _STEEP) and node.args[0].is_polynomial(x):
+        yield Switch(node.args[0])
     elif isinstance(node, AppliedUndef) or (isinstance(node, Function) and not isinstance(node, _KNOWN)):
         raise HamiltonError(f"{node}: where this function of {x} is not smooth cannot be located")
 

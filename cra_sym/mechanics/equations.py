@@ -153,7 +153,7 @@ class GeneralisedForces:
 
     def _condition(self, displacement: Jet) -> BoundaryCondition:
         space, end = self.variation.space, displacement.place
-        assert end is not None
+        assert isinstance(end, str)
         left, right = map(space.write, self.condition_sides(displacement))
         return BoundaryCondition(left, right, end, *self.tags(displacement))
 

@@ -81,11 +81,9 @@ def vanishes(expression: Expr) -> bool:
     plain, relations = _without_roots(_without_functions(plain))
     nodes = {node for part in (plain, *relations.values()) for node in preorder_traversal(part)}
     if not expression.is_commutative or not all(map(_is_rational, nodes)):
-        raise ValueError(
-            f"{expression}: must be made of exact numbers and circular, hyperbolic and exponential functions"
-        )
+        raise ValueError(f"{expression}: must be exact numbers and circular, hyperbolic and exponential functions")
     if any(_is_zero(node.base, relations) for node in nodes if node.is_Pow and node.exp.is_negative):
-        raise ValueError(f"{expression}: must not divide by zero")
+        raise ValueError(f"{expression}: must be free of divisions by zero")
     return _is_zero(plain, relations)
 
 
@@ -189,7 +187,7 @@ def _without_roots(expression: Expr) -> tuple[Expr, dict[Dummy, Expr]]:
 
 def _is_root(power: Expr) -> bool:
     if not power.exp.is_Rational:
-        raise ValueError(f"{power}: exponents must be numbers")
+        raise ValueError(f"{power}: must be free of symbolic powers")
     return not power.exp.is_Integer
 
 

@@ -122,7 +122,7 @@ class JetSpace:
         ends = tuple(scalar("domain", end) for end in listed("domain", domain))
         if len(ends) != 2 or ends[0] == ends[1] or any(end.has(x, t) for end in ends):
             raise HamiltonError(f"domain = {domain}: must be two different end coordinates free of {x} and {t}")
-        self.ends: dict[End, Expr] = dict(zip(END_NAMES, ends, strict=True))
+        self.ends: dict[End | int, Expr] = dict(zip(END_NAMES, ends, strict=True))
         self.known = {function.func for function in prescribed}
         self._heads = {unknown.func: number for number, unknown in enumerate(self.unknowns)}
         if len(self._heads) != len(self.unknowns):
@@ -326,7 +326,7 @@ class JetSpace:
             return self._convert(inner, self._end_at(point, place, subs))
         return self._convert(inner, place)
 
-    def _end_at(self, point: Expr, place: Any, node: Basic) -> End:
+    def _end_at(self, point: Expr, place: Any, node: Basic) -> End | int:
         for end, coordinate in self.ends.items():
             if point == coordinate and place != "domain":
                 return end
@@ -342,7 +342,7 @@ class JetSpace:
         own = self.unknowns[number]
         if len(function.args) != len(own.args):
             raise HamiltonError(f"{function} should be written {own}")
-        where: End | None = None if place == "domain" else place
+        where: End | int | None = None if place == "domain" else place
         for argument, variable in zip(function.args, own.args, strict=True):
             if argument == variable:
                 continue

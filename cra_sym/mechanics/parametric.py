@@ -44,7 +44,7 @@ class Resonance:
         """
         if tongue not in (1, 2):
             raise ValueError(f"tongue = {tongue!r}: must be 1 or 2")
-        allowed = "must be (n, n), (m, n), (m, -n) with modes counted from 1, or a single n for a forced resonance"
+        allowed = "must be (n, n), (m, n) or (m, -n) with modes counted from 1, or n alone for a forced resonance"
         pair = tuple(spec) if isinstance(spec, tuple | list | Tuple) else (spec,)
         if len(pair) not in (1, 2):
             raise ValueError(f"resonance = {spec!r}: {allowed}")
@@ -127,7 +127,7 @@ class ParametricSystem:
             rows = tuple(Integer(i + 1) for i in range(len(frequencies)))
             for mode in resonance.modes:
                 if mode not in rows:
-                    raise ValueError(f"resonance with mode {mode}: must be 1 to {len(rows)}")
+                    raise ValueError(f"resonance with mode {mode}: must be a mode from 1 to {len(rows)}")
         given = {"coupling": coupling, **quantities}
         for name, value in given.items():
             given[name] = _checked(name, value, size, symbolic)

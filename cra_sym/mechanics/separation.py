@@ -254,7 +254,7 @@ def _spatial_problem(weak: WeakForm, frequency: Symbol) -> SpatialProblem:
         fields.append(Eq(amplitude(inner - applied), 0, evaluate=False))
     conditions = []
     for jet in forces.boundary_factors:
-        assert jet.place is not None
+        assert isinstance(jet.place, str)
         left, right = map(amplitude, forces.condition_sides(jet))
         variation, _, kind, names = forces.tags(jet)
         conditions.append(BoundaryCondition(left, right, jet.place, variation, form(jet), kind, names))

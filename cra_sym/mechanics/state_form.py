@@ -146,6 +146,13 @@ def _system(weak: WeakForm, parameter: Symbol) -> Matrix:
         raise HamiltonError(
             f"density: the quadratic form in {', '.join(names)} is singular, so the problem has no state form"
         )
+    for row, jet in enumerate(highest):
+        if jet.space == 0 and leading[row, row].has(parameter):
+            raise HamiltonError(
+                f"density: {weak.variation.space.form(jet)} has kinetic energy but no derivative by "
+                f"{weak.variation.space.x}, so infinitely many motions share one frequency"
+                "; give it a stiffness along the length"
+            )
     # columns of y = (q, w, P, r); the highest derivatives follow from the definition of the top forces
     state = [*section, *lumped]
     width = 2 * (n + m)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, Literal
 
 from sympy import Expr, Piecewise, Symbol, sympify
@@ -47,14 +48,14 @@ def stations(x: Symbol, table: Sequence[tuple[Any, Any]], kind: Literal["linear"
     pairs = [_pair(entry) for entry in table]
     if len(pairs) < 2:
         raise ValueError(f"table has {len(pairs)} stations: must have at least two")
-    for (before, _), (after, _) in zip(pairs, pairs[1:], strict=False):
+    for (before, _), (after, _) in pairwise(pairs):
         if (after - before).is_nonpositive:
             raise ValueError(f"table: the place {after} must be greater than {before} before it")
     if kind == "step":
-        parts = [(value, x < after) for (_, value), (after, _) in zip(pairs, pairs[1:], strict=False)]
+        parts = [(value, x < after) for (_, value), (after, _) in pairwise(pairs)]
     else:
         parts = [(pairs[0][1], x < pairs[0][0])]
-        for (left, low), (right, high) in zip(pairs, pairs[1:], strict=False):
+        for (left, low), (right, high) in pairwise(pairs):
             parts.append((low + (high - low) * (x - left) / (right - left), x < right))
     return Piecewise(*parts, (pairs[-1][1], True))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from sympy import Add, Expr, S, expand_mul
 
@@ -101,13 +101,13 @@ def _read_work(space: JetSpace, triple: VirtualWork) -> list[tuple[Expr, Jet, bo
         raise HamiltonError(f"virtual_work: {shown(triple)} is not a triple (force, displacement, place)") from None
     if not (place is None or isinstance(place, str)) or place not in (*END_NAMES, "domain", None):
         raise HamiltonError(f"virtual_work: place = {shown(place)}: must be 'left', 'right', 'domain' or None")
-    where = "ends" if place is None else place
+    where: Any = "ends" if place is None else place
     label = f"virtual work of {shown(force)} on {shown(displacement)}"
-    moved = space.read(displacement, where, label)  # type: ignore[arg-type]
+    moved = space.read(displacement, where, label)
     ends = {jet.place for jet in space.jets(moved) if jet.place is not None}
     if where == "ends" and len(ends) == 1:
         where = ends.pop()
-    pushed = space.read(force, where, label)  # type: ignore[arg-type]
+    pushed = space.read(force, where, label)
     works = []
     for jet in space.jets(moved):
         factor = moved.diff(space.symbol(jet))

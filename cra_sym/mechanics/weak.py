@@ -90,6 +90,7 @@ class WeakForm:
 
     def place(self, jet: Jet) -> Expr:
         """Return the place of a jet of an end or of an interior place."""
+        assert jet.place is not None
         return self.points[jet.place].place if isinstance(jet.place, int) else self.variation.space.ends[jet.place]
 
     def _numbered(self, jet: Jet, number: int) -> Jet:

@@ -109,8 +109,8 @@ def load(model: Model, name: str) -> Load:
     t = weak.variation.space.t
     function = next(f for e in _load_terms(weak) for f in e.atoms(AppliedUndef) if f.func.__name__ == name)
     cause = function.diff(t, 2) if _kind(weak, function) == "motion" else function
-    parts = (_coefficients(weak, part, cause) for part in (weak.inside_load, weak.discrete_load))
-    return load_of(weak, *parts, model.symbols)
+    inside, discrete = (_coefficients(weak, part, cause) for part in (weak.inside_load, weak.discrete_load))
+    return load_of(weak, inside, discrete, model.symbols)
 
 
 def _coefficients(weak: WeakForm, part: dict[Jet, Expr], cause: Expr) -> dict[Jet, Expr]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sympy import Expr, Matrix, S, expand, zeros
+from sympy import Expr, Matrix, S, zeros
 
 from cra_sym.kernels import kernel
 from cra_sym.mechanics.jets import Jet
 from cra_sym.mechanics.weak import WeakForm, weak_form
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.stress_route import StressRoute
+from cra_sym.model.symmetry import vanishes
 
 if TYPE_CHECKING:
     from cra_sym.model.lagrangian import Model
@@ -27,7 +28,7 @@ def stress_route(model: Model, spatial: SpatialProblem) -> StressRoute | None:
         return None
     state = [*section, *lumped]
     leading, coupled = _matrix(weak, highest, highest, 0), _matrix(weak, highest, state, 0)
-    strain = leading.inv() * coupled if not coupled.is_zero_matrix else coupled
+    strain = _solved(leading, coupled)
     cross = zeros(*coupled.shape)
     if not _one_after_the_other(strain, section, highest):
         strain, cross = cross, coupled
@@ -38,7 +39,7 @@ def stress_route(model: Model, spatial: SpatialProblem) -> StressRoute | None:
         for i in range(matrix.rows):
             for j in range(matrix.cols):
                 value = matrix[i, j]
-                if (j >= i or name in "BD") and value != 0 and (name != "R" or expand(value) != 0):
+                if (j >= i or name in "BD") and value != 0 and not (name in "BR" and vanishes(value)):
                     entries[name, i, j] = value
     x = weak.variation.space.x
     values = tuple(entries.values())
@@ -48,6 +49,15 @@ def stress_route(model: Model, spatial: SpatialProblem) -> StressRoute | None:
         kernel(values, (x, *model.symbols), backend="numpy"),
         tuple(entries),
     )
+
+
+def _solved(leading: Matrix, coupled: Matrix) -> Matrix:
+    """Return the inverse of the leading stiffness times the coupling; entry by entry if it is diagonal."""
+    if coupled.is_zero_matrix:
+        return coupled
+    if leading.is_diagonal():
+        return Matrix(*coupled.shape, lambda i, j: coupled[i, j] / leading[i, i])
+    return leading.inv() * coupled
 
 
 def _matrix(weak: WeakForm, rows: list[Jet], columns: list[Jet], power: int) -> Matrix:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,10 @@ class Excitation:
     """What excitations share: named numbers that may be arrays, compared by value."""
 
     def __init__(self, **numbers: Any) -> None:
-        checked = {name: frozen(real_array(name, value, low=0.0)) for name, value in numbers.items()}
+        units = {"amplitude": "m"}  # the others are weights
+        checked = {
+            name: frozen(real_array(name, value, low=0.0, unit=units.get(name, "1"))) for name, value in numbers.items()
+        }
         broadcastable(**{name: np.asarray(value) for name, value in checked.items()})
         self._numbers: dict[str, Value] = checked
 
@@ -29,6 +32,11 @@ class Excitation:
     def shape(self) -> tuple[int, ...]:
         """Batch shape: the common shape of all numbers."""
         return np.broadcast_shapes(*(np.shape(value) for value in self._numbers.values()))
+
+    def __getitem__(self, index: Any) -> Self:
+        """Return one of a batch, or some."""
+        shape = self.shape
+        return type(self)(**{name: np.broadcast_to(value, shape)[index] for name, value in self._numbers.items()})
 
     def _key(self) -> tuple[Any, ...]:
         numbers = sorted(self._numbers.items())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal, cast
 
 from sympy import Expr, S, Symbol, cancel
 
@@ -87,4 +86,4 @@ def _place(weak: WeakForm, jet: Jet) -> Place:
         return Place("inside", section.index(jet._replace(space=0)), jet.space)
     if isinstance(jet.place, int):
         return Place("point", section.index(jet._replace(place=None, space=0)), jet.space, jet.place)
-    return Place(cast(Literal["left", "right"], jet.place), section.index(jet._replace(place=None)), 0)
+    return Place(jet.place, section.index(jet._replace(place=None)), 0)

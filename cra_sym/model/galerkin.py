@@ -148,7 +148,7 @@ class Ritz:
         slopes = {place: entry.diff(symbol) for place, entry in self.matrices.end_stiffness.items()}
         inside = self.matrices.element_stiffness.free_symbols | self.matrices.element_mass.free_symbols
         if symbol in inside or not any(slopes.values()):
-            raise ValueError(f"{symbol.name} = inf: only the stiffness of an end may be infinite")
+            raise ValueError(f"{symbol.name} = inf: only the stiffness of an end may be inf")
         held = np.zeros((total, total))
         for place, value in zip(slopes, kernel(tuple(slopes.values()), self.symbols)(*column), strict=True):
             held[place] = value

@@ -21,7 +21,7 @@ from cra_sym.model.galerkin import Ritz
 from cra_sym.model.numerics import Numerics
 from cra_sym.model.symmetry import asymmetry, odd_in_time
 from cra_sym.model.system import System
-from cra_sym.model.units import check_dimensions, named_units
+from cra_sym.model.units import check_dimensions, named_units, symbol_units
 
 if TYPE_CHECKING:
     from cra_sym.analysis.modes import ModalParameters
@@ -137,7 +137,8 @@ class Model:
         self.symbols: tuple[Symbol, ...] = parameters(given, self.equations)
         """The parameters: every symbol but x and t, by name."""
         declared = named_units(units, [*given, *self._options["fields"], *self._options["coordinates"]])
-        check_dimensions(sympify(density, strict=True), ends, declared, work)
+        unknowns = (x, t, *self.equations.fields, *self.equations.coordinates, *self._options["prescribed"])
+        check_dimensions(sympify(density, strict=True), ends, declared, work, unknowns)
 
     def _defined(self) -> dict[str, Any]:
         """Return what Hamilton's principle takes, definitions put in."""
@@ -212,6 +213,11 @@ class Model:
         motion = next(function for function in self._pieces["prescribed"] if function.func.__name__ == name)
         prescribed = [function for function in self._pieces["prescribed"] if function != motion]
         return self.replace(prescribed=prescribed, coordinates=[*self._pieces["coordinates"], motion])
+
+    @cached_property
+    def units(self) -> Mapping[str, str]:
+        """Unit of every parameter that is a symbol of ``cra_sym.symbols`` or was given one, by name."""
+        return symbol_units(self.symbols, dict(self._pieces["units"]))
 
     @cached_property
     def numerics(self) -> Numerics:

@@ -26,7 +26,7 @@ class Place(NamedTuple):
     Attributes
     ----------
     where : {'inside', 'left', 'right', 'lumped', 'point'}
-    index : int
+    entry : int
         Of the section's displacement, or of the coordinate.
     order : int
         Derivative by x of that displacement; 0 at the ends.
@@ -35,7 +35,7 @@ class Place(NamedTuple):
     """
 
     where: Literal["inside", "left", "right", "lumped", "point"]
-    index: int
+    entry: int
     order: int
     number: int = 0
 
@@ -160,8 +160,8 @@ def displaced(domain: Domain, modes: Modes, place: Place, places: Kernel | None)
     if place.where == "point" and places is not None:
         return _at_place(domain, modes, place, places)
     if place.where == "lumped":
-        return modes.coordinate(place.index)
-    return modes.displacement(int(place.where == "right"), place.index)
+        return modes.coordinate(place.entry)
+    return modes.displacement(int(place.where == "right"), place.entry)
 
 
 def _at_place(domain: Domain, modes: Modes, place: Place, places: Kernel) -> Array:
@@ -172,16 +172,18 @@ def _at_place(domain: Domain, modes: Modes, place: Place, places: Kernel) -> Arr
     there = (at > left) & (at < right)
     at = np.where(there, at, left)
     if not place.order:
-        return np.where(there, modes.shape(place.index, 0, at)[..., 0], 0.0)
-    both = (modes.shape(place.index, place.order, at + np.where(there, s * aside, 0.0)) for s in (-1, 1))
-    return np.where(there, 0.5 * sum(both)[..., 0], 0.0)
+        return np.where(there[..., 0, None], modes.shape(place.entry, 0, at)[..., 0], 0.0)
+    before, after = (
+        modes.shape(place.entry, place.order, at + np.where(there, side * aside, 0.0))[..., 0] for side in (-1, 1)
+    )
+    return np.where(there[..., 0, None], 0.5 * (before + after), 0.0)
 
 
 def along(modes: Modes, place: Place, x: Array) -> Array:
     """Return a displacement of every mode at places along the interval, shape (..., modes, stations)."""
     if place.where == "lumped":
-        return modes.coordinate(place.index)[..., None]
-    return modes.shape(place.index, place.order, x)
+        return modes.coordinate(place.entry)[..., None]
+    return modes.shape(place.entry, place.order, x)
 
 
 def project(domain: Domain, modes: Modes, load: Load) -> Array:

@@ -15,9 +15,20 @@ from cra_sym.model.values import flat_columns
 from cra_sym.solvers.eigenvalues import lowest
 from cra_sym.solvers.shapes import mode_states
 
-__all__ = ["Estimated", "GeneralRoute", "Modes", "RigidShare", "Route", "StateModes", "Stations", "tip_sign"]
+__all__ = [
+    "Estimated",
+    "GeneralRoute",
+    "Modes",
+    "RigidShare",
+    "Route",
+    "StateModes",
+    "Stations",
+    "mode_sign",
+    "overview_places",
+]
 
 Array = NDArray[np.float64]
+_SHARES = (0.0, 0.22, 0.53, 0.81, 1.0 - 1e-4, 1.0)  # ends, and places that are no node of the first modes
 Values = Sequence[float | Array]
 """Parameters in the order of the model's symbols; they broadcast to the shape of the batch."""
 
@@ -27,13 +38,11 @@ class Modes(Protocol):
 
     Where the displacement of the first field vanishes there, its first derivative that does not is positive.
 
-    Attributes
-    ----------
-    omega : ndarray, shape (..., modes)
-        rad/s.
     """
 
-    omega: Array
+    @property
+    def omega(self) -> Array:
+        """Natural frequencies, rad/s, shape (..., modes)."""
 
     def displacement(self, end: int, place: int) -> Array:
         """Return a displacement of the left (0) or right (1) end section, shape (..., modes)."""
@@ -154,13 +163,19 @@ class StateModes:
     @cached_property
     def _ends(self) -> Array:
         """States at both ends, signed, shape (rows, modes, 2, 2 n + m)."""
-        length, left = (np.broadcast_to(g, len(self._z)) for g in self.spatial.geometry.function(*self._finite))
-        return self._signed(self.states(self._z, np.stack([left, left + length], axis=-1)))
+        return self._signed(self._overview[:, :, [0, -1]])
+
+    @cached_property
+    def _overview(self) -> Array:
+        """States at both ends and some places between, shape (rows, modes, stations, 2 n + m)."""
+        return self.states(self._z, overview_places(self.spatial, self._finite, len(self._z)))
+
+    @cached_property
+    def _sign(self) -> Array:
+        return mode_sign(self._overview[..., : self.spatial.displacements])
 
     def _signed(self, states: Array) -> Array:
-        if "_sign" not in self.__dict__:  # the last station of the first call is the right end
-            self.__dict__["_sign"] = tip_sign(states[:, :, -1, : self.spatial.displacements])
-        return states * self.__dict__["_sign"][..., None]
+        return states * self._sign[..., None]
 
     def _end(self, end: int, entry: int) -> Array:
         return self._ends[:, :, end, entry].reshape(self.omega.shape)
@@ -187,7 +202,6 @@ class StateModes:
         key = x.tobytes()
         kept: dict[bytes, Array] = self.__dict__.setdefault("_kept", {})
         if key not in kept:
-            _ = self._ends  # fixes the sign
             found = self._signed(self.states(self._z, x))
             kept.clear()  # one set of stations at a time: those of a quadrature serve many forms
             kept[key] = found
@@ -198,9 +212,24 @@ class StateModes:
         return None
 
 
-def tip_sign(tip: Array) -> Array:
-    """Return the sign that makes the first tip displacement which is not zero positive, shape (..., 1)."""
-    scale = np.abs(tip).max(axis=-2, keepdims=True)
-    moving = np.abs(tip) > 1e-7 * np.where(scale > 0.0, scale, 1.0)
-    first = np.take_along_axis(tip, moving.argmax(axis=-1)[..., None], axis=-1)
+def overview_places(spatial: SpatialProblem, values: Array, rows: int) -> Array:
+    """Return the places at which :func:`mode_sign` looks, shape (rows, stations)."""
+    length, left = (np.broadcast_to(g, rows) for g in spatial.geometry.function(*values))
+    return np.asarray(left[:, None] + np.multiply.outer(length, _SHARES))
+
+
+def mode_sign(displacements: Array) -> Array:
+    """Return the sign of every mode, shape (rows, modes, 1).
+
+    It makes positive the first displacement of the right end that is not zero, or else the first one beside that end.
+
+    Parameters
+    ----------
+    displacements : ndarray, shape (rows, modes, stations, n)
+        At the places of :func:`overview_places`.
+    """
+    size = np.abs(displacements).max(axis=(1, 2), initial=0.0)[:, None]
+    entries = np.concatenate([displacements[:, :, -1], displacements[:, :, -2]], axis=-1)
+    moving = np.abs(entries) > np.concatenate([1e-7 * size, 1e-12 * size], axis=-1)  # more than rounding there
+    first = np.take_along_axis(entries, moving.argmax(axis=-1)[..., None], axis=-1)
     return np.where(first < 0.0, -1.0, 1.0)

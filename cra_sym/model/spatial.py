@@ -23,6 +23,7 @@ __all__ = ["SpatialProblem", "check_range", "shares", "spatial_problem"]
 
 Array = NDArray[np.float64]
 _MOST_DERIVATIVES = 20
+_LONGEST_ROW = 400  # operations from where on a further derivative of a coefficient takes too long
 
 
 @dataclass(frozen=True)
@@ -366,6 +367,8 @@ def _derivative_rows(form: StateForm, place: int, arguments: Sequence[Symbol]) -
             if not kernels or form.uniform:
                 raise
             break  # the derivative of such a coefficient has no function
+        if not form.uniform and sum(entry.count_ops() for entry in row) > _LONGEST_ROW:
+            break
         row = row.applyfunc(lambda entry: derivative(entry, form.x)) + row * form.system
     return tuple(kernels)
 
@@ -374,7 +377,7 @@ def shares(x: np.ndarray, left: np.ndarray, length: np.ndarray, name: str = "x")
     """Return places as shares of the length, shape (rows, stations)."""
     share = (x - left[:, None]) / length[:, None]
     if (share < -1e-12).any() or (share > 1.0 + 1e-12).any():
-        raise ValueError(f"{name} = {x}: must be in the domain, [{left.max():g}, {(left + length).min():g}]")
+        raise ValueError(f"{name} = {x}: must be in the domain, {left.max():g} to {(left + length).min():g}")
     return np.clip(share, 0.0, 1.0)
 
 

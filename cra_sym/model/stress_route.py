@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.kernels import Kernel
-from cra_sym.model.routes import Values, tip_sign
+from cra_sym.model.routes import Values, mode_sign, overview_places
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.values import flat_columns, infinite_patterns
 from cra_sym.solvers.stress import Continuum, Entries, PointTerm
@@ -166,8 +166,12 @@ def _held(free: Kernel | None, columns: Array, size: int) -> tuple[Array, Array]
         return np.eye(size)[None], np.full((1, size), np.inf)
     motions = np.asarray(free(*columns))
     motions = _once(motions.reshape(-1, *motions.shape[-2:]))
-    frame = np.linalg.svd(motions)[0]
-    directions = frame[..., motions.shape[-1] :].swapaxes(-1, -2)
+    still = (motions == 0.0).all(axis=(0, 2))  # held by themselves: exactly, so that they stay exactly zero
+    units = np.broadcast_to(np.eye(size)[still], (len(motions), int(still.sum()), size))
+    frame = np.linalg.svd(motions[:, ~still])[0][..., motions.shape[-1] :].swapaxes(-1, -2)
+    others = np.zeros((*frame.shape[:2], size))
+    others[..., ~still] = frame
+    directions = np.concatenate([units, others], axis=1)
     return directions, np.full(directions.shape[:2], np.inf)
 
 
@@ -224,8 +228,10 @@ class StressModes:
 
     @cached_property
     def _sign(self) -> Array:
-        right = self._ends[..., self.spatial.displacements + self.spatial.coordinates :]
-        return tip_sign(right)
+        finite = np.where(np.isinf(self.columns), 0.0, self.columns)
+        places = overview_places(self.spatial, finite, len(self._z))
+        states = self._collected(lambda found: found.fields.states(places[found.rows]))
+        return mode_sign(states[..., : self.spatial.displacements])
 
     def _signed(self, values: Array) -> Array:
         return (self._sign[..., 0] * values).reshape(self.omega.shape)
@@ -250,8 +256,9 @@ class StressModes:
         state = self._states(x)
         finite = np.where(np.isinf(self.columns), 0.0, self.columns)
         row = self.spatial.derivative_row(place, derivative, z, x[:, None], finite)
-        found = self._sign * (row * state).sum(axis=-1)
-        return found.reshape(*self.omega.shape, x.shape[-1])
+        found: Array = self._sign * (row * state).sum(axis=-1)
+        shape: Array = found.reshape(*self.omega.shape, x.shape[-1])
+        return shape
 
     def _states(self, x: Array) -> Array:
         key = x.tobytes()
@@ -280,6 +287,7 @@ class StressModes:
         def part(found: Found) -> Array:
             columns = found.fields.columns
             values = found.fields.displaced[place]
-            return (values.reshape(*values.shape[:2], -1) * columns.weights[:, None]).sum(axis=-1)
+            integral: Array = (values.reshape(*values.shape[:2], -1) * columns.weights[:, None]).sum(axis=-1)
+            return integral
 
         return self._signed(self._collected(part))

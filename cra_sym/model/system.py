@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import broadcastable, count, instance
+from cra_sym.checks import broadcastable, count, default_floating_point, instance
 from cra_sym.model.projection import Domain, Load, Projected, project
 from cra_sym.model.routes import Estimated, Modes, Route
 from cra_sym.model.spatial import check_range
@@ -67,7 +67,7 @@ class System:
 
         instance("model", model, Model)
         self._model = model
-        self._values = checked_values([symbol.name for symbol in model.symbols], values)
+        self._values = checked_values([symbol.name for symbol in model.symbols], values, model.units)
         self._zeta = frozen(checked_damping(zeta))
         broadcastable(zeta=self._zeta, **self._values)
 
@@ -169,6 +169,7 @@ class System:
         route: Route = self.numerics("route")
         return route if route.covers(self.parameters) else self.numerics("general_route")
 
+    @default_floating_point
     def _once(self, kind: str, modes: int, find: Any) -> Any:
         kept = self.__dict__.setdefault("_kept", {})
         key = kind, modes

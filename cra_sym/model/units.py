@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from sympy import Add, Expr, expand, sympify
+from sympy import Add, Expr, Float, Symbol, expand, sympify
 from sympy.core.function import AppliedUndef
 
 from cra_sym import symbols as table
 from cra_sym.checks import mapping, shown
 from cra_sym.symbols import Dimension
 
-__all__ = ["check_dimensions", "named_units"]
+__all__ = ["check_dimensions", "named_units", "symbol_units"]
 
 ENERGY = Dimension(2, 1, -2)
 ENERGY_PER_LENGTH = Dimension(1, 1, -2)
@@ -23,6 +23,7 @@ def check_dimensions(
     ends: Mapping[str, Expr],
     units: Mapping[Any, str],
     virtual_work: Iterable[tuple[Expr, Expr, Any]] = (),
+    unknowns: Iterable[Any] = (),
 ) -> None:
     """Refuse a term whose dimension is not energy (per length in the density).
 
@@ -34,12 +35,16 @@ def check_dimensions(
         For symbols that are not those of ``cra_sym.symbols``. Terms with a symbol of unknown unit are not judged.
     virtual_work : iterable of (force, displacement, place)
         The force times the displacement is judged, per length where the place is 'domain'.
+    unknowns : iterable of symbol or function
+        Coordinates, fields and motions. A term of these and numbers alone is not judged, nor one with a floating-point
+        number: a number may carry any unit.
 
     Raises
     ------
     ValueError
         Names the term, its dimension and the dimension it should have.
     """
+    bare = set(unknowns)
     declared = {_name(key): table.unit_dimension(unit) for key, unit in units.items()}
     for label, expression, wanted in (
         ("density", density, ENERGY_PER_LENGTH),
@@ -54,6 +59,8 @@ def check_dimensions(
         ),
     ):
         for term in Add.make_args(expand(expression, deep=False)):
+            if term.has(Float) or not {*term.atoms(AppliedUndef), *term.free_symbols} - bare:
+                continue
             found = _dimension(term, declared)
             if found not in (None, wanted):
                 raise ValueError(
@@ -72,6 +79,13 @@ def named_units(units: Mapping[Any, str] | None, expressions: Iterable[Any]) -> 
             names = ", ".join(sorted(known))
             raise ValueError(f"units: {shown(_name(key))} does not occur in the model; it has {names}")
     return units
+
+
+def symbol_units(symbols: Iterable[Symbol], units: Mapping[Any, str]) -> dict[str, str]:
+    """Return the unit of each symbol that is one of the nomenclature or was given one, by name."""
+    declared = {_name(key): unit for key, unit in units.items()}
+    known = {s.name: table.row(s.name).unit for s in symbols if _is_table_symbol(s, s.name)}
+    return {s.name: (known | declared)[s.name] for s in symbols if s.name in known or s.name in declared}
 
 
 def _name(key: Any) -> str:

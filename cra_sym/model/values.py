@@ -9,13 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.checks import broadcastable, real_array, shown
+from cra_sym.si import paired
 
 __all__ = ["checked_damping", "checked_values", "flat_columns", "frozen", "infinite_patterns"]
 
 Value = float | NDArray[np.float64]
 
 
-def checked_values(names: Sequence[str], given: Mapping[Any, Any]) -> dict[str, Value]:
+def checked_values(
+    names: Sequence[str], given: Mapping[Any, Any], units: Mapping[str, str] | None = None
+) -> dict[str, Value]:
     """Return the values by name, in the order of the names, as numbers and read-only arrays.
 
     Parameters
@@ -23,6 +26,8 @@ def checked_values(names: Sequence[str], given: Mapping[Any, Any]) -> dict[str, 
     names : sequence of str
         The parameters of the model.
     given : mapping of symbol or name to array_like
+    units : mapping of name to unit, optional
+        Quantities with units must be convertible to these; where there is none, they are converted to SI.
 
     Raises
     ------
@@ -32,15 +37,18 @@ def checked_values(names: Sequence[str], given: Mapping[Any, Any]) -> dict[str, 
     """
     if not isinstance(given, Mapping):
         raise TypeError(f"values = {shown(given)}: must be a mapping from symbols or their names to numbers")
-    found: dict[str, NDArray[np.float64]] = {}
+    named: dict[str, Any] = {}
     for key, value in given.items():
         name = key if isinstance(key, str) else getattr(key, "name", str(key))
         if name not in names:
             raise ValueError(f"values: {name} does not occur in the model; it has {', '.join(names) or 'none'}")
-        if name in found:
+        if name in named:
             raise ValueError(f"values: {name} is given twice")
+        named[name] = value
+    found: dict[str, NDArray[np.float64]] = {}
+    for name, value in paired(named, units).items():
         try:
-            found[name] = real_array(name, _as_number(value), allow_infinite=True)
+            found[name] = real_array(name, value, allow_infinite=True, unit=(units or {}).get(name))
         except TypeError as error:
             raise ValueError(str(error)) from None
         if (found[name] == -np.inf).any():
@@ -52,11 +60,6 @@ def checked_values(names: Sequence[str], given: Mapping[Any, Any]) -> dict[str, 
     return {name: frozen(found[name]) for name in names}
 
 
-def _as_number(value: Any) -> Any:
-    """Return a real number of SymPy as a float, everything else as it is."""
-    return float(value) if getattr(value, "is_extended_real", False) and getattr(value, "is_number", False) else value
-
-
 def frozen(array: NDArray[np.float64]) -> Value:
     """Return a number, or a read-only array; -0.0 becomes 0.0."""
     array = np.asarray(array + 0.0)
@@ -66,7 +69,7 @@ def frozen(array: NDArray[np.float64]) -> Value:
 
 def checked_damping(zeta: Any) -> NDArray[np.float64]:
     """Return damping ratios, or raise an error that says what they must be."""
-    return real_array("zeta", zeta, low=0.0, high=np.nextafter(1.0, 0.0), allowed="real numbers in [0, 1)")
+    return real_array("zeta", zeta, low=0.0, high=np.nextafter(1.0, 0.0), unit="1", must="real numbers in [0, 1)")
 
 
 def flat_columns(values: Sequence[Value], shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -92,15 +92,23 @@ def sample_modal_response() -> bool:
     wave = unit.harmonic * (cos(psi) + I * sin(psi))
     numbers = {v_m: 0.3, a_m: -0.7, B: 0.05, psi: 0.9, Gamma_i: 0.4, M_i: 1.3, omega_i: 2, zeta_i: 0}
     numbers = {name: Rational(str(value)) for name, value in numbers.items()}
-    with mpmath.workdps(40):
+    own = _own_context()
+    with own.workdps(40):
         for rate in (Rational(7, 3), 2 + Rational(1, 10**9), Rational(2)):
             parts = (modal_response().rhs, start * unit.impulse + a_m * unit.step, wave, push * B * varpi**2, push)
-            found, plain, swing, weight, factor = (_function(part.subs(numbers | {varpi: rate})) for part in parts)
-            gap = found(3) - factor(3) * plain(3) + weight(3) * mpmath.im(swing(3))
+            found, plain, swing, weight, factor = (_function(part.subs(numbers | {varpi: rate}), own) for part in parts)
+            gap = found(3) - factor(3) * plain(3) + weight(3) * own.im(swing(3))
             if abs(gap) > 1e-20:
                 return False
     return True
 
 
-def _function(expression: Expr) -> Any:
-    return lambdify(t, expression, "mpmath")
+def _own_context() -> Any:
+    """Return a context of mpmath beside the one that the process shares."""
+    return mpmath.mp.clone()
+
+
+def _function(expression: Expr, own: Any) -> Any:
+    """Return the expression as a function of t in the arithmetic of a context."""
+    names = {name: getattr(own, name) for name in dir(own) if not name.startswith("_")}
+    return lambdify(t, expression, [names, "mpmath"])

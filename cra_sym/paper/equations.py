@@ -35,7 +35,7 @@ from importlib import import_module
 from operator import index
 from typing import Any, Literal, TypeVar
 
-from cra_sym.checks import shown
+from cra_sym.checks import default_floating_point, shown
 
 __all__ = ["Equation", "Proof", "equation", "equations", "numbered", "proves", "samples"]
 
@@ -118,6 +118,7 @@ class Equation:
         """
         return "proved" if self.number in _PROOFS else "sampled"
 
+    @default_floating_point
     def check(self) -> bool:
         """Tell whether the independent routes confirm the equation: the proof if there is one, then the numbers.
 
@@ -265,7 +266,7 @@ def equation(number: Number) -> Equation:
         companions = [key for key in _EQUATIONS if isinstance(key, str)]
         whole = [key for key in _EQUATIONS if isinstance(key, int)]
         also = f", and {', '.join(map(repr, sorted(companions, key=_order)))}" if companions else ""
-        raise ValueError(f"number = {shown(number)}: must be one of {min(whole)} to {max(whole)}{also}") from None
+        raise ValueError(f"number = {shown(number)}: must be from {min(whole)} to {max(whole)}{also}") from None
 
 
 def equations(*, companions: bool = False) -> tuple[Equation, ...]:

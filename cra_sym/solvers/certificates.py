@@ -7,10 +7,12 @@ only where the search begins.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from threading import RLock
 from typing import Any, Protocol, TypeVar
 
-__all__ = ["Counted", "UndecidedError", "decided", "enclose", "negatives"]
+__all__ = ["Counted", "UndecidedError", "decided", "enclose", "negatives", "precision"]
 
 FIRST_PRECISION = 192
 _LARGEST_PRECISION = 12_288
@@ -19,22 +21,26 @@ _WIDEST = -8
 _EQUAL = -40  # of the width wanted: frequencies that are closer share an enclosure
 
 Result = TypeVar("Result")
+_ALONE = RLock()
 
 
 class UndecidedError(ArithmeticError):
     """A sign could not be proved at the largest precision: the point is a zero, or as good as one."""
 
 
+@contextmanager
+def precision(flint: Any, bits: int) -> Iterator[None]:
+    """Work with so many bits; threads take turns, since the precision of FLINT belongs to the whole process."""
+    with _ALONE, flint.ctx.workprec(bits):
+        yield
+
+
 class Counted(Protocol):
-    """A problem with natural frequencies that can be counted; points are exact balls.
+    """A problem with natural frequencies that can be counted; points are exact balls."""
 
-    Attributes
-    ----------
-    zeros : int
-        How many natural frequencies are exactly 0.
-    """
-
-    zeros: int
+    @property
+    def zeros(self) -> int:
+        """Number of natural frequencies that are exactly 0."""
 
     def count(self, point: Any) -> int:
         """Return the proved number of natural frequencies below the point, those at 0 included."""
@@ -54,13 +60,13 @@ def decided(flint: Any, attempt: Callable[[], Result]) -> Result:
     UndecidedError
         If 12288 bits are not enough.
     """
-    precision = FIRST_PRECISION
-    while precision <= _LARGEST_PRECISION:
-        with flint.ctx.workprec(precision):
+    bits = FIRST_PRECISION
+    while bits <= _LARGEST_PRECISION:
+        with precision(flint, bits):
             try:
                 return attempt()
             except (UndecidedError, ZeroDivisionError):
-                precision *= 2
+                bits *= 2
     raise UndecidedError(f"a sign is not decided at {_LARGEST_PRECISION} bits")
 
 
@@ -87,7 +93,7 @@ def negatives(matrix: Sequence[Sequence[Any]]) -> int:
     return number
 
 
-def enclose(flint: Any, problem: Counted, guesses: Sequence[float]) -> list[tuple[Any, Any]]:
+def enclose(flint: Any, problem: Counted, guesses: Iterable[float]) -> list[tuple[Any, Any]]:
     """Return a proved enclosure of each of the first natural frequencies.
 
     Parameters
@@ -95,7 +101,7 @@ def enclose(flint: Any, problem: Counted, guesses: Sequence[float]) -> list[tupl
     flint : module
         ``flint`` of python-flint.
     problem : Counted
-    guesses : sequence of float
+    guesses : iterable of float
         Where frequency 1, 2, ... is expected; the better, the faster. They carry no weight in the proof.
 
     Returns
@@ -111,7 +117,7 @@ def enclose(flint: Any, problem: Counted, guesses: Sequence[float]) -> list[tupl
         If a sign cannot be proved, or a frequency is not near its guess.
     """
     zero = flint.arb(0)
-    with flint.ctx.workprec(FIRST_PRECISION):
+    with precision(flint, FIRST_PRECISION):
         return [
             (zero, zero) if number < problem.zeros else _enclosure(flint, problem, number, guess)
             for number, guess in enumerate(guesses)

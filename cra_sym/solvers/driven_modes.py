@@ -60,7 +60,7 @@ _LONGEST = 1e15  # s: beyond it not even a slow mode has a phase
 def checked(motion: Any, t: Any, derivative: Any, start: Any) -> tuple[np.ndarray, int]:
     """Return the times as one axis and the derivative, or raise an error that names what is not allowed."""
     instance("motion", motion, BaseMotion)
-    times = np.atleast_1d(one_axis("t", t, "times", low=0.0, high=_LONGEST))
+    times = np.atleast_1d(one_axis("t", t, "times", low=0.0, high=_LONGEST, unit="s"))
     check_start(start)
     return times, count("derivative", derivative, low=0, high=2)
 

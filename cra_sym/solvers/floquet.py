@@ -100,7 +100,7 @@ class Oscillators:
             steps = 0.6 * angle * (angle * 1e-6 / tolerance) ** 0.25  # the method is of fourth order
         if not (steps <= _MOST_STEPS).all():
             raise ValueError(
-                f"a period takes {steps.max():.2g} steps, more than {_MOST_STEPS:g}: the excitation is too slow "
+                f"a period takes {steps.max():.2g} steps, must be at most {_MOST_STEPS:g}: the excitation is too slow "
                 "against the fastest mode, or too strong"
             )
         return 2 * np.ceil(np.maximum(steps, 8) / 2).astype(np.int64)

@@ -28,6 +28,7 @@ __all__ = [
 ]
 
 Array = np.ndarray
+_LONG = 64  # samples from which the ways for long records gain something
 _CHUNK = 1 << 18  # elements of a temporary array
 
 
@@ -152,6 +153,10 @@ def piecewise_response(osc: Oscillators, cause: Piecewise, t: Array, derivative:
     q_k, u_k = knot_states(osc, cause)
     wide = _widened(osc, -1)
     shape = q_k.shape[:-2]
+    at = _knots_at(cause.knots, t)
+    if at is not None:
+        acceleration = np.expand_dims(pick(cause.acceleration, at, shape), -2)
+        return _outputs(osc, q_k[..., at], u_k[..., at], acceleration, derivative)
 
     def part(times: Array) -> Array:
         k = segment(cause.knots, times)
@@ -176,6 +181,8 @@ def knot_states(osc: Oscillators, cause: Piecewise) -> tuple[Array, Array]:
     wide = _widened(osc, -1)
     shift = _shift(wide, np.expand_dims(span, -2))
     shape = np.broadcast_shapes(osc.omega.shape, (*cause.acceleration.shape[:-1], 1), shift.p.shape[:-1])
+    if span.shape == (1,) and cause.knots.size > _LONG:
+        return _uniform_states(osc, cause, float(span[0]), shape)
     states = np.zeros((2, *shape, cause.knots.shape[-1]), shift.p.dtype)
     state = (states[0, ..., 0], states[1, ..., 0])
     for k in range(1, states.shape[-1]):
@@ -185,6 +192,62 @@ def knot_states(osc: Oscillators, cause: Piecewise) -> tuple[Array, Array]:
         state = _advance(osc, now, state, cause.acceleration[..., None, k - 1], cause.jerk[..., None, k - 1])
         states[0, ..., k], states[1, ..., k] = state
     return states[0], states[1]
+
+
+def _uniform_states(osc: Oscillators, cause: Piecewise, step: float, shape: tuple[int, ...]) -> tuple[Array, Array]:
+    """Return q and q' at every knot of a uniform record, from rest at the first.
+
+    The record is cut into blocks as long as there are blocks. All of them are followed at once from rest, then from
+    block to block, and what a block began with is added to it by an exact shift.
+    """
+    count = cause.knots.size - 1
+    length = int(np.ceil(np.sqrt(count)))
+    blocks = -(-count // length)
+
+    def cut(values: Array) -> Array:
+        """Bring values a knot (..., K) into the shape (length, ..., 1, blocks)."""
+        padded = np.zeros((*values.shape[:-1], blocks * length))
+        padded[..., :count] = values[..., :count]
+        return np.moveaxis(padded.reshape(*values.shape[:-1], 1, blocks, length), -1, 0).copy()
+
+    wide = _widened(osc, -1)
+    one = _shift(wide, step)
+    acceleration, jerk = cut(cause.acceleration), cut(cause.jerk)
+    q, u = np.zeros((2, length, *shape, blocks))
+    state = (np.zeros((*shape, blocks)), np.zeros((*shape, blocks)))
+    for k in range(length):
+        state = _advance(wide, one, state, acceleration[k], jerk[k])
+        q[k], u[k] = state
+    whole = _shift(osc, step * length)
+    start = np.zeros((2, *shape, blocks))
+    for block in range(1, blocks):
+        before = _advance(osc, whole, (start[0, ..., block - 1], start[1, ..., block - 1]), np.zeros(1))
+        start[0, ..., block], start[1, ..., block] = (
+            before[0] + q[-1, ..., block - 1],
+            before[1] + u[-1, ..., block - 1],
+        )
+    for k in range(length):
+        moved = _advance(wide, _shift(wide, step * (k + 1)), (start[0], start[1]), np.zeros(1))
+        q[k] += moved[0]
+        u[k] += moved[1]
+    states = np.zeros((2, *shape, count + 1))
+    for target, values in zip(states, (q, u), strict=True):
+        target[..., 1:] = np.moveaxis(values, 0, -1).reshape(*shape, blocks * length)[..., :count]
+    return states[0], states[1]
+
+
+def _knots_at(knots: Array, t: Array) -> Array | None:
+    """Return the knot that each time is, or None if one is none of them."""
+    if knots.ndim > 1 or t.size < _LONG or knots.size < 2:
+        return None
+    step = (knots[-1] - knots[0]) / (knots.size - 1)
+    at = np.rint((t - knots[0]) / step)
+    if not (at.min() >= 0 and at.max() < knots.size):
+        return None
+    found = at.astype(np.intp)
+    # closer than rounding of the times or 1e-9 of a step: the state moves by less than that share of what a step does
+    slack = 1e-9 * step + 4 * np.finfo(float).eps * np.abs(knots[-1])
+    return found if np.max(np.abs(t - knots[found])) <= slack else None
 
 
 def segment(knots: Array, t: Array) -> Array:

@@ -2,77 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 
-from ..checks import broadcastable, one_axis, real_array
-from .modal_response import pick, segment
+from ..checks import broadcastable, choice, equal, one_axis, real_array
+from ..si import paired
+from .motion_terms import Harmonic, Piecewise, Term
+from .moves import check_feasible, fastest, quotient
+from .records import KINDS, spline_motion, uniform_times
 
 __all__ = ["BaseMotion", "Force", "Harmonic", "Piecewise"]
 
+_RECORD = 32  # samples; fewer are the corners of a motion
 _FASTEST = 1e15  # rad/s, beyond which responses are not even finite
 
 Array = np.ndarray
-
-
-class Harmonic(NamedTuple):
-    """Disturbance ``amplitude * sin(angular_frequency * t + phase)``; the arrays, of one shape, are a batch."""
-
-    amplitude: Array
-    angular_frequency: Array
-    phase: Array
-
-    def kinematics(self, t: Array) -> tuple[Array, Array, Array]:
-        """Return displacement, velocity and acceleration at the times ``t``, which become the last axis."""
-        B, varpi, psi = (value[..., None] for value in self)
-        sine, cosine = np.sin(varpi * t + psi), np.cos(varpi * t + psi)
-        return B * sine, B * varpi * cosine, -B * varpi**2 * sine
-
-    @property
-    def duration(self) -> Array:
-        """Time after which the acceleration vanishes, s."""
-        return np.where(self.amplitude * self.angular_frequency == 0, 0.0, np.inf)
-
-
-class Piecewise(NamedTuple):
-    """Acceleration ``acceleration[k] + jerk[k] (t - knots[k])`` from knot k to the next, the last one for ever.
-
-    Shapes: ``velocity`` (...), ``acceleration`` and ``jerk`` (..., K), ``knots`` (K) or (..., K). Up to the first
-    knot the base keeps ``velocity``.
-    """
-
-    velocity: Array
-    knots: Array
-    acceleration: Array
-    jerk: Array
-
-    def kinematics(self, t: Array) -> tuple[Array, Array, Array]:
-        """Return displacement, velocity and acceleration at the times ``t``, which become the last axis."""
-        span, v_0 = np.diff(self.knots), self.velocity[..., None]
-        a, j = self.acceleration, self.jerk
-        v = np.cumsum(_after(v_0, (a[..., :-1] + j[..., :-1] * span / 2) * span), -1)
-        steps = (v[..., :-1] + (a[..., :-1] / 2 + j[..., :-1] * span / 6) * span) * span
-        w = np.cumsum(_after(v_0 * self.knots[..., :1], steps), -1)
-        k = segment(self.knots, t)
-        knot, w, v, a, j = (pick(values, k, w.shape[:-1]) for values in (self.knots, w, v, a, j))
-        tau = np.maximum(t - knot, 0.0)
-        moving, coast = np.where(k < 0, 0.0, 1.0), np.minimum(t - knot, 0.0)
-        return (
-            w + v_0 * coast + (v + (a / 2 + j * tau / 6) * tau) * tau,
-            v + (a + j * tau / 2) * tau,
-            (a + j * tau) * moving,
-        )
-
-    @property
-    def duration(self) -> Array:
-        """Time after which the acceleration vanishes, s."""
-        rests = (self.acceleration[..., -1] == 0) & (self.jerk[..., -1] == 0)
-        moves = np.any((self.acceleration != 0) | (self.jerk != 0), axis=-1)
-        return np.where(rests, np.where(moves, self.knots[..., -1], 0.0), np.inf)
-
-
-Term = Harmonic | Piecewise
 
 
 class BaseMotion:
@@ -105,6 +50,8 @@ class BaseMotion:
     """
 
     terms: tuple[Term, ...]
+    sample_step: float | None = None
+    """Time between the samples of a record, s; None of a motion that is no record, or one of fewer than 32 samples."""
 
     def __init__(
         self,
@@ -114,9 +61,18 @@ class BaseMotion:
         angular_frequency: Any = 0.0,
         phase: Any = 0.0,
     ) -> None:
-        v, a = real_array("velocity", velocity), real_array("acceleration", acceleration)
-        B, psi = real_array("amplitude", amplitude), real_array("phase", phase)
-        varpi = real_array("angular_frequency", angular_frequency, low=0.0, high=_FASTEST)
+        given = {
+            "velocity": velocity,
+            "acceleration": acceleration,
+            "amplitude": amplitude,
+            "angular_frequency": angular_frequency,
+            "phase": phase,
+        }
+        units = dict(zip(given, ("m/s", "m/s^2", "m", "rad/s", "rad"), strict=True))
+        v, a, B, varpi, psi = (
+            real_array(name, value, unit=units[name]) for name, value in paired(given, units).items()
+        )
+        varpi = real_array("angular_frequency", varpi, low=0.0, high=_FASTEST)
         broadcastable(velocity=v, acceleration=a, amplitude=B, angular_frequency=varpi, phase=psi)
         v, a = np.broadcast_arrays(v, a)
         terms: list[Term] = []
@@ -135,44 +91,67 @@ class BaseMotion:
     def _of(cls, terms: Any, shape: tuple[int, ...]) -> BaseMotion:
         return cls.__new__(cls)._set(terms, shape)
 
+    def _like(self, terms: Any, shape: tuple[int, ...]) -> BaseMotion:
+        made = self._of(terms, shape)
+        made.sample_step = self.sample_step
+        return made
+
     @classmethod
-    def sampled(cls, t: Any, acceleration: Any, velocity: Any = 0.0) -> BaseMotion:
-        """Return the motion of a sampled acceleration, linear between the samples and zero outside the record.
+    def sampled(
+        cls,
+        t: Any,
+        record: Any,
+        velocity: Any = 0.0,
+        *,
+        kind: Literal["acceleration", "velocity", "position"] = "acceleration",
+        sampling_rate: Any = None,
+    ) -> BaseMotion:
+        """Return the motion that a record of samples describes; outside the record the base does not accelerate.
 
         Parameters
         ----------
-        t : array_like, shape (T,)
-            Uniform increasing times from 0 or later, s; at least two.
-        acceleration : array_like, shape (..., T)
-            Samples, m/s2; leading axes are a batch.
+        t : array_like, shape (T,), or None
+            Uniform increasing times from 0 or later, s, to 1 % of a step; at least two. Numbers may be rounded or of
+            single precision, dates and time differences of NumPy are taken too. Dates, and times that begin after
+            1e8 s, are counted from the first sample.
+        record : array_like, shape (..., T)
+            Samples, m/s2, m/s or m; leading axes are a batch.
         velocity : float or ndarray
-            Velocity at t = 0, m/s.
+            Velocity at t = 0, m/s, of a record of acceleration; the others have their own, that of the first sample.
+        kind : {'acceleration', 'velocity', 'position'}
+            What was sampled: acceleration and velocity are linear between the samples, position is a cubic spline
+            (of at least four samples), which is measured from the first sample.
+        sampling_rate : float, optional
+            Samples per second, Hz, where ``t`` is None: the first sample is at t = 0.
 
         Raises
         ------
         TypeError, ValueError
-            If an argument does not hold finite real numbers, the times are not sorted, not uniform or negative, or the
-            shapes do not fit.
+            If an argument does not hold finite real numbers, the times are not sorted, have gaps, are uneven or
+            negative (the sample is named), or the shapes do not fit.
+
+        Examples
+        --------
+        >>> motion = BaseMotion.sampled(None, [0.0, 0.1, 0.2, 0.2], kind="velocity", sampling_rate=10.0)
+        >>> print(motion.velocity([0.05, 0.3, 9.0]))
+        [0.05 0.2  0.2 ]
         """
-        times, a = real_array("t", t, low=0.0), real_array("acceleration", acceleration)
-        v = real_array("velocity", velocity)
-        if times.ndim != 1 or times.size < 2:
-            raise ValueError(f"t has shape {times.shape}: must be one axis of at least two sample times")
-        if a.ndim == 0 or a.shape[-1] != times.size:
-            raise ValueError(f"acceleration has shape {a.shape}: its last axis must have the {times.size} sample times")
-        span = np.diff(times)
-        if not np.all(span > 0):
-            at = int(np.argmin(span > 0))
-            raise ValueError(f"t[{at + 1}] = {times[at + 1]:g} after {times[at]:g}: sample times must increase")
-        step = (times[-1] - times[0]) / span.size
-        off = np.abs(times - (times[0] + step * np.arange(times.size)))
-        if np.any(off > 1e-6 * step):
-            at = int(np.argmax(off))
-            raise ValueError(f"t[{at}] = {times[at]:g}: sample times must be uniform, {step:g} s apart")
-        shape = broadcastable(acceleration=a[..., 0], velocity=v)
-        slope = np.concatenate([np.diff(a) / span, np.zeros_like(a[..., :1])], -1)
-        level = np.concatenate([a[..., :-1], np.zeros_like(a[..., :1])], -1)
-        return cls._of([Piecewise(v, times, level, slope)], shape)
+        choice("kind", kind, KINDS)
+        units = {"acceleration": "m/s^2", "velocity": "m/s", "position": "m"}
+        samples = real_array(kind, record, unit=units[kind])
+        if samples.ndim == 0:
+            raise ValueError(f"{kind} has shape (): its last axis must have the sample times")
+        v = real_array("velocity", velocity, unit="m/s")
+        if kind != "acceleration" and v.any():
+            raise ValueError(f"velocity: must be left out with kind = {kind!r}, which has its own")
+        times = uniform_times(t, sampling_rate, samples.shape[-1], kind)
+        if kind == "position" and times.size < 4:
+            raise ValueError(f"position has {times.size} samples: must be at least four")
+        shape = broadcastable(**{kind: samples[..., 0], "velocity": v})
+        own, level, slope = spline_motion(times, samples, kind)
+        motion = cls._of([Piecewise(v + own, times, level, slope)], shape)
+        motion.sample_step = float((times[-1] - times[0]) / (times.size - 1)) if times.size >= _RECORD else None
+        return motion
 
     @classmethod
     def trapezoid(cls, distance: Any, v_max: Any, a_max: Any, duration: Any = None) -> BaseMotion:
@@ -214,25 +193,25 @@ class BaseMotion:
             As :meth:`trapezoid`.
         """
         limit: dict[str, Any] = {"low": 0.0, "open_low": True}
-        d, a_max = real_array("distance", distance), real_array("a_max", a_max, **limit)
-        v_max = real_array("v_max", v_max, allow_infinite=True, **limit)
-        j_max = real_array("j_max", j_max, allow_infinite=True, **limit)
-        wanted = None if duration is None else real_array("duration", duration, **limit)
+        d, a_max = real_array("distance", distance, unit="m"), real_array("a_max", a_max, unit="m/s^2", **limit)
+        v_max = real_array("v_max", v_max, unit="m/s", allow_infinite=True, **limit)
+        j_max = real_array("j_max", j_max, unit="m/s^3", allow_infinite=True, **limit)
+        wanted = None if duration is None else real_array("duration", duration, unit="s", **limit)
         shapes = {"distance": d, "v_max": v_max, "a_max": a_max, "j_max": j_max}
         shape = broadcastable(**shapes, **({} if wanted is None else {"duration": wanted}))
-        t_j, t_a, t_v = (np.broadcast_to(value, shape) for value in _fastest(np.abs(d), v_max, a_max, j_max))
+        t_j, t_a, t_v = (np.broadcast_to(value, shape) for value in fastest(np.abs(d), v_max, a_max, j_max))
         least = 2 * (2 * t_j + t_a) + t_v
         if not np.isfinite(least).all():
-            raise ValueError("v_max, a_max, j_max: the move never ends; limits must not be next to nothing")
-        peak = _quotient(d, (t_j + t_a) * (2 * t_j + t_a + t_v))
+            raise ValueError("v_max, a_max, j_max: the move never ends; must not be next to nothing")
+        peak = quotient(d, (t_j + t_a) * (2 * t_j + t_a + t_v))
         if wanted is not None:
-            _feasible(wanted, least, {"v_max": t_v > 0, "a_max": (t_a > 0) | np.isinf(j_max), "j_max": t_j > 0})
+            check_feasible(wanted, least, {"v_max": t_v > 0, "a_max": (t_a > 0) | np.isinf(j_max), "j_max": t_j > 0})
             stretch = np.where(least > 0, wanted / np.where(least > 0, least, 1.0), 1.0)
             t_j, t_a, t_v, peak = t_j * stretch, t_a * stretch, t_v * stretch, peak / stretch**2
         spans = np.stack([t_j, t_a, t_j, t_v, t_j, t_a, t_j], -1)
         knots = np.concatenate([np.zeros((*shape, 1)), np.cumsum(spans, -1)], -1)
         level = peak[..., None] * np.array([0, 1, 1, 0, 0, -1, -1, 0])
-        jerk = _quotient(peak, t_j)[..., None] * np.array([1, 0, -1, 0, -1, 0, 1, 0])
+        jerk = quotient(peak, t_j)[..., None] * np.array([1, 0, -1, 0, -1, 0, 1, 0])
         return cls._of([Piecewise(np.zeros(shape), knots, level, jerk)], shape)
 
     def shaped(self, amplitudes: Any, times: Any) -> BaseMotion:
@@ -249,9 +228,9 @@ class BaseMotion:
             If the motion holds a harmonic or does not start from rest, an argument is out of its range, or the shapes
             do not fit.
         """
-        A, delays = real_array("amplitudes", amplitudes), real_array("times", times, low=0.0)
+        A, delays = real_array("amplitudes", amplitudes, unit="1"), real_array("times", times, low=0.0, unit="s")
         if A.ndim == 0 or A.shape[-1:] != delays.shape[-1:]:
-            raise ValueError(f"amplitudes {A.shape} and times {delays.shape}: each impulse must have one time")
+            raise ValueError(f"amplitudes {A.shape} and times {delays.shape}: must be one time for each impulse")
         if not all(isinstance(term, Piecewise) and not np.any(term.velocity) for term in self.terms):
             raise ValueError("only a motion that starts from rest and has no harmonic can be shaped")
         shape = broadcastable(motion=np.empty(self.shape), amplitudes=A[..., 0], times=delays[..., 0])
@@ -265,14 +244,17 @@ class BaseMotion:
                         term.velocity, term.knots + delays[..., i, None], term.acceleration * scale, term.jerk * scale
                     )
                 )
-        return self._of(copies, shape)
+        return self._like(copies, shape)
 
     def __add__(self, other: Any) -> BaseMotion:
         """Superpose two motions; batches broadcast."""
         if not isinstance(other, BaseMotion):
             return NotImplemented
         shape = broadcastable(left=np.empty(self.shape), right=np.empty(other.shape))
-        return self._of(self.terms + other.terms, shape)
+        total = self._of(self.terms + other.terms, shape)
+        steps = [motion.sample_step for motion in (self, other) if motion.sample_step is not None]
+        total.sample_step = max(steps, default=None)
+        return total
 
     def __mul__(self, factor: Any) -> BaseMotion:
         """Scale the motion by real factors; an array is a batch."""
@@ -285,7 +267,7 @@ class BaseMotion:
             else:
                 v, k = scale[..., None], term.knots
                 terms.append(Piecewise(term.velocity * scale, k, term.acceleration * v, term.jerk * v))
-        return self._of(terms, shape)
+        return self._like(terms, shape)
 
     __rmul__ = __mul__
 
@@ -298,7 +280,7 @@ class BaseMotion:
         TypeError, ValueError
             If ``t`` holds no real numbers, a negative one, or has more than one axis.
         """
-        times = one_axis("t", t, "times", low=0.0)
+        times = one_axis("t", t, "times", low=0.0, unit="s")
         total = [np.zeros((*self.shape, times.size)) for _ in range(3)]
         for term in self.terms:
             for i, part in enumerate(term.kinematics(np.atleast_1d(times))):
@@ -325,6 +307,21 @@ class BaseMotion:
         for term in self.terms:
             longest = np.maximum(longest, term.duration)
         return longest if longest.ndim else float(longest)
+
+    def __getitem__(self, index: Any) -> BaseMotion:
+        """Return one of a batch, or some."""
+        if not self.shape:
+            raise IndexError("a single motion has no batch axis")
+        terms = [term.picked(self.shape, index) for term in self.terms]
+        return self._like(terms, np.empty(self.shape)[index].shape)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, BaseMotion):
+            return NotImplemented
+        return self.shape == other.shape and equal(self.terms, other.terms)
+
+    def __hash__(self) -> int:
+        return hash((self.shape, tuple(type(term) for term in self.terms)))
 
     def __repr__(self) -> str:
         kinds = ", ".join(type(term).__name__.lower() for term in self.terms) or "at rest"
@@ -361,8 +358,8 @@ class Force:
 
     def __init__(self, level: Any = 0.0, amplitude: Any = 0.0, angular_frequency: Any = 0.0, phase: Any = 0.0) -> None:
         constant, size = real_array("level", level), real_array("amplitude", amplitude)
-        varpi = real_array("angular_frequency", angular_frequency, low=0.0, high=_FASTEST)
-        psi = real_array("phase", phase)
+        varpi = real_array("angular_frequency", angular_frequency, low=0.0, high=_FASTEST, unit="rad/s")
+        psi = real_array("phase", phase, unit="rad")
         broadcastable(level=constant, amplitude=size, angular_frequency=varpi, phase=psi)
         constant = constant + np.where(varpi == 0.0, size * np.sin(psi), 0.0)
         with np.errstate(all="ignore"):
@@ -373,8 +370,10 @@ class Force:
         self.profile = BaseMotion(acceleration=constant, amplitude=size, angular_frequency=varpi, phase=psi)
 
     @classmethod
-    def sampled(cls, t: Any, force: Any) -> Force:
+    def sampled(cls, t: Any, force: Any, *, sampling_rate: Any = None) -> Force:
         """Return a sampled force, linear between uniform times and zero outside the record; shape (..., T).
+
+        Times or a sampling rate as :meth:`BaseMotion.sampled` takes them.
 
         Raises
         ------
@@ -382,7 +381,7 @@ class Force:
             As :meth:`BaseMotion.sampled`.
         """
         history = cls()
-        history.profile = BaseMotion.sampled(t, real_array("force", force))
+        history.profile = BaseMotion.sampled(t, real_array("force", force), sampling_rate=sampling_rate)
         return history
 
     def __call__(self, t: Any) -> Any:
@@ -403,37 +402,22 @@ class Force:
         total.profile = self.profile + other.profile
         return total
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Batch shape."""
+        return self.profile.shape
+
+    def __getitem__(self, index: Any) -> Force:
+        """Return one of a batch, or some."""
+        chosen = Force()
+        chosen.profile = self.profile[index]
+        return chosen
+
+    def __eq__(self, other: object) -> bool:
+        return self.profile == other.profile if isinstance(other, Force) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash((Force, self.profile))
+
     def __repr__(self) -> str:
         return f"<Force of shape {self.profile.shape}>"
-
-
-def _after(first: Array, rest: Array) -> Array:
-    shape = np.broadcast_shapes(first.shape[:-1], rest.shape[:-1])
-    return np.concatenate([np.broadcast_to(first, (*shape, 1)), np.broadcast_to(rest, (*shape, rest.shape[-1]))], -1)
-
-
-def _quotient(above: Array, below: Array) -> Array:
-    """Return above / below, 0 where below is 0."""
-    return np.where(below > 0, above / np.where(below > 0, below, 1.0), 0.0)
-
-
-def _fastest(d: Array, v: Array, a: Array, j: Array) -> tuple[Array, Array, Array]:
-    """Return the times of a jerk phase, of constant acceleration and of constant velocity in the fastest move."""
-    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        ramp = a / j
-        full = np.where(np.isinf(v), np.inf, np.maximum(v / a, np.sqrt(v / j)))  # t_j + t_a at full speed
-        cruises = d > v * (full + np.minimum(ramp, np.sqrt(v / j)))
-        t_j = np.where(cruises, np.minimum(ramp, np.sqrt(v / j)), np.minimum(ramp, np.cbrt(d / (2 * j))))
-        short = np.sqrt(ramp**2 / 4 + d / a) - ramp / 2  # t_j + t_a of a move that never reaches full speed
-        t_a = np.maximum(np.where(cruises, full, short) - t_j, 0.0)
-        t_v = np.where(cruises, d / v - (full + t_j), 0.0)
-    return t_j, np.where(t_j < ramp, 0.0, t_a), t_v
-
-
-def _feasible(wanted: Array, least: Array, reached: dict[str, Array]) -> None:
-    short = np.broadcast_to(wanted < least * (1 - 1e-12), least.shape)
-    if short.any():
-        at = np.unravel_index(int(np.argmax(short)), short.shape)
-        limits = " and ".join(name for name, hit in reached.items() if np.broadcast_to(hit, least.shape)[at])
-        time = np.broadcast_to(wanted, least.shape)[at]
-        raise ValueError(f"duration = {time:g}: the move takes at least {least[at]:g} s within its limit {limits}")

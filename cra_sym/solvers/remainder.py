@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ def nodes(limit: Array) -> Array:
     return limit[:, None] * (0.5 * (_FARTHEST + _NEAREST) + 0.5 * (_NEAREST - _FARTHEST) * angles)
 
 
-def remainder(values: Array, squares: Array, residues: Array, limit: Array) -> Callable[[NDArray[np.generic]], Array]:
+def remainder(values: Array, squares: Array, residues: Array, limit: Array) -> Callable[[NDArray[Any]], Array]:
     """Return the part of a receptance that the first modes leave, as a function of z for small z.
 
     Parameters
@@ -47,8 +48,8 @@ def remainder(values: Array, squares: Array, residues: Array, limit: Array) -> C
     """
     coefficients, centre, half = _coefficients(values, squares, residues, limit)
 
-    def at(z: NDArray[np.generic]) -> Array:
-        place = (z / limit[:, None] - centre) / half
+    def at(z: NDArray[Any]) -> Array:
+        place = (np.asarray(z) / limit[:, None] - centre) / half
         basis = np.moveaxis(np.polynomial.chebyshev.chebvander(place, _NUMBER - 1), -1, 1)
         return np.asarray(np.einsum("rnp,rn...->rp...", basis, coefficients))
 

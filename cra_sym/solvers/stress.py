@@ -170,7 +170,8 @@ class Columns:
         local = self.grid.local
         values = np.moveaxis(np.polynomial.legendre.legvander(local, self.mesh.degree), -1, 1)
         inside = self.mesh.owner == np.arange(self.elastic[1])[:, None]
-        return values[:, :, None] * inside[:, :, None]
+        found: Array = values[:, :, None] * inside[:, :, None]
+        return found
 
     @cached_property
     def compliance(self) -> Entries:
@@ -215,7 +216,7 @@ class Columns:
 
     @cached_property
     def displaced(self) -> tuple[list[Array], list[Array]]:
-        """Displacements s = (q, w) of each unknown at the points, (sets or 1, size, Q, G), and at the ends of pieces."""
+        """Displacements s = (q, w) of each unknown at the points, (sets or 1, size, Q, G), and at ends of pieces."""
         n, m = self.problem.displacements, self.problem.lumped
         one = np.zeros((1, self.size, 1, 1))
         values: list[Array | None] = [None] * (n + m)
@@ -245,11 +246,12 @@ class Columns:
             return values[place + 1]
         field = tops.index(place)
         coupled = {j: entry for (i, j), entry in self.coefficient["B"].items() if i == field}
-        if any(values[j] is None for j in coupled):
-            return None
         rate = self.strain[field]
         for j, entry in coupled.items():
-            rate = rate - entry[:, None] * values[j]
+            moved = values[j]
+            if moved is None:
+                return None
+            rate = rate - entry[:, None] * moved
         return rate
 
     def _integral(self, rate: Array, start: Array) -> tuple[Array, Array]:
@@ -346,6 +348,7 @@ class Columns:
         """Return the integrals of a coefficient times two functions of every pair of unknowns."""
         first, second = (self._flat(side) for side in (first, second))
         weighted = first * (entry.reshape(len(entry), -1) * self.weights)[:, None]
+        product: Array
         if len(second) == 1:
             product = (weighted.reshape(-1, weighted.shape[-1]) @ second[0].T).reshape(*weighted.shape[:2], -1)
         else:

@@ -157,7 +157,8 @@ def places(reference: Array, edges: Array) -> Array:
     span = np.minimum(reference.astype(int), edges.shape[1] - 2)
     share = reference - span
     left, right = edges[:, span], edges[:, span + 1]
-    return np.where(share < 0.5, left + share * (right - left), right - (1.0 - share) * (right - left))
+    found: Array = np.where(share < 0.5, left + share * (right - left), right - (1.0 - share) * (right - left))
+    return found
 
 
 def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[Array, Array, int]:
@@ -184,7 +185,8 @@ def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[A
     places between the points. One that holds a jump is halved until it does not matter.
     """
     gauss = rule(NODES)
-    off = np.linspace(-0.987, 0.983, 37)
+    near = 1.0 - 10.0 ** -np.arange(2.0, 8.0)  # narrow detail lies at breakpoints
+    off = np.concatenate([-near, np.linspace(-0.987, 0.983, 37), near])
     table = np.polynomial.legendre.legvander(off, NODES - 1) @ gauss.spectrum
     total = peak = np.zeros(0)
     unresolved, degree = np.zeros(len(edges)), 0
@@ -206,7 +208,10 @@ def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[A
             total = (np.abs(known) @ gauss.weights * half).sum(axis=-1, keepdims=True)
         series = np.abs(known @ gauss.spectrum.T)
         error = np.maximum(series[..., -2:].sum(axis=-1), np.abs(known @ table.T - beyond).max(axis=-1))
-        smooth = error <= TAIL * size + ROUNDING * peak
+        # x itself is rounded: over a piece a coefficient has no more digits than its steepness leaves
+        steep = 2.0 * ROUNDING * np.abs(ends).max(axis=-1) / (2.0 * half) * np.ptp(values, axis=-1)
+        allowed = TAIL * size + ROUNDING * peak + steep
+        smooth = error <= allowed
         mass = size * half
         speck = mass <= SPECK * total
         total = np.maximum(total, mass.max(axis=-1, keepdims=True))
@@ -216,7 +221,7 @@ def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[A
         good |= narrow
         unresolved += share[:, :, good].max(axis=0).sum(axis=1)
         done.append(todo[good])
-        large = (series[:, :, good] > (TAIL * size + ROUNDING * peak)[:, :, good, None]).any(axis=(0, 1, 2))
+        large = (series[:, :, good] > allowed[:, :, good, None]).any(axis=(0, 1, 2))
         degree = max(degree, int(np.max(np.nonzero(large)[0], initial=0)))
         todo = todo[~good]
         if sum(map(len, done)) + 2 * len(todo) > most:

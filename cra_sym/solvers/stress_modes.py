@@ -53,7 +53,11 @@ class ModeFields:
     @cached_property
     def ends(self) -> Array:
         """(q(left), w, q(right)), (sets, modes, 2 n + m)."""
-        return self.vectors @ self.columns.ends.swapaxes(-1, -2)
+        found = self.vectors @ self.columns.ends.swapaxes(-1, -2)
+        held = np.isinf(self.problem.springs).any(axis=0)
+        for row in np.moveaxis(self.problem.directions[:, held], 1, 0):  # what is held does not move, not even a little
+            found = found - (found @ row[..., None]) * (row / (row**2).sum(axis=-1, keepdims=True))[:, None]
+        return found
 
     def nodes(self, place: int) -> Array:
         """Return a displacement at the ends of the pieces, (sets, modes, Q + 1)."""

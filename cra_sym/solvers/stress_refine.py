@@ -1,4 +1,4 @@
-"""From a continuum to modes of stated accuracy: quadrature mesh, then elements and degrees until the estimate says so."""
+"""From a continuum to modes of stated accuracy: a quadrature mesh, then elements and degrees, led by the estimate."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def _group(
 
 
 def _quadrature(problem: Continuum, elements: Array, strained: NDArray[np.bool_]) -> tuple[Array, Array, int]:
-    """Return the pieces of the quadrature: the compliance is resolved, or the stiffness where the strain is expanded."""
+    """Return the pieces of the quadrature: the compliance is resolved, the stiffness where the strain is expanded."""
     whole = np.union1d(elements, np.arange(problem.edges.shape[1]))
     parts, unresolved, smoothness = [], np.zeros(len(problem.edges)), 0
     for kind in np.unique(strained):

@@ -144,7 +144,8 @@ class _Problem:
             raise ValueError("values: a static deflection has negative kinetic energy; masses must be at least 0")
         if (size[:, 0] < 1e-14 * size[:, -1]).any():
             raise ValueError("values: a rigid-body motion has no kinetic energy")
-        return (frame.swapaxes(-1, -2) / np.sqrt(size)[..., None]) @ full
+        orthonormal: Array = (frame.swapaxes(-1, -2) / np.sqrt(size)[..., None]) @ full
+        return orthonormal
 
     # ------------------------------------------------------------------------------------------ the factors
 
@@ -221,7 +222,8 @@ class _Problem:
         total = total + np.einsum("sr,sri,srj->sij", finite, self.rows, self.rows)
         diagonal = np.abs(np.einsum("sii->si", total))
         scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-        return total * scale[:, :, None] * scale[:, None, :]
+        scaled: Array = total * scale[:, :, None] * scale[:, None, :]
+        return scaled
 
     def _springs(self, projected: Array, taken: Array) -> Array | None:
         """Return S with S' (I + sum (k - taken) n n') S = I, one spring after the other, or None if it is I."""

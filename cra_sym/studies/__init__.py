@@ -1,4 +1,4 @@
-"""Labelled parameter studies: a quantity of the arm over its parameters, in memory, lazily, or into a store."""
+"""Labelled parameter studies: a quantity of a system over its parameters, in memory, lazily, or into a store."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from cra_sym import checks
-from cra_sym.arm.parameters import Arm
 from cra_sym.extras import require
 from cra_sym.files import path_of
+from cra_sym.model.system import System
 from cra_sym.studies.quantities import QUANTITIES, Quantity
 from cra_sym.studies.study import make_study
 
@@ -19,7 +19,7 @@ _CHUNKS = 64
 
 
 def sweep(
-    arm: Arm,
+    system: System,
     quantity: str | Callable[..., Any] = "natural_frequencies",
     *,
     chunks: int | None = None,
@@ -31,21 +31,24 @@ def sweep(
 
     Parameters
     ----------
-    arm : Arm
-        Holds every parameter that is not swept; its fields are numbers.
+    system : System
+        An :class:`cra_sym.Arm` or any other: it holds every parameter that is not swept; its values are numbers.
     quantity : str or callable
-        A key of `QUANTITIES`, or ``f(arm, **options)`` that broadcasts over ``arm.shape`` and may add axes at the end.
+        A key of `QUANTITIES`, or ``f(system, **options)`` that broadcasts over ``system.shape`` and may add axes at the
+        end: of real or complex numbers, or truth values.
     chunks : int, optional
         Longest piece of each axis. Given, the dataset is lazy (Dask); with ``store`` it sizes the regions, 64 if left.
     store : path, optional
-        A Zarr directory, written region by region while the sweep runs. A sweep that was stopped goes on where it was:
-        a region is in the store as a whole or not at all, and what is there is not computed again.
+        A local Zarr directory (format 2), written region by region while the sweep runs. A sweep that was stopped goes
+        on where it was: a region is in the store as a whole or not at all, and what is there is not computed again.
     client : dask.distributed.Client, optional
         Where the regions of a store are computed; its workers write them, so the store must be in their reach.
     **parameters
-        Fields of `Arm`: a one-dimensional array is an axis, a number replaces the arm's. Anything else is an option of
-        the quantity (``modes``, ``motion``, ``excitation``, ...); options that broadcast with the arm (``epsilon``,
-        ``angular_frequency``) may be axes too.
+        Parameters of the system and ``zeta``: a one-dimensional array is an axis, a number replaces the system's. A
+        labelled array (xarray) lies along its dimensions, which it may share with others: these are then paired.
+        Anything else is an option of the quantity (``modes``, ``motion``, ``excitation``, ...); options that broadcast
+        with the system (``epsilon``, ``angular_frequency``) may be axes too, and a motion, force or excitation that is
+        a batch is one.
 
     Returns
     -------
@@ -57,11 +60,13 @@ def sweep(
     MissingExtraError
         If xarray, or Dask or Zarr where they are asked for, is not installed (extra ``scale``).
     TypeError, ValueError
-        If a parameter is unknown or out of range, an axis is not one-dimensional, or the store holds another sweep.
+        If a parameter is unknown or out of range, an axis is not one-dimensional, or the store holds another sweep or
+        is not a local path; the error says which.
 
     Examples
     --------
     >>> import numpy as np
+    >>> from cra_sym import Arm
     >>> study = sweep(Arm.nominal(), "natural_frequencies", k_t=[1e3, 1e4, np.inf], m_e=[0.0, 0.005], modes=2)
     >>> dict(study.sizes)
     {'k_t': 3, 'm_e': 2, 'mode': 2}
@@ -69,13 +74,15 @@ def sweep(
     'Hz'
     """
     require("xarray", "scale")
-    study = make_study(arm, quantity, parameters)
+    study = make_study(system, quantity, parameters)
     if chunks is not None:
         checks.count("chunks", chunks, high=10**9)
     if store is not None:
         from cra_sym.studies.store import sweep_into
 
+        if isinstance(store, str) and "://" in store:
+            raise ValueError(f"store = {store!r}: must be a local path; write there and copy the folder")
         return sweep_into(study, path_of("store", store), chunks or _CHUNKS, client)
     if client is not None:
-        raise ValueError("client: allowed with a store only, whose regions it computes")
+        raise ValueError("client: must be given together with a store, whose regions it computes")
     return study.dataset(study.evaluate() if chunks is None else study.lazy(chunks))

@@ -3,36 +3,34 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 import cra_sym as cra
-from cra_sym.arm.parameters import Arm
 from cra_sym.checks import choice
+from cra_sym.model.system import System
 
-__all__ = ["ARM_FIELDS", "QUANTITIES", "Quantity", "named_quantity"]
-
-ARM_FIELDS = tuple(entry.name for entry in fields(Arm))
+__all__ = ["QUANTITIES", "Quantity", "named_quantity"]
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """Something of an arm that can be swept.
+    """Something of a system that can be swept.
 
     Attributes
     ----------
     name, unit, meaning : str
         Name and attributes of the variable.
     function : callable
-        ``function(arm, **options)``, an array of shape ``(*arm.shape, *dims)``.
+        ``function(system, **options)``, an array of shape ``(*system.shape, *dims)``.
     dims : tuple of str
         Names of the axes the function adds; ``'mode'`` counts from 1.
     axes : mapping of str to str
-        Options that broadcast with the arm and may therefore be axes too, with their units.
+        Options that broadcast with the system and may therefore be axes too, with their units.
     """
 
     name: str
@@ -42,49 +40,49 @@ class Quantity:
     dims: tuple[str, ...] = ()
     axes: Mapping[str, str] = field(default_factory=dict)
 
-    def check_options(self, given: list[str]) -> None:
+    def check_options(self, given: Sequence[str], parameters: Sequence[str]) -> None:
         """Raise a TypeError that names an option the function does not take, or one that it needs."""
         try:
-            parameters = list(inspect.signature(self.function).parameters.values())[1:]
+            entries = list(inspect.signature(self.function).parameters.values())[1:]
         except ValueError:  # a built-in function that does not say
             return
-        if any(p.kind is p.VAR_KEYWORD for p in parameters):
+        if any(p.kind is p.VAR_KEYWORD for p in entries):
             return
-        allowed = [p.name for p in parameters]
+        known = [p.name for p in entries]
         for key in given:
-            if key not in allowed:
-                names = ", ".join([*ARM_FIELDS, *allowed])
+            if key not in known:
+                names = ", ".join([*parameters, *known])
                 raise TypeError(f"{key!r} is not a parameter of {self.name}: must be one of {names}")
-        for p in parameters:
+        for p in entries:
             if p.default is p.empty and p.name not in given:
                 raise TypeError(f"{self.name} needs the option {p.name}")
 
 
-def _natural_frequencies(arm: Arm, *, modes: int = 3) -> Any:
-    return cra.natural_frequencies(arm, modes=modes)
+def _natural_frequencies(system: System, *, modes: int = 3) -> Any:
+    return cra.natural_frequencies(system, modes=modes)
 
 
-def _sensitivity(name: str, arm: Arm, *, modes: int = 3) -> Any:
-    return getattr(cra.sensitivities(arm, modes=modes), name)
+def _sensitivity(name: str, system: System, *, modes: int = 3) -> Any:
+    return getattr(cra.sensitivities(system, modes=modes), name)
 
 
-def _peak_response(arm: Arm, *, motion: Any, t: Any, modes: int = 5) -> Any:
-    return np.max(np.abs(cra.tip_response(arm, motion, t, modes=modes)), axis=-1)
+def _peak_response(system: System, *, motion: Any, t: Any, modes: int = 5) -> Any:
+    return np.max(np.abs(cra.tip_response(system, motion, t, modes=modes)), axis=-1)
 
 
-def _residual_vibration(arm: Arm, *, motion: Any, modes: int = 5) -> Any:
-    return cra.residual_vibration(arm, motion, modes=modes)
+def _residual_vibration(system: System, *, motion: Any, modes: int = 5) -> Any:
+    return cra.residual_vibration(system, motion, modes=modes)
 
 
 def _boundary_width(
-    arm: Arm, *, excitation: Any, epsilon: Any, resonance: tuple[int, int], order: int = 1, modes: int = 3
+    system: System, *, excitation: Any, epsilon: Any, resonance: tuple[int, int], order: int = 1, modes: int = 3
 ) -> Any:
-    lower, upper = cra.stability_boundary(arm, excitation, epsilon, resonance=resonance, order=order, modes=modes)
+    lower, upper = cra.stability_boundary(system, excitation, epsilon, resonance=resonance, order=order, modes=modes)
     return upper - lower
 
 
-def _growth_rate(arm: Arm, *, excitation: Any, angular_frequency: Any, epsilon: Any, modes: int = 3) -> Any:
-    return cra.growth_rate(arm, excitation, angular_frequency, epsilon, modes=modes)
+def _growth_rate(system: System, *, excitation: Any, angular_frequency: Any, epsilon: Any, modes: int = 3) -> Any:
+    return cra.growth_rate(system, excitation, angular_frequency, epsilon, modes=modes)
 
 
 _FREQUENCIES = "of the natural frequencies"
@@ -122,7 +120,7 @@ QUANTITIES: Mapping[str, Quantity] = {
 
 
 def named_quantity(quantity: str | Callable[..., Any]) -> Quantity:
-    """Return an entry of `QUANTITIES`, or a function of an arm as a quantity."""
+    """Return an entry of `QUANTITIES`, or a function of a system as a quantity."""
     if callable(quantity):
         name = getattr(quantity, "__name__", type(quantity).__name__)
         return Quantity(name, quantity, "", (inspect.getdoc(quantity) or name).splitlines()[0])

@@ -8,6 +8,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from tqdm import tqdm
 
 from cra_sym.extras import require
@@ -16,7 +17,7 @@ from cra_sym.studies.study import Study
 
 __all__ = ["sweep_into"]
 
-_DIGEST = "cra_sym.studies"
+_DESCRIBED = "cra_sym.studies"
 Region = tuple[slice, ...]
 
 
@@ -39,67 +40,109 @@ def sweep_into(study: Study, path: Path, chunks: int, client: Any = None) -> Any
     Raises
     ------
     ValueError
-        If the store holds something else than this sweep.
+        If the store holds something else than this sweep; it says what differs.
     OutputError
         If it cannot be written; what is there is whole, and a later sweep goes on from it.
     """
     xarray = require("xarray", "scale")
-    zarr = require("zarr", "scale")
+    require("zarr", "scale")
     if not os.path.exists(path):
         _make(study, path, chunks)
-    stored = _opened(zarr, study, path)
+    stored = _opened(study, path)
     missing = [region for region in _regions(study.shape, stored.chunks) if not _is_there(stored, path, region)]
     progress = tqdm(total=len(missing), desc=study.quantity.name, disable=None if missing else True)
     with progress, writing(path, path):
         for _ in _written(study, path, missing, client):
             progress.update()
-    return xarray.open_zarr(path, consolidated=False)
+    return xarray.open_zarr(path, consolidated=True)
 
 
 def _make(study: Study, path: Path, chunks: int) -> None:
     """Write coordinates, attributes and the empty variable, under a temporary name until all is there."""
-    require("dask.array", "scale")
-    dataset = study.dataset(study.lazy(chunks)).assign_attrs({_DIGEST: study.digest()})
-    encoding = {study.quantity.name: {"chunks": _chunk_shape(study, chunks), "write_empty_chunks": True}}
+    xarray, zarr = require("xarray", "scale"), require("zarr", "scale")
+    attributes = study.attributes() | {_DESCRIBED: study.described()}
+    labels = xarray.Dataset({}, study.coordinates(), attributes)
     try:
         with draft(path) as place:
-            dataset.to_zarr(place, mode="w", compute=False, consolidated=False, encoding=encoding)
+            labels.to_zarr(place, mode="w", consolidated=False, zarr_format=2)
+            group = zarr.open_group(place, mode="r+", zarr_format=2)
+            group.create_array(
+                study.quantity.name,
+                shape=(*study.shape, *study.added.values()),
+                chunks=_chunk_shape(study, chunks),
+                dtype=study.dtype,
+                fill_value=np.nan if study.dtype.kind == "f" else None,  # what is missing yet
+                attributes={"_ARRAY_DIMENSIONS": [*study.dims, *study.added], **study.variable_attributes()},
+            )
+            zarr.consolidate_metadata(place, zarr_format=2)
     except OutputError:
         if not os.path.exists(path):  # else another process has made it meanwhile
             raise
 
 
 def _chunk_shape(study: Study, chunks: int) -> tuple[int, ...]:
-    return (*(min(chunks, length) for length in study.shape), *study.added.values())
+    return (*(min(chunks, length) for length in study.shape), *(max(1, length) for length in study.added.values()))
 
 
-def _opened(zarr: Any, study: Study, path: Path) -> Any:
+def _opened(study: Study, path: Path) -> Any:
+    """Return the variable of a store that holds this sweep."""
+    zarr = require("zarr", "scale")
     try:
-        group = zarr.open_group(path, mode="r")
-        same = group.attrs.get(_DIGEST) == study.digest()
+        group = zarr.open_group(path, mode="r", zarr_format=2)
+        there = dict(group.attrs).get(_DESCRIBED)
     except (OSError, ValueError, KeyError):
-        same = False
-    if not same:
-        raise ValueError(f"store = {str(path)!r}: holds something else; must be a new path or the same sweep")
-    return group[study.quantity.name]
+        there = None
+    if not isinstance(there, dict):
+        raise ValueError(
+            f"store = {str(path)!r}: holds something else than a sweep of this version; must be a new path"
+        )
+    differences = _differences(there, study.described())
+    if differences:
+        raise ValueError(
+            f"store = {str(path)!r}: holds another sweep ({'; '.join(differences)}); must be a new path or the same one"
+        )
+    return _array(path, study.quantity.name, "r")
+
+
+def _differences(there: dict[str, str], here: dict[str, str]) -> list[str]:
+    """Say what differs between two descriptions."""
+    found = []
+    for name in dict.fromkeys([*there, *here]):
+        if name not in here:
+            found.append(f"{name} is swept or given there only")
+        elif name not in there:
+            found.append(f"{name} is swept or given here only")
+        elif there[name] != here[name]:
+            short = max(len(there[name]), len(here[name])) <= 60
+            found.append(f"{name} is {there[name]} there, {here[name]} here" if short else f"{name} differs")
+    return found
+
+
+def _array(path: Path, name: str, mode: str) -> Any:
+    array = require("zarr", "scale").open_array(path, path=name, mode=mode, zarr_format=2)
+    return array.with_config({"write_empty_chunks": True, "order": "C"})
 
 
 def _regions(shape: tuple[int, ...], chunks: tuple[int, ...]) -> Iterator[Region]:
     starts = [range(0, length, piece) for length, piece in zip(shape, chunks, strict=False)]
     for corner in product(*starts):
-        yield tuple(slice(start, start + piece) for start, piece in zip(corner, chunks, strict=False))
+        yield tuple(
+            slice(start, min(start + piece, length))
+            for start, piece, length in zip(corner, chunks, shape, strict=False)
+        )
 
 
 def _is_there(stored: Any, path: Path, region: Region) -> bool:
     index = [part.start // piece for part, piece in zip(region, stored.chunks, strict=False)]
     index += [0] * (len(stored.shape) - len(index))
-    return (path / stored.name.strip("/") / stored.metadata.encode_chunk_key(tuple(index))).exists()
+    return bool((path / stored.name.strip("/") / stored.metadata.encode_chunk_key(tuple(index))).exists())
 
 
 def _written(study: Study, path: Path, regions: list[Region], client: Any) -> Iterator[None]:
     if client is None:
+        target = _array(path, study.quantity.name, "r+") if regions else None
         for region in regions:
-            _write(study, path, region)
+            _write(study, target, region)
             yield
         return
     distributed = require("distributed", "scale")
@@ -109,15 +152,8 @@ def _written(study: Study, path: Path, regions: list[Region], client: Any) -> It
         yield future.result()
 
 
-def _write(study: Study, path: Path, region: Region) -> None:
-    """Compute one region and write it."""
-    pieces = [axis[part] for axis, part in zip(study.axes.values(), region, strict=True)]
-    labels = dict(zip(study.axes, region, strict=True))
-    dataset = study.dataset(study.block(*pieces)) if not pieces else _piece(study, pieces)
-    dataset.to_zarr(path, region=labels, consolidated=False) if labels else dataset.to_zarr(path, mode="r+")
-
-
-def _piece(study: Study, pieces: list[Any]) -> Any:
-    """The dataset of a region without coordinates, which the store has already."""
-    part = Study(study.arm, study.quantity, dict(zip(study.axes, pieces, strict=True)), study.options, study.added)
-    return part.dataset(part.block(*pieces)).drop_vars([*study.axes, "mode"], errors="ignore")
+def _write(study: Study, target: Any, region: Region) -> None:
+    """Compute one region and write it into an array, or into that of the store at a path."""
+    array = _array(target, study.quantity.name, "r+") if isinstance(target, Path) else target
+    values = study.block(*(np.arange(part.start, part.stop) for part in region))
+    array[(*region, ...)] = values

@@ -4,130 +4,292 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 import cra_sym as cra
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import instance, real_array
 from cra_sym.extras import require
-from cra_sym.studies.quantities import ARM_FIELDS, Quantity, named_quantity
-from cra_sym.symbols import nomenclature
+from cra_sym.model.system import System
+from cra_sym.si import dimensions, plain_numbers
+from cra_sym.studies.fingerprint import fingerprint
+from cra_sym.studies.quantities import Quantity, named_quantity
 
-__all__ = ["Study", "make_study"]
+__all__ = ["Study", "Swept", "make_study"]
 
-_BLOCK = 1 << 17  # arms evaluated at once in memory
+Index = NDArray[np.intp]
+_BLOCK = 1 << 17  # systems evaluated at once in memory
+_KINDS = "biufc"  # truth values, integers, real and complex numbers
+
+
+@dataclass(frozen=True)
+class Swept:
+    """A parameter or an option along some dimensions of the sweep.
+
+    Attributes
+    ----------
+    dims : tuple of str
+    values : ndarray or object
+        An array of numbers, or a motion, force or excitation that is a batch along its one dimension.
+    unit : str
+    """
+
+    dims: tuple[str, ...]
+    values: Any
+    unit: str
+
+    def over(self, at: Mapping[str, Index]) -> Any:
+        """Return the numbers at the mesh of some places of all dimensions, with an axis for each of these."""
+        part = self.values[np.ix_(*(at[dimension] for dimension in self.dims))]
+        part = part.transpose([self.dims.index(dimension) for dimension in at if dimension in self.dims])
+        return part.reshape([at[dimension].size if dimension in self.dims else 1 for dimension in at])
 
 
 @dataclass(frozen=True)
 class Study:
-    """A quantity over the product of axes.
+    """A quantity over the product of dimensions.
 
     Attributes
     ----------
-    arm : Arm
+    system : System
         Parameters that are not swept.
     quantity : Quantity
-    axes : mapping of str to ndarray
-        One-dimensional values of each swept parameter.
+    dims : mapping of str to ndarray
+        Label of every place of each swept dimension.
+    fields, numbers, objects : mapping of str to Swept
+        Parameters of the system, options that are numbers, and options that are motions, forces or excitations.
     options : mapping
         Options of the quantity that are not swept.
     added : mapping of str to int
         Axes that the quantity adds, with their lengths.
+    dtype : numpy.dtype
+        What the quantity is made of.
     """
 
-    arm: Arm
+    system: System
     quantity: Quantity
-    axes: Mapping[str, np.ndarray]
+    dims: Mapping[str, Any]
+    fields: Mapping[str, Swept]
+    numbers: Mapping[str, Swept]
+    objects: Mapping[str, Swept]
     options: Mapping[str, Any]
     added: Mapping[str, int]
+    dtype: np.dtype[Any]
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Shape of the product of the axes."""
-        return tuple(values.size for values in self.axes.values())
+        """Shape of the product of the dimensions."""
+        return tuple(len(labels) for labels in self.dims.values())
 
-    def block(self, *pieces: np.ndarray) -> np.ndarray:
-        """Evaluate the product of pieces of the axes."""
-        values = _evaluated(self.arm, self.quantity, dict(zip(self.axes, pieces, strict=True)), self.options)
-        return np.broadcast_to(values, (*(piece.size for piece in pieces), *self.added.values()))
+    def block(self, *places: Index) -> NDArray[Any]:
+        """Evaluate the product of some places of every dimension."""
+        values = self._evaluated(dict(zip(self.dims, places, strict=True)))
+        whole = (*(place.size for place in places), *self.added.values())
+        return np.broadcast_to(values, whole).astype(self.dtype, copy=False)
 
-    def evaluate(self) -> np.ndarray:
-        """Evaluate everything, in slabs along the first axis."""
-        if not self.axes:
+    def _evaluated(self, at: Mapping[str, Index]) -> NDArray[Any]:
+        """Evaluate the mesh of some places; motions, forces and excitations one after another."""
+        along = [swept.dims[0] for swept in self.objects.values()]
+        if not along:
+            return self._called(at, {})
+        shape = [at[dimension].size for dimension in along]
+        parts = {}
+        for corner in product(*map(range, shape)):
+            chosen = dict(zip(along, corner, strict=True))
+            here = {name: at[name][[chosen[name]]] if name in chosen else places for name, places in at.items()}
+            objects = {name: s.values[int(here[s.dims[0]][0])] for name, s in self.objects.items()}
+            parts[corner] = self._called(here, objects)
+        first = parts[(0,) * len(shape)]
+        found = np.empty((*(places.size for places in at.values()), *first.shape[len(at) :]), first.dtype)
+        order = list(at)
+        for corner, part in parts.items():
+            place: list[Any] = [slice(None)] * len(at)
+            for dimension, number in zip(along, corner, strict=True):
+                place[order.index(dimension)] = slice(number, number + 1)
+            found[tuple(place)] = part
+        return found
+
+    def _called(self, at: Mapping[str, Index], objects: Mapping[str, Any]) -> NDArray[Any]:
+        fields = {name: swept.over(at) for name, swept in self.fields.items()}
+        numbers = {name: swept.over(at) for name, swept in self.numbers.items()}
+        system = self.system.replace(**fields) if fields else self.system
+        return np.asarray(self.quantity.function(system, **self.options, **numbers, **objects))
+
+    def evaluate(self) -> NDArray[Any]:
+        """Evaluate everything, in slabs along the first dimension."""
+        if not self.dims:
             return self.block()
-        first, *others = self.axes.values()
+        first, *others = (np.arange(length) for length in self.shape)
         step = max(1, _BLOCK * first.size // int(np.prod(self.shape)))
         starts = range(0, first.size, step)
         progress = tqdm(starts, desc=self.quantity.name, disable=True if len(starts) == 1 else None)
         return np.concatenate([self.block(first[start : start + step], *others) for start in progress])
 
     def lazy(self, chunks: int) -> Any:
-        """Return the values as a Dask array whose pieces are at most ``chunks`` long in each swept axis."""
+        """Return the values as a Dask array whose pieces are at most ``chunks`` long in each swept dimension."""
         array = require("dask.array", "scale")
-        added = dict(enumerate(self.added.values(), start=len(self.axes)))
+        added = dict(enumerate(self.added.values(), start=len(self.dims)))
         pieces: list[Any] = []
-        for index, axis in enumerate(self.axes.values()):
-            pieces += [array.from_array(axis, chunks=chunks), (index,)]
-        indices = (*range(len(self.axes)), *added)
-        meta = np.empty((0,) * len(indices))
-        return array.blockwise(self.block, indices, *pieces, new_axes=added, dtype=meta.dtype, meta=meta)
+        for index, length in enumerate(self.shape):
+            pieces += [array.from_array(np.arange(length), chunks=chunks), (index,)]
+        indices = (*range(len(self.dims)), *added)
+        meta = np.empty((0,) * len(indices), self.dtype)
+        return array.blockwise(
+            self.block, indices, *pieces, new_axes=added, dtype=self.dtype, meta=meta, align_arrays=False
+        )
+
+    def coordinates(self) -> dict[str, Any]:
+        """Return the coordinates: labels of the dimensions, parameters along them, and the modes."""
+        found: dict[str, Any] = {name: (name, labels, {}) for name, labels in self.dims.items()}
+        for name, swept in {**self.fields, **self.numbers}.items():
+            found[name] = (swept.dims, swept.values, {"units": swept.unit} if swept.unit else {})
+        if "mode" in self.added:
+            found["mode"] = ("mode", np.arange(1, self.added["mode"] + 1), {"units": "1"})
+        return found
+
+    def attributes(self) -> dict[str, Any]:
+        """Return what the dataset says of the parameters that are not swept."""
+        prefix = "arm" if isinstance(self.system, Arm) else "system"
+        return {**{f"{prefix}_{name}": value for name, value in self._held().items()}, "cra_sym": cra.__version__}
+
+    def variable_attributes(self) -> dict[str, str]:
+        """Return unit and meaning of the quantity."""
+        return {"units": self.quantity.unit, "long_name": self.quantity.meaning}
 
     def dataset(self, values: Any) -> Any:
         """Label values, lazy or not, of shape ``(*shape, *added)``."""
         xarray = require("xarray", "scale")
-        units = {**{row.name: row.unit for row in nomenclature()}, **self.quantity.axes}
-        coordinates = {name: (name, axis, {"units": units.get(name, "1")}) for name, axis in self.axes.items()}
-        if "mode" in self.added:
-            coordinates["mode"] = ("mode", np.arange(1, self.added["mode"] + 1), {"units": "1"})
-        attributes = {"units": self.quantity.unit, "long_name": self.quantity.meaning}
-        variable = ((*self.axes, *self.added), values, attributes)
-        held = {f"arm_{name}": value for name, value in self._held().items()}
-        return xarray.Dataset({self.quantity.name: variable}, coordinates, {**held, "cra_sym": cra.__version__})
+        variable = ((*self.dims, *self.added), values, self.variable_attributes())
+        return xarray.Dataset({self.quantity.name: variable}, self.coordinates(), self.attributes())
 
-    def digest(self) -> str:
-        """Return a hash of everything that decides the values."""
-        tokenize = require("dask.base", "scale").tokenize
-        quantity = (self.quantity.name, self.quantity.function)
-        return tokenize(quantity, self._held(), dict(self.axes), dict(self.options), cra.__version__)
+    def described(self) -> dict[str, str]:
+        """Return everything that decides the values, as texts by name."""
+        swept = {**self.fields, **self.numbers, **self.objects}
+        model = {} if isinstance(self.system, Arm) else {"model": str(self.system.model._pieces)}
+        return {
+            "version of cra_sym": cra.__version__,
+            "quantity": f"{self.quantity.name}: {fingerprint(self.quantity.function)}",
+            **{name: fingerprint(value) for name, value in {**self._held(), **self.options, **model}.items()},
+            **{name: f"{s.dims} {fingerprint(s.values)}" for name, s in swept.items()},
+            **{f"dimension {name}": fingerprint(np.asarray(labels).tolist()) for name, labels in self.dims.items()},
+        }
 
     def _held(self) -> dict[str, float]:
-        return {name: getattr(self.arm, name) for name in ARM_FIELDS if name not in self.axes}
+        held = {**self.system.values, "zeta": self.system.zeta}
+        return {name: float(value) for name, value in held.items() if name not in self.fields}
 
 
-def make_study(arm: Arm, quantity: str | Callable[..., Any], parameters: Mapping[str, Any]) -> Study:
+def make_study(system: System, quantity: str | Callable[..., Any], parameters: Mapping[str, Any]) -> Study:
     """Check a sweep and learn the axes that its quantity adds, by evaluating one point.
 
     Raises
     ------
     TypeError, ValueError
-        Naming the parameter that is unknown, missing, out of range, or no axis.
+        Naming the parameter that is unknown, missing, out of range, or not an axis.
     """
-    instance("arm", arm, Arm)
-    if arm.shape:
-        raise ValueError(f"arm: its fields have shape {arm.shape}; must be numbers: arrays belong to the axes")
+    instance("arm" if isinstance(system, Arm) else "system", system, System)
+    if system.shape:
+        raise ValueError(f"system: its values have shape {system.shape}; must be numbers, arrays are axes of the sweep")
     chosen = named_quantity(quantity)
-    fields = {name: value for name, value in parameters.items() if name in ARM_FIELDS}
-    options = {name: value for name, value in parameters.items() if name not in fields}
-    chosen.check_options(list(options))
-    swept = {name: getattr(arm.replace(**{name: value}), name) for name, value in fields.items()}  # checked alone
-    swept |= {name: real_array(name, value) for name, value in options.items() if name in chosen.axes}
-    axes = {name: np.asarray(swept[name]) for name in parameters if np.ndim(swept.get(name, 0.0))}
-    for name, values in axes.items():
-        if values.ndim != 1 or values.size == 0:
-            raise ValueError(f"{name}: an array of shape {values.shape}; must be one-dimensional and not empty")
-    arm = arm.replace(**{name: np.ravel(swept[name])[0] for name in fields})
-    options = {name: value for name, value in options.items() if name not in axes}
-    corner = _evaluated(arm, chosen, {name: axis[:1] for name, axis in axes.items()}, options)
-    lengths = corner.shape[len(axes) :]
-    names = chosen.dims or tuple(f"component_{index}" for index in range(len(lengths)))
-    return Study(arm, chosen, axes, options, dict(zip(names, lengths, strict=True)))
+    known = (*system.values, "zeta")
+    chosen.check_options([name for name in parameters if name not in known], known)
+    units = {**system.model.units, "zeta": "1", **chosen.axes}
+    labels: dict[str, Any] = {}
+    fields: dict[str, Swept] = {}
+    numbers: dict[str, Swept] = {}
+    objects: dict[str, Swept] = {}
+    options = {}
+    for name, value in parameters.items():
+        if name in known or name in chosen.axes:
+            axis = _axis(system, name, value, units.get(name, ""), labels, name in known)
+            if axis is not None:
+                (fields if name in known else numbers)[name] = axis
+            elif name in known:
+                system = system.replace(**{name: value})
+            else:
+                options[name] = value
+        elif _is_batch(value):
+            objects[name] = _batch(name, value, labels)
+        else:
+            options[name] = value
+    first = {name: np.ravel(s.values)[0] for name, s in fields.items()}
+    system = system.replace(**first) if first else system
+    study = Study(system, chosen, labels, fields, numbers, objects, options, {}, np.dtype(float))
+    corner = study._evaluated({name: np.zeros(1, dtype=np.intp) for name in labels})
+    return _with_axes(study, corner)
 
 
-def _evaluated(arm: Arm, quantity: Quantity, axes: dict[str, np.ndarray], options: Mapping[str, Any]) -> np.ndarray:
-    mesh = dict(zip(axes, np.ix_(*axes.values()), strict=True)) if axes else {}
-    fields = {name: values for name, values in mesh.items() if name in ARM_FIELDS}
-    others = {name: values for name, values in mesh.items() if name not in fields}
-    return np.asarray(quantity.function(arm.replace(**fields), **options, **others))
+def _with_axes(study: Study, corner: NDArray[Any]) -> Study:
+    """Return the study with the axes that its quantity adds to one point."""
+    quantity, number = study.quantity, len(study.dims)
+    if corner.dtype.kind not in _KINDS:
+        raise TypeError(f"quantity = {quantity.name}: it returns {corner.dtype}; must be numbers or truth values")
+    if corner.ndim < number or corner.shape[:number] != (1,) * number:
+        held = ", ".join(study.options) or "none"
+        raise ValueError(
+            f"quantity = {quantity.name}: with one entry an axis it returns the shape {corner.shape}, which must "
+            f"begin with {(1,) * number}, that of the system; an array among the options ({held}) may be paired with it"
+        )
+    lengths = corner.shape[number:]
+    names = quantity.dims or tuple(f"component_{index}" for index in range(len(lengths)))
+    if len(names) != len(lengths):
+        raise ValueError(
+            f"quantity = {quantity.name}: it adds {len(lengths)} axes, must be {len(names)} ({', '.join(names)})"
+        )
+    values = {name: getattr(study, name) for name in study.__dataclass_fields__}
+    return Study(**(values | {"added": dict(zip(names, lengths, strict=True)), "dtype": corner.dtype}))
+
+
+def _axis(system: System, name: str, value: Any, unit: str, labels: dict[str, Any], is_field: bool) -> Swept | None:
+    """Return a parameter as an axis, or as part of the labelled one it shares; None if it is a number."""
+    dims = dimensions(value)
+    numbers = plain_numbers(name, value, unit or None) if dims is not None else value
+    if is_field:
+        changed = system.replace(**{name: numbers})
+        array = np.asarray(changed.zeta if name == "zeta" else changed.values[name])
+    else:
+        array = real_array(name, numbers, unit=unit or None)
+    if not array.ndim:
+        return None
+    if dims is None:
+        if array.ndim != 1 or array.size == 0:
+            raise ValueError(f"{name}: an array of shape {array.shape}; must be one-dimensional, not empty")
+        dims = (name,)
+    if array.size == 0:
+        raise ValueError(f"{name}: an array of shape {array.shape}; must not be empty")
+    for dimension, length in zip(dims, array.shape, strict=True):
+        given = getattr(value, "coords", {})
+        own = array if dims == (name,) else np.arange(length)
+        label = np.asarray(given[dimension]) if dimension in given and dims != (name,) else own
+        _put(labels, dimension, label, name, stated=dimension in given or dims == (name,))
+    return Swept(dims, array, unit)
+
+
+def _put(labels: dict[str, Any], dimension: str, label: Any, name: str, stated: bool) -> None:
+    """Note the labels of a dimension, or refuse others than those it has."""
+    if dimension not in labels:
+        labels[dimension] = label
+    elif len(labels[dimension]) != len(label):
+        raise ValueError(f"{name}: dimension {dimension!r} has {len(label)} entries, another {len(labels[dimension])}")
+    elif stated and not np.array_equal(labels[dimension], label):
+        raise ValueError(f"{name}: the coordinate of dimension {dimension!r} is not that of another parameter")
+
+
+def _is_batch(value: Any) -> bool:
+    shape = getattr(value, "shape", ())
+    return (
+        isinstance(shape, tuple) and bool(shape) and not isinstance(value, np.ndarray) and not hasattr(value, "dtype")
+    )
+
+
+def _batch(name: str, value: Any, labels: dict[str, Any]) -> Swept:
+    """Return a motion, force or excitation that is a batch as an axis."""
+    if len(value.shape) != 1 or not hasattr(type(value), "__getitem__"):
+        raise ValueError(f"{name} is a batch of shape {value.shape}: must be a single one, or a batch along one axis")
+    _put(labels, name, np.arange(value.shape[0]), name, stated=True)
+    return Swept((name,), value, "")

@@ -1,15 +1,20 @@
 """Identification: recovery, exact gradients, covariance against repeated noisy measurements, and honest warnings."""
 
+import copy
+import itertools
+import pickle
 import re
 import warnings
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import cra_sym as cra
 from cra_sym import Arm
-from cra_sym.analysis import identification
-from cra_sym.analysis.identification import IdentifiabilityWarning, _gradient
+from cra_sym.analysis.fit_search import Data, Search, unknowns
+from cra_sym.analysis.identification import AmbiguityWarning, IdentifiabilityWarning, MisfitWarning
+from tests.campaigns import joints
 
 NOMINAL = Arm.nominal()
 
@@ -21,43 +26,28 @@ def number_after(words, text):
 @pytest.mark.parametrize(
     ("k_t", "k_r", "length"), [(2e3, 40.0, 1.0), (50.0, 1e3, 1.0), (1e4, 5.0, 1.0), (20.0, 0.3, 1.0), (1.0, 4.0, 5.0)]
 )
-def test_exact_frequencies_give_the_joint_back(k_t, k_r, length, monkeypatch):
-    """After some steps, as with exact gradients; with others, of twice the size say, it takes 80 and more."""
-    steps, counted = [], identification.sensitivities
-    monkeypatch.setattr(identification, "sensitivities", lambda *a, **b: steps.append(1) or counted(*a, **b))
+def test_exact_frequencies_give_the_joint_back(k_t, k_r, length):
     arm = NOMINAL.replace(L=length)
     estimate = cra.identify_joint(arm, cra.natural_frequencies(arm.replace(k_t=k_t, k_r=k_r), 4), 1e-3)
+    # the search ends where the residuals are rounding: 1e-13 of the frequencies, times what a stiffness costs them
     assert (estimate.k_t, estimate.k_r) == (pytest.approx(k_t, rel=1e-9), pytest.approx(k_r, rel=1e-9))
-    assert estimate.identifiable and np.abs(estimate.residuals).max() < 1e-6
-    deviation = [number_after(f"{name} to", estimate.message) for name in ("k_t", "k_r")]
+    assert estimate.identifiable and estimate.fits and np.abs(estimate.residuals).max() < 1e-6
+    deviation = [number_after(f"{name} is known to", estimate.message) for name in ("k_t", "k_r")]
     assert deviation == pytest.approx(estimate.log_standard_deviation, rel=0.06)  # printed with two digits
-    assert len(steps) < 30
 
 
-def test_the_search_starts_from_the_joint_of_the_grid_that_fits_best():
-    arm = NOMINAL.replace(L=0.3)
-    units = identification._units(arm)
-    kappa = identification._STARTS[[4, 7]]
-    measured = cra.natural_frequencies(arm.replace(k_t=kappa[0] * units[0], k_r=kappa[1] * units[1]), 4)
-    best, _ = identification._starts(arm, units, measured, np.full(4, 0.1))
-    np.testing.assert_allclose(best, np.log1p(1 / kappa))
-
-
-def test_the_gradient_is_exact():
+@pytest.mark.parametrize("place", [(2e-3, 0.1, 0.0), (1.5, 3.0, 0.2), (12.0, 0.7, -1.0)])
+def test_the_gradient_is_exact(place):
     arm = NOMINAL.replace(L=0.8)
-    units = identification._units(arm)
-
-    def at(place):
-        k_t, k_r = units / np.expm1(place)
-        return arm.replace(k_t=k_t, k_r=k_r)
-
-    for place in (np.array([2e-3, 0.1]), np.array([1.5, 3.0])):
-        found = _gradient(units / np.expm1(place), cra.sensitivities(at(place), 4), units)
-        for i, direction in enumerate(np.eye(2) * 1e-6 * place):
-            slope = cra.natural_frequencies(at(place + direction), 4) - cra.natural_frequencies(
-                at(place - direction), 4
-            )
-            assert found[:, i] == pytest.approx(slope / (2 * direction[i]), rel=1e-6)
+    parameters = unknowns(arm, ("k_t", "k_r", "E"), {"E": (7e10, 1e9)})
+    search, place = Search(arm, parameters, 4), np.array(place)
+    data = Data(np.array([1.0, 2.0, 3.0]), np.array([0.1, 0.2, 0.3]), np.array([0, 1, 3]))
+    found = search.gradient(place, data)
+    assert found.shape == (4, 3)
+    for i, direction in enumerate(np.eye(3) * 1e-5):
+        slope = (search.residuals(place + direction, data) - search.residuals(place - direction, data)) / 2e-5
+        # central differences of step h: h^2 / 6 times the third derivative, and rounding over h
+        np.testing.assert_allclose(found[:, i], slope, rtol=1e-6, atol=1e-6 * np.abs(found).max())
 
 
 def test_the_covariance_is_that_of_repeated_measurements():
@@ -96,7 +86,7 @@ def test_one_frequency_tells_only_a_combination():
 
 def test_a_stiff_joint_measured_roughly_is_only_bounded():
     true = NOMINAL.replace(k_t=1e4, k_r=1e4)
-    with pytest.warns(IdentifiabilityWarning, match="k_t is told to .*; k_r is only known to exceed"):
+    with pytest.warns(IdentifiabilityWarning, match="k_t is known to .*; k_r is only known to exceed"):
         estimate = cra.identify_joint(NOMINAL, cra.natural_frequencies(true), 0.05)
     assert estimate.log_standard_deviation[0] < 0.2 < np.log(2) < estimate.log_standard_deviation[1]
 
@@ -128,8 +118,8 @@ def test_two_frequencies_tell_two_stiffnesses_until_a_factor_of_two():
 @pytest.mark.parametrize(
     ("arguments", "error", "words"),
     [
-        ({"measured_frequencies": [15.0, 2.4]}, ValueError, "must ascend"),
-        ({"measured_frequencies": [0.0, 2.4]}, ValueError, "measured_frequencies = 0"),
+        ({"measured_frequencies": [15.0, 2.4]}, ValueError, r"measured_frequencies\[1\] = 2.4: must ascend"),
+        ({"measured_frequencies": [0.0, 2.4]}, ValueError, r"measured_frequencies\[0\] = 0"),
         ({"measured_frequencies": 2.4}, ValueError, "one axis"),
         ({"measured_frequencies": []}, ValueError, "one axis of frequencies"),
         ({"measured_frequencies": ["f"]}, TypeError, "measured_frequencies"),
@@ -169,3 +159,155 @@ def test_a_bound_is_two_standard_deviations_of_the_compliance_away():
     deviation = np.sqrt(estimate.compliance_covariance[1, 1])
     assert (1 / least - 1 / estimate.k_r) / deviation == pytest.approx(2.0, rel=0.02)
     assert estimate.log_standard_deviation[1] == pytest.approx(deviation * estimate.k_r)
+
+
+# Every fit, and none ----------------------------------------------------------------------------------------------
+
+JOINT = NOMINAL.replace(k_t=2e3, k_r=40.0)
+
+
+def test_the_search_is_global():
+    """A local search from the two best joints of a grid ends at 1.173 and 56.37 here, 200 sigma away."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fit = cra.identify_joint(NOMINAL, cra.natural_frequencies(NOMINAL.replace(k_t=50.0, k_r=0.4)), 0.01)
+    assert (fit.k_t, fit.k_r) == (pytest.approx(50.0, rel=1e-9), pytest.approx(0.4, rel=1e-9))
+    assert fit.fits and len(fit.solutions) == 1 and fit.degrees_of_freedom == 1 and fit.p_value > 0.99
+
+
+def test_two_joints_of_the_same_two_frequencies_are_both_returned():
+    pairs = [(2.57, 8.28), (15.196, 0.9234)]
+    first, second = (cra.natural_frequencies(NOMINAL.replace(k_t=k_t, k_r=k_r), 2) for k_t, k_r in pairs)
+    np.testing.assert_allclose(first, second, rtol=5e-5)  # the second pair is known to four digits
+    with pytest.warns(AmbiguityWarning, match=r"2 sets of values fit.*k_t = 15\.19.*k_t = 2\.57"):
+        fit = cra.identify_joint(NOMINAL, first, 1e-3)
+    found = sorted((solution.k_t, solution.k_r) for solution in fit.solutions)
+    np.testing.assert_allclose(found, pairs, rtol=1e-3)
+    assert np.isnan(fit.p_value) and fit.fits and fit.solutions[0].values == fit.values
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        third = cra.natural_frequencies(NOMINAL.replace(k_t=2.57, k_r=8.28), 3)
+        assert cra.identify_joint(NOMINAL, third, 1e-3).k_t == pytest.approx(2.57, rel=1e-9)
+
+
+@pytest.mark.parametrize("skipped", [2, 3])
+def test_a_missed_mode_is_named(skipped):
+    modes = [mode for mode in (1, 2, 3, 4, 5) if mode != skipped][:4]
+    measured = cra.natural_frequencies(JOINT, 5)[np.array(modes) - 1]
+    given = re.escape(f"give modes={tuple(modes)}")
+    with pytest.warns(MisfitWarning, match=given), warnings.catch_warnings():
+        warnings.simplefilter("ignore", IdentifiabilityWarning)
+        assert not cra.identify_joint(NOMINAL, measured, 0.01).fits
+    fit = cra.identify_joint(NOMINAL, measured, 0.01, modes=modes)
+    assert fit.fits and fit.k_t == pytest.approx(2e3, rel=1e-9)
+
+
+def test_a_wrong_model_does_not_fit_and_its_covariance_says_so():
+    stiffer = JOINT.replace(E=1.05 * NOMINAL.E, m_e=0.05)
+    measured = cra.natural_frequencies(stiffer, 4)
+    with pytest.warns(MisfitWarning, match="no values of the unknown parameters fit: chi2 = 12[23]"):
+        fit = cra.identify_joint(NOMINAL.replace(m_e=0.05), measured, 0.01)
+    assert not fit.fits and not fit.identifiable and fit.p_value < 1e-20
+    assert fit.log_standard_deviation[0] > 0.008  # 0.0012 if the model were right: sqrt(chi2 / 2) = 7.8 times that
+    with_prior = cra.identify_joint(
+        NOMINAL.replace(m_e=0.05), measured, 0.01, prior={"E": (NOMINAL.E, 0.05 * NOMINAL.E)}
+    )
+    assert with_prior.fits and with_prior.degrees_of_freedom == 2
+    assert with_prior.values["E"] == pytest.approx(stiffer.E, rel=5e-3)
+    assert with_prior.k_t == pytest.approx(2e3, rel=5e-3)
+
+
+@pytest.mark.parametrize("frequencies", [[100.0, 200.0, 300.0], [1.0, 1.1, 1.2], [2.0, 1000.0]])
+def test_what_no_joint_explains_is_said(frequencies):
+    with pytest.warns(MisfitWarning, match="no values of the unknown parameters fit"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", IdentifiabilityWarning)
+        fit = cra.identify_joint(NOMINAL, frequencies, 0.1)
+    assert not fit.fits and not fit.identifiable and len(fit.solutions) == 1
+    if fit.degrees_of_freedom == 0:
+        assert np.isinf(fit.covariance).all()
+
+
+def test_the_frequency_in_the_way_is_named():
+    measured = cra.natural_frequencies(JOINT, 5)
+    measured[1] *= 1.1
+    with pytest.warns(MisfitWarning, match="without mode 2 they fit"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", IdentifiabilityWarning)
+        cra.identify_joint(NOMINAL, measured, 0.01)
+
+
+def test_any_parameters_of_any_system():
+    """A string of unknown tension and end mass, against its own transcendental equation."""
+    from scipy.optimize import brentq
+
+    x, t, tension, mass, spring = sp.symbols("x t tension mass spring")
+    y = sp.Function("y")(x, t)
+    string = cra.Model(
+        y.diff(t) ** 2 / 2 - tension * y.diff(x) ** 2 / 2, fields=[y], x=x, domain=(0, 1), t=t,
+        left=-spring * y**2 / 2, right=mass * y.diff(t) ** 2 / 2,
+    )  # fmt: skip
+    # y = T b cos(b x) + k sin(b x) over T b, omega^2 = T b^2: T y'(1) = m omega^2 y(1)
+    T, m, k = 4.0, 0.3, 25.0
+
+    def end(b):
+        value, slope = T * b * np.cos(b) + k * np.sin(b), b * (k * np.cos(b) - T * b * np.sin(b))
+        return T * slope - m * T * b**2 * value
+
+    grid = np.linspace(0.1, 12.0, 400)
+    waves = [brentq(end, a, b, xtol=1e-15) for a, b in itertools.pairwise(grid) if end(a) * end(b) < 0][:4]
+    measured = np.sqrt(T) * np.array(waves) / (2 * np.pi)
+    start = string.at({"tension": 1.0, "mass": 0.0, "spring": 1.0})
+    with pytest.warns(AmbiguityWarning, match="2 sets of values"):  # k b T and m swap their roles: (m, k), (T/k, T/m)
+        both = cra.identify(start, measured, 1e-4, unknown=("tension", "mass", "spring"))
+    found = sorted(list(solution.values.values()) for solution in both.solutions)
+    np.testing.assert_allclose(found, [[T, T / k, T / m], [T, m, k]], rtol=1e-6)
+    fit = cra.identify(start, measured, 1e-4, unknown=("tension", "spring"), prior={"mass": (m, 0.01 * m)})
+    assert list(fit.values) == ["tension", "spring", "mass"] and fit.fits
+    np.testing.assert_allclose(list(fit.values.values()), [T, k, m], rtol=1e-6)
+    assert fit.covariance.shape == (3, 3) and fit.degrees_of_freedom == 2
+
+
+def test_a_prior_of_what_is_known_better_than_the_data_stays():
+    fit = cra.identify(
+        NOMINAL, cra.natural_frequencies(JOINT, 3), 0.01, unknown=("k_t", "k_r"), prior={"m_e": (0.001, 1e-9)}
+    )
+    assert fit.values["m_e"] == pytest.approx(0.001, rel=1e-5)
+    assert np.sqrt(fit.covariance[2, 2]) == pytest.approx(1e-9, rel=1e-3)
+
+
+@pytest.mark.parametrize("trial", range(25))
+def test_the_true_joint_is_among_the_solutions(trial):
+    assert joints.good(joints.tried(trial))
+
+
+def test_a_parameter_the_frequencies_do_not_depend_on_is_named():
+    with pytest.warns(IdentifiabilityWarning, match="the frequencies do not depend on m_b"):
+        cra.identify(NOMINAL, cra.natural_frequencies(NOMINAL, 1), 0.1, unknown=("m_b",))
+
+
+def test_a_fit_is_a_value():
+    measured = cra.natural_frequencies(JOINT)
+    one, two = (cra.identify_joint(NOMINAL, measured, 0.01) for _ in range(2))
+    assert one == two and pickle.loads(pickle.dumps(one)) == one and copy.deepcopy(one) == one
+    assert one != cra.identify_joint(NOMINAL, measured, 0.02)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "words"),
+    [
+        ({"unknown": "k_t"}, TypeError, "unknown = 'k_t': must be a sequence"),
+        ({"unknown": ("k_x",)}, ValueError, "unknown = 'k_x': must be among L, b"),
+        ({"unknown": ()}, ValueError, "must be 1 to 6 names"),
+        ({"modes": (1, 1)}, ValueError, r"modes = \(1, 1\): must be 2 different modes"),
+        ({"modes": (2, 1)}, ValueError, "ascending"),
+        ({"modes": (0, 1)}, ValueError, "modes = 0"),
+        ({"modes": 2}, TypeError, "modes = 2: must be a sequence"),
+        ({"modes": (1, 2, 3)}, ValueError, "must be 2 different modes"),
+        ({"prior": {"E": 7e10}}, ValueError, "prior: E = .*its positive uncertainty"),
+        ({"prior": {"E": (7e10, 0.0)}}, ValueError, "prior: E = .*its positive uncertainty"),
+        ({"prior": {"Q": (1.0, 1.0)}}, ValueError, "prior: 'Q' must be among"),
+        ({"prior": [("E", 1.0)]}, TypeError, "prior = .*must be a mapping"),
+    ],
+)
+def test_bad_options_are_named(options, error, words):
+    with pytest.raises(error, match=words):
+        cra.identify(NOMINAL, [2.4, 15.0], 0.1, **options)

@@ -36,6 +36,7 @@ def test_three_modes_and_no_direct_path_unless_asked_for_more():
     assert system.A.shape == (6, 6) and system.D.tolist() == [[0.0]]
 
 
+@pytest.mark.filterwarnings("ignore::cra_sym.UndersamplingWarning")
 def test_lsim_of_a_sampled_record_agrees_with_the_closed_form():
     t = np.linspace(0, 1, 51)
     a = np.random.default_rng(2).normal(size=51)

@@ -13,7 +13,19 @@ from typing import Any
 
 import matplotlib
 
-from tests.benchmarks import calls, cold, frequencies, kernel, machine, nodes, responses, stability, targets, waves
+from tests.benchmarks import (
+    along_x,
+    calls,
+    cold,
+    frequencies,
+    kernel,
+    machine,
+    nodes,
+    responses,
+    stability,
+    targets,
+    waves,
+)
 
 RESULTS = Path(__file__).parent / "results"
 
@@ -31,6 +43,7 @@ def run(quick: bool) -> dict[str, Any]:
     report["cold start"] = cold.measured()
     report["responses"], report["stability"] = responses.measured(), stability.measured()
     report["sweep"] = nodes.measured(40_000 if quick else 4_000_000)
+    report["along x"] = along_x.measured(3 if quick else 5)
     report["targets"] = targets.rows(report)
     return report
 
@@ -77,6 +90,12 @@ def table(report: dict[str, Any]) -> str:
         low, high = row["quartiles ns"]
         lines.append(f"| {name} | {row['median ns']} | {low} to {high} | {row['ratio to C']} |")
     lines += ["", "## Calls of a kernel, the determinant again", "", *calls.table(report["calls"])]
+    lines += ["", "## Beams that vary along x, batches of 1000, five modes", ""]
+    lines += ["| beam | µs a set | times the dynamic stiffness | differs by |", "| --- | --: | --: | --: |"]
+    lines += [
+        f"| {name} | {row['us a set']:.3g} | {row['times']:.3g} | {row['differs by']:.0e} |"
+        for name, row in report["along x"].items()
+    ]
     lines += ["", "## Cold start, a new process", "", "| what | processor s | wall s |", "| --- | --: | --: |"]
     lines += [f"| {name} | {row['processor s']} | {row['wall s']} |" for name, row in report["cold start"].items()]
     for kind, routes in report["growth"].items():

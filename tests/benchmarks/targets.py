@@ -60,6 +60,8 @@ def rows(report: dict[str, Any]) -> list[dict[str, Any]]:
                     f"a kernel's call over its best peer, {number} lanes, {case['name']}", ratio_to_best, 1, least=False
                 )
         add(f"overhead of a compiled call, us, {case['name']}", case["overhead us"], 30, least=False)
+    for name, case in report["along x"].items():
+        add(f"a batch of {name} beams, times the dynamic stiffness", case["times"], 1000)
     cold = {key: row["wall s"] for key, row in report["cold start"].items()}
     add("import, s more than NumPy's", cold["import cra_sym and numpy"] - cold["import numpy"], 0.3, least=False)
     for key, seconds in cold.items():

@@ -183,7 +183,7 @@ def test_free_vibration_solves_its_problem_and_the_rates_leave_no_secular_term()
         (lambda: multiple_scales([w], Matrix([[p]]), (1, 1), order=3), "order = 3"),
         (lambda: multiple_scales([w], Matrix([[p]]), (1, 1), tongue=3), "tongue = 3"),
         (lambda: multiple_scales([w], Matrix([[p]]), (1, 1), tongue=2), "appears at order 2"),
-        (lambda: multiple_scales([w], Matrix([[p]]), (1, 2)), "mode 2: must be 1 to 1"),
+        (lambda: multiple_scales([w], Matrix([[p]]), (1, 2)), "mode 2: must be a mode from 1 to 1"),
         (lambda: multiple_scales([w], Matrix([[p]]), (1, -1)), "difference of a mode with itself"),
         (lambda: multiple_scales([w], Matrix([[p]]), (0, 1)), "modes counted from 1"),
         (lambda: multiple_scales([w], Matrix([[p]]), (1, 1, 1)), "resonance ="),

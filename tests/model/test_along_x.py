@@ -1,4 +1,4 @@
-"""Coefficients that vary along x: jumps, kinks, layers, cells and vanishing ends, each against a value from elsewhere."""
+"""Coefficients that vary along x: jumps, kinks, layers, cells and vanishing ends, against values from elsewhere."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def test_periodic_cells():
 
 @pytest.mark.parametrize("cells", [7, 40, 150])
 def test_stepped_cells(cells):
-    """A string of equal cells, each half light and half heavy: Chebyshev's polynomials of the cell's transfer matrix."""
+    """A string of equal cells, each half light and half heavy: powers of the transfer matrix of a cell."""
     mass = 1 + 3 * sp.floor(2 * cells * x - 2 * sp.floor(cells * x))
     found = omega(string(1, mass), 2)
 
@@ -149,6 +149,30 @@ def test_an_unlocated_jump_is_found_by_bisection():
     bending = (1 + ratio) / 2 - (1 - ratio) / 2 * unit
     mass = (1 + heavy) / 2 - (1 - heavy) / 2 * unit
     np.testing.assert_allclose(omega(beam(bending, mass), 3), STEPPED, rtol=CLOSE)
+
+
+@pytest.mark.parametrize("width", [1e-3, 1e-5, 1e-7])
+def test_a_narrow_bump_of_mass_is_a_point_mass(width):
+    """Their difference falls with the square of the width; a bump between samples would not be seen at all."""
+    small, place = sp.Rational(str(width)), sp.Rational(37, 100)
+    bump = sp.exp(-(((x - place) / small) ** 2)) / small / sp.sqrt(sp.pi)
+    point = omega(beam(1, inside=[(place, v.diff(t) ** 2 / 2)]), 2)
+    np.testing.assert_allclose(omega(beam(1, 1 + bump), 2), point, rtol=10 * width**2 + CLOSE)
+
+
+@pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-6])
+def test_a_steep_layer_becomes_a_step(width):
+    """EI from 1 to 1/10 by tanh: the difference to the step falls with the width."""
+    low = sp.Rational(1, 10)
+    layer = (1 + low) / 2 - (1 - low) / 2 * sp.tanh((x - HALF) / sp.Rational(str(width)))
+    jump = omega(beam(step(1, low)), 2)
+    np.testing.assert_allclose(omega(beam(layer), 2), jump, rtol=2 * width)
+
+
+def test_a_thousand_cells():
+    """A string of cells, half light and half heavy, is one of the mean mass, but for the square of a cell."""
+    mass = 1 + 3 * sp.floor(2000 * x - 2 * sp.floor(1000 * x))
+    np.testing.assert_allclose(omega(string(1, mass), 2), np.pi * np.array([1, 2]) / np.sqrt(2.5), rtol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -195,7 +219,7 @@ def test_a_continuous_spectrum_is_refused(kind):
     [
         (sp.Function("f")(x), "cannot be located|unknown|function"),
         (1 + sp.Piecewise((1, sp.Contains(x, sp.FiniteSet(a))), (0, True)), "not made of relations"),
-        (1 + sp.SingularityFunction(x, HALF, -1), "acts at a point"),
+        (1 + sp.SingularityFunction(x, HALF, -2), "acts at a point"),
         (1 + sp.floor(10**6 * x), "jumps along x must be at most"),
     ],
     ids=["unknown function", "set", "point", "too many"],

@@ -152,9 +152,8 @@ def test_rates_of_frequencies_by_everything_at_interior_places(kind):
         high, low = (cra.natural_frequencies(system.replace(**{name: value + d}), 3) for d in (small, -small))
         # the difference loses digits of the frequency, not of the rate
         rounding = 1e-12 * cra.natural_frequencies(system, 3) / small
-        assert (
-            np.abs(found.rate[name] - (high - low) / (2 * small)) < 1e-7 * np.abs(found.rate[name]) + rounding
-        ).all()
+        error = np.abs(found.rate[name] - (high - low) / (2 * small))
+        assert (error < 1e-7 * np.abs(found.rate[name]) + rounding).all()
 
 
 def test_what_knows_no_interior_places_says_so():

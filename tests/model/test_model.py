@@ -360,7 +360,7 @@ class Hostile:
 @pytest.mark.parametrize("place", ["density", "left", "domain", "essential", "prescribed", "fields", "virtual_work"])
 def test_what_is_no_expression_is_named(place, stranger):
     one = {"density": stranger, "left": stranger, "domain": (0, stranger), "virtual_work": [(stranger, v, "left")]}
-    with pytest.raises((TypeError, ValueError), match=f"^{place.replace('_', '.')}.*must"):
+    with pytest.raises((TypeError, ValueError), match=f"^{place.replace('_', '.')}.*must be"):
         model(**{place: one.get(place, [stranger])})
 
 

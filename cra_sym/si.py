@@ -1,0 +1,210 @@
+"""Numbers as they are brought along, as plain numbers in SI: quantities with units, exact numbers, labelled arrays.
+
+A unit is converted or refused, never dropped. The libraries of units are known by their documented attributes only;
+none of them is imported.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from decimal import Decimal
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from cra_sym.symbols import Dimension, unit_dimension
+
+__all__ = ["dimensions", "paired", "plain_numbers", "real_number"]
+
+_EXACT = {int, float}
+_BASE = {"[length]": "meter", "[mass]": "kilogram", "[time]": "second"}
+_OTHERS = {"[current]": "ampere", "[temperature]": "kelvin", "[substance]": "mole", "[luminosity]": "candela"}
+_RATE = Dimension(s=-1)  # cycles or radians: a factor of 2 pi apart
+
+
+def plain_numbers(name: str, value: Any, unit: str | None = None) -> Any:
+    """Return what ``numpy.asarray`` makes numbers of: quantities converted to SI, exact numbers as floats.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument, used in errors.
+    value : array_like
+        Numbers, also of SymPy, ``fractions`` and ``decimal``; quantities of Pint or Astropy; xarray objects.
+    unit : str, optional
+        Unit that a quantity must be convertible to, such as ``"N m/rad"``; without it every unit is converted to SI.
+
+    Raises
+    ------
+    TypeError
+        If booleans stand among numbers, or an element is masked.
+    ValueError
+        If a unit is not convertible to ``unit``, or not to SI.
+    """
+    kind = type(value)
+    if kind in _EXACT or isinstance(value, np.generic):
+        return _timed(value, unit)
+    if kind is np.ndarray and value.dtype.kind != "O":
+        return _timed(value, unit)
+    if isinstance(value, np.ma.MaskedArray):
+        if np.ma.is_masked(value):
+            raise TypeError(f"{name}: element {_first_masked(value)} is masked; must be real numbers")
+        return plain_numbers(name, np.asarray(value), unit)
+    if hasattr(kind, "dimensionality") and hasattr(kind, "to_base_units"):
+        return plain_numbers(name, _from_pint(name, value, unit))
+    if hasattr(kind, "decompose") and hasattr(kind, "unit"):
+        return plain_numbers(name, _from_astropy(name, value, unit))
+    if _is_labelled(value):
+        _check_stated(name, value.attrs.get("units"), unit)
+        return plain_numbers(name, value.data, unit)
+    if hasattr(kind, "units") or hasattr(kind, "in_units"):
+        raise TypeError(f"{name} = {_text(value)}: its unit cannot be converted; must be plain numbers in SI")
+    if kind in (list, tuple) or kind is np.ndarray:
+        return _each(name, value, unit)
+    if unit == "s" and hasattr(kind, "total_seconds"):
+        return value.total_seconds()
+    return value if isinstance(value, bool) else real_number(value)
+
+
+def paired(values: Mapping[str, Any], units: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """Return arguments that make a batch with labelled arrays paired by dimension, not by position.
+
+    The axes of the batch are the dimensions in the order of their first appearance.
+
+    Raises
+    ------
+    ValueError
+        If a dimension has two lengths or two coordinates, arrays without names are given beside labelled ones, or a
+        unit is not that of ``units``.
+    """
+    labelled = {name: value for name, value in values.items() if _is_labelled(value) and value.dims}
+    if not labelled:
+        return dict(values)
+    order = tuple(dict.fromkeys(dimension for value in labelled.values() for dimension in value.dims))
+    for dimension in order:
+        _check_dimension(dimension, {name: value for name, value in labelled.items() if dimension in value.dims})
+    found = {}
+    for name, value in values.items():
+        if name not in labelled:
+            if np.ndim(value):
+                other = next(iter(labelled))
+                raise ValueError(
+                    f"{name} has axes without names, and {other} has the dimensions {labelled[other].dims}: "
+                    "must have names too"
+                )
+            found[name] = value
+            continue
+        numbers = np.asarray(plain_numbers(name, value, (units or {}).get(name)))
+        numbers = numbers.transpose([value.dims.index(dimension) for dimension in order if dimension in value.dims])
+        sizes = dict(zip(value.dims, value.shape, strict=True))
+        found[name] = numbers.reshape([sizes.get(dimension, 1) for dimension in order])
+    return found
+
+
+def dimensions(value: Any) -> tuple[str, ...] | None:
+    """Return the names of the dimensions of a labelled array, None of anything else."""
+    return tuple(value.dims) if _is_labelled(value) else None
+
+
+def _is_labelled(value: Any) -> bool:
+    return all(hasattr(type(value), attribute) for attribute in ("dims", "attrs", "data"))
+
+
+def _check_dimension(dimension: Any, values: Mapping[str, Any]) -> None:
+    (first, one), *others = values.items()
+    for name, other in others:
+        sizes = [value.shape[value.dims.index(dimension)] for value in (one, other)]
+        if sizes[0] != sizes[1]:
+            raise ValueError(f"dimension {dimension!r}: {first} has {sizes[0]} entries, {name} has {sizes[1]}")
+        labels = [getattr(value, "coords", {}) for value in (one, other)]
+        if all(dimension in known for known in labels):
+            first_label, other_label = (np.asarray(known[dimension]) for known in labels)
+            if not np.array_equal(first_label, other_label):
+                raise ValueError(f"dimension {dimension!r}: its coordinate in {first} is not that in {name}")
+
+
+def real_number(value: Any) -> Any:
+    """Return a real number of any kind as a float, everything else as it is."""
+    exact = isinstance(value, (Real, Decimal)) and not isinstance(value, (bool, np.generic))
+    symbolic = getattr(value, "is_extended_real", False) is True and getattr(value, "is_number", False) is True
+    return float(value) if exact or symbolic else value
+
+
+def _timed(value: Any, unit: str | None) -> Any:
+    """Return seconds of NumPy's time differences where a time is wanted."""
+    if unit == "s" and value.__class__ not in _EXACT and value.dtype.kind == "m":
+        return value / np.timedelta64(1, "s")
+    return value
+
+
+def _each(name: str, value: Any, unit: str | None) -> Any:
+    kinds = set(map(type, value if isinstance(value, (list, tuple)) else value.ravel()))
+    if kinds <= _EXACT:
+        return value if isinstance(value, (list, tuple)) else value.astype(float)
+    if kinds & {bool, np.bool_}:
+        raise TypeError(f"{name} = {_text(value)}: booleans among them; must be real numbers")
+    if np.ma.core.MaskedConstant in kinds:
+        raise TypeError(f"{name}: an element is masked; must be real numbers")
+    if isinstance(value, np.ndarray):
+        flat = np.array([plain_numbers(name, entry, unit) for entry in value.ravel()])
+        return flat.reshape(value.shape) if flat.ndim == 1 else value
+    return [plain_numbers(name, entry, unit) for entry in value]
+
+
+def _first_masked(value: Any) -> Any:
+    place = tuple(int(i) for i in np.argwhere(np.ma.getmaskarray(value))[0])
+    return place[0] if len(place) == 1 else place
+
+
+def _from_pint(name: str, value: Any, unit: str | None) -> Any:
+    powers = dict(value.dimensionality)
+    bases = _BASE | _OTHERS
+    if not set(powers) <= set(bases):
+        raise ValueError(f"{name} = {_text(value)}: its unit is not one of SI; must be in {unit or 'SI units'}")
+    turning = "radian" in str(value.to_base_units().units)
+    found = Dimension(*(powers.get(dimension, 0) for dimension in _BASE))
+    _check(name, value, unit, found, bool(set(powers) & set(_OTHERS)), turning)
+    return value.to(" * ".join(f"{bases[dimension]} ** {power}" for dimension, power in powers.items())).magnitude
+
+
+def _from_astropy(name: str, value: Any, unit: str | None) -> Any:
+    basic = value.decompose()
+    powers = {str(base.name): power for base, power in zip(basic.unit.bases, basic.unit.powers, strict=True)}
+    turning = bool(powers.pop("rad", 0))
+    found = Dimension(powers.pop("m", 0), powers.pop("kg", 0), powers.pop("s", 0))
+    if not set(powers) <= {"A", "K", "mol", "cd"}:
+        raise ValueError(f"{name} = {_text(value)}: its unit is not one of SI; must be in {unit or 'SI units'}")
+    _check(name, value, unit, found, bool(powers), turning)
+    return basic.value
+
+
+def _check_stated(name: str, stated: Any, unit: str | None) -> None:
+    """Refuse a ``units`` attribute that is not the coherent unit of SI."""
+    if stated is None:
+        return
+    text = re.sub(r"([A-Za-z])\^?(-?\d)", r"\1^\2", str(stated).strip().replace("**", "^").replace("*", " "))
+    if text in ("", "dimensionless"):
+        text = "1"
+    try:
+        found = unit_dimension(text)
+    except ValueError:
+        raise ValueError(
+            f"{name} has units {stated!r}: must be in {unit or 'base units of SI, such as N/m'}; convert it first"
+        ) from None
+    _check(name, stated, unit, found, False, "rad" in text)
+
+
+def _check(name: str, value: Any, unit: str | None, found: Dimension, more: bool, turning: bool) -> None:
+    if unit is None:
+        return
+    wanted = unit_dimension(unit)
+    if more or found != wanted or (wanted == _RATE and unit in ("Hz", "rad/s") and turning != ("rad" in unit)):
+        cure = "; a frequency in Hz times 2 pi is one in rad/s" if wanted == _RATE == found else ""
+        raise ValueError(f"{name} = {_text(value)}: must be in {unit}{cure}")
+
+
+def _text(value: Any) -> str:
+    text = " ".join(str(value).split())
+    return text if len(text) <= 80 else text[:77] + "..."

@@ -1,0 +1,177 @@
+"""Models of several fields and lumped coordinates that vary along x: stresses against the dynamic stiffness."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import cra_sym as cra
+from cra_sym.model.energies import stress_route
+from cra_sym.model.routes import GeneralRoute
+from cra_sym.model.stress_route import StressRoute
+
+x, t, L = sp.symbols("x t L")
+GA, c, k, m = sp.symbols("GA c k m")
+v, theta, u = (sp.Function(name)(x, t) for name in ("v", "theta", "u"))
+w = sp.Function("w")(t)
+HALF = sp.Rational(1, 2)
+
+
+def step(left, right, place=HALF):
+    return sp.Piecewise((left, x < place), (right, True))
+
+
+def energies(kinetic, potential):
+    return sum(kinetic) / 2 - sum(potential) / 2
+
+
+def timoshenko(bending, shear, mass, inertia):
+    return energies(
+        (mass * v.diff(t) ** 2, inertia * theta.diff(t) ** 2),
+        (bending * theta.diff(x) ** 2, shear * (v.diff(x) - theta) ** 2),
+    )
+
+
+MODELS = {
+    "stepped Timoshenko": dict(
+        density=timoshenko(step(1, c), GA * step(1, c), step(1, HALF), step(HALF, 1) / 100),
+        fields=[v, theta],
+        essential=[v.subs(x, 0), theta.subs(x, 0)],
+        right=m * v.diff(t) ** 2 / 2,
+    ),
+    "tapered Timoshenko on springs": dict(
+        density=timoshenko((1 - x / 2) ** 3, GA * (1 - x / 2), 1 - x / 2, (1 - x / 2) ** 3 / 50),
+        fields=[v, theta],
+        left=-k * v**2 / 2 - c * theta**2,
+        right=m * theta.diff(t) ** 2 / 2,
+    ),
+    "two strings joined along x": dict(
+        density=energies(
+            (v.diff(t) ** 2, step(1, 2) * u.diff(t) ** 2),
+            (step(1, 3) * v.diff(x) ** 2, GA * u.diff(x) ** 2, k * (1 + x) * (v - u) ** 2),
+        ),
+        fields=[v, u],
+        essential=[v.subs(x, 0), u.subs(x, 1)],
+        right=m * v.diff(t) ** 2 / 2,
+    ),
+    "bending coupled to stretching": dict(
+        density=energies(
+            (v.diff(t) ** 2, u.diff(t) ** 2),
+            (step(1, HALF) * v.diff(x, 2) ** 2, GA * u.diff(x) ** 2, 2 * c * x * v.diff(x, 2) * u.diff(x)),
+        ),
+        fields=[v, u],
+        essential=[v.subs(x, 0), v.diff(x).subs(x, 0), u.subs(x, 0)],
+        right=m * v.diff(t) ** 2 / 2,
+    ),
+    "beam on a moving base": dict(
+        density=energies(((1 + x) * (v.diff(t) + w.diff(t)) ** 2,), (step(1, c) * v.diff(x, 2) ** 2, v.diff(x) ** 2)),
+        fields=[v],
+        coordinates=[w],
+        left=-k * v**2 / 2 - 5 * v.diff(x) ** 2 + m * w.diff(t) ** 2 / 2,
+    ),
+    "column under a load": dict(
+        density=energies((v.diff(t) ** 2,), (step(1, HALF) * v.diff(x, 2) ** 2, -(1 + x) * c * v.diff(x) ** 2)),
+        fields=[v],
+        essential=[v.subs(x, 0), v.subs(x, 1)],
+        right=-k * v.diff(x) ** 2 + m * v.diff(x, t) ** 2 / 2,
+    ),
+}
+
+
+class _Aligned:
+    """Modes with the signs of others: where an end is held, those of the dynamic stiffness hang on its rounding."""
+
+    def __init__(self, modes, others):
+        self.modes = modes
+        places = np.linspace(0.0, 1.0, 7)
+        product = (modes.shape(0, 0, places) * others.shape(0, 0, places)).sum(axis=-1)
+        self.sign = np.where(product < 0.0, -1.0, 1.0)
+
+    def shape(self, *arguments):
+        return self.sign[..., None] * self.modes.shape(*arguments)
+
+    def force(self, *arguments):
+        return self.sign * self.modes.force(*arguments)
+
+    def coordinate(self, *arguments):
+        return self.sign * self.modes.coordinate(*arguments)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_two_routes_agree(name):
+    """Frequencies, shapes and forces; the dynamic stiffness has eight digits of the latter."""
+    model = cra.Model(x=x, domain=(0, 1), t=t, **MODELS[name])
+    values = {GA: [20.0, 3e3], c: 0.3, k: [[5.0], [4e3]], m: 0.2}
+    system = model.at({s: values[s] for s in model.symbols})
+    route, general = model.numerics("route"), GeneralRoute(model.numerics("spatial"))
+    assert isinstance(route, StressRoute)
+    found = system.natural_frequencies(4)
+    squares = general.angular_frequencies(system.parameters, system.shape, 4)
+    np.testing.assert_allclose(found, squares, rtol=1e-9, atol=1e-12)
+    assert (system.accuracy < 1e-10).all()
+    one, other = system.modes(4), _Aligned(general.modes(system.parameters, system.shape, squares), system.modes(4))
+    places = np.linspace(0.0, 1.0, 6)
+    for place in range(len(model.state_form.displacements)):
+        expected = other.shape(place, 0, places)
+        np.testing.assert_allclose(one.shape(place, 0, places), expected, atol=1e-6 * np.abs(expected).max())
+        for end in (0, 1):
+            expected = other.force(end, place)
+            size = max(np.abs(other.force(e, place)).max() for e in (0, 1))
+            np.testing.assert_allclose(one.force(end, place), expected, atol=1e-6 * size)
+    for number in range(len(model.state_form.coordinates)):
+        # the sign of a motion of the base alone is a convention
+        np.testing.assert_allclose(np.abs(one.coordinate(number)), np.abs(other.coordinate(number)), atol=1e-7)
+
+
+@pytest.mark.parametrize("stiff", [1e2, 1e7, 1e12, 1e16])
+def test_shear_may_be_as_stiff_as_it_likes(stiff):
+    """Timoshenko's beam without rotary inertia goes over into Euler's: 1.8751^2, with an error of the order 1 / GA."""
+    model = cra.Model(
+        timoshenko(1 + sp.Rational(1, 10**15) * x, GA, 1, 0),
+        fields=[v, theta],
+        x=x,
+        domain=(0, 1),
+        t=t,
+        essential=[v.subs(x, 0), theta.subs(x, 0)],
+    )
+    found = model.at({GA: stiff}).natural_frequencies(2)
+    exact = np.array([1.87510406871196, 4.69409113297417]) ** 2
+    np.testing.assert_allclose(found, exact, rtol=max(30.0 / stiff, 1e-11))
+
+
+@pytest.mark.parametrize("share", [0.9, 0.999999, 1.000001, 5.0])
+def test_buckling_of_a_tapered_column(share):
+    """EI = (1 + x)^2, pinned: P = EI v'' / v gives v = sqrt(s) sin(b ln s), s = 1 + x, b^2 = P - 1/4, b ln 2 = pi."""
+    critical = sp.Float(np.pi**2 / np.log(2.0) ** 2 + 0.25)
+    load = sp.Symbol("load")
+    density = energies((v.diff(t) ** 2,), ((1 + x) ** 2 * v.diff(x, 2) ** 2, -load * v.diff(x) ** 2))
+    model = cra.Model(density, fields=[v], x=x, domain=(0, 1), t=t, essential=[v.subs(x, 0), v.subs(x, 1)])
+    system = model.at({load: float(critical) * share})
+    if share < 1.0:
+        assert 0.0 < system.natural_frequencies(1)[0] < 15.0 * np.sqrt(1.0 - share) * 1.5
+    else:
+        with pytest.raises(ValueError, match=r"the structure has buckled: [12] unstable mode"):
+            system.natural_frequencies(1)
+
+
+def test_rigid_motions_are_zero_and_massless_parts_have_no_modes():
+    free = cra.Model(
+        step(1, 3) * v.diff(t) ** 2 / 2 - step(1, HALF) * v.diff(x, 2) ** 2 / 2, fields=[v], x=x, domain=(0, 1), t=t
+    )
+    found = free.at({}).natural_frequencies(4)
+    assert (found[:2] == 0.0).all() and found[2] > 1.0
+    modes = free.at({}).modes(4)
+    points, weights = modes.stations()
+    shapes = modes.shape(0, 0, points)
+    mass = np.where(points < 0.5, 1.0, 3.0) * weights
+    np.testing.assert_allclose((shapes * mass) @ shapes.T, np.eye(4), atol=1e-11)
+    clamped = dict(fields=[v], x=x, domain=(0, 1), t=t, essential=[v.subs(x, 0), v.diff(x).subs(x, 0)])
+    half = cra.Model(step(1, 0) * v.diff(t) ** 2 / 2 - v.diff(x, 2) ** 2 / 2, **clamped)
+    np.testing.assert_allclose(half.at({}).natural_frequencies(1), 4 * 1.87510406871196**2, rtol=1e-10)
+    tip = cra.Model(-step(1, 2) * v.diff(x, 2) ** 2 / 2, right=v.diff(t) ** 2 / 2, **clamped)
+    compliance = 1 / 3 - 0.5**3 / 3 / 2
+    np.testing.assert_allclose(tip.at({}).natural_frequencies(1), compliance**-0.5, rtol=1e-12)
+    with pytest.raises(ValueError, match="only 1 natural frequencies"):
+        tip.at({}).natural_frequencies(2)
+    assert stress_route(tip, tip.numerics("spatial")) is not None

@@ -1,0 +1,322 @@
+"""Numbers as users bring them: units converted or refused, exact numbers, masked and labelled arrays, extremes."""
+
+import warnings
+from datetime import timedelta
+from decimal import Decimal
+from fractions import Fraction
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import cra_sym as cra
+from cra_sym.checks import real_array
+from cra_sym.symbols import L, t, v, x
+
+ARM = cra.Arm.nominal()
+SI = {"meter": (1.0, {"[length]": 1}), "millimeter": (1e-3, {"[length]": 1}), "kilogram": (1.0, {"[mass]": 1}),
+      "newton / meter": (1.0, {"[mass]": 1, "[time]": -2}), "newton / millimeter": (1e3, {"[mass]": 1, "[time]": -2}),
+      "hertz": (1.0, {"[time]": -1}), "degree / second": (np.pi / 180, {"[time]": -1}), "bit": (1.0, {"[data]": 1}),
+      "pascal": (1.0, {"[mass]": 1, "[length]": -1, "[time]": -2})}  # fmt: skip
+
+
+class PintQuantity:
+    """The documented attributes of a quantity of Pint, for tests without Pint."""
+
+    def __init__(self, magnitude, unit):
+        self.magnitude, self.unit_name = magnitude, unit
+
+    def __array__(self, *_, **__):
+        return np.asarray(self.magnitude)
+
+    def __repr__(self):
+        return f"<Quantity({self.magnitude}, '{self.unit_name}')>"
+
+    __str__ = __repr__
+
+    @property
+    def dimensionality(self):
+        return SI[self.unit_name][1]
+
+    def to_base_units(self):
+        base = type(self)(self.magnitude, self.unit_name)
+        base.units = "radian / second" if self.unit_name.startswith("degree") else self.unit_name
+        return base
+
+    def to(self, unit):
+        return type(self)(np.asarray(self.magnitude) * SI[self.unit_name][0], unit)
+
+
+class AstropyUnit:
+    def __init__(self, **powers):
+        self.bases = [type("Base", (), {"name": name}) for name in powers]
+        self.powers = list(powers.values())
+
+
+class AstropyQuantity(np.ndarray):
+    """The documented attributes of a quantity of Astropy, which is an array that NumPy would strip of its unit."""
+
+    unit = AstropyUnit()
+
+    @classmethod
+    def of(cls, value, scale=1.0, **powers):
+        made = np.asarray(value, float).view(cls)
+        made.scale, made.unit = scale, AstropyUnit(**powers)
+        return made
+
+    @property
+    def value(self):
+        return np.asarray(self)
+
+    def decompose(self):
+        return self.of(
+            self.value * self.scale, 1.0, **{b.name: p for b, p in zip(self.unit.bases, self.unit.powers, strict=True)}
+        )
+
+
+class UnknownQuantity:
+    units = "furlong"
+
+    def __float__(self):
+        return 1.0
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "expected"),
+    [
+        ("k_t", PintQuantity(1, "newton / millimeter"), 1e3),
+        ("k_t", PintQuantity([1.0, 2.0], "newton / millimeter"), [1e3, 2e3]),
+        ("L", [PintQuantity(1, "meter"), PintQuantity(500.0, "millimeter")], [1.0, 0.5]),
+        ("L", np.array([PintQuantity(1, "meter"), 2.0], dtype=object), [1.0, 2.0]),
+        ("k_t", AstropyQuantity.of(3.0, 1e3, kg=1, s=-2), 3e3),
+        ("k_r", AstropyQuantity.of([3.0], 1e-3, kg=1, m=2, s=-2, rad=-1), [3e-3]),
+        ("k_t", sp.Integer(1000), 1e3),
+        ("k_t", sp.oo, np.inf),
+        ("L", sp.sqrt(2), 2**0.5),
+        ("L", [sp.Rational(1, 2), 1], [0.5, 1.0]),
+        ("E", Fraction(1, 3), 1 / 3),
+        ("m_e", Decimal("0.001"), 0.001),
+        ("m_e", np.array([Decimal("0.5"), Fraction(1, 4)]), [0.5, 0.25]),
+        ("m_e", np.ma.masked_array([1.0, 2.0], mask=[False, False]), [1.0, 2.0]),
+        ("m_e", np.float32(0.5), 0.5),
+        ("m_e", np.array([1, 2], dtype=np.uint8), [1.0, 2.0]),
+    ],
+)
+def test_numbers_and_quantities_are_converted(field, value, expected):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        np.testing.assert_allclose(getattr(ARM.replace(**{field: value}), field), expected, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("k_t", PintQuantity(1, "kilogram"), "k_t = .*kilogram.*: must be in N/m"),
+        ("L", [PintQuantity(1, "kilogram")], "L = .*must be in m"),
+        ("L", PintQuantity(1, "bit"), "L = .*not one of SI.*must be in m"),
+        ("k_t", AstropyQuantity.of(3.0, m=1), "k_t = 3.*must be in N/m"),
+        ("k_t", AstropyQuantity.of(3.0, A=1), "k_t = 3.*must be in N/m"),
+        ("k_t", UnknownQuantity(), "k_t = .*its unit cannot be converted"),
+        ("m_e", np.ma.masked_array([1.0, 2.0], mask=[False, True]), "m_e: element 1 is masked"),
+        ("m_e", [1.0, np.ma.masked], "m_e: an element is masked"),
+        ("L", [True, 2.0], "L = .*booleans"),
+        ("L", np.array([True, 2.0], dtype=object), "L = .*booleans"),
+        ("L", sp.I, "L = I: must be real numbers"),
+        ("L", sp.Symbol("a"), "L = a: must be real numbers"),
+        ("L", 10**400, "L = 1000.*must be real numbers"),
+        ("L", np.timedelta64(1, "s"), "L = .*must be real numbers"),
+        ("m_e", [0.1, 0.2, np.nan], r"m_e\[2\] = nan: must be"),
+        ("m_e", [[0.1, 0.2], [-3.0, 0.2]], r"m_e\[1, 0\] = -3.0: must be"),
+    ],
+)
+def test_what_is_not_a_number_in_si_is_refused_by_name(field, value, message):
+    with pytest.raises((TypeError, ValueError), match=message):
+        ARM.replace(**{field: value})
+
+
+def test_a_frequency_is_not_an_angular_frequency():
+    assert real_array("omega", PintQuantity(180.0, "degree / second"), unit="rad/s") == pytest.approx(np.pi)
+    with pytest.raises(ValueError, match="must be in rad/s; a frequency in Hz times 2 pi"):
+        cra.BaseMotion(amplitude=1.0, angular_frequency=PintQuantity(10.0, "hertz"))
+    with pytest.raises(ValueError, match="must be in Hz"):
+        cra.identify_joint(ARM, AstropyQuantity.of([10.0, 20.0], rad=1, s=-1), 0.1)
+
+
+def test_times_are_seconds():
+    assert real_array("t", np.timedelta64(1500, "ms"), unit="s") == 1.5
+    assert real_array("t", timedelta(seconds=2), unit="s") == 2.0
+    assert real_array("t", [timedelta(seconds=2), 3.0], unit="s").tolist() == [2.0, 3.0]
+
+
+def test_values_of_any_model_know_the_units_of_the_nomenclature_and_their_own():
+    damper = sp.Symbol("c")
+    model = cra.Model(
+        v.diff(t) ** 2 / 2 - v.diff(x, 2) ** 2 / 2, fields=[v], x=x, domain=(0, L), t=t,
+        essential=[v.subs(x, 0), v.diff(x).subs(x, 0)], virtual_work=[(-damper * v.diff(t), v, "right")],
+        units={damper: "N s/m"},
+    )  # fmt: skip
+    values = {L: PintQuantity(2000.0, "millimeter"), damper: 0.0}
+    assert model.at(values).values["L"] == 2.0
+    for bad in ({L: PintQuantity(1.0, "kilogram"), damper: 0.0}, {L: 1.0, damper: PintQuantity(1.0, "kilogram")}):
+        with pytest.raises(ValueError, match=r"kilogram.*must be in"):
+            model.at(bad)
+
+
+@pytest.mark.parametrize("library", ["pint", "astropy"])
+def test_real_quantities(library):
+    if library == "pint":
+        pint = pytest.importorskip("pint", reason="Pint is not a dependency")
+        registry = pint.UnitRegistry(system="cgs")
+        newton, mm, degree, hertz = (registry(u) for u in ("newton", "mm", "degree", "hertz"))
+    else:
+        u = pytest.importorskip("astropy.units", reason="Astropy is not a dependency")
+        newton, mm, degree, hertz = u.N, u.mm, u.deg, u.Hz
+    arm = ARM.replace(k_t=2 * newton / mm, k_r=3 * newton * mm / degree, L=np.array([1.0, 2.0]) * 1e3 * mm)
+    assert arm.k_t == pytest.approx(2e3) and arm.k_r == pytest.approx(3e-3 * 180 / np.pi)
+    np.testing.assert_allclose(arm.L, [1.0, 2.0])
+    with pytest.raises(ValueError, match="must be in rad/s"):
+        cra.frequency_response(ARM, 10 * hertz)
+
+
+# Labelled arrays ------------------------------------------------------------------------------------------------
+
+
+def labelled(values, *dims, units=None, **coords):
+    xarray = pytest.importorskip("xarray", reason="the extra 'scale' brings xarray")
+    return xarray.DataArray(values, dims=dims, coords=coords, attrs={} if units is None else {"units": units})
+
+
+def test_labelled_arrays_pair_by_dimension():
+    """The axes come in the order in which the parameters name them: L, b, ..., m_e, J_e, k_t, k_r."""
+    k_t, m_e = labelled([1e3, 1e4, 1e5], "k"), labelled([0.0, 0.01, 0.1], "m")
+    arm = ARM.replace(k_t=k_t, m_e=m_e)
+    assert arm.shape == (3, 3)
+    both = ARM.replace(k_t=labelled([[1.0, 2.0]], "a", "b"), m_e=labelled([[1.0], [2.0]], "b", "a"))
+    assert both.shape == (2, 1) and np.ravel(both.m_e).tolist() == [1.0, 2.0]
+    model = ARM.model.at({**ARM.values, "k_t": k_t, "m_e": m_e})
+    assert model.shape == (3, 3)
+
+
+@pytest.mark.parametrize(
+    ("units", "good"), [("N/m", True), ("N m-1", True), ("kg s-2", True), ("N*m**-1", True), ("N/mm", False),
+                        ("kg", False), ("parsec", False)],
+)  # fmt: skip
+def test_a_units_attribute_is_that_of_si_or_refused(units, good):
+    value = labelled([1.0, 2.0], "k", units=units)
+    if good:
+        assert ARM.replace(k_t=value).k_t.tolist() == [1.0, 2.0]
+    else:
+        with pytest.raises(ValueError, match=r"k_t.*must be in N/m"):
+            ARM.replace(k_t=value)
+
+
+def test_labelled_arrays_that_do_not_fit_are_refused():
+    with pytest.raises(ValueError, match="dimension 'k': m_e has 3 entries, k_t has 2"):
+        ARM.replace(k_t=labelled([1.0, 2.0], "k"), m_e=labelled([1.0, 2.0, 3.0], "k"))
+    with pytest.raises(ValueError, match="dimension 'k': its coordinate in m_e is not that in k_t"):
+        ARM.replace(k_t=labelled([1.0, 2.0], "k", k=[0, 1]), m_e=labelled([1.0, 2.0], "k", k=[1, 0]))
+    with pytest.raises(ValueError, match="m_e has axes without names"):
+        ARM.replace(k_t=labelled([1.0, 2.0], "k"), m_e=[1.0, 2.0])
+    with pytest.raises(ValueError, match="m_e has axes without names"):
+        ARM.replace(m_e=[1.0, 2.0]).replace(k_t=labelled([1.0, 2.0], "k"))
+
+
+# Lagrangians written with numbers -------------------------------------------------------------------------------
+
+
+def clamped(density, **options):
+    return cra.Model(density, fields=[v], x=x, domain=(0, 1), t=t, essential=[v.subs(x, 0), v.diff(x).subs(x, 0)],
+                     **options)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("density", "first"),
+    [
+        (v.diff(t) ** 2 / 2 - v.diff(x, 2) ** 2 / 2, 3.5160152685),
+        (2 * v.diff(t) ** 2 - 2 * v.diff(x, 2) ** 2, 3.5160152685),
+        (sp.Float(2.0) * v.diff(t) ** 2 - sp.Float(8.0) * v.diff(x, 2) ** 2, 2 * 3.5160152685),
+        (v.diff(t) ** 2 / 2 - v.diff(x, 2) ** 2 / 2 - 50 * v**2, np.hypot(3.5160152685, 10.0)),
+    ],
+)
+def test_a_number_may_carry_any_unit(density, first):
+    assert clamped(density).at({}).natural_frequencies(1)[0] == pytest.approx(first, rel=1e-9)
+
+
+@pytest.mark.parametrize("term", ["E", "m_e", "rho"])
+def test_a_parameter_of_the_nomenclature_carries_its_own(term):
+    with pytest.raises(ValueError, match="its dimension is"):
+        clamped(v.diff(t) ** 2 / 2 - sp.Symbol("E", positive=True) * v.diff(x, 2) ** 2 / 2
+                - cra.symbols.symbol(term) * v**2 / 2)  # fmt: skip
+
+
+OTHER = sp.Function("u")(x, t)
+
+
+@pytest.mark.parametrize(
+    ("density", "fields"),
+    [
+        (v.diff(t) ** 2 / 2, [v]),
+        (v.diff(t) ** 2 / 2 - v**2 / 2, [v]),
+        (v.diff(t) ** 2 / 2 - v.diff(x) ** 2 / 2 + OTHER.diff(t) ** 2 / 2, [v, OTHER]),
+    ],
+)
+def test_a_field_without_stiffness_along_the_length_is_refused(density, fields):
+    model = cra.Model(density, fields=fields, x=x, domain=(0, 1), t=t)
+    for asked in (cra.natural_frequencies, cra.mode_shapes):
+        with pytest.raises(ValueError, match="has kinetic energy but no derivative by x, so infinitely many"):
+            asked(model.at({}), *([0.5] if asked is cra.mode_shapes else []))
+
+
+# Extreme values -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "changes", [{"k_t": 1e-160}, {"k_t": 5e-324}, {"k_t": 1e-200, "k_r": 1e-300}, {"k_r": 1e-310}, {"J_e": 1e-300}]
+)
+def test_tiny_values_give_numbers(changes):
+    """As stiffnesses that are zero give: what is that small is nothing beside the beam."""
+    nothing = {name: 0.0 for name in changes}
+    found, limit = (cra.modal_parameters(ARM.replace(**c)) for c in (changes, nothing))
+    for name in ("frequency", "participation", "root_displacement", "tip_slope"):
+        assert np.isfinite(getattr(found, name)).all(), name
+    elastic = limit.frequency > 0
+    # both come from one solver, to its accuracy; rigid-body modes that share a frequency may mix
+    np.testing.assert_allclose(found.frequency[elastic], limit.frequency[elastic], rtol=1e-12)
+    np.testing.assert_allclose(np.abs(found.tip_displacement[elastic]), limit.tip_displacement[elastic], rtol=1e-6)
+
+
+# Signs ------------------------------------------------------------------------------------------------------------
+
+
+PINNED_L, CLAMPED_L = [(v, 0)], [(v, 0), (v.diff(x), 0)]
+PINNED_R, CLAMPED_R = [(v, 1)], [(v, 1), (v.diff(x), 1)]
+
+
+@pytest.mark.parametrize(
+    ("held", "place", "derivative"),
+    [
+        (CLAMPED_L, 1.0, 0),
+        ([*CLAMPED_L, (v.diff(x), 1)], 1.0, 0),
+        ([*PINNED_L, *PINNED_R], 1.0, 1),
+        ([*CLAMPED_L, *PINNED_R], 1.0, 1),
+        (CLAMPED_R, 0.999, 0),
+        ([*PINNED_L, *CLAMPED_R], 0.999, 0),
+        ([(v.diff(x), 0), *CLAMPED_R], 0.999, 0),
+        ([*CLAMPED_L, *CLAMPED_R], 0.999, 0),
+    ],
+)
+@pytest.mark.parametrize("foundation", [0, sp.Rational(1, 10)])
+def test_the_sign_of_a_mode_is_that_of_its_right_end(held, place, derivative, foundation):
+    """Free, guided, pinned and clamped: what moves first at the right end is positive, or else the field beside it."""
+    model = cra.Model(
+        v.diff(t) ** 2 / 2 - v.diff(x, 2) ** 2 / 2 - foundation * x * v**2, fields=[v], x=x, domain=(0, 1), t=t,
+        essential=[displacement.subs(x, end) for displacement, end in held],
+    )  # fmt: skip
+    assert (cra.mode_shapes(model.at({}), place, 4, derivative) > 0).all()
+
+
+def test_labelled_fields_of_a_motion_pair_by_dimension():
+    motion = cra.BaseMotion(velocity=labelled([0.1, 0.2], "a"), amplitude=labelled([1e-3, 2e-3, 3e-3], "b"))
+    assert motion.shape == (2, 3)
+    with pytest.raises(ValueError, match="velocity has units 'km/h': must be in m/s"):
+        cra.BaseMotion(velocity=labelled([0.1], "a", units="km/h"))
