@@ -84,6 +84,7 @@ GOOD = {
     "frequency_response": dict(system=ARM, angular_frequency=[5.0, 9.0], x=0.5, damping="structural"),
     "sensitivities": dict(system=ARM, modes=2, by=("k_t", "m_e")),
     "identify_joint": dict(system=ARM, measured_frequencies=[2.3, 14.0], uncertainty=0.01),
+    "identify": dict(system=ARM, measured=[2.3, 14.0], uncertainty=0.01, unknown=("k_t", "k_r")),
     "input_shaper": dict(angular_frequency=10.0, zeta=0.01, order=1),
     "certify": dict(system=ARM, modes=1),
     "AxialBase": dict(amplitude=0.01),
@@ -96,12 +97,12 @@ GOOD = {
     "stability_boundary": dict(
         system=ARM.replace(zeta=0.0), excitation=SPRING, epsilon=0.01, resonance=(1, 1), order=1, modes=2
     ),
-    "sweep": dict(arm=ARM, quantity="natural_frequencies", k_t=[1e3, 1e4]),
+    "sweep": dict(system=ARM, quantity="natural_frequencies", k_t=[1e3, 1e4]),
 }
 ELSEWHERE = {
     "paper_lagrangian",  # takes no values
-    "AsymptoticWarning", "ResonanceWarning",  # nothing to call with values
-    "Model", "kernel",  # take SymPy expressions: their own tests
+    "AmbiguityWarning", "AsymptoticWarning", "MisfitWarning", "ResonanceWarning", "UndersamplingWarning",  # nothing to call with values
+    "Model", "kernel", "stations",  # take SymPy expressions: their own tests
     "export",  # writes a folder: below
     "explore",  # shows sliders: its own tests
 }  # fmt: skip
@@ -128,7 +129,13 @@ def test_what_is_good_for_an_arm_is_good_for_any_system(name):
     changes = {"by": ("k_t", "m_e")} if "by" in GOOD[name] else {}
     if GOOD[name].get("excitation") == SPRING:
         changes["excitation"] = cra.Fluctuation(k_t=1.0, T=0.5)
-    if name == "identify_joint":
+    if name == "sweep":
+        assert call(name, system=WIRE.at(OF_WIRE)).sizes["k_t"] == 2
+    elif name == "identify":
+        measured = cra.natural_frequencies(WIRE.at({**OF_WIRE, "T": 5.0}), modes=2)
+        fit = call(name, system=WIRE.at(OF_WIRE), measured=measured, unknown=("T",))
+        np.testing.assert_allclose(fit.values["T"], 5.0, rtol=1e-6)
+    elif name == "identify_joint":
         with pytest.raises(ValueError, match="k_r must be the stiffness of an end"):
             call(name, system=WIRE.at(OF_WIRE))
     else:
@@ -176,7 +183,7 @@ def test_work_without_end_is_refused(function, argument, value):
 
 def test_times_without_a_phase_and_moves_without_an_end_are_refused():
     """They came back as nan, one in silence, the other with a warning of NumPy's."""
-    with pytest.raises(ValueError, match=r"t = 1e\+308: must be real numbers in \[0, 1e\+15\]"):
+    with pytest.raises(ValueError, match=r"t\[1\] = 1e\+308: must be real numbers in \[0, 1e\+15\]"):
         call("tip_response", t=[0.1, 1e308])
     with pytest.raises(ValueError, match="the move never ends"):
         cra.BaseMotion.s_curve(0.1, 5e-324, 1.0, 5.0)
