@@ -101,7 +101,8 @@ GOOD = {
 }
 ELSEWHERE = {
     "paper_lagrangian",  # takes no values
-    "AmbiguityWarning", "AsymptoticWarning", "MisfitWarning", "ResonanceWarning", "UndersamplingWarning",  # nothing to call with values
+    "AmbiguityWarning", "AsymptoticWarning", "MisfitWarning",  # nothing to call with values
+    "ResonanceWarning", "UndersamplingWarning",  # likewise
     "Model", "kernel", "stations",  # take SymPy expressions: their own tests
     "export",  # writes a folder: below
     "explore",  # shows sliders: its own tests
