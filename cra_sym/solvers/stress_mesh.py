@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 Sampler = Callable[[Array], Array]
 """Coefficients at places of shape (sets, points), as an array of shape (coefficients, sets, points)."""
 
-NODES = 16
+NODES = 32
 """Gauss points of the test whether a piece is resolved: a coefficient must be a polynomial of that degree there."""
 TAIL = 1e-11
 """Relative size of what a resolved coefficient may hold beyond. Gauss's rule integrates twice that degree, so what is
@@ -181,7 +181,7 @@ def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[A
 
     Notes
     -----
-    A piece is resolved if the last Legendre coefficients of 16 vanish and the polynomial meets the coefficient at
+    A piece is resolved if the last Legendre coefficients of 32 vanish and the polynomial meets the coefficient at
     places between the points. One that holds a jump is halved until it does not matter.
     """
     gauss = rule(NODES)
