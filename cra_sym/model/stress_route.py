@@ -99,6 +99,9 @@ class StressRoute:
             values = [c[0] if same else c[rows][:, None] for c, same in zip(columns, alike, strict=True)]
             with np.errstate(all="ignore"):
                 found = self.coefficients.function(x, *values)
+                if not all(np.isfinite(entry).all() for entry in found):  # exp(800 x) / (1 + exp(800 x)) is bounded
+                    longer = self.coefficients.function(x.astype(np.longdouble), *values)
+                    found = [np.asarray(entry, dtype=float) for entry in longer]
             parts: dict[str, dict[tuple[int, int], Array]] = {name: {} for name in "WBDRM"}
             for (name, i, j), entry in zip(self.entries, found, strict=True):
                 parts[name][i, j] = np.asarray(entry, dtype=float)

@@ -169,6 +169,14 @@ def test_a_steep_layer_becomes_a_step(width):
     np.testing.assert_allclose(omega(beam(layer), 2), jump, rtol=2 * width)
 
 
+@pytest.mark.skipif(np.finfo(np.longdouble).maxexp < 16000, reason="long double is double here")
+def test_exponentials_that_overflow_in_a_bounded_coefficient():
+    """exp(z) / (1 + exp(z)) is (1 + tanh(z / 2)) / 2."""
+    z = 2000 * (x - HALF)
+    logistic, same = sp.exp(z) / (1 + sp.exp(z)), (1 + sp.tanh(z / 2)) / 2
+    np.testing.assert_allclose(omega(beam(1 + logistic), 2), omega(beam(1 + same), 2), rtol=CLOSE)
+
+
 def test_a_thousand_cells():
     """A string of cells, half light and half heavy, is one of the mean mass, but for the square of a cell."""
     mass = 1 + 3 * sp.floor(2000 * x - 2 * sp.floor(1000 * x))
