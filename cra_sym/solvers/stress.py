@@ -161,6 +161,16 @@ class Columns:
             name: {pair: _on_points(entry, self.sets, shape[1:]) for pair, entry in part.items()}
             for name, part in found.items()
         }
+        self._check_signs()
+
+    def _check_signs(self) -> None:
+        """Refuse a stiffness or a mass that is negative somewhere."""
+        for name, what in (("W", "a stiffness"), ("M", "a mass")):
+            for (i, j), entry in self.coefficient[name].items():
+                if i == j and (entry < 0.0).any():
+                    x = np.broadcast_to(self.grid.x, (self.sets, *self.grid.x.shape[1:]))
+                    bad = x[np.broadcast_to(entry < 0.0, x.shape)][0]
+                    raise ValueError(f"values: {what} is negative at x = {bad:.6g}; it must be at least 0")
 
     # ------------------------------------------------------------------------------------------ the unknowns
 

@@ -215,6 +215,23 @@ def test_stiffness_that_vanishes_like_a_root(power):
         np.testing.assert_allclose(w, float(root * (2 - power) / 2), rtol=CLOSE)
 
 
+@pytest.mark.parametrize(
+    ("bending", "mass", "words"),
+    [
+        ((x - HALF) ** 2, 1, "stiffness zero or a coefficient infinite at x = 0.5"),
+        (sp.Abs(x - HALF), 1, "stiffness zero or a coefficient infinite at x = 0.5"),
+        (step(1, -1), 1, "stiffness is negative at x = 0.5"),
+        (1, step(-1, 2), "mass is negative at x = 0.0"),
+        (1, 1 + 1 / (x - HALF) ** 2, "infinite at x = 0.5"),
+        (1 + x, 0 * x, "no motion of the structure has kinetic energy"),
+    ],
+    ids=["hinge", "kinked hinge", "negative stiffness", "negative mass", "infinite mass", "no mass"],
+)
+def test_coefficients_out_of_range_are_refused_with_the_place(bending, mass, words):
+    with pytest.raises(ValueError, match=words):
+        omega(beam(bending, mass), 1)
+
+
 @pytest.mark.parametrize("kind", ["string", "beam"])
 def test_a_continuous_spectrum_is_refused(kind):
     model = string(x**2, essential=FIXED[1:]) if kind == "string" else beam((1 - x) ** 4)
