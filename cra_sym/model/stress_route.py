@@ -13,7 +13,7 @@ from cra_sym.kernels import Kernel
 from cra_sym.model.routes import Values, tip_sign
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.values import flat_columns, infinite_patterns
-from cra_sym.solvers.stress import Continuum, Entries, PointTerm
+from cra_sym.solvers.continuum import Continuum, Entries, PointTerm
 from cra_sym.solvers.stress_refine import Found, solved
 
 __all__ = ["StressModes", "StressRoute"]
@@ -41,7 +41,7 @@ class StressRoute:
     coefficients : Kernel
         Of (x, parameters): the entries, named by ``entries``.
     entries : tuple of (str, int, int)
-        Which entry of 'W', 'B', 'D', 'R' or 'M' each is; see `cra_sym.solvers.stress.Continuum`.
+        Which entry of 'W', 'B', 'D', 'R' or 'M' each is; see `cra_sym.solvers.continuum.Continuum`.
     """
 
     spatial: SpatialProblem

@@ -200,7 +200,9 @@ def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[A
         values = sample(at.reshape(len(edges), -1)).reshape(-1, *at.shape)
         if not np.isfinite(values).all():
             bad = np.argwhere(~np.isfinite(values))[0]
-            raise ValueError(f"values: they make a stiffness zero or a coefficient infinite at x = {at[tuple(bad[1:])]:.6g}")
+            raise ValueError(
+                f"values: they make a stiffness zero or a coefficient infinite at x = {at[tuple(bad[1:])]:.6g}"
+            )
         known, beyond = values[..., :NODES], values[..., NODES:]
         size = np.abs(values).max(axis=-1)
         peak = np.maximum(peak, size.max(axis=-1, keepdims=True)) if total.size else size.max(axis=-1, keepdims=True)
