@@ -13,7 +13,7 @@ from cra_sym.kernels import Kernel
 from cra_sym.model.routes import Values, mode_sign, overview_places
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.values import flat_columns, infinite_patterns
-from cra_sym.solvers.stress import Continuum, Entries, PointTerm
+from cra_sym.solvers.continuum import Continuum, Entries, PointTerm
 from cra_sym.solvers.stress_refine import Found, solved
 
 __all__ = ["StressModes", "StressRoute"]
@@ -41,7 +41,7 @@ class StressRoute:
     coefficients : Kernel
         Of (x, parameters): the entries, named by ``entries``.
     entries : tuple of (str, int, int)
-        Which entry of 'W', 'B', 'D', 'R' or 'M' each is; see `cra_sym.solvers.stress.Continuum`.
+        Which entry of 'W', 'B', 'D', 'R' or 'M' each is; see `cra_sym.solvers.continuum.Continuum`.
     """
 
     spatial: SpatialProblem
@@ -103,6 +103,9 @@ class StressRoute:
             values = [c[0] if same else c[rows][:, None] for c, same in zip(columns, alike, strict=True)]
             with np.errstate(all="ignore"):
                 found = self.coefficients.function(x, *values)
+                if not all(np.isfinite(entry).all() for entry in found):  # exp(800 x) / (1 + exp(800 x)) is bounded
+                    longer = self.coefficients.function(x.astype(np.longdouble), *values)
+                    found = [np.asarray(entry, dtype=float) for entry in longer]
             parts: dict[str, dict[tuple[int, int], Array]] = {name: {} for name in "WBDRM"}
             for (name, i, j), entry in zip(self.entries, found, strict=True):
                 parts[name][i, j] = np.asarray(entry, dtype=float)

@@ -7,127 +7,18 @@ from that end, so nothing needs to be continuous, and a jump of a stiffness cost
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .continuum import Continuum, Entries, compliance
 from .stress_mesh import Grid, Mesh, rule
 
-__all__ = ["Columns", "Continuum", "Entries", "PointTerm"]
+__all__ = ["Columns"]
 
 Array = NDArray[np.float64]
-Entries = Mapping[tuple[int, int], Array]
-Coefficients = Callable[[Array, NDArray[np.intp]], dict[str, Entries]]
-
-
-@dataclass(frozen=True)
-class PointTerm:
-    """Springs and masses at a breakpoint.
-
-    Attributes
-    ----------
-    node : int
-        Number of the breakpoint among the edges.
-    directions, springs : ndarray, shape (rows, springs, n + m), (rows, springs)
-        Each spring, which may be infinite, acts on ``directions @ (q, w)``.
-    mass : ndarray, shape (rows, n + m, n + m)
-    """
-
-    node: int
-    directions: Array
-    springs: Array
-    mass: Array
-
-    def take(self, rows: NDArray[np.intp]) -> PointTerm:
-        """Return those of some of the parameter sets."""
-        return PointTerm(self.node, self.directions[rows], self.springs[rows], self.mass[rows])
-
-
-@dataclass(frozen=True)
-class Continuum:
-    """A spatial problem by its energies, batched over rows (parameter sets).
-
-    With the highest derivatives h of the fields and the displacements s = (q, w) of a section and of the lumped
-    coordinates, twice the potential energy per length is ``e' W e + 2 e' D s + s' R s``, with the strains
-    ``e = h + B s``; twice the kinetic energy is ``z s' M s``.
-
-    Attributes
-    ----------
-    orders : tuple of int
-        Order of the highest derivative of each field.
-    lumped : int
-        Number of lumped coordinates m.
-    coefficients : callable
-        ``coefficients(x, rows)`` with x of shape (len(rows), points): 'W', 'B', 'D', 'R' and 'M' by entry, each entry
-        broadcasting to the shape of x. Entries that are not there are zero; of symmetric ones the upper half is there.
-    edges : ndarray, shape (rows, spans + 1)
-        Left end, breakpoints, right end.
-    directions, springs : ndarray, shape (rows, springs, 2 n + m), (rows, springs)
-        Each spring, which may be infinite, acts on ``directions @ (q(left), w, q(right))``.
-    end_mass : ndarray, shape (rows, 2 n + m, 2 n + m)
-    origin : int
-        The end from which displacements are integrated, 0 or 1: not one at which a stiffness vanishes.
-    points : tuple of PointTerm
-        What acts at breakpoints.
-    """
-
-    orders: tuple[int, ...]
-    lumped: int
-    coefficients: Coefficients
-    edges: Array
-    directions: Array
-    springs: Array
-    end_mass: Array
-    origin: int = 0
-    points: tuple[PointTerm, ...] = ()
-
-    @property
-    def displacements(self) -> int:
-        """Displacements of a section, n."""
-        return sum(self.orders)
-
-    def take(self, rows: NDArray[np.intp]) -> Continuum:
-        """Return the problem of some of the parameter sets."""
-        return replace(
-            self,
-            coefficients=lambda x, index: self.coefficients(x, rows[index]),
-            edges=self.edges[rows],
-            directions=self.directions[rows],
-            springs=self.springs[rows],
-            end_mass=self.end_mass[rows],
-            points=tuple(point.take(rows) for point in self.points),
-        )
-
-    def tops(self) -> list[int]:
-        """Return the position of the highest displacement of each field in a section."""
-        return [sum(self.orders[: k + 1]) - 1 for k in range(len(self.orders))]
-
-    def sample(self, strained: bool) -> Callable[[Array], Array]:
-        """Return all coefficients as one array: the compliances, or the stiffnesses where the strain is expanded."""
-        rows = np.arange(len(self.edges))
-
-        def values(x: Array) -> Array:
-            found = self.coefficients(x, rows)
-            parts = [found["W"]] if strained else [compliance(found["W"], len(self.orders))]
-            parts += [found[name] for name in "BDRM"]
-            return np.stack([np.broadcast_to(entry, x.shape) for part in parts for entry in part.values()])
-
-        return values
-
-
-def compliance(stiffness: Entries, size: int) -> Entries:
-    """Return the inverse of a symmetric matrix given by entries, upper half."""
-    if all(i == j for i, j in stiffness):
-        with np.errstate(divide="ignore"):
-            return {pair: 1.0 / entry for pair, entry in stiffness.items()}
-    matrix = np.zeros((*np.broadcast_shapes(*(np.shape(e) for e in stiffness.values())), size, size))
-    for (i, j), entry in stiffness.items():
-        matrix[..., i, j] = matrix[..., j, i] = entry
-    inverse = np.linalg.inv(matrix)
-    return {(i, j): inverse[..., i, j] for i in range(size) for j in range(i, size) if np.any(inverse[..., i, j])}
 
 
 class Columns:
@@ -161,6 +52,16 @@ class Columns:
             name: {pair: _on_points(entry, self.sets, shape[1:]) for pair, entry in part.items()}
             for name, part in found.items()
         }
+        self._check_signs()
+
+    def _check_signs(self) -> None:
+        """Refuse a stiffness or a mass that is negative somewhere."""
+        for name, what in (("W", "a stiffness"), ("M", "a mass")):
+            for (i, j), entry in self.coefficient[name].items():
+                if i == j and (entry < 0.0).any():
+                    x = np.broadcast_to(self.grid.x, (self.sets, *self.grid.x.shape[1:]))
+                    bad = x[np.broadcast_to(entry < 0.0, x.shape)][0]
+                    raise ValueError(f"values: {what} is negative at x = {bad:.6g}; it must be at least 0")
 
     # ------------------------------------------------------------------------------------------ the unknowns
 

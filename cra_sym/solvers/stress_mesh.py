@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 Sampler = Callable[[Array], Array]
 """Coefficients at places of shape (sets, points), as an array of shape (coefficients, sets, points)."""
 
-NODES = 16
+NODES = 32
 """Gauss points of the test whether a piece is resolved: a coefficient must be a polynomial of that degree there."""
 TAIL = 1e-11
 """Relative size of what a resolved coefficient may hold beyond. Gauss's rule integrates twice that degree, so what is
@@ -181,7 +181,7 @@ def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[A
 
     Notes
     -----
-    A piece is resolved if the last Legendre coefficients of 16 vanish and the polynomial meets the coefficient at
+    A piece is resolved if the last Legendre coefficients of 32 vanish and the polynomial meets the coefficient at
     places between the points. One that holds a jump is halved until it does not matter.
     """
     gauss = rule(NODES)
@@ -200,7 +200,9 @@ def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[A
         values = sample(at.reshape(len(edges), -1)).reshape(-1, *at.shape)
         if not np.isfinite(values).all():
             bad = np.argwhere(~np.isfinite(values))[0]
-            raise ValueError(f"values: they make a coefficient infinite at x = {at[tuple(bad[1:])]:.6g}")
+            raise ValueError(
+                f"values: they make a stiffness zero or a coefficient infinite at x = {at[tuple(bad[1:])]:.6g}"
+            )
         known, beyond = values[..., :NODES], values[..., NODES:]
         size = np.abs(values).max(axis=-1)
         peak = np.maximum(peak, size.max(axis=-1, keepdims=True)) if total.size else size.max(axis=-1, keepdims=True)

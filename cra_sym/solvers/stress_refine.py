@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .stress import Columns, Continuum
+from .continuum import Continuum
+from .stress import Columns
 from .stress_mesh import Mesh, TooFineError, cells, resolved
 from .stress_modes import ModeFields
 from .stress_spectrum import BuckledError, spectrum

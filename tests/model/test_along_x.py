@@ -169,6 +169,14 @@ def test_a_steep_layer_becomes_a_step(width):
     np.testing.assert_allclose(omega(beam(layer), 2), jump, rtol=2 * width)
 
 
+@pytest.mark.skipif(np.finfo(np.longdouble).maxexp < 16000, reason="long double is double here")
+def test_exponentials_that_overflow_in_a_bounded_coefficient():
+    """exp(z) / (1 + exp(z)) is (1 + tanh(z / 2)) / 2."""
+    z = 2000 * (x - HALF)
+    logistic, same = sp.exp(z) / (1 + sp.exp(z)), (1 + sp.tanh(z / 2)) / 2
+    np.testing.assert_allclose(omega(beam(1 + logistic), 2), omega(beam(1 + same), 2), rtol=CLOSE)
+
+
 def test_a_thousand_cells():
     """A string of cells, half light and half heavy, is one of the mean mass, but for the square of a cell."""
     mass = 1 + 3 * sp.floor(2000 * x - 2 * sp.floor(1000 * x))
@@ -205,6 +213,23 @@ def test_stiffness_that_vanishes_like_a_root(power):
     for w in found:
         root = findroot(lambda z: besselj(-order, z), 2 * float(w) / (2 - power))
         np.testing.assert_allclose(w, float(root * (2 - power) / 2), rtol=CLOSE)
+
+
+@pytest.mark.parametrize(
+    ("bending", "mass", "words"),
+    [
+        ((x - HALF) ** 2, 1, "stiffness zero or a coefficient infinite at x = 0.5"),
+        (sp.Abs(x - HALF), 1, "stiffness zero or a coefficient infinite at x = 0.5"),
+        (step(1, -1), 1, "stiffness is negative at x = 0.5"),
+        (1, step(-1, 2), "mass is negative at x = 0.0"),
+        (1, 1 + 1 / (x - HALF) ** 2, "infinite at x = 0.5"),
+        (1 + x, 0 * x, "no motion of the structure has kinetic energy"),
+    ],
+    ids=["hinge", "kinked hinge", "negative stiffness", "negative mass", "infinite mass", "no mass"],
+)
+def test_coefficients_out_of_range_are_refused_with_the_place(bending, mass, words):
+    with pytest.raises(ValueError, match=words):
+        omega(beam(bending, mass), 1)
 
 
 @pytest.mark.parametrize("kind", ["string", "beam"])

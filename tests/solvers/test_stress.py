@@ -7,7 +7,7 @@ import pytest
 from mpmath import mp, mpf
 from scipy.integrate import solve_ivp
 
-from cra_sym.solvers.stress import Continuum
+from cra_sym.solvers.continuum import Continuum
 from cra_sym.solvers.stress_refine import solved
 
 SEED = 20260714
