@@ -77,7 +77,12 @@ GOOD = {
     "sensitivities": dict(system=ARM, modes=2, by=("k_t", "L")),
     "identify_joint": dict(system=ARM, measured_frequencies=[2.3, 14.0], uncertainty=0.01),
     "identify": dict(
-        system=ARM, measured=[2.3, 14.0], uncertainty=0.01, unknown=("k_t",), modes=(1, 2), prior={"E": (7e10, 1e9)}
+        system=ARM,
+        measured=cra.natural_frequencies(ARM, 2),
+        uncertainty=0.01,
+        unknown=("k_t",),
+        modes=(1, 2),
+        prior={"E": (6.9e10, 1e9)},
     ),
     "input_shaper": dict(angular_frequency=10.0, zeta=0.01, order=1),
     "certify": dict(system=ARM, modes=1),
