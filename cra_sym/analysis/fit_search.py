@@ -26,7 +26,7 @@ _LINKED = 4.0  # chi2 on the way between two minima, above theirs, up to which t
 _LOWEST = 200  # places of a grid that are starts whatever is beside them
 _STEPS = 25
 _APART = 1e-2  # of a coordinate: ends of a descent that are closer are one
-_FEW = 40
+_FEW = 24
 _MOST_KEPT = 1000
 _LARGEST = 1e150  # of a residual, whose square is a number
 
@@ -225,9 +225,9 @@ class Search:
 
     # ------------------------------------------------------------------------------------------------------------
 
-    def minima(self, data: Data) -> list[Array]:
-        """Return the local minima that are distinct, best first."""
-        places = [self._polished(start, data) for start in self._descended(self._starts(data), data)]
+    def minima(self, data: Data, most: int | None = None) -> list[Array]:
+        """Return the local minima, best first, or those that the lowest ends of the descent lead to."""
+        places = [self._polished(start, data) for start in self._descended(self._starts(data), data)[:most]]
         places.sort(key=lambda place: self.chi2(place, data))
         return places
 
@@ -258,7 +258,8 @@ class Search:
         with np.errstate(all="ignore"):
             found = least_squares(
                 residuals, start, gradient, bounds=(low, high), x_scale="jac",
-                xtol=tolerance, ftol=tolerance, gtol=tolerance, max_nfev=200,
+                xtol=tolerance, ftol=tolerance, gtol=tolerance,
+                max_nfev=200 if held is None else 20,
             )  # fmt: skip
         place: Array = found.x
         stiff = np.array([unknown.kind != "signed" for unknown in self.unknowns])

@@ -264,7 +264,7 @@ def _estimates(kind: type[Identification], search: Search, data: Data) -> list[I
     """Return the distinct fits, or the best of what does not fit."""
     places = search.minima(data)
     best = _estimate(kind, search, data, places[0])
-    if not best.fits:
+    if not best.fits or search.residuals(places[0], data).size < len(search.unknowns):
         return [best]
     good = [place for place in places if _goodness(search, data, place)[-1]]
     return [_estimate(kind, search, data, place) for place in search.distinct(good, data)]
@@ -352,7 +352,7 @@ def _hints(search: Search, data: Data, lowest: bool) -> list[str]:
 
 
 def _best_p(search: Search, data: Data) -> float:
-    return max(_goodness(search, data, place)[2] for place in search.minima(data))
+    return max(_goodness(search, data, place)[2] for place in search.minima(data, most=3))
 
 
 # Arguments --------------------------------------------------------------------------------------------------------

@@ -175,7 +175,8 @@ class StateModes:
         return mode_sign(self._overview[..., : self.spatial.displacements])
 
     def _signed(self, states: Array) -> Array:
-        return states * self._sign[..., None]
+        signed: Array = states * self._sign[..., None]
+        return signed
 
     def _end(self, end: int, entry: int) -> Array:
         return self._ends[:, :, end, entry].reshape(self.omega.shape)
