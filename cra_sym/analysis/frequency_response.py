@@ -26,6 +26,9 @@ Complex = NDArray[np.complex128]
 _BELOW, _ABOVE, _DIGITS = 18.0, 14.0, 37.0  # reach of the quadrature in ln y, and minus ln of its error
 _SOFT, _MOST_SOFT = 0.03, 4  # a mode this far below the next is soft; at most so many are looked for
 _NEAR = 0.05  # z below which soft modes are summed, over the square of the first frequency that is not soft
+_MODES = (20, 60, 200)  # numbers of modes that are tried in turn where the problem varies along x
+_LEFT_OUT = 1e-9, 1e-6  # what damping of the other modes may add to the response: aimed at, accepted
+_FINEST = 20  # halvings of the domain up to which waves are followed at imaginary frequencies
 _KINDS = ("force", "motion")
 _FASTEST = 1e60  # rad/s, whose fourth power is a number; what is slower than its inverse is static
 
@@ -76,7 +79,7 @@ def frequency_response(
     ------
     TypeError, ValueError
         If an argument is out of its range, an infinite stiffness holds what is driven, the waves are too short to
-        follow, or a model with dampers is given modal damping too.
+        follow, a model with dampers is given modal damping too, or modal damping is beyond the formula, see Notes.
 
     Notes
     -----
@@ -90,6 +93,10 @@ def frequency_response(
 
     The integrand has no resonance, and the trapezoidal rule in ln y converges geometrically to rounding. Rigid-body
     modes, which have no damping, are summed apart.
+
+    Where coefficients or loads vary along x, up to 200 modes are summed, with their damping, and what all others add
+    without damping is exact; more than 1e-6 of the response by the damping of those is refused, as is modal damping
+    of a structure that a motion of one end drives and that varies along x or can still move as a rigid body.
 
     Examples
     --------
@@ -105,7 +112,7 @@ def frequency_response(
     if places is not None:
         check_places(system, places)
     choice("damping", damping, ("modal", "structural"))
-    undamped = _Undamped(system, places, drive, kind, section_place(system, field))
+    undamped = _Undamped(system, places, drive, kind, section_place(system, field), float(grid.max(initial=0.0)))
     zeta = np.broadcast_to(system.zeta, system.shape)[..., None]
     if np.any(zeta) and undamped.problem_damped:
         raise ValueError(
@@ -115,7 +122,10 @@ def frequency_response(
         loss = 1 + 2j * zeta
         found = undamped(grid / np.sqrt(loss)) / loss[..., None]
     else:
-        found = _with_modal_damping(undamped, grid, zeta)
+        undamped.check_modal_damping(zeta)
+        by_modes = undamped.varies and np.any(zeta)
+        found = undamped.by_modes(grid, zeta) if by_modes else _with_modal_damping(undamped, grid, zeta)
+    found = np.where((grid == 0)[..., None, :], undamped.turned_by_motion(found), found)
     unbounded = (grid == 0) & undamped.drives_rigid_motion()[..., None]
     found = np.where(unbounded[..., None, :], np.inf, found)
     found = found[..., 0, :] if places is None or not places.ndim else found
@@ -135,6 +145,7 @@ def _with_modal_damping(undamped: _Undamped, grid: NDArray[np.float64], zeta: ND
     moving = grid[~static]
     step = 2 * np.pi * np.arccos(np.max(zeta)) / _DIGITS
     y = np.exp(np.arange(np.log(moving.min()) - _BELOW, np.log(moving.max()) + _ABOVE, step))
+    y = y[: undamped.followed(y)]  # beyond, the integrand is below the square of a millionth
     Omega = np.where(static, 1.0, grid)[..., None, :]
     factor = zeta[..., None]
     integrand = y[:, None] ** 3 / ((y[:, None] ** 2 + Omega**2) ** 2 - (2 * factor * Omega * y[:, None]) ** 2)
@@ -149,9 +160,15 @@ class _Undamped:
     """The response without modal damping at complex frequencies (..., K), shape (..., X, K)."""
 
     def __init__(
-        self, system: System, places: NDArray[np.float64] | None, drive: Any, kind: str | None, place: int
+        self,
+        system: System,
+        places: NDArray[np.float64] | None,
+        drive: Any,
+        kind: str | None,
+        place: int,
+        fastest: float,
     ) -> None:
-        self._system, self._places, self._place = system, places, place
+        self._system, self._places, self._place, self._fastest = system, places, place, fastest
         self.motion = _motion_name(system, drive)
         if self.motion is not None:
             if kind is not None:
@@ -166,6 +183,43 @@ class _Undamped:
         self._kind = "motion" if self.motion is not None else choice("kind", "force" if kind is None else kind, _KINDS)
         self.by_force = self._kind == "force"
         self.problem_damped: bool = system.numerics("damped")
+        self.varies = not self._problem.uniform and not self.problem_damped
+
+    def check_modal_damping(self, zeta: NDArray[np.float64]) -> None:
+        """Raise if modal damping of this structure has no formula here."""
+        if not np.any(zeta) or self.motion is not None or self.by_force:
+            return
+        if self.varies or (self._system.natural_frequencies(2) == 0).all(axis=-1).any():
+            why = "varies along x" if self.varies else "can still move as a rigid body"
+            raise ValueError(
+                f"zeta: a structure that a motion of one end drives and that {why} must have damping='structural' or "
+                "zeta = 0"
+            )
+
+    def followed(self, y: NDArray[np.float64]) -> int:
+        """Return how many of these rising imaginary frequencies have waves that can be followed."""
+        columns = flat_columns(self._system.parameters, self._system.shape)
+        count = y.size
+        for rows, _, problem in self._problem.problems(columns):
+            row = np.repeat(np.arange(len(rows)), y.size)
+            parameter = np.tile(1j * y if self.problem_damped else -(y**2), len(rows))
+            levels = problem.levels(parameter, row).reshape(len(rows), y.size)
+            count = min(count, int((levels.max(axis=0) <= _FINEST).sum()))
+        return count
+
+    def turned_by_motion(self, found: Complex) -> Complex:
+        """Return the response at rest, where an end that moves also turns the structure about it as a rigid body."""
+        system = self._system
+        if self.problem_damped or self._kind != "motion" or self.motion is not None:
+            return found
+        still = system.natural_frequencies(6) == 0
+        if not still.any():
+            return found
+        drive = np.where(still, self._drive_of_modes(6), 0.0)
+        own = np.sum(drive**2, axis=-1)[..., None, None]
+        limit = np.einsum("...m,...mx->...x", drive, self._shapes(6))[..., None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.where(own > 0, limit / own, found))
 
     def drives_rigid_motion(self) -> NDArray[np.bool_]:
         """Return whether a constant drive accelerates a rigid-body mode, shape of the batch."""
@@ -224,22 +278,70 @@ class _Undamped:
         """Number of modes far below the next, in any member of the batch; 0 for driving by a motion."""
         if self.problem_damped or (self.motion is None and not self.by_force):
             return 0
+        if self.varies:
+            return next((n for n in _MODES if self._reached(n)), _MODES[-1])
         omega = self._system.natural_frequencies(_MOST_SOFT + 1)
         gaps = (omega[..., :-1] < _SOFT * omega[..., 1:]).reshape(-1, _MOST_SOFT).any(axis=0)
         return int(np.flatnonzero(gaps).max(initial=-1)) + 1
 
+    # Where the problem varies along x, many modes are summed: they are known to a stated accuracy, while the dynamic
+    # stiffness of many short pieces loses digits at low frequencies.
+
+    def _reached(self, modes: int) -> bool:
+        omega = self._system.natural_frequencies(modes + 1)
+        low = bool((self._fastest**2 < _NEAR * omega[..., -1] ** 2).all())
+        return low and (not np.any(self._system.zeta) or self._left_out(modes) < _LEFT_OUT[0])
+
+    def _left_out(self, modes: int) -> float:
+        """Return a bound of what damping of the modes beyond adds, over the response at rest of the elastic modes.
+
+        From mode to mode a residue over the squared frequency falls at least as the inverse square of its number.
+        """
+        omega = self._system.natural_frequencies(modes).reshape(-1, modes, 1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            static = np.where(omega > 0, np.abs(self._products(modes)) / omega**2, 0.0)
+            share = modes * static[:, -4:].max(axis=(1, 2)) / static.max(axis=(1, 2))
+        zeta = np.broadcast_to(self._system.zeta, self._system.shape).ravel()
+        return float(np.max(2 * zeta * self._fastest / omega[:, -1, 0] * np.nan_to_num(share), initial=0.0))
+
+    def by_modes(self, grid: NDArray[np.float64], zeta: NDArray[np.float64]) -> Complex:
+        """Return the response with modal damping of the modes that are summed, shape (..., X, K)."""
+        shape, modes = self._system.shape, self._soft
+        squares = self._system.natural_frequencies(modes + 1).reshape(-1, modes + 1) ** 2
+        squares, limit = squares[:, :-1], squares[:, -1]
+        if (self._fastest**2 >= _NEAR * limit).any() or self._left_out(modes) > _LEFT_OUT[1]:
+            raise ValueError(
+                f"zeta: {modes} modes do not reach the accuracy of 1e-6 where the problem varies along x; set "
+                "damping='structural' or lower angular_frequency or zeta"
+            )
+        z = np.broadcast_to(grid**2, (len(squares), grid.size))
+        values = np.swapaxes(self._exact(nodes(limit)), 1, 2).real
+        others = np.swapaxes(remainder(values, squares, self._residues, limit)(z), 1, 2)
+        ratio = np.broadcast_to(zeta, (*shape, 1)).reshape(-1, 1, 1)
+        gap = squares[:, :, None] + 2j * ratio * np.sqrt(squares)[:, :, None] * grid - z[:, None, :]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            answers = np.where(
+                gap == 0, 0.0, 1.0 / gap
+            )  # at rest a rigid-body mode that is driven: found by the caller
+        found = others + np.einsum("rmx,rmk->rxk", self._residues, answers)
+        return np.asarray(found.reshape(*shape, *found.shape[1:]))
+
     @cached_property
     def _residues(self) -> NDArray[np.float64]:
         """Product of the drive of each soft mode and its displacement at the places, shape (rows, modes, X)."""
-        modes = self._system.modes(self._soft)
+        return self._products(self._soft)
+
+    def _products(self, modes: int) -> NDArray[np.float64]:
         sign = -1.0 if self.motion is not None else 1.0
-        drive = sign * self._drive_of_modes(self._soft)
+        product = sign * self._drive_of_modes(modes)[..., None] * self._shapes(modes)
+        return np.asarray(product.reshape(-1, *product.shape[-2:]))
+
+    def _shapes(self, modes: int) -> NDArray[np.float64]:
+        """Return the displacements at the places, shape (..., modes, X)."""
+        found = self._system.modes(modes)
         if self._places is None:
-            shape = modes.displacement(1, self._place)[..., None]
-        else:
-            shape = modes.shape(self._place, 0, np.atleast_1d(self._places))
-        product = drive[..., None] * shape
-        return product.reshape(-1, *product.shape[-2:])
+            return found.displacement(1, self._place)[..., None]
+        return found.shape(self._place, 0, np.atleast_1d(self._places))
 
     def _with_soft_modes(self, z: NDArray[Any], *, rigid: bool) -> Complex:
         squares = self._system.natural_frequencies(self._soft + 1).reshape(len(z), -1) ** 2

@@ -155,7 +155,7 @@ class ModalParameters:
     axial : ndarray, shape (..., modes, modes)
         G_ij = int (rho A (L - x) + m_e) phi_i' phi_j' dx, 1/m: work of the axial load of a base accelerated along x.
     stiffness_translation, stiffness_rotation : ndarray, shape (..., modes, modes)
-        k_t phi_i(0) phi_j(0) and k_r phi_i'(0) phi_j'(0), 1/s2; 0 for infinite stiffness.
+        k_t phi_i(0) phi_j(0) and k_r phi_i'(0) phi_j'(0) by the springs of the left end, 1/s2; 0 for infinite stiffness.
     """
 
     def __init__(self, system: System, modes: int) -> None:
@@ -208,12 +208,15 @@ class ModalParameters:
     @property
     def root_slope(self) -> Array:
         """phi'(0), kg^-1/2/m."""
-        return self._modes.displacement(0, 1)
+        return self._slope(0)
 
     @property
     def root_moment(self) -> Array:
         """EI phi''(0), N kg^-1/2."""
-        return self._modes.force(0, 1)
+        place = self._system.numerics("slope_place")
+        if place is None:
+            raise ValueError("root_moment: no force of the section is conjugate to the slope; use left_force")
+        return self._modes.force(0, place)
 
     @property
     def root_shear(self) -> Array:
@@ -228,7 +231,15 @@ class ModalParameters:
     @property
     def tip_slope(self) -> Array:
         """phi'(L), kg^-1/2/m."""
-        return self._modes.displacement(1, 1)
+        return self._slope(1)
+
+    def _slope(self, end: int) -> Array:
+        place = self._system.numerics("slope_place")
+        if place is not None:
+            return self._modes.displacement(end, place)
+        domain = self._system.domain
+        there = np.broadcast_to(domain.left + domain.length * end, self._system.shape)[..., None]
+        return self._modes.shape(0, 1, there)[..., 0]
 
     @property
     def left(self) -> Array:
@@ -262,13 +273,19 @@ class ModalParameters:
 
     @cached_property
     def stiffness_translation(self) -> Array:
-        """Matrix of k_t phi_i(0) phi_j(0), 1/s2."""
-        return stiffness_coupling(self._system, "k_t", self._number)
+        """Matrix of k_t phi_i(0) phi_j(0) by the springs on the left end, 1/s2."""
+        return self._spring(0)
 
     @cached_property
     def stiffness_rotation(self) -> Array:
-        """Matrix of k_r phi_i'(0) phi_j'(0), 1/s2."""
-        return stiffness_coupling(self._system, "k_r", self._number)
+        """Matrix of k_r phi_i'(0) phi_j'(0) by the springs on the left end, 1/s2."""
+        return self._spring(self._system.numerics("slope_place"))
+
+    def _spring(self, place: int | None) -> Array:
+        """Return the coupling by the springs of a displacement of the left end."""
+        names = [name for name, spring in self._system.numerics("stiffnesses").items() if spring[:2] == (0, place)]
+        zero = np.zeros((*self.omega.shape, self.omega.shape[-1]))
+        return sum((stiffness_coupling(self._system, name, self._number) for name in names), start=zero)
 
     @cached_property
     def axial(self) -> Array:

@@ -67,9 +67,10 @@ def state_space(
         damping = damping + Projected(system.domain, system.modes(modes), dampers)["damping"]
     push = -gamma
     if input == "drive_force":
-        whole = float(system.numerics("carried_mass", motion).function(*system.domain.values))
-        mass = np.block([[np.array([[whole]]), gamma[None]], [gamma[:, None], mass]])
-        stiffness, damping = (np.pad(matrix, ((1, 0), (1, 0))) for matrix in (stiffness, damping))
+        own = system.numerics("carried", motion).function(*system.domain.values)
+        mass, damping, stiffness = (np.pad(matrix, ((1, 0), (1, 0))) for matrix in (mass, damping, stiffness))
+        mass[0, 0], damping[0, 0], stiffness[0, 0] = (float(value) for value in own)
+        mass[0, 1:] = mass[1:, 0] = gamma
         push, tip = np.eye(modes + 1)[0], np.array([0.0, *tip])
     size = push.size
     accelerations = np.linalg.solve(mass, np.hstack([-stiffness, -damping, push[:, None]]))

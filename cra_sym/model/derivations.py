@@ -252,17 +252,20 @@ def axial(model: Model) -> Form:
     return form_of(weak, {"axial": ({(slope, slope): {0: load}}, {})}, model.symbols)
 
 
-def carried_mass(model: Model, name: str) -> Kernel:
-    """Return the mass that a prescribed motion moves when nothing deforms, as a function of the parameters."""
+def carried(model: Model, name: str) -> Kernel:
+    """Return the (mass, damping, stiffness) that a prescribed motion moves when nothing deforms, by the parameters."""
     freed = model.freed(name)
     weak = weak_form(freed.equations.variation)
     space = weak.variation.space
     number = next(k for k, u in enumerate(space.unknowns) if u.func.__name__ == name)
     jet = Jet(number, 0, 0, None)
     left, right = (space.ends[end] for end in END_NAMES)
-    inside = weak.inside.get((jet, jet), {}).get(2, S.Zero)
-    total = integrate(inside, (space.x, left, right)) + weak.discrete.get((jet, jet), {}).get(2, S.Zero)
-    return kernel(total, model.symbols, backend="numpy")
+    inside, discrete = weak.inside.get((jet, jet), {}), weak.discrete.get((jet, jet), {})
+    found = (
+        integrate(inside.get(order, S.Zero), (space.x, left, right)) + discrete.get(order, S.Zero)
+        for order in (2, 1, 0)
+    )
+    return kernel(tuple(found), model.symbols, backend="numpy")
 
 
 def driven(model: Model, name: str) -> SpatialProblem:
@@ -298,6 +301,14 @@ def driven(model: Model, name: str) -> SpatialProblem:
 def sizes(model: Model) -> tuple[int, int]:
     """Return the numbers of displacements of a section and of lumped coordinates."""
     return len(model.state_form.displacements), len(model.state_form.coordinates)
+
+
+def slope_place(model: Model) -> int | None:
+    """Return the position of the first field's slope among the displacements of a section, or None."""
+    field, x = model.equations.fields[0], model.equations.x
+    found = [str(displacement) for displacement in model.state_form.displacements]
+    slope = str(field.diff(x))
+    return found.index(slope) if slope in found else None
 
 
 def stiffnesses(model: Model) -> dict[str, EndParameter]:
