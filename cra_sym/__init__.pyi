@@ -1,10 +1,14 @@
 from .analysis.certification import certify as certify
 from .analysis.frequency_response import frequency_response as frequency_response
+from .analysis.identification import AmbiguityWarning as AmbiguityWarning
+from .analysis.identification import MisfitWarning as MisfitWarning
+from .analysis.identification import identify as identify
 from .analysis.identification import identify_joint as identify_joint
 from .analysis.modes import modal_parameters as modal_parameters
 from .analysis.modes import mode_shapes as mode_shapes
 from .analysis.modes import natural_frequencies as natural_frequencies
 from .analysis.residual_gradient import residual_vibration_gradient as residual_vibration_gradient
+from .analysis.responses import UndersamplingWarning as UndersamplingWarning
 from .analysis.responses import residual_vibration as residual_vibration
 from .analysis.responses import response as response
 from .analysis.responses import tip_response as tip_response

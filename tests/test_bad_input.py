@@ -141,7 +141,7 @@ def test_what_is_good_for_an_arm_is_good_for_any_system(name):
         assert call(name, system=WIRE.at(OF_WIRE)).sizes["k_t"] == 2
     elif name == "identify":
         measured = cra.natural_frequencies(WIRE.at({**OF_WIRE, "T": 5.0}), modes=2)
-        fit = call(name, system=WIRE.at(OF_WIRE), measured=measured, unknown=("T",))
+        fit = call(name, system=WIRE.at(OF_WIRE), measured=measured, unknown=("T",), prior={"mass": (1.0, 0.1)})
         np.testing.assert_allclose(fit.values["T"], 5.0, rtol=1e-6)
     elif name == "identify_joint":
         with pytest.raises(ValueError, match="k_r must be the stiffness of an end"):

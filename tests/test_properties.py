@@ -182,6 +182,10 @@ NUMERIC = {
 BROKEN_AT_ZERO = {"stability_boundary", "sensitivities", "residual_vibration_gradient"}
 #: Those of one arm, or of none.
 SINGLE = {
+    "identify": (
+        lambda arm, u: cra.identify(arm, cra.natural_frequencies(arm, 3), 1e-3 * u(0, -1), ("m_e",)).values["m_e"],
+        (0, 0, 1),
+    ),
     "identify_joint": (
         lambda arm, u: cra.identify_joint(arm, cra.natural_frequencies(arm), 1e-3 * u(0, -1)).k_t,
         (0, -2, 1),
@@ -190,8 +194,9 @@ SINGLE = {
     "state_space": (lambda arm, u: at_rest(cra.state_space(arm)), (0, 2, 0)),
 }  # fmt: skip
 NOT_NUMERIC = {
-    "Arm", "AsymptoticWarning", "AxialBase", "BaseMotion", "Force", "JointStiffness", "Model", "ResonanceWarning",
-    "TransverseBase", "equation", "equations", "explore", "export", "kernel", "sweep",
+    "AmbiguityWarning", "Arm", "AsymptoticWarning", "AxialBase", "BaseMotion", "Fluctuation", "Force", "JointStiffness",
+    "MisfitWarning", "Model", "ResonanceWarning", "System", "TransverseBase", "UndersamplingWarning", "equation",
+    "equations", "explore", "export", "kernel", "paper_lagrangian", "stations", "sweep",
 }  # fmt: skip
 
 

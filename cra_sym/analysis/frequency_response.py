@@ -320,9 +320,7 @@ class _Undamped:
         ratio = np.broadcast_to(zeta, (*shape, 1)).reshape(-1, 1, 1)
         gap = squares[:, :, None] + 2j * ratio * np.sqrt(squares)[:, :, None] * grid - z[:, None, :]
         with np.errstate(divide="ignore", invalid="ignore"):
-            answers = np.where(
-                gap == 0, 0.0, 1.0 / gap
-            )  # at rest a rigid-body mode that is driven: found by the caller
+            answers = np.where(gap == 0, 0.0, 1.0 / gap)  # at rest: rigid-body modes, by the caller
         found = others + np.einsum("rmx,rmk->rxk", self._residues, answers)
         return np.asarray(found.reshape(*shape, *found.shape[1:]))
 

@@ -122,7 +122,7 @@ def identify(
     system: System,
     measured: Any,
     uncertainty: Any,
-    unknown: Sequence[str] = _JOINT,
+    unknown: Sequence[str] | None = None,
     modes: Sequence[int] | None = None,
     prior: Mapping[str, tuple[float, float]] | None = None,
 ) -> Identification:
@@ -140,8 +140,8 @@ def identify(
         Natural frequencies, Hz, ascending.
     uncertainty : float or array_like, shape (m,)
         Standard deviation of each, Hz; 1e-60 to 1e60.
-    unknown : sequence of str
-        Names of parameters of the system.
+    unknown : sequence of str, optional
+        Names of parameters of the system; by default the stiffnesses of the ends, for an arm k_t and k_r.
     modes : sequence of int, shape (m,), optional
         Which modes were measured, from 1, rigid-body modes included; by default the lowest m.
     prior : mapping of str to (value, uncertainty), optional
@@ -384,6 +384,7 @@ def _checked_data(system: System, name: str, measured: Any, uncertainty: Any, mo
 
 
 def _checked_names(system: System, unknown: Any, prior: Mapping[str, Any]) -> tuple[str, ...]:
+    unknown = tuple(system.numerics("stiffnesses")) if unknown is None else unknown
     if isinstance(unknown, str) or not isinstance(unknown, Iterable):
         raise TypeError(f"unknown = {shown(unknown)}: must be a sequence of names of parameters")
     names = tuple(dict.fromkeys([*unknown, *prior]))

@@ -155,7 +155,7 @@ class ModalParameters:
     axial : ndarray, shape (..., modes, modes)
         G_ij = int (rho A (L - x) + m_e) phi_i' phi_j' dx, 1/m: work of the axial load of a base accelerated along x.
     stiffness_translation, stiffness_rotation : ndarray, shape (..., modes, modes)
-        k_t phi_i(0) phi_j(0) and k_r phi_i'(0) phi_j'(0) by the springs of the left end, 1/s2; 0 for infinite stiffness.
+        k_t phi_i(0) phi_j(0) and k_r phi_i'(0) phi_j'(0) of springs of the left end, 1/s2; 0 if infinite.
     """
 
     def __init__(self, system: System, modes: int) -> None:
@@ -333,9 +333,12 @@ def only_motion(system: System) -> str:
     ValueError
         If there is none, or more than one.
     """
-    motions = [name for name, kind in system.numerics("causes") if kind == "motion"]
+    causes = system.numerics("causes")
+    motions = [name for name, kind in causes if kind == "motion"]
     if len(motions) != 1:
         found = ", ".join(motions) or "none"
+        if not motions and causes:
+            found += f" ({', '.join(name for name, _ in causes)} acts in another way)"
         raise ValueError(f"the model must have one prescribed motion that acts by its acceleration; it has {found}")
     return motions[0]
 

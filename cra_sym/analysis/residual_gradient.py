@@ -31,7 +31,7 @@ _POINTS = 8  # on one side of a parameter that cannot be negative, or four on ea
 def residual_vibration_gradient(
     system: System,
     motion: BaseMotion,
-    by: Sequence[str] = ("k_t", "k_r", "duration"),
+    by: Sequence[str] | None = None,
     modes: int = 5,
     *,
     zeta: Any = None,
@@ -47,8 +47,9 @@ def residual_vibration_gradient(
     ----------
     system, motion, modes, zeta
         As in :func:`residual_vibration`.
-    by : sequence of str
-        Parameters of the system; the compliance 1/k of a stiffness k of an end, for an arm 'c_t' and 'c_r', else '1/'
+    by : sequence of str, optional
+        By default the stiffnesses of the ends, for an arm k_t and k_r, and 'duration'. Otherwise parameters of the
+        system; the compliance 1/k of a stiffness k of an end, for an arm 'c_t' and 'c_r', else '1/'
         and its name; and 'duration', which stretches the motion uniformly in time over the same way, as the argument
         of :meth:`BaseMotion.s_curve` does.
 
@@ -79,6 +80,7 @@ def residual_vibration_gradient(
     compliances = {f"1/{name}": name for name in system.numerics("stiffnesses")}
     compliances |= {name.replace("k_", "c_", 1): name for name in compliances.values() if name.startswith("k_")}
     known = [*system.values, *compliances, "duration"]
+    by = (*system.numerics("stiffnesses"), "duration") if by is None else by
     if isinstance(by, str) or not isinstance(by, Sequence) or not all(name in known for name in by):
         raise ValueError(f"by = {shown(by)}: must be a sequence of names among {', '.join(known)}")
     value = residual_vibration(system, motion, modes, zeta=zeta)

@@ -203,6 +203,12 @@ def stopped_oscillators(system: System, motion: BaseMotion, modes: int, zeta: An
         raise ValueError(
             "the dampers of the model couple its modes: use modal damping (zeta), or response after the stop"
         )
+    others = [name for name, _ in system.numerics("causes") if name != only_motion(system)]
+    if others or system.numerics("constant") is not None:
+        what = ", ".join(others) or "a constant load"
+        raise ValueError(
+            f"system: must be driven by one motion alone, but {what} acts too; use response after the stop"
+        )
     modes = count("modes", modes, high=MOST_MODES)
     rows = system.modes(modes).displacement(1, 0)[..., None, :]
     _check_sampling(motion, system.natural_frequencies(modes))
@@ -293,7 +299,7 @@ def _histories(system: System, motion: Any) -> dict[str, History]:
     """Return what was given for each function of time that drives the model, by name."""
     causes = dict(system.numerics("causes"))
     if isinstance(motion, BaseMotion):
-        return {only_motion(system): motion}
+        motion = {only_motion(system): motion}
     if motion is not None and not isinstance(motion, Mapping):
         raise TypeError(f"motion = {shown(motion)}: must be a BaseMotion or a mapping from functions of t to motions")
     given = {

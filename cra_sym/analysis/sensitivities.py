@@ -17,6 +17,8 @@ from cra_sym.model.system import MOST_MODES, System
 __all__ = ["Rates", "Sensitivities", "sensitivities"]
 
 Array = NDArray[np.float64]
+_SAME = 1e-10  # relative distance of frequencies that rounding does not tell apart
+_MIXED = 1e-6  # of a rate: above what rounding of shapes makes of a change that acts alike on repeated modes
 
 
 class Rates(Mapping[str, Array]):
@@ -56,8 +58,8 @@ class Sensitivities:
 
     A rigid-body mode, f = 0, leaves zero like a square root: its raw derivative by the stiffness that would hold it
     is inf, its other raw derivatives are 0 and its logarithmic ones nan. Where there are several such modes, which is
-    which depends on the direction of change: nan. An infinite stiffness has derivatives 0; those by the compliance
-    1/k say what the first give of a rigid support costs.
+    which depends on the direction of change: nan, as where a parameter splits a repeated frequency. An infinite
+    stiffness has derivatives 0; those by the compliance 1/k say what the first give of a rigid support costs.
 
     Attributes
     ----------
@@ -120,7 +122,30 @@ class Sensitivities:
     def _squared(self, name: str) -> Array:
         """Return the derivative of omega^2 by a parameter, by first-order perturbation."""
         rate = self._forms[f"{name} stiffness"] - self._omega**2 * self._forms[f"{name} mass"]
+        if self._repeated is not None:
+            rate = np.where(self._splits(name), np.nan, rate)
         return np.where(np.isinf(column(np.asarray(self._system.values[name]))), 0.0, rate)
+
+    @cached_property
+    def _repeated(self) -> NDArray[np.bool_] | None:
+        """Which frequencies are the same to rounding, shape (..., modes + 2, modes + 2); None if none are."""
+        if isinstance(self._system.modes(self._modes), OneWaveModes):
+            return None  # a mode of one wave number in one field is alone at its frequency
+        omega = self._system.natural_frequencies(self._modes + 2)
+        near = np.abs(omega[..., :, None] - omega[..., None, :]) <= _SAME * omega[..., None, :]
+        near &= (omega > 0)[..., None] & ~np.eye(omega.shape[-1], dtype=bool)
+        return near if near[..., : self._modes, :].any() else None
+
+    def _splits(self, name: str) -> NDArray[np.bool_]:
+        """Return at which modes a change of the parameter splits a repeated frequency: there it has no derivative."""
+        assert self._repeated is not None
+        forms = self._system.form("rates", self._modes + 2)
+        omega = self._system.natural_frequencies(self._modes + 2)
+        block = forms[f"{name} stiffness"] - omega[..., None] * omega[..., None, :] * forms[f"{name} mass"]
+        own = np.diagonal(block, axis1=-2, axis2=-1)
+        off = np.maximum(np.abs(block), np.abs(own[..., :, None] - own[..., None, :]))
+        size = np.maximum(np.abs(own[..., :, None]), np.abs(own[..., None, :])) + np.abs(block)
+        return (self._repeated & (off > _MIXED * size))[..., : self._modes, :].any(axis=-1)
 
     @default_floating_point
     def _raw(self, name: str) -> Array:

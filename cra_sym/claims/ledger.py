@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copyreg
+from dataclasses import fields
 from functools import cache
 from importlib import import_module
 from types import MappingProxyType
@@ -13,8 +15,6 @@ from cra_sym.claims.setting import Setting
 from cra_sym.claims.verdict import OUTCOMES, THEMES, Verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from cra_sym.arm.parameters import Arm
 
 __all__ = ["claim", "claims"]
@@ -34,9 +34,18 @@ def _entry(id: str) -> Entry:
     return ENTRIES[choice("claim", id, _load())]
 
 
-def picture_of(id: str) -> Callable[[Verdict, Any], None] | None:
-    """Return the function that draws the evidence of a claim; None for what is not one of the ledger's."""
-    return ENTRIES[id].picture if id in _load() else None
+def _rebuilt(values: dict[str, Any]) -> Verdict:
+    """Return a verdict that comes from a pickle, with the picture of its claim."""
+    picture = ENTRIES[values["id"]].picture if values["id"] in _load() else None
+    return Verdict(**(values | {"picture": picture}))
+
+
+def _reduced(verdict: Verdict) -> tuple[Any, ...]:
+    values = {item.name: getattr(verdict, item.name) for item in fields(verdict)}
+    return _rebuilt, (values | {"evidence": dict(verdict.evidence), "picture": None},)
+
+
+copyreg.pickle(Verdict, _reduced)  # a picture is a function that no name leads to: the ledger finds it
 
 
 @cache

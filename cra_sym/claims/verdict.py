@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import astuple, dataclass, field, fields
+from dataclasses import astuple, dataclass, field
 from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -119,10 +119,6 @@ class Verdict:
     def __post_init__(self) -> None:
         object.__setattr__(self, "evidence", MappingProxyType(dict(self.evidence)))
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
-        return _rebuilt, (values | {"evidence": dict(self.evidence), "picture": None},)
-
     def __getitem__(self, name: str) -> np.ndarray:
         """Return the values of one quantity of the evidence."""
         values: np.ndarray = self.evidence[name].values
@@ -150,13 +146,6 @@ class Verdict:
         lines += [f"*Smallest change that reproduces the paper:* {self.remedy}"] if self.remedy else []
         lines += [f"*Missing:* {self.missing}"] if self.missing else []
         return "\n\n".join(lines)
-
-
-def _rebuilt(values: dict[str, Any]) -> Verdict:
-    """Return a verdict that comes from a pickle, with the picture of its claim."""
-    from cra_sym.claims.ledger import picture_of
-
-    return Verdict(**(values | {"picture": picture_of(values["id"])}))
 
 
 def _plain(values: np.ndarray) -> Any:

@@ -85,8 +85,8 @@ def switches(expressions: Iterable[Expr], x: Symbol) -> tuple[Switch, ...]:
     --------
     >>> from sympy import Abs, Heaviside, symbols
     >>> x, a, b = symbols("x a b")
-    >>> switches([3 + 2 * Heaviside(x - a), Abs(x**2 - b)], x)
-    (Switch(expression=a - x, levels=False), Switch(expression=b - x**2, levels=False))
+    >>> [switch.expression for switch in switches([3 + 2 * Heaviside(x - a), Abs(x**2 - b)], x)]
+    [a - x, b - x**2, x]
     """
     found: dict[Switch, None] = {}
     for expression in expressions:

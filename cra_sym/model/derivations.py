@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Literal
 
-from sympy import Add, Derivative, Dummy, Expr, S, Symbol, cancel, integrate, sympify
+from sympy import Add, Derivative, Dummy, Expr, S, Symbol, SympifyError, cancel, integrate, sympify
 from sympy.core.function import AppliedUndef
 
 from cra_sym.checks import mapping, shown
@@ -147,7 +147,12 @@ def momentum(model: Model, initial: Mapping[Expr, Any], order: int) -> Load | No
         if function not in space.unknowns or key not in (function, function.diff(space.t)):
             known = ", ".join(f"{u}, {u.diff(space.t)}" for u in space.unknowns)
             raise ValueError(f"initial: {key} must be one of {known}")
-        number, value = space.unknowns.index(function), sympify(value, strict=True)
+        try:
+            number, value = space.unknowns.index(function), sympify(value, strict=True)
+        except (SympifyError, TypeError):
+            raise ValueError(f"initial: {key} = {shown(value)} must be an expression in {space.x}") from None
+        if not isinstance(value, Expr):
+            raise ValueError(f"initial: {key} = {shown(value)} must be an expression in {space.x}")
         free = {*model.symbols, *([space.x] if space.is_field(number) else [])}
         if value.free_symbols - free or value.atoms(AppliedUndef):
             raise ValueError(f"initial: {key} = {value} must be an expression in {', '.join(map(str, free))}")
@@ -238,7 +243,8 @@ def axial(model: Model) -> Form:
     """Return the stiffness that a unit acceleration of the frame along x, towards the right, gives the first field.
 
     What moves across the domain moves along it too: the inertia of all mass beyond x, at the right end included, acts
-    on the foreshortening v_x^2 / 2 there, so that (36b) follows from the kinetic energy.
+    on the foreshortening v_x^2 / 2 there, so that (36b) follows from the kinetic energy. A mass m that an end carries
+    on a rigid lever e, of velocity v_t + e v_xt, adds m e v_x^2 / 2; m e is its coupling of both.
     """
     weak = weak_form(model.equations.variation)
     space = weak.variation.space
@@ -249,7 +255,22 @@ def axial(model: Model) -> Form:
     place = Dummy("x")
     beyond = integrate(density.subs(space.x, place), (place, space.x, space.ends["right"]))
     load = beyond + weak.ends.get((tip, tip), {}).get(2, S.Zero)
-    return form_of(weak, {"axial": ({(slope, slope): {0: load}}, {})}, model.symbols)
+    for number, unknown in enumerate(space.unknowns):
+        lumped = Jet(number, 0, 0, None)
+        if space.is_field(number) or weak.discrete.get((lumped, lumped), {}).get(2, S.Zero) == 0:
+            continue
+        if not any(lumped in pair and 2 in orders for pair, orders in weak.inside.items()):
+            raise ValueError(
+                f"axial: the place along x of the mass that moves by {unknown} is not known; state the work of the "
+                "axial load in the Lagrangian and let its amplitude fluctuate"
+            )
+    levers: dict[tuple[Jet, Jet], dict[int, Expr]] = {}
+    for end in END_NAMES:
+        displacement, turn = Jet(0, 0, 0, end), Jet(0, 1, 0, end)
+        moment = weak.ends.get((displacement, turn), {}).get(2, S.Zero)
+        if moment != 0:
+            levers[turn, turn] = {0: moment}
+    return form_of(weak, {"axial": ({(slope, slope): {0: load}}, levers)}, model.symbols)
 
 
 def carried(model: Model, name: str) -> Kernel:
@@ -322,7 +343,10 @@ def inertias(model: Model) -> dict[str, EndParameter]:
 
 
 def _end_parameters(model: Model, unit: Expr) -> dict[str, EndParameter]:
-    """Return the parameters that add a positive multiple of themselves, times ``unit``, to one entry of an end."""
+    """Return the parameters that add a positive multiple of themselves, times ``unit``, to one entry of an end.
+
+    In the order of the displacements, the left end first.
+    """
     form = model.conservative
     n, m = len(form.displacements), len(form.coordinates)
     inside = form.system.free_symbols | form.length.free_symbols | form.free.free_symbols
@@ -336,7 +360,7 @@ def _end_parameters(model: Model, unit: Expr) -> dict[str, EndParameter]:
             continue
         end, place = (0, row) if row < n else (1, row - n - m)
         found[symbol.name] = EndParameter(end, place, kernel(factor, model.symbols, backend="numpy"))
-    return found
+    return dict(sorted(found.items(), key=lambda item: item[1][:2]))
 
 
 def damped(model: Model) -> bool:

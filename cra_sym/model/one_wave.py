@@ -172,7 +172,10 @@ class OneWave:
         numbers = self._numbers(values)
         left, length, inertia, stiffness, scale = numbers[: _SCALES - 1]
         if lam is None:
-            lam = omega / _column(scale)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                lam = omega / _column(scale)
+            if not np.isfinite(lam).all():
+                raise ValueError("values: they lead beyond the range of double precision")
             lam = lam if self.layout.n == 1 else np.sqrt(lam)
         groups = [np.broadcast_to(x, shape) for x in self._groups(numbers)]
         found = self.family.modes(*groups, lam=lam)
