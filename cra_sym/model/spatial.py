@@ -293,7 +293,14 @@ class SpatialProblem:
         return Stiffness(section, ends, length, n, m, free, self.uniform, halvings, spans, jumps)
 
     def _coefficients(self, x: Array | float, z: np.ndarray, columns: Array) -> tuple[np.ndarray, np.ndarray]:
-        return _finite(self.system(x, z[:, None], *columns[..., None]), "a coefficient of the equations")
+        found = self.system(x, z[:, None], *columns[..., None])
+        if np.isfinite(found[0]).all():
+            return found
+        zero = [f"{name} = 0" for name, column in zip(self.names, columns, strict=True) if (column == 0).any()]
+        raise ValueError(
+            f"{' and '.join(zero) or 'values'}: a coefficient of the equations becomes infinite; a stiffness of the "
+            "interior must be greater than 0 and finite"
+        )
 
     def _rigid_directions(self, position: int, columns: np.ndarray) -> np.ndarray:
         """Return the end displacements that an infinite stiffness holds still, shape (rows, directions, size)."""

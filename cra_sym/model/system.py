@@ -120,9 +120,11 @@ class System:
         finite = [np.where(np.isinf(p), 0.0, p)[()] if np.isinf(p).any() else p for p in self.parameters]
         length, left = self.numerics("geometry").function(*finite)
         if not (np.all(length > 0) and np.all(np.isfinite(length))):
-            bad = np.asarray(length)[~(np.asarray(length) > 0)]
             name = self.numerics("length_name")
-            raise ValueError(f"domain: the length {name} = {bad.flat[0] if bad.size else np.inf:g} must be positive")
+            given = np.atleast_1d(self.values.get(name, length))
+            bad = given[~((given > 0) & np.isfinite(given))]
+            shown = bad.flat[0] if bad.size else np.inf
+            raise ValueError(f"domain: the length {name} = {shown:g} must be in (0, inf)")
         return Domain(finite, left, length)
 
     def natural_frequencies(self, modes: int) -> Array:
