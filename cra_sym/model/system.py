@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import broadcastable, count, default_floating_point, instance
+from cra_sym.checks import broadcastable, count, default_floating_point, instance, shown
 from cra_sym.model.projection import Domain, Load, Projected, project
 from cra_sym.model.routes import Estimated, Modes, Route
 from cra_sym.model.spatial import check_range
@@ -71,6 +71,11 @@ class System:
         self._zeta = frozen(checked_damping(zeta))
         broadcastable(zeta=self._zeta, **self._values)
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not name.startswith("_"):
+            raise AttributeError(f"{name} = {shown(value)}: a System is frozen; use replace({name}=..)")
+        object.__setattr__(self, name, value)
+
     @property
     def model(self) -> Model:
         """The model."""
@@ -123,8 +128,8 @@ class System:
             name = self.numerics("length_name")
             given = np.atleast_1d(self.values.get(name, length))
             bad = given[~((given > 0) & np.isfinite(given))]
-            shown = bad.flat[0] if bad.size else np.inf
-            raise ValueError(f"domain: the length {name} = {shown:g} must be in (0, inf)")
+            first = bad.flat[0] if bad.size else np.inf
+            raise ValueError(f"domain: the length {name} = {first:g} must be in (0, inf)")
         return Domain(finite, left, length)
 
     def natural_frequencies(self, modes: int) -> Array:

@@ -13,6 +13,7 @@ from cra_sym.si import paired
 
 __all__ = ["checked_damping", "checked_values", "flat_columns", "frozen", "infinite_patterns"]
 
+_NUMBERS = "real numbers, or inf for the stiffness of an end"
 Value = float | NDArray[np.float64]
 
 
@@ -48,11 +49,11 @@ def checked_values(
     found: dict[str, NDArray[np.float64]] = {}
     for name, value in paired(named, units).items():
         try:
-            found[name] = real_array(name, value, allow_infinite=True, unit=(units or {}).get(name))
+            found[name] = real_array(name, value, allow_infinite=True, unit=(units or {}).get(name), must=_NUMBERS)
         except TypeError as error:
             raise ValueError(str(error)) from None
         if (found[name] == -np.inf).any():
-            raise ValueError(f"{name} = -inf: must be a real number, or inf for the stiffness of an end")
+            raise ValueError(f"{name} = -inf: must be {_NUMBERS}")
     missing = [name for name in names if name not in found]
     if missing:
         raise ValueError(f"values: no value for {', '.join(missing)}")

@@ -135,3 +135,15 @@ def test_the_base_as_a_coordinate_may_have_a_stiffness_that_fluctuates():
     system = model.at(BEAM)
     low, high = cra.stability_boundary(system, cra.Fluctuation(EI=1.0), 0.1)
     assert low < 2 * system.natural_frequencies(1)[0] < high
+
+
+def test_a_system_is_frozen_and_bad_values_are_named():
+    system = FREE.at(BEAM)
+    with pytest.raises(AttributeError, match=r"zeta = 0.1: a System is frozen; use replace"):
+        system.zeta = 0.1
+    with pytest.raises(ValueError, match=r"L = inf must be in \(0, inf\)"):
+        cra.natural_frequencies(FREE.at({**BEAM, L: np.inf}))
+    with pytest.raises(ValueError, match=r"EI = 0: a coefficient of the equations becomes infinite"):
+        cra.natural_frequencies(FREE.at({**BEAM, EI: 0.0}))
+    with pytest.raises(ValueError, match=r"EI = nan: must be real numbers, or inf for the stiffness of an end"):
+        FREE.at({**BEAM, EI: np.nan})
