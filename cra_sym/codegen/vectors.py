@@ -187,7 +187,7 @@ def _response_checks(arm: Arm) -> Iterator[Check]:
 
 
 def _system_checks(arm: Arm) -> Iterator[Check]:
-    whole = arm.m_b + arm.m_e + arm.rhoA * arm.L
+    whole = float(arm.numerics("carried", "w").function(*arm.domain.values)[0])
     rest = whole - np.sum(modal_parameters(arm, 3).participation ** 2)
     for name, kind in (("acceleration", "base_acceleration"), ("force", "drive_force")):
         system = state_space_module.state_space(arm, 3, kind)  # type: ignore[arg-type]
