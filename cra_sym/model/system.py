@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cra_sym.checks import broadcastable, count, default_floating_point, instance, shown
 from cra_sym.model.projection import Domain, Load, Projected, project
-from cra_sym.model.routes import Estimated, Modes, Route
+from cra_sym.model.routes import Estimated, GeneralRoute, Modes, Route
 from cra_sym.model.spatial import check_range
 from cra_sym.model.values import Value, checked_damping, checked_values, frozen
 
@@ -144,7 +144,8 @@ class System:
                 omega, accuracy = route.estimated(self.parameters, self.shape, modes)
             else:
                 omega = route.angular_frequencies(self.parameters, self.shape, modes)
-                accuracy = np.full(self.shape, ROUNDING)
+                known = not isinstance(route, GeneralRoute) or route.spatial.uniform
+                accuracy = np.full(self.shape, ROUNDING if known else np.nan)
         check_range(omega)
         self.__dict__["_accuracy"] = np.maximum(self.__dict__.get("_accuracy", 0.0), accuracy)
         omega.flags.writeable = False
@@ -156,7 +157,8 @@ class System:
 
         Of the first three if none was computed. Where coefficients vary along x it is estimated from the stresses that
         break equilibrium; a frequency whose error would be beyond 1e-10 is refused. Where they are constant along x
-        frequencies are exact but for rounding, and this is a bound of that, 1e-11.
+        frequencies are exact but for rounding, and this is a bound of that, 1e-11. It is nan where there is no
+        estimate: third derivatives by x, or a mass of the highest derivative, that vary along x.
         """
         if "_accuracy" not in self.__dict__:
             self.natural_frequencies(3)

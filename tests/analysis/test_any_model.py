@@ -147,3 +147,10 @@ def test_a_system_is_frozen_and_bad_values_are_named():
         cra.natural_frequencies(FREE.at({**BEAM, EI: 0.0}))
     with pytest.raises(ValueError, match=r"EI = nan: must be real numbers, or inf for the stiffness of an end"):
         FREE.at({**BEAM, EI: np.nan})
+
+
+def test_no_accuracy_is_told_where_none_is_estimated():
+    """Third derivatives by x are left to the dynamic stiffness, whose pieces have no estimate."""
+    density = energy(stiffness=EI * (1 + x)) - k * v.diff(x, 3) ** 2 / 2
+    system = beam(density=density, essential=[v.subs(x, 0), v.diff(x).subs(x, 0)]).at({**BEAM, k: 0.1})
+    assert np.isnan(system.accuracy)
