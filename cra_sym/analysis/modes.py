@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym import checks
-from cra_sym.model.projection import column
 from cra_sym.model.routes import Modes
 from cra_sym.model.spatial import check_range
 from cra_sym.model.system import MOST_MODES, System
@@ -362,8 +361,3 @@ def stiffness_coupling(system: System, name: str, modes: int) -> Array:
     value = np.asarray(system.values[name])
     rate = system.form("rates", modes)[f"{name} stiffness"]
     return np.where(np.isinf(value), 0.0, value)[..., None, None] * rate
-
-
-def parameter_column(system: System, name: str) -> float | Array:
-    """Return a parameter with an axis for the modes."""
-    return column(system.values[name])

@@ -274,7 +274,9 @@ def _resonance(resonance: Any, modes: int) -> tuple[int, int]:
     except (TypeError, ValueError):
         raise ValueError(f"resonance = {checks.shown(resonance)}: {allowed}") from None
     if first == -second:
-        raise ValueError(f"resonance = {resonance!r}: {allowed}; the difference of a mode with itself is no frequency")
+        raise ValueError(
+            f"resonance = {resonance!r}: {allowed}; the difference of a mode with itself is not a frequency"
+        )
     # which of the two is named first does not matter; omega_m - omega_n is to be positive
     return (-second, -first) if second < 0 and first < -second else (first, second)
 

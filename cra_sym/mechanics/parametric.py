@@ -58,7 +58,7 @@ class Resonance:
         if not all(label.is_Symbol or (label.is_Integer and label > 0) for label in labels):
             raise ValueError(f"resonance = {spec!r}: {allowed}")
         if sign == -1 and labels[0] == labels[1]:
-            raise ValueError(f"resonance = {spec!r}: the difference of a mode with itself is no frequency")
+            raise ValueError(f"resonance = {spec!r}: the difference of a mode with itself is not a frequency")
         if sign == 0 and tongue != 1:
             raise ValueError(f"tongue = {tongue!r}: must be 1 for a forced resonance")
         return cls(labels[0], labels[-1], sign, tongue)

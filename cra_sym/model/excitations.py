@@ -161,7 +161,19 @@ class Fluctuation(Parametric):
         return np.stack(np.broadcast_arrays(*found), axis=-2)
 
 
-class AxialBase(Parametric):
+class _ShakenBase(Excitation):
+    """A base that shakes with an amplitude."""
+
+    def __init__(self, amplitude: Any) -> None:
+        super().__init__(amplitude=amplitude)
+
+    @property
+    def amplitude(self) -> Value:
+        """Amplitude at epsilon = 1, m."""
+        return self._numbers["amplitude"]
+
+
+class AxialBase(_ShakenBase, Parametric):
     """A frame that shakes along x, towards the right end and back, u = epsilon amplitude cos(varpi t), (35a).
 
     The foreshortening of the first field feels the inertia of all mass beyond, so that P grows with the square of the
@@ -180,20 +192,12 @@ class AxialBase(Parametric):
 
     power = 2
 
-    def __init__(self, amplitude: Any) -> None:
-        super().__init__(amplitude=amplitude)
-
-    @property
-    def amplitude(self) -> Value:
-        """Amplitude at epsilon = 1, m."""
-        return self._numbers["amplitude"]
-
     def unit_coupling(self, system: System, modes: int) -> Array:
         """Return P for varpi = 1 rad/s, 1/s2, shape (..., modes, modes)."""
         return np.asarray(self.amplitude)[..., None, None] * system.form("axial", modes)["axial"]
 
 
-class TransverseBase(Excitation):
+class TransverseBase(_ShakenBase):
     """A base that shakes across the span, w = epsilon amplitude sin(varpi t), (35).
 
     The only prescribed motion of the model; it forces vibration and has no boundary.
@@ -208,11 +212,3 @@ class TransverseBase(Excitation):
     TypeError, ValueError
         If the amplitude is not made of finite real numbers or is negative.
     """
-
-    def __init__(self, amplitude: Any) -> None:
-        super().__init__(amplitude=amplitude)
-
-    @property
-    def amplitude(self) -> Value:
-        """Amplitude at epsilon = 1, m."""
-        return self._numbers["amplitude"]

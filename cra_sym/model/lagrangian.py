@@ -66,7 +66,7 @@ class Model:
     Raises
     ------
     TypeError, ValueError
-        Names what is no expression, the term that cannot be treated, or whose dimension is wrong.
+        Names what is not an expression, the term that cannot be treated, or whose dimension is wrong.
 
     Notes
     -----

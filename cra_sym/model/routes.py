@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-_SHARES = (0.0, 0.22, 0.53, 0.81, 1.0 - 1e-4, 1.0)  # ends, and places that are no node of the first modes
+_SHARES = (0.0, 0.22, 0.53, 0.81, 1.0 - 1e-4, 1.0)  # ends, and places that are not a node of the first modes
 Values = Sequence[float | Array]
 """Parameters in the order of the model's symbols; they broadcast to the shape of the batch."""
 
@@ -104,7 +104,7 @@ class GeneralRoute:
     spatial: SpatialProblem
 
     def covers(self, values: Values) -> bool:
-        """Return True: what is not allowed is refused by name."""
+        """Return True: values that are out of range are refused by name."""
         return True
 
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:

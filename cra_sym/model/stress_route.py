@@ -50,7 +50,7 @@ class StressRoute:
     entries: tuple[tuple[str, int, int], ...]
 
     def covers(self, values: Values) -> bool:
-        """Return True: what is not allowed is refused by name."""
+        """Return True: values that are out of range are refused by name."""
         return True
 
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:

@@ -51,7 +51,7 @@ class BaseMotion:
 
     terms: tuple[Term, ...]
     sample_step: float | None = None
-    """Time between the samples of a record, s; None of a motion that is no record, or one of fewer than 32 samples."""
+    """Time between the samples of a record, s; None of a motion that is not one, or one of fewer than 32 samples."""
 
     def __init__(
         self,
