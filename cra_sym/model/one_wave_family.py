@@ -125,11 +125,15 @@ class Family:
 
     @cached_property
     def _spectrum_text(self) -> str:
-        return template("cra_sym.solvers.spectrum_lanes", spectrum_marks(self.layout, self.functions))
+        return template("cra_sym.solvers.pairs_lanes", {}) + template(
+            "cra_sym.solvers.spectrum_lanes", spectrum_marks(self.layout, self.functions)
+        )
 
     @cached_property
     def _modal_text(self) -> str:
-        return template("cra_sym.solvers.modal_lanes", modal_marks(self.layout, self.functions))
+        return template("cra_sym.solvers.pairs_lanes", {}) + template(
+            "cra_sym.solvers.modal_lanes", modal_marks(self.layout, self.functions)
+        )
 
     @cached_property
     def compiled_spectrum(self) -> Any:

@@ -58,19 +58,6 @@ def _power(lam):
     return __POWER__
 
 
-def _stiff(kappa):
-    return 1.0 if kappa == np.inf else kappa / (1.0 + kappa), 1.0 / (1.0 + kappa)
-
-
-def _heavy(mu):
-    return mu / (1.0 + mu), 1.0 / (1.0 + mu)
-
-
-def _both(kappa, mu):
-    total = 1.0 + (kappa + mu)
-    return 1.0 if kappa == np.inf else kappa / total, mu / total, 1.0 / total
-
-
 def _far(w, lam, line, lane):
     cosine, sine, decay, z = cos(lam), sin(lam), exp(-lam), _power(lam)
     __LEFT__, __WAVES__ = amplitudes_far(__AMPLITUDES_FAR__)

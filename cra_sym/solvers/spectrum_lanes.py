@@ -78,19 +78,6 @@ def _scaled_basis(lam, z):
     return __BASIS__
 
 
-def _stiff(kappa):
-    return 1.0 if kappa == np.inf else kappa / (1.0 + kappa), 1.0 / (1.0 + kappa)
-
-
-def _heavy(mu):
-    return mu / (1.0 + mu), 1.0 / (1.0 + mu)
-
-
-def _both(kappa, mu):
-    total = 1.0 + (kappa + mu)
-    return 1.0 if kappa == np.inf else kappa / total, mu / total, 1.0 / total
-
-
 def _prepare(pairs, k, zeros, __GROUPS__, first, size):
     """Fill in (kappa, mu, 1) / (1 + kappa + mu), the determinant's coefficients and its power series."""
     for lane in range(size):

@@ -212,6 +212,9 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "solvers/motion": [
         ["tests/solvers/test_motion.py", f"{_LAWS}::test_a_harmonic_of_no_size_or_speed_is_over_at_once"]
     ],
+    "solvers/pairs_lanes": [
+        [f"{_LANES[0]}::test_{name}" for name in ("spectrum", "spectrum_of_extreme_arms", "modes")]
+    ],
     "solvers/rayleigh": _STIFFNESS,
     "solvers/shapes": _STIFFNESS,
     "solvers/spectrum": [["tests/solvers/test_spectrum.py"], _DIGITS],
