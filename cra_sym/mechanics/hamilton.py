@@ -13,7 +13,7 @@ from sympy.core.symbol import uniquely_named_symbol
 
 from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces, varied_form
 from cra_sym.mechanics.jets import HamiltonError, Jet, JetSpace, listed
-from cra_sym.mechanics.steps import Step, compact_latex
+from cra_sym.mechanics.steps import Step, Steps, compact_latex
 from cra_sym.mechanics.variation import Variation, VirtualWork, vary
 
 __all__ = ["BoundaryCondition", "HamiltonError", "HamiltonResult", "hamilton"]
@@ -62,7 +62,7 @@ class HamiltonResult:
         return uniquely_named_symbol(name, [sympify(expression, strict=True) for expression in given])
 
     @cached_property
-    def steps(self) -> tuple[Step, ...]:
+    def steps(self) -> Steps:
         """The derivation: variation, integration by parts, collected terms, equations."""
         return _narrate(self.variation, self.equations)
 
@@ -187,7 +187,7 @@ _STEPS = (
 )
 
 
-def _narrate(variation: Variation, equations: tuple[Basic, ...]) -> tuple[Step, ...]:
+def _narrate(variation: Variation, equations: tuple[Basic, ...]) -> Steps:
     space, forces = variation.space, GeneralisedForces.of(variation)
     interval = (space.x, space.ends["left"], space.ends["right"])
 
@@ -222,7 +222,7 @@ def _narrate(variation: Variation, equations: tuple[Basic, ...]) -> tuple[Step, 
         collected,
         equations,
     )
-    return tuple(
+    return Steps(
         Step(
             name, statement, expression, before, "first variation of the action on polynomial test motions", space.names
         )

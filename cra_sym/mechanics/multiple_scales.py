@@ -11,7 +11,7 @@ from cra_sym.mechanics.parametric import ParametricSystem, Resonance
 from cra_sym.mechanics.scales_steps import derivation
 from cra_sym.mechanics.stability_condition import Border, border
 from cra_sym.mechanics.steady_response import SteadyResponse, steady_response
-from cra_sym.mechanics.steps import Step
+from cra_sym.mechanics.steps import Step, Steps
 from cra_sym.mechanics.two_scales import Expansion, ModeSum
 
 __all__ = ["MultipleScales", "multiple_scales"]
@@ -45,7 +45,7 @@ class MultipleScales:
     system: ParametricSystem
     resonance: Resonance
     order: int
-    steps: tuple[Step, ...]
+    steps: Steps
     amplitude_equations: tuple[Eq, ...]
     sums: tuple[ModeSum, ...]
     decays: dict[Symbol, Expr]
@@ -72,10 +72,7 @@ class MultipleScales:
 
     def step(self, name: str) -> Step:
         """Return the step of that name."""
-        for step in self.steps:
-            if step.name == name:
-                return step
-        raise ValueError(f"name = {name!r}: must be one of {', '.join(step.name for step in self.steps)}")
+        return self.steps.step(name)
 
     def _repr_latex_(self) -> str:
         if self.border is None:

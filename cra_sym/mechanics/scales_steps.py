@@ -10,7 +10,7 @@ from cra_sym.mechanics.harmonics import Harmonics
 from cra_sym.mechanics.parametric import Label
 from cra_sym.mechanics.stability_condition import DETUNING, Border
 from cra_sym.mechanics.steady_response import SteadyResponse
-from cra_sym.mechanics.steps import Step
+from cra_sym.mechanics.steps import Step, Steps
 from cra_sym.mechanics.two_scales import (
     D0,
     D1,
@@ -29,7 +29,7 @@ T0, T1, T2, TIME = (Symbol(name, real=True) for name in ("T_0", "T_1", "T_2", "t
 VARPI = Symbol("varpi", positive=True)
 
 
-def derivation(e: Expansion, edge: Border | None, response: SteadyResponse | None) -> tuple[Step, ...]:
+def derivation(e: Expansion, edge: Border | None, response: SteadyResponse | None) -> Steps:
     """Return the steps from the expansion to the boundary or, for a forced resonance, to the steady response."""
     steps = [*_problems(e), *_first_order(e)]
     if e.order == 2:
@@ -47,7 +47,7 @@ def derivation(e: Expansion, edge: Border | None, response: SteadyResponse | Non
                 "numerical integration of the equation of motion",
             )
         )
-    return tuple(steps)
+    return Steps(steps)
 
 
 # writing the pieces -----------------------------------------------------------------------------------------------

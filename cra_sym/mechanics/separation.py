@@ -29,7 +29,7 @@ from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces
 from cra_sym.mechanics.hamilton import HamiltonResult
 from cra_sym.mechanics.jets import HamiltonError, Jet, grouped, scalar
 from cra_sym.mechanics.solution import GeneralSolution
-from cra_sym.mechanics.steps import Step
+from cra_sym.mechanics.steps import Step, Steps
 from cra_sym.mechanics.weak import WeakForm, weak_form
 
 __all__ = ["Modal", "SpatialProblem", "separate"]
@@ -128,7 +128,7 @@ class Modal:
         return tuple(shape.xreplace(self.basis.values) for shape in shapes)
 
     @property
-    def steps(self) -> tuple[Step, ...]:
+    def steps(self) -> Steps:
         """Steps from the separated equations to the mode shapes."""
         problem = self.spatial_problem
         names = ("Spatial problem", "General solution", "Characteristic equation", "Modes")
@@ -143,7 +143,7 @@ class Modal:
             (names[3], "The solution, up to its amplitude.", self.mode_shapes, names[1:3], "boundary conditions"),
         )
         variables = problem.boundary_conditions[0].variables
-        return tuple(
+        return Steps(
             Step(name, statement, expression, origin, check, variables)
             for name, statement, expression, origin, check in described
         )

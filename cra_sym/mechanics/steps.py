@@ -6,11 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from sympy import Basic, Derivative, Function, Subs, Symbol
+from sympy import Add, Basic, Derivative, Eq, Function, Subs, Symbol
 from sympy.core.function import AppliedUndef
 from sympy.printing.latex import LatexPrinter
 
-__all__ = ["Step", "compact_latex", "variation_of"]
+__all__ = ["Step", "Steps", "compact_latex", "display_latex", "variation_of"]
 
 _DELTA = "δ"
 
@@ -118,6 +118,52 @@ def compact_latex(expression: Any, variables: tuple[str, str] = ("x", "t")) -> s
     return printer.doprint(expression)
 
 
+#: A line of LaTeX beyond this many characters is broken at the sums in it.
+_LINE = 260
+
+
+def display_latex(expression: Any, variables: tuple[str, str] = ("x", "t"), tag: int | str | None = None) -> str:
+    r"""Return the LaTeX of a displayed formula: a tuple becomes lines, a long sum is broken, one term a line.
+
+    Parameters
+    ----------
+    expression : Basic or iterable of Basic
+    variables : (str, str)
+        Names of the position and of the time.
+    tag : int or str, optional
+        Number of the equation.
+
+    Examples
+    --------
+    >>> from sympy import Eq, symbols
+    >>> x, y = symbols("x y")
+    >>> print(display_latex(Eq(y, x**2), tag=7))
+    \begin{gathered} y = x^{2} \end{gathered} \qquad (7)
+    """
+    several = isinstance(expression, Iterable) and not isinstance(expression, Basic)
+    parts = tuple(expression) if several else (expression,)
+    body = r" \\[4pt] ".join(_typeset(part, variables) for part in parts)
+    number = "" if tag is None else rf" \qquad ({tag})"
+    return rf"\begin{{gathered}} {body} \end{{gathered}}{number}"
+
+
+def _typeset(part: Any, variables: tuple[str, str]) -> str:
+    """Return the LaTeX of an equation; a long sum is broken, one term a line."""
+    whole = compact_latex(part, variables)
+    if len(whole) < _LINE:
+        return whole
+    sides = {side: compact_latex(side, variables) for side in (part.args if isinstance(part, Eq) else (part,))}
+    longest = max(sides, key=lambda side: len(sides[side]))
+    if not isinstance(longest, Add):
+        return whole
+    terms = [compact_latex(term, variables) for term in longest.as_ordered_terms()]
+    lines = r" \\ &".join([terms[0], *(term if term.startswith("-") else f"+ {term}" for term in terms[1:])])
+    others = [(side is part.args[0], text) for side, text in sides.items() if side is not longest]
+    head = "".join(f"{text} = " for first, text in others if first)
+    tail = "".join(f" = {text}" for first, text in others if not first)
+    return rf"\begin{{aligned}} {head}&{lines}{tail} \end{{aligned}}"
+
+
 @dataclass(frozen=True)
 class Step:
     """One step of a derivation.
@@ -136,6 +182,8 @@ class Step:
         How it is checked by another route.
     variables : (str, str)
         Names of position and time, for the notation.
+    tag : int or str, optional
+        Number of the equation that the step ends with.
     """
 
     name: str
@@ -144,9 +192,43 @@ class Step:
     derived_from: tuple[str, ...] = ()
     check: str = ""
     variables: tuple[str, str] = ("x", "t")
+    tag: int | str | None = None
+
+    def _formula(self) -> str:
+        return display_latex(self.expression, self.variables, self.tag)
 
     def _repr_latex_(self) -> str:
-        return rf"$\displaystyle {compact_latex(self.expression, self.variables)}$"
+        return rf"$\displaystyle {self._formula()}$"
 
     def _repr_markdown_(self) -> str:
-        return f"**{self.name}.** {self.statement}\n\n$$ {compact_latex(self.expression, self.variables)} $$"
+        return f"**{self.name}.** {self.statement}\n\n$${self._formula()}$$"
+
+
+class Steps(tuple[Step, ...]):
+    """The steps of a derivation, in order; in a notebook it shows itself.
+
+    >>> from sympy import symbols
+    >>> a, b = symbols("a b")
+    >>> steps = Steps([Step("given", "A sum.", a + b), Step("squared", "Its square.", (a + b) ** 2, ("given",))])
+    >>> steps.step("squared").expression
+    (a + b)**2
+    """
+
+    __slots__ = ()
+
+    def step(self, name: str) -> Step:
+        """Return the step of this name.
+
+        Raises
+        ------
+        ValueError
+            If there is none.
+        """
+        for step in self:
+            if step.name == name:
+                return step
+        known = ", ".join(repr(step.name) for step in self)
+        raise ValueError(f"name = {name!r}: must be one of {known}")
+
+    def _repr_markdown_(self) -> str:
+        return "\n\n".join(step._repr_markdown_() for step in self)

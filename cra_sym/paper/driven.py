@@ -9,7 +9,7 @@ from sympy import Add, Eq, Expr, I, Integral, Rational, cos, expand_mul, lambdif
 from sympy.simplify.fu import TR8
 
 from cra_sym.model.oscillator import unit_responses
-from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.equations import Derivation, Proof, derived, numbered, proves, samples
 from cra_sym.paper.modal_dynamics import duhamel, dynamic_equation
 from cra_sym.symbols import dimension, symbol
 
@@ -50,17 +50,20 @@ def _integral_of_cosine(phase: Expr) -> Expr:
     return t * sinc(change / 2) * cos((phase.subs(tau, 0) + change / 2).expand())
 
 
-@numbered(34, "response of a mode", "derived", (12, 33))
-def modal_response() -> Eq:
+@derived(34, "response of a mode", (12, 33))
+def modal_response() -> Derivation[Eq]:
     """(33) in (12), with an arm at rest before the base starts: v(x, 0) = 0 and y'(x, 0) = 0, so that a base that
     starts with a velocity strikes the arm. Undamped; where varpi meets omega_i, sinc(0) = 1 leaves the secular
     term."""
     moved = base_motion().rhs
     strike = (-Gamma_i / M_i * moved.diff(t)).subs(t, 0)
     solution = duhamel().rhs.subs({q_i.diff(t).subs(t, 0): strike, q_i.subs(t, 0): 0})
+    yield "initial values", "The base's speed at the start strikes an arm at rest, (13).", Eq(q_i, solution)
     (integral,) = solution.atoms(Integral)
     shape = integral.function.subs(w.subs(t, tau).diff(tau, 2), moved.diff(t, 2).subs(t, tau))
+    yield "acceleration of (33)", "Put under the integral.", Integral(shape, *integral.limits)
     sums = TR8(shape.expand()).expand().replace(sin, lambda phase: cos((phase - pi / 2).expand(), evaluate=False))
+    yield "products to sums", "Each term a cosine whose phase is linear in τ.", Integral(sums, *integral.limits)
     total = Add(*(_integrated(term) for term in Add.make_args(sums)))
     terms = Add.make_args(solution.subs(integral, total))
     return Eq(q_i, Add(*(expand_mul(term, deep=False) for term in terms)))

@@ -8,7 +8,7 @@ from typing import Any
 from sympy import Eq, Expr, Function, Integral, S, symbols
 
 from cra_sym.arm.lagrangian import ArmLagrangian, kinetic_energy, paper_lagrangian, potential_energy
-from cra_sym.paper.equations import Proof, numbered, proves
+from cra_sym.paper.equations import Derivation, Proof, derived, numbered, proves
 from cra_sym.paper.evaluation import evaluate, put, termwise
 from cra_sym.paper.modal_sum import ModalSum, written_out
 from cra_sym.paper.oracles import forces
@@ -143,10 +143,12 @@ def _coefficient(energy: ArmLagrangian, motion: dict[Expr, Expr], *sizes: Expr) 
     return ArmLagrangian(*(put(part, motion).diff(*sizes).expand() for part in energy)).total()
 
 
-@numbered(6, "generalised mass, stiffness, participation", "derived", (2, 3, 4))
-def generalised() -> tuple[Eq, Eq, Eq]:
+@derived(6, "generalised mass, stiffness, participation", (2, 3, 4))
+def generalised() -> Derivation[tuple[Eq, Eq, Eq]]:
     """Mass and stiffness of a mode, and how strongly the base's acceleration drives it: in (3) and (4), one mode and
     the base moving, the coefficients of the squares of the mode's speed and displacement and of both speeds."""
+    moving = single_mode(kinetic_energy().total()), single_mode(potential_energy().total())
+    yield "energies of one mode", "One term of (2) in (3) and (4).", moving
     return (
         Eq(symbol("M_i"), inner_mass(phi_i, phi_i)),
         Eq(symbol("K_i"), inner_stiffness(phi_i, phi_i)),

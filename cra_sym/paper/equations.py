@@ -7,6 +7,13 @@ A section's module writes one small function an equation, and one each for a pro
         '''The statement, in words.'''
         return Eq(y, w + v)
 
+    @derived(22, "determinant", (20,))
+    def determinant():
+        '''The statement, in words.'''
+        matrix = reduced_system().lhs.args[0]
+        yield "System", "What was done, in a sentence.", matrix
+        return Eq(matrix.det(), 0)
+
     @proves(1)
     def prove_displacement():
         '''The independent route, in words.'''
@@ -28,16 +35,19 @@ What is derived comes from the Lagrangian in :mod:`cra_sym.arm.lagrangian` and f
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, wraps
 from importlib import import_module
 from operator import index
-from typing import Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from cra_sym.checks import default_floating_point, shown
 
-__all__ = ["Equation", "Proof", "equation", "equations", "numbered", "proves", "samples"]
+if TYPE_CHECKING:
+    from cra_sym.mechanics.steps import Steps
+
+__all__ = ["Derivation", "Equation", "Proof", "derived", "equation", "equations", "numbered", "proves", "samples"]
 
 Number = int | str
 R = TypeVar("R")
@@ -45,6 +55,10 @@ Kind = Literal["definition", "assumption", "derived"]
 Evidence = Literal["proved", "sampled"]
 #: What a proof yields: expressions that vanish identically, and truths without numbers, such as equal dimensions.
 Proof = Iterator[Any]
+#: What was done (a name and a sentence) and what came out.
+Stage = tuple[str, str, Any]
+#: What builds a derived equation: it yields the stages on the way and returns the equation.
+Derivation = Generator[Stage, None, R]
 
 #: Section of the package that builds each equation; a new section adds a line here.
 _HOMES: dict[str, range] = {
@@ -60,6 +74,7 @@ _HOMES: dict[str, range] = {
     "cra_sym.paper.driven": range(33, 35),
     "cra_sym.paper.excited": range(35, 37),
     "cra_sym.paper.resonance": range(37, 50),
+    "cra_sym.paper.literal_route": range(42, 50),
 }
 
 _EQUATIONS: dict[Number, Equation] = {}
@@ -91,6 +106,7 @@ class Equation:
     statement: str
     source: str
     _build: Callable[[], Any] = field(compare=False)
+    _stages: Callable[[], tuple[Stage, ...]] = field(default=tuple, compare=False)
     _shown: Callable[[], Any] | None = field(default=None, compare=False)
 
     @property
@@ -102,6 +118,31 @@ class Equation:
     def shown(self) -> Any:
         """What is displayed: the expression or, where that fills a page, the same in terms of its sources."""
         return self.expression if self._shown is None else self._shown()
+
+    @property
+    def steps(self) -> Steps:
+        """How the equation comes from those it rests on; the last step is the equation itself.
+
+        Empty for a definition or an assumption.
+
+        Examples
+        --------
+        >>> from cra_sym import equation
+        >>> [step.name for step in equation(22).steps]
+        ['matrix of the reduced system', 'determinant']
+        >>> equation(1).steps
+        ()
+        """
+        from cra_sym.mechanics.steps import Step, Steps
+
+        if self.kind != "derived":
+            return Steps()
+        before = tuple(f"({number})" for number in self.derived_from)
+        chain: list[Step] = []
+        for name, statement, expression in self._stages():
+            chain.append(Step(name, statement, expression, before))
+            before = (name,)
+        return Steps((*chain, Step(self.title, self.statement, self.shown, before, self.checked_by, tag=self.number)))
 
     @property
     def checked_by(self) -> str:
@@ -141,9 +182,9 @@ class Equation:
         return f"Equation ({self.number}), {self.title}"
 
     def _formula(self) -> str:
-        parts = self.shown if isinstance(self.shown, tuple) else (self.shown,)
-        body = r" \\[4pt] ".join(map(_typeset, parts))
-        return rf"\begin{{gathered}} {body} \end{{gathered}} \qquad ({self.number})"
+        from cra_sym.mechanics.steps import display_latex
+
+        return display_latex(self.shown, tag=self.number)
 
     def _repr_latex_(self) -> str:
         return rf"$\displaystyle {self._formula()}$"
@@ -152,23 +193,6 @@ class Equation:
         sources = ", ".join(f"({number})" for number in self.derived_from)
         origin = f"{self.kind} from {sources}" if sources else self.kind
         return f"**({self.number}) {self.title}**, {origin}. {self.statement}\n\n$${self._formula()}$$"
-
-
-def _typeset(part: Any, width: int = 260) -> str:
-    """Return the LaTeX of an equation; a long sum is broken, one term a line."""
-    from sympy import Add
-
-    from cra_sym.mechanics.steps import compact_latex
-
-    whole = compact_latex(part)
-    longest = max(part.args, key=lambda side: len(compact_latex(side)), default=part)
-    if len(whole) < width or not isinstance(longest, Add):
-        return whole
-    terms = [compact_latex(term) for term in longest.as_ordered_terms()]
-    lines = r" \\ &".join([terms[0], *(term if term.startswith("-") else f"+ {term}" for term in terms[1:])])
-    left, right = part.args
-    head, tail = ("", f" = {compact_latex(right)}") if longest is left else (f"{compact_latex(left)} = ", "")
-    return rf"\begin{{aligned}} {head}&{lines}{tail} \end{{aligned}}"
 
 
 def _text(function: Callable[..., Any]) -> str:
@@ -185,24 +209,70 @@ def _decide(part: Any) -> bool:
 def numbered(
     number: Number,
     title: str,
-    kind: Kind,
+    kind: Literal["definition", "assumption"],
     derived_from: tuple[Number, ...] = (),
-    shown: Callable[[], Any] | None = None,
 ) -> Callable[[Callable[[], R]], Callable[[], R]]:
-    """Register the decorated function, whose docstring is the statement, as the builder of an equation.
-
-    ``shown`` builds what is displayed in place of an expression that fills a page.
-    """
+    """Register the decorated function, whose docstring is the statement, as the builder of an equation."""
 
     def register(function: Callable[[], R]) -> Callable[[], R]:
-        source = f"{function.__module__}:{function.__qualname__}"
-        if number in _EQUATIONS and _EQUATIONS[number].source != source:
-            raise ValueError(f"equation ({number}) is already built by {_EQUATIONS[number].source}")
         build = cache(function)
-        _EQUATIONS[number] = Equation(number, title, kind, derived_from, _text(function), source, build, shown)
+        _register(function, number, title, kind, derived_from, build)
         return build
 
     return register
+
+
+def derived(
+    number: Number,
+    title: str,
+    derived_from: tuple[Number, ...],
+    shown: Callable[[], Any] | None = None,
+) -> Callable[[Callable[[], Derivation[R]]], Callable[[], R]]:
+    """Register the decorated generator, whose docstring is the statement, as the derivation of an equation.
+
+    It yields the stages on the way and returns the equation; the name then stands for a function that returns the
+    equation. ``shown`` builds what is displayed in place of an expression that fills a page.
+    """
+
+    def register(function: Callable[[], Derivation[R]]) -> Callable[[], R]:
+        carried_out = cache(lambda: _carry_out(function))
+
+        @wraps(function)
+        def build() -> R:
+            return carried_out()[1]
+
+        _register(function, number, title, "derived", derived_from, build, lambda: carried_out()[0], shown)
+        return build
+
+    return register
+
+
+def _carry_out(function: Callable[[], Derivation[R]]) -> tuple[tuple[Stage, ...], R]:
+    """Return the stages of a derivation and what it ends with."""
+    stages: list[Stage] = []
+    work = function()
+    while True:
+        try:
+            stages.append(next(work))
+        except StopIteration as end:
+            return tuple(stages), end.value
+
+
+def _register(
+    function: Callable[[], Any],
+    number: Number,
+    title: str,
+    kind: Kind,
+    derived_from: tuple[Number, ...],
+    build: Callable[[], Any],
+    stages: Callable[[], tuple[Stage, ...]] = tuple,
+    shown: Callable[[], Any] | None = None,
+) -> None:
+    source = f"{function.__module__}:{function.__qualname__}"
+    if number in _EQUATIONS and _EQUATIONS[number].source != source:
+        raise ValueError(f"equation ({number}) is already built by {_EQUATIONS[number].source}")
+    statement = _text(function)
+    _EQUATIONS[number] = Equation(number, title, kind, derived_from, statement, source, build, stages, shown)
 
 
 def proves(number: Number) -> Callable[[Callable[[], Proof]], Callable[[], Proof]]:

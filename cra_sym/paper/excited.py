@@ -9,10 +9,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from sympy import Eq, S, cos, sin
+from sympy import Eq, Expr, Integral, S, cos, sin
 
-from cra_sym.paper.energy import phi_i, phi_j, potential, single_mode, t, w, x
-from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.arm.lagrangian import paper_lagrangian
+from cra_sym.paper.energy import L, phi_i, phi_j, potential, single_mode, t, w, x
+from cra_sym.paper.equations import Derivation, Proof, derived, numbered, proves, samples
 from cra_sym.paper.evaluation import at, evaluate, termwise, virtual_factors
 from cra_sym.paper.modal_dynamics import dynamic_equation
 from cra_sym.paper.oracles import forces
@@ -72,10 +73,12 @@ def prove_fluctuating_joint() -> Proof:
     yield fluctuating_joint().rhs - (full - beam) * (1 + epsilon * cos(varpi * t))
 
 
-@numbered(36, "excited system", "derived", (11, 35))
-def excited_system() -> Eq:
+@derived(36, "excited system", (11, 35))
+def excited_system() -> Derivation[Eq]:
     """(35) in (11). The disturbance stands on the right only: no coefficient of the unknown depends on time, so this
     is a forced system and not, as the paper says, a parametric one."""
+    acceleration = Eq(w.diff(t, 2), TRANSVERSE.diff(t, 2))
+    yield "acceleration of the base", "(35) differentiated twice.", acceleration
     return dynamic_equation().subs(w, TRANSVERSE).doit()
 
 
@@ -103,17 +106,28 @@ def sample_excited_system() -> bool:
     return True
 
 
-@numbered("36a", "coupling by the fluctuating joint", "derived", ("35b", 7))
-def joint_coupling() -> Eq:
+@derived("36a", "coupling by the fluctuating joint", ("35b", 7))
+def joint_coupling() -> Derivation[Eq]:
     """Two modes in the Lagrangian's share of epsilon cos(varpi t), for modes of unit generalised mass. The stiffness
     of the modes varies in time: genuinely parametric."""
+    yield "joint that fluctuates", "What the Lagrangian has at the joint.", excited_lagrangian("joint stiffness").left
+    yield "two modes", "Put in at the joint.", _two_modes(excited_lagrangian("joint stiffness").left)
     return Eq(P_ij, coupling("joint stiffness"), evaluate=False)
 
 
-@numbered("36b", "coupling by the base disturbed along the arm", "derived", ("35a", 7))
-def axial_coupling() -> Eq:
+@derived("36b", "coupling by the base disturbed along the arm", ("35a", 7))
+def axial_coupling() -> Derivation[Eq]:
     """A bent manipulator is shorter, and its foreshortening feels the axial inertia. It grows with varpi^2."""
+    still, moving = paper_lagrangian().density.subs(w, 0).doit(), excited_lagrangian("axial base").density
+    load = Integral((moving - still).subs(u, AXIAL).doit(), (x, 0, L))
+    yield "foreshortening", "What the acceleration along the arm adds to the Lagrangian.", load
+    yield "two modes", "Put in.", _two_modes(load)
     return Eq(P_ij, coupling("axial base"), evaluate=False)
+
+
+def _two_modes(lagrangian: Expr) -> Expr:
+    """Return a part of the Lagrangian with two modes in it."""
+    return single_mode(lagrangian, phi_i * symbol("q_i") + phi_j * symbol("q_j")).doit(integrals=False)
 
 
 @proves("36a")

@@ -8,7 +8,7 @@ import numpy as np
 import sympy as sp
 
 from cra_sym.paper.energy import modal_numbers
-from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.equations import Derivation, Proof, derived, proves, samples
 from cra_sym.paper.evaluation import group_numbers
 from cra_sym.paper.groups import GROUPS
 from cra_sym.paper.limits import natural_frequency
@@ -24,11 +24,16 @@ lamda, L, E, I_z = (symbol(name) for name in ("lamda", "L", "E", "I_z"))
 PAIRS = {name: tuple(symbol(f"{letter}_{name}") for letter in ("s", "c")) for name in ("t", "r")}
 
 
-@numbered(31, "sensitivity function", "derived", (23,))
-def sensitivity_function() -> sp.Eq:
+@derived(31, "sensitivity function", (23,))
+def sensitivity_function() -> Derivation[sp.Eq]:
     """Along a root λ(κ) the frequency equation Δ(λ, κ) = 0 stays satisfied as a stiffness changes: the total
     derivative of Δ vanishes."""
     kappa = symbol("kappa_t")
+    along = sp.Function("Delta")(sp.Function("lamda")(kappa), kappa)
+    yield "along a root", "λ is a function of the stiffness, and the frequency equation holds for all.", sp.Eq(along, 0)
+    free, rate = sp.Function("Delta")(lamda, kappa), sp.Function("lamda")(kappa).diff(kappa)
+    total = sp.Eq(free.diff(lamda) * rate + free.diff(kappa), 0)
+    yield "total derivative", "Chain rule; solved for the slope of λ.", total
     slope = sp.idiff(sp.Function("Delta")(lamda, kappa), lamda, kappa).doit()
     return sp.Eq(sp.Function("lamda")(kappa).diff(kappa), slope)
 
@@ -74,11 +79,15 @@ def _by_parts() -> tuple[sp.Eq, sp.Eq]:
     return _in_hertz({name: sensitivity_function().rhs.subs(kappa_t, symbol(f"kappa_{name}")) for name in PAIRS})
 
 
-@numbered(32, "sensitivities of the frequencies", "derived", (23, 30, 31), shown=_by_parts)
-def frequency_sensitivities() -> tuple[sp.Eq, sp.Eq]:
+@derived(32, "sensitivities of the frequencies", (23, 30, 31), shown=_by_parts)
+def frequency_sensitivities() -> Derivation[tuple[sp.Eq, sp.Eq]]:
     """(31) for the two stiffnesses, turned into hertz per N/m and hertz per N m/rad by (30); f_i is proportional to the
     square of λ. Raw sensitivities have different units: only logarithmic ones can be compared. The expression has
     Δ of (23) written out, which fills a page."""
+    hertz = natural_frequency()
+    yield "hertz over λ", "(30) differentiated.", sp.Eq(sp.Derivative(hertz.lhs, lamda), hertz.rhs.diff(lamda).doit())
+    groups = tuple(sp.Eq(sp.Derivative(group, k), value.diff(k)) for k, (group, value) in list(GROUPS.items())[:2])
+    yield "groups over stiffnesses", "The rest of the chain rule.", groups
     return _in_hertz({name: implicit_derivatives()[f"kappa_{name}"] * c**2 for name, (_, c) in PAIRS.items()})
 
 

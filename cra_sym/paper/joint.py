@@ -11,7 +11,7 @@ from cra_sym.arm.lagrangian import paper_lagrangian, potential_energy
 from cra_sym.mechanics.jets import End, JetSpace
 from cra_sym.mechanics.variation import lagrange_forces
 from cra_sym.paper.energy import E, I_z, L, phi_i, q_i, single_mode, t, v, w, x
-from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.equations import Derivation, Proof, derived, proves, samples
 from cra_sym.paper.evaluation import at, evaluate, put, virtual_factors
 from cra_sym.paper.oracles import forces
 from cra_sym.paper.oracles.shooting import sample, shoot
@@ -22,13 +22,21 @@ __all__ = ["boundary_conditions", "end_values", "mode_conditions", "section_forc
 eta, Q, M_z, omega_i = (symbol(name) for name in ("eta", "Q", "M_z", "omega_i"))
 
 
-@numbered(14, "virtual work at the ends", "derived", (7,))
-def virtual_work() -> tuple[Eq, Eq]:
+@derived(14, "virtual work at the ends", (7,))
+def virtual_work() -> Derivation[tuple[Eq, Eq]]:
     """At the joint the manipulator's shear force and moment work against the two springs, at the tip against the
     inertia of the end-effector; for any virtual displacement the sum is zero."""
     _, root, tip = paper_lagrangian()
+    yield "what works at the ends", "The Lagrangian's terms at joint and tip.", (at(root, 0), at(tip, L))
+    works = _work(root, "left"), _work(tip, "right")
+    yield (
+        "work of the springs and of the end-effector",
+        "Lagrange's forces times virtual displacement and slope.",
+        works,
+    )
     section = Q * eta - M_z * eta.diff(x)
-    return Eq(_work(root, "left") - at(section, 0), 0), Eq(_work(tip, "right") + at(section, L), 0)
+    yield "work of the section", "Shear force and moment of the manipulator on what it is cut from.", section
+    return Eq(works[0] - at(section, 0), 0), Eq(works[1] + at(section, L), 0)
 
 
 def _work(lagrangian: Expr, end: End) -> Expr:
@@ -40,10 +48,11 @@ def _work(lagrangian: Expr, end: End) -> Expr:
     )
 
 
-@numbered(15, "shear force and bending moment", "derived", (4,))
-def section_forces() -> tuple[Eq, Eq]:
+@derived(15, "shear force and bending moment", (4,))
+def section_forces() -> Derivation[tuple[Eq, Eq]]:
     """Small deflections of a Bernoulli-Euler beam: moment is curvature times bending stiffness, shear its slope."""
     strain = potential_energy(joint=False).density
+    yield "strain energy", "Per length of the manipulator, (4).", strain
     moment = strain.diff(v.diff(x, 2))
     return Eq(Q, moment.diff(x) - strain.diff(v.diff(x))), Eq(M_z, moment)
 
@@ -81,17 +90,25 @@ def prove_section_forces() -> Proof:
     yield at(cantilever, L) - Rational(1, 3) * load * L**3 / (E * I_z)
 
 
-@numbered(16, "boundary conditions", "derived", (14, 15))
-def boundary_conditions() -> tuple[Eq, Eq, Eq, Eq]:
+@derived(16, "boundary conditions", (14, 15))
+def boundary_conditions() -> Derivation[tuple[Eq, ...]]:
     """(15) in (14): the virtual displacement and the virtual slope at each end are arbitrary, so each one's factor
     vanishes on its own. Root force, root moment, tip force, tip moment."""
     shear, moment = (law.rhs for law in section_forces())
     works = ((virtual_work()[0].lhs, S.Zero), (virtual_work()[1].lhs, L))
-    return tuple(
-        _solved(_with_section_forces(put(work, {eta: choice})), at(force, place), value)
+    put_in = tuple(Eq(_with_section_forces(work), 0) for work, _ in works)
+    yield "forces of the section put in", "(15) in the virtual work at joint and tip.", put_in
+    chosen = [
+        (_with_section_forces(put(work, {eta: choice})), at(force, place), value)
         for (work, place), values in zip(works, (end_values(v)[:2], end_values(v)[2:]), strict=True)
         for choice, force, value in zip((S.One, x - place), (shear, moment), values, strict=True)
+    ]
+    yield (
+        "one displacement, one turn",
+        "A virtual displacement of one picks the force, a virtual turn about the end picks the moment.",
+        tuple(Eq(balance.expand(), 0) for balance, _, _ in chosen),
     )
+    return tuple(_solved(*balance) for balance in chosen)
 
 
 def end_values(shape: Expr) -> tuple[Expr, ...]:
@@ -106,9 +123,11 @@ def _solved(condition: Expr, force: Expr, value: Expr) -> Eq:
     return Eq(force, ((sign * force - condition) / sign).expand())
 
 
-@numbered("16a", "boundary conditions of a mode", "derived", (2, 16))
-def mode_conditions() -> tuple[Eq, Eq, Eq, Eq]:
+@derived("16a", "boundary conditions of a mode", (2, 16))
+def mode_conditions() -> Derivation[tuple[Eq, ...]]:
     """(2) in (16), the base at rest: in free vibration each coordinate obeys q'' = -ω² q and cancels."""
+    one = tuple(Eq(*(single_mode(side.subs(w, 0).doit()) for side in e.args)) for e in boundary_conditions())
+    yield "one mode, base at rest", "One term of (2) in (16).", one
     return tuple(in_one_mode(e) for e in boundary_conditions())
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from sympy import Eq, Expr, Matrix, Mul, Pow, cancel, limit, oo, pi, solve
+from sympy import Eq, Expr, Limit, Matrix, Mul, Pow, cancel, limit, oo, pi, solve
 
 from cra_sym.arm.lagrangian import HALF
 from cra_sym.paper.energy import L, modal_numbers, phi_i
-from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.equations import Derivation, Proof, derived, proves, samples
 from cra_sym.paper.evaluation import group_numbers, shapes_agree
 from cra_sym.paper.modes import (
     C_1,
@@ -53,11 +53,13 @@ def _take_rigid(expression: Expr) -> Expr:
     return _rigid_limit(cancel(_finite(placed))).subs(VALUES)
 
 
-@numbered(27, "rigid joint with end-effector", "derived", (23, 25, 26))
-def rigid_joint() -> tuple[Eq, Eq, Eq]:
+@derived(27, "rigid joint with end-effector", (23, 25, 26))
+def rigid_joint() -> Derivation[tuple[Eq, Eq, Eq]]:
     """Both stiffnesses to infinity: frequency equation, shape and ratio. Nothing in (23) is lost on the way: divided by
     κ_t κ_r it has this finite limit."""
-    frequency = _rigid_limit((_finite(frequency_polynomial()) / (kappa_t * kappa_r)).expand())
+    divided = (_finite(frequency_polynomial()) / (kappa_t * kappa_r)).expand()
+    yield "divided by the stiffnesses", "(23) over κ_t κ_r.", Eq(divided.subs(VALUES), 0)
+    frequency = _rigid_limit(divided)
     shape = mode_shape().rhs / C_1
     parts = [_gather_rigid(shape.coeff(r_2, power)) for power in (0, 1)]
     return (
@@ -72,16 +74,20 @@ def _gather_rigid(shape: Expr) -> Expr:
     return sum(_rigid_limit(_finite(expanded.coeff(function))) * function for function in basis())
 
 
-@numbered(28, "rigid joint, no end-effector: mode shape", "derived", (27,))
-def cantilever_shape() -> tuple[Eq, Eq]:
+@derived(28, "rigid joint, no end-effector: mode shape", (27,))
+def cantilever_shape() -> Derivation[tuple[Eq, Eq]]:
     """The end-effector's inertia to zero in the shape of (27)."""
     _, shape, ratio = rigid_joint()
+    limits = Limit(Limit(ratio.rhs, mu, 0), iota, 0)
+    yield "limits of the ratio", "No mass, then no rotary inertia at the tip.", Eq(r_2, limits, evaluate=False)
     return shape, Eq(r_2, _bare(ratio.rhs))
 
 
-@numbered(29, "rigid joint, no end-effector: frequency equation", "derived", (27,))
-def cantilever_frequency() -> Eq:
+@derived(29, "rigid joint, no end-effector: frequency equation", (27,))
+def cantilever_frequency() -> Derivation[Eq]:
     """The end-effector's inertia to zero in the frequency equation of (27): the textbook cantilever."""
+    limits = Limit(Limit(rigid_joint()[0].lhs, mu, 0), iota, 0)
+    yield "limits", "No mass, then no rotary inertia at the tip.", Eq(limits, 0, evaluate=False)
     return Eq(_bare(rigid_joint()[0].lhs), 0)
 
 
@@ -152,11 +158,13 @@ def prove_cantilever_frequency() -> Proof:
     yield cantilever_frequency().lhs - cantilever_frequency().rhs + determinant
 
 
-@numbered(30, "natural frequency", "derived", (17,))
-def natural_frequency() -> Eq:
+@derived(30, "natural frequency", (17,))
+def natural_frequency() -> Derivation[Eq]:
     """The wave number of (17) turned into a frequency in hertz."""
     wave = mode_form()[1].subs(beta, lamda / L)
+    yield "wave number", "(17) with λ = β L.", wave
     (square,) = solve(wave, omega_i**2)
+    yield "angular frequency", "Solved, by 2 π to hertz.", Eq(omega_i**2, square)
     speed = Pow(square * L**4 / lamda**4, HALF, evaluate=False)
     return Eq(symbol("f_i"), Mul(lamda**2 / (2 * pi * L**2), speed, evaluate=False), evaluate=False)
 

@@ -22,7 +22,7 @@ from cra_sym.paper.energy import (
     w,
     x,
 )
-from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.equations import Derivation, Proof, derived, proves, samples
 from cra_sym.paper.evaluation import put, termwise
 from cra_sym.paper.modal_sum import ModalSum, member, written_out
 from cra_sym.paper.oracles import forces
@@ -37,16 +37,22 @@ M_i, K_i, Gamma_i, omega_i, zeta_i, tau = (
 )
 
 
-@numbered(11, "dynamic equation", "derived", (5, 8, "16b"))
-def dynamic_equation() -> Eq:
+@derived(11, "dynamic equation", (5, 8, "16b"))
+def dynamic_equation() -> Derivation[Eq]:
     """Hamilton's principle on the modal energies: one equation a mode, driven by the base's acceleration. A damping
     ratio is carried along; it is zero in the paper."""
     kinetic, potential = (_one_mode(e.rhs) for e in modal_energies())
+    yield "energies of mode i", "Its share of (5), and what it shares with the base.", (kinetic, potential)
     friction = -2 * zeta_i * omega_i * M_i * q_i.diff(t)
     result = hamilton(
         S.Zero, fields=[], coordinates=[q_i], prescribed=[w], x=x, domain=(0, L), t=t, left=kinetic - potential,
         virtual_work=[(friction, q_i, None)],
     )  # fmt: skip
+    yield (
+        "Hamilton's principle",
+        "Varied by the coordinate, with the work of the damping.",
+        result.coordinate_equations[0],
+    )
     balance = result.coordinate_equations[0].lhs - result.coordinate_equations[0].rhs
     driven = Gamma_i * w.diff(t, 2)
     free = (balance - driven).expand().subs(K_i, omega_i**2 * M_i)
@@ -108,14 +114,21 @@ def _homogeneous(displacement: Expr, velocity: Expr) -> Expr:
     return dsolve(Eq(free.expand(), 0), q_i, ics=initial).rhs
 
 
-@numbered(12, "Duhamel's integral", "derived", (11,))
-def duhamel() -> Eq:
+@derived(12, "Duhamel's integral", (11,))
+def duhamel() -> Derivation[Eq]:
     """Undamped: the free motion from the initial values, and one free motion for each impulse -Γ_i w'' / M_i that
     the base has given since. With ω_i = 0, sin(ω_i t) / ω_i is t."""
     impulse = _homogeneous(S.Zero, S.One)
     start, rate = symbol("C_1"), symbol("C_2")
     free = _homogeneous(start, rate).subs({start: q_i.subs(t, 0), rate: q_i.diff(t).subs(t, 0)})
+    yield "free motion", "Without drive, from the initial values.", Eq(q_i, free)
+    yield "unit impulse", "The free motion that starts at rest with unit speed.", impulse
     drive = (dynamic_equation().rhs / M_i).subs(t, tau) * impulse.subs(t, t - tau) * omega_i
+    yield (
+        "impulse of the base at tau",
+        "What the base gives in a unit of time, and what is left of it at t.",
+        drive / omega_i,
+    )
     constant, varying = drive.as_independent(tau)
     return Eq(q_i, free + constant / omega_i * Integral(varying, (tau, 0, t)))
 
@@ -150,16 +163,23 @@ def sample_duhamel() -> bool:
     return bool(abs(float(value) - reference.y[0, -1]) < 1e-8)
 
 
-@numbered(13, "its initial values", "derived", (2, 6, "16c"))
-def initial_values() -> tuple[Eq, Eq]:
+@derived(13, "its initial values", (2, 6, "16c"))
+def initial_values() -> Derivation[tuple[Eq, Eq]]:
     """An arm at rest in the inertial frame when the base sets off with speed w'(0): seen from the base it moves
     backwards, v(x, 0) = 0 and v_t(x, 0) = -w'(0). The product with a mode picks out that mode's coordinate."""
     speed = w.diff(t).subs(t, 0)
     participation = generalised()[2]
+    at_start = tuple(Eq(at_zero, value) for at_zero, value in ((v.subs(t, 0), 0), (v.diff(t).subs(t, 0), -speed)))
+    yield "arm at rest when the base sets off", "Displacement and speed seen from the base.", at_start
     projected = [
         tidy(inner_mass(phi_i, start)).subs(tidy(participation.rhs), Gamma_i).doit(integrals=False)
         for start in (S.Zero, S.One)
     ]
+    yield (
+        "product with mode i",
+        "By (16c) a sum over modes leaves M_i times its coordinate; a unit displacement leaves this.",
+        Eq(inner_mass(phi_i, S.One), projected[1]),
+    )
     start, rate = q_i.subs(t, 0), q_i.diff(t).subs(t, 0)
     return Eq(start, projected[0].doit() / M_i), Eq(rate, -speed * projected[1] / M_i)
 

@@ -11,6 +11,7 @@ from sympy import (
     I,
     MatMul,
     Matrix,
+    MatrixSymbol,
     Poly,
     Symbol,
     cancel,
@@ -28,7 +29,7 @@ from sympy import (
 
 from cra_sym.mechanics import HamiltonResult, separate
 from cra_sym.paper.energy import A, E, I_z, L, phi_i, rho, x
-from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.equations import Derivation, Proof, derived, proves, samples
 from cra_sym.paper.evaluation import annihilates, group_numbers, put
 from cra_sym.paper.groups import in_groups
 from cra_sym.paper.joint import mode_conditions
@@ -57,8 +58,7 @@ VALUES = {_c: cos(lamda), _s: sin(lamda), _ch: cosh(lamda), _sh: sinh(lamda)}
 def basis() -> tuple[Expr, ...]:
     """Return four real solutions of the field equation of a mode, from the roots of its characteristic polynomial."""
     r = Symbol("r")
-    balance = put(mode_field_equation().lhs, {phi_i: exp(r * x)}) / exp(r * x)
-    quartic = Poly(balance.subs(omega_i, _frequency()).expand(), r)
+    quartic = Poly(_exponential(r).subs(omega_i, _frequency()).expand(), r)
     circular: list[Expr] = []
     hyperbolic: list[Expr] = []
     for root in roots(quartic):
@@ -68,10 +68,20 @@ def basis() -> tuple[Expr, ...]:
     return (*circular, *hyperbolic)
 
 
-@numbered(17, "form of the mode shape", "derived", ("10b",))
-def mode_form() -> tuple[Eq, Eq]:
+def _exponential(rate: Symbol) -> Expr:
+    """Return what an exponential of x leaves of the field equation of a mode, divided by itself."""
+    return (put(mode_field_equation().lhs, {phi_i: exp(rate * x)}) / exp(rate * x)).expand()
+
+
+@derived(17, "form of the mode shape", ("10b",))
+def mode_form() -> Derivation[tuple[Eq, Eq]]:
     """The field equation of a mode has four exponential solutions, here in real form; the boundary conditions
     determine the coefficients."""
+    r = Symbol("r")
+    yield "exponential put in", "exp(r x) in the field equation (10b).", Eq(_exponential(r), 0)
+    quartic = Eq(r**4, beta**4)
+    yield "characteristic equation", "With the wave number as short for what does not depend on r.", quartic
+    yield "its roots", "Two imaginary, two real.", tuple(roots(quartic.lhs - quartic.rhs, r))
     shape = sum(coefficient * function for coefficient, function in zip(coefficients, basis(), strict=True))
     return Eq(phi_i, shape), _wave()
 
@@ -159,16 +169,26 @@ def _system(matrix: Matrix, unknowns: Matrix) -> Eq:
     return Eq(MatMul(matrix, unknowns), zeros(2, 1), evaluate=False)
 
 
-@numbered(18, "root system", "derived", ("16a", 17))
-def root_system() -> Eq:
+def _put_in(conditions: tuple[Eq, ...]) -> tuple[Eq, ...]:
+    """Return conditions on a mode with (17) in them."""
+    shape = mode_form()[0].rhs
+    return tuple(Eq(*(put(side, {phi_i: shape}).doit() for side in condition.args)) for condition in conditions)
+
+
+@derived(18, "root system", ("16a", 17))
+def root_system() -> Derivation[Eq]:
     """(17) in the conditions at the joint. Each stiffness is written as the pair (s, c) = (κ, 1) / (1 + κ), so
     that a rigid joint (1, 0) and no joint (0, 1) are ordinary values."""
+    yield "shape put in", "(17) in force and moment at the joint, at x = 0.", _put_in(mode_conditions()[:2])
+    rows = tuple(Eq((row * Matrix(coefficients))[0], 0) for row in _rows()[:2])
+    yield "dimensionless", "With λ = β L and the groups of the parameters, divided by common factors.", rows
     return _system(root_matrix(), Matrix(coefficients))
 
 
-@numbered(19, "tip system", "derived", ("16a", 17))
-def tip_system() -> Eq:
+@derived(19, "tip system", ("16a", 17))
+def tip_system() -> Derivation[Eq]:
     """(17) in the conditions at the end-effector."""
+    yield "shape put in", "(17) in force and moment at the tip, at x = L.", _put_in(mode_conditions()[2:])
     return _system(tip_matrix(), Matrix(coefficients))
 
 
@@ -229,10 +249,29 @@ def reduced_matrix() -> Matrix:
 _entries = Matrix(2, 2, [symbol(name) for name in ("d_11", "d_12", "d_21", "d_22")])
 
 
-@numbered(20, "reduced system", "derived", (18, 19))
-def reduced_system() -> Eq:
+@derived(20, "reduced system", (18, 19))
+def reduced_system() -> Derivation[Eq]:
     """(18) gives C_3 and C_4, (19) multiplied by the determinant of that step leaves two equations for C_1 and C_2. The
     determinant vanishes, and the step is empty, for a pinned and for a sliding root only."""
+    root = root_matrix()
+    named_rows = MatrixSymbol("R", 2, 2), MatrixSymbol("T", 2, 2)
+    yield (
+        "columns of C_3 and C_4",
+        "What (18) and (19) multiply these two by.",
+        (
+            Eq(named_rows[0], root[:, 2:], evaluate=False),
+            Eq(named_rows[1], tip_matrix()[:, 2:], evaluate=False),
+        ),
+    )
+    yield "determinant of the first step", "Zero for a pinned and for a sliding root only.", _elimination()[1]
+    third, fourth = coefficients[2:]
+    solved = -root[:, 2:].adjugate() * root[:, :2] * Matrix(coefficients[:2])
+    scale = Symbol("d")
+    yield (
+        "C_3 and C_4 from (18)",
+        "Times that determinant d, Cramer's rule.",
+        tuple(Eq(scale * name, value.expand()) for name, value in zip((third, fourth), solved, strict=True)),
+    )
     return _system(_entries, Matrix(coefficients[:2]))
 
 
@@ -252,9 +291,11 @@ def _named_entries() -> dict[Expr, Expr]:
     return {e.lhs: e.rhs for e in reduced_coefficients()}
 
 
-@numbered(21, "its coefficients", "derived", (18, 19, 20))
-def reduced_coefficients() -> tuple[Eq, ...]:
+@derived(21, "its coefficients", (18, 19, 20))
+def reduced_coefficients() -> Derivation[tuple[Eq, ...]]:
     """What the elimination leaves, with the joint as (s_t, c_t), (s_r, c_r) and the end-effector as μ, ι."""
+    raw = tuple(Eq(name, value.subs(VALUES)) for name, value in zip(_entries, _elimination()[0], strict=True))
+    yield "C_3 and C_4 put into (19)", "Multiplied by d, with cos² + sin² = 1 and cosh² - sinh² = 1 used up.", raw
     grouped = (collect_stiffness(value).subs(VALUES) for value in _elimination()[0])
     return tuple(Eq(name, value) for name, value in zip(_entries, grouped, strict=True))
 
@@ -265,9 +306,10 @@ def prove_reduced_coefficients() -> Proof:
     yield from minors(Matrix(2, 2, [e.rhs for e in reduced_coefficients()]), by_hand.eliminated())
 
 
-@numbered(22, "determinant", "derived", (20,))
-def determinant() -> Eq:
+@derived(22, "determinant", (20,))
+def determinant() -> Derivation[Eq]:
     """A mode is a solution that is not zero: the determinant of the reduced system vanishes."""
+    yield "matrix of the reduced system", "It takes C_1 and C_2 to zero.", _entries
     return Eq(_entries.det(), 0)
 
 
@@ -292,15 +334,29 @@ def frequency_polynomial() -> Expr:
     return (polynomial / (unit * lamda**lowest)).expand()
 
 
+def _never_zero() -> Expr:
+    """Return what the determinant of the reduced system has that the frequency equation has not."""
+    matrix, factor = _elimination()
+    named = dict(zip(_entries, matrix, strict=True))
+    whole = _reduced(determinant().lhs.subs(named))
+    return cancel(whole / _reduced(factor * frequency_polynomial())) * factor
+
+
 def frequency_function() -> tuple[Expr, tuple[Symbol, ...]]:
     """Return Delta and its arguments (lamda, s_t, c_t, s_r, c_r, mu, iota)."""
     return frequency_polynomial().subs(VALUES), (lamda, s_t, c_t, s_r, c_r, mu, iota)
 
 
-@numbered(23, "frequency equation", "derived", (21, 22))
-def frequency_equation() -> Eq:
+@derived(23, "frequency equation", (21, 22))
+def frequency_equation() -> Derivation[Eq]:
     """The determinant expanded; its factors that never vanish are divided out, so that a rigid joint without
     end-effector leaves 1 + cos λ cosh λ."""
+    yield "common factors", "What (21) in (22) has in front: d of the elimination, and powers of λ.", _never_zero()
+    yield (
+        "expanded",
+        "What is left of (22) when they are divided out, not yet sorted.",
+        Eq(frequency_polynomial().subs(VALUES), 0),
+    )
     return Eq(collect_stiffness(frequency_polynomial()).subs(VALUES), 0)
 
 

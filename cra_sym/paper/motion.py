@@ -11,7 +11,7 @@ from sympy import Eq, Expr, Function, Integral, lambdify
 from cra_sym.arm.lagrangian import paper_lagrangian
 from cra_sym.mechanics.hamilton import hamilton
 from cra_sym.paper.energy import ENERGY, L, modal_numbers, phi_i, single_mode, t, v, w, x
-from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.equations import Derivation, Proof, derived, numbered, proves, samples
 from cra_sym.paper.evaluation import at, put, termwise, virtual_factors
 from cra_sym.paper.joint import boundary_conditions, free_vibration, rayleigh_factors, section_forces
 from cra_sym.paper.oracles import forces
@@ -36,7 +36,7 @@ def dynamics(*, driven: bool = True) -> Any:
 
 def _step(name: str) -> Expr:
     """Return what a step of :func:`dynamics` says is zero."""
-    return next(step.expression for step in dynamics().steps if step.name == name)
+    return dynamics().steps.step(name).expression
 
 
 # Hamilton's principle (8)-(10) ----------------------------------------------------------------------------------
@@ -109,10 +109,11 @@ def _action(values: dict[str, float], motion: Any, duration: float) -> float:
     return float(0.5 * duration * weights @ (0.5 * length * weights @ rates[0] + rates[1] + rates[2]))
 
 
-@numbered(9, "variation of the Lagrangian", "derived", (7, 8))
-def variation() -> Eq:
+@derived(9, "variation of the Lagrangian", (7, 8))
+def variation() -> Derivation[Eq]:
     """The elastic displacement and the base's motion are varied; the first-order change of the Lagrangian, with the
     virtual work of the driving force."""
+    yield "Lagrangian", "Density along the manipulator, and what sits at the two ends.", _step("Lagrangian")
     return Eq(delta_L + F * delta_w, _step("Variation"))
 
 
@@ -123,10 +124,12 @@ def prove_variation() -> Proof:
     yield termwise(variation().rhs - F * delta_w - _first_variation())
 
 
-@numbered(10, "principle with the variation put in", "derived", (8, 9))
-def integrated_by_parts() -> Eq:
+@derived(10, "principle with the variation put in", (8, 9))
+def integrated_by_parts() -> Derivation[Eq]:
     """(9) in (8): integration by parts in time and along the manipulator frees the variations of their derivatives and
     leaves terms at the two ends."""
+    in_time = "integration by parts in time"
+    yield in_time, "The variations vanish at both instants, so nothing is left there.", _step(in_time.capitalize())
     return Eq(_step("Integration by parts in x"), 0)
 
 
@@ -143,9 +146,10 @@ def prove_integrated_by_parts() -> Proof:
             yield termwise(found - expected)
 
 
-@numbered("10a", "field equation and equation of the base", "derived", (10,))
-def field_and_base() -> tuple[Eq, Eq]:
+@derived("10a", "field equation and equation of the base", (10,))
+def field_and_base() -> Derivation[tuple[Eq, Eq]]:
     """Variations along the manipulator and of the base are arbitrary; those at the ends give the conditions (16)."""
+    yield "collected terms", "The factor of each variation.", _step("Collected terms")
     return dynamics().field_equations[0], dynamics().coordinate_equations[0]
 
 
@@ -174,11 +178,14 @@ def prove_field_and_base() -> Proof:
     yield termwise(base.lhs - base.rhs + on_arm)
 
 
-@numbered("10b", "field equation of a mode", "derived", (2, "10a"))
-def mode_field_equation() -> Eq:
+@derived("10b", "field equation of a mode", (2, "10a"))
+def mode_field_equation() -> Derivation[Eq]:
     """(2) in the field equation, the base at rest: each coordinate swings with q'' = -ω² q and cancels."""
     field = field_and_base()[0].lhs.subs(w, 0).doit()
-    return Eq(free_vibration(single_mode(field).expand()), 0)
+    yield "base at rest", "The field equation of an arm that vibrates freely.", Eq(field, 0)
+    one = single_mode(field).expand()
+    yield "one mode", "One term of (2).", Eq(one, 0)
+    return Eq(free_vibration(one), 0)
 
 
 @proves("10b")
@@ -202,15 +209,18 @@ def sample_mode_field_equation() -> bool:
     return True
 
 
-@numbered("10c", "equation of the base from its own free body", "derived", ("10a", 16))
-def base_free_body() -> Eq:
+@derived("10c", "equation of the base from its own free body", ("10a", 16))
+def base_free_body() -> Derivation[Eq]:
     """The field equation integrated along the manipulator turns all inertia beyond the joint into the force of the
     translational spring: the base feels its own inertia, the spring and the drive."""
     field, base = field_and_base()
     shear, _ = (law.rhs for law in section_forces())
     inertia = Integral((field.lhs - field.rhs - shear.diff(x)).expand(), (x, 0, L))
+    integrated = Eq(inertia, -Integral(shear.diff(x), (x, 0, L)), evaluate=False)
+    yield "field equation integrated", "All inertia of the manipulator is shear force.", integrated
     known = {e.lhs: e.rhs for e in boundary_conditions()}
     at_ends = at(shear, 0).subs(known) - at(shear, L).subs(known)
+    yield "shear at the ends", "(16) tells the shear force at the joint and at the tip.", Eq(inertia, at_ends.expand())
     return Eq(termwise(base.lhs - base.rhs + F - inertia) + at_ends.expand(), F)
 
 

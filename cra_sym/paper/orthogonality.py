@@ -26,7 +26,7 @@ from cra_sym.paper.energy import (
     w,
     x,
 )
-from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.equations import Derivation, Proof, derived, proves, samples
 from cra_sym.paper.evaluation import at, evaluate, put, termwise, virtual_factors
 from cra_sym.paper.joint import end_values, mode_conditions, section_forces
 from cra_sym.paper.modal_sum import ModalSum, member, written_out
@@ -39,8 +39,8 @@ __all__ = ["modal_energies", "orthogonality", "stiffness_identity"]
 omega_i, omega_j, M_i, K_i, K_b = (symbol(name) for name in ("omega_i", "omega_j", "M_i", "K_i", "K_b"))
 
 
-@numbered("16b", "stiffness and mass of two modes", "derived", (6, "10b", "16a"))
-def stiffness_identity() -> tuple[Eq, Eq]:
+@derived("16b", "stiffness and mass of two modes", (6, "10b", "16a"))
+def stiffness_identity() -> Derivation[tuple[Eq, Eq]]:
     """Integrating by parts twice moves two derivatives from mode j to mode i, where the field equation and the four
     end conditions replace them: the stiffness product is ω_i² times the mass product, springs, tip mass and
     rotary inertia included; for i = j it is K_i = ω_i² M_i."""
@@ -49,9 +49,18 @@ def stiffness_identity() -> tuple[Eq, Eq]:
     along = inner_stiffness(phi_i, phi_j, joint=False) - Integral(by_parts.diff(x) + shear.diff(x) * phi_j, (x, 0, L))
     if termwise(along.doit(integrals=False)) != 0:
         raise ArithmeticError(f"integration by parts leaves {along}")
+    bent = inner_stiffness(phi_i, phi_j, joint=False)
+    by_parts_twice = at(by_parts, L) - at(by_parts, 0) + Integral(shear.diff(x) * phi_j, (x, 0, L))
+    yield (
+        "integration by parts, twice",
+        "Of the bent manipulator's share.",
+        Eq(bent, by_parts_twice.doit(integrals=False)),
+    )
     known = _balance("i")
     interior = Integral(shear.diff(x).xreplace(known) * phi_j, (x, 0, L))
     ends = (at(by_parts, L) - at(by_parts, 0)).xreplace(known)
+    put_in = Eq(bent, (interior + ends).doit(integrals=False).expand())
+    yield "equations of mode i put in", "(10b) replaces the fourth derivative, (16a) what stands at the ends.", put_in
     springs = inner_stiffness(phi_i, phi_j) - inner_stiffness(phi_i, phi_j, joint=False)
     mass = inner_mass(phi_i, phi_j)
     rest = termwise(interior + ends + springs - omega_i**2 * mass)
@@ -110,16 +119,19 @@ def sample_stiffness_identity() -> bool:
     return True
 
 
-@numbered("16c", "orthogonality", "derived", ("16b",))
-def orthogonality() -> tuple[Eq, Eq]:
+@derived("16c", "orthogonality", ("16b",))
+def orthogonality() -> Derivation[tuple[Eq, Eq]]:
     """Exchange i and j in the identity and subtract: (ω_i² - ω_j²) times the mass product is zero, so for
     different frequencies both products vanish."""
     identity, _ = stiffness_identity()
     swapped = Eq(*(_swap(side) for side in identity.args))
+    yield "i and j exchanged", "The identity (16b), and the same for mode j.", (identity, swapped)
     difference = (identity.lhs - swapped.lhs) - (identity.rhs - swapped.rhs)
     mass = inner_mass(phi_i, phi_j)
     if (difference + (omega_i**2 - omega_j**2) * mass).expand() != 0:
         raise ArithmeticError(f"the products are not symmetric: {difference}")
+    subtracted = Eq((omega_i**2 - omega_j**2) * mass, 0, evaluate=False)
+    yield "subtracted", "The stiffness product is symmetric and drops out.", subtracted
     return Eq(mass, 0), Eq(inner_stiffness(phi_i, phi_j), 0)
 
 
@@ -152,11 +164,12 @@ def sample_orthogonality() -> bool:
     return True
 
 
-@numbered("16d", "what the manipulator's energy alone would give", "derived", (4, 6, "16b"))
-def stiffness_of_manipulator_alone() -> Eq:
+@derived("16d", "what the manipulator's energy alone would give", (4, 6, "16b"))
+def stiffness_of_manipulator_alone() -> Derivation[Eq]:
     """The paper's (4) without the springs leaves their share out of the generalised stiffness: K_b / M_i is not
     ω_i² unless the joint is rigid or the mode does not move it."""
     springs = inner_stiffness(phi_i, phi_i) - inner_stiffness(phi_i, phi_i, joint=False)
+    yield "share of the springs", "The second energy of (4) less the first, for one mode.", springs
     return Eq(K_b, stiffness_identity()[1].rhs - springs)
 
 
@@ -210,10 +223,14 @@ def _modal(energy: Expr, variables: list[Expr], named: dict[Expr, Expr]) -> Expr
     return total
 
 
-@numbered(5, "modal energies", "derived", (2, 3, 4, 6, "16c"))
-def modal_energies() -> tuple[Eq, Eq]:
+@derived(5, "modal energies", (2, 3, 4, 6, "16c"))
+def modal_energies() -> Derivation[tuple[Eq, Eq]]:
     """(2) put into (3) and (4): orthogonality leaves no product of two modes."""
     two = separation().rhs.members("i", "j")
+    both = tuple(single_mode(energy.rhs, two) for energy in (kinetic(), potential()[1]))
+    yield "two modes", "Any two members of (2) put into (3) and (4).", both
+    products = tuple(e.lhs for e in orthogonality())
+    yield "products of two different modes", "They have these factors, which vanish by (16c).", products
     named = {tidy(e.rhs): e.lhs for e in generalised()} | {tidy(e.lhs): e.rhs for e in orthogonality()}
     motion = _modal(single_mode(kinetic().rhs, two), [q_i.diff(t), q_j.diff(t), w.diff(t)], named)
     strain = _modal(single_mode(potential()[1].rhs, two), [q_i, q_j], named)

@@ -1,22 +1,23 @@
 """Multiple scales at a principal resonance: equations (37)-(49).
 
-The paper's own (43) and (48) are lost. The plain numbers treat an excitation that is parametric, (36a) or (36b); those
-with a letter follow the paper's words literally, to a forced resonance, or supply what it leaves out.
+The paper's own (43) and (48) are lost. The excitation here is parametric, (36a) or (36b); the paper's words taken
+literally lead to a forced resonance, in :mod:`cra_sym.paper.literal_route`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
 import numpy as np
-from sympy import Derivative, Eq, Expr, Function, I, S, Sum, Symbol, conjugate, cos, exp, integrate, pi, sin, solve
+from sympy import Derivative, Eq, Expr, Function, I, S, Sum, Symbol, conjugate, cos, exp, integrate, pi, roots, sin
 
-from cra_sym.mechanics.boundaries import forced_growth, forced_resonance, general_resonance, plain
+from cra_sym.mechanics.boundaries import general_resonance, plain
+from cra_sym.mechanics.multiple_scales import MultipleScales
 from cra_sym.paper.energy import generalised, inner_mass, phi_i, t, x
-from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.equations import Derivation, Proof, Stage, derived, numbered, proves, samples
 from cra_sym.paper.evaluation import evaluate, put, termwise
-from cra_sym.paper.excited import excited_system
 from cra_sym.paper.operators import acting, named
 from cra_sym.paper.oracles.shooting import sample, shoot
 from cra_sym.symbols import Dimension, dimension, symbol
@@ -28,7 +29,7 @@ P_nn, M_n, Gamma_n, zeta_n = (symbol(name) for name in ("P_nn", "M_n", "Gamma_n"
 
 
 @cache
-def principal(order: int = 1, *, damped: bool = False) -> Any:
+def principal(order: int = 1, *, damped: bool = False) -> MultipleScales:
     """Return multiple scales at the principal resonance of one mode among any number."""
     return general_resonance("principal", order, damped=damped)
 
@@ -47,27 +48,45 @@ def two_scale_expansion() -> Any:
     return _step("expansion")
 
 
-@numbered(38, "derivative operators", "derived", (37,))
-def derivative_operators() -> Any:
+@derived(38, "derivative operators", (37,))
+def derivative_operators() -> Derivation[Any]:
     """The chain rule: D_k is the derivative with respect to T_k = epsilon^k t."""
+    motion, slow = Function("q_n")(T_0, T_1), epsilon * t
+    rate = motion.diff(T_0) + slow.diff(t) * motion.diff(T_1)
+    yield "chain rule", "A function of T_0 = t and T_1 = εt.", Eq(Derivative(motion.subs({T_0: t, T_1: slow}), t), rate)
     return _step("operators")
 
 
-@numbered(39, "order 0", "derived", (37, 38))
-def order_0() -> Any:
+@derived(39, "order 0", (37, 38))
+def order_0() -> Derivation[Any]:
     """Terms without epsilon."""
+    yield _expanded()
     return _step("order 0")
 
 
-@numbered(40, "order 1", "derived", (37, 38))
-def order_1() -> Any:
+@derived(40, "order 1", (37, 38))
+def order_1() -> Derivation[Any]:
     """Terms with epsilon: the slow derivative and the excitation drive."""
+    yield _expanded()
     return _step("order 1")
 
 
-@numbered(41, "solution of order 0", "derived", (39,))
-def order_0_solution() -> Any:
+def _expanded() -> Stage:
+    """Return the equation of motion of a mode with (37) and (38) put in."""
+    (motion,), (_, twice), system = two_scale_expansion(), derivative_operators(), principal().system
+    operator = twice.rhs.subs({Symbol(name): named(name) for name in ("D_0", "D_1")})
+    n, j = principal().resonance.first, system.spectator
+    coupled = Sum(plain(system.p(n, j)) * (named(f"q_{j}0") + epsilon * named(f"q_{j}1")), (j, 1, system.size))
+    left = (operator + omega_n**2) * motion.rhs + epsilon * cos(varpi * T_0) * coupled
+    return "expansion put in", "(37) and (38) in the equation of motion of mode n.", Eq(left.expand(), 0)
+
+
+@derived(41, "solution of order 0", (39,))
+def order_0_solution() -> Derivation[Any]:
     """Each mode swings at its own frequency; its complex amplitude A_n depends on slow time."""
+    rate = Symbol("r")
+    yield "exponential put in", "exp(r T_0) in (39).", Eq(rate**2 + omega_n**2, 0)
+    yield "its roots", "Two, conjugate: with them the amplitudes.", tuple(roots(rate**2 + omega_n**2, rate))
     return _step("free vibration")
 
 
@@ -78,27 +97,36 @@ def detuning() -> Any:
     return _step("detuning")
 
 
-@numbered("42a", "detuning from the natural frequency", "definition")
-def forced_detuning() -> Eq:
-    """The paper's words taken literally: what the forced system (36) calls for."""
-    return plain(forced_resonance().step("detuning").expression)
-
-
-@numbered(43, "the excitation in slow time", "derived", (42,))
-def excitation_in_exponentials() -> Any:
+@derived(43, "the excitation in slow time", (42,))
+def excitation_in_exponentials() -> Derivation[Any]:
     """The paper's equation is lost; from (41) and (42) it can only be this, the excitation at the detuned frequency."""
+    euler = cos(varpi * T_0).rewrite(exp)
+    yield "Euler's formula", "For the frequency of the excitation.", Eq(cos(varpi * T_0), euler, evaluate=False)
     return _step("excitation in exponentials")
 
 
-@numbered(44, "secular terms", "derived", (40, 41, 43))
-def secular_terms() -> Any:
+@derived(44, "secular terms", (40, 41, 43))
+def secular_terms() -> Derivation[Any]:
     """Factor of exp(i omega_n T_0) on the right of order 1."""
+    written, drive = order_0_solution()[0], excitation_in_exponentials()
+    right = _own_member(order_1()[0].rhs).subs(drive.lhs, drive.rhs).xreplace({written.lhs: written.rhs})
+    yield "right of order 1", "(41) and (43) in (40); of the sum the member of mode n itself.", right.expand()
     return _step("secular terms")
 
 
-@numbered(45, "solvability", "derived", (44,))
-def solvability() -> Any:
+@derived(45, "solvability", (44,))
+def solvability() -> Derivation[Any]:
     """Order 1 has a bounded solution only if its right-hand side is orthogonal to the free vibration."""
+    force, time = exp(I * omega_n * T_0), Function("q_n1")(T_0)
+    swelling = -I * T_0 * force / (2 * omega_n)
+    yield (
+        "what a secular term does",
+        "A force of the mode's own frequency makes it swing ever wider.",
+        (
+            Eq(time.diff(T_0, 2) + omega_n**2 * time, force),
+            Eq(time, swelling),
+        ),
+    )
     return _step("solvability")
 
 
@@ -147,12 +175,17 @@ def _fields() -> dict[Symbol, Expr]:
     return _SLOW | {name: order.xreplace(_SLOW) for name, order in orders.items()}
 
 
-def _acted(expression: Expr) -> Expr:
-    """Return what an expression with operators is for a single mode: in sums over modes, all others rest."""
+def _own_member(expression: Expr) -> Expr:
+    """Return an expression with the member of mode n in place of each sum over modes."""
     for total in expression.atoms(Sum):
         own = {s: Symbol(s.name.replace("j", "n"), **s.assumptions0) for s in total.function.free_symbols}
         expression = expression.xreplace({total: total.function.xreplace(own)})
-    excitation = excitation_in_exponentials()
+    return expression
+
+
+def _acted(expression: Expr) -> Expr:
+    """Return what an expression with operators is for a single mode: in sums over modes, all others rest."""
+    expression, excitation = _own_member(expression), excitation_in_exponentials()
     return acting(expression, _fields(), _TIMES).subs(excitation.lhs, excitation.rhs)
 
 
@@ -216,14 +249,6 @@ def prove_detuning() -> Proof:
     yield dimension(detuning()) == Dimension(s=-1)
     yield detuning().lhs == varpi
     yield detuning().rhs - 2 * omega_n - epsilon * sigma
-
-
-@proves("42a")
-def prove_forced_detuning() -> Proof:
-    """Frequencies; at the exact resonance both periods are the same, and sigma in slow time is the distance from it."""
-    yield dimension(forced_detuning()) == Dimension(s=-1)
-    yield forced_detuning().lhs == varpi
-    yield forced_detuning().rhs - omega_n - epsilon * sigma
 
 
 @proves(43)
@@ -292,9 +317,12 @@ def sample_inner_product() -> bool:
     return bool(abs(gram[0, 1]) < 1e-8 * np.sqrt(gram[0, 0] * gram[1, 1]))
 
 
-@numbered(47, "solvability, term by term", "derived", (45, 46))
-def distributed() -> Eq:
+@derived(47, "solvability, term by term", (45, 46))
+def distributed() -> Derivation[Eq]:
     """The inner product with the mode taken of each term: its generalised mass comes in front."""
+    factor = Symbol("c")
+    alone = inner_mass(factor * phi_i, phi_i).doit(integrals=False)
+    yield "one term", "The inner product (46) of any factor c times a mode with that mode: c times its mass (6).", alone
     return Eq((M_n * solvability()[0].lhs).expand(), 0, evaluate=False)
 
 
@@ -312,10 +340,13 @@ def prove_distributed() -> Proof:
 # Amplitude equation and boundary (48)-(49) ----------------------------------------------------------------------
 
 
-@numbered(48, "amplitude equation", "derived", (47,))
-def amplitude_equation() -> Eq:
+@derived(48, "amplitude equation", (47,))
+def amplitude_equation() -> Derivation[Eq]:
     """The paper's equation is lost. For a parametric excitation the amplitude is driven by its own conjugate; here
     the derivative is by the time t."""
+    rate, condition = named("D_1") * named("A_n"), solvability()[0].lhs
+    slow = -condition.coeff(rate, 0) if condition.coeff(rate, 0) != 0 else condition
+    yield "slow derivative", "(47) solved for it; the mass of the mode cancels.", Eq(rate, slow / condition.coeff(rate))
     return plain(principal().amplitude_equations[0]).subs(Symbol("Delta", real=True), epsilon * sigma)
 
 
@@ -326,28 +357,11 @@ def prove_amplitude_equation() -> Proof:
     yield residual(Symbol("r", real=True)) != (0, 0)
 
 
-@numbered("48a", "amplitude equation of the literal route", "derived", (36, "42a"))
-def forced_amplitude_equation() -> Eq:
-    """What (36) gives: no conjugate amplitude, so linear growth at resonance and no boundary of stability."""
-    found = plain(forced_resonance().amplitude_equations[0])
-    return found.subs(Symbol("Delta", real=True), epsilon * sigma)
-
-
-@proves("48a")
-def prove_forced_amplitude_equation() -> Proof:
-    """At resonance the amplitude grows in proportion to time; so made into a motion of the mode, it balances the force
-    of (36). Away from it, it turns with the detuning."""
-    drift = forced_amplitude_equation().rhs
-    motion = 2 * drift.subs(sigma, 0) * t * cos(omega_n * t)
-    force = excited_system().rhs.xreplace({symbol("Gamma_i"): Gamma_n}).subs(varpi, omega_n)
-    yield M_n * (motion.diff(t, 2) + omega_n**2 * motion) - force
-    yield drift - drift.subs(sigma, 0) * exp(I * epsilon * sigma * t)
-
-
-@numbered(49, "stability boundary", "derived", (48,))
-def stability_boundary() -> tuple[Eq, Eq]:
+@derived(49, "stability boundary", (48,))
+def stability_boundary() -> Derivation[tuple[Eq, Eq]]:
     """The amplitude of (48) grows between these two frequencies. The paper's boundary, borrowed from axially moving
     beams, does not follow from its (36); this one follows from (48)."""
+    yield from _border(principal())
     lower, upper = _step("boundary")
     return lower, upper
 
@@ -392,36 +406,19 @@ def sample_stability_boundary() -> bool:
     return bool(3.5 < errors[0] / errors[1] < 4.5)
 
 
-@numbered("49a", "growth of the literal route", "derived", ("48a",))
-def forced_measure() -> Eq:
-    """What can be said instead for a base that moves across the arm: how fast the tip's amplitude grows at resonance,
-    for epsilon = 1. It is a velocity, no frequency."""
-    expression, _ = forced_growth()
-    return Eq(Derivative(Symbol("a"), t), expression, evaluate=False)
+def _border(found: MultipleScales) -> Iterator[Stage]:
+    """Yield the steps from the amplitude equation to where it stops to be stable."""
+    for step in found.steps:
+        if step.name in ("rotating frame", "stability condition"):
+            yield step.name, step.statement, plain(found.explicit(step.expression))
 
 
-@proves("49a")
-def prove_forced_measure() -> Proof:
-    """A velocity that does not change when the mode is scaled; squared it is that of a motion t times a harmonic, which
-    balances the force of (36) at resonance, at the tip."""
-    expression, (_, gamma, tip, mass, _) = forced_growth()
-    shown = forced_measure().rhs
-    yield forced_measure().lhs == Derivative(Symbol("a"), t)
-    yield dimension(shown, {tip: Dimension()}) == Dimension(m=1, s=-1)
-    yield shown - expression
-    yield shown - shown.subs({gamma: 3 * gamma, tip: 3 * tip, mass: 9 * mass}, simultaneous=True)
-    rate = Symbol("r")
-    motion = rate * t * cos(omega_n * t)
-    force = excited_system().rhs.xreplace({symbol("Gamma_i"): gamma}).subs(varpi, omega_n) / epsilon
-    balance = (mass * (motion.diff(t, 2) + omega_n**2 * motion) - force).subs(t, pi / (2 * omega_n))
-    (needed,) = solve(balance, rate)
-    yield shown**2 - (needed * tip) ** 2
-
-
-@numbered("49b", "threshold of damping", "derived", (48,))
-def damping_threshold() -> Eq:
+@derived("49b", "threshold of damping", (48,))
+def damping_threshold() -> Derivation[Eq]:
     """With a damping ratio zeta_n the amplitude grows only above this epsilon."""
     damped = principal(damped=True)
+    yield from _border(damped)
+    assert damped.border is not None
     return Eq(epsilon, plain(damped.explicit(damped.border.threshold)), evaluate=False)
 
 

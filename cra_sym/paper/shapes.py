@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from sympy import Eq, Expr, Matrix, cancel
+from sympy import Eq, Expr, MatMul, Matrix, cancel
 
 from cra_sym.paper.energy import phi_i
-from cra_sym.paper.equations import Proof, numbered, proves, samples
+from cra_sym.paper.equations import Derivation, Proof, derived, proves, samples
 from cra_sym.paper.evaluation import group_numbers, shapes_agree, shot_coefficients
 from cra_sym.paper.modes import (
     C_1,
@@ -19,6 +19,7 @@ from cra_sym.paper.modes import (
     mode_form,
     r_2,
     reduced_matrix,
+    reduced_system,
     root_matrix,
     s_r,
     s_t,
@@ -29,10 +30,16 @@ from cra_sym.paper.oracles.shooting import sample, shoot
 __all__ = ["circular_ratio", "coefficients_of", "mode_shape"]
 
 
-@numbered(24, "coefficient ratios", "derived", (18,))
-def coefficient_ratios() -> tuple[Eq, Eq]:
+@derived(24, "coefficient ratios", (18,))
+def coefficient_ratios() -> Derivation[tuple[Eq, ...]]:
     """The root system solved for the hyperbolic coefficients."""
     root = root_matrix()
+    sides = root[:, 2:], -root[:, :2]
+    yield (
+        "root system, sorted",
+        "C_3 and C_4 on the left, C_1 and C_2 on the right.",
+        Eq(MatMul(sides[0], Matrix(coefficients[2:])), MatMul(sides[1], Matrix(coefficients[:2])), evaluate=False),
+    )
     solved = -root[:, 2:].adjugate() * root[:, :2] * Matrix(coefficients[:2]) / root[:, 2:].det()
     return tuple(
         Eq(name, sum(cancel(value.expand().coeff(c)) * c for c in (C_1, C_2)))
@@ -65,10 +72,12 @@ def sample_coefficient_ratios() -> bool:
     return True
 
 
-@numbered(25, "mode shape", "derived", (17, 24))
-def mode_shape() -> Eq:
+@derived(25, "mode shape", (17, 24))
+def mode_shape() -> Derivation[Eq]:
     """(24) in (17), with C_2 / C_1 = r_2; the scale C_1 stays free."""
-    shape = mode_form()[0].rhs.subs({e.lhs: e.rhs for e in coefficient_ratios()}).subs(C_2, r_2 * C_1)
+    put_in = mode_form()[0].rhs.subs({e.lhs: e.rhs for e in coefficient_ratios()})
+    yield "ratios put in", "(24) in (17).", Eq(phi_i, put_in)
+    shape = put_in.subs(C_2, r_2 * C_1)
     inside = (shape / C_1).expand()
     plain, second = inside.coeff(r_2, 0), inside.coeff(r_2, 1)
     return Eq(phi_i, C_1 * (_gather(plain) + r_2 * _gather(second)))
@@ -78,9 +87,19 @@ def _gather(shape: Expr) -> Expr:
     return sum(cancel(shape.coeff(function)) * function for function in basis())
 
 
-@numbered(26, "ratio of the circular coefficients", "derived", (20, 21))
-def circular_ratio() -> Eq:
+@derived(26, "ratio of the circular coefficients", (20, 21))
+def circular_ratio() -> Derivation[Eq]:
     """The first row of the reduced system, which the second repeats at a natural frequency."""
+    system = reduced_system().lhs
+    row = (system.args[0] * system.args[1])[0]
+    yield (
+        "first row",
+        "Of the reduced system (20), solved for C_2 / C_1.",
+        (
+            Eq(row, 0),
+            Eq(r_2, -row.coeff(C_1) / row.coeff(C_2)),
+        ),
+    )
     first, second = reduced_matrix()[0, :]
     return Eq(r_2, -first / second)
 

@@ -155,7 +155,7 @@ def test_steps_follow_the_textbook():
         assert step._repr_latex_().startswith("$")
     assert result.step("boundary").expression[0].rhs == result.boundary[0]
     assert "varpi" in result._repr_latex_()
-    with pytest.raises(ValueError, match="must be one of expansion"):
+    with pytest.raises(ValueError, match="must be one of 'expansion'"):
         result.step("conclusion")
 
 

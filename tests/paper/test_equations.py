@@ -1,5 +1,6 @@
 """The registry: every equation is found, has a kind, a statement, its sources, and a check that can fail."""
 
+import itertools
 import random
 import sys
 from importlib import import_module
@@ -17,6 +18,7 @@ from sympy import (
     Integral,
     Lambda,
     MatMul,
+    MatrixBase,
     Mul,
     Pow,
     Rational,
@@ -62,6 +64,28 @@ def test_each_equation_says_what_it_is(number):
     assert f"({number})" in e._repr_latex_() and e._repr_latex_().startswith("$")
     if e.kind == "derived":
         assert e.derived_from
+
+
+@pytest.mark.parametrize("number", ALL)
+def test_a_derived_equation_tells_how_it_comes_from_its_sources(number):
+    """Its last step is the equation; each step rests on the one before, the first on what the equation is derived from.
+
+    The others have no steps.
+    """
+    e = cra.equation(number)
+    if e.kind != "derived":
+        assert e.steps == ()
+        return
+    *way, last = e.steps
+    assert way, "nothing between the sources and the equation"
+    assert last.expression == e.shown and last.name == e.title and f"({number})" in last._repr_latex_()
+    assert way[0].derived_from == tuple(f"({source})" for source in e.derived_from)
+    for before, after in itertools.pairwise(e.steps):
+        assert after.derived_from == (before.name,)
+    for step in e.steps:
+        parts = step.expression if isinstance(step.expression, tuple) else (step.expression,)
+        assert all(isinstance(part, Basic | MatrixBase) for part in parts), step.name
+        assert step.statement.endswith(".") and step.statement in e.steps._repr_markdown_()
 
 
 def test_the_papers_numbers_come_in_order_and_none_is_missing():

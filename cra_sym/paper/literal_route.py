@@ -1,0 +1,81 @@
+"""The paper's words of the stability analysis taken literally: a forced resonance, equations (42a), (48a) and (49a)."""
+
+from __future__ import annotations
+
+from sympy import Derivative, Eq, I, Symbol, cos, exp, pi, solve
+
+from cra_sym.mechanics.boundaries import forced_growth, forced_resonance, plain
+from cra_sym.paper.energy import t
+from cra_sym.paper.equations import Derivation, Proof, derived, numbered, proves
+from cra_sym.paper.excited import excited_system
+from cra_sym.symbols import Dimension, dimension, symbol
+
+__all__: list[str] = []
+
+epsilon, sigma, varpi, omega_n, M_n, Gamma_n = (symbol(n) for n in "epsilon sigma varpi omega_n M_n Gamma_n".split())
+
+
+@numbered("42a", "detuning from the natural frequency", "definition")
+def forced_detuning() -> Eq:
+    """The paper's words taken literally: what the forced system (36) calls for."""
+    return plain(forced_resonance().step("detuning").expression)
+
+
+@proves("42a")
+def prove_forced_detuning() -> Proof:
+    """Frequencies; at the exact resonance both periods are the same, and sigma in slow time is the distance from it."""
+    yield dimension(forced_detuning()) == Dimension(s=-1)
+    yield forced_detuning().lhs == varpi
+    yield forced_detuning().rhs - omega_n - epsilon * sigma
+
+
+@derived("48a", "amplitude equation of the literal route", (36, "42a"))
+def forced_amplitude_equation() -> Derivation[Eq]:
+    """What (36) gives: no conjugate amplitude, so linear growth at resonance and no boundary of stability."""
+    for step in forced_resonance().steps:
+        if step.name in ("order 1", "secular terms", "solvability"):
+            yield step.name, step.statement, tuple(map(plain, step.expression))
+    found = plain(forced_resonance().amplitude_equations[0])
+    return found.subs(Symbol("Delta", real=True), epsilon * sigma)
+
+
+@proves("48a")
+def prove_forced_amplitude_equation() -> Proof:
+    """At resonance the amplitude grows in proportion to time; so made into a motion of the mode, it balances the force
+    of (36). Away from it, it turns with the detuning."""
+    drift = forced_amplitude_equation().rhs
+    motion = 2 * drift.subs(sigma, 0) * t * cos(omega_n * t)
+    force = excited_system().rhs.xreplace({symbol("Gamma_i"): Gamma_n}).subs(varpi, omega_n)
+    yield M_n * (motion.diff(t, 2) + omega_n**2 * motion) - force
+    yield drift - drift.subs(sigma, 0) * exp(I * epsilon * sigma * t)
+
+
+@derived("49a", "growth of the literal route", ("48a",))
+def forced_measure() -> Derivation[Eq]:
+    """What can be said instead for a base that moves across the arm: how fast the tip's amplitude grows at resonance,
+    for epsilon = 1. It is a velocity, no frequency."""
+    yield (
+        "at resonance",
+        "No detuning: the amplitude grows at a constant rate.",
+        forced_amplitude_equation().subs(sigma, 0),
+    )
+    expression, _ = forced_growth()
+    return Eq(Derivative(Symbol("a"), t), expression, evaluate=False)
+
+
+@proves("49a")
+def prove_forced_measure() -> Proof:
+    """A velocity that does not change when the mode is scaled; squared it is that of a motion t times a harmonic, which
+    balances the force of (36) at resonance, at the tip."""
+    expression, (_, gamma, tip, mass, _) = forced_growth()
+    shown = forced_measure().rhs
+    yield forced_measure().lhs == Derivative(Symbol("a"), t)
+    yield dimension(shown, {tip: Dimension()}) == Dimension(m=1, s=-1)
+    yield shown - expression
+    yield shown - shown.subs({gamma: 3 * gamma, tip: 3 * tip, mass: 9 * mass}, simultaneous=True)
+    rate = Symbol("r")
+    motion = rate * t * cos(omega_n * t)
+    force = excited_system().rhs.xreplace({symbol("Gamma_i"): gamma}).subs(varpi, omega_n) / epsilon
+    balance = (mass * (motion.diff(t, 2) + omega_n**2 * motion) - force).subs(t, pi / (2 * omega_n))
+    (needed,) = solve(balance, rate)
+    yield shown**2 - (needed * tip) ** 2
