@@ -20,7 +20,7 @@ from cra_sym.mechanics.points import in_points
 from cra_sym.model.galerkin import Ritz
 from cra_sym.model.numerics import Numerics
 from cra_sym.model.symmetry import asymmetry, odd_in_time
-from cra_sym.model.system import System
+from cra_sym.model.system import TOLERANCE, System
 from cra_sym.model.units import check_dimensions, named_units, symbol_units
 
 if TYPE_CHECKING:
@@ -188,7 +188,7 @@ class Model:
         pieces = self._pieces | {"units": dict(self._pieces["units"]), "definitions": dict(self._pieces["definitions"])}
         return Model(**{**pieces, **changes})
 
-    def at(self, values: Mapping[Any, Any], zeta: Any = 0.0) -> System:
+    def at(self, values: Mapping[Any, Any], zeta: Any = 0.0, tolerance: float = TOLERANCE) -> System:
         """Return the model bound to values.
 
         Parameters
@@ -196,6 +196,8 @@ class Model:
         values : mapping of symbol or name to array_like
         zeta : array_like
             Modal damping ratio beside the dampers, in [0, 1).
+        tolerance : float
+            Relative error of natural frequencies that is aimed at where coefficients vary along x, in [1e-13, 0.01].
 
         Returns
         -------
@@ -206,7 +208,7 @@ class Model:
         TypeError, ValueError
             Names the parameter that is missing, unknown or out of range.
         """
-        return System(self, values, zeta)
+        return System(self, values, zeta, tolerance)
 
     def freed(self, name: str) -> Model:
         """Return the model in which a prescribed motion is a lumped coordinate instead."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Protocol, runtime_checkable
@@ -10,12 +10,18 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.model.spatial import SpatialProblem
+from cra_sym.model.announced import refinement
+from cra_sym.model.spatial import HALVINGS, SpatialProblem
 from cra_sym.model.values import flat_columns
 from cra_sym.solvers.eigenvalues import lowest
 from cra_sym.solvers.shapes import mode_states
+from cra_sym.solvers.stiffness import GOLDEN
+from cra_sym.solvers.stress_mesh import Sampler, places, resolved
+from cra_sym.solvers.stress_refine import cure
 
 __all__ = [
+    "ROUNDING",
+    "TOLERANCE",
     "Estimated",
     "GeneralRoute",
     "Modes",
@@ -29,6 +35,11 @@ __all__ = [
 
 Array = NDArray[np.float64]
 _SHARES = (0.0, 0.22, 0.53, 0.81, 1.0 - 1e-4, 1.0)  # ends, and places that are not a node of the first modes
+ROUNDING = 1e-11
+"""Bound of the relative rounding of frequencies from closed forms and from the dynamic stiffness."""
+TOLERANCE = 1e-10
+"""Relative error of a natural frequency beyond which it is refused, unless a system states its own."""
+_FEWEST, _MOST = 2, 11  # halvings of the two parts of a problem that varies along x
 Values = Sequence[float | Array]
 """Parameters in the order of the model's symbols; they broadcast to the shape of the batch."""
 
@@ -72,8 +83,14 @@ class RigidShare(Protocol):
 class Estimated(Protocol):
     """A route that estimates its own error."""
 
-    def estimated(self, values: Values, shape: tuple[int, ...], modes: int) -> tuple[Array, Array]:
-        """Return the first natural frequencies and the estimated largest relative error of them, shape ``shape``."""
+    def estimated(self, values: Values, shape: tuple[int, ...], modes: int, tolerance: float) -> tuple[Array, Array]:
+        """Return the first natural frequencies and the estimated largest relative error of them, shape ``shape``.
+
+        What does not reach the tolerance is refused.
+        """
+
+    def estimated_modes(self, values: Values, shape: tuple[int, ...], omega: Array, tolerance: float) -> Modes:
+        """Return the modes of all the first frequencies as well as the tolerance lets them be known."""
 
 
 @runtime_checkable
@@ -109,13 +126,99 @@ class GeneralRoute:
 
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:
         """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""
+        return np.sqrt(self._squares(flat_columns(values, shape), modes, HALVINGS)).reshape(*shape, modes)
+
+    def _squares(self, columns: Array, modes: int, halvings: int) -> Array:
+        """Return the squared frequencies, shape (sets, modes), from so many steps along x."""
         if self.spatial.points is not None:
             raise ValueError("inside: terms at interior places need fields with first or second derivatives by x")
-        columns = flat_columns(values, shape)
         squares = np.empty((columns.shape[1], modes))
-        for rows, _, problem in self.spatial.problems(columns):
+        for rows, _, problem in self.spatial.problems(columns, halvings):
             squares[rows] = lowest(problem, modes)
-        return np.sqrt(squares).reshape(*shape, modes)
+        return squares
+
+    def estimated(self, values: Values, shape: tuple[int, ...], modes: int, tolerance: float) -> tuple[Array, Array]:
+        """Return the frequencies, and the estimated largest relative error of them, of shape ``shape``.
+
+        Where coefficients vary along x, it is the difference of two numbers of steps. With more of them the error of
+        the integration falls, and rounding rises.
+        """
+        if self.spatial.uniform:
+            return self.angular_frequencies(values, shape, modes), np.full(shape, ROUNDING)
+        columns = flat_columns(values, shape)
+        first = max(self._needed(columns), _FEWEST)
+        before, least = self._squares(columns, modes, first), np.full((columns.shape[1], modes), np.inf)
+        with refinement() as told:
+            for halvings in range(first + 1, _MOST + 1):
+                try:
+                    squares = self._squares(columns, modes, halvings)
+                except ValueError:  # what rounding of so many steps makes of a soft direction
+                    if np.isinf(least).all():
+                        raise
+                    break
+                if (squares == before).all():
+                    continue  # short waves need more steps anyway
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    error = 0.5 * np.where(squares == before, 0.0, np.abs(squares - before) / squares)
+                before, least = squares, np.minimum(least, error)
+                accuracy = np.maximum(error.max(axis=1), ROUNDING)
+                if (error <= tolerance).all():
+                    return np.sqrt(squares).reshape(*shape, modes), accuracy.reshape(shape)
+                told(float(error.max()), f"{2 ** (halvings + 1)} steps")
+        row, mode = np.unravel_index(int(np.argmax(least)), least.shape)
+        raise ValueError(
+            f"modes = {modes}: the relative error of frequency {mode + 1} stays at {least[row, mode]:.1g}; it comes "
+            f"from the coefficients near x = {self._steepest(columns[:, row]):.6g}; {cure(least[row, mode])}"
+        )
+
+    def _needed(self, columns: Array) -> int:
+        """Return how often the parts must be halved for steps on which every coefficient is a polynomial."""
+        needed = 0
+        for some, edges in self._between_breaks(columns):
+            ends, _, _ = resolved(self._sampler(some), edges, np.arange(edges.shape[1], dtype=float), "coefficients")
+            width = (np.diff(places(ends, edges), axis=1) / (edges[:, -1:] - edges[:, :1])).min(axis=1)
+            if (np.log2(GOLDEN / width) > _MOST - 1).any():
+                row = int(np.argmin(width))
+                at = places(ends, edges[row : row + 1])[0]
+                finest = int(np.argmin(np.diff(at)))
+                raise ValueError(
+                    f"coefficients vary too finely at x = {at[finest]:.6g} to {at[finest + 1]:.6g} for a density with "
+                    f"third derivatives by x or a mass of the highest: {2 ** (_MOST + 1)} steps along x do not suffice"
+                )
+            needed = max(needed, int(np.ceil(np.log2(GOLDEN / width)).max()))
+        return needed
+
+    def _between_breaks(self, columns: Array) -> Iterator[tuple[Array, Array]]:
+        """Yield finite parameters, and (left end, breakpoints, right end), of sets that have as many."""
+        finite = np.where(np.isinf(columns), 0.0, columns)
+        length, left = (np.broadcast_to(value, finite.shape[1:]) for value in self.spatial.geometry.function(*finite))
+        if self.spatial.breaks is None:
+            yield finite, np.stack([left, left + length], axis=1)
+            return
+        for members, edges, _ in self.spatial.breaks.edges(finite, left, length):
+            yield finite[:, members], edges
+
+    def _sampler(self, columns: Array) -> Sampler:
+        """Return the entries of the system at unit z along x."""
+
+        def sample(x: Array) -> Array:
+            found = np.asarray(self.spatial.system(x, 1.0, *columns[..., None])[0])
+            return np.ascontiguousarray(np.moveaxis(found.reshape(*found.shape[:-2], -1), -1, 0))
+
+        return sample
+
+    def _steepest(self, column: Array) -> float:
+        """Return where the coefficients of a set change most."""
+        ((some, edges),) = self._between_breaks(column[:, None])
+        x = np.linspace(edges[0, 0], edges[0, -1], 4099)[1:-1]
+        found = self._sampler(some)(x[None])[:, 0]
+        size = np.abs(found).max(axis=1, keepdims=True)
+        change = np.abs(np.diff(found, axis=1)) / np.where(size > 0.0, size, 1.0)
+        return float(x[change.max(axis=0).argmax()])
+
+    def estimated_modes(self, values: Values, shape: tuple[int, ...], omega: Array, tolerance: float) -> StateModes:
+        """Return the modes of all the first frequencies."""
+        return self.modes(values, shape, omega)
 
     def modes(self, values: Values, shape: tuple[int, ...], omega: Array) -> StateModes:
         """Return the modes of all the first frequencies."""

@@ -19,10 +19,11 @@ if TYPE_CHECKING:
 
     from cra_sym.mechanics import StateForm
 
-__all__ = ["SpatialProblem", "check_range", "shares", "spatial_problem"]
+__all__ = ["HALVINGS", "SpatialProblem", "check_range", "shares", "spatial_problem"]
 
 Array = NDArray[np.float64]
-_MOST_DERIVATIVES = 20
+HALVINGS = 6
+"""How often the two parts of a problem that varies along x are halved: then it has 128 steps."""
 _LONGEST_ROW = 400  # operations from where on a further derivative of a coefficient takes too long
 
 
@@ -138,10 +139,10 @@ class Spans:
     edges: Array
 
     @classmethod
-    def of(cls, edges: Array) -> tuple[Spans, int]:
+    def of(cls, edges: Array, halvings: int) -> tuple[Spans, int]:
         """Return the coordinate for breakpoints, and how often a part must be halved to have these nodes."""
         number = edges.shape[1]
-        halvings = max(6, int(np.ceil(np.log2(2 * number))))
+        halvings = max(halvings, int(np.ceil(np.log2(2 * number))))
         cells = np.arange(2**halvings + 1) / 2**halvings
         nodes = np.unique(np.concatenate([GOLDEN * cells, GOLDEN + (1.0 - GOLDEN) * cells]))
         share = ((edges - edges[:, :1]) / (edges[:, -1:] - edges[:, :1])).mean(axis=0)
@@ -233,12 +234,14 @@ class SpatialProblem:
                 row = (row[..., None, :] @ matrix)[..., 0, :]
         return row[..., :size]
 
-    def problems(self, columns: Array) -> Iterator[tuple[np.ndarray, np.ndarray, Stiffness]]:
+    def problems(self, columns: Array, halvings: int = HALVINGS) -> Iterator[tuple[np.ndarray, np.ndarray, Stiffness]]:
         """Yield (rows, left ends, problem) for each pattern of infinite stiffness.
 
         Parameters
         ----------
         columns : ndarray, shape (parameters, sets)
+        halvings : int
+            Least number of times the two parts of a problem that varies along x are halved.
 
         Raises
         ------
@@ -250,10 +253,10 @@ class SpatialProblem:
             some[list(infinite)] = 0.0
             length, left = (np.broadcast_to(value, some.shape[1:]) for value in self.geometry(*some))
             if self.breaks is None:
-                yield rows, left, self._problem(some, infinite, left, length, None)
+                yield rows, left, self._problem(some, infinite, left, length, None, halvings)
                 continue
             for members, edges, nodes in self.breaks.edges(some, left, length):
-                part = self._problem(some[:, members], infinite, left[members], length[members], edges, nodes)
+                part = self._problem(some[:, members], infinite, left[members], length[members], edges, halvings, nodes)
                 yield rows[members], left[members], part
 
     def _problem(
@@ -263,13 +266,14 @@ class SpatialProblem:
         left: Array,
         length: Array,
         edges: Array | None,
+        halvings: int,
         nodes: tuple[int, ...] = (),
     ) -> Stiffness:
         n, m = self.displacements, self.coordinates
         free = np.zeros((2 * n + m, 0)) if self.free is None else self.free(*columns)
         for position in infinite:
             free = _without(free, self._rigid_directions(position, columns))
-        spans, halvings = (None, 6) if edges is None else Spans.of(edges)
+        spans, halvings = (None, halvings) if edges is None else Spans.of(edges, halvings)
 
         def section(z: np.ndarray, rows: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             if spans is None:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.kernels import Kernel
-from cra_sym.model.routes import Values, mode_sign, overview_places
+from cra_sym.model.announced import refinement
+from cra_sym.model.routes import TOLERANCE, Values, mode_sign, overview_places
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.values import flat_columns, infinite_patterns
 from cra_sym.solvers.continuum import Continuum, Entries, PointTerm
@@ -20,12 +21,8 @@ __all__ = ["StressModes", "StressRoute"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-TOLERANCE = 1e-10
-"""Relative error of a frequency beyond which it is refused."""
-_TARGET = 2e-11
-"""What is aimed at for squared frequencies; their error is that of the frequencies twice."""
-_SHAPES = 1e-20
-"""The same for mode shapes, whose relative error is as its square root."""
+_AIM = 0.2
+"""What is aimed at for squared frequencies, in tolerances of frequencies: a tenth of what is accepted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,23 +52,38 @@ class StressRoute:
 
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:
         """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""
-        return self.estimated(values, shape, modes)[0]
+        return self.estimated(values, shape, modes, TOLERANCE)[0]
 
-    def estimated(self, values: Values, shape: tuple[int, ...], modes: int) -> tuple[Array, Array]:
+    def estimated(self, values: Values, shape: tuple[int, ...], modes: int, tolerance: float) -> tuple[Array, Array]:
         """Return the frequencies, and the estimated largest relative error of them, of shape ``shape``."""
         columns = flat_columns(values, shape)
         omega, accuracy = np.empty((columns.shape[1], modes)), np.empty(columns.shape[1])
-        for found in self.found(columns, modes, _TARGET):
+        for found in self.found(columns, modes, tolerance, _AIM * tolerance):
             omega[found.rows], accuracy[found.rows] = np.sqrt(found.fields.z), found.accuracy
         return omega.reshape(*shape, modes), accuracy.reshape(shape)
 
     def modes(self, values: Values, shape: tuple[int, ...], omega: Array) -> StressModes:
         """Return the modes of all the first frequencies."""
-        columns = flat_columns(values, shape)
-        return StressModes(omega, self.spatial, columns, list(self.found(columns, omega.shape[-1], _SHAPES)))
+        return self.estimated_modes(values, shape, omega, TOLERANCE)
 
-    def found(self, columns: Array, modes: int, target: float) -> Iterator[Found]:
-        """Yield the modes of all sets, some at a time, ``rows`` being their positions among the columns."""
+    def estimated_modes(self, values: Values, shape: tuple[int, ...], omega: Array, tolerance: float) -> StressModes:
+        """Return the modes of all the first frequencies; the relative error of a shape is as the root of theirs."""
+        columns = flat_columns(values, shape)
+        found = self.found(columns, omega.shape[-1], tolerance, tolerance**2)
+        return StressModes(omega, self.spatial, columns, list(found))
+
+    def found(self, columns: Array, modes: int, tolerance: float, target: float) -> Iterator[Found]:
+        """Yield the modes of all sets, some at a time, ``rows`` being their positions among the columns.
+
+        Parameters
+        ----------
+        columns : ndarray, shape (parameters, sets)
+        modes : int
+        tolerance : float
+            Relative error of the frequencies that is refused.
+        target : float
+            Relative error of the squared frequencies that is aimed at.
+        """
         for rows, infinite in infinite_patterns(columns):
             some = columns[:, rows].copy()
             some[list(infinite)] = 0.0
@@ -88,7 +100,9 @@ class StressRoute:
                     mass[members],
                     points=self._points(some[:, members], nodes),
                 )
-                for found in solved(problem, modes, 2.0 * TOLERANCE, target):
+                with refinement() as told:
+                    solutions = solved(problem, modes, 2.0 * tolerance, target, told)
+                for found in solutions:
                     yield Found(rows[members][found.rows], found.fields, found.accuracy)
 
     def _edges(self, columns: Array, left: Array, length: Array) -> list[tuple[Index, Array, tuple[int, ...]]]:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import broadcastable, count, default_floating_point, instance, shown
+from cra_sym.checks import broadcastable, count, default_floating_point, instance, real_array, shown
 from cra_sym.model.projection import Domain, Load, Projected, project
-from cra_sym.model.routes import Estimated, GeneralRoute, Modes, Route
+from cra_sym.model.routes import ROUNDING, TOLERANCE, Estimated, Modes, Route
 from cra_sym.model.spatial import check_range
 from cra_sym.model.values import Value, checked_damping, checked_values, frozen
 
@@ -20,12 +20,10 @@ if TYPE_CHECKING:
     from cra_sym.model.lagrangian import Model
     from cra_sym.model.numerics import Numerics
 
-__all__ = ["MOST_MODES", "System"]
+__all__ = ["MOST_MODES", "TOLERANCE", "System"]
 
 Array = NDArray[np.float64]
 MOST_MODES = 1000
-ROUNDING = 1e-11
-"""Bound of the relative rounding of frequencies from closed forms and from the dynamic stiffness."""
 _MOST_KEPT = 8  # numbers of modes for which a system keeps what it computed
 
 
@@ -42,6 +40,9 @@ class System:
         inf.
     zeta : array_like
         Modal damping ratio beside the dampers of the model, the same for every mode, in [0, 1).
+    tolerance : float
+        Relative error of natural frequencies that is aimed at where coefficients vary along x, in [1e-13, 0.01]; what
+        does not reach it is refused. See `accuracy`.
 
     Raises
     ------
@@ -62,13 +63,19 @@ class System:
            [1. , 2. ]])
     """
 
-    def __init__(self, model: Model, values: Mapping[Any, Any], zeta: Any = 0.0) -> None:
+    tolerance: float = TOLERANCE
+
+    def __init__(self, model: Model, values: Mapping[Any, Any], zeta: Any = 0.0, tolerance: float = TOLERANCE) -> None:
         from cra_sym.model.lagrangian import Model
 
         instance("model", model, Model)
         self._model = model
         self._values = checked_values([symbol.name for symbol in model.symbols], values, model.units)
         self._zeta = frozen(checked_damping(zeta))
+        given = real_array("tolerance", tolerance, low=1e-13, high=1e-2)
+        if given.ndim:
+            raise ValueError(f"tolerance = {shown(tolerance)}: must be one number in [1e-13, 0.01]")
+        object.__setattr__(self, "tolerance", float(given))
         broadcastable(zeta=self._zeta, **self._values)
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -97,15 +104,15 @@ class System:
         return broadcastable(zeta=self.zeta, **self.values)
 
     def replace(self, **changes: Any) -> System:
-        """Return a validated copy with some values, or ``zeta``, changed.
+        """Return a validated copy with some values, ``zeta`` or ``tolerance``, changed.
 
         Raises
         ------
         TypeError, ValueError
             As :class:`System`.
         """
-        zeta = changes.pop("zeta", self.zeta)
-        return System(self.model, {**self.values, **changes}, zeta)
+        options = {name: changes.pop(name, getattr(self, name)) for name in ("zeta", "tolerance")}
+        return System(self.model, {**self.values, **changes}, **options)
 
     # ------------------------------------------------------------------------------------------ numbers, once
 
@@ -141,11 +148,10 @@ class System:
         route = self._route
         with np.errstate(all="ignore"):
             if isinstance(route, Estimated):
-                omega, accuracy = route.estimated(self.parameters, self.shape, modes)
+                omega, accuracy = route.estimated(self.parameters, self.shape, modes, self.tolerance)
             else:
                 omega = route.angular_frequencies(self.parameters, self.shape, modes)
-                known = not isinstance(route, GeneralRoute) or route.spatial.uniform
-                accuracy = np.full(self.shape, ROUNDING if known else np.nan)
+                accuracy = np.full(self.shape, ROUNDING)
         check_range(omega)
         self.__dict__["_accuracy"] = np.maximum(self.__dict__.get("_accuracy", 0.0), accuracy)
         omega.flags.writeable = False
@@ -155,10 +161,10 @@ class System:
     def accuracy(self) -> Array:
         """Estimated relative error of the natural frequencies, the largest of those computed so far, shape (...).
 
-        Of the first three if none was computed. Where coefficients vary along x it is estimated from the stresses that
-        break equilibrium; a frequency whose error would be beyond 1e-10 is refused. Where they are constant along x
-        frequencies are exact but for rounding, and this is a bound of that, 1e-11. It is nan where there is no
-        estimate: third derivatives by x, or a mass of the highest derivative, that vary along x.
+        Of the first three if none was computed. Where coefficients vary along x it is estimated, from the stresses that
+        break equilibrium or, with third derivatives by x or a mass of the highest derivative, from a second
+        integration of twice as many steps; a frequency whose error would be beyond ``tolerance`` is refused. Where they
+        are constant along x frequencies are exact but for rounding, and this is a bound of that, 1e-11.
         """
         if "_accuracy" not in self.__dict__:
             self.natural_frequencies(3)
@@ -170,7 +176,10 @@ class System:
 
     def _find_modes(self, modes: int) -> Modes:
         omega = self.natural_frequencies(modes)
-        return self._route.modes(self.parameters, self.shape, omega)
+        route = self._route
+        if isinstance(route, Estimated):
+            return route.estimated_modes(self.parameters, self.shape, omega, self.tolerance)
+        return route.modes(self.parameters, self.shape, omega)
 
     @cached_property
     def _route(self) -> Route:
@@ -201,7 +210,7 @@ class System:
 
     def _key(self) -> tuple[Any, ...]:
         values = (*self.values.values(), self.zeta)
-        return self.model, tuple((np.shape(value), np.asarray(value).tobytes()) for value in values)
+        return self.model, self.tolerance, tuple((np.shape(value), np.asarray(value).tobytes()) for value in values)
 
     def __eq__(self, other: object) -> bool:
         return self._key() == other._key() if isinstance(other, System) else NotImplemented
@@ -210,8 +219,9 @@ class System:
         return hash(self._key())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.model, dict(self.values), self.zeta)
+        return type(self), (self.model, dict(self.values), self.zeta, self.tolerance)
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name}={value!r}" for name, value in self.values.items())
-        return f"<System of {self.model!r} at {values}, zeta={self.zeta!r}>"
+        tolerance = "" if self.tolerance == TOLERANCE else f", tolerance={self.tolerance!r}"
+        return f"<System of {self.model!r} at {values}, zeta={self.zeta!r}{tolerance}>"

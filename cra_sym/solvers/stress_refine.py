@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,10 +14,11 @@ from .stress_mesh import Mesh, TooFineError, cells, resolved
 from .stress_modes import ModeFields
 from .stress_spectrum import BuckledError, spectrum
 
-__all__ = ["Found", "solved"]
+__all__ = ["Found", "cure", "solved"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+Told = Callable[[float, str], None]
 _ROUNDS, _MOST_UNKNOWNS, _MOST_DEGREE = 24, 1500, 40
 _MOST_ELEMENTS = 12  # to begin with: more spans than that share elements
 _FURTHER = 3  # times that the stresses which equilibrium asks for are added
@@ -41,7 +42,7 @@ class Found:
     accuracy: Array
 
 
-def solved(problem: Continuum, modes: int, tolerance: float, target: float) -> list[Found]:
+def solved(problem: Continuum, modes: int, tolerance: float, target: float, told: Told) -> list[Found]:
     """Return the lowest modes of every row.
 
     Parameters
@@ -52,6 +53,8 @@ def solved(problem: Continuum, modes: int, tolerance: float, target: float) -> l
         Relative error of the squared frequencies that must be reached.
     target : float
         What is aimed at; a smaller one gives better mode shapes, whose error is as its square root.
+    told : callable
+        Is told the error of the frequencies that each mesh has reached, and which mesh that is, before the next one.
 
     Raises
     ------
@@ -60,7 +63,7 @@ def solved(problem: Continuum, modes: int, tolerance: float, target: float) -> l
     """
     found: list[Found] = []
     for rows, ends in _alike(problem):
-        found += _group(problem.take(rows), rows, ends, modes, tolerance, target)
+        found += _group(problem.take(rows), rows, ends, _Aim(modes, tolerance, target, told))
     return found
 
 
@@ -103,10 +106,8 @@ def _vanishes(problem: Continuum, end: int) -> NDArray[np.bool_]:
     return vanishes
 
 
-def _group(
-    problem: Continuum, rows: Index, ends: tuple[bool, bool], modes: int, tolerance: float, target: float
-) -> list[Found]:
-    spans = problem.edges.shape[1] - 1
+def _group(problem: Continuum, rows: Index, ends: tuple[bool, bool], aim: _Aim) -> list[Found]:
+    spans, modes = problem.edges.shape[1] - 1, aim.modes
     if ends[0] and not ends[1]:
         problem = replace(problem, origin=1)
     elements = cells(spans, max(_MOST_ELEMENTS, int(np.ceil(modes / 12))))
@@ -123,12 +124,10 @@ def _group(
             raise
         half = len(rows) // 2
         parts = (np.arange(half), np.arange(half, len(rows)))
-        return [
-            item for part in parts for item in _group(problem.take(part), rows[part], ends, modes, tolerance, target)
-        ]
+        return [item for part in parts for item in _group(problem.take(part), rows[part], ends, aim)]
     degree = 8 + int(np.ceil(1.8 * modes / (len(elements) - 1)))
     mesh = Mesh(pieces, elements, degree, strained, smoothness)
-    return _refined(problem, rows, mesh, unresolved, modes, tolerance, target)
+    return _refined(problem, rows, mesh, unresolved, aim)
 
 
 def _quadrature(problem: Continuum, elements: Array, strained: NDArray[np.bool_]) -> tuple[Array, Array, int]:
@@ -148,27 +147,26 @@ def _quadrature(problem: Continuum, elements: Array, strained: NDArray[np.bool_]
     return np.unique(np.concatenate(parts)), unresolved, smoothness
 
 
-def _refined(
-    problem: Continuum, rows: Index, mesh: Mesh, unresolved: Array, modes: int, tolerance: float, target: float
-) -> list[Found]:
+def _refined(problem: Continuum, rows: Index, mesh: Mesh, unresolved: Array, aim: _Aim) -> list[Found]:
     """Solve on finer and finer meshes the sets that have not reached the target."""
     found: list[Found] = []
     open_, before, degree_before = np.arange(len(rows)), np.inf, 0
     for turn in range(_ROUNDS):
-        solutions = [_solved(problem, part, mesh, modes, target) for part in _chunks(problem, mesh, open_)]
+        solutions = [_solved(problem, part, mesh, aim) for part in _chunks(problem, mesh, open_)]
         worst = max(solution.error.max(initial=0.0) for solution in solutions)
         size = solutions[0].fields.columns.size
         last = turn == _ROUNDS - 1 or size > _MOST_UNKNOWNS or (turn > 8 and worst > 0.5 * before)
         for solution in solutions:
-            good = solution.error.max(axis=1) <= (tolerance if last else target)
+            good = solution.error.max(axis=1) <= (aim.tolerance if last else aim.target)
             if last and not good.all():
                 _refuse(solution, good)
             if good.any():
                 found.append(_settled(solution, good, rows, unresolved))
-        still = [solution.part[solution.error.max(axis=1) > target] for solution in solutions]
+        still = [solution.part[solution.error.max(axis=1) > aim.target] for solution in solutions]
         if last or not sum(map(len, still)):
             return found
-        shares = [s.share[s.error.max(axis=1) > target].max(axis=(0, 1), initial=0.0) for s in solutions]
+        aim.told(0.5 * float(worst), f"{len(mesh.elements) - 1} elements of degree {mesh.degree}")
+        shares = [s.share[s.error.max(axis=1) > aim.target].max(axis=(0, 1), initial=0.0) for s in solutions]
         marks, open_ = np.max(shares, axis=0), np.concatenate(still)
         degree = mesh.degree
         falling = turn == 0 or (degree > degree_before and worst < 1e-3 * before)
@@ -178,6 +176,16 @@ def _refined(
             mesh = mesh.split(marks >= 0.03 * marks.max())
         before, degree_before = worst, degree
     return found
+
+
+@dataclass(frozen=True)
+class _Aim:
+    """How many modes are asked for, the relative errors of z to accept and to aim at, and whom to tell."""
+
+    modes: int
+    tolerance: float
+    target: float
+    told: Told
 
 
 @dataclass(frozen=True)
@@ -191,7 +199,7 @@ class _Solution:
     share: Array
 
 
-def _solved(problem: Continuum, part: Index, mesh: Mesh, modes: int, target: float) -> _Solution:
+def _solved(problem: Continuum, part: Index, mesh: Mesh, aim: _Aim) -> _Solution:
     """Return the modes of a chunk; fine detail within an element is met by the stresses that equilibrium asks for."""
     chosen = problem.take(part)
     further: Array | None = None
@@ -200,7 +208,7 @@ def _solved(problem: Continuum, part: Index, mesh: Mesh, modes: int, target: flo
     for turn in range(most + 1):
         columns = Columns(chosen, mesh, further)
         try:
-            result = spectrum(columns, modes)
+            result = spectrum(columns, aim.modes)
         except BuckledError:
             raise
         except ValueError:
@@ -213,9 +221,9 @@ def _solved(problem: Continuum, part: Index, mesh: Mesh, modes: int, target: flo
         if best is not None and solution.error.max() > best.error.max():
             return best
         best = solution
-        if solution.error.max() <= target or turn == most:
+        if solution.error.max() <= aim.target or turn == most:
             break
-        more = fields.further()[:, ((solution.error > 0.01 * target) & (result.z > 0.0)).any(axis=0)]
+        more = fields.further()[:, ((solution.error > 0.01 * aim.target) & (result.z > 0.0)).any(axis=0)]
         further = more if further is None else np.concatenate([further, more], axis=1)
     assert best is not None
     return best
@@ -245,5 +253,11 @@ def _refuse(solution: _Solution, good: NDArray[np.bool_]) -> None:
     ends = solution.fields.columns.grid.ends[row]
     raise ValueError(
         f"modes = {error.shape[1]}: the relative error of frequency {mode + 1} stays at {0.5 * error[row, mode]:.1g}; "
-        f"it comes from the coefficients at x = {ends[piece[0]]:.6g} to {ends[piece[1]]:.6g}"
+        f"it comes from the coefficients at x = {ends[piece[0]]:.6g} to {ends[piece[1]]:.6g}; "
+        f"{cure(0.5 * error[row, mode])}"
     )
+
+
+def cure(error: float) -> str:
+    """Return what may be done about an error that stays."""
+    return f"tolerance={1.5 * error:.0e} accepts it" if error < 5e-3 else "use ritz, which estimates no error"
