@@ -80,7 +80,7 @@ GOOD = {
     "residual_vibration_gradient": dict(
         system=ARM, motion=cra.BaseMotion.trapezoid(0.1, 0.2, 1.0), by=("k_r", "duration"), modes=2, zeta=0.0
     ),
-    "state_space": dict(system=ARM, modes=2, input="base_acceleration"),
+    "state_space": dict(system=ARM, modes=2, input="base_acceleration", outputs=("v", "y")),
     "frequency_response": dict(system=ARM, angular_frequency=[5.0, 9.0], x=0.5, damping="structural"),
     "sensitivities": dict(system=ARM, modes=2, by=("k_t", "m_e")),
     "identify_joint": dict(system=ARM, measured_frequencies=[2.3, 14.0], uncertainty=0.01),

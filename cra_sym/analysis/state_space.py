@@ -1,27 +1,39 @@
-"""A system as a linear one for control design: from base acceleration, or from the force on a free base, to the tip."""
+"""A system as a linear one for control design: from a motion or forces to anything that can be measured."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cra_sym.analysis.modes import only_motion, participation
-from cra_sym.checks import choice, count, default_floating_point, instance
-from cra_sym.model.projection import Projected
+from cra_sym.checks import count, default_floating_point, instance, real_array, shown
+from cra_sym.model.observables import Observable
+from cra_sym.model.projection import Projected, displaced_at
 from cra_sym.model.system import MOST_MODES, System
+from cra_sym.solvers.linear_system import LinearSystem
 
 if TYPE_CHECKING:
-    from scipy.signal import StateSpace
+    from sympy import Expr
 
 __all__ = ["state_space"]
+
+Array = NDArray[np.float64]
+_BASE, _FREE = "base_acceleration", "drive_force"
+_MOST = 1000  # inputs, outputs
 
 
 @default_floating_point
 def state_space(
-    system: System, modes: int = 3, input: Literal["base_acceleration", "drive_force"] = "base_acceleration"
-) -> StateSpace:
-    """Return the continuous-time system from the input to the displacement of the tip seen from the base.
+    system: System,
+    modes: int = 3,
+    input: str | Expr | Sequence[str | Expr] = "base_acceleration",
+    outputs: Sequence[str | tuple[str, float] | Expr] | Mapping[str, Any] | None = None,
+) -> LinearSystem:
+    """Return the continuous-time system from what drives to what is measured, in modal coordinates.
 
     Parameters
     ----------
@@ -29,51 +41,256 @@ def state_space(
         One set of values, not a batch.
     modes : int
         Modes kept, 1 to 1000.
-    input : {'base_acceleration', 'drive_force'}
-        The base acceleration w'' (m/s2), of the only prescribed motion: states q_i, q_i', equation (11). Or a force F
-        (N) drives the free base; of an arm (m_b + m_e + rho A L) w'' + sum Gamma_i q_i'' = F: states w, q_i, w', q_i'.
+    input : str or Expr, or a sequence of them
+        'base_acceleration': w'' (m/s2) of the only prescribed motion. 'drive_force': a force F (N) on that motion,
+        which is then free; of an arm (m_b + m_e + rho A L) w'' + sum Gamma_i q_i'' = F. A prescribed motion or a
+        force of the Lagrangian, as w(t) or by its name: its acceleration, itself. Or a displacement that a unit force
+        acts on: a coordinate, a field or slope at any place such as ``v.subs(x, L/2)``, or a sum of them.
+    outputs : sequence, or mapping of names to them, optional
+        Names: of a field (at the right end), a coordinate, a prescribed motion; 'y', 'tip_velocity' and
+        'tip_acceleration' of the first field there in the inertial frame, prescribed motions included; 'root_force',
+        'root_moment', 'tip_force' and 'tip_moment', what the structure exerts on what holds its ends, of springs k_t
+        v(0, t) and k_r v_x(0, t) (of another field u 'root_force_u'); of an arm 'strain', that of bending on the face
+        turned to -v, h v_xx / 2, at the root. A pair ``('v', 0.3)`` or ``('strain', 0.3)`` takes a field or the strain
+        at another place, m. Expressions linear in fields at places, coordinates, motions and their derivatives, of
+        time up to the second, are outputs too, with parameters of the model as factors. Default: the first field.
 
     Returns
     -------
-    scipy.signal.StateSpace
-        An initial base velocity is the state q_i' = -Gamma_i w'(0+). ``scipy.signal.lsim`` interpolates its input
-        linearly between the samples.
+    LinearSystem
+        A :class:`scipy.signal.StateSpace` with names; `discrete` and `to_control` are its methods. States: q_i and
+        their rates; before them w and before these w', where the base is free or an output needs them.
 
     Raises
     ------
     TypeError, ValueError
-        If ``system`` is not a :class:`System` or is a batch, its model does not have one prescribed motion, ``modes``
-        is not an integer from 1 to 1000, or ``input`` is neither of the two.
+        If ``system`` is not a :class:`System` or is a batch, its model does not have the motion that is asked for,
+        ``modes`` is not an integer from 1 to 1000, or an input or output is none of the above.
+
+    Notes
+    -----
+    Constant loads are left out: states are measured from the equilibrium. An initial base velocity is the state q_i' =
+    -Gamma_i w'(0+). ``scipy.signal.lsim`` interpolates its input linearly between the samples; ``discrete`` holds it.
+
+    The modes left out would add the sum of c_i b_i / (omega_i^2 - Omega^2) to the transfer function of a displacement
+    or force, with c_i and b_i what output and input see of mode i: for displacements it falls with the third power of
+    the number of modes or faster; for the force at a rigid root only as its inverse, by the effective masses left out.
 
     Examples
     --------
     >>> from cra_sym import Arm, state_space
     >>> state_space(Arm.nominal(), modes=2).A.shape
     (4, 4)
+    >>> free = state_space(Arm.nominal(), 2, "drive_force", ["w", "tip_acceleration", ("strain", 0.1)])
+    >>> free.input_names, free.output_names, free.D.round(3).ravel()
+    (('drive_force',), ('w', 'tip_acceleration', 'strain(0.1)'), array([0.   , 0.058, 0.   ]))
     """
-    from scipy.signal import StateSpace
-
     instance("system", system, System)
-    choice("input", input, ("base_acceleration", "drive_force"))
     if system.shape:
         raise ValueError(f"system has shape {system.shape}: must be a single set of values, not a batch")
     modes = count("modes", modes, high=MOST_MODES)
-    motion = only_motion(system)
-    omega, gamma = system.natural_frequencies(modes), participation(system, modes, motion)
-    tip = system.modes(modes).displacement(1, 0)
-    mass, stiffness, damping = np.eye(modes), np.diag(omega**2), np.diag(2 * float(system.zeta) * omega)
+    wanted = _outputs(system, outputs)
+    driven = [_Input.of(system, one) for one in _sequence("input", input)]
+    if len({one.name for one in driven}) < len(driven):
+        raise ValueError(f"input = {shown(input)}: must name each input once")
+    free = any(one.kind == "free" for one in driven)
+    if free and any(one.kind in ("motion", "force") for one in driven):
+        raise ValueError(f"input: beside {_FREE!r} must be displacements that forces act on")
+    base = {
+        one.name if one.kind == "motion" else only_motion(system) for one in driven if one.kind in ("motion", "free")
+    }
+    seen = {part.name for one in wanted.values() for part in one.parts if part.kind == "motion" and part.time < 2}
+    states = sorted(base if free else base & seen)
+    motion = _equations(system, modes, states, driven, free=free)
+    return _measured(system, modes, states, motion, wanted, driven)
+
+
+def _sequence(name: str, given: Any) -> Sequence[Any]:
+    """Return one thing or several as several."""
+    several = list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
+    if not 0 < len(several) <= _MOST:
+        raise ValueError(f"{name} = {shown(given)}: must be from 1 to {_MOST}")
+    return several
+
+
+# What is measured ------------------------------------------------------------------------------------------------
+
+
+def _outputs(system: System, given: Any) -> dict[str, Observable]:
+    """Return what is measured, by name."""
+    if given is None:
+        known = system.numerics("named_observables")
+        tip = next(iter(known))
+        return {tip: known[tip]}
+    named = given.items() if isinstance(given, Mapping) else ((None, one) for one in _sequence("outputs", given))
+    found: dict[str, Observable] = {}
+    for name, one in named:
+        own, value = _observable(system, one)
+        name = own if name is None else name
+        if not isinstance(name, str) or not name or name in found:
+            raise ValueError(f"outputs: {shown(name)} must be a name, and each must be there once")
+        found[name] = value
+    return found
+
+
+def _observable(system: System, given: Any) -> tuple[str, Observable]:
+    known: Mapping[str, Observable] = system.numerics("named_observables")
+    local = system.section_quantities
+    if isinstance(given, str) and given in known:
+        return given, known[given]
+    if isinstance(given, str) and given in local:
+        return given, _at(system, given, system.domain.left, "outputs")
+    if isinstance(given, tuple) and len(given) == 2 and isinstance(given[0], str):
+        return f"{given[0]}({given[1]})", _at(system, *given, "outputs")
+    if isinstance(given, str):
+        raise ValueError(f"outputs = {shown(given)}: must be one of {', '.join((*known, *local))}, or an expression")
+    return str(given), _read(system, given, "outputs")
+
+
+def _at(system: System, name: str, place: Any, argument: str) -> Observable:
+    """Return a field or a quantity of the section at a place."""
+    from sympy import Float
+
+    left, length = float(system.domain.left), float(system.domain.length)
+    where = real_array(f"{argument}: place", place, low=left, high=left + length, unit="m")
+    x, fields = system.model.equations.x, system.model.equations.fields
+    local = {field.func.__name__: field for field in fields} | dict(system.section_quantities)
+    if name not in local:
+        raise ValueError(f"{argument}: {shown(name)} must be one of {', '.join(local)}, which have a place")
+    return _read(system, local[name].subs(x, Float(float(where), 17)), argument)
+
+
+def _read(system: System, expression: Any, argument: str) -> Observable:
+    from cra_sym.model.observables import observable
+
+    found = observable(system.model, expression, argument)
+    for name, value in system.values.items():
+        if np.isinf(value) and name in map(str, expression.free_symbols):
+            raise ValueError(
+                f"{argument}: {name} = inf in {expression} must be finite; name the force, as 'root_force'"
+            )
+    return found
+
+
+def _rows(system: System, modes: int, of: Observable) -> tuple[list[Array], dict[tuple[str, int], float]]:
+    """Return what q, q' and q'' add to an observable, and the factors of prescribed motions by (name, derivative)."""
+    numbers = [float(number) for number in of.numbers.function(*system.domain.values)]
+    found, rows = system.modes(modes), [np.zeros(modes) for _ in range(3)]
+    motions: dict[tuple[str, int], float] = {}
+    for part, factor, place in zip(of.parts, numbers[: len(of.parts)], numbers[len(of.parts) :], strict=True):
+        if part.kind == "motion":
+            motions[part.name, part.time] = motions.get((part.name, part.time), 0.0) + factor
+        elif part.kind == "force":
+            rows[part.time] += factor * found.force(part.end, part.entry)
+        elif part.kind == "coordinate":
+            rows[part.time] += factor * found.coordinate(part.entry)
+        else:
+            rows[part.time] += factor * displaced_at(system.domain, found, part.entry, part.order, place)
+    return rows, motions
+
+
+# What drives -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Input:
+    """One input: of the acceleration of a motion, of a force on a free motion, of a load, or on a displacement."""
+
+    kind: str
+    name: str
+    label: str
+    displacement: Observable | None = None
+
+    @classmethod
+    def of(cls, system: System, given: Any) -> _Input:
+        """Return what a user names."""
+        if isinstance(given, str) and given in (_BASE, _FREE):
+            return cls("free" if given == _FREE else "motion", only_motion(system), given)
+        causes = dict(system.numerics("causes"))
+        name: str = given if isinstance(given, str) else getattr(getattr(given, "func", None), "__name__", "")
+        if name in causes and (isinstance(given, str) or len(given.args) == 1):
+            if causes[name] not in ("motion", "force"):
+                raise ValueError(
+                    f"input: the load {causes[name]} is neither a multiple of {name} nor of its acceleration"
+                )
+            return cls(causes[name], name, name)
+        if isinstance(given, str):
+            known = system.numerics("named_observables")
+            places = [name for name, one in known.items() if _is_displacement(one)]
+            if given not in places:
+                allowed = ", ".join(dict.fromkeys((_BASE, _FREE, *causes, *places)))
+                raise ValueError(f"input = {shown(given)}: must be one of {allowed}, or an expression")
+            return cls("displacement", given, given, known[given])
+        displacement = _read(system, given, "input")
+        if not _is_displacement(displacement):
+            raise ValueError(f"input: {given} must be a displacement that a force acts on, without derivatives by time")
+        return cls("displacement", str(given), str(given), displacement)
+
+
+def _is_displacement(of: Observable) -> bool:
+    return all(part.kind != "force" and part.time == 0 for part in of.parts)
+
+
+def _equations(
+    system: System, modes: int, states: Sequence[str], driven: Sequence[_Input], *, free: bool
+) -> tuple[Array, Array]:
+    """Return accelerations by (z, z') and by the inputs, of z = (motions that are states, q)."""
+    first, size = len(states), len(states) + modes
+    omega = system.natural_frequencies(modes)
+    mass, damping, stiffness = np.eye(size), np.zeros((size, size)), np.zeros((size, size))
+    damping[first:, first:] = np.diag(2 * float(system.zeta) * omega)
+    stiffness[first:, first:] = np.diag(omega**2)
     dampers = system.numerics("damping")
     if dampers is not None:
-        damping = damping + Projected(system.domain, system.modes(modes), dampers)["damping"]
-    push = -gamma
-    if input == "drive_force":
-        own = system.numerics("carried", motion).function(*system.domain.values)
-        mass, damping, stiffness = (np.pad(matrix, ((1, 0), (1, 0))) for matrix in (mass, damping, stiffness))
+        damping[first:, first:] += Projected(system.domain, system.modes(modes), dampers)["damping"]
+    if free:
+        own = system.numerics("carried", states[0]).function(*system.domain.values)
         mass[0, 0], damping[0, 0], stiffness[0, 0] = (float(value) for value in own)
-        mass[0, 1:] = mass[1:, 0] = gamma
-        push, tip = np.eye(modes + 1)[0], np.array([0.0, *tip])
-    size = push.size
-    accelerations = np.linalg.solve(mass, np.hstack([-stiffness, -damping, push[:, None]]))
-    A = np.vstack([np.hstack([np.zeros((size, size)), np.eye(size)]), accelerations[:, :-1]])
-    B = np.concatenate([np.zeros(size), accelerations[:, -1]])[:, None]
-    return StateSpace(A, B, np.concatenate([tip, np.zeros(size)])[None], np.zeros((1, 1)))
+        mass[0, 1:] = mass[1:, 0] = participation(system, modes, states[0])
+    push = np.stack([_push(system, modes, states, one, free=free) for one in driven], axis=-1)
+    found = np.asarray(np.linalg.solve(mass, np.hstack([-stiffness, -damping, push])), dtype=np.float64)
+    return found[:, : 2 * size], found[:, 2 * size :]
+
+
+def _push(system: System, modes: int, states: Sequence[str], one: _Input, *, free: bool) -> Array:
+    """Return the generalised force of one unit of an input on (motions that are states, q)."""
+    base, q = np.zeros(len(states)), np.zeros(modes)
+    if one.kind == "free":
+        base[0] = 1.0
+    elif one.kind == "motion":
+        base[:] = [name == one.name for name in states]
+        q = -participation(system, modes, one.name)
+    elif one.kind == "force":
+        q = system.project(system.numerics("load", one.name), modes)
+    else:
+        assert one.displacement is not None
+        (q, _, _), motions = _rows(system, modes, one.displacement)
+        if free:
+            base[0] = motions.get((states[0], 0), 0.0)
+    return np.concatenate([base, q])
+
+
+def _measured(
+    system: System,
+    modes: int,
+    states: Sequence[str],
+    accelerations: tuple[Array, Array],
+    wanted: Mapping[str, Observable],
+    driven: Sequence[_Input],
+) -> LinearSystem:
+    """Return the linear system of the equations and of what is measured."""
+    by_state, by_input = accelerations
+    size = len(by_state)
+    A = np.vstack([np.hstack([np.zeros((size, size)), np.eye(size)]), by_state])
+    B = np.vstack([np.zeros_like(by_input), by_input])
+    C, D = np.zeros((len(wanted), 2 * size)), np.zeros((len(wanted), len(driven)))
+    for k, of in enumerate(wanted.values()):
+        modal, motions = _rows(system, modes, of)
+        rows = [np.array([*(motions.get((name, time), 0.0) for name in states), *modal[time]]) for time in range(3)]
+        C[k] = np.concatenate(rows[:2]) + rows[2] @ by_state
+        D[k] = rows[2] @ by_input
+        D[k] += [motions.get((one.name, 2), 0.0) * (one.kind == "motion" and one.name not in states) for one in driven]
+    names = [*states, *(f"q_{mode + 1}" for mode in range(modes))]
+    return LinearSystem(
+        A, B, C, D, [*names, *(f"{name}_rate" for name in names)], [one.label for one in driven], list(wanted)
+    )

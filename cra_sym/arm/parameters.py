@@ -17,6 +17,8 @@ from cra_sym.si import paired
 from cra_sym.symbols import row
 
 if TYPE_CHECKING:
+    from sympy import Expr
+
     from cra_sym.model.lagrangian import Model
 
 __all__ = ["Arm", "Provenance"]
@@ -183,6 +185,14 @@ class Arm(System):
         fields = self._fields()
         del fields["zeta"]
         return MappingProxyType(fields)
+
+    @property
+    def section_quantities(self) -> Mapping[str, Expr]:
+        """Strain of bending on the face turned to -v."""
+        from cra_sym.symbols import symbol
+
+        x, v, h = (symbol(name) for name in ("x", "v", "h"))
+        return {"strain": h / 2 * v.diff(x, 2)}
 
     @property
     def numerics(self) -> Numerics:

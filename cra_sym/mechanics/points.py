@@ -11,7 +11,7 @@ from sympy.core.function import AppliedUndef, Derivative
 from cra_sym.checks import shown
 from cra_sym.mechanics.jets import HamiltonError, Jet, JetSpace
 
-__all__ = ["Point", "in_points", "read_points", "supports"]
+__all__ = ["Point", "at_place", "in_points", "read_points", "supports"]
 
 
 @dataclass(frozen=True)
@@ -142,13 +142,20 @@ def supports(
 
 def _displacement(condition: Expr, x: Symbol) -> tuple[Expr, Expr] | None:
     """Return place and displacement of a condition such as v(a, t) = 0 or v_x(a, t) = 0, or None."""
-    if isinstance(condition, Subs) and len(condition.variables) == 1:
-        return condition.point[0], condition.expr.xreplace({condition.variables[0]: x})
-    if isinstance(condition, AppliedUndef) and len(condition.args) == 2 and condition.args[0] != x:
-        return condition.args[0], condition.func(x, condition.args[1])
-    if isinstance(condition, Derivative) and isinstance(condition.expr, AppliedUndef):
-        place, time = condition.expr.args[0], condition.expr.args[-1]
-        if isinstance(place, Symbol) and place != x and place in condition.variables:
-            orders = [x if variable == place else variable for variable in condition.variables]
-            return place, condition.expr.func(x, time).diff(*orders)
+    found = at_place(condition, x)
+    moving = isinstance(condition, Derivative) and found is not None and x not in found[1].variables
+    return None if moving else found
+
+
+def at_place(node: Expr, x: Symbol) -> tuple[Expr, Expr] | None:
+    """Return the place of a value such as v(a, t), v_x(a, t) or v_t(a, t), and the function of x it is of; or None."""
+    if isinstance(node, Subs) and len(node.variables) == 1:
+        return node.point[0], node.expr.xreplace({node.variables[0]: x})
+    if isinstance(node, AppliedUndef) and len(node.args) == 2 and node.args[0] != x:
+        return node.args[0], node.func(x, node.args[1])
+    if isinstance(node, Derivative) and isinstance(node.expr, AppliedUndef):
+        place, time = node.expr.args[0], node.expr.args[-1]
+        if len(node.expr.args) == 2 and place != x:
+            orders = [x if variable == place else variable for variable in node.variables]
+            return place, node.expr.func(x, time).diff(*orders)
     return None

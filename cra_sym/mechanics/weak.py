@@ -88,6 +88,12 @@ class WeakForm:
                 found[jet] = found.get(jet, S.Zero) + value
         return found
 
+    @property
+    def load_terms(self) -> list[Expr]:
+        """Terms of all loads, in the functions they were given in."""
+        loads = (*self.inside_load.values(), *self.discrete_load.values())
+        return [term for e in loads for term in Add.make_args(self.variation.space.restore(e).expand())]
+
     def place(self, jet: Jet) -> Expr:
         """Return the place of a jet of an end or of an interior place."""
         assert jet.place is not None

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Literal
 
-from sympy import Add, Derivative, Dummy, Expr, S, Symbol, SympifyError, cancel, integrate, sympify
+from sympy import Derivative, Dummy, Expr, S, Symbol, SympifyError, cancel, integrate, sympify
 from sympy.core.function import AppliedUndef
 
 from cra_sym.checks import mapping, shown
@@ -19,6 +19,7 @@ from cra_sym.model.exact import BallProblem, exact_kernel
 from cra_sym.model.forms import form_of, load_of
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.moving import jumps
+from cra_sym.model.observables import named_observables, observable
 from cra_sym.model.one_wave import one_wave_route
 from cra_sym.model.projection import EndParameter, Form, Load
 from cra_sym.model.routes import GeneralRoute, Route
@@ -26,7 +27,8 @@ from cra_sym.model.spatial import SpatialProblem, spatial_problem
 from cra_sym.model.symmetry import asymmetry
 from cra_sym.model.two_waves import two_waves_route
 
-__all__ = ["axial", "causes", "constant", "damping", "geometry", "load", "names", "rates", "route", "spatial"]
+__all__ = ["axial", "causes", "constant", "damping", "geometry", "load", "named_observables", "names", "observable",
+           "rates", "route", "spatial"]  # fmt: skip
 
 
 def names(model: Model) -> tuple[str, ...]:
@@ -82,19 +84,12 @@ def causes(model: Model) -> tuple[tuple[str, Kind | str], ...]:
     'motion' acts by its acceleration alone, 'force' by itself; of anything else the kind is the term that is neither.
     """
     weak = weak_form(model.equations.variation)
-    found = sorted({f for e in _load_terms(weak) for f in e.atoms(AppliedUndef)}, key=str)
-    return tuple((f.func.__name__, _kind(weak, f)) for f in found)
-
-
-def _load_terms(weak: WeakForm) -> list[Expr]:
-    space = weak.variation.space
-    loads = (*weak.inside_load.values(), *weak.discrete_load.values())
-    return [term for e in loads for term in Add.make_args(space.restore(e).expand())]
+    return tuple((f.func.__name__, _kind(weak, f)) for f in model.driving)
 
 
 def _kind(weak: WeakForm, function: AppliedUndef) -> str:
     t = weak.variation.space.t
-    terms = [term for term in _load_terms(weak) if term.has(function)]
+    terms = [term for term in weak.load_terms if term.has(function)]
     for kind, cause in (("motion", function.diff(t, 2)), ("force", function)):
         if not any((term / cause).has(t) for term in terms):
             return kind
@@ -107,7 +102,7 @@ def load(model: Model, name: str) -> Load:
     """Return the load of one unit of a cause: of the acceleration of a motion, or of a force."""
     weak = weak_form(model.equations.variation)
     t = weak.variation.space.t
-    function = next(f for e in _load_terms(weak) for f in e.atoms(AppliedUndef) if f.func.__name__ == name)
+    function = next(f for f in model.driving if f.func.__name__ == name)
     cause = function.diff(t, 2) if _kind(weak, function) == "motion" else function
     inside, discrete = (_coefficients(weak, part, cause) for part in (weak.inside_load, weak.discrete_load))
     return load_of(weak, inside, discrete, model.symbols)
@@ -121,7 +116,7 @@ def _coefficients(weak: WeakForm, part: dict[Jet, Expr], cause: Expr) -> dict[Je
 def constant(model: Model) -> Load | None:
     """Return the loads that are constant in time, or None if there are none."""
     weak = weak_form(model.equations.variation)
-    still = {f: S.Zero for e in _load_terms(weak) for f in e.atoms(AppliedUndef)}
+    still = {f: S.Zero for e in weak.load_terms for f in e.atoms(AppliedUndef)}
 
     def left(part: dict[Jet, Expr]) -> dict[Jet, Expr]:
         values = {jet: weak.variation.space.restore(e).subs(still).doit() for jet, e in part.items()}
@@ -280,6 +275,9 @@ def carried(model: Model, name: str) -> Kernel:
     space = weak.variation.space
     number = next(k for k, u in enumerate(space.unknowns) if u.func.__name__ == name)
     jet = Jet(number, 0, 0, None)
+    for pair, entry in (*weak.inside.items(), *weak.discrete.items()):
+        if pair[0] == jet != pair[1] and set(entry) - {2}:
+            raise ValueError(f"{name}: a force on it depends on {space.form(pair[1])} by more than its acceleration")
     left, right = (space.ends[end] for end in END_NAMES)
     inside, discrete = weak.inside.get((jet, jet), {}), weak.discrete.get((jet, jet), {})
     found = (

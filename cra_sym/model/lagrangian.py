@@ -17,6 +17,7 @@ from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics import HamiltonResult, Modal, StateForm, hamilton, ritz, separate, state_form
 from cra_sym.mechanics.jets import listed
 from cra_sym.mechanics.points import in_points
+from cra_sym.mechanics.weak import weak_form
 from cra_sym.model.galerkin import Ritz
 from cra_sym.model.numerics import Numerics
 from cra_sym.model.symmetry import asymmetry, odd_in_time
@@ -211,10 +212,27 @@ class Model:
         return System(self, values, zeta, tolerance)
 
     def freed(self, name: str) -> Model:
-        """Return the model in which a prescribed motion is a lumped coordinate instead."""
-        motion = next(function for function in self._pieces["prescribed"] if function.func.__name__ == name)
+        """Return the model in which a function of time that drives it is a lumped coordinate instead."""
+        motion = next(function for function in self.driving if function.func.__name__ == name)
         prescribed = [function for function in self._pieces["prescribed"] if function != motion]
         return self.replace(prescribed=prescribed, coordinates=[*self._pieces["coordinates"], motion])
+
+    @property
+    def definitions(self) -> dict[Symbol, Expr]:
+        """What symbols of the pieces stand for."""
+        return dict(self._pieces["definitions"])
+
+    @cached_property
+    def driving(self) -> tuple[AppliedUndef, ...]:
+        """Functions of time that drive the model: prescribed motions and forces, by name."""
+        terms = weak_form(self.equations.variation).load_terms
+        return tuple(sorted({f for term in terms for f in term.atoms(AppliedUndef)}, key=str))
+
+    @cached_property
+    def motions(self) -> tuple[AppliedUndef, ...]:
+        """Those of them that act by their acceleration."""
+        terms, t = weak_form(self.equations.variation).load_terms, self.equations.t
+        return tuple(f for f in self.driving if any(term.has(f.diff(t, 2)) for term in terms))
 
     @cached_property
     def units(self) -> Mapping[str, str]:

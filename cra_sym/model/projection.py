@@ -14,7 +14,7 @@ from cra_sym.kernels import Kernel
 from cra_sym.model.moving import Jumps
 from cra_sym.model.routes import Modes, RigidShare, Stations
 
-__all__ = ["Domain", "EndParameter", "Form", "Load", "Place", "Projected", "project", "stations"]
+__all__ = ["Domain", "EndParameter", "Form", "Load", "Place", "Projected", "displaced_at", "project", "stations"]
 
 Array = NDArray[np.float64]
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
@@ -165,18 +165,27 @@ def displaced(domain: Domain, modes: Modes, place: Place, places: Kernel | None)
 
 
 def _at_place(domain: Domain, modes: Modes, place: Place, places: Kernel) -> Array:
-    shape = (*modes.omega.shape[:-1], 1)
-    at = np.broadcast_to(column(places.function(*domain.values)[place.number]), shape)
+    at = np.broadcast_to(column(places.function(*domain.values)[place.number]), (*modes.omega.shape[:-1], 1))
+    left = column(domain.left)
+    there = (at > left) & (at < left + column(domain.length))
+    return np.where(
+        there, displaced_at(domain, modes, place.entry, place.order, np.where(there, at, left)[..., 0]), 0.0
+    )
+
+
+def displaced_at(domain: Domain, modes: Modes, entry: int, order: int, place: float | Array) -> Array:
+    """Return a derivative of a displacement of every mode at a place of the domain, shape (..., modes).
+
+    What has two values there is their mean.
+    """
+    at = np.broadcast_to(column(place), (*modes.omega.shape[:-1], 1))
     left = column(domain.left)
     right, aside = left + column(domain.length), _ASIDE * column(domain.length)
-    there = (at > left) & (at < right)
-    at = np.where(there, at, left)
-    if not place.order:
-        return np.where(there[..., 0, None], modes.shape(place.entry, 0, at)[..., 0], 0.0)
-    before, after = (
-        modes.shape(place.entry, place.order, at + np.where(there, side * aside, 0.0))[..., 0] for side in (-1, 1)
-    )
-    return np.where(there[..., 0, None], 0.5 * (before + after), 0.0)
+    if not order:
+        return modes.shape(entry, 0, at)[..., 0]
+    inside = (at > left) & (at < right)
+    before, after = (modes.shape(entry, order, at + np.where(inside, side * aside, 0.0))[..., 0] for side in (-1, 1))
+    return 0.5 * (before + after)
 
 
 def along(modes: Modes, place: Place, x: Array) -> Array:

@@ -17,6 +17,8 @@ from cra_sym.model.spatial import check_range
 from cra_sym.model.values import Value, checked_damping, checked_values, frozen
 
 if TYPE_CHECKING:
+    from sympy import Expr
+
     from cra_sym.model.lagrangian import Model
     from cra_sym.model.numerics import Numerics
 
@@ -102,6 +104,11 @@ class System:
     def shape(self) -> tuple[int, ...]:
         """Batch shape: the common shape of all values."""
         return broadcastable(zeta=self.zeta, **self.values)
+
+    @property
+    def section_quantities(self) -> Mapping[str, Expr]:
+        """What can be measured of a section beside its displacements, by name: expressions in x."""
+        return {}
 
     def replace(self, **changes: Any) -> System:
         """Return a validated copy with some values, ``zeta`` or ``tolerance``, changed.
