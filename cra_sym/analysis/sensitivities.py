@@ -145,7 +145,7 @@ class Sensitivities:
         own = np.diagonal(block, axis1=-2, axis2=-1)
         off = np.maximum(np.abs(block), np.abs(own[..., :, None] - own[..., None, :]))
         size = np.maximum(np.abs(own[..., :, None]), np.abs(own[..., None, :])) + np.abs(block)
-        return (self._repeated & (off > _MIXED * size))[..., : self._modes, :].any(axis=-1)
+        return np.any((self._repeated & (off > _MIXED * size))[..., : self._modes, :], axis=-1)
 
     @default_floating_point
     def _raw(self, name: str) -> Array:
