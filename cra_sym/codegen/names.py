@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["FORTRAN", "RESERVED"]
+__all__ = ["FORTRAN", "KEYWORDS", "RESERVED"]
 
 _KEYWORDS = """
 auto break case char const continue default do double else enum extern float for goto if inline int long register
@@ -15,12 +15,15 @@ as crate dyn fn impl loop match mod move mut pub ref self trait type unsafe use 
 unsized gen union raw
 and assert def del elif except from global is lambda none nonlocal not or pass raise print
 begin baremodule end elseif module mutable primitive quote isa outer using
+endfunction endif endfor endwhile unwind_protect otherwise persistent until methods properties events
+"""
+_ATTRIBUTES = """
 allocatable allocate assign associate asynchronous backspace bind block call character close codimension common
 concurrent contains contiguous cycle data deallocate deferred dimension elemental elsewhere entry enumerator
 equivalence error exit external file forall format generic go implicit include inquire integer intent intrinsic kind
 len logical namelist non_overridable nopass nullify only open optional parameter pointer precision procedure program
 pure read real recursive result rewind save select sequence stop submodule subroutine sync target then to value wait
-write endfunction endif endfor endwhile unwind_protect otherwise persistent until methods properties events
+write
 """
 _LIBRARY = """
 abs acos acosh asin asinh atan atan2 atanh cbrt ceil copysign cos cosh erf erfc exp exp2 expm1 fabs fdim floor fma
@@ -32,7 +35,10 @@ dict set type id map filter range len repr input status evaluate characteristic 
 all any isreal inverse error real64 floor_real DomainError RangeError ArithmeticError Number NAN INFINITY HUGE_VAL
 """
 
-RESERVED = frozenset(f"{_KEYWORDS} {_LIBRARY} True False None NaN Inf Infinity Math Self".split())
+KEYWORDS = frozenset(_KEYWORDS.split()) | {"result", "status"}
+"""What no variable of a text in the restricted form may be called."""
+
+RESERVED = frozenset(f"{_KEYWORDS} {_ATTRIBUTES} {_LIBRARY} True False None NaN Inf Infinity Math Self".split())
 """Words no variable may be called."""
 
 FORTRAN = frozenset(_LIBRARY.split()) - {"e"}

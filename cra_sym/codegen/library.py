@@ -1,0 +1,215 @@
+"""A text in the restricted form as a library of a language: source, build files, self-test and reference vectors."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+
+import cra_sym
+from cra_sym.codegen.names import FORTRAN, KEYWORDS, RESERVED
+from cra_sym.codegen.print_c import CPrinter
+from cra_sym.codegen.print_fortran import FortranPrinter
+from cra_sym.codegen.print_julia import JuliaPrinter
+from cra_sym.codegen.print_python import PythonPrinter
+from cra_sym.codegen.print_rust import RustPrinter
+from cra_sym.codegen.print_scripts import JavaScriptPrinter, OctavePrinter
+from cra_sym.codegen.printing import Printer, snake
+from cra_sym.codegen.rendering import DIGEST, rendered
+from cra_sym.kernels.form import Form, Function
+from cra_sym.kernels.form_parse import parse
+
+__all__ = ["PRINTERS", "Check", "Library", "check_name", "source"]
+
+PRINTERS: dict[str, type[Printer]] = {
+    printer.name: printer
+    for printer in (
+        CPrinter, FortranPrinter, PythonPrinter, JuliaPrinter, OctavePrinter, RustPrinter, JavaScriptPrinter
+    )
+}  # fmt: skip
+_NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
+_LONGEST = 24  # a name of Fortran has 63 characters at most, ours are in front of others
+_C_HELPERS = {
+    name: f"static int {name}(int one, int other)\n{{\n    return one {sign} other ? one : other;\n}}"
+    for name, sign in (("smaller_of", "<"), ("larger_of", ">"))
+}
+_FORTRAN_HELPERS = {
+    "floor_real": (
+        "Largest whole number not above x, as a real.",
+        "out = aint(x)\n    if (out > x) out = out - 1.0_dp",
+    ),
+    "ceiling_real": (
+        "Smallest whole number not below x, as a real.",
+        "out = aint(x)\n    if (out < x) out = out + 1.0_dp",
+    ),
+}
+
+
+def source(name: str) -> str:
+    """Return a text of the folder of sources, without its docstring."""
+    text = files("cra_sym.codegen").joinpath("sources", f"{name}.form").read_text(encoding="utf-8")
+    return text.split('"""', 2)[2].lstrip()
+
+
+def check_name(name: object, language: str) -> str:
+    """Return a name that may stand in front of what is public.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If it is no text, no identifier in lower case of at most 24 characters, or a word of a language.
+    """
+    if not isinstance(name, str):
+        raise TypeError(f"name = {name!r}: must be a text")
+    if not _NAME.fullmatch(name) or len(name) > _LONGEST or name in RESERVED | FORTRAN:
+        raise ValueError(
+            f"name = {name!r}: must be lower-case letters, digits and single underscores, begin with a letter, have at "
+            f"most {_LONGEST} characters and be no word of a programming language"
+        )
+    return name
+
+
+@dataclass(frozen=True)
+class Check:
+    """One line of the reference vectors.
+
+    Attributes
+    ----------
+    quantity : int
+        Its number in the function ``_evaluate`` of the text.
+    given, expected : tuple of float
+        At most 64 and 256.
+    relative, absolute : float
+        The error allowed.
+    refused : bool
+        Whether the function has to say no.
+    """
+
+    quantity: int
+    given: tuple[float, ...]
+    expected: tuple[float, ...]
+    relative: float = 0.0
+    absolute: float = 0.0
+    refused: bool = False
+
+    def line(self) -> str:
+        """Return the line."""
+        counts = [str(len(self.given)), str(len(self.expected))]
+        numbers = [repr(float(x)) for x in (self.relative, self.absolute)]
+        values = [repr(float(x)) for x in (*self.given, *self.expected)]
+        return " ".join([str(self.quantity), str(int(self.refused)), *numbers, *counts, *values])
+
+
+@dataclass(frozen=True)
+class Library:
+    """What becomes a folder of a language.
+
+    Attributes
+    ----------
+    name : str
+        Prefix, module, crate, target.
+    summary : str
+        One line.
+    text : str
+        In the restricted form; its private function ``_evaluate`` is for the self-test.
+    provenance : tuple of str
+        Lines at the head of every file.
+    checks : tuple of Check
+    readme : str
+        What only this library's README says, in Markdown.
+    real : {'float64', 'float32'}
+    """
+
+    name: str
+    summary: str
+    text: str
+    provenance: tuple[str, ...]
+    checks: tuple[Check, ...]
+    readme: str = ""
+    real: str = "float64"
+
+    def texts(self, language: str) -> dict[str, str]:
+        """Return the texts of all files, by name, but for the licence."""
+        whole = parse(self.text)
+        functions = {name: f for name, f in whole.functions.items() if name != "_evaluate"}
+        taken = KEYWORDS & {name for f in functions.values() for name in (*f.parameters, *f.locals, *f.loops)}
+        if taken:
+            raise ValueError(f"words of a language are no names of variables: {', '.join(sorted(taken))}")
+        printer = PRINTERS[language](whole, self.name, self.real)
+        evaluate = whole.functions["_evaluate"]
+        printed = self._values(printer, list(functions.values())) | {"evaluate": "\n".join(printer.function(evaluate))}
+        texts = rendered(f"library/{language}", printed) | rendered("library/common", printed)
+        texts = {name.replace("NAME", self.name): _tidy(text) for name, text in texts.items()}
+        texts["reference.txt"] = "".join(f"{check.line()}\n" for check in self.checks)
+        return texts
+
+    def _values(self, printer: Printer, functions: Sequence[Function]) -> dict[str, object]:
+        form = printer.form
+        kept = Form(form.doc, form.constants, form.records, {f.name: f for f in functions}, form.comments, form.alone)
+        printer.form = kept
+        text = printer.all_functions()
+        values: dict[str, object] = {
+            "name": self.name,
+            "upper": self.name.upper(),
+            "language": printer.name,
+            "title": printer.title,
+            "summary": self.summary,
+            "version": cra_sym.__version__,
+            "real": self.real,
+            "word": getattr(printer, "word", ""),
+            "constants": printer.constants(),
+            "records": printer.records(),
+            "functions": text,
+            "errors": getattr(printer, "errors", str)(),
+            "exported": _exported(printer),
+            "tasks": [f.name for f in functions if f.public],
+            "helpers": _helpers(printer, text),
+            "of_c": [n for n in ("expm1", "log1p") if f"{n}(" in text] if printer.name == "fortran" else [],
+            "kind_of_c": "c_double" if self.real == "float64" else "c_float",
+            "digest": DIGEST,
+            "header": printer.header() if isinstance(printer, CPrinter) else "",
+            "provenance": self._commented,
+            "readme": self.readme,
+            "checks": len(self.checks),
+            "listed": [(f.name, f.doc.splitlines()[0]) for f in functions if f.public],
+        }
+        printer.form = form
+        return values
+
+    def _commented(self, first: str, further: str, last: str) -> str:
+        lines = ["SPDX-License-Identifier: BSD-3-Clause", *self.provenance]
+        marked = [f"{first if n == 0 else further}{line}".rstrip() for n, line in enumerate(lines)]
+        return "\n".join([*marked, last] if last else marked)
+
+
+def _tidy(text: str) -> str:
+    """Return a text without several empty lines at its end or more than two in a row."""
+    return re.sub(r"\n{4,}", "\n\n\n", text).rstrip("\n") + "\n"
+
+
+def _exported(printer: Printer) -> list[str]:
+    form = printer.form
+    functions = [printer.function_name(f) for f in form.functions.values() if f.public]
+    if isinstance(printer, FortranPrinter):
+        errors = [f"{printer.prefix}_ok", *map(printer.error, form.errors)]
+        records = [printer.record_name(name) for name in form.records]
+        return [f"{printer.prefix}_version", *errors, *form.constants, *records, *functions]
+    if isinstance(printer, JavaScriptPrinter):
+        return [*form.constants, *(f"new_{snake(name)}" for name in form.records), *functions]
+    return [*form.constants, *form.records, *functions]
+
+
+def _helpers(printer: Printer, text: str) -> str:
+    if isinstance(printer, CPrinter):
+        return "\n\n".join(helper for name, helper in _C_HELPERS.items() if f"{name}(" in text)
+    if isinstance(printer, FortranPrinter):
+        return "\n".join(_fortran_helper(n, *words) for n, words in _FORTRAN_HELPERS.items() if f"{n}(" in text)
+    return getattr(printer, "helpers", "")
+
+
+def _fortran_helper(name: str, doc: str, body: str) -> str:
+    return (
+        f"  !> {doc}\n  pure elemental function {name}(x) result(out)\n    real(dp), intent(in) :: x\n"
+        f"    real(dp) :: out\n    {body}\n  end function {name}\n"
+    )

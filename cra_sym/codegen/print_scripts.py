@@ -1,0 +1,266 @@
+"""The restricted form as JavaScript and Octave, and what languages without types have in common."""
+
+from __future__ import annotations
+
+import ast
+import textwrap
+from collections.abc import Sequence
+from typing import ClassVar
+
+from cra_sym.codegen.printing import Lines, Printer, snake
+from cra_sym.kernels.form import Constant, Function, Record, Type
+
+__all__ = ["SAME", "JavaScriptPrinter", "OctavePrinter", "ScriptPrinter"]
+
+SAME = (
+    "sqrt exp expm1 log log1p sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh floor ceil atan2 pow".split()
+)
+
+
+class ScriptPrinter(Printer):
+    """What languages without types have in common: results are returned, and no variable is declared."""
+
+    def results(self, function: Function) -> list[str]:
+        """Return the parameters that a function hands back: those it makes."""
+        return [name for name, kind in function.parameters.items() if kind.access == "out"]
+
+    def given(self, function: Function) -> list[str]:
+        """Return the parameters a caller gives."""
+        return [name for name, kind in function.parameters.items() if kind.access != "out"]
+
+    def declared(self, name: str, kind: Type, value: str | None, fixed: bool) -> str:
+        return "" if value is None else f"{name} = {value}"
+
+    def made(self, kind: Type) -> str:
+        if kind.length is not None:
+            return self.row_of(kind)
+        return {"float": self.number(0.0), "int": "0", "bool": self.false}.get(kind.name) or self.new_record(kind.name)
+
+    def row_of(self, kind: Type) -> str:
+        """Return a new row."""
+        raise NotImplementedError
+
+    def new_record(self, name: str) -> str:
+        """Return a new record."""
+        raise NotImplementedError
+
+    def start(self, function: Function) -> Lines:
+        """Yield what makes the results."""
+        for name in self.results(function):
+            text = self.declared(name, function.parameters[name], self.made(function.parameters[name]), True)
+            yield from self.plain(text, self.indent)
+
+    def together(self, names: Sequence[str]) -> str:
+        """Return several values as one."""
+        return ", ".join(names)
+
+    def returned(self, value: str | None) -> Lines:
+        values = ([] if value is None else [value]) + self.results(self.current)
+        yield f"return {self.together(values)}" if values else "return"
+
+    def tail(self, function: Function) -> Lines:
+        if function.result is None and self.results(function) and not isinstance(function.body[-1], ast.Return):
+            yield from self.plain(next(iter(self.returned(None))), self.indent)
+        yield from filter(None, [self.closing])
+
+    def call_statement(self, target: str, call: ast.Call, callee: Function, indent: str) -> Lines:
+        by_name = dict(zip(callee.parameters, call.args, strict=True))
+        given = ", ".join(self.argument(by_name[name]) for name in self.given(callee))
+        targets = ([target] if target else []) + [self.expression(by_name[name]) for name in self.results(callee)]
+        start = f"{self.targets(targets)} = " if targets else ""
+        yield from self.plain(f"{start}{self.function_name(callee)}({given})", indent)
+
+    def targets(self, names: Sequence[str]) -> str:
+        """Return what a call assigns to."""
+        return self.together(names)
+
+
+class JavaScriptPrinter(ScriptPrinter):
+    """JavaScript, an ECMAScript module."""
+
+    name, title = "javascript", "JavaScript"
+    functions: ClassVar = {n: f"Math.{n}" for n in SAME} | {
+        "abs": "Math.abs", "min": "Math.min", "max": "Math.max", "isfinite": "Number.isFinite",
+    }  # fmt: skip
+
+    def constant(self, constant: Constant) -> str:
+        values = self.literal(constant)
+        comment = f" // {constant.comment}" if constant.comment else ""
+        if constant.type.length is None:
+            return f"export const {constant.name} = {values[0]};{comment}"
+        row = "\n".join(self.wrapped(", ".join(values) + ",", "  "))
+        return f"export const {constant.name} = [{comment}\n{row}\n];"
+
+    def record(self, record: Record) -> Lines:
+        yield from (f"// {line}".rstrip() for line in record.doc.splitlines())
+        yield f"export function {self.new_record(record.name)} {{"
+        yield "    return {"
+        for name, kind in record.fields.items():
+            comment = f" // {record.comments[name]}" if record.comments[name] else ""
+            yield f"        {name}: {self.made(kind)},{comment}"
+        yield from ("    };", "}")
+
+    def row_of(self, kind: Type) -> str:
+        if kind.name in self.form.records:
+            return f"Array.from({{ length: {kind.length} }}, () => {self.new_record(kind.name)})"
+        return f"new Array({kind.length}).fill({self.made(kind.element)})"
+
+    def new_record(self, name: str) -> str:
+        return f"new_{snake(name)}()"
+
+    def head(self, function: Function) -> Lines:
+        export = "export " if function.public else ""
+        yield f"{export}function {self.function_name(function)}({', '.join(self.given(function))}) {{"
+        yield from self.start(function)
+
+    def together(self, names: Sequence[str]) -> str:
+        return names[0] if len(names) == 1 else f"[{', '.join(names)}]"
+
+    def declared(self, name: str, kind: Type, value: str | None, fixed: bool) -> str:
+        whole = not kind.scalar and name not in self.current.parameters  # a call may hand back another
+        return f"let {name}" if value is None else f"{'const' if fixed and not whole else 'let'} {name} = {value}"
+
+    def loop(self, name: str, start: str, stop: ast.expr, step: int) -> str:
+        sign, change = ("<", "++") if step == 1 else (">", "--")
+        return f"for (let {name} = {start}; {name} {sign} {self.expression(stop, 5)}; {name}{change}) {{"
+
+    def comparison(self, sign: str) -> str:
+        return {"==": "===", "!=": "!=="}.get(sign, sign)
+
+    def divided(self, left: ast.expr, right: ast.expr, rest: bool) -> tuple[str, int]:
+        text, strength = super().divided(left, right, rest)
+        return (text, strength) if rest else (f"Math.floor({text})", 10)
+
+    def raised(self, error: str, message: str) -> str:
+        kind = "RangeError" if error.startswith("Invalid") else "Error"
+        return f'throw new {kind}("{message}")'
+
+    def integer_function(self, name: str) -> str:
+        return f"Math.{name}"
+
+    def to_float(self, node: ast.expr) -> tuple[str, int]:
+        return self.printed(node)
+
+    def to_int(self, node: ast.expr) -> tuple[str, int]:
+        return f"Math.trunc({self.expression(node)})", 10
+
+
+class OctavePrinter(ScriptPrinter):
+    """Octave and MATLAB: rows and records are values, so what a function changes it returns too."""
+
+    name, title = "octave", "Octave"
+    comment, closing, origin, width = "%", "end", 1, 100
+    negation = "~"
+    choice_least = 0
+    otherwise, otherwise_if, end_if, end_loop = "else", "else", "end", "end"
+    functions: ClassVar = {n: n for n in (*SAME, "abs", "min", "max", "isfinite")} | {"pow": "power"}
+    helpers = """\
+function out = choose(condition, value, other)
+    if condition
+        out = value;
+    else
+        out = other;
+    end
+end
+"""
+
+    def results(self, function: Function) -> list[str]:
+        return function.changed
+
+    def start(self, function: Function) -> Lines:
+        for name, kind in function.parameters.items():
+            if kind.access == "out":
+                yield from self.plain(f"{name} = {self.made(kind)}", self.indent)
+
+    def constant(self, constant: Constant) -> str:
+        values, lines = self.literal(constant), [f"% {constant.comment}"] if constant.comment else []
+        if constant.type.length is None:
+            return "\n".join([*lines, f"function out = {constant.name}()", f"    out = {values[0]};", "end"])
+        row = list(self.wrapped(f"out = [{', '.join(values)}];", "    "))
+        head, last = (
+            [f"function out = {constant.name}(index)"],
+            ["    if nargin", "        out = out(index);", "    end"],
+        )
+        return "\n".join([*lines, *head, *row, *last, "end"])
+
+    def constants(self) -> str:
+        return "\n\n".join(self.constant(constant) for constant in self.form.constants.values())
+
+    def record(self, record: Record) -> Lines:
+        yield f"function record = {self.new_record(record.name).removesuffix('()')}()"
+        yield from (f"% {line}".rstrip() for line in record.doc.splitlines())
+        for name, kind in record.fields.items():
+            comment = f" % {record.comments[name]}" if record.comments[name] else ""
+            yield f"    record.{name} = {self.made(kind)};{comment}"
+        yield "end"
+
+    def row_of(self, kind: Type) -> str:
+        if kind.name in self.form.records:
+            return f"repmat({self.new_record(kind.name)}, 1, {kind.length})"
+        return f"zeros(1, {kind.length})" if kind.name != "bool" else f"false(1, {kind.length})"
+
+    def new_record(self, name: str) -> str:
+        return f"new_{snake(name)}()"
+
+    def documented(self, function: Function) -> Lines:
+        yield from ()
+
+    def head(self, function: Function) -> Lines:
+        outs = (["result"] if function.result else []) + self.results(function)
+        left = "" if not outs else f"{outs[0]} = " if len(outs) == 1 else f"[{', '.join(outs)}] = "
+        yield f"function {left}{self.function_name(function)}({', '.join(self.given(function))})"
+        yield from (f"% {line}".rstrip() for line in function.doc.splitlines())
+        yield from self.start(function)
+
+    def tail(self, function: Function) -> Lines:
+        yield "end"
+
+    def returned(self, value: str | None) -> Lines:
+        if value is not None:
+            yield f"result = {value}"
+        yield "return"
+
+    def targets(self, names: Sequence[str]) -> str:
+        return names[0] if len(names) == 1 else f"[{', '.join(names)}]"
+
+    def wrapped(self, text: str, indent: str) -> Lines:
+        lines = textwrap.wrap(
+            text, self.width, initial_indent=indent, subsequent_indent=f"{indent}    ", break_long_words=False,
+            break_on_hyphens=False,
+        )  # fmt: skip
+        yield from " ...\n".join(lines).split("\n")
+
+    def if_head(self, condition: str) -> str:
+        return f"if {condition}"
+
+    def while_head(self, condition: str) -> str:
+        return f"while {condition}"
+
+    def loop(self, name: str, start: str, stop: ast.expr, step: int) -> str:
+        return f"for {name} = {start}:{'' if step == 1 else '-1:'}{self.last(stop, step)}"
+
+    def choice(self, condition: str, value: str, otherwise: str) -> tuple[str, int]:
+        return f"choose({condition}, {value}, {otherwise})", 10
+
+    def updated(self, target: ast.expr, op: ast.operator, value: ast.expr) -> str:
+        return f"{self.expression(target)} = {self.operation(target, op, value)[0]}"
+
+    def entry(self, row: str, index: str) -> str:
+        return f"{row}({index})"
+
+    def comparison(self, sign: str) -> str:
+        return {"!=": "~="}.get(sign, sign)
+
+    def divided(self, left: ast.expr, right: ast.expr, rest: bool) -> tuple[str, int]:
+        if rest:
+            return f"mod({self.expression(left)}, {self.expression(right)})", 10
+        return f"floor({super().divided(left, right, rest)[0]})", 10
+
+    def raised(self, error: str, message: str) -> str:
+        return f"error('{self.prefix}:{snake(error)}', '{message}')"
+
+    def to_float(self, node: ast.expr) -> tuple[str, int]:
+        return self.printed(node)
+
+    def to_int(self, node: ast.expr) -> tuple[str, int]:
+        return f"fix({self.expression(node)})", 10

@@ -1,0 +1,206 @@
+"""The restricted form in which an algorithm is written once: Python text, parsed, typed and checked, for printing.
+
+A text is a Python module of constants, records (classes of annotated fields) and functions. Values are doubles
+(`float`), integers (`int`), conditions (`bool`), rows of them and records. A function holds assignments, ``for`` over
+``range``, ``while``, ``if``, ``break``, ``continue``, ``return``, ``raise`` and calls; comments and docstrings travel.
+
+Rules that let every language print the same arithmetic
+    Parameters of type ``Row[float, n]`` or of a record are read only; ``Out[...]`` is made by the function and handed
+    back, ``Mut[...]`` is changed in place. No argument that is changed may be given twice in one call.
+    Both sides of ``and``, ``or`` and ``a if c else b`` must be harmless to evaluate: some languages evaluate both.
+    Integers and doubles do not mix; ``//`` and ``%`` are for integers that are not negative; `int` cuts toward zero.
+    Functions are defined before they are called, so there is no recursion; local rows have constant lengths, so there
+    is no heap. A local variable is first assigned, in the order of the text, then used, and keeps its type.
+    Functions that change an argument, raise, or call one that does, are called in statements of their own.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+__all__ = [
+    "BOOL", "FLOAT", "INT", "SCALARS", "Constant", "Form", "FormError", "Function", "Record", "Type", "error_name",
+    "refused",
+]  # fmt: skip
+
+
+class FormError(ValueError):
+    """What a text does that the restricted form does not allow, with its line."""
+
+
+@dataclass(frozen=True)
+class Type:
+    """A type: a scalar or a record by its name, or a row of them.
+
+    Attributes
+    ----------
+    name : str
+        ``float``, ``int``, ``bool`` or a record.
+    length : int or str or None
+        Of a row: a number, a constant or an integer parameter; None for one value.
+    access : str
+        Of a parameter: ``in``, ``out`` or ``mut``.
+    """
+
+    name: str
+    length: int | str | None = None
+    access: str = "in"
+
+    @property
+    def element(self) -> Type:
+        """The type of an entry of a row."""
+        return Type(self.name)
+
+    @property
+    def scalar(self) -> bool:
+        """Whether it is one number or condition."""
+        return self.length is None and self.name in SCALARS
+
+    @property
+    def changed(self) -> bool:
+        """Whether a parameter of this type is written to."""
+        return self.access != "in"
+
+    def same(self, other: Type) -> bool:
+        """Return whether the values are of one kind, whoever may change them."""
+        return self.name == other.name and (self.length is None) == (other.length is None)
+
+
+SCALARS = ("float", "int", "bool")
+FLOAT, INT, BOOL = (Type(name) for name in SCALARS)
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number, or a row of numbers, at the top of the text."""
+
+    name: str
+    type: Type
+    values: tuple[float | int, ...]
+    comment: str
+
+
+@dataclass(frozen=True)
+class Record:
+    """A record: its fields by name, with the comment of each."""
+
+    name: str
+    doc: str
+    fields: Mapping[str, Type]
+    comments: Mapping[str, str]
+
+
+@dataclass
+class Function:
+    """A function with what the check found out.
+
+    Attributes
+    ----------
+    parameters : dict of str to Type
+    result : Type or None
+    types : dict of int to Type
+        Of every expression, by the id of its node.
+    locals : dict of str to Type
+    homes : dict of str to int
+        For each local the id of the statement before which, or with which, it is declared.
+    writes : dict of str to int
+        How often the text assigns to a local.
+    loops : set of str
+        Variables of ``for`` loops, which exist inside these only.
+    calls, uses, raises : set of str
+        Functions of the text and of the language that it calls, errors it raises itself.
+    """
+
+    name: str
+    doc: str
+    parameters: dict[str, Type]
+    result: Type | None
+    node: ast.FunctionDef
+    types: dict[int, Type] = field(default_factory=dict)
+    locals: dict[str, Type] = field(default_factory=dict)
+    homes: dict[str, int] = field(default_factory=dict)
+    writes: dict[str, int] = field(default_factory=dict)
+    loops: set[str] = field(default_factory=set)
+    calls: set[str] = field(default_factory=set)
+    uses: set[str] = field(default_factory=set)
+    raises: set[str] = field(default_factory=set)
+
+    @property
+    def public(self) -> bool:
+        """Whether it is part of the interface: its name has no leading underscore."""
+        return not self.name.startswith("_")
+
+    @property
+    def body(self) -> list[ast.stmt]:
+        """The statements after the docstring."""
+        return self.node.body[1:] if ast.get_docstring(self.node) else self.node.body
+
+    @property
+    def changed(self) -> list[str]:
+        """The parameters that are written to."""
+        return [name for name, kind in self.parameters.items() if kind.changed]
+
+
+@dataclass(frozen=True)
+class Form:
+    """A checked text.
+
+    Attributes
+    ----------
+    doc : str
+    constants, records, functions : dict
+        By name, in the order of the text.
+    comments : dict of int to str
+        Comment of each line; those that stand alone on their line are also in `alone`.
+    """
+
+    doc: str
+    constants: dict[str, Constant]
+    records: dict[str, Record]
+    functions: dict[str, Function]
+    comments: dict[int, str]
+    alone: frozenset[int]
+
+    def failing(self, also: frozenset[str] = frozenset()) -> frozenset[str]:
+        """Return the functions that raise, or call one that does; ``also`` are taken as such."""
+        found: set[str] = set()
+        for name, function in self.functions.items():  # callees come first
+            if name in also or function.raises or function.calls & found:
+                found.add(name)
+        return frozenset(found)
+
+    @property
+    def errors(self) -> list[str]:
+        """Names of what is raised, in the order of the text."""
+        raised = (
+            error_name(node)
+            for function in self.functions.values()
+            for node in ast.walk(function.node)
+            if isinstance(node, ast.Raise)
+        )
+        return list(dict.fromkeys(raised))
+
+    def used_by(self, names: Sequence[str]) -> Form:
+        """Return the form with these functions and all that they call."""
+        wanted = set(names)
+        for name in reversed(list(self.functions)):
+            if name in wanted:
+                wanted |= self.functions[name].calls
+        kept = {name: f for name, f in self.functions.items() if name in wanted}
+        return Form(self.doc, self.constants, self.records, kept, self.comments, self.alone)
+
+
+def refused(node: ast.AST, reason: str = "") -> FormError:
+    """Return the error that names a line and what is wrong there."""
+    where = getattr(node, "lineno", "?")
+    return FormError(f"line {where}: {ast.unparse(node).splitlines()[0]!r}: {reason or 'not in the restricted form'}")
+
+
+def error_name(node: ast.Raise) -> str:
+    """Return the name of what a statement raises."""
+    match node.exc:
+        case ast.Name(id=name) | ast.Call(func=ast.Name(id=name), args=[ast.Constant(value=str())], keywords=[]):
+            return name
+    raise refused(node, "raise a name, or a name with one text")
