@@ -1,4 +1,7 @@
 from .analysis.certification import certify as certify
+from .analysis.eigenvalues import count_eigenvalues as count_eigenvalues
+from .analysis.eigenvalues import damping_ratios as damping_ratios
+from .analysis.eigenvalues import eigenvalues as eigenvalues
 from .analysis.frequency_response import frequency_response as frequency_response
 from .analysis.identification import AmbiguityWarning as AmbiguityWarning
 from .analysis.identification import MisfitWarning as MisfitWarning

@@ -1,57 +1,98 @@
-"""Complex eigenvalues of a system with dampers."""
+"""Complex eigenvalues of a system with dampers, gyroscopic forces, or forces that follow the motion."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import count, default_floating_point, instance
+from cra_sym.checks import count, default_floating_point, instance, real_array
+from cra_sym.model.spatial import check_range
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.model.values import flat_columns
+from cra_sym.solvers.argument import number_inside
 from cra_sym.solvers.eigenvalues import refine
+from cra_sym.solvers.pencil_refine import TOLERANCE, Settled, lowest_eigenvalues
 
-__all__ = ["damping_ratios", "eigenvalues"]
+__all__ = ["count_eigenvalues", "damping_ratios", "eigenvalues"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+_SHRINK = 0.85  # of a circle in which eigenvalues are counted, over one in which rounding does not let them be
 
 
 @default_floating_point
-def eigenvalues(system: System, modes: int = 3, *, oscillating: bool = True) -> NDArray[np.complex128]:
-    """Return complex eigenvalues s (rad/s) of motions ``exp(s t)``, dampers included, one of each conjugate pair.
+def eigenvalues(system: System, modes: int = 3, *, oscillating: bool = True) -> Complex:
+    """Return complex eigenvalues s (rad/s) of motions ``exp(s t)``, one of each conjugate pair.
 
-    They are guessed by the Ritz matrices and refined on the exact problem. That none is missing is promised only
-    without dampers, where ``s = i omega``. Modal damping (zeta) is left out.
+    Dampers, gyroscopic forces and forces that follow the motion are included, and coefficients may vary along x. Modal
+    damping (zeta) is left out.
 
     Parameters
     ----------
     system : System
     modes : int
+        How many, 1 to 1000.
     oscillating : bool
-        Leave out real eigenvalues, of motions that decay without oscillating: Kelvin-Voigt damping has infinitely
-        many, which crowd at minus one over the retardation time.
+        Leave out real eigenvalues, of motions that do not oscillate, rigid-body motions at rest among them:
+        Kelvin-Voigt damping has infinitely many real ones, which crowd at minus one over the retardation time. Without
+        forces of first order in time that follow the motion, both s and -s of a real pair are given.
 
     Returns
     -------
     ndarray of complex, shape (..., modes)
-        By ascending modulus.
+        By ascending modulus. Where forces follow the motion, a flutter pair ``+-a + i b`` is two of them.
 
     Raises
     ------
+    ValueError
+        If there are fewer eigenvalues, with the number that the argument principle counts.
     ArithmeticError
-        If a refinement does not settle.
+        If they do not settle, and the count does not confirm what Newton's method finds.
+
+    Notes
+    -----
+    They are those of the Ritz basis on the stresses and settle to a relative 1e-10 as its degree rises; where two meet
+    (critical damping, flutter) their mean and product do, and each is known to half the digits, as it is from the
+    parameters. :func:`count_eigenvalues` proves in a region that none is missing. Without dampers and other such forces
+    ``s = i omega``.
+
+    Examples
+    --------
+    Beck's column beyond flutter:
+
+    >>> from sympy import symbols
+    >>> import cra_sym as cra
+    >>> from cra_sym.symbols import L, t, v, x
+    >>> P, B, m = symbols("P B m")
+    >>> column = cra.Model(m * v.diff(t)**2 / 2 - B * v.diff(x, 2)**2 / 2 + P * v.diff(x)**2 / 2, fields=[v], x=x,
+    ...                    domain=(0, L), t=t, essential=[v.subs(x, 0), v.diff(x).subs(x, 0)],
+    ...                    virtual_work=[(-P * v.diff(x), v, "right")])
+    >>> column.eigenvalues({P: 30.0, B: 1.0, m: 1.0, L: 1.0}, modes=2).round(6)
+    array([ 7.101221+10.249159j, -7.101221+10.249159j])
     """
     instance("system", system, System)
     modes = count("modes", modes, high=MOST_MODES)
+    _ = system.domain  # refuses a length that is not positive
     if system.numerics("conservative"):
         return np.asarray(1j * system.natural_frequencies(modes))
-    ritz = system.model.ritz(2 * modes + 10)
-    guesses = ritz.eigenvalues(system.values, modes, oscillating=oscillating).reshape(-1, modes)
-    columns, squared = flat_columns(system.parameters, system.shape), not system.numerics("damped")
-    guesses = np.broadcast_to(guesses, (columns.shape[1], modes))
-    roots = np.empty(guesses.shape, dtype=complex)
-    for rows, _, problem in system.numerics("damped_spatial").problems(columns):
-        found = refine(problem, guesses[rows], squared=squared)
-        if np.isnan(found).any():
-            raise ArithmeticError("eigenvalues: the refinement of a Ritz value did not settle; ask for fewer modes")
-        roots[rows] = np.take_along_axis(found, np.argsort(np.abs(found), axis=1, kind="stable"), axis=1)
+    columns = flat_columns(system.parameters, system.shape)
+    roots = np.empty((columns.shape[1], modes), dtype=complex)
+    pencil = system.numerics("pencil")
+    if pencil is None:
+        guesses = system.model.ritz(2 * modes + 10).eigenvalues(system.values, modes, oscillating=oscillating)
+        roots[:] = _by_newton(system, columns, np.broadcast_to(guesses.reshape(-1, modes), roots.shape))
+        return roots.reshape(*system.shape, modes)
+    for rows, problem in pencil.problems(columns):
+        with np.errstate(over="ignore", under="ignore"):
+            found = lowest_eigenvalues(problem, modes, oscillating)
+        good = (found.error <= TOLERANCE).all(axis=1)
+        roots[rows[good]] = found.values[good]
+        for row in np.nonzero(~good)[0]:
+            one = Settled(found.values[row : row + 1], found.error[row : row + 1])
+            roots[rows[row]] = _unsettled(system, columns[:, rows[row : row + 1]], one, oscillating)
+    check_range(roots)
     return roots.reshape(*system.shape, modes)
 
 
@@ -60,3 +101,105 @@ def damping_ratios(system: System, modes: int = 3) -> NDArray[np.float64]:
     """Return ``-Re s / |s|`` of the :func:`eigenvalues`, zero for a rigid motion, shape (..., modes)."""
     s = eigenvalues(system, modes)
     return -s.real / np.where(s == 0.0, 1.0, np.abs(s))
+
+
+@default_floating_point
+def count_eigenvalues(system: System, radius: Any) -> NDArray[np.int64]:
+    """Return how many eigenvalues have a modulus below a radius, by the argument principle.
+
+    The count rests on the exact characteristic function alone, not on the method of :func:`eigenvalues`: if that gives
+    as many within the radius, none is missing and none comes twice.
+
+    Parameters
+    ----------
+    system : System
+    radius : array_like
+        rad/s, in (0, inf); it broadcasts with the batch of the system.
+
+    Returns
+    -------
+    ndarray of int, shape (...)
+        Both members of each conjugate pair, real eigenvalues, and multiplicities are counted: a rigid-body motion that
+        nothing holds and nothing damps counts twice.
+
+    Raises
+    ------
+    ValueError
+        If the radius is out of range, or the model has supports at interior places.
+    ArithmeticError
+        If an eigenvalue lies on the circle.
+
+    Examples
+    --------
+    A string whose end takes up every wave has no eigenvalue at all:
+
+    >>> from sympy import symbols
+    >>> import cra_sym as cra
+    >>> from cra_sym.symbols import t, v, x
+    >>> c = symbols("c")
+    >>> string = cra.Model(v.diff(t)**2 / 2 - v.diff(x)**2 / 2, fields=[v], x=x, domain=(0, 1), t=t,
+    ...                    essential=[v.subs(x, 0)], virtual_work=[(-c * v.diff(t), v, "right")])
+    >>> count_eigenvalues(string.at({c: [0.5, 1.0]}), 20.0)
+    array([12,  0])
+    """
+    instance("system", system, System)
+    radii = real_array("radius", radius, must="real numbers in (0, inf)", unit="rad/s")
+    if not ((radii > 0.0) & np.isfinite(radii)).all():
+        raise ValueError(f"radius = {radii}: must be in (0, inf)")
+    shape = np.broadcast_shapes(system.shape, radii.shape)
+    columns, radii = flat_columns(system.parameters, shape), np.broadcast_to(radii, shape).ravel()
+    found = np.empty(len(radii), dtype=np.int64)
+    squared = not system.numerics("damped")
+    for rows, _, problem in system.numerics("damped_spatial").problems(columns):
+        for number, row in enumerate(rows):
+            reach = float(radii[row])
+            inside = number_inside(problem, number, 0.0, reach**2 if squared else reach)
+            found[row] = 2 * inside if squared else inside
+    return found.reshape(shape)
+
+
+def _unsettled(system: System, columns: Array, found: Settled, oscillating: bool) -> Complex:
+    """Return eigenvalues by Newton's method if that settles, or say how many there are."""
+    modes, there = found.values.shape[1], int(np.isfinite(found.values).sum())
+    if there < modes:
+        kind = "oscillating motions; oscillating=False gives real ones too" if oscillating else "eigenvalues"
+        raise ValueError(f"modes = {modes}: there are only {there} {kind}")
+    try:
+        return _by_newton(system, columns, found.values)[0]
+    except ArithmeticError:
+        bad = ~(found.error[0] <= TOLERANCE)
+    first, error = int(bad.argmax()), float(found.error[0, bad.argmax()])
+    reason = f"modes = {modes}: the relative error of eigenvalue {first + 1} stays at {error:.1g}"
+    number, reach = _counted(system, columns, float(np.abs(found.values[0][bad]).min()))
+    if number is None:
+        raise ArithmeticError(f"{reason}; ask for fewer modes")
+    raise ValueError(
+        f"{reason}; the argument principle counts {number} eigenvalues, both of each pair, with |s| < {reach:.4g} "
+        "rad/s: an end that takes up the waves leaves none, or none that the parameters determine"
+    )
+
+
+def _counted(system: System, columns: Array, reach: float) -> tuple[int | None, float]:
+    """Return how many eigenvalues lie within the largest circle in which rounding lets them be counted."""
+    one = system.model.at(dict(zip(system.numerics("names"), columns[:, 0], strict=True)))
+    for _ in range(8):
+        reach *= _SHRINK
+        try:
+            return int(count_eigenvalues(one, reach)), reach
+        except ArithmeticError:
+            continue
+        except ValueError:
+            break
+    return None, reach
+
+
+def _by_newton(system: System, columns: Array, guesses: Complex) -> Complex:
+    """Return guesses refined on the exact problem; within the last of them there must be no other eigenvalue."""
+    roots = np.empty(guesses.shape, dtype=complex)
+    squared = not system.numerics("damped")
+    for rows, _, problem in system.numerics("damped_spatial").problems(columns):
+        found = refine(problem, guesses[rows], squared=squared)
+        if np.isnan(found).any():
+            raise ArithmeticError("eigenvalues: the refinement of a Ritz value did not settle; ask for fewer modes")
+        roots[rows] = np.take_along_axis(found, np.argsort(np.abs(found), axis=1, kind="stable"), axis=1)
+    return roots

@@ -120,7 +120,7 @@ class StressRoute:
                 if not all(np.isfinite(entry).all() for entry in found):  # exp(800 x) / (1 + exp(800 x)) is bounded
                     longer = self.coefficients.function(x.astype(np.longdouble), *values)
                     found = [np.asarray(entry, dtype=float) for entry in longer]
-            parts: dict[str, dict[tuple[int, int], Array]] = {name: {} for name in "WBDRM"}
+            parts: dict[str, dict[tuple[int, int], Array]] = {name: {} for name in "WBDRMNC"}
             for (name, i, j), entry in zip(self.entries, found, strict=True):
                 parts[name][i, j] = np.asarray(entry, dtype=float)
             return parts  # type: ignore[return-value]

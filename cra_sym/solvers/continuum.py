@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +82,7 @@ class Continuum:
         """Displacements of a section, n."""
         return sum(self.orders)
 
-    def take(self, rows: NDArray[np.intp]) -> Continuum:
+    def take(self, rows: NDArray[np.intp]) -> Self:
         """Return the problem of some of the parameter sets."""
         return replace(
             self,

@@ -14,7 +14,7 @@ from .stress_mesh import Mesh, TooFineError, cells, resolved
 from .stress_modes import ModeFields
 from .stress_spectrum import BuckledError, spectrum
 
-__all__ = ["Found", "cure", "solved"]
+__all__ = ["Found", "alike", "cure", "meshed", "solved"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -62,12 +62,12 @@ def solved(problem: Continuum, modes: int, tolerance: float, target: float, told
         If the structure has buckled, has fewer modes, or does not reach the tolerance: names the place and the figure.
     """
     found: list[Found] = []
-    for rows, ends in _alike(problem):
+    for rows, ends in alike(problem):
         found += _group(problem.take(rows), rows, ends, _Aim(modes, tolerance, target, told))
     return found
 
 
-def _alike(problem: Continuum) -> Iterator[tuple[Index, tuple[bool, bool]]]:
+def alike(problem: Continuum) -> Iterator[tuple[Index, tuple[bool, bool]]]:
     """Yield sets whose stiffness vanishes at the same ends."""
     kinds = np.stack([_vanishes(problem, end) for end in (0, 1)], axis=1)
     for kind in np.unique(kinds, axis=0):
@@ -107,7 +107,34 @@ def _vanishes(problem: Continuum, end: int) -> NDArray[np.bool_]:
 
 
 def _group(problem: Continuum, rows: Index, ends: tuple[bool, bool], aim: _Aim) -> list[Found]:
-    spans, modes = problem.edges.shape[1] - 1, aim.modes
+    try:
+        problem, mesh, unresolved = meshed(problem, ends, aim.modes)
+    except TooFineError as error:
+        if error.sets == 1:
+            raise
+        half = len(rows) // 2
+        parts = (np.arange(half), np.arange(half, len(rows)))
+        return [item for part in parts for item in _group(problem.take(part), rows[part], ends, aim)]
+    return _refined(problem, rows, mesh, unresolved, aim)
+
+
+def meshed(problem: Continuum, ends: tuple[bool, bool], modes: int) -> tuple[Continuum, Mesh, Array]:
+    """Return the problem integrated from a regular end, a mesh to begin with, and what stays unresolved of each row.
+
+    Parameters
+    ----------
+    problem : Continuum
+        With rows that are alike.
+    ends : tuple of bool
+        Whether a stiffness vanishes at the left and at the right end.
+    modes : int
+
+    Raises
+    ------
+    TooFineError
+        If a coefficient varies too finely.
+    """
+    spans = problem.edges.shape[1] - 1
     if ends[0] and not ends[1]:
         problem = replace(problem, origin=1)
     elements = cells(spans, max(_MOST_ELEMENTS, int(np.ceil(modes / 12))))
@@ -117,17 +144,9 @@ def _group(problem: Continuum, rows: Index, ends: tuple[bool, bool], aim: _Aim) 
     strained = np.zeros(len(elements) - 1, dtype=bool)
     strained[0] |= ends[0]
     strained[-1] |= ends[1]
-    try:
-        pieces, unresolved, smoothness = _quadrature(problem, elements, strained)
-    except TooFineError as error:
-        if error.sets == 1:
-            raise
-        half = len(rows) // 2
-        parts = (np.arange(half), np.arange(half, len(rows)))
-        return [item for part in parts for item in _group(problem.take(part), rows[part], ends, aim)]
+    pieces, unresolved, smoothness = _quadrature(problem, elements, strained)
     degree = 8 + int(np.ceil(1.8 * modes / (len(elements) - 1)))
-    mesh = Mesh(pieces, elements, degree, strained, smoothness)
-    return _refined(problem, rows, mesh, unresolved, aim)
+    return problem, Mesh(pieces, elements, degree, strained, smoothness), unresolved
 
 
 def _quadrature(problem: Continuum, elements: Array, strained: NDArray[np.bool_]) -> tuple[Array, Array, int]:

@@ -8,6 +8,7 @@ infinite spring holds.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from .stress import Columns
 
-__all__ = ["BuckledError", "Spectrum", "spectrum"]
+__all__ = ["BuckledError", "Spectrum", "bases", "spectrum"]
 
 Array = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
@@ -70,24 +71,45 @@ def spectrum(columns: Columns, modes: int) -> Spectrum:
     ValueError
         If there are fewer modes, or no motion has kinetic energy.
     """
-    rows, springs = columns.held
-    free = _rigid_motions(columns, rows, springs)
-    sizes = np.array([len(motion) for motion in free])
-    parts = []
-    for size in np.unique(sizes):
-        sets = np.nonzero(sizes == size)[0]
-        still = np.stack([free[k] for k in sets])
-        parts.append((sets, _Problem(columns, sets, rows[sets], springs[sets], still).solved(modes)))
+    parts = [(problem.sets, problem.solved(modes)) for problem in _problems(columns)]
     if len(parts) == 1:
         return parts[0][1]
     shape = {name: getattr(parts[0][1], name).shape[1:] for name in Spectrum.__dataclass_fields__}
-    joined = {name: np.zeros((len(sizes), *tail)) for name, tail in shape.items()}
+    joined = {name: np.zeros((columns.sets, *tail)) for name, tail in shape.items()}
     for sets, part in parts:
         for name, whole in joined.items():
             found = getattr(part, name)
             width = min(found.shape[1], whole.shape[1])
             whole[sets, :width] = found[:, :width]
     return Spectrum(**joined)
+
+
+def bases(columns: Columns) -> Iterator[tuple[NDArray[np.intp], Array, Array, Callable[[], Array]]]:
+    """Yield sets with equally many rigid-body motions, and motions in which their stiffness is one.
+
+    Yields
+    ------
+    sets : ndarray of int
+    elastic : ndarray, shape (sets, size, size)
+        Rows of unit strain energy, orthogonal to each other, no potential that may be negative included. Rows of zeros
+        stand for what infinite springs hold.
+    rigid : ndarray, shape (sets, motions, size)
+        Rows without strain energy; orthonormal, and orthogonal to the elastic ones, with respect to the mass.
+    root : callable
+        ``root()`` returns F with F' F = M of the unknowns, (sets, more than size, size).
+    """
+    for problem in _problems(columns):
+        yield problem.sets, problem.unloaded(), problem.still, problem._mass_factor
+
+
+def _problems(columns: Columns) -> Iterator[_Problem]:
+    rows, springs = columns.held
+    free = _rigid_motions(columns, rows, springs)
+    sizes = np.array([len(motion) for motion in free])
+    for size in np.unique(sizes):
+        sets = np.nonzero(sizes == size)[0]
+        still = np.stack([free[k] for k in sets])
+        yield _Problem(columns, sets, rows[sets], springs[sets], still)
 
 
 def _rigid_motions(columns: Columns, rows: Array, springs: Array) -> list[Array]:
@@ -151,12 +173,7 @@ class _Problem:
 
     def solved(self, modes: int) -> Spectrum:
         """Return the lowest modes, those of rigid-body motions first."""
-        base, taken = self._base()
-        inverse, scale = self._inverse_factor(base)
-        projected = inverse @ (scale[:, :, None] * self.rows.swapaxes(-1, -2))  # L^-1 b, (sets, size, rows)
-        factor = self._springs(projected, taken)
-        operator = inverse * scale[:, None, :]  # L^-1
-        operator = factor.swapaxes(-1, -2) @ operator if factor is not None else operator
+        operator = self.unloaded()
         if self.potential is not None and self._loaded:
             operator, loading = self._loaded_factor(operator)
         else:
@@ -173,6 +190,15 @@ class _Problem:
         unknowns = vectors @ operator  # x = L^-T u
         kinetic = self._kinetic(unknowns)
         return self._spectrum(unknowns, kinetic, values, loading, number)
+
+    def unloaded(self) -> Array:
+        """Return L^-1 of the structure with its springs, without potential that may be negative."""
+        base, taken = self._base()
+        inverse, scale = self._inverse_factor(base)
+        projected = inverse @ (scale[:, :, None] * self.rows.swapaxes(-1, -2))  # L^-1 b, (sets, size, rows)
+        factor = self._springs(projected, taken)
+        operator: Array = inverse * scale[:, None, :]  # L^-1
+        return operator if factor is None else factor.swapaxes(-1, -2) @ operator
 
     @property
     def _loaded(self) -> bool:

@@ -1,0 +1,273 @@
+"""Any linear motion on the stress basis: dampers, gyroscopic forces and forces that follow the motion included.
+
+In motions of unit strain energy, unloaded and without dampers, the problem of motions ``exp(s t)`` is
+``(K + s C + s^2 S^2) d = 0`` with K one plus what further forces add, and S the square root of the mass. With
+``e = s S d``, and ``g = c b' d`` for a strong damper c on ``b' d``, it is a linear pencil ``(A + s B) w = 0`` of
+bounded matrices, and the largest ``1 / (s - shift)`` belong to the lowest eigenvalues.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .continuum import Continuum
+from .stress import Columns
+from .stress_mesh import Mesh
+from .stress_spectrum import bases
+
+__all__ = ["GeneralContinuum", "Reduced", "reduced"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Index = NDArray[np.intp]
+SHIFT = 0.7318
+"""Real and positive, in units of the rate, a natural frequency without dampers and loads: no eigenvalue of a problem
+that somebody states lies there."""
+_SLOW = 1e-2
+"""Eigenvalues that are taken without a shift, in the same unit."""
+_STRONG = 1e3
+"""Dampers beyond this, in the same unit, have their force as an unknown."""
+_HEAVY, _SPREAD = 4, 1e-3
+"""Where the fifth root of a mass is this much smaller than the first (soft springs, heavy ends), the eigenvalues of the
+mass have lost digits, and its singular values take their place."""
+_NEVER = 1e-13
+"""Of 1 / (s - shift) relative to the largest: infinite eigenvalues, which have no motion."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GeneralContinuum(Continuum):
+    """A continuum with forces of any kind beside its energies, which are then positive.
+
+    Its coefficients have two more parts, of pairs of jets (highest derivatives h of the fields, then s): 'N' and 'C',
+    the forces on the first by the second and by its velocity.
+
+    Attributes
+    ----------
+    end_forces : ndarray, shape (2, rows, 2 n + m, 2 n + m)
+        What displacements and velocities of ends and lumped coordinates add to the forces there.
+    point_forces : tuple of ndarray, shape (2, rows, n + m, n + m)
+        The same at each of the points.
+    dampers : tuple of ndarray, shape (rows, dampers, 2 n + m), (rows, dampers)
+        Directions at the ends and damping constants, beside the end forces.
+    damped : bool
+        Whether there are forces of velocities at all.
+    """
+
+    end_forces: Array
+    point_forces: tuple[Array, ...]
+    dampers: tuple[Array, Array]
+    damped: bool
+
+    def take(self, rows: Index) -> Self:
+        """Return the problem of some of the parameter sets."""
+        return replace(
+            super().take(rows),
+            end_forces=self.end_forces[:, rows],
+            point_forces=tuple(forces[:, rows] for forces in self.point_forces),
+            dampers=(self.dampers[0][rows], self.dampers[1][rows]),
+        )
+
+    def sample(self, strained: bool) -> Callable[[Array], Array]:
+        """Return all coefficients as one array."""
+        energies, rows = super().sample(strained), np.arange(len(self.edges))
+
+        def values(x: Array) -> Array:
+            found = self.coefficients(x, rows)
+            forces = [np.broadcast_to(entry, x.shape) for name in "NC" for entry in found[name].values()]
+            return np.concatenate([energies(x), np.array(forces).reshape(-1, *x.shape)])
+
+        return values
+
+    def loaded(self) -> GeneralContinuum:
+        """Return the problem with the potential energy of displacements among the forces: it need not be positive."""
+        fields = len(self.orders)
+
+        def coefficients(x: Array, rows: Index) -> dict[str, dict[tuple[int, int], Array]]:
+            found = {name: dict(part) for name, part in self.coefficients(x, rows).items()}
+            for (i, j), entry in found.pop("R").items():
+                pair = i + fields, j + fields
+                found["N"][pair] = found["N"].get(pair, 0.0) + entry
+            return {**found, "R": {}}
+
+        return replace(self, coefficients=coefficients)  # type: ignore[arg-type]
+
+
+class _Forces(Columns):
+    """Columns with the matrices of forces of any kind."""
+
+    problem: GeneralContinuum
+
+    @cached_property
+    def jets(self) -> list[Array]:
+        """Highest derivatives of the fields, then displacements, of each unknown at the points."""
+        moved, tops = self.displaced[0], self.problem.tops()
+        highest = [self._rate(place, tops, [*moved]) for place in tops]
+        return [h for h in highest if h is not None] + moved
+
+    def forces(self, power: int) -> Array:
+        """Return the matrix of the forces of displacements (0) or velocities (1), (sets, size, size)."""
+        total = np.zeros((self.sets, self.size, self.size))
+        for (i, j), entry in self.coefficient["NC"[power]].items():
+            total += self._product(entry, self.jets[i], self.jets[j])
+        total += self.ends.swapaxes(-1, -2) @ self.problem.end_forces[power] @ self.ends
+        for matrix, there in zip(self.problem.point_forces, self.at_points, strict=True):
+            total += there.swapaxes(-1, -2) @ matrix[power] @ there
+        return total
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """The pencil of sets with equally many rigid-body motions; time is in units of ``1 / rate``.
+
+    Attributes
+    ----------
+    sets : ndarray of int
+        Positions of the sets in the problem.
+    columns : Columns
+    motions : ndarray, shape (sets, k, size)
+        Unknowns of the columns for a unit of each coordinate d.
+    root_mass : ndarray, shape (sets, k)
+        Diagonal of S.
+    stiffness, damping : ndarray, shape (sets, k, k)
+        K and C, strong dampers left out.
+    directions, constants : ndarray, shape (sets, k, g), (sets, g)
+        Strong dampers.
+    rate : ndarray, shape (sets,)
+        First natural frequency without loads and dampers, rad/s; beside soft springs or heavy ends the fifth.
+    rigid : int
+        How many motions, the last ones, have no strain energy.
+    damped : bool
+    """
+
+    sets: Index
+    columns: Columns
+    motions: Array
+    root_mass: Array
+    stiffness: Array
+    damping: Array
+    directions: Array
+    constants: Array
+    rate: Array
+    rigid: int
+    damped: bool
+
+    def pencil(self) -> tuple[Array, Array]:
+        """Return A and B with ``(A + s B) (d, e, g) = 0``, s in units of the rate."""
+        sets, k = self.root_mass.shape
+        size = 2 * k + self.constants.shape[1]
+        first, second = np.zeros((sets, size, size)), np.zeros((sets, size, size))
+        d, e, g = np.arange(k), np.arange(k, 2 * k), np.arange(2 * k, size)
+        first[:, :k, :k], second[:, :k, :k] = self.stiffness, self.damping
+        first[:, e, e] = -1.0
+        second[:, d, e] = second[:, e, d] = self.root_mass
+        first[:, g, g] = -1.0 / np.maximum(self.constants, 1.0)
+        pull = self.directions * np.sqrt(np.minimum(self.constants, 1.0))[:, None]
+        first[:, 2 * k :, :k], second[:, :k, 2 * k :] = pull.swapaxes(-1, -2), pull
+        return first, second
+
+    def eigenvalues(self) -> Complex:
+        """Return all eigenvalues s, rad/s, by ascending modulus, nan behind the last, shape (sets, number).
+
+        A rigid-body motion that nothing accelerates is one zero.
+        """
+        found = self._of_velocities() if self.damped else self._of_squares()
+        if self.rigid:
+            _rest(self, found)
+        found = np.take_along_axis(found, np.argsort(np.abs(found), axis=1, kind="stable"), axis=1)
+        return found * self.rate[:, None]
+
+    def _of_squares(self) -> Complex:
+        """Return both s of every s^2: for forces of displacements alone."""
+        s = self.root_mass
+        matrix = self.stiffness.copy()
+        diagonal = np.arange(s.shape[1])
+        matrix[:, diagonal, diagonal] += SHIFT * s**2
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mu = np.linalg.eigvals(s[:, :, None] * np.linalg.solve(matrix, s[:, :, None] * np.eye(s.shape[1])))
+            squares = SHIFT - 1.0 / np.where(_small(mu), np.nan, mu)  # s^2
+            root = np.sqrt(squares.astype(complex))
+        return np.concatenate([root, -root], axis=1)
+
+    def _of_velocities(self) -> Complex:
+        first, second = self.pencil()
+        found = _inverted(first, second, SHIFT)
+        slow = np.abs(found) < _SLOW
+        if not self.rigid and slow.any() and not (np.linalg.cond(self.stiffness) > 1e10).any():
+            other = _inverted(first, second, 0.0)  # relatively exact, the shifted ones absolutely
+            order = np.argsort(np.abs(found), axis=1, kind="stable")
+            found = np.take_along_axis(found, order, axis=1)
+            other = np.take_along_axis(other, np.argsort(np.abs(other), axis=1, kind="stable"), axis=1)
+            found = np.where(np.abs(found) < _SLOW, other, found)
+        return found
+
+
+def _inverted(first: Array, second: Array, shift: float) -> Complex:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mu = np.linalg.eigvals(np.linalg.solve(first + shift * second, second))
+        return np.asarray(shift - 1.0 / np.where(_small(mu), np.nan, mu), dtype=complex)
+
+
+def _small(mu: NDArray[np.generic]) -> NDArray[np.bool_]:
+    size = np.abs(mu)
+    small: NDArray[np.bool_] = size <= _NEVER * size.max(axis=1, keepdims=True)
+    return small
+
+
+def _rest(problem: Reduced, found: Complex) -> None:
+    """Put one zero for every motion without stiffness in place of the eigenvalues it has there (in place)."""
+    left, size, right = np.linalg.svd(problem.stiffness)
+    for row in range(len(found)):
+        still = size[row] <= 1e-11 * size[row].max(initial=1.0)
+        if not still.any():
+            continue
+        test, move = left[row][:, still].T, right[row][still].T
+        matrix = problem.damping[row] + (problem.directions[row] * problem.constants[row]) @ problem.directions[row].T
+        matrix = matrix if problem.damped else np.diag(problem.root_mass[row] ** 2)
+        number = int(still.sum())
+        free = number - int(np.linalg.matrix_rank(test @ matrix @ move, tol=1e-9 * np.abs(matrix).max(initial=1e-300)))
+        drop = number + free if problem.damped else 2 * (number + free)
+        place = np.argsort(np.abs(found[row]), kind="stable")[:drop]
+        found[row, place] = np.nan
+        found[row, place[:number]] = 0.0
+
+
+def reduced(problem: GeneralContinuum, mesh: Mesh) -> Iterator[Reduced]:
+    """Yield the pencils of all rows on a mesh."""
+    columns = _Forces(problem, mesh)
+    if any(bool((entry < 0.0).any()) for entry in columns.coefficient["R"].values()):
+        columns = _Forces(problem.loaded(), mesh)
+    forces = columns.forces(0)
+    drag = columns.forces(1) if problem.damped else None
+    for sets, elastic, rigid, mass_factor in bases(columns):
+        square, frame = np.linalg.eigh(elastic @ columns.mass[sets] @ elastic.swapaxes(-1, -2))
+        size, turn = np.sqrt(np.maximum(square, 0.0))[:, ::-1], frame.swapaxes(-1, -2)[:, ::-1]
+        fifth = size[:, min(_HEAVY, size.shape[1] - 1)]
+        light = fifth < _SPREAD * size[:, 0]
+        if light.any():
+            _, size, turn = np.linalg.svd(mass_factor() @ elastic.swapaxes(-1, -2), full_matrices=False)
+        rate = 1.0 / np.where(light & (fifth > 0.0), fifth, np.where(size[:, 0] > 0.0, size[:, 0], 1.0))
+        motions = np.concatenate([turn @ elastic, rigid / rate[:, None, None]], axis=1)
+        root = np.concatenate([size * rate[:, None], np.ones(rigid.shape[:2])], axis=1)
+        back = motions.swapaxes(-1, -2)
+        stiffness = motions @ forces[sets] @ back
+        own = np.arange(elastic.shape[1])
+        stiffness[:, own, own] += 1.0
+        damping = np.zeros_like(stiffness) if drag is None else rate[:, None, None] * (motions @ drag[sets] @ back)
+        pull = motions @ columns.ends[sets].swapaxes(-1, -2) @ problem.dampers[0][sets].swapaxes(-1, -2)
+        constants = rate[:, None] * problem.dampers[1][sets]
+        strong = (constants * (pull**2).sum(axis=1) > _STRONG).any(axis=0)
+        weak = pull[:, :, ~strong]
+        damping += (weak * constants[:, None, ~strong]) @ weak.swapaxes(-1, -2)
+        pull, constants = pull[:, :, strong], constants[:, strong]
+        length = np.sqrt((pull**2).sum(axis=1))
+        length = np.where(length > 0.0, length, 1.0)
+        yield Reduced(
+            sets, columns, motions, root, stiffness, damping, pull / length[:, None], constants * length**2, rate,
+            rigid.shape[1], problem.damped,
+        )  # fmt: skip

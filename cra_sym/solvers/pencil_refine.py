@@ -1,0 +1,178 @@
+"""Complex eigenvalues of stated accuracy: the lowest of a pencil on one mesh must come back on a finer one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .pencil import Complex, GeneralContinuum, Index, Reduced, reduced
+from .stress_mesh import Mesh, TooFineError
+from .stress_refine import alike, meshed
+
+__all__ = ["Settled", "lowest_eigenvalues", "meshes"]
+
+Array = NDArray[np.float64]
+TOLERANCE = 1e-10
+"""Relative difference of an eigenvalue on two meshes; that of the finer one from the limit is far smaller."""
+_STEPS = 4, 6  # degrees between the first two meshes, and between later ones
+_MOST_DEGREE, _MOST_UNKNOWNS = 34, 420
+_LANES = 400_000  # numbers in the largest array of a chunk
+_NEAR = 1e-3
+"""Relative distance of two eigenvalues that are compared by their mean and their product: where they meet, each of them
+is known to half the digits only, by nature."""
+_REAL = 1e-7
+"""Relative imaginary part below which a pair cannot be told from a double real eigenvalue."""
+
+
+@dataclass(frozen=True)
+class Settled:
+    """Lowest eigenvalues of a batch.
+
+    Attributes
+    ----------
+    values : ndarray of complex, shape (rows, modes)
+        By ascending modulus, one of each conjugate pair; the best known where they did not settle, nan where there are
+        no more.
+    error : ndarray, shape (rows, modes)
+        Relative difference of two meshes.
+    """
+
+    values: Complex
+    error: Array
+
+
+def lowest_eigenvalues(problem: GeneralContinuum, modes: int, oscillating: bool) -> Settled:
+    """Return the lowest eigenvalues of every row, on finer and finer meshes until they settle.
+
+    Parameters
+    ----------
+    problem : GeneralContinuum
+    modes : int
+    oscillating : bool
+        Leave out real eigenvalues.
+    """
+    rows = len(problem.edges)
+    found = Settled(np.full((rows, modes), np.nan, dtype=complex), np.full((rows, modes), np.inf))
+    for part, chosen, mesh in meshes(problem, modes):
+        open_, before = np.arange(len(part)), None
+        for finer in _sequence(mesh):
+            results = [_all(chosen.take(open_[k]), finer) for k in _chunks(chosen, finer, len(open_))]
+            values, rate = _joined([values for values, _ in results]), np.concatenate([rate for _, rate in results])
+            if before is not None:
+                picked, error = _compared(values, before, rate, modes, oscillating)
+                place = part[open_]
+                found.values[place], found.error[place] = picked, error
+                still = (error > TOLERANCE).any(axis=1)
+                open_, values = open_[still], values[still]
+            before = values
+            if not len(open_):
+                break
+    return found
+
+
+def meshes(problem: GeneralContinuum, modes: int) -> Iterator[tuple[Index, GeneralContinuum, Mesh]]:
+    """Yield rows that are alike, their problem, and a mesh to begin with."""
+    waiting = [(rows, problem.take(rows), ends) for rows, ends in alike(problem)]
+    while waiting:
+        rows, part, ends = waiting.pop()
+        try:
+            chosen, mesh, unresolved = meshed(part, ends, modes)
+        except TooFineError:
+            if len(rows) == 1:
+                raise
+            half = len(rows) // 2
+            waiting += [(rows[k], part.take(k), ends) for k in (np.arange(half), np.arange(half, len(rows)))]
+            continue
+        if (unresolved > TOLERANCE).any():
+            raise ValueError(
+                f"values: the coefficients along x are resolved to {unresolved.max():.1g} of their integral only; "
+                "state jumps by Piecewise or Heaviside"
+            )
+        yield rows, chosen, mesh  # type: ignore[misc]
+
+
+def _sequence(mesh: Mesh) -> Iterator[Mesh]:
+    """Yield finer and finer meshes: higher degrees, then smaller elements."""
+    first, later = _STEPS
+    mesh = replace(mesh, degree=mesh.degree - 2)
+    yield mesh
+    mesh = replace(mesh, degree=mesh.degree + first)
+    while (len(mesh.elements) - 1) * (mesh.degree + 1) <= _MOST_UNKNOWNS:
+        yield mesh
+        if mesh.degree + later <= _MOST_DEGREE and len(mesh.elements) < 20:
+            mesh = replace(mesh, degree=mesh.degree + later)
+        else:
+            mesh = mesh.split(np.ones(len(mesh.elements) - 1, dtype=bool))
+
+
+def _chunks(problem: GeneralContinuum, mesh: Mesh, number: int) -> Iterator[Index]:
+    size = problem.displacements + len(problem.orders) * (len(mesh.elements) - 1) * (mesh.degree + 1)
+    step = max(1, _LANES // (size * max(4 * size, (len(mesh.pieces) - 1) * mesh.points)))
+    for start in range(0, number, step):
+        yield np.arange(start, min(start + step, number))
+
+
+def _all(problem: GeneralContinuum, mesh: Mesh) -> tuple[Complex, Array]:
+    """Return all eigenvalues of every row, nan behind the last, and the rates."""
+    parts: list[Reduced] = list(reduced(problem, mesh))
+    values = [part.eigenvalues() for part in parts]
+    whole = np.full((len(problem.edges), max(v.shape[1] for v in values)), np.nan, dtype=complex)
+    rate = np.empty(len(whole))
+    for part, value in zip(parts, values, strict=True):
+        whole[part.sets, : value.shape[1]] = value
+        rate[part.sets] = part.rate
+    return whole, rate
+
+
+def _joined(parts: list[Complex]) -> Complex:
+    """Return parts of a batch as one, nan where a part has fewer columns."""
+    width = max(part.shape[1] for part in parts)
+    pad = (np.pad(part, ((0, 0), (0, width - part.shape[1])), constant_values=np.nan) for part in parts)
+    return np.concatenate(list(pad))
+
+
+def _compared(fine: Complex, coarse: Complex, rate: Array, modes: int, oscillating: bool) -> tuple[Complex, Array]:
+    """Return the first eigenvalues of one of each pair, and how far they are from those of the coarser mesh."""
+    size = np.abs(fine)
+    with np.errstate(invalid="ignore"):
+        wanted = fine.imag > _REAL * size if oscillating else fine.imag >= -_REAL * size
+    order = np.argsort(~wanted, axis=1, kind="stable")[:, :modes]
+    order = np.pad(order, ((0, 0), (0, modes - order.shape[1])), constant_values=0)
+    there = np.take_along_axis(wanted, order, axis=1) & (np.arange(modes) < wanted.sum(axis=1)[:, None])
+    width = min(int(np.where(there, order, 0).max(initial=0)) + 4, fine.shape[1])
+    near = _matched(fine[:, :width], coarse)
+    scale = np.maximum(size[:, :width], 1e-5 * rate[:, None])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        error = np.abs(near - fine[:, :width]) / np.where(size[:, :width] > 0.0, size[:, :width], 1.0)
+        gap = np.abs(fine[:, :width, None] - fine[:, None, :width])
+        gap[:, np.arange(width), np.arange(width)] = np.inf
+        gap = np.where(np.isnan(gap), np.inf, gap)
+        other = gap.argmin(axis=2)
+        mate, near_mate = (np.take_along_axis(s[:, :width], other, axis=1) for s in (fine, near))
+        pair = np.maximum(
+            0.5 * np.abs(near + near_mate - fine[:, :width] - mate) / scale,
+            np.abs(near * near_mate - fine[:, :width] * mate) / scale**2,
+        )
+        close = np.take_along_axis(gap, other[..., None], axis=2)[..., 0] <= _NEAR * scale
+        error = np.where(close, np.minimum(error, pair), error)
+    error = np.where(np.isnan(error), np.inf, error)
+    picked = np.where(there, np.take_along_axis(fine, order, axis=1), np.nan)
+    return picked, np.where(there, np.take_along_axis(error, np.minimum(order, width - 1), axis=1), np.inf)
+
+
+def _matched(fine: Complex, coarse: Complex) -> Complex:
+    """Return the nearest eigenvalue of the coarser mesh for each, none twice."""
+    free = np.where(np.isnan(coarse), np.inf, coarse)
+    near = np.empty_like(fine)
+    rows = np.arange(len(fine))
+    for k in range(fine.shape[1]):
+        with np.errstate(invalid="ignore"):
+            distance = np.abs(free - fine[:, k : k + 1])
+        distance = np.where(np.isnan(distance), np.inf, distance)
+        place = distance.argmin(axis=1)
+        near[:, k] = free[rows, place]
+        free[rows, place] = np.inf
+    return near
