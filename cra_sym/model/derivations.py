@@ -21,15 +21,19 @@ from cra_sym.model.lagrangian import Model
 from cra_sym.model.moving import jumps
 from cra_sym.model.observables import named_observables, observable
 from cra_sym.model.one_wave import one_wave_route
-from cra_sym.model.pencil_route import PencilRoute, pencil_route
+from cra_sym.model.pencil_route import pencil_route as pencil
 from cra_sym.model.projection import EndParameter, Form, Load
 from cra_sym.model.routes import GeneralRoute, Route
 from cra_sym.model.spatial import SpatialProblem, spatial_problem
 from cra_sym.model.symmetry import asymmetry
 from cra_sym.model.two_waves import two_waves_route
 
+<<<<<<< HEAD
 __all__ = ["axial", "causes", "constant", "damping", "geometry", "load", "named_observables", "names", "observable",
            "rates", "route", "spatial"]  # fmt: skip
+=======
+__all__ = ["axial", "causes", "constant", "damping", "geometry", "load", "names", "pencil", "rates", "route", "spatial"]
+>>>>>>> 4455a89 (Test complex eigenvalues against closed forms, shooting and the count)
 
 
 def names(model: Model) -> tuple[str, ...]:
@@ -72,11 +76,6 @@ def route(model: Model) -> Route:
 def general_route(model: Model) -> Route:
     """Return the route that serves all values."""
     return GeneralRoute(spatial(model))
-
-
-def pencil(model: Model) -> PencilRoute | None:
-    """Return the route to complex eigenvalues, or None if only the dynamic stiffness gives them."""
-    return pencil_route(model)
 
 
 # Loads -----------------------------------------------------------------------------------------------------------
