@@ -28,12 +28,8 @@ from cra_sym.model.spatial import SpatialProblem, spatial_problem
 from cra_sym.model.symmetry import asymmetry
 from cra_sym.model.two_waves import two_waves_route
 
-<<<<<<< HEAD
 __all__ = ["axial", "causes", "constant", "damping", "geometry", "load", "named_observables", "names", "observable",
-           "rates", "route", "spatial"]  # fmt: skip
-=======
-__all__ = ["axial", "causes", "constant", "damping", "geometry", "load", "names", "pencil", "rates", "route", "spatial"]
->>>>>>> 4455a89 (Test complex eigenvalues against closed forms, shooting and the count)
+           "pencil", "rates", "route", "spatial"]  # fmt: skip
 
 
 def names(model: Model) -> tuple[str, ...]:

@@ -30,7 +30,8 @@ def number_inside(problem: DynamicStiffness, row: int, centre: complex, radius: 
     Raises
     ------
     ArithmeticError
-        If an eigenvalue lies on the circle, or so near that 8192 points do not tell.
+        If an eigenvalue lies on the circle, or so near that 8192 points do not tell, or rounding has left the function
+        no digits there.
     """
     least, most = _POINTS
     total, number = 0.0 + 0.0j, 0
@@ -46,7 +47,10 @@ def number_inside(problem: DynamicStiffness, row: int, centre: complex, radius: 
         if near and before == whole:
             return whole
         before = whole if near else None
-    raise ArithmeticError(f"an eigenvalue lies within about {4 * radius / most:.1g} of the circle; change the radius")
+    raise ArithmeticError(
+        f"an eigenvalue lies within about {4 * radius / most:.1g} of the circle, or rounding leaves no digits there; "
+        "change the radius"
+    )
 
 
 def _sum(problem: DynamicStiffness, row: int, centre: complex, arm: NDArray[np.complex128]) -> complex:

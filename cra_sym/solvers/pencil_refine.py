@@ -15,8 +15,6 @@ from .stress_refine import alike, meshed
 __all__ = ["Settled", "lowest_eigenvalues", "meshes"]
 
 Array = NDArray[np.float64]
-TOLERANCE = 1e-10
-"""Relative difference of an eigenvalue on two meshes; that of the finer one from the limit is far smaller."""
 _STEPS = 4, 6  # degrees between the first two meshes, and between later ones
 _MOST_DEGREE, _MOST_UNKNOWNS = 34, 420
 _LANES = 400_000  # numbers in the largest array of a chunk
@@ -44,7 +42,7 @@ class Settled:
     error: Array
 
 
-def lowest_eigenvalues(problem: GeneralContinuum, modes: int, oscillating: bool) -> Settled:
+def lowest_eigenvalues(problem: GeneralContinuum, modes: int, oscillating: bool, tolerance: float) -> Settled:
     """Return the lowest eigenvalues of every row, on finer and finer meshes until they settle.
 
     Parameters
@@ -53,10 +51,12 @@ def lowest_eigenvalues(problem: GeneralContinuum, modes: int, oscillating: bool)
     modes : int
     oscillating : bool
         Leave out real eigenvalues.
+    tolerance : float
+        Relative difference of an eigenvalue on two meshes; that of the finer one from the limit is far smaller.
     """
     rows = len(problem.edges)
     found = Settled(np.full((rows, modes), np.nan, dtype=complex), np.full((rows, modes), np.inf))
-    for part, chosen, mesh in meshes(problem, modes):
+    for part, chosen, mesh in meshes(problem, modes, tolerance):
         open_, before = np.arange(len(part)), None
         for finer in _sequence(mesh):
             results = [_all(chosen.take(open_[k]), finer) for k in _chunks(chosen, finer, len(open_))]
@@ -65,7 +65,7 @@ def lowest_eigenvalues(problem: GeneralContinuum, modes: int, oscillating: bool)
                 picked, error = _compared(values, before, rate, modes, oscillating)
                 place = part[open_]
                 found.values[place], found.error[place] = picked, error
-                still = (error > TOLERANCE).any(axis=1)
+                still = (error > tolerance).any(axis=1)
                 open_, values = open_[still], values[still]
             before = values
             if not len(open_):
@@ -73,7 +73,7 @@ def lowest_eigenvalues(problem: GeneralContinuum, modes: int, oscillating: bool)
     return found
 
 
-def meshes(problem: GeneralContinuum, modes: int) -> Iterator[tuple[Index, GeneralContinuum, Mesh]]:
+def meshes(problem: GeneralContinuum, modes: int, tolerance: float) -> Iterator[tuple[Index, GeneralContinuum, Mesh]]:
     """Yield rows that are alike, their problem, and a mesh to begin with."""
     waiting = [(rows, problem.take(rows), ends) for rows, ends in alike(problem)]
     while waiting:
@@ -86,7 +86,7 @@ def meshes(problem: GeneralContinuum, modes: int) -> Iterator[tuple[Index, Gener
             half = len(rows) // 2
             waiting += [(rows[k], part.take(k), ends) for k in (np.arange(half), np.arange(half, len(rows)))]
             continue
-        if (unresolved > TOLERANCE).any():
+        if (unresolved > tolerance).any():
             raise ValueError(
                 f"values: the coefficients along x are resolved to {unresolved.max():.1g} of their integral only; "
                 "state jumps by Piecewise or Heaviside"
