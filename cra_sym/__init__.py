@@ -23,6 +23,7 @@ _HOME = {
     "eigenvalues": "analysis.eigenvalues",
     "damping_ratios": "analysis.eigenvalues",
     "count_eigenvalues": "analysis.eigenvalues",
+    "critical_value": "analysis.critical",
     "BaseMotion": "solvers.motion",
     "Force": "solvers.motion",
     "UndersamplingWarning": "analysis.responses",

@@ -1,4 +1,5 @@
 from .analysis.certification import certify as certify
+from .analysis.critical import critical_value as critical_value
 from .analysis.eigenvalues import count_eigenvalues as count_eigenvalues
 from .analysis.eigenvalues import damping_ratios as damping_ratios
 from .analysis.eigenvalues import eigenvalues as eigenvalues

@@ -182,6 +182,26 @@ class Reduced:
         found = np.take_along_axis(found, np.argsort(np.abs(found), axis=1, kind="stable"), axis=1)
         return found * self.rate[:, None]
 
+    def frequency(self, mode: int) -> Array:
+        """Return a natural frequency without loads and dampers, rad/s, shape (sets,); the last if there are fewer."""
+        elastic = self.root_mass[:, : self.root_mass.shape[1] - self.rigid]
+        place = min(max(mode - self.rigid, 1), elastic.shape[1]) - 1
+        return self.rate / np.maximum(elastic[:, place], 1e-100)
+
+    def lossless(self) -> NDArray[np.bool_]:
+        """Return in which sets the eigenvalues come in pairs s and -s: no force does work on a motion and its reverse.
+
+        There are no velocities in the forces, or they are gyroscopic and all others have a potential.
+        """
+        if not self.damped:
+            return np.ones(len(self.sets), dtype=bool)
+        own = np.abs(self.damping + self.damping.swapaxes(-1, -2)).max(axis=(1, 2))
+        follower = np.abs(self.stiffness - self.stiffness.swapaxes(-1, -2)).max(axis=(1, 2))
+        gyroscopic = own <= 1e-10 * np.abs(self.damping).max(axis=(1, 2))
+        potential = follower <= 1e-10 * np.abs(self.stiffness).max(axis=(1, 2))
+        unused = (np.abs(self.damping).max(axis=(1, 2)) == 0.0) & ~self.constants.any(axis=1)
+        return unused | (gyroscopic & potential & ~self.constants.any(axis=1))
+
     def _of_squares(self) -> Complex:
         """Return both s of every s^2: for forces of displacements alone."""
         s = self.root_mass

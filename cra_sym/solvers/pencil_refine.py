@@ -12,7 +12,7 @@ from .pencil import Complex, GeneralContinuum, Index, Reduced, reduced
 from .stress_mesh import Mesh, TooFineError
 from .stress_refine import alike, meshed
 
-__all__ = ["Settled", "lowest_eigenvalues", "meshes"]
+__all__ = ["Settled", "lowest_eigenvalues", "meshes", "sequence"]
 
 Array = NDArray[np.float64]
 _STEPS = 4, 6  # degrees between the first two meshes, and between later ones
@@ -58,7 +58,7 @@ def lowest_eigenvalues(problem: GeneralContinuum, modes: int, oscillating: bool,
     found = Settled(np.full((rows, modes), np.nan, dtype=complex), np.full((rows, modes), np.inf))
     for part, chosen, mesh in meshes(problem, modes, tolerance):
         open_, before = np.arange(len(part)), None
-        for finer in _sequence(mesh):
+        for finer in sequence(mesh):
             results = [_all(chosen.take(open_[k]), finer) for k in _chunks(chosen, finer, len(open_))]
             values, rate = _joined([values for values, _ in results]), np.concatenate([rate for _, rate in results])
             if before is not None:
@@ -94,7 +94,7 @@ def meshes(problem: GeneralContinuum, modes: int, tolerance: float) -> Iterator[
         yield rows, chosen, mesh  # type: ignore[misc]
 
 
-def _sequence(mesh: Mesh) -> Iterator[Mesh]:
+def sequence(mesh: Mesh) -> Iterator[Mesh]:
     """Yield finer and finer meshes: higher degrees, then smaller elements."""
     first, later = _STEPS
     mesh = replace(mesh, degree=mesh.degree - 2)

@@ -1,0 +1,258 @@
+"""Where stability is lost as a parameter grows: divergence (buckling) or flutter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import islice
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from cra_sym.checks import count, default_floating_point, instance, real_array, shown
+from cra_sym.model.system import System
+from cra_sym.model.values import flat_columns
+from cra_sym.solvers.pencil import reduced
+from cra_sym.solvers.pencil_refine import meshes, sequence
+
+if TYPE_CHECKING:
+    from sympy import Symbol
+
+__all__ = ["CriticalValue", "critical_value"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Kind = Literal["divergence", "flutter"]
+_GROWTH = 1e-7, 1e-11
+"""Real part over modulus from where on a motion grows, without losses and with them; less is rounding, which without
+losses is large where two eigenvalues meet."""
+_SECTIONS = 33, 33  # values within the interval that the first stability loss was found in, and again
+_REACH = 1.2  # of the eigenvalues that are looked at, over the frequency of the last mode without loads and dampers
+_MESHES = 8
+
+
+@dataclass(frozen=True)
+class CriticalValue:
+    """Where stability is lost.
+
+    Attributes
+    ----------
+    value : float or ndarray
+        Of the parameter.
+    kind : {'divergence', 'flutter'} or ndarray of str
+        Static, with an eigenvalue that passes zero, or oscillating.
+    angular_frequency : float or ndarray
+        Of the motion that begins to grow, rad/s; 0 for divergence.
+    """
+
+    value: float | Array
+    kind: Kind | NDArray[np.str_]
+    angular_frequency: float | Array
+
+
+@default_floating_point
+def critical_value(
+    system: System, parameter: str | Symbol, between: tuple[float, float], *, modes: int = 6, points: int = 65
+) -> CriticalValue:
+    """Return the first value of a parameter in an interval at which the equilibrium loses its stability.
+
+    Parameters
+    ----------
+    system : System
+        Its own value of the parameter has no effect. Modal damping (zeta) is left out.
+    parameter : str or Symbol
+    between : (float, float)
+        Lower and upper value; at the lower one the system must be stable.
+    modes : int
+        Eigenvalues up to the frequency of this mode, without loads and dampers, are looked at.
+    points : int
+        Values that are tried. If the system is unstable only between two of them, that is not seen.
+
+    Returns
+    -------
+    CriticalValue
+        Shapes are that of the batch of the system, the parameter left out.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the parameter is unknown, the interval is not one, the system is unstable at its lower end, or stable at all
+        values that are tried.
+
+    Notes
+    -----
+    Sections by the complex eigenvalues enclose the first loss; there a function that changes its sign linearly is
+    solved for its zero: the determinant of the static stiffness for divergence; for flutter the squared difference of
+    the two squared eigenvalues that meet or, where dampers or other losses are, a real part. Elements are refined until
+    the value settles to the tolerance of the system.
+
+    References
+    ----------
+    Bolotin, Nonconservative Problems of the Theory of Elastic Stability, 1963.
+
+    Examples
+    --------
+    Euler's and Beck's columns:
+
+    >>> from sympy import symbols
+    >>> import cra_sym as cra
+    >>> from cra_sym.symbols import t, v, x
+    >>> P = symbols("P")
+    >>> euler = cra.Model(v.diff(t)**2 / 2 - v.diff(x, 2)**2 / 2 + P * v.diff(x)**2 / 2, fields=[v], x=x, domain=(0, 1),
+    ...                   t=t, essential=[v.subs(x, 0), v.diff(x).subs(x, 0)])
+    >>> round(critical_value(euler.at({P: 0}), P, between=(0, 10)).value, 9)
+    2.4674011
+    >>> beck = euler.replace(virtual_work=[(-P * v.diff(x), v, "right")])
+    >>> found = critical_value(beck.at({P: 0}), P, between=(0, 30))
+    >>> found.kind, round(found.value, 9), round(found.angular_frequency, 6)
+    ('flutter', 20.050953619, 11.015558)
+    """
+    instance("system", system, System)
+    name, low, high = _checked(system, parameter, between)
+    modes, points = count("modes", modes, high=100), count("points", points, low=2, high=100_000)
+    others = {key: value for key, value in system.values.items() if key != name}
+    shape = np.broadcast_shapes(*(np.shape(value) for value in others.values()))
+    columns = flat_columns([others.get(key, 0.0) for key in system.numerics("names")], shape)
+    place = list(system.numerics("names")).index(name)
+    found = [_Search(system, column, place, name, modes).first(low, high, points) for column in columns.T]
+    if not shape:
+        return CriticalValue(*found[0])
+    value, kind, omega = (np.array(part).reshape(shape) for part in zip(*found, strict=True))
+    return CriticalValue(value, kind, omega)
+
+
+def _checked(system: System, parameter: Any, between: Any) -> tuple[str, float, float]:
+    name = parameter if isinstance(parameter, str) else getattr(parameter, "name", shown(parameter))
+    if name not in system.numerics("names"):
+        raise ValueError(f"parameter = {name}: must be one of {', '.join(system.numerics('names'))}")
+    ends = real_array("between", between, must="two real numbers, the lower one first")
+    if ends.shape != (2,) or not (np.isfinite(ends).all() and ends[0] < ends[1]):
+        raise ValueError(f"between = {shown(between)}: must be two real numbers, the lower one first")
+    if system.numerics("pencil") is None:
+        raise ValueError("system: a density with third derivatives by x or a mass of the highest has no critical value")
+    return name, float(ends[0]), float(ends[1])
+
+
+class _FinestError(Exception):
+    """There is no finer mesh."""
+
+
+class _State(NamedTuple):
+    """What is known at one value: eigenvalues, the determinant of the static stiffness, whether nothing is lost."""
+
+    s: Complex
+    statics: float
+    lossless: bool
+
+
+class _Search:
+    """The search of one parameter set."""
+
+    def __init__(self, system: System, column: Array, place: int, name: str, modes: int) -> None:
+        self._pencil, self._column, self._place, self._name = system.numerics("pencil"), column, place, name
+        self._modes, self._tolerance = modes, system.tolerance
+        self._at = lru_cache(maxsize=None)(lambda value, level: self._states(np.array([value]), level)[0])
+
+    def first(self, low: float, high: float, points: int) -> tuple[float, Kind, float]:
+        """Return value, kind and angular frequency of the first loss of stability."""
+        if self._unstable(self._at(low, 1)):
+            what = _described(self._at(low, 1))
+            raise ValueError(f"between: the system is already unstable at {self._name} = {low:g} ({what})")
+        below, above = self._bracket(low, high, points)
+        for number in _SECTIONS:
+            below, above = self._bracket(below, above, number)
+        s = self._growing(self._at(above, 1))
+        kind: Kind = "divergence" if s.imag == 0.0 else "flutter"
+        before, value = np.inf, np.nan
+        for level in range(1, _MESHES):
+            try:
+                value = self._zero(kind, s, below, above, level)
+            except _FinestError:
+                break
+            if abs(value - before) <= self._tolerance * max(abs(value), 1e-6 * (high - low)):
+                return value, kind, self._omega(kind, s, self._at(value, level))
+            before = value
+        raise ArithmeticError(f"{self._name}: the critical value near {value:.6g} does not settle; ask for fewer modes")
+
+    @staticmethod
+    def _omega(kind: Kind, s: complex, state: _State) -> float:
+        """Return the angular frequency of the motion that is neutral; of two that meet it is known from their mean."""
+        if kind == "divergence":
+            return 0.0
+        if state.lossless:
+            return float(np.sqrt(max(_meeting(state, s).mean().real, 0.0)))
+        return float(abs(state.s[np.abs(state.s - s).argmin()].imag))
+
+    def _bracket(self, low: float, high: float, points: int) -> tuple[float, float]:
+        """Return the last stable and the first unstable of equidistant values."""
+        values = np.linspace(low, high, points)
+        unstable = np.array([self._unstable(state) for state in self._states(values[1:], 1)])
+        if not unstable.any():
+            raise ValueError(
+                f"between: the system is stable at all {points} values of {self._name} from {low:g} to {high:g}; ask "
+                "for a wider interval or, if it is unstable in a narrow one only, more points"
+            )
+        first = int(unstable.argmax())
+        return float(values[first]), float(values[first + 1])
+
+    def _zero(self, kind: Kind, s: complex, low: float, high: float, level: int) -> float:
+        """Return the zero of what changes sign in a bracket, which is widened if finer elements move it."""
+
+        def sign(value: float) -> float:
+            state = self._at(float(value), level)
+            if kind == "divergence":
+                return state.statics
+            if not state.lossless:
+                return float(-state.s[np.abs(state.s - s).argmin()].real)
+            first, second = _meeting(state, s)
+            return float(((first - second) ** 2).real)
+
+        for _ in range(12):
+            if sign(low) * sign(high) <= 0.0:
+                return float(brentq(sign, low, high, xtol=1e-300, rtol=8 * np.finfo(float).eps))
+            low, high = low - (high - low), high + (high - low)
+        raise ArithmeticError(
+            f"{self._name}: the loss of stability near {high:.6g} is not the crossing of one eigenvalue; "
+            "use eigenvalues"
+        )
+
+    def _unstable(self, state: _State) -> bool:
+        return bool((state.s.real > _GROWTH[0 if state.lossless else 1] * np.abs(state.s)).any())
+
+    @staticmethod
+    def _growing(state: _State) -> complex:
+        s = state.s[state.s.imag >= 0.0]
+        return complex(s[s.real.argmax()])
+
+    def _states(self, values: Array, level: int) -> list[_State]:
+        """Return what is known at the values, on the mesh of that level."""
+        columns = np.repeat(self._column[:, None], len(values), axis=1)
+        columns[self._place] = values
+        found: dict[int, _State] = {}
+        for rows, problem in self._pencil.problems(columns):
+            for part, chosen, mesh in meshes(problem, self._modes, self._tolerance):
+                finer = next(islice(sequence(mesh), level, None), None)
+                if finer is None:
+                    raise _FinestError
+                for reduction in reduced(chosen, finer):
+                    reach = _REACH * reduction.frequency(self._modes)
+                    statics = np.linalg.det(reduction.stiffness)
+                    for k, (s, lossless) in enumerate(zip(reduction.eigenvalues(), reduction.lossless(), strict=True)):
+                        near = s[np.abs(s) < reach[k]]
+                        found[int(rows[part[reduction.sets[k]]])] = _State(near, float(statics[k]), bool(lossless))
+        return [found[k] for k in range(len(values))]
+
+
+def _meeting(state: _State, s: complex) -> Complex:
+    """Return the two squared frequencies that are nearest to that of a motion."""
+    squares = -(state.s[(state.s.imag > 0.0)] ** 2)
+    return squares[np.argsort(np.abs(squares + (s**2).real), kind="stable")[:2]]
+
+
+def _described(state: _State) -> str:
+    s = state.s[state.s.real.argmax()]
+    if s.imag == 0.0:
+        return f"divergence, growth {s.real:.4g} 1/s"
+    return f"flutter at {abs(s.imag):.4g} rad/s, growth {s.real:.4g} 1/s"
