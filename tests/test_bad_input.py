@@ -173,13 +173,6 @@ def test_only_documented_errors(name, argument, monkeypatch, tmp_path):
     assert TRAP not in os.environ and not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("low", [5e-324, 1e-307, 1e-160])
-def test_two_springs_of_next_to_nothing_count_as_none(low):
-    """The product of both was no number, and the search for a zero of it did not end well."""
-    found = cra.frequency_parameters([low, low], [low, 1e-300], 0.1, modes=4)
-    np.testing.assert_allclose(found, np.broadcast_to(cra.frequency_parameters(0.0, 0.0, 0.1, modes=4), (2, 4)))
-
-
 @pytest.mark.parametrize(
     ("function", "argument", "value"),
     [("growth_rate", "angular_frequency", 1e-9), ("growth_rate", "epsilon", 1e20)],

@@ -5,6 +5,7 @@ from datetime import timedelta
 from decimal import Decimal
 from fractions import Fraction
 
+import mpmath
 import numpy as np
 import pytest
 import sympy as sp
@@ -283,6 +284,44 @@ def test_tiny_values_give_numbers(changes):
     # both come from one solver, to its accuracy; rigid-body modes that share a frequency may mix
     np.testing.assert_allclose(found.frequency[elastic], limit.frequency[elastic], rtol=1e-12)
     np.testing.assert_allclose(np.abs(found.tip_displacement[elastic]), limit.tip_displacement[elastic], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("k_t", "k_r", "E"),
+    [(1e4, np.inf, 1e300), (1e4, 1e3, 1e300), (0.0, 1e3, 1e300), (1e4, 0.0, 1e300), (1e4, 1e3, 1e160),
+     (1e-250, np.inf, 7e10), (1e-250, 1e-200, 7e10), (1e-305, 1e-200, 7e10), (1e-160, 1e-300, 7e10)],
+)  # fmt: skip
+def test_a_line_beside_which_a_spring_is_nothing_moves_as_a_rigid_body(k_t, k_r, E):
+    """Against the rigid bar with its end mass, with digits to spare."""
+    arm = ARM.replace(k_t=k_t, k_r=k_r, E=E, m_e=0.1, J_e=0.01)
+    bar = mpmath.mpf(arm.rhoA)
+    across, both, turn = bar + mpmath.mpf(0.1), bar / 2 + mpmath.mpf(0.1), bar / 3 + mpmath.mpf(0.1) + mpmath.mpf(0.01)
+    with mpmath.workdps(400):
+        if np.isinf(k_r):
+            squared = [k_t / across]
+        else:  # zeros of |K - z M|
+            a, b, c = across * turn - both**2, mpmath.mpf(k_t) * turn + mpmath.mpf(k_r) * across, mpmath.mpf(k_t) * k_r
+            high = (b + mpmath.sqrt(b**2 - 4 * a * c)) / (2 * a)
+            squared = [c / (a * high), high]
+        expected = [float(mpmath.sqrt(z) / (2 * mpmath.pi)) for z in squared]
+    found = cra.natural_frequencies(arm, 4)
+    # the accuracy of the solver
+    np.testing.assert_allclose(found[: len(expected)], expected, rtol=1e-12)
+    free = cra.natural_frequencies(arm.replace(k_t=0.0, k_r=k_r if np.isinf(k_r) else 0.0), 4)
+    np.testing.assert_allclose(found[len(expected) :], free[len(expected) :], rtol=1e-12)
+
+
+def test_what_is_asked_of_a_mode_that_a_spring_of_nothing_holds():
+    arm = ARM.replace(E=1e300, k_t=1e4)
+    rates, frequency = cra.sensitivities(arm), cra.natural_frequencies(arm)[0]
+    assert rates.rate["k_t"][0] == pytest.approx(frequency / 2e4) and rates.log["k_t"][0] == pytest.approx(0.5)
+    assert rates.compliance["k_t"][0] == pytest.approx(-frequency * 1e4 / 2)
+    with pytest.raises(ValueError, match="below 1e-150 of the line's own"):
+        _ = cra.modal_parameters(arm).root_shear
+    motion = cra.BaseMotion(velocity=0.1)
+    stiff = arm.replace(E=1e100)
+    for asked in (lambda a: cra.tip_response(a, motion, [0.01, 0.02]), lambda a: cra.frequency_response(a, [3.0, 1e3])):
+        np.testing.assert_allclose(asked(arm), asked(stiff), rtol=1e-10)
 
 
 # Signs ------------------------------------------------------------------------------------------------------------

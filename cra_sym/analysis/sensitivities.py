@@ -174,7 +174,7 @@ class Sensitivities:
         """Return what gives the rates by a spring or an inertia of an end in one pass, for one wave number."""
         modes = self._system.modes(self._modes)
         kinds: tuple[tuple[str, Change], ...] = (("stiffnesses", "stiffness"), ("inertias", "inertia"))
-        if not isinstance(modes, OneWaveModes):
+        if not isinstance(modes, OneWaveModes) or modes.is_unfelt.any():
             return None
         for which, kind in kinds:
             found = self._system.numerics(which).get(name)
@@ -190,7 +190,8 @@ class Sensitivities:
         factor = column(np.asarray(kernel.function(*self._system.domain.values)))
         stiffness = factor * column(np.asarray(self._system.values[name]))
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            force = np.where(np.isinf(stiffness), modes.force(end, place), stiffness * modes.displacement(end, place))
+            force, rigid = stiffness * modes.displacement(end, place), np.isinf(stiffness)
+            force = np.where(rigid, modes.force(end, place), force) if rigid.any() else force
             value = -(force**2) / (8 * np.pi**2 * self.frequency * factor)
         return self._at_rest(value, name)
 

@@ -13,8 +13,6 @@ from cra_sym.model.system import MOST_MODES
 
 __all__ = ["frequency_parameters"]
 
-_SOFTEST = 1e-150  # the product of two stiffnesses of this size is a number yet
-
 
 def frequency_parameters(kappa_t: Any, kappa_r: Any, mu: Any, iota: Any = 0.0, modes: int = 3) -> NDArray[np.float64]:
     """Return the frequency parameters lambda = beta L of the paper's arm, the zeros of its determinant (22).
@@ -22,8 +20,7 @@ def frequency_parameters(kappa_t: Any, kappa_r: Any, mu: Any, iota: Any = 0.0, m
     Parameters
     ----------
     kappa_t, kappa_r : array_like
-        Dimensionless translational and rotational stiffness of the joint, in ``[0, inf]``; below 1e-150 they count as
-        0, for their product has to be a number.
+        Dimensionless translational and rotational stiffness of the joint, in ``[0, inf]``.
     mu, iota : array_like
         Mass and rotary inertia of the end-effector over those of the arm, in ``[0, inf)``.
     modes : int
@@ -53,8 +50,6 @@ def frequency_parameters(kappa_t: Any, kappa_r: Any, mu: Any, iota: Any = 0.0, m
         "mu": checks.real_array("mu", mu, low=0.0),
         "iota": checks.real_array("iota", iota, low=0.0),
     }
-    for name in ("kappa_t", "kappa_r"):
-        arrays[name] = np.where(arrays[name] < _SOFTEST, 0.0, arrays[name])
     checks.broadcastable(**arrays)
     groups = {"k_t": "kappa_t", "k_r": "kappa_r", "m_e": "mu", "J_e": "iota"}
     unit = {"L": 1.0, "b": 1.0, "h": 1.0, "E": 12.0, "rho": 1.0, "m_b": 1.0}  # E I = rho A = L = 1

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.model.close_pairs import resolve_close_pairs
 from cra_sym.model.one_wave_family import DimensionlessModes, family
+from cra_sym.model.soft_springs import felt, free_motions, put_soft
 from cra_sym.solvers.one_wave import Layout, parameters
 from cra_sym.solvers.one_wave_shapes import Table, fill
 
@@ -32,7 +33,6 @@ Channel = tuple[int, int]
 Rates = dict[Channel, Array]
 Change = Literal["stiffness", "compliance", "inertia"]
 
-_SOFTEST = 1e-150  # the product of two stiffnesses of this size is a number yet
 _TINY = 1e-30  # an imaginary part whose square is nothing
 _SCALES = 6  # names before those of the groups
 
@@ -106,25 +106,14 @@ class OneWave:
         return [np.asarray(x, dtype=np.float64) for x in found[1:]]
 
     def _groups(self, numbers: list[Array]) -> list[Array]:
-        """Return kappa and mu of the channels, as the layout has them; not broadcast.
-
-        Stiffnesses below 1e-150 count as 0, for their product has to be a number.
-        """
         if not self._are_covered(numbers):
             raise ValueError(
                 "values: a stiffness must be in [0, inf], an inertia in [0, inf), those of the line itself positive"
             )
-        groups = zip(numbers[_SCALES - 1 :], self.layout.groups, strict=True)
-        return [self._felt(x, letter) for x, (_, letter) in groups]
-
-    @staticmethod
-    def _felt(value: Array, letter: str) -> Array:
-        return np.where(value < _SOFTEST, 0.0, value) if letter == "k" and np.any(value < _SOFTEST) else value
+        return numbers[_SCALES - 1 :]
 
     def groups(self, values: Sequence[Value]) -> list[Array]:
         """Return kappa and mu of the channels, as the layout has them; not broadcast.
-
-        Stiffnesses below 1e-150 count as 0, for their product has to be a number.
 
         Raises
         ------
@@ -139,12 +128,14 @@ class OneWave:
 
     def parameters_of_groups(self, groups: Sequence[Array], shape: tuple[int, ...], modes: int) -> Array:
         """Return lambda of the first modes from the dimensionless groups themselves, shape (*shape, modes)."""
-        groups = [self._felt(x, letter) for x, (_, letter) in zip(groups, self.layout.groups, strict=True)]
         common = np.broadcast_shapes(*(x.shape for x in groups)) if groups else ()
-        broadcast = [np.broadcast_to(x, common) for x in groups]
-        lam = self.family.frequency_parameters(*broadcast, modes=modes)
-        resolve_close_pairs(self.family, lam, *broadcast)
+        lam = put_soft(self.layout, [np.broadcast_to(x, common) for x in groups], self._solved, modes)
         return lam if common == shape else np.ascontiguousarray(np.broadcast_to(lam, (*shape, modes)))
+
+    def _solved(self, groups: list[Array], modes: int) -> Array:
+        lam = self.family.frequency_parameters(*groups, modes=modes)
+        resolve_close_pairs(self.family, lam, *groups)
+        return lam
 
     def angular_frequencies(self, values: Sequence[Value], shape: tuple[int, ...], modes: int) -> Array:
         """Return the natural angular frequencies, rad/s, shape (*shape, modes)."""
@@ -177,7 +168,10 @@ class OneWave:
             if not np.isfinite(lam).all():
                 raise ValueError("values: they lead beyond the range of double precision")
             lam = lam if self.layout.n == 1 else np.sqrt(lam)
-        groups = [np.broadcast_to(x, shape) for x in self._groups(numbers)]
+        given = [np.broadcast_to(x, shape) for x in self._groups(numbers)]
+        groups = felt(self.layout, given)
+        if any(a is not b for a, b in zip(groups, given, strict=True)):  # as free where nothing else holds them
+            lam = np.where(free_motions(self.layout, groups, lam), 0.0, lam)
         found = self.family.modes(*groups, lam=lam)
         return OneWaveModes(found, omega, left, length, inertia, stiffness, scale)
 
@@ -211,6 +205,11 @@ class OneWaveModes:
     def lam(self) -> Array:
         """The frequency parameter lambda, shape (..., modes)."""
         return self.dimensionless.lam
+
+    @cached_property
+    def is_unfelt(self) -> NDArray[np.bool]:
+        """Which modes are held by springs alone that are too soft for the shapes to feel, shape (..., modes)."""
+        return np.asarray((self.lam == 0) & (self.omega > 0))
 
     @property
     def _table(self) -> Table:
@@ -249,7 +248,15 @@ class OneWaveModes:
         return self._end_row(rows.start + place)
 
     def force(self, end: int, place: int) -> Array:
-        """Return a natural force P of the left (0) or the right end (1), shape (..., modes)."""
+        """Return a natural force P of the left (0) or the right end (1), shape (..., modes).
+
+        Raises
+        ------
+        ValueError
+            If a mode is held by stiffnesses alone that are too small beside the line to be felt by the shapes.
+        """
+        if self.is_unfelt.any():
+            raise ValueError("values: a stiffness below 1e-150 of the line's own has no force in the modes; take 0")
         if end:
             found: Array = self._right_forces[place]
             return found

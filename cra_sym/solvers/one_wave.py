@@ -110,8 +110,8 @@ class Layout:
         held: NDArray[np.bool] = groups[self.groups.index((channel, "k"))] > 0
         return held
 
-    def rigid_body_modes(self, groups: Sequence[Array], lanes: int) -> Counts:
-        """Return how many rigid-body motions no spring and no support resists, shape (lanes,)."""
+    def rigid_body_modes(self, groups: Sequence[Array], lanes: int | tuple[int, ...]) -> Counts:
+        """Return how many rigid-body motions no spring and no support resists, of the shape of the lanes."""
         n = self.n
         resisted = [np.asarray(self.is_held(groups, i)).astype(np.int64) for i in range(2 * n)]
         rank = resisted[0] + resisted[n]
