@@ -5,157 +5,34 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.analysis.fit_unknowns import Unknown
 from cra_sym.analysis.sensitivities import Sensitivities, sensitivities
 from cra_sym.model.system import System
 
-__all__ = ["Data", "Search", "Unknown", "unknowns"]
+__all__ = ["Data", "Search"]
 
 Array = NDArray[np.float64]
-Kind = Literal["stiffness", "signed", "nonnegative"]
 
-_SOFTEST, _STIFFEST = 1e-8, 1e8  # of a stiffness in natural units: beyond, it is absent or rigid to rounding
-_RANGE = 1e3  # factor by which other parameters may differ from where the search begins
 _MOST_POINTS = 20_000
 _SAMPLES = 8_192  # where a grid would have more points
 _LINKED = 4.0  # chi2 on the way between two minima, above theirs, up to which they are one: two standard deviations
 _LOWEST = 200  # places of a grid that are starts whatever is beside them
-_STEPS = 25
+_STEPS, _MORE_STEPS = 25, 50
+_IDLE = 3  # steps in a row that gain nothing anywhere
+_MARGIN = 1e-9  # of a coordinate, inside its bounds
+_NOTHING = 1e-20  # of chi2: nothing more is to be gained
+_HOLD = 1e3 * _LINKED**0.5  # weight of a component that is to stay what it is
+_SHARES = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)  # of the way between two minima
+_SAME = 1e-6  # of a coordinate: minima that are closer are one
 _APART = 1e-2  # of a coordinate: ends of a descent that are closer are one
 _FEW = 24
 _MOST_KEPT = 1000
 _LARGEST = 1e150  # of a residual, whose square is a number
-
-
-@dataclass(frozen=True)
-class Unknown:
-    """A parameter to be estimated, with the coordinate in which it is searched.
-
-    That is ln(1 + unit/k) for the stiffness k of an end, in which a rigid one is the ordinary value 0, ln(p / unit) for
-    others, and ln(1 + p/unit) for one that is zero where the search begins.
-
-    Attributes
-    ----------
-    name : str
-    kind : {'stiffness', 'signed', 'nonnegative'}
-    unit : float
-    prior : (value, uncertainty), optional
-    """
-
-    name: str
-    kind: Kind
-    unit: float
-    prior: tuple[float, float] | None = None
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Smallest and largest coordinate."""
-        if self.kind == "stiffness":
-            return 0.0, float(np.log1p(1 / _SOFTEST))
-        return (-np.log(_RANGE), np.log(_RANGE)) if self.kind == "signed" else (0.0, np.log1p(_RANGE))
-
-    @property
-    def grid(self) -> Array:
-        """Coordinates among which the search starts."""
-        if self.prior is not None:
-            return np.array([self.coordinate(self.prior[0])])
-        if self.kind == "stiffness":
-            return np.log1p(1 / np.logspace(-4.0, 6.0, 41))
-        return np.linspace(*self.bounds, 13)
-
-    def coordinate(self, value: float) -> float:
-        """Return the coordinate of a value."""
-        if self.kind == "stiffness":
-            return float(np.clip(np.log1p(self.unit / value), *self.bounds)) if value > 0 else self.bounds[1]
-        return float(np.log(value / self.unit) if self.kind == "signed" else np.log1p(value / self.unit))
-
-    def value(self, coordinate: Array) -> Array:
-        """Return values from coordinates; a stiffness that is rigid to rounding is inf."""
-        if self.kind == "stiffness":
-            rigid = coordinate < 1e-12
-            soft = self.unit / np.expm1(np.where(rigid, 1.0, coordinate))
-            return np.where(rigid, np.inf, soft)
-        return self.unit * (np.exp(coordinate) if self.kind == "signed" else np.expm1(coordinate))
-
-    def rate(self, coordinate: Array) -> Array:
-        """Return the derivative by the coordinate of what has a finite one everywhere: 1/k of a stiffness, p else."""
-        return np.exp(coordinate) / self.unit if self.kind == "stiffness" else np.exp(coordinate) * self.unit
-
-    def slopes(self, found: Sensitivities) -> Array:
-        """Return the derivatives of the frequencies by 1/k of a stiffness, by p itself otherwise."""
-        return found.compliance[self.name] if self.kind == "stiffness" else found.rate[self.name]
-
-    def gradient(self, found: Sensitivities, coordinate: Array) -> Array:
-        """Return the derivatives of the frequencies by the coordinate, shape (..., modes)."""
-        column = np.asarray(coordinate)[..., None]
-        slope = self.slopes(found) * self.rate(column)
-        if self.kind == "stiffness":
-            with np.errstate(divide="ignore", invalid="ignore"):
-                soft = -found.frequency * found.log[self.name] * (1 + 1 / np.expm1(column))
-            slope = np.where(np.expm1(column) > 1, soft, slope)  # soft: the rate by k is the exact one
-        return np.where(np.isfinite(slope), slope, 0.0)
-
-    def prior_row(self, value: Any) -> Any:
-        """Return the derivative of the prior's residual by 1/k of a stiffness, by p itself otherwise."""
-        assert self.prior is not None
-        return (-(value**2) if self.kind == "stiffness" else 1.0) / self.prior[1]
-
-
-def unknowns(system: System, names: Sequence[str], prior: dict[str, tuple[float, float]]) -> tuple[Unknown, ...]:
-    """Return the parameters to be estimated, in natural units."""
-    stiff = [name for name in names if name in system.numerics("stiffnesses")]
-    units = natural_stiffnesses(system, stiff)
-    found = []
-    for name in names:
-        start = prior[name][0] if name in prior else float(np.asarray(system.values[name]))
-        if name in units:
-            found.append(Unknown(name, "stiffness", units[name], prior.get(name)))
-        elif start != 0:
-            found.append(Unknown(name, "signed", start, prior.get(name)))
-        else:
-            found.append(Unknown(name, "nonnegative", _natural_unit(system, name), prior.get(name)))
-    return tuple(found)
-
-
-def natural_stiffnesses(system: System, names: Sequence[str]) -> dict[str, float]:
-    """Return the stiffnesses beside which the structure itself gives as much as the end.
-
-    The first give of a rigid support lowers omega^2 by P^2 times its compliance, P its force in the first elastic mode;
-    P^2 / omega^2 is the stiffness that would halve it.
-    """
-    if not names:
-        return {}
-    rigid = system.replace(**dict.fromkeys(names, np.inf))
-    number = _elastic(rigid)
-    modes, omega = rigid.modes(number), rigid.natural_frequencies(number)
-    units = {}
-    for name in names:
-        spring = system.numerics("stiffnesses")[name]
-        factor = float(spring.factor.function(*rigid.domain.values))
-        ratio = modes.force(spring.end, spring.place)[omega > 0] ** 2 / (factor * omega[omega > 0] ** 2)
-        units[name] = float(ratio[0] if ratio[0] > 1e-6 * ratio.max() else ratio.max())
-    return units
-
-
-def _natural_unit(system: System, name: str) -> float:
-    """Return the value that would change the square of a frequency as much as it is."""
-    found = sensitivities(system, _elastic(system), by=(name,))
-    change = np.abs(found.rate[name])[found.frequency > 0] / found.frequency[found.frequency > 0]
-    if not change.max() > 0:
-        raise ValueError(f"unknown: {name} does not change the natural frequencies")
-    return float(1 / (2 * change.max()))
-
-
-def _elastic(system: System) -> int:
-    """Return a number of modes of which the last is elastic, with two more if the model has them."""
-    for number in (3, 6, 9, 12):
-        if system.natural_frequencies(number)[-1] > 0:
-            return number
-    raise ValueError("system: none of its first twelve modes is elastic")
 
 
 @dataclass(frozen=True)
@@ -178,7 +55,7 @@ class Search:
     system: System
     unknowns: tuple[Unknown, ...]
     most_modes: int
-    _known: dict[bytes, Sensitivities] = field(default_factory=dict)
+    _known: dict[tuple[tuple[int, ...], bytes], Sensitivities] = field(default_factory=dict)
     _table: tuple[Array, Array, tuple[int, ...]] | None = None
 
     def values(self, place: Array) -> dict[str, Any]:
@@ -187,7 +64,7 @@ class Search:
 
     def found(self, place: Array) -> Sensitivities:
         """Return frequencies and sensitivities at a place, or at places; the last ones are kept."""
-        key = place.tobytes()
+        key = place.shape, place.tobytes()
         if key not in self._known:
             if len(self._known) > _MOST_KEPT:
                 self._known.clear()
@@ -226,44 +103,53 @@ class Search:
     # ------------------------------------------------------------------------------------------------------------
 
     def minima(self, data: Data, most: int | None = None) -> list[Array]:
-        """Return the local minima, best first, or those that the lowest ends of the descent lead to."""
-        places = [self._polished(start, data) for start in self._descended(self._starts(data), data)[:most]]
+        """Return the local minima, best first, or those that the lowest ends of the descent lead to.
+
+        Of ends that are linked within the uncertainty, as in a valley of values that the data do not tell apart, only
+        the lowest is followed to its minimum.
+        """
+        ends = self._descended(self._starts(data), data)[:most]
+        if most is None:
+            ends = np.array(self.distinct([*self._apart(*self._followed(ends, data, _MORE_STEPS))], data))
+        places = [self._polished(end, data) for end in ends]
         places.sort(key=lambda place: self.chi2(place, data))
         return places
 
     def distinct(self, places: Sequence[Array], data: Data) -> list[Array]:
         """Return those places that no path links to a better one within the uncertainty of the data."""
         kept: list[Array] = []
-        for place in places:
-            if not any(self._linked(place, other, data) for other in kept):
-                kept.append(place)
+        left = list(places)
+        while left:
+            kept.append(left.pop(0))
+            if left:
+                linked = self._linked(np.array(left), kept[-1], data)
+                left = [place for place, is_linked in zip(left, linked, strict=True) if not is_linked]
         return kept
 
-    def _polished(self, start: Array, data: Data, held: tuple[Array, float] | None = None) -> Array:
+    def _polished(self, start: Array, data: Data) -> Array:
+        if self.chi2(start, data) <= _NOTHING:
+            return self._rounded(start)
         from scipy.optimize import least_squares
 
-        low, high = np.array([unknown.bounds for unknown in self.unknowns]).T
-        direction, share = (np.zeros(len(start)), 0.0) if held is None else held
-
-        def residuals(place: Array) -> Array:
-            own = self.residuals(place, data)
-            return own if held is None else np.append(own, 1e3 * np.sqrt(_LINKED) * (direction @ place - share))
-
-        def gradient(place: Array) -> Array:
-            own = self.gradient(place, data)
-            return own if held is None else np.vstack([own, 1e3 * np.sqrt(_LINKED) * direction])
-
-        tolerance = 1e-14 if held is None else 1e-8
-        start = np.clip(start, low + 1e-9, high - 1e-9)
+        low, high = self._bounds
         with np.errstate(all="ignore"):
             found = least_squares(
-                residuals, start, gradient, bounds=(low, high), x_scale="jac",
-                xtol=tolerance, ftol=tolerance, gtol=tolerance,
-                max_nfev=200 if held is None else 20,
+                lambda place: self.residuals(place, data), np.clip(start, low, high),
+                lambda place: self.gradient(place, data), bounds=(low - _MARGIN, high + _MARGIN), x_scale="jac",
+                xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=100,
             )  # fmt: skip
-        place: Array = found.x
+        return self._rounded(found.x)
+
+    def _rounded(self, place: Array) -> Array:
+        """Return a place with a stiffness that is rigid, and an addition that is nothing, to the margin as such."""
         stiff = np.array([unknown.kind != "signed" for unknown in self.unknowns])
-        return np.where(stiff & (place < 1e-12), 0.0, place)
+        return np.where(stiff & (place <= 2 * _MARGIN), 0.0, place)
+
+    @property
+    def _bounds(self) -> tuple[Array, Array]:
+        """Smallest and largest coordinates, a margin inside those that are allowed."""
+        low, high = np.array([unknown.bounds for unknown in self.unknowns]).T
+        return low + _MARGIN, high - _MARGIN
 
     def _starts(self, data: Data) -> Array:
         """Return the local minima of the misfit on the grid, weighted by the uncertainties and relative, and the lowest
@@ -282,37 +168,71 @@ class Search:
         return places[sorted(found)]
 
     def _descended(self, places: Array, data: Data) -> Array:
-        """Follow all starts at once by damped Gauss-Newton steps; return those that end apart, the lowest of each.
+        """Follow all starts at once; return those that end apart, the lowest of each.
 
-        Where some start leads to values without natural frequencies, the starts are returned as they are.
+        Where some start has no natural frequencies, the starts are returned as they are.
         """
-        low, high = np.array([unknown.bounds for unknown in self.unknowns]).T
-        places = np.clip(places, low + 1e-9, high - 1e-9)
+        places = np.clip(places, *self._bounds)
         residuals = self.residuals(places, data)
         if not np.isfinite(residuals).all():
             return places[np.argsort(np.nan_to_num(np.sum(residuals**2, -1), nan=np.inf))][:_FEW]
-        damping = np.full(len(places), 1e-2)
-        with np.errstate(all="ignore"):
-            cost = np.sum(residuals**2, -1)
-            for _ in range(_STEPS):
-                jacobian = self.gradient(places, data)
-                normal = np.swapaxes(jacobian, -1, -2) @ jacobian
-                size = np.einsum("...ii->...i", normal)
-                floor = 1e-12 * size.max(axis=-1, keepdims=True) + np.finfo(float).tiny
-                normal += np.eye(len(low)) * (damping[:, None] * np.maximum(size, floor) + floor)[:, None]
-                push = np.swapaxes(jacobian, -1, -2) @ residuals[..., None]
-                tried = np.clip(places - np.linalg.solve(normal, push)[..., 0], low + 1e-9, high - 1e-9)
-                there = self.residuals(tried, data)
-                lower = np.sum(there**2, -1) < cost
-                places = np.where(lower[:, None], tried, places)
-                residuals = np.where(lower[:, None], there, residuals)
-                cost = np.sum(residuals**2, -1)
-                damping = np.clip(np.where(lower, damping / 5, damping * 4), 1e-12, 1e12)
+        return self._apart(*self._followed(places, data, _STEPS))
+
+    @staticmethod
+    def _apart(places: Array, cost: Array) -> Array:
+        """Return the lowest few places that are not the same to the resolution of the search."""
         kept: list[Array] = []
         for place in places[np.argsort(cost)]:
             if all(np.max(np.abs(place - other)) > _APART for other in kept):
                 kept.append(place)
         return np.array(kept[:_FEW])
+
+    def _followed(
+        self, places: Array, data: Data, steps: int, held: tuple[Array, Array] | None = None
+    ) -> tuple[Array, Array]:
+        """Return where damped Gauss-Newton steps lead from all places at once, and chi2 there.
+
+        Parameters
+        ----------
+        places : ndarray, shape (P, unknowns)
+        data : Data
+        steps : int
+        held : tuple of ndarrays, shape (P, unknowns), (P,), optional
+            Directions, and the components of the places along them, which stay what they are.
+        """
+        bounds = self._bounds
+
+        def rows(at: Array) -> Array:
+            own = self.residuals(at, data)
+            if held is None:
+                return own
+            off = np.einsum("pi,pi->p", held[0], at) - held[1]
+            return np.concatenate([own, _HOLD * off[:, None]], axis=-1)
+
+        residuals = rows(places)
+        damping = np.full(len(places), 1e-2)
+        with np.errstate(all="ignore"):
+            cost, idle = np.sum(residuals**2, -1), 0
+            for _ in range(steps):
+                if not np.isfinite(cost).all() or not cost.max() > _NOTHING or idle > _IDLE:
+                    break
+                jacobian = self.gradient(places, data)
+                if held is not None:
+                    jacobian = np.concatenate([jacobian, _HOLD * held[0][:, None, :]], axis=-2)
+                normal = np.swapaxes(jacobian, -1, -2) @ jacobian
+                size = np.einsum("...ii->...i", normal)
+                floor = 1e-12 * size.max(axis=-1, keepdims=True) + np.finfo(float).tiny
+                normal += np.eye(places.shape[-1]) * (damping[:, None] * np.maximum(size, floor) + floor)[:, None]
+                push = np.swapaxes(jacobian, -1, -2) @ residuals[..., None]
+                tried = np.clip(places - np.linalg.solve(normal, push)[..., 0], *bounds)
+                there = rows(tried)
+                lower = np.sum(there**2, -1) < cost
+                places = np.where(lower[:, None], tried, places)
+                residuals = np.where(lower[:, None], there, residuals)
+                before, cost = cost, np.sum(residuals**2, -1)
+                idle = 0 if (before - cost > 1e-6 * before).any() else idle + 1
+                damping = np.clip(np.where(lower, damping / 5, damping * 4), 1e-12, 1e12)
+        return places, np.nan_to_num(cost, nan=np.inf)
 
     def _grid(self) -> tuple[Array, Array, tuple[int, ...]]:
         """Return places (P, unknowns), their frequencies (P, modes) and the shape of the grid, () for a sample."""
@@ -343,20 +263,19 @@ class Search:
                     continue
         return omega / (2 * np.pi)
 
-    def _linked(self, place: Array, other: Array, data: Data) -> bool:
-        """Tell whether a path leads from one minimum to another on which the misfit stays within the uncertainty."""
-        step = other - place
-        distance = float(np.linalg.norm(step))
-        if distance < 1e-6:
-            return True
-        limit = max(self.chi2(place, data), self.chi2(other, data)) + _LINKED
-        direction, here = step / distance, place
-        for share in (0.5, 0.25, 0.75, 0.125, 0.375, 0.625, 0.875):
-            target = place + share * step
-            here = self._polished(target, data, (direction, float(direction @ target)))
-            if self.chi2(here, data) > limit:
-                return False
-        return True
+    def _linked(self, places: Array, other: Array, data: Data) -> NDArray[np.bool]:
+        """Tell from which minima a path leads to another on which the misfit stays within the uncertainty."""
+        step = other - places
+        distance = np.linalg.norm(step, axis=-1)
+        limit = np.array([max(self.chi2(place, data), self.chi2(other, data)) for place in places]) + _LINKED
+        highest = np.zeros(len(places))
+        far = np.flatnonzero(distance > _SAME)
+        if far.size:
+            direction = np.repeat(step[far] / distance[far, None], len(_SHARES), axis=0)
+            starts = (places[far, None] + np.array(_SHARES)[:, None] * step[far, None]).reshape(-1, places.shape[-1])
+            held = direction, np.einsum("pi,pi->p", direction, starts)
+            highest[far] = self._followed(starts, data, _STEPS, held)[1].reshape(far.size, -1).max(axis=-1)
+        return np.asarray(highest <= limit)
 
 
 def _lowest(cost: Array) -> list[int]:

@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis import fit_words
-from cra_sym.analysis.fit_search import Data, Search, Unknown, unknowns
-from cra_sym.checks import broadcastable, count, default_floating_point, instance, mapping, real_array, shown
-from cra_sym.model.system import MOST_MODES, System
+from cra_sym.analysis.fit_arguments import checked_data, checked_names, checked_priors
+from cra_sym.analysis.fit_search import Data, Search
+from cra_sym.analysis.fit_unknowns import Unknown, unknowns
+from cra_sym.checks import default_floating_point, instance
+from cra_sym.model.system import System
 
 __all__ = [
     "AmbiguityWarning",
@@ -29,7 +31,6 @@ Array = NDArray[np.float64]
 _JOINT = ("k_t", "k_r")
 _SMALLEST_P = 0.01
 _LARGEST_RESIDUAL = 3.0  # sigma, where there are no degrees of freedom
-_MOST_UNKNOWN = 6
 
 
 class IdentifiabilityWarning(UserWarning):
@@ -61,6 +62,10 @@ class Identification:
         Standard deviations of the logarithms of the values: about the relative uncertainty where it is small.
     frequencies, residuals : ndarray, shape (m,)
         Fitted frequencies (Hz), and measured minus fitted in units of the uncertainty.
+    measured, uncertainty : ndarray, shape (m,)
+        What was fitted, Hz.
+    modes : ndarray of int, shape (m,)
+        The modes these belong to, from 1.
     chi2 : float
         Sum of the squared residuals, those of the priors included.
     degrees_of_freedom : int
@@ -83,6 +88,9 @@ class Identification:
     log_standard_deviation: Array
     frequencies: Array
     residuals: Array
+    measured: Array
+    uncertainty: Array
+    modes: NDArray[np.intp]
     chi2: float
     degrees_of_freedom: int
     p_value: float
@@ -234,13 +242,13 @@ def _identified(
     system: System,
     measured: Any,
     uncertainty: Any,
-    unknown: Sequence[str],
+    unknown: Sequence[str] | None,
     modes: Any,
     prior: Any,
 ) -> Identification:
-    data = _checked_data(system, name, measured, uncertainty, modes)
-    priors = _checked_priors(system, prior)
-    parameters = unknowns(system, _checked_names(system, unknown, priors), priors)
+    data = checked_data(system, name, measured, uncertainty, modes)
+    priors = checked_priors(system, prior)
+    parameters = unknowns(system, checked_names(system, unknown, priors), priors)
     search = Search(system, parameters, int(data.modes.max()) + 2)
     estimates = _estimates(kind, search, data)
     best = estimates[0]
@@ -305,8 +313,8 @@ def _estimate(kind: type[Identification], search: Search, data: Data, place: Arr
     frequencies = found.frequency[data.modes]
     residuals = (data.measured - frequencies) / data.sigma
     return kind(
-        values, covariance, spread, deviation, frequencies, residuals, chi2, freedom, p_value, fits, identifiable,
-        message,
+        values, covariance, spread, deviation, frequencies, residuals, data.measured, data.sigma, data.modes + 1,
+        chi2, freedom, p_value, fits, identifiable, message,
     )  # fmt: skip
 
 
@@ -353,59 +361,3 @@ def _hints(search: Search, data: Data, lowest: bool) -> list[str]:
 
 def _best_p(search: Search, data: Data) -> float:
     return max(_goodness(search, data, place)[2] for place in search.minima(data, most=3))
-
-
-# Arguments --------------------------------------------------------------------------------------------------------
-
-
-def _checked_data(system: System, name: str, measured: Any, uncertainty: Any, modes: Any) -> Data:
-    instance("system", system, System)
-    if system.shape:
-        raise ValueError(f"system has shape {system.shape}: must be a single set of values, not a batch")
-    frequencies = real_array(name, measured, low=0.0, open_low=True, unit="Hz")
-    sigma = real_array("uncertainty", uncertainty, low=1e-60, high=1e60, unit="Hz")
-    if frequencies.ndim != 1 or frequencies.size == 0:
-        raise ValueError(f"{name} has shape {frequencies.shape}: must be one axis of frequencies")
-    if np.any(np.diff(frequencies) <= 0):
-        at = int(np.argmax(np.diff(frequencies) <= 0)) + 1
-        raise ValueError(f"{name}[{at}] = {frequencies[at]:g}: must ascend, as natural frequencies do")
-    if broadcastable(**{name: frequencies, "uncertainty": sigma}) != frequencies.shape:
-        raise ValueError(f"uncertainty has shape {sigma.shape}: must be a number or {frequencies.shape}")
-    if modes is None:
-        numbers = np.arange(frequencies.size)
-    else:
-        if isinstance(modes, str) or not isinstance(modes, Iterable):
-            raise TypeError(f"modes = {shown(modes)}: must be a sequence of mode numbers from 1")
-        listed = [count("modes", mode, high=MOST_MODES) for mode in modes]
-        if len(listed) != frequencies.size or sorted(set(listed)) != listed:
-            raise ValueError(f"modes = {shown(modes)}: must be {frequencies.size} different modes, ascending")
-        numbers = np.array(listed) - 1
-    return Data(frequencies, np.broadcast_to(sigma, frequencies.shape).copy(), numbers)
-
-
-def _checked_names(system: System, unknown: Any, prior: Mapping[str, Any]) -> tuple[str, ...]:
-    unknown = tuple(system.numerics("stiffnesses")) if unknown is None else unknown
-    if isinstance(unknown, str) or not isinstance(unknown, Iterable):
-        raise TypeError(f"unknown = {shown(unknown)}: must be a sequence of names of parameters")
-    names = tuple(dict.fromkeys([*unknown, *prior]))
-    for name in names:
-        if name not in system.values:
-            raise ValueError(f"unknown = {shown(name)}: must be among {', '.join(system.values)}")
-    if not 1 <= len(names) <= _MOST_UNKNOWN:
-        raise ValueError(f"unknown = {shown(unknown)}: must be 1 to {_MOST_UNKNOWN} names, those with priors included")
-    return names
-
-
-def _checked_priors(system: System, prior: Any) -> dict[str, tuple[float, float]]:
-    found = {}
-    for name, pair in mapping("prior", prior, "names to (value, uncertainty)").items():
-        if name not in system.values:
-            raise ValueError(f"prior: {shown(name)} must be among {', '.join(system.values)}")
-        numbers = real_array(f"prior: {name}", pair, unit=system.model.units.get(name))
-        if numbers.shape != (2,) or not numbers[1] > 0:
-            raise ValueError(f"prior: {name} = {shown(pair)}: must be a value and its positive uncertainty")
-        value, deviation = map(float, numbers)
-        if value == 0 or (value < 0 and name in system.numerics("stiffnesses")):
-            raise ValueError(f"prior: {name} = {shown(pair)}: the value must be positive")
-        found[name] = value, deviation
-    return found

@@ -34,8 +34,8 @@ def sweep(
     system : System
         An :class:`cra_sym.Arm` or any other: it holds every parameter that is not swept; its values are numbers.
     quantity : str or callable
-        A key of `QUANTITIES`, or ``f(system, **options)`` that broadcasts over ``system.shape`` and may add axes at the
-        end: of real or complex numbers, or truth values.
+        A key of `QUANTITIES`, ``df_dNAME`` or ``log_NAME`` of a parameter NAME, or ``f(system, **options)`` that
+        broadcasts over ``system.shape`` and may add axes at the end: of real or complex numbers, or truth values.
     chunks : int, optional
         Longest piece of each axis. Given, the dataset is lazy (Dask); with ``store`` it sizes the regions, 64 if left.
     store : path, optional

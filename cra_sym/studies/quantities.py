@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import cra_sym as cra
-from cra_sym.checks import choice
+from cra_sym.checks import shown
 from cra_sym.model.system import System
 
 __all__ = ["QUANTITIES", "Quantity", "named_quantity"]
@@ -62,8 +62,30 @@ def _natural_frequencies(system: System, *, modes: int = 3) -> Any:
     return cra.natural_frequencies(system, modes=modes)
 
 
-def _sensitivity(name: str, system: System, *, modes: int = 3) -> Any:
-    return getattr(cra.sensitivities(system, modes=modes), name)
+def _sensitivity(kind: str, parameter: str, system: System, *, modes: int = 3) -> Any:
+    return getattr(cra.sensitivities(system, modes=modes, by=(parameter,)), kind)[parameter]
+
+
+def _fits(system: System, given: Mapping[str, Any]) -> Iterator[Any]:
+    """Fit the parameters of every system of a batch."""
+    for place in np.ndindex(system.shape):
+        values = {name: np.broadcast_to(value, system.shape)[place] for name, value in system.values.items()}
+        yield cra.identify(system.replace(**values, zeta=0.0), **given)
+
+
+def _identified(
+    system: System, *, measured: Any, uncertainty: Any, unknown: Any = None, modes: Any = None, prior: Any = None
+) -> Any:
+    given = {"measured": measured, "uncertainty": uncertainty, "unknown": unknown, "modes": modes, "prior": prior}
+    found = [list(fit.values.values()) for fit in _fits(system, given)]
+    return np.array(found).reshape(*system.shape, -1)
+
+
+def _misfit(
+    system: System, *, measured: Any, uncertainty: Any, unknown: Any = None, modes: Any = None, prior: Any = None
+) -> Any:
+    given = {"measured": measured, "uncertainty": uncertainty, "unknown": unknown, "modes": modes, "prior": prior}
+    return np.array([fit.chi2 for fit in _fits(system, given)]).reshape(system.shape)
 
 
 def _peak_response(system: System, *, motion: Any, t: Any, modes: int = 5) -> Any:
@@ -85,20 +107,12 @@ def _growth_rate(system: System, *, excitation: Any, angular_frequency: Any, eps
     return cra.growth_rate(system, excitation, angular_frequency, epsilon, modes=modes)
 
 
-_FREQUENCIES = "of the natural frequencies"
 QUANTITIES: Mapping[str, Quantity] = {
     quantity.name: quantity
     for quantity in (
         Quantity("natural_frequencies", _natural_frequencies, "Hz", "natural frequencies", ("mode",)),
-        *(
-            Quantity(name, partial(_sensitivity, name), unit, f"{kind} {_FREQUENCIES} to {spring}", ("mode",))
-            for name, unit, kind, spring in (
-                ("df_dk_t", "Hz m/N", "sensitivity", "k_t"),
-                ("df_dk_r", "Hz rad/(N m)", "sensitivity", "k_r"),
-                ("log_k_t", "1", "logarithmic sensitivity", "k_t"),
-                ("log_k_r", "1", "logarithmic sensitivity", "k_r"),
-            )
-        ),
+        Quantity("identified", _identified, "", "values in SI that fit measured frequencies best", ("unknown",)),
+        Quantity("misfit", _misfit, "1", "chi2 of the best fit to measured natural frequencies"),
         Quantity("peak_response", _peak_response, "m", "largest elastic tip displacement at the times t"),
         Quantity("residual_vibration", _residual_vibration, "m", "peak tip amplitude after the stop"),
         Quantity(
@@ -119,9 +133,30 @@ QUANTITIES: Mapping[str, Quantity] = {
 }
 
 
-def named_quantity(quantity: str | Callable[..., Any]) -> Quantity:
-    """Return an entry of `QUANTITIES`, or a function of a system as a quantity."""
+def named_quantity(quantity: str | Callable[..., Any], system: System) -> Quantity:
+    """Return an entry of `QUANTITIES`, a sensitivity to a parameter of a system, or a function of it as a quantity."""
     if callable(quantity):
         name = getattr(quantity, "__name__", type(quantity).__name__)
         return Quantity(name, quantity, "", (inspect.getdoc(quantity) or name).splitlines()[0])
-    return QUANTITIES[choice("quantity", quantity, QUANTITIES)]
+    units = system.model.units
+    for parameter in system.values if isinstance(quantity, str) else ():
+        for name, kind, unit, meaning in (
+            (f"df_d{parameter}", "rate", _per(units.get(parameter, "")), "sensitivity"),
+            (f"log_{parameter}", "log", "1", "logarithmic sensitivity"),
+        ):
+            if name == quantity:
+                function = partial(_sensitivity, kind, parameter)
+                return Quantity(name, function, unit, f"{meaning} of the natural frequencies to {parameter}", ("mode",))
+    if isinstance(quantity, str) and quantity in QUANTITIES:
+        return QUANTITIES[quantity]
+    words = f"one of {', '.join(QUANTITIES)}, df_dNAME or log_NAME of a parameter, or a function of a system"
+    raise (ValueError if isinstance(quantity, str) else TypeError)(f"quantity = {shown(quantity)}: must be {words}")
+
+
+def _per(unit: str) -> str:
+    """Return Hz over a unit, none if that is not known."""
+    above, _, below = unit.partition("/")
+    if not unit:
+        return ""
+    below = "" if above == "1" and not below else f"/({above})" if " " in above else f"/{above}"
+    return " ".join(["Hz", *unit.partition("/")[2].split()]) + below

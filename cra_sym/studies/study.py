@@ -150,6 +150,9 @@ class Study:
             found[name] = (swept.dims, swept.values, {"units": swept.unit} if swept.unit else {})
         if "mode" in self.added:
             found["mode"] = ("mode", np.arange(1, self.added["mode"] + 1), {"units": "1"})
+        if "unknown" in self.added:
+            given = self.options.get("unknown") or self.system.numerics("stiffnesses")
+            found["unknown"] = ("unknown", list(dict.fromkeys([*given, *(self.options.get("prior") or {})])), {})
         return found
 
     def attributes(self) -> dict[str, Any]:
@@ -195,7 +198,7 @@ def make_study(system: System, quantity: str | Callable[..., Any], parameters: M
     instance("arm" if isinstance(system, Arm) else "system", system, System)
     if system.shape:
         raise ValueError(f"system: its values have shape {system.shape}; must be numbers, arrays are axes of the sweep")
-    chosen = named_quantity(quantity)
+    chosen = named_quantity(quantity, system)
     known = (*system.values, "zeta")
     chosen.check_options([name for name in parameters if name not in known], known)
     units = {**system.model.units, "zeta": "1", **chosen.axes}

@@ -12,7 +12,8 @@ import sympy as sp
 
 import cra_sym as cra
 from cra_sym import Arm
-from cra_sym.analysis.fit_search import Data, Search, unknowns
+from cra_sym.analysis.fit_search import Data, Search
+from cra_sym.analysis.fit_unknowns import unknowns
 from cra_sym.analysis.identification import AmbiguityWarning, IdentifiabilityWarning, MisfitWarning
 from tests.campaigns import joints
 
@@ -150,6 +151,20 @@ def test_the_combination_one_frequency_tells_is_the_one_the_shapes_say(sigma):
     assert number_after("= (", told) == pytest.approx(1 / estimate.k_t + ratio / estimate.k_r, rel=6e-3)
     slope = shear**2 / (2 * omega) / (2 * np.pi)  # Hz lost by a give in translation of 1 m/N
     assert number_after("+-", told) == pytest.approx(0.01 / slope, rel=6e-2)
+
+
+@pytest.mark.parametrize(
+    ("options", "number"), [({}, 3), ({"unknown": ("E", "rho", "k_t", "k_r")}, 4), ({"unknown": ("L", "E", "rho")}, 5)]
+)
+def test_a_valley_of_values_that_fit_alike_is_walked_once(options, number, monkeypatch):
+    """Two dozen starts end in it; each was followed to its own end and linked to the others one by one."""
+    calls, found = [], Search.found
+    monkeypatch.setattr(Search, "found", lambda self, place: (calls.append(place.shape), found(self, place))[1])
+    measured = cra.natural_frequencies(NOMINAL.replace(k_t=500.0, k_r=20.0), number)
+    with pytest.warns(IdentifiabilityWarning):
+        fit = cra.identify(NOMINAL, measured, [0.01, *[1e3] * (number - 1)], **options)
+    assert fit.fits and len(fit.solutions) == 1
+    assert len(calls) < 1000  # it took more than 10 000
 
 
 def test_a_bound_is_two_standard_deviations_of_the_compliance_away():

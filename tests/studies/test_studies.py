@@ -263,18 +263,60 @@ def test_a_study_travels():
 # Any system, any quantity, any input ------------------------------------------------------------------------------
 
 
-def test_any_system_is_swept():
+def wire(**options):
     import sympy as sp
 
     x, t, tension, mass = sp.symbols("x t tension mass")
     y = sp.Function("y")(x, t)
-    string = cra.Model(
+    return cra.Model(
         y.diff(t) ** 2 / 2 - tension * y.diff(x) ** 2 / 2, fields=[y], x=x, domain=(0, 1), t=t,
-        essential=[y.subs(x, 0)], right=mass * y.diff(t) ** 2 / 2, units={tension: "N"},
+        essential=[y.subs(x, 0)], right=mass * y.diff(t) ** 2 / 2, **options,
     )  # fmt: skip
-    study = cra.sweep(string.at({"tension": 1.0, "mass": 0.0}), tension=[1.0, 4.0], zeta=0.01)
+
+
+def test_any_system_is_swept():
+    study = cra.sweep(wire(units={"tension": "N"}).at({"tension": 1.0, "mass": 0.0}), tension=[1.0, 4.0], zeta=0.01)
     np.testing.assert_allclose(study.natural_frequencies, [[0.25, 0.75, 1.25], [0.5, 1.5, 2.5]], rtol=1e-9)
     assert study.tension.attrs["units"] == "N" and study.attrs["system_mass"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("df_dk_t", "Hz m/N"), ("df_dk_r", "Hz rad/(N m)"), ("log_k_t", "1"), ("df_dm_e", "Hz/kg"), ("log_L", "1"),
+     ("df_dE", "Hz/Pa"), ("df_dL", "Hz/m")],
+)  # fmt: skip
+def test_the_sensitivity_to_any_parameter_is_swept(name, unit):
+    arm = cra.Arm.nominal().replace(m_e=0.02, k_r=50.0)
+    study = cra.sweep(arm, name, k_t=[1e3, 1e4], modes=2)
+    assert study[name].attrs["units"] == unit and study[name].dims == ("k_t", "mode")
+    parameter, step = name.removeprefix("df_d").removeprefix("log_"), 1e-5
+    for k_t, found in zip([1e3, 1e4], study[name].values, strict=True):
+        here = arm.replace(k_t=k_t)
+        value = here.values[parameter]
+        above, below = (cra.natural_frequencies(here.replace(**{parameter: value * (1 + s)}), 2) for s in (step, -step))
+        slope = (above - below) / (2 * step)  # a central difference: h^2 = 1e-10 and rounding over h
+        expected = slope / (cra.natural_frequencies(here, 2) if name.startswith("log") else value)
+        np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
+def test_the_sensitivity_of_any_system_is_swept():
+    study = cra.sweep(wire(units={"tension": "N"}).at({"tension": 1.0, "mass": 0.0}), "df_dtension", tension=[1.0, 4.0])
+    f = np.multiply.outer([0.5, 1.0], [0.5, 1.5, 2.5])  # of the wire without an end mass: f = sqrt(T) (2 n - 1) / 4
+    np.testing.assert_allclose(study.df_dtension, f / (2 * np.array([[1.0], [4.0]])), rtol=1e-9)
+    assert study.df_dtension.attrs["units"] == "Hz/N"
+
+
+def test_fits_are_swept_over_what_is_assumed():
+    """The fitted stiffnesses depend on the assumed end mass, and chi2 says which one is right."""
+    arm = cra.Arm.nominal()
+    measured = cra.natural_frequencies(arm.replace(k_t=2e3, k_r=40.0, m_e=0.02), 4)
+    given = {"measured": measured, "uncertainty": 0.005, "m_e": [0.01, 0.02]}
+    with pytest.warns(cra.MisfitWarning):
+        fits = cra.sweep(arm, "identified", **given, unknown=("k_t", "k_r"))
+        chi2 = cra.sweep(arm, "misfit", **given).misfit
+    assert fits.identified.dims == ("m_e", "unknown") and fits.unknown.values.tolist() == ["k_t", "k_r"]
+    np.testing.assert_allclose(fits.identified[1], [2e3, 40.0], rtol=1e-6)
+    assert chi2[0] > 100 > 1e-6 > chi2[1]
 
 
 def test_a_batch_of_motions_is_an_axis():

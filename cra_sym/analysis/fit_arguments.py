@@ -1,0 +1,72 @@
+"""What an identification is given, checked: measured frequencies, names of unknowns, what is known of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from cra_sym.analysis.fit_search import Data
+from cra_sym.checks import broadcastable, count, instance, mapping, real_array, shown
+from cra_sym.model.system import MOST_MODES, System
+
+__all__ = ["checked_data", "checked_names", "checked_priors"]
+
+_MOST_UNKNOWN = 6
+
+
+def checked_data(system: System, name: str, measured: Any, uncertainty: Any, modes: Any) -> Data:
+    """Return the measured frequencies, or raise an error that names the argument; ``name`` is that of ``measured``."""
+    instance("system", system, System)
+    if system.shape:
+        raise ValueError(f"system has shape {system.shape}: must be a single set of values, not a batch")
+    frequencies = real_array(name, measured, low=0.0, open_low=True, unit="Hz")
+    sigma = real_array("uncertainty", uncertainty, low=1e-60, high=1e60, unit="Hz")
+    if frequencies.ndim != 1 or frequencies.size == 0:
+        raise ValueError(f"{name} has shape {frequencies.shape}: must be one axis of frequencies")
+    if np.any(np.diff(frequencies) <= 0):
+        at = int(np.argmax(np.diff(frequencies) <= 0)) + 1
+        raise ValueError(f"{name}[{at}] = {frequencies[at]:g}: must ascend, as natural frequencies do")
+    if broadcastable(**{name: frequencies, "uncertainty": sigma}) != frequencies.shape:
+        raise ValueError(f"uncertainty has shape {sigma.shape}: must be a number or {frequencies.shape}")
+    if modes is None:
+        numbers = np.arange(frequencies.size)
+    else:
+        if isinstance(modes, str) or not isinstance(modes, Iterable):
+            raise TypeError(f"modes = {shown(modes)}: must be a sequence of mode numbers from 1")
+        listed = [count("modes", mode, high=MOST_MODES) for mode in modes]
+        if len(listed) != frequencies.size or sorted(set(listed)) != listed:
+            raise ValueError(f"modes = {shown(modes)}: must be {frequencies.size} different modes, ascending")
+        numbers = np.array(listed) - 1
+    return Data(frequencies, np.broadcast_to(sigma, frequencies.shape).copy(), numbers)
+
+
+def checked_names(system: System, unknown: Any, prior: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the names of all parameters to be estimated, or raise an error that says what they must be."""
+    unknown = tuple(system.numerics("stiffnesses")) if unknown is None else unknown
+    if isinstance(unknown, str) or not isinstance(unknown, Iterable):
+        raise TypeError(f"unknown = {shown(unknown)}: must be a sequence of names of parameters")
+    names = tuple(dict.fromkeys([*unknown, *prior]))
+    for name in names:
+        if name not in system.values:
+            raise ValueError(f"unknown = {shown(name)}: must be among {', '.join(system.values)}")
+    if not 1 <= len(names) <= _MOST_UNKNOWN:
+        raise ValueError(f"unknown = {shown(unknown)}: must be 1 to {_MOST_UNKNOWN} names, those with priors included")
+    return names
+
+
+def checked_priors(system: System, prior: Any) -> dict[str, tuple[float, float]]:
+    """Return value and uncertainty of what is roughly known, or raise an error that names the parameter."""
+    found = {}
+    for name, pair in mapping("prior", prior, "names to (value, uncertainty)").items():
+        if name not in system.values:
+            raise ValueError(f"prior: {shown(name)} must be among {', '.join(system.values)}")
+        numbers = real_array(f"prior: {name}", pair, unit=system.model.units.get(name))
+        if numbers.shape != (2,) or not numbers[1] > 0:
+            raise ValueError(f"prior: {name} = {shown(pair)}: must be a value and its positive uncertainty")
+        value, deviation = map(float, numbers)
+        if value == 0 or (value < 0 and name in system.numerics("stiffnesses")):
+            raise ValueError(f"prior: {name} = {shown(pair)}: the value must be positive")
+        found[name] = value, deviation
+    return found
