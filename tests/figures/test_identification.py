@@ -33,7 +33,7 @@ def test_data_and_fit_of_any_system(off):
     assert sorted(fitted[1]) == ["fitted", "measured"]
     np.testing.assert_allclose(right.lines[-1].get_ydata(), (measured - fit.frequencies) / 0.01)
     assert [text.get_text() for text in right.texts] == (["mode 2"] if off else [])
-    assert ("no fit" in right.get_title()) == bool(off) and "Hz" in left.get_ylabel()
+    assert ("no fit" in right.get_title(loc="left")) == bool(off) and "Hz" in left.get_ylabel()
 
 
 def test_what_is_no_fit_is_named():
