@@ -38,7 +38,7 @@ from sympy.logic.boolalg import Boolean, BooleanAtom, BooleanFunction
 
 from cra_sym.mechanics.jets import HamiltonError
 
-__all__ = ["Switch", "derivative", "switches"]
+__all__ = ["Exponents", "Switch", "derivative", "exponents", "switches"]
 
 _SMOOTH = tuple(
     getattr(sympy, name)
@@ -47,7 +47,8 @@ _SMOOTH = tuple(
         "erf erfc gamma loggamma besselj bessely besseli besselk airyai airybi legendre chebyshevt chebyshevu LambertW"
     ).split()
 )
-_STEEP = (sympy.exp, sympy.tanh, sympy.erf, sympy.atan, sympy.cosh, sympy.sech)
+_DECAYING = (sympy.exp, sympy.sech, sympy.csch, sympy.tanh, sympy.coth, sympy.erf, sympy.erfc)
+_LOW_POWER = 8  # of a polynomial that has no detail finer than it shows
 _KNOWN = (*_SMOOTH, Abs, sign, Heaviside, floor, ceiling, frac, Mod, log, Max, Min, SingularityFunction, Piecewise)
 
 
@@ -86,7 +87,7 @@ def switches(expressions: Iterable[Expr], x: Symbol) -> tuple[Switch, ...]:
     >>> from sympy import Abs, Heaviside, symbols
     >>> x, a, b = symbols("x a b")
     >>> [switch.expression for switch in switches([3 + 2 * Heaviside(x - a), Abs(x**2 - b)], x)]
-    [a - x, b - x**2, x]
+    [a - x, b - x**2]
     """
     found: dict[Switch, None] = {}
     for expression in expressions:
@@ -120,6 +121,53 @@ def derivative(expression: Expr, symbol: Symbol) -> Expr:
     return rate.xreplace(points).xreplace({dummy: s for s, dummy in real.items()})
 
 
+@dataclass(frozen=True)
+class Exponents:
+    """Expressions in x and the parameters that tell how fast smooth functions may vary.
+
+    Where an exponent e changes by a few units, exp(e), cos(e) and the like may rise and fall; between places where it
+    changes by little they cannot.
+
+    Attributes
+    ----------
+    decaying : tuple of Expr
+        Those of functions that are constant, to the last digit, where the exponent is very negative.
+    others : tuple of Expr
+    """
+
+    decaying: tuple[Expr, ...]
+    others: tuple[Expr, ...]
+
+
+def exponents(expressions: Iterable[Expr], x: Symbol) -> Exponents:
+    """Return the exponents of all functions in some expressions that are neither polynomials nor piecewise.
+
+    Examples
+    --------
+    >>> from sympy import cos, exp, symbols, tanh
+    >>> x, a = symbols("x a")
+    >>> exponents([exp(-(x / a)**2) + cos(x), tanh(x) / (a + x)], x)
+    Exponents(decaying=(-Abs(x), -log(Abs(a + x)), -x**2/a**2), others=(x,))
+    """
+    decaying: set[Expr] = set()
+    others: set[Expr] = set()
+    for expression in expressions:
+        for node in preorder_traversal(expression):
+            if isinstance(node, Pow) and node.has(x):
+                degree = node.exp.is_Integer and 0 <= node.exp <= _LOW_POWER
+                if node.base.has(x) and not degree and not (node.exp.is_Rational and 0 < node.exp < 1):
+                    decaying.add(node.exp * log(Abs(node.base)))
+                elif not node.base.has(x):
+                    decaying.add(node.exp * log(Abs(node.base)))
+            elif isinstance(node, _DECAYING) and node.has(x):
+                decaying.add(node.args[0] if isinstance(node, sympy.exp) else -Abs(node.args[0]))
+            elif isinstance(node, (sympy.atan, sympy.asinh)) and node.has(x):
+                decaying.add(-log(1 + node.args[0] ** 2))
+            elif isinstance(node, _SMOOTH) and node.has(x):
+                others |= {argument for argument in node.args if argument.has(x)}
+    return Exponents(tuple(sorted(decaying, key=str)), tuple(sorted(others, key=str)))
+
+
 def _of(node: Expr | Boolean, x: Symbol) -> Iterator[Switch]:
     if isinstance(node, Piecewise):
         for _, condition in node.args:
@@ -141,10 +189,6 @@ def _of(node: Expr | Boolean, x: Symbol) -> Iterator[Switch]:
     elif isinstance(node, Pow):
         if not node.exp.is_integer and node.base.has(x):
             yield Switch(node.base)
-        elif node.exp.is_integer and node.exp.is_even and node.base.is_polynomial(x):
-            yield Switch(node.base)  # smooth, but what is narrow is narrow about such a place
-    elif isinstance(node, _STEEP) and node.args[0].is_polynomial(x):
-        yield Switch(node.args[0])
     elif isinstance(node, AppliedUndef) or (isinstance(node, Function) and not isinstance(node, _KNOWN)):
         raise HamiltonError(f"{node}: where this function of {x} is not smooth cannot be located")
 

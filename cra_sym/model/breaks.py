@@ -14,7 +14,7 @@ from cra_sym.kernels import Kernel, kernel
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
 
-__all__ = ["Breaks", "breaks"]
+__all__ = ["Breaks", "breaks", "varying"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -33,6 +33,8 @@ class Breaks:
         Of (x, parameters): value and slope of each switch that is affine in x.
     others : Kernel
         Of (x, parameters): values of the other switches.
+    turns : Kernel
+        Of (x, parameters): derivatives by x of these, and of the exponents in them.
     levels : tuple of bool
         Of the affine ones, then of the others: whether all integer values count.
     rates : tuple of Kernel
@@ -43,6 +45,7 @@ class Breaks:
 
     affine: Kernel
     others: Kernel
+    turns: Kernel
     levels: tuple[bool, ...]
     rates: tuple[Kernel, ...]
     places: Kernel
@@ -120,33 +123,50 @@ class Breaks:
                     yield k // 2, ends[:, :1] + (level - value[:, :1]) / slope[:, :1]
                 else:
                     yield k // 2, ends[:, :1] - value[:, :1] / slope[:, :1]
-            yield from self._sampled(columns, left, length)
+            if self.others.layout:
+                yield from self._sampled(columns, self._samples(columns, left, length))
 
-    def _sampled(self, columns: Array, left: Array, length: Array) -> Iterator[tuple[int, Array]]:
-        number = len(self.others.layout)
-        if not number:
-            return
+    def _samples(self, columns: Array, left: Array, length: Array) -> Array:
+        """Return places between which no switch passes a value twice, (sets, samples), ascending."""
+        ends = left[:, None] + length[:, None] * np.array([0.0, 1.0])
+        values = self.affine.function(ends, *columns[..., None])
         grid = left[:, None] + length[:, None] * np.linspace(0.0, 1.0, _SAMPLES)
+        kinks = [ends[:, :1] - values[k] / values[k + 1] for k in range(0, len(values), 2)]
+        grid = _inserted(grid, [np.broadcast_to(kink, ends.shape)[:, :1] for kink in kinks])
+        turning = self.turns.function(grid, *columns[..., None])
+        values = [np.broadcast_to(value, grid.shape) for value in turning]
+        return _inserted(grid, [_roots(self.turns, k, 0.0, columns, grid, value) for k, value in enumerate(values)])
+
+    def _sampled(self, columns: Array, grid: Array) -> Iterator[tuple[int, Array]]:
+        number = len(self.others.layout)
         sampled = self.others.function(grid, *columns[..., None])
         for k in range(number):
             value = np.broadcast_to(sampled[k], grid.shape)
             switch = len(self.levels) - number + k
             levels = _integers(value) if self.levels[switch] else np.zeros((1, 1))
             for level in np.unique(levels[np.isfinite(levels)]):
-                yield switch, self._roots(k, level, columns, grid, value)
+                yield switch, _roots(self.others, k, level, columns, grid, value)
 
-    def _roots(self, number: int, level: float, columns: Array, grid: Array, value: Array) -> Array:
-        """Return where a switch passes a level between samples, (sets, roots), filled up with inf."""
-        above = value >= level
-        row, cell = np.nonzero(above[:, 1:] != above[:, :-1])
-        low, high, start = grid[row, cell], grid[row, cell + 1], above[row, cell]
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            here = self.others.function(middle, *columns[:, row])[number] >= level
-            low, high = np.where(here == start, middle, low), np.where(here == start, high, middle)
-        found = np.full((len(grid), int(np.bincount(row, minlength=1).max(initial=0))), np.inf)
-        found[row, np.arange(len(row)) - np.searchsorted(row, row)] = high
-        return found
+
+def _roots(function: Kernel, number: int, level: float, columns: Array, grid: Array, value: Array) -> Array:
+    """Return where one of some functions passes a level between samples, (sets, roots), filled up with inf."""
+    above = value >= level
+    row, cell = np.nonzero(above[:, 1:] != above[:, :-1])
+    low, high, start = grid[row, cell], grid[row, cell + 1], above[row, cell]
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        here = function.function(middle, *columns[:, row])[number] >= level
+        low, high = np.where(here == start, middle, low), np.where(here == start, high, middle)
+    found = np.full((len(grid), int(np.bincount(row, minlength=1).max(initial=0))), np.inf)
+    found[row, np.arange(len(row)) - np.searchsorted(row, row)] = high
+    return found
+
+
+def _inserted(grid: Array, places: list[Array]) -> Array:
+    """Return samples with further places among them, ascending; what is not within is left out."""
+    every = np.concatenate([grid, *places], axis=1)
+    inside = (every >= grid[:, :1]) & (every <= grid[:, -1:])
+    return np.sort(np.where(inside, every, grid[:, -1:]), axis=1)
 
 
 def _integers(value: Array) -> Array:
@@ -159,6 +179,19 @@ def _integers(value: Array) -> Array:
     return np.where(found <= high[:, None], found, np.inf)
 
 
+def varying(expressions: Sequence[Expr], x: Symbol, symbols: Sequence[Symbol]) -> tuple[Kernel | None, int]:
+    """Return how fast coefficients may vary, compiled as a function of (x, parameters), and how many of these decay.
+
+    None where they are polynomials between breakpoints. See :func:`cra_sym.mechanics.breakpoints.exponents`.
+    """
+    from cra_sym.mechanics.breakpoints import exponents
+
+    found = exponents(expressions, x)
+    if not found.decaying and not found.others:
+        return None, 0
+    return kernel((*found.decaying, *found.others), (x, *symbols), backend="numpy"), len(found.decaying)
+
+
 def breaks(expressions: Sequence[Expr], x: Symbol, symbols: Sequence[Symbol], places: Sequence[Expr] = ()) -> Breaks:
     """Return the compiled switches of coefficients, with interior places of terms.
 
@@ -167,7 +200,7 @@ def breaks(expressions: Sequence[Expr], x: Symbol, symbols: Sequence[Symbol], pl
     HamiltonError
         Names what cannot be located.
     """
-    from cra_sym.mechanics.breakpoints import derivative, switches
+    from cra_sym.mechanics.breakpoints import derivative, exponents, switches
 
     affine, others = [], []
     for switch in switches(expressions, x):
@@ -178,11 +211,14 @@ def breaks(expressions: Sequence[Expr], x: Symbol, symbols: Sequence[Symbol], pl
             affine.append((switch, slope))
     pairs = tuple(part for switch, slope in affine for part in (switch.expression, slope))
     values = tuple(switch.expression for switch in others)
+    inner = exponents(values, x)
+    turning = dict.fromkeys((*values, *inner.decaying, *inner.others))
     arguments = (x, *symbols)
     every = [*(switch for switch, _ in affine), *others]
     return Breaks(
         kernel(pairs, arguments, backend="numpy"),
         kernel(values, arguments, backend="numpy"),
+        kernel(tuple(derivative(part, x) for part in turning), arguments, backend="numpy"),
         tuple(switch.levels for switch in every),
         tuple(
             kernel(tuple(derivative(switch.expression, symbol) for symbol in arguments), arguments, backend="numpy")

@@ -175,7 +175,13 @@ class GeneralRoute:
         """Return how often the parts must be halved for steps on which every coefficient is a polynomial."""
         needed = 0
         for some, edges in self._between_breaks(columns):
-            ends, _, _ = resolved(self._sampler(some), edges, np.arange(edges.shape[1], dtype=float), "coefficients")
+            ends, _, _ = resolved(
+                self._sampler(some),
+                edges,
+                np.arange(edges.shape[1], dtype=float),
+                "coefficients",
+                self.spatial.variation(some),
+            )
             width = (np.diff(places(ends, edges), axis=1) / (edges[:, -1:] - edges[:, :1])).min(axis=1)
             if (np.log2(GOLDEN / width) > _MOST - 1).any():
                 row = int(np.argmin(width))

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.kernels import Kernel, kernel
-from cra_sym.model.breaks import Breaks, breaks
+from cra_sym.model.breaks import Breaks, breaks, varying
+from cra_sym.model.spans import Spans
 from cra_sym.model.values import infinite_patterns
 from cra_sym.solvers.stiffness import GOLDEN, DynamicStiffness, Evaluation
+from cra_sym.solvers.stress_mesh import Variation
 
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
@@ -123,54 +125,6 @@ class PointTerms:
         return [(found[k], found[k + 1]) for k in range(0, len(found), 2)]
 
 
-@dataclass(frozen=True)
-class Spans:
-    """A coordinate s from 0 to 1 that passes through breakpoints at nodes of the dynamic stiffness.
-
-    Attributes
-    ----------
-    knots : ndarray, shape (spans + 1,)
-        Nodes.
-    edges : ndarray, shape (rows, spans + 1)
-        Left end, breakpoints, right end.
-    """
-
-    knots: Array
-    edges: Array
-
-    @classmethod
-    def of(cls, edges: Array, halvings: int) -> tuple[Spans, int]:
-        """Return the coordinate for breakpoints, and how often a part must be halved to have these nodes."""
-        number = edges.shape[1]
-        halvings = max(halvings, int(np.ceil(np.log2(2 * number))))
-        cells = np.arange(2**halvings + 1) / 2**halvings
-        nodes = np.unique(np.concatenate([GOLDEN * cells, GOLDEN + (1.0 - GOLDEN) * cells]))
-        share = ((edges - edges[:, :1]) / (edges[:, -1:] - edges[:, :1])).mean(axis=0)
-        place = np.searchsorted(nodes, share)
-        for k in range(1, number):  # one after the other, from the left and then from the right
-            place[k] = max(place[k], place[k - 1] + 1)
-        place[-1] = len(nodes) - 1
-        for k in range(number - 2, -1, -1):
-            place[k] = min(place[k], place[k + 1] - 1)
-        return cls(nodes[place], edges), halvings
-
-    def take(self, rows: np.ndarray) -> Spans:
-        """Return those of some rows."""
-        return Spans(self.knots, self.edges[rows])
-
-    def places(self, share: Array, rows: np.ndarray) -> tuple[Array, Array]:
-        """Return x and dx/ds at shares of shape (rows or 1, stations)."""
-        share = np.broadcast_to(share, (len(rows), share.shape[-1]))
-        span = np.clip(np.searchsorted(self.knots, share, side="right") - 1, 0, len(self.knots) - 2)
-        left, right = (self.edges[rows[:, None], span + k] for k in (0, 1))
-        slope = (right - left) / (self.knots[span + 1] - self.knots[span])
-        return left + (share - self.knots[span]) * slope, slope
-
-    def shares(self, x: Array) -> Array:
-        """Return the shares of places, shape (rows, stations)."""
-        return np.stack([np.interp(at, row, self.knots) for at, row in zip(x, self.edges, strict=True)])
-
-
 def check_range(*numbers: np.ndarray) -> None:
     """Raise a ValueError unless all numbers are finite."""
     if not all(np.isfinite(array).all() for array in numbers):
@@ -203,6 +157,8 @@ class SpatialProblem:
         Where the system is not smooth along x, unless it is uniform.
     points : PointTerms or None
         What acts at interior places.
+    exponents : (Kernel or None, int)
+        How fast the system may vary along x, see `cra_sym.model.breaks.varying`.
     """
 
     names: tuple[str, ...]
@@ -217,6 +173,12 @@ class SpatialProblem:
     rows: tuple[tuple[Kernel, ...], ...]
     breaks: Breaks | None = None
     points: PointTerms | None = None
+    exponents: tuple[Kernel | None, int] = (None, 0)
+
+    def variation(self, columns: Array) -> Variation | None:
+        """Return how fast the system of some parameter sets may vary along x, or None if as polynomials do."""
+        found, decaying = self.exponents
+        return None if found is None else Variation(found.function, columns, decaying)
 
     def derivative_row(self, place: int, order: int, z: np.ndarray, x: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Return the row c with ``D^order q[place] = c (q, w, P)``, shape (rows, modes, stations, 2 n + m)."""
@@ -348,6 +310,7 @@ def spatial_problem(form: StateForm, symbols: tuple[Symbol, ...], left: Expr) ->
         tuple(_derivative_rows(form, place, arguments) for place in range(len(form.displacements))),
         found,
         points,
+        (None, 0) if form.uniform else varying(list(form.system.subs(form.parameter, 1)), form.x, symbols),
     )
 
 

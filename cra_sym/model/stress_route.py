@@ -99,6 +99,7 @@ class StressRoute:
                     springs[members],
                     mass[members],
                     points=self._points(some[:, members], nodes),
+                    variation=self.spatial.variation(some[:, members]),
                 )
                 with refinement() as told:
                     solutions = solved(problem, modes, 2.0 * tolerance, target, told)

@@ -9,6 +9,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from .stress_mesh import Variation
+
 __all__ = ["Continuum", "Entries", "PointTerm", "compliance"]
 
 Array = NDArray[np.float64]
@@ -65,6 +67,8 @@ class Continuum:
         The end from which displacements are integrated, 0 or 1: not one at which a stiffness vanishes.
     points : tuple of PointTerm
         What acts at breakpoints.
+    variation : Variation, optional
+        How fast the coefficients may vary, unless they are polynomials.
     """
 
     orders: tuple[int, ...]
@@ -76,6 +80,7 @@ class Continuum:
     end_mass: Array
     origin: int = 0
     points: tuple[PointTerm, ...] = ()
+    variation: Variation | None = None
 
     @property
     def displacements(self) -> int:
@@ -92,6 +97,7 @@ class Continuum:
             springs=self.springs[rows],
             end_mass=self.end_mass[rows],
             points=tuple(point.take(rows) for point in self.points),
+            variation=None if self.variation is None else self.variation.take(rows),
         )
 
     def tops(self) -> list[int]:

@@ -6,18 +6,69 @@ sets whose breakpoints differ then share a mesh.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Grid", "Mesh", "Rule", "Sampler", "TooFineError", "cells", "resolved", "rule"]
+__all__ = ["Grid", "Mesh", "Rule", "Sampler", "TooFineError", "Variation", "cells", "places", "resolved", "rule"]
 
 Array = NDArray[np.float64]
 Sampler = Callable[[Array], Array]
 """Coefficients at places of shape (sets, points), as an array of shape (coefficients, sets, points)."""
+
+
+@dataclass(frozen=True)
+class Variation:
+    """How fast coefficients may vary between the places where they are sampled.
+
+    Attributes
+    ----------
+    exponents : callable
+        ``exponents(x, *parameters)``: exponents e of functions such as exp(e) or cos(e).
+    columns : ndarray, shape (parameters, sets)
+    decaying : int
+        So many, the first, are of functions that no longer change where e is below -745.
+    """
+
+    exponents: Callable[..., Sequence[Any]]
+    columns: Array
+    decaying: int
+
+    def take(self, rows: NDArray[np.intp]) -> Variation:
+        """Return that of some of the parameter sets."""
+        return replace(self, columns=self.columns[:, rows])
+
+    def _at(self, x: NDArray[np.floating]) -> Array:
+        with np.errstate(all="ignore"):
+            exponents = self.exponents(x, *self.columns[..., None, None])
+        return np.stack([np.broadcast_to(np.asarray(exponent, dtype=float), x.shape) for exponent in exponents])
+
+    def resolved(self, x: Array) -> NDArray[np.bool_]:
+        """Return whether no exponent changes so much that detail hides between samples, (functions, sets, pieces).
+
+        Parameters
+        ----------
+        x : ndarray, shape (sets, pieces, samples)
+        """
+        found = self._at(x)
+        if np.isnan(found).any():  # exp(800 x) / (1 + exp(800 x)) is bounded
+            found = self._at(x.astype(np.longdouble))
+        found = np.clip(found, -1e300, 1e300)  # the logarithm of what overflows is infinite
+        swing = np.ptp(found, axis=-1)
+        gone = found.max(axis=-1) + swing / 8.0 < UNDERFLOW  # an exponent has no detail finer than an eighth
+        good: NDArray[np.bool_] = swing <= SWING
+        good[: self.decaying] |= gone[: self.decaying]
+        return good
+
+
+SWING = 48.0
+"""Change of an exponent on a piece up to which 69 samples show every rise and fall."""
+UNDERFLOW = -745.0
+"""Exponent from which exp underflows."""
 
 NODES = 32
 """Gauss points of the test whether a piece is resolved: a coefficient must be a polynomial of that degree there."""
@@ -26,6 +77,8 @@ TAIL = 1e-11
 left out of an integral is far below; sin(1e3 x) has only this many digits anyway."""
 SPECK = 2e-16
 """Share of its own integral that a coefficient may have on a piece which is left unresolved."""
+SINGULAR = 1e-9
+"""Share of its own integral that a coefficient may not have on a piece that has no width: it is infinite there."""
 ROUNDING = 8 * np.finfo(float).eps
 """The same relative to the largest value anywhere: a coefficient that passes zero has no more digits."""
 MOST_PIECES = 8000
@@ -161,7 +214,9 @@ def places(reference: Array, edges: Array) -> Array:
     return found
 
 
-def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[Array, Array, int]:
+def resolved(
+    sample: Sampler, edges: Array, pieces: Array, what: str, variation: Variation | None = None
+) -> tuple[Array, Array, int]:
     """Return pieces on which every coefficient is resolved, the relative size of what is not, shape (sets,), and the
     highest degree of the coefficients there.
 
@@ -173,6 +228,8 @@ def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[A
         To begin with, in the reference coordinate.
     what : str
         What the coefficients are, for errors.
+    variation : Variation, optional
+        Where it is left out, the coefficients have no detail finer than the pieces to begin with show.
 
     Raises
     ------
@@ -181,12 +238,11 @@ def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[A
 
     Notes
     -----
-    A piece is resolved if the last Legendre coefficients of 32 vanish and the polynomial meets the coefficient at
-    places between the points. One that holds a jump is halved until it does not matter.
+    A piece is resolved if the last Legendre coefficients of 32 vanish, the polynomial meets the coefficient at places
+    between the points, and nothing can hide between these. One that holds a jump is halved until it does not matter.
     """
     gauss = rule(NODES)
-    near = 1.0 - 10.0 ** -np.arange(2.0, 8.0)  # narrow detail lies at breakpoints
-    off = np.concatenate([-near, np.linspace(-0.987, 0.983, 37), near])
+    off = np.linspace(-0.987, 0.983, 37)
     table = np.polynomial.legendre.legvander(off, NODES - 1) @ gauss.spectrum
     total = peak = np.zeros(0)
     unresolved, degree = np.zeros(len(edges)), 0
@@ -198,11 +254,7 @@ def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[A
         half = 0.5 * (ends[..., 1] - ends[..., 0])
         at = ends[..., :1] + half[..., None] * (1.0 + np.concatenate([gauss.points, off]))
         values = sample(at.reshape(len(edges), -1)).reshape(-1, *at.shape)
-        if not np.isfinite(values).all():
-            bad = np.argwhere(~np.isfinite(values))[0]
-            raise ValueError(
-                f"values: they make a stiffness zero or a coefficient infinite at x = {at[tuple(bad[1:])]:.6g}"
-            )
+        _refuse(~np.isfinite(values), at)
         known, beyond = values[..., :NODES], values[..., NODES:]
         size = np.abs(values).max(axis=-1)
         peak = np.maximum(peak, size.max(axis=-1, keepdims=True)) if total.size else size.max(axis=-1, keepdims=True)
@@ -214,13 +266,17 @@ def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[A
         steep = 2.0 * ROUNDING * np.abs(ends).max(axis=-1) / (2.0 * half) * np.ptp(values, axis=-1)
         allowed = TAIL * size + ROUNDING * peak + steep
         smooth = error <= allowed
+        rough = error > allowed - steep
         mass = size * half
         speck = mass <= SPECK * total
         total = np.maximum(total, mass.max(axis=-1, keepdims=True))
         good = (smooth | speck).all(axis=(0, 1))
+        if variation is not None:
+            good &= variation.resolved(at).all(axis=(0, 1))
         share = np.where(smooth, 0.0, mass / np.where(total > 0.0, total, 1.0))
         narrow = todo[:, 1] - todo[:, 0] <= 4 * np.spacing(todo[:, 1])
         good |= narrow
+        _refuse(rough & (narrow | (steep > 1e-3 * size)) & (mass > SINGULAR * total), at[..., 0])
         unresolved += share[:, :, good].max(axis=0).sum(axis=1)
         done.append(todo[good])
         large = (series[:, :, good] > allowed[:, :, good, None]).any(axis=(0, 1, 2))
@@ -236,6 +292,15 @@ def resolved(sample: Sampler, edges: Array, pieces: Array, what: str) -> tuple[A
         middle = todo.mean(axis=1, keepdims=True)
         todo = np.concatenate([np.hstack([todo[:, :1], middle]), np.hstack([middle, todo[:, 1:]])])
     return np.unique(np.concatenate(done)), unresolved, degree
+
+
+def _refuse(bad: NDArray[np.bool_], at: Array) -> None:
+    """Raise where a coefficient is infinite, or has an integral on a piece without width."""
+    if bad.any():
+        place = np.argwhere(bad)[0]
+        raise ValueError(
+            f"values: they make a stiffness zero or a coefficient infinite at x = {at[tuple(place[1:])]:.6g}"
+        )
 
 
 def cells(edges: int, most: int) -> Array:

@@ -42,7 +42,7 @@ class Found:
     accuracy: Array
 
 
-def solved(problem: Continuum, modes: int, tolerance: float, target: float, told: Told) -> list[Found]:
+def solved(problem: Continuum, modes: int, tolerance: float, target: float, told: Told | None = None) -> list[Found]:
     """Return the lowest modes of every row.
 
     Parameters
@@ -53,7 +53,7 @@ def solved(problem: Continuum, modes: int, tolerance: float, target: float, told
         Relative error of the squared frequencies that must be reached.
     target : float
         What is aimed at; a smaller one gives better mode shapes, whose error is as its square root.
-    told : callable
+    told : callable, optional
         Is told the error of the frequencies that each mesh has reached, and which mesh that is, before the next one.
 
     Raises
@@ -160,7 +160,9 @@ def _quadrature(problem: Continuum, elements: Array, strained: NDArray[np.bool_]
             if not strained.any():
                 right = elements[-1]
             inner = whole[(whole >= left) & (whole <= right)]
-            part, rest, degree = resolved(problem.sample(bool(kind)), problem.edges, inner, "coefficients")
+            part, rest, degree = resolved(
+                problem.sample(bool(kind)), problem.edges, inner, "coefficients", problem.variation
+            )
             parts.append(part)
             unresolved, smoothness = np.maximum(unresolved, rest), max(smoothness, degree)
     return np.unique(np.concatenate(parts)), unresolved, smoothness
@@ -184,7 +186,8 @@ def _refined(problem: Continuum, rows: Index, mesh: Mesh, unresolved: Array, aim
         still = [solution.part[solution.error.max(axis=1) > aim.target] for solution in solutions]
         if last or not sum(map(len, still)):
             return found
-        aim.told(0.5 * float(worst), f"{len(mesh.elements) - 1} elements of degree {mesh.degree}")
+        if aim.told is not None:
+            aim.told(0.5 * float(worst), f"{len(mesh.elements) - 1} elements of degree {mesh.degree}")
         shares = [s.share[s.error.max(axis=1) > aim.target].max(axis=(0, 1), initial=0.0) for s in solutions]
         marks, open_ = np.max(shares, axis=0), np.concatenate(still)
         degree = mesh.degree
@@ -204,7 +207,7 @@ class _Aim:
     modes: int
     tolerance: float
     target: float
-    told: Told
+    told: Told | None
 
 
 @dataclass(frozen=True)

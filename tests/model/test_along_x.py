@@ -160,6 +160,34 @@ def test_a_narrow_bump_of_mass_is_a_point_mass(width):
     np.testing.assert_allclose(omega(beam(1, 1 + bump), 2), point, rtol=10 * width**2 + CLOSE)
 
 
+PLACE, WIDTH = sp.Rational(37, 100), sp.Rational(1, 10**6)
+FAR = (x - PLACE) / WIDTH
+BUMPS = {
+    "squared hyperbolic secant": sp.sech(FAR) ** 2 / 2,
+    "two layers": (sp.tanh(FAR + 1) - sp.tanh(FAR - 1)) / 4,
+    "two error functions": (sp.erf(FAR + 1) - sp.erf(FAR - 1)) / 4,
+    "two exponentials": sp.exp(-sp.Abs(FAR)) / 2,
+    "nested": sp.exp(-((sp.sin(x - PLACE) / WIDTH) ** 2)) / sp.sqrt(sp.pi),
+    "fraction": 2 / (1 + FAR**2) ** 2 / sp.pi,
+    "pulse": sp.Heaviside(1 - 4 * FAR**2),
+    "conditions": sp.Piecewise((1, (FAR > -HALF) & (FAR < HALF)), (0, True)),
+    "condition that is not affine": sp.Piecewise((1, sp.sin(x - PLACE) ** 2 < WIDTH**2 / 4), (0, True)),
+    "roof": sp.Max(0, 1 - sp.Abs(FAR)),
+    "parabola": sp.Max(0, 1 - FAR**2) * sp.Rational(3, 4),
+}
+
+
+@pytest.mark.parametrize("kind", BUMPS)
+def test_narrow_bumps_of_every_kind_are_seen(kind):
+    """Of the width 1e-6, of unit mass or of unit compliance: as a mass or a spring in the string at that place."""
+    bump = BUMPS[kind] / WIDTH
+    point = omega(beam(1, inside=[(PLACE, v.diff(t) ** 2 / 2)]), 2)
+    np.testing.assert_allclose(omega(beam(1, 1 + bump), 2), point, rtol=CLOSE)
+    # where the compliance of a string has it, the displacement jumps by the force; mass within counts as the width
+    split = brentq(lambda w: np.sin(w) + w * np.cos(0.37 * w) * np.cos(0.63 * w), 1.5, 3.1, xtol=1e-15)
+    np.testing.assert_allclose(omega(string(1 / (1 + bump)), 1), split, rtol=1e-6)
+
+
 @pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-6])
 def test_a_steep_layer_becomes_a_step(width):
     """EI from 1 to 1/10 by tanh: the difference to the step falls with the width."""
