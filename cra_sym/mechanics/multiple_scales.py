@@ -20,7 +20,7 @@ __all__ = ["MultipleScales", "multiple_scales"]
 VARPI = Symbol("varpi", positive=True)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class MultipleScales:
     """What the method of multiple scales says about one resonance.
 

@@ -164,7 +164,7 @@ def _typeset(part: Any, variables: tuple[str, str]) -> str:
     return rf"\begin{{aligned}} {head}&{lines}{tail} \end{{aligned}}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Step:
     """One step of a derivation.
 
@@ -193,6 +193,9 @@ class Step:
     check: str = ""
     variables: tuple[str, str] = ("x", "t")
     tag: int | str | None = None
+
+    def __repr__(self) -> str:
+        return f"Step {self.name!r}"
 
     def _formula(self) -> str:
         return display_latex(self.expression, self.variables, self.tag)

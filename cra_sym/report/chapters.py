@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Chapter", "chapter"]
 
-_DRAWN = re.compile(r'\bdraw\("(\w+)"\)\s*$')
+_DRAWN = re.compile(r'\bdraw\("(\w+)"(?:, \w+)?\)\s*$')
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,9 @@ def chapter(name: str, notebook: NotebookNode, markup: Markup, figures: Mapping[
         if cell.cell_type == "markdown":
             pieces.append(markup(cell.source))
         elif cell.cell_type == "code":
+            folded = "solution" in cell.metadata.get("tags", ())
+            if folded:
+                pieces.append("<details><summary>Solution</summary>")
             pieces.append(f'<div class="code" translate="no">{highlight(cell.source)}</div>')
             drawn = _DRAWN.search(cell.source)
             if drawn and drawn[1] in figures and drawn[1] not in shown:
@@ -60,6 +63,8 @@ def chapter(name: str, notebook: NotebookNode, markup: Markup, figures: Mapping[
                     f'<div class="output">{_output(output, markup, f"{name}-{place}-{number}")}</div>'
                     for number, output in enumerate(cell.outputs)
                 )
+            if folded:
+                pieces.append("</details>")
     return Chapter("\n".join(pieces), markup.headings, shown)
 
 

@@ -56,7 +56,10 @@ def _normalise(notebook: NotebookNode) -> None:
     notebook.metadata = {"kernelspec": _KERNEL, "language_info": {"name": "python"}}
     for number, cell in enumerate(notebook.cells, 1):
         cell.id = f"cell-{number:02d}"
-        cell.metadata = {"tags": cell.metadata.tags} if cell.metadata.get("tags") else {}
+        tags = cell.metadata.get("tags")
+        cell.metadata = {"tags": tags} if tags else {}
+        if tags and "solution" in tags:
+            cell.metadata["jupyter"] = {"source_hidden": True, "outputs_hidden": True}
         for output in cell.get("outputs", []):
             if "metadata" in output:
                 output.metadata = {}

@@ -1,0 +1,85 @@
+"""The chapters keep their promise: every equation is shown, and everything follows the one cell of parameters."""
+
+import ast
+import re
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbformat.v4 import new_code_cell
+
+import cra_sym as cra
+from cra_sym.report.notebooks import execute
+
+FOLDER = Path(__file__).parents[2] / "notebooks"
+DERIVATION = sorted(FOLDER.glob("0[1-7]*.ipynb"))
+#: Another arm: longer, with a heavier tip and a rotary inertia, on a joint that gives.
+OTHER = 'fields |= {"L": 0.8, "m_e": 0.004, "J_e": 1e-6, "k_t": 5e3, "k_r": 4e2}'
+
+
+def tagged(notebook, tag):
+    return [cell for cell in notebook.cells if tag in cell.metadata.get("tags", ())]
+
+
+def outputs(notebook):
+    return [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
+
+
+def pictures(notebook):
+    return [output.data["image/png"] for output in outputs(notebook) if "image/png" in output.get("data", {})]
+
+
+def test_every_equation_of_the_ledger_is_shown_with_its_number():
+    shown = set()
+    for path in DERIVATION:
+        for output in outputs(nbformat.read(path, as_version=4)):
+            text = "".join(output.get("data", {}).get(kind, "") for kind in ("text/markdown", "text/latex"))
+            shown |= set(re.findall(r"\\qquad \((\d+[a-z]?)\)", text))
+    assert shown == {str(e.number) for e in cra.equations(companions=True)}
+
+
+@pytest.mark.parametrize("path", DERIVATION, ids=lambda path: path.stem)
+def test_a_chapter_has_objectives_pitfalls_and_exercises(path):
+    notebook = nbformat.read(path, as_version=4)
+    prose = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
+    assert len(notebook.cells) <= 41
+    assert "**After this chapter you can**" in prose and "## Pitfalls" in prose
+    solutions = tagged(notebook, "solution")
+    assert 2 <= len(solutions) <= 4 and len(re.findall(r"^\*\*\d\.\*\*", prose, re.MULTILINE)) == len(solutions)
+    for cell in solutions:
+        assert "assert " in cell.source and cell.metadata["jupyter"]["source_hidden"]
+
+
+@pytest.mark.parametrize("path", DERIVATION, ids=lambda path: path.stem)
+def test_assertions_say_what_they_check(path):
+    for cell in nbformat.read(path, as_version=4).cells:
+        if cell.cell_type == "code":
+            for node in ast.walk(ast.parse(cell.source)):
+                assert not isinstance(node, ast.Assert) or node.msg, ast.unparse(node)
+
+
+def following():
+    return [
+        path for path in DERIVATION if any("fields" in c.source for c in tagged(nbformat.read(path, 4), "parameters"))
+    ]
+
+
+@pytest.mark.parametrize("path", following(), ids=lambda path: path.stem)
+def test_a_chapter_follows_its_parameters(path, monkeypatch):
+    """Another arm: no cell fails, and every figure that shows an arm is another."""
+    stored = nbformat.read(path, as_version=4)
+    (parameters,) = tagged(stored, "parameters")
+    read = nbformat.read
+
+    def with_another_arm(*arguments, **options):
+        notebook = read(*arguments, **options)
+        place = [cell.source for cell in notebook.cells].index(parameters.source)
+        notebook.cells.insert(place + 1, new_code_cell(OTHER))
+        return notebook
+
+    monkeypatch.setattr(nbformat, "read", with_another_arm)
+    before, after = pictures(stored), pictures(execute(path))
+    assert len(before) == len(after)
+    drawn = [cell.source for cell in stored.cells if re.search(r"\bdraw\(", cell.source)]
+    still = {k for k, source in enumerate(drawn) if not re.search(r"draw\(.*, \w+\)", source)}
+    assert [k for k, (a, b) in enumerate(zip(before, after, strict=True)) if a == b] == sorted(still)
