@@ -33,6 +33,7 @@ _START = {"v_m": 0.0, "a_m": 0.1, "B": 1e-3, "varpi": 10.0, "psi": 0.0, "epsilon
 _EXCITATIONS = {"joint stiffness fluctuates": JOINT, "base shakes along the arm": AXIAL}
 _SWING = 24  # pictures of one swing of the mode shapes
 _SIZE = (8.6, 2.9)
+_TIME = np.linspace(0.0, 2.0, 1601)
 
 #: First value, last value and number of steps; stiffnesses run through decades and end in a rigid joint.
 _RANGES: dict[str, tuple[float, float, int]] = {
@@ -99,14 +100,14 @@ class Explorer:
         }
 
     def _modes(self) -> dict[str, Any]:
-        return {"arm": self.arm, "k_t": self.values["k_t"], "k_r": self.values["k_r"], "phase": self.swing}
+        return {"system": self.arm, "phase": self.swing}
 
     def _response(self) -> dict[str, Any]:
-        return {"arm": self.arm, "motion": self.motion}
+        return {"system": self.arm, "motion": self.motion, "t": _TIME}
 
     def _zones(self) -> dict[str, Any]:
         coarse = {"points": 17, "tolerance": 1e-4}  # growth to about 1e-4 of its largest: a picture's worth
-        return {"arm": self.arm, "excitation": self.excitation, "epsilon": self.values["epsilon"], **coarse}
+        return {"system": self.arm, "excitation": self.excitation, "epsilon": self.values["epsilon"], **coarse}
 
     def _set(self, **changes: Any) -> None:
         """Change values, ``excitation`` or ``swing`` by name, and redraw what depends on them."""

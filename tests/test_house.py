@@ -33,7 +33,6 @@ STRANGERS = ({"mechanics", "kernels", "solvers"}, {"analysis", "arm"})  # rooms 
 # A module that names one of a higher room, to load it when a function asks for it: the only ways up.
 UPWARDS = {
     ("cra_sym/model/lagrangian.py", "analysis"),  # a model has its tools at hand
-    ("cra_sym/figures/__init__.py", "claims"),  # Fig. 4 sets a second route beside the derived result
 }
 KNOW_ORACLES = {"paper", "claims"}
 
@@ -111,12 +110,12 @@ def test_the_import_rule_sees_a_trespass(tmp_path, monkeypatch):
     planted.parent.mkdir(parents=True)
     planted.write_text(
         "def f():\n    from ..mechanics import hamilton\n    from cra_sym import figures, checks, symbols\n"
-        "    return derived_kernel('cra_sym.paper.oracles.flipped:characteristic'), f'cra_sym.report.{f}'\n"
+        "    return derived_kernel('cra_sym.paper.oracles.shooting:characteristic'), f'cra_sym.report.{f}'\n"
     )
     monkeypatch.setitem(globals(), "ROOT", tmp_path)
     monkeypatch.setitem(globals(), "PACKAGE", tmp_path / "cra_sym")
     assert sorted(trespasses(planted)) == ["cra_sym.figures", "cra_sym.mechanics.hamilton"]
-    assert named_in_text(planted) == {"cra_sym.paper.oracles.flipped", "cra_sym.report."}
+    assert named_in_text(planted) == {"cra_sym.paper.oracles.shooting", "cra_sym.report."}
     with pytest.raises(AssertionError):
         test_second_routes_serve_proofs_and_claims_only(planted)
 

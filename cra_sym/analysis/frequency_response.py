@@ -57,11 +57,12 @@ def frequency_response(
         Omega, rad/s, not negative; a number or one axis.
     x : array_like, optional
         Place or one axis of places in the domain, m; the right end by default.
-    drive : Expr, optional
-        What drives: a prescribed motion ``w(t)`` by one unit of its acceleration (by default the only one), or a
-        displacement of an end, such as ``v.subs(x, L)``, or a lumped coordinate.
+    drive : Expr or str, optional
+        What drives: a prescribed motion ``w(t)`` by one unit of its acceleration (by default the only one), a force
+        ``F(t)`` of the Lagrangian or the virtual work, distributed or not, by one unit of it; or a displacement of a
+        section at an end or an interior place, such as ``v.subs(x, L/2)``, or a lumped coordinate.
     kind : {'force', 'motion'}, optional
-        A unit force on that displacement (the default), or one unit of motion of it.
+        A unit force on that displacement (the default), or one unit of motion of it, at an end or a coordinate.
     field : applied undefined function, optional
         Default: the first.
     damping : {'modal', 'structural'}
@@ -112,6 +113,7 @@ def frequency_response(
     if places is not None:
         check_places(system, places)
     choice("damping", damping, ("modal", "structural"))
+    system, drive = _with_force_inside(system, drive, kind)
     undamped = _Undamped(system, places, drive, kind, section_place(system, field), float(grid.max(initial=0.0)))
     zeta = np.broadcast_to(system.zeta, system.shape)[..., None]
     if np.any(zeta) and undamped.problem_damped:
@@ -169,10 +171,10 @@ class _Undamped:
         fastest: float,
     ) -> None:
         self._system, self._places, self._place, self._fastest = system, places, place, fastest
-        self.motion = _motion_name(system, drive)
+        self.motion = _cause_name(system, drive)
         if self.motion is not None:
             if kind is not None:
-                raise ValueError(f"kind = {kind!r}: a prescribed motion drives by its acceleration; leave kind out")
+                raise ValueError(f"kind = {kind!r}: {self.motion} drives by its acceleration or itself; leave kind out")
             self._problem: SpatialProblem = system.numerics("driven", self.motion)
             self._driven = self._problem.displacements + system.numerics("driven_coordinate", self.motion)
         else:
@@ -378,11 +380,28 @@ class _Undamped:
         return np.asarray(found.reshape(*shape, *found.shape[1:]))
 
 
-def _motion_name(system: System, drive: Any) -> str | None:
-    """Return the name of the prescribed motion that drives, or None if a displacement does."""
+def _cause_name(system: System, drive: Any) -> str | None:
+    """Return the name of the prescribed motion or force that drives, or None if a displacement does."""
     if drive is None:
         return only_motion(system)
-    motions = [name for name, kind in system.numerics("causes") if kind == "motion"]
+    causes = dict(system.numerics("causes"))
     name = drive if isinstance(drive, str) else getattr(getattr(drive, "func", None), "__name__", shown(drive))
-    arguments = len(getattr(drive, "args", (None,)))
-    return name if name in motions and (isinstance(drive, str) or arguments == 1) else None
+    if name not in causes or (not isinstance(drive, str) and len(drive.args) != 1):
+        return None
+    if causes[name] not in ("motion", "force"):
+        raise ValueError(f"drive: the load {causes[name]} is neither a multiple of {name} nor of its acceleration")
+    return name
+
+
+def _with_force_inside(system: System, drive: Any, kind: Any) -> tuple[System, Any]:
+    """Return the system and what drives it; a displacement of an interior place with a force of its own there."""
+    if drive is None or isinstance(drive, str):
+        return system, drive
+    found = system.model.numerics("pushed", drive)
+    if found is None:
+        return system, drive
+    if kind not in (None, "force"):
+        raise ValueError(f"kind = {shown(kind)}: what drives at an interior place must be a force")
+    model, name, place = found
+    check_places(system, np.asarray(place.function(*system.domain.values)), "drive: place")
+    return model.at({**system.values}, system.zeta), name

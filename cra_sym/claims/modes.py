@@ -15,7 +15,7 @@ from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
 from cra_sym.claims.verdict import Finding, Quantity, Verdict, outcome
 from cra_sym.claims.words import listed, number, percent, span
-from cra_sym.paper.oracles.flipped import flipped_frequencies
+from cra_sym.paper.flipped import flipped_frequencies
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,4 +1,4 @@
-"""One function a figure: it takes data or an arm and an optional ``ax`` and returns the Figure. No global state."""
+"""One function a figure: it takes data or a system and optional axes, returns the Figure and sets nothing global."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from importlib.resources import files
 from inspect import cleandoc, signature
 from typing import TYPE_CHECKING, Any
 
-from cra_sym.checks import choice, instance
+from cra_sym.checks import choice, instance, shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cra_sym.arm.parameters import Arm
+    from cra_sym.model.system import System
 
-__all__ = ["ANIMATIONS", "FIGURES", "STYLE", "animate", "described", "draw", "shows_an_arm"]
+__all__ = ["ANIMATIONS", "FIGURES", "STYLE", "animate", "described", "draw", "shows_an_arm", "shows_any_system"]
 
 FIGURES = {
     "fig01": "cra_sym.figures.robot:figure_1",
     "fig02": "cra_sym.figures.joint:figure_2",
     "fig03": "cra_sym.figures.modes:figure_3",
-    "fig04": "cra_sym.claims.figure_4:figure_4",
+    "fig04": "cra_sym.figures.modes:figure_4",
     "fig05": "cra_sym.figures.sensitivity:figure_5",
     "fig06": "cra_sym.figures.responses:figure_6",
     "fig07": "cra_sym.figures.responses:figure_7",
@@ -34,11 +34,14 @@ FIGURES = {
     "fig12": "cra_sym.figures.stability:figure_12",
     "fig12_axial": "cra_sym.figures.stability:figure_12_axial",
     "zone_widths": "cra_sym.figures.stability:figure_widths",
+    "zones": "cra_sym.figures.stability:figure_zones",
     "combinations": "cra_sym.figures.stability:figure_combinations",
     "accuracy": "cra_sym.figures.stability:figure_accuracy",
     "frequency_response": "cra_sym.figures.vibration:figure_frequency_response",
     "residual_vibration": "cra_sym.figures.vibration:figure_residual_vibration",
     "input_shaping": "cra_sym.figures.vibration:figure_input_shaping",
+    "frequencies": "cra_sym.figures.modes:figure_frequencies",
+    "response": "cra_sym.figures.responses:figure_response",
     "mode_shapes": "cra_sym.figures.modes:figure_mode_shapes",
     "derivation": "cra_sym.figures.derivation:figure_derivation",
 }
@@ -54,30 +57,59 @@ STYLE = str(files(__name__) / "style.mplstyle")
 """The one style: ``with plt.style.context(STYLE): ...``."""
 
 
-def draw(name: str, arm: Arm | None = None) -> Figure:
-    """Draw one figure of ``FIGURES`` in the house style, of the arm given or of the paper's.
+def draw(name: str, system: System | None = None, **options: Any) -> Figure:
+    """Draw one figure of ``FIGURES`` in the house style, of the system given or of the paper's arm.
+
+    Parameters
+    ----------
+    name : str
+        'frequencies', 'mode_shapes', 'response', 'frequency_response', 'zones' and 'combinations' show any system, the
+        others of `shows_an_arm` an arm.
+    system : System, optional
+        A single one. An arm is one.
+    **options
+        What else the figure's function takes, such as ``parameter="k_t"`` of 'frequencies' or ``excitation=``.
 
     Raises
     ------
     TypeError, ValueError
-        If there is no such figure, or an arm is given to one that shows none, or it is no `Arm`.
+        If there is no such figure or it does not take an option, or a system is given to one that shows none, or is
+        no `Arm` where that is needed.
+
+    Examples
+    --------
+    >>> from cra_sym import Arm
+    >>> draw("frequencies", Arm.nominal(), parameter="m_e").axes[0].get_xlabel()
+    '$m_e$ / kg'
     """
     choice("figure", name, FIGURES)
-    if arm is not None:
+    taken = signature(_function(name)).parameters
+    unknown = [option for option in options if option not in taken or option in ("system", "arm")]
+    if unknown:
+        raise TypeError(f"{unknown[0]} = {shown(options[unknown[0]])}: {name!r} takes {', '.join(taken) or 'nothing'}")
+    subject: dict[str, System] = {}
+    if system is not None:
         if not shows_an_arm(name):
             raise ValueError(f"figure = {name!r}: it shows no arm, so none can be given")
         from cra_sym.arm.parameters import Arm
+        from cra_sym.model.system import System
 
-        instance("arm", arm, Arm)
+        instance("system", system, System if shows_any_system(name) else Arm)
+        subject = {"system" if shows_any_system(name) else "arm": system}
     from matplotlib import style
 
     with style.context(STYLE):
-        return _function(name)(**({} if arm is None else {"arm": arm}))
+        return _function(name)(**subject, **options)
 
 
 def shows_an_arm(name: str) -> bool:
     """Tell whether a figure of ``FIGURES`` can be drawn of an arm other than the paper's."""
-    return "arm" in signature(_function(name)).parameters
+    return bool({"arm", "system"} & signature(_function(name)).parameters.keys())
+
+
+def shows_any_system(name: str) -> bool:
+    """Tell whether a figure of ``FIGURES`` can be drawn of any system."""
+    return "system" in signature(_function(name)).parameters
 
 
 def animate(name: str) -> str:

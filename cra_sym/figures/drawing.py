@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,7 +13,7 @@ from cra_sym.arm.parameters import Arm
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["BLUE", "GREEN", "INK", "ORANGE", "canvas", "deflection"]
+__all__ = ["BLUE", "GREEN", "INK", "ORANGE", "canvas", "deflection", "panels"]
 
 #: The style's first colours by value: "C0" would take the colour of whoever shows the figure, not of the style.
 INK, BLUE, ORANGE, GREEN = "#222222", "#0072B2", "#D55E00", "#009E73"
@@ -26,6 +26,13 @@ def canvas(ax: Axes | None, figsize: tuple[float, float]) -> tuple[Figure, Axes]
     ax.set_aspect("equal")
     ax.set_axis_off()
     return cast(Figure, ax.figure), ax
+
+
+def panels(axes: Any, rows: int, columns: int, size: tuple[float, float], **options: Any) -> np.ndarray:
+    """Return a grid of axes, shape (rows, columns): those given, or those of a new figure."""
+    if axes is None:
+        axes = Figure(figsize=size, layout="constrained").subplots(rows, columns, squeeze=False, **options)
+    return np.asarray(axes).reshape(rows, columns)
 
 
 def deflection(arm: Arm | None, xi: np.ndarray) -> np.ndarray:

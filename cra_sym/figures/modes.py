@@ -1,20 +1,34 @@
-"""Natural frequencies against a stiffness of the joint (Fig. 3) and the first mode shapes."""
+"""Natural frequencies against a stiffness of the joint (Figs. 3, 4) or any parameter, and the first mode shapes."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from cra_sym.analysis.modes import mode_shapes, natural_frequencies
 from cra_sym.arm.parameters import Arm
-from cra_sym.figures.drawing import BLUE, ORANGE
+from cra_sym.checks import choice, one_axis
+from cra_sym.figures.drawing import BLUE, ORANGE, panels
+from cra_sym.figures.subject import (
+    around,
+    field_label,
+    fields,
+    leading_parameter,
+    parameter_label,
+    rigid_ends,
+    single,
+)
+from cra_sym.model.system import System
+from cra_sym.paper.flipped import flipped_frequencies
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_in_hertz", "draw_relative", "figure_3", "figure_mode_shapes", "panels"]
+__all__ = ["decades", "figure_3", "figure_4", "figure_frequencies", "figure_mode_shapes"]
 
 _UNITS = {"k_t": "N/m", "k_r": "N m/rad"}
 _QUANTITIES = {"k_t": "translational stiffness", "k_r": "rotational stiffness"}
@@ -29,68 +43,176 @@ def figure_3(arm: Arm | None = None, k_t: Any = None, *, axes: Any = None) -> Fi
     arm : Arm, optional
         By default the nominal one.
     k_t : array_like, optional
-        Stiffnesses in N/m, by default 1 to 1e6.
+        Stiffnesses in N/m, by default 1 to 1e6 for the nominal EI / L^3.
     axes : pair of Axes, optional
     """
     arm = arm or Arm.nominal()
-    k_t = np.logspace(0, 6, 301) if k_t is None else np.asarray(k_t, dtype=float)
-    figure, (left, right) = panels(axes, 1, 2, (8.6, 3.9))
+    k_t = decades(arm, "k_t", 0, 6) if k_t is None else np.asarray(k_t, dtype=float)
+    ((left, right),) = panels(axes, 1, 2, (8.6, 3.9))
     found, rigid = natural_frequencies(arm.replace(k_t=k_t)), natural_frequencies(arm.replace(k_t=np.inf))
-    draw_in_hertz(left, k_t, found, rigid, "k_t")
-    draw_relative(right, k_t, found / rigid, "k_t")
+    _in_hertz(left, k_t, found, rigid, "k_t")
+    _relative(right, k_t, found / rigid, "k_t")
     left.set_title("Fig. 3  A softer joint lowers every mode")
     right.set_title("higher modes feel it first", fontweight="normal")
-    return figure
+    return left.figure
 
 
-def figure_mode_shapes(
-    arm: Arm | None = None, k_t: float = 1e3, k_r: float = 1e2, *, phase: float | None = None, axes: Any = None
-) -> Figure:
-    """Draw the first three mode shapes of the arm with a rigid and with an elastic joint.
+def figure_4(arm: Arm | None = None, k_r: Any = None, *, axes: Any = None) -> Figure:
+    """Draw f1, f2, f3 against the joint's rotational stiffness: as derived, and with the spring's sign flipped.
+
+    The left column follows from the Lagrangian. The right one from the same Lagrangian with the sign of the rotational
+    spring's energy flipped, EI v_xx(0) = -k_r v_x(0): it shows the rising f2 and f3 and the seemingly flat f1 that the
+    paper reports.
 
     Parameters
     ----------
     arm : Arm, optional
         By default the nominal one.
-    k_t, k_r : float
-        The elastic joint, N/m and N m/rad.
-    phase : float, optional
-        Instant of a free vibration, rad: the elastic arm's shapes times its cosine, on axes with room for the whole
-        swing.
-    axes : three Axes, optional
+    k_r : array_like, optional
+        Stiffnesses in N m/rad, by default 1e2 to 1e5 for the nominal EI / L.
+    axes : 2 x 2 array of Axes, optional
     """
     arm = arm or Arm.nominal()
-    figure, grid = panels(axes, 1, 3, (8.6, 3.4), sharey=True)
-    x = np.linspace(0.0, float(arm.L), 301)
-    rigid, elastic = arm.replace(k_t=np.inf, k_r=np.inf), arm.replace(k_t=k_t, k_r=k_r)
-    pairs = [(mode_shapes(a, x), natural_frequencies(a)) for a in (rigid, elastic)]
-    swing = 1.0 if phase is None else np.cos(phase)
-    for mode, ax in enumerate(grid):
-        ax.axhline(0.0, color="0.75", linewidth=0.8)
-        for (shapes, hertz), colour, name in zip(pairs, (BLUE, ORANGE), ("rigid", "elastic"), strict=True):
-            line: dict[str, Any] = {"color": colour, "linestyle": "-" if name == "elastic" else (0, (4, 2))}
-            shape = shapes[mode] * (swing if name == "elastic" else 1.0)
-            ax.plot(x, shape, label=f"{name}, {hertz[mode]:.2f} Hz", **line)
+    k_r = decades(arm, "k_r", 2, 5) if k_r is None else np.asarray(k_r, dtype=float)
+    grid = panels(axes, 2, 2, (8.6, 6.6), sharey="row")
+    (top_left, top_right), (low_left, low_right) = grid
+    rigid = natural_frequencies(arm.replace(k_r=np.inf))
+    derived, flipped = natural_frequencies(arm.replace(k_r=k_r)), flipped_frequencies(arm.replace(k_r=k_r))
+    for upper, lower, found in ((top_left, low_left, derived), (top_right, low_right, flipped)):
+        _in_hertz(upper, k_r, found, rigid, "k_r")
+        _relative(lower, k_r, found / rigid, "k_r")
+        upper.set_xlabel("")
+    for ax in (top_right, low_right):
+        ax.set_ylabel("")
+    top_left.set_title("Fig. 4  Derived: $EI\\,v_{xx}(0)=+k_r\\,v_x(0)$")
+    top_right.set_title("Sign flipped: $EI\\,v_{xx}(0)=-k_r\\,v_x(0)$")
+    low_left.set_title("all fall, near the rigid joint by the same fraction", fontweight="normal")
+    low_right.set_title("all rise; in hertz f1 only seems unchanged", fontweight="normal")
+    return grid[0, 0].figure
+
+
+def figure_frequencies(
+    system: System | None = None,
+    parameter: str | None = None,
+    values: ArrayLike | None = None,
+    *,
+    modes: int = 3,
+    ax: Axes | None = None,
+) -> Figure:
+    """Draw natural frequencies against any parameter.
+
+    Parameters
+    ----------
+    system : System, optional
+        By default the nominal arm with k_t = 1e4 N/m.
+    parameter : str, optional
+        Its name; by default the first stiffness of an end, or else what the first frequency depends on most.
+    values : array_like, optional
+        By default around the value the system has: decades of a stiffness, from half to twice of anything else.
+    modes : int
+    ax : Axes, optional
+    """
+    system = single(Arm.nominal().replace(k_t=1e4) if system is None else system)
+    name = leading_parameter(system) if parameter is None else choice("parameter", parameter, system.values)
+    if values is None:
+        x, found = _over_what_is_stable(system, name, modes)
+    else:
+        x = one_axis("values", values, "values", allow_infinite=True)
+        found = natural_frequencies(system.replace(**{name: x}), modes)
+    ax = panels(ax, 1, 1, (6.4, 4.0))[0, 0]
+    if name in system.numerics("stiffnesses"):
+        for level in natural_frequencies(system.replace(**{name: np.inf}), modes):
+            ax.axhline(level, **_RIGID)
+    for mode in range(modes):
+        ax.plot(x, found[:, mode], label=f"$f_{{{mode + 1}}}$")
+    given = float(system.values[name])
+    if x.min() <= given <= x.max():
+        ax.axvline(given, color="0.75", linewidth=0.8, zorder=0)
+    ax.set_xscale("log" if x.min() > 0 and x.max() > 10 * x.min() else "linear")
+    ax.set_yscale("log" if (found > 0).any() else "linear")
+    ax.set_xlabel(parameter_label(system, name))
+    ax.set_ylabel("natural frequency / Hz")
+    ax.legend(loc="lower left", ncols=modes, bbox_to_anchor=(0.0, 0.98), borderaxespad=0)
+    return cast(Figure, ax.figure)
+
+
+def _over_what_is_stable(system: System, name: str, modes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return values of a parameter and the frequencies there, over a range where nothing buckles."""
+    for narrowing in range(5):
+        x = around(system, name, narrowing)
+        try:
+            return x, natural_frequencies(system.replace(**{name: x}), modes)
+        except ValueError:
+            if narrowing == 4:
+                raise
+    raise AssertionError
+
+
+def figure_mode_shapes(
+    system: System | None = None, *, modes: int = 3, phase: float | None = None, axes: Any = None
+) -> Figure:
+    """Draw the first mode shapes, with the springs of the ends as they are and rigid.
+
+    Parameters
+    ----------
+    system : System, optional
+        By default the nominal arm with k_t = 1e3 N/m and k_r = 1e2 N m/rad.
+    modes : int
+    phase : float, optional
+        Instant of a free vibration, rad: the elastic shapes times its cosine, on axes with room for the whole swing.
+    axes : Axes, optional
+        A row for each field, a column for each mode.
+    """
+    system = single(Arm.nominal().replace(k_t=1e3, k_r=1e2) if system is None else system)
+    known = fields(system)
+    grid = panels(axes, len(known), modes, (2.87 * modes, 1.0 + 2.4 * len(known)), sharey="row")
+    along, unit = field_label(system)
+    for row, (name, field) in zip(grid, known.items(), strict=True):
+        _shapes_of_field(row, system, field, modes, 1.0 if phase is None else float(np.cos(phase)), phase is not None)
+        symbol = r"\phi" if len(known) == 1 else name
+        row[0].set_ylabel(f"mass-normalised shape ${symbol}${unit}")
+    for mode, ax in enumerate(grid[0]):
         ax.set_title(f"mode {mode + 1}")
-        ax.set_xlabel("position along the arm $x$ / m")
+    for ax in grid[-1]:
+        ax.set_xlabel(along)
+    return grid[0, 0].figure
+
+
+def _shapes_of_field(
+    row: Sequence[Axes], system: System, field: Any, modes: int, swing: float, whole_swing: bool
+) -> None:
+    left = float(system.domain.left)
+    x = np.linspace(left, left + float(system.domain.length), 301)
+    looks: dict[str, tuple[System, dict[str, Any]]] = {
+        "elastic": (system, {"color": ORANGE, "linestyle": "-"}),
+        "rigid": (rigid_ends(system), {"color": BLUE, "linestyle": (0, (4, 2))}),
+    }
+    if looks["rigid"][0] == system:
+        looks = {"": looks["rigid"]}
+    found = {name: mode_shapes(one, x, modes, field=field) for name, (one, _) in looks.items()}
+    for mode, ax in enumerate(row):
+        ax.axhline(0.0, color="0.75", linewidth=0.8)
+        for name in reversed(looks):
+            hertz = natural_frequencies(looks[name][0], modes)[mode]
+            shape = found[name][mode] * (1.0 if name == "rigid" else swing)
+            ax.plot(x, shape, label=f"{name}, {hertz:.2f} Hz".removeprefix(", "), **looks[name][1])
         ax.margins(x=0.02, y=0.12)
-        ax.legend(loc=("upper left", "upper center", "upper center")[mode], fontsize=8)
-    largest = max(np.abs(shapes).max() for shapes, _ in pairs)
-    grid[0].set_ylim(None if phase is None else -1.15 * largest, 1.35 * largest)
-    grid[0].set_ylabel("mass-normalised shape $\\phi$ / kg$^{-1/2}$")
-    return figure
+        ax.legend(loc="upper center" if mode else "upper left", fontsize=8)
+    largest = max(np.abs(shapes).max() for shapes in found.values())
+    row[0].set_ylim(-1.15 * largest if whole_swing else None, 1.35 * largest)
 
 
-def panels(axes: Any, rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Figure, Any]:
-    """Return a figure and its grid of axes: those given, or new ones."""
-    if axes is not None:
-        grid = np.asarray(axes)
-        return grid.flat[0].figure, grid
-    figure = Figure(figsize=size, layout="constrained")
-    return figure, figure.subplots(rows, columns, **options)
+def decades(arm: Arm, name: str, low: int, high: int, points: int = 301) -> np.ndarray:
+    """Return stiffnesses of the joint from 10^low to 10^high for the nominal arm, of another one decades like these.
+
+    What counts is k_t L^3 / EI and k_r L / EI.
+    """
+    nominal, power = Arm.nominal(), {"k_t": 3, "k_r": 1}[name]
+    shift = round(float(np.log10(arm.EI / arm.L**power / (nominal.EI / nominal.L**power))))
+    return np.logspace(low + shift, high + shift, points)
 
 
-def draw_in_hertz(ax: Axes, stiffness: np.ndarray, found: np.ndarray, rigid: np.ndarray, name: str) -> None:
+def _in_hertz(ax: Axes, stiffness: np.ndarray, found: np.ndarray, rigid: np.ndarray, name: str) -> None:
     """Draw frequencies, shape (len(stiffness), modes), against a stiffness, with those of the rigid joint."""
     for mode in range(found.shape[-1]):
         ax.axhline(rigid[mode], **_RIGID)
@@ -103,7 +225,7 @@ def draw_in_hertz(ax: Axes, stiffness: np.ndarray, found: np.ndarray, rigid: np.
     ax.set_ylabel("natural frequency / Hz")
 
 
-def draw_relative(ax: Axes, stiffness: np.ndarray, ratio: np.ndarray, name: str) -> None:
+def _relative(ax: Axes, stiffness: np.ndarray, ratio: np.ndarray, name: str) -> None:
     """Draw frequencies over those of the rigid joint, shape (len(stiffness), modes), against a stiffness."""
     ax.axhline(1.0, **_RIGID)
     for mode in range(ratio.shape[-1]):

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
-from cra_sym.analysis.responses import tip_response
+from cra_sym.analysis.responses import History, response, tip_response
 from cra_sym.arm.parameters import Arm
-from cra_sym.figures.drawing import BLUE, ORANGE
-from cra_sym.solvers.motion import BaseMotion
+from cra_sym.figures.drawing import BLUE, ORANGE, panels
+from cra_sym.figures.subject import fields, moving_place, rigid_ends, single, span
+from cra_sym.model.system import System
+from cra_sym.solvers.motion import BaseMotion, Force
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,15 +40,9 @@ def _name(arm: Arm) -> str:
     return "nominal arm" if arm == Arm.nominal() else "arm as given"
 
 
-def _panels(axes: Any, rows: int, columns: int, size: tuple[float, float], **options: Any) -> np.ndarray:
-    if axes is not None:
-        return np.asarray(axes).reshape(rows, columns)
-    return Figure(figsize=size, layout="constrained").subplots(rows, columns, squeeze=False, **options)
-
-
-def _finish(panels: np.ndarray, scenario: str) -> Figure:
-    figure = panels.flat[0].figure
-    for ax in panels[-1]:
+def _finish(grid: np.ndarray, scenario: str) -> Figure:
+    figure = grid.flat[0].figure
+    for ax in grid[-1]:
         ax.set_xlabel("time $t$ / s")
     figure.supxlabel(scenario, fontsize=8, color="0.35")
     return figure
@@ -58,35 +56,79 @@ def _peak(ax: Axes, t: np.ndarray, v: np.ndarray, color: Any) -> float:
 
 
 def figure_response(
-    arm: Arm | None = None, motion: BaseMotion | None = None, t: Any = None, *, axes: Any = None
+    system: System | None = None,
+    motion: BaseMotion | Mapping[Any, History] | None = None,
+    t: ArrayLike | None = None,
+    *,
+    modes: int = 5,
+    initial: Mapping[Any, Any] | None = None,
+    axes: Any = None,
 ) -> Figure:
-    """Draw the tip's response to any motion of the base, with the joint as it is and with a rigid one.
+    """Draw the response of the tip to any motion and forces, with the springs of the ends as they are and rigid.
+
+    Where no mode moves the right end, the place that the first mode moves most takes the place of the tip.
 
     Parameters
     ----------
-    arm : Arm, optional
-        By default the nominal one with k_t = 1e3 N/m.
-    motion : BaseMotion, optional
-        By default a mean acceleration of 0.1 m/s2 with the disturbance of Fig. 7.
+    system : System, optional
+        By default the nominal arm with k_t = 1e3 N/m.
+    motion : BaseMotion, or mapping of function of t to BaseMotion or Force, optional
+        By default a mean acceleration of 0.1 m/s2 with the disturbance of Fig. 7 for the only prescribed motion, a
+        unit step of every force, and, where nothing drives, a unit velocity of the first field at t = 0.
     t : array_like, optional
-        Times, s, by default 0 to 2.
+        Times, s, by default about five periods.
+    modes : int
+    initial : mapping, optional
+        State at t = 0, as in :func:`cra_sym.response`.
     axes : Axes, optional
     """
-    arm, t = arm or Arm.nominal().replace(k_t=SOFT), _TIME if t is None else np.asarray(t, dtype=float)
-    motion = motion or BaseMotion(acceleration=0.1, amplitude=AMPLITUDE, angular_frequency=RATE)
-    panels = _panels(axes, 1, 1, (6.4, 3.6))
-    ax = panels[0, 0]
-    for joined, name, look in (
-        (arm.replace(k_t=np.inf, k_r=np.inf), "rigid joint", _GREY),
-        (arm, "joint as given", {"color": ORANGE, "linestyle": "-"}),
-    ):
-        v = 1e3 * tip_response(joined, motion, t)
-        ax.plot(t, v, label=f"{name}, peak {_peak(ax, t, v, look['color']):.2f} mm", **look)
+    system = single(Arm.nominal().replace(k_t=SOFT) if system is None else system)
+    t = _times(system) if t is None else np.asarray(t, dtype=float)
+    if motion is None and initial is None:
+        motion, initial = _default_drive(system)
+    ax = panels(axes, 1, 1, (6.4, 3.6))[0, 0]
+    place, tip, rigid = moving_place(system), float(system.domain.left + system.domain.length), rigid_ends(system)
+    looks: list[tuple[System, str, dict[str, Any]]] = [(system, "as given", {"color": ORANGE, "linestyle": "-"})]
+    if rigid != system:
+        looks.insert(0, (rigid, "rigid ends", _GREY))
+    scale, label = (1e3, _TIP) if isinstance(system, Arm) else (1.0, _displacement_label(system, place))
+    for one, name, look in looks:
+        if place == tip:
+            found = scale * tip_response(one, motion, t, modes, initial=initial)
+        else:
+            found = scale * response(one, motion, t, place, modes, initial=initial)
+        peak = _peak(ax, t, found, look["color"])
+        ax.plot(t, found, label=f"{name}, peak {_short(peak)}{' mm' * isinstance(system, Arm)}", **look)
     ax.legend(loc="lower right", ncols=2, bbox_to_anchor=(1.0, 0.98), borderaxespad=0)
     ax.set_title("Response of the tip", pad=8)
     ax.set_xlabel("time $t$ / s")
-    ax.set_ylabel(_TIP)
+    ax.set_ylabel(label)
     return ax.figure
+
+
+def _short(value: float) -> str:
+    return f"{value:.2f}" if 0.1 <= value < 1000 else f"{value:.3g}"
+
+
+def _displacement_label(system: System, place: float) -> str:
+    field = next(iter(fields(system)))
+    return f"${field}$ at ${system.model.equations.x}$ = {place:g} m / SI unit"
+
+
+def _times(system: System) -> np.ndarray:
+    return np.linspace(0.0, span(system), _TIME.size)
+
+
+def _default_drive(system: System) -> tuple[Any, Any]:
+    causes = dict(system.numerics("causes"))
+    motions = [name for name, kind in causes.items() if kind == "motion"]
+    disturbed = BaseMotion(acceleration=0.1, amplitude=AMPLITUDE, angular_frequency=RATE)
+    drive: dict[str, History] = {name: Force(1.0) for name, kind in causes.items() if kind == "force"}
+    drive |= {name: disturbed if name == motions[0] else BaseMotion() for name in motions}
+    if drive or system.numerics("constant") is not None:
+        return drive, None
+    equations = system.model.equations
+    return None, {equations.fields[0].diff(equations.t): 1}
 
 
 def figure_6(arm: Arm | None = None, *, axes: Any = None) -> Figure:
@@ -100,12 +142,13 @@ def figure_6(arm: Arm | None = None, *, axes: Any = None) -> Figure:
         By default the nominal one.
     axes : 2 x 2 array of Axes, optional
     """
-    arm, t = arm or Arm.nominal(), _TIME
-    panels = _panels(axes, 2, 2, (8.6, 6.2), sharex=True, sharey="col")
+    arm = arm or Arm.nominal()
+    t = _times(arm)
+    grid = panels(axes, 2, 2, (8.6, 6.2), sharex=True, sharey="col")
     cases = (("mean velocity 0.1 m/s", {"velocity": VELOCITY}), ("mean acceleration 0.1 m/s²", {"acceleration": 0.1}))
-    for ax, (title, _) in zip(panels[0], cases, strict=True):
-        ax.set_title(f"Fig. 6  {title}" if ax is panels[0, 0] else title, pad=36)
-    for row, (phase, name) in zip(panels, ((0.0, "0"), (np.pi, r"\pi")), strict=True):
+    for ax, (title, _) in zip(grid[0], cases, strict=True):
+        ax.set_title(f"Fig. 6  {title}" if ax is grid[0, 0] else title, pad=36)
+    for row, (phase, name) in zip(grid, ((0.0, "0"), (np.pi, r"\pi")), strict=True):
         for ax, (_, mean) in zip(row, cases, strict=True):
             plain, moved = (_tip(arm, t, disturbed, phase=phase, **mean) for disturbed in (False, True))
             (with_line,) = ax.plot(t, moved, color=BLUE, linestyle="-", zorder=2)
@@ -117,24 +160,25 @@ def figure_6(arm: Arm | None = None, *, axes: Any = None) -> Figure:
             ax.legend([with_line, without], labels, loc="lower left", bbox_to_anchor=(0.0, 0.98), borderaxespad=0)
             ax.text(0.99, 1.03, rf"$\psi={name}$", transform=ax.transAxes, ha="right", va="bottom")
         row[0].set_ylabel(_TIP)
-    return _finish(panels, f"{_name(arm)}, $B$ = 1 mm, $\\varpi$ = 10 rad/s, {_FROM_REST}")
+    return _finish(grid, f"{_name(arm)}, $B$ = 1 mm, $\\varpi$ = 10 rad/s, {_FROM_REST}")
 
 
 def _against_rigid(axes: Any, arm: Arm | None, quantity: Any, label: str, title: str) -> Figure:
-    arm, t = arm or Arm.nominal(), _TIME
-    panels = _panels(axes, 1, 2, (8.6, 3.9), sharex=True, sharey=True)
-    rigid, soft = arm.replace(k_t=np.inf), arm.replace(k_t=SOFT)
-    joints = ((rigid, "rigid joint", BLUE, "-"), (soft, "$k_t$ = 1000 N/m", ORANGE, "--"))
-    for ax, rate in zip(panels[0], (RATE, 2 * RATE), strict=True):
+    arm = arm or Arm.nominal()
+    t = _times(arm)
+    grid = panels(axes, 1, 2, (8.6, 3.9), sharex=True, sharey=True)
+    rigid, soft = arm.replace(k_t=np.inf), arm.replace(k_t=SOFT) if np.isinf(arm.k_t) else arm
+    joints = ((rigid, "rigid joint", BLUE, "-"), (soft, f"$k_t$ = {soft.k_t:g} N/m", ORANGE, "--"))
+    for ax, rate in zip(grid[0], (RATE, 2 * RATE), strict=True):
         for joined, name, color, style in joints:
             v = quantity(joined, t, rate)
             peak = _peak(ax, t, v, color)
             ax.plot(t, v, color=color, linestyle=style, label=f"{name}, peak {peak:.2f} mm")
         ax.legend(loc="lower left", bbox_to_anchor=(0.0, 0.98), borderaxespad=0)
         ax.text(0.99, 1.03, rf"$\varpi={rate:g}$ rad/s", transform=ax.transAxes, ha="right", va="bottom")
-    panels[0, 0].set_title(title, pad=36)
-    panels[0, 0].set_ylabel(label)
-    return _finish(panels, f"{_name(arm)}, mean acceleration 0.1 m/s², $B$ = 1 mm, $\\psi$ = 0, {_FROM_REST}")
+    grid[0, 0].set_title(title, pad=36)
+    grid[0, 0].set_ylabel(label)
+    return _finish(grid, f"{_name(arm)}, mean acceleration 0.1 m/s², $B$ = 1 mm, $\\psi$ = 0, {_FROM_REST}")
 
 
 def figure_7(arm: Arm | None = None, *, axes: Any = None) -> Figure:
@@ -150,10 +194,10 @@ def figure_7(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     axes : pair of Axes, optional
     """
 
-    def response(joined: Arm, t: np.ndarray, rate: float) -> Any:
+    def tip(joined: Arm, t: np.ndarray, rate: float) -> Any:
         return _tip(joined, t, rate=rate, acceleration=0.1)
 
-    return _against_rigid(axes, arm, response, _TIP, "Fig. 7  A softer joint: smaller peak at 20 rad/s, not at 10")
+    return _against_rigid(axes, arm, tip, _TIP, "Fig. 7  A softer joint: smaller peak at 20 rad/s, not at 10")
 
 
 def figure_8(arm: Arm | None = None, *, axes: Any = None) -> Figure:
@@ -181,18 +225,19 @@ def figure_9(arm: Arm | None = None, *, axes: Any = None) -> Figure:
         By default the nominal one.
     axes : pair of Axes, optional
     """
-    arm, t = arm or Arm.nominal(), _TIME
-    panels = _panels(axes, 1, 2, (8.6, 3.9), sharex=True, sharey=True)
-    for ax, disturbed, word in zip(panels[0], (True, False), ("with", "without"), strict=True):
+    arm = arm or Arm.nominal()
+    t = _times(arm)
+    grid = panels(axes, 1, 2, (8.6, 3.9), sharex=True, sharey=True)
+    for ax, disturbed, word in zip(grid[0], (True, False), ("with", "without"), strict=True):
         for a in ACCELERATIONS:
             v = _tip(arm, t, disturbed, acceleration=a)
             (line,) = ax.plot(t, v)
             line.set_label(f"{a:g} m/s², peak {_peak(ax, t, v, line.get_color()):.2f} mm")
         ax.legend(loc="lower left", bbox_to_anchor=(0.0, 0.98), borderaxespad=0)
         ax.text(0.99, 1.03, f"{word} disturbance", transform=ax.transAxes, ha="right", va="bottom")
-    panels[0, 0].set_title("Fig. 9  Peaks grow with the mean acceleration", pad=52)
-    panels[0, 0].set_ylabel(_TIP)
-    return _finish(panels, f"{_name(arm)}, $B$ = 1 mm, $\\varpi$ = 10 rad/s, $\\psi$ = 0, {_FROM_REST}")
+    grid[0, 0].set_title("Fig. 9  Peaks grow with the mean acceleration", pad=52)
+    grid[0, 0].set_ylabel(_TIP)
+    return _finish(grid, f"{_name(arm)}, $B$ = 1 mm, $\\varpi$ = 10 rad/s, $\\psi$ = 0, {_FROM_REST}")
 
 
 def figure_10(arm: Arm | None = None, *, axes: Any = None) -> Figure:
@@ -206,9 +251,10 @@ def figure_10(arm: Arm | None = None, *, axes: Any = None) -> Figure:
         By default the nominal one.
     axes : pair of Axes, optional
     """
-    arm, t = arm or Arm.nominal(), _TIME
-    panels = _panels(axes, 1, 2, (8.6, 3.9))
-    left, right = panels[0]
+    arm = arm or Arm.nominal()
+    t = _times(arm)
+    grid = panels(axes, 1, 2, (8.6, 3.9))
+    left, right = grid[0]
     for a, width in zip(ACCELERATIONS, (5.0, 3.0, 1.2), strict=True):
         error = _tip(arm, t, acceleration=a) - _tip(arm, t, disturbed=False, acceleration=a)
         left.plot(t, error, linewidth=width, label=f"{a:g} m/s²")
@@ -225,6 +271,6 @@ def figure_10(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     right.legend(loc="lower left", ncols=3, bbox_to_anchor=(0.0, 0.98), borderaxespad=0)
     right.set_title("Error of the peak: never grows", pad=22)
     right.set_ylabel("peak with minus peak without / mm")
-    figure = _finish(panels, f"{_name(arm)}, $B$ = 1 mm, $\\varpi$ = 10 rad/s, {_FROM_REST}; 0 to 2 s")
+    figure = _finish(grid, f"{_name(arm)}, $B$ = 1 mm, $\\varpi$ = 10 rad/s, {_FROM_REST}; 0 to {t[-1]:g} s")
     right.set_xlabel("mean acceleration / (m/s²)")
     return figure

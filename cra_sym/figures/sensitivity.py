@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.arm.parameters import Arm
+from cra_sym.figures.modes import decades
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,7 +40,7 @@ def figure_5(arm: Arm | None = None, *, axes: Any = None) -> Figure:
         axes[1, 1].sharey(axes[1, 0])
     (raw_t, raw_r), (log_t, log_r) = np.asarray(axes)
     for name, raw, log, low in (("k_t", raw_t, log_t, 0), ("k_r", raw_r, log_r, -1)):
-        stiffness = np.logspace(low, 6, 281)
+        stiffness = decades(arm, name, low, 6, 281)
         found, marked = (
             sensitivities(arm.replace(**{name: values}), by=[name]) for values in (stiffness, _MARKED[name])
         )

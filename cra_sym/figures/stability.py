@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,10 @@ from cra_sym.analysis.stability import (
 )
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
-from cra_sym.model.excitations import AxialBase, TransverseBase
+from cra_sym.figures.drawing import panels
+from cra_sym.figures.subject import default_excitation, single
+from cra_sym.model.excitations import AxialBase, Fluctuation, TransverseBase
+from cra_sym.model.system import System
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,16 +47,12 @@ _FIRST: dict[str, Any] = {"color": "#0072B2", "linestyle": (0, (4, 2)), "linewid
 _SECOND: dict[str, Any] = {"color": "#111111", "linestyle": "-", "linewidth": 1.2}
 
 
-def _grid(axes: Any, rows: int, columns: int, size: tuple[float, float], **options: Any) -> np.ndarray:
-    if axes is not None:
-        return np.asarray(axes).reshape(rows, columns)
-    return Figure(figsize=size, layout="constrained").subplots(rows, columns, squeeze=False, **options)
-
-
 def _described(excitation: Any) -> str:
     if isinstance(excitation, AxialBase):
         return f"base shakes along the arm, {1e3 * np.max(excitation.amplitude):g} mm × ε"
-    return "joint stiffness fluctuates"
+    if isinstance(excitation, Fluctuation) and not isinstance(excitation, JointStiffness):
+        return f"{', '.join(name for name, weight in excitation.weights.items() if weight)} × (1 + ε cos ϖt)"
+    return "joint stiffness fluctuates" if isinstance(excitation, JointStiffness) else "as the Lagrangian says"
 
 
 def _boundary(*given: Any, **more: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -64,18 +64,28 @@ def _boundary(*given: Any, **more: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _growth(
-    arm: Arm, excitation: Any, frequency: np.ndarray, epsilon: np.ndarray, modes: int, tolerance: float = 1e-7
+    system: System, excitation: Any, frequency: np.ndarray, epsilon: np.ndarray, modes: int, tolerance: float = 1e-7
 ) -> np.ndarray:
-    """Return the growth rate over a chart, converged in the number of modes."""
-    residual = isinstance(excitation, JointStiffness)
-    return growth_rate(arm, excitation, frequency, epsilon[:, None], modes, residual=residual, tolerance=tolerance)
+    """Return the growth rate over a chart, converged in the number of modes where springs of ends fluctuate."""
+    residual = bool(excitation.springs(system))
+    return growth_rate(system, excitation, frequency, epsilon[:, None], modes, residual=residual, tolerance=tolerance)
 
 
 _RIGID = "no zone: a rigid joint cannot\nfluctuate; give $k_t$, as 1e4 N/m"
 
 
-def _is_rigid(arm: Arm, excitation: Any) -> bool:
-    return isinstance(excitation, JointStiffness) and bool(np.isinf(arm.k_t))
+def _is_rigid(system: System, excitation: Any) -> bool:
+    return isinstance(excitation, JointStiffness) and bool(np.isinf(system.values["k_t"]))
+
+
+def _excitation(system: System, given: Any, of_an_arm: Any) -> Any:
+    if given is not None:
+        return given
+    return of_an_arm if isinstance(system, Arm) else default_excitation(system)
+
+
+def _rigid_body_modes(system: System) -> int:
+    return int((system.natural_frequencies(6) == 0).sum())
 
 
 def _say(ax: Axes, words: str) -> None:
@@ -83,11 +93,11 @@ def _say(ax: Axes, words: str) -> None:
 
 
 def _zone(
-    ax: Axes, arm: Arm, excitation: Any, mode: int, epsilon: np.ndarray, points: int, tolerance: float = 1e-7
+    ax: Axes, arm: System, excitation: Any, mode: int, epsilon: np.ndarray, points: int, tolerance: float = 1e-7
 ) -> None:
     """Draw one principal zone against its detuning."""
-    centre = 2 * arm.natural_frequencies(3)[mode - 1]
-    second = _boundary(arm, excitation, epsilon, (mode, mode), order=2)
+    centre = 2 * arm.natural_frequencies(max(mode, 3))[mode - 1]
+    second = _boundary(arm, excitation, epsilon, (mode, mode), order=2, modes=max(mode, 3))
     width = second[1] - second[0]  # to second order the zone moves and keeps its width
     first, half = (centre - width / 2, centre + width / 2), width[-1] / 2
     if not half > 0:
@@ -110,14 +120,16 @@ def _zone(
 
 
 def _shade(ax: Axes, frequency: np.ndarray, epsilon: np.ndarray, rates: np.ndarray, step: float | None = None) -> Any:
-    """Shade what grows in steps; the rest stays white."""
+    """Shade what grows in steps; the rest stays white. Return None if nothing does."""
     top = rates.max()
+    if not top > 0:
+        return None
     levels = np.linspace(0.02, 1.0, 7) * top if step is None else np.r_[0.1 * step, np.arange(step, top + step, step)]
     return ax.contourf(frequency, epsilon, rates, levels=levels, cmap=_GROWTH, antialiased=False)
 
 
 def _principal_zones(
-    arms: list[tuple[str, Arm]],
+    arms: Sequence[tuple[str, System]],
     excitation: Any,
     epsilon: float,
     title: str,
@@ -126,18 +138,19 @@ def _principal_zones(
     tolerance: float = 1e-7,
 ) -> Figure:
     """Draw the zones of modes 1 to 3, a row an arm."""
-    panels = _grid(axes, len(arms), 3, (8.4, 1.95 * len(arms) + 0.8), sharey=True)
+    grid = panels(axes, len(arms), 3, (8.4, 1.95 * len(arms) + 0.8), sharey=True)
     sizes = np.linspace(0.0, epsilon, points)
-    for row, (label, arm) in zip(panels, arms, strict=True):
-        for mode, ax in enumerate(row, start=1):
+    first = 1 + max(_rigid_body_modes(arm) for _, arm in arms)
+    for row, (label, arm) in zip(grid, arms, strict=True):
+        for mode, ax in enumerate(row, start=first):
             _zone(ax, arm, excitation, mode, sizes, points, tolerance)
         row[0].set_ylabel(f"{label}\n$\\epsilon$".strip())
-    for mode, ax in enumerate(panels[0], start=1):
-        ax.set_title(f"{title}mode {mode}" if mode == 1 else f"mode {mode}")
-    for mode, ax in enumerate(panels[-1], start=1):
+    for mode, ax in enumerate(grid[0], start=first):
+        ax.set_title(f"{title}mode {mode}" if mode == first else f"mode {mode}")
+    for mode, ax in enumerate(grid[-1], start=first):
         ax.set_xlabel(rf"$\varpi - 2\omega_{mode}$ / (rad/s)")
-    handles = [panels[0, 0].plot([], [], **look)[0] for look in (_FIRST, _SECOND)]
-    figure = panels[0, 0].figure
+    handles = [grid[0, 0].plot([], [], **look)[0] for look in (_FIRST, _SECOND)]
+    figure = grid[0, 0].figure
     names = ("multiple scales, first order", "second order, all modes")
     note = f"shaded: growth by Floquet theory; {_described(excitation)}; widths at ε = {epsilon:g}, scales differ"
     figure.legend(handles, names, loc="outside lower center", ncols=2, title=note, title_fontsize=8)
@@ -145,21 +158,23 @@ def _principal_zones(
 
 
 def figure_zones(
-    arm: Arm | None = None,
-    excitation: Any = JOINT,
+    system: System | None = None,
+    excitation: Any = None,
     epsilon: float = 0.3,
     *,
     axes: Any = None,
     points: int = 37,
     tolerance: float = 1e-7,
 ) -> Figure:
-    """Draw the principal zones of the first three modes of one arm.
+    """Draw the principal zones of the first three modes of one system.
 
     Parameters
     ----------
-    arm : Arm, optional
-        By default the nominal one with k_t = 1e4 N/m.
-    excitation : JointStiffness or AxialBase
+    system : System, optional
+        By default the nominal arm with k_t = 1e4 N/m.
+    excitation : Fluctuation, AxialBase or another parametric one, optional
+        By default what the Lagrangian itself says, for an arm `JointStiffness()`, else the stiffness of an end, or
+        the other stiffness, that the first frequency depends on most.
     epsilon : float
         Top of the axis.
     axes : three Axes, optional
@@ -168,8 +183,9 @@ def figure_zones(
     tolerance : float
         Relative error of the monodromy matrices.
     """
-    arm = arm or Arm.nominal().replace(k_t=1e4)
-    return _principal_zones([("", arm)], excitation, epsilon, "Zones of ", axes, points, tolerance)
+    system = single(Arm.nominal().replace(k_t=1e4) if system is None else system)
+    excitation = _excitation(system, excitation, JOINT)
+    return _principal_zones([("", system)], excitation, epsilon, "Zones of ", axes, points, tolerance)
 
 
 def figure_11(
@@ -251,14 +267,14 @@ def figure_widths(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     axes : 2 x 3 array of Axes, optional
     """
     arm = arm or Arm.nominal()
-    panels = _grid(axes, 2, 3, (9.6, 5.6), sharex="row")
+    grid = panels(axes, 2, 3, (9.6, 5.6), sharex="row")
     k_t, m_e = np.logspace(1, 6, 201), np.linspace(0.0, 0.02, 101)
     titles = ("joint stiffness", "base along the arm", "base across the arm")
     rows: tuple[tuple[np.ndarray, Arm, str, Any], ...] = (
         (k_t, arm.replace(k_t=k_t), "$k_t$ / (N/m)", K_T),
         (m_e * 1e3, arm.replace(k_t=1e4, m_e=m_e), "$m_e$ / g", np.array(M_E) * 1e3),
     )
-    for row, (values, batch, label, marks) in zip(panels, rows, strict=True):
+    for row, (values, batch, label, marks) in zip(grid, rows, strict=True):
         for ax, excitation in zip(row, (JOINT, AXIAL, TRANSVERSE), strict=True):
             for mode, width in enumerate(_widths(batch, excitation), start=1):
                 ax.plot(values, width, label=f"mode {mode}")
@@ -266,14 +282,14 @@ def figure_widths(arm: Arm | None = None, *, axes: Any = None) -> Figure:
                 ax.axvline(mark, color="0.8", linewidth=0.8, zorder=0)
             ax.set_yscale("log")
             ax.set_xlabel(label)
-    for ax, title in zip(panels[0], titles, strict=True):
+    for ax, title in zip(grid[0], titles, strict=True):
         ax.set_xscale("log")
         ax.set_title(title)
-    for row in panels:
+    for row in grid:
         row[0].set_ylabel("width / ε / (rad/s)")
         row[2].set_ylabel("growth of the tip / ε / (m/s)")
-    panels[0, 0].legend()
-    figure = panels[0, 0].figure
+    grid[0, 0].legend()
+    figure = grid[0, 0].figure
     note = "first order, no damping; the base moves 10 mm along or 1 mm across at ε = 1; the last column is no zone"
     figure.supxlabel(note, fontsize=8, color="0.35")
     return figure
@@ -288,9 +304,9 @@ def _widths(arm: Arm, excitation: Any) -> list[np.ndarray]:
 
 
 def figure_combinations(
-    arm: Arm | None = None,
-    excitation: Any = AXIAL,
-    epsilon: float = 1.0,
+    system: System | None = None,
+    excitation: Any = None,
+    epsilon: float | None = None,
     *,
     ax: Axes | None = None,
     points: int = 420,
@@ -299,29 +315,33 @@ def figure_combinations(
 
     Parameters
     ----------
-    arm : Arm, optional
-        By default the nominal one with k_t = 1e3 N/m.
-    excitation : JointStiffness or AxialBase
-    epsilon : float
-        Top of the axis.
+    system : System, optional
+        By default the nominal arm with k_t = 1e3 N/m.
+    excitation : Fluctuation, AxialBase or another parametric one, optional
+        By default what the Lagrangian itself says, for an arm a base that shakes along it, else as `figure_zones`.
+    epsilon : float, optional
+        Top of the axis; by default 1 for a base that shakes, else 0.5.
     ax : Axes, optional
     points : int
         Points of the Floquet chart along the frequency axis.
     """
-    arm = arm or Arm.nominal().replace(k_t=1e3)
-    ax = _grid(None, 1, 1, (9.4, 5.0))[0, 0] if ax is None else ax
-    omega = arm.natural_frequencies(3)
-    frequency = np.linspace(0.5 * omega[0], 2.2 * omega[2], points)
+    system = single(Arm.nominal().replace(k_t=1e3) if system is None else system)
+    excitation = _excitation(system, excitation, AXIAL)
+    epsilon = (1.0 if isinstance(excitation, AxialBase) else 0.5) if epsilon is None else epsilon
+    ax = panels(ax, 1, 1, (9.4, 5.0))[0, 0]
+    still = _rigid_body_modes(system)
+    omega = system.natural_frequencies(still + 3)
+    frequency = np.linspace(0.5 * omega[still], 2.2 * omega[-1], points)
     sizes = np.linspace(0.0, epsilon, points // 3)
-    rates = _growth(arm, excitation, frequency, sizes, 4)
-    mesh = _shade(ax, frequency, sizes, np.sqrt(rates), step=1.0)
-    for m in (1, 2, 3):
-        for n in range(m, 4):
-            for side in _boundary(arm, excitation, sizes, (m, n), order=2):
+    rates = np.sqrt(_growth(system, excitation, frequency, sizes, still + 4))
+    mesh = _shade(ax, frequency, sizes, rates, step=1.0 if rates.max() > 3 else None)
+    for m in range(still + 1, still + 4):
+        for n in range(m, still + 4):
+            for side in _boundary(system, excitation, sizes, (m, n), order=2, modes=still + 3):
                 ax.plot(side, sizes, **_SECOND | {"linewidth": 0.9})
             name = f"$2\\omega_{m}$" if m == n else f"$\\omega_{m}+\\omega_{n}$"
             _name(ax, name, omega[m - 1] + omega[n - 1], epsilon)
-        for side in _boundary(arm, excitation, sizes, (m, m), order=2, tongue=2):
+        for side in _boundary(system, excitation, sizes, (m, m), order=2, tongue=2, modes=still + 3):
             ax.plot(side, sizes, **_FIRST | {"linewidth": 0.9})
         _name(ax, f"$\\omega_{m}$", omega[m - 1], epsilon, color=_FIRST["color"])
     ax.set_xlim(frequency[0], frequency[-1])
@@ -333,10 +353,13 @@ def figure_combinations(
     handles = [ax.plot([], [], **look)[0] for look in (_SECOND, _FIRST)]
     figure = ax.figure
     names = ("multiple scales, second order", "second tongue, width of order ε²")
-    note = "shaded: growth by Floquet theory, 4 modes; thin streaks are tongues of higher order"
+    note = f"shaded: growth by Floquet theory, {still + 4} modes; thin streaks are tongues of higher order"
     figure.legend(handles, names, loc="outside lower center", ncols=2, title=note, title_fontsize=8)
-    bar = figure.colorbar(mesh, ax=ax, pad=0.01, aspect=30)
-    bar.set_label(r"$\sqrt{\mathrm{growth\ rate\ /\ (1/s)}}$")
+    if mesh is None:
+        _say(ax, "no growth up to this ε")
+    else:
+        bar = figure.colorbar(mesh, ax=ax, pad=0.01, aspect=30)
+        bar.set_label(r"$\sqrt{\mathrm{growth\ rate\ /\ (1/s)}}$")
     assert isinstance(figure, Figure)
     return figure
 
@@ -357,9 +380,9 @@ def figure_accuracy(arm: Arm | None = None, epsilon: Any = None, *, axes: Any = 
     """
     arm = arm or Arm.nominal().replace(k_t=1e4)
     epsilon = np.geomspace(0.03, 0.12, 3) if epsilon is None else np.asarray(epsilon, dtype=float)
-    panels = _grid(axes, 1, 2, (8.6, 3.9), sharey=False)[0]
+    grid = panels(axes, 1, 2, (8.6, 3.9), sharey=False)[0]
     cases = ((JOINT, (2, 2)), (JOINT, (1, 2))), ((STRONG, (2, 2)), (STRONG, (1, 2)))
-    for ax, pair in zip(panels, cases, strict=True):
+    for ax, pair in zip(grid, cases, strict=True):
         if _is_rigid(arm, pair[0][0]):
             _say(ax, _RIGID)
             continue
@@ -374,10 +397,10 @@ def figure_accuracy(arm: Arm | None = None, epsilon: Any = None, *, axes: Any = 
         ax.set_xticks(epsilon, [f"{size:.2g}" for size in epsilon])
         ax.minorticks_off()
         ax.legend(fontsize=8, loc="lower right")
-    panels[0].set_ylabel("largest error of the two sides / (rad/s)")
-    panels[0].set_title("Joint stiffness: error against Floquet")
-    panels[1].set_title("Base along the arm, 50 mm × ε")
-    return panels[0].figure
+    grid[0].set_ylabel("largest error of the two sides / (rad/s)")
+    grid[0].set_title("Joint stiffness: error against Floquet")
+    grid[1].set_title("Base along the arm, 50 mm × ε")
+    return grid[0].figure
 
 
 def boundary_errors(arm: Arm, excitation: Any, epsilon: Any, resonance: tuple[int, int]) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.colors import LogNorm
@@ -12,58 +12,105 @@ from cra_sym.analysis.frequency_response import frequency_response
 from cra_sym.analysis.modes import modal_parameters, mode_shapes
 from cra_sym.analysis.responses import residual_vibration, tip_response
 from cra_sym.analysis.shaping import input_shaper
+from cra_sym.analysis.state_space import state_space
 from cra_sym.arm.parameters import Arm
-from cra_sym.figures.drawing import GREEN, ORANGE
+from cra_sym.figures.drawing import GREEN, ORANGE, panels
+from cra_sym.figures.subject import fields, moving_place, single
+from cra_sym.model.system import System
 from cra_sym.solvers.motion import BaseMotion, Piecewise
+
+if TYPE_CHECKING:
+    from sympy import Expr
 
 __all__ = ["figure_frequency_response", "figure_input_shaping", "figure_residual_vibration"]
 
+_SIZE = (8.6, 3.9)
 _LOOSE = {"k_t": 1e3, "k_r": 1e2}
 _LIMITS = {"distance": 0.5, "v_max": 1.0, "a_max": 4.0, "j_max": 40.0}  # m, m/s, m/s2, m/s3
 _MOVE = "0.5 m S-curve, at most 1 m/s, 4 m/s², 40 m/s³"
 
 
-def _panels(axes: Any, columns: int, **options: Any) -> np.ndarray:
-    if axes is not None:
-        return np.atleast_1d(np.asarray(axes))
-    return Figure(figsize=(8.6, 3.9), layout="constrained").subplots(1, columns, squeeze=False, **options)[0]
-
-
-def _caption(panels: np.ndarray, scenario: str) -> Figure:
-    figure = panels[0].figure
+def _caption(row: np.ndarray, scenario: str) -> Figure:
+    figure = row[0].figure
     figure.supxlabel(scenario, fontsize=8, color="0.35")
     return figure
 
 
-def figure_frequency_response(arm: Arm | None = None, *, axes: Any = None) -> Figure:
-    """Draw the exact frequency response of tip and joint, and what keeping a few modes makes of it.
+def figure_frequency_response(
+    system: System | None = None, drive: Expr | str | None = None, *, axes: Any = None, points: int = 1500
+) -> Figure:
+    """Draw the exact frequency response of both ends, and what keeping a few modes makes of it.
+
+    Where no mode moves the right end, the place that the first mode moves most takes its place, and is alone if
+    nothing moves the left end either.
 
     Parameters
     ----------
-    arm : Arm, optional
-        By default the nominal one with a stiff but elastic joint and 1 % of damping.
-    axes : pair of Axes, optional
+    system : System, optional
+        By default the nominal arm with a stiff but elastic joint and 1 % of damping.
+    drive : Expr or str, optional
+        As in :func:`cra_sym.frequency_response`; by default the only prescribed motion or the first force, and where
+        there is none a unit force on the first field at the place shown.
+    axes : Axes, optional
+        One for each place shown: two, or one.
+    points : int
+        Frequencies drawn.
     """
-    arm = arm or Arm.nominal().replace(k_t=1e5, k_r=1e3, zeta=0.01)
-    panels = _panels(axes, 2, sharex=True)
-    Omega = np.geomspace(2.0, 600.0, 1500)
+    given = Arm.nominal().replace(k_t=1e5, k_r=1e3, zeta=0.01) if system is None else system
+    system = single(given)
+    tip, left = moving_place(system), float(system.domain.left)
+    shapes = np.abs(mode_shapes(system, [left, tip], 3))
+    places = [tip, left] if shapes[:, 0].max() > 1e-9 * shapes[:, 1].max() else [tip]
+    drive = _drive(system, tip) if drive is None else drive
+    (row,) = panels(axes, 1, len(places), (4.3 * len(places), 3.9), sharex=True)
+    elastic = [value for value in system.natural_frequencies(6) if value > 0]
+    Omega = np.geomspace(float(f"{0.13 * elastic[0]:.0e}"), float(f"{2.25 * elastic[2]:.0e}"), points)
+    exact = np.abs(frequency_response(system, Omega, places, drive))
     titles = ("Tip: few modes are enough", "Joint: modes converge slowly")
-    for ax, x, title in zip(panels, (float(arm.L), 0.0), titles, strict=True):
-        ax.loglog(Omega, np.abs(frequency_response(arm, Omega, x)), label="exact", color="0.25", linestyle="-")
+    for number, (ax, place) in enumerate(zip(row, places, strict=True)):
+        ax.loglog(Omega, exact[number], label="exact", color="0.25", linestyle="-")
         for modes in (3, 12):
-            ax.loglog(Omega, np.abs(_series(arm, Omega, x, modes)), label=f"{modes} modes", linewidth=1.3,
-                      linestyle=("--", ":")[modes > 3], color=(ORANGE, GREEN)[modes > 3])  # fmt: skip
-        ax.set_title(title)
-        ax.set_xlabel(r"frequency of the base $\Omega$ / (rad/s)")
-    panels[0].set_ylabel("elastic displacement per base acceleration / s²")
-    panels[0].legend(loc="lower left")
-    return _caption(panels, f"$k_t$ = {arm.k_t:g} N/m, $k_r$ = {arm.k_r:g} N m/rad, $\\zeta$ = {arm.zeta:g}")
+            ax.loglog(Omega, np.abs(_of_modes(system, Omega, place, drive, modes)), label=f"{modes} modes",
+                      linewidth=1.3, linestyle=("--", ":")[modes > 3], color=(ORANGE, GREEN)[modes > 3])  # fmt: skip
+        ax.set_title(titles[number] if isinstance(system, Arm) else f"at $x$ = {place:g} m")
+        driven = "of the base " if isinstance(system, Arm) and drive == "w" else ""
+        ax.set_xlabel(rf"frequency {driven}$\Omega$ / (rad/s)")
+    row[0].set_ylabel(_response_label(system, drive))
+    row[0].legend(loc="lower left")
+    return _caption(row, _values(system))
 
 
-def _series(arm: Arm, Omega: np.ndarray, x: float, modes: int) -> np.ndarray:
-    p = modal_parameters(arm, modes)
-    stiffness = p.omega**2 + 2j * arm.zeta * p.omega * Omega[:, None] - Omega[:, None] ** 2
-    return -(p.participation * mode_shapes(arm, x, modes) / stiffness).sum(-1)
+def _drive(system: System, place: float) -> Any:
+    """Return what drives by default: the first prescribed motion or force by name, or the field at a place."""
+    causes = dict(system.numerics("causes"))
+    ordered = sorted(causes, key=lambda name: causes[name] != "motion")
+    if ordered:
+        return ordered[0]
+    field, (_, right) = system.model.equations.fields[0], system.model.equations.domain
+    x = system.model.equations.x
+    return field.subs(x, right if np.isclose(place, float(system.domain.left + system.domain.length)) else place)
+
+
+def _of_modes(system: System, Omega: np.ndarray, place: float, drive: Any, modes: int) -> np.ndarray:
+    """Return the transfer function of the first modes alone."""
+    field = "v" if isinstance(system, Arm) else system.model.equations.fields[0].func.__name__
+    few = state_space(system, modes, drive, [(field, place)])
+    size, points = len(few.A), 1j * Omega[:, None, None]
+    found: np.ndarray = few.C @ np.linalg.solve(points * np.eye(size) - few.A, few.B) + few.D
+    return found[:, 0, 0]
+
+
+def _response_label(system: System, drive: Any) -> str:
+    if isinstance(system, Arm) and drive == "w":
+        return "elastic displacement per base acceleration / s²"
+    per = "acceleration" if dict(system.numerics("causes")).get(str(drive)) == "motion" else "force"
+    return f"${next(iter(fields(system)))}$ per unit {per} / SI unit"
+
+
+def _values(system: System) -> str:
+    if isinstance(system, Arm):
+        return f"$k_t$ = {system.k_t:g} N/m, $k_r$ = {system.k_r:g} N m/rad, $\\zeta$ = {system.zeta:g}"
+    return f"$\\zeta$ = {system.zeta:g}"
 
 
 def figure_residual_vibration(arm: Arm | None = None, *, ax: Any = None) -> Figure:
@@ -76,7 +123,7 @@ def figure_residual_vibration(arm: Arm | None = None, *, ax: Any = None) -> Figu
     ax : Axes, optional
     """
     arm = arm or Arm.nominal()
-    (panel,) = _panels(None if ax is None else [ax], 1)
+    panel = panels(ax, 1, 1, _SIZE)[0, 0]
     k_t, fastest = np.geomspace(10.0, 1e5, 161), BaseMotion.s_curve(**_LIMITS).duration
     duration = np.linspace(fastest, 2.6, 281)
     left = residual_vibration(arm.replace(k_t=k_t[:, None]), BaseMotion.s_curve(**_LIMITS, duration=duration))
@@ -109,7 +156,8 @@ def figure_input_shaping(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     axes : pair of Axes, optional
     """
     arm = arm or Arm.nominal().replace(**_LOOSE, zeta=0.01)
-    left, right = panels = _panels(axes, 2)
+    (row,) = panels(axes, 1, 2, _SIZE)
+    left, right = row
     t, k_t = np.linspace(0, 2.5, 1601), np.geomspace(0.1, 10.0, 201) * arm.k_t
     for name, move in shaped_moves(arm).items():
         left.plot(t, 1e3 * tip_response(arm, move, t), label=f"{name}, {move.duration:.2f} s", linewidth=1.4)
@@ -123,7 +171,7 @@ def figure_input_shaping(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     right.set_xlabel("true $k_t$ / assumed $k_t$")
     right.set_ylabel("residual tip amplitude / mm")
     assumed = f"assumed $k_t$ = {arm.k_t:g} N/m, $k_r$ = {arm.k_r:g} N m/rad, $\\zeta$ = {arm.zeta:g}"
-    return _caption(panels, f"{_MOVE}; {assumed}")
+    return _caption(row, f"{_MOVE}; {assumed}")
 
 
 def shaped_moves(arm: Arm) -> dict[str, BaseMotion]:

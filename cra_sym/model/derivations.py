@@ -14,6 +14,7 @@ from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics.breakpoints import derivative
 from cra_sym.mechanics.jets import END_NAMES, Jet
 from cra_sym.mechanics.weak import Bilinear, WeakForm, weak_form
+from cra_sym.model.driven import driven, driven_coordinate, driven_displacement, pushed
 from cra_sym.model.energies import stress_route
 from cra_sym.model.exact import BallProblem, exact_kernel
 from cra_sym.model.forms import form_of, load_of
@@ -28,8 +29,9 @@ from cra_sym.model.spatial import SpatialProblem, spatial_problem
 from cra_sym.model.symmetry import asymmetry
 from cra_sym.model.two_waves import two_waves_route
 
-__all__ = ["axial", "causes", "constant", "damping", "geometry", "load", "named_observables", "names", "observable",
-           "pencil", "rates", "route", "spatial"]  # fmt: skip
+__all__ = ["axial", "causes", "constant", "damping", "driven", "driven_coordinate", "driven_displacement", "geometry",
+           "load", "named_observables", "names", "observable", "pencil", "pushed", "rates", "route",
+           "spatial"]  # fmt: skip
 
 
 def names(model: Model) -> tuple[str, ...]:
@@ -288,36 +290,6 @@ def carried(model: Model, name: str) -> Kernel:
     return kernel(tuple(found), model.symbols, backend="numpy")
 
 
-def driven(model: Model, name: str) -> SpatialProblem:
-    """Return the spatial problem with the acceleration of a prescribed motion as a lumped coordinate.
-
-    The motion w is freed, and its acceleration a takes its place: w = -a / omega^2, so its column and its row are
-    divided by -omega^2 (by s^2 where the parameter is s). What a does to itself is left out; it is given.
-    """
-    freed = model.freed(name)
-    form = freed.state_form
-    number = next(k for k, c in enumerate(form.coordinates) if c.func.__name__ == name)
-    n, m, z = len(form.displacements), len(form.coordinates), form.parameter
-    factor = 1 / z**2 if form.damped else -1 / z
-    system, boundary = form.system.as_mutable(), form.boundary.as_mutable()
-    points = [matrix.as_mutable() for _, matrix, _ in form.points]
-    own = n + number
-    for matrix, row, column in (
-        (system, 2 * n + m + number, own),
-        *((other, own, own) for other in (boundary, *points)),
-    ):
-        matrix[row, column] = S.Zero
-        matrix[:, column] = (matrix[:, column] * factor).applyfunc(cancel)
-        matrix[row, :] = (matrix[row, :] * factor).applyfunc(cancel)
-        if matrix.has(1 / z):
-            raise ValueError(f"{name} acts by more than its acceleration")
-    there = tuple(
-        (place, matrix.as_immutable(), held) for (place, _, held), matrix in zip(form.points, points, strict=True)
-    )
-    changed = replace(form, system=system.as_immutable(), boundary=boundary.as_immutable(), points=there)
-    return spatial_problem(changed, model.symbols, model.equations.domain[0])
-
-
 def sizes(model: Model) -> tuple[int, int]:
     """Return the numbers of displacements of a section and of lumped coordinates."""
     return len(model.state_form.displacements), len(model.state_form.coordinates)
@@ -365,32 +337,6 @@ def _end_parameters(model: Model, unit: Expr) -> dict[str, EndParameter]:
 def damped(model: Model) -> bool:
     """Return whether the Lagrangian or the virtual work has terms of first order in time."""
     return model.state_form.damped
-
-
-def driven_coordinate(model: Model, name: str) -> int:
-    """Return the position of a prescribed motion among the lumped coordinates once it is freed."""
-    return [c.func.__name__ for c in model.freed(name).state_form.coordinates].index(name)
-
-
-def driven_displacement(model: Model, drive: Expr) -> int:
-    """Return the position of a displacement in the order (q(left), w, q(right)).
-
-    Raises
-    ------
-    ValueError
-        If it is none of them, or an essential condition holds it.
-    """
-    form = model.state_form
-    left, right = (
-        [displacement.subs(form.x, end) for displacement in form.displacements] for end in model.equations.domain
-    )
-    order = [*left, *form.coordinates, *right]
-    if not isinstance(drive, Expr) or drive not in order:
-        raise ValueError(f"drive = {shown(drive)}: must be a prescribed motion or one of {', '.join(map(str, order))}")
-    place = order.index(drive)
-    if form.free[place, :].is_zero_matrix:
-        raise ValueError(f"drive = {drive}: an essential condition holds it still")
-    return place
 
 
 def fluctuation(model: Model, name: str) -> str:

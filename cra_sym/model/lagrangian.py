@@ -212,15 +212,37 @@ class Model:
         return System(self, values, zeta, tolerance)
 
     def freed(self, name: str) -> Model:
-        """Return the model in which a function of time that drives it is a lumped coordinate instead."""
-        motion = next(function for function in self.driving if function.func.__name__ == name)
-        prescribed = [function for function in self._pieces["prescribed"] if function != motion]
-        return self.replace(prescribed=prescribed, coordinates=[*self._pieces["coordinates"], motion])
+        """Return the model in which a function of time that drives it is a lumped coordinate instead.
+
+        The work of a force becomes a term of the Lagrangian, so that the equations stay symmetric.
+        """
+        driver = next(function for function in self.driving if function.func.__name__ == name)
+        prescribed = [function for function in self._pieces["prescribed"] if function != driver]
+        pieces = {"prescribed": prescribed, "coordinates": [*self._pieces["coordinates"], driver]}
+        return self.replace(**pieces, **({} if driver in self.motions else self._worked_by(driver)))
+
+    def _worked_by(self, force: AppliedUndef) -> dict[str, Any]:
+        """Return the pieces in which the work of a given force is a term of the Lagrangian."""
+        terms: dict[str, Expr] = {"domain": S.Zero, "left": S.Zero, "right": S.Zero}
+        works = []
+        for given, displacement, place in self._pieces["virtual_work"]:
+            share = sympify(given, strict=True).expand().coeff(force) * force
+            terms[place or "left"] += share * displacement
+            if given - share != 0:
+                works.append((given - share, displacement, place))
+        ends = {"left": (self._pieces["left"] or S.Zero) + terms["left"]}
+        ends["right"] = (self._pieces["right"] or S.Zero) + terms["right"]
+        return {"density": self._pieces["density"] + terms["domain"], **ends, "virtual_work": works}
 
     @property
     def definitions(self) -> dict[Symbol, Expr]:
         """What symbols of the pieces stand for."""
         return dict(self._pieces["definitions"])
+
+    @property
+    def inside(self) -> tuple[tuple[Expr, Expr], ...]:
+        """Terms of interior places, as given."""
+        return tuple(self._pieces["inside"])
 
     @cached_property
     def driving(self) -> tuple[AppliedUndef, ...]:

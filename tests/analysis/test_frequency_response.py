@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import cra_sym as cra
 from cra_sym import Arm, BaseMotion
-from cra_sym.symbols import L, v, x
+from cra_sym.symbols import L, t, v, x
 
 OMEGA = np.array([0.01, 1.0, 5.0, 15.2, 30.0, 96.0, 150.0, 300.0, 2000.0])
 JOINTS = [{}, {"k_t": 1e3, "k_r": 50.0}, {"k_t": 1e3, "k_r": 0.0, "J_e": 1e-3}, {"k_t": 50.0}]
@@ -117,3 +118,56 @@ def test_batches_broadcast_and_single_values_drop_axes():
 def test_bad_input_is_named(arguments, error, words):
     with pytest.raises(error, match=words):
         cra.frequency_response(**({"system": Arm.nominal(), "angular_frequency": 1.0} | arguments))
+
+
+POINT, SPREAD = (sp.Function(name)(t) for name in ("point", "spread"))
+mass, tension = sp.symbols("mass tension")
+STRING = mass * v.diff(t) ** 2 / 2 - tension * v.diff(x) ** 2 / 2
+HELD = {"fields": [v], "x": x, "domain": (0, L), "t": t, "essential": [v.subs(x, 0), v.subs(x, L)]}
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.02])
+def test_forces_along_the_span_are_those_of_the_modal_series(zeta):
+    """As a term of the Lagrangian and as virtual work, spread over the span; only odd modes of a string answer."""
+    values, grid = ({"mass": 1.0, "tension": 4.0, "L": 1.5}, zeta), np.array([0.0, 1.0, 3.0, 9.0])
+    number = np.arange(1, 4001, 2)
+    omega = number * np.pi / 1.5 * 2.0
+    driven = 4 / (number * np.pi) * np.sin(number * np.pi * 0.4 / 1.5)  # load times shape over the modal mass
+    gap = omega**2 + 2j * zeta * omega * grid[:, None] - grid[:, None] ** 2
+    exact = (driven / gap).sum(axis=-1)  # what is left out falls with the square of the number: 1e-11 of it
+    for model in (
+        cra.Model(STRING + SPREAD * v, **HELD),
+        cra.Model(STRING, **HELD, virtual_work=[(SPREAD, v, "domain")]),
+    ):
+        found = cra.frequency_response(model.at(*values), grid, 0.4, drive=SPREAD)
+        np.testing.assert_allclose(found, exact, rtol=1e-8)
+
+
+def test_a_force_at_an_interior_place_is_reciprocal_and_static():
+    arm = Arm.nominal().replace(k_t=1e3, k_r=50.0, zeta=0.01)
+    there = cra.frequency_response(arm, OMEGA[:-1], 1.0, drive=v.subs(x, L / 2))
+    back = cra.frequency_response(arm, OMEGA[:-1], 0.5, drive=v.subs(x, L))
+    np.testing.assert_allclose(there, back, rtol=1e-6)  # modal damping where the problem varies along x: 1e-6
+    string = cra.Model(STRING, **HELD).at({"mass": 1.0, "tension": 4.0, "L": 1.5})
+    found = cra.frequency_response(string, 3.0, [0.2, 0.7, 1.3], drive=v.subs(x, 0.7))
+    wave = 3.0 / 2.0  # the closed form of a string that a force parts
+    near, far = np.sin(wave * np.array([0.2, 0.7, 0.7])), np.sin(wave * np.array([0.8, 0.8, 0.2]))
+    np.testing.assert_allclose(found, near * far / (4.0 * wave * np.sin(wave * 1.5)), rtol=1e-9)
+    named = cra.Model(STRING, **HELD, inside=[(sp.Symbol("a"), POINT * v)])
+    system = named.at({"mass": 1.0, "tension": 4.0, "L": 1.5, "a": 0.7})
+    np.testing.assert_allclose(cra.frequency_response(system, 3.0, 0.2, drive="point"), found[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("drive", "kind", "words"),
+    [
+        (v.subs(x, 2.0), None, r"drive: place = 2 must be in the domain"),
+        (v.diff(x, 2).subs(x, 0.5), None, "what a force acts on at 0.5.* must be one of"),
+        (v.subs(x, 0.5), "motion", "kind = 'motion': what drives at an interior place must be a force"),
+        (v, None, r"drive = v\(x, t\): must be one of w\(t\), v\(0, t\)"),
+        ("F", None, "drive = 'F': must be one of w"),
+    ],
+)
+def test_what_does_not_drive_is_named(drive, kind, words):
+    with pytest.raises(ValueError, match=words):
+        cra.frequency_response(Arm.nominal(), 1.0, drive=drive, kind=kind)

@@ -7,7 +7,7 @@ import cra_sym as cra
 from cra_sym.claims import claim, modes, provenance_family
 from cra_sym.claims.family import common_scale
 from cra_sym.paper import joint
-from cra_sym.paper.oracles.flipped import flipped_frequencies
+from cra_sym.paper.flipped import flipped_frequencies
 
 ARM = cra.Arm.nominal()
 BARE = ARM.replace(m_e=0.0)

@@ -9,7 +9,7 @@ import cra_sym as cra
 from cra_sym.claims import claim, comparisons, ledger, modes, motions, responses, sensitivity, stability, zones
 from cra_sym.mechanics import boundaries
 from cra_sym.paper import joint, parametric
-from cra_sym.paper.oracles.flipped import flipped_frequencies
+from cra_sym.paper.flipped import flipped_frequencies
 
 ARM = cra.Arm.nominal()
 TURNS = {}

@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 
 import cra_sym as cra
 from cra_sym.figures import FIGURES, STYLE
-from cra_sym.figures.modes import figure_3, figure_mode_shapes
+from cra_sym.figures.modes import figure_3, figure_4, figure_mode_shapes
+from cra_sym.paper.flipped import flipped_frequencies
 
 ARM = cra.Arm.nominal()
 
@@ -31,6 +32,16 @@ def test_figure_3_shows_the_frequencies_against_the_translational_stiffness():
     np.testing.assert_allclose([line.get_ydata()[-1] for line in curves(right)], 1.0, rtol=1e-3)
     assert left.get_xscale() == "log" and "N/m" in left.get_xlabel() and "Hz" in left.get_ylabel()
     assert len({line.get_linestyle() for line in curves(left)}) == 3
+
+
+def test_figure_4_sets_the_derived_result_beside_the_flipped_sign():
+    k_r = np.logspace(2, 5, 7)
+    derived, flipped, *relative = figure_4(k_r=k_r).axes
+    softened = cra.Arm.nominal().replace(k_r=k_r)
+    np.testing.assert_array_equal([line.get_ydata() for line in curves(derived)], cra.natural_frequencies(softened).T)
+    np.testing.assert_array_equal([line.get_ydata() for line in curves(flipped)], flipped_frequencies(softened).T)
+    assert all(np.all(np.diff(line.get_ydata()) > 0) for line in curves(relative[0]))
+    assert all(np.all(np.diff(line.get_ydata()) < 0) for line in curves(relative[1]))
 
 
 def test_mode_shapes_are_those_of_the_two_joints():

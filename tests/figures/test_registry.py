@@ -63,8 +63,8 @@ def test_an_unknown_figure_is_named(asked):
 
 
 def test_what_is_no_arm_is_named():
-    with pytest.raises(TypeError, match=r"arm = 5.*Arm"):
-        draw("fig03", arm=5)
+    with pytest.raises(TypeError, match=r"system = 5.*Arm"):
+        draw("fig03", 5)
 
 
 def test_files_are_the_same_in_each_run(tmp_path):

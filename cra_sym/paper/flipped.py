@@ -41,7 +41,7 @@ def characteristic() -> tuple[Any, tuple[Any, ...]]:
     return separated(flipped()), frequency_function()[1]
 
 
-_function = derived_kernel("cra_sym.paper.oracles.flipped:characteristic")
+_function = derived_kernel("cra_sym.paper.flipped:characteristic")
 
 
 def flipped_frequencies(arm: Arm, modes: int = 3) -> np.ndarray:

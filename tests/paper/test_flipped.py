@@ -8,8 +8,8 @@ import cra_sym as cra
 from cra_sym import symbols as s
 from cra_sym.paper import modes
 from cra_sym.paper.energy import potential, single_mode
+from cra_sym.paper.flipped import characteristic, flipped, flipped_frequencies
 from cra_sym.paper.motion import natural_conditions
-from cra_sym.paper.oracles.flipped import characteristic, flipped, flipped_frequencies
 
 ARM = cra.Arm.nominal()
 K_R = np.logspace(2, 6, 41)

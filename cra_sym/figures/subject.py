@@ -1,0 +1,151 @@
+"""What a figure has to know of the system it shows: names with units, ranges of parameters, a place that moves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.analysis.modes import mode_shapes
+from cra_sym.analysis.sensitivities import sensitivities
+from cra_sym.arm.parameters import Arm
+from cra_sym.checks import instance
+from cra_sym.model.excitations import Excitation, Fluctuation
+from cra_sym.model.system import System
+from cra_sym.symbols import row
+
+__all__ = [
+    "around",
+    "default_excitation",
+    "field_label",
+    "fields",
+    "leading_parameter",
+    "moving_place",
+    "parameter_label",
+    "rigid_ends",
+    "single",
+    "span",
+]
+
+Array = NDArray[np.float64]
+_STILL = 1e-9  # of the largest displacement: a place that a mode does not move
+
+
+def single(system: System) -> System:
+    """Return a system, or refuse what is none or a batch."""
+    instance("system", system, System)
+    if system.shape:
+        raise ValueError(f"system has shape {system.shape}: must be a single set of values, not a batch")
+    return system
+
+
+def fields(system: System) -> dict[str, Any]:
+    """Return the fields by their names in LaTeX; an arm's without its derivation."""
+    if isinstance(system, Arm):
+        return {"v": None}
+    from sympy import Symbol, latex
+
+    return {latex(Symbol(field.func.__name__)): field for field in system.model.equations.fields}
+
+
+def field_label(system: System) -> tuple[str, str]:
+    """Return how the axis along the domain and a field are called, with their units where they are known."""
+    if isinstance(system, Arm):
+        return "position along the arm $x$ / m", " / kg$^{-1/2}$"
+    return f"${system.model.equations.x}$", ""
+
+
+def parameter_label(system: System, name: str) -> str:
+    """Return a parameter with its unit, as an axis names it."""
+    if isinstance(system, Arm):
+        return with_unit(f"${row(name).latex}$", row(name).unit)
+    from sympy import Symbol, latex
+
+    return with_unit(f"${latex(Symbol(name))}$", system.model.units.get(name, "1"))
+
+
+def with_unit(quantity: str, unit: str) -> str:
+    """Return a quantity over its unit."""
+    if unit == "1":
+        return quantity
+    unit = unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴")
+    return f"{quantity} / ({unit})" if {" ", "/"} & {*unit} else f"{quantity} / {unit}"
+
+
+def rigid_ends(system: System) -> System:
+    """Return the system with every spring of an end rigid."""
+    return system.replace(**dict.fromkeys(system.numerics("stiffnesses"), np.inf))
+
+
+def leading_parameter(system: System) -> str:
+    """Return the first stiffness of an end, or else the parameter that the first elastic frequency owes most to."""
+    ends = system.numerics("stiffnesses")
+    if ends:
+        return str(next(iter(ends)))
+    found = sensitivities(system, _first_elastic(system))
+    return max(found.log, key=lambda name: float(np.nan_to_num(np.abs(found.log[name][-1]))))
+
+
+def _first_elastic(system: System) -> int:
+    return next((modes for modes in range(1, 8) if system.natural_frequencies(modes)[-1] > 0), 7)
+
+
+def around(system: System, name: str, narrowing: int = 0, points: int = 81) -> Array:
+    """Return values of a parameter over which the frequencies change: decades of a stiffness of an end.
+
+    Each ``narrowing`` takes the square root of how far they go.
+
+    Raises
+    ------
+    ValueError
+        If it is 0 and no frequency depends on it.
+    """
+    value, stiff = float(system.values[name]), name in system.numerics("stiffnesses")
+    far = (1e3 if stiff else 2.0) ** 0.5**narrowing
+    if 0 < abs(value) < np.inf:
+        return (np.geomspace if stiff else np.linspace)(value / far, far * value, points)
+    found = sensitivities(system, _first_elastic(system) + 2, [name])
+    rate = np.abs(found.compliance[name] if np.isinf(value) else found.rate[name])
+    good = (rate > 0) & np.isfinite(rate) & (found.frequency > 0)
+    if not good.any():
+        raise ValueError(f"values: must be given, as no frequency depends on {name} = {value:g}")
+    reach = float((found.frequency[good] / rate[good]).min())  # by which a first order would halve or double one
+    middle = 1 / reach if np.isinf(value) else reach
+    return np.geomspace(middle / far, middle * far, points) if stiff else np.linspace(0.0, (far - 1) * reach, points)
+
+
+def moving_place(system: System, modes: int = 3) -> float:
+    """Return the right end, or, where no mode moves the first field there, the place that the first mode moves most."""
+    left = float(system.domain.left)
+    x = np.linspace(left, left + float(system.domain.length), 201)
+    shapes = np.abs(mode_shapes(system, x, modes))
+    shown = shapes[max(_first_elastic(system) - 1, 0) if _first_elastic(system) <= modes else 0]
+    held = shapes[:, -1].max() <= _STILL * shapes.max()
+    return float(x[np.argmax(shown)] if held else x[-1])
+
+
+def span(system: System, periods: float = 5.0) -> float:
+    """Return a time of about so many periods of the first elastic mode, s, to one digit."""
+    modes = _first_elastic(system)
+    omega = system.natural_frequencies(modes)[-1]
+    return float(f"{2 * np.pi * periods / omega:.0e}") if omega > 0 else 1.0
+
+
+def default_excitation(system: System) -> Excitation:
+    """Return what fluctuates by default: what does so in the Lagrangian, springs of the ends, or another stiffness.
+
+    Raises
+    ------
+    ValueError
+        If no parameter can fluctuate.
+    """
+    own = getattr(system.model, "excitation", None)
+    if own is not None:
+        return own  # type: ignore[no-any-return]
+    able = [n for n, value in system.values.items() if 0 < value < np.inf and not system.numerics("fluctuation", n)]
+    springs = [name for name in able if name in system.numerics("stiffnesses")]
+    if not able:
+        raise ValueError("excitation: must be given, as no stiffness of the model can fluctuate by itself")
+    found = sensitivities(system, _first_elastic(system), springs or able)
+    return Fluctuation({max(found.log, key=lambda name: float(np.nan_to_num(found.log[name][-1]))): 1.0})

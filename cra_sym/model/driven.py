@@ -1,0 +1,96 @@
+"""What drives a model at one frequency: a prescribed motion, a force, or a displacement that a unit force acts on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from sympy import Expr, Function, S, cancel
+
+from cra_sym.checks import shown
+from cra_sym.kernels import Kernel, kernel
+from cra_sym.mechanics.points import at_place
+from cra_sym.model.lagrangian import Model
+from cra_sym.model.spatial import SpatialProblem, spatial_problem
+
+__all__ = ["driven", "driven_coordinate", "driven_displacement", "pushed"]
+
+
+def driven(model: Model, name: str) -> SpatialProblem:
+    """Return the spatial problem with the acceleration of a prescribed motion, or a force, as a lumped coordinate.
+
+    A motion w is freed, and its acceleration a takes its place: w = -a / omega^2, so its column and its row are
+    divided by -omega^2 (by s^2 where the parameter is s). A force is freed as it is. What either does to itself is left
+    out; it is given.
+    """
+    freed = model.freed(name)
+    form = freed.state_form
+    number = next(k for k, c in enumerate(form.coordinates) if c.func.__name__ == name)
+    n, m, z = len(form.displacements), len(form.coordinates), form.parameter
+    moves = any(motion.func.__name__ == name for motion in model.motions)
+    factor = (1 / z**2 if form.damped else -1 / z) if moves else S.One
+    system, boundary = form.system.as_mutable(), form.boundary.as_mutable()
+    points = [matrix.as_mutable() for _, matrix, _ in form.points]
+    own = n + number
+    for matrix, row, column in (
+        (system, 2 * n + m + number, own),
+        *((other, own, own) for other in (boundary, *points)),
+    ):
+        matrix[row, column] = S.Zero
+        matrix[:, column] = (matrix[:, column] * factor).applyfunc(cancel)
+        matrix[row, :] = (matrix[row, :] * factor).applyfunc(cancel)
+        if matrix.has(1 / z):
+            raise ValueError(f"{name} acts by more than its acceleration")
+    there = tuple(
+        (place, matrix.as_immutable(), held) for (place, _, held), matrix in zip(form.points, points, strict=True)
+    )
+    changed = replace(form, system=system.as_immutable(), boundary=boundary.as_immutable(), points=there)
+    return spatial_problem(changed, model.symbols, model.equations.domain[0])
+
+
+def driven_coordinate(model: Model, name: str) -> int:
+    """Return the position of a prescribed motion among the lumped coordinates once it is freed."""
+    return [c.func.__name__ for c in model.freed(name).state_form.coordinates].index(name)
+
+
+def driven_displacement(model: Model, drive: Expr) -> int:
+    """Return the position of a displacement in the order (q(left), w, q(right)).
+
+    Raises
+    ------
+    ValueError
+        If it is none of them, or an essential condition holds it.
+    """
+    form = model.state_form
+    left, right = (
+        [displacement.subs(form.x, end) for displacement in form.displacements] for end in model.equations.domain
+    )
+    order = [*left, *form.coordinates, *right]
+    if not isinstance(drive, Expr) or drive not in order:
+        known = ", ".join(map(str, (*model.driving, *order)))
+        raise ValueError(f"drive = {shown(drive)}: must be one of {known}, or a displacement at an interior place")
+    place = order.index(drive)
+    if form.free[place, :].is_zero_matrix:
+        raise ValueError(f"drive = {drive}: an essential condition holds it still")
+    return place
+
+
+def pushed(model: Model, drive: Expr) -> tuple[Model, str, Kernel] | None:
+    """Return the model with a force on a displacement of an interior place, its name and its place, or None.
+
+    None is for what is not at an interior place.
+
+    Raises
+    ------
+    ValueError
+        If what is there is no displacement of a section.
+    """
+    local = at_place(drive, model.equations.x) if isinstance(drive, Expr) else None
+    if local is None or local[0] in model.equations.domain:
+        return None
+    place, displacement = local
+    if displacement not in model.state_form.displacements:
+        known = ", ".join(map(str, model.state_form.displacements))
+        raise ValueError(f"drive = {shown(drive)}: what a force acts on at {place} must be one of {known}")
+    force = Function("unit_force")(model.equations.t)
+    inside = [*model.inside, (place, force * displacement)]
+    return model.replace(inside=inside), force.func.__name__, kernel(place, model.symbols, backend="numpy")

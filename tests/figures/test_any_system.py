@@ -1,0 +1,108 @@
+"""Figures of systems that are no arm: the curves are those of the public functions, axes say what they show."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+import cra_sym as cra
+from cra_sym.figures import FIGURES, draw, shows_any_system
+from tests.systems import NAMES, system
+
+COARSE = {
+    "zones": {"points": 5, "tolerance": 1e-3},
+    "combinations": {"points": 21},
+    "frequency_response": {"points": 50},
+}
+SHOWN = [name for name in FIGURES if shows_any_system(name)]
+
+
+DEAR = {"combinations": ("string", "gantry")}  # that of the others costs seconds and takes no other way
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_figure_of_a_system_draws_every_system(name):
+    given = system(name, 0.01)
+    for figure in SHOWN:
+        if name in DEAR.get(figure, NAMES):
+            drawn = draw(figure, given, **COARSE.get(figure, {}))
+            FigureCanvasAgg(drawn).draw()
+            assert all(ax.lines or ax.collections or ax.texts for ax in drawn.axes), figure
+            assert any(ax.get_xlabel() for ax in drawn.axes) and any(ax.get_ylabel() for ax in drawn.axes), figure
+
+
+def curves(ax):
+    return [line.get_xydata() for line in ax.lines if len(line.get_xdata()) > 10]
+
+
+def test_the_curves_are_the_public_functions():
+    """Each in the shape and the units of what it says."""
+    given = system("beam with an interior mass", 0.02)
+    over = draw("frequencies", given, parameter="m").axes[0]
+    values = curves(over)[0][:, 0]
+    found = cra.natural_frequencies(given.replace(m=values))
+    np.testing.assert_array_equal([curve[:, 1] for curve in curves(over)], found.T)
+    assert over.get_xlabel() == "$m$" and values.min() < 0.1 < values.max()
+    (shape,) = curves(draw("mode_shapes", given, modes=2).axes[1])
+    np.testing.assert_array_equal(shape[:, 1], cra.mode_shapes(given, shape[:, 0], 2)[1])
+    move = {"w": cra.BaseMotion.trapezoid(0.1, 0.2, 1.0), "p": cra.Force(2.0)}
+    (moved,) = curves(draw("response", given, motion=move).axes[0])
+    np.testing.assert_array_equal(moved[:, 1], cra.tip_response(given, move, moved[:, 0]))
+    tip = draw("frequency_response", given, drive="p", points=20).axes[0]
+    exact, few, more = curves(tip)
+    np.testing.assert_allclose(exact[:, 1], np.abs(cra.frequency_response(given, exact[:, 0], drive="p")), rtol=1e-9)
+    low = exact[:, 0] < 2 * np.pi * found[0, 0]
+    assert (np.abs(more / exact - 1)[low, 1] < 1e-2).all() and (np.abs(few / exact - 1)[low, 1] < 5e-2).all()
+
+
+def test_springs_of_the_ends_are_drawn_beside_rigid_ones():
+    given = system("Timoshenko beam")
+    (spring,) = [name for name in given.values if name == "k"]
+    assert not given.numerics("stiffnesses")  # k holds two displacements: rigid ends are not one value of it
+    arm = cra.Arm.nominal().replace(L=2.0, k_t=300.0, k_r=20.0)
+    rigid, elastic = curves(draw("mode_shapes", arm).axes[0])
+    np.testing.assert_array_equal(elastic[:, 1], cra.mode_shapes(arm, elastic[:, 0])[0])
+    assert elastic[-1, 0] == 2.0 and abs(rigid[0, 1]) < 1e-12 and spring == "k"
+
+
+@pytest.mark.parametrize("name", ["fig03", "fig05", "fig07", "fig08", "frequency_response", "response"])
+def test_figures_follow_the_arm_handed_in(name):
+    """Another length, end mass and joint move the curves, and the axes with them."""
+    arm = cra.Arm.nominal().replace(L=3.0, m_e=0.05, k_t=2e3)
+    options = {"points": 20} if name == "frequency_response" else {}
+    paper, other = (curves(draw(name, *given, **options).axes[0])[-1] for given in ((), (arm,)))
+    assert paper.shape == other.shape and not np.allclose(paper[:, 1], other[:, 1], rtol=0.05)
+    assert not np.allclose(paper[:, 0], other[:, 0], rtol=0.05)
+
+
+def test_a_string_held_at_both_ends_is_shown_where_it_moves():
+    from sympy import symbols
+
+    from cra_sym.symbols import L, t, v, x
+
+    mass, tension = symbols("mass tension")
+    string = cra.Model(
+        mass * v.diff(t) ** 2 / 2 - tension * v.diff(x) ** 2 / 2,
+        fields=[v], x=x, domain=(0, L), t=t, essential=[v.subs(x, 0), v.subs(x, L)],
+    ).at({mass: 1.0, tension: 4.0, L: 1.0})  # fmt: skip
+    (moved,) = curves(draw("response", string).axes[0])
+    assert np.abs(moved[:, 1]).max() == pytest.approx(0.25, rel=0.1)  # the middle, unit velocity: half a period long
+    answers = draw("frequency_response", string, points=15).axes
+    assert len(answers) == 1 and np.isfinite(curves(answers[0])[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "options", "words"),
+    [
+        ("fig06", system("string"), {}, "system = .* must be an Arm"),
+        ("frequencies", 3, {}, "system = 3: must be a System"),
+        ("frequencies", None, {"parameter": "k"}, "parameter = 'k': must be one of L, b"),
+        ("frequencies", None, {"colour": 1}, r"colour = 1: 'frequencies' takes system, parameter"),
+        ("derivation", cra.Arm.nominal(), {}, "it shows no arm"),
+        ("response", cra.Arm.nominal().replace(m_e=[0.1, 0.2]), {}, r"system has shape \(2,\)"),
+    ],
+)
+def test_what_cannot_be_drawn_is_named(name, given, options, words):
+    with pytest.raises((TypeError, ValueError), match=words):
+        draw(name, given, **options)
