@@ -13,6 +13,7 @@ from .stress import Columns
 from .stress_mesh import Mesh, TooFineError, cells, resolved
 from .stress_modes import ModeFields
 from .stress_spectrum import BuckledError, spectrum
+from .stress_tail import complete, tail
 
 __all__ = ["Found", "alike", "cure", "meshed", "solved"]
 
@@ -178,20 +179,19 @@ def _refined(problem: Continuum, rows: Index, mesh: Mesh, unresolved: Array, aim
         size = solutions[0].fields.columns.size
         last = turn == _ROUNDS - 1 or size > _MOST_UNKNOWNS or (turn > 8 and worst > 0.5 * before)
         for solution in solutions:
-            good = solution.error.max(axis=1) <= (aim.tolerance if last else aim.target)
+            good = solution.good(aim.tolerance if last else aim.target)
             if last and not good.all():
                 _refuse(solution, good)
             if good.any():
                 found.append(_settled(solution, good, rows, unresolved))
-        still = [solution.part[solution.error.max(axis=1) > aim.target] for solution in solutions]
+        still = [solution.part[~solution.good(aim.target)] for solution in solutions]
         if last or not sum(map(len, still)):
             return found
         if aim.told is not None:
             aim.told(0.5 * float(worst), f"{len(mesh.elements) - 1} elements of degree {mesh.degree}")
-        shares = [s.share[s.error.max(axis=1) > aim.target].max(axis=(0, 1), initial=0.0) for s in solutions]
-        marks, open_ = np.max(shares, axis=0), np.concatenate(still)
+        marks, open_ = np.max([s.marks(aim.target) for s in solutions], axis=0), np.concatenate(still)
         degree = mesh.degree
-        falling = turn == 0 or (degree > degree_before and worst < 1e-3 * before)
+        falling = worst > aim.target and (turn == 0 or (degree > degree_before and worst < 1e-3 * before))
         if falling and degree < _MOST_DEGREE - 6 and len(mesh.elements) < 20:
             mesh = replace(mesh, degree=degree + 6)
         else:
@@ -212,13 +212,26 @@ class _Aim:
 
 @dataclass(frozen=True)
 class _Solution:
-    """Modes of a chunk on one mesh, with the estimated relative error of z, in all and by element."""
+    """Modes of a chunk on one mesh, with the estimated relative error of z, in all and by element.
+
+    ``missing`` has a bound of the compliance that the basis leaves out, by element, where a mode may be missing.
+    """
 
     part: Index
     fields: ModeFields
     rounding: Array
     error: Array
     share: Array
+    missing: Array
+
+    def good(self, level: float) -> NDArray[np.bool_]:
+        """Return which sets have an error below a level and all their modes."""
+        return (self.error.max(axis=1) <= level) & ~self.missing.any(axis=1)
+
+    def marks(self, level: float) -> Array:
+        """Return the share of each element in what is not good enough yet, (elements,)."""
+        shares: Array = self.share[self.error.max(axis=1) > level].max(axis=(0, 1), initial=0.0)
+        return shares if shares.any() else self.missing.max(axis=0)
 
 
 def _solved(problem: Continuum, part: Index, mesh: Mesh, aim: _Aim) -> _Solution:
@@ -239,7 +252,10 @@ def _solved(problem: Continuum, part: Index, mesh: Mesh, aim: _Aim) -> _Solution
             return best  # the further stresses depend on the others to rounding
         fields = ModeFields(columns, result.z, result.vectors)
         share = 2.0 * fields.residual
-        solution = _Solution(part, fields, result.rounding, share.sum(axis=-1), share)
+        left_out = tail(columns)
+        whole = complete(result.compliances, (result.z > 0.0).sum(axis=1), left_out.max(axis=1))
+        missing = np.where(whole[:, None], 0.0, left_out)
+        solution = _Solution(part, fields, result.rounding, share.sum(axis=-1), share, missing)
         if best is not None and solution.error.max() > best.error.max():
             return best
         best = solution
@@ -270,9 +286,15 @@ def _refuse(solution: _Solution, good: NDArray[np.bool_]) -> None:
     error = np.where(good[:, None], 0.0, solution.error)
     row, mode = (int(k) for k in np.unravel_index(np.argmax(error), error.shape))
     mesh = solution.fields.columns.mesh
-    element = int(np.argmax(solution.share[row, mode]))
+    missing = bool(solution.missing[row].any())
+    element = int(np.argmax(solution.missing[row] if missing else solution.share[row, mode]))
     piece = np.searchsorted(mesh.pieces, mesh.elements[element : element + 2])
     ends = solution.fields.columns.grid.ends[row]
+    if missing:
+        raise ValueError(
+            f"modes = {error.shape[1]}: one may be missing; what {mesh.elements.size - 1} elements leave out is too "
+            f"soft at x = {ends[piece[0]]:.6g} to {ends[piece[1]]:.6g}; use ritz"
+        )
     raise ValueError(
         f"modes = {error.shape[1]}: the relative error of frequency {mode + 1} stays at {0.5 * error[row, mode]:.1g}; "
         f"it comes from the coefficients at x = {ends[piece[0]]:.6g} to {ends[piece[1]]:.6g}; "

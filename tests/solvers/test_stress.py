@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from cra_sym.solvers.continuum import Continuum
+from cra_sym.solvers.stress import Columns
+from cra_sym.solvers.stress_mesh import Mesh
 from cra_sym.solvers.stress_refine import solved
+from cra_sym.solvers.stress_spectrum import spectrum
+from cra_sym.solvers.stress_tail import complete, tail
 
 SEED = 20260714
 TARGET = 2e-11  # relative error of squared frequencies
@@ -192,3 +197,63 @@ def test_compliances_far_apart_keep_their_digits():
                 h = w * mpf(10) ** -15
                 error = abs(condition(w) * 2 * h / (condition(w + h) - condition(w - h))) / w
                 assert error < 1e-11
+
+
+# completeness ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degree", [4, 6, 8, 11])
+@pytest.mark.parametrize("order", [1, 2])
+def test_compliances_lie_between_those_of_the_basis_and_what_it_leaves_out(order, degree):
+    """A uniform string or beam, in up to three elements: exact ones are never more than the bound beyond the basis."""
+    essential = [np.inf] * order + [0.0] * order
+    problem = continuum(
+        {("W", 0): np.ones_like, ("M", 0): np.ones_like}, [0.0, 1.0], essential, [0.0] * 2 * order, order
+    )
+    if order == 1:
+        exact = 1.0 / (np.pi * (np.arange(40) + 0.5)) ** 2
+    else:
+        roots = [1.875104068711961, 4.694091132974175, 7.854757438237613, 10.995540734875467, 14.13716839104647]
+        k = np.array([*roots, *(np.pi * (np.arange(5, 40) + 0.5))])
+        exact = k**-4.0
+    for elements in (np.array([0.0, 1.0]), np.array([0.0, 0.25, 0.5, 1.0])):
+        mesh = Mesh(elements, elements, degree, np.zeros(len(elements) - 1, dtype=bool), 0)
+        columns = Columns(problem, mesh)
+        bound = float(tail(columns).max())
+        found = spectrum(columns, 1).compliances[0]
+        assert (found <= exact[: len(found)] * (1 + 1e-6)).all()  # roots from the sixth on are asymptotic
+        assert (exact[: len(found)] <= found + bound).all()
+        if len(elements) == 2:
+            assert bound < 12.0 * exact[degree]  # and it is not much larger than what is really left out
+
+
+def test_completeness_is_proved_by_a_gap_or_is_open():
+    compliances = np.array([[1.0, 0.5, 0.4999, 0.1], [1.0, 0.5, 0.4999, 0.1]])
+    elastic = np.array([2, 3])
+    np.testing.assert_array_equal(complete(compliances, elastic, np.array([0.3, 0.3])), [True, True])
+    np.testing.assert_array_equal(complete(compliances, elastic, np.array([0.45, 0.45])), [False, False])
+    assert complete(compliances[:1], np.array([0]), np.array([9.0])).all()
+
+
+def test_a_mode_that_the_first_basis_cannot_hold_is_found():
+    """A soft heavy spot of the width 1e-4: its own modes are the lowest, and none of them is missed."""
+    left, right, soft, heavy = 0.3, 0.3001, 1e-7, 1e6
+    inside = {"W": lambda x: np.where((x > left) & (x < right), soft, 1.0)}
+    inside["M"] = lambda x: np.where((x > left) & (x < right), heavy, 1.0)
+    edges = [0.0, left, right, 1.0]
+    problem = continuum({("W", 0): inside["W"], ("M", 0): inside["M"]}, edges, [np.inf, np.inf], [0.0, 0.0], 1)
+    omega, _, _ = frequencies(problem, 4)
+
+    def condition(w):
+        state = np.array([0.0, 1.0])
+        for width, tension, mass in ((left, 1.0, 1.0), (right - left, soft, heavy), (1.0 - right, 1.0, 1.0)):
+            k = w * np.sqrt(mass / tension)
+            c, s = np.cos(k * width), np.sin(k * width)
+            state = np.array([c * state[0] + s * state[1] / (tension * k), -tension * k * s * state[0] + c * state[1]])
+        return state[0]
+
+    grid = np.linspace(1e-3, 1.05 * omega[-1], 40001)
+    signs = np.sign([condition(w) for w in grid])
+    assert np.count_nonzero(np.diff(signs)) == 4
+    exact = [brentq(condition, *grid[k : k + 2], xtol=1e-16) for k in np.nonzero(np.diff(signs))[0]]
+    np.testing.assert_allclose(omega, exact, rtol=1e-9)
