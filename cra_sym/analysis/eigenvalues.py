@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.checks import count, default_floating_point, instance, real_array
+from cra_sym.model.complex_shapes import ComplexShapes
 from cra_sym.model.spatial import check_range
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.model.values import flat_columns
@@ -15,7 +16,7 @@ from cra_sym.solvers.argument import number_inside
 from cra_sym.solvers.eigenvalues import refine
 from cra_sym.solvers.pencil_refine import Settled, lowest_eigenvalues
 
-__all__ = ["count_eigenvalues", "damping_ratios", "eigenvalues"]
+__all__ = ["complex_shapes", "count_eigenvalues", "damping_ratios", "eigenvalues"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -156,6 +157,22 @@ def count_eigenvalues(system: System, radius: Any) -> NDArray[np.int64]:
             inside = number_inside(problem, number, 0.0, reach**2 if squared else reach)
             found[row] = 2 * inside if squared else inside
     return found.reshape(shape)
+
+
+def complex_shapes(system: System, modes: int, oscillating: bool, place: int, derivative: int, x: Array) -> Complex:
+    """Return a derivative of a displacement of the section in complex modes, shape (..., modes, len(x))."""
+    numerics = system.numerics
+    if numerics("conservative"):
+        return np.asarray(system.modes(modes).shape(place, derivative, x), dtype=complex)
+    shapes = ComplexShapes(
+        eigenvalues(system, modes, oscillating=oscillating),
+        numerics("damped_spatial"),
+        numerics("damped"),
+        flat_columns(system.parameters, system.shape),
+        system.domain,
+        numerics("inertia"),
+    )
+    return shapes.shape(place, derivative, x)
 
 
 def _unsettled(system: System, columns: Array, found: Settled, oscillating: bool) -> Complex:

@@ -118,7 +118,8 @@ def frequency_response(
     zeta = np.broadcast_to(system.zeta, system.shape)[..., None]
     if np.any(zeta) and undamped.problem_damped:
         raise ValueError(
-            "zeta: the model has dampers, beside which a frequency response has no modal damping; set it to 0"
+            "zeta: the model has dampers or forces that follow the motion, beside which a frequency response has no "
+            "modal damping; set it to 0"
         )
     if damping == "structural":
         loss = 1 + 2j * zeta
@@ -184,7 +185,8 @@ class _Undamped:
             self._driven = driven_displacement(system.model, drive)
         self._kind = "motion" if self.motion is not None else choice("kind", "force" if kind is None else kind, _KINDS)
         self.by_force = self._kind == "force"
-        self.problem_damped: bool = system.numerics("damped")
+        self._laplace: bool = system.numerics("damped")
+        self.problem_damped: bool = not system.numerics("conservative")
         self.varies = not self._problem.uniform and not self.problem_damped
 
     def check_modal_damping(self, zeta: NDArray[np.float64]) -> None:
@@ -204,7 +206,7 @@ class _Undamped:
         count = y.size
         for rows, _, problem in self._problem.problems(columns):
             row = np.repeat(np.arange(len(rows)), y.size)
-            parameter = np.tile(1j * y if self.problem_damped else -(y**2), len(rows))
+            parameter = np.tile(1j * y if self._laplace else -(y**2), len(rows))
             levels = problem.levels(parameter, row).reshape(len(rows), y.size)
             count = min(count, int((levels.max(axis=0) <= _FINEST).sum()))
         return count
@@ -249,7 +251,7 @@ class _Undamped:
         shape = self._system.shape
         frequency = np.broadcast_to(frequency, (*shape, frequency.shape[-1])).reshape(-1, frequency.shape[-1])
         if self.problem_damped or not self._soft:
-            found = self._exact(1j * frequency if self.problem_damped else frequency**2)
+            found = self._exact(1j * frequency if self._laplace else frequency**2)
         else:
             found = self._with_soft_modes(frequency**2, rigid=rigid)
         return found.reshape(*shape, *found.shape[-2:])
@@ -262,7 +264,7 @@ class _Undamped:
         for rows, left, problem in self._problem.problems(columns):
             row = np.repeat(np.arange(len(rows)), parameter.shape[-1])
             here = parameter[rows].ravel()
-            here = here if np.imag(here).any() else np.real(here)
+            here = here + 0j if self.problem_damped or np.imag(here).any() else np.real(here)
             if self._places is None:
                 share = np.ones((len(rows), 1))
             else:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym import checks
+from cra_sym.analysis.eigenvalues import complex_shapes
 from cra_sym.model.routes import Modes
 from cra_sym.model.spatial import check_range
 from cra_sym.model.system import MOST_MODES, System
@@ -72,11 +73,48 @@ def section_place(system: System, field: Any = None) -> int:
     fields = system.model.equations.fields
     if not any(field is one or (isinstance(field, type(one)) and field == one) for one in fields):
         raise ValueError(f"field = {checks.shown(field)}: must be one of {', '.join(map(str, fields))}")
-    return list(system.model.conservative.displacements).index(field)
+    return list(system.model.state_form.displacements).index(field)
+
+
+@overload
+def mode_shapes(
+    system: System,
+    x: Any,
+    modes: int = 3,
+    derivative: int = 0,
+    *,
+    field: Any = None,
+    damped: Literal[False] = False,
+    oscillating: bool = True,
+) -> Array:
+    """Return real shapes."""
+
+
+@overload
+def mode_shapes(
+    system: System,
+    x: Any,
+    modes: int = 3,
+    derivative: int = 0,
+    *,
+    field: Any = None,
+    damped: bool,
+    oscillating: bool = True,
+) -> Array | NDArray[np.complex128]:
+    """Return complex shapes if they are asked for."""
 
 
 @checks.default_floating_point
-def mode_shapes(system: System, x: Any, modes: int = 3, derivative: int = 0, *, field: Any = None) -> Array:
+def mode_shapes(
+    system: System,
+    x: Any,
+    modes: int = 3,
+    derivative: int = 0,
+    *,
+    field: Any = None,
+    damped: bool = False,
+    oscillating: bool = True,
+) -> Array | NDArray[np.complex128]:
     """Return the mass-normalised mode shapes (25), or their derivatives by x, positive at the right end.
 
     Where the first field vanishes at its right end in a mode, the first of its derivatives there that does not is
@@ -93,11 +131,17 @@ def mode_shapes(system: System, x: Any, modes: int = 3, derivative: int = 0, *, 
         Order of the derivative by x, 0 to 20.
     field : applied undefined function, optional
         Default: the first.
+    damped : bool
+        Complex shapes phi of the motions ``phi exp(s t)`` of :func:`cra_sym.eigenvalues`: with dampers, gyroscopic
+        forces and forces that follow the motion. They are normalised to ``conj(phi)' M phi = 1``, and their phase makes
+        real and positive what is made positive otherwise. Without such forces they are the same.
+    oscillating : bool
+        Leave out the shapes of real eigenvalues, as in :func:`cra_sym.eigenvalues`.
 
     Returns
     -------
     ndarray, shape (..., modes) or (..., modes, len(x))
-        In kg^-1/2 m^-derivative for a displacement in m.
+        In kg^-1/2 m^-derivative for a displacement in m; complex if ``damped``.
 
     Raises
     ------
@@ -110,8 +154,13 @@ def mode_shapes(system: System, x: Any, modes: int = 3, derivative: int = 0, *, 
     modes = checks.count("modes", modes, high=MOST_MODES)
     points = checks.one_axis("x", x, "points", unit="m")
     check_places(system, points)
+    place, every = section_place(system, field), np.atleast_1d(points)
+    shapes: Array | NDArray[np.complex128]
     with np.errstate(all="ignore"):
-        shapes = system.modes(modes).shape(section_place(system, field), derivative, np.atleast_1d(points))
+        if damped:
+            shapes = complex_shapes(system, modes, oscillating, place, derivative, every)
+        else:
+            shapes = system.modes(modes).shape(place, derivative, every)
     check_range(shapes)
     return shapes if points.ndim else shapes[..., 0]
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.analysis.complex_responses import complex_response
 from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
 from cra_sym.checks import broadcastable, count, default_floating_point, instance, mapping, one_axis, shown
 from cra_sym.kernels import derived_kernel
 from cra_sym.model.projection import Projected
+from cra_sym.model.routes import Modes
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.model.values import checked_damping
 from cra_sym.solvers import modal_response as solver
@@ -79,8 +81,12 @@ def tip_response(
     """
     instance("system", system, System)
     modes = count("modes", modes, high=MOST_MODES)
-    rows = system.modes(modes).displacement(1, section_place(system, field))[..., None, :]
-    values = _oscillation(system, motion, rows, t, modes, derivative, zeta, start, initial)[..., 0, :]
+    place = section_place(system, field)
+
+    def tip(found: Modes) -> Array:
+        return found.displacement(1, place)[..., None, :]
+
+    values = _oscillation(system, motion, tip, t, modes, derivative, zeta, start, initial)[..., 0, :]
     return values if np.ndim(t) else values[..., 0]
 
 
@@ -102,7 +108,9 @@ def response(
 
     The sum over modes of phi_i(x) q_i(t), with Duhamel's integral (12) in closed form: exact at and near every
     resonance, with and without damping, and for rigid-body modes. Uniform times of 64 and more cost a few nanoseconds
-    each. Dampers of the model couple the modes; then matrix exponentials take the place of the closed form.
+    each. Of a system with local dampers, gyroscopic forces or forces that follow the motion the sum is that of the
+    lowest complex modes, as many eigenvalues as ``modes`` oscillators have, by exponentials of their state matrix;
+    velocities are those of the modes.
 
     Parameters
     ----------
@@ -149,8 +157,12 @@ def response(
     places = one_axis("x", x, "places", unit="m")
     check_places(system, places)
     modes = count("modes", modes, high=MOST_MODES)
-    shapes = system.modes(modes).shape(section_place(system, field), 0, np.atleast_1d(places))
-    values = _oscillation(system, motion, np.swapaxes(shapes, -1, -2), t, modes, derivative, zeta, start, initial)
+    place = section_place(system, field)
+
+    def along(found: Modes) -> Array:
+        return np.swapaxes(found.shape(place, 0, np.atleast_1d(places)), -1, -2)
+
+    values = _oscillation(system, motion, along, t, modes, derivative, zeta, start, initial)
     values = values if places.ndim else values[..., 0, :]
     return values if np.ndim(t) else values[..., 0]
 
@@ -236,7 +248,7 @@ def _ratios(system: System, modes: int, zeta: Any) -> Array:
 def _oscillation(
     system: System,
     motion: BaseMotion | Mapping[Any, History] | None,
-    rows: Array,
+    outputs: Callable[[Modes], Array],
     t: Any,
     modes: int,
     derivative: int,
@@ -244,10 +256,20 @@ def _oscillation(
     start: Start,
     initial: Mapping[Any, Any] | None,
 ) -> Array:
-    """Return the outputs ``rows`` (..., outputs, modes) of the driven modes, shape (..., outputs, times)."""
+    """Return outputs of the driven modes, rows (..., outputs, modes) times these, shape (..., outputs, times)."""
     check_start(start)
     histories = _histories(system, motion)
-    still = np.zeros(modes)
+    if initial is not None and not isinstance(initial, Mapping):
+        raise TypeError(
+            f"initial = {shown(initial)}: must be a mapping from fields and coordinates to expressions in x"
+        )
+    ratio = np.asarray(system.zeta if zeta is None else checked_damping(zeta))
+    if system.numerics("complex_modes") and (ratio.ndim == 0 or ratio.shape[-1] == 1 or zeta is None):
+        ratio = ratio[..., 0] if zeta is not None and ratio.ndim else ratio
+        return complex_response(
+            system, histories, outputs, t, modes, derivative, ratio, start, initial, _check_sampling
+        )
+    rows, still = outputs(system.modes(modes)), np.zeros(modes)
     damping = system.numerics("damping")
     matrix = None if damping is None else Projected(system.domain, system.modes(modes), damping)["damping"]
 
@@ -261,10 +283,6 @@ def _oscillation(
         return driven_response(osc, profile, t, derivative, begin, state)
 
     total: Array | None = None
-    if initial is not None and not isinstance(initial, Mapping):
-        raise TypeError(
-            f"initial = {shown(initial)}: must be a mapping from fields and coordinates to expressions in x"
-        )
     if initial or not histories:
         q, u = (_initial_state(system, initial or {}, modes, order) for order in (0, 1))
         total = answer(still, BaseMotion(), "base", (q, u))

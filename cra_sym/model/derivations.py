@@ -22,6 +22,7 @@ from cra_sym.model.lagrangian import Model
 from cra_sym.model.moving import jumps
 from cra_sym.model.observables import named_observables, observable
 from cra_sym.model.one_wave import one_wave_route
+from cra_sym.model.pencil_route import complex_modes, inertia
 from cra_sym.model.pencil_route import pencil_route as pencil
 from cra_sym.model.projection import EndParameter, Form, Load
 from cra_sym.model.routes import GeneralRoute, Route
@@ -29,9 +30,9 @@ from cra_sym.model.spatial import SpatialProblem, spatial_problem
 from cra_sym.model.symmetry import asymmetry
 from cra_sym.model.two_waves import two_waves_route
 
-__all__ = ["axial", "causes", "constant", "damping", "driven", "driven_coordinate", "driven_displacement", "geometry",
-           "load", "named_observables", "names", "observable", "pencil", "pushed", "rates", "route",
-           "spatial"]  # fmt: skip
+__all__ = ["axial", "causes", "complex_modes", "constant", "damping", "driven", "driven_coordinate",
+           "driven_displacement", "geometry", "inertia", "load", "named_observables", "names", "observable", "pencil",
+           "pushed", "rates", "route", "spatial"]  # fmt: skip
 
 
 def names(model: Model) -> tuple[str, ...]:

@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 
     from cra_sym.mechanics.jets import Jet
     from cra_sym.model.lagrangian import Model
+    from cra_sym.model.projection import Form
 
-__all__ = ["PencilRoute", "pencil_route"]
+__all__ = ["PencilRoute", "complex_modes", "inertia", "pencil_route"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -197,3 +198,33 @@ def pencil_route(model: Model) -> PencilRoute | None:
         kernel(tuple(points), model.symbols, backend="numpy"),
         1 in weak.powers,
     )
+
+
+def complex_modes(model: Model) -> bool:
+    """Return whether motions are sums of complex modes.
+
+    They are where dampers couple the natural modes, or there are none. Dampers of the highest derivatives
+    (Kelvin-Voigt) have eigenvalues that crowd: there the natural modes serve.
+    """
+    from cra_sym.mechanics.weak import weak_form
+
+    if model.numerics("conservative") or model.numerics("pencil") is None:
+        return False
+    try:
+        _ = model.conservative
+    except ValueError:
+        return True
+    weak = weak_form(model.equations.variation)
+    _, highest, _ = weak.fields()
+    return not any(jet in highest for pair, powers in weak.inside.items() for jet in pair if 1 in powers)
+
+
+def inertia(model: Model) -> Form:
+    """Return the mass of a model with forces of any kind."""
+    from cra_sym.mechanics.weak import weak_form
+    from cra_sym.model.forms import form_of
+
+    weak = weak_form(model.equations.variation)
+    parts = ({pair: {2: e[2]} for pair, e in form.items() if 2 in e} for form in (weak.inside, weak.discrete))
+    inside, ends = parts
+    return form_of(weak, {"mass": (inside, ends)}, model.symbols)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -328,10 +328,11 @@ def overview_places(spatial: SpatialProblem, values: Array, rows: int) -> Array:
     return np.asarray(left[:, None] + np.multiply.outer(length, _SHARES))
 
 
-def mode_sign(displacements: Array) -> Array:
+def mode_sign(displacements: NDArray[Any]) -> NDArray[Any]:
     """Return the sign of every mode, shape (rows, modes, 1).
 
-    It makes positive the first displacement of the right end that is not zero, or else the first one beside that end.
+    It makes positive the first displacement of the right end that is not zero, or else the first one beside that end;
+    of complex modes it is the phase that does.
 
     Parameters
     ----------
@@ -342,4 +343,6 @@ def mode_sign(displacements: Array) -> Array:
     entries = np.concatenate([displacements[:, :, -1], displacements[:, :, -2]], axis=-1)
     moving = np.abs(entries) > np.concatenate([1e-7 * size, 1e-12 * size], axis=-1)  # more than rounding there
     first = np.take_along_axis(entries, moving.argmax(axis=-1)[..., None], axis=-1)
+    if np.iscomplexobj(first):
+        return np.asarray(np.conj(first) / np.where(first == 0.0, 1.0, np.abs(first)))
     return np.where(first < 0.0, -1.0, 1.0)

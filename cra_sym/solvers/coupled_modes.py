@@ -15,9 +15,10 @@ from ..checks import broadcastable
 from .driven_modes import Start, checked
 from .motion import BaseMotion, Harmonic, Piecewise
 
-__all__ = ["CoupledModes", "coupled_response"]
+__all__ = ["CoupledModes", "coupled_response", "driven_system"]
 
 _CHUNK = 512  # times whose exponentials are formed at once
+_FEW = 32  # times whose exponentials are formed one by one
 
 
 class CoupledModes(NamedTuple):
@@ -79,12 +80,53 @@ def _member_term(term: Harmonic | Piecewise, shape: tuple[int, ...], index: tupl
 def _outputs(
     modes: CoupledModes, terms: list[Harmonic | Piecewise], state: np.ndarray, times: np.ndarray, derivative: int
 ) -> np.ndarray:
-    """Return the outputs (R, T) of one set of modes: the free motion and what each term of the base motion adds."""
+    """Return the outputs (R, T) of one set of modes."""
     size = len(modes.omega)
     friction = modes.damping + np.diag(np.broadcast_to(2.0 * modes.zeta * modes.omega, size))
     system = np.block([[np.zeros((size, size)), np.eye(size)], [-np.diag(modes.omega**2), -friction]])
     push = np.concatenate([np.zeros(size), -modes.gamma])
     rows = np.concatenate([modes.rows, np.zeros_like(modes.rows)], axis=1)
+    return _driven(system, push, rows, terms, state, times, derivative)
+
+
+def driven_system(
+    system: np.ndarray,
+    push: np.ndarray,
+    rows: np.ndarray,
+    motion: BaseMotion,
+    index: tuple[int, ...],
+    start: np.ndarray,
+    times: np.ndarray,
+    derivative: int,
+) -> np.ndarray:
+    """Return outputs ``rows y`` of ``y' = system y + push w''``, or their derivative by time, shape (outputs, times).
+
+    Parameters
+    ----------
+    system, push, rows : ndarray, shape (r, r), (r,), (outputs, r)
+    motion : BaseMotion
+        A batch.
+    index : tuple of int
+        The member of the batch.
+    start : ndarray, shape (r,)
+        y at t = 0.
+    times : ndarray, shape (times,)
+    derivative : {0, 1, 2}
+    """
+    terms = [_member_term(term, motion.shape, index) for term in motion.terms]
+    return _driven(system, push, rows, terms, start, times, derivative)
+
+
+def _driven(
+    system: np.ndarray,
+    push: np.ndarray,
+    rows: np.ndarray,
+    terms: list[Harmonic | Piecewise],
+    state: np.ndarray,
+    times: np.ndarray,
+    derivative: int,
+) -> np.ndarray:
+    """Return the outputs (R, T): the free motion and what each term of the base motion adds."""
     for _ in range(derivative):
         rows, direct = rows @ system, rows @ push
     nothing = _Cause(np.zeros((0, 0)), np.zeros(0), np.zeros(0))
@@ -129,7 +171,23 @@ def _carried(
     whole = np.zeros((size + len(cause.start),) * 2)
     whole[:size, :size], whole[size:, size:] = system, cause.generator
     whole[:size, size:] = np.outer(push, cause.weight)
-    start = np.concatenate([state, cause.start])
-    parts = [expm(times[i : i + _CHUNK, None, None] * whole) @ start for i in range(0, max(len(times), 1), _CHUNK)]
-    moved = np.concatenate(parts)
+    moved = _free(whole, np.concatenate([state, cause.start]), times)
     return moved[:, :size], moved[:, size:] @ cause.weight
+
+
+def _free(system: np.ndarray, start: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return the states (T, N) at the times of y' = system y; equidistant times share their exponentials."""
+    number = len(times)
+    step = (times[-1] - times[0]) / (number - 1) if number > _FEW else 0.0
+    if not step or np.abs(np.diff(times) - step).max() > 8 * np.finfo(float).eps * np.abs(times).max():
+        return _exponentials(system, times) @ start
+    block = int(np.sqrt(number))
+    coarse = _exponentials(system, times[::block]) @ start
+    fine = _exponentials(system, step * np.arange(block))
+    states: np.ndarray = np.einsum("fij,cj->cfi", fine, coarse, optimize=True).reshape(-1, len(start))
+    return states[:number]
+
+
+def _exponentials(system: np.ndarray, times: np.ndarray) -> np.ndarray:
+    parts = (expm(times[i : i + _CHUNK, None, None] * system) for i in range(0, max(len(times), 1), _CHUNK))
+    return np.concatenate(list(parts))

@@ -21,7 +21,7 @@ from .stress import Columns
 from .stress_mesh import Mesh
 from .stress_spectrum import bases
 
-__all__ = ["GeneralContinuum", "Reduced", "reduced"]
+__all__ = ["Forces", "GeneralContinuum", "Reduced", "reduced"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -98,7 +98,7 @@ class GeneralContinuum(Continuum):
         return replace(self, coefficients=coefficients)  # type: ignore[arg-type]
 
 
-class _Forces(Columns):
+class Forces(Columns):
     """Columns with the matrices of forces of any kind."""
 
     problem: GeneralContinuum
@@ -129,7 +129,7 @@ class Reduced:
     ----------
     sets : ndarray of int
         Positions of the sets in the problem.
-    columns : Columns
+    columns : Forces
     motions : ndarray, shape (sets, k, size)
         Unknowns of the columns for a unit of each coordinate d.
     root_mass : ndarray, shape (sets, k)
@@ -146,7 +146,7 @@ class Reduced:
     """
 
     sets: Index
-    columns: Columns
+    columns: Forces
     motions: Array
     root_mass: Array
     stiffness: Array
@@ -259,9 +259,9 @@ def _rest(problem: Reduced, found: Complex) -> None:
 
 def reduced(problem: GeneralContinuum, mesh: Mesh) -> Iterator[Reduced]:
     """Yield the pencils of all rows on a mesh."""
-    columns = _Forces(problem, mesh)
+    columns = Forces(problem, mesh)
     if any(bool((entry < 0.0).any()) for entry in columns.coefficient["R"].values()):
-        columns = _Forces(problem.loaded(), mesh)
+        columns = Forces(problem.loaded(), mesh)
     forces = columns.forces(0)
     drag = columns.forces(1) if problem.damped else None
     for sets, elastic, rigid, mass_factor in bases(columns):

@@ -12,7 +12,7 @@ from .pencil import Complex, GeneralContinuum, Index, Reduced, reduced
 from .stress_mesh import Mesh, TooFineError
 from .stress_refine import alike, meshed
 
-__all__ = ["Settled", "lowest_eigenvalues", "meshes", "sequence"]
+__all__ = ["Settled", "lowest_eigenvalues", "matched", "meshes", "sequence"]
 
 Array = NDArray[np.float64]
 _STEPS = 4, 6  # degrees between the first two meshes, and between later ones
@@ -143,7 +143,7 @@ def _compared(fine: Complex, coarse: Complex, rate: Array, modes: int, oscillati
     order = np.pad(order, ((0, 0), (0, modes - order.shape[1])), constant_values=0)
     there = np.take_along_axis(wanted, order, axis=1) & (np.arange(modes) < wanted.sum(axis=1)[:, None])
     width = min(int(np.where(there, order, 0).max(initial=0)) + 4, fine.shape[1])
-    near = _matched(fine[:, :width], coarse)
+    near = matched(fine[:, :width], coarse)
     scale = np.maximum(size[:, :width], 1e-5 * rate[:, None])
     with np.errstate(divide="ignore", invalid="ignore"):
         error = np.abs(near - fine[:, :width]) / np.where(size[:, :width] > 0.0, size[:, :width], 1.0)
@@ -163,7 +163,7 @@ def _compared(fine: Complex, coarse: Complex, rate: Array, modes: int, oscillati
     return picked, np.where(there, np.take_along_axis(error, np.minimum(order, width - 1), axis=1), np.inf)
 
 
-def _matched(fine: Complex, coarse: Complex) -> Complex:
+def matched(fine: Complex, coarse: Complex) -> Complex:
     """Return the nearest eigenvalue of the coarser mesh for each, none twice."""
     free = np.where(np.isnan(coarse), np.inf, coarse)
     near = np.empty_like(fine)

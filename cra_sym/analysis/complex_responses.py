@@ -1,0 +1,121 @@
+"""Responses of systems whose modes are complex: local dampers, gyroscopic forces, forces that follow the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.checks import broadcastable
+from cra_sym.model.projection import Load, project
+from cra_sym.model.routes import Modes
+from cra_sym.model.system import System
+from cra_sym.model.values import flat_columns
+from cra_sym.solvers.coupled_modes import driven_system
+from cra_sym.solvers.driven_modes import Start, checked
+from cra_sym.solvers.lowest_motions import LowestMotions, lowest_motions
+from cra_sym.solvers.motion import BaseMotion, Force
+
+__all__ = ["complex_response"]
+
+Array = NDArray[np.float64]
+
+
+class _Cause(NamedTuple):
+    """A motion or a force: its history as a motion whose acceleration acts, its load, whether it strikes at t = 0."""
+
+    profile: BaseMotion
+    load: Load
+    strikes: bool
+
+
+def complex_response(
+    system: System,
+    histories: Mapping[str, BaseMotion | Force],
+    outputs: Callable[[Modes], Array],
+    t: Any,
+    modes: int,
+    derivative: int,
+    zeta: Array,
+    start: Start,
+    initial: Mapping[Any, Any] | None,
+    check: Callable[[BaseMotion, Array], None],
+) -> Array:
+    """Return outputs of the lowest complex modes, shape (..., outputs, times).
+
+    Parameters
+    ----------
+    system : System
+    histories : mapping of name to BaseMotion or Force
+    outputs : callable
+        ``outputs(modes)`` returns the rows (outputs, modes) of a basis.
+    t, modes, derivative, start, initial
+        As :func:`cra_sym.response`; the sum has as many eigenvalues as ``modes`` oscillators.
+    zeta : ndarray
+        Modal damping ratio of the structure without its dampers.
+    check : callable
+        ``check(motion, omega)`` is told every motion and the frequencies.
+    """
+    causes = _causes(system, histories, start)
+    times = np.empty(0)
+    for cause in (None, *causes):
+        times, derivative = checked(BaseMotion() if cause is None else cause.profile, t, derivative, start)
+    shapes = {f"motion {k}": np.empty(cause.profile.shape) for k, cause in enumerate(causes)}
+    shape = broadcastable(values=np.empty(system.shape), zeta=zeta, **shapes)
+    columns, ratios = flat_columns(system.parameters, shape), np.broadcast_to(zeta, shape).ravel()
+    momenta = _momenta(system, initial)
+    found, kept, motions = [], b"", None
+    for number, index in enumerate(np.ndindex(shape)):
+        column = columns[:, number : number + 1]
+        key = np.append(column, ratios[number]).tobytes()
+        if motions is None or key != kept:  # the motion varies fastest
+            ((_, problem),) = system.numerics("pencil").problems(column)
+            motions, kept = lowest_motions(problem, modes, float(ratios[number])), key
+        one = system.model.at(dict(zip(system.numerics("names"), column[:, 0], strict=True)))
+        rows = outputs(motions.basis) @ motions.shapes
+        omega = np.sort(np.abs(motions.eigenvalues.imag))
+        state = _projected(one, motions, motions.start, momenta[0]) + _projected(one, motions, motions.push, momenta[1])
+        total = driven_system(motions.system, 0.0 * state, rows, BaseMotion(), (), state, times, derivative)
+        for cause in causes:
+            check(cause.profile, omega)
+            push = _projected(one, motions, motions.push, cause.load)
+            speed = float(np.broadcast_to(cause.profile.velocity(0.0), shape)[index]) if cause.strikes else 0.0
+            member = _member(index, cause.profile.shape)
+            total += driven_system(motions.system, push, rows, cause.profile, member, push * speed, times, derivative)
+        found.append(total)
+    return np.array(found).reshape(*shape, *found[0].shape)
+
+
+def _causes(system: System, histories: Mapping[str, BaseMotion | Force], start: Start) -> list[_Cause]:
+    found = []
+    for name, history in histories.items():
+        force = isinstance(history, Force)
+        profile = history.profile if isinstance(history, Force) else history
+        found.append(_Cause(profile, system.numerics("load", name), not force and start == "inertial"))
+    constant = system.numerics("constant")
+    return found if constant is None else [*found, _Cause(Force(1.0).profile, constant, False)]
+
+
+def _momenta(system: System, initial: Mapping[Any, Any] | None) -> tuple[Load | None, Load | None]:
+    """Return the momenta of given displacements and velocities as loads, None where there are none."""
+    if not initial:
+        return None, None
+    from cra_sym.model.derivations import momentum
+
+    return momentum(system.model, initial, 0), momentum(system.model, initial, 1)
+
+
+def _projected(one: System, motions: LowestMotions, effect: Array, load: Load | None) -> Array:
+    """Return what a load on the coordinates of the basis does to the state."""
+    if load is None:
+        return np.zeros(len(motions.system))
+    moved: Array = effect @ project(one.domain, motions.basis, load)
+    return moved
+
+
+def _member(index: tuple[int, ...], shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the member of an array of that shape that goes with one of the batch."""
+    last = index[len(index) - len(shape) :]
+    return tuple(0 if size == 1 else k for k, size in zip(last, shape, strict=True))

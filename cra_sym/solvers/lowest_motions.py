@@ -1,0 +1,234 @@
+"""The lowest complex modes of one parameter set as a real linear system: an invariant subspace of the pencil.
+
+Bases of the subspace and of its partner for the forces come from ordered real Schur forms, so that modes that meet, as
+at critical damping and at flutter, need no case of their own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigvals, schur, solve
+
+from .pencil import SHIFT, Array, GeneralContinuum, Reduced, reduced
+from .pencil_refine import matched, meshes, sequence
+from .stress_mesh import rule
+
+__all__ = ["BasisModes", "LowestMotions", "lowest_motions"]
+
+_SETTLED = 1e-9
+"""Relative difference of the eigenvalues on two meshes."""
+_SAME = 1e-6  # relative difference of moduli that are not told apart: a pair is not split
+_LIGHT = 1e-7  # square root of a mass, relative to the largest, below which a coordinate has none
+
+
+@dataclass(frozen=True, eq=False)
+class BasisModes:
+    """The coordinates of a pencil of one set as modes: what each of them displaces."""
+
+    problem: Reduced
+
+    @property
+    def omega(self) -> Array:
+        """Nothing but the shape: one entry a coordinate."""
+        return np.zeros(self.problem.root_mass.shape[1])
+
+    @cached_property
+    def _motions(self) -> Array:
+        return self.problem.motions[0]
+
+    @cached_property
+    def _ends(self) -> Array:
+        return self._motions @ self.problem.columns.ends[self.problem.sets[0]].T
+
+    def displacement(self, end: int, place: int) -> Array:
+        """Return a displacement of an end section, shape (k,)."""
+        continuum = self.problem.columns.problem
+        return self._ends[:, end * (continuum.displacements + continuum.lumped) + place]
+
+    def force(self, end: int, place: int) -> Array:
+        """Raise: the coordinates of a basis have no natural forces of their own."""
+        raise NotImplementedError
+
+    def coordinate(self, number: int) -> Array:
+        """Return a lumped coordinate, shape (k,)."""
+        return self._ends[:, self.problem.columns.problem.displacements + number]
+
+    def shape(self, place: int, derivative: int, x: Array) -> Array:
+        """Return a derivative of a displacement, up to the highest in the energies, at places, shape (k, stations)."""
+        columns = self.problem.columns
+        tops, field = columns.problem.tops(), 0
+        while tops[field] < place:
+            field += 1
+        over = place + derivative - tops[field]
+        jet = field if over > 0 else len(tops) + place + derivative
+        values = columns.jets[jet]
+        own = self.problem.sets[0] if len(values) > 1 else 0
+        values = np.broadcast_to(values[own], (values.shape[1], *columns.grid.x.shape[1:]))
+        values = np.tensordot(self._motions, values, axes=1)
+        ends, half = columns.grid.ends[self._grid_row], columns.grid.half[self._grid_row]
+        piece = np.searchsorted(ends[1:-1], x, side="right")
+        local = np.clip((x - 0.5 * (ends[piece] + ends[piece + 1])) / half[piece], -1.0, 1.0)
+        spectrum = rule(columns.mesh.points).spectrum
+        table = np.polynomial.legendre.legvander(local, len(spectrum) - 1) @ spectrum
+        found: Array = (values[:, piece] * table).sum(axis=-1)
+        return found
+
+    @cached_property
+    def _grid_row(self) -> int:
+        return int(self.problem.sets[0]) if len(self.problem.columns.grid.ends) > 1 else 0
+
+    def integral(self, place: int) -> None:
+        """Return None: only quadrature gives integrals."""
+        return None
+
+    def stations(self) -> tuple[Array, Array]:
+        """Return points and weights of a quadrature that respects the breakpoints, shape (points,)."""
+        columns = self.problem.columns
+        row = self.problem.sets[0] if len(columns.weights) > 1 else 0
+        return columns.grid.x[self._grid_row].ravel(), columns.weights[row]
+
+
+@dataclass(frozen=True, eq=False)
+class LowestMotions:
+    """The motions of the lowest complex modes: ``y' = system y + push f`` for forces f on the coordinates of the basis.
+
+    Attributes
+    ----------
+    basis : BasisModes
+    system : ndarray, shape (r, r)
+        1/s.
+    push : ndarray, shape (r, k)
+    shapes : ndarray, shape (k, r)
+        Coordinates of the basis for a unit of each y.
+    start : ndarray, shape (r, k)
+        y for a unit of each momentum of given displacements, ``M d``; that of given velocities is ``push``.
+    """
+
+    basis: BasisModes
+    system: Array
+    push: Array
+    shapes: Array
+    start: Array
+
+    @property
+    def eigenvalues(self) -> NDArray[np.complex128]:
+        """Eigenvalues s, rad/s."""
+        return np.asarray(eigvals(self.system))
+
+
+def lowest_motions(problem: GeneralContinuum, modes: int, zeta: float) -> LowestMotions:
+    """Return the motions of as many eigenvalues as that many oscillators have, or one more than splits a pair.
+
+    Parameters
+    ----------
+    problem : GeneralContinuum
+        Of one parameter set.
+    modes : int
+    zeta : float
+        Modal damping ratio of the structure without dampers.
+
+    Raises
+    ------
+    ValueError
+        If the eigenvalues do not settle, or there is modal damping of a structure without natural modes.
+    """
+    ((_, chosen, mesh),) = meshes(problem, 2 * modes, 1e-10)
+    before: NDArray[np.complex128] | None = None
+    worst = np.inf
+    for finer in sequence(mesh):
+        (one,) = reduced(chosen, finer)
+        first, second = one.pencil()
+        first, second = first[0], second[0]
+        second[: len(one.stiffness[0]), : len(one.stiffness[0])] += _modal(one, zeta)
+        s = _all(first, second)
+        number = _number(s, 2 * modes)
+        if before is not None:
+            near = matched(s[None, :number], before[None])[0]
+            scale = np.maximum(np.abs(s[:number]), 1e-3)
+            # where some meet each is known to half its digits
+            worst = float((np.abs(near - s[:number]) / scale).max())
+            if worst < _SETTLED or _moments(near, s[:number]) < _SETTLED:
+                return _motions(one, first, second, float(np.sqrt(np.abs(s[number - 1] * s[number]))))
+        before = s
+    raise ValueError(
+        f"modes = {modes}: the eigenvalues of so many modes settle to {worst:.1g} only; ask for fewer modes. An end "
+        "that takes up the waves leaves none"
+    )
+
+
+def _all(first: Array, second: Array) -> NDArray[np.complex128]:
+    """Return all eigenvalues by ascending modulus, in units of the rate."""
+    mu = np.linalg.eigvals(np.linalg.solve(first + SHIFT * second, second))
+    mu = mu[np.abs(mu) > 1e-13 * np.abs(mu).max()]
+    s = SHIFT - 1.0 / mu
+    return np.asarray(s[np.argsort(np.abs(s), kind="stable")], dtype=complex)
+
+
+def _number(s: NDArray[np.complex128], least: int) -> int:
+    """Return how many of the lowest to take so that the next has a larger modulus."""
+    if len(s) <= least:
+        raise ValueError(f"modes = {least // 2}: the model has only {len(s)} eigenvalues")
+    size, number = np.abs(s), least
+    while number < len(s) - 1 and size[number] <= size[number - 1] * (1.0 + _SAME) + 1e-6:
+        number += 1
+    return number
+
+
+def _moments(near: NDArray[np.complex128], s: NDArray[np.complex128]) -> float:
+    """Return the relative difference of the sums of s and of s^2, which are well known where eigenvalues meet."""
+    size = np.abs(s).sum()
+    return float(max(abs((near - s).sum()) / size, abs((near**2 - s**2).sum()) / size**2))
+
+
+def _modal(one: Reduced, zeta: float) -> Array | float:
+    """Return the damping matrix of a ratio of every mode of the structure without dampers."""
+    if not zeta:
+        return 0.0
+    stiffness, root = one.stiffness[0], one.root_mass[0]
+    elastic = len(root) - one.rigid
+    k = stiffness[:elastic, :elastic]
+    size, frame = np.linalg.eigh(0.5 * (k + k.T))
+    if np.abs(stiffness - stiffness.T).max() > 1e-9 * np.abs(stiffness).max() or (size <= 0.0).any():
+        raise ValueError("zeta: a structure whose forces have no potential has no natural modes to damp; use dampers")
+    half = (frame * np.sqrt(size)) @ frame.T
+    inverse = (frame / np.sqrt(size)) @ frame.T
+    value, turn = np.linalg.eigh(inverse @ (root[:elastic, None] ** 2 * inverse))
+    found = np.zeros_like(stiffness)
+    found[:elastic, :elastic] = 2.0 * zeta * half @ ((turn * np.sqrt(np.maximum(value, 0.0))) @ turn.T) @ half
+    return found
+
+
+def _motions(one: Reduced, first: Array, second: Array, radius: float) -> LowestMotions:
+    rate, k = float(one.rate[0]), one.root_mass.shape[1]
+    shifted = first + SHIFT * second
+
+    def lowest(real: float, imaginary: float) -> bool:
+        mu = complex(real, imaginary)
+        return mu != 0.0 and abs(SHIFT - 1.0 / mu) <= radius
+
+    # (A + shift B)^-1 B maps the motions to themselves, its partner (A + shift B)^-T B^T the tests of the forces
+    _, right, number = schur(solve(shifted, second), sort=lowest)
+    _, left, same = schur(solve(shifted.T, second.T), sort=lowest)
+    if number != same:
+        raise ArithmeticError("modes: the eigenvalues lie too close together to be told apart; ask for other modes")
+    right, left = right[:, :number], left[:, :number]
+    project = left.T @ second
+    inverse = np.linalg.inv(project @ right)
+    system = -inverse @ (left.T @ first @ right)
+    root = one.root_mass[0]
+    light = root < _LIGHT * root.max()
+    per_root = np.where(light, 0.0, 1.0 / np.where(light, 1.0, root))
+    units = np.zeros((len(first), k))  # w = (d, e, g) of displacements at rest
+    units[:k] = np.diag(per_root**2)
+    units[2 * k :] = np.maximum(one.constants[0], 1.0)[:, None] * (first[2 * k :, :k] @ units[:k])
+    return LowestMotions(
+        BasisModes(one),
+        rate * system,
+        rate * inverse @ left[:k].T,
+        right[:k],
+        rate**2 * inverse @ (project @ units),
+    )
