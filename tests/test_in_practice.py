@@ -212,3 +212,26 @@ def test_nothing_is_left_changed():
         WORK[name]()
     assert cra.equation(34).check()
     assert (np.geterr(), dict(matplotlib.rcParams), list(warnings.filters), mpmath.mp.prec) == before
+
+
+def test_no_thread_changes_the_warnings_of_another():
+    """The filters of warnings are those of the process: nothing in the package sets them, even for a moment."""
+    from pathlib import Path
+
+    users = [path.name for path in Path(cra.__file__).parent.rglob("*.py") if "catch_warnings" in path.read_text("utf-8")]
+    assert users == []
+
+
+def test_eight_threads_find_the_boundaries_one_does_and_each_its_warnings():
+    from cra_sym.analysis.floquet_boundary import floquet_boundary
+
+    arms = [cra.Arm.nominal().replace(k_t=k_t) for k_t in np.geomspace(5e3, 5e4, 8)]
+
+    def work(arm):
+        return floquet_boundary(arm, cra.JointStiffness(), 0.05, (1, 1), modes=2)
+
+    serial = [work(arm) for arm in arms]
+    before = list(warnings.filters)
+    with ThreadPoolExecutor(8) as pool:
+        assert list(pool.map(work, arms)) == serial
+    assert list(warnings.filters) == before

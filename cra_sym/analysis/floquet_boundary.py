@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
 
-from cra_sym.analysis.stability import AsymptoticWarning, growth_rate, stability_boundary
+from cra_sym.analysis.stability import growth_rate, judged_boundary
 from cra_sym.model.excitations import Fluctuation
 from cra_sym.model.system import System
 
@@ -52,9 +51,7 @@ def floquet_boundary(
     """
     highest = max(map(abs, resonance))
     modes = highest + 5 if modes is None else modes
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", AsymptoticWarning)
-        sides = stability_boundary(system, excitation, epsilon, resonance, order=2, modes=highest)
+    sides = judged_boundary(system, excitation, epsilon, resonance, order=2, modes=highest)[:2]
     middle, half = np.mean(sides), np.ptp(sides) / 2
     residual = (
         isinstance(excitation, Fluctuation) and bool(excitation.springs(system)) if residual is None else residual

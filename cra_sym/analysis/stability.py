@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -25,6 +26,7 @@ __all__ = [
     "floquet_exponents",
     "forced_width",
     "growth_rate",
+    "judged_boundary",
     "stability_boundary",
 ]
 
@@ -95,6 +97,24 @@ def stability_boundary(
     >>> print(f"{lower:.3f} {upper:.3f}")
     186.938 187.346
     """
+    lower, upper, doubts = judged_boundary(system, excitation, epsilon, resonance, order, modes, tongue=tongue)
+    for kind, text in doubts:
+        warnings.warn(text, kind, stacklevel=3)
+    return lower, upper
+
+
+@checks.default_floating_point
+def judged_boundary(
+    system: System,
+    excitation: Excitation,
+    epsilon: Any,
+    resonance: tuple[int, int] = (1, 1),
+    order: int = 1,
+    modes: int = 3,
+    *,
+    tongue: int = 1,
+) -> tuple[np.ndarray, np.ndarray, list[tuple[type[UserWarning], str]]]:
+    """Return what :func:`stability_boundary` does, and what that warns of as kinds and texts, for those who know it."""
     excitation = _parametric(excitation)
     epsilon = checks.real_array("epsilon", epsilon, low=0.0, unit="1")
     modes = checks.count("modes", modes)
@@ -104,12 +124,14 @@ def stability_boundary(
         raise ValueError("order = 1: the second tongue appears at order 2")
     shape = _shape(system, excitation, epsilon=epsilon)
     zone = zone_of(system, excitation, epsilon, first, second, tongue, modes)
-    _explain(zone, epsilon, excitation, first, second, shape)
-    _doubt(zone, system, excitation, epsilon, (first, second), modes, rival=tongue == 1)
+    doubts = [
+        *_explained(zone, excitation, first, second),
+        *_doubted(zone, system, excitation, epsilon, (first, second), modes, rival=tongue == 1),
+    ]
     middle = zone.centre + (zone.shift if order == 2 else 0.0)
     sides = (np.broadcast_to(middle + sign * zone.half_width, shape) for sign in (-1.0, 1.0))
     lower, upper = (side[()] + 0.0 for side in sides)
-    return lower, upper
+    return lower, upper, doubts
 
 
 @checks.default_floating_point
@@ -281,9 +303,7 @@ def _resonance(resonance: Any, modes: int) -> tuple[int, int]:
     return (-second, -first) if second < 0 and first < -second else (first, second)
 
 
-def _explain(
-    zone: Zone, epsilon: np.ndarray, excitation: Parametric, first: int, second: int, shape: tuple[int, ...]
-) -> None:
+def _explained(zone: Zone, excitation: Parametric, first: int, second: int) -> Iterator[tuple[type[UserWarning], str]]:
     """Say why there is no zone, where there is none."""
     name = f"resonance ({first}, {second})"
     rest = zone.centre <= 0
@@ -302,10 +322,10 @@ def _explain(
     for where, reason in reasons:
         if np.any(where):
             scope = "" if np.all(where) else f" for {np.count_nonzero(where)} of {np.size(where)} parameter sets"
-            warnings.warn(f"{name}: no instability{scope}: {reason}", ResonanceWarning, stacklevel=4)
+            yield ResonanceWarning, f"{name}: no instability{scope}: {reason}"
 
 
-def _doubt(
+def _doubted(
     zone: Zone,
     system: System,
     excitation: Parametric,
@@ -314,7 +334,7 @@ def _doubt(
     modes: int,
     *,
     rival: bool,
-) -> None:
+) -> Iterator[tuple[type[UserWarning], str]]:
     """Say where the expansion cannot be trusted; with ``rival``, second order is to be smaller than first."""
     name = f"resonance {resonance}"
     there = ~np.isnan(zone.half_width) & (epsilon > 0)
@@ -324,14 +344,14 @@ def _doubt(
     if np.any(far):
         largest = np.broadcast_to(epsilon, far.shape)[far].min()
         text = f"epsilon = {largest:g} is beyond the reach of the expansion"
-        warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=4)
+        yield AsymptoticWarning, f"{name}: {text}"
     weights = excitation.weights.values() if isinstance(excitation, Fluctuation) else ()
     if any(np.any(epsilon * np.asarray(weight) > 1) for weight in weights):
         text = "epsilon times weight exceeds 1: a stiffness is negative in part of the period"
-        warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=4)
+        yield AsymptoticWarning, f"{name}: {text}"
     for other in _overlapping(zone, system, excitation, epsilon, resonance, modes):
         text = f"its zone overlaps that of resonance {other}, and each is derived as if it were alone"
-        warnings.warn(f"{name}: {text}", AsymptoticWarning, stacklevel=4)
+        yield AsymptoticWarning, f"{name}: {text}"
 
 
 def _overlapping(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cra_sym.analysis.modes import modal_parameters
-from cra_sym.analysis.stability import AsymptoticWarning, growth_rate, stability_boundary
+from cra_sym.analysis.stability import AsymptoticWarning, growth_rate, judged_boundary
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.claims.motions import tip
 from cra_sym.claims.pictures import PALETTE, STYLES, note
@@ -35,9 +35,11 @@ _NO_GROWTH = 1e-9  # 1/s: what rounding makes of no growth at all
 
 def zone(arm: Arm, excitation: Any, epsilon: Any, resonance: tuple[int, int], **options: Any) -> tuple[Any, Any]:
     """Return a stability boundary wherever its expansion is formally defined, as the paper draws it."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", AsymptoticWarning)
-        return stability_boundary(arm, excitation, epsilon, resonance, **options)
+    lower, upper, doubts = judged_boundary(arm, excitation, epsilon, resonance, **options)
+    for kind, text in doubts:
+        if kind is not AsymptoticWarning:
+            warnings.warn(text, kind, stacklevel=2)
+    return lower, upper
 
 
 def _terms(kind: str) -> tuple[bool, bool]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,13 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cra_sym.analysis.floquet_boundary import floquet_boundary
-from cra_sym.analysis.stability import (
-    AsymptoticWarning,
-    ResonanceWarning,
-    forced_width,
-    growth_rate,
-    stability_boundary,
-)
+from cra_sym.analysis.stability import forced_width, growth_rate, judged_boundary
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
 from cra_sym.figures.drawing import panels
@@ -57,10 +50,8 @@ def _described(excitation: Any) -> str:
 
 def _boundary(*given: Any, **more: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return a boundary where a figure shows by itself what a warning would say."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", AsymptoticWarning)
-        warnings.simplefilter("ignore", ResonanceWarning)
-        return stability_boundary(*given, **more)
+    lower, upper, _ = judged_boundary(*given, **more)
+    return lower, upper
 
 
 def _growth(
