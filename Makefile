@@ -60,9 +60,10 @@ lint: .venv/.ready
 mutation: .venv/.ready
 	$(RUN) -m tests.mutation $(ARGS)
 
-# Random joints against their own frequencies; it goes on where it was stopped.
+# Random joints against their own frequencies, which goes on where it was stopped; bad values in every argument.
 campaign: .venv/.ready
 	$(RUN) -m tests.campaigns.joints $(ARGS)
+	$(RUN) -m tests.campaigns.attacks
 
 clean:
 	rm -rf .venv .venv-oldest .venv-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage .coverage.*

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,9 @@ __all__ = [
     "default_floating_point",
     "equal",
     "instance",
+    "listed",
     "mapping",
+    "names",
     "one_axis",
     "real_array",
     "shown",
@@ -136,6 +138,24 @@ def choice(name: str, value: Any, allowed: Collection[str]) -> str:
         return value
     words = " or ".join(map(repr, allowed)) if len(allowed) < 3 else f"one of {', '.join(allowed)}"
     raise (ValueError if isinstance(value, str) else TypeError)(f"{name} = {shown(value)}: must be {words}")
+
+
+def listed(name: str, value: Any, of: str) -> list[Any]:
+    """Return the entries of a sequence, which is no text, or raise an error that names the field."""
+    flat = getattr(value, "ndim", 1) == 1
+    if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, Iterable) or not flat:
+        raise TypeError(f"{name} = {shown(value)}: must be a sequence of {of}")
+    return list(value)
+
+
+def names(name: str, value: Any, allowed: Collection[str]) -> tuple[str, ...]:
+    """Return a sequence of words as a tuple, or raise an error that names the field and the words."""
+    words = listed(name, value, f"names among {', '.join(allowed)}")
+    for word in words:
+        if not isinstance(word, str) or word not in allowed:
+            kind = ValueError if isinstance(word, str) else TypeError
+            raise kind(f"{name} = {shown(word)}: must be among {', '.join(allowed)}")
+    return tuple(words)
 
 
 def mapping(name: str, value: Any, entries: str) -> Mapping[Any, Any]:

@@ -16,6 +16,7 @@ import cra_sym as cra
 from cra_sym import symbols as s
 from cra_sym.__main__ import COMMANDS, main
 from cra_sym.mechanics import multiple_scales, ritz
+from tests.campaigns import attacks
 
 TRAP = "CRA_SYM_TRAP"
 ATTACKS = (
@@ -324,3 +325,13 @@ def test_a_store_in_an_odd_or_closed_place_changes_nothing(tmp_path):
         run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
         assert run.stdout.strip() == expected, run.stderr
     assert (tmp_path / "file").read_text() == "mine" and not (tmp_path / "sprung").exists()
+
+
+@pytest.mark.parametrize("name", attacks.systems())
+def test_a_sample_of_the_attacks_on_every_kind_of_system(name, monkeypatch, tmp_path):
+    """``python -m tests.campaigns.attacks`` tries them all."""
+    monkeypatch.chdir(tmp_path)  # a text is a path where a store is asked for
+    every = [attack for attack in attacks.attacks() if attack[0] == name]
+    for index in np.random.default_rng(17).choice(len(every), 300, replace=False):
+        *place, value, inside = every[index]
+        assert attacks.attacked(*place, value, inside=inside) is None, every[index]

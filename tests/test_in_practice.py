@@ -218,7 +218,9 @@ def test_no_thread_changes_the_warnings_of_another():
     """The filters of warnings are those of the process: nothing in the package sets them, even for a moment."""
     from pathlib import Path
 
-    users = [path.name for path in Path(cra.__file__).parent.rglob("*.py") if "catch_warnings" in path.read_text("utf-8")]
+    users = [
+        path.name for path in Path(cra.__file__).parent.rglob("*.py") if "catch_warnings" in path.read_text("utf-8")
+    ]
     assert users == []
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from cra_sym.analysis.fit_search import Data
-from cra_sym.checks import broadcastable, count, instance, mapping, real_array, shown
+from cra_sym.checks import broadcastable, count, instance, listed, mapping, names, real_array, shown
 from cra_sym.model.system import MOST_MODES, System
 
 __all__ = ["checked_data", "checked_names", "checked_priors"]
@@ -33,27 +33,20 @@ def checked_data(system: System, name: str, measured: Any, uncertainty: Any, mod
     if modes is None:
         numbers = np.arange(frequencies.size)
     else:
-        if isinstance(modes, str) or not isinstance(modes, Iterable):
-            raise TypeError(f"modes = {shown(modes)}: must be a sequence of mode numbers from 1")
-        listed = [count("modes", mode, high=MOST_MODES) for mode in modes]
-        if len(listed) != frequencies.size or sorted(set(listed)) != listed:
+        chosen = [count("modes", mode, high=MOST_MODES) for mode in listed("modes", modes, "mode numbers from 1")]
+        if len(chosen) != frequencies.size or sorted(set(chosen)) != chosen:
             raise ValueError(f"modes = {shown(modes)}: must be {frequencies.size} different modes, ascending")
-        numbers = np.array(listed) - 1
+        numbers = np.array(chosen) - 1
     return Data(frequencies, np.broadcast_to(sigma, frequencies.shape).copy(), numbers)
 
 
 def checked_names(system: System, unknown: Any, prior: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the names of all parameters to be estimated, or raise an error that says what they must be."""
-    unknown = tuple(system.numerics("stiffnesses")) if unknown is None else unknown
-    if isinstance(unknown, str) or not isinstance(unknown, Iterable):
-        raise TypeError(f"unknown = {shown(unknown)}: must be a sequence of names of parameters")
-    names = tuple(dict.fromkeys([*unknown, *prior]))
-    for name in names:
-        if name not in system.values:
-            raise ValueError(f"unknown = {shown(name)}: must be among {', '.join(system.values)}")
-    if not 1 <= len(names) <= _MOST_UNKNOWN:
+    given = tuple(system.numerics("stiffnesses")) if unknown is None else names("unknown", unknown, system.values)
+    found = tuple(dict.fromkeys([*given, *prior]))
+    if not 1 <= len(found) <= _MOST_UNKNOWN:
         raise ValueError(f"unknown = {shown(unknown)}: must be 1 to {_MOST_UNKNOWN} names, those with priors included")
-    return names
+    return found
 
 
 def checked_priors(system: System, prior: Any) -> dict[str, tuple[float, float]]:

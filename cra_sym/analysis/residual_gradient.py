@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cra_sym.analysis.modes import only_motion, participation
 from cra_sym.analysis.responses import residual_vibration, stopped_oscillators
 from cra_sym.analysis.sensitivities import Sensitivities, sensitivities
-from cra_sym.checks import count, default_floating_point, shown
+from cra_sym.checks import count, default_floating_point, names
 from cra_sym.model.one_wave import Change, OneWaveModes
 from cra_sym.model.projection import column
 from cra_sym.model.system import MOST_MODES, System
@@ -80,9 +80,7 @@ def residual_vibration_gradient(
     compliances = {f"1/{name}": name for name in system.numerics("stiffnesses")}
     compliances |= {name.replace("k_", "c_", 1): name for name in compliances.values() if name.startswith("k_")}
     known = [*system.values, *compliances, "duration"]
-    by = (*system.numerics("stiffnesses"), "duration") if by is None else by
-    if isinstance(by, str) or not isinstance(by, Sequence) or not all(name in known for name in by):
-        raise ValueError(f"by = {shown(by)}: must be a sequence of names among {', '.join(known)}")
+    by = names("by", (*system.numerics("stiffnesses"), "duration") if by is None else by, known)
     value = residual_vibration(system, motion, modes, zeta=zeta)
     peak, stretched = _unit_peaks(osc, motion)
     factor = osc.gamma * osc.rows[..., 0, :]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import count, default_floating_point, instance, shown
+from cra_sym.checks import count, default_floating_point, instance, names
 from cra_sym.model.one_wave import Change, OneWaveModes
 from cra_sym.model.projection import Projected, column
 from cra_sym.model.system import MOST_MODES, System
@@ -249,9 +249,5 @@ def sensitivities(system: System, modes: int = 3, by: Sequence[str] | None = Non
     [0.0173 0.2076 0.204 ] [0.0089 0.0047 0.    ]
     """
     instance("system", system, System)
-    names = tuple(system.values)
-    if by is None:
-        by = names
-    if isinstance(by, str) or not isinstance(by, Sequence) or not all(name in names for name in by):
-        raise ValueError(f"by = {shown(by)}: must be a sequence of names among {', '.join(names)}")
+    by = tuple(system.values) if by is None else names("by", by, system.values)
     return Sensitivities(system, count("modes", modes, high=MOST_MODES), by)
