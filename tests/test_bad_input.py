@@ -332,6 +332,6 @@ def test_a_sample_of_the_attacks_on_every_kind_of_system(name, monkeypatch, tmp_
     """``python -m tests.campaigns.attacks`` tries them all."""
     monkeypatch.chdir(tmp_path)  # a text is a path where a store is asked for
     every = [attack for attack in attacks.attacks() if attack[0] == name]
-    for index in np.random.default_rng(17).choice(len(every), 300, replace=False):
+    for index in np.random.default_rng(17).choice(len(every), 200, replace=False):
         *place, value, inside = every[index]
         assert attacks.attacked(*place, value, inside=inside) is None, every[index]

@@ -8,7 +8,6 @@ from typing import Any
 
 from cra_sym import checks
 from cra_sym.extras import require
-from cra_sym.files import path_of
 from cra_sym.model.system import System
 from cra_sym.studies.quantities import QUANTITIES, Quantity
 from cra_sym.studies.study import make_study
@@ -38,9 +37,11 @@ def sweep(
         broadcasts over ``system.shape`` and may add axes at the end: of real or complex numbers, or truth values.
     chunks : int, optional
         Longest piece of each axis. Given, the dataset is lazy (Dask); with ``store`` it sizes the regions, 64 if left.
-    store : path, optional
-        A local Zarr directory (format 2), written region by region while the sweep runs. A sweep that was stopped goes
-        on where it was: a region is in the store as a whole or not at all, and what is there is not computed again.
+    store : path or URL, optional
+        A Zarr store (format 2), written region by region while the sweep runs: a local directory, or a URL of an object
+        store such as ``"s3://bucket/study.zarr"``, which fsspec reaches with a library of its own (``s3fs``). A sweep
+        that was stopped goes on where it was: a region is in the store as a whole or not at all, and what is there is
+        not computed again.
     client : dask.distributed.Client, optional
         Where the regions of a store are computed; its workers write them, so the store must be in their reach.
     **parameters
@@ -61,7 +62,7 @@ def sweep(
         If xarray, or Dask or Zarr where they are asked for, is not installed (extra ``scale``).
     TypeError, ValueError
         If a parameter is unknown or out of range, an axis is not one-dimensional, or the store holds another sweep or
-        is not a local path; the error says which.
+        cannot give that promise; the error says which.
 
     Examples
     --------
@@ -80,9 +81,7 @@ def sweep(
     if store is not None:
         from cra_sym.studies.store import sweep_into
 
-        if isinstance(store, str) and "://" in store:
-            raise ValueError(f"store = {store!r}: must be a local path; write there and copy the folder")
-        return sweep_into(study, path_of("store", store), chunks or _CHUNKS, client)
+        return sweep_into(study, store, chunks or _CHUNKS, client)
     if client is not None:
         raise ValueError("client: must be given together with a store, whose regions it computes")
     return study.dataset(study.evaluate() if chunks is None else study.lazy(chunks))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
@@ -12,7 +11,8 @@ import numpy as np
 from tqdm import tqdm
 
 from cra_sym.extras import require
-from cra_sym.files import OutputError, draft, writing
+from cra_sym.files import OutputError
+from cra_sym.studies.places import Place, place_of
 from cra_sym.studies.study import Study
 
 __all__ = ["sweep_into"]
@@ -21,7 +21,7 @@ _DESCRIBED = "cra_sym.studies"
 Region = tuple[slice, ...]
 
 
-def sweep_into(study: Study, path: Path, chunks: int, client: Any = None) -> Any:
+def sweep_into(study: Study, store: str | Path, chunks: int, client: Any = None) -> Any:
     """Compute what the store lacks and return the dataset, opened lazily.
 
     A region is one Zarr chunk, which the store writes as a whole or not at all; so the chunks that are there are the
@@ -30,8 +30,8 @@ def sweep_into(study: Study, path: Path, chunks: int, client: Any = None) -> Any
     Parameters
     ----------
     study : Study
-    path : Path
-        The store; made if it does not exist.
+    store : path or URL
+        Made if it does not exist.
     chunks : int
         Longest piece of each swept axis; a store keeps the pieces it was made with.
     client : dask.distributed.Client, optional
@@ -46,26 +46,29 @@ def sweep_into(study: Study, path: Path, chunks: int, client: Any = None) -> Any
     """
     xarray = require("xarray", "scale")
     require("zarr", "scale")
-    if not os.path.exists(path):
-        _make(study, path, chunks)
-    stored = _opened(study, path)
-    missing = [region for region in _regions(study.shape, stored.chunks) if not _is_there(stored, path, region)]
+    place = place_of(store)
+    if client is not None and not place.is_shared:
+        raise ValueError(f"store = {place.name!r}: is in the memory of one process; must be another with a client")
+    if not place.exists():
+        _make(study, place, chunks)
+    stored = _opened(study, place)
+    missing = _missing(study, place, stored)
     progress = tqdm(total=len(missing), desc=study.quantity.name, disable=None if missing else True)
-    with progress, writing(path, path):
-        for _ in _written(study, path, missing, client):
+    with progress, place.writing():
+        for _ in _written(study, place, missing, client):
             progress.update()
-    return xarray.open_zarr(path, consolidated=True)
+    return xarray.open_zarr(place.opened(), consolidated=True)
 
 
-def _make(study: Study, path: Path, chunks: int) -> None:
-    """Write coordinates, attributes and the empty variable, under a temporary name until all is there."""
+def _make(study: Study, place: Place, chunks: int) -> None:
+    """Write coordinates, attributes and the empty variable; the store is there with its consolidated metadata."""
     xarray, zarr = require("xarray", "scale"), require("zarr", "scale")
     attributes = study.attributes() | {_DESCRIBED: study.described()}
     labels = xarray.Dataset({}, study.coordinates(), attributes)
     try:
-        with draft(path) as place:
-            labels.to_zarr(place, mode="w", consolidated=False, zarr_format=2)
-            group = zarr.open_group(place, mode="r+", zarr_format=2)
+        with place.new() as made:
+            labels.to_zarr(made, mode="w-", consolidated=False, zarr_format=2)
+            group = zarr.open_group(made, mode="r+", zarr_format=2)
             group.create_array(
                 study.quantity.name,
                 shape=(*study.shape, *study.added.values()),
@@ -74,9 +77,9 @@ def _make(study: Study, path: Path, chunks: int) -> None:
                 fill_value=np.nan if study.dtype.kind == "f" else None,  # what is missing yet
                 attributes={"_ARRAY_DIMENSIONS": [*study.dims, *study.added], **study.variable_attributes()},
             )
-            zarr.consolidate_metadata(place, zarr_format=2)
+            zarr.consolidate_metadata(made, zarr_format=2)
     except OutputError:
-        if not os.path.exists(path):  # else another process has made it meanwhile
+        if not place.exists():  # else another process has made it meanwhile
             raise
 
 
@@ -84,24 +87,22 @@ def _chunk_shape(study: Study, chunks: int) -> tuple[int, ...]:
     return (*(min(chunks, length) for length in study.shape), *(max(1, length) for length in study.added.values()))
 
 
-def _opened(study: Study, path: Path) -> Any:
+def _opened(study: Study, place: Place) -> Any:
     """Return the variable of a store that holds this sweep."""
     zarr = require("zarr", "scale")
     try:
-        group = zarr.open_group(path, mode="r", zarr_format=2)
+        group = zarr.open_group(place.opened(), mode="r", zarr_format=2)
         there = dict(group.attrs).get(_DESCRIBED)
     except (OSError, ValueError, KeyError):
         there = None
     if not isinstance(there, dict):
         raise ValueError(
-            f"store = {str(path)!r}: holds something else than a sweep of this version; must be a new path"
+            f"store = {place.name!r}: holds something else than a sweep of this version; must be a new path"
         )
     differences = _differences(there, study.described())
     if differences:
-        raise ValueError(
-            f"store = {str(path)!r}: holds another sweep ({'; '.join(differences)}); must be a new path or the same one"
-        )
-    return _array(path, study.quantity.name, "r")
+        raise ValueError(f"store = {place.name!r}: holds another sweep ({'; '.join(differences)}); must be a new place")
+    return _array(place, study.quantity.name, "r")
 
 
 def _differences(there: dict[str, str], here: dict[str, str]) -> list[str]:
@@ -118,8 +119,8 @@ def _differences(there: dict[str, str], here: dict[str, str]) -> list[str]:
     return found
 
 
-def _array(path: Path, name: str, mode: str) -> Any:
-    array = require("zarr", "scale").open_array(path, path=name, mode=mode, zarr_format=2)
+def _array(place: Place, name: str, mode: str) -> Any:
+    array = require("zarr", "scale").open_array(place.opened(), path=name, mode=mode, zarr_format=2)
     return array.with_config({"write_empty_chunks": True, "order": "C"})
 
 
@@ -132,28 +133,34 @@ def _regions(shape: tuple[int, ...], chunks: tuple[int, ...]) -> Iterator[Region
         )
 
 
-def _is_there(stored: Any, path: Path, region: Region) -> bool:
-    index = [part.start // piece for part, piece in zip(region, stored.chunks, strict=False)]
-    index += [0] * (len(stored.shape) - len(index))
-    return bool((path / stored.name.strip("/") / stored.metadata.encode_chunk_key(tuple(index))).exists())
+def _missing(study: Study, place: Place, stored: Any) -> list[Region]:
+    """Return the regions whose chunk is not there."""
+    found = place.keys(study.quantity.name)
+    missing = []
+    for region in _regions(study.shape, stored.chunks):
+        index = [part.start // piece for part, piece in zip(region, stored.chunks, strict=False)]
+        index += [0] * (len(stored.shape) - len(index))
+        if stored.metadata.encode_chunk_key(tuple(index)) not in found:
+            missing.append(region)
+    return missing
 
 
-def _written(study: Study, path: Path, regions: list[Region], client: Any) -> Iterator[None]:
+def _written(study: Study, place: Place, regions: list[Region], client: Any) -> Iterator[None]:
     if client is None:
-        target = _array(path, study.quantity.name, "r+") if regions else None
+        target = _array(place, study.quantity.name, "r+") if regions else None
         for region in regions:
             _write(study, target, region)
             yield
         return
     distributed = require("distributed", "scale")
     shared = client.scatter(study, broadcast=True) if regions else None
-    futures = [client.submit(_write, shared, path, region, pure=False) for region in regions]
+    futures = [client.submit(_write, shared, place, region, pure=False) for region in regions]
     for future in distributed.as_completed(futures):
         yield future.result()
 
 
 def _write(study: Study, target: Any, region: Region) -> None:
-    """Compute one region and write it into an array, or into that of the store at a path."""
-    array = _array(target, study.quantity.name, "r+") if isinstance(target, Path) else target
+    """Compute one region and write it into an array, or into that of the store at a place."""
+    array = _array(target, study.quantity.name, "r+") if isinstance(target, Place) else target
     values = study.block(*(np.arange(part.start, part.stop) for part in region))
     array[(*region, ...)] = values

@@ -14,6 +14,7 @@ import pytest
 
 import cra_sym as cra
 from cra_sym.files import OutputError
+from cra_sym.studies import places
 from cra_sym.studies import store as store_module
 from cra_sym.studies.study import make_study
 
@@ -188,7 +189,7 @@ def test_a_store_made_by_another_process_meanwhile_is_used(tmp_path, monkeypatch
     place, answers = tmp_path / "study.zarr", iter([False])
     cra.sweep(cra.Arm.nominal(), k_t=K_T, store=place)
     disk = SimpleNamespace(path=SimpleNamespace(exists=lambda _: next(answers, True)))
-    monkeypatch.setattr(store_module, "os", disk)
+    monkeypatch.setattr(places, "os", disk)
     study = cra.sweep(cra.Arm.nominal(), k_t=K_T, store=place)
     assert not list(answers) and study.sizes["k_t"] == K_T.size
     assert [path.name for path in tmp_path.iterdir()] == [place.name]
@@ -517,13 +518,81 @@ def test_a_callable_object_resumes_until_its_state_changes(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "url", ["s3://bucket/study.zarr", "memory://study", "gs://bucket/a", "file" + ":///study.zarr"]
+    "url", ["sftp://host/study", "http" + "://host/study", "file" + ":///study.zarr", "://", "x://y"]
 )
-def test_a_store_elsewhere_is_refused(url, tmp_path, monkeypatch):
+def test_a_store_that_gives_no_promise_is_refused(url, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ValueError, match=r"store = .*must be a local path"):
+    with pytest.raises(ValueError, match=r"store = .*must be a local path, or a URL of an object store \(memory, s3"):
         cra.sweep(cra.Arm.nominal(), k_t=K_T, store=url)
     assert not list(tmp_path.iterdir())
+
+
+def test_the_library_of_an_object_store_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "s3fs", None)
+    with pytest.raises(ImportError, match=r"store = 's3://bucket/study.zarr': .*not installed .*s3fs"):
+        cra.sweep(cra.Arm.nominal(), k_t=K_T, store="s3://bucket/study.zarr")
+
+
+@pytest.fixture
+def bucket():
+    """A prefix in the object store that fsspec keeps in memory."""
+    memory = pytest.importorskip("fsspec").filesystem("memory")
+    yield "memory://bucket/study.zarr"
+    memory.store.clear()
+
+
+def test_a_sweep_into_an_object_store_goes_on_where_it_was_stopped(bucket, monkeypatch):
+    written, write = [], store_module._write
+
+    def stopping(study, target, region):
+        if len(written) == 3:
+            raise KeyboardInterrupt
+        write(study, target, region)
+        written.append(region)
+
+    monkeypatch.setattr(store_module, "_write", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        cra.sweep(cra.Arm.nominal(), k_t=K_T, m_e=M_E, chunks=1, store=bucket)
+    rest = []
+    monkeypatch.setattr(store_module, "_write", lambda *job: (rest.append(job[2]), write(*job)))
+    study = cra.sweep(cra.Arm.nominal(), k_t=K_T, m_e=M_E, chunks=1, store=bucket + "/")
+    assert len(rest) == K_T.size * M_E.size - 3 and not {*map(str, written)} & {*map(str, rest)}
+    eager = cra.sweep(cra.Arm.nominal(), k_t=K_T, m_e=M_E)
+    np.testing.assert_allclose(study.natural_frequencies, eager.natural_frequencies, rtol=1e-14)
+    rest.clear()
+    cra.sweep(cra.Arm.nominal(), k_t=K_T, m_e=M_E, store=bucket)
+    assert rest == []
+    with pytest.raises(ValueError, match=r"store = 'memory:.*holds another sweep \(modes is .* given here only"):
+        cra.sweep(cra.Arm.nominal(), k_t=K_T, m_e=M_E, modes=4, store=bucket)
+
+
+def test_what_an_object_store_holds_is_not_touched(bucket):
+    import fsspec
+
+    files = fsspec.filesystem("memory")
+    files.pipe("/bucket/study.zarr/letter", b"keep me")
+    with pytest.raises(ValueError, match="holds something else"):
+        cra.sweep(cra.Arm.nominal(), k_t=K_T, store=bucket)
+    assert files.find("/") == ["/bucket/study.zarr/letter"]
+
+
+def test_what_an_object_store_refuses_is_said(bucket, monkeypatch):
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    cra.sweep(cra.Arm.nominal(), k_t=K_T[:1], m_e=M_E, chunks=1, store=bucket)
+    import fsspec
+
+    files = fsspec.filesystem("memory")
+    files.rm("/bucket/study.zarr/natural_frequencies/0.1.0")
+    monkeypatch.setattr(type(files), "pipe_file", full)
+    with pytest.raises(OutputError, match=r"output = 'memory:.*cannot be written \(No space left"):
+        cra.sweep(cra.Arm.nominal(), k_t=K_T[:1], m_e=M_E, store=bucket)
+
+
+def test_the_memory_of_one_process_is_no_place_for_workers(bucket):
+    with pytest.raises(ValueError, match="is in the memory of one process"):
+        cra.sweep(cra.Arm.nominal(), k_t=K_T, store=bucket, client=SimpleNamespace())
 
 
 def test_a_store_opens_without_warnings(tmp_path):

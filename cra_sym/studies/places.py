@@ -1,0 +1,159 @@
+"""Where a store of a sweep is: a folder, or what an object store has under a prefix."""
+
+from __future__ import annotations
+
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cra_sym.extras import MissingExtraError, require
+from cra_sym.files import OutputError, draft, path_of, writing
+
+__all__ = ["Bucket", "Folder", "Place", "place_of"]
+
+_OBJECTS = ("memory", "s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "adl", "oss")
+"""Protocols of stores in which an object appears as a whole or not at all."""
+
+
+class Place(ABC):
+    """A place of a store, whose metadata and whose chunks appear as a whole or not at all."""
+
+    is_shared = True  # between processes
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """What the user called it, as an absolute path or a URL."""
+
+    @abstractmethod
+    def exists(self) -> bool:
+        """Tell whether anything is there."""
+
+    @abstractmethod
+    def opened(self) -> Any:
+        """Return what Zarr opens."""
+
+    @abstractmethod
+    def keys(self, array: str) -> set[str]:
+        """Return the names of what an array has there."""
+
+    @abstractmethod
+    def new(self) -> AbstractContextManager[Any]:
+        """Give what Zarr writes a new store to."""
+
+    @abstractmethod
+    def writing(self) -> AbstractContextManager[None]:
+        """Turn what the system refuses into an OutputError that names the place."""
+
+
+@dataclass(frozen=True)
+class Folder(Place):
+    """A directory of this machine."""
+
+    path: Path
+
+    @property
+    def name(self) -> str:
+        """The path."""
+        return str(self.path)
+
+    def exists(self) -> bool:
+        """Tell whether anything is there."""
+        return os.path.exists(self.path)
+
+    def opened(self) -> Path:
+        """Return the path."""
+        return self.path
+
+    def keys(self, array: str) -> set[str]:
+        """Return the names of what an array has there."""
+        return {file.name for file in (self.path / array).iterdir()}
+
+    def new(self) -> AbstractContextManager[Path]:
+        """Give a temporary folder that becomes the store at the end."""
+        return draft(self.path)
+
+    def writing(self) -> AbstractContextManager[None]:
+        """Turn what the system refuses into an OutputError that names the path."""
+        return writing(self.path, self.path)
+
+
+@dataclass(frozen=True)
+class Bucket(Place):
+    """What an object store has under a URL, through fsspec."""
+
+    url: str
+
+    @property
+    def name(self) -> str:
+        """The URL."""
+        return self.url
+
+    @property
+    def is_shared(self) -> bool:  # type: ignore[override]
+        """Whether other processes see it."""
+        return not self.url.startswith("memory:")
+
+    def exists(self) -> bool:
+        """Tell whether anything is there."""
+        files, root = self._files()
+        return bool(files.exists(root))
+
+    def opened(self) -> Any:
+        """Return the store of Zarr."""
+        return require("zarr.storage", "scale").FsspecStore.from_url(self.url)
+
+    def keys(self, array: str) -> set[str]:
+        """Return the names of what an array has there."""
+        files, root = self._files()
+        return {key.rpartition("/")[2] for key in files.find(f"{root}/{array}")}
+
+    @contextmanager
+    def new(self) -> Iterator[Any]:
+        """Give the store; a new one that is stopped before its metadata are whole is refused later, not mended."""
+        with self.writing():
+            yield self.opened()
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Turn what the store refuses into an OutputError that names the URL."""
+        try:
+            yield
+        except OSError as error:
+            raise OutputError(f"output = {self.url!r}: cannot be written ({error.strerror or error})") from None
+
+    def _files(self) -> tuple[Any, str]:
+        """Return the file system and the path in it."""
+        found: tuple[Any, str] = require("fsspec.core", "scale").url_to_fs(self.url, use_listings_cache=False)
+        return found
+
+
+def place_of(store: str | Path) -> Place:
+    """Return the place of a store, or raise an error that says what it must be.
+
+    Raises
+    ------
+    MissingExtraError
+        If the library that reaches an object store is not installed; it is named.
+    TypeError, ValueError
+        If it is no path and no URL of an object store.
+    """
+    if not isinstance(store, str) or "://" not in store:
+        return Folder(path_of("store", store))
+    protocol = store.partition("://")[0]
+    if protocol not in _OBJECTS:
+        raise ValueError(
+            f"store = {store!r}: must be a local path, or a URL of an object store ({', '.join(_OBJECTS)}), in which a "
+            "region appears as a whole or not at all"
+        )
+    try:
+        require("fsspec", "scale").get_filesystem_class(protocol)
+    except MissingExtraError:
+        raise
+    except ImportError as error:
+        raise MissingExtraError(f"store = {store!r}: a library beside fsspec is not installed ({error})") from None
+    return Bucket(store.rstrip("/"))
