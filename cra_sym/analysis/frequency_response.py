@@ -179,10 +179,13 @@ class _Undamped:
             self._problem: SpatialProblem = system.numerics("driven", self.motion)
             self._driven = self._problem.displacements + system.numerics("driven_coordinate", self.motion)
         else:
-            self._problem = system.numerics("damped_spatial")
+            self._problem = system.numerics("driven_spatial")
             from cra_sym.model.derivations import driven_displacement  # SymPy is there: the drive is an expression
 
             self._driven = driven_displacement(system.model, drive)
+        sizes = system.numerics("sizes")
+        reactions = 0 if self.motion is not None else self._problem.coordinates - sizes[1]
+        self._row = self._driven + (reactions if self._driven >= sum(sizes) else 0)
         self._kind = "motion" if self.motion is not None else choice("kind", "force" if kind is None else kind, _KINDS)
         self.by_force = self._kind == "force"
         self._laplace: bool = system.numerics("damped")
@@ -269,7 +272,7 @@ class _Undamped:
                 share = np.ones((len(rows), 1))
             else:
                 share = problem.shares(np.atleast_1d(self._places), left)
-            state = driven_states(problem, here, row, share[row], self._driven, self._kind)
+            state = driven_states(problem, here, row, share[row], self._row, self._kind)
             values = state[..., self._place].reshape(len(rows), parameter.shape[-1], count)
             found[rows] = np.swapaxes(values, 1, 2)
         return found

@@ -6,13 +6,14 @@ import functools
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from sympy import Add, Eq, Equality, Expr, Integral, S
+from sympy import Add, Eq, Equality, Expr, Integral, Limit, S
 
 from cra_sym.mechanics.jets import END_NAMES, End, Jet, JetSpace
+from cra_sym.mechanics.points import Point
 from cra_sym.mechanics.steps import compact_latex, variation_of
 from cra_sym.mechanics.variation import Forces, Variation, lagrange_forces
 
-__all__ = ["BoundaryCondition", "GeneralisedForces", "varied_form"]
+__all__ = ["BoundaryCondition", "GeneralisedForces", "JumpCondition", "varied_form"]
 
 
 class BoundaryCondition(Equality):
@@ -74,6 +75,24 @@ class BoundaryCondition(Equality):
         return rf"$\displaystyle {compact_latex(Eq(*self.args, evaluate=False), self.variables)}$"
 
 
+class JumpCondition(BoundaryCondition):
+    """How a natural force jumps at an interior place, or the displacement that a support holds there.
+
+    The displacements of a section are continuous; so is every natural force that nothing at the place works against.
+
+    Attributes
+    ----------
+    place : Expr
+    variation, displacement, kind
+        As of a `BoundaryCondition`.
+    """
+
+    @property
+    def place(self) -> Expr:
+        """The interior place."""
+        return self.end  # type: ignore[return-value]
+
+
 @dataclass(frozen=True)
 class GeneralisedForces:
     """Generalised forces after integration by parts in time: conservative or applied, inside or at the ends."""
@@ -132,6 +151,32 @@ class GeneralisedForces:
     def boundary_conditions(self) -> tuple[BoundaryCondition, ...]:
         """Collect the factor of each end displacement, or the essential condition that forbids its variation."""
         return tuple(map(self._condition, self.boundary_factors))
+
+    def jump_conditions(self) -> tuple[JumpCondition, ...]:
+        """Collect the factor of each displacement of a section at interior places; fields in order."""
+        space, found = self.variation.space, []
+        for point in self.variation.points:
+            forces = lagrange_forces(space, point.lagrangian)
+            for force, jet in point.applied:
+                forces[jet] = forces.get(jet, S.Zero) + force
+            for number, top in enumerate(self.variation.orders):
+                for order in range(top):
+                    found.append(self._jump(point, forces, Jet(number, order, 0, None)))
+        return tuple(found)
+
+    def _jump(self, point: Point, forces: Forces, displacement: Jet) -> JumpCondition:
+        space, held = self.variation.space, displacement in point.held
+        varied, moved = (
+            form.subs(space.x, point.place) for form in (varied_form(space, displacement), space.form(displacement))
+        )
+        tags = point.place, varied, moved, "essential" if held else "natural", space.names
+        if held:
+            return JumpCondition(moved, S.Zero, *tags)  # type: ignore[arg-type]
+        sign = (-1) ** (self.variation.orders[displacement.unknown] - displacement.space)
+        inner = space.write(sign * self.boundary_force(displacement.unknown, displacement.space))
+        after, before = (Limit(inner, space.x, point.place, side) for side in "+-")
+        outer = space.write(sign * forces.get(displacement, S.Zero))
+        return JumpCondition(after - before, outer.subs(space.x, point.place), *tags)  # type: ignore[arg-type]
 
     def interior_factors(self) -> Forces:
         """Return the factor of every variation in the interval, coordinates included."""

@@ -11,7 +11,7 @@ from sympy import Add, Basic, Eq, Expr, Integral, S, Symbol, sympify
 from sympy.core.function import AppliedUndef
 from sympy.core.symbol import uniquely_named_symbol
 
-from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces, varied_form
+from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces, JumpCondition, varied_form
 from cra_sym.mechanics.jets import HamiltonError, Jet, JetSpace, listed
 from cra_sym.mechanics.steps import Step, Steps, compact_latex
 from cra_sym.mechanics.variation import Variation, VirtualWork, vary
@@ -33,6 +33,9 @@ class HamiltonResult:
         One for each lumped coordinate.
     variation : Variation
         What was varied, in jet symbols.
+    jump_conditions : tuple of JumpCondition
+        Of interior places: how much a natural force jumps there, or which displacement is held, each with its
+        ``place`` and ``variation``.
     """
 
     field_equations: tuple[Eq, ...]
@@ -49,11 +52,17 @@ class HamiltonResult:
     virtual_work: tuple[VirtualWork, ...]
     essential: tuple[Expr, ...]
     variation: Variation = field(repr=False, compare=False)
+    jump_conditions: tuple[JumpCondition, ...] = ()
 
     @property
     def equations(self) -> tuple[Eq, ...]:
-        """All equations: fields, ends, coordinates."""
-        return (*self.field_equations, *self.boundary_conditions, *self.coordinate_equations)
+        """All equations: fields, ends, interior places, coordinates."""
+        return (
+            *self.field_equations,
+            *self.boundary_conditions,
+            *self.jump_conditions,
+            *self.coordinate_equations,
+        )
 
     def unused_symbol(self, name: str, *others: Expr) -> Symbol:
         """Return a symbol of this name, changed if what was given (or ``others``) holds one that looks the same."""
@@ -102,7 +111,8 @@ def hamilton(
         Lagrangian terms of each end. ``v(x, t)`` and its derivatives are understood at that end; evaluated forms
         such as ``v.subs(x, 0)`` or ``v.diff(x).subs(x, 0)`` are accepted too.
     virtual_work : sequence of (generalised force, displacement, place), optional
-        Place is 'left', 'right', 'domain' (force per length) or None (a coordinate, or evaluated forms). A damper is
+        Place is 'left', 'right', 'domain' (force per length), an interior place, or None (a coordinate, or evaluated
+        forms). A damper is
         ``(-c*v.diff(t), v, 'left')``, Kelvin-Voigt damping ``(-c*v.diff(x, 2, t), v.diff(x, 2), 'domain')``.
     essential : sequence of Expr, optional
         Linear combinations of end displacements (and coordinates) that vanish, in evaluated form.
@@ -133,6 +143,13 @@ def hamilton(
     Eq(T*Subs(Derivative(y(x, t), x), x, 0), k*y(0, t))
     >>> string.boundary_conditions[0].end, string.boundary_conditions[0].variation
     ('left', δy(0, t))
+
+    A mass at an interior place makes the force jump:
+
+    >>> a, m = symbols("a m")
+    >>> beaded = hamilton(-T*y.diff(x)**2/2, fields=[y], x=x, domain=(0, l), t=t, inside=[(a, m*y.diff(t)**2/2)])
+    >>> beaded.jump_conditions[0].rhs, beaded.jump_conditions[0].place, beaded.jump_conditions[0].variation
+    (m*Derivative(y(a, t), (t, 2)), a, δy(a, t))
     """
     space = JetSpace(fields, coordinates, x, t, domain, prescribed)
     left, right = _optional(left), _optional(right)
@@ -159,6 +176,7 @@ def hamilton(
         virtual_work,
         essential,
         variation,
+        forces.jump_conditions(),
     )
 
 

@@ -11,7 +11,7 @@ from sympy.core.function import AppliedUndef, Derivative
 from cra_sym.checks import shown
 from cra_sym.mechanics.jets import HamiltonError, Jet, JetSpace
 
-__all__ = ["Point", "at_place", "in_points", "read_points", "supports"]
+__all__ = ["Point", "at_place", "in_points", "linear_work", "read_points", "supports"]
 
 
 @dataclass(frozen=True)
@@ -25,11 +25,14 @@ class Point:
         In the jet symbols of the interval, taken at that place.
     held : tuple of Jet
         Displacements that vanish there.
+    applied : tuple of (Expr, Jet)
+        Non-conservative forces there, and the displacement each works on.
     """
 
     place: Expr
     lagrangian: Expr
     held: tuple[Jet, ...]
+    applied: tuple[tuple[Expr, Jet], ...] = ()
 
 
 def in_points(density: Expr, x: Symbol) -> tuple[Expr, list[tuple[Expr, Expr]]]:
@@ -71,10 +74,18 @@ def in_points(density: Expr, x: Symbol) -> tuple[Expr, list[tuple[Expr, Expr]]]:
 
 
 def read_points(
-    space: JetSpace, inside: Sequence[tuple[Expr, Expr]], held: Iterable[tuple[Expr, Expr]], orders: Sequence[int]
+    space: JetSpace,
+    inside: Sequence[tuple[Expr, Expr]],
+    held: Iterable[tuple[Expr, Expr]],
+    work: Iterable[tuple[Expr, Expr, Expr]],
+    orders: Sequence[int],
 ) -> tuple[Point, ...]:
-    """Read terms and supports at interior places into jet symbols, one point for each place."""
-    found: dict[Expr, tuple[list[Expr], list[Jet]]] = {}
+    """Read terms, supports and forces at interior places into jet symbols, one point for each place."""
+    found: dict[Expr, tuple[list[Expr], list[Jet], list[tuple[Expr, Jet]]]] = {}
+
+    def at(place: Expr) -> tuple[list[Expr], list[Jet], list[tuple[Expr, Jet]]]:
+        return found.setdefault(place, ([], [], []))
+
     for given in inside:
         try:
             place, term = given
@@ -85,13 +96,44 @@ def read_points(
         read = space.read(_moved(sympify(term, strict=True), space.x, place), "domain", label)
         for jet in space.jets(read):
             _check(space, jet, orders, label)
-        found.setdefault(place, ([], []))[0].append(read)
+        at(place)[0].append(read)
     for place, displacement in held:
         read = space.read(displacement, "domain", f"essential inside at {space.x} = {place}")
         (jet,) = space.jets(read)
         _check(space, jet, orders, f"essential inside at {space.x} = {place}")
-        found.setdefault(_place(space, place), ([], []))[1].append(jet)
-    return tuple(Point(place, Add(*terms).subs(space.x, place), tuple(jets)) for place, (terms, jets) in found.items())
+        at(_place(space, place))[1].append(jet)
+    for force, displacement, place in work:
+        place = _place(space, place)
+        label = f"virtual work of {shown(force)} on {shown(displacement)} at {space.x} = {place}"
+        pushed, moved = (
+            space.read(_moved(sympify(part, strict=True), space.x, place), "domain", label)
+            for part in (force, displacement)
+        )
+        for jet in space.jets(pushed, moved):
+            _check(space, jet, orders, label)
+        at(place)[2].extend(linear_work(space, pushed, moved, label))
+    return tuple(
+        Point(
+            place,
+            Add(*terms).subs(space.x, place),
+            tuple(jets),
+            tuple((force.subs(space.x, place), jet) for force, jet in forces),
+        )
+        for place, (terms, jets, forces) in found.items()
+    )
+
+
+def linear_work(space: JetSpace, force: Expr, moved: Expr, label: str) -> list[tuple[Expr, Jet]]:
+    """Return (force, displacement) for each displacement that a linear combination of them holds."""
+    works = []
+    for jet in space.jets(moved):
+        factor = moved.diff(space.symbol(jet))
+        if jet.time or space.jets(factor):
+            raise HamiltonError(f"{label}: the displacement must be linear and free of time derivatives")
+        works.append((factor * force, jet))
+    if not works:
+        raise HamiltonError(f"{label}: the displacement holds no field and no coordinate")
+    return works
 
 
 def _place(space: JetSpace, place: Expr) -> Expr:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product
+from itertools import pairwise, product
 from typing import Any
 
-from sympy import Dummy, Expr, Matrix, Poly, Rational, S, SparseMatrix, Symbol, zeros
+from sympy import Dummy, Expr, Matrix, Poly, Rational, S, SparseMatrix, Symbol, sympify, zeros
 from sympy.integrals.quadrature import gauss_legendre
 
 from cra_sym import checks
@@ -28,13 +28,16 @@ class RitzMatrices:
     r"""Ritz matrices of :math:`M \ddot q + C \dot q + K q = f` on equal Hermite elements, symbolic in the parameters.
 
     Unknowns: node by node every field with its slope (and the second derivative, if third ones occur in the density),
-    then the lumped coordinates. To assemble numbers, evaluate the element matrices for ``element_length`` and each
-    ``element_start``, add entry (i, j) to ``(connectivity[e][i], connectivity[e][j])``, add the end terms, and replace
-    each unknown by its ``restraint``.
+    then the lumped coordinates, then slopes right of interior nodes where the density has first derivatives only. To
+    assemble numbers, evaluate the element matrices for ``element_length`` and each ``element_start``, add entry (i, j)
+    to ``(connectivity[e][i], connectivity[e][j])``, add the end terms, and replace each unknown by its ``restraint``.
 
     Attributes
     ----------
     elements : int
+        Of all spans together.
+    spans : tuple of (Expr, Expr)
+        Left end and length of each span between nodes at interior places; all have as many elements.
     element_stiffness, element_damping, element_mass : Matrix
         In ``element_length`` and, where coefficients vary along x, ``element_start``.
     element_load : Matrix, shape (unknowns of an element, 1)
@@ -55,6 +58,7 @@ class RitzMatrices:
     """
 
     elements: int
+    spans: tuple[tuple[Expr, Expr], ...]
     element_stiffness: Matrix
     element_damping: Matrix
     element_mass: Matrix
@@ -106,9 +110,11 @@ class RitzMatrices:
 
     def _places(self) -> Iterator[tuple[tuple[int, ...], dict[Symbol, Expr]]]:
         """Yield the unknowns of each element with its length and position."""
-        step = self.length / self.elements
+        each = self.elements // len(self.spans)
         for number, unknowns in enumerate(self.connectivity):
-            yield unknowns, {self.element_length: step, self.element_start: self.start + number * step}
+            start, length = self.spans[number // each]
+            step = length / each
+            yield unknowns, {self.element_length: step, self.element_start: start + number % each * step}
 
     def _assembled(self, element: Matrix, ends: Entries) -> SparseMatrix:
         total: Entries = dict(ends)
@@ -124,7 +130,9 @@ class RitzMatrices:
         return SparseMatrix(self.free, self.free, reduced)
 
 
-def ritz(problem: HamiltonResult | Expr, *, elements: int, **arguments: Any) -> RitzMatrices:
+def ritz(
+    problem: HamiltonResult | Expr, *, elements: int, nodes: Sequence[Expr] = (), **arguments: Any
+) -> RitzMatrices:
     """Return Ritz matrices of a quadratic Lagrangian on Hermite elements.
 
     Parameters
@@ -132,14 +140,17 @@ def ritz(problem: HamiltonResult | Expr, *, elements: int, **arguments: Any) -> 
     problem : HamiltonResult or Expr
         What `hamilton` returned, or a Lagrangian density with the ``arguments`` of `hamilton`.
     elements : int
-        Number of equal elements.
+        Number of equal elements, of each span between nodes.
+    nodes : sequence of Expr, optional
+        Places inside that are nodes beside those of terms and supports, such as jumps of a coefficient.
 
     Notes
     -----
     A field with x derivatives up to order m is interpolated by polynomials of degree ``2 p - 1``, ``p = max(m, 2)``,
     with continuous derivatives up to ``p - 1``. Frequencies converge from above, with an error of order
     ``2 (2 p - m)`` in the element length. Coefficients polynomial in x are integrated exactly, others by Gauss's rule
-    with eight points an element; place the jumps of a coefficient at nodes.
+    with eight points an element; place the jumps of a coefficient at nodes. Interior places that are not all numbers
+    are taken to ascend in the order in which they were stated, those of ``nodes`` first.
 
     Raises
     ------
@@ -161,7 +172,14 @@ def ritz(problem: HamiltonResult | Expr, *, elements: int, **arguments: Any) -> 
     """
     count = checks.count("elements", elements)
     result = problem if isinstance(problem, HamiltonResult) else hamilton(problem, **arguments)
-    return _Mesh(weak_form(result.variation), count, result.unused_symbol("h"), result.unused_symbol("x_e")).matrices()
+    step, begin = result.unused_symbol("h"), result.unused_symbol("x_e")
+    return _Mesh(weak_form(result.variation), count, tuple(nodes), step, begin).matrices()
+
+
+def ordered(places: Iterable[Expr]) -> list[Expr]:
+    """Return interior places in ascending order if they are numbers, else as they are."""
+    found = list(places)
+    return sorted(found, key=float) if all(place.is_number for place in found) else found
 
 
 @lru_cache
@@ -184,14 +202,13 @@ def hermite(size: int) -> tuple[Poly, ...]:
 class _Mesh:
     """Numbering of the unknowns and integrals over one element."""
 
-    def __init__(self, weak: WeakForm, elements: int, step: Symbol, begin: Symbol) -> None:
-        self.weak, self.elements = weak, elements
+    def __init__(self, weak: WeakForm, elements: int, nodes: tuple[Expr, ...], step: Symbol, begin: Symbol) -> None:
+        self.weak, self.each = weak, elements
         if max(weak.powers, default=0) > 2:
             raise HamiltonError("ritz: more than two time derivatives; there is no mass matrix")
         weak.variation.elimination.check_homogeneous("ritz")
-        if weak.points:
-            place = weak.points[0].place
-            raise HamiltonError(f"ritz: the term at the interior place {weak.variation.space.x} = {place} needs a node")
+        self.nodes = ordered(dict.fromkeys((*map(sympify, nodes), *(point.place for point in weak.points))))
+        self.elements = elements * (len(self.nodes) + 1)
         self.space = weak.variation.space
         self.step, self.begin = step, begin
         self.sizes = [max(order, 2) for order in weak.variation.orders]
@@ -203,11 +220,30 @@ class _Mesh:
         """Unknowns of one node."""
         return self.offsets[-1]
 
+    @property
+    def broken(self) -> list[int]:
+        """Unknowns of a node that may jump between spans: slopes of fields with first derivatives in the density."""
+        orders = self.weak.variation.orders
+        return [self.offsets[f] + j for f, size in enumerate(self.sizes) for j in range(max(orders[f], 1), size)]
+
+    def _unknowns(self, element: int) -> list[int]:
+        """Return the unknowns of both nodes of an element; those that jump have a second one right of a node."""
+        found = list(range(element * self.width, (element + 2) * self.width))
+        node, within = divmod(element, self.each)
+        if node and not within:
+            first = (self.elements + 1) * self.width + len(self.lumped) + (node - 1) * len(self.broken)
+            for number, unknown in enumerate(self.broken):
+                found[unknown] = first + number
+        return found
+
     def index(self, jet: Jet) -> int:
         """Return the unknown that a displacement of an end, or a coordinate, is."""
         if jet in self.lumped:
             return (self.elements + 1) * self.width + self.lumped.index(jet)
-        node = self.elements if jet.place == "right" else 0
+        if isinstance(jet.place, int):
+            node = self.each * (self.nodes.index(self.weak.points[jet.place].place) + 1)
+        else:
+            node = self.elements if jet.place == "right" else 0
         return node * self.width + self.offsets[jet.unknown] + jet.space
 
     def matrices(self) -> RitzMatrices:
@@ -215,23 +251,23 @@ class _Mesh:
         nodal = [Jet(f, j, 0, None) for f, size in enumerate(self.sizes) for j in range(size)]
         labels = tuple(self.space.form(jet) for jet in [*nodal, *self.lumped])
         tail = tuple(map(self.index, self.lumped))
-        spans = (range(e * self.width, (e + 2) * self.width) for e in range(self.elements))
         element = {power: self._integrated(power) for power in range(3)}
         ends = {power: self._pointwise(power) for power in range(3)}
         start, end = self.space.ends["left"], self.space.ends["right"]
         return RitzMatrices(
             self.elements,
+            tuple((left, right - left) for left, right in pairwise((start, *self.nodes, end))),
             element[0],
             element[1],
             element[2],
             self._load(),
             self.step,
             self.begin,
-            tuple((*span, *tail) for span in spans),
+            tuple((*self._unknowns(e), *tail) for e in range(self.elements)),
             ends[0],
             ends[1],
             ends[2],
-            {self.index(jet): value for jet, value in self.weak.end_load.items()},
+            {self.index(jet): value for jet, value in self.weak.discrete_load.items()},
             self._restraint(),
             labels,
             start,
@@ -239,7 +275,7 @@ class _Mesh:
         )
 
     def _pointwise(self, power: int) -> Entries:
-        form = _of_power(self.weak.ends, power)
+        form = _of_power(self.weak.discrete, power)
         return {(self.index(p), self.index(q)): value for (p, q), value in form.items()}
 
     def _restraint(self) -> tuple[dict[int, Expr], ...]:
@@ -248,7 +284,9 @@ class _Mesh:
             self.index(jet): {self.index(other): factor for other, factor in row.items()}
             for jet, row in factors.items()
         }
-        total = (self.elements + 1) * self.width + len(self.lumped)
+        for place, point in enumerate(self.weak.points):
+            fixed |= {self.index(jet._replace(place=place)): {} for jet in point.held}
+        total = (self.elements + 1) * self.width + len(self.lumped) + len(self.nodes) * len(self.broken)
         number = {unknown: free for free, unknown in enumerate(u for u in range(total) if u not in fixed)}
         rows = (fixed.get(unknown, {unknown: S.One}) for unknown in range(total))
         return tuple({number[other]: factor for other, factor in row.items()} for row in rows)

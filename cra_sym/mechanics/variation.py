@@ -6,16 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from sympy import Add, Expr, S, expand_mul
+from sympy import Add, Expr, S, SympifyError, expand_mul, sympify
 
 from cra_sym.checks import shown
 from cra_sym.mechanics.constraints import Elimination, eliminate
 from cra_sym.mechanics.jets import END_NAMES, End, HamiltonError, Jet, JetSpace
-from cra_sym.mechanics.points import Point, read_points, supports
+from cra_sym.mechanics.points import Point, linear_work, read_points, supports
 
 __all__ = ["Forces", "Variation", "VirtualWork", "lagrange_forces", "vary"]
 
-VirtualWork = tuple[Expr, Expr, Literal["left", "right", "domain"] | None]
+VirtualWork = tuple[Expr, Expr, Literal["left", "right", "domain"] | Expr | None]
 Forces = dict[Jet, Expr]
 
 
@@ -60,7 +60,9 @@ def vary(
     along = space.read(density, "domain", "density")
     essential, held = supports(essential, space.x, tuple(space.ends.values()))
     terms = {end: space.read(ends[end], end, f"{end} end") for end in END_NAMES}
-    applied = tuple(work for triple in virtual_work for work in _read_work(space, triple))
+    triples = [_triple(space, triple) for triple in virtual_work]
+    there = [triple for triple in triples if isinstance(triple[2], Expr)]
+    applied = tuple(work for triple in triples if triple not in there for work in _read_work(space, triple))
     varied = [*space.jets(along), *(jet for _, jet, everywhere in applied if everywhere)]
     orders = tuple(
         max((jet.space for jet in varied if jet.unknown == number), default=0) for number in range(len(space.fields))
@@ -78,7 +80,7 @@ def vary(
             label = f"virtual work of {space.write(force)} on {space.form(jet)}"
             _check_end_term(space, label, [jet], orders)
             elimination.check_effective(space.symbol(jet), label)
-    points = read_points(space, inside, held, orders)
+    points = read_points(space, inside, held, there, orders)  # type: ignore[arg-type]
     return Variation(space, along, terms["left"] + terms["right"], applied, orders, elimination, points)
 
 
@@ -93,14 +95,28 @@ def _check_end_term(space: JetSpace, label: str, jets: Sequence[Jet], orders: Se
             )
 
 
-def _read_work(space: JetSpace, triple: VirtualWork) -> list[tuple[Expr, Jet, bool]]:
-    """Return (force, displacement jet, whether it is a force per length) for one virtual work triple."""
+def _triple(space: JetSpace, triple: VirtualWork) -> VirtualWork:
+    """Return one virtual work triple with an interior place as an expression."""
     try:
         force, displacement, place = triple
     except (TypeError, ValueError):
         raise HamiltonError(f"virtual_work: {shown(triple)} is not a triple (force, displacement, place)") from None
-    if not (place is None or isinstance(place, str)) or place not in (*END_NAMES, "domain", None):
-        raise HamiltonError(f"virtual_work: place = {shown(place)}: must be 'left', 'right', 'domain' or None")
+    if place is None or (isinstance(place, str) and place in (*END_NAMES, "domain")):
+        return force, displacement, place
+    try:
+        found = sympify(place, strict=True)
+    except (SympifyError, TypeError):
+        found = None
+    if not isinstance(found, Expr):
+        raise HamiltonError(
+            f"virtual_work: place = {shown(place)}: must be 'left', 'right', 'domain', an interior place or None"
+        )
+    return force, displacement, found
+
+
+def _read_work(space: JetSpace, triple: VirtualWork) -> list[tuple[Expr, Jet, bool]]:
+    """Return (force, displacement jet, whether it is a force per length) for one virtual work triple."""
+    force, displacement, place = triple
     where: Any = "ends" if place is None else place
     label = f"virtual work of {shown(force)} on {shown(displacement)}"
     moved = space.read(displacement, where, label)
@@ -108,15 +124,7 @@ def _read_work(space: JetSpace, triple: VirtualWork) -> list[tuple[Expr, Jet, bo
     if where == "ends" and len(ends) == 1:
         where = ends.pop()
     pushed = space.read(force, where, label)
-    works = []
-    for jet in space.jets(moved):
-        factor = moved.diff(space.symbol(jet))
-        if jet.time or space.jets(factor):
-            raise HamiltonError(f"{label}: the displacement must be linear and free of time derivatives")
-        works.append((factor * pushed, jet, place == "domain"))
-    if not works:
-        raise HamiltonError(f"{label}: the displacement holds no field and no coordinate")
-    return works
+    return [(push, jet, place == "domain") for push, jet in linear_work(space, pushed, moved, label)]
 
 
 def lagrange_forces(space: JetSpace, lagrangian: Expr) -> Forces:

@@ -127,16 +127,25 @@ def weak_form(variation: Variation) -> WeakForm:
         label = f"virtual work on {space.form(displacement)}"
         for jet, factor in _linear(space, force, label):
             _check_order(variation, jet, factor, label)
-            _accumulate(form, displacement, jet, -factor)
-        still = force.xreplace({space.symbol(jet): S.Zero for jet in space.jets(force)})
-        load[displacement] = load.get(displacement, S.Zero) + still
+        _apply(space, form, load, force, displacement, label)
     points = []
     for point in variation.points:
         form, load = _quadratic(space, point.lagrangian, f"term inside at {space.x} = {point.place}")
+        for force, displacement in point.applied:
+            label = f"virtual work on {space.form(displacement)} at {space.x} = {point.place}"
+            _apply(space, form, load, force, displacement, label)
         points.append(PointForm(point.place, _cleaned(form), _nonzero(load), point.held))
     return WeakForm(
         variation, _cleaned(inside), _cleaned(ends), _nonzero(inside_load), _nonzero(end_load), tuple(points)
     )
+
+
+def _apply(space: JetSpace, form: Bilinear, load: dict[Jet, Expr], force: Expr, displacement: Jet, label: str) -> None:
+    """Add a force that is linear in the unknowns to a form, and what does not depend on them to a load."""
+    for jet, factor in _linear(space, force, label):
+        _accumulate(form, displacement, jet, -factor)
+    still = force.xreplace({space.symbol(jet): S.Zero for jet in space.jets(force)})
+    load[displacement] = load.get(displacement, S.Zero) + still
 
 
 def _quadratic(space: JetSpace, lagrangian: Expr, label: str) -> tuple[Bilinear, dict[Jet, Expr]]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Literal
 
-from sympy import Derivative, Dummy, Expr, S, Symbol, SympifyError, cancel, integrate, sympify
+from sympy import Derivative, Dummy, Expr, Heaviside, S, Symbol, SympifyError, cancel, integrate, sympify
 from sympy.core.function import AppliedUndef
 
 from cra_sym.checks import mapping, shown
@@ -14,7 +14,7 @@ from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics.breakpoints import derivative
 from cra_sym.mechanics.jets import END_NAMES, Jet
 from cra_sym.mechanics.weak import Bilinear, WeakForm, weak_form
-from cra_sym.model.driven import driven, driven_coordinate, driven_displacement, pushed
+from cra_sym.model.driven import driven, driven_coordinate, driven_displacement, driven_spatial, pushed
 from cra_sym.model.energies import stress_route
 from cra_sym.model.exact import BallProblem, exact_kernel
 from cra_sym.model.forms import form_of, load_of
@@ -31,8 +31,8 @@ from cra_sym.model.symmetry import asymmetry
 from cra_sym.model.two_waves import two_waves_route
 
 __all__ = ["axial", "causes", "complex_modes", "constant", "damping", "driven", "driven_coordinate",
-           "driven_displacement", "geometry", "inertia", "load", "named_observables", "names", "observable", "pencil",
-           "pushed", "rates", "route", "spatial"]  # fmt: skip
+           "driven_displacement", "driven_spatial", "geometry", "inertia", "load", "named_observables", "names",
+           "observable", "pencil", "pushed", "rates", "route", "spatial"]  # fmt: skip
 
 
 def names(model: Model) -> tuple[str, ...]:
@@ -247,13 +247,13 @@ def axial(model: Model) -> Form:
     """
     weak = weak_form(model.equations.variation)
     space = weak.variation.space
-    if weak.points:
-        raise ValueError("axial: the inertia of what is at interior places must be stated in the Lagrangian")
     field, tip, slope = Jet(0, 0, 0, None), Jet(0, 0, 0, "right"), Jet(0, 1, 0, None)
     density = weak.inside.get((field, field), {}).get(2, S.Zero)
     place = Dummy("x")
     beyond = integrate(density.subs(space.x, place), (place, space.x, space.ends["right"]))
     load = beyond + weak.ends.get((tip, tip), {}).get(2, S.Zero)
+    for point in weak.points:
+        load += point.form.get((field, field), {}).get(2, S.Zero) * Heaviside(point.place - space.x)
     for number, unknown in enumerate(space.unknowns):
         lumped = Jet(number, 0, 0, None)
         if space.is_field(number) or weak.discrete.get((lumped, lumped), {}).get(2, S.Zero) == 0:
@@ -264,9 +264,9 @@ def axial(model: Model) -> Form:
                 "axial load in the Lagrangian and let its amplitude fluctuate"
             )
     levers: dict[tuple[Jet, Jet], dict[int, Expr]] = {}
-    for end in END_NAMES:
+    for end in (*END_NAMES, *range(len(weak.points))):
         displacement, turn = Jet(0, 0, 0, end), Jet(0, 1, 0, end)
-        moment = weak.ends.get((displacement, turn), {}).get(2, S.Zero)
+        moment = weak.discrete.get((displacement, turn), {}).get(2, S.Zero)
         if moment != 0:
             levers[turn, turn] = {0: moment}
     return form_of(weak, {"axial": ({(slope, slope): {0: load}}, levers)}, model.symbols)

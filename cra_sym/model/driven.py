@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sympy import Expr, Function, S, cancel
+from sympy import Expr, Function, Matrix, S, Symbol, cancel, eye, zeros
 
 from cra_sym.checks import shown
 from cra_sym.kernels import Kernel, kernel
+from cra_sym.mechanics import StateForm
 from cra_sym.mechanics.points import at_place
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.spatial import SpatialProblem, spatial_problem
 
-__all__ = ["driven", "driven_coordinate", "driven_displacement", "pushed"]
+__all__ = ["driven", "driven_coordinate", "driven_displacement", "driven_spatial", "pushed", "reacting"]
 
 
 def driven(model: Model, name: str) -> SpatialProblem:
@@ -44,7 +45,53 @@ def driven(model: Model, name: str) -> SpatialProblem:
         (place, matrix.as_immutable(), held) for (place, _, held), matrix in zip(form.points, points, strict=True)
     )
     changed = replace(form, system=system.as_immutable(), boundary=boundary.as_immutable(), points=there)
-    return spatial_problem(changed, model.symbols, model.equations.domain[0])
+    return spatial_problem(reacting(changed), model.symbols, model.equations.domain[0])
+
+
+def driven_spatial(model: Model) -> SpatialProblem:
+    """Return the spatial problem with everything in it, the reactions of interior supports as lumped coordinates."""
+    return spatial_problem(reacting(model.state_form), model.symbols, model.equations.domain[0])
+
+
+def reacting(form: StateForm) -> StateForm:
+    """Return the same problem without supports at interior places: their reactions are further lumped coordinates.
+
+    A reaction R works against the displacement that is held: its Lagrangian is R v(a). The force jumps by R there, and
+    the equation of R says that the displacement vanishes.
+    """
+    reactions = [(number, k) for number, (_, _, held) in enumerate(form.points) for k in held]
+    if not reactions:
+        return form
+    n, m = len(form.displacements), len(form.coordinates)
+    t = form.coordinates[0].args[0] if m else Symbol("t")
+    added = tuple(Function(f"reaction_{k}")(t) for k in range(len(reactions)))
+    points = []
+    for number, (place, matrix, _) in enumerate(form.points):
+        extended = _inserted(matrix, (n + m,), len(reactions))
+        for row, (own, k) in enumerate(reactions):
+            if own == number:
+                extended[k, n + m + row] = extended[n + m + row, k] = S.One
+        points.append((place, extended.as_immutable(), ()))
+    free = form.free.row_insert(n + m, zeros(len(reactions), form.free.cols))
+    own = zeros(free.rows, len(reactions))
+    own[n + m : n + m + len(reactions), :] = eye(len(reactions))
+    return replace(
+        form,
+        coordinates=(*form.coordinates, *added),
+        system=_inserted(form.system, (n + m, 2 * (n + m)), len(reactions)).as_immutable(),
+        boundary=_inserted(form.boundary, (n + m,), len(reactions)).as_immutable(),
+        free=free.row_join(own).as_immutable(),
+        points=tuple(points),
+    )
+
+
+def _inserted(matrix: Matrix, places: tuple[int, ...], number: int) -> Matrix:
+    """Return a square matrix with so many rows and columns of zeros before each of some places, ascending."""
+    found = matrix.as_mutable()
+    for place in reversed(places):
+        found = found.row_insert(place, zeros(number, found.cols))
+        found = found.col_insert(place, zeros(found.rows, number))
+    return found
 
 
 def driven_coordinate(model: Model, name: str) -> int:

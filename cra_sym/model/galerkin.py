@@ -100,7 +100,8 @@ class Ritz:
         )
         ends = tuple((tuple(e), tuple(e.values())) for e in (m.end_stiffness, m.end_damping, m.end_mass))
         factors = [(i, j, factor) for i, row in enumerate(m.restraint) for j, factor in row.items()]
-        parts = (m.start, m.length, tuple(f for *_, f in factors), *(v for _, v in ends))
+        starts, lengths = zip(*m.spans, strict=True)
+        parts = (starts, lengths, tuple(f for *_, f in factors), *(v for _, v in ends))
         return element, kernel(parts, self.symbols, backend="numpy"), factors, [places for places, _ in ends]
 
     def _columns(self, values: Mapping[Any, Any]) -> tuple[np.ndarray, tuple[int, ...]]:
@@ -124,10 +125,14 @@ class Ritz:
 
     def _assembled(self, column: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
         element, rest, factors, places = self._kernels
-        start, length, weights, *ends = rest(*column)
+        starts, lengths, weights, *ends = rest(*column)
         m = self.matrices
-        step = length / m.elements
-        local = element(step, start + step * np.arange(m.elements), *column)
+        each = m.elements // len(m.spans)
+        if not min(lengths) > 0.0:
+            raise ValueError("values: interior places must lie in the domain, in the order in which they are stated")
+        step = np.repeat(np.array(lengths, dtype=float) / each, each)
+        begin = np.repeat(np.array(starts, dtype=float), each) + step * np.tile(np.arange(each), len(m.spans))
+        local = element(step, begin, *column)
         total = len(m.restraint)
         matrices = []
         for part, indices, entries in zip(local, places, ends, strict=True):

@@ -56,7 +56,8 @@ class Model:
     prescribed : sequence of applied undefined functions, optional
         Motions ``w(t)`` that are given, see `response`. A force ``F(t)`` needs no mention.
     virtual_work : sequence of (force, displacement, place), optional
-        Non-conservative forces; place is 'left', 'right', 'domain' (per length) or None (on a coordinate).
+        Non-conservative forces; place is 'left', 'right', 'domain' (per length), an interior place, or None (on a
+        coordinate).
     units : mapping, optional
         Units of symbols of the model that are not those of ``cra_sym.symbols``, such as ``{c: "N s/m"}``. Every term
         whose symbols all have a known unit must be an energy (per length in the density).
@@ -135,6 +136,7 @@ class Model:
         given = [density, *self._options["domain"], *self._options["essential"], *ends.values(), *places]
         given += [term for _, term in self._options["inside"]]
         given += [part for force, displacement, _ in work for part in (force, displacement)]
+        given += [sympify(place, strict=True) for *_, place in work if not (place is None or isinstance(place, str))]
         self.symbols: tuple[Symbol, ...] = parameters(given, self.equations)
         """The parameters: every symbol but x and t, by name."""
         declared = named_units(units, [*given, *self._options["fields"], *self._options["coordinates"]])
@@ -321,9 +323,18 @@ class Model:
         """Separate the variables: characteristic matrix and function, mode shapes, in closed form."""
         return separate(self.equations, **options)
 
-    def ritz(self, elements: int) -> Ritz:
-        """Return the same Lagrangian on equal Hermite elements: frequencies from above, coefficients may vary by x."""
-        return Ritz(ritz(self.equations, elements=elements), self.symbols)
+    def ritz(self, elements: int, nodes: Sequence[Expr] = ()) -> Ritz:
+        """Return the same Lagrangian on Hermite elements: frequencies from above, coefficients may vary by x.
+
+        Parameters
+        ----------
+        elements : int
+            Number of equal elements, of each span between nodes.
+        nodes : sequence of Expr
+            Interior places that are nodes, in ascending order, such as jumps of a coefficient. Those of terms and
+            supports are nodes anyway; name these too where they are symbols and do not ascend as they were stated.
+        """
+        return Ritz(ritz(self.equations, elements=elements, nodes=nodes), self.symbols)
 
     def kernel(self) -> Kernel:
         """Return the characteristic function as a fast function of the angular frequency and the parameters.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -156,15 +158,9 @@ def test_rates_of_frequencies_by_everything_at_interior_places(kind):
         assert (error < 1e-7 * np.abs(found.rate[name]) + rounding).all()
 
 
-def test_what_knows_no_interior_places_says_so():
-    model = beam(inside=[(HALF, m * KINETIC)])
-    with pytest.raises(ValueError, match="needs a node"):
-        model.ritz(4)
+def test_closed_forms_know_no_interior_places():
     with pytest.raises(ValueError, match="varies along x"):
-        model.separate()
-    held = beam(essential=(*PINNED, v.subs(x, HALF))).at({})
-    with pytest.raises(ValueError, match="supports at interior places"):
-        cra.frequency_response(held, 1.0, drive=v.diff(x).subs(x, 1))
+        beam(inside=[(HALF, m * KINETIC)]).separate()
 
 
 # tables ---------------------------------------------------------------------------------------------------------------
@@ -200,3 +196,127 @@ def test_tables_as_coefficients():
 def test_tables_that_are_refused(table, error, words):
     with pytest.raises(error, match=words):
         cra.stations(x, table)
+
+
+# what follows from interior places ------------------------------------------------------------------------------------
+
+c, J = sp.symbols("c J")
+TIP = v.subs(x, 1)
+
+
+def test_jump_conditions_have_their_place_and_variation():
+    """EI v''' falls by the inertia, the spring and the damper; EI v'' rises by the rotary inertia; supports hold."""
+    term = m * KINETIC + J * v.diff(x, t) ** 2 / 2 - k * v**2 / 2
+    model = beam(
+        length=L, inside=[(a, term)], virtual_work=[(-c * v.diff(t), v, a)], essential=(*CLAMPED, v.subs(x, L / 2))
+    )
+    shear, moment, held, free = model.equations.jump_conditions
+    there = v.subs(x, a)
+    assert shear.rhs == -m * there.diff(t, 2) - k * there - c * there.diff(t)
+    right, left = sp.Limit(v.diff(x, 3), x, a, "+"), sp.Limit(v.diff(x, 3), x, a, "-")
+    assert shear.lhs == right - left
+    assert moment.rhs == J * v.diff(x, t, t).subs(x, a)
+    assert [condition.place for condition in model.equations.jump_conditions] == [a, a, L / 2, L / 2]
+    assert str(shear.variation) == "δv(a, t)" and shear.kind == "natural"
+    assert (held.lhs, held.rhs, held.kind) == (v.subs(x, L / 2), 0, "essential") and free.rhs == 0
+    assert r"\lim_{x \to a^+}" in model.equations._repr_latex_()
+    assert pickle.loads(pickle.dumps(shear)).place == a
+
+
+@pytest.mark.parametrize(
+    ("model", "values"),
+    [
+        (beam(inside=[(a, m * KINETIC - k * v**2 / 2)]), {a: 0.3, m: 2.0, k: 50.0}),
+        (beam(essential=(*PINNED, v.subs(x, a))), {a: 0.37}),
+        (beam(essential=(*PINNED, v.subs(x, HALF), v.diff(x).subs(x, HALF))), {}),
+        (string(inside=[(a, m * KINETIC), (sp.Rational(3, 4), -k * v**2 / 2)]), {a: 0.3, m: 1.0, k: 2.0}),
+    ],
+    ids=["mass and spring", "support", "clamp", "string, whose slope jumps"],
+)
+def test_ritz_has_nodes_at_interior_places(model, values):
+    """From above, and with the order of convergence of elements on smooth spans: 4 of beams, 6 of strings."""
+    exact = model.at(values).natural_frequencies(3) / 2 / np.pi
+    errors = [model.ritz(n).natural_frequencies(values, 3) / exact - 1 for n in (4, 8)]
+    assert (errors[1] > -1e-9).all() and (errors[0] > errors[1]).all()
+    order = 6 if model.equations.variation.orders == (1,) else 4
+    clear = errors[1] > 1e-9
+    rates = np.log2(errors[0][clear] / errors[1][clear])
+    assert clear.any() and (np.abs(rates - order) < 0.6).all()
+
+
+def test_nodes_of_ritz_at_jumps_and_in_order():
+    mass = sp.Piecewise((1, x < HALF), (4, True))
+    density = mass * KINETIC - v.diff(x) ** 2 / 2
+    model = cra.Model(density, fields=[v], x=x, domain=(0, 1), t=t, essential=PINNED, inside=[(a, -k * v**2)])
+    found = model.ritz(8, nodes=[HALF]).natural_frequencies({a: 0.8, k: 3.0}, 2)
+    np.testing.assert_allclose(found, model.at({a: 0.8, k: 3.0}).natural_frequencies(2) / 2 / np.pi, rtol=1e-7)
+    with pytest.raises(ValueError, match="in the order in which they are stated"):
+        model.ritz(8, nodes=[HALF]).natural_frequencies({a: 0.2, k: 3.0}, 2)
+    assert model.ritz(8, nodes=[a, HALF]).natural_frequencies({a: 0.2, k: 3.0}, 1) > 0
+
+
+def by_ritz(model, values, Omega, elements=40, nodes=()):
+    """Tip displacement for a unit force there, from the assembled matrices."""
+    elements = model.ritz(elements, nodes=nodes)
+    columns = np.array([[float(values[s])] for s in elements.symbols]).reshape(len(elements.symbols), 1)
+    ((_, stiffness, damping, mass),) = elements._numbers(columns)
+    force = np.zeros(len(stiffness))
+    force[-2] = 1.0
+    return np.linalg.solve(stiffness + 1j * Omega * damping - Omega**2 * mass, force)[-2]
+
+
+HELD = {
+    "support": (beam(essential=(*CLAMPED, v.subs(x, a))), {a: 0.6}, ()),
+    "clamp": (beam(essential=(*CLAMPED, v.subs(x, HALF), v.diff(x).subs(x, HALF))), {}, ()),
+    "damper": (beam(virtual_work=[(-c * v.diff(t), v, a)]), {a: 0.6, c: 1.5}, ()),
+    "damped turning": (beam(virtual_work=[(-c * v.diff(x, t), v.diff(x), a)]), {a: 0.3, c: 0.4}, ()),
+    "support and damper": (
+        beam(essential=(*CLAMPED, v.subs(x, a)), virtual_work=[(-c * v.diff(t), v, HALF)]),
+        {a: 0.6, c: 2.0},
+        (HALF, a),
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", HELD)
+def test_frequency_responses_with_supports_and_dampers_inside(kind):
+    """Against 40 elements a span, whose error at 30 rad/s is below 1e-6."""
+    model, values, nodes = HELD[kind]
+    for Omega in (0.0, 1.0, 30.0):
+        found = cra.frequency_response(model.at(values), Omega, drive=TIP)
+        np.testing.assert_allclose(found, by_ritz(model, values, Omega, nodes=nodes), rtol=3e-6)
+
+
+def test_a_static_force_on_a_beam_held_inside():
+    """Propped at a: the overhang of b bends by b^3 / 3 and turns with the span, b^2 a / 4."""
+    model = beam(essential=(*CLAMPED, v.subs(x, a)))
+    found = cra.frequency_response(model.at({a: [0.4, 0.7]}), 0.0, drive=TIP)
+    near, over = np.array([0.4, 0.7]), np.array([0.6, 0.3])
+    np.testing.assert_allclose(found, over**3 / 3 + over**2 * near / 4, rtol=1e-8)
+
+
+def test_eigenvalues_with_a_damper_inside():
+    model, values, _ = HELD["damper"]
+    found = model.eigenvalues(values, 3)
+    np.testing.assert_allclose(found, model.ritz(24).eigenvalues(values, 3), rtol=3e-6)
+
+
+def test_a_base_that_shakes_along_the_beam_pulls_what_is_inside():
+    """A mass at a place, as the limit of one that is spread; the mass per length beyond pulls (36b)."""
+    spread = sp.Symbol("spread")
+    bump = m / spread * sp.Heaviside(x - a + spread / 2) * sp.Heaviside(a + spread / 2 - x)
+    point = beam(inside=[(a, m * KINETIC)])
+    wide = beam(1 + bump)
+    values = {a: 0.6, m: 2.0}
+    one = point.at(values).form("axial", 3)
+    other = wide.at({**values, spread: 1e-4}).form("axial", 3)
+    np.testing.assert_allclose(one["axial"], other["axial"], rtol=1e-6)
+
+
+def test_works_at_places_that_are_refused():
+    with pytest.raises(ValueError, match="use left or right"):
+        beam(virtual_work=[(-c * v.diff(t), v, 0)])
+    with pytest.raises(ValueError, match="may jump there"):
+        beam(virtual_work=[(-c * v.diff(x, 2, t), v.diff(x, 2), a)])
+    with pytest.raises(ValueError, match="an interior place or None"):
+        beam(virtual_work=[(-c * v.diff(t), v, "middle")])
