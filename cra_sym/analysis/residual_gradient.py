@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.analysis.modes import only_motion, participation
-from cra_sym.analysis.responses import residual_vibration, stopped_oscillators
+from cra_sym.analysis.modes import participation
+from cra_sym.analysis.responses import History, Stopped, residual_vibration, stopped
 from cra_sym.analysis.sensitivities import Sensitivities, sensitivities
 from cra_sym.checks import count, default_floating_point, names
 from cra_sym.model.one_wave import Change, OneWaveModes
 from cra_sym.model.projection import column
 from cra_sym.model.system import MOST_MODES, System
-from cra_sym.solvers.driven_modes import state_at_stop
-from cra_sym.solvers.modal_response import Oscillators, free_peak
 from cra_sym.solvers.motion import BaseMotion
+
+if TYPE_CHECKING:
+    from sympy.core.function import AppliedUndef
 
 __all__ = ["residual_vibration_gradient"]
 
@@ -30,7 +31,7 @@ _POINTS = 8  # on one side of a parameter that cannot be negative, or four on ea
 @default_floating_point
 def residual_vibration_gradient(
     system: System,
-    motion: BaseMotion,
+    motion: BaseMotion | Mapping[AppliedUndef, History],
     by: Sequence[str] | None = None,
     modes: int = 5,
     *,
@@ -38,18 +39,19 @@ def residual_vibration_gradient(
 ) -> tuple[Any, Array]:
     r"""Return the residual vibration and its derivatives, as a gradient-based optimiser wants them.
 
-    Mode i leaves :math:`|\Gamma_i \phi_i(L)| A(\omega_i T)` behind. The sensitivities (31)-(32) tell how the frequency
-    follows a parameter, and the exact states of the oscillator at the stop how the peak A follows the frequency. How
-    :math:`\Gamma_i \phi_i(L)` follows a spring or an inertia of an end of a model with one wave number is a closed form
-    along the frequency equation; otherwise it is a difference of eighth order, whose error is about 1e-11 of it.
+    What mode i leaves behind follows from its frequency and from :math:`\Gamma_i \phi_i(L)` for every motion and force.
+    The sensitivities (31)-(32) tell how the frequency follows a parameter; how :math:`\Gamma_i \phi_i(L)` follows a
+    spring or an inertia of an end of a model with one wave number that a motion drives is a closed form along the
+    frequency equation; otherwise it is a difference of eighth order, whose error is about 1e-11 of it. The exact states
+    of the oscillator at the stop carry both along in their imaginary parts.
 
     Parameters
     ----------
     system, motion, modes, zeta
         As in :func:`residual_vibration`.
     by : sequence of str, optional
-        By default the stiffnesses of the ends, for an arm k_t and k_r, and 'duration'. Otherwise parameters of the
-        system; the compliance 1/k of a stiffness k of an end, for an arm 'c_t' and 'c_r', else '1/'
+        By default the stiffnesses of the ends, for an arm k_t and k_r, and, of one motion alone, 'duration'. Otherwise
+        parameters of the system; the compliance 1/k of a stiffness k of an end, for an arm 'c_t' and 'c_r', else '1/'
         and its name; and 'duration', which stretches the motion uniformly in time over the same way, as the argument
         of :meth:`BaseMotion.s_curve` does.
 
@@ -76,41 +78,48 @@ def residual_vibration_gradient(
     1.696 mm, 52.49 mm/s
     """
     modes = count("modes", modes, high=MOST_MODES)
-    osc = stopped_oscillators(system, motion, modes, zeta)
+    driven = stopped(system, motion, modes, zeta)
+    stretch = ["duration"] if isinstance(motion, BaseMotion) or (len(driven.names) == 1 and _moves(system)) else []
     compliances = {f"1/{name}": name for name in system.numerics("stiffnesses")}
     compliances |= {name.replace("k_", "c_", 1): name for name in compliances.values() if name.startswith("k_")}
-    known = [*system.values, *compliances, "duration"]
-    by = names("by", (*system.numerics("stiffnesses"), "duration") if by is None else by, known)
+    known = [*system.values, *compliances, *stretch]
+    by = names("by", (*system.numerics("stiffnesses"), *stretch) if by is None else by, known)
     value = residual_vibration(system, motion, modes, zeta=zeta)
-    peak, stretched = _unit_peaks(osc, motion)
-    factor = osc.gamma * osc.rows[..., 0, :]
+    still: list[Array] = [np.zeros(modes) for _ in driven.names]
     found = sensitivities(system, modes + 1)  # the next mode may be close to the last one
     gradient = np.empty((*np.shape(value), len(by)))
     for place, name in enumerate(by):
         with np.errstate(divide="ignore", invalid="ignore"):
-            if name == "duration":
-                rate = np.abs(factor) * stretched / np.asarray(motion.duration)[..., None]
+            if name == "duration":  # frequency and duration count by their product alone
+                rate = _along(driven, still, np.ones(modes)) / np.asarray(driven.stop)[..., None]
             else:
                 stiffness = compliances.get(name)
-                change, logarithmic = _rates(system, found, stiffness or name, modes, compliance=stiffness is not None)
-                rate = np.sign(factor) * change * peak + np.abs(factor) * stretched * logarithmic
+                pairs = [
+                    _rates(system, cause, found, stiffness or name, modes, compliance=stiffness is not None)
+                    for cause in driven.names
+                ]
+                rate = _along(driven, [change for change, _ in pairs], pairs[0][1])
         gradient[..., place] = rate.sum(axis=-1)
     return value, gradient
 
 
-def _unit_peaks(osc: Oscillators, motion: BaseMotion) -> tuple[Array, Array]:
-    """Return the peak of each mode after the stop for Gamma = 1, and its derivative by ln omega.
-
-    The peak depends on frequency and duration by their product alone, so the second is also that by ln T.
-    """
-    unit = osc._replace(omega=osc.omega * (1 + 1j * _TINY), gamma=np.ones_like(osc.gamma))
-    q, u = state_at_stop(unit, motion)
-    u = np.where(osc.omega > 0, u, 0.0)  # what a rigid-body mode does is the same at any frequency near
-    peak = free_peak(unit, q, u)
-    return peak.real, np.where(osc.omega > 0, peak.imag / _TINY, 0.0)
+def _moves(system: System) -> bool:
+    return {kind for _, kind in system.numerics("causes")} == {"motion"}
 
 
-def _rates(system: System, found: Sensitivities, name: str, modes: int, *, compliance: bool) -> tuple[Array, Array]:
+def _along(driven: Stopped, changes: Sequence[Array], logarithmic: Array) -> Array:
+    """Return the derivatives of the peaks of the modes from those of Gamma_i phi_i(L) and of ln omega_i."""
+    omega = driven.osc.omega
+    moved = omega * (1 + 1j * _TINY * np.where(omega > 0, logarithmic, 0.0))
+    products = [p + 1j * _TINY * change for p, change in zip(driven.products, changes, strict=True)]
+    peaks = driven.peaks(moved, products)
+    rate = np.where(peaks.real != 0, peaks.imag / _TINY, 0.0)
+    return np.where(np.isnan(logarithmic), np.nan, rate)
+
+
+def _rates(
+    system: System, cause: str, found: Sensitivities, name: str, modes: int, *, compliance: bool
+) -> tuple[Array, Array]:
     """Return the derivatives of Gamma_i phi_i(L) and of ln omega_i by a parameter or by one over it."""
     rate = found.compliance[name] if compliance else found.rate[name]
     by_frequency, frequency = rate[..., :modes], found.frequency[..., :modes]
@@ -118,22 +127,21 @@ def _rates(system: System, found: Sensitivities, name: str, modes: int, *, compl
     with np.errstate(divide="ignore", invalid="ignore"):
         logarithmic = np.where(still, np.where(by_frequency == 0, 0.0, np.nan), by_frequency / frequency)
     given = np.broadcast_to(system.values[name], system.shape)
-    change = _along_the_mode(system, name, modes, compliance=compliance)
+    change = _along_the_mode(system, cause, name, modes, compliance=compliance)
     if change is None:
-        change = _by_differences(system, found, name, modes, compliance=compliance)
+        change = _by_differences(system, cause, found, name, modes, compliance=compliance)
     held = np.isinf(given)[..., None] & (not compliance)
     absent = (given == 0)[..., None] & compliance
     return np.where(held, 0.0, np.where(absent, np.nan, change)), np.where(held, 0.0, logarithmic)
 
 
-def _along_the_mode(system: System, name: str, modes: int, *, compliance: bool) -> Array | None:
+def _along_the_mode(system: System, cause: str, name: str, modes: int, *, compliance: bool) -> Array | None:
     """Return the derivative of Gamma_i phi_i(L) in closed form, or None where there is none.
 
     There is one for a spring or an inertia of an end of a model with one wave number whose participation is that of a
     rigid translation.
     """
-    motion = only_motion(system)
-    load = system.numerics("load", motion)
+    load = system.numerics("load", cause)
     springs, inertias = system.numerics("stiffnesses"), system.numerics("inertias")
     found = system.modes(modes)
     if not isinstance(found, OneWaveModes) or load.share is None or load.rest_ends:
@@ -148,19 +156,23 @@ def _along_the_mode(system: System, name: str, modes: int, *, compliance: bool) 
     return -column(np.asarray(share)) * change
 
 
-def _by_differences(system: System, found: Sensitivities, name: str, modes: int, *, compliance: bool) -> Array:
+def _by_differences(
+    system: System, cause: str, found: Sensitivities, name: str, modes: int, *, compliance: bool
+) -> Array:
     """Return the derivative of Gamma_i phi_i(L) by differences, of a stiff spring in its compliance."""
     given = np.broadcast_to(system.values[name], system.shape)
     if compliance or name not in found.compliance:
-        return _differences(system, found, name, modes, compliance=compliance)
+        return _differences(system, cause, found, name, modes, compliance=compliance)
     stiff = given > _own_stiffness(system, name)
     total = np.zeros((*system.shape, modes))
     if not stiff.all():
-        total = _differences(system, found, name, modes, compliance=False)
+        total = _differences(system, cause, found, name, modes, compliance=False)
     if stiff.any():
         with np.errstate(divide="ignore"):
             slope = -((1 / given) ** 2)[..., None]
-        total = np.where(stiff[..., None], slope * _differences(system, found, name, modes, compliance=True), total)
+        total = np.where(
+            stiff[..., None], slope * _differences(system, cause, found, name, modes, compliance=True), total
+        )
     return total
 
 
@@ -191,7 +203,7 @@ def _reach(frequency: Array, rate: Array, place: Array) -> Array:
     return np.where(np.isfinite(reach), reach, np.where(place > 0, place, 1.0))
 
 
-def _differences(system: System, found: Sensitivities, name: str, modes: int, *, compliance: bool) -> Array:
+def _differences(system: System, cause: str, found: Sensitivities, name: str, modes: int, *, compliance: bool) -> Array:
     """Return the derivative of Gamma_i phi_i(L) by differences: central where the parameter allows, else one-sided."""
     given = np.broadcast_to(system.values[name], system.shape)
     with np.errstate(divide="ignore"):
@@ -205,7 +217,7 @@ def _differences(system: System, found: Sensitivities, name: str, modes: int, *,
     values = place + offsets * step
     with np.errstate(divide="ignore"):
         moved = system.replace(**{name: 1 / values if compliance else values})
-    products = participation(moved, modes) * moved.modes(modes).displacement(1, 0)
+    products = participation(moved, modes, cause) * moved.modes(modes).displacement(1, 0)
     weights = _weights(offsets)
     return np.asarray((weights[..., None] * products).sum(axis=0) / step[..., None])
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from sympy import Expr
     from sympy.core.function import AppliedUndef
 
-__all__ = ["History", "UndersamplingWarning", "oscillators", "residual_vibration", "response", "tip_response"]
+__all__ = ["History", "Stopped", "UndersamplingWarning", "residual_vibration", "response", "stopped", "tip_response"]
 
 Array = NDArray[np.float64]
 History = BaseMotion | Force
@@ -168,8 +169,14 @@ def response(
 
 
 @default_floating_point
-def residual_vibration(system: System, motion: BaseMotion, modes: int = 5, *, zeta: Any = None) -> Any:
-    """Return the peak amplitude of the tip after the base has stopped, m: the sum of the peaks of the modes.
+def residual_vibration(
+    system: System,
+    motion: BaseMotion | Mapping[AppliedUndef, History],
+    modes: int = 5,
+    *,
+    zeta: Any = None,
+) -> Any:
+    """Return the peak amplitude of the tip after all motions and forces have stopped, m: the sum over the modes.
 
     Exact for one mode; without damping the least upper bound over all times (frequencies of modes are
     incommensurable); with damping an upper bound that ignores only that modes do not peak together. Being at rest
@@ -179,7 +186,7 @@ def residual_vibration(system: System, motion: BaseMotion, modes: int = 5, *, ze
     Parameters
     ----------
     system, motion, modes, zeta
-        As in :func:`response`; the motion is that of the only prescribed one, and the system is at rest before t = 0.
+        As in :func:`response`; the system is at rest before t = 0. Every motion and every force must end.
 
     Returns
     -------
@@ -193,38 +200,84 @@ def residual_vibration(system: System, motion: BaseMotion, modes: int = 5, *, ze
     Raises
     ------
     TypeError, ValueError
-        If the motion never stops accelerating, or the model has dampers, which couple the modes; otherwise as
-        :func:`response`.
+        If a motion never stops accelerating or a force never ends, or the model has dampers, which couple the modes;
+        otherwise as :func:`response`.
     """
-    osc = stopped_oscillators(system, motion, modes, zeta)
-    q, u = state_at_stop(osc, motion)
-    # a rigid-body mode keeps its inertial momentum: its velocity is the base's, rounding if the base has really stopped
-    drift = -osc.gamma * np.asarray(motion.velocity(np.max(motion.duration)), float)[..., None]
-    u = np.where(osc.omega > 0, u, np.where(np.abs(drift) > 1e-9 * np.abs(osc.gamma), drift, 0.0))
-    total = np.sum(np.abs(osc.rows[..., 0, :]) * solver.free_peak(osc, q, u), -1)
+    found = stopped(system, motion, modes, zeta)
+    total = np.sum(found.peaks(found.osc.omega, found.products), -1)
     return total if total.ndim else float(total)
 
 
-def stopped_oscillators(system: System, motion: BaseMotion, modes: int, zeta: Any) -> solver.Oscillators:
-    """Return the modes as oscillators that move the tip, or refuse what never stops or couples the modes."""
+@dataclass(frozen=True)
+class Stopped:
+    """Modes that are driven until everything stops.
+
+    Attributes
+    ----------
+    osc : Oscillators
+        Of which omega and zeta count.
+    names : tuple of str
+        What drives.
+    profiles : tuple of BaseMotion
+        Their motions; that of a force is the one whose acceleration it is.
+    stop : float or ndarray
+        When the last of them stops, s.
+    products : list of ndarray, shape (..., modes)
+        Participation in each times the displacement of the tip.
+    """
+
+    osc: solver.Oscillators
+    names: tuple[str, ...]
+    profiles: tuple[BaseMotion, ...]
+    stop: Any
+    products: list[Array]
+
+    def peaks(self, omega: NDArray[Any], products: Sequence[NDArray[Any]]) -> NDArray[Any]:
+        """Return the largest displacement of the tip by each mode after the stop, shape (..., modes).
+
+        Complex frequencies and products carry a derivative along in their imaginary parts.
+        """
+        q: Any = 0.0
+        u: Any = 0.0
+        for profile, product in zip(self.profiles, products, strict=True):
+            one = self.osc._replace(omega=omega, gamma=product)
+            q_one, u_one = state_at_stop(one, profile, self.stop)
+            # a rigid-body mode keeps its inertial momentum: its velocity is the base's, rounding if it has really
+            # stopped
+            speed = np.asarray(profile.velocity(np.max(self.stop)), float)[..., None]
+            drift = np.where(np.abs(speed) > 1e-9, -product * speed, 0.0)
+            q, u = q + q_one, u + np.where(omega.real > 0, u_one, drift)
+        return solver.free_peak(self.osc._replace(omega=omega), q, u)
+
+
+def stopped(system: System, motion: Any, modes: int, zeta: Any) -> Stopped:
+    """Return the modes driven until everything stops, or refuse what never stops or couples the modes."""
     instance("system", system, System)
-    instance("motion", motion, BaseMotion)
-    if not np.all(np.isfinite(motion.duration)):
-        raise ValueError("motion never stops accelerating: must be a move with a stop, or a sampled record")
+    histories = _histories(system, motion)
+    if not histories:
+        raise ValueError("motion: must be of what drives the model; nothing does")
+    profiles = tuple(one.profile if isinstance(one, Force) else one for one in histories.values())
+    for (name, one), profile in zip(histories.items(), profiles, strict=True):
+        if not np.all(np.isfinite(profile.duration)):
+            if isinstance(one, Force):
+                raise ValueError(f"motion: the force {name} never ends: must be a sampled record")
+            raise ValueError("motion never stops accelerating: must be a move with a stop, or a sampled record")
     if system.numerics("damping") is not None:
         raise ValueError(
             "the dampers of the model couple its modes: use modal damping (zeta), or response after the stop"
         )
-    others = [name for name, _ in system.numerics("causes") if name != only_motion(system)]
-    if others or system.numerics("constant") is not None:
-        what = ", ".join(others) or "a constant load"
-        raise ValueError(
-            f"system: must be driven by one motion alone, but {what} acts too; use response after the stop"
-        )
+    if system.numerics("constant") is not None:
+        raise ValueError("system: a constant load acts too and never ends; use response after the stop")
     modes = count("modes", modes, high=MOST_MODES)
-    rows = system.modes(modes).displacement(1, 0)[..., None, :]
-    _check_sampling(motion, system.natural_frequencies(modes))
-    return oscillators(system, participation(system, modes), rows, modes, zeta)
+    osc = oscillators(system, np.zeros(modes), np.zeros((1, modes)), modes, zeta)
+    for profile in profiles:
+        _check_sampling(profile, osc.omega)
+    stop = profiles[0].duration
+    for profile in profiles[1:]:
+        stop = np.maximum(stop, profile.duration)
+    tip = system.modes(modes).displacement(1, 0)
+    products = [participation(system, modes, name) * tip for name in histories]
+    return Stopped(osc, tuple(histories), profiles, stop, products)
 
 
 def oscillators(system: System, gamma: Array, rows: Array, modes: int, zeta: Any) -> solver.Oscillators:

@@ -93,9 +93,9 @@ def _steady(osc: solver.Oscillators, motion: BaseMotion, start: Start) -> solver
     return solver.Steady(impulse, level, harmonics) if harmonics or level.any() or impulse.any() else None
 
 
-def state_at_stop(osc: solver.Oscillators, motion: BaseMotion) -> tuple[np.ndarray, np.ndarray]:
-    """Return q and q' when the base stops accelerating, shape (..., modes)."""
-    stop = _column(motion.duration)
+def state_at_stop(osc: solver.Oscillators, motion: BaseMotion, stop: Any = None) -> tuple[np.ndarray, np.ndarray]:
+    """Return q and q' when the base stops accelerating, or at a later time, shape (..., modes)."""
+    stop = _column(motion.duration if stop is None else stop)
     rest = np.zeros(1), -osc.gamma * _column(motion.velocity(0.0))
     q, u = solver.free_motion(osc, stop, rest)
     for piece in _pieces(motion):

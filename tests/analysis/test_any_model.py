@@ -121,11 +121,13 @@ def test_a_lumped_mass_of_unknown_place_is_not_pulled():
         cra.AxialBase(1.0).unit_coupling(model.at({**BEAM, m: 0.5, k: 1e3}), 2)
 
 
-def test_residual_vibration_is_of_one_motion_alone():
+def test_residual_vibration_is_after_all_that_drives_has_ended():
     move = cra.BaseMotion.trapezoid(0.1, 0.2, 1.0)
     model = beam(density=energy(v + w) + force * v, prescribed=[w, force], left=springs())
-    with pytest.raises(ValueError, match="must be driven by one motion alone, but force acts too"):
+    with pytest.raises(ValueError, match="no history for force; must be a Force or a BaseMotion"):
         cra.residual_vibration(model.at(BEAM), move)
+    with pytest.raises(ValueError, match="the force force never ends: must be a sampled record"):
+        cra.residual_vibration(model.at(BEAM), {w: move, force: cra.Force(1.0)})
 
 
 def test_the_base_as_a_coordinate_may_have_a_stiffness_that_fluctuates():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import cra_sym as cra
+from tests.systems import system
 
 LIMITS = {"distance": 0.2, "v_max": 1.0, "a_max": 2.0, "j_max": 40.0}
 MOVE = cra.BaseMotion.s_curve(**LIMITS, duration=1.234)
@@ -93,3 +94,35 @@ def test_unknown_names_are_named():
     for by in ("k_t", ("k_t", "A"), (3,), 5):
         with pytest.raises(ValueError, match="must be a sequence of names among L, b"):
             cra.residual_vibration_gradient(ARM, MOVE, by)
+
+
+PULSE = cra.Force.sampled(np.linspace(0.0, 0.35, 36), 3.0 * np.sin(np.linspace(0.0, np.pi, 36)))
+BOTH = {"w": cra.BaseMotion.trapezoid(0.1, 0.4, 2.0), "p": PULSE}
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.02])
+def test_forces_inside_the_span_and_a_move_leave_what_the_response_shows(zeta):
+    """The peak of each mode after both have ended, from the response on a fine grid of times."""
+    given = system("beam with an interior mass", zeta)
+    stop = max(0.35, BOTH["w"].duration)
+    t = stop + np.linspace(0.0, 0.8, 40001)
+    cumulative = [cra.tip_response(given, BOTH, t, modes) for modes in (1, 2, 3)]
+    peaks = [np.abs(v).max() for v in np.diff([np.zeros_like(t), *cumulative], axis=0)]
+    for modes in (1, 2, 3):
+        assert cra.residual_vibration(given, BOTH, modes) == pytest.approx(sum(peaks[:modes]), rel=1e-5)
+
+
+def test_the_gradient_by_any_parameter_with_forces():
+    """Against differences of fourth order of the residual vibration, by the place of the force too."""
+    given = system("beam with an interior mass", 0.01)
+    by = ("a", "m", "EI", "rhoA", "l", "k")
+    value, gradient = cra.residual_vibration_gradient(given, BOTH, by, 3)
+    assert value == pytest.approx(cra.residual_vibration(given, BOTH, 3), rel=1e-14)
+    for name, found in zip(by, gradient, strict=True):
+        step = 1e-3 * given.values[name]
+        values = given.values[name] + step * np.array([-2, -1, 1, 2])
+        around = [cra.residual_vibration(given.replace(**{name: one}), BOTH, 3) for one in values]
+        # a step of a thousandth, of which the fourth power is left out, times what the phase turns meanwhile
+        assert found == pytest.approx(np.dot(around, [1, -8, 8, -1]) / (12 * step), rel=1e-6), name
+    with pytest.raises(ValueError, match=r"by = .*'duration'.*: must be a sequence of names among EI, .*"):
+        cra.residual_vibration_gradient(given, BOTH, ("duration",), 3)
