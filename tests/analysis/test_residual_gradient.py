@@ -124,5 +124,5 @@ def test_the_gradient_by_any_parameter_with_forces():
         around = [cra.residual_vibration(given.replace(**{name: one}), BOTH, 3) for one in values]
         # a step of a thousandth, of which the fourth power is left out, times what the phase turns meanwhile
         assert found == pytest.approx(np.dot(around, [1, -8, 8, -1]) / (12 * step), rel=1e-6), name
-    with pytest.raises(ValueError, match=r"by = .*'duration'.*: must be a sequence of names among EI, .*"):
+    with pytest.raises(ValueError, match=r"by = 'duration': must be among EI, a"):
         cra.residual_vibration_gradient(given, BOTH, ("duration",), 3)
