@@ -13,7 +13,7 @@ import numpy as np
 from cra_sym.kernels.callables import Kernel
 from cra_sym.kernels.specialise import has_compiler, is_compiled
 
-__all__ = ["COMPILE_FROM", "LOAD_FROM", "flattened", "in_parts", "wants_compiler"]
+__all__ = ["COMPILE_FROM", "LOAD_FROM", "Parts", "flattened", "in_parts", "wants_compiler"]
 
 # A root costs NumPy about 2 microseconds and compiled code 0.1; to load machine code, Numba included, takes as long as
 # LOAD_FROM roots by NumPy, to make it as long as COMPILE_FROM. The benchmark of cold starts measures both.

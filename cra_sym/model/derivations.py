@@ -28,7 +28,7 @@ from cra_sym.model.projection import EndParameter, Form, Load
 from cra_sym.model.routes import GeneralRoute, Route
 from cra_sym.model.spatial import SpatialProblem, spatial_problem
 from cra_sym.model.symmetry import asymmetry
-from cra_sym.model.two_waves import two_waves_route
+from cra_sym.model.waves import waves_route
 
 __all__ = ["axial", "causes", "complex_modes", "constant", "damping", "driven", "driven_coordinate",
            "driven_displacement", "driven_spatial", "geometry", "inertia", "load", "named_observables", "names",
@@ -68,7 +68,7 @@ def route(model: Model) -> Route:
     compiled = spatial(model)
     if not compiled.uniform:
         return stress_route(model, compiled) or GeneralRoute(compiled)
-    fast = one_wave_route(form, model.symbols, left) or two_waves_route(form, compiled, model.symbols)
+    fast = one_wave_route(form, model.symbols, left) or waves_route(form, compiled, model.symbols)
     return fast or GeneralRoute(compiled)
 
 

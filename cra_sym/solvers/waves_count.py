@@ -1,179 +1,273 @@
-"""Uniform problems with two waves a section: their determinant and exact count in NumPy, and rigid-body motions."""
+"""Uniform problems with up to three waves a section: their determinant and exact count, in NumPy and as text."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from . import waves_kernel
+from . import waves_kernel, waves_three
+from .straight import Exact, straight
+from .waves_problem import Floats, Integers, Structure
 
-__all__ = ["Determinant", "UniformProblem", "negative_energy", "rigid_motions"]
+__all__ = [
+    "KINDS", "Determinant", "Functions", "assembled", "block_waves", "direct", "displacements",
+    "formulas", "kept", "lowest_branch", "regime",
+    "sections", "signs",
+]  # fmt: skip
 
-kernel: Any = waves_kernel  # formulas of arrays, without types: they are compiled text too
+kernel: Any = waves_kernel  # formulas of arrays and terms, without types
+three: Any = waves_three
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-
-_A, _B, _RIGHT, _LEFT, _POLYNOMIALS, _COUPLINGS = 0, 8, 16, 22, 28, 34
-_DEPENDENT = 1e-14  # a row of unit size that rounding leaves of a dependent one
-
-
-@dataclass(frozen=True)
-class UniformProblem:
-    """Problems of motions ``cos(omega t)`` with ``z = omega^2``, constant along x and even under ``x -> -x``.
-
-    The state of a section has n displacements q and their natural forces P (positive at the right end). Displacement i
-    and its force are partners ``E[i]`` and ``O[i]``: the first ``even`` displacements are even under reflection, with
-    ``E[i] = q_i`` and ``O[i] = P_i``; the others are odd, with ``E[i] = P_i`` and ``O[i] = q_i``. Then ``O' = A_OE E``
-    and ``E' = A_EO O``.
-
-    Parameters
-    ----------
-    length : ndarray, shape (rows,)
-        In (0, inf).
-    odd_by_even, even_by_odd : ndarray, shape (2, rows, n, n)
-        A_OE and A_EO: the part without z, and the factor of z.
-    stiffness, mass : ndarray, shape (2, rows, n)
-        Of the end conditions at the left (first) and right end, in the units of P over those of q:
-        ``P + (k - z m) q = 0`` at the right end, ``-P + (k - z m) q = 0`` at the left. Stiffness in [0, inf], inf holds
-        the displacement; masses in [0, inf).
-    couplings : ndarray, shape (2, 2, rows), optional
-        Off-diagonal entries of the end matrices: stiffness and mass, of the left and the right end. An offset mass m at
-        the distance e has m e. The end matrices must be positive semidefinite.
-    even : int
-        Number of even displacements, 1 to n. (If all are odd, call them even.)
-    """
-
-    length: Floats
-    odd_by_even: Floats
-    even_by_odd: Floats
-    stiffness: Floats
-    mass: Floats
-    even: int = 1
-    couplings: Floats | None = None
-
-    def __post_init__(self) -> None:
-        rows, n = len(self.length), self.odd_by_even.shape[-1]
-        shapes: dict[str, tuple[int, ...]] = {"odd_by_even": (2, rows, n, n), "even_by_odd": (2, rows, n, n)}
-        shapes |= {"stiffness": (2, rows, n), "mass": (2, rows, n)}
-        if self.couplings is not None:
-            shapes["couplings"] = (2, 2, rows)
-        for name, shape in shapes.items():
-            if getattr(self, name).shape != shape:
-                raise ValueError(f"{name}: the shape {getattr(self, name).shape} must be {shape}")
-        if n != 2:
-            raise ValueError(f"odd_by_even: the number of displacements {n} must be 2")
-        if not 1 <= self.even <= n:
-            raise ValueError(f"even = {self.even}: must be from 1 to {n}")
-
-    def take(self, rows: NDArray[np.int64] | slice) -> UniformProblem:
-        """Return the problem of some of the parameter sets."""
-        matrices = self.odd_by_even[:, rows], self.even_by_odd[:, rows]
-        couplings = None if self.couplings is None else self.couplings[:, :, rows]
-        ends = self.stiffness[:, rows], self.mass[:, rows]
-        return UniformProblem(self.length[rows], *matrices, *ends, self.even, couplings)
-
-    def coefficients(self) -> Floats:
-        """Return what `waves_kernel` takes, shape (42, rows): matrices times half the length, ends, dispersion."""
-        rows = len(self.length)
-        k = np.empty((42, rows))
-        for first, matrix in ((_A, self.odd_by_even), (_B, self.even_by_odd)):
-            k[first : first + 8] = np.moveaxis(matrix, 1, -1).reshape(8, rows) * (0.5 * self.length)
-        for first, end in ((_RIGHT, 1), (_LEFT, 0)):
-            for i in range(2):
-                stiffness, mass = self.stiffness[end, :, i], self.mass[end, :, i]
-                share = 1.0 / (1.0 + stiffness + mass)
-                held = np.isinf(stiffness)
-                k[first + 3 * i] = np.where(held, 1.0, np.where(held, 1.0, stiffness) * share)
-                k[first + 3 * i + 1], k[first + 3 * i + 2] = mass * share, share
-        k[_COUPLINGS:] = 0.0
-        if self.couplings is not None:
-            for first, end in ((_COUPLINGS, 1), (_COUPLINGS + 4, 0)):
-                for i in range(4):
-                    k[first + i] = self.couplings[i % 2, end] * k[(_RIGHT, _LEFT)[1 - end] + 3 * (i // 2) + 2]
-        k[_POLYNOMIALS:_COUPLINGS] = _dispersion(*k[:_RIGHT].reshape(4, 4, rows))
-        return k
+ZERO = Exact(0)
+Functions = Mapping[str, Callable[..., Any]]
+Entries = Any  # a sequence of numbers, arrays or terms
 
 
-def _dispersion(a0: Floats, a1: Floats, b0: Floats, b1: Floats) -> Floats:
-    """Return the coefficients of 1, z and z^2 in the trace and the determinant of ``A_EO A_OE``."""
-
-    def trace(b: Floats, a: Floats) -> Floats:
-        products: Floats = b[0] * a[0] + b[1] * a[2] + b[2] * a[1] + b[3] * a[3]
-        return products
-
-    def determinant(m0: Floats, m1: Floats) -> tuple[Floats, Floats, Floats]:
-        mixed = m0[0] * m1[3] + m1[0] * m0[3] - m0[1] * m1[2] - m1[1] * m0[2]
-        return m0[0] * m0[3] - m0[1] * m0[2], mixed, m1[0] * m1[3] - m1[1] * m1[2]
-
-    d, e = determinant(a0, a1), determinant(b0, b1)
-    product = d[0] * e[0], d[0] * e[1] + d[1] * e[0], d[0] * e[2] + d[1] * e[1] + d[2] * e[0]
-    return np.array([trace(b0, a0), trace(b1, a0) + trace(b0, a1), trace(b1, a1), *product])
+def sections(structure: Structure, k: Entries, z: Any) -> list[tuple[Any, Any]]:
+    """Return the matrices a and b of every block."""
+    first, second = structure.matrices
+    n = structure.n
+    return [(kernel.linear(k, z, first, block, n), kernel.linear(k, z, second, block, n)) for block in structure.blocks]
 
 
-class _Zero:
-    """The number 0 as an entry of all rows: NumPy spends no time on products with it."""
+def signs(structure: Structure, block: tuple[int, int]) -> list[int]:
+    """Return 1 for each even and -1 for each odd displacement of a block."""
+    return [-1 if odd else 1 for odd in structure.odd[slice(*block)]]
 
-    __array_ufunc__ = None
 
-    def __mul__(self, other: Any) -> _Zero:
-        return self
+def block_waves(structure: Structure, block: tuple[int, int], a: Any, b: Any) -> Any:
+    """Return what the waves of a block are, before any of its columns."""
+    if len(a) == 1:
+        return (b[0] * a[0],)
+    return kernel.wave_numbers(a, b) if len(a) == 4 else three.alone(a, b, signs(structure, block))
 
-    __rmul__ = __mul__
 
-    def __truediv__(self, other: Any) -> float:
+def block_columns(structure: Structure, block: tuple[int, int], a: Any, b: Any, waves: Any, kind: str) -> Any:
+    """Return the columns of a block and their basis, in a regime or whichever it is."""
+    if len(a) == 1:
+        return kernel.columns_of_one(a[0], b[0], *kernel.wave(waves[0])), 1.0
+    if len(a) == 4:
+        return kernel.two_waves(a, b, waves, kind)
+    return three.three_waves(a, b, signs(structure, block), waves, kernel.two_waves, kind)
+
+
+KINDS = {1: ("any",), 2: ("near", "close", "mixed", "distant"), 3: ("near", "close", "mixed", "distant", "series")}
+"""Regimes, by the size of the largest block."""
+
+
+def regime(waves: Any) -> Any:
+    """Return the place of the regime of a block among the kinds; a number, for terms too."""
+    where, split = kernel.where, len(waves) == 7
+    near, close, mixed = kernel.regime(*(waves[2] if split else waves)[:3])
+    found = where(near, 0.0, where(close, 1.0, where(mixed, 2.0, 3.0)))
+    return where(waves[0], 4.0, found) if split else found
+
+
+def _mu(waves: Any, slopes: Any) -> list[tuple[Any, Any, Any]]:
+    """Return each mu of a block, whether it is real, and whether its branch omega(k) falls."""
+    rates = [-value if at % 2 == 0 else value for at, value in enumerate(slopes)]
+
+    def rate(mu: Any) -> Any:  # of the characteristic polynomial by z
+        found = rates[0]
+        for value in rates[1:]:
+            found = found * mu + value
+        return found
+
+    if len(waves) == 1:
+        return [(waves[0], True, rates[0] < 0.0)]
+    pair, lone = (waves[2], waves[1]) if len(waves) == 7 else (waves, None)
+    half, product, square = pair[:3]
+    big, small = kernel.eigenvalues(half, product, square)
+    real = square >= 0.0
+    upward = kernel.where(half < 0.0, -1.0, 1.0)  # the sign of big - small
+    if lone is None:
+        return [(big, real, rate(big) * upward < 0.0), (small, real, rate(small) * upward > 0.0)]
+    beyond = kernel.where(lone < half, 1.0, -1.0)  # the sign of both over the one alone
+    found = [(lone, True, rate(lone) < 0.0)]
+    found += [(big, real, rate(big) * upward * beyond < 0.0), (small, real, rate(small) * upward * beyond > 0.0)]
+    return found
+
+
+def _shears(structure: Structure, block: tuple[int, int], b: Any) -> Any:
+    """Return how many motions that are the same all along a block has below z."""
+    size, odd = block[1] - block[0], structure.odd[slice(*block)]
+    if not any(odd):
         return 0.0
-
-    def __add__(self, other: Any) -> Any:
-        return other
-
-    __radd__ = __add__
-
-    def __rsub__(self, other: Any) -> Any:
-        return other
-
-    def __sub__(self, other: Any) -> Any:
-        return -other
-
-    def __neg__(self) -> _Zero:
-        return self
-
-    __abs__ = __neg__
-
-    def __gt__(self, other: float) -> bool:
-        return other < 0.0
-
-    def __lt__(self, other: float) -> bool:
-        return other > 0.0
-
-    def __eq__(self, other: object) -> Any:
-        return other == 0.0 if isinstance(other, float) else NotImplemented
-
-    __hash__ = object.__hash__
-
-    def __getitem__(self, members: Any) -> _Zero:
-        return self
+    order = sorted(range(size), key=lambda i: odd[i])
+    first = sum(1 for value in odd if not value)
+    found = []
+    for number in range(first + 1, size + 1):
+        found.append(kernel.determinant([[b[size * i + j] for j in order[:number]] for i in order[:number]]))
+    if len(found) == 1:
+        return kernel.where(found[0] < 0.0, 1.0, 0.0)
+    return kernel.where(found[1] < 0.0, 1.0, kernel.where(found[0] < 0.0, 2.0, 0.0))
 
 
-_ZERO = _Zero()
+def assembled(structure: Structure, columns: Sequence[Any]) -> tuple[list[Any], list[Any]]:
+    """Return E and O on all columns, row by row."""
+    n = structure.n
+    even, odd = ([[ZERO] * (2 * n) for _ in range(n)] for _ in range(2))
+    for (start, stop), block in zip(structure.blocks, columns, strict=True):
+        size = stop - start
+        parts = ((even, 0), (odd, 0), (odd, n), (even, n))
+        for number, (rows, shift) in enumerate(parts):
+            for i in range(size):
+                for j in range(size):
+                    rows[start + i][shift + start + j] = block[number * size * size + size * i + j]
+    return even, odd
 
 
-def end_conditions(k: Any, z: Any, end: int, odd: bool) -> tuple[Any, Any]:
-    """Return what multiplies E[0], O[0], E[1], O[1] in both conditions of an end, and what couples displacements."""
-    s1, c1, s2, c2 = kernel.pairs(k, z, _RIGHT if end else _LEFT)
-    t1, t2 = kernel.couplings(k, z, _COUPLINGS + (0 if end else 4))
-    if not odd:
-        return (s1, c1, s2, c2), (t1, t2)
-    return (s1, c1, c2, s2), ((t1, t2) if end else (-t1, -t2))  # O is reflected
+def displacements(structure: Structure, even: list[Any], odd: list[Any]) -> tuple[list[Any], list[Any]]:
+    """Return q and P of sections whose E and O are given."""
+    q = [odd[i] if structure.odd[i] else even[i] for i in range(structure.n)]
+    return q, [even[i] if structure.odd[i] else odd[i] for i in range(structure.n)]
 
 
-def second_displacement(columns: Any, odd: bool) -> tuple[Any, ...]:
-    """Return the second displacement on the four columns."""
-    return (*columns[6:8], *columns[10:12]) if odd else (*columns[2:4], *columns[14:16])
+def _value(structure: Structure, k: Entries, z: Any, columns: Sequence[Any], basis: Any) -> Any:
+    """Return the determinant of all conditions."""
+    q, force = displacements(structure, *assembled(structure, columns))
+    ends = [
+        kernel.minors([
+            kernel.condition(k, z, structure.condition(end, i), q, force) for i in range(structure.n)
+        ])
+        for end in (1, 0)
+    ]  # fmt: skip
+    return kernel.joined(*ends, structure.n) / basis
+
+
+def _count(
+    structure: Structure,
+    k: Entries,
+    z: Any,
+    matrices: Sequence[Any],
+    waves: Sequence[Any],
+    columns: Sequence[Any],
+    bases: Sequence[Any],
+) -> tuple[Any, Any]:
+    """Return the count by a chain of end conditions, and the last determinant.
+
+    From E = 0 at both ends, one condition at a time becomes what it is. Free to sprung takes 0 or 1 away, or adds it
+    where inertia outweighs the spring; held to whatever it is gives 0 or 1 more.
+    """
+    n, number, basis = structure.n, 0.0, 1.0
+    for block, (_, b), wave, column, own in zip(structure.blocks, matrices, waves, columns, bases, strict=True):
+        size = block[1] - block[0]
+        table = [k[structure.table(i) : structure.table(i) + 4] for i in range(*block)]
+        held = [
+            kernel.determinant([column[part * size * size + size * i :][:size] for i in range(size)]) for part in (0, 3)
+        ]
+        slopes = kernel.elementary(table, z)[1]
+        shear = _shears(structure, block, b)
+        number = kernel.reference(_mu(wave, slopes), shear, held[0] * held[1] * own) + number
+        basis = own if isinstance(basis, float) else basis * own
+    even, odd = assembled(structure, columns)
+    q, force = displacements(structure, even, odd)
+    rows = {0: list(even), 1: list(even)}
+    found = {end: kernel.minors(rows[end]) for end in (0, 1)}
+    value = kernel.joined(found[1], found[0], n)
+    for end, i in structure.steps(k):
+        first = structure.condition(end, i)
+        rows[end][i] = kernel.condition(k, z, first, q, force)
+        found[end] = kernel.minors(rows[end])
+        value = kernel.joined(found[1], found[0], n)
+        sprung = k[first + i] - z * k[first + n + i] > 0.0
+        number = kernel.adaptable(value * basis, number, kernel.where(sprung, -1.0, 1.0) if structure.odd[i] else 1.0)
+    return number, value / basis
+
+
+def _prepared(structure: Structure, k: Entries, z: Any, kind: str) -> tuple[Any, ...]:
+    """Return matrices, waves, columns and their bases of all blocks."""
+    matrices, blocks = sections(structure, k, z), structure.blocks
+    waves = [block_waves(structure, block, *both) for block, both in zip(blocks, matrices, strict=True)]
+    given = zip(blocks, matrices, waves, strict=True)
+    columns, bases = zip(
+        *(block_columns(structure, block, *both, own, kind) for block, both, own in given), strict=True
+    )
+    return matrices, waves, columns, bases
+
+
+def _functions(structure: Structure, kinds: Sequence[str]) -> dict[str, Callable[[Entries, Any], Sequence[Any]]]:
+    """Return the functions of the coefficients of a lane and of z, or of half waves along the length."""
+
+    def value(kind: str) -> Callable[[Entries, Any], Sequence[Any]]:
+        def found(k: Entries, z: Any) -> Sequence[Any]:
+            _, _, columns, bases = _prepared(structure, k, z, kind)
+            return [_value(structure, k, z, columns, _product(bases))]
+
+        return found
+
+    def count(kind: str) -> Callable[[Entries, Any], Sequence[Any]]:
+        return lambda k, z: _count(structure, k, z, *_prepared(structure, k, z, kind))
+
+    def kind_of(k: Entries, z: Any) -> Sequence[Any]:
+        largest = max(structure.blocks, key=lambda block: block[1] - block[0])
+        (a, b) = sections(structure, k, z)[structure.blocks.index(largest)]
+        return [0.0 if len(a) == 1 else regime(block_waves(structure, largest, a, b))]
+
+    found = {f"_value_{kind}": value(kind) for kind in kinds}
+    found |= {f"_count_{kind}": count(kind) for kind in kinds}
+    return found | {"_regime": kind_of, "_branch": lambda k, turns: [lowest_branch(structure, k, turns)]}
+
+
+@cache
+def formulas(structure: Structure, known: tuple[int | None, ...], kinds: tuple[str, ...] = ()) -> str:
+    """Return the text of ``_value_kind`` and ``_count_kind`` for kinds of regimes, of ``_regime`` and ``_branch``.
+
+    They take coefficients, of which some are known, a lane or lanes, and z or half waves along the length. Default: the
+    kinds that `Determinant` needs.
+    """
+    functions = _functions(structure, kinds or KINDS[max(structure.sizes)])
+    texts = [straight("_wave", lambda _, m: kernel.wave_anywhere(m), ["m"])]
+    texts += [straight(name, function, ["z"], known) for name, function in functions.items()]
+    return "\n\n\n".join(texts) + "\n"
+
+
+def direct(structure: Structure, known: tuple[int | None, ...]) -> Functions:
+    """Return what the text of `formulas` defines, without text: slower."""
+
+    def of_lanes(function: Callable[[Entries, Any], Sequence[Any]]) -> Callable[..., Any]:
+        def found(k: Floats, i: Any, z: Any) -> Any:
+            rows = iter(k)
+            results = function([Exact(value) if value is not None else next(rows)[i] for value in known], z)
+            return results[0] if len(results) == 1 else tuple(results)
+
+        return found
+
+    return {name: of_lanes(function) for name, function in _functions(structure, KINDS[max(structure.sizes)]).items()}
+
+
+def _product(bases: Sequence[Any]) -> Any:
+    found = bases[0]
+    for basis in bases[1:]:
+        found = found if isinstance(basis, float) else basis if isinstance(found, float) else found * basis
+    return found
+
+
+def kept(structure: Structure, known: Sequence[int | None]) -> list[int | None]:
+    """Return what is known of coefficients, but for rows of matrices that would be left out as a whole."""
+    kept, n = list(known), structure.n
+    for first in structure.matrices:
+        for start, stop in structure.blocks:
+            for i in range(start, stop):
+                row = [first + shift + n * i + j for shift in (0, n * n) for j in range(start, stop)]
+                if stop - start > 1 and all(known[place] == 0 for place in row):
+                    for place in row:
+                        kept[place] = None
+    return kept
+
+
+def lowest_branch(structure: Structure, k: Entries, turns: Any) -> Any:
+    """Return the lowest z of free waves of ``turns`` half waves along the length."""
+    wave = turns * (0.5 * np.pi) * (turns * (0.5 * np.pi))
+    lowest = None
+    for block in structure.blocks:
+        table = [k[structure.table(i) : structure.table(i) + 4] for i in range(*block)]
+        z = kernel.branch(wave, table)
+        lowest = z if lowest is None else kernel.where((z < lowest) | (lowest != lowest), z, lowest)
+    return lowest
 
 
 class Determinant:
@@ -181,167 +275,54 @@ class Determinant:
 
     Parameters
     ----------
-    k : ndarray, shape (42, rows)
+    k : ndarray, shape (varying coefficients, rows)
         From `UniformProblem.coefficients`.
-    odd : bool
-        Whether the second displacement is odd under reflection.
+    structure : Structure
+    functions : mapping of str to callable
+        What the text of `formulas` defines.
     zeros : ndarray of int, shape (rows,)
         Multiplicity of the zero at z = 0, which is divided out of the values.
     """
 
-    def __init__(self, k: Floats, odd: bool, zeros: Integers) -> None:
-        self.k, self.odd, self.zeros = k, odd, zeros
-        used: NDArray[np.bool_] = np.any(k, axis=1)
-        for first in (*range(_A, _A + 4, 2), *range(_B, _B + 4, 2)):  # no row of a matrix is left out
-            used[first : first + 2] |= not used[[first, first + 1, first + 4, first + 5]].any()
-        self._entries = [row if entry else _ZERO for row, entry in zip(k, used, strict=True)]
+    def __init__(self, k: Floats, structure: Structure, functions: Functions, zeros: Integers) -> None:
+        self.k, self.structure, self.zeros = k, structure, zeros
+        self._functions, self._kinds = functions, KINDS[max(structure.sizes)]
 
     def take(self, rows: Integers) -> Determinant:
         """Return the functions of some of the rows."""
-        return Determinant(self.k[:, rows], self.odd, self.zeros[rows])
+        return Determinant(self.k[:, rows], self.structure, self._functions, self.zeros[rows])
 
     @np.errstate(all="ignore")
     def value(self, z: Floats) -> Floats:
         """Return the determinant over ``z**zeros``."""
         result = np.empty(z.size)
-        for part, _, columns, basis, ends in self._regimes(z):
-            second = self._second(columns)
-            ends = (kernel.minors(*kernel.conditions(*end, columns, second)) for end in ends)
-            result[part] = kernel.joined(*ends) / basis
+        for kind, part in self._regimes(z):
+            result[part] = self._functions[f"_value_{kind}"](self.k, part, z[part])
         return self._deflated(result, z)
 
     @np.errstate(all="ignore")
     def count(self, z: Floats) -> tuple[Integers, Floats]:
         """Return the exact number of zeros below z (for z > 0 those at 0 included), and the value."""
         number, result = np.empty(z.size, dtype=np.int64), np.empty(z.size)
-        slopes = 0.5 * self.k[29] + z * self.k[30], self.k[32] + 2.0 * z * self.k[33], self._shears(z)
-        for part, waves, columns, basis, (right, left) in self._regimes(z):
-            more = (entry[part] for entry in slopes)
-            count = kernel.chain(columns, self._second(columns), right, left, basis, *waves[:3], *more, self.odd)
-            number[part], result[part] = count
+        for kind, part in self._regimes(z):
+            number[part], result[part] = self._functions[f"_count_{kind}"](self.k, part, z[part])
         return number, self._deflated(result, z)
 
     def branch(self, turns: float) -> Floats:
         """Return the lowest z of free waves of ``turns`` half waves along the length."""
-        z: Floats = kernel.branch((0.5 * np.pi * turns) ** 2, *self.k[_POLYNOMIALS:_COUPLINGS])
-        return z
+        z: Floats = self._functions["_branch"](self.k, slice(None), turns)
+        return z + np.zeros(self.zeros.size)
 
     def _deflated(self, value: Floats, z: Floats) -> Floats:
         return value / z**self.zeros if self.zeros.any() else value
 
-    def _end(self, z: Floats, end: int) -> tuple[Any, ...]:
-        """Return what multiplies E and O in both conditions of an end, and what couples the displacements."""
-        return end_conditions(self._entries, z, end, self.odd)
-
-    def _second(self, columns: tuple[Any, ...]) -> tuple[Any, ...]:
-        return second_displacement(columns, self.odd)
-
-    def _shears(self, z: Floats) -> NDArray[np.bool_]:
-        b11, b12, b21, b22 = kernel.linear(self._entries, z, _B)
-        found: NDArray[np.bool_] = self.odd & (b11 * b22 - b12 * b21 < 0.0)
-        return found
-
-    def _regimes(self, z: Floats) -> Iterator[tuple[Any, Any, Any, Floats, Any]]:
-        """Yield, for each regime: its members, wave numbers, columns at the right end, their basis, end conditions."""
-        a, b = kernel.linear(self._entries, z, _A), kernel.linear(self._entries, z, _B)
-        groups = a, b, kernel.wave_numbers(a, b), *(entry for end in (1, 0) for entry in self._end(z, end))
-        near, close = kernel.regime(*groups[2][:3])
-        for name, mask in (("near", near), ("close", close & ~near), ("distant", ~(near | close))):
-            members = np.flatnonzero(mask)
-            if not members.size:
-                continue
-            part = slice(None) if members.size == z.size else members
-            a, b, waves, *ends = (tuple(entry[part] for entry in group) for group in groups)
-            if name != "near":
-                pair = (kernel.half_sums if name == "close" else kernel.eigenvalues)(*waves[:3])
-                functions = *kernel.wave(pair[0]), *kernel.wave(pair[1])
-            if name == "distant":
-                *columns, basis = kernel.distant_columns(a, b, *waves, *functions)
-            else:
-                series = kernel.close_series(*pair, *functions) if name == "close" else kernel.near_series(*waves[:3])
-                *factors, exponent = series
-                columns, basis = kernel.close_columns(a, b, *waves, *factors), np.exp(-exponent)
-            yield part, waves, tuple(columns), basis, (ends[:2], ends[2:])
-
-
-def rigid_motions(problem: UniformProblem) -> Integers:
-    """Return how many independent motions without strain energy and without deflected springs each row has.
-
-    Exact: such a motion has P = 0, so ``q' = A_qq q`` with ``A_Pq q = 0``, and is zero where an end has stiffness. Only
-    linear dependence of a few rows of numbers decides.
-    """
-    rows, n = problem.stiffness.shape[1:]
-    result = np.zeros(rows, dtype=np.int64)
-    sprung = problem.stiffness > 0.0
-    coupled = np.zeros(rows, dtype=bool) if problem.couplings is None else problem.couplings[0].any(axis=0)
-    open_ = np.flatnonzero(coupled | ~sprung.all(axis=2).any(axis=0))
-    if not open_.size:
-        return result
-    gradient, force = _static_blocks(problem, open_)
-    right, left = np.eye(n), np.eye(n)
-    power = term = np.broadcast_to(np.eye(n), gradient.shape)
-    conditions = [force]
-    for j in range(1, n):
-        power = power @ gradient
-        conditions.append(force @ power)
-        term = power / float(np.prod(range(1, j + 1)))
-        right, left = right + term, left + (-1.0) ** j * term
-    for end, motion in ((0, left), (1, right)):
-        conditions.append(_end_stiffness(problem, end, open_) @ motion)
-    result[open_] = n - _ranks(np.concatenate(conditions, axis=1))
-    return result
-
-
-def _static_blocks(problem: UniformProblem, rows: Integers) -> tuple[Floats, Floats]:
-    """Return A_qq and A_Pq at z = 0 times half the length, shape (rows, n, n) each."""
-    n, even = problem.stiffness.shape[2], problem.even
-    h = 0.5 * problem.length[rows, None, None]
-    a, b = problem.odd_by_even[0, rows] * h, problem.even_by_odd[0, rows] * h
-    first, second = slice(0, even), slice(even, n)
-    gradient, force = np.zeros(a.shape), np.zeros(a.shape)
-    gradient[:, first, second], gradient[:, second, first] = b[:, first, second], a[:, second, first]
-    force[:, first, first], force[:, second, second] = a[:, first, first], b[:, second, second]
-    return gradient, force
-
-
-def _end_stiffness(problem: UniformProblem, end: int, rows: Integers) -> Floats:
-    """Return the stiffness matrices of an end, each row over its size; an infinite one holds its displacement."""
-    stiffness = problem.stiffness[end, rows]
-    held = np.isinf(stiffness)
-    matrix = np.where(held, 1.0, stiffness)[:, :, None] * np.eye(2)
-    if problem.couplings is not None:
-        matrix[:, [0, 1], [1, 0]] = np.where(held, 0.0, problem.couplings[0, end, rows, None])
-    size = np.abs(matrix).max(axis=2, keepdims=True)
-    return matrix / np.where(size > 0.0, size, 1.0)
-
-
-def _ranks(matrix: Floats) -> Integers:
-    """Return the rank of each matrix of a stack with few columns, by elimination with rows of unit size."""
-    rest = matrix.copy()
-    rank = np.zeros(len(rest), dtype=np.int64)
-    every = np.arange(len(rest))
-    for _ in range(matrix.shape[2]):
-        size = np.abs(rest).max(axis=2)
-        rest = rest / np.where(size > 0.0, size, 1.0)[:, :, None]
-        best = np.abs(rest).max(axis=1).argmax(axis=1)
-        pivot_row = np.abs(rest[every, :, best]).argmax(axis=1)
-        pivot = rest[every, pivot_row, best]
-        rank += pivot != 0.0
-        factor = rest[every, :, best] / np.where(pivot == 0.0, 1.0, pivot)[:, None]
-        rest = rest - factor[:, :, None] * rest[every, pivot_row][:, None, :]
-        rest = np.where(np.abs(rest) < _DEPENDENT, 0.0, rest)
-    return rank
-
-
-@np.errstate(invalid="ignore", over="ignore", divide="ignore")
-def negative_energy(problem: UniformProblem) -> NDArray[np.bool_]:
-    """Return where static strain energy may be negative, as in compression: only there can a row buckle."""
-    _, force = _static_blocks(problem, np.arange(len(problem.length)))
-    off = force[:, 0, 1]
-    scale = np.abs(force[:, 0, 0] * force[:, 1, 1])
-    definite = force[:, 0, 0] * force[:, 1, 1] - off * force[:, 1, 0] >= -1e-15 * scale
-    if problem.couplings is not None:
-        for stiffness, coupling in zip(problem.stiffness, problem.couplings[0], strict=True):
-            definite &= (coupling == 0.0) | (stiffness[:, 0] * stiffness[:, 1] >= (1.0 - 1e-14) * coupling**2)
-    found: NDArray[np.bool_] = ~((force[:, 0, 0] >= 0.0) & (force[:, 1, 1] >= 0.0) & definite)
-    return found
+    def _regimes(self, z: Floats) -> Iterator[tuple[str, Any]]:
+        """Yield each regime and its members."""
+        if len(self._kinds) == 1:
+            yield self._kinds[0], slice(None)
+            return
+        place = self._functions["_regime"](self.k, slice(None), z)
+        for at, kind in enumerate(self._kinds):
+            members = np.flatnonzero(place == at)
+            if members.size:
+                yield kind, slice(None) if members.size == z.size else members

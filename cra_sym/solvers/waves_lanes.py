@@ -2,26 +2,26 @@
 # mypy: ignore-errors
 """Template of the compiled twin of `cra_sym.solvers.waves`: the same steps, for blocks of lanes at once.
 
-The text of `cra_sym.solvers.waves_kernel` stands before it (see `waves.template`). All regimes of a lane are evaluated
-and one is taken, so that loops over lanes have no branch.
+The functions of a lane stand behind it (see `waves.template`): ``_value`` and ``_count``, in any regime or for waves of
+both signs, ``_regime`` and ``_branch``. In any regime all are evaluated and one is taken, so that loops over lanes have
+no branch.
 """
 
 import numpy as np
 
 _LANES = 128
-_ENTRIES = 42
 _MOST_STEPS = 400
 _EPS = 2.220446049250313e-16
 
 
-def lowest_waves(out, evaluations, k, zeros, odd):
-    """Fill ``out`` (lanes, modes) with the lowest roots from coefficients ``k`` (42, lanes).
+def lowest_waves(out, evaluations, k, zeros):
+    """Fill ``out`` (lanes, modes) with the lowest roots from coefficients ``k`` (entries, lanes).
 
     Returns 0, or one more than a lane in which the points did not reach enough roots, or -1 if a search did not settle.
     """
-    modes = out.shape[1]
+    modes, entries = out.shape[1], k.shape[0]
     most = 2 * modes + 64
-    own, moved = np.empty((_ENTRIES, _LANES)), np.empty((_ENTRIES, _LANES))
+    own, moved = np.empty((entries, _LANES)), np.empty((entries, _LANES))
     points, values = np.empty((most, _LANES)), np.empty((most, _LANES))
     counts, rigid = np.empty((most, _LANES), np.int64), np.empty(_LANES, np.int64)
     state = np.empty((8, _LANES))  # of roots on their way
@@ -30,24 +30,24 @@ def lowest_waves(out, evaluations, k, zeros, odd):
     z = np.empty(_LANES)
     for first in range(0, out.shape[0], _LANES):
         size = min(_LANES, out.shape[0] - first)
-        for entry in range(_ENTRIES):
+        for entry in range(k.shape[0]):
             for lane in range(size):
                 own[entry, lane] = k[entry, first + lane]
         for lane in range(size):
             rigid[lane] = zeros[first + lane]
-        last = _counted(points, counts, values, own, rigid, odd, modes, most, size)
+        last = _counted(points, counts, values, own, rigid, modes, most, size)
         evaluations[1] += last * size
         if last == most:
             return 1 + first
         for number in range(modes):
             _bracketed(bracket, at, points, counts, values, number, last, size)
-            evaluations[1] += _isolated(bracket, at, place, left, moved, own, rigid, odd, number, size)
-            _opened(bracket, own, rigid, odd, number, size)
+            evaluations[1] += _isolated(bracket, at, place, left, moved, own, rigid, number, size)
+            _opened(bracket, own, rigid, number, size)
             many = _started(z, state, bracket, at, place, rigid, number, size)
-            for entry in range(_ENTRIES):
+            for entry in range(k.shape[0]):
                 for i in range(many):
                     moved[entry, i] = own[entry, place[i]]
-            steps = _interpolated(z, state, place, left, moved, rigid, odd, number, many, evaluations)
+            steps = _interpolated(z, state, place, left, moved, rigid, number, many, evaluations)
             if steps == _MOST_STEPS:
                 return -1
             for lane in range(size):
@@ -56,100 +56,29 @@ def lowest_waves(out, evaluations, k, zeros, odd):
     return 0
 
 
-def _lane(k, i):
-    return (
-        k[0, i], k[1, i], k[2, i], k[3, i], k[4, i], k[5, i], k[6, i], k[7, i], k[8, i], k[9, i], k[10, i], k[11, i],
-        k[12, i], k[13, i], k[14, i], k[15, i], k[16, i], k[17, i], k[18, i], k[19, i], k[20, i], k[21, i], k[22, i],
-        k[23, i], k[24, i], k[25, i], k[26, i], k[27, i], k[28, i], k[29, i], k[30, i], k[31, i], k[32, i], k[33, i],
-        k[34, i], k[35, i], k[36, i], k[37, i], k[38, i], k[39, i], k[40, i], k[41, i],
-    )  # fmt: skip
-
-
-def _columns(a, b, waves):
-    """Return the columns of whichever regime it is, and their basis."""
-    half, product, square, e, e12, e21, o, o12, o21 = waves
-    near, close = regime(half, product, square)
-    close_big, close_small = half_sums(half, product, square)
-    distant_big, distant_small = eigenvalues(half, product, square)
-    big, small = where(close, close_big, distant_big), where(close, close_small, distant_small)
-    big_c, big_s = wave(big)
-    small_c, small_s = wave(small)
-    near_c0, near_c1, near_s0, near_s1, near_exponent = near_series(half, product, square)
-    close_c0, close_c1, close_s0, close_s1, close_exponent = close_series(big, small, big_c, big_s, small_c, small_s)
-    c0, c1 = where(near, near_c0, close_c0), where(near, near_c1, close_c1)
-    s0, s1 = where(near, near_s0, close_s0), where(near, near_s1, close_s1)
-    together = close_columns(a, b, half, product, square, e, e12, e21, o, o12, o21, c0, c1, s0, s1)
-    scale = exp(-where(near, near_exponent, close_exponent))
-    far = distant_columns(a, b, half, product, square, e, e12, e21, o, o12, o21, big_c, big_s, small_c, small_s)
-    d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15, basis = far
-    apart = (d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15)
-    return where(near | close, together, apart), where(near | close, scale, basis)
-
-
-def _end(k, z, first, coupling, odd, side):
-    """Return what multiplies E and O in both conditions of an end, and what couples the displacements."""
-    s1, c1, s2, c2 = pairs(k, z, first)
-    t1, t2 = couplings(k, z, coupling)
-    sign = where(odd, side, 1.0)
-    return (s1, c1, where(odd, c2, s2), where(odd, s2, c2)), (sign * t1, sign * t2)
-
-
-def _second(columns, odd):
-    """Return the second displacement on the columns."""
-    odd_one = columns[6], columns[7], columns[10], columns[11]
-    return where(odd, odd_one, (columns[2], columns[3], columns[14], columns[15]))
-
-
-def _value(k, z, odd, zeros):
-    """Return the determinant over z**zeros."""
-    a, b = linear(k, z, 0), linear(k, z, 8)
-    columns, basis = _columns(a, b, wave_numbers(a, b))
-    second = _second(columns, odd)
-    right_pair, right_couplings = _end(k, z, 16, 34, odd, 1.0)
-    left_pair, left_couplings = _end(k, z, 22, 38, odd, -1.0)
-    right1, right2 = conditions(right_pair, right_couplings, columns, second)
-    left1, left2 = conditions(left_pair, left_couplings, columns, second)
-    value = joined(minors(right1, right2), minors(left1, left2)) / basis
-    return _deflated(value, z, zeros)
-
-
 def _deflated(value, z, zeros):
-    value = value / where(zeros > 0, z, 1.0)
-    return value / where(zeros > 1, z, 1.0)
+    for multiplicity in range(3):
+        value = value / (z if zeros > multiplicity else 1.0)
+    return value
 
 
-def _count(k, z, odd, zeros):
-    a, b = linear(k, z, 0), linear(k, z, 8)
-    waves = wave_numbers(a, b)
-    columns, basis = _columns(a, b, waves)
-    b11, b12, b21, b22 = b
-    shear = (odd > 0) & (b11 * b22 - b12 * b21 < 0.0)
-    slope, product_slope = 0.5 * k[29] + z * k[30], k[32] + 2.0 * z * k[33]
-    number, value = chain(
-        columns, _second(columns, odd), _end(k, z, 16, 34, odd, 1.0), _end(k, z, 22, 38, odd, -1.0), basis,
-        waves[0], waves[1], waves[2], slope, product_slope, shear, odd > 0,
-    )  # fmt: skip
-    return number, _deflated(value, z, zeros)
-
-
-def _counted(points, counts, values, k, zeros, odd, modes, most, size):
+def _counted(points, counts, values, k, zeros, modes, most, size):
     """Count at one point after the other until every lane has enough roots; return the last point."""
     for lane in range(size):
-        value = _value(_lane(k, lane), 0.0, odd, 0)
+        value = _value_any(k, lane, 0.0)
         points[0, lane], counts[0, lane] = 0.0, zeros[lane]
         values[0, lane] = value if (zeros[lane] == 0) & (value > 0.0) else np.nan
     for point in range(1, most):
-        wave = (0.5 * np.pi * (point + 0.0625)) ** 2
         for lane in range(size):
-            z = branch(wave, k[28, lane], k[29, lane], k[30, lane], k[31, lane], k[32, lane], k[33, lane])
+            z = _branch(k, lane, point + 0.0625)
             before = points[point - 1, lane]
             points[point, lane] = z if (z > before) & (z < np.inf) else (4.0 * before if before > 0.0 else 1.0)
         least = modes
         for lane in range(size):
             z = points[point, lane]
-            number, value = _count(_lane(k, lane), z, odd, zeros[lane])
-            counts[point, lane], values[point, lane] = number, value
-            least = min(least, number)
+            number, value = _count_any(k, lane, z)
+            counts[point, lane], values[point, lane] = np.int64(number), _deflated(value, z, zeros[lane])
+            least = min(least, np.int64(number))
         if least >= modes:
             return point
     return most
@@ -177,22 +106,25 @@ def _is_crowded(bracket, at, number, lane):
     return wide & ((at[0, lane] < number) | (at[1, lane] > number + 1))
 
 
-def _isolated(bracket, at, place, left, moved, k, zeros, odd, number, size):
+def _isolated(bracket, at, place, left, moved, k, zeros, number, size):
     """Shrink brackets until each holds its root alone, or no number between its ends; return the number of counts."""
     many, counted = 0, 0
     for lane in range(size):
         place[many] = lane
         many += _is_crowded(bracket, at, number, lane) & (zeros[lane] <= number)
-    for entry in range(_ENTRIES):
+    for entry in range(k.shape[0]):
         for i in range(many):
             moved[entry, i] = k[entry, place[i]]
-    while many > 0:
+    steps = 0
+    while (many > 0) & (steps < _MOST_STEPS):
+        steps += 1
         counted += many
         for i in range(many):
             lane = place[i]
             low, high = bracket[0, lane], bracket[1, lane]
             middle = np.sqrt(low * high) if low > 0.0 else high / 64.0
-            found, value = _count(_lane(moved, i), middle, odd, zeros[lane])
+            counts, determinant = _count_any(moved, i, middle)
+            found, value = np.int64(counts), _deflated(determinant, middle, zeros[lane])
             up = found <= number
             bracket[0, lane], bracket[1, lane] = middle if up else low, high if up else middle
             bracket[2, lane], bracket[3, lane] = value if up else bracket[2, lane], bracket[3, lane] if up else value
@@ -203,21 +135,21 @@ def _isolated(bracket, at, place, left, moved, k, zeros, odd, number, size):
             still += _is_crowded(bracket, at, number, place[i])
         for i in range(still):
             place[i] = place[left[i]]
-        for entry in range(_ENTRIES):
+        for entry in range(k.shape[0]):
             for i in range(still):
                 moved[entry, i] = moved[entry, left[i]]
         many = still
     return counted
 
 
-def _opened(bracket, k, zeros, odd, number, size):
+def _opened(bracket, k, zeros, number, size):
     """Replace lower ends at z = 0 where the value is not known by small z on the same side of the root."""
     for lane in range(size):
         if (bracket[0, lane] == 0.0) & (not bracket[2, lane] == bracket[2, lane]) & (zeros[lane] <= number):
             share, before = 1e-3, 0
             while (before == 0) & (share > 1e-300):
                 z = share * bracket[1, lane]
-                value = _value(_lane(k, lane), z, odd, zeros[lane])
+                value = _deflated(_value_any(k, lane, z), z, zeros[lane])
                 side = 0 if (value > 0.0) == ((number & 1) == 0) else 2
                 before = 1 - side // 2
                 bracket[side // 2, lane], bracket[2 + side // 2, lane] = z, value
@@ -245,7 +177,7 @@ def _started(z, state, bracket, at, place, zeros, number, size):
     return many
 
 
-def _interpolated(z, state, place, left, k, zeros, odd, number, many, evaluations):
+def _interpolated(z, state, place, left, k, zeros, number, many, evaluations):
     """Search all roots at once, then those that are not found yet, moved side by side; return the number of steps."""
     sign = 1.0 if (number & 1) == 0 else -1.0
     steps = 0
@@ -253,10 +185,13 @@ def _interpolated(z, state, place, left, k, zeros, odd, number, many, evaluation
         steps += 1
         evaluations[0] += many
         for i in range(many):
+            state[5, i] = state[0, i] + state[4, i] * (state[1, i] - state[0, i])
+        _values(state, k, many)
+        for i in range(many):
             x1, x2, f1, f2 = state[0, i], state[1, i], state[2, i], state[3, i]
             step = state[4, i] * (x2 - x1)
-            x = x1 + step
-            f = sign * _value(_lane(k, i), x, odd, zeros[place[i]])
+            x = state[5, i]
+            f = sign * _deflated(state[7, i], x, zeros[place[i]])
             same = (f > 0.0) == (f1 > 0.0)
             x3, f3 = x1 if same else x2, f1 if same else f2
             x2, f2 = x2 if same else x1, f2 if same else f1
@@ -283,11 +218,24 @@ def _interpolated(z, state, place, left, k, zeros, odd, number, many, evaluation
                 place[i] = place[j]
                 state[0, i], state[1, i], state[2, i] = state[0, j], state[1, j], state[2, j]
                 state[3, i], state[4, i] = state[3, j], state[4, j]
-            for entry in range(_ENTRIES):
+            for entry in range(k.shape[0]):
                 for i in range(still):
                     k[entry, i] = k[entry, left[i]]
         many = still
     return steps
+
+
+def _values(state, k, many):
+    """Fill in the determinants where the searches are."""
+    others = 0
+    for i in range(many):
+        others += _regime(k, i, state[5, i]) != 2.0
+    if others == 0:
+        for i in range(many):
+            state[7, i] = _value_mixed(k, i, state[5, i])
+    else:
+        for i in range(many):
+            state[7, i] = _value_any(k, i, state[5, i])
 
 
 def _sort(out):

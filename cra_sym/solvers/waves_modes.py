@@ -1,4 +1,4 @@
-"""Mode shapes of uniform problems with two waves a section, in closed form from the columns of the determinant.
+"""Mode shapes of uniform problems with up to three waves a section, in closed form from the columns of the determinant.
 
 The modal mass is exact without quadrature: for motions ``y(x; z)`` with ``y' = A(z) y``, the kinetic energy of a
 section is the derivative of ``q_z P - P_z q`` along x, so its integral is what that has at the ends. The derivative by
@@ -12,13 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import waves_kernel
+from . import waves_kernel, waves_three
 from .shapes import clusters
-from .waves_count import Floats, UniformProblem, end_conditions, second_displacement
+from .waves_count import KINDS, assembled, block_waves, displacements, lowest_branch, regime, sections, signs
+from .waves_problem import Floats, Structure, UniformProblem
 
 __all__ = ["wave_states"]
 
-kernel: Any = waves_kernel  # formulas of arrays, without types: they are compiled text too
+kernel: Any = waves_kernel  # formulas of arrays and terms, without types
+three: Any = waves_three
 
 Complexes = NDArray[np.complex128]
 
@@ -51,57 +53,93 @@ def wave_states(problem: UniformProblem, z: Floats, share: Floats) -> Floats:
     rows, modes = z.shape
     row = np.repeat(np.arange(rows), modes)
     place, joined = clusters(z)
+    structure = problem.structure
     with np.errstate(all="ignore"):
-        k = problem.coefficients()[:, row]
-        unit = kernel.branch((0.5 * np.pi) ** 2, *k[28:34])
+        k = problem.take(row).all_coefficients()
+        unit = lowest_branch(structure, k, 1.0)
         step = _STEP * np.where(np.isfinite(unit) & (unit > 0.0), unit, 1.0)
         moved = joined.ravel() + 1j * step
-        columns = _columns(k, moved, np.broadcast_to(_PLACES, (row.size, len(_PLACES))))
-        conditions = [_conditions(k, joined.ravel(), at, problem.even) for at in np.moveaxis(columns.real, 2, 0)]
-        null = _null_vectors(np.array(conditions), place.ravel())
-        ends = columns[..., 0]
-        null = _normalised(null.reshape(rows, modes, 4), place, _mass(problem, row, ends, step, null.shape[0] // modes))
-        along = _columns(k, moved, 2.0 * share[row] - 1.0).real
-    even, odd = _parts(along, null.reshape(row.size, 4)[..., None])
-    order = problem.even
-    q = np.concatenate([even[:order], odd[order:]])
-    force = np.concatenate([odd[:order], even[order:]])
-    states = np.moveaxis(np.concatenate([q, force]), 0, -1)
+        columns = _columns(structure, k, moved, np.broadcast_to(_PLACES, (row.size, len(_PLACES))))
+        conditions = _conditions(structure, k, joined.ravel(), columns.real)
+        null = _null_vectors(np.moveaxis(conditions, -1, 0), place.ravel())
+        mass = _mass(problem, row, columns[..., 0], step, null.shape[0] // modes)
+        null = _normalised(null.reshape(rows, modes, 2 * structure.n), place, mass)
+        along = _columns(structure, k, moved, 2.0 * share[row] - 1.0).real
+    even, odd = _parts(along, null.reshape(row.size, -1)[..., None])
+    states = np.moveaxis(np.concatenate(displacements(structure, list(even), list(odd))), 0, -1)
     size = np.abs(states).max(axis=(1, 2), keepdims=True, initial=0.0)
-    return np.where(np.abs(states) > _TINY_SHARE * size, states, 0.0).reshape(rows, modes, -1, 4)
+    return np.where(np.abs(states) > _TINY_SHARE * size, states, 0.0).reshape(rows, modes, *states.shape[1:])
 
 
-def _columns(k: Floats, z: Complexes, place: Floats) -> Complexes:
-    """Return E and O of the E-columns, O and E of the O-columns, shape (16, roots, stations).
+def _columns(structure: Structure, k: Floats, z: Complexes, place: Floats) -> Complexes:
+    """Return E and O on all columns, shape (2, n, 2 n, roots, stations).
 
     ``place`` is x in half lengths from mid-span, shape (roots, stations); each column is over its size at the ends.
     """
-    entries = k[:, :, None]
-    a, b = kernel.linear(entries, z[:, None], 0), kernel.linear(entries, z[:, None], 8)
-    waves = kernel.wave_numbers(a, b)
-    near, close = (mask[:, 0] for mask in kernel.regime(*(entry.real for entry in waves[:3])))
-    result = np.empty((16, *place.shape), dtype=complex)
-    for name, mask in (("near", near), ("close", close & ~near), ("distant", ~(near | close))):
-        part = np.flatnonzero(mask)
-        if not part.size:
-            continue
-        x = np.where(place[part] == 0.0, _TINY, place[part])  # quotients of sizes that vanish at mid-span
-        square = x * x
-        a_part, b_part, w = (tuple(entry[part] for entry in group) for group in (a, b, waves))
-        if name == "near":
-            c0, c1, s0, s1, _ = kernel.near_series(w[0] * square, w[1] * square * square, w[2] * square * square)
-        else:
-            pair = (kernel.half_sums if name == "close" else kernel.eigenvalues)(*w[:3])
-            functions = [value for m in pair for value in _waves(m, x)]
-            if name == "close":
-                c0, c1, s0, s1, _ = kernel.close_series(*(m * square for m in pair), *functions)
-        if name == "distant":
-            big_c, big_s, small_c, small_s = functions
-            columns = kernel.distant_columns(a_part, b_part, *w, big_c, x * big_s, small_c, x * small_s)[:16]
-        else:
-            columns = kernel.close_columns(a_part, b_part, *w, c0, square * c1, x * s0, x * square * s1)
-        result[:, part] = columns
+    n = structure.n
+    result = np.zeros((2, n, 2 * n, *place.shape), dtype=complex)
+    blocks = []
+    for block, (a, b) in zip(structure.blocks, sections(structure, k[:, :, None], z[:, None]), strict=True):
+        waves = block_waves(structure, block, a, b)
+        size = block[1] - block[0]
+        found = np.empty((4 * size * size, *place.shape), dtype=complex)
+        place_of_kind = regime(_real(waves)) if size > 1 else 0.0
+        for at, kind in enumerate(KINDS[size]):
+            part = np.flatnonzero(np.broadcast_to(place_of_kind == at, (len(z), 1)))
+            if part.size:
+                x = np.where(place[part] == 0.0, _TINY, place[part])  # quotients of sizes that vanish at mid-span
+                a_part, b_part, own = _members((a, b, waves), part)
+                columns = _block(signs(structure, block), a_part, b_part, own, x, kind)
+                found[:, part] = np.array([np.broadcast_to(entry, x.shape) for entry in columns])
+        blocks.append(found)
+    for half, rows in enumerate(assembled(structure, blocks)):
+        for i in range(n):
+            for c in range(2 * n):
+                if isinstance(rows[i][c], np.ndarray):
+                    result[half, i, c] = rows[i][c]
     return result
+
+
+def _real(waves: Any) -> Any:
+    return tuple(_real(entry) if isinstance(entry, tuple) else np.real(entry) for entry in waves)
+
+
+def _members(values: Any, part: Any) -> Any:
+    if isinstance(values, tuple):
+        return tuple(_members(value, part) for value in values)
+    return values[part] if isinstance(values, np.ndarray) and values.ndim else values
+
+
+def _block(reflected: list[int], a: Any, b: Any, waves: Any, x: Floats, kind: str) -> Any:
+    """Return the columns of a block at places x, in one regime."""
+    if len(a) == 1:
+        c, s = _waves(waves[0], x)
+        return kernel.columns_of_one(a[0], b[0], c, x * s)
+    if len(a) == 4:
+        return _pair(a, b, waves, x, kind)
+    _, mu, pair, matrices, vectors, masks, _ = waves
+    if kind == "series":
+        found = three.near_columns(a, b, reflected, x * x)
+        return (*found[:9], *(x * entry for entry in found[9:18]), *found[18:27], *(x * entry for entry in found[27:]))
+    c, s = _waves(mu, x)
+    single = kernel.columns_of_one(*vectors[:2], c, x * s)
+    return three.joined_columns(single, _pair(matrices[:4], matrices[4:], pair, x, kind), vectors, masks)
+
+
+def _pair(a: Any, b: Any, waves: Any, x: Floats, kind: str) -> Any:
+    """Return the columns of a block of two at places x, in one regime."""
+    square = x * x
+    if kind == "near":
+        series = kernel.near_series(waves[0] * square, waves[1] * square * square, waves[2] * square * square)
+    else:
+        pair = (kernel.half_sums if kind == "close" else kernel.eigenvalues)(*waves[:3])
+        functions = [value for m in pair for value in _waves(m, x)]
+        if kind != "close":
+            big_c, big_s, small_c, small_s = functions
+            return kernel.distant_columns(a, b, *waves, big_c, x * big_s, small_c, x * small_s)[:16]
+        series = kernel.close_series(*(m * square for m in pair), *functions)
+    c0, c1, s0, s1, _ = series
+    return kernel.close_columns(a, b, *waves, c0, square * c1, x * s0, x * square * s1)
 
 
 def _waves(m: Complexes, x: Floats) -> tuple[Complexes, Complexes]:
@@ -112,25 +150,25 @@ def _waves(m: Complexes, x: Floats) -> tuple[Complexes, Complexes]:
 
 
 def _parts(columns: Any, null: Any) -> tuple[Any, Any]:
-    """Return E and O of combinations of the columns, shape (2, ...) each."""
-    e, o, p, q = columns.reshape(4, 2, 2, *columns.shape[1:])
-    v, u = np.moveaxis(null, 1, 0)[:2], np.moveaxis(null, 1, 0)[2:]
-    return (e * v).sum(axis=1) + (q * u).sum(axis=1), (o * v).sum(axis=1) + (p * u).sum(axis=1)
+    """Return E and O of combinations of the columns, shape (n, ...) each."""
+    even, odd = (columns * np.moveaxis(null, 1, 0)).sum(axis=2)
+    return even, odd
 
 
-def _conditions(k: Floats, z: Floats, columns: Floats, even: int) -> Floats:
-    """Return the matrix of the end conditions on the four columns, shape (roots, 4, 4)."""
-    rows = []
+def _conditions(structure: Structure, k: Floats, z: Floats, columns: Floats) -> Floats:
+    """Return the matrix of the end conditions on the columns, shape (roots, 2 n, 2 n, places)."""
+    n, rows = structure.n, []
+    q, force = displacements(structure, *columns)
+    entries = k[:, :, None]
     for end, sign in ((1, 1.0), (0, -1.0)):
-        found = kernel.conditions(
-            *end_conditions(k, z, end, even == 1), columns, second_displacement(columns, even == 1)
-        )
-        rows += [[x1, x2, sign * y1, sign * y2] for x1, x2, y1, y2 in found]
-    return np.moveaxis(np.array(rows), -1, 0)
+        for i in range(n):
+            found = kernel.condition(entries, z[:, None], structure.condition(end, i), q, force)
+            rows.append([*found[:n], *(sign * value for value in found[n:])])
+    return np.moveaxis(np.array(rows), 2, 0)
 
 
 def _null_vectors(matrices: Floats, place: NDArray[np.int64]) -> Floats:
-    """Return the null vectors of the first of some matrices, shape (places, roots, 4, 4), all of which set the scale.
+    """Return the null vectors of the first of some matrices; all of them, (places, roots, 2 n, 2 n), set the scale.
 
     A column that meets the conditions at the ends by itself is rounding there, but not elsewhere. Of several vectors of
     an equal root it is the one in its place.
@@ -143,12 +181,13 @@ def _null_vectors(matrices: Floats, place: NDArray[np.int64]) -> Floats:
     rows = np.where(rows > 0.0, rows, 1.0)
     balanced = matrices[0] * scale[:, None, :] / rows[:, :, None]
     vectors = np.linalg.svd(balanced)[2]
-    return vectors[np.arange(len(place)), 3 - place] * np.where(zero, 1.0, scale)
+    return vectors[np.arange(len(place)), -1 - place] * np.where(zero, 1.0, scale)
 
 
 def _mass(problem: UniformProblem, row: NDArray[np.int64], ends: Complexes, step: Floats, rows: int) -> Any:
     """Return the function (i, first, second) that is the modal mass of two motions of mode i in every row."""
-    sign = np.where(np.arange(2) < problem.even, 1.0, -1.0)[:, None]
+    structure, n = problem.structure, problem.structure.n
+    sign = np.where(problem.odd, -1.0, 1.0)[:, None]
     columns, rate = ends.real, ends.imag / step
     modes = row.size // rows
 
@@ -156,16 +195,14 @@ def _mass(problem: UniformProblem, row: NDArray[np.int64], ends: Complexes, step
         here = slice(i, None, modes)
         total = np.zeros(rows)
         for end, side in ((1, 1.0), (0, -1.0)):
-            flip = np.array([1.0, 1.0, side, side])
+            flip = np.repeat([1.0, side], n)
             # at the left end E of O-columns and O of E-columns have the other sign
-            states = [_parts(columns[:, here], vector * flip) for vector in (first, second)]
+            states = [_parts(columns[..., here], vector * flip) for vector in (first, second)]
             (e1, o1), (e2, o2) = ((e, side * o) for e, o in states)
-            e_rate, o_rate = _parts(rate[:, here], first * flip)
+            e_rate, o_rate = _parts(rate[..., here], first * flip)
             total += side * (sign * (e_rate * o2 - side * o_rate * e2)).sum(axis=0)
-            q1, q2 = (np.where(sign > 0.0, e, o) for e, o in ((e1, o1), (e2, o2)))
-            total += (problem.mass[end].T * q1 * q2).sum(axis=0)
-            if problem.couplings is not None:
-                total += problem.couplings[1, end] * (q1[0] * q2[1] + q1[1] * q2[0])
+            q1, q2 = (np.array(displacements(structure, list(e), list(o))[0]) for e, o in ((e1, o1), (e2, o2)))
+            total += np.einsum("ir,rij,jr->r", q1, problem.end_rows(end)[1], q2)
         return total
 
     return mass

@@ -11,8 +11,8 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from typing import Any
 from unittest import mock
 
@@ -24,7 +24,8 @@ import cra_sym as cra
 from cra_sym import symbols as s
 from cra_sym.kernels import compiled, has_compiler
 from cra_sym.kernels.parts import in_parts
-from cra_sym.solvers.waves import Search, UniformProblem, lowest_waves, template
+from cra_sym.kernels.plain import functions_of
+from cra_sym.solvers.waves import QUICK, Functions, Search, UniformProblem, formulas, lowest_waves, template
 from tests.benchmarks.machine import in_rounds, processors, summary
 
 SEED = 20261130
@@ -98,16 +99,12 @@ def _determinant(model: cra.Model) -> Callable[..., float]:
     return lambda omega, *values: made(complex(omega), *values).real
 
 
-@cache
-def _search() -> Search:
-    return compiled(template(), {}).lowest_waves  # type: ignore[no-any-return]
-
-
 class Case:
     """One family with every route to its frequencies."""
 
     def __init__(self, family: Family) -> None:
-        self.family, self.problem = family, problem(family.values)
+        known = family.model.numerics("route").known
+        self.family, self.problem = family, replace(problem(family.values), known=known)
         omega = np.sqrt(lowest_waves(self.problem.take(slice(0, 20_000)), MODES + 1))
         middle = 0.5 * (omega[:, :-1] + omega[:, 1:])
         self.omega = omega[:, :MODES]
@@ -143,17 +140,28 @@ class Case:
 
     def ours(self, number: int) -> np.ndarray:
         """Solve by this package in NumPy."""
-        return np.sqrt(lowest_waves(self.problem.take(slice(0, number)), MODES))
+        return np.sqrt(lowest_waves(self.problem.take(slice(0, number)), MODES, None, self.functions))
 
     def compiled(self, number: int, threads: int) -> np.ndarray:
         """Solve by this package, compiled."""
         result = np.empty((number, MODES))
 
         def fill(part: slice) -> None:
-            result[part] = np.sqrt(lowest_waves(self.problem.take(part), MODES, _search()))
+            result[part] = np.sqrt(lowest_waves(self.problem.take(part), MODES, self.search))
 
         in_parts(fill, number, MODES, threads=threads, compiled=True)
         return result
+
+    @cached_property
+    def functions(self) -> Functions:
+        """The formulas for NumPy, as the model of the family has them."""
+        assert self.problem.known is not None
+        return functions_of(formulas(self.problem.structure, self.problem.known), QUICK)
+
+    @cached_property
+    def search(self) -> Search:
+        """The compiled twin for the family, as its model has it."""
+        return compiled(template(self.problem.structure, self.problem.known), {}).lowest_waves  # type: ignore[no-any-return]
 
     def public(self, number: int) -> np.ndarray:
         """Solve as a user does."""
@@ -162,7 +170,7 @@ class Case:
 
     def public_numpy(self, number: int) -> np.ndarray:
         """Solve as a user without a compiler does."""
-        with mock.patch("cra_sym.model.two_waves.wants_compiler", return_value=False):
+        with mock.patch("cra_sym.model.waves.wants_compiler", return_value=False):
             return self.public(number)
 
     def routes(self) -> dict[str, tuple[int, Callable[[int], np.ndarray]]]:

@@ -46,73 +46,80 @@ def beams(
     couplings = None
     if offset is not None:
         springs[3, :, 1] += springs[3, :, 0] * offset**2
-        couplings = np.zeros((2, 2, *shape))
-        couplings[1, 1] = springs[3, :, 0] * offset
+        couplings = np.zeros((2, 2, *shape, 2, 2))
+        couplings[1, 1, :, 0, 1] = couplings[1, 1, :, 1, 0] = springs[3, :, 0] * offset
     return UniformProblem(length.copy(), a, b, springs[:2], springs[2:], couplings=couplings)
 
 
 def positions(problem: UniformProblem) -> tuple[list[int], list[int]]:
     """Return where E and O stand in the state (q, P)."""
-    return ([0, 3], [2, 1]) if problem.even == 1 else ([0, 1], [2, 3])
+    n = len(problem.odd)
+    even = [n + i if odd else i for i, odd in enumerate(problem.odd)]
+    return even, [(place + n) % (2 * n) for place in even]
+
+
+def system(problem: UniformProblem) -> np.ndarray:
+    """Return the matrix of a section: constants and factors of z, shape (2, rows, 2 n, 2 n)."""
+    e, o = (np.array(places) for places in positions(problem))
+    found = np.zeros((2, len(problem.length), len(e) * 2, len(e) * 2))
+    found[:, :, o[:, None], e] = problem.odd_by_even
+    found[:, :, e[:, None], o] = problem.even_by_odd
+    return found
+
+
+def end_matrices(problem: UniformProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return stiffness and mass of both ends, shape (rows, 2 n, 2 n), and the motions that they allow as columns."""
+    rows, n = problem.stiffness.shape[1:]
+    stiff, heavy = np.zeros((2, rows, 2 * n, 2 * n))
+    held = np.isinf(problem.stiffness)
+    assert (held == held[:, :1]).all()
+    basis = np.eye(2 * n)
+    for end in (0, 1):
+        here = slice(end * n, (end + 1) * n)
+        stiff[:, here, here] = np.where(held[end], 0.0, problem.stiffness[end])[:, :, None] * np.eye(n)
+        heavy[:, here, here] = problem.mass[end][:, :, None] * np.eye(n)
+        if problem.couplings is not None:
+            stiff[:, here, here] += problem.couplings[0, end]
+            heavy[:, here, here] += problem.couplings[1, end]
+        if problem.ties is not None:
+            assert (problem.ties[end] == problem.ties[end, :1]).all()
+            basis[here, here] += problem.ties[end, 0]
+    return stiff, heavy, basis[:, ~held[:, 0].ravel()]
 
 
 def stiffness(problem: UniformProblem) -> DynamicStiffness:
     """Return the dynamic stiffness of a problem whose rows hold the same displacements."""
-    e, o = positions(problem)
-    system = np.zeros((2, len(problem.length), 4, 4))
-    system[:, :, np.array(o)[:, None], e] = problem.odd_by_even
-    system[:, :, np.array(e)[:, None], o] = problem.even_by_odd
-    springs, masses = (np.concatenate(list(ends), axis=1) for ends in (problem.stiffness, problem.mass))
-    held = np.isinf(springs[0])
-    assert (np.isinf(springs) == held).all()
-    springs = np.where(held, 0.0, springs)
+    section, (stiff, heavy, free) = system(problem), end_matrices(problem)
 
     def at(z, rows, share):
-        return (system[0, rows] + z[:, None, None] * system[1, rows])[:, None], system[1, rows][:, None]
+        return (section[0, rows] + z[:, None, None] * section[1, rows])[:, None], section[1, rows][:, None]
 
     def ends(z, rows):
-        stiff, heavy = springs[rows, :, None] * np.eye(4), masses[rows, :, None] * np.eye(4)
-        if problem.couplings is not None:
-            for matrix, coupling in zip((stiff, heavy), problem.couplings, strict=True):
-                for end, (i, j) in enumerate(((0, 1), (2, 3))):
-                    matrix[:, i, j] = matrix[:, j, i] = coupling[end, rows]
-        return stiff - z[:, None, None] * heavy, -heavy
+        return stiff[rows] - z[:, None, None] * heavy[rows], -heavy[rows]
 
-    return DynamicStiffness(at, ends, problem.length, 2, 0, np.eye(4)[:, ~held])
+    return DynamicStiffness(at, ends, problem.length, len(problem.odd), 0, free)
 
 
 def determinant(problem: UniformProblem, row: int, z: Any) -> Any:
     """Return the determinant of the end conditions on the transfer matrix of the whole length, in many digits."""
-    e, o = positions(problem)
-    system = mp.zeros(4)
-    for rows, columns, part in ((o, e, problem.odd_by_even), (e, o, problem.even_by_odd)):
-        for i, r in enumerate(rows):
-            for j, c in enumerate(columns):
-                system[r, c] = mpf(part[0, row, i, j]) + z * mpf(part[1, row, i, j])
-    transfer = mp.expm(system * mpf(problem.length[row]))
-
-    def pair(end, i):
-        spring, mass = problem.stiffness[end, row, i], problem.mass[end, row, i]
-        return (mpf(1), mpf(0)) if np.isinf(spring) else (mpf(spring) - z * mpf(mass), mpf(1))
-
-    left, right = ([pair(end, i) for i in range(2)] for end in (0, 1))
-    off = mpf(0)
-    if problem.couplings is not None:
-        assert not problem.couplings[:, 0, row].any()
-        off = mpf(problem.couplings[0, 1, row]) - z * mpf(problem.couplings[1, 1, row])
-    # motions that meet the conditions s q = c P at the left end, and what they leave of s q + c P at the right
-    ends = [left[j][1] * transfer[:, j] + left[j][0] * transfer[:, 2 + j] for j in range(2)]
-    rest = [[right[i][0] * end[i] + right[i][1] * (end[2 + i] + off * end[1 - i]) for end in ends] for i in range(2)]
-    return rest[0][0] * rest[1][1] - rest[0][1] * rest[1][0]
+    n, constant, slope = len(problem.odd), *system(problem)[:, row]
+    transfer = mp.expm((mp.matrix(constant) + z * mp.matrix(slope)) * mpf(problem.length[row]))
+    stiff, heavy, free = end_matrices(problem.take(np.array([row])))
+    boundary, free = mp.matrix(stiff[0]) - z * mp.matrix(heavy[0]), mp.matrix(free)
+    # unknown: P at the left end and the free motions of both; q of the right end, then forces on the free motions
+    left, right = free[:n, :], free[n:, :]
+    size = free.cols
+    found = mp.zeros(n + size)
+    found[:n, :n], found[:n, n:] = transfer[:n, n:], transfer[:n, :n] * left - right
+    found[n:, n:] = right.T * transfer[n:, :n] * left + free.T * boundary * free
+    found[n:, :n] = right.T * transfer[n:, n:] - left.T
+    return mp.det(found)
 
 
 def distance(problem: UniformProblem, row: int, z: float) -> float:
     """Return the relative distance of z to the root next to it, by the secant method in extended precision."""
-    system = np.zeros((4, 4))
-    e, o = positions(problem)
-    system[np.ix_(o, e)] = problem.odd_by_even[0, row] + z * problem.odd_by_even[1, row]
-    system[np.ix_(e, o)] = problem.even_by_odd[0, row] + z * problem.even_by_odd[1, row]
-    growth = np.abs(np.linalg.eigvals(system).real).max() * problem.length[row]
+    constant, slope = system(problem)[:, row]
+    growth = np.abs(np.linalg.eigvals(constant + z * slope).real).max() * problem.length[row]
     with mp.workdps(50 + int(2.0 * growth)):  # the determinant cancels to exp(-2 growth) of its terms
         old, new = mpf(z), mpf(z) * (1 + mpf(10) ** -13)
         at_old, at_new = determinant(problem, row, old), determinant(problem, row, new)

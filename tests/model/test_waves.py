@@ -1,0 +1,164 @@
+"""Models with one to three wave numbers beside those of the arm: closed forms against dynamic stiffness and Ritz."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import cra_sym as cra
+from cra_sym.kernels import compiled, has_compiler
+from cra_sym.model.routes import GeneralRoute
+from cra_sym.model.waves import Waves
+from cra_sym.solvers.waves import lowest_waves, template
+from tests.solvers.wave_problems import INF
+
+x, t, L = sp.Symbol("x"), sp.Symbol("t"), sp.Symbol("L")
+v, w, phi, theta = (sp.Function(name)(x, t) for name in ("v", "w", "phi", "theta"))
+EI, GJ, m, m_2, J, y, T, T_2, K, k, k_2, m_e, G, I = sp.symbols("EI GJ m m_2 J y T T_2 K k k_2 m_e G I")
+HALF = sp.Rational(1, 2)
+BEAM = HALF * m * v.diff(t) ** 2 - HALF * EI * v.diff(x, 2) ** 2
+STRING = HALF * m_2 * w.diff(t) ** 2 - HALF * T_2 * w.diff(x) ** 2
+TWIST = HALF * m * (v.diff(t) + y * phi.diff(t)) ** 2 + HALF * J * phi.diff(t) ** 2 - HALF * GJ * phi.diff(x) ** 2
+THICK = HALF * m * v.diff(t) ** 2 + HALF * I * theta.diff(t) ** 2 - HALF * EI * theta.diff(x) ** 2
+GIVEN = {
+    "EI": 1.3, "GJ": 0.4, "m": 1.1, "m_2": 0.7, "J": 0.05, "y": 0.2, "T": 3.0, "T_2": 5.0, "K": 20.0, "k": 30.0,
+    "k_2": 7.0, "m_e": 0.4, "L": 1.2, "G": 40.0, "I": 0.01,
+}  # fmt: skip
+
+
+def model(density, fields, left, right, *essential):
+    return cra.Model(density, fields=fields, x=x, domain=(0, L), t=t, left=left, right=right, essential=list(essential))
+
+
+@cache
+def models():
+    tip, joint = HALF * m_e * v.diff(t) ** 2, -HALF * k * v**2
+    lever = HALF * m_e * (v.diff(t) + 2 * y * phi.diff(t)) ** 2
+    return {
+        "string on a foundation": model(
+            HALF * m * v.diff(t) ** 2 - HALF * T * v.diff(x) ** 2 - HALF * K * v**2, [v], joint, tip
+        ),
+        "bending and torsion": model(
+            TWIST - HALF * EI * v.diff(x, 2) ** 2, [v, phi], joint - HALF * k_2 * phi**2, lever, v.diff(x).subs(x, 0)
+        ),
+        "bending and torsion on a foundation": model(
+            TWIST - HALF * EI * v.diff(x, 2) ** 2 - HALF * K * v**2 - HALF * T * v.diff(x) ** 2,
+            [v, phi], joint - HALF * k_2 * phi**2, tip, v.diff(x).subs(x, 0),
+        ),
+        "beam tied to a string": model(
+            BEAM + STRING, [v, w], joint, tip, v.diff(x).subs(x, 0), w.subs(x, 0), (v - w).subs(x, L)
+        ),
+        "beam and string with a spring between the ends": model(
+            BEAM + STRING, [v, w], joint, tip - HALF * k_2 * (v - w) ** 2, w.subs(x, 0)
+        ),
+        "beam and string on an elastic layer": model(
+            BEAM + STRING - HALF * K * (v - w) ** 2, [v, w], joint, tip - HALF * k_2 * (v - w) ** 2, w.subs(x, 0)
+        ),
+        "Timoshenko beam beside a string": model(
+            THICK - HALF * G * (v.diff(x) - theta) ** 2, [v, theta], joint, tip, theta.subs(x, 0)
+        ),
+    }  # fmt: skip
+
+
+def random_values(name, rows, decades=1.0):
+    rng = np.random.default_rng(len(name))
+    return {s.name: GIVEN[s.name] * 10 ** rng.uniform(-decades, decades, rows) for s in models()[name].symbols}
+
+
+def both(system, modes):
+    general = GeneralRoute(system.numerics("spatial"))
+    return system.natural_frequencies(modes), general.angular_frequencies(system.parameters, system.shape, modes)
+
+
+@pytest.mark.parametrize("name", models())
+def test_closed_forms_are_the_dynamic_stiffness(name):
+    system = models()[name].at(random_values(name, 12))
+    assert isinstance(system._route, Waves)
+    found, other = both(system, 5)
+    # the polish of the dynamic stiffness is good to 1e-12 of a squared frequency, and of the last one for soft ones
+    np.testing.assert_allclose(found, other, rtol=1e-10, atol=1e-6 * 1e-6 * other[:, -1].max())
+
+
+@pytest.mark.parametrize("name", models())
+def test_ritz_converges_to_the_closed_forms(name):
+    values = {s.name: GIVEN[s.name] for s in models()[name].symbols}
+    exact = models()[name].natural_frequencies(values, modes=3)
+    coarse, fine = (models()[name].ritz(elements=n).natural_frequencies(values, modes=3) for n in (8, 16))
+    # from above; halving the elements divides the error of the square by 2^4 for slopes linear in an element, or more
+    assert (fine >= exact * (1 - 1e-9)).all()
+    assert ((fine - exact) <= (coarse - exact) / 3.5 + 1e-9 * exact).all()
+    np.testing.assert_allclose(fine, exact, rtol=2e-2)
+
+
+@pytest.mark.parametrize("name", models())
+def test_modes_are_those_of_the_dynamic_stiffness(name):
+    system = models()[name].at({s.name: GIVEN[s.name] for s in models()[name].symbols})
+    ours = system.modes(4)
+    theirs = GeneralRoute(system.numerics("spatial")).modes(system.parameters, (), system.natural_frequencies(4))
+    places = np.linspace(0.0, GIVEN["L"], 7)
+    for field in range(system.numerics("spatial").displacements):
+        size = np.abs(theirs.shape(field, 0, places)).max()
+        np.testing.assert_allclose(
+            ours.shape(field, 0, places), theirs.shape(field, 0, places), atol=1e-8 * size
+        )  # roots to 1e-12, shapes to that over the distance of neighbours
+
+
+@pytest.mark.parametrize("name", models())
+def test_what_is_known_of_the_coefficients_is_so(name):
+    """For infinite stiffness of the ends too."""
+    model = models()[name]
+    values = random_values(name, 3) | {"k": np.array([0.0, 1.0, INF])}
+    if name in ("bending and torsion", "bending and torsion on a foundation"):
+        values["k_2"] = np.array([INF, 0.0, 2.0])
+    system = model.at(values)
+    route = system._route
+    problem = route._problem(np.array([np.broadcast_to(value, 3) for value in system.parameters]))
+    coefficients = problem.all_coefficients()
+    for value, row in zip(route.known, coefficients, strict=True):
+        assert value is None or (row == value).all()
+    found, other = both(system, 4)
+    np.testing.assert_allclose(found, other, rtol=1e-9, atol=1e-9 * other.max())
+
+
+@pytest.mark.skipif(not has_compiler(), reason="needs Numba")
+@pytest.mark.parametrize(
+    "name", ["string on a foundation", "bending and torsion on a foundation", "beam tied to a string"]
+)
+def test_compiled_twins_agree(name):
+    system = models()[name].at(random_values(name, 300))
+    route = system._route
+    problem = route._problem(np.array([np.broadcast_to(value, 300) for value in system.parameters]))
+    search = compiled(template(route.structure, route.known), {}).lowest_waves
+    # three waves that are coupled: roundings of the split, over the distance of the waves
+    np.testing.assert_allclose(lowest_waves(problem, 4, search), lowest_waves(problem, 4), rtol=1e-11)
+
+
+def test_a_string_below_its_cut_off():
+    """A heavy end moves at a frequency below that of the foundation, where no wave runs along the string."""
+    system = models()["string on a foundation"].at({"m": 1.0, "T": 1.0, "K": 100.0, "L": 1.0, "k": INF, "m_e": 5.0})
+    omega = system.natural_frequencies(3)
+    kappa = np.sqrt(100.0 - omega[0] ** 2)
+    assert omega[0] < 10.0
+    np.testing.assert_allclose(kappa, 5.0 * omega[0] ** 2 * np.tanh(kappa), rtol=1e-12)
+    wave = np.sqrt(omega[1:] ** 2 - 100.0)
+    # cos - m_e omega^2 sin / wave of both, over its slope
+    np.testing.assert_allclose(wave / np.tan(wave), 5.0 * omega[1:] ** 2, rtol=1e-9)
+
+
+def test_rigid_motions_of_tied_fields_are_exact_zeros():
+    system = models()["beam and string with a spring between the ends"].at(
+        {**{s.name: GIVEN[s.name] for s in models()["beam and string with a spring between the ends"].symbols},
+         "k": 0.0, "k_2": 0.0}
+    )  # fmt: skip
+    omega = system.natural_frequencies(4)
+    assert (omega[:2] == 0.0).all() and omega[2] > 0.0
+
+
+def test_what_the_count_does_not_know_takes_the_dynamic_stiffness():
+    """Springs between the slopes of a beam and another slope, and ends that are linked."""
+    between = -HALF * k * (v.subs(x, 0) - v.subs(x, L)) ** 2
+    linked = cra.Model(BEAM, fields=[v], x=x, domain=(0, L), t=t, left=between)
+    assert isinstance(linked.at({s.name: GIVEN[s.name] for s in linked.symbols})._route, GeneralRoute)
