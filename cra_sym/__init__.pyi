@@ -1,8 +1,11 @@
 from .analysis.certification import certify as certify
+from .analysis.certified_stability import certify_stability as certify_stability
 from .analysis.critical import critical_value as critical_value
 from .analysis.eigenvalues import count_eigenvalues as count_eigenvalues
 from .analysis.eigenvalues import damping_ratios as damping_ratios
 from .analysis.eigenvalues import eigenvalues as eigenvalues
+from .analysis.floquet import floquet_exponents as floquet_exponents
+from .analysis.floquet import growth_rate as growth_rate
 from .analysis.frequency_response import frequency_response as frequency_response
 from .analysis.identification import AmbiguityWarning as AmbiguityWarning
 from .analysis.identification import MisfitWarning as MisfitWarning
@@ -20,9 +23,7 @@ from .analysis.sensitivities import sensitivities as sensitivities
 from .analysis.shaping import input_shaper as input_shaper
 from .analysis.stability import AsymptoticWarning as AsymptoticWarning
 from .analysis.stability import ResonanceWarning as ResonanceWarning
-from .analysis.stability import floquet_exponents as floquet_exponents
 from .analysis.stability import forced_width as forced_width
-from .analysis.stability import growth_rate as growth_rate
 from .analysis.stability import stability_boundary as stability_boundary
 from .analysis.state_space import state_space as state_space
 from .arm.excitations import JointStiffness as JointStiffness

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from cra_sym.analysis.stability import growth_rate, judged_boundary
+from cra_sym.analysis.floquet import growth_rate
+from cra_sym.analysis.stability import judged_boundary
 from cra_sym.model.excitations import Fluctuation
 from cra_sym.model.system import System
 

@@ -1,37 +1,24 @@
-"""Parametric stability of a system: boundaries by multiple scales, growth by Floquet theory."""
+"""Parametric stability of a system: boundaries by multiple scales."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from functools import cache
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
 from cra_sym import checks
+from cra_sym.analysis.floquet import batch_shape, matrices_of, parametric
 from cra_sym.analysis.modes import participation
-from cra_sym.analysis.static_corrections import static_terms
-from cra_sym.analysis.zones import Zone, first_order_zone, zone_of
-from cra_sym.kernels import Kernel, compiled, derived_kernel, has_compiler
-from cra_sym.kernels.parts import wants_compiler
+from cra_sym.analysis.zones import Zone, derived, first_order_zone, zone_of
+from cra_sym.kernels import derived_kernel
 from cra_sym.model.excitations import Excitation, Fluctuation, Parametric, TransverseBase
 from cra_sym.model.system import MOST_MODES, System
-from cra_sym.solvers import floquet
 
-__all__ = [
-    "AsymptoticWarning",
-    "ResonanceWarning",
-    "floquet_exponents",
-    "forced_width",
-    "growth_rate",
-    "judged_boundary",
-    "stability_boundary",
-]
+__all__ = ["AsymptoticWarning", "ResonanceWarning", "forced_width", "judged_boundary", "stability_boundary"]
 
 _FORCED = derived_kernel("cra_sym.mechanics.boundaries:forced_growth")
-_ROOTS = 5  # of the spectrum, for which the compiled path saves as much as for a point of a chart
 _REACH = 0.5  # share of the half-width by which second order may move the zone
 
 
@@ -59,14 +46,15 @@ def stability_boundary(
     Parameters
     ----------
     system : System
-    excitation : Fluctuation, JointStiffness or AxialBase
+    excitation : Fluctuation, JointStiffness, AxialBase or the model's own `excitation`
     epsilon : array_like
         Not negative.
     resonance : (int, int)
         ``(n, n)`` principal, ``(m, n)`` sum, ``(m, -n)`` difference; modes are counted from 1.
     order : {1, 2}
-        Order in epsilon. The second one moves the zone without changing its width. It contains the response of all
-        modes of the system, not only of the first ``modes``: those beyond the ones computed enter by their statics.
+        Order in epsilon. The second one moves the zone; where the boundary is a derived formula, its width stays. It
+        contains the response of all modes of the system, not only of the first ``modes``: of 24, and of those beyond
+        by their statics where stiffnesses of ends fluctuate and damping is modal.
     modes : int
         How many modes may take part, 1 to 1000; other resonances among them are checked for overlap.
     tongue : {1, 2}
@@ -88,6 +76,13 @@ def stability_boundary(
     ------
     TypeError, ValueError
         If an argument is out of its range or shapes do not broadcast together.
+
+    Notes
+    -----
+    For one stiffness that goes with cos(varpi t) and modal damping, the boundary is derived by multiple scales,
+    (37)-(49). Elsewhere all states but those of the two modes are eliminated to second order
+    (:mod:`cra_sym.solvers.normal_form`). Modes are then those of the whole system with what does not oscillate,
+    dampers and gyroscopic forces included, by ascending frequency.
 
     Examples
     --------
@@ -115,116 +110,26 @@ def judged_boundary(
     tongue: int = 1,
 ) -> tuple[np.ndarray, np.ndarray, list[tuple[type[UserWarning], str]]]:
     """Return what :func:`stability_boundary` does, and what that warns of as kinds and texts, for those who know it."""
-    excitation = _parametric(excitation)
+    excitation = parametric(excitation)
     epsilon = checks.real_array("epsilon", epsilon, low=0.0, unit="1")
     modes = checks.count("modes", modes)
     first, second = _resonance(resonance, modes)
     order, tongue = checks.count("order", order, high=2), checks.count("tongue", tongue, high=2)
-    if tongue > order:
+    shape = batch_shape(system, excitation, epsilon=epsilon)
+    if tongue > order and not any(d.oscillation.order == tongue for d in excitation.drives(system, modes)):
         raise ValueError("order = 1: the second tongue appears at order 2")
-    shape = _shape(system, excitation, epsilon=epsilon)
     zone = zone_of(system, excitation, epsilon, first, second, tongue, modes)
+    alone = derived(matrices_of(system, excitation, modes))
     doubts = [
-        *_explained(zone, excitation, first, second),
+        *_explained(zone, alone, excitation, first, second),
         *_doubted(zone, system, excitation, epsilon, (first, second), modes, rival=tongue == 1),
     ]
-    middle = zone.centre + (zone.shift if order == 2 else 0.0)
+    if order == 1:
+        zone = first_order_zone(system, excitation, epsilon, first, second, modes, tongue)
+    middle = zone.centre + zone.shift
     sides = (np.broadcast_to(middle + sign * zone.half_width, shape) for sign in (-1.0, 1.0))
     lower, upper = (side[()] + 0.0 for side in sides)
     return lower, upper, doubts
-
-
-@checks.default_floating_point
-def growth_rate(
-    system: System,
-    excitation: Excitation,
-    angular_frequency: Any,
-    epsilon: Any,
-    modes: int = 3,
-    *,
-    residual: bool = False,
-    tolerance: float = 1e-8,
-    backend: str = "auto",
-) -> np.ndarray:
-    """Return the rate at which vibration grows: max(0, largest real part of the Floquet exponents).
-
-    The couplings are those of (36a) and (36b); the method is in :mod:`cra_sym.solvers.floquet`.
-
-    Parameters
-    ----------
-    system : System
-    excitation : Fluctuation, JointStiffness or AxialBase
-    angular_frequency : array_like
-        Excitation frequency varpi, rad/s, positive.
-    epsilon : array_like
-        Not negative.
-    modes : int
-        How many modes move, 1 to 1000.
-    residual : bool
-        Whether the static flexibility of the modes left out is kept, for fluctuating stiffnesses of ends: few modes
-        then do for what would take many. Without it the system is its first modes and nothing else.
-    tolerance : float
-        Relative error of the monodromy matrix.
-    backend : {'auto', 'numpy', 'numba'}
-        'auto' compiles for large charts if Numba is there, by the policy for frequencies.
-
-    Returns
-    -------
-    ndarray
-        1/s, shape broadcast from system, excitation, angular_frequency and epsilon.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If an argument is out of its range, as a :class:`TransverseBase`, ``residual`` without fluctuating stiffnesses
-        of ends and 'numba' without Numba are; if shapes do not broadcast together; or if a period takes more than 1e7
-        steps.
-
-    Examples
-    --------
-    >>> from cra_sym import Arm, JointStiffness
-    >>> arm = Arm.nominal().replace(k_t=1e4)
-    >>> print(growth_rate(arm, JointStiffness(), [186.0, 187.15, 188.0], 0.1).round(3))
-    [0.    0.102 0.   ]
-    """
-    taken = _taken(system, excitation, angular_frequency, epsilon, modes, residual)
-    return floquet.growth_rate(**taken, tolerance=tolerance, loop=_loop(backend, taken))[()]
-
-
-@checks.default_floating_point
-def floquet_exponents(
-    system: System,
-    excitation: Excitation,
-    angular_frequency: Any,
-    epsilon: Any,
-    modes: int = 3,
-    *,
-    residual: bool = False,
-    tolerance: float = 1e-8,
-    backend: str = "auto",
-) -> np.ndarray:
-    """Return all Floquet exponents of the excited system, largest real part first.
-
-    The first one's real part is the growth rate before it is cut at zero, so with damping it tells the margin.
-    Imaginary parts are given between -1/2 and 1/2 of the excitation frequency.
-
-    Parameters
-    ----------
-    system, excitation, angular_frequency, epsilon, modes, residual, tolerance, backend
-        As in :func:`growth_rate`.
-
-    Returns
-    -------
-    complex ndarray, shape (..., 2 modes)
-        1/s; ``...`` is broadcast from system, excitation, angular_frequency and epsilon.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As :func:`growth_rate`.
-    """
-    taken = _taken(system, excitation, angular_frequency, epsilon, modes, residual)
-    return floquet.floquet_exponents(**taken, tolerance=tolerance, loop=_loop(backend, taken))
 
 
 @checks.default_floating_point
@@ -266,24 +171,6 @@ def forced_width(system: System, excitation: TransverseBase, modes: int = 3) -> 
     return _FORCED(system.natural_frequencies(modes), participation(system, modes), tip, 1.0, amplitude)
 
 
-def _parametric(excitation: Any) -> Parametric:
-    if isinstance(excitation, TransverseBase):
-        raise ValueError(
-            f"excitation = {excitation!r}: in linear theory a transverse base only forces the system and has no "
-            "boundary; see forced_width"
-        )
-    if not isinstance(excitation, Parametric):
-        raise TypeError(
-            f"excitation = {checks.shown(excitation)}: must be a Fluctuation, such as JointStiffness, or an AxialBase"
-        )
-    return excitation
-
-
-def _shape(system: Any, excitation: Excitation, **arrays: np.ndarray) -> tuple[int, ...]:
-    checks.instance("system", system, System)
-    return checks.broadcastable(system=np.empty(system.shape), excitation=np.empty(excitation.shape), **arrays)
-
-
 def _resonance(resonance: Any, modes: int) -> tuple[int, int]:
     allowed = f"must be (n, n), (m, n) or (m, -n) with modes from 1 to {modes}"
     try:
@@ -303,7 +190,9 @@ def _resonance(resonance: Any, modes: int) -> tuple[int, int]:
     return (-second, -first) if second < 0 and first < -second else (first, second)
 
 
-def _explained(zone: Zone, excitation: Parametric, first: int, second: int) -> Iterator[tuple[type[UserWarning], str]]:
+def _explained(
+    zone: Zone, alone: bool, excitation: Parametric, first: int, second: int
+) -> Iterator[tuple[type[UserWarning], str]]:
     """Say why there is no zone, where there is none."""
     name = f"resonance ({first}, {second})"
     rest = zone.centre <= 0
@@ -315,7 +204,9 @@ def _explained(zone: Zone, excitation: Parametric, first: int, second: int) -> I
         ),
         (
             ~rest & (zone.strength < 0),
-            "there is none: P is symmetric, and a difference resonance needs P_mn P_nm < 0",
+            "there is none: P is symmetric, and a difference resonance needs P_mn P_nm < 0"
+            if alone
+            else "there is none: one of the modes takes what the other one gives",
         ),
         (~rest & (zone.strength > 0) & np.isnan(zone.half_width), "epsilon is below the threshold that damping sets"),
     ]
@@ -376,52 +267,3 @@ def _overlapping(
 def _touches(zone: Zone, centre: np.ndarray, half_width: np.ndarray) -> bool:
     with np.errstate(invalid="ignore"):
         return bool(np.any(np.abs(centre - zone.centre - zone.shift) < half_width + zone.half_width))
-
-
-def _loop(backend: str, taken: dict[str, Any]) -> floquet.Loop | None:
-    """Return the compiled loop of the Floquet solver if it is asked for, or pays."""
-    checks.choice("backend", backend, ("auto", "numpy", "numba"))
-    if backend == "numba" and not has_compiler():
-        raise ValueError("backend = 'numba': Numba is not installed; backend must be 'auto' or 'numpy'")
-    points = np.broadcast(taken["angular_frequency"], taken["epsilon"], taken["omega"][..., 0]).size
-    compile = backend == "auto" and wants_compiler(_ROOTS * points, _template_parts)
-    return _template().kick_and_drift if compile or backend == "numba" else None
-
-
-@cache
-def _template() -> Any:
-    return compiled(*_template_parts())
-
-
-def _template_parts() -> tuple[str, dict[str, Kernel]]:
-    return files("cra_sym.solvers").joinpath("floquet_lanes.py").read_text(encoding="utf-8"), {}
-
-
-def _taken(
-    system: System, excitation: Excitation, angular_frequency: Any, epsilon: Any, modes: int, residual: bool
-) -> dict[str, Any]:
-    """Return what the Floquet solver takes."""
-    excitation = _parametric(excitation)
-    frequency = checks.real_array("angular_frequency", angular_frequency, low=1e-300, unit="rad/s")
-    epsilon = checks.real_array("epsilon", epsilon, low=0.0, unit="1")
-    _shape(system, excitation, angular_frequency=frequency, epsilon=epsilon)
-    modes = checks.count("modes", modes, high=MOST_MODES)
-    if system.numerics("damping") is not None:
-        raise ValueError("the dampers of the model couple its modes: use modal damping (zeta) for parametric stability")
-    omega = system.natural_frequencies(modes)
-    taken: dict[str, Any] = {
-        "omega": omega,
-        "angular_frequency": frequency,
-        "epsilon": epsilon,
-        "decay": np.asarray(system.zeta)[..., None] * omega,
-    }
-    if residual:
-        if not isinstance(excitation, Fluctuation) or not excitation.springs(system):
-            raise ValueError(f"residual = True needs fluctuating stiffnesses of ends, not {excitation!r}")
-        taken["coupling"], taken["compliance"] = static_terms(system, excitation, modes)
-    else:
-        # P grows with a power of the frequency: that factor goes with epsilon, which varies over a chart anyway
-        taken["coupling"] = excitation.unit_coupling(system, modes)[..., None, :, :]
-        if excitation.power:
-            taken["epsilon"] = epsilon * frequency**excitation.power
-    return taken

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from cra_sym.analysis.floquet import Matrices, matrices_of
+from cra_sym.analysis.reduced_zones import reduced_zone
 from cra_sym.analysis.static_corrections import moments_of_other_modes
 from cra_sym.kernels import Kernel, derived_kernel
 from cra_sym.model.excitations import Fluctuation, Parametric
@@ -69,13 +71,21 @@ def _quantities(
     _, labels = _kind(first, second)
     omega = system.natural_frequencies(modes)
     centre = (omega[..., first - 1] + np.sign(second) * omega[..., abs(second) - 1]) / tongue
-    coupling, slope = excitation.coupling(system, modes, centre), excitation.slope(system, modes, centre)
+    coupling, slope = _coupling(system, excitation, modes, centre)
     values: dict[str, Any] = {"epsilon": epsilon}
     for a, i in labels.items():
         values |= {f"omega_{a}": omega[..., i], f"c_{a}": np.asarray(system.zeta) * omega[..., i], f"S_{a}": 0.0}
         for b, k in labels.items():
             values |= {f"P_{a}{b}": coupling[..., i, k], f"dP_{a}{b}": slope[..., i, k], f"W_{a}{b}": 0.0}
     return values, centre, coupling
+
+
+def _coupling(system: System, excitation: Parametric, modes: int, varpi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return P and dP/dvarpi, shape (..., modes, modes)."""
+    (drive,) = excitation.drives(system, modes)
+    assert drive.stiffness is not None
+    power, varpi = drive.oscillation.power, varpi[..., None, None]
+    return varpi**power * drive.stiffness, power * varpi ** max(power - 1, 0) * drive.stiffness
 
 
 def _sums(
@@ -120,10 +130,21 @@ def _paths_of_other_modes(
     return second, fourth
 
 
+def derived(matrices: Matrices) -> bool:
+    """Tell whether the derived boundaries hold: one stiffness that goes with cos(varpi t), symmetric, modal damping."""
+    if not matrices.only_stiffness or len(matrices.drives) != 1:
+        return False
+    ((order, kind, _), stiffness, *_) = matrices.drives[0]
+    symmetric = stiffness is not None and np.array_equal(stiffness, stiffness.swapaxes(-1, -2))
+    return symmetric and order == 1 and kind == "cos"
+
+
 def zone_of(
     system: System, excitation: Parametric, epsilon: np.ndarray, first: int, second: int, tongue: int, modes: int
 ) -> Zone:
     """Return a zone to second order; modes are counted from 1, and ``second`` is negative for a difference."""
+    if not derived(matrices_of(system, excitation, modes)):
+        return _reduced(system, excitation, epsilon, (first, second), tongue, max(modes, _SPECTATORS), 2)
     kind, labels = _kind(first, second)
     modes = max(modes, _SPECTATORS)
     omega = system.natural_frequencies(modes)
@@ -134,10 +155,29 @@ def zone_of(
         return replace(zone, shift=_with_damping(f"shift_{kind}_{tongue}", values, system)[0])
 
 
-def first_order_zone(
-    system: System, excitation: Parametric, epsilon: np.ndarray, first: int, second: int, modes: int
+def _reduced(
+    system: System,
+    excitation: Parametric,
+    epsilon: np.ndarray,
+    resonance: tuple[int, int],
+    tongue: int,
+    modes: int,
+    order: int,
 ) -> Zone:
-    """Return a zone to first order."""
+    centre, sides = reduced_zone(system, excitation, epsilon, resonance, tongue, modes, order)
+    middle, half_width = (sides.lower + sides.upper) / 2, (sides.upper - sides.lower) / 2
+    there = (sides.strength > 0) & (centre > 0)
+    strength = np.where(np.abs(sides.strength) < 1e-20 * centre**2, 0.0, sides.strength)
+    half_width = np.where(there, half_width, np.nan)
+    return Zone(centre, half_width, half_width, np.where(there, middle - centre, 0.0), strength)
+
+
+def first_order_zone(
+    system: System, excitation: Parametric, epsilon: np.ndarray, first: int, second: int, modes: int, tongue: int = 1
+) -> Zone:
+    """Return a zone to first order; one of derived boundaries has tongue 1."""
+    if not derived(matrices_of(system, excitation, modes)):
+        return _reduced(system, excitation, epsilon, (first, second), tongue, modes, 1)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         values, centre, _ = _quantities(system, modes, excitation, epsilon, first, second, 1)
         return _zone(_kind(first, second)[0], 1, values, centre, system)

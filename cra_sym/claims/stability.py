@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cra_sym.analysis.floquet import growth_rate
 from cra_sym.analysis.modes import modal_parameters
-from cra_sym.analysis.stability import AsymptoticWarning, growth_rate, judged_boundary
+from cra_sym.analysis.stability import AsymptoticWarning, judged_boundary
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.claims.motions import tip
 from cra_sym.claims.pictures import PALETTE, STYLES, note

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from cra_sym.analysis.floquet import growth_rate
 from cra_sym.analysis.floquet_boundary import floquet_boundary
-from cra_sym.analysis.stability import forced_width, growth_rate, judged_boundary
+from cra_sym.analysis.stability import forced_width, judged_boundary
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
 from cra_sym.figures.drawing import panels

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Literal
 
-from sympy import Derivative, Dummy, Expr, Heaviside, S, Symbol, SympifyError, cancel, integrate, sympify
+from sympy import Derivative, Expr, S, Symbol, SympifyError, cancel, integrate, sympify
 from sympy.core.function import AppliedUndef
 
 from cra_sym.checks import mapping, shown
@@ -14,9 +14,11 @@ from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics.breakpoints import derivative
 from cra_sym.mechanics.jets import END_NAMES, Jet
 from cra_sym.mechanics.weak import Bilinear, WeakForm, weak_form
+from cra_sym.model.conservative_part import conservative_part, stiffness_beside
 from cra_sym.model.driven import driven, driven_coordinate, driven_displacement, driven_spatial, pushed
 from cra_sym.model.energies import stress_route
 from cra_sym.model.exact import BallProblem, exact_kernel
+from cra_sym.model.excited import axial, fluctuating, fluctuation
 from cra_sym.model.forms import form_of, load_of
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.moving import jumps
@@ -30,9 +32,32 @@ from cra_sym.model.spatial import SpatialProblem, spatial_problem
 from cra_sym.model.symmetry import asymmetry
 from cra_sym.model.waves import waves_route
 
-__all__ = ["axial", "causes", "complex_modes", "constant", "damping", "driven", "driven_coordinate",
-           "driven_displacement", "driven_spatial", "geometry", "inertia", "load", "named_observables", "names",
-           "observable", "pencil", "pushed", "rates", "route", "spatial"]  # fmt: skip
+__all__ = [
+    "axial",
+    "causes",
+    "complex_modes",
+    "conservative_part",
+    "constant",
+    "damping",
+    "driven",
+    "driven_coordinate",
+    "driven_displacement",
+    "driven_spatial",
+    "fluctuating",
+    "fluctuation",
+    "geometry",
+    "inertia",
+    "load",
+    "named_observables",
+    "names",
+    "observable",
+    "pencil",
+    "pushed",
+    "rates",
+    "route",
+    "spatial",
+    "stiffness_beside",
+]
 
 
 def names(model: Model) -> tuple[str, ...]:
@@ -238,40 +263,6 @@ def _add(form: Bilinear, pair: tuple[Jet, Jet], power: int, value: Expr) -> None
     entry[power] = entry.get(power, S.Zero) + value
 
 
-def axial(model: Model) -> Form:
-    """Return the stiffness that a unit acceleration of the frame along x, towards the right, gives the first field.
-
-    What moves across the domain moves along it too: the inertia of all mass beyond x, at the right end included, acts
-    on the foreshortening v_x^2 / 2 there, so that (36b) follows from the kinetic energy. A mass m that an end carries
-    on a rigid lever e, of velocity v_t + e v_xt, adds m e v_x^2 / 2; m e is its coupling of both.
-    """
-    weak = weak_form(model.equations.variation)
-    space = weak.variation.space
-    field, tip, slope = Jet(0, 0, 0, None), Jet(0, 0, 0, "right"), Jet(0, 1, 0, None)
-    density = weak.inside.get((field, field), {}).get(2, S.Zero)
-    place = Dummy("x")
-    beyond = integrate(density.subs(space.x, place), (place, space.x, space.ends["right"]))
-    load = beyond + weak.ends.get((tip, tip), {}).get(2, S.Zero)
-    for point in weak.points:
-        load += point.form.get((field, field), {}).get(2, S.Zero) * Heaviside(point.place - space.x)
-    for number, unknown in enumerate(space.unknowns):
-        lumped = Jet(number, 0, 0, None)
-        if space.is_field(number) or weak.discrete.get((lumped, lumped), {}).get(2, S.Zero) == 0:
-            continue
-        if not any(lumped in pair and 2 in orders for pair, orders in weak.inside.items()):
-            raise ValueError(
-                f"axial: the place along x of the mass that moves by {unknown} is not known; state the work of the "
-                "axial load in the Lagrangian and let its amplitude fluctuate"
-            )
-    levers: dict[tuple[Jet, Jet], dict[int, Expr]] = {}
-    for end in (*END_NAMES, *range(len(weak.points))):
-        displacement, turn = Jet(0, 0, 0, end), Jet(0, 1, 0, end)
-        moment = weak.discrete.get((displacement, turn), {}).get(2, S.Zero)
-        if moment != 0:
-            levers[turn, turn] = {0: moment}
-    return form_of(weak, {"axial": ({(slope, slope): {0: load}}, levers)}, model.symbols)
-
-
 def carried(model: Model, name: str) -> Kernel:
     """Return the (mass, damping, stiffness) that a prescribed motion moves when nothing deforms, by the parameters."""
     freed = model.freed(name)
@@ -338,21 +329,6 @@ def _end_parameters(model: Model, unit: Expr) -> dict[str, EndParameter]:
 def damped(model: Model) -> bool:
     """Return whether the Lagrangian or the virtual work has terms of first order in time."""
     return model.state_form.damped
-
-
-def fluctuation(model: Model, name: str) -> str:
-    """Return why a parameter cannot fluctuate about its value in a parametric excitation, or an empty text."""
-    weak = weak_form(model.equations.variation)
-    symbol = next(s for s in model.symbols if s.name == name)
-    if any(end.has(symbol) for end in weak.variation.space.ends.values()):
-        return "is a length of the domain"
-    entries = [entry for form in (weak.inside, weak.discrete) for entry in form.values()]
-    if any(value.diff(symbol) != 0 for entry in entries for power, value in entry.items() if power):
-        return "changes the mass or the damping"
-    rates = [entry[0].diff(symbol) for entry in entries if 0 in entry]
-    if not any(rates):
-        return "changes no stiffness"
-    return "does not enter the stiffness linearly" if any(rate.has(symbol) for rate in rates) else ""
 
 
 def conservative(model: Model) -> bool:

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.checks import broadcastable, real_array, shown
+from cra_sym.model.modal_matrices import between_modes
+from cra_sym.model.projection import Load, project
 from cra_sym.model.system import System
 from cra_sym.model.values import Value, frozen
+from cra_sym.solvers.floquet import Oscillation
 
-__all__ = ["AxialBase", "Excitation", "Fluctuation", "Parametric", "TransverseBase"]
+if TYPE_CHECKING:
+    from cra_sym.model.lagrangian import Model
+
+__all__ = ["AxialBase", "Drive", "Excitation", "Fluctuation", "LagrangianTerms", "Parametric", "TransverseBase"]
 
 Array = NDArray[np.float64]
 
@@ -59,42 +65,113 @@ def _rebuilt(kind: type[Excitation], numbers: dict[str, Any]) -> Excitation:
     return kind(**numbers)
 
 
-class Parametric(Excitation):
-    """An excitation that makes the equations of motion periodic: epsilon cos(varpi t) P between the modes.
+class Drive(NamedTuple):
+    r"""One oscillation and what it moves: with g = epsilon varpi^power cos or sin(order varpi t) the equations are
+
+    :math:`\frac{d}{dt}(\dot q + g(M\dot q + Bq)) + C_0\dot q + gC\dot q + K_0q + gKq = 0`.
 
     Attributes
     ----------
-    power : int
-        P grows with this power of the excitation frequency varpi.
+    oscillation : Oscillation
+    stiffness, damping, momentum, mass : ndarray, shape (..., modes, modes), or None
+        K, C, B and M; None is nothing.
     """
 
-    power = 0
+    oscillation: Oscillation
+    stiffness: Array | None = None
+    damping: Array | None = None
+    momentum: Array | None = None
+    mass: Array | None = None
 
-    def unit_coupling(self, system: System, modes: int) -> Array:
-        """Return P for varpi = 1 rad/s, 1/s2, shape (..., modes, modes)."""
+
+_COSINE = Oscillation(1, "cos", 0)
+
+
+class Parametric(Excitation):
+    """An excitation that makes the equations of motion periodic."""
+
+    def drives(self, system: System, modes: int) -> list[Drive]:
+        """Return what oscillates between the first modes of the system's conservative part."""
         raise NotImplementedError
-
-    def coupling(self, system: System, modes: int, angular_frequency: Any) -> Array:
-        """Return P, 1/s2, shape (..., modes, modes)."""
-        return self._scale(angular_frequency, 0) * self.unit_coupling(system, modes)
-
-    def slope(self, system: System, modes: int, angular_frequency: Any) -> Array:
-        """Return dP/dvarpi, 1/s, shape (..., modes, modes)."""
-        return self._scale(angular_frequency, 1) * self.unit_coupling(system, modes)
-
-    def _scale(self, angular_frequency: Any, derivative: int) -> Array:
-        frequency = np.asarray(angular_frequency, float)[..., None, None]
-        if derivative:
-            return self.power * frequency ** max(self.power - 1, 0)
-        return frequency**self.power
 
     def springs(self, system: System) -> list[str]:
         """Return the fluctuating stiffnesses of ends, if nothing else fluctuates; then statics keep the other modes."""
         return []
 
 
+class LagrangianTerms(Parametric):
+    """The terms of a model's own Lagrangian that oscillate: :attr:`cra_sym.Model.excitation`.
+
+    Parameters
+    ----------
+    model : Model
+    """
+
+    def __init__(self, model: Model) -> None:
+        super().__init__()
+        self._model = model
+
+    @property
+    def oscillations(self) -> tuple[Oscillation, ...]:
+        """What oscillates, (order, 'cos' or 'sin', power): varpi**power times cos or sin of order * varpi * t."""
+        return tuple(dict.fromkeys(part.oscillation for part in self._model._periodic))
+
+    def drives(self, system: System, modes: int) -> list[Drive]:
+        """Return what oscillates between the first modes of the system's conservative part."""
+        self._check(system)
+        found = []
+        for part in self._model._periodic:
+            if part.matrices is not None:
+                form = between_modes(system, modes, part.matrices)
+                found.append(Drive(part.oscillation, **{name: form[name] for name in part.matrices.names}))
+        return found
+
+    def forces(self, system: System, modes: int) -> list[tuple[Oscillation, bool, Array]]:
+        """Return (oscillation, whether times epsilon, force on each mode (..., modes)) of what acts directly."""
+        self._check(system)
+        found = []
+        for part in self._model._periodic:
+            if part.force is not None:
+                found.append((part.oscillation, part.small, self._on_modes(system, modes, part.force)))
+            if part.momentum is not None:
+                oscillation, factor = part.oscillation.rate()
+                found.append((oscillation, part.small, factor * self._on_modes(system, modes, part.momentum)))
+        return found
+
+    def _on_modes(self, system: System, modes: int, load: Load) -> Array:
+        return project(system.domain, system.conservative_part.modes(modes), load)
+
+    def _check(self, system: System) -> None:
+        if system.model != self._model:
+            raise ValueError(f"excitation = {self!r}: is of another model; must be system.model.excitation")
+
+    def _key(self) -> tuple[Any, ...]:
+        return (self._model,)
+
+    def __getitem__(self, index: Any) -> Self:
+        """Return itself: there is no batch."""
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self._model,)
+
+    def __repr__(self) -> str:
+        epsilon, varpi = self._model._pieces["small"]
+        words = []
+        for part in self._model._periodic:
+            order, kind, power = part.oscillation
+            factors = [str(epsilon)] * part.small + [f"{varpi}**{power}" if power > 1 else str(varpi)] * (power > 0)
+            words.append(
+                " ".join([*factors, f"{kind}({'' if order == 1 else f'{order} '}{varpi} t)" if order else "1"])
+            )
+        return f"<{', '.join(dict.fromkeys(words))} in the Lagrangian>"
+
+
 class Fluctuation(Parametric):
-    """Stiffnesses that fluctuate about their values: each is p (1 + weight epsilon cos(varpi t)).
+    """Parameters that fluctuate about their values: each is p (1 + weight epsilon cos(varpi t)).
+
+    Stiffnesses, masses, dampers, tensions, speeds: any that the Lagrangian and the virtual work are linear in. What
+    moves with a changing mass keeps its momentum; nothing else enters or leaves with it.
 
     Parameters
     ----------
@@ -128,20 +205,30 @@ class Fluctuation(Parametric):
         """The weight of every fluctuating parameter, by name."""
         return self._numbers
 
-    def unit_coupling(self, system: System, modes: int) -> Array:
-        """Return P, 1/s2, shape (..., modes, modes); an infinite stiffness does not fluctuate."""
-        total: Array = np.zeros((modes, modes))
-        form = system.form("rates", modes)
+    def drives(self, system: System, modes: int) -> list[Drive]:
+        """Return what fluctuates between the first modes; an infinite stiffness does not."""
+        totals: dict[str, Array] = {}
+        used: dict[str, tuple[str, ...]] = {}
         for name, weight in self.weights.items():
             reason = "is not a parameter" if name not in system.values else system.numerics("fluctuation", name)
             if reason:
                 known = ", ".join(n for n in system.values if not system.numerics("fluctuation", n))
                 raise ValueError(f"{self!r}: {name} {reason}; must be one of {known}")
+            form, used[name] = system.numerics("fluctuating", name)
+            other = next((n for n in used if n in used[name] or (name in used[n] and n != name)), None)
+            if other is not None:
+                raise ValueError(
+                    f"{self!r}: {name} and {other} multiply each other, so epsilon comes squared; must fluctuate alone"
+                )
             value = np.asarray(system.values[name])
-            size = np.asarray(weight) * np.where(np.isinf(value), 0.0, value)
-            total = total + size[..., None, None] * form[f"{name} stiffness"]
-        moving = system.natural_frequencies(modes) > 0  # a rigid-body motion deforms nothing
-        return total * (moving[..., :, None] & moving[..., None, :])
+            size = (np.asarray(weight) * np.where(np.isinf(value), 0.0, value))[..., None, None]
+            found = between_modes(system, modes, form)
+            for kind in form.names:
+                totals[kind] = totals.get(kind, 0.0) + size * found[kind]
+        if "stiffness" in totals:
+            moving = system.conservative_part.natural_frequencies(modes) > 0  # a rigid-body motion deforms nothing
+            totals["stiffness"] = totals["stiffness"] * (moving[..., :, None] & moving[..., None, :])
+        return [Drive(_COSINE, **totals)]
 
     def springs(self, system: System) -> list[str]:
         """Return the fluctuating stiffnesses if all of them are stiffnesses of an end."""
@@ -190,11 +277,10 @@ class AxialBase(_ShakenBase, Parametric):
         If the amplitude is not made of finite real numbers or is negative.
     """
 
-    power = 2
-
-    def unit_coupling(self, system: System, modes: int) -> Array:
-        """Return P for varpi = 1 rad/s, 1/s2, shape (..., modes, modes)."""
-        return np.asarray(self.amplitude)[..., None, None] * system.form("axial", modes)["axial"]
+    def drives(self, system: System, modes: int) -> list[Drive]:
+        """Return what oscillates: a stiffness that grows with the square of the excitation frequency."""
+        form = between_modes(system, modes, system.numerics("axial"))
+        return [Drive(Oscillation(1, "cos", 2), np.asarray(self.amplitude)[..., None, None] * form["axial"])]
 
 
 class TransverseBase(_ShakenBase):

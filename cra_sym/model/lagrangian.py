@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from sympy import Add, Expr, S, Symbol, sympify
+from sympy import Expr, S, Symbol, sympify
 from sympy.core.function import AppliedUndef
 
 from cra_sym.checks import mapping
@@ -18,8 +17,11 @@ from cra_sym.mechanics import HamiltonResult, Modal, StateForm, hamilton, ritz, 
 from cra_sym.mechanics.jets import listed
 from cra_sym.mechanics.points import in_points
 from cra_sym.mechanics.weak import weak_form
+from cra_sym.model.excitations import LagrangianTerms
+from cra_sym.model.excited import checked_small, refuse_small, without_oscillations
 from cra_sym.model.galerkin import Ritz
 from cra_sym.model.numerics import Numerics
+from cra_sym.model.parameters import parameters
 from cra_sym.model.symmetry import asymmetry, odd_in_time
 from cra_sym.model.system import TOLERANCE, System
 from cra_sym.model.units import check_dimensions, named_units, symbol_units
@@ -64,6 +66,11 @@ class Model:
     definitions : mapping of Symbol to Expr, optional
         Symbols of the pieces above that stand for expressions, such as ``{A: b*h}``: the parameters of the model are
         then those of the expressions.
+    small : (Symbol, Symbol), optional
+        epsilon and varpi of a Lagrangian that is periodic itself: terms, loads and forces with cosines and sines of
+        ``n*varpi*t + phase``, n a whole number; what multiplies the unknowns twice is times epsilon. They are no
+        values. Every analysis is that of the Lagrangian without these terms, which are `excitation`, for
+        ``cra_sym.growth_rate`` and its kin.
 
     Raises
     ------
@@ -105,6 +112,7 @@ class Model:
         virtual_work: Sequence[tuple[Expr, Expr, Any]] | None = None,
         units: Mapping[Any, str] | None = None,
         definitions: Mapping[Symbol, Expr] | None = None,
+        small: tuple[Symbol, Symbol] | None = None,
     ) -> None:
         self._pieces: dict[str, Any] = {
             "density": density,
@@ -123,6 +131,7 @@ class Model:
             ),
             "units": tuple(mapping("units", units, "symbols to units").items()),
             "definitions": tuple(mapping("definitions", definitions, "symbols to expressions").items()),
+            "small": checked_small(small, (x, t)),
         }
         self._options = self._defined()
         self.equations: HamiltonResult = hamilton(**self._options)
@@ -140,12 +149,16 @@ class Model:
         self.symbols: tuple[Symbol, ...] = parameters(given, self.equations)
         """The parameters: every symbol but x and t, by name."""
         declared = named_units(units, [*given, *self._options["fields"], *self._options["coordinates"]])
+        if self._pieces["small"] is not None:
+            self.symbols = tuple(symbol for symbol in self.symbols if symbol not in self._pieces["small"])
+            self._steady, self._periodic = without_oscillations(self, self._options, declared)
+            return
         unknowns = (x, t, *self.equations.fields, *self.equations.coordinates, *self._options["prescribed"])
         check_dimensions(sympify(density, strict=True), ends, declared, work, unknowns)
 
     def _defined(self) -> dict[str, Any]:
         """Return what Hamilton's principle takes, definitions put in."""
-        options = {name: piece for name, piece in self._pieces.items() if name not in ("units", "definitions")}
+        options = {name: piece for name, piece in self._pieces.items() if name not in ("units", "definitions", "small")}
         definitions = dict(self._pieces["definitions"])
         if not definitions:
             return self._with_points(options)
@@ -211,7 +224,28 @@ class Model:
         TypeError, ValueError
             Names the parameter that is missing, unknown or out of range.
         """
+        refuse_small(self._pieces["small"], values)
         return System(self, values, zeta, tolerance)
+
+    @property
+    def steady(self) -> Model:
+        """The model without the terms of its Lagrangian that oscillate: itself if there are none."""
+        return self if self._pieces["small"] is None else self._steady
+
+    @cached_property
+    def excitation(self) -> LagrangianTerms | None:
+        """What oscillates in the Lagrangian and the virtual work, or None.
+
+        Examples
+        --------
+        >>> from sympy import cos
+        >>> from cra_sym.symbols import L, epsilon, k_t, t, v, varpi, x
+        >>> beam = Model(v.diff(t)**2 / 2 - v.diff(x, 2)**2 / 2, fields=[v], x=x, domain=(0, L), t=t,
+        ...     left=-k_t * (1 + epsilon * cos(varpi*t)) * v**2 / 2, small=(epsilon, varpi))
+        >>> beam.excitation
+        <epsilon cos(varpi t) in the Lagrangian>
+        """
+        return LagrangianTerms(self) if self.steady is not self and self._periodic else None
 
     def freed(self, name: str) -> Model:
         """Return the model in which a function of time that drives it is a lumped coordinate instead.
@@ -249,13 +283,13 @@ class Model:
     @cached_property
     def driving(self) -> tuple[AppliedUndef, ...]:
         """Functions of time that drive the model: prescribed motions and forces, by name."""
-        terms = weak_form(self.equations.variation).load_terms
+        terms = weak_form(self.steady.equations.variation).load_terms
         return tuple(sorted({f for term in terms for f in term.atoms(AppliedUndef)}, key=str))
 
     @cached_property
     def motions(self) -> tuple[AppliedUndef, ...]:
         """Those of them that act by their acceleration."""
-        terms, t = weak_form(self.equations.variation).load_terms, self.equations.t
+        terms, t = weak_form(self.steady.equations.variation).load_terms, self.equations.t
         return tuple(f for f in self.driving if any(term.has(f.diff(t, 2)) for term in terms))
 
     @cached_property
@@ -266,7 +300,7 @@ class Model:
     @cached_property
     def numerics(self) -> Numerics:
         """What is derived from the Lagrangian and compiled, each thing when it is first needed."""
-        return Numerics(lambda: self)
+        return Numerics(lambda: self.steady)
 
     def __eq__(self, other: object) -> bool:
         return self._pieces == other._pieces if isinstance(other, Model) else NotImplemented
@@ -289,7 +323,7 @@ class Model:
     @cached_property
     def state_form(self) -> StateForm:
         """The spatial problem as a first-order system, virtual work included."""
-        return state_form(self.equations)
+        return state_form(self.steady.equations)
 
     @cached_property
     def conservative(self) -> StateForm:
@@ -303,7 +337,7 @@ class Model:
         if not self.state_form.damped:
             form = self.state_form
         else:
-            form = state_form(hamilton(**(self._options | {"virtual_work": self._undamped_work()})))
+            form = state_form(hamilton(**(self.steady._options | {"virtual_work": self._undamped_work()})))
         problem = asymmetry(form)
         if problem:
             raise ValueError(f"natural frequencies need conservative forces, and {problem}; use eigenvalues")
@@ -316,12 +350,14 @@ class Model:
             terms = sympify(force, strict=True).expand().as_ordered_terms()
             return sum((term for term in terms if not odd_in_time(term, t)), S.Zero)
 
-        kept = ((still(force), displacement, place) for force, displacement, place in self._options["virtual_work"])
+        kept = (
+            (still(force), displacement, place) for force, displacement, place in self.steady._options["virtual_work"]
+        )
         return tuple(work for work in kept if work[0] != 0)
 
     def separate(self, **options: Any) -> Modal:
         """Separate the variables: characteristic matrix and function, mode shapes, in closed form."""
-        return separate(self.equations, **options)
+        return separate(self.steady.equations, **options)
 
     def ritz(self, elements: int, nodes: Sequence[Expr] = ()) -> Ritz:
         """Return the same Lagrangian on Hermite elements: frequencies from above, coefficients may vary by x.
@@ -334,7 +370,7 @@ class Model:
             Interior places that are nodes, in ascending order, such as jumps of a coefficient. Those of terms and
             supports are nodes anyway; name these too where they are symbols and do not ascend as they were stated.
         """
-        return Ritz(ritz(self.equations, elements=elements, nodes=nodes), self.symbols)
+        return Ritz(ritz(self.steady.equations, elements=elements, nodes=nodes), self.symbols)
 
     def kernel(self) -> Kernel:
         """Return the characteristic function as a fast function of the angular frequency and the parameters.
@@ -410,19 +446,3 @@ def _analysis(module: str) -> Any:
 
 def _rebuilt(pieces: dict[str, Any]) -> Model:
     return Model(**(pieces | {"units": dict(pieces["units"]), "definitions": dict(pieces["definitions"])}))
-
-
-def parameters(given: Iterable[Expr], result: HamiltonResult) -> tuple[Symbol, ...]:
-    """Return every symbol of the expressions but x and t, by name; refuse an undeclared field and two of a name."""
-    expressions = [sympify(part, strict=True) for part in given]
-    own = {result.x, result.t}
-    known = {f.func for f in (*result.fields, *result.coordinates)}
-    for term in (term for e in expressions for term in Add.make_args(e)):
-        for function in term.atoms(AppliedUndef):
-            if function.func not in known and own <= function.free_symbols:
-                raise ValueError(f"term {term}: {function} is not one of the fields {list(map(str, result.fields))}")
-    found = sorted({s for e in expressions for s in e.free_symbols} - own, key=lambda s: (s.name, str(s)))
-    for first, second in itertools.pairwise(found):
-        if first.name == second.name:
-            raise ValueError(f"two different symbols are named {first.name}: their assumptions differ")
-    return tuple(found)

@@ -146,6 +146,12 @@ class System:
             raise ValueError(f"domain: the length {name} = {first:g} must be in (0, inf)")
         return Domain(finite, left, length)
 
+    @cached_property
+    def conservative_part(self) -> System:
+        """The system without gyroscopic and follower forces: itself if it has natural modes."""
+        part: Model | None = self.numerics("conservative_part")
+        return self if part is None else part.at(self.values, tolerance=self.tolerance)
+
     def natural_frequencies(self, modes: int) -> Array:
         """Return the first natural frequencies, rad/s, shape (..., modes); read-only."""
         return self._once("omega", count("modes", modes, high=MOST_MODES), self._find_frequencies)

@@ -1,20 +1,31 @@
 r"""Floquet theory for :math:`\ddot q + 2C\dot q + (\Omega^2 + \sum_r g_r(t) P_r)\,q = 0`, many systems at once.
 
-The excitation is :math:`g_r = \epsilon\cos\varpi t / (1 + \lambda_r\epsilon\cos\varpi t)`; with :math:`\lambda_r = 0`
-it is the plain cosine. Between kicks of the excitation every mode moves exactly (damped oscillation in closed form),
-so the step follows the excitation, not the highest mode. The kicks sit at the nodes of Gauss and Legendre; the middle
-one also carries the commutator that makes the composition of fourth order (Laskar and Robutel, 2001). The result is
-symmetric in time, and symplectic without damping.
+The excitation is :math:`g_r = s_r / (1 + \lambda_r s_r)` with :math:`s_r` epsilon times a cosine or sine of a multiple
+of :math:`\varpi t`; :math:`\lambda_r` is zero but for statics of other modes. Between kicks of the excitation every
+mode moves exactly (damped oscillation in closed form), so the step follows the excitation, not the highest mode. The
+kicks sit at the nodes of Gauss and Legendre; the middle one also carries the commutator that makes the composition of
+fourth order (Laskar and Robutel, 2001). The result is symmetric in time, and symplectic without damping.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
-__all__ = ["Loop", "Oscillators", "floquet_exponents", "growth_rate", "monodromy"]
+__all__ = [
+    "Loop",
+    "Oscillation",
+    "Oscillators",
+    "exponents_of",
+    "flat",
+    "floquet_exponents",
+    "growth_rate",
+    "monodromy",
+    "rate_of",
+]
 
 _NODES, KICKS = (0.5 * np.array(row) for row in np.polynomial.legendre.leggauss(3))
 _NODES = _NODES + 0.5
@@ -22,7 +33,20 @@ DRIFTS = np.diff([0.0, *_NODES, 1.0])
 #: Weight of the nested commutator in one step: what the quadrature misses of the double integral of |s - t|.
 COMMUTATOR = float(1.0 / 3.0 - KICKS @ np.abs(_NODES[:, None] - _NODES) @ KICKS) / 2
 _BLOCK = 512  # systems propagated together, small enough for the cache
-_MOST_STEPS = 1e7  # a period: minutes
+MOST_STEPS = 1e7  # a period: minutes
+
+
+class Oscillation(NamedTuple):
+    """``varpi**power`` times the cosine or sine of ``order * varpi * t``; order 0 with 'cos' is constant."""
+
+    order: int
+    kind: Literal["cos", "sin"]
+    power: int
+
+    def rate(self) -> tuple[Oscillation, int]:
+        """Return the oscillation of the derivative by time, and its factor."""
+        other: Literal["cos", "sin"] = "sin" if self.kind == "cos" else "cos"
+        return Oscillation(self.order, other, self.power + 1), -self.order if self.kind == "cos" else self.order
 
 
 @dataclass(frozen=True)
@@ -37,7 +61,11 @@ class Oscillators:
         The matrices P_r.
     compliance : ndarray, shape (R, points)
         lambda_r.
-    epsilon, period : ndarray, shape (points,)
+    epsilon : ndarray, shape (R, points)
+        Times the power of varpi of each oscillation.
+    period : ndarray, shape (points,)
+    oscillations : tuple of Oscillation
+        One for each of the R terms.
     """
 
     omega: np.ndarray
@@ -46,10 +74,18 @@ class Oscillators:
     compliance: np.ndarray
     epsilon: np.ndarray
     period: np.ndarray
+    oscillations: tuple[Oscillation, ...]
 
     @classmethod
     def of(
-        cls, omega: Any, coupling: Any, angular_frequency: Any, epsilon: Any, decay: Any = 0.0, compliance: Any = 0.0
+        cls,
+        omega: Any,
+        coupling: Any,
+        angular_frequency: Any,
+        epsilon: Any,
+        decay: Any = 0.0,
+        compliance: Any = 0.0,
+        oscillations: Sequence[Oscillation] | None = None,
     ) -> tuple[Oscillators, tuple[int, ...]]:
         """Return the batch and its shape.
 
@@ -60,6 +96,8 @@ class Oscillators:
         compliance : array_like, shape (..., R)
         angular_frequency, epsilon : array_like, shape (...)
             Excitation frequency varpi, rad/s, positive; epsilon.
+        oscillations : sequence of R Oscillation, optional
+            By default every one is cos(varpi t).
         """
         omega, coupling = np.asarray(omega, dtype=float), np.asarray(coupling, dtype=float)
         modes, terms = omega.shape[-1], coupling.shape[-3]
@@ -74,33 +112,43 @@ class Oscillators:
             frequency.shape,
             epsilon.shape,
         )
+        waves = tuple(oscillations or [Oscillation(1, "cos", 0)] * terms)
+        if {kind for _, kind, _ in waves} == {"sin"} and len({order for order, _, _ in waves}) == 1:
+            waves = tuple(Oscillation(order, "cos", power) for order, _, power in waves)  # a quarter of a turn later
+        varpi, size = flat(frequency, shape, 0), flat(epsilon, shape, 0)
         shared = coupling.size == terms * modes * modes
-        matrices = coupling.reshape(terms, modes, modes, 1) if shared else _flat(coupling, shape, 3)
+        matrices = coupling.reshape(terms, modes, modes, 1) if shared else flat(coupling, shape, 3)
         batch = cls(
-            _flat(omega, shape, 1),
-            _flat(decay, shape, 1),
+            flat(omega, shape, 1),
+            flat(decay, shape, 1),
             matrices,
-            _flat(compliance, shape, 1),
-            _flat(epsilon, shape, 0),
-            2 * np.pi / _flat(frequency, shape, 0),
+            flat(compliance, shape, 1),
+            np.stack([size * varpi**power if power else size for _, _, power in waves]),
+            2 * np.pi / varpi,
+            waves,
         )
         return batch, shape
 
     @property
     def conservative(self) -> bool:
-        """Whether all systems are undamped with symmetric couplings."""
-        return not self.decay.any() and bool(np.array_equal(self.coupling, self.coupling.swapaxes(1, 2)))
+        """Whether all systems are undamped with symmetric couplings, and half of a period mirrors the other."""
+        even = all(kind == "cos" for _, kind, _ in self.oscillations)
+        return even and not self.decay.any() and bool(np.array_equal(self.coupling, self.coupling.swapaxes(1, 2)))
 
     def steps(self, tolerance: float) -> np.ndarray:
         """Return the number of steps a period for each system, even, for a relative error of about ``tolerance``."""
-        strength = np.sqrt(self.epsilon * np.abs(self.coupling).sum(axis=(0, 2)).max(axis=0))
-        fastest = np.maximum(self.omega.max(axis=0), 2.0 * strength) + 2 * np.pi / self.period
+        rows = np.abs(self.coupling).sum(axis=2)
+        strength = np.sqrt(
+            np.einsum("rp,rip->ip", self.epsilon, np.broadcast_to(rows, (*rows.shape[:2], self.period.size)))
+        )
+        turns = max(1, *(order for order, _, _ in self.oscillations))
+        fastest = np.maximum(self.omega.max(axis=0), 2.0 * strength.max(axis=0)) + 2 * np.pi * turns / self.period
         angle = self.period * fastest
         with np.errstate(over="ignore"):
             steps = 0.6 * angle * (angle * 1e-6 / tolerance) ** 0.25  # the method is of fourth order
-        if not (steps <= _MOST_STEPS).all():
+        if not (steps <= MOST_STEPS).all():
             raise ValueError(
-                f"a period takes {steps.max():.2g} steps, must be at most {_MOST_STEPS:g}: the excitation is too slow "
+                f"a period takes {steps.max():.2g} steps, must be at most {MOST_STEPS:g}: the excitation is too slow "
                 "against the fastest mode, or too strong"
             )
         return 2 * np.ceil(np.maximum(steps, 8) / 2).astype(np.int64)
@@ -113,8 +161,9 @@ class Oscillators:
             self.decay[:, index],
             self.coupling if shared else self.coupling[..., index],
             self.compliance[:, index],
-            self.epsilon[index],
+            self.epsilon[:, index],
             self.period[index],
+            self.oscillations,
         )
 
 
@@ -145,16 +194,16 @@ class Loop(Protocol):
             Weights of the kicks.
         commutator : float
             Weight of the commutator in the middle kick.
-        swings : ndarray, shape (steps, stages)
-            cos(varpi t) at the kicks.
+        swings : ndarray, shape (steps, stages, R)
+            The cosines and sines at the kicks.
         coupling, compliance, epsilon : ndarray
             As in :class:`Oscillators`, with a full batch axis.
         state : ndarray, shape (2N, 2N, points)
         """
 
 
-def _flat(array: np.ndarray, shape: tuple[int, ...], own: int) -> np.ndarray:
-    """Broadcast, flatten the batch axes and put them last."""
+def flat(array: np.ndarray, shape: tuple[int, ...], own: int) -> np.ndarray:
+    """Return an array whose batch axes are broadcast, made one and put last; ``own`` axes are its own."""
     tail = array.shape[array.ndim - own :]
     flat = np.broadcast_to(array, shape + tail).reshape(-1, *tail)
     return np.ascontiguousarray(np.moveaxis(flat, 0, -1))
@@ -180,12 +229,15 @@ def _propagate(part: Oscillators, steps: int, share: float, loop: Loop | None) -
     around, between, joined = (drift_matrix(part.omega, part.decay, a * h) for a in (*DRIFTS[:2], 2 * DRIFTS[0]))
     drifts = np.stack([around, between, between, joined])  # before each kick; last: between two steps
     times = np.arange(steps)[:, None] + _NODES
-    swings = np.cos(2 * np.pi * share / steps * times)
+    phase = 2 * np.pi * share / steps * times
+    waves = [(np.cos if kind == "cos" else np.sin)(order * phase) for order, kind, _ in part.oscillations]
+    swings = np.stack(waves, axis=-1)
     state = np.broadcast_to(np.eye(2 * modes)[:, :, None], (2 * modes, 2 * modes, points)).copy()
     if loop is not None:
         coupling = np.array(np.broadcast_to(part.coupling, (*part.coupling.shape[:3], points)))
         compliance = np.ascontiguousarray(part.compliance)
-        loop(drifts, h, KICKS, COMMUTATOR, swings, coupling, compliance, part.epsilon, state)
+        epsilon = np.ascontiguousarray(part.epsilon)
+        loop(drifts, h, KICKS, COMMUTATOR, swings, coupling, compliance, epsilon, state)
     else:
         _kick_and_drift(drifts[:, :, :, :, None], h, swings, part, state)
     return state
@@ -197,9 +249,9 @@ def _kick_and_drift(
     """Propagate the states in place: `Loop` in NumPy."""
     q, p = state[: len(state) // 2], state[len(state) // 2 :]
     for step, row in enumerate(swings):
-        for stage, cosine in enumerate(row):
+        for stage, waves in enumerate(row):
             _drift(drifts[-1 if stage == 0 and step > 0 else stage], q, p)
-            swing = part.epsilon * cosine
+            swing = part.epsilon * waves[:, None]
             weights = swing / (1.0 + part.compliance * swing)
             force = _force(part.coupling, weights, q)
             p -= KICKS[stage] * h * force
@@ -268,24 +320,35 @@ def floquet_exponents(*system: Any, tolerance: float = 1e-8, loop: Loop | None =
     Their imaginary parts are fixed up to multiples of the excitation frequency and given between -1/2 and 1/2 of it.
     """
     batch, shape = Oscillators.of(*system, **more)
-    period = batch.period[:, None]
     if batch.conservative:
         growing = _conservative_exponents(batch, tolerance, loop)
-        exponents = np.concatenate([growing, -growing], axis=-1)
+        exponents = _ordered(np.concatenate([growing, -growing], axis=-1), batch.period)
     else:
-        maps = _maps(batch, 1.0, tolerance, loop)
-        exponents = np.log(np.linalg.eigvals(maps).astype(complex)) / period
-    order = np.lexsort((exponents.imag, -np.round(exponents.real * period, 9)), axis=-1)
-    exponents = np.take_along_axis(exponents, order, axis=-1)
+        exponents = exponents_of(_maps(batch, 1.0, tolerance, loop), batch.period)
     return exponents.reshape(*shape, exponents.shape[-1])
+
+
+def exponents_of(maps: np.ndarray, period: np.ndarray) -> np.ndarray:
+    """Return the exponents of monodromy matrices (points, 2N, 2N), in the order of :func:`floquet_exponents`."""
+    return _ordered(np.log(np.linalg.eigvals(maps).astype(complex)) / period[:, None], period)
+
+
+def _ordered(exponents: np.ndarray, period: np.ndarray) -> np.ndarray:
+    order = np.lexsort((exponents.imag, -np.round(exponents.real * period[:, None], 9)), axis=-1)
+    return np.take_along_axis(exponents, order, axis=-1)
+
+
+def rate_of(maps: np.ndarray, period: np.ndarray) -> np.ndarray:
+    """Return max(0, largest real part of the exponents) of monodromy matrices (points, 2N, 2N)."""
+    rates = np.log(np.abs(np.linalg.eigvals(maps)).max(axis=-1)) / period
+    return np.maximum(rates, 0.0)
 
 
 def growth_rate(*system: Any, tolerance: float = 1e-8, loop: Loop | None = None, **more: Any) -> np.ndarray:
     """Return max(0, largest real part of the exponents), shape (...); arguments of :class:`Oscillators`."""
     batch, shape = Oscillators.of(*system, **more)
     if batch.conservative:
-        rates = _conservative_exponents(batch, tolerance, loop).real.max(axis=-1)
+        rates = np.maximum(_conservative_exponents(batch, tolerance, loop).real.max(axis=-1), 0.0)
     else:
-        multipliers = np.linalg.eigvals(_maps(batch, 1.0, tolerance, loop))
-        rates = np.log(np.abs(multipliers).max(axis=-1)) / batch.period
-    return np.maximum(rates, 0.0).reshape(shape)
+        rates = rate_of(_maps(batch, 1.0, tolerance, loop), batch.period)
+    return rates.reshape(shape)

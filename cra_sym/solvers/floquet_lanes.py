@@ -29,11 +29,11 @@ def kick_and_drift(drifts, h, kicks, commutator, swings, coupling, compliance, e
     _drift(drifts[0], state, weight)
 
 
-def _stiffness(coupling, compliance, epsilon, cosine, weight, total):
+def _stiffness(coupling, compliance, epsilon, waves, weight, total):
     for r in range(len(coupling)):
-        soft = compliance[r]
+        soft, size = compliance[r], epsilon[r]
         for k in range(weight.size):
-            swing = epsilon[k] * cosine
+            swing = size[k] * waves[r]
             weight[k] = swing / (1.0 + soft[k] * swing)
         for i in range(len(total)):
             for n in range(len(total)):

@@ -111,14 +111,14 @@ def test_an_accelerated_base_pulls_the_mass_on_its_lever():
     tip = cra.mode_shapes(system, 1.3, 2, 1)
     load = 0.65 * weights * (0.24 * (1.3 - places) + 0.05)
     expected = (slopes * load) @ slopes.T + 0.05 * 0.1 * np.outer(tip, tip)
-    np.testing.assert_allclose(cra.AxialBase(1.0).unit_coupling(system, 2), expected, rtol=1e-9)
+    np.testing.assert_allclose(cra.AxialBase(1.0).drives(system, 2)[0].stiffness, expected, rtol=1e-9)
 
 
 def test_a_lumped_mass_of_unknown_place_is_not_pulled():
     q = sp.Function("q")(t)
     model = beam(left=springs(), right=m * q.diff(t) ** 2 / 2 - k * (v - q) ** 2 / 2, coordinates=[q])
     with pytest.raises(ValueError, match="the place along x of the mass that moves by q"):
-        cra.AxialBase(1.0).unit_coupling(model.at({**BEAM, m: 0.5, k: 1e3}), 2)
+        cra.AxialBase(1.0).drives(model.at({**BEAM, m: 0.5, k: 1e3}), 2)
 
 
 def test_residual_vibration_is_after_all_that_drives_has_ended():

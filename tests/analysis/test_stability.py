@@ -12,8 +12,9 @@ import pytest
 from scipy.optimize import brentq
 
 import cra_sym as cra
+from cra_sym.analysis import floquet as growth
 from cra_sym.analysis import floquet_boundary as edges
-from cra_sym.analysis import stability, static_corrections, zones
+from cra_sym.analysis import static_corrections, zones
 from cra_sym.analysis.floquet_boundary import floquet_boundary
 from cra_sym.analysis.static_corrections import moments_of_other_modes
 from cra_sym.kernels import has_compiler
@@ -413,19 +414,19 @@ def test_numbers_come_without_sympy_once_derived():
 def test_the_compiled_loop_is_numpys(decay):
     omega, coupling = np.array([1.0, 2.2]), np.array([[[1.0, 0.5], [0.5, -0.7]], [[0.1, 0.0], [0.0, 0.2]]])
     system = omega, coupling, np.linspace(0.7, 6.0, 70)[:, None], np.linspace(0.0, 0.6, 3), decay, [0.1, 0.3]
-    maps = [floquet.monodromy(*system, loop=loop) for loop in (stability._template().kick_and_drift, None)]
+    maps = [floquet.monodromy(*system, loop=loop) for loop in (growth._template().kick_and_drift, None)]
     np.testing.assert_allclose(*maps, rtol=1e-11, atol=1e-11)
 
 
 def test_charts_are_compiled_where_it_pays(monkeypatch):
     asked = []
-    monkeypatch.setattr(stability, "wants_compiler", lambda roots, parts: bool(asked.append(roots)))
-    monkeypatch.setattr(stability, "_template", lambda: pytest.fail("nothing is to be compiled"))
+    monkeypatch.setattr(growth, "wants_compiler", lambda roots, parts: bool(asked.append(roots)))
+    monkeypatch.setattr(growth, "_template", lambda: pytest.fail("nothing is to be compiled"))
     arm, chart = cra.Arm.nominal().replace(k_t=1e3), (np.linspace(20.0, 90.0, 7)[:, None], np.linspace(0.0, 0.3, 3))
     one = cra.growth_rate(arm, cra.JointStiffness(), *chart, modes=2)
-    assert asked == [21 * stability._ROOTS]
+    assert asked == [21 * growth._ROOTS]
     np.testing.assert_array_equal(one, cra.growth_rate(arm, cra.JointStiffness(), *chart, modes=2, backend="numpy"))
-    monkeypatch.setattr(stability, "has_compiler", lambda: False)
+    monkeypatch.setattr(growth, "has_compiler", lambda: False)
     with pytest.raises(ValueError, match="backend = 'numba': Numba is not installed"):
         cra.growth_rate(arm, cra.JointStiffness(), *chart, backend="numba")
     with pytest.raises(ValueError, match="backend = 'fortran'"):

@@ -3,7 +3,7 @@
 import numpy as np
 
 import cra_sym as cra
-from cra_sym.analysis.stability import growth_rate
+from cra_sym.analysis.floquet import growth_rate
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.claims import claim
 from cra_sym.solvers.hill import hill_exponents

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import cra_sym as cra
-from cra_sym.analysis import stability
+from cra_sym.analysis import floquet as growth
 from cra_sym.kernels import specialise
 from cra_sym.model.one_wave_family import Family
 from cra_sym.solvers import floquet
@@ -188,6 +188,6 @@ def test_floquet():
     system = (np.array([1.0, 2.2]), coupling, np.array([1.9, 3.1, 4.2, 5.0]), 0.3, np.array([0.01, 0.03]))
     one, two = (
         floquet.monodromy(*system, compliance=np.array([0.5, 0.2, 0.3]), tolerance=1e-4, loop=loop)
-        for loop in (plain("solvers/floquet_lanes", *stability._template_parts()).kick_and_drift, None)
+        for loop in (plain("solvers/floquet_lanes", *growth._template_parts()).kick_and_drift, None)
     )
     np.testing.assert_allclose(one, two, rtol=1e-11, atol=1e-13)

@@ -18,6 +18,7 @@ EXEMPT = {
     "paper/equations": "the registry of equations and how wide a printed line may be",
 }
 
+_PERIODIC = "tests/analysis/test_periodic.py"
 _LAWS = "tests/test_properties.py"
 _LAMBDA, _MODAL = "tests/analysis/test_frequency_parameters.py", "tests/analysis/test_modal_parameters.py"
 _COUNTS = [
@@ -187,7 +188,13 @@ _ROUNDS: dict[str, list[list[str]]] = {
         [f"{_LAWS}::test_sensitivities_are_slopes_at_any_length", "tests/analysis/test_residual_gradient.py"],
     ],
     "paper/oracles/shooting": [],
-    "analysis/stability": [[*_ZONES, *_FORCED, *_SYSTEM], [*_LOOPED, *_DOUBTS, *_FEW_MODES]],
+    "analysis/stability": [[*_ZONES, *_FORCED], [*_LOOPED, *_DOUBTS, *_FEW_MODES]],
+    "analysis/floquet": [[*_ZONES, *_SYSTEM], [*_LOOPED, *_FEW_MODES], [_PERIODIC]],
+    "analysis/reduced_zones": [[_PERIODIC]],
+    "model/excited": [[_PERIODIC]],
+    "solvers/normal_form": [[_PERIODIC]],
+    "solvers/periodic": [[_PERIODIC]],
+    "solvers/proved_stability": [[_PERIODIC]],
     "analysis/zones": [[*_ZONES, *_SUMMED], [*_LOOPED, *_DAMPED, *_DOUBTS], _ORDER],
     "model/oscillator": [["tests/model/test_oscillator.py"], ["tests/analysis/test_responses.py"]],
     "solvers/floquet_lanes": [[f"{_LANES[0]}::test_floquet"]],

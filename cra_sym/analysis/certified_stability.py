@@ -1,0 +1,83 @@
+"""Proved stability of systems with periodic coefficients."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.analysis.floquet import Matrices, batch_shape, checked_point, matrices_of
+from cra_sym.checks import default_floating_point
+from cra_sym.model.excitations import Excitation
+from cra_sym.model.system import ROUNDING, System
+from cra_sym.solvers.floquet import flat
+from cra_sym.solvers.periodic import PeriodicSystem
+from cra_sym.solvers.proved_stability import STABLE, UNSTABLE, proved_stability
+
+__all__ = ["certify_stability"]
+
+
+@default_floating_point
+def certify_stability(
+    system: System, excitation: Excitation, angular_frequency: Any, epsilon: Any, modes: int = 3
+) -> NDArray[np.str_]:
+    """Prove whether vibration grows, for each point of a chart.
+
+    The proof is for the model of that many modes, that is for the equations of motion between them, with every
+    coefficient within `system.accuracy` of the computed one, 1e-11 at least, relative to the sum of its row. 'stable'
+    means that every motion is bounded: all multipliers lie inside the unit circle, or, without any damping, on it and
+    apart from each other. 'unstable' means that a multiplier lies outside. On a boundary, and where multipliers meet, a
+    point is 'undecided'. The method is in :mod:`cra_sym.solvers.proved_stability`: enclosures of the monodromy matrix
+    by Taylor series with bounds of all that is left out, and of its multipliers by discs.
+
+    Parameters
+    ----------
+    system : System
+    excitation : Fluctuation, JointStiffness, AxialBase or the model's own `excitation`
+        Of stiffness and damping.
+    angular_frequency : array_like
+        Excitation frequency varpi, rad/s, positive.
+    epsilon : array_like
+        Not negative.
+    modes : int
+        How many modes move, 1 to 1000.
+
+    Returns
+    -------
+    ndarray of str
+        'stable', 'unstable' or 'undecided', shape broadcast from system, excitation, angular_frequency and epsilon.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As :func:`cra_sym.growth_rate`; if a mass or a speed oscillates.
+
+    Examples
+    --------
+    >>> from cra_sym import Arm, JointStiffness
+    >>> arm = Arm.nominal().replace(k_t=1e4)
+    >>> print(certify_stability(arm, JointStiffness(), [186.0, 187.15, 188.0], 0.1))
+    ['stable' 'unstable' 'stable']
+    """
+    given, frequency, epsilon, modes = checked_point(system, excitation, angular_frequency, epsilon, modes)
+    shape = batch_shape(system, given, angular_frequency=frequency, epsilon=epsilon)
+    matrices = matrices_of(system, given, modes)
+    drives = [(d.oscillation, (d.stiffness, d.damping, d.momentum, d.mass)) for d in matrices.drives]
+    whole = np.broadcast_to(epsilon, shape)
+    batch, _ = PeriodicSystem.of(matrices.stiffness, matrices.damping, drives, frequency, whole)
+    omega = matrices.modal.omega
+    slowest = np.where(omega > 0, omega, np.maximum(omega.max(axis=-1, keepdims=True), 1.0) * 1e-2)
+    unit = slowest.reshape(-1, 1) if slowest.size == modes else flat(slowest, shape, 1)
+    spread = float(np.fmax(system.conservative_part.accuracy, ROUNDING).max())
+    verdict = proved_stability(batch, unit, _conservative(matrices), spread)
+    words = np.where(verdict == STABLE, "stable", np.where(verdict == UNSTABLE, "unstable", "undecided"))
+    return words.reshape(shape)[()]
+
+
+def _conservative(matrices: Matrices) -> bool:
+    """Return whether nothing damps or drives but what oscillates with a potential."""
+    damping = [matrices.damping, *(d.damping for d in matrices.drives if d.damping is not None)]
+    stiffness = [matrices.stiffness, *(d.stiffness for d in matrices.drives if d.stiffness is not None)]
+    skew = all(np.array_equal(c, -c.swapaxes(-1, -2)) for c in damping)
+    return skew and all(np.array_equal(k, k.swapaxes(-1, -2)) for k in stiffness)

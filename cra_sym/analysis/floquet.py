@@ -1,0 +1,243 @@
+"""Growth of a system with periodic coefficients, by Floquet theory."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cra_sym import checks
+from cra_sym.analysis.static_corrections import static_terms
+from cra_sym.kernels import Kernel, compiled, has_compiler
+from cra_sym.kernels.parts import wants_compiler
+from cra_sym.model.excitations import Drive, Excitation, Fluctuation, Parametric, TransverseBase
+from cra_sym.model.modal_matrices import ModalMatrices, modal_matrices
+from cra_sym.model.system import MOST_MODES, System
+from cra_sym.solvers import floquet, periodic
+
+__all__ = [
+    "Matrices",
+    "batch_shape",
+    "checked_point",
+    "floquet_exponents",
+    "growth_rate",
+    "matrices_of",
+    "parametric",
+]
+
+_ROOTS = 5  # of the spectrum, for which the compiled path saves as much as for a point of a chart
+
+
+@checks.default_floating_point
+def growth_rate(
+    system: System,
+    excitation: Excitation,
+    angular_frequency: Any,
+    epsilon: Any,
+    modes: int = 3,
+    *,
+    residual: bool = False,
+    tolerance: float = 1e-8,
+    backend: str = "auto",
+) -> np.ndarray:
+    """Return the rate at which vibration grows: max(0, largest real part of the Floquet exponents).
+
+    The system moves in the first natural modes of its conservative part: dampers, gyroscopic and follower forces act
+    between them, so that with such forces more modes may be needed. Where stiffness alone oscillates, as in (36a) and
+    (36b), and damping is modal, the method is that of :mod:`cra_sym.solvers.floquet`, else that of
+    :mod:`cra_sym.solvers.periodic`.
+
+    Parameters
+    ----------
+    system : System
+    excitation : Fluctuation, JointStiffness, AxialBase or the model's own `excitation`
+    angular_frequency : array_like
+        Excitation frequency varpi, rad/s, positive.
+    epsilon : array_like
+        Not negative.
+    modes : int
+        How many modes move, 1 to 1000.
+    residual : bool
+        Whether the static flexibility of the modes left out is kept, for fluctuating stiffnesses of ends: few modes
+        then do for what would take many. Without it the system is its first modes and nothing else.
+    tolerance : float
+        Relative error of the monodromy matrix where stiffness alone oscillates; elsewhere it is rounding.
+    backend : {'auto', 'numpy', 'numba'}
+        'auto' compiles for large charts if Numba is there, by the policy for frequencies.
+
+    Returns
+    -------
+    ndarray
+        1/s, shape broadcast from system, excitation, angular_frequency and epsilon.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is out of its range, as a :class:`TransverseBase`, ``residual`` without fluctuating stiffnesses
+        of ends and 'numba' without Numba are; if shapes do not broadcast together; or if a period takes more than 1e7
+        steps.
+
+    Examples
+    --------
+    >>> from cra_sym import Arm, JointStiffness
+    >>> arm = Arm.nominal().replace(k_t=1e4)
+    >>> print(growth_rate(arm, JointStiffness(), [186.0, 187.15, 188.0], 0.1).round(3))
+    [0.    0.102 0.   ]
+    """
+    found = _taken(system, excitation, angular_frequency, epsilon, modes, residual)
+    if isinstance(found, tuple):
+        checks.choice("backend", backend, ("auto", "numpy"))
+        return periodic.growth_rate(*found)[()]
+    return floquet.growth_rate(**found, tolerance=tolerance, loop=_loop(backend, found))[()]
+
+
+@checks.default_floating_point
+def floquet_exponents(
+    system: System,
+    excitation: Excitation,
+    angular_frequency: Any,
+    epsilon: Any,
+    modes: int = 3,
+    *,
+    residual: bool = False,
+    tolerance: float = 1e-8,
+    backend: str = "auto",
+) -> np.ndarray:
+    """Return all Floquet exponents of the excited system, largest real part first.
+
+    The first one's real part is the growth rate before it is cut at zero, so with damping it tells the margin.
+    Imaginary parts are given between -1/2 and 1/2 of the excitation frequency.
+
+    Parameters
+    ----------
+    system, excitation, angular_frequency, epsilon, modes, residual, tolerance, backend
+        As in :func:`growth_rate`.
+
+    Returns
+    -------
+    complex ndarray, shape (..., 2 modes)
+        1/s; ``...`` is broadcast from system, excitation, angular_frequency and epsilon.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As :func:`growth_rate`.
+    """
+    found = _taken(system, excitation, angular_frequency, epsilon, modes, residual)
+    if isinstance(found, tuple):
+        checks.choice("backend", backend, ("auto", "numpy"))
+        return periodic.floquet_exponents(*found)
+    return floquet.floquet_exponents(**found, tolerance=tolerance, loop=_loop(backend, found))
+
+
+def parametric(excitation: Any) -> Parametric:
+    """Return the excitation, or say which there are."""
+    if isinstance(excitation, TransverseBase):
+        raise ValueError(
+            f"excitation = {excitation!r}: in linear theory a transverse base only forces the system and has no "
+            "boundary; see forced_width"
+        )
+    if not isinstance(excitation, Parametric):
+        raise TypeError(
+            f"excitation = {checks.shown(excitation)}: must be a Fluctuation, such as JointStiffness, an AxialBase or "
+            "the excitation of a model that has one"
+        )
+    return excitation
+
+
+def batch_shape(system: Any, excitation: Excitation, **arrays: np.ndarray) -> tuple[int, ...]:
+    """Return the common shape of a system, an excitation and arrays."""
+    checks.instance("system", system, System)
+    return checks.broadcastable(system=np.empty(system.shape), excitation=np.empty(excitation.shape), **arrays)
+
+
+def _loop(backend: str, found: dict[str, Any]) -> floquet.Loop | None:
+    """Return the compiled loop of the Floquet solver if it is asked for, or pays."""
+    checks.choice("backend", backend, ("auto", "numpy", "numba"))
+    if backend == "numba" and not has_compiler():
+        raise ValueError("backend = 'numba': Numba is not installed; backend must be 'auto' or 'numpy'")
+    points = np.broadcast(found["angular_frequency"], found["epsilon"], found["omega"][..., 0]).size
+    compile = backend == "auto" and wants_compiler(_ROOTS * points, _template_parts)
+    return _template().kick_and_drift if compile or backend == "numba" else None
+
+
+@cache
+def _template() -> Any:
+    return compiled(*_template_parts())
+
+
+def _template_parts() -> tuple[str, dict[str, Kernel]]:
+    return files("cra_sym.solvers").joinpath("floquet_lanes.py").read_text(encoding="utf-8"), {}
+
+
+class Matrices(NamedTuple):
+    """A system between its modes, and what oscillates."""
+
+    modal: ModalMatrices
+    drives: list[Drive]
+
+    @property
+    def only_stiffness(self) -> bool:
+        """Whether damping is modal and nothing but stiffness oscillates."""
+        still = self.modal.damping is None and self.modal.stiffness is None
+        return still and all(d.damping is None and d.momentum is None and d.mass is None for d in self.drives)
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """K, shape (..., modes, modes)."""
+        unit = np.eye(self.modal.omega.shape[-1])
+        own = self.modal.omega[..., None] ** 2 * unit
+        return own if self.modal.stiffness is None else own + self.modal.stiffness
+
+    @property
+    def damping(self) -> np.ndarray:
+        """C, shape (..., modes, modes)."""
+        own = 2.0 * self.modal.decay[..., None] * np.eye(self.modal.omega.shape[-1])
+        return own if self.modal.damping is None else own + self.modal.damping
+
+
+def matrices_of(system: System, excitation: Parametric, modes: int) -> Matrices:
+    """Return the matrices between the first modes of the conservative part."""
+    return Matrices(modal_matrices(system, modes), excitation.drives(system, modes))
+
+
+def checked_point(
+    system: System, excitation: Any, angular_frequency: Any, epsilon: Any, modes: Any
+) -> tuple[Parametric, np.ndarray, np.ndarray, int]:
+    """Return the arguments of a chart, or raise an error that names what is not allowed."""
+    excitation = parametric(excitation)
+    frequency = checks.real_array("angular_frequency", angular_frequency, low=1e-300, unit="rad/s")
+    epsilon = checks.real_array("epsilon", epsilon, low=0.0, unit="1")
+    batch_shape(system, excitation, angular_frequency=frequency, epsilon=epsilon)
+    return excitation, frequency, epsilon, checks.count("modes", modes, high=MOST_MODES)
+
+
+def _taken(
+    system: System, excitation: Excitation, angular_frequency: Any, epsilon: Any, modes: int, residual: bool
+) -> dict[str, Any] | tuple[Any, ...]:
+    """Return what `cra_sym.solvers.floquet` takes, or else, as a tuple, what `cra_sym.solvers.periodic` does."""
+    given, frequency, epsilon, modes = checked_point(system, excitation, angular_frequency, epsilon, modes)
+    matrices = matrices_of(system, given, modes)
+    if residual and not (isinstance(given, Fluctuation) and given.springs(system) and matrices.only_stiffness):
+        raise ValueError(
+            f"residual = True needs fluctuating stiffnesses of ends and no forces between modes, not {given!r}"
+        )
+    if not matrices.only_stiffness:
+        drives = [(d.oscillation, (d.stiffness, d.damping, d.momentum, d.mass)) for d in matrices.drives]
+        return matrices.stiffness, matrices.damping, drives, frequency, epsilon
+    found: dict[str, Any] = {
+        "omega": matrices.modal.omega,
+        "angular_frequency": frequency,
+        "epsilon": epsilon,
+        "decay": matrices.modal.decay,
+    }
+    if residual:
+        assert isinstance(given, Fluctuation)
+        found["coupling"], found["compliance"] = static_terms(system, given, modes)
+    else:
+        couplings = np.broadcast_arrays(*(d.stiffness for d in matrices.drives if d.stiffness is not None))
+        found["coupling"] = np.stack(couplings, axis=-3) if couplings else np.zeros((1, modes, modes))
+        found["oscillations"] = [d.oscillation for d in matrices.drives] or None
+    return found

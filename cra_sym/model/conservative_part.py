@@ -1,0 +1,81 @@
+"""The part of a model that has natural modes: no gyroscopic terms, no forces that follow the motion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sympy import Add, Derivative, Expr, S, Symbol, expand, sympify
+
+from cra_sym.mechanics.jets import END_NAMES
+from cra_sym.mechanics.weak import Bilinear, weak_form
+from cra_sym.model.forms import form_of
+from cra_sym.model.projection import Form
+
+if TYPE_CHECKING:
+    from cra_sym.model.lagrangian import Model
+
+__all__ = ["conservative_part", "stiffness_beside"]
+
+
+def conservative_part(model: Model) -> Model | None:
+    """Return the model without terms that are odd in time and without virtual work; None if it has natural modes.
+
+    Dampers alone are left out of natural frequencies anyway. Where forces follow the motion, the potential energy of
+    the highest derivatives alone stays: what such forces keep from buckling would buckle without them.
+    """
+    try:
+        _ = model.conservative
+    except ValueError:
+        pass
+    else:
+        return None
+    options, t = model._options, model._options["t"]
+    density = _leading(model) if model._undamped_work() else options["density"]
+
+    def even(expression: Expr | None) -> Expr | None:
+        if expression is None:
+            return None
+        terms = Add.make_args(expand(sympify(expression, strict=True)))
+        return sum((term for term in terms if not _turns(term, t)), S.Zero)
+
+    changes = {"density": even(density)} | {end: even(options[end]) for end in END_NAMES}
+    inside = tuple((place, even(term)) for place, term in options["inside"])
+    found = type(model)(**{**options, **changes, "inside": inside, "virtual_work": ()})
+    found.symbols = model.symbols
+    return found
+
+
+def _leading(model: Model) -> Expr:
+    """Return the density without the energy of displacements that are not the highest derivatives of their fields."""
+    variation = model.equations.variation
+    space, orders = variation.space, variation.orders
+
+    def stays(term: Expr) -> bool:
+        return all(j.time or (space.is_field(j.unknown) and j.space == orders[j.unknown]) for j in space.jets(term))
+
+    return space.restore(Add(*(term for term in Add.make_args(expand(variation.density)) if stays(term))))
+
+
+def _turns(term: Expr, t: Symbol) -> bool:
+    """Tell whether a term of a Lagrangian changes sign when time runs backwards."""
+    odd = {node for node in term.atoms(Derivative) if sum(n for s, n in node.variable_count if s == t) % 2}
+    return bool(odd) and expand(term.xreplace({node: -node for node in odd}) + term) == 0
+
+
+def stiffness_beside(model: Model) -> Form | None:
+    """Return the stiffness that the conservative part does not have, of follower forces; None if there is none."""
+    part = conservative_part(model)
+    if part is None:
+        return None
+    whole, own = weak_form(model.equations.variation), weak_form(part.equations.variation)
+    parts = _beyond(whole.inside, own.inside), _beyond(whole.discrete, own.discrete)
+    return form_of(whole, {"stiffness": parts}, model.symbols) if any(parts) else None
+
+
+def _beyond(whole: Bilinear, own: Bilinear) -> Bilinear:
+    found: Bilinear = {}
+    for pair in {**whole, **own}:
+        value = expand(whole.get(pair, {}).get(0, S.Zero) - own.get(pair, {}).get(0, S.Zero))
+        if value != 0:
+            found[pair] = {0: value}
+    return found

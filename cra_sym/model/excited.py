@@ -1,0 +1,267 @@
+"""What of a model oscillates: fluctuating parameters, shaken frames, and the periodic terms of its own Lagrangian."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from sympy import Dummy, Expr, Heaviside, S, Symbol, integrate, sympify
+
+from cra_sym.mechanics.hamilton import HamiltonResult
+from cra_sym.mechanics.jets import END_NAMES, End, HamiltonError, Jet
+from cra_sym.mechanics.periodic import Key, TimeForms, separated, time_forms
+from cra_sym.mechanics.variation import Variation, vary
+from cra_sym.mechanics.weak import weak_form
+from cra_sym.model.forms import form_of, load_of
+from cra_sym.model.projection import Form, Load
+from cra_sym.solvers.floquet import Oscillation
+
+if TYPE_CHECKING:
+    from cra_sym.model.lagrangian import Model
+
+__all__ = [
+    "PeriodicForms",
+    "axial",
+    "checked_small",
+    "fluctuating",
+    "fluctuation",
+    "periodic_forms",
+    "refuse_small",
+    "split_options",
+    "without_oscillations",
+]
+
+Options = dict[str, Any]
+Term = tuple[str, Expr, int | None, bool]
+Parts = dict[tuple[int, Key], Options]
+_TERMS = ("density", "left", "right")
+
+
+class PeriodicForms(NamedTuple):
+    """What of a Lagrangian goes with one oscillation.
+
+    Attributes
+    ----------
+    oscillation : Oscillation
+    small : bool
+        Whether it is times epsilon.
+    matrices : Form or None
+        Stiffness, damping, momentum and mass, as far as they occur.
+    force, momentum : Load or None
+        What acts by itself, and what acts by its derivative by time.
+    """
+
+    oscillation: Oscillation
+    small: bool
+    matrices: Form | None
+    force: Load | None
+    momentum: Load | None
+
+
+# ------------------------------------------------------------------------------------- the Lagrangian's own terms
+
+
+def checked_small(small: Any, own: tuple[Symbol, Symbol]) -> tuple[Symbol, Symbol] | None:
+    """Return (epsilon, varpi), or None if nothing is declared small."""
+    if small is None:
+        return None
+    pair = tuple(small) if isinstance(small, tuple | list) else ()
+    if len(pair) != 2 or not all(isinstance(s, Symbol) for s in pair) or len({*pair, *own}) != 4:
+        raise TypeError(f"small = {small}: must be two symbols (epsilon, varpi) other than {own[0]} and {own[1]}")
+    return pair[0], pair[1]
+
+
+def refuse_small(small: tuple[Symbol, Symbol] | None, values: Any) -> None:
+    """Refuse a value for epsilon or varpi."""
+    given = values if isinstance(values, Mapping) else {}
+    for symbol in small or ():
+        if symbol in given or symbol.name in given:
+            raise ValueError(f"values: {symbol} is small, no value: growth_rate and stability_boundary take it")
+
+
+def split_options(options: Options, small: tuple[Symbol, Symbol]) -> tuple[Options, Parts]:
+    """Return what Hamilton's principle takes without the terms that oscillate, and these by oscillation.
+
+    Raises
+    ------
+    HamiltonError
+        Names the argument in which something oscillates that must not, or a term of another form.
+    """
+    t = options["t"]
+    for name in ("domain", "essential"):
+        for given in (sympify(given, strict=True) for given in options[name]):
+            if given.has(*small):
+                raise HamiltonError(f"{name}: {given} must be free of {small[0]} and {small[1]}: no length oscillates")
+    parts: Parts = {}
+
+    def part(key: tuple[int, Key]) -> Options:
+        return parts.setdefault(key, {"density": S.Zero, "left": S.Zero, "right": S.Zero, "inside": [], "work": []})
+
+    still = dict(options)
+    for name in _TERMS:
+        if options[name] is None:
+            continue
+        still[name], found = separated(name, sympify(options[name], strict=True), small, t)
+        for key, value in found.items():
+            part(key)[name] = value
+    inside, work = [], []
+    for place, term in options["inside"]:
+        if sympify(place, strict=True).has(*small):
+            raise HamiltonError(f"inside: the place {place} must be free of {small[0]} and {small[1]}")
+        rest, found = separated(f"inside at {place}", sympify(term, strict=True), small, t)
+        inside.append((place, rest))
+        for key, value in found.items():
+            part(key)["inside"].append((place, value))
+    for force, displacement, place in options["virtual_work"]:
+        if sympify(displacement, strict=True).has(*small):
+            raise HamiltonError(f"virtual_work: the displacement {displacement} must be free of {small[0]}, {small[1]}")
+        rest, found = separated(f"virtual work on {displacement}", sympify(force, strict=True), small, t)
+        if rest != 0:
+            work.append((rest, displacement, place))
+        for key, value in found.items():
+            part(key)["work"].append((value, displacement, place))
+    return {**still, "inside": tuple(inside), "virtual_work": tuple(work)}, parts
+
+
+def without_oscillations(
+    model: Model, options: Options, units: Mapping[Any, str]
+) -> tuple[Model, tuple[PeriodicForms, ...]]:
+    """Return the model without what oscillates, with the same parameters, and that."""
+    still, parts = split_options(options, model._pieces["small"])
+    steady = type(model)(**still)
+    steady.symbols = model.symbols
+    steady._pieces["units"] = tuple(units.items())
+    return steady, periodic_forms(steady, parts)
+
+
+def periodic_forms(model: Model, parts: Mapping[tuple[int, Key], Options]) -> tuple[PeriodicForms, ...]:
+    """Return the compiled matrices and forces of the oscillating terms; ``model`` is without them.
+
+    Raises
+    ------
+    HamiltonError
+        If a parametric term is not proportional to epsilon, or a force to a higher power of it.
+    """
+    found = []
+    for (epsilons, key), options in parts.items():
+        oscillation = Oscillation(*key)
+        label = f"{oscillation.kind} of order {oscillation.order}"
+        forms = _forms_of(model.equations, options, label)
+        named = forms.named()
+        if named and epsilons != 1:
+            raise HamiltonError(
+                f"small: the parametric terms with the {label} are times epsilon**{epsilons}: they must be times "
+                "epsilon to the first power; state the Lagrangian to first order"
+            )
+        loads = forms.load or forms.discrete_load
+        if loads and epsilons > 1:
+            raise HamiltonError(f"small: the forces with the {label} are times epsilon**{epsilons}; at most one")
+        weak = weak_form(model.equations.variation)
+        matrices = form_of(weak, named, model.symbols) if named else None
+        force, momentum = (_load(model, forms, order) for order in (0, 1))
+        if matrices or force or momentum:
+            found.append(PeriodicForms(oscillation, epsilons == 1, matrices, force, momentum))
+    return tuple(found)
+
+
+def _forms_of(equations: HamiltonResult, options: Options, label: str) -> TimeForms:
+    """Return the matrices of one part, read like the whole Lagrangian."""
+    steady, space = equations.variation, equations.variation.space
+    carrier: Expr = sum((_highest(steady, number) for number in range(len(space.fields))), S.Zero)
+    ends: dict[End, Expr] = {end: options[end] for end in END_NAMES}
+    varied = vary(space, options["density"] + carrier, ends, options["work"], (), options["inside"])
+    if any(order > own for order, own in zip(varied.orders, steady.orders, strict=True)):
+        raise HamiltonError(f"small: {label} has a higher derivative by {space.x} than what does not oscillate")
+    places = [point.place for point in steady.points]
+    density = varied.density - space.read(carrier, "domain", "density")
+    terms: list[Term] = [("density", density, None, True)]
+    terms.append(("end", varied.ends, None, False))
+    points = varied.points
+    terms += [(f"inside at {point.place}", point.lagrangian, places.index(point.place), False) for point in points]
+    return time_forms(space, terms, varied.applied)
+
+
+def _highest(variation: Variation, number: int) -> Expr:
+    """Return a term that has the highest derivative of a field, so that its displacements are known at the ends."""
+    jet = Jet(number, variation.orders[number], 0, None)
+    return variation.space.form(jet)
+
+
+def _load(model: Model, forms: TimeForms, order: int) -> Load | None:
+    inside, ends = (
+        {jet: value for (jet, n), value in load.items() if n == order} for load in (forms.load, forms.discrete_load)
+    )
+    return load_of(weak_form(model.equations.variation), inside, ends, model.symbols) if inside or ends else None
+
+
+# ------------------------------------------------------------------------------------------ fluctuating parameters
+
+
+def fluctuation(model: Model, name: str) -> str:
+    """Return why a parameter cannot fluctuate about its value in a parametric excitation, or an empty text."""
+    variation = model.equations.variation
+    symbol = next(s for s in model.symbols if s.name == name)
+    places = [*variation.space.ends.values(), *(point.place for point in variation.points)]
+    if any(place.has(symbol) for place in places):
+        return "is a length"
+    forms = _by(variation, symbol).named()
+    if not forms:
+        return "changes neither stiffness, damping nor mass"
+    values = (value for pair in forms.values() for part in pair for entry in part.values() for value in entry.values())
+    return "does not enter the Lagrangian linearly" if any(value.has(symbol) for value in values) else ""
+
+
+def fluctuating(model: Model, name: str) -> tuple[Form, tuple[str, ...]]:
+    """Return the matrices that a unit of a parameter gives, and the parameters they depend on."""
+    variation = model.equations.variation
+    named = _by(variation, next(s for s in model.symbols if s.name == name)).named()
+    values = (value for pair in named.values() for part in pair for entry in part.values() for value in entry.values())
+    used = sorted({symbol.name for value in values for symbol in value.free_symbols if isinstance(symbol, Symbol)})
+    form = form_of(weak_form(variation), named, model.symbols)
+    return form, tuple(name for name in used if name in {s.name for s in model.symbols})
+
+
+def _by(variation: Variation, symbol: Symbol) -> TimeForms:
+    """Return the derivative of all matrices by a parameter."""
+    terms: list[Term] = [("density", variation.density.diff(symbol), None, True)]
+    terms.append(("end", variation.ends.diff(symbol), None, False))
+    terms += [("inside", point.lagrangian.diff(symbol), k, False) for k, point in enumerate(variation.points)]
+    applied = [(force.diff(symbol), jet, per_length) for force, jet, per_length in variation.applied]
+    return time_forms(variation.space, terms, applied, linearise=True)
+
+
+# ------------------------------------------------------------------------------------------------- shaken frames
+
+
+def axial(model: Model) -> Form:
+    """Return the stiffness that a unit acceleration of the frame along x, towards the right, gives the first field.
+
+    What moves across the domain moves along it too: the inertia of all mass beyond x, at the right end included, acts
+    on the foreshortening v_x^2 / 2 there, so that (36b) follows from the kinetic energy. A mass m that an end carries
+    on a rigid lever e, of velocity v_t + e v_xt, adds m e v_x^2 / 2; m e is its coupling of both.
+    """
+    weak = weak_form(model.equations.variation)
+    space = weak.variation.space
+    field, tip, slope = Jet(0, 0, 0, None), Jet(0, 0, 0, "right"), Jet(0, 1, 0, None)
+    density = weak.inside.get((field, field), {}).get(2, S.Zero)
+    place = Dummy("x")
+    beyond = integrate(density.subs(space.x, place), (place, space.x, space.ends["right"]))
+    load = beyond + weak.ends.get((tip, tip), {}).get(2, S.Zero)
+    for point in weak.points:
+        load += point.form.get((field, field), {}).get(2, S.Zero) * Heaviside(point.place - space.x)
+    for number, unknown in enumerate(space.unknowns):
+        lumped = Jet(number, 0, 0, None)
+        if space.is_field(number) or weak.discrete.get((lumped, lumped), {}).get(2, S.Zero) == 0:
+            continue
+        if not any(lumped in pair and 2 in orders for pair, orders in weak.inside.items()):
+            raise ValueError(
+                f"axial: the place along x of the mass that moves by {unknown} is not known; state the work of the "
+                "axial load in the Lagrangian and let its amplitude fluctuate"
+            )
+    levers: dict[tuple[Jet, Jet], dict[int, Expr]] = {}
+    for end in (*END_NAMES, *range(len(weak.points))):
+        displacement, turn = Jet(0, 0, 0, end), Jet(0, 1, 0, end)
+        moment = weak.discrete.get((displacement, turn), {}).get(2, S.Zero)
+        if moment != 0:
+            levers[turn, turn] = {0: moment}
+    return form_of(weak, {"axial": ({(slope, slope): {0: load}}, levers)}, model.symbols)
