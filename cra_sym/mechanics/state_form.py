@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sympy import Expr, Matrix, S, Symbol, diag, eye, zeros
+from sympy import Expr, Matrix, Not, Or, Piecewise, S, Symbol, diag, eye, zeros
 from sympy.core.function import AppliedUndef
 
 from cra_sym import checks
@@ -146,6 +146,7 @@ def _system(weak: WeakForm, parameter: Symbol) -> Matrix:
         raise HamiltonError(
             f"density: the quadratic form in {', '.join(names)} is singular, so the problem has no state form"
         )
+    _check_parts(leading, weak.variation.space.x)
     for row, jet in enumerate(highest):
         if jet.space == 0 and leading[row, row].has(parameter):
             raise HamiltonError(
@@ -171,6 +172,20 @@ def _system(weak: WeakForm, parameter: Symbol) -> Matrix:
             slope[row, :] = top[highest.index(raised), :]
     rate = stiffness(state, state) * motion + stiffness(state, highest) * top - lower
     return Matrix.vstack(slope, zeros(m, width), rate)
+
+
+def _check_parts(leading: Matrix, x: Symbol) -> None:
+    """Refuse a stiffness that is zero on a part of the domain; name the part."""
+    for stiffness in leading.diagonal():
+        for piecewise in stiffness.atoms(Piecewise):
+            for value, condition in piecewise.args:
+                if stiffness.xreplace({piecewise: value}) == 0:
+                    earlier = [c for _, c in piecewise.args[: [c for _, c in piecewise.args].index(condition)]]
+                    where = condition if condition != True else Not(Or(*earlier))  # noqa: E712
+                    raise HamiltonError(
+                        f"density: the stiffness {stiffness} is 0 where {where}; every part of the domain in {x} needs "
+                        "a stiffness: end the domain there, or join two fields"
+                    )
 
 
 def _inverse(matrix: Matrix) -> Matrix:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.checks import broadcastable, count, default_floating_point, instance, real_array, shown
+from cra_sym.model.cross_check import CrossCheck, cross_check
 from cra_sym.model.projection import Domain, Load, Projected, project
 from cra_sym.model.routes import ROUNDING, TOLERANCE, Estimated, Modes, Route
 from cra_sym.model.spatial import check_range
@@ -182,6 +183,33 @@ class System:
         if "_accuracy" not in self.__dict__:
             self.natural_frequencies(3)
         return np.asarray(self.__dict__["_accuracy"])
+
+    def check(self, modes: int = 3) -> CrossCheck:
+        """Return how far natural frequencies differ from those of Hermite elements, and what that is owed to.
+
+        Ritz's method shares nothing with the route of the frequencies but the Lagrangian, and bounds them from above.
+        Its elements have nodes at all breakpoints.
+
+        Parameters
+        ----------
+        modes : int
+
+        Raises
+        ------
+        ValueError
+            If the model has no natural frequencies of conservative motions.
+
+        Examples
+        --------
+        >>> from sympy import Piecewise, symbols
+        >>> import cra_sym as cra
+        >>> from cra_sym.symbols import t, v, x
+        >>> rope = cra.Model(v.diff(t)**2 / 2 - Piecewise((1, x < 1), (3, True)) * v.diff(x)**2 / 2, fields=[v], x=x,
+        ...                  domain=(0, 2), t=t, essential=[v.subs(x, 0), v.subs(x, 2)], units={x: "1"})
+        >>> bool(rope.at({}).check().agree)
+        True
+        """
+        return cross_check(self, count("modes", modes, high=MOST_MODES))
 
     def modes(self, modes: int) -> Modes:
         """Return the first natural modes."""

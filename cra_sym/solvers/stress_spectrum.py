@@ -297,7 +297,8 @@ class _Problem:
         if number > 0 and (there < number).any():
             rigid = self.still.shape[1]
             raise ValueError(
-                f"modes = {number + rigid}: the model has only {int(there.min()) + rigid} natural frequencies"
+                f"modes = {number + rigid}: the model has only {int(there.min()) + rigid} natural frequencies below "
+                "1e14 times the first that is not 0"
             )
 
     def _singular(self, operator: Array, wanted: int) -> tuple[Array, Array]:
@@ -359,7 +360,7 @@ class _Problem:
             z = 1.0 / compliances[:, :number] if number > 0 else np.zeros((len(self.sets), 0))
         unknowns = np.take_along_axis(unknowns, order[..., None], axis=1)[:, : max(number, 0)]
         spread = compliances[:, :1] / compliances[:, : max(number, 0)]
-        rounding = EPS * (8.0 * loading + np.sqrt(spread))
+        rounding = EPS * (8.0 * loading + EPS * spread)  # a quotient has the square of the error of its vector
         vectors = unknowns * np.sqrt(z)[..., None]
         rigid = self.still.shape[1]
         if rigid:

@@ -175,3 +175,40 @@ def test_rigid_motions_are_zero_and_massless_parts_have_no_modes():
     with pytest.raises(ValueError, match="only 1 natural frequencies"):
         tip.at({}).natural_frequencies(2)
     assert stress_route(tip, tip.numerics("spatial")) is not None
+
+
+@pytest.mark.parametrize("soft", [1e-8, 1e-12, 1e-16, 1e-20])
+@pytest.mark.parametrize("stiff", [0.0, 1e3, 1e12, np.inf])
+def test_a_spring_of_next_to_nothing_beside_a_stiff_one(soft, stiff):
+    """A stepped beam that turns or slides as a rigid body, but for the spring, whose higher modes do not notice it."""
+    mass = 1 / 2 + 3 / 2
+    inertia = (1 / 8 + 3 * 7 / 8) / 3
+    springs = -k * v**2 / 2 - c * v.diff(x) ** 2 / 2
+    beam = step(1, 3) * v.diff(t) ** 2 / 2 - step(1, HALF) * v.diff(x, 2) ** 2 / 2
+    model = cra.Model(beam, fields=[v], x=x, domain=(0, 1), t=t, left=springs)
+    sliding = model.at({k: soft, c: stiff})
+    turning = model.at({k: stiff, c: soft})
+    if stiff > 0.0:
+        np.testing.assert_allclose(sliding.natural_frequencies(1)[0], np.sqrt(soft / mass), rtol=max(1e-11, 2 * soft))
+        limit = np.sqrt(soft / inertia)
+        known = 1e-11 if np.isinf(stiff) else max(1e-11, 20 * soft / stiff)
+        np.testing.assert_allclose(turning.natural_frequencies(1)[0], limit, rtol=max(known, 2 * soft))
+    for system, symbol in ((sliding, "k"), (turning, "c")):
+        free = system.replace(**{symbol: 0.0}).natural_frequencies(4)
+        higher = free > 1e-3
+        found = system.natural_frequencies(4)
+        np.testing.assert_allclose(found[higher], free[higher], rtol=max(1e-11, 20 * soft))
+        assert (system.accuracy < (1e-10 if soft > 1e-18 else 1e-6)).all()
+
+
+def test_a_spring_too_soft_for_doubles_is_refused_in_words():
+    model = cra.Model(
+        step(1, 3) * v.diff(t) ** 2 / 2 - v.diff(x, 2) ** 2 / 2,
+        fields=[v],
+        x=x,
+        domain=(0, 1),
+        t=t,
+        left=-k * v**2 / 2 - v.diff(x) ** 2,
+    )
+    with pytest.raises(ValueError, match="only 1 natural frequencies below 1e14 times the first"):
+        model.at({k: 1e-33}).natural_frequencies(3)

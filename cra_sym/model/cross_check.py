@@ -1,0 +1,129 @@
+"""Frequencies of a system by its own route against Ritz's method on Hermite elements, which shares none of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.model.galerkin import Ritz
+from cra_sym.model.values import flat_columns
+
+if TYPE_CHECKING:
+    from sympy import Expr, Symbol
+
+    from cra_sym.model.system import System
+
+__all__ = ["CrossCheck", "cross_check"]
+
+Array = NDArray[np.float64]
+_ELEMENTS, _FEWEST = 32, 2  # of all spans together, of one
+_ROUNDING = 1e-15  # of Ritz's method, times the fourth power of the number of elements
+
+
+@dataclass(frozen=True)
+class CrossCheck:
+    """How far two routes to the natural frequencies differ.
+
+    Attributes
+    ----------
+    difference : ndarray, shape (...)
+        Ritz's frequency over that of the system's own route, minus one, where this is largest among the modes.
+    mode : ndarray of int, shape (...)
+        Which mode that is, from 1.
+    expected : ndarray, shape (...)
+        What the estimates of both routes allow there.
+    agree : ndarray of bool, shape (...)
+        Whether no mode differs by more than that.
+    cause : str
+        What the largest difference of all sets is owed to.
+    """
+
+    difference: Array
+    mode: NDArray[np.intp]
+    expected: Array
+    agree: NDArray[np.bool_]
+    cause: str
+
+
+def cross_check(system: System, modes: int) -> CrossCheck:
+    """Compare natural frequencies with those of Hermite elements that have nodes at every breakpoint."""
+    own = system.natural_frequencies(modes).reshape(-1, modes) / (2.0 * np.pi)
+    accuracy = np.broadcast_to(system.accuracy, system.shape).reshape(-1, 1)
+    coarse, fine, elements = _by_ritz(system, modes)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        difference = np.where(own > 0.0, fine / own - 1.0, np.where(fine > 0.0, np.inf, 0.0))
+        falling = np.where(fine > 0.0, coarse / fine - 1.0, 0.0)
+    expected = accuracy + np.abs(falling) + _ROUNDING * (2.0 * elements[:, None]) ** 4
+    over = np.abs(difference) - expected
+    mode = np.where((over > 0.0).any(axis=1), over.argmax(axis=1), np.abs(difference).argmax(axis=1))
+    rows = np.arange(len(own))
+    worst = int(np.argmax(np.where((over > 0.0).any(axis=1), np.inf, np.abs(difference[rows, mode]))))
+    shape = system.shape
+    return CrossCheck(
+        difference[rows, mode].reshape(shape),
+        (mode + 1).reshape(shape),
+        expected[rows, mode].reshape(shape),
+        (over <= 0.0).all(axis=1).reshape(shape),
+        _cause(difference[worst, mode[worst]], mode[worst] + 1, accuracy[worst, 0], falling[worst, mode[worst]]),
+    )
+
+
+def _cause(difference: float, mode: int, accuracy: float, falling: float) -> str:
+    expected = accuracy + abs(falling)
+    found = f"mode {mode}: Ritz's method lies {abs(difference):.1g} {'above' if difference >= 0.0 else 'below'}; "
+    if abs(difference) <= max(2.0 * expected, 1e-9):
+        return found + (
+            f"its elements, halved, still change it by {falling:.1g}"
+            if falling >= accuracy
+            else f"the own route estimates {accuracy:.1g} for itself"
+        )
+    if difference < 0.0:
+        return found + f"it bounds frequencies from above, so the own route is wrong, which estimates {accuracy:.1g}"
+    return found + (
+        f"its elements, halved, change it by {falling:.1g} only, and the own route estimates {accuracy:.1g}: one misses "
+        "a mode or detail of a coefficient"
+    )
+
+
+def _by_ritz(system: System, modes: int) -> tuple[Array, Array, Array]:
+    """Return frequencies in Hz of some elements and of twice as many, (sets, modes), and the number of the former."""
+    from cra_sym.mechanics import ritz
+
+    model, spatial = system.model, system.numerics("spatial")
+    columns = flat_columns(system.parameters, system.shape)
+    sets = columns.shape[1]
+    found = np.empty((2, sets, modes))
+    number = np.empty(sets)
+    for rows, names, places in _nodes(system, columns):
+        each = max(_FEWEST, int(np.ceil((_ELEMENTS + modes) / (len(names) + 1))))
+        values = {name: column[rows] for name, column in zip(spatial.names, columns, strict=True)}
+        values |= {symbol.name: at for symbol, at in zip(places[0], places[1], strict=True)}
+        for k, elements in enumerate((each, 2 * each)):
+            matrices = ritz(model.equations, elements=elements, nodes=names)
+            found[k, rows] = Ritz(matrices, (*model.symbols, *places[0])).natural_frequencies(values, modes)
+        number[rows] = each * (len(names) + 1)
+    return found[0], found[1], number
+
+
+def _nodes(
+    system: System, columns: Array
+) -> Iterator[tuple[NDArray[np.intp], tuple[Expr, ...], tuple[tuple[Symbol, ...], tuple[Array, ...]]]]:
+    """Yield sets with as many breakpoints, these as symbols or stated places, and (symbols, their values)."""
+    from sympy import Symbol
+
+    spatial = system.numerics("spatial")
+    finite = np.where(np.isinf(columns), 0.0, columns)
+    length, left = (np.broadcast_to(value, columns.shape[1:]) for value in spatial.geometry.function(*finite))
+    if spatial.breaks is None:
+        yield np.arange(columns.shape[1]), (), ((), ())
+        return
+    stated = [point.place for point in system.model.equations.variation.points]
+    for rows, edges, nodes in spatial.breaks.edges(finite, left, length):
+        symbols = [Symbol(f"breakpoint_{k}") for k in range(1, edges.shape[1] - 1)]
+        names = [stated[nodes.index(k)] if k in nodes else symbols[k - 1] for k in range(1, edges.shape[1] - 1)]
+        free = [k for k, name in enumerate(names) if name is symbols[k]]
+        yield rows, tuple(names), (tuple(symbols[k] for k in free), tuple(edges[:, k + 1] for k in free))
