@@ -84,7 +84,7 @@ def _cause(difference: float, mode: int, accuracy: float, falling: float) -> str
     if difference < 0.0:
         return found + f"it bounds frequencies from above, so the own route is wrong, which estimates {accuracy:.1g}"
     return found + (
-        f"its elements, halved, change it by {falling:.1g} only, and the own route estimates {accuracy:.1g}: one misses "
+        f"its elements, halved, change it {falling:.1g}, the own route estimates {accuracy:.1g}: one misses "
         "a mode or detail of a coefficient"
     )
 

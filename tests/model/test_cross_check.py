@@ -39,7 +39,7 @@ def step(left, right, place):
         (beam(step(1, b, a), inside=[(HALF, -k * v**2 / 2)]), {a: [0.3, 0.6], b: 3.0, k: [20.0, np.inf][:1]}),
         (string(1 + x, step(1, 4, a)), {a: 0.37}),
         (string(1 - x / 2), {}),
-        (beam(1, left=-k * v**2 / 2, essential=()), {k: [0.0, 1e-6]}),
+        (beam(1, left=-k * v**2 / 2, essential=()), {k: [0.0, 1.0]}),
     ],
     ids=["step", "mass", "step and spring", "string", "smooth", "rigid motions"],
 )
@@ -56,7 +56,7 @@ def test_the_papers_arm_checks_itself():
     assert check.agree.all() and check.mode.shape == (2,)
 
 
-@pytest.mark.parametrize(("factor", "words"), [(1 + 1e-4, "is wrong"), (1 - 1e-4, "misses a mode or detail")])
+@pytest.mark.parametrize(("factor", "words"), [(1 + 1e-4, "is wrong"), (1 - 1e-4, "one misses a mode")])
 def test_a_route_that_errs_is_told(monkeypatch, factor, words):
     model = beam(1 + x)
     for route in (StressRoute, GeneralRoute):
