@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from cra_sym.checks import choice
+from cra_sym.checks import choice, count, instance
 from cra_sym.codegen.expressions import gauss_rule, modal_functions, spectrum_functions, stability_functions
+from cra_sym.codegen.fmu import VERSIONS, fmu_archive
+from cra_sym.codegen.frozen import frozen_library
 from cra_sym.codegen.languages import LANGUAGES, Language
+from cra_sym.codegen.library import check_name
 from cra_sym.codegen.program import Function
-from cra_sym.codegen.rendering import DIGEST, common_values, rendered
-from cra_sym.codegen.user_model import model_texts
+from cra_sym.codegen.rendering import DIGEST, common_values, licence, rendered
+from cra_sym.codegen.user_model import model_library
 from cra_sym.codegen.vectors import arm_checks, written
 from cra_sym.files import OutputError, path_of, staged_directory
+from cra_sym.model.lagrangian import Model
+from cra_sym.model.system import MOST_MODES, System
 
 __all__ = ["Export", "export"]
 
@@ -45,20 +51,36 @@ class Export:
 
     def __repr__(self) -> str:
         names = "\n".join(f"  {name}" for name in self.files)
-        return f"<Export to {LANGUAGES[self.language].title}, {self.digest[:12]}, in {self.directory}\n{names}>"
+        title = LANGUAGES[self.language].title if self.language in LANGUAGES else "FMI"
+        return f"<Export to {title}, {self.digest[:12]}, in {self.directory}\n{names}>"
 
 
-def export(language: str, directory: str | Path, model: Any = None, overwrite: bool = False) -> Export:
-    """Write the arm, or a model of one's own, as tested source code without dependence on this package.
+def export(
+    language: str,
+    directory: str | Path,
+    model: Model | None = None,
+    overwrite: bool = False,
+    *,
+    system: System | None = None,
+    name: str | None = None,
+    modes: int = 3,
+    real: str = "float64",
+    version: str = "3.0",
+    input: Any = "base_acceleration",
+    outputs: Any = None,
+) -> Export:
+    """Write the arm, a model, or the modes of any system, as tested source code that does not need this package.
 
-    The folder holds source, build files, reference vectors made by this package's kernels, a self-test that compares
-    with them, and a README. The same input gives the same bytes.
+    The folder holds source, build files, reference vectors computed by this package, a self-test that compares with
+    them, and a README. The same input gives the same bytes.
 
     Parameters
     ----------
-    language : {'c', 'fortran', 'python', 'julia', 'octave', 'rust', 'javascript'}
-        The first three hold everything: characteristic function, frequencies, modes, sensitivities, responses, state
-        space and first-order stability. The others hold the characteristic function and the frequencies.
+    language : {'c', 'fortran', 'python', 'julia', 'octave', 'rust', 'javascript', 'fmu'}
+        Of the arm the first three hold everything: characteristic function, frequencies, modes, sensitivities,
+        responses, state space and first-order stability; the others the characteristic function and the frequencies.
+        Of models and systems all hold the same. 'fmu' writes NAME.fmu, of a system: model exchange and co-simulation
+        with sources, and a binary for this platform where a C compiler is. Its values are frozen.
     directory : path
         Folder to make, with its parents.
     model : Model, optional
@@ -66,6 +88,21 @@ def export(language: str, directory: str | Path, model: Any = None, overwrite: b
     overwrite : bool
         Whether a folder that is not empty is replaced by one that holds the new files and, of the old ones, those no
         earlier export made. The folder changes in one step: a failed export leaves it as it was.
+    system : System, optional
+        Its first modes, frozen as numbers, are exported instead: exact steps under a held input, outputs, frequency
+        response, input shapers. It may have dampers, vary along x, or be an arm; it is a single set of values.
+    name : str, optional
+        In front of every public symbol, and the name of package, module, crate and target. Default: `cra`, with the
+        arm's package `cra_arm`; `model`; `system`.
+    modes : int
+        Modes of the system that are kept.
+    real : {'float64', 'float32'}
+        Type of real numbers in the code of a system. Single precision is there for C, Fortran and Rust.
+    version : {'3.0', '2.0'}
+        Of FMI.
+    input, outputs
+        Of a system, as :func:`cra_sym.state_space` takes them; one input. Default outputs: y, v, w, root_force,
+        root_moment and tip_acceleration, as far as the system has them.
 
     Returns
     -------
@@ -74,25 +111,79 @@ def export(language: str, directory: str | Path, model: Any = None, overwrite: b
     Raises
     ------
     TypeError
-        If the language is no text, the directory no path or the model no Model.
+        If the language or the name is no text, the directory no path, the model no Model, or the system no System.
     ValueError
-        If the language is unknown, the folder is not empty, or the model has no real closed form. Nothing is written.
+        If the language is unknown, the folder is not empty, the model has no real closed form, or the system cannot be
+        frozen. Nothing is written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import cra_sym as cra
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     made = cra.export("c", folder, system=cra.Arm.nominal(), name="crane", modes=2)
+    >>> [name for name in made.files if name.startswith("crane")]
+    ['crane.c', 'crane.h']
     """
-    choice("language", language, LANGUAGES)
+    choice("language", language, [*LANGUAGES, "fmu"])
+    choice("version", version, VERSIONS)
+    choice("real", real, ("float64", "float32"))
+    if model is not None and system is not None:
+        raise TypeError("model and system: give one of them; a system is a model with values")
+    if name is not None:
+        check_name(name)
+    if system is None and real != "float64":
+        raise ValueError("real = 'float32': only the code of a system has it; give system=")
+    if language == "fmu" and system is None:
+        raise ValueError("language = 'fmu': is that of a system; give system=")
     target = Path(os.path.realpath(path_of("directory", directory)))
     _check_free(target, overwrite)
-    texts = _arm_texts(language) if model is None else model_texts(language, model)
+    texts: dict[str, str | bytes]
+    if system is not None:
+        texts = _system_texts(language, system, name or "system", modes, real, version, input, outputs)
+    elif model is not None:
+        texts = dict(model_library(model, name or "model").texts(language))
+    else:
+        texts = dict(_named(_arm_texts(language), name))
+    if language != "fmu":
+        texts["LICENSE"] = licence()
     digest = _digest(texts)
-    texts = {name: text.replace(DIGEST, digest) for name, text in texts.items()}
+    texts = {file: text if isinstance(text, bytes) else text.replace(DIGEST, digest) for file, text in texts.items()}
     _write(target, texts, overwrite)
     return Export(language, Path(directory), tuple(sorted(texts)), digest)
 
 
-def _digest(texts: dict[str, str]) -> str:
+def _system_texts(
+    language: str, system: System, name: str, modes: int, real: str, version: str, drive: Any, outputs: Any
+) -> dict[str, str | bytes]:
+    instance("system", system, System)
+    modes = count("modes", modes, high=MOST_MODES)
+    library, given, names = frozen_library(system, name, modes, real, drive, outputs)
+    if language != "fmu":
+        return dict(library.texts(language))
+    if real != "float64":
+        raise ValueError(f"real = {real!r}: an FMU has float64")
+    return {f"{name}.fmu": fmu_archive(library, given, names, version)}
+
+
+def _named(texts: dict[str, str], name: str | None) -> dict[str, str]:
+    """Return the arm's texts with another name in front of what is public."""
+    if name is None:
+        return texts
+
+    def put(text: str) -> str:
+        text = re.sub(r"cra_(?!sym)", f"{name}_", text).replace("CRA_", f"{name.upper()}_").replace("cra-", f"{name}-")
+        return text.replace("CraArm", "".join(map(str.capitalize, f"{name}_arm".split("_"))))
+
+    return {put(file): text if file == "reference.txt" else put(text) for file, text in texts.items()}
+
+
+def _digest(texts: Mapping[str, str | bytes]) -> str:
     digest = hashlib.sha256()
     for name, text in sorted(texts.items()):
         if name != "README.md":
-            digest.update(f"{name} {len(text.encode())}\n{text}".encode())
+            content = text if isinstance(text, bytes) else text.encode()
+            digest.update(f"{name} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 
@@ -105,12 +196,15 @@ def _check_free(target: Path, overwrite: bool) -> None:
         raise OutputError(f"directory = {str(target)!r}: is not empty; overwrite=True (--force) writes into it")
 
 
-def _write(target: Path, texts: dict[str, str], keep: bool) -> None:
+def _write(target: Path, texts: Mapping[str, str | bytes], keep: bool) -> None:
     """Write everything or nothing: the folder is complete before it takes its place."""
     with staged_directory(target, keep=keep) as folder:
         for name, text in texts.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            (folder / name).write_text(text, encoding="utf-8", newline="\n")
+            if isinstance(text, bytes):
+                (folder / name).write_bytes(text)
+            else:
+                (folder / name).write_text(text, encoding="utf-8", newline="\n")
 
 
 @cache
@@ -135,7 +229,7 @@ def arm_sources(name: str) -> dict[str, str]:
             values |= _modal_values(language)
             values["helpers"] = language.helped(values["spectrum_functions"] + values["modal_functions"])
     values["nomenclature"] = nomenclature_rows()
-    return rendered(name, values) | {"LICENSE": values["licence"]}
+    return rendered(name, values)
 
 
 def _spectrum_values(language: Language) -> dict[str, Any]:

@@ -29,6 +29,7 @@ PRINTERS: dict[str, type[Printer]] = {
     )
 }  # fmt: skip
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
+_ASIDE = {"_evaluate", "_example"}
 _LONGEST = 24  # a name of Fortran has 63 characters at most, ours are in front of others
 _C_HELPERS = {
     name: f"static int {name}(int one, int other)\n{{\n    return one {sign} other ? one : other;\n}}"
@@ -52,7 +53,7 @@ def source(name: str) -> str:
     return text.split('"""', 2)[2].lstrip()
 
 
-def check_name(name: object, language: str) -> str:
+def check_name(name: object) -> str:
     """Return a name that may stand in front of what is public.
 
     Raises
@@ -112,7 +113,8 @@ class Library:
     summary : str
         One line.
     text : str
-        In the restricted form; its private function ``_evaluate`` is for the self-test.
+        In the restricted form; of its private functions ``_evaluate`` is for the self-test and ``_example``, which
+        fills one row, for the README.
     provenance : tuple of str
         Lines at the head of every file.
     checks : tuple of Check
@@ -132,13 +134,17 @@ class Library:
     def texts(self, language: str) -> dict[str, str]:
         """Return the texts of all files, by name, but for the licence."""
         whole = parse(self.text)
-        functions = {name: f for name, f in whole.functions.items() if name != "_evaluate"}
+        functions = {name: f for name, f in whole.functions.items() if name not in _ASIDE}
         taken = KEYWORDS & {name for f in functions.values() for name in (*f.parameters, *f.locals, *f.loops)}
         if taken:
             raise ValueError(f"words of a language are no names of variables: {', '.join(sorted(taken))}")
         printer = PRINTERS[language](whole, self.name, self.real)
-        evaluate = whole.functions["_evaluate"]
-        printed = self._values(printer, list(functions.values())) | {"evaluate": "\n".join(printer.function(evaluate))}
+        printed = self._values(printer, list(functions.values()))
+        for name in _ASIDE & set(whole.functions):
+            printed[name.strip("_")] = "\n".join(printer.function(whole.functions[name]))
+        if "_example" in whole.functions:
+            length = whole.functions["_example"].parameters["found"].length
+            printed["shown"] = length if isinstance(length, int) else whole.constants[str(length)].values[0]
         texts = rendered(f"library/{language}", printed) | rendered("library/common", printed)
         texts = {name.replace("NAME", self.name): _tidy(text) for name, text in texts.items()}
         texts["reference.txt"] = "".join(f"{check.line()}\n" for check in self.checks)

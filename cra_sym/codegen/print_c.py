@@ -207,7 +207,7 @@ class CPrinter(Printer):
         return f"return {self.error(error)}"
 
     def number(self, value: float) -> str:
-        text = repr(float(value))
+        text = self.digits(value)
         if self.real == "float64":
             return text
         return f"{text}{'' if '.' in text or 'e' in text else '.0'}f"

@@ -41,6 +41,9 @@ class FortranPrinter(Printer):
         )  # fmt: skip
         yield from " &\n".join(lines).split("\n")
 
+    def headed(self, text: str, indent: str) -> Lines:
+        yield from self.wrapped(text, indent)
+
     def constants(self) -> str:
         errors = [f"  integer, parameter :: {self.error(e)} = {n}" for n, e in enumerate(self.form.errors, 1)]
         ok = f"  integer, parameter :: {self.prefix}_ok = 0"
@@ -213,7 +216,7 @@ class FortranPrinter(Printer):
         return super().built_in(name, arguments)
 
     def number(self, value: float) -> str:
-        mantissa, _, exponent = repr(float(value)).partition("e")
+        mantissa, _, exponent = self.digits(value).partition("e")
         return f"{mantissa}{'' if '.' in mantissa else '.0'}{f'e{exponent}' if exponent else ''}_dp"
 
     def to_float(self, node: ast.expr) -> tuple[str, int]:

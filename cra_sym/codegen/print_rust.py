@@ -153,6 +153,10 @@ class RustPrinter(Printer):
             return f"for {name} in {start}..{self.expression(stop, 5)} {{"
         return f"for {name} in ({self.last(stop, -1)}..{start} + 1).rev() {{"
 
+    def loop_over(self, node: ast.For, name: str) -> str:
+        used = any(isinstance(n, ast.Name) and n.id == name for part in node.body for n in ast.walk(part))
+        return name if used else f"_{name}"
+
     def call_statement(self, target: str, call: ast.Call, callee: Function, indent: str) -> Lines:
         changed = [kind.changed for kind in callee.parameters.values()]
         given = ", ".join(self.argument(a, c) for a, c in zip(call.args, changed, strict=True))

@@ -117,7 +117,7 @@ class JavaScriptPrinter(ScriptPrinter):
         return names[0] if len(names) == 1 else f"[{', '.join(names)}]"
 
     def declared(self, name: str, kind: Type, value: str | None, fixed: bool) -> str:
-        whole = not kind.scalar and name not in self.current.parameters  # a call may hand back another
+        whole = not kind.scalar  # a call may hand back another
         return f"let {name}" if value is None else f"{'const' if fixed and not whole else 'let'} {name} = {value}"
 
     def loop(self, name: str, start: str, stop: ast.expr, step: int) -> str:

@@ -18,7 +18,7 @@ from sympy.printing.precedence import PRECEDENCE
 from sympy.printing.pycode import PythonCodePrinter
 from sympy.printing.rust import RustCodePrinter
 
-from cra_sym.codegen.program import Place
+from cra_sym.codegen.program import Function, Place
 
 __all__ = ["PRINTERS", "ScalarPrinter"]
 
@@ -122,6 +122,8 @@ class ScalarPrinter(CodePrinter):
         if abs(expr.exp) == sp.S.Half:
             root = f"{self.functions['sqrt']}({self._print(expr.base)})"
             return root if expr.exp > 0 else f"{self.number(1.0)}/{root}"
+        if expr.exp == sp.Rational(1, 4):
+            return f"{self.functions['sqrt']}({self.functions['sqrt']}({self._print(expr.base)}))"
         if expr.exp == 2 and expr.base.is_Symbol:
             return f"{self._print(expr.base)}*{self._print(expr.base)}"
         if expr.base == sp.E:
@@ -303,6 +305,50 @@ class PythonPrinter(ScalarPrinter, PythonCodePrinter):
             value, 110, initial_indent=f"{indent}    ", subsequent_indent=f"{indent}    ", break_long_words=False
         )
         return f"{indent}{start}\n{inner}\n{indent})"
+
+
+class FormPrinter(PythonPrinter):
+    """The restricted form, which all languages are printed from."""
+
+    functions: ClassVar = {n: n for n in _SAME} | {"Abs": "abs", "ceiling": "ceil", "Max": "max", "Min": "min"}
+    power = "pow({base}, {exponent})"
+    helper = """\
+def _inverse(x: float) -> float:
+    \"\"\"Return 1 / x, and 0 for 0: where that occurs the quotient is discarded.\"\"\"
+    return 1.0 / (x if x != 0.0 else 1.0) if x != 0.0 else 0.0
+
+
+"""
+
+    def _print_Pow(self, expr: sp.Pow) -> str:
+        return super()._print_Pow(expr).replace("inverse(", "_inverse(")
+
+    @classmethod
+    def text_of(cls, function: Function) -> str:
+        """Return a function of numbers, with one row of results and at most three branches, as text.
+
+        It raises where a result is not finite.
+        """
+        lines = []
+        for number, branch in enumerate(function.branches):
+            letter = "" if len(function.branches) == 1 else "abc"[number]
+            own = {s: Place(f"{function.places[s].name}{letter}") for s, _ in branch.steps}
+            printer = cls(function.places | own)
+            values = (*(v for _, v in branch.steps), *branch.outputs)
+            printer.guarded = any(value.has(sp.Piecewise) for value in values)
+            indent = "" if len(function.branches) == 1 else "    "
+            if indent:
+                word = "else" if branch.condition is None else "elif" if number else "if"
+                lines.append(f"{word}{'' if branch.condition is None else ' ' + printer.doprint(branch.condition)}:")
+            steps = [f"{printer.places[symbol].name} = {printer.doprint(value)}" for symbol, value in branch.steps]
+            steps += [f"found[{i}] = {printer.doprint(value)}" for i, value in enumerate(branch.outputs)]
+            lines += [indent + step for step in steps]
+        size = function.size
+        parameters = "".join(f"{a.name}: float, " for a in function.arguments)
+        finite = " and ".join(f"isfinite(found[{i}])" for i in range(size))
+        body = "\n    ".join([f'"""{function.summary}"""', *lines, f"if not ({finite}):", "    raise Overflow"])
+        head = f"def {function.name}({parameters}found: Out[Row[float, {size}]]) -> None:"
+        return f"{cls.helper if '_inverse(' in body else ''}{head}\n    {body}\n"
 
 
 PRINTERS: dict[str, type[ScalarPrinter]] = {

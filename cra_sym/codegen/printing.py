@@ -13,6 +13,8 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import ClassVar
 
+import numpy as np
+
 from cra_sym.kernels.form import INT, Constant, Form, Function, Record, Type
 
 __all__ = ["ALWAYS", "Printer", "snake"]
@@ -21,6 +23,7 @@ Lines = Iterator[str]
 ALWAYS = 10  # the precedence of what never needs brackets
 _ADD, _MULTIPLY, _UNARY = 6, 7, 8
 _COMPARE = 4
+_LARGEST_SINGLE = 3e38
 _OPERATORS: dict[type, tuple[str, int]] = {
     ast.Add: ("+", _ADD),
     ast.Sub: ("-", _ADD),
@@ -226,11 +229,13 @@ class Printer:
                 yield from self.plain(self.updated(target, op, value), indent)
             case ast.For(target=ast.Name(id=name), iter=ast.Call(args=args)):
                 start, stop = (args[0], args[1]) if len(args) > 1 else (ast.Constant(0), args[0])
-                yield indent + self.loop(name, self.expression(start), stop, -1 if len(args) == 3 else 1)
+                yield indent + self.loop(
+                    self.loop_over(node, name), self.expression(start), stop, -1 if len(args) == 3 else 1
+                )
                 yield from self.block(node.body, node.lineno, inner)
                 yield indent + self.end_loop
             case ast.While(test=test):
-                yield indent + self.while_head(self.expression(test))
+                yield from self.headed(self.while_head(self.expression(test)), indent)
                 yield from self.block(node.body, node.lineno, inner)
                 yield indent + self.end_loop
             case ast.If():
@@ -249,9 +254,17 @@ class Printer:
             case ast.Expr(value=ast.Call() as call):
                 yield from self.call_statement("", call, self.form.functions[self.callee(call)], indent)
 
+    def headed(self, text: str, indent: str) -> Lines:
+        """Yield the head of a branch or a loop, which only some languages let go on in the next line."""
+        yield indent + text
+
+    def loop_over(self, node: ast.For, name: str) -> str:
+        """Return the variable of a loop."""
+        return name
+
     def branches(self, node: ast.If, indent: str, prefix: str = "") -> Lines:
         """Yield a choice with all its branches."""
-        yield indent + prefix + self.if_head(self.expression(node.test))
+        yield from self.headed(prefix + self.if_head(self.expression(node.test)), indent)
         yield from self.block(node.body, node.lineno, indent + self.indent)
         match node.orelse:
             case []:
@@ -414,10 +427,16 @@ class Printer:
 
     def number(self, value: float) -> str:
         """Return a literal that reads back as exactly this number."""
-        return repr(float(value))
+        return self.digits(value)
+
+    def digits(self, value: float) -> str:
+        """Return the fewest digits that tell a number of this type from all others."""
+        return str(np.float32(value)) if self.real == "float32" else repr(float(value))
 
     def literal(self, constant: Constant) -> list[str]:
         """Return the values of a constant."""
+        if self.real == "float32" and any(abs(v) > _LARGEST_SINGLE for v in constant.values):
+            raise ValueError(f"real = 'float32': {constant.name} is out of its range; take float64 or fewer modes")
         return [str(v) if constant.type.name == "int" else self.number(v) for v in constant.values]
 
     def to_float(self, node: ast.expr) -> tuple[str, int]:

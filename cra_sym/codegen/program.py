@@ -108,7 +108,7 @@ def function(name: str, summary: str, expression: Any, arguments: Sequence[tuple
     outputs = [sp.sympify(e, strict=True) for e in ([expression] if scalar else expression)]
     branches = [_branch(condition, values) for condition, values in _alternatives(outputs)]
     free = set().union(*map(_free_symbols, branches))
-    taken: set[str] = {"out"}
+    taken: set[str] = {"out", "found"}
     places: dict[sp.Symbol, Place] = {}
     signature = []
     for wish, symbols in arguments:
@@ -172,7 +172,7 @@ def christen(wish: str, taken: set[str]) -> str:
     base = base[:40]
     name, number = base, 1
     lower = {other.lower() for other in taken}
-    while name in RESERVED or name.lower() in FORTRAN | lower or re.fullmatch(r"[xX]\d+", name):
+    while name in RESERVED or name.lower() in FORTRAN | lower or re.fullmatch(r"[xX]\d+[a-c]?", name):
         number += 1
         name = f"{base}_{number}"
     taken.add(name)

@@ -10,7 +10,7 @@ import cra_sym
 from cra_sym.codegen.languages import Language
 from cra_sym.codegen.vectors import TOLERANCE
 
-__all__ = ["DIGEST", "common_values", "rendered"]
+__all__ = ["DIGEST", "common_values", "licence", "rendered"]
 
 #: Stands for the content hash, until all texts are there.
 DIGEST = "@content-hash@"
@@ -44,12 +44,15 @@ def _templates(root: Any, prefix: str = "") -> list[tuple[str, str]]:
 
 def common_values(language: Language) -> dict[str, Any]:
     """Return what every template may use."""
-    licence = files("cra_sym.codegen").joinpath("templates", "LICENSE.txt").read_text(encoding="utf-8")
     return {
         "version": cra_sym.__version__,
         "title": "cra_arm",
         "language": language.title,
         "digest": DIGEST,
         "tolerance": f"{TOLERANCE:g}",
-        "licence": licence,
     }
+
+
+def licence() -> str:
+    """Return the licence of generated code."""
+    return files("cra_sym.codegen").joinpath("templates", "LICENSE.txt").read_text(encoding="utf-8")

@@ -102,9 +102,9 @@ class Checker:
         if result is not None and not _ends(self.function.body):
             raise refused(node, "not every way out returns a value")
         lower = [name.lower() for name in (*parameters, *self.function.locals, *self.function.loops)]
-        top = {name.lower().strip("_") for name in (*functions, *constants, *records)}
+        top = {name.lower().strip("_") for name in (*functions, *constants)}
         if len(set(lower)) < len(lower) or set(lower) & top:
-            raise refused(node, "variables, constants, records and functions must differ by more than case")
+            raise refused(node, "variables, constants and functions must differ by more than case")
 
     # Statements ---------------------------------------------------------------------------------------------------
 

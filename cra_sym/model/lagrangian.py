@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -269,6 +270,11 @@ class Model:
         ends = {"left": (self._pieces["left"] or S.Zero) + terms["left"]}
         ends["right"] = (self._pieces["right"] or S.Zero) + terms["right"]
         return {"density": self._pieces["density"] + terms["domain"], **ends, "virtual_work": works}
+
+    @property
+    def pieces(self) -> Mapping[str, Any]:
+        """What the model was made of, by the arguments of Model; read-only."""
+        return MappingProxyType(self._pieces)
 
     @property
     def definitions(self) -> dict[Symbol, Expr]:

@@ -39,10 +39,10 @@ def test_a_model_of_ones_own_parses(tmp_path):
     folder = tmp_path / "model"
     made = cra.export("julia", folder, model=string)
     texts = {name: (folder / name).read_text() for name in made.files if name.endswith(".jl")}
-    assert sorted(texts) == ["Model.jl", "self_test.jl"]
+    assert sorted(texts) == ["src/model.jl", "test/runtests.jl"]
     for name, text in texts.items():
         assert not parsed(text).has_error, name
-    (head,) = (line for line in texts["Model.jl"].splitlines() if line.startswith("function characteristic("))
+    (head,) = (line for line in texts["src/model.jl"].splitlines() if line.startswith("function characteristic("))
     assert not {"DomainError", "all", "end", "lambda"} & set(head[:-1].partition("(")[2].split(", "))
     readme = (folder / "README.md").read_text()
     assert "Parsed, not run" in readme

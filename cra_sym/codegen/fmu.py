@@ -1,0 +1,152 @@
+"""A system as a Functional Mock-up Unit, FMI 3.0 or 2.0: model exchange and co-simulation, sources and a binary."""
+
+from __future__ import annotations
+
+import io
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+import cra_sym
+from cra_sym.codegen.library import Library
+from cra_sym.codegen.rendering import licence, rendered
+from cra_sym.kernels.form_parse import parse
+
+__all__ = ["VERSIONS", "fmu_archive"]
+
+VERSIONS = ("3.0", "2.0")
+_UNITS = {
+    "m": ' m="1"', "m/s": ' m="1" s="-1"', "m/s2": ' m="1" s="-2"', "N": ' kg="1" m="1" s="-2"',
+    "N.m": ' kg="1" m="2" s="-2"', "1": "",
+}  # fmt: skip
+_UNIT_OF = {
+    "y": "m", "v": "m", "w": "m", "tip_velocity": "m/s", "tip_acceleration": "m/s2", "root_force": "N",
+    "root_moment": "N.m", "tip_force": "N", "tip_moment": "N.m", "base_acceleration": "m/s2", "drive_force": "N",
+    "strain": "1",
+}  # fmt: skip
+_OUTPUT, _STATE, _DERIVATIVE = 1000, 10000, 20000  # first numbers, as in the template
+_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
+_SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib")}
+_MACHINES = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
+
+
+@dataclass(frozen=True)
+class _Variable:
+    name: str
+    number: int
+    causality: str
+    kind: str
+    description: str
+    index: int
+    state: int = 0
+
+    @property
+    def unit(self) -> str:
+        unit = _UNIT_OF.get(self.name)
+        return f' unit="{unit}"' if unit else ""
+
+    @property
+    def more3(self) -> str:
+        return {
+            "input": ' start="0"', "state": ' initial="exact" start="0"', "derivative": f' derivative="{self.state}"',
+        }.get(self.kind, "")  # fmt: skip
+
+    @property
+    def more2(self) -> str:
+        return self.more3.replace(' initial="exact"', "")
+
+    @property
+    def initial2(self) -> str:
+        return {
+            "state": ' initial="exact"',
+            "derivative": ' initial="calculated"',
+            "output": ' initial="calculated"',
+        }.get(self.kind, "")
+
+
+def _variables(blocks: int, given: str, outputs: Sequence[str], version: str) -> list[_Variable]:
+    """Return all variables; time is one in FMI 3.0 only, and indices count from 1."""
+    found = [_Variable("time", 0, "independent", "time", "time, s", 0)] if version == "3.0" else []
+    rows = [(given, 1, "input", "input", "input, held between communication points")]
+    rows += [(name, _OUTPUT + i, "output", "output", f"output {name}") for i, name in enumerate(outputs)]
+    for i in range(2 * blocks):
+        of = f"{'position' if i % 2 == 0 else 'rate'}[{i // 2 + 1}]"
+        rows.append((of, _STATE + i, "local", "state", "of a modal block"))
+    start = len(outputs) + 2
+    found += [_Variable(*row, index) for index, row in enumerate(rows, 1)]
+    for i in range(2 * blocks):
+        of = f"der({'position' if i % 2 == 0 else 'rate'}[{i // 2 + 1}])"
+        state = _STATE + i if version == "3.0" else start + i
+        words = "local", "derivative", "time derivative of a state"
+        found.append(_Variable(of, _DERIVATIVE + i, *words, len(rows) + 1 + i, state))
+    return found
+
+
+def fmu_archive(library: Library, given: str, outputs: Sequence[str], version: str) -> bytes:
+    """Return the bytes of the archive; the same input and compiler give the same bytes."""
+    blocks = int(parse(library.text).constants["BLOCKS"].values[0])
+    c = library.texts("c")
+    sources = {name: c[name] for name in (f"{library.name}.c", f"{library.name}.h")}
+    values = {
+        "name": library.name,
+        "upper": library.name.upper(),
+        "version": cra_sym.__version__,
+        "token": _token(library, version),
+        "description": escape(f"{library.summary}. {library.provenance[-1]}", {'"': "&quot;"}),
+        "units": _UNITS.items(),
+        "variables": _variables(blocks, given, outputs, version),
+    }
+    made = rendered("fmu", values)
+    major = version[0]
+    sources |= {name: made[name] for name in ("fmu.h", f"fmi{major}.c")}
+    archive: dict[str, str | bytes] = {"modelDescription.xml": made[f"modelDescription{major}.xml"]}
+    archive |= {f"sources/{name}": text for name, text in sources.items()}
+    archive["documentation/licenses/LICENSE.txt"] = licence()
+    if major == "3":
+        archive["sources/buildDescription.xml"] = made["buildDescription.xml"]
+    archive |= _binary(library.name, sources, major)
+    return _zipped(archive)
+
+
+def _token(library: Library, version: str) -> str:
+    """Return an identifier that is another for another system."""
+    import hashlib
+    import uuid
+
+    digest = hashlib.sha256(f"{version}\n{library.name}\n{library.text}".encode()).digest()
+    return f"{{{uuid.UUID(bytes=digest[:16])}}}"
+
+
+def _binary(name: str, sources: dict[str, str], major: str) -> dict[str, bytes]:
+    """Return the shared library for this platform by its place, or nothing where there is no compiler."""
+    compiler, machine = shutil.which("cc"), _MACHINES.get(platform.machine().lower())
+    if compiler is None or sys.platform not in _SYSTEMS or machine is None:
+        return {}
+    system, ending = _SYSTEMS[sys.platform]
+    folder = f"{machine}-{system}" if major == "3" else f"{system}64"
+    with tempfile.TemporaryDirectory() as place:
+        for file, text in sources.items():
+            (Path(place) / file).write_text(text, encoding="utf-8")
+        output = f"{name}{ending}"
+        command = [compiler, *_FLAGS, *(f for f in sorted(sources) if f.endswith(".c")), "-o", output, "-lm"]
+        done = subprocess.run(command, cwd=place, capture_output=True, text=True)
+        if done.returncode:
+            raise OSError(f"{compiler} cannot build the FMU: {done.stderr.strip().splitlines()[0]}")
+        return {f"binaries/{folder}/{output}": (Path(place) / output).read_bytes()}
+
+
+def _zipped(files: dict[str, str | bytes]) -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in sorted(files.items()):
+            entry = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, content)
+    return buffer.getvalue()

@@ -1,0 +1,176 @@
+"""Any system as exported code: its modes frozen as numbers, to be stepped, driven and measured."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.analysis.state_space import state_space
+from cra_sym.codegen.blocks import Blocks, blocks_of
+from cra_sym.codegen.library import Check, Library, source
+from cra_sym.model.lagrangian import Model
+from cra_sym.model.system import System
+
+__all__ = ["OUTPUTS", "frozen_library", "frozen_system", "stated"]
+
+Array = NDArray[np.float64]
+OUTPUTS = ("y", "v", "w", "root_force", "root_moment", "tip_acceleration")
+"""Outputs that are taken where none are named, as far as the system has them."""
+_MOST_OUTPUTS = 64
+_ERRORS = {"float64": 1e-11, "float32": 2e-3}
+"""Error of the outputs in the reference vectors, relative to the largest of them, by the type of real numbers."""
+
+
+def stated(model: Model, width: int = 96) -> tuple[str, ...]:
+    """Return what a model is, in lines: Lagrangian, boundary conditions, and the hash of both."""
+    pieces, found = model.pieces, model.equations
+    parts = {
+        "Lagrangian density": [pieces["density"]],
+        "Lagrangian at the ends": [pieces["left"], pieces["right"]],
+        "Lagrangian inside": pieces["inside"],
+        "Virtual work": pieces["virtual_work"],
+        "Field equations": found.field_equations,
+        "Boundary conditions": found.boundary_conditions,
+        "Equations of the coordinates": found.coordinate_equations,
+    }
+    stated_parts = {name: [str(e) for e in values if e is not None and e != 0] for name, values in parts.items()}
+    told = [f"{name}: {'; '.join(texts)}" for name, texts in stated_parts.items() if texts]
+    digest = hashlib.sha256("\n".join(told).encode()).hexdigest()
+    lines = [line for text in told for line in textwrap.wrap(text, width, subsequent_indent="  ")]
+    return (*(line.replace("*/", "* /") for line in lines), f"SHA-256 of the above: {digest}")
+
+
+def frozen_system(
+    system: System, modes: int, drive: Any, outputs: Sequence[str] | Mapping[str, Any] | None
+) -> tuple[Blocks, tuple[str, ...], str]:
+    """Return the blocks of a system, the names of its outputs and that of its input.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As :func:`cra_sym.state_space`; and if there are more than one input or more than 64 outputs.
+    """
+    if outputs is None:
+        outputs = [name for name in OUTPUTS if _has(system, drive, name)]
+    found = state_space(system, modes, drive, outputs or None)
+    if found.B.shape[1] != 1:
+        raise ValueError(f"input: must be one, there are {found.B.shape[1]}")
+    if len(found.output_names) > _MOST_OUTPUTS:
+        raise ValueError(f"outputs: must be at most {_MOST_OUTPUTS}, there are {len(found.output_names)}")
+    return blocks_of(found.A, found.B, found.C, found.D), found.output_names, found.input_names[0]
+
+
+def _has(system: System, drive: Any, output: str) -> bool:
+    """Return whether a system has an output."""
+    try:
+        state_space(system, 1, drive, [output])
+    except ValueError:
+        return False
+    return True
+
+
+def frozen_library(
+    system: System, name: str, modes: int, real: str, drive: Any, outputs: Sequence[str] | Mapping[str, Any] | None
+) -> tuple[Library, str, tuple[str, ...]]:
+    """Return a system as a library, with the names of its input and its outputs."""
+    blocks, names, given = frozen_system(system, modes, drive, outputs)
+    if not len(blocks.stiffness):
+        raise ValueError(f"input = {given!r}: it moves nothing")
+    values = ", ".join(f"{key} = {float(value)!r}" for key, value in system.values.items())
+    told = [f"At {values}; zeta = {float(system.zeta)!r}; {modes} modes."]
+    told += [f"Input u: {given}. Outputs y: {', '.join(names)}."]
+    lines = (*stated(system.model), *(line for text in told for line in textwrap.wrap(text, 96)))
+    text = constants(blocks, names, system.natural_frequencies(modes))
+    text += "\n\n".join(source(part) for part in ("frozen", "frozen_check", "frozen_example"))
+    summary = "A flexible system frozen as numbers, to be stepped in real time"
+    checks = tuple(_checks(blocks, system.natural_frequencies(modes), real))
+    return Library(name, summary, text, lines, checks, _readme(given, names), real), given, names
+
+
+def _readme(given: str, names: Sequence[str]) -> str:
+    listed = "\n".join(f"| {i} | `{name}` |" for i, name in enumerate(names))
+    return f"The input u is `{given}`; the outputs, in SI units, are\n\n| entry | output |\n| --- | --- |\n{listed}\n"
+
+
+def constants(blocks: Blocks, names: Sequence[str], omega: Array) -> str:
+    """Return the numbers of a system as a text in the restricted form."""
+    rows = {
+        "STIFFNESS": (blocks.stiffness, "1/s^2, of each block"),
+        "DAMPING": (blocks.damping, "1/s"),
+        "ON_POSITION": (blocks.on_position, "output by output, on q of each block"),
+        "ON_RATE": (blocks.on_rate, "the same on q', s"),
+        "THROUGH": (blocks.through, "the same on u"),
+        "FREQUENCIES": (omega, "rad/s, of the modes kept"),
+    }
+    scalars = [
+        f"PI = {math.pi!r}  # half a turn",
+        f"BLOCKS = {len(blocks.stiffness)}  # of second order, whose sum the system is",
+        f"SIGNALS = {len(names)}  # outputs: {', '.join(names)}",
+        f"MODES = {len(omega)}  # modes kept",
+    ]
+    return "\n".join([*scalars, *(f"{n} = ({_numbers(v)},)  # {comment}" for n, (v, comment) in rows.items()), "", ""])
+
+
+def _numbers(values: Array) -> str:
+    return ", ".join(repr(float(x) + 0.0) for x in np.ravel(values))
+
+
+def _checks(blocks: Blocks, omegas: Array, real: str) -> Iterator[Check]:
+    """Yield what the outputs are by SciPy's matrix exponential, another way than the code's."""
+    loss = _ERRORS[real]
+    rates = np.sqrt(np.abs(blocks.stiffness)) + np.abs(blocks.damping)
+    fastest, slowest = float(rates.max()), float(np.min(rates[rates > 0.0], initial=1.0))
+    for time in (0.03 / fastest, 0.7 / fastest, 0.3 / slowest):
+        for steps in (0, 1, 7, 40):
+            found, size = _stepped(blocks, time, 0.25, steps)
+            for_one = loss * size * max(1.0, time * steps * fastest * 1e-3)
+            yield Check(0, (time, 0.25, steps), tuple(found), 0.0, float(for_one))
+    for omega in (0.0, 0.31 * slowest, 1.37 * fastest):
+        undamped = (blocks.damping * omega == 0.0) & (blocks.stiffness == omega**2)
+        if undamped.any():
+            yield Check(1, (omega,), (), refused=True)
+            continue
+        z = blocks.frequency_response(np.array([omega]))[:, 0]
+        yield Check(1, (omega,), tuple(np.column_stack([z.real, z.imag]).ravel()), 0.0, loss * float(np.abs(z).max()))
+    for omega, zeta in ((fastest, 0.0), (slowest, 0.2)):
+        root = math.sqrt(1 - zeta**2)
+        decay = math.exp(-math.pi * zeta / root)
+        amplitudes = [math.comb(3, k) * decay**k / (1 + decay) ** 3 for k in range(4)]
+        times = [k * math.pi / (omega * root) for k in range(4)]
+        yield Check(2, (omega, zeta), (*amplitudes, *times), loss)
+    for bad in (0.0, -1.0, math.nan, math.inf):
+        yield Check(0, (bad, 1.0, 1), (), refused=True)
+        yield Check(2, (bad, 0.1), (), refused=True)
+    yield from (Check(3, (n,), (omega,), _ERRORS[real]) for n, omega in enumerate(omegas, 1))
+    yield from (Check(3, (n,), (), refused=True) for n in (0, -1, len(omegas) + 1))
+    yield Check(1, (-1.0,), (), refused=True)
+    yield Check(1, (math.nan,), (), refused=True)
+    yield Check(2, (1.0, 1.0), (), refused=True)
+
+
+def _stepped(blocks: Blocks, time: float, push: float, steps: int) -> tuple[Array, float]:
+    """Return the outputs after steps of the input that the self-test gives, and the largest size met in the sum."""
+    from scipy.linalg import expm
+
+    count = len(blocks.stiffness)
+    scale = np.maximum(np.sqrt(np.abs(blocks.stiffness)) + np.abs(blocks.damping), 1e-3 / time)
+    state = np.zeros((count, 2))
+    moves = []
+    for k, d, s in zip(blocks.stiffness, blocks.damping, scale, strict=True):  # the rate measured in s p
+        moves.append(expm(time * np.array([[0.0, s, 0.0], [-k / s, -d, 1.0 / s], [0.0, 0.0, 0.0]])))
+    met = np.zeros(len(blocks.through))
+    u = push
+    for n in range(steps + 1):
+        rows = blocks.on_position * state[:, 0], blocks.on_rate * (state[:, 1] * scale)
+        met = np.maximum(met, np.abs(rows[0]).sum(axis=1) + np.abs(rows[1]).sum(axis=1) + np.abs(blocks.through * push))
+        if n == steps:
+            break
+        u = push if n % 3 == 0 else -0.5 * push
+        state = np.array([move[:2, :2] @ x + move[:2, 2] * u for move, x in zip(moves, state, strict=True)])
+    return rows[0].sum(axis=1) + rows[1].sum(axis=1) + blocks.through * push, float(met.max())
