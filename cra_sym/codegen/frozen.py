@@ -125,7 +125,7 @@ def _checks(blocks: Blocks, omegas: Array, real: str) -> Iterator[Check]:
     """Yield what the outputs are by SciPy's matrix exponential, another way than the code's."""
     loss = _ERRORS[real]
     rates = np.sqrt(np.abs(blocks.stiffness)) + np.abs(blocks.damping)
-    fastest, slowest = float(rates.max()), float(np.min(rates[rates > 0.0], initial=1.0))
+    fastest, slowest = float(rates.max()) or 1.0, float(np.min(rates[rates > 0.0], initial=1.0))
     for time in (0.03 / fastest, 0.7 / fastest, 0.3 / slowest):
         for steps in (0, 1, 7, 40):
             found, size = _stepped(blocks, time, 0.25, steps)
