@@ -292,7 +292,7 @@ def _goodness(search: Search, data: Data, place: Array) -> tuple[float, int, flo
 
 
 def _estimate(kind: type[Identification], search: Search, data: Data, place: Array) -> Identification:
-    found, values = search.found(place), search.values(place)
+    found, values = search.found(place), {name: float(value) for name, value in search.values(place).items()}
     chi2, freedom, p_value, fits = _goodness(search, data, place)
     stiff = [unknown.kind == "stiffness" for unknown in search.unknowns]
     jacobian = _jacobian(search.unknowns, values, found, data)

@@ -21,6 +21,7 @@ from tests.benchmarks import (
     kernel,
     machine,
     nodes,
+    records,
     responses,
     stability,
     targets,
@@ -44,6 +45,7 @@ def run(quick: bool) -> dict[str, Any]:
     report["responses"], report["stability"] = responses.measured(), stability.measured()
     report["sweep"] = nodes.measured(40_000 if quick else 4_000_000)
     report["along x"] = along_x.measured(3 if quick else 5)
+    report["in practice"] = records.measured(quick)
     report["targets"] = targets.rows(report)
     return report
 
@@ -105,6 +107,7 @@ def table(report: dict[str, Any]) -> str:
     for title, unit in (("responses", "ns a sample"), ("stability", "ms a point")):
         lines += ["", f"## {title.capitalize()}", "", f"| route | {unit} | times as long |", "| --- | --: | --: |"]
         lines += [f"| {name} | {row[unit]:.3g} | {row['times as long']:.1f} |" for name, row in report[title].items()]
+    lines += ["", "## Records of motion, and stores", "", *records.note(report["in practice"])]
     lines += ["", "## Sweeps", "", nodes.note(report["sweep"])]
     return "\n".join(lines) + "\n"
 

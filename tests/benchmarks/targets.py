@@ -62,6 +62,9 @@ def rows(report: dict[str, Any]) -> list[dict[str, Any]]:
         add(f"overhead of a compiled call, us, {case['name']}", case["overhead us"], 30, least=False)
     for name, case in report["along x"].items():
         add(f"a batch of {name} beams, times the dynamic stiffness", case["times"], 1000)
+    practice = report["in practice"]
+    add("a record of 1e6 samples, 5 modes, times lsim", practice["records"]["times as fast"], 2)
+    add("a sweep into a store over Zarr alone", practice["stores"]["times zarr"], 2.0, least=False)
     cold = {key: row["wall s"] for key, row in report["cold start"].items()}
     add("import, s more than NumPy's", cold["import cra_sym and numpy"] - cold["import numpy"], 0.3, least=False)
     for key, seconds in cold.items():

@@ -80,6 +80,6 @@ def test_a_chapter_follows_its_parameters(path, monkeypatch):
     monkeypatch.setattr(nbformat, "read", with_another_arm)
     before, after = pictures(stored), pictures(execute(path))
     assert len(before) == len(after)
-    drawn = [cell.source for cell in stored.cells if re.search(r"\bdraw\(", cell.source)]
+    drawn = [cell.source for cell in stored.cells if re.search(r"\b(draw|figure_fit)\(", cell.source)]
     still = {k for k, source in enumerate(drawn) if not re.search(r"draw\(.*, \w+\)", source)}
     assert [k for k, (a, b) in enumerate(zip(before, after, strict=True)) if a == b] == sorted(still)
