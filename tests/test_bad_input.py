@@ -60,6 +60,10 @@ WIRE = cra.Model(
     MASS * (s.v + s.w).diff(s.t) ** 2 / 2 - TENSION * s.v.diff(s.x) ** 2 / 2, fields=[s.v], prescribed=[s.w], x=s.x,
     domain=(0, s.L), t=s.t, left=-s.k_t * s.v**2 / 2, right=s.m_e * (s.v + s.w).diff(s.t) ** 2 / 2,
 )  # fmt: skip
+COLUMN = cra.Model(
+    s.v.diff(s.t) ** 2 / 2 - s.v.diff(s.x, 2) ** 2 / 2 + sp.Symbol("P") * s.v.diff(s.x) ** 2 / 2, fields=[s.v], x=s.x,
+    domain=(0, 1), t=s.t, essential=[s.v.subs(s.x, 0), s.v.diff(s.x).subs(s.x, 0)],
+)  # fmt: skip
 ARM = cra.Arm.nominal().replace(k_t=1e3, k_r=50.0, zeta=0.01)
 SPRING = cra.JointStiffness(k_t=1.0)
 MOTION = cra.BaseMotion(velocity=0.1)
@@ -73,6 +77,10 @@ GOOD = {
     "frequency_parameters": dict(kappa_t=1.0, kappa_r=2.0, mu=0.1, iota=0.0, modes=2),
     "mode_shapes": dict(system=ARM, x=0.5, modes=2, derivative=1),
     "modal_parameters": dict(system=ARM, modes=2),
+    "eigenvalues": dict(system=ARM, modes=2, oscillating=True),
+    "damping_ratios": dict(system=ARM, modes=2),
+    "count_eigenvalues": dict(system=ARM, radius=40.0),
+    "critical_value": dict(system=COLUMN.at({"P": 0.0}), parameter="P", between=(0.0, 5.0), modes=2, points=9),
     "BaseMotion": dict(velocity=0.1, acceleration=0.1, amplitude=1e-3, angular_frequency=10.0, phase=0.0),
     "Force": dict(level=1.0, amplitude=0.5, angular_frequency=10.0, phase=0.0),
     "response": dict(system=ARM, motion=MOTION, t=[0.0, 0.1], x=0.5, modes=2, derivative=0, zeta=0.01, start="base"),
@@ -144,6 +152,9 @@ def test_what_is_good_for_an_arm_is_good_for_any_system(name):
         measured = cra.natural_frequencies(WIRE.at({**OF_WIRE, "T": 5.0}), modes=2)
         fit = call(name, system=WIRE.at(OF_WIRE), measured=measured, unknown=("T",), prior={"mass": (1.0, 0.1)})
         np.testing.assert_allclose(fit.values["T"], 5.0, rtol=1e-6)
+    elif name == "critical_value":
+        with pytest.raises(ValueError, match="parameter = 'P': must be one of"):
+            call(name, system=WIRE.at(OF_WIRE))
     elif name == "identify_joint":
         with pytest.raises(ValueError, match="k_r must be the stiffness of an end"):
             call(name, system=WIRE.at(OF_WIRE))

@@ -124,9 +124,9 @@ def critical_value(
 
 
 def _checked(system: System, parameter: Any, between: Any) -> tuple[str, float, float]:
-    name = parameter if isinstance(parameter, str) else getattr(parameter, "name", shown(parameter))
-    if name not in system.numerics("names"):
-        raise ValueError(f"parameter = {name}: must be one of {', '.join(system.numerics('names'))}")
+    name = getattr(parameter, "name", parameter)
+    if not isinstance(name, str) or name not in system.numerics("names"):
+        raise ValueError(f"parameter = {shown(parameter)}: must be one of {', '.join(system.numerics('names'))}")
     ends = real_array("between", between, must="two real numbers, the lower one first")
     if ends.shape != (2,) or not (np.isfinite(ends).all() and ends[0] < ends[1]):
         raise ValueError(f"between = {shown(between)}: must be two real numbers, the lower one first")

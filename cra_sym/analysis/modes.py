@@ -152,6 +152,7 @@ def mode_shapes(
     checks.instance("system", system, System)
     derivative = checks.count("derivative", derivative, low=0, high=_MOST_DERIVATIVES)
     modes = checks.count("modes", modes, high=MOST_MODES)
+    checks.instance("damped", damped, bool)
     points = checks.one_axis("x", x, "points", unit="m")
     check_places(system, points)
     place, every = section_place(system, field), np.atleast_1d(points)

@@ -10,6 +10,7 @@ from .stiffness import DynamicStiffness
 __all__ = ["number_inside"]
 
 _POINTS = 64, 8192
+_MOST_LEVELS = 10
 _CLEAR = 0.05
 """How far from a whole number the integral may be. Two sums, one of twice the points, must agree."""
 
@@ -30,10 +31,13 @@ def number_inside(problem: DynamicStiffness, row: int, centre: complex, radius: 
     Raises
     ------
     ArithmeticError
-        If an eigenvalue lies on the circle, or so near that 8192 points do not tell, or rounding has left the function
-        no digits there.
+        If the waves are too short, an eigenvalue lies on the circle, or so near that 8192 points do not tell, or
+        rounding has left the function no digits there.
     """
     least, most = _POINTS
+    levels = problem.levels(np.array([centre + radius]), np.array([row]))
+    if levels.max() > _MOST_LEVELS:
+        raise ArithmeticError("the waves must not be shorter than a thousandth of the domain")
     total, number = 0.0 + 0.0j, 0
     before: int | None = None
     while number < most:

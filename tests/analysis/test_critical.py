@@ -131,7 +131,7 @@ def test_little_internal_damping_lowers_becks_load():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("Q", (0, 30)), "parameter = Q: must be one of P"),
+        (("Q", (0, 30)), "parameter = 'Q': must be one of P"),
         ((P, (0, 15)), "stable at all 65 values of P from 0 to 15"),
         ((P, (25, 30)), "already unstable at P = 25 .flutter at 10.6"),
         ((P, (30, 0)), "between = .30, 0.: must be two real numbers, the lower one first"),
