@@ -14,6 +14,8 @@ _HOME = {
     "Arm": "arm.parameters",
     "paper_lagrangian": "arm.lagrangian",
     "System": "model",
+    "Member": "model.members",
+    "joined": "model.members",
     "equation": "paper.equations",
     "equations": "paper.equations",
     "natural_frequencies": "analysis.modes",

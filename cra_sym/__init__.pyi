@@ -39,6 +39,8 @@ from .model import System as System
 from .model.excitations import AxialBase as AxialBase
 from .model.excitations import Fluctuation as Fluctuation
 from .model.excitations import TransverseBase as TransverseBase
+from .model.members import Member as Member
+from .model.members import joined as joined
 from .paper.equations import equation as equation
 from .paper.equations import equations as equations
 from .solvers.motion import BaseMotion as BaseMotion
