@@ -57,10 +57,9 @@ MODELS = {
     ),
     "gantry": lambda: (
         _model(
-            rhoA * (v + q).diff(t) ** 2 / 2 - EI * v.diff(x, 2) ** 2 / 2,
-            prescribed=[],
+            rhoA * (v + q + w).diff(t) ** 2 / 2 - EI * v.diff(x, 2) ** 2 / 2,
             coordinates=[q],
-            right=m * (v + q).diff(t) ** 2 / 2 + m * q.diff(t) ** 2 - c * q**2 / 2 + p * q,
+            right=m * (v + q + w).diff(t) ** 2 / 2 + m * (q + w).diff(t) ** 2 - c * q**2 / 2 + p * q,
         ),
         {"c": 900.0},
     ),

@@ -1,0 +1,138 @@
+"""Whatever the arm can do, any system can do: every public function that takes one, with eight that are no arm."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import cra_sym as cra
+from cra_sym.figures.subject import default_excitation, leading_parameter
+from tests.systems import NAMES, system
+
+GRID = np.linspace(0.0, 0.3, 4)
+MOVE = cra.BaseMotion.trapezoid(0.1, 0.2, 1.0)
+PULSE = cra.Force.sampled([0.0, 0.1, 0.2], [0.0, 2.0, 0.0])
+
+
+def driven(given):
+    """Return a history that ends for everything that drives a system."""
+    return {name: MOVE if kind == "motion" else PULSE for name, kind in given.numerics("causes")}
+
+
+def principal(given):
+    return 2.01 * given.natural_frequencies(1)[0]
+
+
+def density(given):
+    return "rho" if isinstance(given, cra.Arm) else "rhoA"
+
+
+def measured(given):
+    heavier = given.replace(**{density(given): 1.02 * given.values[density(given)]})
+    return cra.natural_frequencies(heavier, 2)
+
+
+#: What each function is called with beside the system.
+CALLS = {
+    "natural_frequencies": lambda s: {"modes": 4},
+    "mode_shapes": lambda s: {"x": [0.0, 0.7, 1.2], "modes": 2, "derivative": 1},
+    "modal_parameters": lambda s: {"modes": 3},
+    "response": lambda s: {"motion": driven(s), "t": GRID, "x": [0.3, 1.2], "modes": 4, "derivative": 1},
+    "tip_response": lambda s: {"motion": driven(s), "t": GRID, "modes": 4},
+    "residual_vibration": lambda s: {"motion": driven(s), "modes": 3},
+    "residual_vibration_gradient": lambda s: {"motion": driven(s), "by": (leading_parameter(s), *s.values), "modes": 2},
+    "state_space": lambda s: {"modes": 3, "input": "w", "outputs": ["v", "y", ("v", 0.4), "tip_acceleration"]},
+    "frequency_response": lambda s: {"angular_frequency": [0.7, 3.0], "x": [0.5, 1.2], "damping": "structural"},
+    "sensitivities": lambda s: {"modes": 3},
+    "identify": lambda s: {"measured": measured(s), "uncertainty": 1e-3, "unknown": (density(s),)},
+    "certify": lambda s: {"modes": 2},
+    "floquet_exponents": lambda s: {
+        "excitation": default_excitation(s), "angular_frequency": principal(s), "epsilon": 0.2},
+    "growth_rate": lambda s: {
+        "excitation": default_excitation(s), "angular_frequency": principal(s), "epsilon": [0.1, 0.6]},
+    "stability_boundary": lambda s: {"excitation": default_excitation(s), "epsilon": [1e-3, 2e-3], "order": 2},
+    "forced_width": lambda s: {"excitation": cra.TransverseBase(1e-3), "modes": 2},
+    "sweep": lambda s: {
+        "quantity": "natural_frequencies", leading_parameter(s): s.values[leading_parameter(s)] * np.array([1, 1.1])},
+}  # fmt: skip
+#: What has tests of its own with other systems: what a place in the complex plane, a critical load or damping is of.
+ELSEWHERE = {
+    "identify_joint",  # the case of the arm: k_t and k_r of its ends
+    "eigenvalues", "damping_ratios", "count_eigenvalues", "critical_value",
+    "certify_stability", "backbone", "steady_states", "slow_flow", "export",
+    "explore",  # shows sliders: tests/test_explorer.py
+}  # fmt: skip
+VARIES = ("hanging beam", "beam with an interior mass")
+REFUSED = {("certify", name): "constant along x" for name in VARIES}
+
+
+def numbers(result):
+    """Return all arrays of a result."""
+    if isinstance(result, (float, complex, np.ndarray, np.number)):
+        return [np.asarray(result)]
+    if isinstance(result, Mapping) and not hasattr(result, "data_vars"):
+        return [np.asarray(result[name]) for name in sorted(result)]
+    if isinstance(result, tuple):
+        return [array for part in result for array in numbers(part)]
+    if hasattr(result, "data_vars"):
+        return [variable.values for variable in result.data_vars.values()]
+    kinds = (("A", "B", "C", "D"), ("rate", "log"), ("lower", "upper"), ("values",), ("omega", "participation", "left"))
+    for names in kinds:
+        if all(hasattr(result, name) for name in names):
+            return [array for name in names for array in numbers(getattr(result, name))]
+    raise AssertionError(type(result))
+
+
+def call(function, given):
+    return getattr(cra, function)(given, **CALLS[function](given))
+
+
+def test_every_function_that_takes_a_system_is_called():
+    public = {name for name in cra._HOME if not isinstance(getattr(cra, name), type)}
+    takes = {name for name in public if {"system", "arm"} & inspect.signature(getattr(cra, name)).parameters.keys()}
+    assert takes - ELSEWHERE == CALLS.keys()
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("function", CALLS)
+def test_a_function_takes_any_system(function, name):
+    given = system(name)
+    if (function, name) in REFUSED:
+        with pytest.raises(ValueError, match=REFUSED[function, name]):
+            call(function, given)
+        return
+    found = numbers(call(function, given))
+    assert found and all(np.isfinite(array).all() for array in found)
+    assert any(np.abs(array).max() > 0 for array in found)
+
+
+L, b, h, E, rho, m_b, m_e, J_e, k_t, k_r, x, t = sp.symbols("L b h E rho m_b m_e J_e k_t k_r x t")
+y, base = sp.Function("y")(x, t), sp.Function("w")(t)
+BY_HAND = cra.Model(
+    rho * b * h * (y + base).diff(t) ** 2 / 2 - E * b * h**3 / 12 * y.diff(x, 2) ** 2 / 2,
+    fields=[y], prescribed=[base], x=x, domain=(0, L), t=t,
+    left=m_b * base.diff(t) ** 2 / 2 - k_t * y**2 / 2 - k_r * y.diff(x) ** 2 / 2,
+    right=m_e * (y + base).diff(t) ** 2 / 2 + J_e * y.diff(x).diff(t) ** 2 / 2,
+)  # fmt: skip
+ARM = cra.Arm.nominal().replace(L=1.2, k_t=1e3, k_r=50.0, m_e=0.05, J_e=1e-4)
+WRITTEN = {"state_space": {"outputs": ["y", "tip_acceleration"]}}
+
+
+@pytest.mark.parametrize("function", CALLS)
+def test_the_arm_written_by_hand_gives_the_arms_numbers(function):
+    known = {symbol.name for symbol in BY_HAND.symbols}
+    hand = BY_HAND.at({name: value for name, value in ARM.values.items() if name in known}, ARM.zeta)
+    options = CALLS[function](ARM)
+    if function == "state_space":
+        options["outputs"] = ["tip_acceleration", "tip_velocity", "root_force"]
+    if function == "residual_vibration_gradient":
+        options["by"] = ("k_t", "k_r", "m_e", "J_e", "L", "E")
+    if function == "sensitivities":
+        options["by"] = sorted(known - {"m_b"})
+    pairs = zip(*(numbers(getattr(cra, function)(one, **options)) for one in (ARM, hand)), strict=True)
+    for of_arm, by_hand in pairs:
+        np.testing.assert_allclose(by_hand, of_arm, rtol=0, atol=1e-12 * np.abs(of_arm).max())
