@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +25,7 @@ from cra_sym.model.parameters import parameters
 from cra_sym.model.symmetry import asymmetry, odd_in_time
 from cra_sym.model.system import TOLERANCE, System
 from cra_sym.model.units import check_dimensions, named_units, symbol_units
+from cra_sym.model.work import work_as_energy
 
 if TYPE_CHECKING:
     from cra_sym.analysis.modes import ModalParameters
@@ -256,25 +256,7 @@ class Model:
         driver = next(function for function in self.driving if function.func.__name__ == name)
         prescribed = [function for function in self._pieces["prescribed"] if function != driver]
         pieces = {"prescribed": prescribed, "coordinates": [*self._pieces["coordinates"], driver]}
-        return self.replace(**pieces, **({} if driver in self.motions else self._worked_by(driver)))
-
-    def _worked_by(self, force: AppliedUndef) -> dict[str, Any]:
-        """Return the pieces in which the work of a given force is a term of the Lagrangian."""
-        terms: dict[str, Expr] = {"domain": S.Zero, "left": S.Zero, "right": S.Zero}
-        works = []
-        for given, displacement, place in self._pieces["virtual_work"]:
-            share = sympify(given, strict=True).expand().coeff(force) * force
-            terms[place or "left"] += share * displacement
-            if given - share != 0:
-                works.append((given - share, displacement, place))
-        ends = {"left": (self._pieces["left"] or S.Zero) + terms["left"]}
-        ends["right"] = (self._pieces["right"] or S.Zero) + terms["right"]
-        return {"density": self._pieces["density"] + terms["domain"], **ends, "virtual_work": works}
-
-    @property
-    def pieces(self) -> Mapping[str, Any]:
-        """What the model was made of, by the arguments of Model; read-only."""
-        return MappingProxyType(self._pieces)
+        return self.replace(**pieces, **({} if driver in self.motions else work_as_energy(self._pieces, driver)))
 
     @property
     def definitions(self) -> dict[Symbol, Expr]:
