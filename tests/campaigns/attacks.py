@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import argparse
 import itertools
+import os
+import tempfile
 import time
 import warnings
 from collections.abc import Iterator, Mapping
@@ -195,6 +197,7 @@ def main() -> None:
     every = attacks()
     order = np.random.default_rng(options.seed).permutation(len(every))
     bad: dict[str, list[str]] = {}
+    os.chdir(tempfile.mkdtemp())  # a text is a path where a store is asked for
     start, number = time.process_time(), 0
     for index in order:
         number += 1
