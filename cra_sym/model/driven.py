@@ -139,5 +139,5 @@ def pushed(model: Model, drive: Expr) -> tuple[Model, str, Kernel] | None:
         known = ", ".join(map(str, model.state_form.displacements))
         raise ValueError(f"drive = {shown(drive)}: what a force acts on at {place} must be one of {known}")
     force = Function("unit_force")(model.equations.t)
-    inside = [*model.inside, (place, force * displacement)]
+    inside = [*model.pieces["inside"], (place, force * displacement)]
     return model.replace(inside=inside), force.func.__name__, kernel(place, model.symbols, backend="numpy")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -259,14 +260,9 @@ class Model:
         return self.replace(**pieces, **({} if driver in self.motions else work_as_energy(self._pieces, driver)))
 
     @property
-    def definitions(self) -> dict[Symbol, Expr]:
-        """What symbols of the pieces stand for."""
-        return dict(self._pieces["definitions"])
-
-    @property
-    def inside(self) -> tuple[tuple[Expr, Expr], ...]:
-        """Terms of interior places, as given."""
-        return tuple(self._pieces["inside"])
+    def pieces(self) -> Mapping[str, Any]:
+        """What the model was made of, by the arguments of Model; read-only."""
+        return MappingProxyType(self._pieces)
 
     @cached_property
     def driving(self) -> tuple[AppliedUndef, ...]:

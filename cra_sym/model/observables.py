@@ -133,7 +133,7 @@ def observable(model: Model, expression: Any, name: str = "outputs") -> Observab
         given = None
     if not isinstance(given, Expr):
         raise TypeError(f"{name} = {shown(expression)}: must be an expression in fields at places and coordinates")
-    given = expand(given.xreplace(model.definitions))
+    given = expand(given.xreplace(dict(model.pieces["definitions"])))
     marks = {node: Dummy() for node in _functions(given)}
     linear = expand(given.xreplace(marks))
     factors = [linear.diff(mark) for mark in marks.values()]
