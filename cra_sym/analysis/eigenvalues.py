@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.checks import count, default_floating_point, instance, real_array
-from cra_sym.model.complex_shapes import ComplexShapes
 from cra_sym.model.spatial import check_range
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.model.values import flat_columns
@@ -17,7 +16,7 @@ from cra_sym.solvers.argument import number_inside
 from cra_sym.solvers.eigenvalues import refine
 from cra_sym.solvers.pencil_refine import Settled, lowest_eigenvalues
 
-__all__ = ["complex_shapes", "count_eigenvalues", "damping_ratios", "eigenvalues"]
+__all__ = ["count_eigenvalues", "damping_ratios", "eigenvalues"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -162,22 +161,6 @@ def count_eigenvalues(system: System, radius: Any) -> NDArray[np.int64]:
     return found.reshape(shape)
 
 
-def complex_shapes(system: System, modes: int, oscillating: bool, place: int, derivative: int, x: Array) -> Complex:
-    """Return a derivative of a displacement of the section in complex modes, shape (..., modes, len(x))."""
-    numerics = system.numerics
-    if numerics("conservative"):
-        return np.asarray(system.modes(modes).shape(place, derivative, x), dtype=complex)
-    shapes = ComplexShapes(
-        eigenvalues(system, modes, oscillating=oscillating),
-        numerics("damped_spatial"),
-        numerics("damped"),
-        flat_columns(system.parameters, system.shape),
-        system.domain,
-        numerics("inertia"),
-    )
-    return shapes.shape(place, derivative, x)
-
-
 def _unsettled(system: System, columns: Array, found: Settled, oscillating: bool) -> Complex:
     """Return eigenvalues by Newton's method if that settles, or say how many there are."""
     modes, there = found.values.shape[1], int(np.isfinite(found.values).sum())
@@ -186,13 +169,13 @@ def _unsettled(system: System, columns: Array, found: Settled, oscillating: bool
         raise ValueError(f"modes = {modes}: there are only {there} {kind}")
     try:
         return _by_newton(system, columns, found.values)[0]
-    except ArithmeticError:
+    except (ArithmeticError, ValueError):
         bad = ~(found.error[0] <= system.tolerance)
     first, error = int(bad.argmax()), float(found.error[0, bad.argmax()])
     reason = f"modes = {modes}: the relative error of eigenvalue {first + 1} stays at {error:.1g}"
     number, reach = _counted(system, columns, float(np.abs(found.values[0][bad]).min()))
     if number is None:
-        raise ArithmeticError(f"{reason}; ask for fewer modes")
+        raise ArithmeticError(f"{reason}, and none can be counted; ask for fewer modes")
     raise ValueError(
         f"{reason}; the argument principle counts {number} eigenvalues, both of each pair, with |s| < {reach:.4g} "
         "rad/s: an end that takes up the waves leaves none, or none that the parameters determine"

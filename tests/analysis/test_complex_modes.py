@@ -123,11 +123,26 @@ def test_shapes_without_dampers_are_the_natural_ones():
     assert np.abs(real.imag).max() < 1e-12
 
 
-def test_shapes_too_fine_are_refused():
+def test_shapes_with_a_support_and_with_fine_detail_come_from_the_basis():
+    """A support as an immense spring; a tension of 200 cells: the force of the damper at the end, the tension is 1."""
+    held = model(essential=[*CLAMPED, v.subs(x, HALF)], virtual_work=END_DAMPER)
+    sprung = model(inside=[(HALF, -5e7 * v**2)], virtual_work=END_DAMPER)
+    found, other = (
+        held.mode_shapes({c: 0.4}, PLACES, 2, damped=True),
+        sprung.mode_shapes({c: 0.4}, PLACES, 2, damped=True),
+    )
+    assert_allclose(found, other, atol=1e-5)  # of a spring 1e8 as stiff as the beam
+    assert np.abs(held.mode_shapes({c: 0.4}, 0.5, 2, damped=True)).max() < 1e-12
     fine = model(HALF * v.diff(t) ** 2 - HALF * (1 + 0.9 * sp.sin(400 * sp.pi * x)) * v.diff(x) ** 2,
                  [v.subs(x, 0)], virtual_work=END_DAMPER)  # fmt: skip
-    with pytest.raises(ValueError, match="vary too finely along x for complex shapes"):
-        fine.mode_shapes({c: 0.3}, PLACES, 1, damped=True)
+    (s,), shape, slope = (
+        fine.eigenvalues({c: 0.3}, 1),
+        fine.mode_shapes({c: 0.3}, [0.0, 1.0], 1, damped=True)[0],
+        fine.mode_shapes({c: 0.3}, 1.0, 1, derivative=1, damped=True)[0],
+    )
+    assert abs(shape[0]) < 1e-12 and abs(slope + 0.3 * s * shape[1]) < 1e-6 * abs(s)
+    with pytest.raises(ValueError, match="derivative = 3: complex shapes with supports"):
+        held.mode_shapes({c: 0.4}, 0.5, 2, derivative=3, damped=True)
 
 
 # responses --------------------------------------------------------------------------------------------------------
