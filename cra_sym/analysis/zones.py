@@ -20,6 +20,8 @@ __all__ = ["Zone", "first_order_zone", "zone_of"]
 #: Modes in the sums of second order; those beyond enter by their statics (springs of ends) or not at all (what acts
 #: along the span, where the terms fall off with the sixth power of the mode's number).
 _SPECTATORS = 24
+_SMALLEST = 1e-9  # epsilon, in place of 0, at which a zone has a strength but hardly a width
+_UNCOUPLED = 1e-24  # of a squared coupling over frequencies, in these: it is rounding
 
 
 @dataclass(frozen=True)
@@ -164,11 +166,13 @@ def _reduced(
     modes: int,
     order: int,
 ) -> Zone:
-    centre, sides = reduced_zone(system, excitation, epsilon, resonance, tongue, modes, order)
+    positive = np.where(epsilon > 0, epsilon, _SMALLEST)
+    centre, sides = reduced_zone(system, excitation, positive, resonance, tongue, modes, order)
     middle, half_width = (sides.lower + sides.upper) / 2, (sides.upper - sides.lower) / 2
-    there = (sides.strength > 0) & (centre > 0)
-    strength = np.where(np.abs(sides.strength) < 1e-20 * centre**2, 0.0, sides.strength)
-    half_width = np.where(there, half_width, np.nan)
+    strength = sides.strength / positive**2
+    strength = np.where(np.abs(strength) < _UNCOUPLED * centre**2, 0.0, strength)
+    there = (strength > 0) & (centre > 0)
+    half_width = np.where(there, np.where(epsilon > 0, half_width, 0.0 * half_width), np.nan)
     return Zone(centre, half_width, half_width, np.where(there, middle - centre, 0.0), strength)
 
 

@@ -145,7 +145,7 @@ def periodic_forms(model: Model, parts: Mapping[tuple[int, Key], Options]) -> tu
     found = []
     for (epsilons, key), options in parts.items():
         oscillation = Oscillation(*key)
-        label = f"{oscillation.kind} of order {oscillation.order}"
+        label = f"{oscillation.kind} of order {oscillation.order}" if oscillation.order else "constant"
         forms = _forms_of(model.equations, options, label)
         named = forms.named()
         if named and epsilons != 1:
