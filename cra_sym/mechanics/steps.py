@@ -6,9 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from sympy import Add, Basic, Derivative, Eq, Function, Subs, Symbol
+from sympy import Basic, Derivative, Function, Subs, Symbol
 from sympy.core.function import AppliedUndef
 from sympy.printing.latex import LatexPrinter
+
+from cra_sym.mechanics.layout import arranged
 
 __all__ = ["Step", "Steps", "compact_latex", "display_latex", "variation_of"]
 
@@ -118,12 +120,8 @@ def compact_latex(expression: Any, variables: tuple[str, str] = ("x", "t")) -> s
     return printer.doprint(expression)
 
 
-#: A line of LaTeX beyond this many characters is broken at the sums in it.
-_LINE = 260
-
-
 def display_latex(expression: Any, variables: tuple[str, str] = ("x", "t"), tag: int | str | None = None) -> str:
-    r"""Return the LaTeX of a displayed formula: a tuple becomes lines, a long sum is broken, one term a line.
+    r"""Return the LaTeX of a displayed formula: a tuple becomes lines, a line that is too wide is broken.
 
     Parameters
     ----------
@@ -142,26 +140,9 @@ def display_latex(expression: Any, variables: tuple[str, str] = ("x", "t"), tag:
     """
     several = isinstance(expression, Iterable) and not isinstance(expression, Basic)
     parts = tuple(expression) if several else (expression,)
-    body = r" \\[4pt] ".join(_typeset(part, variables) for part in parts)
+    body = r" \\[4pt] ".join(arranged(part, lambda line: compact_latex(line, variables)) for part in parts)
     number = "" if tag is None else rf" \qquad ({tag})"
     return rf"\begin{{gathered}} {body} \end{{gathered}}{number}"
-
-
-def _typeset(part: Any, variables: tuple[str, str]) -> str:
-    """Return the LaTeX of an equation; a long sum is broken, one term a line."""
-    whole = compact_latex(part, variables)
-    if len(whole) < _LINE:
-        return whole
-    sides = {side: compact_latex(side, variables) for side in (part.args if isinstance(part, Eq) else (part,))}
-    longest = max(sides, key=lambda side: len(sides[side]))
-    if not isinstance(longest, Add):
-        return whole
-    terms = [compact_latex(term, variables) for term in longest.as_ordered_terms()]
-    lines = r" \\ &".join([terms[0], *(term if term.startswith("-") else f"+ {term}" for term in terms[1:])])
-    others = [(side is part.args[0], text) for side, text in sides.items() if side is not longest]
-    head = "".join(f"{text} = " for first, text in others if first)
-    tail = "".join(f" = {text}" for first, text in others if not first)
-    return rf"\begin{{aligned}} {head}&{lines}{tail} \end{{aligned}}"
 
 
 @dataclass(frozen=True, repr=False)

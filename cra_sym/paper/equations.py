@@ -178,6 +178,28 @@ class Equation:
             return None
         return all(map(_decide, _PROOFS[self.number]()))
 
+    def latex(self, label: str | None = None) -> str:
+        r"""Return the equation as LaTeX for an article, with the paper's number; its lines fit an article's page.
+
+        Parameters
+        ----------
+        label : str, optional
+            What ``\ref`` calls it; by default ``eq:`` and the number.
+
+        Examples
+        --------
+        >>> from cra_sym import equation
+        >>> print(equation(1).latex())
+        \begin{equation}\tag{1}\label{eq:1}
+        \begin{gathered} y = v + w \end{gathered}
+        \end{equation}
+        """
+        from cra_sym.mechanics.steps import display_latex
+
+        name = f"eq:{self.number}" if label is None else label
+        body = display_latex(self.shown)
+        return rf"\begin{{equation}}\tag{{{self.number}}}\label{{{name}}}" + f"\n{body}\n" + r"\end{equation}"
+
     def __repr__(self) -> str:
         return f"Equation ({self.number}), {self.title}"
 

@@ -175,6 +175,11 @@ def _put_in(conditions: tuple[Eq, ...]) -> tuple[Eq, ...]:
     return tuple(Eq(*(put(side, {phi_i: shape}).doit() for side in condition.args)) for condition in conditions)
 
 
+def short_symbols() -> Eq:
+    """Return what the short symbols in displayed equations stand for."""
+    return Eq(Matrix([list(VALUES)]), Matrix([list(VALUES.values())]), evaluate=False)
+
+
 @derived(18, "root system", ("16a", 17))
 def root_system() -> Derivation[Eq]:
     """(17) in the conditions at the joint. Each stiffness is written as the pair (s, c) = (κ, 1) / (1 + κ), so
@@ -185,7 +190,11 @@ def root_system() -> Derivation[Eq]:
     return _system(root_matrix(), Matrix(coefficients))
 
 
-@derived(19, "tip system", ("16a", 17))
+def _tip_system_in_short() -> tuple[Eq, Eq]:
+    return _system(_tip(), Matrix(coefficients)), short_symbols()
+
+
+@derived(19, "tip system", ("16a", 17), shown=_tip_system_in_short)
 def tip_system() -> Derivation[Eq]:
     """(17) in the conditions at the end-effector."""
     yield "shape put in", "(17) in force and moment at the tip, at x = L.", _put_in(mode_conditions()[2:])
@@ -291,10 +300,15 @@ def _named_entries() -> dict[Expr, Expr]:
     return {e.lhs: e.rhs for e in reduced_coefficients()}
 
 
-@derived(21, "its coefficients", (18, 19, 20))
+def _coefficients_in_short() -> tuple[Eq, ...]:
+    grouped = (Eq(name, collect_stiffness(value)) for name, value in zip(_entries, _elimination()[0], strict=True))
+    return (*grouped, short_symbols())
+
+
+@derived(21, "its coefficients", (18, 19, 20), shown=_coefficients_in_short)
 def reduced_coefficients() -> Derivation[tuple[Eq, ...]]:
     """What the elimination leaves, with the joint as (s_t, c_t), (s_r, c_r) and the end-effector as μ, ι."""
-    raw = tuple(Eq(name, value.subs(VALUES)) for name, value in zip(_entries, _elimination()[0], strict=True))
+    raw = tuple(Eq(name, value) for name, value in zip(_entries, _elimination()[0], strict=True))
     yield "C_3 and C_4 put into (19)", "Multiplied by d, with cos² + sin² = 1 and cosh² - sinh² = 1 used up.", raw
     grouped = (collect_stiffness(value).subs(VALUES) for value in _elimination()[0])
     return tuple(Eq(name, value) for name, value in zip(_entries, grouped, strict=True))
@@ -347,7 +361,11 @@ def frequency_function() -> tuple[Expr, tuple[Symbol, ...]]:
     return frequency_polynomial().subs(VALUES), (lamda, s_t, c_t, s_r, c_r, mu, iota)
 
 
-@derived(23, "frequency equation", (21, 22))
+def _frequency_equation_in_short() -> tuple[Eq, Eq]:
+    return Eq(collect_stiffness(frequency_polynomial()), 0), short_symbols()
+
+
+@derived(23, "frequency equation", (21, 22), shown=_frequency_equation_in_short)
 def frequency_equation() -> Derivation[Eq]:
     """The determinant expanded; its factors that never vanish are divided out, so that a rigid joint without
     end-effector leaves 1 + cos λ cosh λ."""
@@ -355,7 +373,7 @@ def frequency_equation() -> Derivation[Eq]:
     yield (
         "expanded",
         "What is left of (22) when they are divided out, not yet sorted.",
-        Eq(frequency_polynomial().subs(VALUES), 0),
+        Eq(frequency_polynomial(), 0),
     )
     return Eq(collect_stiffness(frequency_polynomial()).subs(VALUES), 0)
 

@@ -87,19 +87,17 @@ def _gather(shape: Expr) -> Expr:
     return sum(cancel(shape.coeff(function)) * function for function in basis())
 
 
-@derived(26, "ratio of the circular coefficients", (20, 21))
+def _ratio_by_parts() -> Eq:
+    entries = reduced_system().lhs.args[0]
+    return Eq(r_2, -entries[0, 0] / entries[0, 1])
+
+
+@derived(26, "ratio of the circular coefficients", (20, 21), shown=_ratio_by_parts)
 def circular_ratio() -> Derivation[Eq]:
     """The first row of the reduced system, which the second repeats at a natural frequency."""
     system = reduced_system().lhs
     row = (system.args[0] * system.args[1])[0]
-    yield (
-        "first row",
-        "Of the reduced system (20), solved for C_2 / C_1.",
-        (
-            Eq(row, 0),
-            Eq(r_2, -row.coeff(C_1) / row.coeff(C_2)),
-        ),
-    )
+    yield "first row", "Of the reduced system (20), to be solved for C_2 / C_1; (21) has its entries.", Eq(row, 0)
     first, second = reduced_matrix()[0, :]
     return Eq(r_2, -first / second)
 

@@ -2,6 +2,8 @@
 
 import itertools
 import random
+import shutil
+import subprocess
 import sys
 from importlib import import_module
 
@@ -86,6 +88,28 @@ def test_a_derived_equation_tells_how_it_comes_from_its_sources(number):
         parts = step.expression if isinstance(step.expression, tuple) else (step.expression,)
         assert all(isinstance(part, Basic | MatrixBase) for part in parts), step.name
         assert step.statement.endswith(".") and step.statement in e.steps._repr_markdown_()
+
+
+@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="needs LaTeX: apt install texlive-latex-base")
+def test_every_formula_fits_the_page_of_an_article(tmp_path):
+    """Equations and steps, in LaTeX's own measure: it reports what is wider than the text."""
+    shown = [
+        rf"\typeout{{of ({e.number})}} \[ {step._formula()} \]"
+        for e in cra.equations(companions=True)
+        for step in e.steps
+    ]
+    shown += [e.latex() for e in cra.equations(companions=True)]
+    text = r"\documentclass{article}\usepackage{amsmath,amssymb}\begin{document}" + "\n".join(shown) + r"\end{document}"
+    (tmp_path / "all.tex").write_text(text, encoding="utf-8")
+    run = subprocess.run(
+        ["pdflatex", "-interaction=nonstopmode", "all.tex"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        errors="replace",
+    )
+    log = run.stdout
+    assert run.returncode == 0 and "Overfull" not in log and "Undefined" not in log, log[-3000:]
 
 
 def test_the_papers_numbers_come_in_order_and_none_is_missing():
