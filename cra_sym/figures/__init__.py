@@ -64,7 +64,7 @@ def draw(name: str, system: System | None = None, **options: Any) -> Figure:
     ----------
     name : str
         'frequencies', 'mode_shapes', 'response', 'frequency_response', 'zones' and 'combinations' show any system, the
-        others of `shows_an_arm` an arm.
+        others of `shows_an_arm` one with the parameters of an arm, whose Lagrangian may be another; 'fig04' an arm.
     system : System, optional
         A single one. An arm is one.
     **options
@@ -73,8 +73,8 @@ def draw(name: str, system: System | None = None, **options: Any) -> Figure:
     Raises
     ------
     TypeError, ValueError
-        If there is no such figure or it does not take an option, or a system is given to one that shows none, or is
-        no `Arm` where that is needed.
+        If there is no such figure or it does not take an option, or a system is given to one that shows none, or lacks
+        the parameters of an arm where those are needed.
 
     Examples
     --------
@@ -92,9 +92,12 @@ def draw(name: str, system: System | None = None, **options: Any) -> Figure:
         if not shows_an_arm(name):
             raise ValueError(f"figure = {name!r}: it shows no arm, so none can be given")
         from cra_sym.arm.parameters import Arm
+        from cra_sym.figures.subject import parameters_of
         from cra_sym.model.system import System
 
-        instance("system", system, System if shows_any_system(name) else Arm)
+        instance("system", system, Arm if name == "fig04" else System)
+        if not shows_any_system(name):
+            parameters_of(system)
         subject = {"system" if shows_any_system(name) else "arm": system}
     from matplotlib import style
 

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from cra_sym.analysis.modes import mode_shapes
 from cra_sym.arm.parameters import Arm
+from cra_sym.model.system import System
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,10 +36,10 @@ def panels(axes: Any, rows: int, columns: int, size: tuple[float, float], **opti
     return np.asarray(axes).reshape(rows, columns)
 
 
-def deflection(arm: Arm | None, xi: np.ndarray) -> np.ndarray:
+def deflection(arm: System | None, xi: np.ndarray) -> np.ndarray:
     """First mode shape of ``arm`` at ``xi = x / L``, 1 at the tip; by default of an arm whose joint gives visibly."""
     if arm is None:
         nominal = Arm.nominal()
         arm = nominal.replace(k_t=20 * nominal.EI / nominal.L**3, k_r=5 * nominal.EI / nominal.L)
-    shape = mode_shapes(arm, xi * arm.L, modes=1)[0]
+    shape = mode_shapes(arm, xi * arm.values["L"], modes=1)[0]
     return shape / shape[-1]

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cra_sym.arm.parameters import Arm
+    from cra_sym.model.system import System
 
 __all__ = ["figure_2"]
 
@@ -120,7 +120,7 @@ def _lines_and_measures(ax: Axes, x: np.ndarray, v: np.ndarray, slope: float) ->
     _line(ax, (0.0, _DATUM - 0.68), (0.0, _DATUM - 0.42), INK)
 
 
-def figure_2(arm: Arm | None = None, ax: Axes | None = None) -> Figure:
+def figure_2(arm: System | None = None, ax: Axes | None = None) -> Figure:
     """The bolted joint as two springs: ``k_t`` yields to the shear force, ``k_r`` to the bending moment.
 
     The base has moved by w(t); the manipulator, bent in the first mode of ``arm``, stands off by v(x, t), which at

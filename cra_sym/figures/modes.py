@@ -19,6 +19,7 @@ from cra_sym.figures.subject import (
     fields,
     leading_parameter,
     parameter_label,
+    parameters_of,
     rigid_ends,
     single,
 )
@@ -35,7 +36,7 @@ _QUANTITIES = {"k_t": "translational stiffness", "k_r": "rotational stiffness"}
 _RIGID: dict[str, Any] = {"color": "0.45", "linestyle": (0, (4, 2)), "linewidth": 0.9}
 
 
-def figure_3(arm: Arm | None = None, k_t: Any = None, *, axes: Any = None) -> Figure:
+def figure_3(arm: System | None = None, k_t: Any = None, *, axes: Any = None) -> Figure:
     """Draw f1, f2, f3 against the joint's translational stiffness, in Hz and as a fraction of the rigid joint's.
 
     Parameters
@@ -202,12 +203,13 @@ def _shapes_of_field(
     row[0].set_ylim(-1.15 * largest if whole_swing else None, 1.35 * largest)
 
 
-def decades(arm: Arm, name: str, low: int, high: int, points: int = 301) -> np.ndarray:
-    """Return stiffnesses of the joint from 10^low to 10^high for the nominal arm, of another one decades like these.
+def decades(system: System, name: str, low: int, high: int, points: int = 301) -> np.ndarray:
+    """Return stiffnesses of the joint from 10^low to 10^high for the nominal arm, for another one decades like these.
 
     What counts is k_t L^3 / EI and k_r L / EI.
     """
     nominal, power = Arm.nominal(), {"k_t": 3, "k_r": 1}[name]
+    arm = parameters_of(system)
     shift = round(float(np.log10(arm.EI / arm.L**power / (nominal.EI / nominal.L**power))))
     return np.logspace(low + shift, high + shift, points)
 

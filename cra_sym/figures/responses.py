@@ -30,13 +30,15 @@ _TIP = "tip displacement $v(L,t)$ / mm"
 _ERROR = "error: with minus without disturbance / mm"
 
 
-def _tip(arm: Arm, t: np.ndarray, disturbed: bool = True, rate: float = RATE, phase: float = 0.0, **mean: Any) -> Any:
+def _tip(
+    arm: System, t: np.ndarray, disturbed: bool = True, rate: float = RATE, phase: float = 0.0, **mean: Any
+) -> Any:
     """Return the tip's displacement in mm."""
     motion = BaseMotion(**mean, amplitude=AMPLITUDE * disturbed, angular_frequency=rate, phase=phase)
     return 1e3 * tip_response(arm, motion, t)
 
 
-def _name(arm: Arm) -> str:
+def _name(arm: System) -> str:
     return "nominal arm" if arm == Arm.nominal() else "arm as given"
 
 
@@ -131,7 +133,7 @@ def _default_drive(system: System) -> tuple[Any, Any]:
     return None, {equations.fields[0].diff(equations.t): 1}
 
 
-def figure_6(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+def figure_6(arm: System | None = None, *, axes: Any = None) -> Figure:
     """Draw the tip's response to a mean velocity and to a mean acceleration, without and with the disturbance.
 
     The phase of the disturbance, which the paper does not tell, decides on the first: one row each for 0 and pi.
@@ -163,12 +165,12 @@ def figure_6(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     return _finish(grid, f"{_name(arm)}, $B$ = 1 mm, $\\varpi$ = 10 rad/s, {_FROM_REST}")
 
 
-def _against_rigid(axes: Any, arm: Arm | None, quantity: Any, label: str, title: str) -> Figure:
+def _against_rigid(axes: Any, arm: System | None, quantity: Any, label: str, title: str) -> Figure:
     arm = arm or Arm.nominal()
     t = _times(arm)
     grid = panels(axes, 1, 2, (8.6, 3.9), sharex=True, sharey=True)
-    rigid, soft = arm.replace(k_t=np.inf), arm.replace(k_t=SOFT) if np.isinf(arm.k_t) else arm
-    joints = ((rigid, "rigid joint", BLUE, "-"), (soft, f"$k_t$ = {soft.k_t:g} N/m", ORANGE, "--"))
+    rigid, soft = arm.replace(k_t=np.inf), arm.replace(k_t=SOFT) if np.isinf(arm.values["k_t"]) else arm
+    joints = ((rigid, "rigid joint", BLUE, "-"), (soft, f"$k_t$ = {soft.values['k_t']:g} N/m", ORANGE, "--"))
     for ax, rate in zip(grid[0], (RATE, 2 * RATE), strict=True):
         for joined, name, color, style in joints:
             v = quantity(joined, t, rate)
@@ -181,7 +183,7 @@ def _against_rigid(axes: Any, arm: Arm | None, quantity: Any, label: str, title:
     return _finish(grid, f"{_name(arm)}, mean acceleration 0.1 m/s², $B$ = 1 mm, $\\psi$ = 0, {_FROM_REST}")
 
 
-def figure_7(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+def figure_7(arm: System | None = None, *, axes: Any = None) -> Figure:
     """Draw the tip's response with a joint of finite translational stiffness against a rigid one.
 
     Two frequencies of the disturbance, below and above the first natural frequency: on it depends what a softer joint
@@ -194,13 +196,13 @@ def figure_7(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     axes : pair of Axes, optional
     """
 
-    def tip(joined: Arm, t: np.ndarray, rate: float) -> Any:
+    def tip(joined: System, t: np.ndarray, rate: float) -> Any:
         return _tip(joined, t, rate=rate, acceleration=0.1)
 
     return _against_rigid(axes, arm, tip, _TIP, "Fig. 7  A softer joint: smaller peak at 20 rad/s, not at 10")
 
 
-def figure_8(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+def figure_8(arm: System | None = None, *, axes: Any = None) -> Figure:
     """Draw what the disturbance adds to the responses of Fig. 7.
 
     Parameters
@@ -210,13 +212,13 @@ def figure_8(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     axes : pair of Axes, optional
     """
 
-    def error(joined: Arm, t: np.ndarray, rate: float) -> Any:
+    def error(joined: System, t: np.ndarray, rate: float) -> Any:
         return _tip(joined, t, rate=rate, acceleration=0.1) - _tip(joined, t, disturbed=False, acceleration=0.1)
 
     return _against_rigid(axes, arm, error, _ERROR, "Fig. 8  It suppresses the disturbance at 20 rad/s, not at 10")
 
 
-def figure_9(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+def figure_9(arm: System | None = None, *, axes: Any = None) -> Figure:
     """Draw the tip's response to three mean accelerations, with and without the disturbance.
 
     Parameters
@@ -240,7 +242,7 @@ def figure_9(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     return _finish(grid, f"{_name(arm)}, $B$ = 1 mm, $\\varpi$ = 10 rad/s, $\\psi$ = 0, {_FROM_REST}")
 
 
-def figure_10(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+def figure_10(arm: System | None = None, *, axes: Any = None) -> Figure:
     """Draw the error caused by the disturbance for three mean accelerations: of the response, and of its peak.
 
     By superposition the first does not depend on the acceleration at all; the second never grows with it.

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cra_sym.arm.parameters import Arm
+    from cra_sym.model.system import System
 
 __all__ = ["figure_1"]
 
@@ -106,7 +106,7 @@ def _end_effector(ax: Axes, x: float, w: float) -> None:
         _box(ax, (x + 0.36, x + 0.8), (w - 0.12, w + 0.08), (z, z + 0.1), _STEEL, 11 + z)
 
 
-def figure_1(arm: Arm | None = None, ax: Axes | None = None) -> Figure:
+def figure_1(arm: System | None = None, ax: Axes | None = None) -> Figure:
     """The flexible Cartesian robotic arm: driving base, bolted joint, manipulator and end-effector.
 
     The manipulator is bent in the first mode of ``arm``; dashed lines show it straight.

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.arm.parameters import Arm
 from cra_sym.figures.modes import decades
+from cra_sym.model.system import System
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +22,7 @@ _UNITS = {"k_t": "N/m", "k_r": "N m/rad"}
 _NAMES = {"k_t": "translational stiffness $k_t$ / (N/m)", "k_r": "rotational stiffness $k_r$ / (N m/rad)"}
 
 
-def figure_5(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+def figure_5(arm: System | None = None, *, axes: Any = None) -> Figure:
     """Draw the sensitivities of f1, f2, f3 to k_t and to k_r, each with the other spring as the arm has it.
 
     Upper row: raw, in different units, so that the two panels cannot be compared. Lower row: logarithmic, on one scale.

@@ -181,7 +181,7 @@ def figure_zones(
 
 
 def figure_11(
-    arm: Arm | None = None,
+    arm: System | None = None,
     k_t: Any = K_T,
     excitation: Any = JOINT,
     epsilon: float = 0.3,
@@ -209,13 +209,13 @@ def figure_11(
     return _principal_zones(arms, excitation, epsilon, "Fig. 11  ", axes, points)
 
 
-def figure_11_axial(arm: Arm | None = None) -> Figure:
+def figure_11_axial(arm: System | None = None) -> Figure:
     """Draw Fig. 11 for a base that shakes along the arm."""
     return figure_11(arm, excitation=AXIAL, epsilon=0.2)
 
 
 def figure_12(
-    arm: Arm | None = None,
+    arm: System | None = None,
     m_e: Any = M_E,
     excitation: Any = JOINT,
     epsilon: float = 0.3,
@@ -239,7 +239,7 @@ def figure_12(
     return _principal_zones(arms, excitation, epsilon, "Fig. 12  ", axes, points)
 
 
-def figure_12_axial(arm: Arm | None = None) -> Figure:
+def figure_12_axial(arm: System | None = None) -> Figure:
     """Draw Fig. 12 for a base that shakes along the arm."""
     return figure_12(arm, excitation=AXIAL, epsilon=0.2)
 
@@ -249,7 +249,7 @@ def _power(value: float) -> str:
     return f"$10^{{{exponent:.0f}}}$" if abs(exponent - round(exponent)) < 1e-9 else f"{value:g}"
 
 
-def figure_widths(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+def figure_widths(arm: System | None = None, *, axes: Any = None) -> Figure:
     """Draw how wide the principal zones are against k_t and m_e: first-order widths at epsilon = 1, three excitations.
 
     Parameters
@@ -262,7 +262,7 @@ def figure_widths(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     grid = panels(axes, 2, 3, (9.6, 5.6), sharex="row")
     k_t, m_e = np.logspace(1, 6, 201), np.linspace(0.0, 0.02, 101)
     titles = ("joint stiffness", "base along the arm", "base across the arm")
-    rows: tuple[tuple[np.ndarray, Arm, str, Any], ...] = (
+    rows: tuple[tuple[np.ndarray, System, str, Any], ...] = (
         (k_t, arm.replace(k_t=k_t), "$k_t$ / (N/m)", K_T),
         (m_e * 1e3, arm.replace(k_t=1e4, m_e=m_e), "$m_e$ / g", np.array(M_E) * 1e3),
     )
@@ -287,7 +287,7 @@ def figure_widths(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     return figure
 
 
-def _widths(arm: Arm, excitation: Any) -> list[np.ndarray]:
+def _widths(arm: System, excitation: Any) -> list[np.ndarray]:
     if isinstance(excitation, TransverseBase):
         return list(np.moveaxis(forced_width(arm, excitation), -1, 0))
     # the width is proportional to epsilon: any small value will do
@@ -360,7 +360,7 @@ def _name(ax: Axes, name: str, place: float, top: float, **look: Any) -> None:
     ax.annotate(name, (place, top), xytext=(0, 4), textcoords="offset points", ha="center", **look)
 
 
-def figure_accuracy(arm: Arm | None = None, epsilon: Any = None, *, axes: Any = None) -> Figure:
+def figure_accuracy(arm: System | None = None, epsilon: Any = None, *, axes: Any = None) -> Figure:
     """Draw the error of the boundaries against epsilon: first order has slope 2, second order slope 3.
 
     Parameters
@@ -395,7 +395,7 @@ def figure_accuracy(arm: Arm | None = None, epsilon: Any = None, *, axes: Any = 
     return grid[0].figure
 
 
-def boundary_errors(arm: Arm, excitation: Any, epsilon: Any, resonance: tuple[int, int]) -> np.ndarray:
+def boundary_errors(arm: System, excitation: Any, epsilon: Any, resonance: tuple[int, int]) -> np.ndarray:
     """Return the largest error of a zone's two sides at orders 1 and 2 against Floquet theory, rad/s.
 
     Returns

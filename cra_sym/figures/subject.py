@@ -23,6 +23,7 @@ __all__ = [
     "leading_parameter",
     "moving_place",
     "parameter_label",
+    "parameters_of",
     "rigid_ends",
     "single",
     "span",
@@ -38,6 +39,23 @@ def single(system: System) -> System:
     if system.shape:
         raise ValueError(f"system has shape {system.shape}: must be a single set of values, not a batch")
     return system
+
+
+def parameters_of(system: System) -> Arm:
+    """Return the arm with the parameters of a system, or refuse one that lacks some.
+
+    Raises
+    ------
+    ValueError
+        If the system has not all the parameters of an arm.
+    """
+    if isinstance(system, Arm):
+        return system
+    names = Arm.nominal().values
+    missing = [name for name in names if name not in system.values]
+    if missing:
+        raise ValueError(f"system has no parameter {missing[0]!r}: this figure is of an arm, with {', '.join(names)}")
+    return Arm(**{name: system.values[name] for name in names}, zeta=system.zeta)
 
 
 def fields(system: System) -> dict[str, Any]:

@@ -113,7 +113,7 @@ def _values(system: System) -> str:
     return f"$\\zeta$ = {system.zeta:g}"
 
 
-def figure_residual_vibration(arm: Arm | None = None, *, ax: Any = None) -> Figure:
+def figure_residual_vibration(arm: System | None = None, *, ax: Any = None) -> Figure:
     """Draw the vibration left after a move over the time the move takes and the joint's translational stiffness.
 
     Parameters
@@ -145,7 +145,7 @@ def figure_residual_vibration(arm: Arm | None = None, *, ax: Any = None) -> Figu
     return _caption(np.array([panel]), f"{_MOVE}, slowed down; {dotted}; undamped")
 
 
-def figure_input_shaping(arm: Arm | None = None, *, axes: Any = None) -> Figure:
+def figure_input_shaping(arm: System | None = None, *, axes: Any = None) -> Figure:
     """Draw a move shaped for the computed modes against an S-curve of the same duration, and with a joint wrongly
     known.
 
@@ -158,10 +158,10 @@ def figure_input_shaping(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     arm = arm or Arm.nominal().replace(**_LOOSE, zeta=0.01)
     (row,) = panels(axes, 1, 2, _SIZE)
     left, right = row
-    t, k_t = np.linspace(0, 2.5, 1601), np.geomspace(0.1, 10.0, 201) * arm.k_t
+    t, k_t = np.linspace(0, 2.5, 1601), np.geomspace(0.1, 10.0, 201) * arm.values["k_t"]
     for name, move in shaped_moves(arm).items():
         left.plot(t, 1e3 * tip_response(arm, move, t), label=f"{name}, {move.duration:.2f} s", linewidth=1.4)
-        right.loglog(k_t / arm.k_t, 1e3 * residual_vibration(arm.replace(k_t=k_t), move), linewidth=1.4)
+        right.loglog(k_t / arm.values["k_t"], 1e3 * residual_vibration(arm.replace(k_t=k_t), move), linewidth=1.4)
     left.legend(loc="lower left", bbox_to_anchor=(0.0, 0.98), ncols=2, borderaxespad=0, fontsize=8)
     left.set_title("Input shaping from the computed modes", pad=36)
     left.set_xlabel("time $t$ / s")
@@ -170,11 +170,12 @@ def figure_input_shaping(arm: Arm | None = None, *, axes: Any = None) -> Figure:
     right.set_title("with a joint other than assumed", pad=36, fontweight="normal")
     right.set_xlabel("true $k_t$ / assumed $k_t$")
     right.set_ylabel("residual tip amplitude / mm")
-    assumed = f"assumed $k_t$ = {arm.k_t:g} N/m, $k_r$ = {arm.k_r:g} N m/rad, $\\zeta$ = {arm.zeta:g}"
+    k_t_assumed, k_r_assumed = arm.values["k_t"], arm.values["k_r"]
+    assumed = f"assumed $k_t$ = {k_t_assumed:g} N/m, $k_r$ = {k_r_assumed:g} N m/rad, $\\zeta$ = {arm.zeta:g}"
     return _caption(row, f"{_MOVE}; {assumed}")
 
 
-def shaped_moves(arm: Arm) -> dict[str, BaseMotion]:
+def shaped_moves(arm: System) -> dict[str, BaseMotion]:
     """Return the fastest S-curve, the same shaped for mode 1 (ZV, ZVD), and an S-curve as slow as the ZVD move."""
     omega = modal_parameters(arm, 1).omega[0]
     fast = BaseMotion.s_curve(**_LIMITS)

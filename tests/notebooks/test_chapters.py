@@ -13,8 +13,9 @@ from cra_sym.report.notebooks import execute
 
 FOLDER = Path(__file__).parents[2] / "notebooks"
 DERIVATION = sorted(FOLDER.glob("0[1-7]*.ipynb"))
-#: Another arm: longer, with a heavier tip and a rotary inertia, on a joint that gives.
+#: Another arm: longer, with a heavier tip and a rotary inertia, on a joint that gives; and another Lagrangian.
 OTHER = 'fields |= {"L": 0.8, "m_e": 0.004, "J_e": 1e-6, "k_t": 5e3, "k_r": 4e2}'
+TENSIONED = OTHER + "; tension = 2.0"
 
 
 def tagged(notebook, tag):
@@ -66,7 +67,7 @@ def following():
 
 @pytest.mark.parametrize("path", following(), ids=lambda path: path.stem)
 def test_a_chapter_follows_its_parameters(path, monkeypatch):
-    """Another arm: no cell fails, and every figure that shows an arm is another."""
+    """Another arm, under tension where a chapter has one: no cell fails, every figure that shows an arm is another."""
     stored = nbformat.read(path, as_version=4)
     (parameters,) = tagged(stored, "parameters")
     read = nbformat.read
@@ -74,7 +75,8 @@ def test_a_chapter_follows_its_parameters(path, monkeypatch):
     def with_another_arm(*arguments, **options):
         notebook = read(*arguments, **options)
         place = [cell.source for cell in notebook.cells].index(parameters.source)
-        notebook.cells.insert(place + 1, new_code_cell(OTHER))
+        changed = TENSIONED if "tension" in parameters.source else OTHER
+        notebook.cells.insert(place + 1, new_code_cell(changed))
         return notebook
 
     monkeypatch.setattr(nbformat, "read", with_another_arm)
