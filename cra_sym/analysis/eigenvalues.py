@@ -20,6 +20,7 @@ __all__ = ["count_eigenvalues", "damping_ratios", "eigenvalues"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+_LEAST = 1e-11  # tolerance that rounding lets two meshes keep
 _SHRINK = 0.85  # of a circle in which eigenvalues are counted, over one in which rounding does not let them be
 
 
@@ -54,10 +55,11 @@ def eigenvalues(system: System, modes: int = 3, *, oscillating: bool = True) -> 
 
     Notes
     -----
-    They are those of the Ritz basis on the stresses and settle to a relative ``system.tolerance`` as its degree rises.
-    Where two meet (critical damping, flutter) their mean and product do, and each is known to half the digits, as it is
-    from the parameters. :func:`count_eigenvalues` proves in a region that none is missing. Without dampers and other
-    such forces ``s = i omega``.
+    They are those of the Ritz basis on the stresses and settle to a relative ``system.tolerance`` (1e-11 at least) as
+    its degree rises. Where two meet (critical damping, flutter) their mean and product do, and each is known to half
+    the digits, as it is from the parameters. :func:`count_eigenvalues` proves in a region that none is missing. With
+    third derivatives by x or a mass of the highest derivative, Newton's method on the exact problem refines Ritz values
+    of Hermite elements. Without dampers and other such forces ``s = i omega``.
 
     Examples
     --------
@@ -81,19 +83,19 @@ def eigenvalues(system: System, modes: int = 3, *, oscillating: bool = True) -> 
         return np.asarray(1j * system.natural_frequencies(modes))
     columns = flat_columns(system.parameters, system.shape)
     roots = np.empty((columns.shape[1], modes), dtype=complex)
-    pencil = system.numerics("pencil")
+    pencil, tolerance = system.numerics("pencil"), max(system.tolerance, _LEAST)
     if pencil is None:
         guesses = system.model.ritz(2 * modes + 10).eigenvalues(system.values, modes, oscillating=oscillating)
         roots[:] = _by_newton(system, columns, np.broadcast_to(guesses.reshape(-1, modes), roots.shape))
         return roots.reshape(*system.shape, modes)
     for rows, problem in pencil.problems(columns):
         with np.errstate(over="ignore", under="ignore"):
-            found = lowest_eigenvalues(problem, modes, oscillating, system.tolerance)
-        good = (found.error <= system.tolerance).all(axis=1)
+            found = lowest_eigenvalues(problem, modes, oscillating, tolerance)
+        good = (found.error <= tolerance).all(axis=1)
         roots[rows[good]] = found.values[good]
         for row in np.nonzero(~good)[0]:
             one = Settled(found.values[row : row + 1], found.error[row : row + 1])
-            roots[rows[row]] = _unsettled(system, columns[:, rows[row : row + 1]], one, oscillating)
+            roots[rows[row]] = _unsettled(system, columns[:, rows[row : row + 1]], one, oscillating, tolerance)
     check_range(roots)
     return roots.reshape(*system.shape, modes)
 
@@ -161,7 +163,7 @@ def count_eigenvalues(system: System, radius: Any) -> NDArray[np.int64]:
     return found.reshape(shape)
 
 
-def _unsettled(system: System, columns: Array, found: Settled, oscillating: bool) -> Complex:
+def _unsettled(system: System, columns: Array, found: Settled, oscillating: bool, tolerance: float) -> Complex:
     """Return eigenvalues by Newton's method if that settles, or say how many there are."""
     modes, there = found.values.shape[1], int(np.isfinite(found.values).sum())
     if there < modes:
@@ -170,7 +172,7 @@ def _unsettled(system: System, columns: Array, found: Settled, oscillating: bool
     try:
         return _by_newton(system, columns, found.values)[0]
     except (ArithmeticError, ValueError):
-        bad = ~(found.error[0] <= system.tolerance)
+        bad = ~(found.error[0] <= tolerance)
     first, error = int(bad.argmax()), float(found.error[0, bad.argmax()])
     reason = f"modes = {modes}: the relative error of eigenvalue {first + 1} stays at {error:.1g}"
     number, reach = _counted(system, columns, float(np.abs(found.values[0][bad]).min()))

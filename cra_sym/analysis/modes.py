@@ -77,30 +77,14 @@ def section_place(system: System, field: Any = None) -> int:
 
 
 @overload
-def mode_shapes(
-    system: System,
-    x: Any,
-    modes: int = 3,
-    derivative: int = 0,
-    *,
-    field: Any = None,
-    damped: Literal[False] = False,
-    oscillating: bool = True,
-) -> Array:
+def mode_shapes(system: System, x: Any, modes: int = 3, derivative: int = 0, *, field: Any = None,
+                damped: Literal[False] = False, oscillating: bool = True) -> Array:  # fmt: skip
     """Return real shapes."""
 
 
 @overload
-def mode_shapes(
-    system: System,
-    x: Any,
-    modes: int = 3,
-    derivative: int = 0,
-    *,
-    field: Any = None,
-    damped: bool,
-    oscillating: bool = True,
-) -> Array | NDArray[np.complex128]:
+def mode_shapes(system: System, x: Any, modes: int = 3, derivative: int = 0, *, field: Any = None,
+                damped: bool, oscillating: bool = True) -> Array | NDArray[np.complex128]:  # fmt: skip
     """Return complex shapes if they are asked for."""
 
 
