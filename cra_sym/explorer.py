@@ -1,6 +1,6 @@
-"""The arm under sliders: its mode shapes, its response and its zones of instability follow each of them at once.
+"""Any system under sliders: its mode shapes, its response and its zones of instability follow each of them at once.
 
-The state is plain numbers named by the nomenclature, so everything but the sliders works without any widget library.
+The state is plain numbers named as the parameters are, so everything but the sliders works without any widget library.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import instance, real_array, shown
 from cra_sym.extras import MissingExtraError, require
@@ -21,19 +20,20 @@ from cra_sym.figures.live import LiveFigure
 from cra_sym.figures.modes import figure_mode_shapes
 from cra_sym.figures.responses import figure_response
 from cra_sym.figures.stability import AXIAL, JOINT, figure_zones
-from cra_sym.model.excitations import AxialBase
+from cra_sym.figures.subject import around, default_excitation, fields, parameter_name, single, span, with_unit
+from cra_sym.model.excitations import Parametric
+from cra_sym.model.system import System
 from cra_sym.solvers.motion import BaseMotion
 from cra_sym.symbols import row
 
 __all__ = ["Explorer", "explore"]
 
-_ARM = ("k_t", "k_r", "m_e")
+_ARM = ("k_t", "k_r", "m_e", "J_e", "L", "b", "h", "E", "rho")
 _MOTION = {"v_m": "velocity", "a_m": "acceleration", "B": "amplitude", "varpi": "angular_frequency", "psi": "phase"}
 _START = {"v_m": 0.0, "a_m": 0.1, "B": 1e-3, "varpi": 10.0, "psi": 0.0, "epsilon": 0.3}
-_EXCITATIONS = {"joint stiffness fluctuates": JOINT, "base shakes along the arm": AXIAL}
+_OF_AN_ARM = {"joint stiffness fluctuates": JOINT, "base shakes along the arm": AXIAL}
 _SWING = 24  # pictures of one swing of the mode shapes
 _SIZE = (8.6, 2.9)
-_TIME = np.linspace(0.0, 2.0, 1601)
 
 #: First value, last value and number of steps; stiffnesses run through decades and end in a rigid joint.
 _RANGES: dict[str, tuple[float, float, int]] = {
@@ -63,55 +63,64 @@ class Explorer:
     Attributes
     ----------
     values : dict
-        The present values by their names in the nomenclature, SI units.
+        The present values by their names, SI units.
     """
 
-    def __init__(self, arm: Arm, excitation: Any, values: dict[str, Any]) -> None:
-        self._given, self._excitations = arm, dict(_EXCITATIONS)
-        if not isinstance(excitation, JointStiffness | AxialBase) or excitation.shape:
-            raise TypeError(f"excitation = {shown(excitation)}: must be a single JointStiffness or AxialBase")
-        if excitation not in self._excitations.values():
-            self._excitations["as given"] = excitation
-        self.excitation, self.swing = excitation, 0.0
-        self.values = {name: getattr(arm, name) for name in _ARM} | _START
+    def __init__(self, system: System, excitation: Any, values: dict[str, Any]) -> None:
+        self._given = system
+        self._names = _ARM if isinstance(system, Arm) else tuple(system.values)
+        self._excitations, self.excitation = _choices(system, excitation)
+        own = [kind for _, kind in system.numerics("causes")] == ["motion"]
+        self._motion = {name: field for name, field in _MOTION.items() if own and name not in self._names}
+        start = {name: _START[name] for name in (*self._motion, "epsilon") if name not in self._names}
+        self.swing = 0.0
+        self.values: dict[str, float] = {name: float(system.values[name]) for name in self._names} | start
         self._pictures: dict[str, bytes] = {}
         self._check(values)
         self.values |= {name: float(value) for name, value in values.items()}
+        self._times = np.linspace(0.0, 2.0 if isinstance(system, Arm) else span(system), 1601)
 
     @property
-    def arm(self) -> Arm:
-        """The arm as the sliders stand."""
-        return self._given.replace(**{name: self.values[name] for name in _ARM})
+    def system(self) -> System:
+        """The system as the sliders stand."""
+        return self._given.replace(**{name: self.values[name] for name in self._names})
 
     @property
-    def motion(self) -> BaseMotion:
-        """The base's motion as the sliders stand."""
-        return BaseMotion(**{field: self.values[name] for name, field in _MOTION.items()})
+    def motion(self) -> BaseMotion | None:
+        """The motion of the base as the sliders stand; None if one prescribed motion is not all that drives."""
+        given = {field: self.values[name] for name, field in self._motion.items()}
+        return BaseMotion(**given) if given else None
 
     @cached_property
     def views(self) -> dict[str, _View]:
         """The pictures: mode shapes, response, zones."""
-        modes = LiveFigure(figure_mode_shapes, 3, _SIZE, sharey=True)
-        zones = LiveFigure(figure_zones, 3, _SIZE, sharey=True)
-        return {
-            "modes": _View(frozenset({*_ARM, "swing"}), modes, self._modes),
-            "response": _View(frozenset({*_ARM, *_MOTION}), LiveFigure(figure_response, 1, _SIZE), self._response),
-            "zones": _View(frozenset({*_ARM, "epsilon", "excitation"}), zones, self._zones),
+        rows = len(fields(self._given))
+        size = _SIZE[0], _SIZE[1] * rows
+        found = {
+            "modes": _View(
+                frozenset({*self._names, "swing"}),
+                LiveFigure(figure_mode_shapes, rows, 3, size, sharey="row"),
+                lambda: {"system": self.system, "phase": self.swing},
+            ),
+            "response": _View(
+                frozenset({*self._names, *self._motion}),
+                LiveFigure(figure_response, 1, 1, _SIZE),
+                lambda: {"system": self.system, "motion": self.motion, "t": self._times},
+            ),
         }
-
-    def _modes(self) -> dict[str, Any]:
-        return {"system": self.arm, "phase": self.swing}
-
-    def _response(self) -> dict[str, Any]:
-        return {"system": self.arm, "motion": self.motion, "t": _TIME}
+        if self._excitations:
+            zones = LiveFigure(figure_zones, 1, 3, _SIZE, sharey=True)
+            found["zones"] = _View(frozenset({*self._names, "epsilon", "excitation"}), zones, self._zones)
+        return found
 
     def _zones(self) -> dict[str, Any]:
         coarse = {"points": 17, "tolerance": 1e-4}  # growth to about 1e-4 of its largest: a picture's worth
-        return {"system": self.arm, "excitation": self.excitation, "epsilon": self.values["epsilon"], **coarse}
+        epsilon = self.values["epsilon"] if "epsilon" not in self._names else _START["epsilon"]
+        return {"system": self.system, "excitation": self.excitation, "epsilon": epsilon, **coarse}
 
     def _set(self, **changes: Any) -> None:
         """Change values, ``excitation`` or ``swing`` by name, and redraw what depends on them."""
-        values = {name: float(value) for name, value in changes.items() if name in _RANGES}
+        values = {name: float(value) for name, value in changes.items() if name in self.values}
         self._check(values)
         self.values |= values
         self.excitation = changes.get("excitation", self.excitation)
@@ -121,16 +130,16 @@ class Explorer:
                 self._draw(name)
 
     def _check(self, values: dict[str, Any]) -> None:
-        unknown = set(values) - set(_RANGES)
+        unknown = set(values) - set(self.values)
         if unknown:
-            raise TypeError(f"{', '.join(sorted(unknown))}: must be among {', '.join(_RANGES)}")
+            raise TypeError(f"{', '.join(sorted(unknown))}: must be among {', '.join(self.values)}")
         for name, value in values.items():
             shape = real_array(name, value, allow_infinite=True).shape
             if shape:
                 raise ValueError(f"{name} has shape {shape}: must be one number")
-        self._given.replace(**{name: values[name] for name in _ARM if name in values})
-        BaseMotion(**{_MOTION[name]: values[name] for name in _MOTION if name in values})
-        if "epsilon" in values:
+        self._given.replace(**{name: values[name] for name in self._names if name in values})
+        BaseMotion(**{self._motion[name]: values[name] for name in self._motion if name in values})
+        if "epsilon" in values and "epsilon" not in self._names:
             real_array("epsilon", values["epsilon"], low=0.0, high=1.0, open_low=True)
 
     def _draw(self, name: str) -> None:
@@ -165,18 +174,19 @@ class Explorer:
         MissingExtraError
             If ipywidgets, from the extra ``explore``, is not installed.
         """
-        return {name: self._slider(name) for name in _RANGES}
+        return {name: self._slider(name) for name in self.values}
 
     def _slider(self, name: str) -> Any:
-        widgets, entry, value = require("ipywidgets", "explore"), row(name), self.values[name]
+        widgets, value = require("ipywidgets", "explore"), self.values[name]
+        symbol, unit, meaning = self._named(name)
         common: dict[str, Any] = {
-            "description": f"${entry.latex}$ {_divisor(entry.unit)}",
-            "tooltip": entry.meaning,
+            "description": with_unit(symbol, unit),
+            "tooltip": meaning,
             "style": {"description_width": "8em"},
             "layout": {"width": "24em"},
         }
-        low, high, steps = _RANGES[name]
-        if name in ("k_t", "k_r"):
+        low, high, steps = self._range(name)
+        if name in self._names and name in self._given.numerics("stiffnesses"):
             grid = sorted({*np.geomspace(low, high, steps + 1).round(6).tolist(), np.inf, value})
             options = [("rigid" if np.isinf(k) else f"{k:.3g}", k) for k in grid]
             slider = widgets.SelectionSlider(options=options, value=value, **common)
@@ -185,6 +195,23 @@ class Explorer:
             slider = widgets.FloatSlider(value, readout_format=".3g", **common)
         slider.observe(lambda change: self._set(**{name: change["new"]}), "value")
         return slider
+
+    def _named(self, name: str) -> tuple[str, str, str]:
+        """Return symbol, unit and meaning of a value."""
+        if name not in self._names or isinstance(self._given, Arm):
+            entry = row(name)
+            return f"${entry.latex}$", entry.unit, entry.meaning
+        return (*parameter_name(self._given, name), f"parameter {name} of the model")
+
+    def _range(self, name: str) -> tuple[float, float, int]:
+        if name in _RANGES and (name not in self._names or isinstance(self._given, Arm)):
+            return _RANGES[name]
+        try:
+            values = around(self._given, name)
+        except ValueError:  # a parameter of value 0 on which no frequency depends
+            return 0.0, 1.0, 50
+        low, high = float(values.min()), float(values.max())
+        return low, high, 50
 
     @cached_property
     def images(self) -> dict[str, Any]:
@@ -205,19 +232,22 @@ class Explorer:
             If ipywidgets, from the extra ``explore``, is not installed.
         """
         widgets = require("ipywidgets", "explore")
-        choice = widgets.Dropdown(options=self._excitations, value=self.excitation, layout={"width": "24em"})
-        choice.observe(lambda change: self._set(excitation=change["new"]), "value")
+        choices = []
+        if self._excitations:
+            choice = widgets.Dropdown(options=self._excitations, value=self.excitation, layout={"width": "24em"})
+            choice.observe(lambda change: self._set(excitation=change["new"]), "value")
+            choices = [choice]
         play = widgets.Play(min=0, max=_SWING - 1, interval=120, repeat=True, tooltip="let the mode shapes swing")
         play.observe(lambda change: self._set(swing=2 * np.pi * change["new"] / _SWING), "value")
-        columns: list[tuple[Any, list]] = [(_ARM, [play]), (_MOTION, []), (("epsilon",), [choice])]
+        amplitude = [name for name in ("epsilon",) if name in self.values and name not in self._names]
+        columns: list[tuple[Any, list[Any]]] = [(self._names, [play]), (self._motion, []), (amplitude, choices)]
         boxes = [widgets.VBox([*(self.sliders[name] for name in names), *more]) for names, more in columns]
         controls = widgets.HBox(boxes, layout={"flex_flow": "row wrap"})
         return widgets.VBox([controls, *self.images.values()])
 
     def __repr__(self) -> str:
-        told = (
-            f"{name} = {value:.4g} {row(name).unit.removesuffix('1')}".rstrip() for name, value in self.values.items()
-        )
+        units = {name: self._named(name)[1].removesuffix("1") for name in self.values}
+        told = (f"{name} = {value:.4g} {units[name]}".rstrip() for name, value in self.values.items())
         return f"explorer: {', '.join(told)}"
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, Any]:
@@ -229,41 +259,50 @@ class Explorer:
             return shown
 
 
-def _divisor(unit: str) -> str:
-    if unit == "1":
-        return ""
-    unit = unit.replace("^2", "²")
-    return f"/ ({unit})" if {" ", "/"} & {*unit} else f"/ {unit}"
+def _choices(system: System, given: Any) -> tuple[dict[str, Any], Any]:
+    """Return what may fluctuate in the picture of the zones, by words, and what does first."""
+    if given is not None and (not isinstance(given, Parametric) or given.shape):
+        raise TypeError(f"excitation = {shown(given)}: must be a single Fluctuation, JointStiffness or AxialBase")
+    if isinstance(system, Arm):
+        choices: dict[str, Any] = dict(_OF_AN_ARM)
+    else:
+        try:
+            choices = {"as by default": default_excitation(system)}
+        except ValueError:  # nothing can fluctuate
+            choices = {}
+    if given is not None and given not in choices.values():
+        choices["as given"] = given
+    return choices, given if given is not None else next(iter(choices.values()), None)
 
 
-def explore(arm: Arm | None = None, *, excitation: Any = JOINT, **values: Any) -> Explorer:
-    """Return the arm under sliders, to be shown as the last expression of a notebook cell.
+def explore(system: System | None = None, *, excitation: Any = None, **values: Any) -> Explorer:
+    """Return a system under sliders, to be shown as the last expression of a notebook cell.
 
     The sliders need the extra ``explore`` (ipywidgets); without it the notebook shows a picture of the same state.
 
     Parameters
     ----------
-    arm : Arm, optional
-        By default the nominal one with an elastic joint, k_t = 1e4 N/m and k_r = 1e3 N m/rad.
-    excitation : JointStiffness or AxialBase
+    system : System, optional
+        By default the nominal arm with an elastic joint, k_t = 1e4 N/m and k_r = 1e3 N m/rad. There is a slider for
+        each parameter, for an arm k_t, k_r, m_e, J_e, L, b, h, E and rho.
+    excitation : Fluctuation, JointStiffness or AxialBase, optional
         What fluctuates in the picture of the zones.
     values : float
-        Start values of k_t, k_r, m_e, v_m, a_m, B, varpi, psi, epsilon: names and units of the nomenclature.
+        Start values of the parameters by name; of the base's motion, if that is all that drives, v_m, a_m, B, varpi and
+        psi; and epsilon. Names and units of these are those of the nomenclature.
 
     Raises
     ------
     TypeError, ValueError
-        If a name is unknown, a value is not allowed, or the arm is a batch.
+        If a name is unknown, a value is not allowed, or ``system`` is no :class:`System` or a batch.
 
     Examples
     --------
     >>> from cra_sym import explore
-    >>> view = explore(k_t=1e3, B=2e-3)
-    >>> view.arm.k_t, view.motion
-    (1000.0, <BaseMotion of shape (): piecewise, harmonic>)
+    >>> view = explore(k_t=1e3, B=2e-3, L=1.2)
+    >>> view.system.k_t, view.system.L, view.motion
+    (1000.0, 1.2, <BaseMotion of shape (): piecewise, harmonic>)
     """
-    arm = Arm.nominal().replace(k_t=1e4, k_r=1e3) if arm is None else arm
-    instance("arm", arm, Arm)
-    if arm.shape:
-        raise ValueError(f"arm has shape {arm.shape}: must be a single one")
-    return Explorer(arm, excitation, values)
+    given = Arm.nominal().replace(k_t=1e4, k_r=1e3) if system is None else system
+    instance("system", given, System)
+    return Explorer(single(given), excitation, values)

@@ -13,8 +13,9 @@ from PIL import Image
 import cra_sym as cra
 from cra_sym.extras import MissingExtraError
 from cra_sym.symbols import nomenclature, row
+from tests.systems import system
 
-VALUES = {"k_t", "k_r", "m_e", "v_m", "a_m", "B", "varpi", "psi", "epsilon"}
+VALUES = {"k_t", "k_r", "m_e", "J_e", "L", "b", "h", "E", "rho", "v_m", "a_m", "B", "varpi", "psi", "epsilon"}
 WIDGET = "application/vnd.jupyter.widget-view+json"
 
 
@@ -44,7 +45,8 @@ def test_a_slider_for_each_value_labelled_by_the_nomenclature(moved):
     for name, slider in moved.sliders.items():
         assert slider.tooltip == row(name).meaning
         assert f"${row(name).latex}$" in slider.description
-        assert row(name).unit == "1" or row(name).unit.replace("^2", "²") in slider.description
+        unit = row(name).unit.replace("^2", "²").replace("^3", "³")
+        assert unit == "1" or unit in slider.description
 
 
 def test_stiffness_runs_through_decades_to_a_rigid_joint(moved):
@@ -55,7 +57,7 @@ def test_stiffness_runs_through_decades_to_a_rigid_joint(moved):
 
 
 def test_sliders_are_arm_and_motion(moved):
-    assert moved.arm == cra.Arm.nominal().replace(k_t=1e3, k_r=np.inf, m_e=0.005)
+    assert moved.system == cra.Arm.nominal().replace(k_t=1e3, k_r=np.inf, m_e=0.005)
     expected = cra.BaseMotion(velocity=0.05, acceleration=0.1, amplitude=2e-3, angular_frequency=20.0)
     t = np.linspace(0, 1, 7)
     np.testing.assert_array_equal(moved.motion.kinematics(t), expected.kinematics(t))
@@ -65,16 +67,16 @@ def test_mode_shapes_are_the_kernels(moved):
     for mode in range(3):
         zero, rigid, elastic = moved.views["modes"].figure.axes[mode].lines
         x = elastic.get_xdata()
-        np.testing.assert_array_equal(elastic.get_ydata(), cra.mode_shapes(moved.arm, x)[mode])
-        np.testing.assert_array_equal(rigid.get_ydata(), cra.mode_shapes(moved.arm.replace(k_t=np.inf), x)[mode])
+        np.testing.assert_array_equal(elastic.get_ydata(), cra.mode_shapes(moved.system, x)[mode])
+        np.testing.assert_array_equal(rigid.get_ydata(), cra.mode_shapes(moved.system.replace(k_t=np.inf), x)[mode])
         assert not np.any(zero.get_ydata())
-        hertz = cra.natural_frequencies(moved.arm)[mode]
+        hertz = cra.natural_frequencies(moved.system)[mode]
         assert f"{hertz:.2f} Hz" in elastic.get_label()
 
 
 def test_response_is_the_kernels(moved):
     rigid, given = drawn(moved.views["response"])
-    for arm, curve in ((moved.arm.replace(k_t=np.inf), rigid), (moved.arm, given)):
+    for arm, curve in ((moved.system.replace(k_t=np.inf), rigid), (moved.system, given)):
         np.testing.assert_array_equal(curve[:, 1], 1e3 * cra.tip_response(arm, moved.motion, curve[:, 0]))
 
 
@@ -83,12 +85,14 @@ def test_zones_are_the_kernels(moved):
         lines = [
             line.get_xydata() for line in moved.views["zones"].figure.axes[mode - 1].lines if line.get_xdata().size
         ]
-        centre = 2 * cra.modal_parameters(moved.arm).omega[mode - 1]
+        centre = 2 * cra.modal_parameters(moved.system).omega[mode - 1]
         assert lines[0][-1, 1] == 0.2
         expected = [
             np.array(side) - centre
             for order in (1, 2)
-            for side in cra.stability_boundary(moved.arm, moved.excitation, lines[0][:, 1], (mode, mode), order=order)
+            for side in cra.stability_boundary(
+                moved.system, moved.excitation, lines[0][:, 1], (mode, mode), order=order
+            )
         ]
         np.testing.assert_allclose([line[:, 0] for line in lines], expected, rtol=0, atol=1e-12)
 
@@ -116,7 +120,7 @@ def test_shapes_swing(moved):
     (play,) = [w for box in moved.panel.children[0].children for w in box.children if type(w).__name__ == "Play"]
     play.value = 12
     elastic = moved.views["modes"].figure.axes[0].lines[2]
-    np.testing.assert_allclose(elastic.get_ydata(), -cra.mode_shapes(moved.arm, elastic.get_xdata())[0])
+    np.testing.assert_allclose(elastic.get_ydata(), -cra.mode_shapes(moved.system, elastic.get_xdata())[0])
     play.value = 0
 
 
@@ -152,11 +156,45 @@ def test_without_the_extra_a_picture_and_an_error_that_names_it(monkeypatch):
         ({"epsilon": 0.0}, "epsilon"),
         ({"epsilon": 1e3}, "epsilon"),
         ({"excitation": "x" * 1000}, r"^excitation = 'x{70,76}\.\.\.: must be a single"),
-        ({"arm": cra.Arm.nominal().replace(k_t=[1.0, 2.0])}, r"arm has shape \(2,\)"),
-        ({"arm": 3}, "arm"),
+        ({"system": cra.Arm.nominal().replace(k_t=[1.0, 2.0])}, r"system has shape \(2,\)"),
+        ({"system": 3}, "system = 3: must be a System"),
         ({"excitation": cra.TransverseBase(0.001)}, "TransverseBase"),
     ],
 )
 def test_bad_values_are_named(given, told):
     with pytest.raises((TypeError, ValueError), match=told):
         cra.explore(**given)
+
+
+@pytest.mark.parametrize("name", ["Timoshenko beam", "gantry"])
+def test_any_system_is_explored(name):
+    """Sliders for all its parameters; the pictures are those of the system they stand for."""
+    pytest.importorskip("ipywidgets", reason="needs the extra explore: ipywidgets")
+    view = cra.explore(system(name), rhoA=0.4)
+    assert view.panel.children and set(view.system.values) <= set(view.sliders)
+    view.sliders["l"].value = 1.3
+    assert view.system == system(name, rhoA=0.4, l=1.3)
+    shape = view.views["modes"].figure.axes[0].lines[-1]
+    expected = cra.mode_shapes(view.system, shape.get_xdata())[0]
+    np.testing.assert_array_equal(shape.get_ydata(), expected)
+    assert (view.motion is None) is (name == "gantry")  # a force acts on it too
+    assert "l = 1.3" in repr(view)
+
+
+def test_the_geometry_of_the_arm_has_sliders(moved):
+    view = cra.explore()
+    view._set(L=1.5, E=7e10)
+    assert (view.system.L, view.system.E) == (1.5, 7e10)
+    assert moved.sliders["h"].min < cra.Arm.nominal().h < moved.sliders["h"].max
+
+
+def test_labels_are_not_cut_when_ticks_grow():
+    """The y-label had been cut off once tick labels had two digits more."""
+    view = cra.explore(k_t=1e3)
+    figure = view.views["response"].figure
+    view._draw("response")
+    for values in ({"a_m": 1.0, "L": 3.0}, {"a_m": 0.001, "B": 0.0}, {"a_m": 1.0, "L": 4.0}):
+        view._set(**values)
+        for ax in figure.axes:
+            box = ax.yaxis.get_tightbbox(figure.canvas.get_renderer())
+            assert box.x0 >= 0 and box.y0 >= 0 and box.y1 <= figure.figure.bbox.height

@@ -23,14 +23,14 @@ _FILL = 0.6  # limits stay as they are while what is drawn fills this part of th
 
 
 class LiveFigure:
-    """A row of axes in which a figure function draws; axes, ticks and labels are painted only when they change.
+    """A grid of axes in which a figure function draws; axes, ticks and labels are painted only when they change.
 
     Parameters
     ----------
     draw : callable
         Called with ``axes=`` and the arguments of :meth:`redraw`: a figure function of this package.
-    columns : int
-        Number of axes.
+    rows, columns : int
+        Of the grid.
     size : pair of float
         Width and height, inches.
     dpi : float
@@ -39,7 +39,14 @@ class LiveFigure:
     """
 
     def __init__(
-        self, draw: Callable[..., Any], columns: int, size: tuple[float, float], *, dpi: float = 90, **options: Any
+        self,
+        draw: Callable[..., Any],
+        rows: int,
+        columns: int,
+        size: tuple[float, float],
+        *,
+        dpi: float = 90,
+        **options: Any,
     ) -> None:
         self._draw = draw
         self._frame: Any = None
@@ -47,7 +54,7 @@ class LiveFigure:
         with style.context(STYLE):
             self.figure = Figure(figsize=size, dpi=dpi, layout="constrained")
             self.canvas = FigureCanvasAgg(self.figure)
-            self.axes = self.figure.subplots(1, columns, squeeze=False, **options)[0]
+            self.axes = self.figure.subplots(rows, columns, squeeze=False, **options).ravel()
 
     def redraw(self, *given: Any, **more: Any) -> bytes:
         """Draw with these arguments in place of what was there; return the picture as PNG."""
@@ -89,9 +96,9 @@ class LiveFigure:
                 for ax in self.axes]  # fmt: skip
         content = list(self._content())
         if look != self._look:
-            if self._frame is None:  # the first drawing settles the layout
-                self.canvas.draw()
-                self.figure.set_layout_engine("none")
+            self.figure.set_layout_engine("constrained")  # makes room for ticks and labels as they are now
+            self.canvas.draw()
+            self.figure.set_layout_engine("none")
             for artist in content:
                 artist.set_animated(True)
             self.canvas.draw()

@@ -23,10 +23,12 @@ __all__ = [
     "leading_parameter",
     "moving_place",
     "parameter_label",
+    "parameter_name",
     "parameters_of",
     "rigid_ends",
     "single",
     "span",
+    "with_unit",
 ]
 
 Array = NDArray[np.float64]
@@ -76,11 +78,16 @@ def field_label(system: System) -> tuple[str, str]:
 
 def parameter_label(system: System, name: str) -> str:
     """Return a parameter with its unit, as an axis names it."""
+    return with_unit(*parameter_name(system, name))
+
+
+def parameter_name(system: System, name: str) -> tuple[str, str]:
+    """Return the symbol of a parameter in LaTeX and its unit, '1' if it is not known."""
     if isinstance(system, Arm):
-        return with_unit(f"${row(name).latex}$", row(name).unit)
+        return f"${row(name).latex}$", row(name).unit
     from sympy import Symbol, latex
 
-    return with_unit(f"${latex(Symbol(name))}$", system.model.units.get(name, "1"))
+    return f"${latex(Symbol(name))}$", system.model.units.get(name, "1")
 
 
 def with_unit(quantity: str, unit: str) -> str:
