@@ -60,10 +60,12 @@ lint: .venv/.ready
 mutation: .venv/.ready
 	$(RUN) -m tests.mutation $(ARGS)
 
-# Random joints against their own frequencies, which goes on where it was stopped; bad values in every
-# argument; a sweep past the memory of its workers, of which one is killed.
+# Random joints against their own frequencies and coefficients along x against other methods, which go on where
+# they were stopped; bad values in every argument; a sweep past the memory of its workers, of which one is
+# killed.
 campaign: .venv/.ready
 	$(RUN) -m tests.campaigns.joints $(ARGS)
+	$(RUN) -m tests.campaigns.along_x
 	$(RUN) -m tests.campaigns.attacks
 	$(RUN) -m tests.campaigns.workers
 

@@ -90,7 +90,7 @@ def damped_spatial(model: Model) -> SpatialProblem:
 def route(model: Model) -> Route:
     """Return the fastest way to natural frequencies and modes that the Lagrangian allows."""
     form, left = model.conservative, model.equations.domain[0]
-    compiled = spatial(model)
+    compiled = model.numerics("spatial")
     if not compiled.uniform:
         return stress_route(model, compiled) or GeneralRoute(compiled)
     fast = one_wave_route(form, model.symbols, left) or waves_route(form, compiled, model.symbols)
@@ -99,7 +99,7 @@ def route(model: Model) -> Route:
 
 def general_route(model: Model) -> Route:
     """Return the route that serves all values."""
-    return GeneralRoute(spatial(model))
+    return GeneralRoute(model.numerics("spatial"))
 
 
 # Loads -----------------------------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import jn_zeros
 
@@ -115,6 +116,57 @@ def test_periodic_cells():
     """Tension 1 + 0.9 sin(400 pi x); by the transfer matrix of a period 2.0741352770515."""
     tension = 1 + sp.Rational(9, 10) * sp.sin(400 * sp.pi * x)
     np.testing.assert_allclose(omega(string(tension), 1), 2.0741352770515, rtol=CLOSE)
+
+
+CELLS = {
+    "tension": (1 + sp.Rational(9, 10) * sp.sin(40 * sp.pi * x), 1 + 0 * x),
+    "mass": (1 + 0 * x, 1 + sp.Rational(3, 4) * sp.cos(40 * sp.pi * x)),
+    "compliance": (1 / (1 + sp.cos(40 * sp.pi * x) / 2), 1 + 0 * x),
+    "both": (sp.exp(sp.sin(40 * sp.pi * x)), 2 + sp.sin(40 * sp.pi * x) ** 3),
+}
+
+
+@pytest.mark.parametrize("kind", CELLS)
+def test_smooth_cells_of_every_kind(kind):
+    """Twenty periods: powers of the transfer matrix of one, by DOP853."""
+    tension, mass = CELLS[kind]
+    T, m = (sp.lambdify(x, part, "numpy") for part in (tension, mass))
+
+    def condition(w):
+        def rate(place, y):
+            return np.concatenate([y[2:] / T(place), -m(place) * w**2 * y[:2]])
+
+        end = solve_ivp(rate, (0.0, 0.05), np.eye(2).ravel(), method="DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
+        return np.linalg.matrix_power(end.reshape(2, 2), 20)[0, 1]
+
+    found = omega(string(tension, mass), 2)
+    for w in found:
+        np.testing.assert_allclose(w, brentq(condition, w * (1 - 1e-5), w * (1 + 1e-5), xtol=1e-14), rtol=CLOSE)
+
+
+LAYERS = {
+    "at the root": 1 + sp.exp(-300 * x),
+    "at the tip": 1 + sp.exp(-300 * (1 - x)),
+    "soft": 2 - sp.Rational(3, 2) * sp.exp(-300 * x),
+    "inside": sp.Rational(3, 2) + sp.tanh(100 * (x - HALF)),
+}
+
+
+@pytest.mark.parametrize("kind", LAYERS)
+def test_layers_of_every_kind(kind):
+    """A string that is held at the left, against shooting."""
+    tension = LAYERS[kind]
+    T = sp.lambdify(x, tension, "numpy")
+
+    def condition(w):
+        def rate(place, y):
+            return np.array([y[1] / T(place), -(w**2) * y[0]])
+
+        steps = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-15, "max_step": 0.02}
+        return solve_ivp(rate, (0.0, 1.0), [0.0, 1.0], **steps).y[1, -1]
+
+    for w in omega(string(tension, essential=FIXED[:1]), 2):
+        np.testing.assert_allclose(w, brentq(condition, w * (1 - 1e-5), w * (1 + 1e-5), xtol=1e-14), rtol=CLOSE)
 
 
 @pytest.mark.parametrize("cells", [7, 40, 150])
@@ -377,3 +429,12 @@ def test_uniform_beams_by_stresses(tension, spring):
             route.angular_frequencies(values, (), 5)
     else:
         np.testing.assert_allclose(route.angular_frequencies(values, (), 5), exact, rtol=CLOSE)
+
+
+def test_random_coefficients_agree_with_elements_or_are_refused():
+    """A seeded sample of the campaign over coefficients that SymPy can write."""
+    from tests.campaigns.along_x import coefficients, good
+
+    for trial in (1, 7):
+        result = coefficients(trial)
+        assert good(result), result
