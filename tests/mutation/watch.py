@@ -19,6 +19,7 @@ EXEMPT = {
 }
 
 _PERIODIC = "tests/analysis/test_periodic.py"
+_COMPLEX, _EIGENVALUES = "tests/analysis/test_complex_modes.py", "tests/model/test_eigenvalues.py"
 _LAWS = "tests/test_properties.py"
 _LAMBDA, _MODAL = "tests/analysis/test_frequency_parameters.py", "tests/analysis/test_modal_parameters.py"
 _COUNTS = [
@@ -189,6 +190,15 @@ _ROUNDS: dict[str, list[list[str]]] = {
     ],
     "paper/oracles/shooting": [],
     "analysis/stability": [[*_ZONES, *_FORCED], [*_LOOPED, *_DOUBTS, *_FEW_MODES]],
+    "analysis/eigenvalues": [[_EIGENVALUES]],
+    "analysis/complex_responses": [[_COMPLEX]],
+    "analysis/complex_shapes": [[_COMPLEX]],
+    "model/complex_shapes": [[_COMPLEX]],
+    "model/pencil_route": [[_EIGENVALUES], [_COMPLEX]],
+    "solvers/argument": [[_EIGENVALUES]],
+    "solvers/lowest_motions": [[_COMPLEX]],
+    "solvers/pencil": [[_EIGENVALUES], ["tests/analysis/test_critical.py"], [_COMPLEX]],
+    "solvers/pencil_refine": [[_EIGENVALUES], [_COMPLEX]],
     "analysis/floquet": [[*_ZONES, *_SYSTEM], [*_LOOPED, *_FEW_MODES], [_PERIODIC]],
     "analysis/reduced_zones": [[_PERIODIC]],
     "model/excited": [[_PERIODIC]],
