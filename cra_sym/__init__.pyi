@@ -1,3 +1,5 @@
+from .analysis.backbone import Backbone as Backbone
+from .analysis.backbone import backbone as backbone
 from .analysis.certification import certify as certify
 from .analysis.certified_stability import certify_stability as certify_stability
 from .analysis.critical import critical_value as critical_value
@@ -14,6 +16,8 @@ from .analysis.identification import identify_joint as identify_joint
 from .analysis.modes import modal_parameters as modal_parameters
 from .analysis.modes import mode_shapes as mode_shapes
 from .analysis.modes import natural_frequencies as natural_frequencies
+from .analysis.nonlinear import ConvergenceWarning as ConvergenceWarning
+from .analysis.nonlinear import nonlinear_modal_equations as nonlinear_modal_equations
 from .analysis.residual_gradient import residual_vibration_gradient as residual_vibration_gradient
 from .analysis.responses import UndersamplingWarning as UndersamplingWarning
 from .analysis.responses import residual_vibration as residual_vibration
@@ -21,11 +25,14 @@ from .analysis.responses import response as response
 from .analysis.responses import tip_response as tip_response
 from .analysis.sensitivities import sensitivities as sensitivities
 from .analysis.shaping import input_shaper as input_shaper
+from .analysis.slow_flow import slow_flow_values as slow_flow_values
 from .analysis.stability import AsymptoticWarning as AsymptoticWarning
 from .analysis.stability import ResonanceWarning as ResonanceWarning
 from .analysis.stability import forced_width as forced_width
 from .analysis.stability import stability_boundary as stability_boundary
 from .analysis.state_space import state_space as state_space
+from .analysis.steady_states import SteadyState as SteadyState
+from .analysis.steady_states import steady_states as steady_states
 from .arm.excitations import JointStiffness as JointStiffness
 from .arm.frequency_parameters import frequency_parameters as frequency_parameters
 from .arm.lagrangian import paper_lagrangian as paper_lagrangian

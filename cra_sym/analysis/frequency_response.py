@@ -196,7 +196,7 @@ class _Undamped:
         """Raise if modal damping of this structure has no formula here."""
         if not np.any(zeta) or self.motion is not None or self.by_force:
             return
-        if self.varies or (self._system.natural_frequencies(2) == 0).all(axis=-1).any():
+        if self.varies or (self._system.natural_frequencies(min(2, self._system.most_modes)) == 0).all(axis=-1).any():
             why = "varies along x" if self.varies else "can still move as a rigid body"
             raise ValueError(
                 f"zeta: a structure that a motion of one end drives and that {why} must have damping='structural' or "
@@ -219,12 +219,13 @@ class _Undamped:
         system = self._system
         if self.problem_damped or self._kind != "motion" or self.motion is not None:
             return found
-        still = system.natural_frequencies(6) == 0
+        modes = min(6, system.most_modes)
+        still = system.natural_frequencies(modes) == 0
         if not still.any():
             return found
-        drive = np.where(still, self._drive_of_modes(6), 0.0)
+        drive = np.where(still, self._drive_of_modes(modes), 0.0)
         own = np.sum(drive**2, axis=-1)[..., None, None]
-        limit = np.einsum("...m,...mx->...x", drive, self._shapes(6))[..., None]
+        limit = np.einsum("...m,...mx->...x", drive, self._shapes(modes))[..., None]
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.where(own > 0, limit / own, found))
 
@@ -235,8 +236,9 @@ class _Undamped:
             return np.zeros(system.shape, dtype=bool)
         if not (system.natural_frequencies(1) == 0).any():
             return np.zeros(system.shape, dtype=bool)
-        driven = self._drive_of_modes(2)
-        still = system.natural_frequencies(2) == 0
+        modes = min(2, system.most_modes)
+        driven = self._drive_of_modes(modes)
+        still = system.natural_frequencies(modes) == 0
         return (still & (np.abs(driven) > 1e-9 * np.abs(driven).max(axis=-1, keepdims=True))).any(axis=-1)
 
     def _drive_of_modes(self, modes: int) -> NDArray[np.float64]:
@@ -283,7 +285,7 @@ class _Undamped:
     @cached_property
     def _soft(self) -> int:
         """Number of modes far below the next, in any member of the batch; 0 for driving by a motion."""
-        if self.problem_damped or (self.motion is None and not self.by_force):
+        if self.problem_damped or (self.motion is None and not self.by_force) or not self._problem.displacements:
             return 0
         if self.varies:
             return next((n for n in _MODES if self._reached(n)), _MODES[-1])

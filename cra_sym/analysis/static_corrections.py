@@ -31,6 +31,9 @@ def moments_of_other_modes(system: System, excitation: Fluctuation, modes: int) 
         1 and s2; 0 for an infinite stiffness.
     """
     names = excitation.springs(system)
+    if modes >= system.most_modes:  # there are no others
+        nothing = np.zeros((*system.shape, len(names), len(names)))
+        return nothing, nothing
     problem: SpatialProblem = system.numerics("spatial")
     ends = [system.numerics("stiffnesses")[name] for name in names]
     places = [place if end == 0 else problem.displacements + problem.coordinates + place for end, place, _ in ends]

@@ -101,12 +101,14 @@ def _sums(
 ) -> dict[str, np.ndarray]:
     """Return the sums over all modes of the system."""
     spectators = np.setdiff1d(np.arange(omega.shape[-1]), list(labels.values()))
+    alone = not spectators.size  # one mode, where there is no other: a path that does not count
+    spectators = np.zeros(1, int) if alone else spectators
     columns = {key: np.asarray(value)[..., None] for key, value in values.items()}
     kernel = _kernel(name)
     sums = {}
     for which in kernel(*(1.0 for _ in kernel.arguments)):
         row, target = labels[which[2]], labels[which[-1]]
-        path = coupling[..., row, :] * coupling[..., :, target]
+        path = 0.0 * coupling[..., 0] if alone else coupling[..., row, :] * coupling[..., :, target]
         at = columns | {"omega_j": omega[..., spectators], "path": path[..., spectators]}
         table = _evaluate(name, at)[which]
         total = table["resonant"][..., 0] + np.where(at["path"] == 0, 0.0, table["spectator"]).sum(axis=-1)
@@ -148,7 +150,7 @@ def zone_of(
     if not derived(matrices_of(system, excitation, modes)):
         return _reduced(system, excitation, epsilon, (first, second), tongue, max(modes, _SPECTATORS), 2)
     kind, labels = _kind(first, second)
-    modes = max(modes, _SPECTATORS)
+    modes = max(modes, min(_SPECTATORS, system.most_modes))
     omega = system.natural_frequencies(modes)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         values, centre, coupling = _quantities(system, modes, excitation, epsilon, first, second, tongue)

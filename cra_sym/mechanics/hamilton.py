@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -12,7 +12,8 @@ from sympy.core.function import AppliedUndef
 from sympy.core.symbol import uniquely_named_symbol
 
 from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces, JumpCondition, varied_form
-from cra_sym.mechanics.jets import HamiltonError, Jet, JetSpace, listed
+from cra_sym.mechanics.jets import HamiltonError, Jet, JetSpace, listed, scalar
+from cra_sym.mechanics.quadratures import Quadrature, quadratures_of, with_constraints
 from cra_sym.mechanics.steps import Step, Steps, compact_latex
 from cra_sym.mechanics.variation import Variation, VirtualWork, vary
 
@@ -36,6 +37,8 @@ class HamiltonResult:
     jump_conditions : tuple of JumpCondition
         Of interior places: how much a natural force jumps there, or which displacement is held, each with its
         ``place`` and ``variation``.
+    quadratures : tuple of Quadrature
+        Fields that are integrals of others; they and their multipliers are the last of ``fields``.
     """
 
     field_equations: tuple[Eq, ...]
@@ -53,6 +56,7 @@ class HamiltonResult:
     essential: tuple[Expr, ...]
     variation: Variation = field(repr=False, compare=False)
     jump_conditions: tuple[JumpCondition, ...] = ()
+    quadratures: tuple[Quadrature, ...] = ()
 
     @property
     def equations(self) -> tuple[Eq, ...]:
@@ -93,6 +97,7 @@ def hamilton(
     essential: Sequence[Expr] | None = None,
     prescribed: Sequence[AppliedUndef] = (),
     inside: Sequence[tuple[Expr, Expr]] = (),
+    quadratures: Mapping[AppliedUndef, Expr] | None = None,
 ) -> HamiltonResult:
     r"""Derive equations of motion and boundary conditions from :math:`\delta\int L\,dt + \int\delta W\,dt = 0`.
 
@@ -121,6 +126,11 @@ def hamilton(
     inside : sequence of (place, Expr), optional
         Lagrangian terms at interior places, in displacements of a section there. The field equations hold between
         them. An essential condition at an interior place is one displacement in evaluated form.
+    quadratures : mapping of applied undefined function to Expr, optional
+        Fields s(x, t) that are the integral of an expression in the others and their x derivatives from the left end,
+        such as the foreshortening ``{s: v.diff(x)**2/2}``. Each becomes a field with the constraint s_x = integrand,
+        which a multiplier N_s(x, t) enforces: if s is a shortening, N_s is the tension. Its equation is s_x =
+        integrand, that of s is the balance along x, and the end conditions of s give N_s there.
 
     Returns
     -------
@@ -151,6 +161,12 @@ def hamilton(
     >>> beaded.jump_conditions[0].rhs, beaded.jump_conditions[0].place, beaded.jump_conditions[0].variation
     (m*Derivative(y(a, t), (t, 2)), a, δy(a, t))
     """
+    constrained = quadratures_of(quadratures, listed("fields", fields), x, t, listed("domain", domain))
+    if constrained:
+        start = JetSpace((), (), x, t, domain).ends["left"]
+        held = listed("essential", () if essential is None else essential)
+        posed = with_constraints(constrained, scalar("density", density), fields, held, x, start)
+        density, fields, essential = posed["density"], posed["fields"], posed["essential"]
     space = JetSpace(fields, coordinates, x, t, domain, prescribed)
     left, right = _optional(left), _optional(right)
     virtual_work = listed("virtual_work", () if virtual_work is None else virtual_work)
@@ -177,6 +193,7 @@ def hamilton(
         essential,
         variation,
         forces.jump_conditions(),
+        constrained,
     )
 
 

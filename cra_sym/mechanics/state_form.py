@@ -190,6 +190,8 @@ def _check_parts(leading: Matrix, x: Symbol) -> None:
 
 def _inverse(matrix: Matrix) -> Matrix:
     """Return the inverse; of a diagonal matrix entry by entry, as it stands: 1 + exp(-x) stays bounded."""
+    if not matrix.rows:  # lumped coordinates alone
+        return matrix
     return diag(*(1 / entry for entry in matrix.diagonal())) if matrix.is_diagonal() else matrix.inv()
 
 

@@ -47,7 +47,7 @@ def conservative_part(model: Model) -> Model | None:
 
 def _leading(model: Model) -> Expr:
     """Return the density without the energy of displacements that are not the highest derivatives of their fields."""
-    variation = model.equations.variation
+    variation = model.linearised.variation
     space, orders = variation.space, variation.orders
 
     def stays(term: Expr) -> bool:
@@ -67,7 +67,7 @@ def stiffness_beside(model: Model) -> Form | None:
     part = conservative_part(model)
     if part is None:
         return None
-    whole, own = weak_form(model.equations.variation), weak_form(part.equations.variation)
+    whole, own = weak_form(model.linearised.variation), weak_form(part.linearised.variation)
     parts = _beyond(whole.inside, own.inside), _beyond(whole.discrete, own.discrete)
     return form_of(whole, {"stiffness": parts}, model.symbols) if any(parts) else None
 

@@ -22,6 +22,7 @@ from cra_sym.model.excited import axial, fluctuating, fluctuation
 from cra_sym.model.forms import form_of, load_of
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.moving import jumps
+from cra_sym.model.nonlinear import nonlinear
 from cra_sym.model.observables import named_observables, observable
 from cra_sym.model.one_wave import one_wave_route
 from cra_sym.model.pencil_route import complex_modes, inertia
@@ -50,6 +51,7 @@ __all__ = [
     "load",
     "named_observables",
     "names",
+    "nonlinear",
     "observable",
     "pencil",
     "pushed",
@@ -112,7 +114,7 @@ def causes(model: Model) -> tuple[tuple[str, Kind | str], ...]:
 
     'motion' acts by its acceleration alone, 'force' by itself; of anything else the kind is the term that is neither.
     """
-    weak = weak_form(model.equations.variation)
+    weak = weak_form(model.linearised.variation)
     return tuple((f.func.__name__, _kind(weak, f)) for f in model.driving)
 
 
@@ -129,7 +131,7 @@ def _kind(weak: WeakForm, function: AppliedUndef) -> str:
 
 def load(model: Model, name: str) -> Load:
     """Return the load of one unit of a cause: of the acceleration of a motion, or of a force."""
-    weak = weak_form(model.equations.variation)
+    weak = weak_form(model.linearised.variation)
     t = weak.variation.space.t
     function = next(f for f in model.driving if f.func.__name__ == name)
     cause = function.diff(t, 2) if _kind(weak, function) == "motion" else function
@@ -144,7 +146,7 @@ def _coefficients(weak: WeakForm, part: dict[Jet, Expr], cause: Expr) -> dict[Je
 
 def constant(model: Model) -> Load | None:
     """Return the loads that are constant in time, or None if there are none."""
-    weak = weak_form(model.equations.variation)
+    weak = weak_form(model.linearised.variation)
     still = {f: S.Zero for e in weak.load_terms for f in e.atoms(AppliedUndef)}
 
     def left(part: dict[Jet, Expr]) -> dict[Jet, Expr]:
@@ -163,7 +165,7 @@ def momentum(model: Model, initial: Mapping[Expr, Any], order: int) -> Load | No
     ValueError
         Names the function that is not an unknown of the model, or the value that is not an expression in x.
     """
-    weak = weak_form(model.equations.variation)
+    weak = weak_form(model.linearised.variation)
     space = weak.variation.space
     given: dict[int, Expr] = {}
     for key, value in mapping("initial", initial, "fields and coordinates to expressions in x").items():
@@ -201,7 +203,7 @@ def momentum(model: Model, initial: Mapping[Expr, Any], order: int) -> Load | No
 
 def damping(model: Model) -> Form | None:
     """Return the damping of a model between its modes, or None if it has none."""
-    weak = weak_form(model.equations.variation)
+    weak = weak_form(model.linearised.variation)
     if 1 not in weak.powers:
         return None
     parts = tuple({pair: {1: e[1]} for pair, e in part.items() if 1 in e} for part in (weak.inside, weak.discrete))
@@ -215,7 +217,7 @@ def rates(model: Model) -> Form:
     squared natural frequency is the difference of the two, mass times omega^2, for every parameter, those of the
     domain included.
     """
-    weak = weak_form(model.equations.variation)
+    weak = weak_form(model.linearised.variation)
     kinds = {"stiffness": 0, "mass": 2}
     named: dict[str, tuple[Bilinear, Bilinear]] = {
         kind: (_power(weak.inside, power), _power(weak.discrete, power)) for kind, power in kinds.items()
@@ -266,7 +268,7 @@ def _add(form: Bilinear, pair: tuple[Jet, Jet], power: int, value: Expr) -> None
 def carried(model: Model, name: str) -> Kernel:
     """Return the (mass, damping, stiffness) that a prescribed motion moves when nothing deforms, by the parameters."""
     freed = model.freed(name)
-    weak = weak_form(freed.equations.variation)
+    weak = weak_form(freed.linearised.variation)
     space = weak.variation.space
     number = next(k for k, u in enumerate(space.unknowns) if u.func.__name__ == name)
     jet = Jet(number, 0, 0, None)
@@ -347,7 +349,7 @@ def ball_problem(model: Model) -> BallProblem:
     form = model.conservative
     if not form.uniform:
         raise ValueError("certification needs coefficients that are constant along x")
-    weak = weak_form(model.equations.variation)
+    weak = weak_form(model.linearised.variation)
     kinds = {"stiffness": 0, "mass": 2}
     parts = {kind: (_power(weak.inside, power), _power(weak.ends, power)) for kind, power in kinds.items()}
     pairs = [pair for pair in dict.fromkeys(p for inside, _ in parts.values() for p in inside)]

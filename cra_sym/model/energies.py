@@ -21,7 +21,7 @@ __all__ = ["stress_route"]
 
 def stress_route(model: Model, spatial: SpatialProblem) -> StressRoute | None:
     """Return the route of a model by its energies, or None if a field has derivatives of other orders than 1 and 2."""
-    weak = weak_form(model.equations.variation)
+    weak = weak_form(model.linearised.variation)
     section, highest, lumped = weak.fields()
     orders = tuple(weak.variation.orders)
     if not set(orders) <= {1, 2} or any(jet in highest for pair, e in weak.inside.items() for jet in pair if 2 in e):

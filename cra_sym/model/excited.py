@@ -146,7 +146,7 @@ def periodic_forms(model: Model, parts: Mapping[tuple[int, Key], Options]) -> tu
     for (epsilons, key), options in parts.items():
         oscillation = Oscillation(*key)
         label = f"{oscillation.kind} of order {oscillation.order}" if oscillation.order else "constant"
-        forms = _forms_of(model.equations, options, label)
+        forms = _forms_of(model.linearised, options, label)
         named = forms.named()
         if named and epsilons != 1:
             raise HamiltonError(
@@ -156,7 +156,7 @@ def periodic_forms(model: Model, parts: Mapping[tuple[int, Key], Options]) -> tu
         loads = forms.load or forms.discrete_load
         if loads and epsilons > 1:
             raise HamiltonError(f"small: the forces with the {label} are times epsilon**{epsilons}; at most one")
-        weak = weak_form(model.equations.variation)
+        weak = weak_form(model.linearised.variation)
         matrices = form_of(weak, named, model.symbols) if named else None
         force, momentum = (_load(model, forms, order) for order in (0, 1))
         if matrices or force or momentum:
@@ -191,7 +191,7 @@ def _load(model: Model, forms: TimeForms, order: int) -> Load | None:
     inside, ends = (
         {jet: value for (jet, n), value in load.items() if n == order} for load in (forms.load, forms.discrete_load)
     )
-    return load_of(weak_form(model.equations.variation), inside, ends, model.symbols) if inside or ends else None
+    return load_of(weak_form(model.linearised.variation), inside, ends, model.symbols) if inside or ends else None
 
 
 # ------------------------------------------------------------------------------------------ fluctuating parameters
@@ -199,7 +199,7 @@ def _load(model: Model, forms: TimeForms, order: int) -> Load | None:
 
 def fluctuation(model: Model, name: str) -> str:
     """Return why a parameter cannot fluctuate about its value in a parametric excitation, or an empty text."""
-    variation = model.equations.variation
+    variation = model.linearised.variation
     symbol = next(s for s in model.symbols if s.name == name)
     places = [*variation.space.ends.values(), *(point.place for point in variation.points)]
     if any(place.has(symbol) for place in places):
@@ -213,7 +213,7 @@ def fluctuation(model: Model, name: str) -> str:
 
 def fluctuating(model: Model, name: str) -> tuple[Form, tuple[str, ...]]:
     """Return the matrices that a unit of a parameter gives, and the parameters they depend on."""
-    variation = model.equations.variation
+    variation = model.linearised.variation
     named = _by(variation, next(s for s in model.symbols if s.name == name)).named()
     values = (value for pair in named.values() for part in pair for entry in part.values() for value in entry.values())
     used = sorted({symbol.name for value in values for symbol in value.free_symbols if isinstance(symbol, Symbol)})
@@ -240,7 +240,7 @@ def axial(model: Model) -> Form:
     on the foreshortening v_x^2 / 2 there, so that (36b) follows from the kinetic energy. A mass m that an end carries
     on a rigid lever e, of velocity v_t + e v_xt, adds m e v_x^2 / 2; m e is its coupling of both.
     """
-    weak = weak_form(model.equations.variation)
+    weak = weak_form(model.linearised.variation)
     space = weak.variation.space
     field, tip, slope = Jet(0, 0, 0, None), Jet(0, 0, 0, "right"), Jet(0, 1, 0, None)
     density = weak.inside.get((field, field), {}).get(2, S.Zero)

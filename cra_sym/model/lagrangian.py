@@ -1,4 +1,4 @@
-"""One object from any quadratic Lagrangian to its equations, complete spectrum, mode shapes and kernels."""
+"""One object from any polynomial Lagrangian to its equations, complete spectrum, mode shapes and kernels."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics import HamiltonResult, Modal, StateForm, hamilton, ritz, separate, state_form
 from cra_sym.mechanics.jets import listed
 from cra_sym.mechanics.points import in_points
+from cra_sym.mechanics.polynomials import linearised
 from cra_sym.mechanics.weak import weak_form
 from cra_sym.model.excitations import LagrangianTerms
 from cra_sym.model.excited import checked_small, refuse_small, without_oscillations
@@ -30,6 +31,7 @@ from cra_sym.model.work import work_as_energy
 
 if TYPE_CHECKING:
     from cra_sym.analysis.modes import ModalParameters
+    from cra_sym.mechanics.slow_flow import SlowFlow
 
 __all__ = ["Model"]
 
@@ -73,6 +75,9 @@ class Model:
         ``n*varpi*t + phase``, n a whole number; what multiplies the unknowns twice is times epsilon. They are no
         values. Every analysis is that of the Lagrangian without these terms, which are `excitation`, for
         ``cra_sym.growth_rate`` and its kin.
+    quadratures : mapping of applied undefined function to Expr, optional
+        Fields s(x, t) that are integrals from the left end, such as the foreshortening ``{s: v.diff(x)**2/2}``; see
+        :func:`cra_sym.mechanics.hamilton`.
 
     Raises
     ------
@@ -115,6 +120,7 @@ class Model:
         units: Mapping[Any, str] | None = None,
         definitions: Mapping[Symbol, Expr] | None = None,
         small: tuple[Symbol, Symbol] | None = None,
+        quadratures: Mapping[AppliedUndef, Expr] | None = None,
     ) -> None:
         self._pieces: dict[str, Any] = {
             "density": density,
@@ -134,6 +140,7 @@ class Model:
             "units": tuple(mapping("units", units, "symbols to units").items()),
             "definitions": tuple(mapping("definitions", definitions, "symbols to expressions").items()),
             "small": checked_small(small, (x, t)),
+            "quadratures": tuple(mapping("quadratures", quadratures, "functions s(x, t) to integrands").items()),
         }
         self._options = self._defined()
         self.equations: HamiltonResult = hamilton(**self._options)
@@ -148,6 +155,7 @@ class Model:
         given += [term for _, term in self._options["inside"]]
         given += [part for force, displacement, _ in work for part in (force, displacement)]
         given += [sympify(place, strict=True) for *_, place in work if not (place is None or isinstance(place, str))]
+        given += [q.integrand for q in self.equations.quadratures]
         self.symbols: tuple[Symbol, ...] = parameters(given, self.equations)
         """The parameters: every symbol but x and t, by name."""
         declared = named_units(units, [*given, *self._options["fields"], *self._options["coordinates"]])
@@ -203,8 +211,7 @@ class Model:
         unknown = [name for name in changes if name not in self._pieces]
         if unknown:
             raise TypeError(f"{unknown[0]!r} is not an argument of Model; it has {', '.join(self._pieces)}")
-        pieces = self._pieces | {"units": dict(self._pieces["units"]), "definitions": dict(self._pieces["definitions"])}
-        return Model(**{**pieces, **changes})
+        return Model(**{**_arguments(self._pieces), **changes})
 
     def at(self, values: Mapping[Any, Any], zeta: Any = 0.0, tolerance: float = TOLERANCE) -> System:
         """Return the model bound to values.
@@ -267,13 +274,13 @@ class Model:
     @cached_property
     def driving(self) -> tuple[AppliedUndef, ...]:
         """Functions of time that drive the model: prescribed motions and forces, by name."""
-        terms = weak_form(self.steady.equations.variation).load_terms
+        terms = weak_form(self.linearised.variation).load_terms
         return tuple(sorted({f for term in terms for f in term.atoms(AppliedUndef)}, key=str))
 
     @cached_property
     def motions(self) -> tuple[AppliedUndef, ...]:
         """Those of them that act by their acceleration."""
-        terms, t = weak_form(self.steady.equations.variation).load_terms, self.equations.t
+        terms, t = weak_form(self.linearised.variation).load_terms, self.equations.t
         return tuple(f for f in self.driving if any(term.has(f.diff(t, 2)) for term in terms))
 
     @cached_property
@@ -296,7 +303,7 @@ class Model:
         return _rebuilt, (self._pieces,)
 
     def __repr__(self) -> str:
-        unknowns = ", ".join(map(str, (*self.equations.fields, *self.equations.coordinates)))
+        unknowns = ", ".join(map(str, (*self._pieces["fields"], *self.equations.coordinates)))
         return f"<Model of {unknowns} with parameters {', '.join(s.name for s in self.symbols) or 'none'}>"
 
     def _repr_latex_(self) -> str:
@@ -305,9 +312,27 @@ class Model:
     # ------------------------------------------------------------------------------------------------- symbolic
 
     @cached_property
+    def linearised(self) -> HamiltonResult:
+        """Equations of motion and boundary conditions, linearised about zero; of a linear model its `equations`.
+
+        Every linear function (frequencies, modes, stability, exports) is of these.
+
+        Raises
+        ------
+        ValueError
+            Names the term that is not polynomial in the unknowns.
+        """
+        return linearised(self.steady.equations, self.steady._options)
+
+    @cached_property
+    def nonlinear(self) -> bool:
+        """Whether the equations of motion are nonlinear."""
+        return self.linearised is not self.steady.equations
+
+    @cached_property
     def state_form(self) -> StateForm:
         """The spatial problem as a first-order system, virtual work included."""
-        return state_form(self.steady.equations)
+        return state_form(self.linearised)
 
     @cached_property
     def conservative(self) -> StateForm:
@@ -321,7 +346,8 @@ class Model:
         if not self.state_form.damped:
             form = self.state_form
         else:
-            form = state_form(hamilton(**(self.steady._options | {"virtual_work": self._undamped_work()})))
+            undamped = self.steady._options | {"virtual_work": self._undamped_work()}
+            form = state_form(linearised(hamilton(**undamped), undamped))
         problem = asymmetry(form)
         if problem:
             raise ValueError(f"natural frequencies need conservative forces, and {problem}; use eigenvalues")
@@ -341,7 +367,7 @@ class Model:
 
     def separate(self, **options: Any) -> Modal:
         """Separate the variables: characteristic matrix and function, mode shapes, in closed form."""
-        return separate(self.steady.equations, **options)
+        return separate(self.linearised, **options)
 
     def ritz(self, elements: int, nodes: Sequence[Expr] = ()) -> Ritz:
         """Return the same Lagrangian on Hermite elements: frequencies from above, coefficients may vary by x.
@@ -354,7 +380,7 @@ class Model:
             Interior places that are nodes, in ascending order, such as jumps of a coefficient. Those of terms and
             supports are nodes anyway; name these too where they are symbols and do not ascend as they were stated.
         """
-        return Ritz(ritz(self.steady.equations, elements=elements, nodes=nodes), self.symbols)
+        return Ritz(ritz(self.linearised, elements=elements, nodes=nodes), self.symbols)
 
     def kernel(self) -> Kernel:
         """Return the characteristic function as a fast function of the angular frequency and the parameters.
@@ -372,6 +398,10 @@ class Model:
         if None in waves.values():
             raise ValueError(f"the wave numbers have no closed form, only {modal.basis.dispersion}")
         return kernel(modal.characteristic_function.xreplace(waves), (modal.frequency, *self.symbols))
+
+    def slow_flow(self, resonance: Any, order: int = 1, modes: int | None = None) -> SlowFlow:
+        """Return :func:`cra_sym.analysis.slow_flow.slow_flow` of the model: multiple scales of its modal equations."""
+        return _analysis("slow_flow").slow_flow(self, resonance, order, modes)
 
     # ------------------------------------------------------------------------------- one line each on the analysis
 
@@ -429,4 +459,8 @@ def _analysis(module: str) -> Any:
 
 
 def _rebuilt(pieces: dict[str, Any]) -> Model:
-    return Model(**(pieces | {"units": dict(pieces["units"]), "definitions": dict(pieces["definitions"])}))
+    return Model(**_arguments(pieces))
+
+
+def _arguments(pieces: dict[str, Any]) -> dict[str, Any]:
+    return pieces | {name: dict(pieces[name]) for name in ("units", "definitions", "quadratures")}

@@ -99,7 +99,7 @@ def frame(model: Model) -> Expr:
     """Return how far the prescribed motions carry the right end of the first field when nothing deforms."""
     total = S.Zero
     for motion in model.motions:
-        freed = weak_form(model.freed(motion.func.__name__).equations.variation)
+        freed = weak_form(model.freed(motion.func.__name__).linearised.variation)
         space, field = freed.variation.space, Jet(0, 0, 0, None)
         carried = Jet(space.unknowns.index(motion), 0, 0, None)
         for form, own in ((freed.inside, field), (freed.ends, field._replace(place="right"))):

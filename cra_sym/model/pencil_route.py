@@ -150,7 +150,7 @@ def pencil_route(model: Model) -> PencilRoute | None:
     from cra_sym.model.energies import _one_after_the_other, _solved
     from cra_sym.model.symmetry import vanishes
 
-    weak = weak_form(model.equations.variation)
+    weak = weak_form(model.linearised.variation)
     section, highest, lumped = weak.fields()
     orders = tuple(weak.variation.orders)
     if not set(orders) <= {1, 2} or any(jet in highest for pair, e in weak.inside.items() for jet in pair if 2 in e):
@@ -214,7 +214,7 @@ def complex_modes(model: Model) -> bool:
         _ = model.conservative
     except ValueError:
         return True
-    weak = weak_form(model.equations.variation)
+    weak = weak_form(model.linearised.variation)
     _, highest, _ = weak.fields()
     return not any(jet in highest for pair, powers in weak.inside.items() for jet in pair if 1 in powers)
 
@@ -224,7 +224,7 @@ def inertia(model: Model) -> Form:
     from cra_sym.mechanics.weak import weak_form
     from cra_sym.model.forms import form_of
 
-    weak = weak_form(model.equations.variation)
+    weak = weak_form(model.linearised.variation)
     parts = ({pair: {2: e[2]} for pair, e in form.items() if 2 in e} for form in (weak.inside, weak.discrete))
     inside, ends = parts
     return form_of(weak, {"mass": (inside, ends)}, model.symbols)

@@ -281,7 +281,8 @@ class StateModes:
 
     @cached_property
     def _sign(self) -> Array:
-        return mode_sign(self._overview[..., : self.spatial.displacements])
+        watched = self.spatial.displacements or self.spatial.coordinates  # coordinates where there is no field
+        return mode_sign(self._overview[..., :watched])
 
     def _signed(self, states: Array) -> Array:
         signed: Array = states * self._sign[..., None]

@@ -211,6 +211,12 @@ class System:
         """
         return cross_check(self, count("modes", modes, high=MOST_MODES))
 
+    @property
+    def most_modes(self) -> int:
+        """How many modes there may be: as many as coordinates where there is no field."""
+        displacements, coordinates = self.numerics("sizes")
+        return MOST_MODES if displacements else int(coordinates)
+
     def modes(self, modes: int) -> Modes:
         """Return the first natural modes."""
         return self._once("modes", modes, lambda n: self._find_modes(n))

@@ -1,0 +1,396 @@
+"""Backbones: the free periodic motions that a linear mode becomes as it grows, with folds and internal resonances."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym import checks
+from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, ConvergenceWarning, equations_of, samples, watched
+from cra_sym.model.system import System
+from cra_sym.solvers.continuation import Curve, Measure, Point, correct, first_point, follow
+from cra_sym.solvers.harmonic_balance import Balance, Basis, peak
+from cra_sym.solvers.modal_polynomials import ModalPolynomials
+from cra_sym.solvers.monodromy import even_monodromy
+
+__all__ = ["Backbone", "backbone"]
+
+Array = NDArray[np.float64]
+_START = 1e-5  # nonlinear share of the forces at the first point
+_MOST_POINTS = 1000
+_MORE_MODES, _MORE_HARMONICS = 3, 4  # in which the error is estimated
+UNSTABLE = 1e-6
+"""A motion is unstable if a Floquet multiplier lies beyond the unit circle by more."""
+
+
+@dataclass(frozen=True, eq=False)
+class Backbone:
+    """Free periodic motions that grow from a linear mode.
+
+    Attributes
+    ----------
+    angular_frequency : ndarray, shape (...)
+        rad/s.
+    energy : ndarray, shape (...)
+        At the instant of zero velocity, J.
+    amplitude : ndarray, shape (...)
+        Peak at the tip, or of what was chosen.
+    stable : ndarray of bool, shape (...)
+        Whether no Floquet multiplier has a modulus beyond 1 + 1e-6.
+    error_modes, error_harmonics : ndarray, shape (...)
+        Estimated relative error of the frequency for want of modes and of harmonics: what three more modes, and four
+        more harmonics, change.
+    coefficients : ndarray, shape (..., modes, functions)
+        Modal coordinates as sums of cosines of ``multiples`` of the phase.
+    multiples : tuple of int
+    crossings : ndarray, shape (branch points,)
+        Angular frequencies at which the curve meets another one on the way.
+    """
+
+    angular_frequency: Array
+    energy: Array
+    amplitude: Array
+    stable: NDArray[np.bool_]
+    error_modes: Array
+    error_harmonics: Array
+    coefficients: Array
+    multiples: tuple[int, ...]
+    crossings: Array
+
+
+@checks.default_floating_point
+def backbone(
+    system: System,
+    mode: int = 1,
+    *,
+    energy: Any = None,
+    amplitude: Any = None,
+    modes: int = 6,
+    harmonics: int = 9,
+    points: int = 400,
+    place: Any = None,
+    field: Any = None,
+) -> Backbone:
+    """Return the free periodic motions that a mode becomes as it grows, without damping.
+
+    Harmonic balance, continued by arclength from the linear mode through every fold. No internal resonance is jumped:
+    a change of the number of negative eigenvalues of the Jacobian tells where a step was too long.
+
+    Parameters
+    ----------
+    system : System
+        Not a batch.
+    mode : int
+        Counted from 1.
+    energy, amplitude : array_like, optional
+        Where the motion is wanted: the first along the curve with that energy (J, at zero velocity), or with that peak
+        at the tip. Neither: the whole curve with its turns, up to ``points`` points.
+    modes : int
+        How many linear modes take part, 1 to 40.
+    harmonics : int
+        Highest multiple of the frequency, 1 to 60. Internal resonances with higher ones do not show.
+    points : int
+        Length of the whole curve.
+    place, field : optional
+        Of the peak, instead of the tip.
+
+    Returns
+    -------
+    Backbone
+        Of the shape of ``energy`` or ``amplitude``, or with one axis of points.
+
+    Warns
+    -----
+    ConvergenceWarning
+        If the curve could not be followed as far as asked; what was not reached is nan.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is out of its range, both energy and amplitude are given, the system is a batch, has no
+        vibrating mode of that number, has constant loads, terms that are not polynomial, or forces without a potential
+        that are even in time.
+
+    Examples
+    --------
+    A mass on a spring that hardens, x'' + x + x^3 = 0, at the amplitude 1:
+
+    >>> from sympy import Function
+    >>> import cra_sym as cra
+    >>> from cra_sym.symbols import t, x
+    >>> q = Function("q")(t)
+    >>> duffing = cra.Model(0, fields=(), coordinates=[q], x=x, domain=(0, 1), t=t,
+    ...                     left=q.diff(t)**2/2 - q**2/2 - q**4/4)
+    >>> cra.backbone(duffing.at({}), amplitude=1.0, modes=1).angular_frequency.round(6)
+    np.float64(1.317776)
+    """
+    checks.instance("system", system, System)
+    modes, harmonics = (
+        checks.count("modes", modes, high=MOST_NONLINEAR_MODES),
+        checks.count("harmonics", harmonics, high=60),
+    )
+    mode, points = checks.count("mode", mode, high=modes), checks.count("points", points, low=2, high=_MOST_POINTS)
+    if energy is not None and amplitude is not None:
+        raise ValueError("energy, amplitude: one of them must be None")
+    problem = _Problem.of(system, mode, modes, harmonics, place, field)
+    if energy is None and amplitude is None:
+        return _whole(problem, points)
+    name, value = ("energy", energy) if amplitude is None else ("amplitude", amplitude)
+    unit = "J" if amplitude is None else None
+    targets = checks.real_array(name, value, low=0.0, open_low=True, unit=unit)
+    return _at_targets(problem, targets, problem.energy if amplitude is None else problem.peak, name)
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """A mode to be followed, in so many modes and harmonics."""
+
+    system: System
+    mode: int
+    balance: Balance
+    rows: Array
+    arguments: tuple[int, int, Any, Any]
+
+    @classmethod
+    def of(cls, system: System, mode: int, modes: int, harmonics: int, place: Any, field: Any) -> _Problem:
+        whole = equations_of(system, modes)
+        if system.numerics("constant") is not None:
+            raise ValueError("a backbone starts from rest at zero; the model has a constant load, which moves it away")
+        forces = [force for force in whole.forces if not force.causes]
+        if any(force.velocities % 2 == 0 for force in forces):
+            raise ValueError("virtual_work: a backbone needs forces with a potential, or dampers, which it leaves out")
+        if any(term.velocities % 2 for term in whole.energies if not term.causes):
+            raise ValueError("a backbone needs a Lagrangian that is even in time; it has gyroscopic terms")
+        equations = whole.free()
+        if not equations.omega[mode - 1] > 0:
+            raise ValueError(f"mode = {mode}: is a rigid-body mode and does not vibrate")
+        multiples = tuple(range(1, harmonics + 1, 2)) if equations.odd else tuple(range(harmonics + 1))
+        basis = Basis(multiples, (), samples(equations.degree, harmonics))
+        rows = watched(system, modes, place, field)
+        return cls(system, mode, Balance(equations, basis), rows, (modes, harmonics, place, field))
+
+    def richer(self, more_modes: int, more_harmonics: int) -> _Problem:
+        modes, harmonics, place, field = self.arguments
+        return self.of(self.system, self.mode, modes + more_modes, harmonics + more_harmonics, place, field)
+
+    @property
+    def equations(self) -> ModalPolynomials:
+        return self.balance.equations
+
+    def energy(self, unknowns: Array) -> tuple[float, Array]:
+        """Return the energy at zero velocity and its gradient."""
+        start = self.balance.basis.values(np.zeros(1))[0]
+        q = self.balance.coefficients(unknowns)[0] @ start
+        force = self.equations.derivatives(q[None], np.zeros_like(q)[None]).force[0]
+        return float(self.equations.potential(q)), np.outer(self.equations.omega**2 * q - force, start).ravel()
+
+    def peak(self, unknowns: Array) -> tuple[float, Array]:
+        """Return the peak and its gradient."""
+        basis, coefficients = self.balance.basis, self.balance.coefficients(unknowns)
+        largest, phase = peak(basis, self.rows, coefficients)
+        values = basis.values(phase)[0]
+        sign = np.sign(self.rows @ coefficients[0] @ values)
+        return float(largest[0]), sign * np.outer(self.rows, values).ravel()
+
+    def linear_motion(self, size: float) -> Array:
+        """Return the unknowns of the linear mode with a modal amplitude."""
+        x = np.zeros((self.equations.modes, self.balance.basis.size))
+        x[self.mode - 1, self.balance.basis.cosines.index(1)] = size
+        return x.ravel()
+
+    def small(self) -> float:
+        """Return a modal amplitude at which nonlinear forces are a small share of the linear ones."""
+        square = self.equations.omega[self.mode - 1] ** 2
+        low, high = -40.0, 40.0
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            q = np.zeros((1, self.equations.modes))
+            q[0, self.mode - 1] = 10.0**middle
+            v = np.roll(q, 0) * self.equations.omega[self.mode - 1]
+            found = self.equations.derivatives(q, v)
+            share = np.abs(found.force).max() + np.abs(found.momentum).max() * np.sqrt(square)
+            low, high = (middle, high) if share < _START * square * 10.0**middle else (low, middle)
+        return float(10.0**low)
+
+
+def _started(problem: _Problem, measure: Measure, below: float | None) -> tuple[Curve, Point]:
+    curve = Curve(problem.balance, float(problem.equations.omega[problem.mode - 1]))
+    size = problem.small()
+    if below is not None:
+        whole = measure(problem.linear_motion(1.0))[0]
+        if not whole > 0:
+            raise ValueError("amplitude: the mode does not move there; choose another place or field")
+        power = 2.0 if measure == problem.energy else 1.0
+        size = min(size, float((0.5 * below / whole) ** (1 / power)))
+    for _ in range(20):
+        found = first_point(curve, problem.linear_motion(size), measure)
+        if found is not None:
+            return curve, found
+        size *= 0.3
+    raise ValueError(f"mode = {problem.mode}: harmonic balance does not converge even for a small motion")
+
+
+def _whole(problem: _Problem, points: int) -> Backbone:
+    if not problem.equations.energies:
+        raise ValueError("system: is linear, so its backbone has no end; ask for an energy or an amplitude")
+    curve, start = _started(problem, problem.energy, None)
+    found: list[Point] = []
+    for point in follow(curve, start):
+        found.append(point)
+        if len(found) == points:
+            break
+    else:
+        _unfinished(found[-1], f"after {len(found)} of {points} points")
+    return _told(problem, [p.vector for p in found], [p.tangent for p in found], (len(found),), _crossings(found))
+
+
+def _at_targets(problem: _Problem, targets: Array, measure: Measure, name: str) -> Backbone:
+    flat = targets.ravel()
+    curve, point = _started(problem, measure, float(flat.min()))
+    answers: list[Array | None] = [None] * flat.size
+    passed: list[Point] = []
+    value, slope = _rate(measure, point)
+    for following in follow(curve, point):
+        passed.append(following)
+        new_value, new_slope = _rate(measure, following)
+        for k, target in enumerate(flat):
+            if answers[k] is None and following is not point:
+                share = _first_crossing(value, slope, new_value, new_slope, following.step, np.log(target))
+                if share is not None:
+                    answers[k] = _refined(curve, point, following, share, measure, float(target))
+        point, value, slope = following, new_value, new_slope
+        if all(a is not None for a in answers) or len(passed) == _MOST_POINTS:
+            break
+    missing = [k for k, answer in enumerate(answers) if answer is None]
+    if missing:
+        _unfinished(passed[-1], f"before {name} = {flat[missing[0]]:g}")
+    blank = np.full(problem.balance.size + 1, np.nan)
+    vectors = [blank if a is None else a for a in answers]
+    normals = [blank if a is None else np.append(measure(a[:-1])[1], 0.0) for a in answers]
+    return _told(problem, vectors, normals, targets.shape, _crossings(passed))
+
+
+def _crossings(points: list[Point]) -> Array:
+    return np.array([point.frequency for point in points if point.crossing])
+
+
+def _unfinished(last: Point, where: str) -> None:
+    warnings.warn(
+        f"the curve could not be followed beyond {last.frequency:.6g} rad/s, {where}", ConvergenceWarning, stacklevel=5
+    )
+
+
+def _rate(measure: Measure, point: Point) -> tuple[float, float]:
+    """Return the logarithm of the measure and its rate along the curve."""
+    value, gradient = measure(point.unknowns)
+    return float(np.log(value)), float(gradient @ point.tangent[:-1] / value)
+
+
+def _first_crossing(
+    value: float, slope: float, end: float, end_slope: float, step: float, target: float
+) -> float | None:
+    """Return the share of a step at which a cubic through both ends first takes a value, or None."""
+    first, last = slope * step, end_slope * step
+    rise = end - value
+    cubic = [first + last - 2 * rise, 3 * rise - 2 * first - last, first, value - target]
+    if not np.any(cubic[:3]):
+        return None
+    roots = np.roots(cubic)
+    real = np.sort(roots[np.abs(roots.imag) < 1e-9].real)
+    inside = real[(real >= -1e-12) & (real <= 1 + 1e-12)]
+    return float(inside[0]) if inside.size else None
+
+
+def _refined(curve: Curve, before: Point, after: Point, share: float, measure: Measure, target: float) -> Array | None:
+    h = after.step
+    s = share
+    guess = (
+        (1 + 2 * s) * (1 - s) ** 2 * before.vector
+        + s * (1 - s) ** 2 * h * before.tangent
+        + s**2 * (3 - 2 * s) * after.vector
+        + s**2 * (s - 1) * h * after.tangent
+    )
+
+    def constraint(vector: Array) -> tuple[float, Array]:
+        value, gradient = measure(vector[:-1])
+        return np.log(value / target), np.append(gradient / value, 0.0)
+
+    found = correct(curve, guess, constraint, 20)
+    return None if found is None else found[0]
+
+
+def _told(
+    problem: _Problem, vectors: list[Array], normals: list[Array], shape: tuple[int, ...], crossings: Array
+) -> Backbone:
+    """Return the result at points of the curve; the normals fix a point when modes or harmonics are added."""
+    stacked = np.array(vectors)
+    good = np.isfinite(stacked).all(axis=1)
+    unknowns, frequency = stacked[:, :-1], stacked[:, -1]
+    size, multiples = len(stacked), problem.balance.basis.cosines
+    energy, largest = np.full(size, np.nan), np.full(size, np.nan)
+    for k in np.flatnonzero(good):
+        energy[k] = problem.energy(unknowns[k])[0]
+    coefficients = problem.balance.coefficients(unknowns)
+    largest[good] = peak(problem.balance.basis, problem.rows, coefficients[good])[0]
+    stable = np.zeros(size, bool)
+    stable[good] = _stable(problem, coefficients[good], frequency[good])
+    errors = []
+    for more in ((_MORE_MODES, 0), (0, _MORE_HARMONICS)):
+        error = np.full(size, np.nan)
+        error[good] = _changed(problem, more, stacked[good], np.array(normals)[good])
+        errors.append(error.reshape(shape))
+    return Backbone(
+        frequency.reshape(shape)[()],
+        energy.reshape(shape)[()],
+        largest.reshape(shape)[()],
+        stable.reshape(shape)[()],
+        errors[0][()],
+        errors[1][()],
+        coefficients.reshape(*shape, *coefficients.shape[1:]),
+        multiples,
+        crossings,
+    )
+
+
+def _stable(problem: _Problem, coefficients: Array, frequency: Array) -> NDArray[np.bool_]:
+    """Return whether no multiplier leaves the unit circle, but for the pair that belongs to the curve itself."""
+    if not len(frequency):
+        return np.zeros(0, bool)
+    turns = float((problem.equations.omega.max() / frequency).max())
+    steps = 2 ** int(np.ceil(np.log2(max(128.0, 2.5 * turns, 8.0 * max(problem.balance.basis.cosines)))))
+    maps = even_monodromy(problem.equations, problem.balance.basis, coefficients, frequency, steps)
+    values = np.linalg.eigvals(maps)
+    order = np.argsort(np.abs(values - 1.0), axis=1)
+    others = np.take_along_axis(values, order[:, 2:], axis=1)
+    return np.asarray(np.abs(others).max(axis=1, initial=0.0) <= 1.0 + UNSTABLE)
+
+
+def _changed(problem: _Problem, more: tuple[int, int], vectors: Array, normals: Array) -> Array:
+    """Return by what share the frequency changes when modes and harmonics are added: two steps of Newton's method."""
+    try:
+        rich = problem.richer(*more)
+    except ValueError:  # there are no more modes
+        return np.zeros(len(vectors))
+    n, old, new = problem.equations.modes, problem.balance.basis.cosines, rich.balance.basis.cosines
+    places = [new.index(k) for k in old]
+
+    def embedded(rows: Array) -> Array:
+        x = np.zeros((len(rows), rich.equations.modes, len(new)))
+        x[:, :n, places] = rows[:, :-1].reshape(-1, n, len(old))
+        return np.concatenate([x.reshape(len(rows), -1), rows[:, -1:]], axis=1)
+
+    curve = Curve(rich.balance, float(rich.equations.omega[problem.mode - 1]))
+    z, normal = embedded(vectors), embedded(normals)
+    metric = np.stack([curve.metric(row[:-1], row[-1]) for row in z])
+    for _ in range(2):
+        residual, jacobian, rate, _ = rich.balance.residual(z[:, :-1], z[:, -1])
+        matrix = np.concatenate([jacobian, rate[:, :, None]], axis=2)
+        size = np.linalg.norm(normal / metric, axis=1)[:, None]
+        bordered = np.concatenate([matrix / metric[:, None, :], (normal / metric / size)[:, None, :]], axis=1)
+        right = np.concatenate([residual, np.zeros((len(z), 1))], axis=1)
+        z = z - np.linalg.solve(bordered, right[:, :, None])[:, :, 0] / metric
+    return np.abs(z[:, -1] / vectors[:, -1] - 1.0)

@@ -1,0 +1,116 @@
+"""What analyses of nonlinear systems share: warnings, the displacement that is watched, sizes of motions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym import checks
+from cra_sym.analysis.modes import check_places, section_place
+from cra_sym.model.modal_equations import ModalEquations, modal_equations
+from cra_sym.model.system import MOST_MODES, System
+from cra_sym.solvers.modal_polynomials import ModalPolynomials
+
+__all__ = ["ConvergenceWarning", "equations_of", "nonlinear_modal_equations", "samples", "watched"]
+
+Array = NDArray[np.float64]
+MOST_NONLINEAR_MODES = 40
+
+
+class ConvergenceWarning(UserWarning):
+    """An answer was not found; the last good one is returned."""
+
+
+@checks.default_floating_point
+def nonlinear_modal_equations(system: System, modes: int = 3, zeta: Any = None) -> ModalEquations:
+    r"""Return the equations of motion of the first linear modes with their nonlinear coefficient tensors.
+
+    .. math:: L = \tfrac12\dot q^T\dot q - \tfrac12 q^T\Omega^2 q + \sum T[q, \ldots, q, \dot q, \ldots, \dot q]
+
+    The modes are exact, mass-normalised and positive at the tip; the tensors are integrals along the domain by
+    Gauss quadrature.
+
+    Parameters
+    ----------
+    system : System
+        Not a batch.
+    modes : int
+        1 to 40.
+    zeta : array_like, optional
+        Damping ratios, one or ``modes``; default: that of the system.
+
+    Returns
+    -------
+    ModalEquations
+        ``.polynomials`` has ``.omega``, ``.damping``, and the tensors in ``.energies`` and ``.forces``; ``.error`` is
+        the estimated relative error of the quadrature.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is out of its range, the system is a batch, or a term is not polynomial.
+
+    Examples
+    --------
+    >>> from sympy import Symbol
+    >>> import cra_sym as cra
+    >>> k_3, v = Symbol("k_3"), cra.Arm.nominal().model.equations.fields[0]
+    >>> arm = cra.Arm.nominal().replace(k_t=1e4)
+    >>> model = arm.model.replace(left=cra.paper_lagrangian()[1] - k_3 * v**4 / 4)
+    >>> equations = cra.nonlinear_modal_equations(model.at({**arm.values, "k_3": 1e9}), modes=2)
+    >>> equations.polynomials.energies[0].tensor.shape
+    (2, 2, 2, 2)
+    """
+    checks.instance("system", system, System)
+    modes = checks.count("modes", modes, high=MOST_NONLINEAR_MODES)
+    ratios = None
+    if zeta is not None:
+        ratios = checks.one_axis("zeta", zeta, "modes", low=0.0, unit="1")
+        if ratios.ndim and ratios.size not in (1, modes):
+            raise ValueError(f"zeta has shape {ratios.shape}: must have one value, or one for each of {modes} modes")
+    return modal_equations(system, modes, ratios)
+
+
+def equations_of(system: System, modes: int, zeta: Any = None) -> ModalPolynomials:
+    """Return the checked modal equations without known functions of time."""
+    return nonlinear_modal_equations(system, modes, zeta).polynomials
+
+
+def watched(system: System, modes: int, place: Any = None, field: Any = None) -> Array:
+    """Return the displacement of every mode that is watched: the tip, or the first coordinate where there is no field.
+
+    Parameters
+    ----------
+    system : System
+    modes : int
+        At most `MOST_MODES`.
+    place : float, optional
+        In the domain, m.
+    field : applied undefined function, optional
+        A field, or a lumped coordinate.
+
+    Raises
+    ------
+    ValueError
+        If it is none of the model, or the place is not in the domain.
+    """
+    checks.count("modes", modes, high=MOST_MODES)
+    coordinates = list(system.model.linearised.coordinates)
+    found = system.modes(modes)
+    if field is None and not system.model.linearised.fields:
+        field = coordinates[0]
+    if field in coordinates:
+        return found.coordinate(coordinates.index(field))
+    entry = section_place(system, field)
+    if place is None:
+        return found.displacement(1, entry)
+    at = np.atleast_1d(checks.real_array("place", place, unit="m"))
+    check_places(system, at, "place")
+    return found.shape(entry, 0, at)[..., 0]
+
+
+def samples(degree: int, harmonics: int, causes: int = 0) -> int:
+    """Return how many samples of a period make the sums of harmonic balance exact."""
+    return 4 * int(np.ceil(((degree + 1) * harmonics + causes + 1) / 4))

@@ -1,0 +1,200 @@
+"""Responses of nonlinear systems by integration in time: the referee of steady states.
+
+The linear modes turn exactly, in a frame that rotates with each of them; an adaptive Runge-Kutta method of order eight
+integrates what nonlinear terms, damping and loads add.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, nonlinear_modal_equations
+from cra_sym.model.modal_equations import ModalEquations
+from cra_sym.model.system import System
+from cra_sym.solvers.motion import BaseMotion, Force
+from cra_sym.solvers.motion_terms import Piecewise
+
+__all__ = ["integrated"]
+
+Array = NDArray[np.float64]
+_TOLERANCE = 1e-10
+_BEYOND = 1e6  # nonlinear over linear forces
+_MOST_PARTS = 500  # of a motion, at whose joints the integration starts anew
+
+
+def integrated(
+    system: System,
+    histories: Mapping[str, BaseMotion | Force],
+    gammas: Mapping[str, Array],
+    constant: Array,
+    rows: Array,
+    t: Array,
+    derivative: int,
+    start: tuple[Array, Array],
+    zeta: Any = None,
+) -> Array:
+    """Return outputs of the modes of a nonlinear system in time.
+
+    Parameters
+    ----------
+    system : System
+        Not a batch.
+    histories : mapping of name to BaseMotion or Force
+        Not batches.
+    gammas : mapping of name to ndarray, shape (modes,)
+        Minus the generalised force of one unit of each.
+    constant : ndarray, shape (modes,)
+        Loads that do not change.
+    rows : ndarray, shape (outputs, modes)
+    t : ndarray, shape (times,)
+    derivative : {0, 1, 2}
+    start : (q, dq/dt)
+        At t = 0.
+    zeta : array_like, optional
+
+    Returns
+    -------
+    ndarray, shape (outputs, times)
+        Relative error about 1e-9.
+
+    Raises
+    ------
+    ValueError
+        If system or motions are batches, there are too many modes, or the motion runs away.
+    """
+    modes = rows.shape[-1]
+    if modes > MOST_NONLINEAR_MODES:
+        raise ValueError(f"modes = {modes}: must be at most {MOST_NONLINEAR_MODES} for a nonlinear system")
+    if any(history.shape for history in histories.values()):
+        raise ValueError("motion: must not be a batch for a nonlinear system")
+    moving = _Moving(nonlinear_modal_equations(system, modes, zeta), histories, gammas, constant)
+    order = np.argsort(t, kind="stable")
+    found = moving.states(t[order], np.concatenate(start))
+    values = np.empty((modes, t.size))
+    if derivative == 2:
+        values[:, order] = np.stack(
+            [moving.acceleration(time, q, u) for time, q, u in zip(t[order], found[0].T, found[1].T, strict=True)], 1
+        )
+    else:
+        values[:, order] = found[derivative]
+    return np.asarray(rows @ values)
+
+
+@dataclass(frozen=True)
+class _Moving:
+    """The equations of motion with their loads."""
+
+    equations: ModalEquations
+    histories: Mapping[str, BaseMotion | Force]
+    gammas: Mapping[str, Array]
+    constant: Array
+
+    def _known(self, time: float) -> Array:
+        """Return the known functions of the nonlinear terms at a time, shape (functions, 1)."""
+        found = []
+        for name, order in self.equations.causes:
+            history = self.histories.get(name)
+            if history is None:
+                found.append(0.0)
+            elif isinstance(history, Force):
+                found.append(float(history(time)))
+            else:
+                found.append(float((history.displacement, history.velocity, history.acceleration)[order](time)))
+        return np.array(found).reshape(-1, 1)
+
+    def _load(self, time: float) -> Array:
+        total = self.constant
+        for name, gamma in self.gammas.items():
+            history = self.histories[name]
+            value = history(time) if isinstance(history, Force) else history.acceleration(time)
+            total = total - gamma * float(value)
+        return total
+
+    def beside(self, time: float, q: Array, u: Array) -> Array:
+        """Return the acceleration without the share of the undamped linear modes."""
+        polynomials = self.equations.polynomials
+        found = polynomials.derivatives(q[None], u[None], self._known(time))
+        force = found.force[0] - polynomials.damping @ u + self._load(time)
+        if not polynomials.moves_mass:
+            return np.asarray(force)
+        if self.equations.causes:  # momenta may follow known motions
+            step = 1e-6 / max(float(polynomials.omega.max()), 1e-12)
+            ends = [
+                polynomials.derivatives(q[None], u[None], self._known(max(time + side * step, 0.0))).momentum[0]
+                for side in (-1.0, 1.0)
+            ]
+            width = min(time, step) + step
+            force = force - (ends[1] - ends[0]) / width
+        inertia = found.momentum_v[0]
+        pull = polynomials.omega**2 * q
+        rest = force - found.momentum_q[0] @ u + inertia @ pull
+        return np.asarray(np.linalg.solve(np.eye(q.size) + inertia, rest))
+
+    def acceleration(self, time: float, q: Array, u: Array) -> Array:
+        """Return the acceleration."""
+        return np.asarray(self.beside(time, q, u) - self.equations.polynomials.omega**2 * q)
+
+    def states(self, t: Array, start: Array) -> tuple[Array, Array]:
+        """Return q and dq/dt at rising times, shape (modes, times)."""
+        n, last = start.size // 2, float(t[-1])
+        found = np.empty((2 * n, t.size))
+        found[:, t <= 0] = start[:, None]
+        state = start
+        joints = [time for time in self._joints() if 0 < time < last]
+        for begin, end in zip([0.0, *joints], [*joints, last], strict=True):
+            if end <= begin:
+                continue
+            inside = (t > begin) & (t <= end)
+            state = self._part(begin, end, state, t[inside], found, inside)
+        return found[:n], found[n:]
+
+    def _part(self, begin: float, end: float, state: Array, t: Array, found: Array, inside: NDArray[np.bool_]) -> Array:
+        fastest = float(self.equations.polynomials.omega.max())
+        loads = float(np.abs(self._load(begin)).max() + np.abs(self._load(end)).max()) + 1e-300
+
+        def rate(time: float, y: Array) -> Array:
+            q, u = self._turned(time - begin, y)
+            force = self.beside(time, q, u)
+            if np.abs(force).max() > _BEYOND * (fastest**2 * np.abs(q).max() + fastest * np.abs(u).max() + loads):
+                raise ValueError(f"the motion runs away at t = {time:.6g} s: nonlinear forces outgrow all others")
+            return self._turned_back(time - begin, force)
+
+        at = np.append(t, end)
+        scale = float(np.abs(state).max())
+        run = solve_ivp(
+            rate,
+            (begin, end),
+            state,
+            method="DOP853",
+            t_eval=np.unique(at),
+            rtol=_TOLERANCE,
+            atol=1e-13 * (scale + 1e-6),
+        )
+        if not run.success or not np.isfinite(run.y).all():
+            raise ValueError(f"the motion runs away at t = {run.t[-1] if run.t.size else begin:g} s: {run.message}")
+        places = np.searchsorted(run.t, t)
+        states = np.stack([np.concatenate(self._turned(run.t[k] - begin, run.y[:, k])) for k in range(run.t.size)], 1)
+        found[:, inside] = states[:, places]
+        return np.asarray(states[:, -1])
+
+    def _turned(self, time: float, y: Array) -> tuple[Array, Array]:
+        omega, n = self.equations.polynomials.omega, y.size // 2
+        cosine, angle = np.cos(omega * time), omega * time
+        sine = time * np.sinc(angle / np.pi)
+        return cosine * y[:n] + sine * y[n:], -omega * np.sin(angle) * y[:n] + cosine * y[n:]
+
+    def _turned_back(self, time: float, force: Array) -> Array:
+        omega = self.equations.polynomials.omega
+        angle = omega * time
+        return np.concatenate([-time * np.sinc(angle / np.pi) * force, np.cos(angle) * force])
+
+    def _joints(self) -> list[float]:
+        terms = (term for h in self.histories.values() for term in (h.profile if isinstance(h, Force) else h).terms)
+        found = np.unique([k for term in terms if isinstance(term, Piecewise) for k in term.knots.ravel()])
+        return found.tolist() if found.size <= _MOST_PARTS else []

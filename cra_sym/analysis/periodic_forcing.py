@@ -1,0 +1,179 @@
+"""What drives a nonlinear system periodically: excitations and drives as waves in its modal equations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym import checks
+from cra_sym.analysis.nonlinear import nonlinear_modal_equations
+from cra_sym.model.excitations import Parametric
+from cra_sym.model.system import System
+from cra_sym.solvers.modal_polynomials import ModalPolynomials, Term
+
+__all__ = ["Forced", "Wave", "forced"]
+
+Array = NDArray[np.float64]
+
+
+class Wave(NamedTuple):
+    """A known function of time, factor varpi^power cos(order varpi t + phase).
+
+    Attributes
+    ----------
+    order, power : int
+    phase, factor : float
+    """
+
+    order: int = 1
+    power: int = 0
+    phase: float = 0.0
+    factor: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Forced:
+    """Modal equations with the waves that drive them.
+
+    Attributes
+    ----------
+    equations : ModalPolynomials
+    waves : tuple of Wave
+        The known functions of the equations, by number.
+    """
+
+    equations: ModalPolynomials
+    waves: tuple[Wave, ...]
+
+    @property
+    def order(self) -> int:
+        """Highest multiple of the excitation frequency in a product of waves of one term."""
+        terms = (*self.equations.energies, *self.equations.forces)
+        return max((sum(self.waves[k].order for k in term.causes) for term in terms), default=0)
+
+    @property
+    def rests(self) -> bool:
+        """Whether no motion is an answer."""
+        return not any(not t.positions and not t.velocities and t.tensor.any() for t in self.equations.forces)
+
+    def causes(self, varpi: Array, phase: Array, period: int) -> Array:
+        """Return the waves at phases of a period of ``period`` cycles, shape (points, waves, samples)."""
+        values = np.zeros((len(varpi), len(self.waves), phase.size))
+        for k, wave in enumerate(self.waves):
+            size = wave.factor * varpi**wave.power
+            values[:, k] = size[:, None] * np.cos(wave.order * period * phase + wave.phase)
+        return values
+
+    def first(self, modes: int) -> Forced:
+        """Return the same for the first modes alone."""
+        return Forced(self.equations.first(modes), self.waves)
+
+
+@dataclass
+class _Collected:
+    """Terms and waves while they are gathered."""
+
+    energies: list[Term] = field(default_factory=list)
+    forces: list[Term] = field(default_factory=list)
+    waves: list[Wave] = field(default_factory=list)
+
+    def number(self, wave: Wave) -> int:
+        if wave not in self.waves:
+            self.waves.append(wave)
+        return self.waves.index(wave)
+
+
+def forced(
+    system: System,
+    modes: int,
+    excitation: Any = None,
+    epsilon: Any = None,
+    drive: Mapping[Any, Any] | None = None,
+    zeta: Any = None,
+) -> Forced:
+    """Return the modal equations of a system that is excited, driven, or both.
+
+    Parameters
+    ----------
+    system : System
+    modes : int
+    excitation : Parametric, optional
+    epsilon : float, optional
+        With the excitation.
+    drive : mapping of function of t, or its name, to float, optional
+        Amplitudes of prescribed motions and forces that go with cos(varpi t).
+    zeta : array_like, optional
+
+    Raises
+    ------
+    TypeError, ValueError
+        Names the argument.
+    """
+    whole = nonlinear_modal_equations(system, modes, zeta)
+    found = _Collected()
+    amplitudes = _amplitudes(system, drive, {name for name, _ in whole.causes})
+    numbers = [found.number(_rate(amplitudes.get(name, 0.0), order)) for name, order in whole.causes]
+    for own, terms in ((found.energies, whole.polynomials.energies), (found.forces, whole.polynomials.forces)):
+        own += [term._replace(causes=tuple(numbers[k] for k in term.causes)) for term in terms]
+    _add_loads(found, system, modes, amplitudes)
+    if (excitation is None) != (epsilon is None):
+        raise ValueError("excitation, epsilon: both or neither must be given")
+    if excitation is not None:
+        checks.instance("excitation", excitation, Parametric)
+        size = checks.real_array("epsilon", epsilon, low=0.0, unit="1")
+        if size.ndim:
+            raise ValueError(f"epsilon has shape {size.shape}: must be one number here")
+        _add_excitation(found, system, modes, excitation, float(size))
+    polynomials = whole.polynomials
+    equations = ModalPolynomials(polynomials.omega, polynomials.damping, tuple(found.energies), tuple(found.forces))
+    return Forced(equations, tuple(found.waves))
+
+
+def _rate(amplitude: float, order: int) -> Wave:
+    return Wave(1, order, 0.5 * np.pi * order, amplitude)
+
+
+def _amplitudes(system: System, drive: Any, others: set[str]) -> dict[str, float]:
+    given = checks.mapping("drive", drive, "functions of t to amplitudes")
+    known = [*dict(system.numerics("causes")), *others]
+    found = {}
+    for key, value in given.items():
+        name = key if isinstance(key, str) else getattr(getattr(key, "func", None), "__name__", str(key))
+        if name not in known:
+            raise ValueError(
+                f"drive: {name} does not drive the model; what drives it is {', '.join(dict.fromkeys(known)) or 'none'}"
+            )
+        amplitude = checks.real_array(f"drive: {name}", value)
+        if amplitude.ndim:
+            raise ValueError(f"drive: {name} has shape {amplitude.shape}: must be one number")
+        found[name] = float(amplitude)
+    return found
+
+
+def _add_loads(found: _Collected, system: System, modes: int, amplitudes: Mapping[str, float]) -> None:
+    """Add what drives linearly, and the loads that are constant in time."""
+    for name, kind in system.numerics("causes"):
+        amplitude = amplitudes.get(name, 0.0)
+        if not amplitude:
+            continue
+        if kind not in ("motion", "force"):
+            raise ValueError(f"drive: the load {kind} is neither a multiple of {name} nor of its acceleration")
+        load = system.project(system.numerics("load", name), modes)
+        wave = _rate(amplitude, 2 if kind == "motion" else 0)
+        found.forces.append(Term(load, 0, 0, (found.number(wave),)))
+    constant = system.numerics("constant")
+    if constant is not None:
+        found.forces.append(Term(system.project(constant, modes), 0, 0))
+
+
+def _add_excitation(found: _Collected, system: System, modes: int, excitation: Any, epsilon: float) -> None:
+    wave = Wave(1, excitation.power, 0.0, epsilon)
+    coupling = excitation.unit_coupling(system, modes)
+    found.forces.append(Term(-coupling, 1, 0, (found.number(wave),)))
+
+
+Causes = Callable[[Array, NDArray[np.intp]], Array]

@@ -1,0 +1,108 @@
+"""Slow flow of a model by multiple scales, and the numbers of its symbols."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cra_sym import checks
+from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, nonlinear_modal_equations
+from cra_sym.model.system import System
+
+if TYPE_CHECKING:
+    from sympy import Symbol
+
+    from cra_sym.mechanics.slow_flow import SlowFlow
+    from cra_sym.model.lagrangian import Model
+
+__all__ = ["slow_flow", "slow_flow_values"]
+
+
+def slow_flow(model: Model, resonance: Any, order: int = 1, modes: int | None = None) -> SlowFlow:
+    """Return the slow evolution of amplitudes at a resonance, by multiple scales of the nonlinear modal equations.
+
+    Parameters
+    ----------
+    model : Model
+    resonance : int or tuple
+        ``n`` primary (varpi about omega_n); ``(n, n)``, ``(m, n)``, ``(m, -n)`` parametric (varpi about the sum or
+        difference); ``('free', n)``; ``('superharmonic', n, k)`` (k varpi about omega_n); ``('subharmonic', n, k)``
+        (varpi about k omega_n); ``('internal', m, n, k)`` (omega_n about k omega_m). Modes are counted from 1.
+    order : {1}
+        The first order at which the amplitudes change: second in the amplitude where quadratic terms resonate, else
+        third, with what quadratic terms add by way of the second.
+    modes : int, optional
+        How many modes the second-order solution holds; default: those of the resonance.
+
+    Returns
+    -------
+    SlowFlow
+
+    Raises
+    ------
+    ValueError
+        Names the argument that is out of its range, or the term that is not polynomial.
+
+    Examples
+    --------
+    The clamped arm that does not stretch, to third order:
+
+    >>> from sympy import Function, symbols
+    >>> import cra_sym as cra
+    >>> from cra_sym.symbols import L, t, v, x
+    >>> stiffness, mass = symbols("stiffness mass", positive=True)
+    >>> s = Function("s")(x, t)
+    >>> arm = cra.Model(mass*(v.diff(t)**2 + s.diff(t)**2)/2 - stiffness*v.diff(x, 2)**2*(1 + v.diff(x)**2)/2,
+    ...                 fields=[v], x=x, domain=(0, L), t=t, essential=[v.subs(x, 0), v.diff(x).subs(x, 0)],
+    ...                 quadratures={s: v.diff(x)**2/2})
+    >>> arm.slow_flow(("free", 1)).backbone
+    -J_1111*omega_1/4 + 3*K_1111/(4*omega_1)
+    """
+    from cra_sym.mechanics import slow_flow as mechanics
+    from cra_sym.model.slow_coefficients import slow_coefficients
+
+    numbers = [abs(n) for n in (resonance if isinstance(resonance, tuple) else (resonance,)) if isinstance(n, int)]
+    kind = resonance[0] if isinstance(resonance, tuple) and resonance and isinstance(resonance[0], str) else ""
+    own = max(numbers[: {"internal": 2, "": 2}.get(kind, 1)], default=1)
+    own = checks.count("resonance", own, high=MOST_NONLINEAR_MODES)
+    total = own if modes is None else checks.count("modes", modes, low=own, high=MOST_NONLINEAR_MODES)
+    coefficients = slow_coefficients(model.numerics("nonlinear"), total)
+    return mechanics.slow_flow(resonance, coefficients, total, order)
+
+
+@checks.default_floating_point
+def slow_flow_values(flow: SlowFlow, system: System) -> dict[Symbol, float]:
+    """Return the numbers of the symbols of a slow flow: frequencies, decay rates and coefficients.
+
+    Parameters
+    ----------
+    flow : SlowFlow
+    system : System
+        Of the model of the flow; not a batch.
+
+    Returns
+    -------
+    dict of Symbol to float
+        ``sigma``, ``varpi``, forces f_n and couplings P_mn are not among them.
+    """
+    checks.instance("system", system, System)
+    found = sorted({s for e in flow.amplitude_equations for s in e.free_symbols}, key=str)
+    numbers = [int(s.name[6:]) for s in found if s.name.startswith("omega_")]
+    numbers += [n for c in flow.coefficients for n in c.indices]
+    equations = nonlinear_modal_equations(system, max(numbers, default=1)).polynomials
+    values: dict[Symbol, float] = {}
+    for symbol in found:
+        if symbol.name.startswith("omega_"):
+            values[symbol] = float(equations.omega[int(symbol.name[6:]) - 1])
+        elif symbol.name.startswith("c_"):
+            n = int(symbol.name[2:]) - 1
+            values[symbol] = float(equations.damping[n, n]) / 2
+    for c in flow.coefficients:
+        terms = equations.forces if c.force else equations.energies
+        entry = 0.0
+        for term in terms:
+            if (term.positions, term.velocities, term.causes) == (c.positions, c.velocities, ()):
+                entry = float(term.tensor[tuple(np.array(c.indices) - 1)])
+        values[c.symbol] = entry / float(c.factor)
+    return values

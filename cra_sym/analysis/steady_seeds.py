@@ -1,0 +1,140 @@
+"""Starts for steady states: rest, all answers of one mode with one harmonic, free vibration with several phases."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.analysis.nonlinear import samples
+from cra_sym.analysis.periodic_forcing import Forced
+from cra_sym.solvers.harmonic_balance import Balance, Basis
+from cra_sym.solvers.polynomial_roots import monomials_up_to, polynomial_roots
+
+__all__ = ["seeds"]
+
+Array = NDArray[np.float64]
+_SAMPLED = 9  # frequencies at which each mode alone is solved, unless that is the whole problem
+_PHASES = 4
+_FAR = 0.5  # a harmonic this far from a natural frequency, relative to it, is not tried
+
+
+def seeds(
+    driven: Forced, basis: Basis, varpi: Array, order: NDArray[np.intp], period: int
+) -> tuple[NDArray[np.intp], Array, float]:
+    """Return starts for Newton's method.
+
+    Parameters
+    ----------
+    driven : Forced
+    basis : Basis
+        Constant and harmonics of varpi / period.
+    varpi : ndarray, shape (frequencies,)
+    order : ndarray of int
+        That sorts them.
+    period : int
+
+    Returns
+    -------
+    where : ndarray of int, shape (starts,)
+        The frequency each start belongs to.
+    starts : ndarray, shape (starts, unknowns)
+    size : float
+        Modal amplitude at which nonlinear forces are as large as linear ones, or that of the linear answer.
+    """
+    n, harmonics = driven.equations.modes, len(basis.cosines) - 1
+    only = n == 1 and harmonics == 1
+    picked = order if only else order[np.unique(np.linspace(0, len(order) - 1, _SAMPLED).round().astype(int))]
+    where, starts = list(range(len(varpi))), [np.zeros(n * basis.size) for _ in varpi]
+    sizes = []
+    for mode in range(n):
+        alone = Forced(driven.equations.of(np.array([mode])), driven.waves)
+        size = _size(alone)
+        sizes.append(size)
+        if not np.isfinite(size):
+            continue
+        for at in picked:
+            for harmonic in _harmonics(alone, varpi[at] / period, harmonics, only):
+                small = _One(alone, harmonic, period, float(varpi[at]), size)
+                for constant, cosine, sine in small.answers(with_free=not only):
+                    x = np.zeros((n, basis.size))
+                    x[mode, [0, harmonic, harmonics + harmonic]] = constant, cosine, sine
+                    where.append(int(at))
+                    starts.append(x.ravel())
+    size = min((s for s in sizes if np.isfinite(s)), default=1.0)
+    return np.array(where, int), np.array(starts), float(size)
+
+
+def _harmonics(alone: Forced, frequency: float, harmonics: int, only: bool) -> list[int]:
+    omega = float(alone.equations.omega[0])
+    if only:
+        return [1]
+    near = int(np.clip(round(omega / frequency), 1, harmonics))
+    return [near] if abs(near * frequency - omega) <= _FAR * omega else []
+
+
+def _size(alone: Forced) -> float:
+    """Return the amplitude at which nonlinear and linear forces of one mode are alike; inf for a linear mode."""
+    equations = alone.equations
+    free = equations.free()
+    forces = tuple(t for t in equations.forces if not t.causes and t.positions + t.velocities > 1)
+    omega = max(float(equations.omega[0]), 1e-300)
+    low, high = -40.0, 40.0
+
+    def share(exponent: float) -> float:
+        q = np.array([[10.0**exponent]])
+        found = free.derivatives(q, omega * q)
+        other = type(free)(free.omega, free.damping, (), forces).derivatives(q, omega * q)
+        force = np.abs(found.force).max() + omega * np.abs(found.momentum).max() + np.abs(other.force).max()
+        return float(force / (omega**2 * 10.0**exponent))
+
+    if share(high) < 1:
+        return np.inf
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if share(middle) < 1 else (low, middle)
+    return float(10.0**high)
+
+
+class _One:
+    """One mode with a constant and one harmonic: polynomials in three unknowns."""
+
+    def __init__(self, alone: Forced, harmonic: int, period: int, varpi: float, size: float) -> None:
+        self._size, self._degree = size, alone.equations.degree
+        number = samples(self._degree, harmonic, alone.order * period)
+        basis = Basis((0, harmonic), (harmonic,), number)
+        self._balance = Balance(alone.equations, basis)
+        self._free = Balance(alone.equations.free(), basis)
+        self._frequency = varpi / period
+        self._causes = alone.causes(np.array([varpi]), basis.phase, period)
+
+    def _residual(self, balance: Balance, unknowns: Array) -> Array:
+        frequency = np.full(len(unknowns), self._frequency)
+        return balance.residual(unknowns, frequency, np.repeat(self._causes, len(unknowns), axis=0))[0]
+
+    def answers(self, *, with_free: bool) -> Array:
+        """Return all real answers, and free vibration at the frequency with several phases, shape (answers, 3)."""
+        exponents = np.array(monomials_up_to(3, self._degree))
+        points = np.random.default_rng(1).uniform(-1.5, 1.5, (2 * len(exponents), 3))
+        table = np.prod(points[:, None, :] ** exponents, axis=-1)
+        values = self._residual(self._balance, points * self._size)
+        coefficients = np.linalg.lstsq(table, values, rcond=None)[0].T
+        size = np.abs(coefficients).max()
+        coefficients[np.abs(coefficients) < 1e-13 * size] = 0.0
+        try:
+            roots = polynomial_roots(coefficients, self._degree)
+        except ValueError:
+            roots = np.empty((0, 3), complex)
+        real = roots[np.abs(roots.imag).max(axis=1) < 1e-5 * (1 + np.abs(roots).max(axis=1))].real
+        found = [*real, *(self._free_vibration() if with_free else [])]
+        return self._size * np.array(found).reshape(-1, 3)
+
+    def _free_vibration(self) -> list[Array]:
+        points = np.linspace(0.2, 1.5, self._degree)
+        unknowns = np.zeros((len(points), 3))
+        unknowns[:, 1] = points * self._size
+        forces = self._residual(self._free, unknowns)[:, 1] / points
+        polynomial = np.polyfit(points, forces, len(points) - 1)
+        roots = np.roots(polynomial)
+        sizes = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)].real
+        phases = 2 * np.pi * np.arange(_PHASES) / _PHASES + 0.3
+        return [np.array([0.0, a * np.cos(p), a * np.sin(p)]) for a in sizes for p in phases]

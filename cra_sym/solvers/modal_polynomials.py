@@ -1,0 +1,243 @@
+r"""Modal equations with polynomial terms: their Lagrangian and forces as coefficient tensors, with exact derivatives.
+
+.. math:: L = \tfrac12 \dot q^T \dot q - \tfrac12 q^T\Omega^2 q + \sum T[q, \ldots, q, \dot q, \ldots, \dot q]\,e(t)
+
+with forces :math:`-C\dot q + \sum Q[q, \ldots, \dot q]\,e(t)` that have no Lagrangian. The linear modes are exact, so
+that the quadratic part is diagonal.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import factorial, perm
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Derivatives", "ModalPolynomials", "Term", "symmetrised"]
+
+Array = NDArray[np.float64]
+
+
+class Term(NamedTuple):
+    """A tensor times modal coordinates, modal velocities, and known functions of time.
+
+    Attributes
+    ----------
+    tensor : ndarray, shape (modes,) * (positions + velocities), of a force (modes, modes, ...)
+        Symmetric in the axes of coordinates, which come first, and in those of velocities. The first axis of a force is
+        the equation it stands in.
+    positions, velocities : int
+    causes : tuple of int
+        Known functions of time that multiply it, by number.
+    """
+
+    tensor: Array
+    positions: int
+    velocities: int
+    causes: tuple[int, ...] = ()
+
+
+class Derivatives(NamedTuple):
+    """Generalised forces, momenta and their rates at samples, linear terms left out.
+
+    Attributes
+    ----------
+    force : ndarray, shape (samples, modes)
+        dL/dq + Q.
+    momentum : ndarray, shape (samples, modes)
+        dL/dv.
+    force_q, force_v, momentum_q, momentum_v : ndarray, shape (samples, modes, modes)
+        Rates of both by q and v.
+    """
+
+    force: Array
+    momentum: Array
+    force_q: Array
+    force_v: Array
+    momentum_q: Array
+    momentum_v: Array
+
+
+def symmetrised(tensor: Array, positions: int, first: int = 0) -> Array:
+    """Return a tensor that is symmetric in ``positions`` axes from ``first`` on, and in the axes after them."""
+    for start, stop in ((first, first + positions), (first + positions, tensor.ndim)):
+        axes = list(range(start, stop))
+        orders = list(itertools.permutations(axes))
+        if len(orders) > 1:
+            total = np.zeros_like(tensor)
+            for order in orders:
+                total += tensor.transpose(*range(start), *order, *range(stop, tensor.ndim))
+            tensor = total / factorial(len(axes))
+    return tensor
+
+
+@dataclass(frozen=True, eq=False)
+class ModalPolynomials:
+    """Modal equations with polynomial terms.
+
+    Attributes
+    ----------
+    omega : ndarray, shape (modes,)
+        Natural frequencies, rad/s.
+    damping : ndarray, shape (modes, modes)
+        C, 1/s.
+    energies, forces : tuple of Term
+        Of the Lagrangian, and without one; at least of degree one.
+    """
+
+    omega: Array
+    damping: Array
+    energies: tuple[Term, ...]
+    forces: tuple[Term, ...] = ()
+
+    @property
+    def modes(self) -> int:
+        """Number of modes."""
+        return self.omega.size
+
+    @cached_property
+    def degree(self) -> int:
+        """Highest degree of the equations of motion in the unknowns."""
+        found = [term.positions + term.velocities - 1 for term in self.energies]
+        return max([1, *found, *(term.positions + term.velocities for term in self.forces)])
+
+    @cached_property
+    def order_of_causes(self) -> int:
+        """Largest number of known functions that multiply each other."""
+        return max((len(term.causes) for term in (*self.energies, *self.forces)), default=0)
+
+    @cached_property
+    def odd(self) -> bool:
+        """Whether reversed displacements obey the same equations, without known functions of time."""
+        free = [term for term in self.energies if not term.causes], [term for term in self.forces if not term.causes]
+        even = all((term.positions + term.velocities) % 2 == 0 for term in free[0])
+        return even and all((term.positions + term.velocities) % 2 for term in free[1])
+
+    @cached_property
+    def reversible(self) -> bool:
+        """Whether reversed time obeys the same equations, dampers left out."""
+        return not self.forces and all(term.velocities % 2 == 0 for term in self.energies)
+
+    @cached_property
+    def moves_mass(self) -> bool:
+        """Whether the nonlinear terms hold velocities."""
+        return any(term.velocities for term in (*self.energies, *self.forces))
+
+    def free(self) -> ModalPolynomials:
+        """Return the same without damping, forces and known functions of time."""
+        kept = tuple(term for term in self.energies if not term.causes)
+        return ModalPolynomials(self.omega, np.zeros_like(self.damping), kept)
+
+    def first(self, modes: int) -> ModalPolynomials:
+        """Return the equations of the first modes alone."""
+        return self.of(np.arange(modes))
+
+    def of(self, numbers: NDArray[np.intp]) -> ModalPolynomials:
+        """Return the equations of some modes alone, by number."""
+
+        def some(terms: Sequence[Term]) -> tuple[Term, ...]:
+            return tuple(t._replace(tensor=t.tensor[np.ix_(*[numbers] * t.tensor.ndim)]) for t in terms)
+
+        damping = self.damping[np.ix_(numbers, numbers)]
+        return ModalPolynomials(self.omega[numbers], damping, some(self.energies), some(self.forces))
+
+    def potential(self, q: Array) -> Array:
+        """Return minus the Lagrangian at zero velocity, J, for q of shape (..., modes)."""
+        flat = q.reshape(-1, self.modes)
+        value = 0.5 * ((self.omega * flat) ** 2).sum(axis=-1)
+        for term in self.energies:
+            if not term.velocities and not term.causes:
+                value = value - _contracted(term.tensor, term.positions, 0, flat, flat).reshape(len(flat))
+        return value.reshape(q.shape[:-1])
+
+    def energy(self, q: Array, v: Array) -> Array:
+        """Return the energy v dL/dv - L, J, for q and v of shape (..., modes)."""
+        flat, rates = q.reshape(-1, self.modes), v.reshape(-1, self.modes)
+        value = 0.5 * (rates**2).sum(axis=-1) + 0.5 * ((self.omega * flat) ** 2).sum(axis=-1)
+        for term in self.energies:
+            if not term.causes:
+                part = _contracted(term.tensor, term.positions, term.velocities, flat, rates)
+                value = value + (term.velocities - 1) * part.reshape(len(flat))
+        return value.reshape(q.shape[:-1])
+
+    def derivatives(self, q: Array, v: Array, causes: Array | None = None) -> Derivatives:
+        """Return forces, momenta and their rates of the terms beside the linear ones.
+
+        Parameters
+        ----------
+        q, v : ndarray, shape (samples, modes)
+        causes : ndarray, shape (known functions, samples), optional
+        """
+        samples, n = q.shape
+        found = Derivatives(*(np.zeros((samples, n)) for _ in range(2)), *(np.zeros((samples, n, n)) for _ in range(4)))
+        for term in self.energies:
+            scale = _scale(term, causes)
+            a, b = term.positions, term.velocities
+            for degree, kept, vector, first, second in (
+                (a, (2, 0), q, found.force, found.force_q),
+                (b, (0, 2), v, found.momentum, found.momentum_v),
+            ):
+                if degree > 1:
+                    part = _slots(term, q, v, *kept)
+                    _add(second, perm(degree, 2), part, scale)
+                    _add(first, degree, (part @ vector[:, :, None])[:, :, 0], scale)
+                elif degree:
+                    _add(first, degree, _slots(term, q, v, kept[0] // 2, kept[1] // 2), scale)
+            if a and b:
+                mixed = _slots(term, q, v, 1, 1)
+                _add(found.force_v, a * b, mixed, scale)
+                _add(found.momentum_q, a * b, mixed.swapaxes(-1, -2), scale)
+        for term in self.forces:
+            scale = _scale(term, causes)
+            a, b = term.positions, term.velocities
+            _add(found.force, 1, _slots(term, q, v, 0, 0, equation=True), scale)
+            if a:
+                _add(found.force_q, a, _slots(term, q, v, 1, 0, equation=True), scale)
+            if b:
+                _add(found.force_v, b, _slots(term, q, v, 0, 1, equation=True), scale)
+        return found
+
+
+def _scale(term: Term, causes: Array | None) -> Array | float:
+    if not term.causes:
+        return 1.0
+    assert causes is not None
+    return causes[list(term.causes)].prod(axis=0)
+
+
+def _add(total: Array, factor: int, part: Array, scale: Array | float) -> None:
+    scale = scale if isinstance(scale, float) else scale.reshape(-1, *(1,) * (part.ndim - 1))
+    total += factor * scale * part
+
+
+def _slots(term: Term, q: Array, v: Array, kept_q: int, kept_v: int, equation: bool = False) -> Array:
+    """Contract all axes but some of coordinates and velocities; equation, coordinates, velocities is their order."""
+    a, b = term.positions, term.velocities
+    return _contracted(term.tensor, a - kept_q, b - kept_v, q, v, equation=equation)
+
+
+def _contracted(tensor: Array, with_q: int, with_v: int, q: Array, v: Array, equation: bool = False) -> Array:
+    """Contract the last axes with v and axes of coordinates with q; shape (samples, modes, ...)."""
+    samples, n = q.shape
+    found: Array = tensor.reshape(1, *tensor.shape)
+    for _ in range(with_v):
+        found = _last(found, v, n)
+    if with_q:
+        axis = 2 if equation else 1  # coordinates come first, after the equation
+        found = np.moveaxis(found, range(axis, axis + with_q), range(found.ndim - with_q, found.ndim))
+        for _ in range(with_q):
+            found = _last(found, q, n)
+    return np.broadcast_to(found, (samples, *found.shape[1:]))
+
+
+def _last(found: Array, vector: Array, n: int) -> Array:
+    """Contract the last axis with a vector at every sample."""
+    shape = found.shape[1:-1]
+    if found.shape[0] == 1:  # the same tensor at all samples: one product of matrices
+        return (vector @ found.reshape(-1, n).T).reshape(len(vector), *shape)
+    return (found.reshape(len(found), -1, n) @ vector[:, :, None]).reshape(len(found), *shape)

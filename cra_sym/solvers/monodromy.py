@@ -1,0 +1,185 @@
+"""Floquet multipliers of periodic answers: the equations of variation over one period, many answers at once.
+
+A step turns the linear modes exactly and applies what is left at its middle by a Cayley transform, so that a system
+without damping stays symplectic: multipliers of stable motions lie on the unit circle to rounding, however coarse the
+steps are for the highest modes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.solvers.harmonic_balance import Basis
+from cra_sym.solvers.modal_polynomials import ModalPolynomials
+
+__all__ = ["even_monodromy", "monodromy", "multipliers"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Causes = Callable[[Array, NDArray[np.intp]], Array]
+"""Known functions at phases of shape (samples,) for some points, shape (points, known functions, samples)."""
+_BLOCK = 2_000_000  # entries of matrices that are held at a time
+_LEVELS = 6
+
+
+def monodromy(
+    equations: ModalPolynomials,
+    basis: Basis,
+    coefficients: Array,
+    frequency: Array,
+    steps: int,
+    causes: Causes | None = None,
+    share: float = 1.0,
+) -> Array:
+    """Return the maps of displacements and momenta over one period, or a share of it from the phase 0.
+
+    Parameters
+    ----------
+    equations : ModalPolynomials
+    basis : Basis
+    coefficients : ndarray, shape (points, modes, functions)
+    frequency : ndarray, shape (points,)
+    steps : int
+        A power of two.
+    causes : callable, optional
+    share : float
+
+    Returns
+    -------
+    ndarray, shape (points, 2 modes, 2 modes)
+        Its error falls with the square of the number of steps.
+    """
+    n = equations.modes
+    most = max(1, _BLOCK // (steps * 4 * n * n))
+    found = np.empty((len(frequency), 2 * n, 2 * n))
+    for start in range(0, len(frequency), most):
+        rows = np.arange(start, min(start + most, len(frequency)))
+        found[rows] = _maps(equations, basis, coefficients[rows], frequency[rows], steps, causes, rows, share)
+    return found
+
+
+def even_monodromy(
+    equations: ModalPolynomials, basis: Basis, coefficients: Array, frequency: Array, steps: int
+) -> Array:
+    """Return the maps over one period of motions of a system without damping that are sums of cosines.
+
+    The equations of variation are even in time: the second half of the period is the first one mirrored. If all
+    multiples are odd, and the system is, their period is half as long.
+    """
+    halves = 2 if equations.odd and all(order % 2 for order in basis.cosines) else 1
+    n, share = equations.modes, 0.5 / halves
+    half = monodromy(equations, basis, coefficients, frequency, max(1, int(steps * share)), share=share)
+    a, b, c, d = (half[:, i : i + n, j : j + n].swapaxes(1, 2) for i in (0, n) for j in (0, n))
+    mirrored = np.block([[d, b], [c, a]])
+    whole: Array = mirrored @ half
+    return whole @ whole if halves == 2 else whole
+
+
+def _maps(
+    equations: ModalPolynomials,
+    basis: Basis,
+    coefficients: Array,
+    frequency: Array,
+    steps: int,
+    causes: Causes | None,
+    rows: NDArray[np.intp],
+    share: float,
+) -> Array:
+    n, points = equations.modes, len(frequency)
+    phase = 2 * np.pi * share * (np.arange(steps) + 0.5) / steps
+    q = np.einsum("pnm,sm->psn", coefficients, basis.values(phase)).reshape(-1, n)
+    v = np.einsum("pnm,sm,p->psn", coefficients, basis.values(phase, 1), frequency).reshape(-1, n)
+    known = None if causes is None else causes(phase, rows).swapaxes(0, 1).reshape(-1, points * steps)
+    rest = _beside_linear(equations, q, v, known)
+    h = 2 * np.pi * share / (frequency * steps)
+    scaled = rest.reshape(points, steps, 2 * n, 2 * n) * h[:, None, None, None]
+    one = np.eye(2 * n)
+    if equations.moves_mass or equations.damping.any():
+        kick = np.linalg.solve(one - 0.5 * scaled, one + 0.5 * scaled)
+    else:  # the product of two such matrices vanishes
+        kick = one + scaled
+    turn = _rotation(equations.omega, 0.5 * h)[:, None]
+    maps = turn @ kick @ turn
+    while maps.shape[1] > 1:
+        maps = maps[:, 1::2] @ maps[:, 0::2]
+    return maps[:, 0]
+
+
+def _beside_linear(equations: ModalPolynomials, q: Array, v: Array, causes: Array | None) -> Array:
+    """Return the matrix of the equations of variation in (q, p) without the undamped linear modes."""
+    n, found = equations.modes, equations.derivatives(q, v, causes)
+    matrix = np.zeros((len(q), 2 * n, 2 * n))
+    drag = found.force_v - equations.damping
+    if not equations.moves_mass:
+        matrix[:, n:, :n], matrix[:, n:, n:] = found.force_q, drag
+        return matrix
+    inverse = np.linalg.inv(np.eye(n) + found.momentum_v)
+    back = -inverse @ found.momentum_q
+    matrix[:, :n, :n], matrix[:, :n, n:] = back, inverse - np.eye(n)
+    matrix[:, n:, :n], matrix[:, n:, n:] = found.force_q + drag @ back, drag @ inverse
+    return matrix
+
+
+def _rotation(omega: Array, time: Array) -> Array:
+    """Return the exact maps of undamped linear modes, shape (points, 2 modes, 2 modes)."""
+    angle = omega * time[:, None]
+    cosine, n = np.cos(angle), omega.size
+    matrix = np.zeros((len(time), 2 * n, 2 * n))
+    place = np.arange(n)
+    matrix[:, place, place] = matrix[:, n + place, n + place] = cosine
+    matrix[:, place, n + place] = time[:, None] * np.sinc(angle / np.pi)
+    matrix[:, n + place, place] = -omega * np.sin(angle)
+    return matrix
+
+
+def multipliers(
+    equations: ModalPolynomials,
+    basis: Basis,
+    coefficients: Array,
+    frequency: Array,
+    causes: Causes | None = None,
+    tolerance: float = 1e-9,
+) -> Complex:
+    """Return the Floquet multipliers, by extrapolation of the maps to infinitely many steps.
+
+    Parameters
+    ----------
+    equations, basis, coefficients, frequency, causes
+        As in :func:`monodromy`.
+    tolerance : float
+        Error of the maps relative to their size.
+
+    Returns
+    -------
+    complex ndarray, shape (points, 2 modes)
+        Largest first.
+    """
+    found = np.empty((len(frequency), 2 * equations.modes), complex)
+    open_ = np.arange(len(frequency))
+    turns = float((equations.omega.max() / frequency).max(initial=1.0))
+    steps = 2 ** int(np.ceil(np.log2(max(32.0, 2.0 * turns, 4.0 * basis.orders.max(initial=1.0)))))
+    table: list[Array] = []
+    for level in range(_LEVELS):
+        some = None if causes is None else _of(causes, open_)
+        row = [monodromy(equations, basis, coefficients[open_], frequency[open_], steps << level, some)]
+        for k, before in enumerate(table):
+            row.append(row[k] + (row[k] - before) / (4.0 ** (k + 1) - 1))
+        if table:
+            size = np.abs(row[-1]).max(axis=(1, 2))
+            good = np.abs(row[-1] - row[-2]).max(axis=(1, 2)) <= tolerance * size
+            good |= level == _LEVELS - 1
+            values = np.linalg.eigvals(row[-1][good])
+            order = np.argsort(-np.abs(values), axis=1, kind="stable")
+            found[open_[good]] = np.take_along_axis(values, order, axis=1)
+            open_, row = open_[~good], [entry[~good] for entry in row]
+        table = row
+        if not open_.size:
+            break
+    return found
+
+
+def _of(causes: Causes, members: NDArray[np.intp]) -> Causes:
+    return lambda phase, rows: causes(phase, members[rows])
