@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from cra_sym import checks
 from cra_sym.analysis.nonlinear import nonlinear_modal_equations
-from cra_sym.model.excitations import Parametric
+from cra_sym.model.excitations import Fluctuation, LagrangianTerms, Parametric
 from cra_sym.model.system import System
-from cra_sym.solvers.modal_polynomials import ModalPolynomials, Term
+from cra_sym.solvers.floquet import Oscillation
+from cra_sym.solvers.modal_polynomials import ModalPolynomials, Term, symmetrised
 
 __all__ = ["Forced", "Wave", "forced"]
 
@@ -170,10 +171,35 @@ def _add_loads(found: _Collected, system: System, modes: int, amplitudes: Mappin
         found.forces.append(Term(system.project(constant, modes), 0, 0))
 
 
-def _add_excitation(found: _Collected, system: System, modes: int, excitation: Any, epsilon: float) -> None:
-    wave = Wave(1, excitation.power, 0.0, epsilon)
-    coupling = excitation.unit_coupling(system, modes)
-    found.forces.append(Term(-coupling, 1, 0, (found.number(wave),)))
+def _add_excitation(found: _Collected, system: System, modes: int, excitation: Parametric, epsilon: float) -> None:
+    _refuse_nonlinear(system, excitation)
+    for drive in excitation.drives(system, modes):
+        wave = (found.number(_wave(drive.oscillation, epsilon)),)
+        for matrix, positions, velocities in ((drive.stiffness, 1, 0), (drive.damping, 0, 1)):
+            if matrix is not None:
+                found.forces.append(Term(-matrix, positions, velocities, wave))
+        if drive.mass is not None:  # d/dt (g M v) is of the Lagrangian g v M v/2
+            found.energies.append(Term(symmetrised(drive.mass / 2, 0), 0, 2, wave))
+        if drive.momentum is not None:  # d/dt (g B q) is of the Lagrangian g v B q, but for a force g B' v
+            found.energies.append(Term(drive.momentum.T, 1, 1, wave))
+            found.forces.append(Term(-drive.momentum.T, 0, 1, wave))
+    if isinstance(excitation, LagrangianTerms):
+        for oscillation, small, force in excitation.forces(system, modes):
+            wave = (found.number(_wave(oscillation, epsilon if small else 1.0)),)
+            found.forces.append(Term(force, 0, 0, wave))
 
 
-Causes = Callable[[Array, NDArray[np.intp]], Array]
+def _wave(oscillation: Oscillation, size: float) -> Wave:
+    return Wave(oscillation.order, oscillation.power, 0.0 if oscillation.kind == "cos" else -0.5 * np.pi, size)
+
+
+def _refuse_nonlinear(system: System, excitation: Parametric) -> None:
+    """Refuse a fluctuating parameter that nonlinear terms hold too: only the linear ones would fluctuate."""
+    terms = system.numerics("nonlinear")
+    if terms is not None and isinstance(excitation, Fluctuation):
+        both = [name for name in excitation.weights if name in terms.parameters]
+        if both:
+            raise ValueError(
+                f"excitation = {excitation!r}: {both[0]} is in nonlinear terms too; give the fluctuating part a symbol "
+                "of its own"
+            )

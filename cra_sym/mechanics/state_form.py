@@ -176,7 +176,7 @@ def _system(weak: WeakForm, parameter: Symbol) -> Matrix:
 
 def _check_parts(leading: Matrix, x: Symbol) -> None:
     """Refuse a stiffness that is zero on a part of the domain; name the part."""
-    for stiffness in leading.diagonal():
+    for stiffness in leading.diagonal() if leading.rows else ():
         for piecewise in stiffness.atoms(Piecewise):
             for value, condition in piecewise.args:
                 if stiffness.xreplace({piecewise: value}) == 0:

@@ -128,7 +128,7 @@ def without_oscillations(
 ) -> tuple[Model, tuple[PeriodicForms, ...]]:
     """Return the model without what oscillates, with the same parameters, and that."""
     still, parts = split_options(options, model._pieces["small"])
-    steady = type(model)(**still)
+    steady = type(model)(**still | {"quadratures": dict(still["quadratures"])})
     steady.symbols = model.symbols
     steady._pieces["units"] = tuple(units.items())
     return steady, periodic_forms(steady, parts)

@@ -9,14 +9,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from sympy import Expr, S, Symbol, sympify
+from sympy import Expr, Symbol, sympify
 from sympy.core.function import AppliedUndef
 
 from cra_sym.checks import mapping
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics import HamiltonResult, Modal, StateForm, hamilton, ritz, separate, state_form
 from cra_sym.mechanics.jets import listed
-from cra_sym.mechanics.points import in_points
 from cra_sym.mechanics.polynomials import linearised
 from cra_sym.mechanics.weak import weak_form
 from cra_sym.model.excitations import LagrangianTerms
@@ -24,7 +23,8 @@ from cra_sym.model.excited import checked_small, refuse_small, without_oscillati
 from cra_sym.model.galerkin import Ritz
 from cra_sym.model.numerics import Numerics
 from cra_sym.model.parameters import parameters
-from cra_sym.model.symmetry import asymmetry, odd_in_time
+from cra_sym.model.pieces import arguments, options_of, undamped
+from cra_sym.model.symmetry import asymmetry
 from cra_sym.model.system import TOLERANCE, System
 from cra_sym.model.units import check_dimensions, named_units, symbol_units
 from cra_sym.model.work import work_as_energy
@@ -142,7 +142,7 @@ class Model:
             "small": checked_small(small, (x, t)),
             "quadratures": tuple(mapping("quadratures", quadratures, "functions s(x, t) to integrands").items()),
         }
-        self._options = self._defined()
+        self._options, self._stated_inside = options_of(self._pieces)
         self.equations: HamiltonResult = hamilton(**self._options)
         """Equations of motion, boundary conditions and the steps that led there."""
         stated = ((f"{end} end", self._options[end]) for end in ("left", "right"))
@@ -165,26 +165,6 @@ class Model:
             return
         unknowns = (x, t, *self.equations.fields, *self.equations.coordinates, *self._options["prescribed"])
         check_dimensions(sympify(density, strict=True), ends, declared, work, unknowns)
-
-    def _defined(self) -> dict[str, Any]:
-        """Return what Hamilton's principle takes, definitions put in."""
-        options = {name: piece for name, piece in self._pieces.items() if name not in ("units", "definitions", "small")}
-        definitions = dict(self._pieces["definitions"])
-        if not definitions:
-            return self._with_points(options)
-
-        def put(piece: Any) -> Any:
-            if isinstance(piece, tuple):
-                return tuple(put(part) for part in piece)
-            return piece.subs(definitions) if isinstance(piece, Expr) and not isinstance(piece, Symbol) else piece
-
-        return self._with_points({name: put(piece) for name, piece in options.items()})
-
-    def _with_points(self, options: dict[str, Any]) -> dict[str, Any]:
-        """Return the options with point loads of the density among the terms at interior places."""
-        density, points = in_points(options["density"], options["x"])
-        self._stated_inside = options["inside"]
-        return {**options, "density": density, "inside": (*options["inside"], *points)} if points else options
 
     def replace(self, **changes: Any) -> Model:
         """Return the same model with some of what it was made of replaced.
@@ -211,7 +191,7 @@ class Model:
         unknown = [name for name in changes if name not in self._pieces]
         if unknown:
             raise TypeError(f"{unknown[0]!r} is not an argument of Model; it has {', '.join(self._pieces)}")
-        return Model(**{**_arguments(self._pieces), **changes})
+        return Model(**{**arguments(self._pieces), **changes})
 
     def at(self, values: Mapping[Any, Any], zeta: Any = 0.0, tolerance: float = TOLERANCE) -> System:
         """Return the model bound to values.
@@ -354,16 +334,7 @@ class Model:
         return form
 
     def _undamped_work(self) -> tuple[tuple[Expr, Expr, Any], ...]:
-        t = self._options["t"]
-
-        def still(force: Expr) -> Expr:
-            terms = sympify(force, strict=True).expand().as_ordered_terms()
-            return sum((term for term in terms if not odd_in_time(term, t)), S.Zero)
-
-        kept = (
-            (still(force), displacement, place) for force, displacement, place in self.steady._options["virtual_work"]
-        )
-        return tuple(work for work in kept if work[0] != 0)
+        return undamped(self.steady._options["virtual_work"], self._options["t"])
 
     def separate(self, **options: Any) -> Modal:
         """Separate the variables: characteristic matrix and function, mode shapes, in closed form."""
@@ -459,8 +430,4 @@ def _analysis(module: str) -> Any:
 
 
 def _rebuilt(pieces: dict[str, Any]) -> Model:
-    return Model(**_arguments(pieces))
-
-
-def _arguments(pieces: dict[str, Any]) -> dict[str, Any]:
-    return pieces | {name: dict(pieces[name]) for name in ("units", "definitions", "quadratures")}
+    return Model(**arguments(pieces))

@@ -65,6 +65,8 @@ class NonlinearTerms:
         Where coefficients are not smooth along x, interior places among it.
     places : Kernel
         Of the parameters: interior places.
+    parameters : tuple of str
+        Those that nonlinear terms hold.
     """
 
     inside: tuple[Product, ...]
@@ -76,6 +78,7 @@ class NonlinearTerms:
     causes: tuple[tuple[str, int], ...]
     breaks: Breaks
     places: Kernel
+    parameters: tuple[str, ...]
 
 
 def nonlinear(model: Model) -> NonlinearTerms | None:
@@ -130,6 +133,7 @@ class _Reader:
             tuple(self._causes),
             breaks(coefficients, x, symbols, places),
             kernel(places, symbols, backend="numpy"),
+            tuple(s.name for s in symbols if any(c.has(s) for c in (*(c for _, c in (*inside, *discrete)), *weights))),
         )
 
     def _energy(self, lagrangian: Expr, label: str, point: int | None) -> list[tuple[Product, Expr]]:

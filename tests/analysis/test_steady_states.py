@@ -45,6 +45,32 @@ def test_parametron_has_one_three_and_five_states():
     assert counts == [1, 3, 5, 5] and stable == [1, 2, 3, 3]
 
 
+def test_excitation_of_the_lagrangian_itself_and_a_force_together():
+    """The published parametron: the spring pulsates at 2 varpi, and a force goes with varpi."""
+    epsilon, varpi, push = sp.symbols("epsilon varpi push")
+    pulsating = (1 - epsilon * sp.cos(2 * varpi * t)) * q**2 / 2
+    lagrangian = q.diff(t) ** 2 / 2 - pulsating - alpha * q**4 / 4 - push * sp.cos(varpi * t) * q
+    work = [(-gamma * q.diff(t) - eta * q**2 * q.diff(t), q, None)]
+    model = oscillator(lagrangian, virtual_work=work, small=(epsilon, varpi))
+    system = model.at({alpha: 1.0, gamma: 0.01, eta: 0.3, push: 1e-3})
+    options = {"excitation": model.excitation, "epsilon": 0.05, "modes": 1, "harmonics": 1}
+    found = cra.steady_states(system, [0.98, 1.0, 1.02, 1.05], **options)
+    assert [len(states) for states in found] == [1, 3, 5, 5]
+    assert [sum(state.stable for state in states) for states in found] == [1, 2, 3, 3]
+    assert found[0][0].amplitude > 0
+
+
+def test_a_parameter_of_nonlinear_terms_may_not_fluctuate():
+    with pytest.raises(ValueError, match="alpha is in nonlinear terms too"):
+        cra.steady_states(
+            oscillator(q.diff(t) ** 2 / 2 - alpha * q**2 / 2 - alpha * q**4).at({alpha: 1.0}),
+            2.0,
+            excitation=cra.Fluctuation(alpha=1.0),
+            epsilon=0.1,
+            modes=1,
+        )
+
+
 def test_amplitude_inside_the_tongue_is_that_of_time_integration():
     states = cra.steady_states(parametron(), 2.04, excitation=cra.Fluctuation(k=1.0), epsilon=0.05, modes=1, period=2)
     assert [state.stable for state in states] == [True, False, False, True, True]

@@ -1,0 +1,52 @@
+"""The pieces a model is made of: what Hamilton's principle takes of them, and how they are changed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from sympy import Expr, S, Symbol, sympify
+
+from cra_sym.mechanics.points import in_points
+from cra_sym.model.symmetry import odd_in_time
+
+__all__ = ["arguments", "options_of", "undamped"]
+
+Pieces = dict[str, Any]
+Works = tuple[tuple[Expr, Expr, Any], ...]
+
+
+def arguments(pieces: Pieces) -> Pieces:
+    """Return the arguments of Model: pieces that are kept as pairs are mappings again."""
+    return pieces | {name: dict(pieces[name]) for name in ("units", "definitions", "quadratures")}
+
+
+def options_of(pieces: Pieces) -> tuple[Pieces, tuple[tuple[Expr, Expr], ...]]:
+    """Return what Hamilton's principle takes, definitions put in, and the terms at interior places as stated.
+
+    Point loads of the density are among the terms at interior places.
+    """
+    options = {name: piece for name, piece in pieces.items() if name not in ("units", "definitions", "small")}
+    definitions = dict(pieces["definitions"])
+
+    def put(piece: Any) -> Any:
+        if isinstance(piece, tuple):
+            return tuple(put(part) for part in piece)
+        return piece.subs(definitions) if isinstance(piece, Expr) and not isinstance(piece, Symbol) else piece
+
+    if definitions:
+        options = {name: put(piece) for name, piece in options.items()}
+    density, points = in_points(options["density"], options["x"])
+    stated = options["inside"]
+    return ({**options, "density": density, "inside": (*stated, *points)} if points else options), stated
+
+
+def undamped(work: Sequence[tuple[Expr, Expr, Any]], t: Symbol) -> Works:
+    """Return the virtual work without forces that are odd in time."""
+
+    def still(force: Expr) -> Expr:
+        terms = sympify(force, strict=True).expand().as_ordered_terms()
+        return sum((term for term in terms if not odd_in_time(term, t)), S.Zero)
+
+    kept = ((still(force), displacement, place) for force, displacement, place in work)
+    return tuple(work for work in kept if work[0] != 0)
