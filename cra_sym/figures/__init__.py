@@ -37,6 +37,7 @@ FIGURES = {
     "zones": "cra_sym.figures.stability:figure_zones",
     "combinations": "cra_sym.figures.stability:figure_combinations",
     "accuracy": "cra_sym.figures.stability:figure_accuracy",
+    "inside_tongues": "cra_sym.figures.nonlinear:figure_inside_tongues",
     "frequency_response": "cra_sym.figures.vibration:figure_frequency_response",
     "residual_vibration": "cra_sym.figures.vibration:figure_residual_vibration",
     "input_shaping": "cra_sym.figures.vibration:figure_input_shaping",

