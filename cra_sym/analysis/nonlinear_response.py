@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, nonlinear_modal_equations
+from cra_sym.checks import count, one_axis
 from cra_sym.model.modal_equations import ModalEquations
 from cra_sym.model.system import System
 from cra_sym.solvers.motion import BaseMotion, Force
 from cra_sym.solvers.motion_terms import Piecewise
 
-__all__ = ["integrated"]
+__all__ = ["nonlinear_response"]
 
 Array = NDArray[np.float64]
 _TOLERANCE = 1e-10
@@ -28,15 +29,15 @@ _BEYOND = 1e6  # nonlinear over linear forces
 _MOST_PARTS = 500  # of a motion, at whose joints the integration starts anew
 
 
-def integrated(
+def nonlinear_response(
     system: System,
     histories: Mapping[str, BaseMotion | Force],
-    gammas: Mapping[str, Array],
-    constant: Array,
     rows: Array,
-    t: Array,
-    derivative: int,
-    start: tuple[Array, Array],
+    t: Any,
+    modes: int,
+    derivative: Any,
+    state: tuple[Array, ...],
+    start: str,
     zeta: Any = None,
 ) -> Array:
     """Return outputs of the modes of a nonlinear system in time.
@@ -47,15 +48,14 @@ def integrated(
         Not a batch.
     histories : mapping of name to BaseMotion or Force
         Not batches.
-    gammas : mapping of name to ndarray, shape (modes,)
-        Minus the generalised force of one unit of each.
-    constant : ndarray, shape (modes,)
-        Loads that do not change.
     rows : ndarray, shape (outputs, modes)
-    t : ndarray, shape (times,)
+    t : array_like
+        A number or one axis of times, s.
+    modes : int
     derivative : {0, 1, 2}
-    start : (q, dq/dt)
-        At t = 0.
+    state : (q, dq/dt)
+        At t = 0, beside what a base that starts with a velocity gives if ``start`` is 'inertial'.
+    start : {'inertial', 'base'}
     zeta : array_like, optional
 
     Returns
@@ -68,19 +68,27 @@ def integrated(
     ValueError
         If system or motions are batches, there are too many modes, or the motion runs away.
     """
-    modes = rows.shape[-1]
+    times = np.atleast_1d(one_axis("t", t, "times", low=0.0, unit="s"))
+    derivative = count("derivative", derivative, low=0, high=2)
     if modes > MOST_NONLINEAR_MODES:
         raise ValueError(f"modes = {modes}: must be at most {MOST_NONLINEAR_MODES} for a nonlinear system")
     if any(history.shape for history in histories.values()):
         raise ValueError("motion: must not be a batch for a nonlinear system")
-    moving = _Moving(nonlinear_modal_equations(system, modes, zeta), histories, gammas, constant)
-    order = np.argsort(t, kind="stable")
-    found = moving.states(t[order], np.concatenate(start))
-    values = np.empty((modes, t.size))
+    gammas = {name: -system.project(system.numerics("load", name), modes) for name, _ in system.numerics("causes")}
+    constant = system.numerics("constant")
+    load = np.zeros(modes) if constant is None else system.project(constant, modes)
+    q, u = state
+    for name, gamma in gammas.items():
+        history = histories[name]
+        if isinstance(history, BaseMotion) and start == "inertial":
+            u = u - gamma * np.asarray(history.velocity(0.0), float)
+    moving = _Moving(nonlinear_modal_equations(system, modes, zeta), histories, gammas, load)
+    order = np.argsort(times, kind="stable")
+    found = moving.states(times[order], np.concatenate([q, u]))
+    values = np.empty((modes, times.size))
     if derivative == 2:
-        values[:, order] = np.stack(
-            [moving.acceleration(time, q, u) for time, q, u in zip(t[order], found[0].T, found[1].T, strict=True)], 1
-        )
+        along = zip(times[order], found[0].T, found[1].T, strict=True)
+        values[:, order] = np.stack([moving.acceleration(*at) for at in along], 1)
     else:
         values[:, order] = found[derivative]
     return np.asarray(rows @ values)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cra_sym.analysis.complex_responses import complex_response
 from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
-from cra_sym.analysis.nonlinear_response import integrated
+from cra_sym.analysis.nonlinear_response import nonlinear_response
 from cra_sym.checks import broadcastable, count, default_floating_point, instance, mapping, one_axis, shown
 from cra_sym.kernels import derived_kernel
 from cra_sym.model.projection import Projected
@@ -319,8 +319,9 @@ def _oscillation(
             f"initial = {shown(initial)}: must be a mapping from fields and coordinates to expressions in x"
         )
     if system.numerics("nonlinear") is not None:
+        state = tuple(_initial_state(system, initial or {}, modes, order) for order in (0, 1))
         rows = outputs(system.modes(modes))
-        return _integrated(system, histories, rows, t, modes, derivative, zeta, start, initial)
+        return nonlinear_response(system, histories, rows, t, modes, derivative, state, start, zeta)
     ratio = np.asarray(system.zeta if zeta is None else checked_damping(zeta))
     if system.numerics("complex_modes") and (ratio.ndim == 0 or ratio.shape[-1] == 1 or zeta is None):
         ratio = ratio[..., 0] if zeta is not None and ratio.ndim else ratio
@@ -352,32 +353,6 @@ def _oscillation(
         total = added if total is None else total + added
     assert total is not None
     return total
-
-
-def _integrated(
-    system: System,
-    histories: Mapping[str, History],
-    rows: Array,
-    t: Any,
-    modes: int,
-    derivative: int,
-    zeta: Any,
-    start: Start,
-    initial: Mapping[Any, Any] | None,
-) -> Array:
-    """Return the outputs of a nonlinear system."""
-    times = np.atleast_1d(one_axis("t", t, "times", low=0.0, unit="s"))
-    derivative = count("derivative", derivative, low=0, high=2)
-    linear = [name for name, _ in system.numerics("causes")]
-    gammas = {name: -system.project(system.numerics("load", name), modes) for name in linear}
-    constant = system.numerics("constant")
-    load = np.zeros(modes) if constant is None else system.project(constant, modes)
-    q, u = (_initial_state(system, initial or {}, modes, order) for order in (0, 1))
-    for name, gamma in gammas.items():
-        history = histories[name]
-        if isinstance(history, BaseMotion) and start == "inertial":
-            u = u - gamma * np.asarray(history.velocity(0.0), float)
-    return integrated(system, histories, gammas, load, rows, times, derivative, (q, u), zeta)
 
 
 def _check_sampling(motion: BaseMotion, omega: Array) -> None:

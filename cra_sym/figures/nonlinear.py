@@ -20,7 +20,15 @@ from cra_sym.solvers.harmonic_balance import Basis, peak
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["cubic_joint", "figure_backbone", "figure_inside_tongues", "show_states"]
+__all__ = [
+    "cubic_joint",
+    "figure_amplitude_map",
+    "figure_backbone",
+    "figure_inside_tongues",
+    "figure_sweep",
+    "show_states",
+    "swept",
+]
 
 _EPSILON, _CUBIC = 0.3, 1e9
 
@@ -86,7 +94,7 @@ def figure_inside_tongues(
     k_3: float = _CUBIC,
     epsilon: float = _EPSILON,
     modes: int = 3,
-    points: int = 25,
+    points: int = 17,
     zeta: float = 1e-4,
     axes: Any = None,
 ) -> Figure:
@@ -135,6 +143,74 @@ def figure_inside_tongues(
     row[0].set_ylabel("peak at the tip / mm")
     row[0].legend(loc="upper left")
     return row[0].figure
+
+
+def swept(states: Sequence[Sequence[SteadyState]]) -> np.ndarray:
+    """Return the amplitudes that a slow sweep passes: it keeps to the stable answer nearest to the last one.
+
+    Parameters
+    ----------
+    states : sequence of sequence of SteadyState
+        In the order of the sweep, which begins at rest.
+
+    Returns
+    -------
+    ndarray, shape (frequencies,)
+        nan where no stable answer is known.
+    """
+    last, found = 0.0, []
+    for here in states:
+        stable = [state.amplitude for state in here if state.stable]
+        last = min(stable, key=lambda a, last=last: abs(a - last)) if stable else np.nan
+        found.append(last)
+    return np.array(found)
+
+
+def figure_sweep(states: Sequence[Sequence[SteadyState]], *, ax: Any = None) -> Figure:
+    """Draw what a slow sweep of the frequency upwards and one downwards meet: they jump at different frequencies.
+
+    Parameters
+    ----------
+    states : sequence of sequence of SteadyState
+        Ascending frequencies.
+    ax : Axes, optional
+    """
+    ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
+    frequency = [here[0].angular_frequency for here in states]
+    show_states(ax, states, "0.6", "all answers")
+    ax.plot(frequency, 1e3 * swept(states), "-", color=BLUE, label="swept upwards")
+    ax.plot(frequency, 1e3 * swept(states[::-1])[::-1], "--", color=ORANGE, label="swept downwards")
+    ax.set_xlabel("excitation frequency $\\varpi$ / (rad/s)")
+    ax.set_ylabel("peak at the tip / mm")
+    ax.legend()
+    return ax.figure
+
+
+def figure_amplitude_map(
+    frequency: Any, epsilon: Any, amplitude: Any, boundary: Any = None, *, ax: Any = None
+) -> Figure:
+    """Draw the largest stable amplitude over the chart of excitation frequency and size.
+
+    Parameters
+    ----------
+    frequency : array_like, shape (n,)
+        rad/s.
+    epsilon : array_like, shape (m,)
+    amplitude : array_like, shape (m, n)
+        m.
+    boundary : pair of array_like, shape (m,), optional
+        Where rest loses its stability.
+    ax : Axes, optional
+    """
+    ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
+    mesh = ax.pcolormesh(frequency, epsilon, 1e3 * np.asarray(amplitude), cmap="cividis", shading="nearest")
+    ax.figure.colorbar(mesh, ax=ax, label="largest stable amplitude at the tip / mm")
+    for side in () if boundary is None else boundary:
+        ax.plot(side, epsilon, "-", color="white", linewidth=1.4)
+    ax.set_xlim(np.min(frequency), np.max(frequency))
+    ax.set_xlabel("excitation frequency $\\varpi$ / (rad/s)")
+    ax.set_ylabel("$\\epsilon$")
+    return ax.figure
 
 
 def _largest(rows: np.ndarray, state: SteadyState) -> float:

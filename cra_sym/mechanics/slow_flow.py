@@ -384,7 +384,7 @@ def _steps(
     ]
     if detuning is not None:
         statements.append(("detuning", "How far the frequencies are from the exact resonance.", detuning))
-    if second is not None:
+    if second is not None and any(second):
         statements.append(
             (
                 "second order",
