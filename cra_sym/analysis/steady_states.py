@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cra_sym import checks
 from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, samples, watched
 from cra_sym.analysis.periodic_forcing import Forced, forced
 from cra_sym.analysis.steady_seeds import seeds
+from cra_sym.model.excitations import Parametric
 from cra_sym.model.system import System
 from cra_sym.solvers.harmonic_balance import Balance, Basis, newton, peak
 from cra_sym.solvers.monodromy import multipliers
@@ -123,6 +124,36 @@ class _Problem:
         return float(np.linalg.norm(after - before) / size) if size > 0 else 0.0
 
 
+@overload
+def steady_states(
+    system: System,
+    angular_frequency: float,
+    *,
+    excitation: Parametric | None = None,
+    epsilon: float | None = None,
+    drive: Mapping[Any, float] | None = None,
+    modes: int = 3,
+    harmonics: int = 7,
+    period: int = 1,
+    zeta: ArrayLike | None = None,
+    place: float | None = None,
+    field: Any = None,
+) -> tuple[SteadyState, ...]: ...
+@overload
+def steady_states(
+    system: System,
+    angular_frequency: ArrayLike,
+    *,
+    excitation: Parametric | None = None,
+    epsilon: float | None = None,
+    drive: Mapping[Any, float] | None = None,
+    modes: int = 3,
+    harmonics: int = 7,
+    period: int = 1,
+    zeta: ArrayLike | None = None,
+    place: float | None = None,
+    field: Any = None,
+) -> list[tuple[SteadyState, ...]]: ...
 @checks.default_floating_point
 def steady_states(
     system: System,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib import style
 from matplotlib.figure import Figure
 
 from cra_sym.analysis.backbone import Backbone, backbone
@@ -13,6 +14,7 @@ from cra_sym.analysis.stability import stability_boundary
 from cra_sym.analysis.steady_states import SteadyState, steady_states
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
+from cra_sym.figures import STYLE
 from cra_sym.figures.drawing import BLUE, INK, ORANGE, panels
 from cra_sym.model.system import System
 from cra_sym.solvers.harmonic_balance import Basis, peak
@@ -158,10 +160,10 @@ def swept(states: Sequence[Sequence[SteadyState]]) -> np.ndarray:
     ndarray, shape (frequencies,)
         nan where no stable answer is known.
     """
-    last, found = 0.0, []
+    last, found = 0.0, list[float]()
     for here in states:
-        stable = [state.amplitude for state in here if state.stable]
-        last = min(stable, key=lambda a, last=last: abs(a - last)) if stable else np.nan
+        stable = np.array([state.amplitude for state in here if state.stable])
+        last = float(stable[np.abs(stable - last).argmin()]) if stable.size else np.nan
         found.append(last)
     return np.array(found)
 
@@ -175,14 +177,15 @@ def figure_sweep(states: Sequence[Sequence[SteadyState]], *, ax: Any = None) -> 
         Ascending frequencies.
     ax : Axes, optional
     """
-    ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
-    frequency = [here[0].angular_frequency for here in states]
-    show_states(ax, states, "0.6", "all answers")
-    ax.plot(frequency, 1e3 * swept(states), "-", color=BLUE, label="swept upwards")
-    ax.plot(frequency, 1e3 * swept(states[::-1])[::-1], "--", color=ORANGE, label="swept downwards")
-    ax.set_xlabel("excitation frequency $\\varpi$ / (rad/s)")
-    ax.set_ylabel("peak at the tip / mm")
-    ax.legend()
+    with style.context(STYLE):
+        ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
+        frequency = [here[0].angular_frequency for here in states]
+        show_states(ax, states, "0.6", "all answers")
+        ax.plot(frequency, 1e3 * swept(states), "-", color=BLUE, label="swept upwards")
+        ax.plot(frequency, 1e3 * swept(states[::-1])[::-1], "--", color=ORANGE, label="swept downwards")
+        ax.set_xlabel("excitation frequency $\\varpi$ / (rad/s)")
+        ax.set_ylabel("peak at the tip / mm")
+        ax.legend()
     return ax.figure
 
 
@@ -202,14 +205,15 @@ def figure_amplitude_map(
         Where rest loses its stability.
     ax : Axes, optional
     """
-    ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
-    mesh = ax.pcolormesh(frequency, epsilon, 1e3 * np.asarray(amplitude), cmap="cividis", shading="nearest")
-    ax.figure.colorbar(mesh, ax=ax, label="largest stable amplitude at the tip / mm")
-    for side in () if boundary is None else boundary:
-        ax.plot(side, epsilon, "-", color="white", linewidth=1.4)
-    ax.set_xlim(np.min(frequency), np.max(frequency))
-    ax.set_xlabel("excitation frequency $\\varpi$ / (rad/s)")
-    ax.set_ylabel("$\\epsilon$")
+    with style.context(STYLE):
+        ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
+        mesh = ax.pcolormesh(frequency, epsilon, 1e3 * np.asarray(amplitude), cmap="cividis", shading="nearest")
+        ax.figure.colorbar(mesh, ax=ax, label="largest stable amplitude at the tip / mm")
+        for side in () if boundary is None else boundary:
+            ax.plot(side, epsilon, "-", color="white", linewidth=1.4)
+        ax.set_xlim(np.min(frequency), np.max(frequency))
+        ax.set_xlabel("excitation frequency $\\varpi$ / (rad/s)")
+        ax.set_ylabel("$\\epsilon$")
     return ax.figure
 
 
@@ -224,22 +228,21 @@ def figure_backbone(
 ) -> Figure:
     """Draw the frequency of free vibration over its energy, with the turns at internal resonances.
 
-    Dotted: where the motion is unstable.
-
     Parameters
     ----------
     system : System, optional
-        Default: the nominal arm with k_t = 10 000 N/m and a joint that hardens.
+        Default: the nominal arm with k_t = 1000 N/m and a joint that hardens.
     mode, modes, points : int
         As in :func:`cra_sym.backbone`.
     ax : Axes, optional
     """
     system = cubic_joint(Arm.nominal().replace(k_t=1e3), _CUBIC) if system is None else system
     curve = backbone(system, mode, modes=modes, points=points)
-    ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
-    _show_curve(ax, curve)
-    ax.set_xlabel("energy / J")
-    ax.set_ylabel("frequency / Hz")
+    with style.context(STYLE):
+        ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
+        _show_curve(ax, curve)
+        ax.set_xlabel("energy / J")
+        ax.set_ylabel("frequency / Hz")
     return ax.figure
 
 
