@@ -63,7 +63,7 @@ def growth_rate(
         Whether the static flexibility of the modes left out is kept, for fluctuating stiffnesses of ends: few modes
         then do for what would take many. Without it the system is its first modes and nothing else.
     tolerance : float
-        Relative error of the monodromy matrix where stiffness alone oscillates; elsewhere it is rounding.
+        Relative error of the monodromy matrix.
     backend : {'auto', 'numpy', 'numba'}
         'auto' compiles for large charts if Numba is there, by the policy for frequencies.
 
@@ -89,7 +89,7 @@ def growth_rate(
     found = _taken(system, excitation, angular_frequency, epsilon, modes, residual)
     if isinstance(found, tuple):
         checks.choice("backend", backend, ("auto", "numpy"))
-        return periodic.growth_rate(*found)[()]
+        return periodic.growth_rate(*found, tolerance=tolerance)[()]
     return floquet.growth_rate(**found, tolerance=tolerance, loop=_loop(backend, found))[()]
 
 
@@ -128,7 +128,7 @@ def floquet_exponents(
     found = _taken(system, excitation, angular_frequency, epsilon, modes, residual)
     if isinstance(found, tuple):
         checks.choice("backend", backend, ("auto", "numpy"))
-        return periodic.floquet_exponents(*found)
+        return periodic.floquet_exponents(*found, tolerance=tolerance)
     return floquet.floquet_exponents(**found, tolerance=tolerance, loop=_loop(backend, found))
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import factorial
 from typing import Any
 
 import numpy as np
@@ -24,8 +25,8 @@ __all__ = ["PeriodicSystem", "Swing", "floquet_exponents", "growth_rate", "monod
 
 Array = NDArray[np.float64]
 _ORDER = 16
-_ANGLE = 1.0  # of a step, against the fastest motion: the series then ends below 1/17! = 3e-15
-_BLOCK = 512  # systems propagated together, small enough for the cache
+_STEPS = 100.0  # a period, whose errors add up: more where the fastest motion is faster, but its rate is a bound
+_BLOCK = 256  # systems propagated together, small enough for the cache
 
 
 @dataclass(frozen=True)
@@ -244,9 +245,11 @@ def propagated(system: PeriodicSystem, steps: int, order: int = _ORDER) -> Itera
         yield q, p
 
 
-def monodromy(system: PeriodicSystem) -> Array:
-    """Return the monodromy matrices of (q, p), shape (points, 2N, 2N)."""
-    steps = np.ceil(system.period * system.rate() / _ANGLE)
+def monodromy(system: PeriodicSystem, tolerance: float = 1e-8) -> Array:
+    """Return the monodromy matrices of (q, p), shape (points, 2N, 2N), for a relative error of about ``tolerance``."""
+    # a series of a motion with the rate 1 that ends with the term of this order leaves angle^n / n! of the next one
+    angle = min((tolerance / _STEPS * factorial(_ORDER + 1)) ** (1.0 / (_ORDER + 1)), 2.0)
+    steps = np.ceil(system.period * system.rate() / angle)
     if not (steps <= MOST_STEPS).all():
         raise ValueError(
             f"a period takes {steps.max():.2g} steps, must be at most {MOST_STEPS:g}: the excitation is too slow "
@@ -262,14 +265,14 @@ def monodromy(system: PeriodicSystem) -> Array:
     return out
 
 
-def growth_rate(*given: Any) -> Array:
+def growth_rate(*given: Any, tolerance: float = 1e-8) -> Array:
     """Return max(0, largest real part of the exponents), shape (...); arguments of :meth:`PeriodicSystem.of`."""
     system, shape = PeriodicSystem.of(*given)
-    return rate_of(monodromy(system), system.period).reshape(shape)
+    return rate_of(monodromy(system, tolerance), system.period).reshape(shape)
 
 
-def floquet_exponents(*given: Any) -> NDArray[np.complex128]:
+def floquet_exponents(*given: Any, tolerance: float = 1e-8) -> NDArray[np.complex128]:
     """Return all Floquet exponents, shape (..., 2N), largest real part first; arguments as :func:`growth_rate`."""
     system, shape = PeriodicSystem.of(*given)
-    exponents = exponents_of(monodromy(system), system.period)
+    exponents = exponents_of(monodromy(system, tolerance), system.period)
     return exponents.reshape(*shape, exponents.shape[-1])

@@ -467,3 +467,16 @@ def test_discs_hold_the_eigenvalues_of_every_matrix_within_the_error():
     found = np.linalg.eigvals(maps + other)
     assert (np.abs(found[:, :, None] - centres[:, None, :]) <= radii[:, None, :]).any(axis=2).all()
     assert np.median(radii) < 1e-2
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-8, 1e-12])
+def test_the_monodromy_matrix_is_as_accurate_as_it_is_asked_for(tolerance):
+    """Of random systems in which everything oscillates, against one of far smaller steps."""
+    rng = np.random.default_rng(11)
+    for _ in range(5):
+        random = [0.2 * rng.normal(size=(2, 2, 1)) for _ in range(5)]
+        swing = periodic.Swing(floquet.Oscillation(2, "sin", 0), np.array([0.4]), *random[:4])
+        still = np.diag(rng.uniform(1.0, 30.0, 2))[..., None]
+        system = periodic.PeriodicSystem(still, random[4], (swing,), np.array([2 * np.pi / rng.uniform(0.5, 5.0)]))
+        found, exact = periodic.monodromy(system, tolerance), periodic.monodromy(system, 1e-17)
+        assert np.abs(found - exact).max() < max(tolerance, 1e-12) * np.abs(exact).max()
