@@ -1,0 +1,138 @@
+"""Stability charts of other systems, proved charts and Timoshenko arms: ``python -m tests.benchmarks.charts``.
+
+Writes ``charts.json`` beside this file: what a chart of each system costs beside the arm's, in processor time of one
+run; how many points of two charts of the arm are proved, and how many against the growth rates; how many frequencies of
+random Timoshenko arms are proved, and how far outside the enclosures the solver's values lie.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+from importlib import metadata
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+import cra_sym as cra
+from cra_sym.symbols import L, t, v, x
+
+SIDE, MODES, SEED = 200, 3, 20261130
+EI, rhoA, rhoI, kGA, m, k, c, T, d = sp.symbols("EI rhoA rhoI kGA m k c T d")
+psi = sp.Function("psi")(x, t)
+PLACE: dict[str, Any] = {"x": x, "domain": (0, L), "t": t}
+SHEAR = rhoA * v.diff(t) ** 2 / 2 + rhoI * psi.diff(t) ** 2 / 2 - EI * psi.diff(x) ** 2 / 2
+TIMOSHENKO = cra.Model(
+    SHEAR - kGA * (v.diff(x) - psi) ** 2 / 2,
+    fields=[v, psi],
+    left=-k * v**2 / 2,
+    right=m * v.diff(t) ** 2 / 2,
+    essential=[psi.subs(x, 0)],
+    **PLACE,
+)
+DAMPED = cra.Model(
+    rhoA * v.diff(t) ** 2 / 2 - EI * v.diff(x, 2) ** 2 / 2,
+    fields=[v],
+    left=-k * v**2 / 2,
+    right=m * v.diff(t) ** 2 / 2,
+    essential=[v.diff(x).subs(x, 0)],
+    virtual_work=[(-d * v.diff(t), v, "right")],
+    **PLACE,
+)
+BELT = cra.Model(
+    rhoA * (v.diff(t) + c * v.diff(x)) ** 2 / 2 - T * v.diff(x) ** 2 / 2,
+    fields=[v],
+    essential=[v.subs(x, 0), v.subs(x, L)],
+    **PLACE,
+)
+
+
+def systems() -> dict[str, tuple[cra.System, cra.Fluctuation]]:
+    """Return the systems and what fluctuates."""
+    beam = {EI: 1.0, rhoA: 1.0, L: 1.0, m: 0.2, k: 1e3}
+    return {
+        "the arm": (cra.Arm.nominal().replace(k_t=1e3), cra.JointStiffness()),
+        "Timoshenko arm": (TIMOSHENKO.at({**beam, rhoI: 1e-3, kGA: 300.0}), cra.Fluctuation(k=1.0)),
+        "arm with a damper": (DAMPED.at({**beam, d: 0.05}), cra.Fluctuation(k=1.0)),
+        "moving belt": (BELT.at({rhoA: 1.0, c: 0.3, T: 1.0, L: 1.0}), cra.Fluctuation(T=1.0)),
+    }
+
+
+def chart(system: cra.System) -> tuple[np.ndarray, np.ndarray]:
+    """Return the excitation frequencies and the sizes of a chart."""
+    omega = 2 * np.pi * cra.natural_frequencies(system.conservative_part, MODES)
+    return np.linspace(omega[0], 2.2 * omega[-1], SIDE), np.linspace(0.0, 0.4, SIDE)[:, None]
+
+
+def costs() -> dict[str, float]:
+    """Return what a chart costs beside the arm's, in NumPy."""
+    found: dict[str, float] = {}
+    for name, (system, excitation) in systems().items():
+        at = chart(system)
+        cra.growth_rate(system, excitation, at[0][:2], 0.1, MODES, backend="numpy")
+        start = process_time()
+        cra.growth_rate(system, excitation, *at, MODES, backend="numpy")
+        found[name] = process_time() - start
+    return {name: round(seconds / found["the arm"], 2) for name, seconds in found.items()}
+
+
+def proofs() -> dict[str, dict[str, float]]:
+    """Return how much of two charts of the arm is proved, and how many points against the growth rates."""
+    arm = cra.Arm.nominal().replace(k_t=1e3)
+    found = {}
+    for excitation in (cra.JointStiffness(), cra.AxialBase(0.01)):
+        at = chart(arm)
+        start = process_time()
+        proved = cra.certify_stability(arm, excitation, *at, MODES)
+        seconds = process_time() - start
+        grown = cra.growth_rate(arm, excitation, *at, MODES, tolerance=1e-12)
+        against = ((proved == "stable") & (grown > 1e-7)) | ((proved == "unstable") & (grown == 0))
+        found[repr(excitation)] = {
+            "points": proved.size,
+            "decided": float((proved != "undecided").mean()),
+            "unstable": int((proved == "unstable").sum()),
+            "against the growth rates": int(against.sum()),
+            "processor s": round(seconds, 1),
+        }
+    return found
+
+
+def timoshenko(number: int = 1000, modes: int = 5) -> dict[str, float]:
+    """Return how many frequencies of random Timoshenko arms are proved."""
+    rng = np.random.default_rng(SEED)
+    spans = {rhoI: (-5, -2), kGA: (1.5, 4), m: (-3, 1), k: (0, 6)}
+    arms = TIMOSHENKO.at({EI: 1.0, rhoA: 1.0, L: 1.0} | {s: 10 ** rng.uniform(*e, number) for s, e in spans.items()})
+    frequency = cra.natural_frequencies(arms, modes)
+    start = process_time()
+    certificate = cra.certify(arms, modes)
+    seconds = process_time() - start
+    outside = np.maximum(frequency - certificate.upper, certificate.lower - frequency) / frequency
+    return {
+        "arms": number,
+        "modes": modes,
+        "proved": int(certificate.complete.sum()) * modes,
+        "widest enclosure, relative": float(np.nanmax((certificate.upper - certificate.lower) / frequency)),
+        "farthest solver value outside, relative": float(np.nanmax(outside)),
+        "processor s": round(seconds, 1),
+    }
+
+
+def main() -> dict[str, Any]:
+    """Measure, write and return all three."""
+    summary = {
+        "charts, times the arm's processor time": costs(),
+        "proved charts": proofs(),
+        "proved Timoshenko arms": timoshenko(),
+        "seed": SEED,
+        "versions": {name: metadata.version(name) for name in ("python-flint", "numpy", "sympy")},
+        "python": platform.python_version(),
+    }
+    Path(__file__).with_suffix(".json").write_text(json.dumps(summary, indent=1) + "\n")
+    return summary
+
+
+if __name__ == "__main__":
+    print(json.dumps(main(), indent=1))
