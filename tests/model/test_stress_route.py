@@ -212,3 +212,41 @@ def test_a_spring_too_soft_for_doubles_is_refused_in_words():
     )
     with pytest.raises(ValueError, match="only 1 natural frequencies below 1e14 times the first"):
         model.at({k: 1e-33}).natural_frequencies(3)
+
+
+PUBLISHED = {
+    (0.0036, 0.25, 1.0, 0.8): (3.0066, 9.6678, 33.5711, 72.3926, 126.1107),
+    (0.0036, 0.25, 0.8, 0.8): (3.2454, 9.6354, 33.8621, 72.6068, 125.6169),
+    (0.0036, 0.25, 0.8, 0.6): (3.3812, 8.1031, 28.3643, 59.8385, 100.2447),
+    (0.0036, 0.50, 1.0, 0.8): (2.9462, 9.9192, 33.2046, 71.4693, 116.7245),
+    (0.0036, 0.50, 0.8, 0.8): (3.1120, 10.0304, 32.9259, 71.7415, 116.3618),
+    (0.0036, 0.50, 0.8, 0.6): (3.2721, 9.3908, 27.4490, 64.0200, 102.6966),
+    (0.01, 0.25, 1.0, 0.8): (3.0009, 9.6192, 32.8407, 69.2292, 117.2380),
+    (0.01, 0.25, 0.8, 0.8): (3.2390, 9.5858, 33.1092, 69.4435, 116.7981),
+    (0.01, 0.25, 0.8, 0.6): (3.3744, 8.0784, 27.9139, 57.9705, 95.3698),
+    (0.01, 0.50, 1.0, 0.8): (2.9255, 9.7104, 30.7111, 61.7680, 95.6230),
+    (0.01, 0.50, 0.8, 0.8): (3.0908, 9.8086, 30.4643, 61.9117, 95.3257),
+}
+
+
+def test_published_stepped_timoshenko_beams():
+    """Table 1 of El-Sayed and Farghaly (Shock and Vibration 2017, 8186976), all digits.
+
+    The square of the radius of gyration over the length of the first span, place of the step, ratios of width and
+    height there; no end turns, the left one has a spring of 10 E I / L^3; shear factor 5/6, Poisson's ratio 0.3.
+    """
+    slenderness, place, width, height = sp.symbols("slenderness place width height")
+    area, bending = step(1, width * height, place), step(1, width * height**3, place)
+    gyration = slenderness * place**2
+    model = cra.Model(
+        timoshenko(bending, area / gyration / sp.Rational(312, 100), area, gyration * bending),
+        fields=[v, theta],
+        x=x,
+        domain=(0, 1),
+        t=t,
+        left=-5 * v**2,
+        essential=[theta.subs(x, 0), theta.subs(x, 1)],
+    )
+    values = dict(zip((slenderness, place, width, height), np.array(list(PUBLISHED)).T, strict=True))
+    found = model.at(values).natural_frequencies(5)
+    np.testing.assert_allclose(found, list(PUBLISHED.values()), rtol=0, atol=6e-5)
