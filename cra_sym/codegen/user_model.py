@@ -103,6 +103,7 @@ def _checks(made: Function, pair: list[sp.Expr], plain: list[sp.Expr]) -> Iterat
         inputs[0] = float(f"{inputs[0] * 10 ** rng.uniform(-2, 4):.6g}") if number else 0.0
         with mpmath.workdps(40):
             value, rate = (f(*map(mpmath.mpf, inputs)) for f in functions[:2])
+        with mpmath.workdps(120):  # near 0 the function as derived loses 60 digits
             beside = [mpmath.mpf(inputs[0] or 1e-15), *map(mpmath.mpf, inputs[1:])]  # as derived it is 0/0 at 0
             near, climb, whole, slope = (f(*beside) for f in functions)
             if abs(climb * whole - near * slope) > 1e-18 * (abs(climb * whole) + abs(near * slope)):

@@ -207,3 +207,14 @@ def test_a_missing_library_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "flint", None)
     with pytest.raises(ImportError, match=r"'cra_sym\[certify\]'"):
         cra.certify(cra.Arm.nominal())
+
+
+def test_a_frequency_that_is_a_float_is_enclosed():
+    """A string between fixed ends whose first frequencies are 1 and 2 Hz: the guess is the frequency itself."""
+    m, N = sp.symbols("m N", positive=True)
+    string = cra.Model(
+        m * v.diff(t) ** 2 / 2 - N * v.diff(x) ** 2 / 2,
+        fields=[v], x=x, domain=(0, 1), t=t, essential=[v.subs(x, 0), v.subs(x, 1)],
+    )  # fmt: skip
+    proved = cra.certify(string.at({m: 1.0, N: 4.0}), 2)
+    assert proved.complete and (proved.lower < [1.0, 2.0]).all() and (proved.upper > [1.0, 2.0]).all()
