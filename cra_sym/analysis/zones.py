@@ -125,7 +125,7 @@ def _paths_of_other_modes(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the sums over the modes j beyond the first ones of P_rj P_jt / omega_j^2 and / omega_j^4."""
     b = excitation.spring_displacements(system, modes)
-    weights = np.stack(np.broadcast_arrays(*(np.asarray(w) for w in excitation.weights.values())), axis=-1)
+    weights = np.stack(np.broadcast_arrays(*(excitation.weights[name] for name in excitation.springs(system))), axis=-1)
     first, last = (weights * b[..., mode] for mode in (row, target))
     second, fourth = (
         ((first[..., None, :] @ moment)[..., 0, :] * last).sum(axis=-1)

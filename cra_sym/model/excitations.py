@@ -209,7 +209,7 @@ class Fluctuation(Parametric):
         """Return what fluctuates between the first modes; an infinite stiffness does not."""
         totals: dict[str, Array] = {}
         used: dict[str, tuple[str, ...]] = {}
-        for name, weight in self.weights.items():
+        for name, weight in self._fluctuating(system).items():
             reason = "is not a parameter" if name not in system.values else system.numerics("fluctuation", name)
             if reason:
                 known = ", ".join(n for n in system.values if not system.numerics("fluctuation", n))
@@ -230,10 +230,14 @@ class Fluctuation(Parametric):
             totals["stiffness"] = totals["stiffness"] * (moving[..., :, None] & moving[..., None, :])
         return [Drive(_COSINE, **totals)]
 
+    def _fluctuating(self, system: System) -> dict[str, Value]:
+        """Return the weights but for those that are 0 of what the model has not."""
+        return {name: weight for name, weight in self.weights.items() if name in system.values or np.any(weight)}
+
     def springs(self, system: System) -> list[str]:
         """Return the fluctuating stiffnesses if all of them are stiffnesses of an end."""
-        known = system.numerics("stiffnesses")
-        return list(self.weights) if all(name in known for name in self.weights) else []
+        known, names = system.numerics("stiffnesses"), list(self._fluctuating(system))
+        return names if all(name in known for name in names) else []
 
     def spring_displacements(self, system: System, modes: int) -> Array:
         """Return sqrt(k) times the displacement of each spring in every mode, 1/s, shape (..., springs, modes)."""

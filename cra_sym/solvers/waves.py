@@ -71,7 +71,7 @@ def lowest_waves(
     Raises
     ------
     ValueError
-        If a structure has buckled, or has fewer natural frequencies than asked for.
+        If a structure has buckled, has fewer natural frequencies than asked for, or several of next to nothing.
 
     Examples
     --------
@@ -96,7 +96,21 @@ def lowest_waves(
                 result[part] = _block(function, modes)
             else:
                 _searched(search, function, result[part])
+            _check_range(function, result[part])
     return result
+
+
+def _check_range(function: Determinant, squares: Floats) -> None:
+    """Refuse several frequencies of next to nothing: the determinant has their product."""
+    least = function.branch(1.0)[:, None]
+    least = np.where((least > 0.0) & (least < np.inf), least, 1.0)
+    if (squares[:, :1] > 1e-90 * least).all():
+        return
+    positive = (squares > 0.0) | (np.arange(squares.shape[1]) >= function.zeros[:, None])
+    for together, share in ((2, 1e-140), (3, 1e-95)):
+        small = squares < share * least
+        if ((small.sum(axis=1) >= together) & (small & positive).any(axis=1)).any():
+            raise ValueError(f"values: several motions have less than {share:g} of the line's own omega^2; take 0")
 
 
 def _searched(search: Search, function: Determinant, result: Floats) -> None:

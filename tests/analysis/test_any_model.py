@@ -156,3 +156,18 @@ def test_no_accuracy_is_told_where_none_is_estimated():
     density = energy(stiffness=EI * (1 + x)) - k * v.diff(x, 3) ** 2 / 2
     system = beam(density=density, essential=[v.subs(x, 0), v.diff(x).subs(x, 0)]).at({**BEAM, k: 0.1})
     assert np.isnan(system.accuracy)
+
+
+def test_a_weight_of_zero_asks_for_no_parameter():
+    """A joint that fluctuates in k_t alone is that of a model without k_r; a weight that is not 0 names it."""
+    k_t = sp.Symbol("k_t")
+    model = cra.Model(
+        rhoA * v.diff(t) ** 2 / 2 - EI * v.diff(x, 2) ** 2 / 2,
+        fields=[v], x=x, domain=(0, L), t=t, left=-k_t * v**2 / 2, essential=[v.diff(x).subs(x, 0)],
+    )  # fmt: skip
+    system = model.at({rhoA: 1.0, EI: 1.0, L: 1.0, k_t: 10.0})
+    for order in (1, 2):
+        found = cra.stability_boundary(system, cra.JointStiffness(), 0.1, (1, 1), order=order)
+        assert found == cra.stability_boundary(system, cra.Fluctuation(k_t=1.0), 0.1, (1, 1), order=order)
+    with pytest.raises(ValueError, match="k_r is not a parameter; must be one of"):
+        cra.stability_boundary(system, cra.JointStiffness(1.0, 0.5), 0.1, (1, 1))

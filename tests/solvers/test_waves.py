@@ -336,3 +336,15 @@ def test_wrong_structures_are_named(given, message):
     parts = problem.length, problem.odd_by_even, problem.even_by_odd, problem.stiffness, problem.mass
     with pytest.raises(ValueError, match=message):
         UniformProblem(*parts, **given)
+
+
+@pytest.mark.parametrize("stiffness", [1e-120, 1e-160, 1e-300])
+def test_springs_of_next_to_nothing(stiffness):
+    """One frequency of next to nothing is right; the determinant has no room for the product of two."""
+    z = one(beams((stiffness, INF), tension=2.0, right_mass=(0.3, 0.0)), 3)
+    np.testing.assert_allclose(z[0], stiffness / 1.3, rtol=1e-13)
+    if stiffness < 1e-150:
+        with pytest.raises(ValueError, match="several motions have less than 1e-140 of the line's own"):
+            one(beams((stiffness, 0.0), (0.0, stiffness), foundation=0.0), 3)
+        with pytest.raises(ValueError, match="take 0"):
+            one(beams((stiffness, 0.0)), 3)
