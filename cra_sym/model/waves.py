@@ -134,7 +134,10 @@ class Waves:
         def part(rows: slice) -> None:
             squares[rows] = lowest_waves(problem.take(rows), squares.shape[1], search, self._functions)
 
-        in_parts(part, len(squares), squares.shape[1], threads=None, compiled=search is not None)
+        if search is None:
+            part(slice(None))
+        else:
+            in_parts(part, len(squares), squares.shape[1], threads=None, compiled=True)
 
     def _states(self, columns: Array, problem: UniformProblem, z: Array, x: Array) -> Array:
         """Return the state of every mode at places x (rows, stations), shape (rows, modes, stations, 2 n)."""

@@ -123,9 +123,13 @@ def _operator(sign: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
     def forward(self: Term, other: Any) -> Any:
         if isinstance(other, Exact):
             return NotImplemented  # which knows what is idle
+        if sign in "*/" and isinstance(other, float) and other == 1.0:
+            return self
         return self._new(f"{self.name} {sign} {_written(other)}")
 
     def backward(self: Term, other: Any) -> Any:
+        if sign == "*" and isinstance(other, float) and other == 1.0:
+            return self
         return self._new(f"{_written(other)} {sign} {self.name}")
 
     return forward, backward

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from .waves_count import Determinant, Functions, direct, formulas, kept
-from .waves_kernel import wave
+from .waves_kernel import rising, turning, wave
 from .waves_problem import Floats, Integers, Structure, UniformProblem, negative_energy, rigid_motions
 
 __all__ = [
@@ -25,11 +25,16 @@ __all__ = [
 
 _BLOCK = 8192  # rows whose temporaries stay in the processor's cache
 _COMPILED_BLOCK = 8192
+_SHRINK = 0.8
 _MOST_STEPS = 400
 _EPS = float(np.finfo(float).eps)
 
 
-QUICK: dict[str, Callable[..., Any]] = {"_wave": lambda k, i, m: wave(m)}
+QUICK: dict[str, Callable[..., Any]] = {
+    "_wave": lambda k, i, m: wave(m),
+    "_rising": lambda k, i, m: rising(m),
+    "_turning": lambda k, i, m: turning(m),
+}
 """What may replace functions of `formulas` where all lanes are looked at together."""
 
 Search = Callable[[Floats, Integers, Floats, Integers], int]
@@ -271,7 +276,7 @@ def _interpolated(
         on = np.flatnonzero(place < z.size)
         if not on.size:
             return z
-        if on.size < 0.8 * place.size:
+        if on.size < _SHRINK * place.size:
             function, place, sign, share = function.take(on), place[on], sign[on], share[on]
             x1, x2, f1, f2 = x1[on], x2[on], f1[on], f2[on]
     raise ArithmeticError("the search for natural frequencies did not settle")

@@ -220,7 +220,8 @@ def formulas(structure: Structure, known: tuple[int | None, ...], kinds: tuple[s
     kinds that `Determinant` needs.
     """
     functions = _functions(structure, kinds or KINDS[max(structure.sizes)])
-    texts = [straight("_wave", lambda _, m: kernel.wave_anywhere(m), ["m"])]
+    waves = {"_wave": kernel.wave_anywhere, "_rising": kernel.rising, "_turning": kernel.turning}
+    texts = [straight(name, lambda _, m, function=function: function(m), ["m"]) for name, function in waves.items()]
     texts += [straight(name, function, ["z"], known) for name, function in functions.items()]
     return "\n\n\n".join(texts) + "\n"
 

@@ -21,6 +21,8 @@ from operator import add
 import numpy as np
 from numpy import cos, exp, sin
 
+from .straight import Exact
+
 
 def where(condition, value, otherwise):
     """Return one of two, lane by lane; a condition that is known beforehand leaves the other out."""
@@ -72,12 +74,9 @@ def wave(m):
     if hasattr(m, "called"):
         return m.called("_wave", 2)
     if isinstance(m, np.ndarray) and (m > 0.25).all():
-        size = np.sqrt(m)
-        twice = 0.5 * exp(-2.0 * size)
-        return 0.5 + twice, (0.5 - twice) / size
+        return rising(m)
     if isinstance(m, np.ndarray) and (m < -0.25).all():
-        size = np.sqrt(-m)
-        return cos(size), sin(size) / size
+        return turning(m)
     return wave_anywhere(m)
 
 
@@ -88,6 +87,26 @@ def wave_anywhere(m):
     twice = 0.5 * decay * decay
     apart = where(m > 0.0, 0.5 - twice, sin(size)) / size
     return where(m > 0.0, 0.5 + twice, cos(size)), where((m < 0.25) & (m > -0.25), decay * small_sinh(m), apart)
+
+
+def rising(m):
+    """Return what `wave` does for positive m."""
+    size = np.sqrt(m)
+    decay = exp(-size)
+    twice, small = 0.5 * decay * decay, m < 0.25
+    apart = (0.5 - twice) / size
+    if isinstance(small, np.ndarray) and not small.any():
+        return 0.5 + twice, apart
+    return 0.5 + twice, where(small, decay * small_sinh(m), apart)
+
+
+def turning(m):
+    """Return what `wave` does for negative m."""
+    size, small = np.sqrt(-m), m > -0.25
+    apart = sin(size) / size
+    if isinstance(small, np.ndarray) and not small.any():
+        return cos(size), apart
+    return cos(size), where(small, small_sinh(m), apart)
 
 
 def small_sinh(m):
@@ -153,9 +172,13 @@ def eigenvalues(half, product, square):
 def multiple(m, v1, v2, u1, u2):
     """Return t of ``m v = t u`` for vectors that are parallel, from the component that cancels least."""
     m11, m12, m21, m22 = m
-    first, second = m11 * v1 + m12 * v2, m21 * v1 + m22 * v2
-    size1, size2 = abs(m11 * v1) + abs(m12 * v2), abs(m21 * v1) + abs(m22 * v2)
-    take_first = (abs(first) * size2 > abs(second) * size1) | (size2 == 0.0)
+    terms = (m11 * v1, m12 * v2), (m21 * v1, m22 * v2)
+    first, second = (one + other for one, other in terms)
+    if all(isinstance(one, Exact) or isinstance(other, Exact) for one, other in terms):
+        take_first = second == 0.0  # nothing cancels
+    else:
+        size1, size2 = (abs(one) + abs(other) for one, other in terms)
+        take_first = (abs(first) * size2 > abs(second) * size1) | (size2 == 0.0)
     return where(take_first, first, second) / where(take_first, u1, u2)
 
 
@@ -310,12 +333,10 @@ def waves_of_both_signs(big, small):
     """Return what `wave` does for two m of which one is positive and the other negative."""
     first = big > 0.0
     positive, negative = where(first, big, small), where(first, small, big)
-    size_p, size_n = np.sqrt(positive), np.sqrt(-negative)
-    decay = exp(-size_p)
-    twice = 0.5 * decay * decay
-    grown_c, grown_s = 0.5 + twice, where(positive < 0.25, decay * small_sinh(positive), (0.5 - twice) / size_p)
-    turned_c, turned_s = cos(size_n), where(negative > -0.25, small_sinh(negative), sin(size_n) / size_n)
-    pairs = (grown_c, grown_s), (turned_c, turned_s)
+    if hasattr(positive, "called"):
+        pairs = positive.called("_rising", 2), negative.called("_turning", 2)
+    else:
+        pairs = rising(positive), turning(negative)
     return (*where(first, pairs[0], pairs[1]), *where(first, pairs[1], pairs[0]))
 
 
