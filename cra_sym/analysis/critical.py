@@ -165,16 +165,21 @@ class _Search:
             below, above = self._bracket(below, above, number)
         s = self._growing(self._at(above, 1))
         kind: Kind = "divergence" if s.imag == 0.0 else "flutter"
-        before, value = np.inf, np.nan
+        before, value, least = np.inf, np.nan, np.inf
         for level in range(1, _MESHES):
             try:
                 value = self._zero(kind, s, below, above, level)
             except _FinestError:
                 break
-            if abs(value - before) <= self._tolerance * max(abs(value), 1e-6 * (high - low)):
+            error = abs(value - before) / max(abs(value), 1e-6 * (high - low))
+            least = min(least, error)
+            if error <= self._tolerance:
                 return value, kind, self._omega(kind, s, self._at(value, level))
             before = value
-        raise ArithmeticError(f"{self._name}: the critical value near {value:.6g} does not settle; ask for fewer modes")
+        raise ValueError(
+            f"{self._name}: the critical value near {value:.6g} settles to {least:.1g} only; a tolerance of the system "
+            f"of {2 * least:.1g} accepts that"
+        )
 
     @staticmethod
     def _omega(kind: Kind, s: complex, state: _State) -> float:

@@ -73,6 +73,17 @@ def test_becks_column():
     assert_allclose(found.angular_frequency**2, 121.3425101405, rtol=1e-8)
 
 
+def test_a_force_that_follows_in_part():
+    """Divergence at cos(sqrt P) = a/(a - 1) for a share a below 1/2 that follows, flutter beyond (Bolotin 1963)."""
+    share = sp.Symbol("share")
+    column = model(virtual_work=[(-share * P * v.diff(x), v, "right")])
+    shares = np.array([0.0, 0.3, 0.49, 0.51, 1.0])
+    found = cra.critical_value(column.at({P: 0, share: shares}), P, between=(0, 60))
+    assert found.kind.tolist() == ["divergence"] * 3 + ["flutter"] * 2
+    assert_allclose(found.value[:3], np.arccos(shares[:3] / (shares[:3] - 1)) ** 2, rtol=ACCURACY)
+    assert_allclose(found.value[3], 16.05, atol=0.02)
+
+
 def test_leipholz_column():
     """Distributed follower load: 40.05; between elements that flutter and elements that do not."""
     column = model(BEAM + HALF * P * (1 - x) * v.diff(x) ** 2, virtual_work=[(-P * v.diff(x), v, "domain")])
@@ -123,6 +134,8 @@ def test_little_internal_damping_lowers_becks_load():
     damped = model(virtual_work=work)
     found = cra.critical_value(damped.at({P: 0, tau: [1e-3, 1e-5]}), P, between=(0, 30))
     assert_allclose(found.value, 10.94, atol=0.01)
+    little = damped.at({P: 0, tau: 1e-8}, tolerance=1e-4)  # the growth that decides is 1e-8 of P: near rounding
+    assert_allclose(cra.critical_value(little, P, between=(0, 30)).value, 10.94, atol=0.01)
     # the root passes the imaginary axis there
     s = damped.eigenvalues({P: found.value[0] * (1 + np.array([-1e-4, 1e-4])), tau: 1e-3}, 2)
     assert s.real.max(axis=1)[0] < 0 < s.real.max(axis=1)[1]
