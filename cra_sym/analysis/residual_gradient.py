@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.analysis.differences import by_differences
 from cra_sym.analysis.modes import participation
 from cra_sym.analysis.responses import History, Stopped, residual_vibration, stopped
 from cra_sym.analysis.sensitivities import Sensitivities, sensitivities
@@ -24,8 +25,6 @@ __all__ = ["residual_vibration_gradient"]
 
 Array = NDArray[np.float64]
 _TINY = 1e-30  # an imaginary part whose square is nothing
-_STEP = 0.02  # of the differences, over the change of the parameter at which two modes would meet
-_POINTS = 8  # on one side of a parameter that cannot be negative, or four on each side
 
 
 @default_floating_point
@@ -129,7 +128,13 @@ def _rates(
     given = np.broadcast_to(system.values[name], system.shape)
     change = _along_the_mode(system, cause, name, modes, compliance=compliance)
     if change is None:
-        change = _by_differences(system, cause, found, name, modes, compliance=compliance)
+        change = by_differences(
+            system,
+            found,
+            name,
+            lambda moved: participation(moved, modes, cause) * moved.modes(modes).displacement(1, 0),
+            compliance=compliance,
+        )
     held = np.isinf(given)[..., None] & (not compliance)
     absent = (given == 0)[..., None] & compliance
     return np.where(held, 0.0, np.where(absent, np.nan, change)), np.where(held, 0.0, logarithmic)
@@ -154,79 +159,3 @@ def _along_the_mode(system: System, cause: str, name: str, modes: int, *, compli
     unit = np.asarray(factor.function(*system.domain.values))
     share = load.share.function(*system.domain.values) * (1 / unit if compliance else unit)
     return -column(np.asarray(share)) * change
-
-
-def _by_differences(
-    system: System, cause: str, found: Sensitivities, name: str, modes: int, *, compliance: bool
-) -> Array:
-    """Return the derivative of Gamma_i phi_i(L) by differences, of a stiff spring in its compliance."""
-    given = np.broadcast_to(system.values[name], system.shape)
-    if compliance or name not in found.compliance:
-        return _differences(system, cause, found, name, modes, compliance=compliance)
-    stiff = given > _own_stiffness(system, name)
-    total = np.zeros((*system.shape, modes))
-    if not stiff.all():
-        total = _differences(system, cause, found, name, modes, compliance=False)
-    if stiff.any():
-        with np.errstate(divide="ignore"):
-            slope = -((1 / given) ** 2)[..., None]
-        total = np.where(
-            stiff[..., None], slope * _differences(system, cause, found, name, modes, compliance=True), total
-        )
-    return total
-
-
-def _own_stiffness(system: System, name: str) -> Array:
-    """Return the stiffness beside which the structure gives as much as a spring of an end, shape of the batch."""
-    rigid = system.replace(**{name: np.inf})
-    end, place, factor = system.numerics("stiffnesses")[name]
-    force, unit = rigid.modes(1).force(end, place)[..., 0], factor.function(*rigid.domain.values)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.broadcast_to((force / rigid.natural_frequencies(1)[..., 0]) ** 2 / unit, system.shape)
-
-
-def _reach(frequency: Array, rate: Array, place: Array) -> Array:
-    """Return how far a parameter may go before modes meet or become rigid-body motions, to first order.
-
-    In the complex plane of the parameter the modes are analytic up to about there.
-    """
-    squares = frequency**2
-    slopes = np.where(np.isfinite(rate), np.abs(2 * frequency * rate), 0.0)
-    gaps = np.abs(squares[..., :, None] - squares[..., None, :])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        meeting = gaps / (slopes[..., :, None] + slopes[..., None, :])
-        falling = squares / slopes
-    own = np.eye(squares.shape[-1], dtype=bool)
-    meeting = np.where(own | ~(gaps > 0) | np.isnan(meeting), np.inf, meeting)
-    falling = np.where(squares > 0, falling, np.inf)
-    reach = np.minimum(meeting.min(axis=(-2, -1)), falling.min(axis=-1))
-    return np.where(np.isfinite(reach), reach, np.where(place > 0, place, 1.0))
-
-
-def _differences(system: System, cause: str, found: Sensitivities, name: str, modes: int, *, compliance: bool) -> Array:
-    """Return the derivative of Gamma_i phi_i(L) by differences: central where the parameter allows, else one-sided."""
-    given = np.broadcast_to(system.values[name], system.shape)
-    with np.errstate(divide="ignore"):
-        place = 1 / given if compliance else given
-    fixed = np.isinf(place)  # nothing to differ from; the caller knows the answer
-    place = np.where(fixed, 1.0, place)
-    step = _STEP * _reach(found.frequency, found.compliance[name] if compliance else found.rate[name], place)
-    half = _POINTS // 2
-    room = np.floor(place / step).clip(0, half)
-    offsets = np.arange(-half, half + 1)[:, *(None,) * place.ndim] + (half - room)
-    values = place + offsets * step
-    with np.errstate(divide="ignore"):
-        moved = system.replace(**{name: 1 / values if compliance else values})
-    products = participation(moved, modes, cause) * moved.modes(modes).displacement(1, 0)
-    weights = _weights(offsets)
-    return np.asarray((weights[..., None] * products).sum(axis=0) / step[..., None])
-
-
-def _weights(offsets: Array) -> Array:
-    """Return the weights of the derivative at 0 of the polynomial through values at offsets (points, ...)."""
-    points = len(offsets)
-    orders = np.arange(points, dtype=float).reshape(-1, *(1,) * offsets.ndim)
-    powers = np.moveaxis(np.power(offsets, orders), (0, 1), (-2, -1))
-    slope = np.zeros((*powers.shape[:-2], points, 1))
-    slope[..., 1, 0] = 1.0
-    return np.moveaxis(np.linalg.solve(powers, slope)[..., 0], -1, 0)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import count, default_floating_point, instance, names
+from cra_sym.analysis.differences import by_differences
+from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
+from cra_sym.checks import choice, count, default_floating_point, instance, names, one_axis
 from cra_sym.model.one_wave import Change, OneWaveModes
 from cra_sym.model.projection import Projected, column
 from cra_sym.model.system import MOST_MODES, System
@@ -110,6 +112,83 @@ class Sensitivities:
         return [*super().__dir__(), *names, *(f"df_d{name.replace('k_', 'c_', 1)}" for name in self.compliance)]
 
     # ------------------------------------------------------------------------------------------------------------
+
+    def shapes(self, name: str, x: Any, *, field: Any = None) -> Array:
+        """Return the derivatives of the mass-normalised mode shapes by a parameter at places.
+
+        Places keep their distance from the left end over the length. By an infinite stiffness it is 0; where a
+        frequency is repeated there is none, and it is nan. Differences of eighth order: the error is about 1e-10 of the
+        largest shape over the value of the parameter.
+
+        Parameters
+        ----------
+        name : str
+            One of those asked for.
+        x : array_like
+            Places in the domain, m: a number or one axis.
+        field : applied undefined function, optional
+            Default: the first.
+
+        Returns
+        -------
+        ndarray, shape (..., modes) or (..., modes, x)
+
+        Raises
+        ------
+        TypeError, ValueError
+            If the name was not asked for, or a place or the field is not of the system.
+
+        Examples
+        --------
+        >>> from cra_sym import Arm, mode_shapes
+        >>> arm = Arm.nominal().replace(m_e=0.0)
+        >>> change = sensitivities(arm, 2).shapes("rho", 1.0)
+        >>> bool(np.allclose(change, -mode_shapes(arm, 1.0, 2) / (2 * arm.rho)))  # the mass is normalised
+        True
+        """
+        points = one_axis("x", x, "places", unit="m")
+        check_places(self._system, points)
+        domain = self._system.domain
+        share = (np.atleast_1d(points) - column(domain.left)) / column(domain.length)
+
+        def at(system: System) -> Array:
+            there = column(system.domain.left) + share * column(system.domain.length)
+            return system.modes(self._modes).shape(section_place(system, field), 0, there)
+
+        found = self._changed(name, at)
+        return found if points.ndim else found[..., 0]
+
+    def participation(self, name: str, motion: str | None = None) -> Array:
+        """Return the derivatives of the participation factors by a parameter, shape (..., modes).
+
+        Parameters
+        ----------
+        name : str
+            One of those asked for.
+        motion : str, optional
+            Name of a prescribed motion or force; by default the only prescribed motion.
+
+        Raises
+        ------
+        ValueError
+            If the name was not asked for, or nothing of that name drives the model.
+        """
+        causes = dict(self._system.numerics("causes"))
+        driver = only_motion(self._system) if motion is None else choice("motion", motion, causes)
+        return self._changed(name, lambda system: participation(system, self._modes, driver))
+
+    def _changed(self, name: str, quantity: Callable[[System], Array]) -> Array:
+        """Return the derivative of a modal quantity of shape (..., modes, ...)."""
+        choice("name", name, self._by)
+        more = Sensitivities(self._system, self._modes + 1, [name])  # the next mode may be close to the last one
+        found = by_differences(self._system, more, name, quantity)
+        none = np.zeros(self.frequency.shape, dtype=bool)
+        if self._repeated is not None:
+            none = np.asarray(self._repeated[..., : self._modes, :].any(axis=-1))
+        rigid = np.isinf(column(np.asarray(self._system.values[name]))) | none
+        extra = (None,) * (found.ndim - self.frequency.ndim)
+        return np.where(np.broadcast_to(none, rigid.shape)[(..., *extra)], np.nan,
+                        np.where(rigid[(..., *extra)], 0.0, found))  # fmt: skip
 
     @cached_property
     def _forms(self) -> Projected:

@@ -12,6 +12,7 @@ import cra_sym as cra
 from cra_sym import Arm
 from cra_sym.paper.modes import frequency_function
 from cra_sym.paper.oracles.implicit_rates import implicit_rates
+from tests.systems import system
 
 FIELDS = ("k_t", "k_r", "m_e", "J_e", "L", "b", "h", "E", "rho")
 ELASTIC = Arm.nominal().replace(k_t=2e3, k_r=60.0, m_e=0.02, J_e=2e-4)
@@ -126,3 +127,57 @@ def test_bad_input_is_named(arguments):
     (name,) = arguments
     with pytest.raises((TypeError, ValueError), match=f"{name} = "):
         cra.sensitivities(Arm.nominal(), **arguments)
+
+
+def test_shapes_and_participation_follow_a_spring_as_along_the_frequency_equation():
+    """Gamma_i phi_i(L) by closed form; the sum of what both do, by differences of eighth order."""
+    arm = Arm.nominal().replace(L=1.1, k_t=[8e2, 2e4], k_r=60.0, m_e=0.03, J_e=1e-4)
+    found, modal = cra.sensitivities(arm, 3), cra.modal_parameters(arm, 3)
+    for name, channel in (("k_t", (0, 0)), ("k_r", (0, 1)), ("m_e", (1, 0)), ("J_e", (1, 1))):
+        both = found.participation(name) * modal.tip_displacement + modal.participation * found.shapes(name, arm.L)
+        by = "inertia" if channel[0] else "stiffness"
+        end, place, factor = arm.numerics("inertias" if channel[0] else "stiffnesses")[name]
+        assert (end, place) == channel
+        exact, _ = arm.modes(3).product_rates(1, 0, channel, by)
+        share = arm.numerics("load", "w").share.function(*arm.domain.values)
+        exact = -np.asarray(share * factor.function(*arm.domain.values))[..., None] * exact
+        value = np.broadcast_to(arm.values[name], (2,))[:, None]
+        size = np.abs(modal.participation * modal.tip_displacement).max()
+        np.testing.assert_allclose(value * both, value * exact, rtol=0, atol=1e-9 * size, err_msg=name)
+
+
+@pytest.mark.parametrize("name", ["Timoshenko beam", "gantry", "hanging beam"])
+def test_shapes_of_any_system_follow_every_parameter(name):
+    """Against central differences extrapolated to no step, at places and for every field."""
+    system_ = system(name)
+    found = cra.sensitivities(system_, 2)
+    share = np.array([0.0, 0.31, 1.0])
+    for parameter in system_.values:
+        steps = []
+        for size in (2e-3, 1e-3):
+            moved = [system_.replace(**{parameter: system_.values[parameter] * (1 + s * size)}) for s in (1, -1)]
+            up, down = (cra.mode_shapes(one, share * one.values["l"], 2) for one in moved)
+            gamma = [cra.modal_parameters(one, 2).participation for one in moved]
+            steps.append((up - down, gamma[0] - gamma[1], 2 * size * system_.values[parameter]))
+        (up2, gamma2, h2), (up1, gamma1, h1) = steps
+        shape, gamma = (4 * up1 / h1 - up2 / h2) / 3, (4 * gamma1 / h1 - gamma2 / h2) / 3
+        size = np.abs(cra.mode_shapes(system_, 1.2, 2)).max() / system_.values[parameter]
+        # the fourth power of a step of 2e-3, times what a fifth derivative may be
+        np.testing.assert_allclose(found.shapes(parameter, share * 1.2), shape, rtol=0, atol=1e-7 * size)
+        np.testing.assert_allclose(found.participation(parameter), gamma, rtol=0, atol=1e-7 * size)
+
+
+def test_the_mass_alone_scales_shapes():
+    """Exact: without an end mass shapes go with the inverse root of the mass, participation with its root."""
+    arm = Arm.nominal().replace(m_e=0.0, k_t=1e3, k_r=40.0)
+    found, x = cra.sensitivities(arm, 3), np.linspace(0, 1, 5)
+    exact = -cra.mode_shapes(arm, x, 3) / (2 * arm.rho)
+    np.testing.assert_allclose(found.shapes("rho", x), exact, rtol=0, atol=1e-9 * np.abs(exact).max())
+    gamma = cra.modal_parameters(arm, 3).participation / (2 * arm.rho)
+    np.testing.assert_allclose(found.participation("rho"), gamma, rtol=1e-9)
+    rigid = cra.sensitivities(Arm.nominal(), 2)
+    assert not rigid.shapes("k_t", 1.0).any() and rigid.participation("k_r").shape == (2,)
+    with pytest.raises(ValueError, match="name = 'A': must be one of L"):
+        found.shapes("A", 0.5)
+    with pytest.raises(ValueError, match="x = 2 must be in the domain"):
+        found.shapes("rho", 2.0)

@@ -1,0 +1,118 @@
+"""Derivatives of modal quantities by a parameter, as differences of eighth order with a step that the modes allow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.model.system import System
+
+if TYPE_CHECKING:
+    from cra_sym.analysis.sensitivities import Sensitivities
+
+__all__ = ["by_differences"]
+
+Array = NDArray[np.float64]
+Quantity = Callable[[System], Array]
+_STEP = 0.02  # of the differences, over the change of the parameter at which two modes would meet
+_POINTS = 8  # on one side of a parameter that cannot be negative, or four on each side
+
+
+def by_differences(
+    system: System, found: Sensitivities, name: str, quantity: Quantity, *, compliance: bool = False
+) -> Array:
+    """Return the derivative of a modal quantity by a parameter, of a stiff spring of an end by way of its compliance.
+
+    Parameters
+    ----------
+    system : System
+    found : Sensitivities
+        Of the modes the quantity is of, and of the next one, which may be close to the last.
+    name : str
+    quantity : callable
+        Takes a system, returns an array of shape (..., modes, ...) that begins with the shape of the batch.
+    compliance : bool
+        Whether the derivative is by one over the stiffness.
+
+    Returns
+    -------
+    ndarray
+        As the quantity; its relative error is about 1e-11.
+    """
+    given = np.broadcast_to(system.values[name], system.shape)
+    if compliance or name not in found.compliance:
+        return _differences(system, found, name, quantity, compliance=compliance)
+    stiff = given > _own_stiffness(system, name)
+    if not stiff.any():
+        return _differences(system, found, name, quantity, compliance=False)
+    by_compliance = _differences(system, found, name, quantity, compliance=True)
+    more = (None,) * (by_compliance.ndim - given.ndim)
+    with np.errstate(divide="ignore"):
+        total = -((1 / given) ** 2)[(..., *more)] * by_compliance
+    if not stiff.all():
+        soft = _differences(system, found, name, quantity, compliance=False)
+        total = np.where(stiff[(..., *more)], total, soft)
+    return np.asarray(total)
+
+
+def _own_stiffness(system: System, name: str) -> Array:
+    """Return the stiffness beside which the structure gives as much as a spring of an end, shape of the batch."""
+    rigid = system.replace(**{name: np.inf})
+    end, place, factor = system.numerics("stiffnesses")[name]
+    force, unit = rigid.modes(1).force(end, place)[..., 0], factor.function(*rigid.domain.values)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.broadcast_to((force / rigid.natural_frequencies(1)[..., 0]) ** 2 / unit, system.shape)
+
+
+def _reach(frequency: Array, rate: Array, place: Array) -> Array:
+    """Return how far a parameter may go before modes meet or become rigid-body motions, to first order.
+
+    In the complex plane of the parameter the modes are analytic up to about there.
+    """
+    squares = frequency**2
+    slopes = np.where(np.isfinite(rate), np.abs(2 * frequency * rate), 0.0)
+    gaps = np.abs(squares[..., :, None] - squares[..., None, :])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        meeting = gaps / (slopes[..., :, None] + slopes[..., None, :])
+        falling = squares / slopes
+    own = np.eye(squares.shape[-1], dtype=bool)
+    meeting = np.where(own | ~(gaps > 0) | np.isnan(meeting), np.inf, meeting)
+    falling = np.where(squares > 0, falling, np.inf)
+    reach = np.minimum(meeting.min(axis=(-2, -1)), falling.min(axis=-1))
+    return np.where(np.isfinite(reach), reach, np.where(place > 0, place, 1.0))
+
+
+def _differences(system: System, found: Sensitivities, name: str, quantity: Quantity, *, compliance: bool) -> Array:
+    """Return the derivative by differences: central where the parameter allows, else one-sided."""
+    given = np.broadcast_to(system.values[name], system.shape)
+    with np.errstate(divide="ignore"):
+        place = 1 / given if compliance else given
+    fixed = np.isinf(place)  # nothing to differ from; the caller knows the answer
+    place = np.where(fixed, 1.0, place)
+    reach = _reach(found.frequency, found.compliance[name] if compliance else found.rate[name], place)
+    if not compliance and name not in {*system.numerics("stiffnesses"), *system.numerics("inertias")}:
+        reach = np.where(place == 0, reach, np.minimum(reach, np.abs(place)))  # such as a density: nothing beyond 0
+    step = _STEP * reach
+    half = _POINTS // 2
+    room = np.floor(place / step).clip(0, half)
+    offsets = np.arange(-half, half + 1)[:, *(None,) * place.ndim] + (half - room)
+    values = place + offsets * step
+    with np.errstate(divide="ignore"):
+        moved = system.replace(**{name: 1 / values if compliance else values})
+    values_there = quantity(moved)
+    more = (None,) * (values_there.ndim - offsets.ndim)
+    weights = _weights(offsets) / step
+    return np.asarray((weights[(..., *more)] * values_there).sum(axis=0))
+
+
+def _weights(offsets: Array) -> Array:
+    """Return the weights of the derivative at 0 of the polynomial through values at offsets (points, ...)."""
+    points = len(offsets)
+    orders = np.arange(points, dtype=float).reshape(-1, *(1,) * offsets.ndim)
+    powers = np.moveaxis(np.power(offsets, orders), (0, 1), (-2, -1))
+    slope = np.zeros((*powers.shape[:-2], points, 1))
+    slope[..., 1, 0] = 1.0
+    return np.moveaxis(np.linalg.solve(powers, slope)[..., 0], -1, 0)
