@@ -79,7 +79,9 @@ def critical_value(
     ------
     TypeError, ValueError
         If the parameter is unknown, the interval is not one, the system is unstable at its lower end, or stable at all
-        values that are tried.
+        values that are tried; if the critical value does not settle to the tolerance of the system: says to which.
+    ArithmeticError
+        If more than one eigenvalue crosses in a bracket that cannot be narrowed.
 
     Notes
     -----
