@@ -114,12 +114,27 @@ GOOD = {
     "stability_boundary": dict(
         system=ARM.replace(zeta=0.0), excitation=SPRING, epsilon=0.01, resonance=(1, 1), order=1, modes=2
     ),
+    "nonlinear_modal_equations": dict(system=ARM, modes=2, zeta=0.01),
+    "backbone": dict(system=ARM, mode=1, amplitude=1e-3, modes=2, harmonics=3, points=20, place=0.9),
+    "steady_states": dict(
+        system=ARM,
+        angular_frequency=[28.0],
+        excitation=SPRING,
+        epsilon=0.05,
+        drive={"w": 1e-4},
+        modes=2,
+        harmonics=2,
+        period=1,
+        zeta=0.01,
+        place=0.9,
+    ),
+    "slow_flow_values": dict(flow=ARM.model.slow_flow(("free", 1)), system=ARM),
     "sweep": dict(system=ARM, quantity="natural_frequencies", k_t=[1e3, 1e4]),
 }
 ELSEWHERE = {
     "paper_lagrangian",  # takes no values
     "AmbiguityWarning", "AsymptoticWarning", "MisfitWarning",  # nothing to call with values
-    "ResonanceWarning", "UndersamplingWarning",  # likewise
+    "ResonanceWarning", "UndersamplingWarning", "ConvergenceWarning", "Backbone", "SteadyState",  # likewise
     "Model", "Member", "joined", "kernel", "stations",  # take SymPy expressions: their own tests
     "export",  # writes a folder: below
     "explore",  # shows sliders: its own tests

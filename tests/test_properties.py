@@ -195,6 +195,8 @@ SINGLE = {
 }  # fmt: skip
 NOT_NUMERIC = {
     "AmbiguityWarning", "Arm", "AsymptoticWarning", "AxialBase", "BaseMotion", "Fluctuation", "Force", "JointStiffness",
+    "Backbone", "ConvergenceWarning", "SteadyState", "backbone", "nonlinear_modal_equations", "slow_flow_values",
+    "steady_states",
     "MisfitWarning", "Model", "ResonanceWarning", "System", "TransverseBase", "UndersamplingWarning", "equation",
     "equations", "explore", "export", "kernel", "paper_lagrangian", "stations", "sweep",
 }  # fmt: skip

@@ -141,7 +141,7 @@ def backbone(
         return _whole(problem, points)
     name, value = ("energy", energy) if amplitude is None else ("amplitude", amplitude)
     unit = "J" if amplitude is None else None
-    targets = checks.real_array(name, value, low=0.0, open_low=True, unit=unit)
+    targets = checks.real_array(name, value, low=1e-60, high=1e60, unit=unit)
     return _at_targets(problem, targets, problem.energy if amplitude is None else problem.peak, name)
 
 

@@ -106,9 +106,11 @@ def watched(system: System, modes: int, place: Any = None, field: Any = None) ->
     entry = section_place(system, field)
     if place is None:
         return found.displacement(1, entry)
-    at = np.atleast_1d(checks.real_array("place", place, unit="m"))
+    at = checks.real_array("place", place, unit="m")
+    if at.ndim:
+        raise ValueError(f"place has shape {at.shape}: must be one number")
     check_places(system, at, "place")
-    return found.shape(entry, 0, at)[..., 0]
+    return found.shape(entry, 0, np.atleast_1d(at))[..., 0]
 
 
 def samples(degree: int, harmonics: int, causes: int = 0) -> int:

@@ -86,6 +86,9 @@ def slow_flow_values(flow: SlowFlow, system: System) -> dict[Symbol, float]:
     dict of Symbol to float
         ``sigma``, ``varpi``, forces f_n and couplings P_mn are not among them.
     """
+    from cra_sym.mechanics.slow_flow import SlowFlow
+
+    checks.instance("flow", flow, SlowFlow)
     checks.instance("system", system, System)
     found = sorted({s for e in flow.amplitude_equations for s in e.free_symbols}, key=str)
     numbers = [int(s.name[6:]) for s in found if s.name.startswith("omega_")]

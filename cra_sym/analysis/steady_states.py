@@ -24,6 +24,7 @@ __all__ = ["SteadyState", "steady_states"]
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 _SAME = 1e-6  # of the size of two answers that are one
+_WIDE = 1e4  # ratio of the frequencies of modes and excitation
 _ROUNDS = 60  # in which answers are handed to neighbouring frequencies
 UNSTABLE, UNSTABLE_UNDAMPED = 1e-9, 1e-6
 """Beyond the unit circle a multiplier means instability; without damping pairs on the circle split by rounding."""
@@ -242,6 +243,15 @@ def steady_states(
         period=period,
     )
     flat = np.atleast_1d(varpi)
+    fastest = float(problem.driven.equations.omega.max())
+    low, high = period * fastest / _WIDE, fastest * _WIDE
+    if not flat.size:
+        return []
+    if not (flat.min() >= low and flat.max() <= high):
+        bad = flat.min() if flat.min() < low else flat.max()
+        raise ValueError(
+            f"angular_frequency = {bad:g} must be in [{low:.3g}, {high:.3g}], near the modes that take part"
+        )
     answers = _told(problem, flat, _found(problem, flat))
     return answers if varpi.ndim else answers[0]
 
