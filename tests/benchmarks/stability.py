@@ -26,11 +26,11 @@ def chart(arm):
 def monodromy(arm, excitation, varpi, epsilon, **options):
     """The monodromy matrix of one point as anyone would write it."""
     omega = cra.modal_parameters(arm, MODES).omega
-    coupling = excitation.coupling(arm, MODES, varpi)
+    ((_, _, power), coupling, *_) = excitation.drives(arm, MODES)[0]
 
     def rates(time, y):
         q, p = y.reshape(2, MODES, 2 * MODES)
-        stiffness = np.diag(omega**2) + epsilon * np.cos(varpi * time) * coupling
+        stiffness = np.diag(omega**2) + epsilon * varpi**power * np.cos(varpi * time) * coupling
         return np.concatenate([p, -stiffness @ q]).ravel()
 
     return solve_ivp(rates, (0, 2 * np.pi / varpi), np.eye(2 * MODES).ravel(), **options).y[:, -1]
