@@ -37,6 +37,9 @@ def reduced_zone(
     """
     matrices = matrices_of(system, excitation, modes)
     shape = np.broadcast_shapes(system.shape, excitation.shape, np.shape(epsilon))
+    if 0 in shape:
+        nothing = np.empty(shape)
+        return nothing, Boundary(nothing, nothing, nothing)
     expansion = _expansion(matrices, shape)
     values, right, left = eigenpairs(expansion.still)
     first, second = resonance

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sympy import Add, Derivative, Expr, S, Symbol, expand, sympify
 
@@ -38,9 +38,10 @@ def conservative_part(model: Model) -> Model | None:
         terms = Add.make_args(expand(sympify(expression, strict=True)))
         return sum((term for term in terms if not _turns(term, t)), S.Zero)
 
-    changes = {"density": even(density)} | {end: even(options[end]) for end in END_NAMES}
+    changes: dict[str, Any] = {"density": even(density)} | {end: even(options[end]) for end in END_NAMES}
     inside = tuple((place, even(term)) for place, term in options["inside"])
-    found = type(model)(**{**options, **changes, "inside": inside, "virtual_work": ()})
+    changes |= {"inside": inside, "virtual_work": (), "quadratures": dict(options["quadratures"])}
+    found = type(model)(**{**options, **changes})
     found.symbols = model.symbols
     return found
 
