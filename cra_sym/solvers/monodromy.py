@@ -95,17 +95,29 @@ def _maps(
     known = None if causes is None else causes(phase, rows).swapaxes(0, 1).reshape(-1, points * steps)
     rest = _beside_linear(equations, q, v, known)
     h = 2 * np.pi * share / (frequency * steps)
-    scaled = rest.reshape(points, steps, 2 * n, 2 * n) * h[:, None, None, None]
-    one = np.eye(2 * n)
-    if equations.moves_mass or equations.damping.any():
-        kick = np.linalg.solve(one - 0.5 * scaled, one + 0.5 * scaled)
-    else:  # the product of two such matrices vanishes
-        kick = one + scaled
+    kick = _kick(equations, rest.reshape(points, steps, 2 * n, 2 * n), h)
     turn = _rotation(equations.omega, 0.5 * h)[:, None]
     maps = turn @ kick @ turn
     while maps.shape[1] > 1:
         maps = maps[:, 1::2] @ maps[:, 0::2]
     return maps[:, 0]
+
+
+def _kick(equations: ModalPolynomials, rest: Array, h: Array) -> Array:
+    """Return the maps of what is beside the undamped linear modes over a step of length h (points,)."""
+    n, one = equations.modes, np.eye(2 * equations.modes)
+    drag = np.diag(equations.damping)
+    if equations.moves_mass or np.any(equations.damping != np.diag(drag)):
+        scaled = rest * h[:, None, None, None]
+        return np.asarray(np.linalg.solve(one - 0.5 * scaled, one + 0.5 * scaled))
+    # displacements stand still: momenta decay under a constant force, exactly
+    rate = drag * h[:, None]
+    lasting = np.where(rate > 0, -np.expm1(-rate) / np.where(rate > 0, rate, 1.0), 1.0) * h[:, None]
+    kick = np.broadcast_to(one, rest.shape).copy()
+    kick[:, :, n:, :n] = lasting[:, None, :, None] * rest[:, :, n:, :n]
+    place = np.arange(n, 2 * n)
+    kick[:, :, place, place] = np.exp(-rate)[:, None, :]
+    return kick
 
 
 def _beside_linear(equations: ModalPolynomials, q: Array, v: Array, causes: Array | None) -> Array:

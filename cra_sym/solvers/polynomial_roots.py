@@ -75,17 +75,19 @@ def polynomial_roots(coefficients: Array, degree: int) -> Complex:
 
 def _macaulay(coefficients: Array, degree: int, top: int) -> Array:
     """Return all products of the polynomials with monomials, up to the degree ``top``."""
-    variables = len(coefficients)
+    places = _places(len(coefficients), degree, top)
+    rows = np.zeros((len(places), len(coefficients), len(monomials_up_to(len(coefficients), top))))
+    rows[np.arange(len(places))[:, None], :, places] = coefficients.T
+    return rows.reshape(-1, rows.shape[-1])
+
+
+@cache
+def _places(variables: int, degree: int, top: int) -> NDArray[np.intp]:
+    """Return where the monomials of a polynomial go when it is multiplied with each monomial, (factors, monomials)."""
     place = {exponents: k for k, exponents in enumerate(monomials_up_to(variables, top))}
     own = monomials_up_to(variables, degree)
-    rows = []
-    for factor in monomials_up_to(variables, top - degree):
-        at = [place[tuple(a + b for a, b in zip(factor, e, strict=True))] for e in own]
-        for polynomial in coefficients:
-            row = np.zeros(len(place))
-            row[at] = polynomial
-            rows.append(row)
-    return np.array(rows)
+    factors = monomials_up_to(variables, top - degree)
+    return np.array([[place[tuple(a + b for a, b in zip(f, e, strict=True))] for e in own] for f in factors])
 
 
 def _null_space(matrix: Array) -> Array:
