@@ -6,12 +6,13 @@ import hashlib
 import os
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from cra_sym.checks import choice, count, instance
+from cra_sym.codegen.arm_library import arm_library
 from cra_sym.codegen.expressions import gauss_rule, modal_functions, spectrum_functions, stability_functions
 from cra_sym.codegen.fmu import VERSIONS, fmu_archive
 from cra_sym.codegen.frozen import frozen_library
@@ -27,7 +28,8 @@ from cra_sym.model.system import MOST_MODES, System
 
 __all__ = ["Export", "export"]
 
-_FULL = ("c", "fortran", "python")
+_BY_HAND = ("c", "fortran")
+_THINNED = 8  # of the reference vectors, those that Octave, some hundred times slower than the others, has
 
 
 @dataclass(frozen=True)
@@ -77,10 +79,10 @@ def export(
     Parameters
     ----------
     language : {'c', 'fortran', 'python', 'julia', 'octave', 'rust', 'javascript', 'fmu'}
-        Of the arm the first three hold everything: characteristic function, frequencies, modes, sensitivities,
-        responses, state space and first-order stability; the others the characteristic function and the frequencies.
-        Of models and systems all hold the same. 'fmu' writes NAME.fmu, of a system: model exchange and co-simulation
-        with sources, and a binary for this platform where a C compiler is. Its values are frozen.
+        All hold the same: of the arm characteristic function, frequencies, modes, sensitivities, responses, state
+        space and first-order stability; C also solves many arms at once. 'fmu' writes NAME.fmu, of a system: model
+        exchange and co-simulation with sources, and a binary for this platform where a C compiler is. Its values are
+        frozen.
     directory : path
         Folder to make, with its parents.
     model : Model, optional
@@ -144,7 +146,7 @@ def export(
     elif model is not None:
         texts = dict(model_library(model, name or "model").texts(language))
     else:
-        texts = dict(_named(_arm_texts(language), name))
+        texts = dict(_arm_texts(language, name))
     if language != "fmu":
         texts["LICENSE"] = licence()
     digest = _digest(texts)
@@ -208,26 +210,27 @@ def _write(target: Path, texts: Mapping[str, str | bytes], keep: bool) -> None:
 
 
 @cache
-def _reference(everything: bool) -> str:
-    return written(arm_checks(everything=everything), "a flexible Cartesian robotic arm")
+def _reference() -> str:
+    return written(arm_checks(everything=True), "a flexible Cartesian robotic arm")
 
 
-def _arm_texts(name: str) -> dict[str, str]:
-    texts = arm_sources(name)
-    texts["reference.txt"] = _reference(name in _FULL)
-    return texts
+def _arm_texts(language: str, name: str | None) -> dict[str, str]:
+    if language in _BY_HAND:
+        return _named(arm_sources(language) | {"reference.txt": _reference()}, name)
+    library = arm_library(name or "cra_arm")
+    if language == "octave":
+        library = replace(library, checks=library.checks[::_THINNED])
+    return library.texts(language)
 
 
 def arm_sources(name: str) -> dict[str, str]:
-    """Return the texts of an arm's export, by file, all but the reference vectors."""
+    """Return the texts of an arm's export to C or Fortran, by file, all but the reference vectors."""
     from tqdm import tqdm
 
     language = LANGUAGES[name]
     with tqdm(total=0, desc=f"deriving and printing {language.title}", bar_format="{desc}", leave=False, disable=None):
-        values = common_values(language) | _spectrum_values(language)
-        if name in _FULL:
-            values |= _modal_values(language)
-            values["helpers"] = language.helped(values["spectrum_functions"] + values["modal_functions"])
+        values = common_values(language) | _spectrum_values(language) | _modal_values(language)
+        values["helpers"] = language.helped(values["spectrum_functions"] + values["modal_functions"])
     values["nomenclature"] = nomenclature_rows()
     return rendered(name, values)
 

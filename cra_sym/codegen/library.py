@@ -134,14 +134,16 @@ class Library:
     def texts(self, language: str) -> dict[str, str]:
         """Return the texts of all files, by name, but for the licence."""
         whole = parse(self.text)
-        functions = {name: f for name, f in whole.functions.items() if name not in _ASIDE}
+        public = whole.used_by([name for name, f in whole.functions.items() if f.public]).functions
+        functions = {name: f for name, f in public.items() if name not in _ASIDE}
         taken = KEYWORDS & {name for f in functions.values() for name in (*f.parameters, *f.locals, *f.loops)}
         if taken:
             raise ValueError(f"words of a language are no names of variables: {', '.join(sorted(taken))}")
         printer = PRINTERS[language](whole, self.name, self.real)
         printed = self._values(printer, list(functions.values()))
         for name in _ASIDE & set(whole.functions):
-            printed[name.strip("_")] = "\n".join(printer.function(whole.functions[name]))
+            needed = [f for n, f in whole.used_by([name]).functions.items() if n not in functions]
+            printed[name.strip("_")] = printer.several(needed)
         if "_example" in whole.functions:
             length = whole.functions["_example"].parameters["found"].length
             printed["shown"] = length if isinstance(length, int) else whole.constants[str(length)].values[0]

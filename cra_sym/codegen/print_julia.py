@@ -19,7 +19,7 @@ class JuliaPrinter(ScriptPrinter):
     name, title = "julia", "Julia"
     comment, end, closing, origin = "#", "", "end", 1
     otherwise, otherwise_if, end_if, end_loop = "else", "else", "end", "end"
-    leave, again = "break", "continue"
+    leave, again, infinity = "break", "continue", "Inf"
     functions: ClassVar = {n: n for n in (*SAME, "abs", "min", "max", "isfinite")} | {"atan2": "atan", "pow": "^"}
 
     def constant(self, constant: Constant) -> str:
@@ -36,7 +36,7 @@ class JuliaPrinter(ScriptPrinter):
         for name, kind in record.fields.items():
             comment = f" # {record.comments[name]}" if record.comments[name] else ""
             word = words[kind.name] if kind.length is None else f"Vector{{{words[kind.name]}}}"
-            yield f"    {name}::{word} = {self.made(kind)}{comment}"
+            yield f"    {name}::{word} = {self.begun(record, name)}{comment}"
         yield "end"
 
     def row_of(self, kind: Type) -> str:
@@ -52,7 +52,6 @@ class JuliaPrinter(ScriptPrinter):
 
     def head(self, function: Function) -> Lines:
         yield f"function {self.function_name(function)}({', '.join(self.given(function))})"
-        yield from self.start(function)
 
     def returned(self, value: str | None) -> Lines:
         values = ([] if value is None else [value]) + self.results(self.current)
@@ -68,10 +67,12 @@ class JuliaPrinter(ScriptPrinter):
             yield indent + text
             return
         head, sign, value = text.partition(" = ")
+        if text.startswith("return "):
+            head, sign, value = "return", " ", text.removeprefix("return ")
         if not sign or "(" in head:
             yield from super().wrapped(text, indent)
             return
-        yield f"{indent}{head} = ("
+        yield f"{indent}{head}{sign}("
         yield from super().wrapped(value, f"{indent}    ")
         yield f"{indent})"
 

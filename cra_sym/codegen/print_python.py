@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from cra_sym.codegen.print_scripts import SAME, ScriptPrinter
 from cra_sym.codegen.printing import Lines, snake
-from cra_sym.kernels.form import Constant, Function, Record, Type
+from cra_sym.kernels.form import FLOAT, Constant, Function, Record, Type
 
 __all__ = ["PythonPrinter"]
 
@@ -17,8 +17,8 @@ class PythonPrinter(ScriptPrinter):
     """Python 3, the standard library alone."""
 
     name, title = "python", "Python"
-    comment, end, closing = "#", "", ""
-    true, false = "True", "False"
+    comment, end, closing, between = "#", "", "", "\n\n\n"
+    true, false, infinity = "True", "False", "math.inf"
     both, either, negation = "and", "or", "not "
     otherwise, otherwise_if, end_if, end_loop = "else:", "el", "", ""
     leave, again = "break", "continue"
@@ -39,9 +39,6 @@ class PythonPrinter(ScriptPrinter):
                  for e in self.form.errors]  # fmt: skip
         return "\n\n\n".join(words)
 
-    def all_functions(self) -> str:
-        return "\n\n\n".join("\n".join(self.function(function)) for function in self.form.functions.values())
-
     def constant(self, constant: Constant) -> str:
         values = self.literal(constant)
         comment = f"  # {constant.comment}" if constant.comment else ""
@@ -56,9 +53,15 @@ class PythonPrinter(ScriptPrinter):
             comment = f"  # {record.comments[name]}" if record.comments[name] else ""
             if kind.length is None:
                 word = {"float": "float", "int": "int", "bool": "bool"}[kind.name]
-                yield f"    {name}: {word} = {self.made(kind)}{comment}"
+                yield f"    {name}: {word} = {self.begun(record, name)}{comment}"
             else:
                 yield f"    {name}: list = field(default_factory=lambda: {self.made(kind)}){comment}"
+        numbers = [name for name, kind in record.fields.items() if kind == FLOAT]
+        if numbers:
+            names = ", ".join(f'"{name}"' for name in numbers)
+            yield from ("", "    def __post_init__(self):")
+            yield from self.wrapped(f"for name in ({names},):", "        ")
+            yield "            setattr(self, name, _real(getattr(self, name)))"
 
     def records(self) -> str:
         return "\n\n\n".join("\n".join(self.record(record)) for record in self.form.records.values())
@@ -81,17 +84,21 @@ class PythonPrinter(ScriptPrinter):
             yield f'    """{lines[0]}' + ('"""' if len(lines) == 1 else "")
             yield from (f"    {line}".rstrip() for line in lines[1:])
             yield from ['    """'] if len(lines) > 1 else []
-        yield from self.start(function)
+        for name, kind in function.parameters.items():
+            if function.public and kind == FLOAT:
+                yield f"    {name} = _real({name})"
 
     def wrapped(self, text: str, indent: str) -> Lines:
         if len(indent + text) <= self.width:
             yield indent + text
             return
         head, sign, value = text.partition(" = ")
+        if text.startswith("return "):
+            head, sign, value = "return", " ", text.removeprefix("return ")
         if not sign or "(" in head:
             yield from super().wrapped(text, indent)
             return
-        yield f"{indent}{head} = ("
+        yield f"{indent}{head}{sign}("
         yield from super().wrapped(value, f"{indent}    ")
         yield f"{indent})"
 

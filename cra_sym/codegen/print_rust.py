@@ -29,11 +29,26 @@ def _last(body: Sequence[ast.stmt]) -> set[int]:
     return {id(body[-1])}
 
 
+def _most_writes(body: Sequence[ast.stmt], name: str) -> int:
+    """Return how often a variable is written to on the way through a body that does it most."""
+    total = 0
+    for statement in body:
+        match statement:
+            case ast.If(body=first, orelse=second):
+                total += max(_most_writes(first, name), _most_writes(second, name))
+            case ast.For(body=inside) | ast.While(body=inside):
+                total += 2 * _most_writes(inside, name)
+            case ast.Assign(targets=[ast.Name(id=target)]) | ast.AugAssign(target=ast.Name(id=target)):
+                total += target == name
+    return total
+
+
 class RustPrinter(Printer):
     """Rust 2021."""
 
     name, title = "rust", "Rust"
     choice_least = 0
+    infinity = "f64::INFINITY"
     reals: ClassVar = ("float64", "float32")
     functions: ClassVar = {n: n for n in _FUNCTIONS.split()} | {
         "log": "ln", "expm1": "exp_m1", "log1p": "ln_1p", "pow": "powf", "isfinite": "is_finite",
@@ -78,8 +93,8 @@ class RustPrinter(Printer):
             yield f"    pub {name}: {self.owned(kind)},"
         yield from ("}", "", f"impl {record.name} {{", "    /// All zero.", "    pub const fn zero() -> Self {")
         yield f"        {record.name} {{"
-        for name, kind in record.fields.items():
-            yield f"            {name}: {self.made(kind)},"
+        for name in record.fields:
+            yield f"            {name}: {self.begun(record, name)},"
         yield from ("        }", "    }", "}")
 
     def scalar(self, kind: Type) -> str:
@@ -130,7 +145,8 @@ class RustPrinter(Printer):
 
     def declared(self, name: str, kind: Type, value: str | None, fixed: bool) -> str:
         if value is None:
-            mutable = "" if self.current.writes[name] == 1 else "mut "
+            once = self.current.writes[name] == 1 or _most_writes(self.current.body, name) == 1
+            mutable = "" if once else "mut "
             return f"let {mutable}{name}: {self.owned(kind)}"
         return f"let {'' if fixed else 'mut '}{name} = {value}"
 

@@ -78,7 +78,7 @@ class ScriptPrinter(Printer):
 class JavaScriptPrinter(ScriptPrinter):
     """JavaScript, an ECMAScript module."""
 
-    name, title = "javascript", "JavaScript"
+    name, title, infinity = "javascript", "JavaScript", "Infinity"
     functions: ClassVar = {n: f"Math.{n}" for n in SAME} | {
         "abs": "Math.abs", "min": "Math.min", "max": "Math.max", "isfinite": "Number.isFinite",
     }  # fmt: skip
@@ -95,9 +95,9 @@ class JavaScriptPrinter(ScriptPrinter):
         yield from (f"// {line}".rstrip() for line in record.doc.splitlines())
         yield f"export function {self.new_record(record.name)} {{"
         yield "    return {"
-        for name, kind in record.fields.items():
+        for name in record.fields:
             comment = f" // {record.comments[name]}" if record.comments[name] else ""
-            yield f"        {name}: {self.made(kind)},{comment}"
+            yield f"        {name}: {self.begun(record, name)},{comment}"
         yield from ("    };", "}")
 
     def row_of(self, kind: Type) -> str:
@@ -111,7 +111,6 @@ class JavaScriptPrinter(ScriptPrinter):
     def head(self, function: Function) -> Lines:
         export = "export " if function.public else ""
         yield f"{export}function {self.function_name(function)}({', '.join(self.given(function))}) {{"
-        yield from self.start(function)
 
     def together(self, names: Sequence[str]) -> str:
         return names[0] if len(names) == 1 else f"[{', '.join(names)}]"
@@ -148,7 +147,7 @@ class JavaScriptPrinter(ScriptPrinter):
 class OctavePrinter(ScriptPrinter):
     """Octave and MATLAB: rows and records are values, so what a function changes it returns too."""
 
-    name, title = "octave", "Octave"
+    name, title, infinity = "octave", "Octave", "Inf"
     comment, closing, origin, width = "%", "end", 1, 100
     negation = "~"
     choice_least = 0
@@ -189,9 +188,9 @@ end
     def record(self, record: Record) -> Lines:
         yield f"function record = {self.new_record(record.name).removesuffix('()')}()"
         yield from (f"% {line}".rstrip() for line in record.doc.splitlines())
-        for name, kind in record.fields.items():
+        for name in record.fields:
             comment = f" % {record.comments[name]}" if record.comments[name] else ""
-            yield f"    record.{name} = {self.made(kind)};{comment}"
+            yield f"    record.{name} = {self.begun(record, name)};{comment}"
         yield "end"
 
     def row_of(self, kind: Type) -> str:
@@ -210,7 +209,6 @@ end
         left = "" if not outs else f"{outs[0]} = " if len(outs) == 1 else f"[{', '.join(outs)}] = "
         yield f"function {left}{self.function_name(function)}({', '.join(self.given(function))})"
         yield from (f"% {line}".rstrip() for line in function.doc.splitlines())
-        yield from self.start(function)
 
     def tail(self, function: Function) -> Lines:
         yield "end"

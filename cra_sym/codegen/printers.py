@@ -18,7 +18,7 @@ from sympy.printing.precedence import PRECEDENCE
 from sympy.printing.pycode import PythonCodePrinter
 from sympy.printing.rust import RustCodePrinter
 
-from cra_sym.codegen.program import Function, Place
+from cra_sym.codegen.program import Argument, Function, Place
 
 __all__ = ["PRINTERS", "ScalarPrinter"]
 
@@ -324,10 +324,15 @@ def _inverse(x: float) -> float:
         return super()._print_Pow(expr).replace("inverse(", "_inverse(")
 
     @classmethod
-    def text_of(cls, function: Function) -> str:
+    def helped(cls, text: str) -> str:
+        """Return the helper functions that a text calls."""
+        return cls.helper if "_inverse(" in text else ""
+
+    @classmethod
+    def text_of(cls, function: Function, name: str, *, checked: bool) -> str:
         """Return a function of numbers, with one row of results and at most three branches, as text.
 
-        It raises where a result is not finite.
+        If checked, it raises where a result is not finite.
         """
         lines = []
         for number, branch in enumerate(function.branches):
@@ -343,12 +348,21 @@ def _inverse(x: float) -> float:
             steps = [f"{printer.places[symbol].name} = {printer.doprint(value)}" for symbol, value in branch.steps]
             steps += [f"found[{i}] = {printer.doprint(value)}" for i, value in enumerate(branch.outputs)]
             lines += [indent + step for step in steps]
-        size = function.size
-        parameters = "".join(f"{a.name}: float, " for a in function.arguments)
-        finite = " and ".join(f"isfinite(found[{i}])" for i in range(size))
-        body = "\n    ".join([f'"""{function.summary}"""', *lines, f"if not ({finite}):", "    raise Overflow"])
-        head = f"def {function.name}({parameters}found: Out[Row[float, {size}]]) -> None:"
-        return f"{cls.helper if '_inverse(' in body else ''}{head}\n    {body}\n"
+        parameters = "".join(f"{a.name}: {_kind(a)}, " for a in function.arguments)
+        if function.scalar:
+            lines[-1] = lines[-1].replace("found[0] =", "return", 1)
+            head = f"def {name}({parameters.removesuffix(', ')}) -> float:"
+        else:
+            head = f"def {name}({parameters}found: Out[Row[float, {function.size}]]) -> None:"
+        if checked:
+            finite = " and ".join(f"isfinite(found[{i}])" for i in range(function.size))
+            lines += [f"if not ({finite}):", "    raise Overflow"]
+        body = "\n    ".join([f'"""{function.summary}"""', *lines])
+        return f"{head}\n    {body}\n"
+
+
+def _kind(argument: Argument) -> str:
+    return f"Row[float, {len(argument.symbols)}]" if argument.row else "float"
 
 
 PRINTERS: dict[str, type[ScalarPrinter]] = {

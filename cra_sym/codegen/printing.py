@@ -10,7 +10,7 @@ from __future__ import annotations
 import ast
 import re
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import ClassVar
 
 from cra_sym.codegen.print_expressions import OPERATORS, ExpressionPrinter
@@ -64,21 +64,45 @@ class Printer(ExpressionPrinter):
 
     def all_functions(self) -> str:
         """Return the functions as text."""
-        return "\n\n".join("\n".join(self.function(function)) for function in self.form.functions.values())
+        return self.several(self.form.functions.values())
+
+    def several(self, functions: Iterable[Function]) -> str:
+        """Return some functions as text."""
+        return self.between.join("\n".join(self.function(function)) for function in functions)
 
     def function(self, function: Function) -> Lines:
         """Yield the lines of a function."""
         self.current = function
         yield from self.documented(function)
         yield from self.head(function)
-        yield from self.block(function.body, function.node.lineno, self.indent)
+        checks = self.checks(function)
+        yield from self.block(function.body[:checks], function.node.lineno, self.indent)
+        yield from self.start(function)
+        line = function.body[checks - 1].end_lineno if checks else function.node.lineno
+        yield from self.block(function.body[checks:], line or 0, self.indent)
         yield from self.tail(function)
+
+    def checks(self, function: Function) -> int:
+        """Return how many statements at the beginning only refuse bad input."""
+        for number, statement in enumerate(function.body):
+            match statement:
+                case ast.If(body=[ast.Raise()], orelse=[]):
+                    continue
+                case ast.Expr(value=ast.Call() as call) if not self.form.functions[self.callee(call)].changed:
+                    continue
+            return number
+        return len(function.body)
+
+    def start(self, function: Function) -> Lines:
+        """Yield what makes the results, where the caller does not."""
+        yield from ()
 
     def documented(self, function: Function) -> Lines:
         """Yield what a function does, as comments in front of it."""
         for line in textwrap.dedent(function.doc).strip().splitlines():
             yield f"{self.outer}{self.doc_comment} {line}".rstrip()
 
+    between = "\n\n"  # functions
     outer = ""  # indentation of functions
 
     @property
@@ -111,6 +135,12 @@ class Printer(ExpressionPrinter):
     def made(self, kind: Type) -> str:
         """Return a new row of zeros or a new record."""
         raise NotImplementedError
+
+    infinity = ""  # what a field may begin with
+
+    def begun(self, record: Record, name: str) -> str:
+        """Return what a field of a new record holds."""
+        return self.infinity if name in record.infinite else self.made(record.fields[name])
 
     def loop(self, name: str, start: str, stop: ast.expr, step: int) -> str:
         """Return the head of a loop over integers."""

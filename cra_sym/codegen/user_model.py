@@ -52,7 +52,8 @@ def _library(model: Model, name: str) -> Library:
     checks = tuple(_checks(made, pair, plain))
     sample = ", ".join(map(repr, checks[1].given))
     rest = source("characteristic_check").replace("GIVEN", given).replace("SAMPLE", sample)
-    text = f"{FormPrinter.text_of(made)}\n\n{rest}"
+    text = FormPrinter.text_of(made, "characteristic", checked=True)
+    text = f"{FormPrinter.helped(text)}{text}\n\n{rest}"
     summary = f"The characteristic function of a {repr(model).strip('<>')}".replace("\\", "")
     units = ["rad/s", *[""] * len(made.arguments)]
     rows = "".join(

@@ -84,12 +84,16 @@ class Constant:
 
 @dataclass(frozen=True)
 class Record:
-    """A record: its fields by name, with the comment of each."""
+    """A record: its fields by name, with the comment of each; those that are infinite unless they are given.
+
+    Only languages whose records have beginnings follow the latter; in C and Fortran a new record is zero.
+    """
 
     name: str
     doc: str
     fields: Mapping[str, Type]
     comments: Mapping[str, str]
+    infinite: frozenset[str] = frozenset()
 
 
 @dataclass

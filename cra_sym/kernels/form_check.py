@@ -103,8 +103,9 @@ class Checker:
             raise refused(node, "not every way out returns a value")
         lower = [name.lower() for name in (*parameters, *self.function.locals, *self.function.loops)]
         top = {name.lower().strip("_") for name in (*functions, *constants)}
-        if len(set(lower)) < len(lower) or set(lower) & top:
-            raise refused(node, "variables, constants and functions must differ by more than case")
+        clashes = {one for one in lower if lower.count(one) > 1} | set(lower) & top
+        if clashes:
+            raise refused(node, f"names must differ by more than case: {', '.join(sorted(clashes))}")
 
     # Statements ---------------------------------------------------------------------------------------------------
 
@@ -167,6 +168,8 @@ class Checker:
         match value:
             case ast.Call(func=ast.Name(id="zeros"), args=[length]):
                 return Type("float", self.length(length))
+            case ast.Call(func=ast.Name(id="records"), args=[ast.Name(id=name), length]) if name in self.records:
+                return Type(name, self.length(length))
             case ast.Call(func=ast.Name(id=name), args=[]) if name in self.records:
                 return Type(name)
             case ast.Call():

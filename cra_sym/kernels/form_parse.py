@@ -45,8 +45,10 @@ def parse(text: str) -> Form:
             case _:
                 raise refused(node)
     names = [*constants, *records, *functions]
-    if len({name.lower().strip("_") for name in names}) < len(names):
-        raise FormError("line 1: names at the top must differ by more than case and underscores")
+    plain = [name.lower().strip("_") for name in names]
+    clashes = sorted({name for name in plain if plain.count(name) > 1})
+    if clashes:
+        raise FormError(f"names at the top must differ by more than case and underscores: {', '.join(clashes)}")
     return Form(ast.get_docstring(tree) or "", constants, records, functions, comments, alone)
 
 
@@ -78,15 +80,17 @@ def _record(
     node: ast.ClassDef, comments: Mapping[int, str], records: Mapping[str, Record], constants: Mapping[str, Constant]
 ) -> Record:
     fields, words = {}, {}
+    infinite: set[str] = set()
     for part in node.body:
         match part:
             case ast.Expr(value=ast.Constant(value=str())):
                 continue
-            case ast.AnnAssign(target=ast.Name(id=name), annotation=annotation, value=None):
+            case ast.AnnAssign(target=ast.Name(id=name), annotation=annotation, value=None | ast.Name(id="inf")):
                 fields[name] = type_of(annotation, records, constants)
+                infinite |= {name} if part.value is not None else set()
                 words[name] = comments.get(part.lineno, "")
                 if fields[name].changed or fields[name].name in records:
                     raise refused(part, "a field is a number, a condition or a row of them")
             case _:
                 raise refused(part)
-    return Record(node.name, ast.get_docstring(node) or "", fields, words)
+    return Record(node.name, ast.get_docstring(node) or "", fields, words, frozenset(infinite))

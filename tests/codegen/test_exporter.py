@@ -12,6 +12,8 @@ import pytest
 
 import cra_sym as cra
 from cra_sym.codegen import exporter
+from cra_sym.codegen.library import Library
+from tests.codegen import kit
 
 once = cache(exporter.arm_sources)
 
@@ -20,7 +22,8 @@ once = cache(exporter.arm_sources)
 def short(monkeypatch):
     """Exports with sources printed once and a short reference file: how they are written is all that matters here."""
     monkeypatch.setattr(exporter, "arm_sources", lambda name: dict(once(name)))
-    monkeypatch.setattr(exporter, "_reference", lambda everything: "# nothing\n")
+    monkeypatch.setattr(exporter, "_reference", lambda: "# nothing\n")
+    monkeypatch.setattr(exporter, "arm_library", lambda name: Library(name, "Every construct.", kit.TEXT, (), ()))
 
 
 def test_the_result_lists_what_was_written(short, tmp_path):
@@ -32,10 +35,15 @@ def test_the_result_lists_what_was_written(short, tmp_path):
 
 
 DIGESTS = """
-from cra_sym.codegen.exporter import _digest, _reference, arm_sources
-from cra_sym.codegen.languages import LANGUAGES
+import cra_sym.codegen.arm_library as arm
+from cra_sym.codegen.exporter import _digest, arm_sources
+from cra_sym.codegen.library import PRINTERS
+from cra_sym.codegen.vectors import arm_checks, written
 
-digests = [*(_digest(arm_sources(name)) for name in LANGUAGES), _digest({"reference": _reference(False)})]
+text = written(arm_checks(everything=False), "an arm")
+arm._checks = tuple
+digests = [*map(_digest, map(arm_sources, ("c", "fortran"))), _digest({"reference": text})]
+digests += [_digest(arm.arm_library.__wrapped__("crane").texts(language)) for language in PRINTERS]
 """
 
 
@@ -46,7 +54,7 @@ def test_same_input_same_bytes():
     command = [sys.executable, "-c", f"{DIGESTS}print(*digests)"]
     environment = os.environ | {"PYTHONHASHSEED": "1"}
     there = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
-    assert there.split() == here["digests"] and len(here["digests"]) == 8
+    assert there.split() == here["digests"] and len(here["digests"]) == 10
 
 
 def test_a_folder_with_content_is_left_alone(short, tmp_path):
@@ -80,7 +88,7 @@ def test_a_failed_export_leaves_everything_as_it_was(short, tmp_path, monkeypatc
     for target, overwrite in (("old", True), ("new/deep", False)):
         left[0] = 3
         with pytest.raises(error):
-            cra.export("python", tmp_path / target, overwrite=overwrite)
+            cra.export("fortran", tmp_path / target, overwrite=overwrite)
     assert {path.name: path.read_bytes() for path in (tmp_path / "old").iterdir()} == before
     assert [path.name for path in tmp_path.iterdir()] == ["old"]
 

@@ -1,0 +1,96 @@
+"""The arm as a library: one source of frequencies, modes and responses around what its Lagrangian derives to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import lru_cache
+
+from cra_sym.arm.parameters import Arm
+from cra_sym.codegen.expressions import gauss_rule, modal_functions, spectrum_functions, stability_functions
+from cra_sym.codegen.frozen import stated
+from cra_sym.codegen.library import Check, Library, source
+from cra_sym.codegen.printers import FormPrinter
+from cra_sym.codegen.vectors import TOLERANCE, arm_checks
+
+__all__ = ["arm_library"]
+
+_MODAL = (
+    "omega", "participation", "root_displacement", "root_slope", "root_moment", "root_shear", "tip_displacement",
+    "tip_slope",
+)  # fmt: skip
+_QUANTITIES = {"frequency_parameters": 0, "characteristic": 1, "natural_frequencies": 2} | {
+    name: 3 + i for i, name in enumerate(_MODAL)
+} | {
+    name: 11 + i for i, name in enumerate((
+        "mode_shape", "tip_response", "df_dk_t", "df_dk_r", "log_k_t", "log_k_r", "state_space_acceleration_A",
+        "state_space_acceleration_B", "state_space_acceleration_C", "state_space_force_A", "state_space_force_B",
+        "state_space_force_C", "excitation_joint", "excitation_axial", "boundary_joint", "boundary_axial",
+    ))
+}  # fmt: skip
+_README = """\
+An Euler-Bernoulli manipulator on a driven base, with an elastic bolted joint (any stiffness from 0 to infinity) and
+an end-effector. The frequencies are complete: an exact count says how many there are below any lambda. A frequency
+takes some three evaluations of the characteristic function, whatever the arm; responses are sums over the modes in
+closed form.
+"""
+
+
+@lru_cache(maxsize=4)
+def arm_library(name: str) -> Library:
+    """Return the arm as a library."""
+    parts = source("arm"), _with_widths(source("arm_modes")), source("arm_check")
+    text = "\n\n".join([_constants(), _generated(), *parts])
+    summary = "A flexible Cartesian robotic arm: frequencies, modes, responses"
+    return Library(name, summary, text, stated(Arm.nominal().model), tuple(_checks()), _README)
+
+
+def _constants() -> str:
+    from cra_sym.solvers.one_wave import NEAR
+    from cra_sym.solvers.one_wave_shapes import NEAR as NEAR_SHAPE
+
+    nodes, weights = gauss_rule()
+    terms = next(f.size for f in spectrum_functions() if f.name == "power_series")
+    return (
+        f"PI = {math.pi!r}  # half a turn\n"
+        f"NEAR = {float(NEAR[2])!r}  # lambda^4 below which the power series of the determinant serves\n"
+        f"TERMS = {terms}  # of that series\n"
+        f"GAUSS = {len(nodes)}  # points of a rule on (0, 1)\n"
+        f"NODES = ({', '.join(map(repr, nodes))})\nWEIGHTS = ({', '.join(map(repr, weights))})\n"
+        f"NEAR_SHAPE = {float(NEAR_SHAPE[2])!r}  # lambda^4 below which power series of the shapes serve\n"
+    )
+
+
+def _with_widths(text: str) -> str:
+    """Put in the calls of the half widths, with their arguments in the functions' own order."""
+    one, two = "first.omega", "second.omega"
+    given = {
+        "P_nn": "P", "P_mn": "P", "P_nm": "P", "epsilon": "epsilon", "omega_m": one, "omega_n": two,
+        "c_m": f"zeta * {one}", "c_n": f"zeta * {two}",
+    }  # fmt: skip
+    for f in stability_functions():
+        call = f"_{f.name}({', '.join(given[a.name] for a in f.arguments)})"
+        text = text.replace(f"half = {f.name.removesuffix('_width').upper()}\n", f"half = {call}\n")
+    return text
+
+
+def _generated() -> str:
+    functions = (*spectrum_functions(), *modal_functions(), *stability_functions())
+    text = "\n\n".join(FormPrinter.text_of(f, f"_{f.name}", checked=False) for f in functions)
+    return FormPrinter.helped(text) + text
+
+
+def _checks() -> Iterator[Check]:
+    """Yield the reference vectors of the package's own kernels, as far as the library goes."""
+    for check in arm_checks(everything=True):
+        if all(map(math.isfinite, check.outputs)):  # others are the sensitivities of rigid-body modes
+            yield Check(_QUANTITIES[check.quantity], check.inputs, check.outputs, TOLERANCE, check.absolute)
+    nominal = tuple(float(getattr(Arm.nominal(), name)) for name in ("L", "b", "h", "E", "rho", "m_b", "m_e", "J_e"))
+    for bad in (math.nan, -1.0):
+        yield Check(0, (bad, 0.0, 0.0, 0.0), (), refused=True)
+        yield Check(1, (0.0, 0.0, 0.0, 0.0, bad, 0.0), (), refused=True)
+        for place in range(11):
+            given = [*nominal, 1e4, 1e3, 0.01]
+            given[place] = bad
+            yield Check(2, tuple(given), (), refused=True)
+            yield Check(3, tuple(given), (), refused=True)
