@@ -171,9 +171,9 @@ def _claims(options: Options) -> None:
 
 
 def _export_options(parser: argparse.ArgumentParser) -> None:
-    from cra_sym.codegen.languages import LANGUAGES
+    from cra_sym.codegen.library import PRINTERS
 
-    parser.add_argument("language", choices=LANGUAGES, metavar="LANGUAGE", help=f"of {', '.join(LANGUAGES)}")
+    parser.add_argument("language", choices=PRINTERS, metavar="LANGUAGE", help=f"of {', '.join(PRINTERS)}")
     parser.add_argument("directory", metavar="DIR", type=Path, help="folder to make")
     parser.add_argument("--force", action="store_true", help="write into a folder that is not empty")
 

@@ -17,7 +17,7 @@ from cra_sym.codegen.expressions import gauss_rule, modal_functions, spectrum_fu
 from cra_sym.codegen.fmu import VERSIONS, fmu_archive
 from cra_sym.codegen.frozen import frozen_library
 from cra_sym.codegen.languages import LANGUAGES, Language
-from cra_sym.codegen.library import check_name
+from cra_sym.codegen.library import PRINTERS, check_name
 from cra_sym.codegen.program import Function
 from cra_sym.codegen.rendering import DIGEST, common_values, licence, rendered
 from cra_sym.codegen.user_model import model_library
@@ -53,7 +53,7 @@ class Export:
 
     def __repr__(self) -> str:
         names = "\n".join(f"  {name}" for name in self.files)
-        title = LANGUAGES[self.language].title if self.language in LANGUAGES else "FMI"
+        title = PRINTERS[self.language].title if self.language in PRINTERS else "FMI"
         return f"<Export to {title}, {self.digest[:12]}, in {self.directory}\n{names}>"
 
 
@@ -127,7 +127,7 @@ def export(
     >>> [name for name in made.files if name.startswith("crane")]
     ['crane.c', 'crane.h']
     """
-    choice("language", language, [*LANGUAGES, "fmu"])
+    choice("language", language, [*PRINTERS, "fmu"])
     choice("version", version, VERSIONS)
     choice("real", real, ("float64", "float32"))
     if model is not None and system is not None:

@@ -115,23 +115,6 @@ def _fortran_head(f: Function) -> list[str]:
     return lines
 
 
-def _plain_head(text: str) -> Callable[[Function], list[str]]:
-    def head(f: Function) -> list[str]:
-        return [text.format(name=f.name, arguments=", ".join(a.name for a in f.arguments))]
-
-    return head
-
-
-def _rust_head(f: Function) -> list[str]:
-    arguments = ", ".join(f"{a.name}: {f'&[f64; {len(a.symbols)}]' if a.row else 'f64'}" for a in f.arguments)
-    return [f"fn {f.name}({arguments}) -> {'f64' if f.scalar else f'[f64; {f.size}]'} {{"]
-
-
-def _octave_head(f: Function) -> list[str]:
-    lines = _plain_head("function out = {name}({arguments})")(f)
-    return lines if f.scalar else [*lines, f"    out = zeros(1, {f.size});"]
-
-
 _FORTRAN_HELPERS = (
     (
         "expm1",
@@ -169,31 +152,6 @@ _FORTRAN_HELPERS = (
 """,
     ),
 )
-_OCTAVE_HELPERS = (
-    (
-        "choose",
-        """\
-function out = choose(condition, value, alternative)
-    if condition
-        out = value;
-    else
-        out = alternative;
-    end
-end
-""",
-    ),
-)
-_PYTHON_HELPERS = (
-    (
-        "inverse",
-        """\
-def inverse(x):
-    \"\"\"Return 1 / x, and infinity for 0: where that occurs the quotient is discarded.\"\"\"
-    return 1.0 / x if x else math.copysign(math.inf, x)
-
-""",
-    ),
-)
 _BRACES = ("if ({}) {{", "}} else if ({}) {{", "}} else {{", "}")
 
 LANGUAGES = {
@@ -207,26 +165,6 @@ LANGUAGES = {
             "fortran", "Fortran 2008", _fortran_head, "{name} = {value}", "out({index}) = {value}", "out = {value}",
             ("if ({}) then", "else if ({}) then", "else", "end if"), "  end {kind} {name}", "  !",
             helpers=_FORTRAN_HELPERS,
-        ),
-        Language(
-            "julia", "Julia", _plain_head("function {name}({arguments})"), "{name} = {value}", "return ({values},)",
-            "return {value}", ("if {}", "elseif {}", "else", "end"), "end", "#",
-        ),
-        Language(
-            "octave", "Octave", _octave_head, "{name} = {value};", "out({index}) = {value};", "out = {value};",
-            ("if ({})", "elseif ({})", "else", "end"), "end", "%", helpers=_OCTAVE_HELPERS,
-        ),
-        Language(
-            "rust", "Rust", _rust_head, "let {name}: f64 = {value};", "[{values}]", "{value}",
-            ("if {} {{", "}} else if {} {{", "}} else {{", "}"), "}", "///",
-        ),
-        Language(
-            "javascript", "JavaScript", _plain_head("function {name}({arguments}) {{"), "const {name} = {value};",
-            "return [{values}];", "return {value};", _BRACES, "}", "//",
-        ),
-        Language(
-            "python", "Python", _plain_head("def {name}({arguments}):"), "{name} = {value}", "return ({values})",
-            "return {value}", ("if {}:", "elif {}:", "else:", ""), "", "#", helpers=_PYTHON_HELPERS,
         ),
     )
 }  # fmt: skip

@@ -1,4 +1,4 @@
-"""SymPy's code printers, one a language, made to agree: every number a double, every fraction one exact division."""
+"""SymPy's printers for C, Fortran and the restricted form: every number a double, every fraction one exact division."""
 
 from __future__ import annotations
 
@@ -11,16 +11,12 @@ import sympy as sp
 from sympy.printing.c import C99CodePrinter
 from sympy.printing.codeprinter import CodePrinter
 from sympy.printing.fortran import FCodePrinter
-from sympy.printing.jscode import JavascriptCodePrinter
-from sympy.printing.julia import JuliaCodePrinter
-from sympy.printing.octave import OctaveCodePrinter
 from sympy.printing.precedence import PRECEDENCE
 from sympy.printing.pycode import PythonCodePrinter
-from sympy.printing.rust import RustCodePrinter
 
 from cra_sym.codegen.program import Argument, Function, Place
 
-__all__ = ["PRINTERS", "ScalarPrinter"]
+__all__ = ["PRINTERS", "FormPrinter", "ScalarPrinter"]
 
 _SAME = "sqrt exp expm1 log log1p sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh floor".split()
 _EXACT = 2**53  # integers up to this are doubles
@@ -222,95 +218,12 @@ class FortranPrinter(ScalarPrinter, FCodePrinter):
         return " &\n".join(lines)
 
 
-class JuliaPrinter(ScalarPrinter, JuliaCodePrinter):
-    """Julia: scalar arithmetic without broadcasting dots."""
-
-    functions: ClassVar = {n: n for n in _SAME} | {"Abs": "abs", "ceiling": "ceil", "Max": "max", "Min": "min"}
-    functions["atan2"] = "atan"
-    origin = 1
-    power = "({base})^({exponent})"
-
-
-class OctavePrinter(ScalarPrinter, OctaveCodePrinter):
-    """Octave and MATLAB: scalar arithmetic; a choice evaluates both sides and picks one."""
-
-    functions: ClassVar = {n: n for n in _SAME} | {"Abs": "abs", "ceiling": "ceil", "Max": "max", "Min": "min"}
-    entry, origin = "{name}({index})", 1
-    choice = "choose({condition}, {value}, {otherwise})"
-    unequal, negation = "~=", "(~{})"
-    power = "({base})^({exponent})"
-
-    def wrapped(self, text: str, indent: str) -> str:
-        lines = textwrap.wrap(
-            text, 100, initial_indent=indent, subsequent_indent=f"{indent}    ", break_long_words=False
-        )
-        return " ...\n".join(lines)
-
-
-class RustPrinter(ScalarPrinter, RustCodePrinter):
-    """Rust: functions of f64 in call syntax, where a literal needs no type of its own."""
-
-    functions: ClassVar = {n: f"f64::{n}" for n in _SAME} | {
-        "Abs": "f64::abs",
-        "ceiling": "f64::ceil",
-        "expm1": "f64::exp_m1",
-        "log": "f64::ln",
-        "log1p": "f64::ln_1p",
-        "Max": "f64::max",
-        "Min": "f64::min",
-    }
-    choice = "(if {condition} {{ {value} }} else {{ {otherwise} }})"
-    power = "f64::powf({base}, {exponent})"
-
-
-class JavaScriptPrinter(ScalarPrinter, JavascriptCodePrinter):
-    """JavaScript: the functions of Math."""
-
-    functions: ClassVar = {n: f"Math.{n}" for n in _SAME} | {
-        "Abs": "Math.abs",
-        "ceiling": "Math.ceil",
-        "Max": "Math.max",
-        "Min": "Math.min",
-    }
-    power = "Math.pow({base}, {exponent})"
-    unequal = "!=="
-
-    def _print_Relational(self, expr: Any) -> str:
-        return super()._print_Relational(expr).replace(" == ", " === ")
-
-
-class PythonPrinter(ScalarPrinter, PythonCodePrinter):
-    """Python: the functions of math."""
-
-    functions: ClassVar = {n: f"math.{n}" for n in _SAME} | {"Abs": "abs", "Max": "max", "Min": "min"}
-    functions |= {"floor": "math.floor", "ceiling": "math.ceil"}
-    choice = "({value} if {condition} else {otherwise})"
-    both, either, negation = "and", "or", "(not {})"
-    power = "math.pow({base}, {exponent})"
-
-    def _print_Mul(self, expr: sp.Mul) -> str:
-        if not (self.guarded and any(f.is_Pow and f.exp == -1 for f in expr.args)):
-            return super()._print_Mul(expr)
-        return "*".join(self.parenthesize(factor, PRECEDENCE["Mul"]) for factor in expr.args)
-
-    def _print_Pow(self, expr: sp.Pow) -> str:
-        return f"inverse({self._print(expr.base)})" if self.guarded and expr.exp == -1 else super()._print_Pow(expr)
-
-    def wrapped(self, text: str, indent: str) -> str:
-        if len(indent + text) <= 110:
-            return indent + text
-        head, sign, value = text.partition(" = ")
-        start, value = (f"{head}{sign}(", value) if sign else ("return (", text.removeprefix("return "))
-        inner = textwrap.fill(
-            value, 110, initial_indent=f"{indent}    ", subsequent_indent=f"{indent}    ", break_long_words=False
-        )
-        return f"{indent}{start}\n{inner}\n{indent})"
-
-
-class FormPrinter(PythonPrinter):
+class FormPrinter(ScalarPrinter, PythonCodePrinter):
     """The restricted form, which all languages are printed from."""
 
     functions: ClassVar = {n: n for n in _SAME} | {"Abs": "abs", "ceiling": "ceil", "Max": "max", "Min": "min"}
+    choice = "({value} if {condition} else {otherwise})"
+    both, either, negation = "and", "or", "(not {})"
     power = "pow({base}, {exponent})"
     helper = """\
 def _inverse(x: float) -> float:
@@ -320,8 +233,13 @@ def _inverse(x: float) -> float:
 
 """
 
+    def _print_Mul(self, expr: sp.Mul) -> str:
+        if not (self.guarded and any(f.is_Pow and f.exp == -1 for f in expr.args)):
+            return super()._print_Mul(expr)
+        return "*".join(self.parenthesize(factor, PRECEDENCE["Mul"]) for factor in expr.args)
+
     def _print_Pow(self, expr: sp.Pow) -> str:
-        return super()._print_Pow(expr).replace("inverse(", "_inverse(")
+        return f"_inverse({self._print(expr.base)})" if self.guarded and expr.exp == -1 else super()._print_Pow(expr)
 
     @classmethod
     def helped(cls, text: str) -> str:
@@ -346,11 +264,11 @@ def _inverse(x: float) -> float:
                 word = "else" if branch.condition is None else "elif" if number else "if"
                 lines.append(f"{word}{'' if branch.condition is None else ' ' + printer.doprint(branch.condition)}:")
             steps = [f"{printer.places[symbol].name} = {printer.doprint(value)}" for symbol, value in branch.steps]
-            steps += [f"found[{i}] = {printer.doprint(value)}" for i, value in enumerate(branch.outputs)]
+            result = "return {1}" if function.scalar else "found[{0}] = {1}"
+            steps += [result.format(i, printer.doprint(value)) for i, value in enumerate(branch.outputs)]
             lines += [indent + step for step in steps]
         parameters = "".join(f"{a.name}: {_kind(a)}, " for a in function.arguments)
         if function.scalar:
-            lines[-1] = lines[-1].replace("found[0] =", "return", 1)
             head = f"def {name}({parameters.removesuffix(', ')}) -> float:"
         else:
             head = f"def {name}({parameters}found: Out[Row[float, {function.size}]]) -> None:"
@@ -365,12 +283,4 @@ def _kind(argument: Argument) -> str:
     return f"Row[float, {len(argument.symbols)}]" if argument.row else "float"
 
 
-PRINTERS: dict[str, type[ScalarPrinter]] = {
-    "c": CPrinter,
-    "fortran": FortranPrinter,
-    "julia": JuliaPrinter,
-    "octave": OctavePrinter,
-    "rust": RustPrinter,
-    "javascript": JavaScriptPrinter,
-    "python": PythonPrinter,
-}
+PRINTERS: dict[str, type[ScalarPrinter]] = {"c": CPrinter, "fortran": FortranPrinter}

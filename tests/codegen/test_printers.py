@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
-import sys
-
-import numpy as np
 import pytest
 import sympy as sp
 from sympy.codegen.cfunctions import expm1, log1p
 
 from cra_sym.codegen.languages import LANGUAGES
+from cra_sym.codegen.library import Check, Library
+from cra_sym.codegen.printers import FormPrinter
 from cra_sym.codegen.program import christen, function, scalars
+from tests.codegen import kit
 
 x, y = sp.symbols("x y", real=True)
 a, b = sp.symbols("a b", positive=True)
@@ -47,91 +45,55 @@ def expected(point) -> list[float]:
     return [float(sp.N(e.subs(values), 20)) for e in COVERAGE]
 
 
-CC = "cc -std=c99 -pedantic -Wall -Wextra -Wconversion -Werror -O1 -o run coverage.c -lm && ./run"
-GFORTRAN = "gfortran -std=f2008 -Wall -Wextra -Werror -o run coverage.f90 && ./run"
-PROGRAMS = {
-    "python": (sys.executable, "coverage.py", [sys.executable, "coverage.py"]),
-    "c": ("cc", "coverage.c", ["sh", "-c", CC]),
-    "fortran": ("gfortran", "coverage.f90", ["sh", "-c", GFORTRAN]),
-    "octave": ("octave", "run_it.m", ["octave", "--norc", "--no-gui", "--quiet", "run_it.m"]),
-    "rust": ("rustc", "coverage.rs", ["sh", "-c", "rustc -o run coverage.rs && ./run"]),
-    "javascript": ("node", "coverage.mjs", ["node", "coverage.mjs"]),
-}  # fmt: skip
+EVALUATE = """
+def _evaluate(quantity: int, given: Row[float, 64], found: Mut[Row[float, 256]]) -> None:
+    many = zeros(COUNT)
+    if quantity == 0:
+        coverage(given[0], given[1], given[2], given[3], many)
+        for i in range(COUNT):
+            found[i] = many[i]
+    elif quantity == 1:
+        one = branched(given[0], given[1], given[2])
+        found[0] = one
+    else:
+        raise InvalidArgument("nothing has this number")
+"""
 
 
-def program(language: str) -> str:
-    """Return a program that prints all outputs at all points, one a line, then those of the branches."""
-    text = "\n\n".join(LANGUAGES[language].function(f) for f in (WHOLE, BRANCHED))
-    helpers = LANGUAGES[language].helped(text)
-    n, arguments = len(COVERAGE), [", ".join(f"{v!r}" for v in p) for p in POINTS]
-    short = [", ".join(f"{v!r}" for v in p[:3]) for p in POINTS]
-    if language == "python":
-        calls = [f"print(*coverage({p}), sep='\\n')" for p in arguments] + [f"print(branched({p}))" for p in short]
-        return "\n".join(["import math", helpers, text, *calls])
-    if language == "c":
-        calls = [f'coverage({p}, out); for (int i = 0; i < {n}; i++) printf("%.17g\\n", out[i]);' for p in arguments]
-        calls += [f'printf("%.17g\\n", branched({p}));' for p in short]
-        return (
-            "#include <math.h>\n#include <stdio.h>\n"
-            + text
-            + f"\nint main(void) {{ double out[{n}];\n"
-            + "\n".join(calls)
-            + "\nreturn 0; }\n"
-        )
-    if language == "fortran":
-        typed = [", ".join(f"{v!r}_dp" for v in p) for p in POINTS]
-        calls = [f"call coverage({p}, out)\nprint '(es25.16e3)', out" for p in typed]
-        calls += [f"print '(es25.16e3)', branched({', '.join(p.split(', ')[:3])})" for p in typed]
-        head = "program run\nuse, intrinsic :: iso_fortran_env, only: dp => real64\nimplicit none\n"
-        return head + f"real(dp) :: out({n})\n" + "\n".join(calls) + f"\ncontains\n{helpers}\n{text}\nend program\n"
-    if language == "octave":
-        calls = [f"printf('%.17g\\n', coverage({p}));" for p in arguments] + [
-            f"printf('%.17g\\n', branched({p}));" for p in short
-        ]
-        return "1;\n" + helpers + "\n" + text + "\n" + "\n".join(calls) + "\n"
-    if language == "rust":
-        calls = [f'for v in coverage({p}) {{ println!("{{:e}}", v); }}' for p in arguments] + [
-            f'println!("{{:e}}", branched({p}));' for p in short
-        ]
-        return (
-            "#![deny(warnings)]\n#![allow(unused_parens, clippy::all)]\n"
-            + text
-            + "\nfn main() {\n"
-            + "\n".join(calls)
-            + "\n}\n"
-        )
-    calls = [f"for (const v of coverage({p})) console.log(v);" for p in arguments] + [
-        f"console.log(branched({p}));" for p in short
+def library() -> Library:
+    text = "\n\n".join(FormPrinter.text_of(f, f.name, checked=False) for f in (WHOLE, BRANCHED))
+    text = f"COUNT = {len(COVERAGE)}\n\n{FormPrinter.helped(text)}{text}\n{EVALUATE}"
+    checks = [Check(0, p, tuple(expected(p)), 2e-14, 1e-14) for p in POINTS]
+    checks += [
+        Check(1, p[:3], (p[0] * p[2] if p[0] > p[1] else p[1] / p[2] if p[0] < 0 else p[2],), 1e-15) for p in POINTS
     ]
-    return text + "\n" + "\n".join(calls) + "\n"
+    return Library("printed", "Everything.", text, ("Nothing.",), tuple(checks))
 
 
-@pytest.mark.parametrize("language", PROGRAMS)
+@pytest.mark.parametrize("language", kit.COMMANDS)
 def test_every_function_means_the_same(language, tmp_path):
-    tool, name, command = PROGRAMS[language]
-    if shutil.which(tool) is None:
-        pytest.skip(f"{language} needs {tool}")
-    (tmp_path / name).write_text(program(language))
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stderr[-4000:]
-    got = [float(word) for word in done.stdout.split()]
-    wanted = [value for point in POINTS for value in expected(point)]
-    wanted += [p[0] * p[2] if p[0] > p[1] else p[1] / p[2] if p[0] < 0 else p[2] for p in POINTS]
-    np.testing.assert_allclose(got, wanted, rtol=2e-14, atol=1e-14)
+    if not kit.has(language):
+        pytest.skip(f"{language} needs {kit.COMMANDS[language][0]}")
+    for name, text in library().texts(language).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    for command in kit.COMMANDS[language][1]:
+        printed = kit.run(command, tmp_path)
+    assert "8 checks, 0 failures" in printed or "test result: ok" in printed
 
 
 def test_julia_parses():
     tree_sitter = pytest.importorskip("tree_sitter", reason="needs tree-sitter")
     grammar = pytest.importorskip("tree_sitter_julia", reason="needs tree-sitter-julia")
-    text = "\n".join(LANGUAGES["julia"].function(f) for f in (WHOLE, BRANCHED))
+    text = library().texts("julia")["src/printed.jl"]
     assert not tree_sitter.Parser(tree_sitter.Language(grammar.language())).parse(text.encode()).root_node.has_error
 
 
-@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("language", [*LANGUAGES, "form"])
 def test_a_function_without_equivalent_is_refused(language):
     f = function("f", "", sp.zeta(x), scalars([x]))
     with pytest.raises(ValueError, match="zeta"):
-        LANGUAGES[language].function(f)
+        LANGUAGES[language].function(f) if language in LANGUAGES else FormPrinter.text_of(f, "f", checked=False)
 
 
 def test_names_are_valid_everywhere():
