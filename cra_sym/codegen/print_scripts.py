@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import ast
-import textwrap
 from collections.abc import Sequence
 from typing import ClassVar
 
-from cra_sym.codegen.printing import Lines, Printer, snake
+from cra_sym.codegen.printing import Lines, Printer, folded, snake
 from cra_sym.kernels.form import Constant, Function, Record, Type
 
 __all__ = ["SAME", "JavaScriptPrinter", "OctavePrinter", "ScriptPrinter"]
@@ -222,10 +221,7 @@ end
         return names[0] if len(names) == 1 else f"[{', '.join(names)}]"
 
     def wrapped(self, text: str, indent: str) -> Lines:
-        lines = textwrap.wrap(
-            text, self.width, initial_indent=indent, subsequent_indent=f"{indent}    ", break_long_words=False,
-            break_on_hyphens=False,
-        )  # fmt: skip
+        lines = folded(text, self.width, indent)
         yield from " ...\n".join(lines).split("\n")
 
     def if_head(self, condition: str) -> str:

@@ -16,7 +16,7 @@ from typing import ClassVar
 from cra_sym.codegen.print_expressions import OPERATORS, ExpressionPrinter
 from cra_sym.kernels.form import Constant, Form, Function, Record, Type
 
-__all__ = ["Lines", "Printer", "snake"]
+__all__ = ["Lines", "Printer", "folded", "snake"]
 
 Lines = Iterator[str]
 
@@ -24,6 +24,16 @@ Lines = Iterator[str]
 def snake(name: str) -> str:
     """Return a CamelCase name in lower case with underscores."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+
+
+def folded(text: str, width: int, indent: str) -> list[str]:
+    """Return a statement on as many lines as it needs, broken at blanks that are in no text."""
+    whole = re.sub(r"'[^']*'|\"[^\"]*\"", lambda found: found[0].replace(" ", "\0"), text)
+    lines = textwrap.wrap(
+        whole, width, initial_indent=indent, subsequent_indent=f"{indent}    ", break_long_words=False,
+        break_on_hyphens=False,
+    )  # fmt: skip
+    return [line.replace("\0", " ") for line in lines]
 
 
 class Printer(ExpressionPrinter):
@@ -174,10 +184,7 @@ class Printer(ExpressionPrinter):
 
     def wrapped(self, text: str, indent: str) -> Lines:
         """Yield a statement on as many lines as it needs."""
-        yield from textwrap.wrap(
-            text, self.width, initial_indent=indent, subsequent_indent=f"{indent}    ", break_long_words=False,
-            break_on_hyphens=False,
-        )  # fmt: skip
+        yield from folded(text, self.width, indent)
 
     # Statements ---------------------------------------------------------------------------------------------------
 

@@ -52,16 +52,14 @@ def _evaluate(quantity: int, given: Row[float, 64], found: Mut[Row[float, 256]])
         coverage(given[0], given[1], given[2], given[3], many)
         for i in range(COUNT):
             found[i] = many[i]
-    elif quantity == 1:
+    else:
         one = branched(given[0], given[1], given[2])
         found[0] = one
-    else:
-        raise InvalidArgument("nothing has this number")
 """
 
 
 def library() -> Library:
-    text = "\n\n".join(FormPrinter.text_of(f, f.name, checked=False) for f in (WHOLE, BRANCHED))
+    text = "\n\n".join(FormPrinter.text_of(f, f.name, checked=f is WHOLE) for f in (WHOLE, BRANCHED))
     text = f"COUNT = {len(COVERAGE)}\n\n{FormPrinter.helped(text)}{text}\n{EVALUATE}"
     checks = [Check(0, p, tuple(expected(p)), 2e-14, 1e-14) for p in POINTS]
     checks += [
