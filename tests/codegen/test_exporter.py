@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import shutil
 import subprocess
 import sys
 from functools import cache
@@ -97,3 +99,33 @@ def test_unknown_language_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"language = 'cobol': must be one of c, fortran"):
         cra.export("cobol", tmp_path / "out")
     assert not list(tmp_path.iterdir())
+
+
+def test_two_arms_link_into_one_program(short, tmp_path):
+    if shutil.which("g++") is None or shutil.which("make") is None:
+        pytest.skip("needs g++ and make")
+    for name in ("left", "right_one"):
+        made = cra.export("c", tmp_path / name, name=name)
+        assert {f"{name}_arm.h", f"{name}_internal.h"} <= set(made.files)
+        text = "".join((tmp_path / name / file).read_text() for file in made.files if file != "README.md")
+        assert not re.search(r"\bcra_(?!sym)|CRA_", text)
+        kit.run(["make", f"lib{name}_arm.a"], tmp_path / name)
+    (tmp_path / "main.cpp").write_text(
+        '#include "left/left_arm.h"\n#include "right_one/right_one_arm.h"\n'
+        "int main() { double one[2], two[2];\n"
+        "  int bad = left_frequency_parameters(3, 0, 0.1, 0, 2, one) != LEFT_OK;\n"
+        "  bad += right_one_frequency_parameters(3, 0, 0.1, 0, 2, two) != RIGHT_ONE_OK;\n"
+        "  return bad || one[1] != two[1]; }\n"
+    )
+    libraries = ["left/libleft_arm.a", "right_one/libright_one_arm.a"]
+    kit.run(["g++", "-Wall", "-Werror", "main.cpp", *libraries, "-lm", "-o", "main"], tmp_path)
+    kit.run(["./main"], tmp_path)
+
+
+@pytest.mark.parametrize("language", ["fortran", "python", "rust", "julia"])
+def test_a_name_stands_in_front_of_everything(short, tmp_path, language):
+    made = cra.export(language, tmp_path / "out", name="crane")
+    assert not any("cra_" in file for file in made.files)
+    text = "".join((tmp_path / "out" / file).read_text() for file in made.files if file != "README.md")
+    assert not re.search(r"\bcra_(?!sym)|CRA_|CraArm", text)
+    assert re.search(r"\bcrane", text)
