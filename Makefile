@@ -9,7 +9,7 @@ RUN = .venv/bin/python
 NOTEBOOKS = --nbval --nbval-current-env --nbval-sanitize-with tests/notebooks/sanitize.cfg notebooks
 SHARED = -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
-.PHONY: reproduce test coverage lab notebooks oldest newest lint mutation campaign clean
+.PHONY: reproduce test check lock coverage lab notebooks oldest newest lint mutation campaign clean
 
 reproduce: .venv/.ready
 	$(RUN) -m cra_sym reproduce --output "$(OUTPUT)"
@@ -19,6 +19,11 @@ reproduce: .venv/.ready
 test: export OPENBLAS_NUM_THREADS = 1
 test: .venv/.ready
 	$(RUN) -m pytest $(SHARED) README.md $(NOTEBOOKS) tests cra_sym $(ARGS)
+
+# Before each commit, under two minutes on two processors: style, types, and the tests that tests/fast.txt names.
+check: export OPENBLAS_NUM_THREADS = 1
+check: lint
+	$(RUN) -m pytest -n $(JOBS) --dist worksteal -q -m "not network and not browser" @tests/fast.txt $(ARGS)
 
 # Lines and branches of the package that the tests run, without the notebooks; derivations too: the store is empty.
 coverage: export OPENBLAS_NUM_THREADS = 1
@@ -54,6 +59,12 @@ lint: .venv/.ready
 	$(RUN) -m ruff check .
 	$(RUN) -m ruff format --check .
 	$(RUN) -m mypy
+
+# Every wheel for every system and Python, with its hash, after a change of requirements.txt.
+lock: .venv/.ready
+	$(RUN) -m pip install --quiet --disable-pip-version-check uv
+	grep -v '^-e' requirements.txt | $(RUN) -m uv pip compile --quiet --universal --no-build --python-version 3.11 \
+	    --custom-compile-command "make lock" --format pylock.toml --output-file .ci/pylock.toml -
 
 # Hours on one processor: every mutant of every module, or those left by the run before. ARGS="--sample 10" takes the
 # first ten of each, ARGS=arm/lagrangian one module, and --again starts anew. The record stays out of version control.

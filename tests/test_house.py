@@ -6,6 +6,7 @@ import ast
 import re
 import subprocess
 import sys
+import tomllib
 from importlib import import_module
 from pathlib import Path
 
@@ -177,8 +178,23 @@ def test_public_things_are_documented(module):
 
 
 def tracked_texts() -> list[Path]:
-    kinds = {".py", ".pyi", ".md", ".ipynb", ".txt", ".toml", ".cfg", ".cff", ".mplstyle", ".jinja", ".css"}
-    folders = [ROOT / name for name in ("cra_sym", "notebooks", "tests", ".ci")]
+    kinds = {
+        ".py",
+        ".pyi",
+        ".md",
+        ".ipynb",
+        ".txt",
+        ".toml",
+        ".cfg",
+        ".cff",
+        ".mplstyle",
+        ".jinja",
+        ".css",
+        ".yml",
+        ".yaml",
+        ".bib",
+    }
+    folders = [ROOT / name for name in ("cra_sym", "notebooks", "tests", ".ci", ".github")]
     files = [path for folder in folders for path in folder.rglob("*")] + list(ROOT.iterdir())
     hidden = {".ipynb_checkpoints", "__pycache__"}
     return sorted(
@@ -225,10 +241,10 @@ def test_readme_commands_exist():
     assert {"reproduce", "test", "lab", "notebooks"} <= named <= targets
 
 
-def test_readme_links_lead_somewhere():
-    for document in ("README.md", "CONTRIBUTING.md"):
-        links = re.findall(r"\]\((?!https?:|#)([^)#]+)", (ROOT / document).read_text(encoding="utf-8"))
-        assert [link for link in links if not (ROOT / link).exists()] == []
+def test_links_of_documents_lead_somewhere():
+    for document in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / ".github").glob("*.md")]:
+        links = re.findall(r"\]\((?!https?:|#)([^)#]+)", document.read_text(encoding="utf-8"))
+        assert [link for link in links if not (document.parent / link).exists()] == []
 
 
 def test_readme_tells_where_each_equation_lives():
@@ -239,6 +255,31 @@ def test_readme_tells_where_each_equation_lives():
 
 
 def test_readme_pictures_are_small():
-    pictures = re.findall(r"!\[[^]]+\]\(([^)]+)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
+    pictures = re.findall(r"!\[[^]]+\]\((?!https:)([^)]+)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
     assert len(pictures) == 2
     assert all((ROOT / picture).stat().st_size < 200_000 for picture in pictures)
+
+
+def test_badges_of_the_readme_are_true():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    pythons = re.findall(r"Python :: (3\.\d+)", "\n".join(project["classifiers"]))
+    assert "Typing :: Typed" in project["classifiers"] and (PACKAGE / "py.typed").exists()
+    badges = re.findall(r"^\[!\[([^]]+)\]\(https://img", (ROOT / "README.md").read_text(encoding="utf-8"), re.M)
+    assert badges == [f"Python {pythons[0]} to {pythons[-1]}", f"Licence {project['license']}", "Typed"]
+
+
+def test_fast_selection_exists():
+    selected = (ROOT / "tests" / "fast.txt").read_text(encoding="utf-8").split()
+    assert [name for name in selected if not (ROOT / name).exists()] == []
+
+
+def test_top_level_is_small():
+    """What lies beside the package is known by name; what a run leaves behind is not committed."""
+    done = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True)
+    if done.returncode:
+        pytest.skip("not a git checkout")
+    folders = {"cra_sym", "notebooks", "tests", ".ci", ".github"}
+    documents = {"README.md", "CHANGELOG.md", "CONTRIBUTING.md", "CITATION.cff", "LICENSE"}
+    settings = {"Makefile", "pyproject.toml", "requirements.txt", ".gitignore", ".pre-commit-config.yaml"}
+    there = {name.partition("/")[0] for name in done.stdout.splitlines()}
+    assert there == folders | documents | settings

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import subprocess
 import sys
 import tomllib
@@ -15,7 +17,8 @@ from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[1]
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+PROJECT = SETTINGS["project"]
 LINES = [line for line in (ROOT / "requirements.txt").read_text(encoding="utf-8").splitlines() if line.strip()]
 PINS = [line for line in LINES if not line.startswith(("#", "-e"))]
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
@@ -25,17 +28,50 @@ def test_the_package_itself_is_listed():
     assert LINES[-1] == "-e ."
 
 
+WITH_COMPILER = {"numba", "llvmlite"}  # which some platforms have no wheels of
+
+
 @pytest.mark.parametrize("line", PINS)
 def test_every_line_is_a_plain_pin(line):
     requirement = Requirement(line)
     assert [clause.operator for clause in requirement.specifier] == ["=="]
-    assert not (requirement.marker or requirement.url or requirement.extras)
+    assert not (requirement.url or requirement.extras)
+    assert bool(requirement.marker) == (requirement.name in WITH_COMPILER)
+
+
+def test_numba_is_asked_for_where_it_has_wheels():
+    """One condition in both files, which holds and fails where it should."""
+    lines = [line for line in [*PROJECT["dependencies"], *PINS] if Requirement(line).name in WITH_COMPILER]
+    (marker,) = {str(Requirement(line).marker) for line in lines}
+    with_wheels = {
+        ("linux", "x86_64"),
+        ("linux", "aarch64"),
+        ("darwin", "arm64"),
+        ("win32", "AMD64"),
+        ("win32", "ARM64"),
+    }
+    without = {("darwin", "x86_64"), ("win32", "x86"), ("linux", "riscv64"), ("emscripten", "wasm32")}
+    assert len(lines) == 3
+    for system, machine in with_wheels | without:
+        where = {"sys_platform": system, "platform_machine": machine}
+        assert Requirement(f"numba; {marker}").marker.evaluate(where) == ((system, machine) in with_wheels), where
+
+
+def test_lock_has_the_pins():
+    """A pin that is not in the lock: run make lock."""
+    locked = tomllib.loads((ROOT / ".ci" / "pylock.toml").read_text(encoding="utf-8"))["packages"]
+    versions = {package["name"]: package["version"] for package in locked}
+    pins = {canonicalize_name(pin.name): next(iter(pin.specifier)).version for pin in map(Requirement, PINS)}
+    assert {name: versions.get(name) for name in pins} == pins
+    wheels = [wheel for package in locked for wheel in package["wheels"]]
+    assert all(wheel["url"].startswith("https://") and wheel["hashes"]["sha256"] for wheel in wheels)
 
 
 def test_pins_lie_in_the_ranges():
-    """Every dependency and every extra of pyproject.toml is pinned, inside the range given there."""
+    """Every dependency, extra and group of pyproject.toml is pinned, inside the range given there."""
     pinned = {Requirement(line).name: next(iter(Requirement(line).specifier)).version for line in PINS}
-    ranges = [*PROJECT["dependencies"], *(r for extra in PROJECT["optional-dependencies"].values() for r in extra)]
+    lists = [*PROJECT["optional-dependencies"].values(), *SETTINGS["dependency-groups"].values()]
+    ranges = [*PROJECT["dependencies"], *(line for lines in lists for line in lines if isinstance(line, str))]
     for requirement in map(Requirement, ranges):
         assert requirement.specifier.contains(pinned[requirement.name]), requirement
 
@@ -44,6 +80,9 @@ def test_supported_pythons_agree():
     assert PROJECT["requires-python"] == f">={PYTHONS[0]}"
     declared = [c.removeprefix("Programming Language :: Python :: ") for c in PROJECT["classifiers"]]
     assert set(PYTHONS) <= set(declared)
+    workflow = (ROOT / ".github" / "workflows" / "tests.yml").read_text(encoding="utf-8")
+    (row,) = re.findall(r"^ +python: (\[.*\])$", workflow, re.M)
+    assert json.loads(row) == list(PYTHONS)
 
 
 def installed() -> dict[str, Distribution]:

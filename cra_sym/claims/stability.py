@@ -48,7 +48,8 @@ def _terms(kind: str) -> tuple[bool, bool]:
     from sympy import Function, Symbol
 
     from cra_sym.paper.evaluation import put
-    from cra_sym.paper.parametric import AXIAL, TRANSVERSE, excited_motion, t, u, v, w, x
+    from cra_sym.paper.parametric import AXIAL, TRANSVERSE, excited_motion
+    from cra_sym.symbols import t, u, v, w, x
 
     motion = excited_motion(kind)
     size, shape = Symbol("size"), Function("shape")(x)
