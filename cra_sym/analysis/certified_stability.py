@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from cra_sym.analysis.floquet import Matrices, batch_shape, checked_point, matrices_of
 from cra_sym.checks import default_floating_point
 from cra_sym.model.excitations import Excitation
-from cra_sym.model.system import ROUNDING, System
+from cra_sym.model.routes import ROUNDING
+from cra_sym.model.system import System
 from cra_sym.solvers.floquet import flat
 from cra_sym.solvers.periodic import PeriodicSystem
 from cra_sym.solvers.proved_stability import STABLE, UNSTABLE, proved_stability
