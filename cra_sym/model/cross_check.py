@@ -103,7 +103,7 @@ def _by_ritz(system: System, modes: int) -> tuple[Array, Array, Array]:
         values = {name: column[rows] for name, column in zip(spatial.names, columns, strict=True)}
         values |= {symbol.name: at for symbol, at in zip(places[0], places[1], strict=True)}
         for k, elements in enumerate((each, 2 * each)):
-            matrices = ritz(model.equations, elements=elements, nodes=names)
+            matrices = ritz(model.linearised, elements=elements, nodes=names)
             found[k, rows] = Ritz(matrices, (*model.symbols, *places[0])).natural_frequencies(values, modes)
         number[rows] = each * (len(names) + 1)
     return found[0], found[1], number
