@@ -167,6 +167,8 @@ NUMERIC = {
     "residual_vibration_gradient": (residual_gradient, (1, 0, 0)),
     "frequency_response": (lambda arm, u: cra.frequency_response(arm, u(0, -1) * np.array([3.0, 40.0])), (0, 2, 0)),
     "sensitivities": (lambda arm, u: cra.sensitivities(arm).df_dk_t, (0, 1, -1)),
+    "eigenvalues": (lambda arm, u: cra.eigenvalues(arm, 2).imag, (0, -1, 0)),
+    "damping_ratios": (lambda arm, u: cra.damping_ratios(arm, 2), (0, 0, 0)),
     "certify": (lambda arm, u: cra.certify(arm, modes=2).lower, (0, -1, 0)),
     "floquet_exponents": (
         lambda arm, u: cra.floquet_exponents(arm, SPRING, 30.0 * u(0, -1), 0.05, modes=2).real, (0, -1, 0),
@@ -195,8 +197,8 @@ SINGLE = {
 }  # fmt: skip
 NOT_NUMERIC = {
     "AmbiguityWarning", "Arm", "AsymptoticWarning", "AxialBase", "BaseMotion", "Fluctuation", "Force", "JointStiffness",
-    "Backbone", "ConvergenceWarning", "SteadyState", "backbone", "nonlinear_modal_equations", "slow_flow_values",
-    "steady_states",
+    "Backbone", "ConvergenceWarning", "Member", "SteadyState", "backbone", "certify_stability", "count_eigenvalues",
+    "critical_value", "joined", "nonlinear_modal_equations", "slow_flow_values", "steady_states",
     "MisfitWarning", "Model", "ResonanceWarning", "System", "TransverseBase", "UndersamplingWarning", "equation",
     "equations", "explore", "export", "kernel", "paper_lagrangian", "stations", "sweep",
 }  # fmt: skip

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.model.galerkin import Ritz
 from cra_sym.model.values import flat_columns
 
 if TYPE_CHECKING:
@@ -92,6 +91,7 @@ def _cause(difference: float, mode: int, accuracy: float, falling: float) -> str
 def _by_ritz(system: System, modes: int) -> tuple[Array, Array, Array]:
     """Return frequencies in Hz of some elements and of twice as many, (sets, modes), and the number of the former."""
     from cra_sym.mechanics import ritz
+    from cra_sym.model.galerkin import Ritz
 
     model, spatial = system.model, system.numerics("spatial")
     columns = flat_columns(system.parameters, system.shape)
