@@ -20,6 +20,12 @@ _QUIET = (
 )
 
 
+def pytest_addoption(parser):
+    parser.addoption(
+        "--all-chapters", action="store_true", help="run every chapter with another arm, not the quick ones"
+    )
+
+
 def pytest_sessionfinish(session):
     """Store what a worker covered while there is time: it is ended ten seconds after its last test."""
     coverage = sys.modules.get("coverage")

@@ -404,7 +404,7 @@ def _with_force_inside(system: System, drive: Any, kind: Any) -> tuple[System, A
     """Return the system and what drives it; a displacement of an interior place with a force of its own there."""
     if drive is None or isinstance(drive, str):
         return system, drive
-    found = system.model.numerics("pushed", drive)
+    found = system.model.numerics("pushed", drive) if hasattr(drive, "free_symbols") else None
     if found is None:
         return system, drive
     if kind not in (None, "force"):

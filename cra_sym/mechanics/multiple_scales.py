@@ -52,6 +52,9 @@ class MultipleScales:
     border: Border | None
     response: SteadyResponse | None
 
+    def __repr__(self) -> str:
+        return f"Multiple scales of order {self.order} at {self.resonance}"
+
     @property
     def exact_resonance(self) -> Expr:
         """Excitation frequency at the exact resonance."""

@@ -10,6 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from cra_sym.figures import FIGURES, described, draw, shows_an_arm
 from cra_sym.report.pictures import save_figures
+from tests.systems import system
 
 
 def function(name):
@@ -63,8 +64,13 @@ def test_an_unknown_figure_is_named(asked):
 
 
 def test_what_is_no_arm_is_named():
-    with pytest.raises(TypeError, match=r"system = 5.*Arm"):
+    with pytest.raises(TypeError, match="system = 5: must be a System"):
         draw("fig03", 5)
+    string = system("string")
+    with pytest.raises(ValueError, match="system has no parameter 'L': this figure is of an arm, with L, b, h, E"):
+        draw("fig03", string)
+    with pytest.raises(TypeError, match=r"system = <System.*must be an Arm"):
+        draw("fig04", string)
 
 
 def test_files_are_the_same_in_each_run(tmp_path):
