@@ -80,8 +80,8 @@ def draw(name: str, system: System | None = None, **options: Any) -> Figure:
     Examples
     --------
     >>> from cra_sym import Arm
-    >>> draw("frequencies", Arm.nominal(), parameter="m_e").axes[0].get_xlabel()
-    '$m_e$ / kg'
+    >>> draw("frequencies", Arm.nominal(), parameter="m_e").axes[0].get_xlabel().endswith("/ kg")
+    True
     """
     choice("figure", name, FIGURES)
     taken = signature(_function(name)).parameters

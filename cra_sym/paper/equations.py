@@ -200,6 +200,9 @@ class Equation:
         body = display_latex(self.shown)
         return rf"\begin{{equation}}\tag{{{self.number}}}\label{{{name}}}" + f"\n{body}\n" + r"\end{equation}"
 
+    def __reduce__(self) -> tuple[Callable[[Number], Equation], tuple[Number]]:
+        return equation, (self.number,)
+
     def __repr__(self) -> str:
         return f"Equation ({self.number}), {self.title}"
 

@@ -158,8 +158,8 @@ def test_the_overview_opens_and_runs(page, lab):
 
 @pytest.mark.browser
 def test_a_chapter_runs(page, lab):
-    shown, pictures = run_all(page, lab, "03_joint.ipynb")
-    keep(page, "joint")
+    shown, pictures = run_all(page, lab, "08_your_own_lagrangian.ipynb")
+    keep(page, "chapter_8")
     assert (shown["errors"], shown["broken"], page.elsewhere) == ([], 0, [])
     assert shown["pictures"] == pictures > 0
     assert shown["maths"] > 0 and shown["outputs"] > 0
@@ -172,7 +172,7 @@ def test_a_slider_moves_the_pictures(page, lab):
     assert (shown["errors"], page.elsewhere) == ([], [])
     panel = page.locator(".jp-OutputArea-output .widget-vbox").first
     pictures = panel.locator("img.widget-image")
-    assert (panel.locator(".noUi-handle").count(), pictures.count()) == (9, 3)
+    assert (panel.locator(".noUi-handle").count(), pictures.count()) == (15, 3)
     before = [picture.get_attribute("src") for picture in pictures.all()]
     panel.locator(".noUi-handle").first.press("ArrowLeft")
     page.wait_for_function(
