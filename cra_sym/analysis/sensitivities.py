@@ -205,12 +205,17 @@ class Sensitivities:
             rate = np.where(self._splits(name), np.nan, rate)
         return np.where(np.isinf(column(np.asarray(self._system.values[name]))), 0.0, rate)
 
+    @property
+    def _watched(self) -> int:
+        """How many modes are compared, so that one beyond the last that shares its frequency is seen."""
+        return min(self._modes + 2, self._system.most_modes)
+
     @cached_property
     def _repeated(self) -> NDArray[np.bool_] | None:
         """Which frequencies are the same to rounding, shape (..., modes + 2, modes + 2); None if none are."""
         if isinstance(self._system.modes(self._modes), OneWaveModes):
             return None  # a mode of one wave number in one field is alone at its frequency
-        omega = self._system.natural_frequencies(min(self._modes + 2, self._system.most_modes))
+        omega = self._system.natural_frequencies(self._watched)
         near = np.abs(omega[..., :, None] - omega[..., None, :]) <= _SAME * omega[..., None, :]
         near &= (omega > 0)[..., None] & ~np.eye(omega.shape[-1], dtype=bool)
         return near if near[..., : self._modes, :].any() else None
@@ -218,8 +223,8 @@ class Sensitivities:
     def _splits(self, name: str) -> NDArray[np.bool_]:
         """Return at which modes a change of the parameter splits a repeated frequency: there it has no derivative."""
         assert self._repeated is not None
-        forms = self._system.form("rates", min(self._modes + 2, self._system.most_modes))
-        omega = self._system.natural_frequencies(min(self._modes + 2, self._system.most_modes))
+        forms = self._system.form("rates", self._watched)
+        omega = self._system.natural_frequencies(self._watched)
         block = forms[f"{name} stiffness"] - omega[..., None] * omega[..., None, :] * forms[f"{name} mass"]
         own = np.diagonal(block, axis1=-2, axis2=-1)
         off = np.maximum(np.abs(block), np.abs(own[..., :, None] - own[..., None, :]))

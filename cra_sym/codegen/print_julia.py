@@ -6,14 +6,14 @@ import ast
 from collections.abc import Sequence
 from typing import ClassVar
 
-from cra_sym.codegen.print_scripts import SAME, ScriptPrinter
+from cra_sym.codegen.print_scripts import SAME, BracketingPrinter
 from cra_sym.codegen.printing import Lines
 from cra_sym.kernels.form import Constant, Function, Record, Type
 
 __all__ = ["JuliaPrinter"]
 
 
-class JuliaPrinter(ScriptPrinter):
+class JuliaPrinter(BracketingPrinter):
     """Julia: rows are vectors, records mutable structs."""
 
     name, title = "julia", "Julia"
@@ -61,20 +61,6 @@ class JuliaPrinter(ScriptPrinter):
         if not isinstance(function.body[-1], ast.Return):
             yield f"    {next(iter(self.returned(None)))}"
         yield "end"
-
-    def wrapped(self, text: str, indent: str) -> Lines:
-        if len(indent + text) <= self.width:
-            yield indent + text
-            return
-        head, sign, value = text.partition(" = ")
-        if text.startswith("return "):
-            head, sign, value = "return", " ", text.removeprefix("return ")
-        if not sign or "(" in head:
-            yield from super().wrapped(text, indent)
-            return
-        yield f"{indent}{head}{sign}("
-        yield from super().wrapped(value, f"{indent}    ")
-        yield f"{indent})"
 
     def declared(self, name: str, kind: Type, value: str | None, fixed: bool) -> str:
         return f"local {name}" if value is None else f"{name} = {value}"

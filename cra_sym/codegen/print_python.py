@@ -6,14 +6,14 @@ import ast
 from collections.abc import Sequence
 from typing import ClassVar
 
-from cra_sym.codegen.print_scripts import SAME, ScriptPrinter
+from cra_sym.codegen.print_scripts import SAME, BracketingPrinter
 from cra_sym.codegen.printing import Lines, snake
 from cra_sym.kernels.form import FLOAT, Constant, Function, Record, Type
 
 __all__ = ["PythonPrinter"]
 
 
-class PythonPrinter(ScriptPrinter):
+class PythonPrinter(BracketingPrinter):
     """Python 3, the standard library alone."""
 
     name, title = "python", "Python"
@@ -87,20 +87,6 @@ class PythonPrinter(ScriptPrinter):
         for name, kind in function.parameters.items():
             if function.public and kind == FLOAT:
                 yield f"    {name} = _real({name})"
-
-    def wrapped(self, text: str, indent: str) -> Lines:
-        if len(indent + text) <= self.width:
-            yield indent + text
-            return
-        head, sign, value = text.partition(" = ")
-        if text.startswith("return "):
-            head, sign, value = "return", " ", text.removeprefix("return ")
-        if not sign or "(" in head:
-            yield from super().wrapped(text, indent)
-            return
-        yield f"{indent}{head}{sign}("
-        yield from super().wrapped(value, f"{indent}    ")
-        yield f"{indent})"
 
     def if_head(self, condition: str) -> str:
         return f"if {condition}:"

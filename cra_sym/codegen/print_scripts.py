@@ -9,7 +9,7 @@ from typing import ClassVar
 from cra_sym.codegen.printing import Lines, Printer, folded, snake
 from cra_sym.kernels.form import Constant, Function, Record, Type
 
-__all__ = ["SAME", "JavaScriptPrinter", "OctavePrinter", "ScriptPrinter"]
+__all__ = ["SAME", "BracketingPrinter", "JavaScriptPrinter", "OctavePrinter", "ScriptPrinter"]
 
 SAME = (
     "sqrt exp expm1 log log1p sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh floor ceil atan2 pow".split()
@@ -72,6 +72,24 @@ class ScriptPrinter(Printer):
     def targets(self, names: Sequence[str]) -> str:
         """Return what a call assigns to."""
         return self.together(names)
+
+
+class BracketingPrinter(ScriptPrinter):
+    """Where a line ends the statement: one that is too long goes on within brackets."""
+
+    def wrapped(self, text: str, indent: str) -> Lines:
+        if len(indent + text) <= self.width:
+            yield indent + text
+            return
+        head, sign, value = text.partition(" = ")
+        if text.startswith("return "):
+            head, sign, value = "return", " ", text.removeprefix("return ")
+        if not sign or "(" in head:
+            yield from super().wrapped(text, indent)
+            return
+        yield f"{indent}{head}{sign}("
+        yield from super().wrapped(value, f"{indent}    ")
+        yield f"{indent})"
 
 
 class JavaScriptPrinter(ScriptPrinter):

@@ -337,11 +337,15 @@ def prove_determinant() -> Proof:
 
 
 @cache
+def _expanded_determinant() -> Expr:
+    """Return (22) with (21) in it, free of squares of sine and hyperbolic sine."""
+    return _reduced(determinant().lhs.subs(dict(zip(_entries, _elimination()[0], strict=True))))
+
+
+@cache
 def frequency_polynomial() -> Expr:
     """Return the determinant, divided so as to leave 1 + c C for the bare cantilever."""
-    matrix, factor = _elimination()
-    named = dict(zip(_entries, matrix, strict=True))
-    polynomial = cancel(_reduced(determinant().lhs.subs(named)) / factor).expand()
+    polynomial = cancel(_expanded_determinant() / _elimination()[1]).expand()
     lowest = min(power for (power,), _ in Poly(polynomial, lamda).terms())
     rigid = {s_t: 1, c_t: 0, s_r: 1, c_r: 0, mu: 0, iota: 0}
     unit = (polynomial / lamda**lowest).expand().subs(rigid).subs({_c: 0})
@@ -350,10 +354,8 @@ def frequency_polynomial() -> Expr:
 
 def _never_zero() -> Expr:
     """Return what the determinant of the reduced system has that the frequency equation has not."""
-    matrix, factor = _elimination()
-    named = dict(zip(_entries, matrix, strict=True))
-    whole = _reduced(determinant().lhs.subs(named))
-    return cancel(whole / _reduced(factor * frequency_polynomial())) * factor
+    factor = _elimination()[1]
+    return cancel(_expanded_determinant() / _reduced(factor * frequency_polynomial())) * factor
 
 
 def frequency_function() -> tuple[Expr, tuple[Symbol, ...]]:
