@@ -107,21 +107,11 @@ class ModalPolynomials:
         return max([1, *found, *(term.positions + term.velocities for term in self.forces)])
 
     @cached_property
-    def order_of_causes(self) -> int:
-        """Largest number of known functions that multiply each other."""
-        return max((len(term.causes) for term in (*self.energies, *self.forces)), default=0)
-
-    @cached_property
     def odd(self) -> bool:
         """Whether reversed displacements obey the same equations, without known functions of time."""
         free = [term for term in self.energies if not term.causes], [term for term in self.forces if not term.causes]
         even = all((term.positions + term.velocities) % 2 == 0 for term in free[0])
         return even and all((term.positions + term.velocities) % 2 for term in free[1])
-
-    @cached_property
-    def reversible(self) -> bool:
-        """Whether reversed time obeys the same equations, dampers left out."""
-        return not self.forces and all(term.velocities % 2 == 0 for term in self.energies)
 
     @cached_property
     def moves_mass(self) -> bool:
