@@ -62,21 +62,26 @@ def test_own_quantities():
     np.testing.assert_allclose(study.tip_stiffness[0], 8 * study.tip_stiffness[1])
 
 
-def test_a_stored_sweep_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
-    place = tmp_path / "a study.zarr"
-    written, write = [], store_module._write
+def stopped_after_three(store, monkeypatch):
+    """Interrupt a sweep into a store; return the regions written, and a list that takes those written from now on."""
+    written, rest, write = [], [], store_module._write
 
-    def stopping(study, path, region):
+    def stopping(study, target, region):
         if len(written) == 3:
             raise KeyboardInterrupt
-        write(study, path, region)
+        write(study, target, region)
         written.append(region)
 
     monkeypatch.setattr(store_module, "_write", stopping)
     with pytest.raises(KeyboardInterrupt):
-        cra.sweep(cra.Arm.nominal(), k_t=K_T, m_e=M_E, chunks=1, store=place)
-    rest = []
+        cra.sweep(cra.Arm.nominal(), k_t=K_T, m_e=M_E, chunks=1, store=store)
     monkeypatch.setattr(store_module, "_write", lambda *job: (rest.append(job[2]), write(*job)))
+    return written, rest
+
+
+def test_a_stored_sweep_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
+    place = tmp_path / "a study.zarr"
+    written, rest = stopped_after_three(place, monkeypatch)
     study = cra.sweep(cra.Arm.nominal(), k_t=K_T, m_e=M_E, chunks=1, store=place)
     assert len(written) == 3 and len(rest) == K_T.size * M_E.size - 3
     assert not {str(region) for region in written} & {str(region) for region in rest}
@@ -542,19 +547,7 @@ def bucket():
 
 
 def test_a_sweep_into_an_object_store_goes_on_where_it_was_stopped(bucket, monkeypatch):
-    written, write = [], store_module._write
-
-    def stopping(study, target, region):
-        if len(written) == 3:
-            raise KeyboardInterrupt
-        write(study, target, region)
-        written.append(region)
-
-    monkeypatch.setattr(store_module, "_write", stopping)
-    with pytest.raises(KeyboardInterrupt):
-        cra.sweep(cra.Arm.nominal(), k_t=K_T, m_e=M_E, chunks=1, store=bucket)
-    rest = []
-    monkeypatch.setattr(store_module, "_write", lambda *job: (rest.append(job[2]), write(*job)))
+    written, rest = stopped_after_three(bucket, monkeypatch)
     study = cra.sweep(cra.Arm.nominal(), k_t=K_T, m_e=M_E, chunks=1, store=bucket + "/")
     assert len(rest) == K_T.size * M_E.size - 3 and not {*map(str, written)} & {*map(str, rest)}
     eager = cra.sweep(cra.Arm.nominal(), k_t=K_T, m_e=M_E)
