@@ -141,7 +141,7 @@ def choice(name: str, value: Any, allowed: Collection[str]) -> str:
 
 
 def listed(name: str, value: Any, of: str) -> list[Any]:
-    """Return the entries of a sequence, which is no text, or raise an error that names the field."""
+    """Return the entries of a sequence that is not text, or raise an error that names the field."""
     flat = getattr(value, "ndim", 1) == 1
     if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, Iterable) or not flat:
         raise TypeError(f"{name} = {shown(value)}: must be a sequence of {of}")

@@ -294,7 +294,7 @@ def explore(system: System | None = None, *, excitation: Any = None, **values: A
     Raises
     ------
     TypeError, ValueError
-        If a name is unknown, a value is not allowed, or ``system`` is no :class:`System` or a batch.
+        If a name is unknown, a value is not allowed, or ``system`` is not a :class:`System` or is a batch.
 
     Examples
     --------

@@ -113,7 +113,8 @@ def export(
     Raises
     ------
     TypeError
-        If the language or the name is no text, the directory no path, the model no Model, or the system no System.
+        If the language or the name is not text, the directory not a path, the model not a Model, or the system not a
+        System.
     ValueError
         If the language is unknown, the folder is not empty, the model has no real closed form, or the system cannot be
         frozen. Nothing is written.

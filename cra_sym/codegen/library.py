@@ -59,7 +59,7 @@ def check_name(name: object) -> str:
     Raises
     ------
     TypeError, ValueError
-        If it is no text, no identifier in lower case of at most 24 characters, or a word of a language.
+        If it is not text, not an identifier in lower case of at most 24 characters, or a word of a language.
     """
     if not isinstance(name, str):
         raise TypeError(f"name = {name!r}: must be a text")
@@ -138,7 +138,7 @@ class Library:
         functions = {name: f for name, f in public.items() if name not in _ASIDE}
         taken = KEYWORDS & {name for f in functions.values() for name in (*f.parameters, *f.locals, *f.loops)}
         if taken:
-            raise ValueError(f"words of a language are no names of variables: {', '.join(sorted(taken))}")
+            raise ValueError(f"words of a language cannot name variables: {', '.join(sorted(taken))}")
         printer = PRINTERS[language](whole, self.name, self.real)
         printed = self._values(printer, list(functions.values()))
         for name in _ASIDE & set(whole.functions):

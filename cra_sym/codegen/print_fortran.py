@@ -155,7 +155,7 @@ class FortranPrinter(Printer):
         if not self.is_subroutine(callee):
             yield from self.plain(f"{target} = {self.function_name(callee)}({', '.join(given)})", indent)
             return
-        if target:  # an argument that is an expression is no other name of the result
+        if target:  # an argument that is an expression is not another name of the result
             given = [f"({text})" if text == target else text for text in given] + [target]
         given += ["status"] if callee.name in self.failing else []
         yield from self.plain(f"call {self.function_name(callee)}({', '.join(given)})", indent)

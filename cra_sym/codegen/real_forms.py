@@ -34,12 +34,12 @@ def characteristic_pair(value: sp.Expr, waves: Mapping[sp.Symbol, sp.Expr], omeg
     Raises
     ------
     ValueError
-        If the wave number is no such root, or the function is not even in it.
+        If the wave number is not such a root, or the function is not even in it.
     """
     ((wave, root),) = waves.items()
     order = next((n for n in (2, 4) if _is_free_of_roots(sp.powsimp(sp.expand_power_base(root**n, force=True)))), None)
     if order is None:
-        raise ValueError(f"the wave number {wave} = {root} is no square root or fourth root")
+        raise ValueError(f"the wave number {wave} = {root} is neither a square root nor a fourth root")
     z = sp.powsimp(sp.expand_power_base(root**order, force=True))
     size = sp.Dummy("size", positive=True)
     slope = sp.diff(z, omega)

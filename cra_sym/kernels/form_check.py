@@ -52,7 +52,7 @@ def type_of(node: ast.expr, records: Mapping[str, Record], lengths: Mapping[str,
             return Type(name)
         case ast.Subscript(value=ast.Name(id="Row"), slice=ast.Tuple(elts=[ast.Name(id=name), length])):
             if name not in SCALARS and name not in records:
-                raise refused(node, f"{name} is no type")
+                raise refused(node, f"{name} is not a type")
             match length:
                 case ast.Constant(value=int() as size):
                     return Type(name, size)

@@ -48,7 +48,7 @@ def separated(
     ------
     HamiltonError
         Names the term whose dependence on time is not of the form ``cos(n*varpi*t + phase)`` with a whole number n, or
-        that is no polynomial in epsilon and varpi.
+        that is not a polynomial in epsilon and varpi.
 
     Examples
     --------

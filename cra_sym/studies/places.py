@@ -140,7 +140,7 @@ def place_of(store: str | Path) -> Place:
     MissingExtraError
         If the library that reaches an object store is not installed; it is named.
     TypeError, ValueError
-        If it is no path and no URL of an object store.
+        If it is neither a path nor the URL of an object store.
     """
     if not isinstance(store, str) or "://" not in store:
         return Folder(path_of("store", store))
