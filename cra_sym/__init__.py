@@ -60,6 +60,8 @@ _HOME = {
     "slow_flow_values": "analysis.slow_flow",
     "SteadyState": "analysis.steady_states",
     "steady_states": "analysis.steady_states",
+    "Iwan": "model.hysteresis",
+    "Jenkins": "model.hysteresis",
     "Model": "model",
     "stations": "mechanics.stations",
     "sweep": "studies",

@@ -46,6 +46,8 @@ from .model import System as System
 from .model.excitations import AxialBase as AxialBase
 from .model.excitations import Fluctuation as Fluctuation
 from .model.excitations import TransverseBase as TransverseBase
+from .model.hysteresis import Iwan as Iwan
+from .model.hysteresis import Jenkins as Jenkins
 from .model.members import Member as Member
 from .model.members import joined as joined
 from .paper.equations import equation as equation

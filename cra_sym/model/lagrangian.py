@@ -21,9 +21,11 @@ from cra_sym.mechanics.weak import weak_form
 from cra_sym.model.excitations import LagrangianTerms
 from cra_sym.model.excited import checked_small, refuse_small, without_oscillations
 from cra_sym.model.galerkin import Ritz
+from cra_sym.model.hysteresis import Element
 from cra_sym.model.numerics import Numerics
 from cra_sym.model.parameters import parameters
 from cra_sym.model.pieces import arguments, options_of, undamped
+from cra_sym.model.slip_terms import check_displacements, checked_hysteresis, expressions_of
 from cra_sym.model.symmetry import asymmetry
 from cra_sym.model.system import TOLERANCE, System
 from cra_sym.model.units import check_dimensions, named_units, symbol_units
@@ -78,6 +80,9 @@ class Model:
     quadratures : mapping of applied undefined function to Expr, optional
         Fields s(x, t) that are integrals from the left end, such as the foreshortening ``{s: v.diff(x)**2/2}``; see
         :func:`cra_sym.mechanics.hamilton`.
+    hysteresis : sequence of (element, displacement, place), optional
+        Elastic-slip elements, :class:`cra_sym.Jenkins` or :class:`cra_sym.Iwan`, and the displacement, slope or
+        coordinate they act on; place as in ``virtual_work``. Equations and every linear analysis take them stuck.
 
     Raises
     ------
@@ -121,6 +126,7 @@ class Model:
         definitions: Mapping[Symbol, Expr] | None = None,
         small: tuple[Symbol, Symbol] | None = None,
         quadratures: Mapping[AppliedUndef, Expr] | None = None,
+        hysteresis: Sequence[tuple[Element, Expr, Any]] = (),
     ) -> None:
         self._pieces: dict[str, Any] = {
             "density": density,
@@ -141,7 +147,10 @@ class Model:
             "definitions": tuple(mapping("definitions", definitions, "symbols to expressions").items()),
             "small": checked_small(small, (x, t)),
             "quadratures": tuple(mapping("quadratures", quadratures, "functions s(x, t) to integrands").items()),
+            "hysteresis": checked_hysteresis(hysteresis),
         }
+        if self._pieces["hysteresis"]:
+            check_displacements(self)
         self._options, self._stated_inside = options_of(self._pieces)
         self.equations: HamiltonResult = hamilton(**self._options)
         """Equations of motion, boundary conditions and the steps that led there."""
@@ -156,6 +165,7 @@ class Model:
         given += [part for force, displacement, _ in work for part in (force, displacement)]
         given += [sympify(place, strict=True) for *_, place in work if not (place is None or isinstance(place, str))]
         given += [q.integrand for q in self.equations.quadratures]
+        given += expressions_of(self._pieces)
         self.symbols: tuple[Symbol, ...] = parameters(given, self.equations)
         """The parameters: every symbol but x and t, by name."""
         declared = named_units(units, [*given, *self._options["fields"], *self._options["coordinates"]])
@@ -165,6 +175,11 @@ class Model:
             return
         unknowns = (x, t, *self.equations.fields, *self.equations.coordinates, *self._options["prescribed"])
         check_dimensions(sympify(density, strict=True), ends, declared, work, unknowns)
+
+    @cached_property
+    def without_hysteresis(self) -> Model:
+        """The model without its elastic-slip elements, to whose modes nonlinear results refer; itself without any."""
+        return self.replace(hysteresis=()) if self._pieces["hysteresis"] else self
 
     def replace(self, **changes: Any) -> Model:
         """Return the same model with some of what it was made of replaced.

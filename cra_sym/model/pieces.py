@@ -10,7 +10,7 @@ from sympy import Expr, S, Symbol, sympify
 from cra_sym.mechanics.points import in_points
 from cra_sym.model.symmetry import odd_in_time
 
-__all__ = ["arguments", "options_of", "undamped"]
+__all__ = ["arguments", "options_of", "stuck", "undamped"]
 
 Pieces = dict[str, Any]
 Works = tuple[tuple[Expr, Expr, Any], ...]
@@ -24,9 +24,11 @@ def arguments(pieces: Pieces) -> Pieces:
 def options_of(pieces: Pieces) -> tuple[Pieces, tuple[tuple[Expr, Expr], ...]]:
     """Return what Hamilton's principle takes, definitions put in, and the terms at interior places as stated.
 
-    Point loads of the density are among the terms at interior places.
+    Point loads of the density are among the terms at interior places. Elastic-slip elements are there as springs.
     """
-    options = {name: piece for name, piece in pieces.items() if name not in ("units", "definitions", "small")}
+    apart = ("units", "definitions", "small", "hysteresis")
+    options = {name: piece for name, piece in pieces.items() if name not in apart}
+    options |= stuck(pieces)
     definitions = dict(pieces["definitions"])
 
     def put(piece: Any) -> Any:
@@ -39,6 +41,19 @@ def options_of(pieces: Pieces) -> tuple[Pieces, tuple[tuple[Expr, Expr], ...]]:
     density, points = in_points(options["density"], options["x"])
     stated = options["inside"]
     return ({**options, "density": density, "inside": (*stated, *points)} if points else options), stated
+
+
+def stuck(pieces: Pieces) -> Pieces:
+    """Return the pieces to which the energy of the stuck elastic-slip elements belongs, with it."""
+    found = {name: pieces[name] for name in ("left", "right", "inside")}
+    for element, displacement, place in pieces["hysteresis"]:
+        energy = -sympify(element.stiffness, strict=True) * displacement**2 / 2
+        if place is None or place in ("left", "right"):
+            end = place or "left"
+            found[end] = energy if found[end] is None else found[end] + energy
+        else:
+            found["inside"] = (*found["inside"], (place, energy))
+    return found if pieces["hysteresis"] else {}
 
 
 def undamped(work: Sequence[tuple[Expr, Expr, Any]], t: Symbol) -> Works:

@@ -14,6 +14,7 @@ from cra_sym.checks import broadcastable, count, default_floating_point, instanc
 from cra_sym.model.cross_check import CrossCheck, cross_check
 from cra_sym.model.projection import Domain, Load, Projected, project
 from cra_sym.model.routes import ROUNDING, TOLERANCE, Estimated, Modes, Route
+from cra_sym.model.slip_elements import SlipElements, slip_elements
 from cra_sym.model.spatial import check_range
 from cra_sym.model.values import Value, checked_damping, checked_values, frozen
 
@@ -80,6 +81,8 @@ class System:
             raise ValueError(f"tolerance = {shown(tolerance)}: must be one number in [1e-13, 0.01]")
         object.__setattr__(self, "tolerance", float(given))
         broadcastable(zeta=self._zeta, **self._values)
+        if model.pieces["hysteresis"]:
+            self.numerics("slip_terms").at(self.parameters)  # refuses elements that are out of range
 
     def __setattr__(self, name: str, value: Any) -> None:
         if not name.startswith("_"):
@@ -121,6 +124,33 @@ class System:
         """
         options = {name: changes.pop(name, getattr(self, name)) for name in ("zeta", "tolerance")}
         return System(self.model, {**self.values, **changes}, **options)
+
+    @cached_property
+    def without_hysteresis(self) -> System:
+        """The system without its elastic-slip elements, to whose modes nonlinear results refer; itself without any."""
+        model = self.model.without_hysteresis
+        if model is self.model:
+            return self
+        values = {symbol.name: self.values[symbol.name] for symbol in model.symbols}
+        return System(model, values, self.zeta, self.tolerance)
+
+    def slip_elements(self, modes: int) -> SlipElements:
+        """Return the elastic-slip elements in numbers, seen by modes of the system without them.
+
+        Parameters
+        ----------
+        modes : int
+
+        Returns
+        -------
+        SlipElements
+
+        Raises
+        ------
+        ValueError
+            If the system has none, or what one of them acts on is held.
+        """
+        return self._once("slip", modes, lambda n: slip_elements(self, n))
 
     # ------------------------------------------------------------------------------------------ numbers, once
 

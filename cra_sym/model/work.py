@@ -17,20 +17,23 @@ def work_as_energy(pieces: Mapping[str, Any], force: AppliedUndef) -> dict[str, 
     Parameters
     ----------
     pieces : mapping
-        Of which 'density', 'left', 'right' and 'virtual_work' are read, as `Model` takes them.
+        Of which 'density', 'left', 'right', 'inside' and 'virtual_work' are read, as `Model` takes them.
     force : function of time
 
     Returns
     -------
     dict
-        The same four.
+        The same five.
     """
     terms: dict[str, Expr] = {"domain": S.Zero, "left": S.Zero, "right": S.Zero}
-    rest = []
+    inside, rest = list(pieces["inside"]), []
     for given, displacement, place in pieces["virtual_work"]:
         share = sympify(given, strict=True).expand().coeff(force) * force
-        terms[place or "left"] += share * displacement
+        if place is None or isinstance(place, str):
+            terms[place or "left"] += share * displacement
+        elif share != 0:
+            inside.append((place, share * displacement))
         if given - share != 0:
             rest.append((given - share, displacement, place))
     ends = {end: (pieces[end] or S.Zero) + terms[end] for end in ("left", "right")}
-    return {"density": pieces["density"] + terms["domain"], **ends, "virtual_work": rest}
+    return {"density": pieces["density"] + terms["domain"], **ends, "inside": inside, "virtual_work": rest}
