@@ -63,12 +63,15 @@ def without_content(element: Any, variables: Iterable[Symbol]) -> tuple[Any, Exp
 
 
 def divided(element: Any, divisor: Expr) -> tuple[Any, Expr]:
-    """Return (quotient, 1) if the divisor divides the polynomial, otherwise (polynomial, divisor)."""
+    """Return (quotient, 1) if the divisor divides the polynomial, otherwise both without powers that they share."""
     ring = element.ring
     if divisor.free_symbols <= set(ring.symbols):
-        quotient, remainder = divmod(element, ring.from_expr(divisor))
+        whole = ring.from_expr(divisor)
+        quotient, remainder = divmod(element, whole)
         if not remainder:
             return quotient, S.One
+        shared = _monomial(ring, element).gcd(_monomial(ring, whole))
+        return element.exquo(shared), whole.exquo(shared).as_expr()
     return element, divisor
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -152,30 +153,33 @@ class GeneralisedForces:
         """Collect the factor of each end displacement, or the essential condition that forbids its variation."""
         return tuple(map(self._condition, self.boundary_factors))
 
-    def jump_conditions(self) -> tuple[JumpCondition, ...]:
-        """Collect the factor of each displacement of a section at interior places; fields in order."""
+    def jump_conditions(self, write: Callable[[Expr], Expr] | None = None) -> tuple[JumpCondition, ...]:
+        """Collect the factor of each displacement of a section at interior places; fields in order.
+
+        ``write`` makes expressions of jet symbols, by default the functions themselves.
+        """
         space, found = self.variation.space, []
+        write = write or space.write
         for point in self.variation.points:
             forces = lagrange_forces(space, point.lagrangian)
             for force, jet in point.applied:
                 forces[jet] = forces.get(jet, S.Zero) + force
             for number, top in enumerate(self.variation.orders):
                 for order in range(top):
-                    found.append(self._jump(point, forces, Jet(number, order, 0, None)))
+                    found.append(self._jump(point, forces, Jet(number, order, 0, None), write))
         return tuple(found)
 
-    def _jump(self, point: Point, forces: Forces, displacement: Jet) -> JumpCondition:
+    def _jump(self, point: Point, forces: Forces, displacement: Jet, write: Callable[[Expr], Expr]) -> JumpCondition:
         space, held = self.variation.space, displacement in point.held
-        varied, moved = (
-            form.subs(space.x, point.place) for form in (varied_form(space, displacement), space.form(displacement))
-        )
+        varied = varied_form(space, displacement).subs(space.x, point.place)
+        moved = write(space.symbol(displacement)).subs(space.x, point.place)
         tags = point.place, varied, moved, "essential" if held else "natural", space.names
         if held:
             return JumpCondition(moved, S.Zero, *tags)  # type: ignore[arg-type]
         sign = (-1) ** (self.variation.orders[displacement.unknown] - displacement.space)
-        inner = space.write(sign * self.boundary_force(displacement.unknown, displacement.space))
+        inner = write(sign * self.boundary_force(displacement.unknown, displacement.space))
         after, before = (Limit(inner, space.x, point.place, side) for side in "+-")
-        outer = space.write(sign * forces.get(displacement, S.Zero))
+        outer = write(sign * forces.get(displacement, S.Zero))
         return JumpCondition(after - before, outer.subs(space.x, point.place), *tags)  # type: ignore[arg-type]
 
     def interior_factors(self) -> Forces:

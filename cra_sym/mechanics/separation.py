@@ -9,7 +9,6 @@ from typing import Literal
 
 from sympy import (
     Add,
-    DiracDelta,
     Eq,
     Expr,
     Function,
@@ -25,7 +24,7 @@ from sympy import (
 from cra_sym import checks
 from cra_sym.mechanics.basis import Basis
 from cra_sym.mechanics.determinants import cofactors, collected, determinant, divided, primitive_rows, without_content
-from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces
+from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces, JumpCondition
 from cra_sym.mechanics.hamilton import HamiltonResult
 from cra_sym.mechanics.jets import HamiltonError, Jet, grouped, scalar
 from cra_sym.mechanics.solution import GeneralSolution
@@ -43,6 +42,8 @@ class SpatialProblem:
     ----------
     field_equations : tuple of Eq
     boundary_conditions : tuple of BoundaryCondition
+    jump_conditions : tuple of JumpCondition
+        Of interior places.
     amplitudes : tuple of Expr
         ``phi(x)`` of each field, then the amplitude of each lumped coordinate.
     frequency : Symbol
@@ -54,6 +55,7 @@ class SpatialProblem:
 
     field_equations: tuple[Eq, ...]
     boundary_conditions: tuple[BoundaryCondition, ...]
+    jump_conditions: tuple[JumpCondition, ...]
     amplitudes: tuple[Expr, ...]
     frequency: Symbol
     damped: bool
@@ -70,8 +72,9 @@ class Modal:
     basis : Basis
         General solution; its ``values`` symbols stand for the functions at the right end.
     characteristic_matrix : Matrix
-        Rows: conditions of the left end, lumped coordinates, conditions of the right end. Columns: constants of the
-        basis, amplitudes of the coordinates. Polynomial in the basis ``values``.
+        Rows: conditions of the left end, lumped coordinates, interior places, conditions of the right end. Columns:
+        constants of the basis, amplitudes of the coordinates, jumps of natural forces at interior places. Polynomial in
+        the basis ``values``.
     characteristic_polynomial : Expr
         Its determinant over that of the initial state, so that its zeros are the eigenvalues and nothing else, without
         factors that depend on no wave number; in the basis ``values``.
@@ -79,8 +82,8 @@ class Modal:
         ``det(characteristic_matrix) = scale * characteristic_polynomial``.
     still : Matrix
         Constant displacement of each field (rows) for a unit amplitude of each coordinate (columns).
-    position : Expr
-        x from the left end.
+    begun : tuple of tuple of Expr
+        Motion of each field that begins with a unit jump at an interior place, for each jump.
     """
 
     spatial_problem: SpatialProblem
@@ -89,6 +92,7 @@ class Modal:
     characteristic_polynomial: Expr
     scale: Expr
     still: Matrix
+    begun: tuple[tuple[Expr, ...], ...] = ()
 
     @property
     def frequency(self) -> Symbol:
@@ -120,10 +124,13 @@ class Modal:
     def mode_shapes(self) -> tuple[Expr, ...]:
         """Shape of each field as a function of x at an eigenvalue."""
         row = Matrix([self.basis.functions])
-        constants = Matrix(self.coefficients[: len(self.basis.functions)])
-        moved = self.still * Matrix(self.still.cols, 1, self.coefficients[len(self.basis.functions) :])
+        size, lumped = len(self.basis.functions), self.still.cols
+        constants, jumps = Matrix(self.coefficients[:size]), self.coefficients[size + lumped :]
+        moved = self.still * Matrix(lumped, 1, self.coefficients[size : size + lumped])
+        begun = [Add(*(jump * own[k] for jump, own in zip(jumps, self.begun, strict=True))) for k in range(len(moved))]
         shapes = (
-            Add(*(row * field * constants)) + still for field, still in zip(self.basis.fields, moved, strict=True)
+            Add(*(row * field * constants)) + still + more
+            for field, still, more in zip(self.basis.fields, moved, begun, strict=True)
         )
         return tuple(shape.xreplace(self.basis.values) for shape in shapes)
 
@@ -133,7 +140,7 @@ class Modal:
         problem = self.spatial_problem
         names = ("Spatial problem", "General solution", "Characteristic equation", "Modes")
         motion = r"e^{s t}" if problem.damped else r"e^{i \omega t}"
-        equations = (*problem.field_equations, *problem.boundary_conditions)
+        equations = (*problem.field_equations, *problem.boundary_conditions, *problem.jump_conditions)
         solutions = (self.basis.dispersion, *self.basis.functions)
         condition = Eq(self.characteristic_function, 0, evaluate=False)
         described = (
@@ -166,7 +173,8 @@ def separate(
         ``k: EI/L**3 * s/c`` of two finite numbers: denominators are cleared row by row, so both limits are ordinary.
     basis : {'hyperbolic', 'decaying'}
         For beams with one wave number: ``cosh, sinh``, or ``exp(-beta x), exp(-beta (L - x))``, which stay bounded at
-        any frequency. Others always get cosh and sinh; `state_form` is the exact form to evaluate at high frequencies.
+        any frequency. Others, and those with interior places, always get cosh and sinh; `state_form` is the exact form
+        to evaluate at high frequencies.
     frequency : Symbol, optional
         Symbol for omega (or s).
 
@@ -179,6 +187,13 @@ def separate(
     HamiltonError
         If the Lagrangian is not quadratic, its coefficients vary along x (`ritz` treats these), or the characteristic
         equation has a root that is repeated at every frequency.
+
+    Notes
+    -----
+    Right of an interior place the motion that begins there with a jump of a natural force is added: what inertia,
+    springs, dampers and supports do is closed form too. Places that are symbols must lie inside and ascend in the order
+    in which they are stated. Parts with coefficients of their own have wave numbers of their own: state them as fields
+    of their own (`cra_sym.joined`).
 
     Examples
     --------
@@ -193,6 +208,14 @@ def separate(
     (kappa*sin(lambda) + lambda*cos(lambda))/lambda
     >>> modal.mode_shapes
     (sin(lambda*x/l),)
+
+    A bead on a string between two walls:
+
+    >>> a, m = symbols("a m")
+    >>> beaded = hamilton(y.diff(t)**2/2 - y.diff(x)**2/2, fields=[y], x=x, domain=(0, 1), t=t,
+    ...                   inside=[(a, m*y.diff(t)**2/2)], essential=[y.subs(x, 0), y.subs(x, 1)])
+    >>> separate(beaded).characteristic_function
+    (lambda*m*sin(a*lambda)*sin(lambda*(1 - a)) - sin(lambda))/lambda
     """
     checks.instance("result", result, HamiltonResult)
     checks.choice("basis", basis, ("hyperbolic", "decaying"))
@@ -201,26 +224,28 @@ def separate(
     for symbol in (*others, *(() if frequency is None else (frequency,))):
         checks.instance("a parameter or frequency", symbol, Symbol)
     weak = weak_form(result.variation)
-    if not weak.uniform:
-        raise HamiltonError(f"separate: {_varying(weak)} varies along {result.x}, so there is no closed form; use ritz")
+    if not weak.constant:
+        raise HamiltonError(
+            f"separate: {_varying(weak)} varies along {result.x}, so there is no closed form; use ritz or, for "
+            "constant pieces, fields of their own (cra_sym.joined)"
+        )
 
     def names(name: str) -> Symbol:
         return result.unused_symbol(name, *others.values())
 
     frequency = frequency or names("omega" if weak.even else "s")
     spatial = _spatial_problem(weak, frequency)
-    solution = GeneralSolution(weak, frequency, basis, names)
+    solution = GeneralSolution(weak, frequency, "hyperbolic" if weak.points else basis, names)
     matrix, start = solution.conditions(), solution.initial_state()
     known = {**solution.known, **others}
     rows, contents = primitive_rows(matrix.subs(known))
     characteristic, scale = _characteristic(contents, rows, start.subs(known), solution.basis, frequency)
-    return Modal(spatial, solution.basis, rows, characteristic, scale, solution.still.subs(known))
+    begun = tuple(tuple(shape.subs(known) for shape in solution.begun(jump)) for jump in solution.jumps)
+    return Modal(spatial, solution.basis, rows, characteristic, scale, solution.still.subs(known), begun)
 
 
 def _varying(weak: WeakForm) -> Expr:
     x = weak.variation.space.x
-    if weak.points:
-        return DiracDelta(x - weak.points[0].place)
     return next(value for entry in weak.inside.values() for value in entry.values() if value.has(x))
 
 
@@ -260,7 +285,9 @@ def _spatial_problem(weak: WeakForm, frequency: Symbol) -> SpatialProblem:
         conditions.append(BoundaryCondition(left, right, jet.place, variation, form(jet), kind, names))
     loads = [*weak.inside_load.values(), *weak.end_load.values(), *weak.variation.elimination.offsets.values()]
     left_out = tuple(space.write(load) for load in loads if load != 0)
-    return SpatialProblem(tuple(fields), tuple(conditions), tuple(heads.values()), frequency, not weak.even, left_out)
+    amplitudes = tuple(heads.values())
+    jumps = forces.jump_conditions(amplitude)
+    return SpatialProblem(tuple(fields), tuple(conditions), jumps, amplitudes, frequency, not weak.even, left_out)
 
 
 # ------------------------------------------------------------------------------------------------ the determinant

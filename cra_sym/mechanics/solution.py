@@ -1,26 +1,33 @@
-"""The general solution of a spatial problem as matrices: displacements, forces and conditions of both ends."""
+"""The general solution of a spatial problem as matrices: displacements, forces and conditions of ends and places."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import cached_property, cmp_to_key
 from typing import Literal
 
-from sympy import Add, Expr, Matrix, S, Symbol, zeros
+from sympy import Add, Expr, Heaviside, Matrix, S, Symbol, sin, sinh, zeros
 
 from cra_sym.mechanics.basis import Naming, general_solution
 from cra_sym.mechanics.jets import HamiltonError, Jet
 from cra_sym.mechanics.state_form import end_displacements
-from cra_sym.mechanics.weak import WeakForm, polynomial
+from cra_sym.mechanics.weak import PointForm, WeakForm, polynomial
 
 __all__ = ["GeneralSolution"]
 
 
 class GeneralSolution:
-    """Rows of coefficients of the unknown constants: those of the basis, then the amplitudes of the coordinates.
+    """Rows of coefficients of the unknowns: constants of the basis, amplitudes of coordinates, jumps of forces.
+
+    Right of an interior place a motion is added that begins there with a unit jump of one natural force. The jumps that
+    inertia, springs or a support cause are unknowns.
 
     Parameters
     ----------
     weak : WeakForm
-        With coefficients that do not depend on x.
+        With coefficients that do not depend on x. Interior places ascend in the order in which they are stated, where
+        their difference has no known sign.
     frequency : Symbol
         omega, or s if odd powers of s occur.
     kind : {'hyperbolic', 'decaying'}
@@ -46,6 +53,10 @@ class GeneralSolution:
             raise HamiltonError("separate: the density is singular in its highest derivatives")
         self.known = self._frequency_of_wave_number(frequency)
         self.still = self._still(operator.subs(r, 0))
+        self.points = _ascending(weak.points, space.ends["left"], space.ends["right"])
+        self.jumps = [(point, jet) for point in self.points for jet in self.section if _acts(point, jet)]
+        self.columns = self.size + len(self.lumped) + len(self.jumps)
+        self._names = names
 
     def stiffness(self, varied: Jet, jet: Jet, ends: bool = False) -> Expr:
         """Return the stiffness between two displacements at this frequency."""
@@ -84,22 +95,80 @@ class GeneralSolution:
             )
         return -zero_order.inv() * pull
 
+    # ------------------------------------------------------------------------------------------------ stations
+
+    def _values(self, offset: Expr) -> Matrix:
+        """Return the functions of the basis at a distance from the left end, as symbols that it gets."""
+        space = self.weak.variation.space
+        values, relations = dict(self.basis.values), list(self.basis.relations)
+        row: list[Expr] = []
+        known = {value: symbol for symbol, value in values.items()}
+        for function in self.basis.functions:
+            sign, value = function.subs(space.x, space.ends["left"] + offset).as_coeff_Mul()
+            if value not in known:
+                symbol = known[value] = self._names(f"{value.func.__name__}_{len(values) + 1}")
+                values[symbol] = value
+                if isinstance(value, (sin, sinh)):  # behind cos and cosh
+                    relations.append((symbol, 1 - row[-1] ** 2 if isinstance(value, sin) else row[-1] ** 2 - 1))
+            row.append(sign * known[value])
+        self.basis = replace(self.basis, values=values, relations=tuple(relations))
+        return Matrix([row])
+
+    @cached_property
+    def _stations(self) -> tuple[Matrix, list[Matrix], Matrix]:
+        """The functions at the left end, at every place and at the right end; below them those that begin at places."""
+        left = self.weak.variation.space.ends["left"]
+        nothing = zeros(len(self.points), self.size)
+        if not self.points:
+            return self.basis.left, [], self.basis.right
+        places = []
+        for number, point in enumerate(self.points):
+            begun = [self._values(point.place - other.place) for other in self.points[:number]]
+            at = Matrix.vstack(self._values(point.place - left), *begun)
+            places.append(Matrix.vstack(at, nothing[: nothing.rows + 1 - at.rows, :]))
+        ends = [self._values(self.length + left - point.place) for point in self.points]
+        return Matrix.vstack(self.basis.left, nothing), places, Matrix.vstack(self.basis.right, *ends)
+
+    @cached_property
+    def _starts(self) -> list[Matrix]:
+        """Constants of the basis for a unit jump of each natural force of a section at its left end."""
+        inverse = self.initial_state().inv(method="ADJ")
+        return [inverse[:, len(self.section) + k] for k in range(len(self.section))]
+
+    def begun(self, jump: tuple[PointForm, Jet]) -> tuple[Expr, ...]:
+        """Return the motion of each field that begins with a unit jump."""
+        space = self.weak.variation.space
+        point, jet = jump
+        shift = space.ends["left"] + space.x - point.place
+        row = Matrix([self.basis.functions]).subs(space.x, shift) * Heaviside(space.x - point.place)
+        start = self._starts[self.section.index(jet)]
+        return tuple((row * field * start)[0] for field in self.basis.fields)
+
     # -------------------------------------------------------------------------------------------------- rows
 
     def _row(self, jet: Jet, at: Matrix) -> Matrix:
         """Return a derivative of a field where the basis has the values ``at``, or a coordinate."""
         if jet in self.lumped:
-            row = zeros(1, self.size + len(self.lumped))
+            row = self._zero()
             row[self.size + self.lumped.index(jet)] = S.One
             return row
-        shape = at * self.basis.derivative**jet.space * self.basis.fields[jet.unknown]
-        return shape.row_join(zeros(1, len(self.lumped)) if jet.space else self.still[jet.unknown, :])
+        moved = zeros(1, len(self.lumped)) if jet.space else self.still[jet.unknown, :]
+        return self._spread(at * self.basis.derivative**jet.space * self.basis.fields[jet.unknown], moved)
+
+    def _spread(self, shapes: Matrix, moved: Matrix) -> Matrix:
+        """Return the row of a quantity that the basis, and below it what begins at each place, has."""
+        begun = zeros(1, len(self.jumps))
+        if shapes.rows > 1:
+            for number, (point, jet) in enumerate(self.jumps):
+                own = shapes[1 + self.points.index(point), :]
+                begun[number] = (own * self._starts[self.section.index(jet)])[0]
+        return shapes[0, :].row_join(moved).row_join(begun)
 
     def _partners(self, varied: Jet) -> list[Jet]:
         return [jet for left, jet in self.weak.inside if left == varied]
 
     def _zero(self) -> Matrix:
-        return zeros(1, self.size + len(self.lumped))
+        return zeros(1, self.columns)
 
     def _force(self, varied: Jet, at: Matrix) -> Matrix:
         """Return the natural partner of a displacement: P_j = W_(j+1) q - P_(j+1)'."""
@@ -109,26 +178,58 @@ class GeneralSolution:
             rows = (self.stiffness(jet, other) * self._row(other, spread) for other in self._partners(jet))
             term = sum(rows, self._zero())
             if order > varied.space + 1:  # differentiated: what is constant along x has gone
-                term[:, self.size :] = zeros(1, len(self.lumped))
+                term[:, self.size : self.size + len(self.lumped)] = zeros(1, len(self.lumped))
             total, spread = total + term, -spread * self.basis.derivative
         return total
 
     def _gathered(self, coordinate: Jet) -> Matrix:
         """Return the force along the interval on a coordinate: integrals are differences of values at the ends."""
-        total, change = self._zero(), self.basis.right - self.basis.left
+        _, _, right = self._stations
+        total, change = self._zero(), right - Matrix.vstack(*[self.basis.left] * right.rows)
         for jet in self._partners(coordinate):
-            row = self.length * self._row(jet, zeros(1, self.size))
+            row = self.length * self._row(jet, zeros(*right.shape))
             if jet not in self.lumped:
-                row[:, : self.size] = change * self.basis.derivative ** (jet.space - 1) * self.basis.fields[jet.unknown]
+                gathered = change * self.basis.derivative ** (jet.space - 1) * self.basis.fields[jet.unknown]
+                row += self._spread(gathered, zeros(1, len(self.lumped)))
             total += self.stiffness(coordinate, jet) * row
+        for point, moved in zip(self.points, self._moved, strict=True):
+            for varied, jet in point.form:
+                if varied == coordinate:
+                    total += self._at_point(point, varied, jet) * moved[jet]
         return total
 
+    @cached_property
+    def _moved(self) -> list[dict[Jet, Matrix]]:
+        """Rows of the displacements of a section at every place, and of the coordinates."""
+        return [{jet: self._row(jet, at) for jet in (*self.section, *self.lumped)} for at in self._stations[1]]
+
+    def _at_point(self, point: PointForm, varied: Jet, jet: Jet) -> Expr:
+        return polynomial(point.form.get((varied, jet), {}).items(), self.parameter, self.weak.even)
+
+    def _jump_conditions(self) -> list[Matrix]:
+        """Return the rows that say what each jump is, or that a displacement is held there."""
+        table = []
+        for number, (point, jet) in enumerate(self.jumps):
+            moved = self._moved[self.points.index(point)]
+            if jet in point.held:
+                table.append(moved[jet])
+                continue
+            row = self._zero()
+            row[self.size + len(self.lumped) + number] = S.One
+            caused = (self._at_point(point, jet, other) * moved[other] for varied, other in point.form if varied == jet)
+            table.append(row - sum(caused, self._zero()))
+        return table
+
     def conditions(self) -> Matrix:
-        """Return the equilibrium of ends and coordinates, or the essential condition in its place, row by row."""
+        """Return the equilibrium of ends, coordinates and interior places, or the essential condition in its place.
+
+        Those of the right end are the last rows.
+        """
         rows = end_displacements(self.weak)
         moves, forces = {}, {}
+        left, _, right = self._stations
         for jet in rows:
-            at, sign = (self.basis.left, -1) if jet.place == "left" else (self.basis.right, 1)
+            at, sign = (left, -1) if jet.place == "left" else (right, 1)
             inner = jet._replace(place=None)
             moves[jet] = self._row(inner, at)
             forces[jet] = self._gathered(jet) if jet in self.lumped else sign * self._force(inner, at)
@@ -143,10 +244,27 @@ class GeneralSolution:
             else:
                 shares = (factor * forces[pivot] for pivot, factor in elimination.shares(jet))
                 table.append(sum(shares, forces[jet]))
-        return Matrix.vstack(*table)
+        last = len(table) - len(self.section)
+        return Matrix.vstack(*table[:last], *self._jump_conditions(), *table[last:])
 
     def initial_state(self) -> Matrix:
         """Return displacements and forces at the left end: singular only where the basis degenerates."""
         left = self.basis.left
         rows = [*(self._row(jet, left) for jet in self.section), *(self._force(jet, left) for jet in self.section)]
         return Matrix.vstack(*rows)[:, : self.size]
+
+
+def _acts(point: PointForm, jet: Jet) -> bool:
+    """Return whether a natural force jumps at an interior place."""
+    return jet in point.held or any(varied == jet for varied, _ in point.form)
+
+
+def _ascending(points: Iterable[PointForm], left: Expr, right: Expr) -> list[PointForm]:
+    """Return the places in ascending order, as stated where their difference has no known sign; none beyond an end."""
+    inside = [p for p in points if not ((p.place - left).is_negative or (right - p.place).is_negative)]
+
+    def order(first: PointForm, second: PointForm) -> int:
+        gap = first.place - second.place
+        return int(bool(gap.is_positive)) - int(bool(gap.is_negative))
+
+    return sorted(inside, key=cmp_to_key(order))

@@ -62,10 +62,10 @@ class WeakForm:
         return all(power % 2 == 0 for power in self.powers)
 
     @property
-    def uniform(self) -> bool:
-        """Whether no coefficient depends on x."""
+    def constant(self) -> bool:
+        """Whether no coefficient depends on x; something may act at interior places."""
         x = self.variation.space.x
-        return not self.points and not any(v.has(x) for entry in self.inside.values() for v in entry.values())
+        return not any(v.has(x) for entry in self.inside.values() for v in entry.values())
 
     @property
     def discrete(self) -> Bilinear:

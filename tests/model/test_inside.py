@@ -158,9 +158,104 @@ def test_rates_of_frequencies_by_everything_at_interior_places(kind):
         assert (error < 1e-7 * np.abs(found.rate[name]) + rounding).all()
 
 
-def test_closed_forms_know_no_interior_places():
-    with pytest.raises(ValueError, match="varies along x"):
-        beam(inside=[(HALF, m * KINETIC)]).separate()
+# closed forms ---------------------------------------------------------------------------------------------------------
+
+T, kG, b, C = sp.symbols("T kG b C")
+w, turn = sp.Function("w")(t), sp.Function("turn")(x, t)
+LOADED = m * KINETIC - k * v**2 / 2 + m * v.diff(x, t) ** 2 / 20
+SHAKEN = m * KINETIC - k * v**2 / 2 + m * turn.diff(t) ** 2 / 20
+RIDING = m * (v.diff(t) + w.diff(t)) ** 2 / 2
+TENSE = KINETIC - v.diff(x, 2) ** 2 / 2 - T * v.diff(x) ** 2 / 2
+SHEARED = KINETIC + turn.diff(t) ** 2 / 400 - turn.diff(x) ** 2 / 2 - kG * (v.diff(x) - turn) ** 2 / 2
+ALONG = {"x": x, "domain": (0, 1), "t": t}
+CLOSED = {
+    "bead on a string": (string(inside=[(a, m * KINETIC)]), {a: 0.3, m: 0.7}),
+    "mass, spring, rotary inertia": (beam(inside=[(a, LOADED)]), {a: 0.3, m: 0.7, k: 3.0}),
+    "support": (beam(essential=(*PINNED, v.subs(x, a))), {a: 0.37}),
+    "support at an irrational place": (beam(essential=(*CLAMPED, v.subs(x, 1 / sp.sqrt(2)))), {}),
+    "two places": (beam(inside=[(a, m * KINETIC), (b, -k * v**2 / 2)]), {a: 0.3, b: 0.8, m: 0.7, k: 3.0}),
+    "numbers that descend": (beam(inside=[(0.8, m * KINETIC), (HALF / 2, -k * v**2 / 2)]), {m: 0.7, k: 3.0}),
+    "mass before a support": (
+        beam(essential=(*CLAMPED, v.subs(x, b)), inside=[(a, m * KINETIC)]), {a: 0.3, b: 0.8, m: 1}
+    ),
+    "tension": (
+        cra.Model(TENSE, fields=[v], essential=CLAMPED, inside=[(a, m * KINETIC)], **ALONG), {a: 0.3, m: 1, T: 5}
+    ),
+    "Timoshenko": (
+        cra.Model(SHEARED, fields=[v, turn], essential=[v.subs(x, 0), turn.subs(x, 0)], inside=[(a, SHAKEN)], **ALONG),
+        {a: 0.4, m: 0.5, kG: 50.0, k: 2.0},
+    ),
+    "on a free base": (
+        cra.Model(
+            (v.diff(t) + w.diff(t)) ** 2 / 2 - v.diff(x, 2) ** 2 / 2,
+            fields=[v],
+            coordinates=[w],
+            left=w.diff(t) ** 2 - k * w**2 / 2,
+            inside=[(a, RIDING)],
+            essential=CLAMPED,
+            **ALONG,
+        ),
+        {a: 0.3, m: 0.7, k: 5.0},
+    ),
+}  # fmt: skip
+
+
+def newton(function, root):
+    """Distance of a root from that of a function, relative: a Newton step by a central difference."""
+    low, here, high = (complex(function(root * (1 + h))) for h in (-1e-6, 0.0, 1e-6))
+    return abs(here * 2e-6 / (high - low))
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_closed_forms_with_interior_places(name):
+    """The characteristic function vanishes at the frequencies of the stress basis; the shapes are the same."""
+    model, values = CLOSED[name]
+    closed, function = model.separate(), model.kernel()
+    numbers = [values[symbol] for symbol in model.symbols]
+    omega = model.at(values).natural_frequencies(3)
+    for root in omega:  # the cut-off of a wave number makes it imaginary
+        assert newton(lambda z: function(z + 0j, *numbers), root) < 1e-10  # the accuracy of the frequencies
+    assert len(closed.spatial_problem.jump_conditions) == len(model.equations.jump_conditions) > 0
+    if closed.characteristic_matrix.rows < 6:  # cofactors of larger ones take long
+        known = {**values, closed.frequency: omega[1]}
+        waves = {wave: value.subs(known).evalf() for wave, value in closed.basis.wave_numbers.items()}
+        places = [0.2, 0.45, 0.9]
+        first = closed.mode_shapes[0].subs(waves).subs(known)
+        shape = np.array([complex(first.subs(x, place).evalf()) for place in places])
+        expected = model.mode_shapes(values, places, 2)[1]
+        np.testing.assert_allclose(shape / shape[2], expected / expected[2], rtol=1e-8)
+
+
+def test_closed_forms_say_what_stands_at_interior_places():
+    """A bead: lambda m sin(lambda a) sin(lambda (1 - a)) = sin(lambda), as two sines joined by hand give it."""
+    closed = string(inside=[(a, m * KINETIC)]).separate()
+    lam = next(iter(closed.basis.wave_numbers))
+    by_hand = m * lam * sp.sin(a * lam) * sp.sin(lam * (1 - a)) - sp.sin(lam)
+    assert sp.simplify(closed.characteristic_function * lam - by_hand) == 0
+    (condition,) = closed.spatial_problem.jump_conditions
+    assert condition.place == a and condition.rhs.has(closed.frequency)
+    beyond = beam(inside=[(sp.Integer(2), m * KINETIC)]).separate()
+    assert beyond.characteristic_function == beam().separate().characteristic_function  # there it is not
+
+
+def test_a_double_frequency_is_a_double_zero():
+    """A pinned beam clamped at its middle: both halves alike, so that the function does not change its sign."""
+    model = beam(essential=(*PINNED, v.subs(x, HALF), v.diff(x).subs(x, HALF)))
+    function, root = model.kernel(), 4 * 3.92660231204792**2
+    near = np.array([function(root * (1 + h)) for h in (-1e-3, 0.0, 1e-3)])
+    assert near[0] * near[2] > 0 and abs(near[1]) < 1e-9 * abs(near[0])
+
+
+def test_a_damper_inside_in_closed_form():
+    model = beam(virtual_work=[(-C * v.diff(t), v, a)])
+    function = model.kernel()
+    for root in model.eigenvalues({a: 0.6, C: 1.5}, 3):
+        assert newton(lambda s: function(s, 1.5, 0.6), root) < 1e-10
+
+
+def test_what_has_no_closed_form_is_told_the_way():
+    with pytest.raises(ValueError, match=r"Heaviside.* use ritz or, for constant pieces, fields of their own"):
+        beam(1 + sp.Heaviside(x - HALF)).separate()
 
 
 # tables ---------------------------------------------------------------------------------------------------------------
