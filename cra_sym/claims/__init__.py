@@ -4,13 +4,14 @@ from cra_sym.claims.family import ArmFamily, provenance_family
 from cra_sym.claims.ledger import claim, claims
 from cra_sym.claims.overviews import figure_claims, figure_family
 from cra_sym.claims.setting import Setting
-from cra_sym.claims.verdict import OUTCOMES, THEMES, Finding, Quantity, Verdict, outcome
+from cra_sym.claims.verdict import OUTCOMES, THEMES, Finding, Judgement, Quantity, Verdict, judged
 
 __all__ = [
     "OUTCOMES",
     "THEMES",
     "ArmFamily",
     "Finding",
+    "Judgement",
     "Quantity",
     "Setting",
     "Verdict",
@@ -18,6 +19,6 @@ __all__ = [
     "claims",
     "figure_claims",
     "figure_family",
-    "outcome",
+    "judged",
     "provenance_family",
 ]

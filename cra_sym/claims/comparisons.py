@@ -12,15 +12,15 @@ from cra_sym.claims.pictures import PALETTE, STYLES, note, region_map
 from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.responses import plane_picture
 from cra_sym.claims.setting import Setting
-from cra_sym.claims.verdict import Finding, Quantity, Verdict, outcome
-from cra_sym.claims.words import listed, mm, number, percent, span
+from cra_sym.claims.verdict import Finding, Quantity, Verdict, judged
+from cra_sym.claims.words import by_outcome, listed, mm, number, percent, span
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def _softened(setting: Setting, mean: dict[str, float], head: str) -> Finding:
-    """Judge whether peaks on elastic joints are smaller than on the rigid one; the sentence begins with ``head``."""
+def _softened(setting: Setting, mean: dict[str, float], what: str) -> Finding:
+    """Judge whether peaks on elastic joints are smaller than on the rigid one: those of ``what`` the response is to."""
     k_t = np.logspace(2, 6, 33)
     varpi = Plane.of(setting).varpi
     elastic = setting.arm.replace(k_t=k_t[:, None])
@@ -48,24 +48,29 @@ def _softened(setting: Setting, mean: dict[str, float], head: str) -> Finding:
         "smaller": Quantity(smaller, "1", "the same at the soft k_t of Figs. 7 and 8, by fine_varpi"),
         "fine_varpi": Quantity(fine, "rad/s", "frequency of the disturbance"),
     }
+    judgement = judged(region, here=nominal[0] < seen * nominal[1])
+    plain = by_outcome(
+        judgement,
+        f"The response to {what} is smaller on an elastic joint, whatever its stiffness and the disturbance.",
+        f"Whether the response to {what} is smaller on an elastic joint depends on the disturbance's frequency: "
+        "softening moves the first natural frequency away from some and towards others.",
+        f"The response to {what} is smaller on no elastic joint.",
+    )
     sentence = (
-        f"{head} with k_t = {number(setting.soft_k_t)} N/m v(L, t) is smaller than on the rigid joint, by over "
-        f"{percent(setting.visible)}, for varpi of "
+        f"With $k_t$ = {number(setting.soft_k_t)} N/m $v(L,t)$ is smaller than on the rigid joint, by over "
+        rf"{percent(setting.visible)}, for $\varpi$ of "
         f"{span(fine, smaller, 'rad/s')}; at {number(setting.angular_frequency)} rad/s it is {mm(nominal[0])} mm "
-        "against "
-        f"{mm(nominal[1])} mm. The spring lowers omega_1 from {number(first[1])} to {number(first[0])} rad/s: "
-        f"towards a disturbance below it (smaller at {percent(smaller[fine < first[0]].mean())} of these frequencies) "
-        f"and away from one above ({percent(smaller[fine > first[1]].mean())}; well above, how the beats fall into "
-        f"{number(setting.duration)} s decides). For k_t of {number(k_t[0])} to {number(k_t[-1])} N/m the claim "
-        "holds in "
-        f"{percent(region.mean())} of the plane, measured as v(L) - v(0) in "
-        f"{percent(region_relative.mean())}."
+        rf"against {mm(nominal[1])} mm. The spring changes $\omega_1$ from {number(first[1])} to {number(first[0])} "
+        f"rad/s; below, the response is smaller at {percent(smaller[fine < first[0]].mean())} of the frequencies, "
+        f"above at {percent(smaller[fine > first[1]].mean())}, where the beats that fall into "
+        f"{number(setting.duration)} s decide. For $k_t$ of {number(k_t[0])} to {number(k_t[-1])} N/m the claim holds "
+        f"in {percent(region.mean())} of the plane, measured as $v(L) - v(0)$ in {percent(region_relative.mean())}."
     )
     criterion = (
-        f"the largest |v(L, t)| is smaller than on the rigid joint by over {percent(setting.visible)}, for k_t of "
+        f"the largest $|v(L,t)|$ is smaller than on the rigid joint by over {percent(setting.visible)}, for $k_t$ of "
         f"{number(k_t[0])} to {number(k_t[-1])} N/m and frequencies up to twice the first natural one"
     )
-    return Finding(outcome(region), sentence, evidence, criterion)
+    return Finding(judgement, plain, sentence, evidence, criterion)
 
 
 @claimed(
@@ -77,10 +82,11 @@ def _softened(setting: Setting, mean: dict[str, float], head: str) -> Finding:
     "rigid "
     "restraint",
 )
-def _(setting: Setting) -> Finding:
+def smaller_on_an_elastic_joint(setting: Setting) -> Finding:
+    """Judge C10."""
     acceleration = setting.accelerations[0]
-    head = f"Under {number(acceleration)} m/s2 and the disturbance,"
-    return _softened(setting, {"acceleration": acceleration}, head)
+    what = f"an acceleration of {number(acceleration)} m/s² and the disturbance"
+    return _softened(setting, {"acceleration": acceleration}, what)
 
 
 @claimed(
@@ -92,8 +98,9 @@ def _(setting: Setting) -> Finding:
     "stiffness has "
     "a suppressing effect on the motion disturbance",
 )
-def _(setting: Setting) -> Finding:
-    return _softened(setting, {}, "The error is the response to the disturbance alone, by superposition:")
+def disturbance_suppressed(setting: Setting) -> Finding:
+    """Judge C11."""
+    return _softened(setting, {}, "the disturbance alone, the error,")
 
 
 def _softened_picture(verdict: Verdict, ax: Axes, label: str) -> None:
@@ -113,12 +120,14 @@ def _softened_picture(verdict: Verdict, ax: Axes, label: str) -> None:
 
 
 @pictured("C10")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_smaller_on_an_elastic_joint(verdict: Verdict, ax: Axes) -> None:
+    """Draw C10."""
     _softened_picture(verdict, ax, "smaller than rigid")
 
 
 @pictured("C11")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_disturbance_suppressed(verdict: Verdict, ax: Axes) -> None:
+    """Draw C11."""
     _softened_picture(verdict, ax, "error smaller")
 
 
@@ -129,7 +138,8 @@ def _(verdict: Verdict, ax: Axes) -> None:
     "amplitude grows with acceleration",
     "the vibration response amplitudes increase with the motion accelerations",
 )
-def _(setting: Setting) -> Finding:
+def amplitude_grows_with_acceleration(setting: Setting) -> Finding:
+    """Judge C12."""
     plane, a = Plane.of(setting), np.array(setting.accelerations)
     pairs = [plane.peaks(acceleration=value) for value in a]
     found, without = np.stack([with_ for with_, _ in pairs]), np.array([bare for _, bare in pairs])
@@ -144,25 +154,34 @@ def _(setting: Setting) -> Finding:
         "region": Quantity(least > 0, "1", "where the claim holds: varpi, psi"),
         "without": Quantity(without, "m", "peak without disturbance, by acceleration"),
     }
-    theorem = (
-        "the peak is proportional to the acceleration, a theorem" if scales < 1e-9 else "it is not quite proportional"
+    here = Plane(setting, np.array([setting.angular_frequency]), np.array([setting.phase]))
+    ours = np.array([here.peaks(acceleration=value)[0] for value in a])
+    judgement = judged(least > 0, here=np.diff(ours, axis=0) > 0)
+    plain = by_outcome(
+        judgement,
+        "The peak grows with the acceleration, whatever the disturbance.",
+        "The peak grows with the acceleration unless the disturbance works against it.",
+        "With the disturbance the peak never grows from each acceleration to the next.",
     )
+    law = "proportional to the acceleration, by superposition" if scales < 1e-9 else "not proportional to it"
     where = (
         f"; it fails for some phase between {number(fails.min())} and {number(fails.max())} rad/s" if fails.size else ""
     )
     sentence = (
-        f"Without disturbance {theorem} of linear theory ({listed(without, mm)} mm). With it the peak grows from each "
-        f"acceleration to the next in {percent((least > 0).mean())} of the plane of frequency and phase{where}."
+        f"Without disturbance the peak is {law} ({listed(without, mm)} mm). With it the peak grows from each "
+        f"acceleration to the next in {percent((least > 0).mean())} of the plane of frequency and "
+        f"phase{where}."
     )
     criterion = (
-        "with the disturbance the largest |v(L, t)| grows with each step of the mean acceleration, over every phase "
+        "with the disturbance the largest $|v(L,t)|$ grows with each step of the mean acceleration, over every phase "
         "and frequencies up to twice the first natural one; no threshold"
     )
-    return Finding(outcome(least > 0), sentence, evidence, criterion)
+    return Finding(judgement, plain, sentence, evidence, criterion)
 
 
 @pictured("C12")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_amplitude_grows_with_acceleration(verdict: Verdict, ax: Axes) -> None:
+    """Draw C12."""
     plane_picture(verdict, ax, "peak grows with $a$")
 
 
@@ -173,7 +192,8 @@ def _(verdict: Verdict, ax: Axes) -> None:
     "error grows with acceleration",
     "with the increasing of the motion accelerations, the error aroused by the motion disturbance increases",
 )
-def _(setting: Setting) -> Finding:
+def error_grows_with_acceleration(setting: Setting) -> Finding:
+    """Judge C13."""
     plane, a = Plane.of(setting), np.array(setting.accelerations)
 
     def error(acceleration: float, scale: float = 1.0) -> np.ndarray:
@@ -198,29 +218,39 @@ def _(setting: Setting) -> Finding:
         "share_of_magnitudes": Quantity(magnitude.mean(), "1", "share of the plane where its magnitude grows"),
     }
     # the claim can be read instant by instant or for peaks: it stands if either reading does
-    verdict = outcome(pointwise) if pointwise.any() else outcome(grows)
+    judgement = judged(pointwise) if pointwise.any() else judged(grows)
+    plain = by_outcome(
+        judgement,
+        "What the disturbance adds grows with the acceleration.",
+        "What the disturbance adds grows with the acceleration in some cases only.",
+        "What the disturbance adds does not grow with the acceleration, at any instant or in the peak.",
+    )
     superposed = "the same for every acceleration" if gap < 1e-9 else f"different by up to {percent(gap)}"
     steps = "never grows" if not grows.any() else f"grows in {percent(grows.mean())} of the steps"
+    reason = (
+        r" ($\max|a r + d| - a \max|r|$ cannot, by the triangle inequality); only where it is negative does its "
+        "magnitude grow,"
+        if judgement.outcome == "contradicted"
+        else "; its magnitude grows"
+    )
     sentence = (
-        f"Instant by instant the error is {superposed}: the response is a sum of what each motion causes. The "
-        "difference of "
-        f"the peaks {steps} with a (max|a r + d| - a max|r| cannot, by the triangle inequality); only where it is "
-        "negative does "
-        f"its magnitude grow, in {percent(magnitude.mean())} of the plane of frequency and phase."
+        f"Instant by instant the error is {superposed}. The difference of the peaks {steps}{reason} in "
+        f"{percent(magnitude.mean())} of the plane of frequency and phase."
     )
     remedy = None
     scaled = np.diff([float(peak(error(value, value / a[0]))) for value in a])
-    if verdict == "contradicted" and (scaled > 0).all():
-        remedy = "a disturbance whose amplitude grows with the acceleration it rides on, B proportional to a"
+    if judgement.outcome == "contradicted" and (scaled > 0).all():
+        remedy = "a disturbance whose amplitude grows with the acceleration it rides on, $B$ proportional to $a$"
     criterion = (
-        "what the disturbance adds grows with each step of the mean acceleration by over 1e-9 of itself, instant by "
-        "instant or, if it does so nowhere, as the difference of the peaks with and without disturbance"
+        "what the disturbance adds grows with each step of the mean acceleration by over $10^{-9}$ of itself, instant "
+        "by instant or, if it does so nowhere, as the difference of the peaks with and without disturbance"
     )
-    return Finding(verdict, sentence, evidence, criterion, remedy)
+    return Finding(judgement, plain, sentence, evidence, criterion, remedy)
 
 
 @pictured("C13")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_error_grows_with_acceleration(verdict: Verdict, ax: Axes) -> None:
+    """Draw C13."""
     t = verdict["times"]
     for k, (a, error) in enumerate(zip(verdict["accelerations"], verdict["errors"], strict=True)):
         ax.plot(t, 1e3 * error, color=PALETTE[k], ls=STYLES[k], lw=4.0 - 1.3 * k, label=f"$a$ = {a:g} m/s$^2$")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from cra_sym.checks import choice, default_floating_point
 from cra_sym.claims.registry import ENTRIES, Entry
 from cra_sym.claims.setting import Setting
-from cra_sym.claims.verdict import OUTCOMES, THEMES, Verdict
+from cra_sym.claims.verdict import THEMES, Verdict
 
 if TYPE_CHECKING:
     from cra_sym.arm.parameters import Arm
@@ -52,15 +52,16 @@ copyreg.pickle(Verdict, _reduced)  # a picture is a function that no name leads 
 def _verdict(id: str, setting: Setting) -> Verdict:
     entry = _entry(id)
     found = entry.find(setting)
-    if found.outcome not in OUTCOMES:
-        raise ArithmeticError(f"{id}: outcome {found.outcome!r} is none of {', '.join(OUTCOMES)}")
     return Verdict(
         id=id,
         theme=entry.theme,
         title=entry.title,
         claim=entry.claim,
         source=entry.source,
-        outcome=found.outcome,
+        outcome=found.judgement.outcome,
+        share=found.judgement.share,
+        here=found.judgement.here,
+        plain=found.plain,
         sentence=" ".join(found.sentence.split()),
         evidence=MappingProxyType(dict(found.evidence)),
         setting=setting,

@@ -13,8 +13,8 @@ from cra_sym.claims.family import common_scale
 from cra_sym.claims.pictures import PALETTE, STYLES, by_mode, note, stiffness_axis
 from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
-from cra_sym.claims.verdict import Finding, Quantity, Verdict, outcome
-from cra_sym.claims.words import listed, number, percent, span
+from cra_sym.claims.verdict import Finding, Quantity, Verdict, judged
+from cra_sym.claims.words import by_outcome, listed, number, percent, span
 from cra_sym.paper.flipped import flipped_frequencies
 
 if TYPE_CHECKING:
@@ -32,7 +32,8 @@ _ROUNDING = 1e-9  # relative: what quadrature and rounding may leave of an ident
     "for the ideal fixed restraint, the natural frequencies of the flexible manipulator can be calculated as 2.448 Hz, "
     "15.339 Hz, and 42.950 Hz",
 )
-def _(setting: Setting) -> Finding:
+def rigid_joint_frequencies(setting: Setting) -> Finding:
+    """Judge C01."""
     published = np.array(setting.frequencies)
     bare = setting.rigid.replace(m_e=0.0, J_e=0.0)
     found = natural_frequencies(bare, modes=published.size)
@@ -45,29 +46,33 @@ def _(setting: Setting) -> Finding:
         "scale_allowed": Quantity(np.array([low, high]), "rad/s", "interval all printed frequencies agree with"),
         "scale_by_mode": Quantity(offered, "rad/s", "interval of each printed frequency: mode, (low, high)"),
     }
-    criterion = "all printed frequencies, to within 0.0005 Hz, are those of one clamped uniform beam: this arm"
+    judgement = judged([np.all(np.abs(found - published) <= 0.0005)])
+    criterion = "the printed frequencies, to within 0.0005 Hz, are those of this arm on an ideal rigid joint"
+    ours = listed(found, lambda f: f"{f:.3f}")
+    ratio = r"$\sqrt{EI/\rho A}/L^2$"
     if low > high:
+        plain = "No clamped uniform beam has the printed frequencies, so this arm has not."
         sentence = (
-            f"No clamped uniform beam has these frequencies: mode by mode they ask for different values of "
-            f"sqrt(EI/rho A)/L^2, from {number(offered.max(), 6)} down to {number(offered.min(), 6)} rad/s."
+            f"Mode by mode they ask for different values of {ratio}, from {number(offered.max(), 6)} down to "
+            f"{number(offered.min(), 6)} rad/s; this arm has {ours} Hz."
         )
-        return Finding("contradicted", sentence, evidence, criterion)
-    same = f"sqrt(EI/rho A)/L^2 between {number(low, 6)} and {number(high, 6)} rad/s"
-    if low <= scale <= high:
+        return Finding(judgement, plain, sentence, evidence, criterion)
+    same = f"{ratio} between {number(low, 6)} and {number(high, 6)} rad/s"
+    if judgement.outcome == "holds":
+        plain = "The printed frequencies are those of our arm on a rigid joint, to every digit."
         sentence = (
-            f"{listed(found, lambda f: f'{f:.3f}')} Hz come out, every printed digit. The three numbers are those of a "
-            f"clamped uniform beam whatever it is made of, and all agree with {same}: that one number is all they tell."
+            f"{ours} Hz come out. A clamped uniform beam has these three numbers whatever it is made of, if it has "
+            f"{same}: that one number is all they tell."
         )
-        return Finding("holds", sentence, evidence, criterion)
-    sentence = (
-        f"The three printed numbers are those of a clamped uniform beam with {same}; this arm has "
-        f"{number(scale, 6)} rad/s and {listed(found, lambda f: f'{f:.3f}')} Hz."
-    )
-    return Finding("holds where", sentence, evidence, criterion)
+        return Finding(judgement, plain, sentence, evidence, criterion)
+    plain = "The printed frequencies are those of a clamped uniform beam, but not of this arm."
+    sentence = f"This arm has {ratio} = {number(scale, 6)} rad/s and {ours} Hz."
+    return Finding(judgement, plain, sentence, evidence, criterion, remedy=f"an arm with {same}")
 
 
 @pictured("C01")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_rigid_joint_frequencies(verdict: Verdict, ax: Axes) -> None:
+    """Draw C01."""
     centre = verdict["scale_allowed"].mean()
     for mode, (low, high) in enumerate(verdict["scale_by_mode"], 1):
         ax.plot([1e6 * (low / centre - 1), 1e6 * (high / centre - 1)], [mode, mode], "-", color=PALETTE[mode - 1], lw=5)
@@ -91,7 +96,8 @@ def _(verdict: Verdict, ax: Axes) -> None:
     "with the decreasing of tensional restraint stiffness, the first three natural frequencies obviously decrease and "
     "are small compared to the ideal fixed restraint",
 )
-def _(setting: Setting) -> Finding:
+def fall_with_k_t(setting: Setting) -> Finding:
+    """Judge C02."""
     k_t = np.logspace(6, 0, 61)
     k_r = np.array([np.inf, *setting.k_r])
     masses = np.array(setting.masses)
@@ -110,27 +116,32 @@ def _(setting: Setting) -> Finding:
         "falls": Quantity(falls, "1", "whether the next softer k_t lowers it: end-effector, k_r, k_t, mode"),
         "slope": Quantity(slope, "kg^-1", "d omega^2 / d k_t = phi(0)^2: end-effector, k_r, k_t, mode"),
     }
-    verdict = outcome(falls, below)
-    if verdict == "holds":
+    series = natural_frequencies(setting.arm.replace(k_t=np.array(setting.k_t)))
+    judgement = judged(falls, below, here=np.diff(series, axis=0) < 0)
+    reach = f"{number(k_t[0])} to {number(k_t[-1])} N/m"
+    if judgement.outcome == "holds":
+        plain = "A softer $k_t$ lowers every natural frequency: it cannot do otherwise."
         sentence = (
-            f"All three fall at every step from {number(k_t[0])} to {number(k_t[-1])} N/m, for {masses.size} "
-            f"end-effectors and {k_r.size} rotational stiffnesses; at {number(setting.soft_k_t)} N/m they are "
-            f"{listed(soft, percent)} of the rigid joint's. It is a theorem: d(omega_i^2)/dk_t = phi_i(0)^2."
+            f"All three fall at every step from {reach}, for {masses.size} end-effectors and {k_r.size} rotational "
+            f"stiffnesses; at {number(setting.soft_k_t)} N/m they are {listed(soft, percent)} of the rigid joint's. "
+            r"It is a theorem: $d(\omega_i^2)/dk_t = \phi_i(0)^2$."
         )
     else:
+        plain = "A softer $k_t$ does not lower every natural frequency."
         sentence = (
-            f"In {percent(falls.mean())} of the steps from {number(k_t[0])} to {number(k_t[-1])} N/m a softer joint "
-            f"lowers a frequency, in the others it does not."
+            f"In {percent(falls.mean())} of the steps from {reach} a softer joint lowers a frequency, in the others it "
+            "does not."
         )
     criterion = (
-        f"each softer k_t from {number(k_t[0])} to {number(k_t[-1])} N/m has the lower frequency, below that of the "
-        "ideal fixed joint, for every end-effector and k_r; no threshold"
+        f"each softer $k_t$ from {number(k_t[0])} to {number(k_t[-1])} N/m has the lower frequency, below that of the "
+        "ideal fixed joint, for every end-effector and $k_r$; no threshold"
     )
-    return Finding(verdict, sentence, evidence, criterion)
+    return Finding(judgement, plain, sentence, evidence, criterion)
 
 
 @pictured("C02")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_fall_with_k_t(verdict: Verdict, ax: Axes) -> None:
+    """Draw C02."""
     ax.axhline(1.0, color="0.45", lw=0.9, ls=(0, (4, 2)))
     by_mode(ax, verdict["k_t"], verdict["frequency"] / verdict["rigid_frequency"])
     stiffness_axis(ax, "k_t")
@@ -152,7 +163,8 @@ def _fig_4(found: np.ndarray, rigid: np.ndarray, visible: float) -> tuple[np.nda
     "with torsional restraint stiffness decrease, the first natural frequency presents no change, while the second and "
     "third natural frequencies obviously increase",
 )
-def _(setting: Setting) -> Finding:
+def flat_and_rising_with_k_r(setting: Setting) -> Finding:
+    """Judge C03."""
     k_r = np.logspace(5, np.log10(min(setting.k_r)), 121)
     arm = setting.arm.replace(k_r=k_r)
     found, fixed = natural_frequencies(arm), natural_frequencies(setting.arm.replace(k_r=np.inf))
@@ -168,41 +180,51 @@ def _(setting: Setting) -> Finding:
         "region": Quantity(flat & rises, "1", "where Fig. 4 would look as the paper says, by k_r"),
         "flipped_region": Quantity(as_printed, "1", "the same with the sign flipped, by k_r"),
     }
-    verdict = outcome(flat & rises)
+    series = natural_frequencies(setting.arm.replace(k_r=np.array(setting.k_r)))
+    judgement = judged(flat & rises, here=np.logical_and(*_fig_4(series, fixed, setting.visible)))
     last, change = found[-1] / fixed - 1, np.diff(found, axis=0)
-    if verdict == "contradicted" and np.all(change < 0):
+    if judgement.outcome == "contradicted" and np.all(change < 0):
         near = (1 - found[0] / fixed) * float(np.max(arm.kappa_r))
         equal = np.ptp(near) < setting.visible * near.max()
         share = f"same fraction {number(near[0], 1)}" if equal else f"fractions {listed(near)} over"
+        plain = "A softer $k_r$ lowers all three frequencies, and raises none."
         sentence = (
-            f"All three fall, by {listed(-last, percent)} at {number(k_r[-1])} N m/rad, near the rigid joint by the "
-            f"{share}{'/' if equal else ' '}kappa_r. A softer spring cannot raise a frequency: "
-            f"d(omega_i^2)/dk_r = phi_i'(0)^2."
+            f"They fall by {listed(-last, percent)} at {number(k_r[-1])} N m/rad, near the rigid joint by the {share}"
+            + (r"$/\kappa_r$" if equal else r" $\kappa_r$")
+            + r". A softer spring cannot raise a frequency: $d(\omega_i^2)/dk_r = \phi_i'(0)^2$."
         )
     else:
+        plain = by_outcome(
+            judgement,
+            "A softer $k_r$ raises $f_2$ and $f_3$, and $f_1$ looks flat.",
+            "For some $k_r$ the picture is as the paper draws it, for others it is not.",
+            "Nowhere along $k_r$ is $f_1$ flat while $f_2$ and $f_3$ rise.",
+        )
         sentence = (
-            f"On an axis in hertz f1 stays within {percent(setting.visible)} while f2 and f3 rise for k_r of "
-            f"{span(k_r, flat & rises, 'N m/rad')}; at {number(k_r[-1])} N m/rad they change by "
+            f"On an axis in hertz $f_1$ stays within {percent(setting.visible)} while $f_2$ and $f_3$ rise for $k_r$ "
+            f"of {span(k_r, flat & rises, 'N m/rad')}; at {number(k_r[-1])} N m/rad they change by "
             f"{listed(last, percent)}."
         )
     remedy = None
     if as_printed.any() and not (flat & rises).any():
         rise = flipped[-1] / fixed - 1
         remedy = (
-            f"the sign of the rotational spring, EI v_xx(0) = -k_r v_x(0): all three rise, by {listed(rise, percent)}, "
-            f"and for k_r of {span(k_r, as_printed, 'N m/rad')} f1 moves by less than {percent(setting.visible)} of "
-            "an axis in "
-            f"hertz that shows f3, so that it looks flat. Such a joint {_energy_of_a_tilt()}"
+            f"the sign of the rotational spring, $EI v_{{xx}}(0) = -k_r v_x(0)$: all three rise, by "
+            f"{listed(rise, percent)}, and for $k_r$ of {span(k_r, as_printed, 'N m/rad')} $f_1$ moves by less than "
+            f"{percent(setting.visible)} of an axis in hertz that shows $f_3$, so that it looks flat. Such a joint "
+            f"{_energy_of_a_tilt()}"
         )
     criterion = (
-        f"on one axis in hertz that reaches f3, f1 moves by at most {percent(setting.visible)} of it, and f2 and f3 "
-        f"rise by more, for k_r of {number(k_r[-1])} to {number(k_r[0])} N m/rad"
+        f"on one axis in hertz that reaches $f_3$, $f_1$ moves by at most {percent(setting.visible)} of it, and $f_2$ "
+        f"and $f_3$ rise by more, for $k_r$ of {number(k_r[-1])} to {number(k_r[0])} N m/rad"
     )
-    return Finding(verdict, sentence, evidence, criterion, remedy)
+    return Finding(judgement, plain, sentence, evidence, criterion, remedy)
 
 
 def _energy_of_a_tilt() -> str:
     """Say how much energy the flipped joint holds when the straight arm is turned about it by one radian."""
+    from sympy import latex
+
     from cra_sym.arm.lagrangian import paper_lagrangian
     from cra_sym.paper.energy import k_r, v, w, x
     from cra_sym.paper.evaluation import at, put
@@ -211,11 +233,12 @@ def _energy_of_a_tilt() -> str:
     flipped = 2 * left.coeff(k_r) * k_r - left
     energy = at(put(flipped, {v: x, w: x * 0}), 0).doit()
     folds = ": it would fold by itself" if energy.is_nonpositive else ""
-    return f"has the potential energy {energy} when turned by 1 rad{folds}"
+    return f"has the potential energy ${latex(energy, fold_short_frac=True)}$ when turned by 1 rad{folds}"
 
 
 @pictured("C03")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_flat_and_rising_with_k_r(verdict: Verdict, ax: Axes) -> None:
+    """Draw C03."""
     rigid = verdict["rigid_frequency"]
     by_mode(ax, verdict["k_r"], verdict["frequency"] / rigid)
     for mode in range(rigid.size):
@@ -235,7 +258,8 @@ def _(verdict: Verdict, ax: Axes) -> None:
     "the mode shape equation and frequency equation ... consistent with the ideal rigid assumption ... the proposed "
     "elastic restraint model can provide a whole restraint of the bolted joints",
 )
-def _(setting: Setting) -> Finding:
+def limit_of_infinite_stiffness(setting: Setting) -> Finding:
+    """Judge C04."""
     from sympy import cos, cosh
 
     from cra_sym.paper.equations import equation
@@ -263,29 +287,31 @@ def _(setting: Setting) -> Finding:
         "limits": Quantity(limits, "1", "whether (27), (28), (29) pass their checks"),
         "textbook": Quantity(textbook, "1", "whether (29) is 1 + cos(lambda) cosh(lambda) = 0"),
     }
-    verdict = outcome(limits, [textbook], reached)
-    if verdict == "holds":
+    judgement = judged(limits, [textbook], reached)
+    if judgement.outcome == "holds":
+        plain = "With infinite stiffness the model becomes the ideal rigid joint, in its equations and in its numbers."
         sentence = (
-            "Symbolically: (23) divided by kappa_t kappa_r has the finite limit (27), which without end-effector is "
-            "1 + cos(lambda) cosh(lambda) = 0. Numerically the frequencies approach the rigid joint's from below as "
-            f"1/kappa, to {percent(gaps[..., -1, :].max())} at kappa = {number(kappa[-1])}."
+            r"Symbolically: (23) divided by $\kappa_t \kappa_r$ has the finite limit (27), which without end-effector "
+            r"is $1 + \cos\lambda \cosh\lambda = 0$. Numerically the frequencies approach the rigid joint's from below "
+            rf"as $1/\kappa$, to {percent(gaps[..., -1, :].max())} at $\kappa$ = {number(kappa[-1])}."
         )
     else:
+        plain = "The limit of infinite stiffness is not that of the ideal rigid joint in every respect."
         sentence = (
             f"Of the limits (27), (28), (29) {int(limits.sum())} are confirmed, (29) is "
-            f"{'' if textbook else 'not '}the "
-            f"cantilever's equation, and {percent(reached.mean())} of the frequencies approach the rigid joint's as "
-            "1/kappa."
+            f"{'' if textbook else 'not '}the cantilever's equation, and {percent(reached.mean())} of the frequencies "
+            r"approach the rigid joint's as $1/\kappa$."
         )
     criterion = (
-        "(27), (28) and (29) pass their checks, (29) is the cantilever's, and over the last decades of kappa the "
-        f"shortfall vanishes as a power of 1/kappa within {number(_NEAR_ONE)} of 1"
+        r"(27), (28) and (29) pass their checks, (29) is the cantilever's, and over the last decades of $\kappa$ the "
+        rf"shortfall vanishes as a power of $1/\kappa$ within {number(_NEAR_ONE)} of 1"
     )
-    return Finding(verdict, sentence, evidence, criterion)
+    return Finding(judgement, plain, sentence, evidence, criterion)
 
 
 @pictured("C04")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_limit_of_infinite_stiffness(verdict: Verdict, ax: Axes) -> None:
+    """Draw C04."""
     for spring, (gap, style) in enumerate(zip(verdict["gap"], ("-", "--"), strict=True)):
         for mode in range(gap.shape[-1]):
             label = f"$f_{mode + 1}$" if spring == 0 else None
@@ -303,7 +329,8 @@ def _(verdict: Verdict, ax: Axes) -> None:
     "the potential energy of the flexible CRA system mainly considers the elastic potential energy of the flexible "
     "manipulator",
 )
-def _(setting: Setting) -> Finding:
+def energy_of_the_beam_alone(setting: Setting) -> Finding:
+    """Judge C18."""
     k_t, k_r = np.logspace(6, 1, 41), np.logspace(5, 0, 41)
     cases = [setting.rigid.replace(k_t=k_t), setting.rigid.replace(k_r=k_r)]
     beam = np.stack([_beam_stiffness(arm) for arm in cases])
@@ -321,26 +348,31 @@ def _(setting: Setting) -> Finding:
         "with_springs": Quantity(whole, "1", "the same with the two springs' energy"),
         "rigid": Quantity(clamped, "1", "the same on the rigid joint, by mode"),
     }
-    verdict = outcome(agrees)
     soft = _beam_stiffness(setting.rigid.replace(k_t=setting.soft_k_t))
     soft = soft / modal_parameters(setting.rigid.replace(k_t=setting.soft_k_t)).omega ** 2
+    judgement = judged(agrees, here=np.abs(soft - 1) < _ROUNDING)
+    plain = by_outcome(
+        judgement,
+        "The beam's energy alone gives every frequency.",
+        "The beam's energy alone gives the frequencies of some joints only.",
+        "On an elastic joint the beam's energy alone falls short of the frequencies: the springs store energy too.",
+    )
     sentence = (
-        f"For an elastic joint K_i/M_i of (6) with the beam's energy alone falls short of omega_i^2 of (30): at k_t = "
-        f"{number(setting.soft_k_t)} N/m it is {listed(soft, percent)} of it. "
-        + ("It is exact only for the rigid joint." if np.allclose(clamped, 1, rtol=_ROUNDING) else "")
-        if verdict == "contradicted"
-        else f"K_i/M_i of (6) equals omega_i^2 of (30) in {percent(agrees.mean())} of the cases."
+        rf"$K_i/M_i$ of (6) with the beam's energy alone is $\omega_i^2$ of (30) in {percent(agrees.mean())} of the "
+        f"cases; at $k_t$ = {number(setting.soft_k_t)} N/m it is {listed(soft, percent)} of it"
+        f"{', on the rigid joint all of it' if np.allclose(clamped, 1, rtol=_ROUNDING) else ''}."
     )
     remedy = None
-    if verdict != "holds" and np.allclose(whole, 1, rtol=_ROUNDING):
+    if judgement.outcome != "holds" and np.allclose(whole, 1, rtol=_ROUNDING):
         remedy = (
-            "the springs' energy, k_t v(0)^2/2 + k_r v_x(0)^2/2, added to (4): then K_i = M_i omega_i^2 to "
+            r"the springs' energy, $k_t v(0)^2/2 + k_r v_x(0)^2/2$, added to (4): then $K_i = M_i \omega_i^2$ to "
             f"{number(np.abs(whole - 1).max(), 1)} for every stiffness"
         )
     criterion = (
-        f"K_i/M_i with the beam's energy alone is omega_i^2 to {number(_ROUNDING, 1)}, for every stiffness and mode"
+        rf"$K_i/M_i$ with the beam's energy alone is $\omega_i^2$ to {number(_ROUNDING, 1)}, for every stiffness and "
+        "mode"
     )
-    return Finding(verdict, sentence, evidence, criterion, remedy)
+    return Finding(judgement, plain, sentence, evidence, criterion, remedy)
 
 
 def _beam_stiffness(arm: Arm) -> np.ndarray:
@@ -357,7 +389,8 @@ def _joint_stiffness(arm: Arm) -> np.ndarray:
 
 
 @pictured("C18")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_energy_of_the_beam_alone(verdict: Verdict, ax: Axes) -> None:
+    """Draw C18."""
     by_mode(ax, verdict["k_t"], verdict["beam_only"][0])
     ax.plot(verdict["k_t"], verdict["with_springs"][0].mean(-1), color="0.3", lw=1.0, ls="-")
     note(ax, "grey: with the springs' energy", "lower right")
@@ -373,7 +406,8 @@ def _(verdict: Verdict, ax: Axes) -> None:
     "two principles, one joint",
     "Hamilton's variational principle ... the principle of virtual work is utilized [for the boundary conditions]",
 )
-def _(setting: Setting) -> Finding:
+def two_principles(setting: Setting) -> Finding:
+    """Judge C21."""
     from cra_sym.arm.lagrangian import paper_lagrangian
     from cra_sym.mechanics import hamilton
     from cra_sym.paper.energy import L, t, v, w, x
@@ -390,20 +424,25 @@ def _(setting: Setting) -> Finding:
         "with_springs": Quantity(agree[0], "1", "condition (16) met by Hamilton's principle with the springs in (4)"),
         "beam_only": Quantity(agree[1], "1", "the same with the beam's energy alone"),
     }
-    verdict = outcome(agree[0])
-    lost = 4 - sum(agree[1])
+    judgement = judged(agree[0])
+    plain = by_outcome(
+        judgement,
+        "Hamilton's principle and virtual work describe one joint, once the springs' energy is counted.",
+        "Hamilton's principle and virtual work describe the joint differently, whatever energy is counted.",
+        "Hamilton's principle and virtual work have no boundary condition in common.",
+    )
     sentence = (
-        f"Virtual work (14) and Hamilton's principle (8) give {'the same four' if all(agree[0]) else 'different'} "
-        "boundary "
-        f"conditions once (4) holds the springs' energy; with the beam's energy alone {lost} of the four, those at the "
-        f"joint, come out as those of a free end."
+        f"With the springs' energy in (4) {sum(agree[0])} of the four conditions of virtual work (14) come out of "
+        f"Hamilton's principle (8); with the beam's energy alone {sum(agree[1])} of them do, and the joint's end is "
+        f"{'free' if sum(agree[1]) < 4 else 'the same'}."
     )
     criterion = "each condition of (16) is one of Hamilton's principle with the springs in (4); symbolic, no threshold"
-    return Finding(verdict, sentence, evidence, criterion)
+    return Finding(judgement, plain, sentence, evidence, criterion)
 
 
 @pictured("C21")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_two_principles(verdict: Verdict, ax: Axes) -> None:
+    """Draw C21."""
     table = np.array([verdict["with_springs"], verdict["beam_only"]], dtype=float)
     ax.imshow(table, cmap="cividis", vmin=-0.4, vmax=1.4, aspect="auto")
     for (row, column), value in np.ndenumerate(table):

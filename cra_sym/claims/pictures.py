@@ -30,7 +30,8 @@ __all__ = [
 
 MARKS = {
     "holds": ("\N{CHECK MARK}", "#007A59"),
-    "holds where": ("\N{CIRCLE WITH LEFT HALF BLACK}", "#8A5C00"),
+    "mostly holds": ("\N{CIRCLE WITH ALL BUT UPPER LEFT QUADRANT BLACK}", "#56690A"),
+    "rarely holds": ("\N{CIRCLE WITH UPPER RIGHT QUADRANT BLACK}", "#8A5C00"),
     "contradicted": ("\N{BALLOT X}", "#B34700"),
     "undecidable": ("?", "#595959"),
 }

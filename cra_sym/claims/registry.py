@@ -3,12 +3,12 @@
 ::
 
     @claimed("C02", "modes", "Section 4, Fig. 3", "f1 to f3 fall with k_t", "with the decreasing of ...")
-    def _(setting):
+    def fall_with_k_t(setting):
         ...
-        return Finding(outcome(region), sentence, evidence)
+        return Finding(judged(region), plain, sentence, evidence, criterion)
 
     @pictured("C02")
-    def _(verdict, ax):
+    def draw_fall_with_k_t(verdict, ax):
         ...
 """
 
@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from cra_sym.claims.verdict import Finding, Verdict
 
 __all__ = ["ENTRIES", "Entry", "claimed", "pictured"]
+
+
+Find: TypeAlias = "Callable[[Setting], Finding]"
+Draw: TypeAlias = "Callable[[Verdict, Axes], None]"
 
 
 @dataclass
@@ -36,28 +40,28 @@ class Entry:
     source: str
     title: str
     claim: str
-    find: Callable[[Setting], Finding]
-    picture: Callable[[Verdict, Axes], None] | None = None
+    find: Find
+    picture: Draw | None = None
 
 
 ENTRIES: dict[str, Entry] = {}
 """Claims by id, in the order their modules were imported."""
 
 
-def claimed(id: str, theme: str, source: str, title: str, words: str) -> Callable:
+def claimed(id: str, theme: str, source: str, title: str, words: str) -> Callable[[Find], Find]:
     """Register the decorated function, ``Setting -> Finding``, as the judge of a claim."""
 
-    def register(function: Callable[[Setting], Finding]) -> Callable[[Setting], Finding]:
+    def register(function: Find) -> Find:
         ENTRIES[id] = Entry(id, theme, source, title, words, function)
         return function
 
     return register
 
 
-def pictured(id: str) -> Callable:
+def pictured(id: str) -> Callable[[Draw], Draw]:
     """Register the decorated function, ``(Verdict, Axes) -> None``, as what draws the evidence."""
 
-    def register(function: Callable[[Verdict, Axes], None]) -> Callable[[Verdict, Axes], None]:
+    def register(function: Draw) -> Draw:
         ENTRIES[id].picture = function
         return function
 

@@ -11,8 +11,8 @@ from cra_sym.claims.motions import Plane, peak, tip
 from cra_sym.claims.pictures import PALETTE, note, region_map, stiffness_axis
 from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
-from cra_sym.claims.verdict import Finding, Quantity, Verdict, outcome
-from cra_sym.claims.words import listed, mm, number, percent, span
+from cra_sym.claims.verdict import Finding, Judgement, Quantity, Verdict, judged
+from cra_sym.claims.words import by_outcome, listed, mm, number, percent, span
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,27 +58,34 @@ def _peak_claim(setting: Setting, lowers: bool, mean: dict[str, float], words: s
         ),
         "peak_without_start_on_base": Quantity(without_base, "m", "peak without disturbance for that start"),
     }
+    judgement = judged(region, here=sign * (nominal - without) < 0)
     verb = "lowers" if lowers else "raises"
+    plain = by_outcome(
+        judgement,
+        f"{words} the disturbance {verb} the peak, whatever its frequency and phase.",
+        f"{words} it depends on the frequency and phase of the disturbance, which the text does not tell, whether the "
+        f"peak is {'lower' if lowers else 'higher'}.",
+        f"{words} no frequency and no phase of the disturbance {verb} the peak.",
+    )
     sentence = (
-        f"{words}, a disturbance of {mm(setting.amplitude)} mm {verb} the peak in {percent(region.mean())} of "
-        "the "
-        f"plane of frequency and phase. At {number(setting.angular_frequency)} rad/s it does for psi of "
-        f"{span(degrees, held(along_psi)[0], 'deg')}; at psi = {number(np.degrees(setting.phase))} deg for varpi of "
+        f"A disturbance of {mm(setting.amplitude)} mm {verb} the peak in {percent(region.mean())} of the plane of "
+        rf"frequency and phase. At {number(setting.angular_frequency)} rad/s it does for $\psi$ of "
+        f"{span(degrees, held(along_psi)[0], 'deg')}; "
+        rf"at $\psi$ = {number(np.degrees(setting.phase))} deg for $\varpi$ of "
         f"{span(in_phase.varpi, held(in_phase)[:, 0], 'rad/s')}, at 180 deg for "
         f"{span(opposite.varpi, held(opposite)[:, 0], 'rad/s')}. "
-        f"Peaks at {number(setting.angular_frequency)} rad/s: {mm(nominal)} mm (psi = "
-        f"{number(np.degrees(setting.phase))} deg) and "
-        f"{mm(against)} mm (180 deg) against {mm(without)} mm without."
+        rf"Peaks at {number(setting.angular_frequency)} rad/s: {mm(nominal)} mm ($\psi$ = "
+        f"{number(np.degrees(setting.phase))} deg) and {mm(against)} mm (180 deg) against {mm(without)} mm without."
     )
     if without_base < 1e-12 * without:
         sentence += (
             " If the arm already moves with the base at t = 0, a constant velocity alone makes no vibration at all."
         )
     criterion = (
-        f"the largest |v(L, t)| from 0 to {number(setting.duration)} s is {'smaller' if lowers else 'larger'} with the "
-        f"disturbance than without, over {_PLANE}; no threshold"
+        f"the largest $|v(L,t)|$ from 0 to {number(setting.duration)} s is {'smaller' if lowers else 'larger'} with "
+        f"the disturbance than without, over {_PLANE}; no threshold"
     )
-    return Finding(outcome(region), sentence, evidence, criterion)
+    return Finding(judgement, plain, sentence, evidence, criterion)
 
 
 def plane_picture(verdict: Verdict, ax: Axes, label: str) -> None:
@@ -100,9 +107,10 @@ def plane_picture(verdict: Verdict, ax: Axes, label: str) -> None:
     "the "
     "vibration response amplitude without motion disturbance",
 )
-def _(setting: Setting) -> Finding:
+def lower_peak_at_mean_velocity(setting: Setting) -> Finding:
+    """Judge C07."""
     mean = {"velocity": setting.velocity}
-    return _peak_claim(setting, True, mean, f"With a mean velocity of {number(setting.velocity)} m/s")
+    return _peak_claim(setting, True, mean, f"At a mean velocity of {number(setting.velocity)} m/s")
 
 
 @claimed(
@@ -114,18 +122,21 @@ def _(setting: Setting) -> Finding:
     "is "
     "larger than the vibration response amplitude without motion disturbance",
 )
-def _(setting: Setting) -> Finding:
+def higher_peak_at_mean_acceleration(setting: Setting) -> Finding:
+    """Judge C08."""
     mean = {"acceleration": setting.accelerations[0]}
-    return _peak_claim(setting, False, mean, f"With a mean acceleration of {number(setting.accelerations[0])} m/s2")
+    return _peak_claim(setting, False, mean, f"Under a mean acceleration of {number(setting.accelerations[0])} m/s²")
 
 
 @pictured("C07")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_lower_peak_at_mean_velocity(verdict: Verdict, ax: Axes) -> None:
+    """Draw C07."""
     plane_picture(verdict, ax, "peak lowered")
 
 
 @pictured("C08")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_higher_peak_at_mean_acceleration(verdict: Verdict, ax: Axes) -> None:
+    """Draw C08."""
     plane_picture(verdict, ax, "peak raised")
 
 
@@ -136,7 +147,8 @@ def _(verdict: Verdict, ax: Axes) -> None:
     "it matters more when accelerating",
     "the motion disturbance enhances the vibration of the end-effector especially for the accelerating operations",
 )
-def _(setting: Setting) -> Finding:
+def matters_more_when_accelerating(setting: Setting) -> Finding:
+    """Judge C09."""
     plane = Plane.of(setting)
     means = [{"velocity": setting.velocity}, {"acceleration": setting.accelerations[0]}]
     ratios = [found / without for found, without in (plane.peaks(**mean) for mean in means)]
@@ -156,23 +168,29 @@ def _(setting: Setting) -> Finding:
         ),
         "absolute_gap": Quantity(gap, "1", "largest difference of v with minus v without between the two, relative"),
     }
-    same = "the same at every instant" if gap < 1e-9 else f"different by {percent(gap)}"
+    judgement = judged(ratio < 0, here=nominal[1] > nominal[0])
+    plain = by_outcome(
+        judgement,
+        "As a share of the peak the disturbance matters more when accelerating, whatever its frequency and phase.",
+        "As a share of the peak the disturbance matters more when accelerating for some frequencies and phases only.",
+        "As a share of the peak the disturbance matters more when accelerating for no frequency and no phase.",
+    )
+    same = "the same at every instant, by superposition" if gap < 1e-9 else f"different by {percent(gap)}"
     sentence = (
-        f"In millimetres, no: what the disturbance adds to v(L, t) is {same} in both operations, by superposition. "
-        "As a share "
-        f"of the peak it matters more when accelerating in {percent((ratio < 0).mean())} of the plane of frequency "
-        "and phase; "
-        f"for the nominal disturbance the peak changes by {listed(nominal, percent)} (velocity, acceleration)."
+        f"In millimetres what the disturbance adds to $v(L,t)$ in the two operations is {same}. As a share of the peak "
+        f"it matters more when accelerating in {percent((ratio < 0).mean())} of the plane of frequency and phase; for "
+        f"the nominal disturbance the peak changes by {listed(nominal, percent)} (velocity, acceleration)."
     )
     criterion = (
         "the peak with over the peak without disturbance is larger under the mean acceleration than at the mean "
         f"velocity, over {_PLANE}; no threshold"
     )
-    return Finding(outcome(ratio < 0), sentence, evidence, criterion)
+    return Finding(judgement, plain, sentence, evidence, criterion)
 
 
 @pictured("C09")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_matters_more_when_accelerating(verdict: Verdict, ax: Axes) -> None:
+    """Draw C09."""
     plane_picture(verdict, ax, "changes more when accelerating")
 
 
@@ -185,7 +203,8 @@ def _(verdict: Verdict, ax: Axes) -> None:
     "mm) is "
     "larger than ... without (... mm)",
 )
-def _(setting: Setting) -> Finding:
+def four_printed_peaks(setting: Setting) -> Finding:
+    """Judge C22."""
     plane = Plane.of(setting)
     means = [{"velocity": setting.velocity}, {"acceleration": setting.accelerations[0]}]
     pairs = [plane.peaks(**mean) for mean in means]
@@ -214,18 +233,26 @@ def _(setting: Setting) -> Finding:
             "mean acceleration."
         )
         missing = (
-            "the four amplitudes in mm, the mean velocity and acceleration, and B, varpi and psi of the disturbance"
+            r"the four amplitudes in mm, the mean velocity and acceleration, and $B$, $\varpi$ and $\psi$ of the "
+            "disturbance"
         )
-        return Finding("undecidable", text, evidence, criterion, missing=missing)
+        plain = "The four printed amplitudes are lost, and the model alone cannot tell them."
+        return Finding(Judgement("undecidable"), plain, text, evidence, criterion, missing=missing)
     printed = np.array(setting.peaks)
-    near = np.abs(computed / printed - 1) < setting.visible
-    agree = f"{int(near.sum())} of 4 agree to {percent(setting.visible)}"
-    text = f"{ours}, where the paper prints {listed(printed, mm)} mm: {agree}."
-    return Finding(outcome(near), text, evidence, criterion)
+    judgement = judged(np.abs(computed / printed - 1) < setting.visible)
+    plain = by_outcome(
+        judgement,
+        "The model gives the four printed amplitudes.",
+        "The model gives some of the four printed amplitudes, and others not.",
+        "With the values assumed here the model gives none of the four printed amplitudes.",
+    )
+    text = f"{ours}, where the paper prints {listed(printed, mm)} mm."
+    return Finding(judgement, plain, text, evidence, criterion)
 
 
 @pictured("C22")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_four_printed_peaks(verdict: Verdict, ax: Axes) -> None:
+    """Draw C22."""
     for k, (band, without, name) in enumerate(
         zip(verdict["over_phase"], verdict["without"], ("mean velocity", "mean acceleration"), strict=True)
     ):
@@ -246,7 +273,8 @@ def _(verdict: Verdict, ax: Axes) -> None:
     "significantly "
     "considered in the dynamic analysis",
 )
-def _(setting: Setting) -> Finding:
+def main_factor(setting: Setting) -> Finding:
+    """Judge C23."""
     k_t, k_r = np.logspace(1, 6, 81), np.logspace(0, 5, 81)
 
     def give(**joint: np.ndarray) -> np.ndarray:
@@ -265,23 +293,28 @@ def _(setting: Setting) -> Finding:
         "critical": Quantity(critical, "1", "k_t L^2 / k_r below which k_t adds more"),
         "series": Quantity(series, "1", "the claim at the stiffnesses of Fig. 5: k_t, k_r"),
     }
+    judgement = judged(ratio < 0, here=series)
+    plain = by_outcome(
+        judgement,
+        "The translational spring adds most to the deflection of the tip, on every joint.",
+        "Which of the two springs adds most to the deflection of the tip depends on the joint.",
+        "The translational spring adds most to the deflection of the tip on no joint.",
+    )
     sentence = (
-        "Under a steady acceleration of the base the elastic joint adds to the sag of the tip, and k_t adds more "
-        "than k_r "
-        f"where k_t L^2/k_r < {number(critical)}: at {series.sum()} of the {series.size} pairs of Fig. 5. Which "
-        "spring matters "
-        f"depends on the joint, not on the kind of spring."
+        "Under a steady acceleration of the base $k_t$ adds more than $k_r$ to the sag of the tip where $k_t L^2/k_r$ "
+        f"is below {number(critical)}: at {series.sum()} of the {series.size} pairs of Fig. 5."
     )
     criterion = (
-        f"k_t adds more than k_r to the tip's deflection under a steady acceleration of the base, for k_t of "
-        f"{number(k_t[0])} to {number(k_t[-1])} N/m and k_r of {number(k_r[0])} to {number(k_r[-1])} N m/rad; no "
+        "$k_t$ adds more than $k_r$ to the tip's deflection under a steady acceleration of the base, for $k_t$ of "
+        f"{number(k_t[0])} to {number(k_t[-1])} N/m and $k_r$ of {number(k_r[0])} to {number(k_r[-1])} N m/rad; no "
         "threshold"
     )
-    return Finding(outcome(ratio < 0), sentence, evidence, criterion)
+    return Finding(judgement, plain, sentence, evidence, criterion)
 
 
 @pictured("C23")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_main_factor(verdict: Verdict, ax: Axes) -> None:
+    """Draw C23."""
     x, y = verdict["k_t"], verdict["k_r"]
     ax.set(xscale="log", yscale="log")
     region_map(ax, x, y, verdict["log_ratio"], ("k_t", "k_r"))

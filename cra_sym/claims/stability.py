@@ -15,8 +15,8 @@ from cra_sym.claims.motions import tip
 from cra_sym.claims.pictures import PALETTE, STYLES, note
 from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
-from cra_sym.claims.verdict import Finding, Quantity, Verdict, outcome
-from cra_sym.claims.words import listed, number, percent
+from cra_sym.claims.verdict import Finding, Quantity, Verdict, judged
+from cra_sym.claims.words import by_outcome, listed, number, percent
 from cra_sym.model.excitations import AxialBase
 
 if TYPE_CHECKING:
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 KINDS = ("transverse base", "joint stiffness", "axial base")
 _WORDS = {
-    "joint stiffness": "a joint whose stiffness fluctuates, k_t (1 + epsilon cos varpi t)",
-    "axial base": "the same disturbance along the arm, u = epsilon u_0 cos varpi t",
+    "joint stiffness": r"a joint whose stiffness fluctuates, $k_t (1 + \epsilon \cos\varpi t)$",
+    "axial base": r"the same disturbance along the arm, $u = \epsilon u_0 \cos\varpi t$",
 }
 
 
@@ -70,7 +70,8 @@ def _terms(kind: str) -> tuple[bool, bool]:
     "instability "
     "may occur under suitable conditions",
 )
-def _(setting: Setting) -> Finding:
+def shaken_base_is_parametric(setting: Setting) -> Finding:
+    """Judge C14."""
     found = {kind: _terms(kind) for kind in KINDS}
     arm = setting.arm.replace(k_t=setting.soft_k_t)
     omega = float(modal_parameters(arm, 2).omega[1])
@@ -89,29 +90,30 @@ def _(setting: Setting) -> Finding:
         ),
         "growth": Quantity(rate, "1/s", "growth rate with the fluctuating joint at 2 omega_2"),
     }
-    verdict = outcome(parametric[:1])
-    if verdict == "contradicted":
+    judgement = judged(parametric[:1])
+    if judgement.outcome == "contradicted":
+        plain = "A base that shakes across the arm forces it, and makes no coefficient of its equations vary in time."
         sentence = (
-            "A base that shakes across the arm enters (11) only as the force -Gamma_i w'': no coefficient of the "
-            "equation "
-            f"of motion or of a boundary condition depends on time. At omega_2 such a base makes the response grow in "
-            f"proportion to time, at 2 omega_2 it stays below {number(1e3 * envelope[1, -1])} mm, where a joint "
-            "fluctuating by "
-            f"{percent(setting.epsilon)} makes any vibration grow as exp({number(rate)} t), t in s."
+            r"It enters (11) only as the force $-\Gamma_i \ddot w$: no coefficient of the equation of motion or of a "
+            r"boundary condition depends on time. At $\omega_2$ such a base makes the response grow in proportion to "
+            rf"time, at $2\omega_2$ it stays below {number(1e3 * envelope[1, -1])} mm, where a joint fluctuating by "
+            f"{percent(setting.epsilon)} makes any vibration grow by a factor e in {number(1 / rate)} s."
         )
     else:
-        sentence = f"The equations of the shaken arm have time-dependent coefficients; it grows at {number(rate)} 1/s."
+        plain = "A base that shakes across the arm makes coefficients of its equations vary in time."
+        sentence = f"With the fluctuating joint a vibration grows at {number(rate)} 1/s."
     others = [_WORDS[kind] for kind, there in zip(KINDS[1:], parametric[1:], strict=True) if there]
-    remedy = listed(others, str, "or") if verdict == "contradicted" and others else None
+    remedy = listed(others, str, "or") if judgement.outcome == "contradicted" and others else None
     criterion = (
         "a coefficient of the equation of motion or of a boundary condition depends on time when the base shakes "
         "across the arm; symbolic, no threshold"
     )
-    return Finding(verdict, sentence, evidence, criterion, remedy)
+    return Finding(judgement, plain, sentence, evidence, criterion, remedy)
 
 
 @pictured("C14")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_shaken_base_is_parametric(verdict: Verdict, ax: Axes) -> None:
+    """Draw C14."""
     t, start = verdict["times"], 1e3 * verdict["envelope"][1, -1]
     labels = ("across, at $\\omega_2$", "across, at $2\\omega_2$")
     for k, (curve, label) in enumerate(zip(verdict["envelope"], labels, strict=True)):
@@ -132,7 +134,8 @@ def _(verdict: Verdict, ax: Axes) -> None:
     "similarly "
     "expressed by [(49)]",
 )
-def _(setting: Setting) -> Finding:
+def boundary_from_the_amplitude_equation(setting: Setting) -> Finding:
+    """Judge C15."""
     from sympy.core.function import AppliedUndef
 
     from cra_sym.mechanics.boundaries import forced_resonance, general_resonance, n
@@ -163,28 +166,34 @@ def _(setting: Setting) -> Finding:
         "detuning": Quantity(probes, "1", "detuning from 2 omega_2 over the derived half-width"),
         "growth": Quantity(rates, "1/s", "growth rate by Floquet theory about 2 omega_2: excitation, detuning"),
     }
-    verdict = outcome(bounded[:1], conjugate[:1])
+    judgement = judged(bounded[:1], conjugate[:1])
+    plain = by_outcome(
+        judgement,
+        "The amplitude equation of (36) has a boundary of instability, as the paper says.",
+        "The amplitude equation of (36) has a boundary of instability in part.",
+        "The amplitude equation of (36) has no boundary of instability: nothing in it can grow by itself.",
+    )
     confirmed = bool((rates[:, np.abs(probes) < 0.8] > 0).all())
     sentence = (
-        "The printed (48) is lost. Derived from (36) as the paper builds it, the amplitude equation is A_n' = const "
-        "times "
-        f"exp(i sigma T1): {'with' if conjugate[0] else 'without'} the conjugate amplitude that makes a zone, so "
-        f"{'a' if bounded[0] else 'no'} boundary follows. It does for axially moving beams, whose speed stands in the "
-        f"coefficients. With a parametric excitation the zones sit at {number(evidence['centre'].values.mean(), 4)} "
-        f"omega_n, not at omega_n, and Floquet theory {'confirms' if confirmed else 'does not confirm'} them."
+        "The printed (48) is lost. Derived from (36) as the paper builds it, the amplitude equation is "
+        rf"{'with' if conjugate[0] else 'without'} the conjugate amplitude that makes a zone, so "
+        f"{'a' if bounded[0] else 'no'} boundary follows. With a parametric excitation the zones sit at "
+        rf"{number(evidence['centre'].values.mean(), 4)} $\omega_n$, and Floquet theory "
+        f"{'confirms' if confirmed else 'does not confirm'} them."
     )
     remedy = None
-    if verdict == "contradicted" and bounded[1] and confirmed:
-        remedy = f"{listed(_WORDS.values(), str, 'or')}; and the detuning (42) counted from 2 omega_n"
+    if judgement.outcome == "contradicted" and bounded[1] and confirmed:
+        remedy = rf"{listed(_WORDS.values(), str, 'or')}; and the detuning (42) counted from $2\omega_n$"
     criterion = (
         "the amplitude equation derived from (36) holds the conjugate amplitude and gives a boundary; symbolic, no "
         "threshold"
     )
-    return Finding(verdict, sentence, evidence, criterion, remedy)
+    return Finding(judgement, plain, sentence, evidence, criterion, remedy)
 
 
 @pictured("C15")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_boundary_from_the_amplitude_equation(verdict: Verdict, ax: Axes) -> None:
+    """Draw C15."""
     for k, (curve, label) in enumerate(zip(verdict["growth"], ("joint stiffness", "axial base"), strict=True)):
         ax.plot(verdict["detuning"], curve / curve.max(), color=PALETTE[k + 1], ls=STYLES[k], label=label)
     ax.axvspan(-1, 1, color="#BFE3D6", alpha=0.6, lw=0)
@@ -201,7 +210,8 @@ def _(verdict: Verdict, ax: Axes) -> None:
     "resonance at any $\\omega_n$",
     "If the variation frequency approaches any natural frequency of the system, the parametric resonance may occur",
 )
-def _(setting: Setting) -> Finding:
+def resonance_at_any_frequency(setting: Setting) -> Finding:
+    """Judge C19."""
     arm = setting.arm.replace(k_t=setting.soft_k_t, zeta=0.0)
     epsilon = np.geomspace(0.02, 0.3, 8)
     zeta = np.array([0.0, 1e-5, 1e-4, 1e-3, 1e-2])
@@ -224,22 +234,32 @@ def _(setting: Setting) -> Finding:
     }
     reach = f"{number(epsilon[0])} to {number(epsilon[-1])}"
     gone = [z for z, least in zip(zeta, needed, strict=True) if np.isinf(least)]
-    end = f"; a damping ratio of {percent(gone[0], 1)} removes it for epsilon of {reach}" if gone else ""
+    end = rf"; a damping ratio of {percent(gone[0], 1)} removes it for $\epsilon$ of {reach}" if gone else ""
+    own = float(np.max(setting.arm.zeta)) * omega
+    judgement = judged(region, here=rates[2][at] > own + _NO_GROWTH)
+    plain = by_outcome(
+        judgement,
+        r"A fluctuating joint makes the arm unstable near $\omega_n$, whatever the damping.",
+        r"Near $\omega_n$ a fluctuating joint makes the arm unstable only by a second-order effect, which a little "
+        "damping removes; the instability to expect lies near twice that frequency.",
+        r"Near $\omega_n$ a fluctuating joint does not make the arm unstable; near twice that frequency it does.",
+    )
     sentence = (
-        f"To first order only near 2 omega_n. For a fluctuating joint Floquet theory finds growth near 2 omega_2 in "
-        f"proportion to epsilon^{number(powers[0])} and near omega_2 to epsilon^{number(powers[1])}: "
-        f"{number(rates[1][at])} "
-        f"against {number(rates[2][at], 2)} 1/s at epsilon = {number(epsilon[at], 2)}. The first-order expansion "
-        "(37) cannot see "
-        f"the latter{end}."
+        r"Floquet theory finds growth near $2\omega_2$ in proportion to "
+        rf"$\epsilon^{{{powers[0]:.2f}}}$: {number(rates[1][at])} 1/s at $\epsilon$ = {number(epsilon[at], 2)}"
     )
-    if not region.any():
-        sentence = f"Only near 2 omega_n: for epsilon of {reach} nothing grows near omega_2."
+    if region.any():
+        sentence += (
+            rf", and near $\omega_2$ to $\epsilon^{{{powers[1]:.2f}}}$: {number(rates[2][at], 2)} 1/s, which the "
+            f"first-order expansion (37) cannot see{end}."
+        )
+    else:
+        sentence += rf", and none near $\omega_2$ for $\epsilon$ of {reach}."
     criterion = (
-        f"near omega_2 a vibration grows by more than {number(_NO_GROWTH, 1)} 1/s, for epsilon of {reach} and damping "
-        f"ratios of {listed(zeta, percent)}"
+        rf"near $\omega_2$ a vibration grows by more than {number(_NO_GROWTH, 1)} 1/s, for $\epsilon$ of {reach} and "
+        f"damping ratios of {listed(zeta, percent)}"
     )
-    return Finding(outcome(region), sentence, evidence, criterion)
+    return Finding(judgement, plain, sentence, evidence, criterion)
 
 
 def _largest_growth(arm: Arm, epsilon: np.ndarray, tongue: int) -> np.ndarray:
@@ -251,7 +271,8 @@ def _largest_growth(arm: Arm, epsilon: np.ndarray, tongue: int) -> np.ndarray:
 
 
 @pictured("C19")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_resonance_at_any_frequency(verdict: Verdict, ax: Axes) -> None:
+    """Draw C19."""
     for k, (name, label) in enumerate(
         (("growth_at_twice", "near $2\\omega_2$"), ("growth_at_once", "near $\\omega_2$"))
     ):

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from cra_sym.claims.pictures import MARKS
 from cra_sym.claims.verdict import OUTCOMES, Verdict
+from cra_sym.claims.words import plain_text
 
 __all__ = ["verdict_markdown", "verdict_text"]
 
@@ -26,12 +27,14 @@ def verdict_text(verdicts: Sequence[Verdict], width: int | None = None) -> str:
     lines: list[str] = []
     for verdict in verdicts:
         mark, _ = MARKS[verdict.outcome]
-        lines.append(f"{verdict.id}  {mark} {verdict.outcome.upper()}  ({verdict.source})")
-        parts = [("", f'"{verdict.claim}"'), ("", verdict.sentence)]
-        parts += [("Would reproduce the paper: ", verdict.remedy)] if verdict.remedy else []
-        parts += [("Missing: ", verdict.missing)] if verdict.missing else []
+        headline = verdict.outcome.upper() + verdict.headline.removeprefix(verdict.outcome)
+        lines.append(f"{verdict.id}  {mark} {headline}")
+        parts = [("", f'"{verdict.claim}" ({verdict.source})'), ("", verdict.plain), ("", verdict.sentence)]
+        parts += [("Judged: ", f"{verdict.criterion}.")]
+        parts += [("Would reproduce the paper: ", f"{verdict.remedy}.")] if verdict.remedy else []
+        parts += [("Missing: ", f"{verdict.missing}.")] if verdict.missing else []
         for head, text in parts:
-            lines += textwrap.wrap(head + text, width, initial_indent="     ", subsequent_indent="     ")
+            lines += textwrap.wrap(head + plain_text(text), width, initial_indent="     ", subsequent_indent="     ")
         lines.append("")
     counts = Counter(verdict.outcome for verdict in verdicts)
     lines.append(", ".join(f"{counts[name]} {name}" for name in OUTCOMES if counts[name]))
@@ -39,18 +42,26 @@ def verdict_text(verdicts: Sequence[Verdict], width: int | None = None) -> str:
 
 
 def verdict_markdown(verdicts: Sequence[Verdict]) -> str:
-    """Return the verdicts as a Markdown table: outcome, what the paper says, what the computation says."""
-    rows = ["| | the paper | computed |", "| --- | --- | --- |"]
+    """Return the verdicts as a Markdown table: the paper's words, the verdict in a sentence, the numbers."""
+    rows = ["| the paper | verdict | computed |", "| --- | --- | --- |"]
     for verdict in verdicts:
         mark, _ = MARKS[verdict.outcome]
-        found = verdict.sentence
+        found = f"{verdict.sentence} *Judged:* {verdict.criterion}."
         found += f" **Would reproduce the paper:** {verdict.remedy}." if verdict.remedy else ""
         found += f" **Missing:** {verdict.missing}." if verdict.missing else ""
-        head = f"**{verdict.id}** {mark} {verdict.outcome}"
-        words = f"{verdict.claim} *({verdict.source})*"
-        rows.append("| " + " | ".join(_cell(text) for text in (head, words, found)) + " |")
+        words = f"**{verdict.id}** {verdict.claim} *({verdict.source})*"
+        head = f"{mark} **{verdict.headline}.** {verdict.plain}"
+        rows.append("| " + " | ".join(_cell(text) for text in (words, head, found)) + " |")
     return "\n".join(rows)
 
 
 def _cell(text: str) -> str:
-    return text.replace("|", r"\|").replace("_", r"\_").replace("^", r"\^")
+    r"""Return text without a bar that would end the cell; in LaTeX an escaped bar is another sign.
+
+    >>> print(_cell("$|v|$ | w"))
+    $\vert v\vert $ \| w
+    """
+    parts = text.split("$")
+    parts[::2] = (part.replace("|", r"\|") for part in parts[::2])
+    parts[1::2] = (part.replace("|", r"\vert ") for part in parts[1::2])
+    return "$".join(parts)

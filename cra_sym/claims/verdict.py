@@ -19,10 +19,12 @@ if TYPE_CHECKING:
 
     from cra_sym.claims.setting import Setting
 
-__all__ = ["OUTCOMES", "THEMES", "Finding", "Quantity", "Verdict", "outcome"]
+__all__ = ["OUTCOMES", "THEMES", "Finding", "Judgement", "Quantity", "Verdict", "judged"]
 
-Outcome = Literal["holds", "holds where", "contradicted", "undecidable"]
-OUTCOMES: tuple[str, ...] = get_args(Outcome)
+Outcome = Literal["holds", "mostly holds", "rarely holds", "contradicted", "undecidable"]
+OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
+MOSTLY = 0.5
+"""A claim that holds in more than this share of the cases tried mostly holds, in a lesser one it rarely holds."""
 THEMES = ("modes", "responses", "stability")
 
 
@@ -56,15 +58,35 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Finding:
-    """What the function of a claim returns.
+class Judgement:
+    """How a claim fares.
 
     Attributes
     ----------
     outcome : str
         One of `OUTCOMES`.
+    share : float, optional
+        Of the cases tried, those where the claim holds; None if there are none to try.
+    here : bool, optional
+        Whether it holds at the point assumed for what the paper's text lost; None if there is no such point.
+    """
+
+    outcome: Outcome
+    share: float | None = None
+    here: bool | None = None
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What the function of a claim returns. Mathematics stands between dollar signs, in LaTeX.
+
+    Attributes
+    ----------
+    judgement : Judgement
+    plain : str
+        What a reader should take away, in one plain sentence.
     sentence : str
-        The verdict in words, with the computed numbers.
+        The computed numbers behind it, in words.
     evidence : mapping of Quantity
         ``"region"``, of truth values, is where a claim holds that holds somewhere.
     criterion : str
@@ -75,7 +97,8 @@ class Finding:
         What the text lacks to decide.
     """
 
-    outcome: str
+    judgement: Judgement
+    plain: str
     sentence: str
     evidence: Mapping[str, Quantity]
     criterion: str
@@ -94,7 +117,9 @@ class Verdict:
         In the paper's words.
     source : str
         Where the paper says so.
-    outcome, sentence, evidence, criterion, remedy, missing
+    outcome, share, here
+        As in `Judgement`.
+    plain, sentence, evidence, criterion, remedy, missing
         As in `Finding`.
     setting : Setting
         Every number that went in.
@@ -107,12 +132,15 @@ class Verdict:
     title: str
     claim: str
     source: str
-    outcome: str
+    outcome: Outcome
+    plain: str
     sentence: str
     evidence: Mapping[str, Quantity] = field(repr=False)
     criterion: str = field(repr=False)
     setting: Setting = field(repr=False)
     picture: Callable[[Verdict, Axes], None] | None = field(repr=False, compare=False)
+    share: float | None = None
+    here: bool | None = None
     remedy: str | None = None
     missing: str | None = None
 
@@ -124,6 +152,19 @@ class Verdict:
         values: np.ndarray = self.evidence[name].values
         return values
 
+    @property
+    def headline(self) -> str:
+        """The outcome, the share of the cases tried where the claim holds, and whether it does at the assumed point.
+
+        >>> from cra_sym.claims import claim
+        >>> claim("C07").headline
+        'rarely holds (in 17 % of the cases; at our assumed point: no)'
+        """
+        partly = self.share is not None and 0 < self.share < 1
+        told = [f"in {_share(self.share)} of the cases"] if partly and self.share is not None else []
+        told += [f"at our assumed point: {'yes' if self.here else 'no'}"] if self.here is not None else []
+        return f"{self.outcome} ({'; '.join(told)})" if told else self.outcome
+
     def draw(self, ax: Axes | None = None) -> Figure:
         """Draw the evidence into one pair of axes, by default a new figure in the house style."""
         from cra_sym.claims.pictures import draw_panel
@@ -134,18 +175,29 @@ class Verdict:
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything as plain Python values, ready for JSON; what is not finite becomes text."""
-        plain = ("id", "theme", "title", "claim", "source", "outcome", "sentence", "criterion", "remedy", "missing")
+        told = ("id", "theme", "title", "claim", "source", "outcome", "share", "here", "headline")
+        texts = ("plain", "sentence", "criterion", "remedy", "missing")
         evidence = {
             name: {"values": _plain(q.values), "unit": q.unit, "meaning": q.meaning}
             for name, q in self.evidence.items()
         }
-        return {**{name: getattr(self, name) for name in plain}, "evidence": evidence}
+        return {**{name: getattr(self, name) for name in (*told, *texts)}, "evidence": evidence}
 
     def _repr_markdown_(self) -> str:
-        lines = [f"**{self.id} {self.outcome}.** {self.sentence}", f"> {self.claim} ({self.source})"]
-        lines += [f"*Smallest change that reproduces the paper:* {self.remedy}"] if self.remedy else []
-        lines += [f"*Missing:* {self.missing}"] if self.missing else []
+        lines = [f"> {self.claim} ({self.source})", f"**{self.id} {self.headline}.** {self.plain}", self.sentence]
+        lines += [f"*Judged:* {self.criterion}."]
+        lines += [f"*Smallest change that reproduces the paper:* {self.remedy}."] if self.remedy else []
+        lines += [f"*Missing:* {self.missing}."] if self.missing else []
         return "\n\n".join(lines)
+
+
+def _share(share: float) -> str:
+    """Return a share that is neither none nor all in per cent, so that rounding makes it neither.
+
+    >>> _share(0.1649), _share(0.9997), _share(1e-5)
+    ('16 %', 'over 99 %', 'under 1 %')
+    """
+    return "over 99 %" if share > 0.99 else "under 1 %" if share < 0.01 else f"{100 * share:.0f} %"
 
 
 def _plain(values: np.ndarray) -> Any:
@@ -156,13 +208,24 @@ def _plain(values: np.ndarray) -> Any:
     )
 
 
-def outcome(*parts: Any) -> str:
+def judged(*parts: Any, here: Any = None) -> Judgement:
     """Judge a claim that all ``parts`` must meet, each an array that tells where it does.
 
-    >>> outcome([True, True]), outcome([True, False]), outcome([True, True], [False, False])
-    ('holds', 'holds where', 'contradicted')
+    Parameters
+    ----------
+    *parts : array_like of bool
+        The share of a claim of several parts is the least of theirs.
+    here : array_like of bool, optional
+        Whether the claim holds at the assumed point: if all are true.
+
+    Examples
+    --------
+    >>> judged([True, True], here=True)
+    Judgement(outcome='holds', share=1.0, here=True)
+    >>> judged([True, False, False, False]).outcome, judged([True, True], [False, False]).outcome
+    ('rarely holds', 'contradicted')
     """
-    arrays = [np.asarray(part, dtype=bool) for part in parts]
-    if not all(part.any() for part in arrays):
-        return "contradicted"
-    return "holds" if all(part.all() for part in arrays) else "holds where"
+    share = min(float(np.mean(np.asarray(part, dtype=bool))) for part in parts)
+    point = None if here is None else bool(np.all(here))
+    outcome: Outcome = "mostly holds" if share > MOSTLY else "rarely holds"
+    return Judgement("holds" if share == 1.0 else "contradicted" if share == 0.0 else outcome, share, point)

@@ -1,20 +1,37 @@
-"""Numbers put into sentences."""
+"""Numbers put into sentences, with mathematics as LaTeX between dollar signs; and such sentences as plain text."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-__all__ = ["listed", "mm", "number", "percent", "span"]
+if TYPE_CHECKING:
+    from cra_sym.claims.verdict import Judgement
+
+__all__ = ["by_outcome", "listed", "mm", "number", "percent", "plain_text", "span"]
+
+_SIGNS = {
+    name: chr(code)
+    for name, code in {
+        "omega": 0x3C9, "varpi": 0x3D6, "psi": 0x3C8, "phi": 0x3C6, "kappa": 0x3BA, "lambda": 0x3BB, "rho": 0x3C1,
+        "sigma": 0x3C3, "Gamma": 0x393, "epsilon": 0x3B5, "zeta": 0x3B6, "times": 0xD7, "infty": 0x221E,
+    }.items()
+}  # fmt: skip
+_POWERS = str.maketrans("-0123456789", "\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT ZERO}\N{SUPERSCRIPT ONE}\N{SUPERSCRIPT TWO}"
+    "\N{SUPERSCRIPT THREE}\N{SUPERSCRIPT FOUR}\N{SUPERSCRIPT FIVE}\N{SUPERSCRIPT SIX}\N{SUPERSCRIPT SEVEN}"
+    "\N{SUPERSCRIPT EIGHT}\N{SUPERSCRIPT NINE}")  # fmt: skip
+
+TIMES = r"\times"
 
 
 def number(value: Any, digits: int = 3) -> str:
     """Return a number as a reader writes it: no exponent from 1e-3 to 1e5.
 
-    >>> number(0.30000001), number(1234.5), number(2e6), number(float("inf"))
-    ('0.3', '1230', '2e6', 'infinite')
+    >>> print(number(0.30000001), number(1234.5), number(2e6), number(float("inf")))
+    0.3 1230 $2\\times10^{6}$ infinite
     """
     value = float(value)
     if not np.isfinite(value):
@@ -23,7 +40,8 @@ def number(value: Any, digits: int = 3) -> str:
     if rounded == 0 or 1e-3 <= abs(rounded) < 1e5:
         return f"{rounded:.10f}".rstrip("0").rstrip(".")
     mantissa, exponent = f"{rounded:.{digits - 1}e}".split("e")
-    return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}e{int(exponent)}"
+    factor = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
+    return f"${'' if factor == '1' else factor + TIMES}10^{{{int(exponent)}}}$"
 
 
 def mm(value: Any) -> str:
@@ -69,3 +87,25 @@ def span(places: Any, where: Any, unit: str = "", form: Any = number) -> str:
         low, high = sorted((places[first], places[last]))
         parts.append(form(low) if form(low) == form(high) else f"{form(low)} to {form(high)}")
     return listed(parts, str) + (f" {unit}" if unit else "")
+
+
+def by_outcome(judgement: Judgement, holds: str, partly: str, contradicted: str) -> str:
+    """Return the sentence that a judgement asks for: everywhere, somewhere or nowhere."""
+    return {"holds": holds, "contradicted": contradicted}.get(judgement.outcome, partly)
+
+
+def plain_text(text: str) -> str:
+    r"""Return a sentence without LaTeX, as a terminal shows it.
+
+    >>> plain_text(r"$k_t L^2/k_r$ of $2\times10^{-6}$, $\sqrt{EI/\rho A}$, $\omega_1$")
+    'k_t L²/k_r of 2×10⁻⁶, sqrt(EI/ρ A), ω_1'
+    """
+    return re.sub(r"\$([^$]*)\$", lambda match: _plain_formula(match[1]), text)
+
+
+def _plain_formula(latex: str) -> str:
+    latex = re.sub(r"\\sqrt\{([^}]*)\}", r"sqrt(\1)", latex)
+    latex = re.sub(r"\\ddot ?(\w)", r"\1''", latex)
+    latex = re.sub(r"\^(?:\{(-?\d+)\}|(\d))", lambda match: (match[1] or match[2]).translate(_POWERS), latex)
+    latex = re.sub(r"\\([A-Za-z]+)(?=(\\?))", lambda m: _SIGNS.get(m[1], m[1] + (" " if m[2] else "")), latex)
+    return re.sub(r"[{}]|\\[,;]", "", latex)

@@ -12,8 +12,8 @@ from cra_sym.claims.pictures import PALETTE, by_mode, note, stiffness_axis, stri
 from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
 from cra_sym.claims.stability import KINDS, zone
-from cra_sym.claims.verdict import Finding, Quantity, Verdict, outcome
-from cra_sym.claims.words import listed, number, percent, span
+from cra_sym.claims.verdict import Finding, Quantity, Verdict, judged
+from cra_sym.claims.words import by_outcome, listed, number, percent, span
 from cra_sym.model.excitations import AxialBase, TransverseBase
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def _where(k_t: np.ndarray, region: np.ndarray) -> str:
     """Say in words for which k_t a claim holds, excitation by excitation."""
     across, joint, along = (span(k_t, row, "N/m") for row in region)
     return (
-        f"for the fluctuating joint for k_t of {joint}, for the base shaken along the arm {along}, for the forced "
+        f"for the fluctuating joint for $k_t$ of {joint}, for the base shaken along the arm {along}, for the forced "
         f"resonances of the base shaken across {across}"
     )
 
@@ -59,7 +59,8 @@ _WIDTH = "width at epsilon (transverse base: rate of its forced resonance, m/s)"
     "minor change "
     "while the instability regions of the second and third principal resonances become wider",
 )
-def _(setting: Setting) -> Finding:
+def zone_1_stays(setting: Setting) -> Finding:
+    """Judge C16."""
     k_t = np.logspace(np.log10(setting.k_t[0]), np.log10(setting.k_t[-1]) - 1, 61)
     widths = _widths(setting, setting.arm.replace(k_t=k_t))
     minor = 10 * setting.visible
@@ -76,24 +77,33 @@ def _(setting: Setting) -> Finding:
         "region": Quantity(region, "1", "where the claim holds in absolute width: excitation, k_t but the first"),
         "relative": Quantity(relative, "1", "the same for the relative change of the widths"),
     }
+    series = as_printed(_widths(setting, setting.arm.replace(k_t=np.array(setting.k_t))))[1]
+    judgement = judged(region, here=series)
+    plain = by_outcome(
+        judgement,
+        "As the joint softens zone 1 stays and zones 2 and 3 widen, in every case tried.",
+        "As the joint softens zone 1 stays and zones 2 and 3 widen for some excitations and down to some $k_t$ only.",
+        "As the joint softens it is nowhere so that zone 1 stays and zones 2 and 3 widen.",
+    )
     factors = widths[1, -1] / widths[1, 0]
-    in_relative = f"in {percent(relative.mean())} of the cases" if relative.any() else "it does nowhere"
+    in_relative = f"in {percent(relative.mean())} of the cases" if relative.any() else "nowhere"
     sentence = (
-        f"As k_t falls from {number(k_t[0])} N/m, zones 2 and 3 widen, and zone 1 by under {percent(minor)} of what "
-        f"they do in rad/s: {_where(k_t[1:], region)}. In "
-        f"relative width {in_relative}: down to {number(k_t[-1])} N/m the joint's three zones widen "
-        f"{listed(factors, lambda f: number(f, 2))}-fold, and zone 3 is "
-        f"widest at {number(k_t[widths[1, :, 2].argmax()])} N/m."
+        f"With $k_t$ below {number(k_t[0])} N/m zones 2 and 3 are wider, and zone 1 has changed by under "
+        f"{percent(minor)} of what they have, in rad/s, {_where(k_t[1:], region)}. In relative width they do so "
+        f"{in_relative}: down to {number(k_t[-1])} N/m the joint's three zones widen "
+        f"{listed(factors, lambda f: number(f, 2))}-fold, and zone 3 is widest at "
+        f"{number(k_t[widths[1, :, 2].argmax()])} N/m."
     )
     criterion = (
         f"zones 2 and 3 are wider than at {number(k_t[0])} N/m and zone 1 has changed by at most {percent(minor)} of "
-        f"what the lesser of them has, in rad/s, for k_t down to {number(k_t[-1])} N/m and three excitations"
+        f"what the lesser of them has, in rad/s, for $k_t$ down to {number(k_t[-1])} N/m and three excitations"
     )
-    return Finding(outcome(region), sentence, evidence, criterion)
+    return Finding(judgement, plain, sentence, evidence, criterion)
 
 
 @pictured("C16")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_zone_1_stays(verdict: Verdict, ax: Axes) -> None:
+    """Draw C16."""
     k_t = verdict["k_t"]
     by_mode(ax, k_t, verdict["width"][1])
     ax.set_yscale("log")
@@ -122,7 +132,8 @@ def _strips(ax: Axes, x: np.ndarray, rows: np.ndarray, names: tuple[str, ...]) -
     "a heavier end-effector narrows all zones",
     "with the increasing of the mass, the instability regions of the first three principal resonances become narrower",
 )
-def _(setting: Setting) -> Finding:
+def heavier_is_narrower(setting: Setting) -> Finding:
+    """Judge C17."""
     k_t = np.logspace(2, 6, 61)
     masses = np.array(setting.masses)
     widths = _widths(setting, setting.arm.replace(k_t=k_t[:, None], m_e=masses))
@@ -135,6 +146,14 @@ def _(setting: Setting) -> Finding:
         "narrows": Quantity(narrows, "1", "whether the width falls with every step of mass: excitation, k_t, mode"),
         "region": Quantity(region, "1", "whether it does for all three: excitation, k_t"),
     }
+    ours = _widths(setting, setting.arm.replace(k_t=setting.soft_k_t, m_e=masses))[1]
+    judgement = judged(region, here=np.diff(ours, axis=0) < 0)
+    plain = by_outcome(
+        judgement,
+        "A heavier end-effector narrows all three zones, in every case tried.",
+        "A heavier end-effector narrows all three zones for some joints and excitations, and widens one for others.",
+        "A heavier end-effector narrows all three zones at once in no case.",
+    )
     change = widths[1, :, -1] / widths[1, :, 0] - 1
     stiff = int(np.argmin(np.abs(k_t - setting.k_t[-1])))
     sentence = (
@@ -143,14 +162,15 @@ def _(setting: Setting) -> Finding:
         f"{listed(change[stiff], percent)} at {number(k_t[stiff])} N/m."
     )
     criterion = (
-        f"each step of the end-effector's mass narrows all three zones, for k_t of {number(k_t[0])} to "
+        f"each step of the end-effector's mass narrows all three zones, for $k_t$ of {number(k_t[0])} to "
         f"{number(k_t[-1])} N/m and three excitations; no threshold"
     )
-    return Finding(outcome(region), sentence, evidence, criterion)
+    return Finding(judgement, plain, sentence, evidence, criterion)
 
 
 @pictured("C17")
-def _(verdict: Verdict, ax: Axes) -> None:
+def draw_heavier_is_narrower(verdict: Verdict, ax: Axes) -> None:
+    """Draw C17."""
     k_t, narrows = verdict["k_t"], verdict["narrows"]
     for kind in range(narrows.shape[0]):
         for mode in range(narrows.shape[-1]):

@@ -8,6 +8,7 @@ from html import escape
 from pathlib import Path
 
 from cra_sym.claims import Verdict
+from cra_sym.claims.words import plain_text
 from cra_sym.figures import described
 from cra_sym.report.markup import Markup, anchor
 from cra_sym.report.svg import inline_svg
@@ -35,6 +36,7 @@ class ClaimEntry:
     anchor: str
     title: str
     claim: str
+    texts: dict[str, str]
     picture: str
     arrays: list[tuple[str, str, str, str]]
 
@@ -47,11 +49,16 @@ def claim_entries(verdicts: Sequence[Verdict], folder: Path, markup: Markup) -> 
             anchor=anchor("claim", v.id),
             title=_inline(markup, v.title),
             claim=_inline(markup, v.claim),
+            texts={
+                name: _inline(markup, text)
+                for name in ("plain", "sentence", "criterion", "remedy", "missing")
+                if (text := getattr(v, name))
+            },
             picture=inline_svg(
                 _text(folder / f"{v.id}.svg"),
                 anchor("picture", v.id),
                 f"{v.id}, {v.outcome}: {v.title.replace('$', '')}",
-                v.sentence,
+                plain_text(v.plain),
             ),
             arrays=[
                 (name, " x ".join(map(str, q.values.shape)) or "1", q.unit, q.meaning) for name, q in v.evidence.items()

@@ -91,9 +91,14 @@ def frequencies() -> Table:
 def claims() -> Table:
     """What the paper says, and what the computation says about it."""
     from cra_sym.claims import claims
+    from cra_sym.claims.words import plain_text
 
-    rows = [(v.id, v.outcome, v.claim, v.source, v.sentence, v.remedy or v.missing or "") for v in claims()]
-    columns = ("claim", "outcome", "the paper", "where", "computed", "would reproduce the paper, or is missing")
+    rows = [
+        (v.id, v.claim, v.source, v.headline, *map(plain_text, (v.plain, v.sentence, v.remedy or v.missing or "")))
+        for v in claims()
+    ]
+    end = "would reproduce the paper, or is missing"
+    columns = ("claim", "the paper", "where", "outcome", "in a sentence", "computed", end)
     return Table("Claims", columns, rows)
 
 

@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 
 import cra_sym as cra
 from cra_sym.__main__ import main
-from cra_sym.claims import OUTCOMES, THEMES, Setting, claim, claims, figure_claims, ledger, outcome, provenance_family
+from cra_sym.claims import OUTCOMES, THEMES, Setting, claim, claims, figure_claims, judged, ledger, provenance_family
 from cra_sym.claims.family import MATERIALS
 from cra_sym.claims.overviews import figure_family
 from cra_sym.claims.table import verdict_markdown
-from cra_sym.claims.words import listed, number, percent, span
+from cra_sym.claims.words import listed, number, percent, plain_text, span
 
 FOLDER = Path(ledger.__file__).parent
 IDS = ledger._load()
@@ -29,14 +29,15 @@ def verdict(request):
 
 
 def test_the_claims_are_numbered_on():
-    assert list(IDS) == [f"C{k:02d}" for k in range(1, len(IDS) + 1)] and len(IDS) >= 23
+    assert [id for id in IDS if id != "C06b"] == [f"C{k:02d}" for k in range(1, len(IDS))] and "C06b" in IDS
     assert claims() == tuple(claim(id) for id in IDS)
     assert {v.theme for v in claims()} == set(THEMES)
     assert {v.outcome for v in claims()} == set(OUTCOMES)
 
 
 def test_a_verdict_says_what_and_why(verdict):
-    assert verdict.outcome in OUTCOMES
+    assert verdict.outcome in OUTCOMES and verdict.headline.startswith(verdict.outcome)
+    assert verdict.plain.endswith(".") and ". " not in verdict.plain
     assert verdict.sentence.endswith(".") and any(c.isdigit() for c in verdict.sentence)
     assert "  " not in verdict.sentence and "nan" not in verdict.sentence.split()
     assert verdict.evidence and all(q.unit and q.meaning for q in verdict.evidence.values())
@@ -45,11 +46,27 @@ def test_a_verdict_says_what_and_why(verdict):
 
 
 def test_where_is_a_region(verdict):
-    """What holds somewhere shows where: truth values over the quantities their meaning names."""
-    if verdict.outcome == "holds where":
+    """What holds somewhere shows where: truth values over the quantities their meaning names; the mean is the share."""
+    if verdict.outcome in ("mostly holds", "rarely holds"):
         region = verdict.evidence["region"]
-        assert region.values.dtype.kind == "b" and outcome(region.values) == "holds where"
+        assert region.values.dtype.kind == "b" and judged(region.values).outcome == verdict.outcome
+        assert verdict.share == region.values.mean() and verdict.here is not None
         assert region.values.size > 20 and ("where" in region.meaning or "whether" in region.meaning)
+
+
+def test_a_headline_tells_the_share_and_our_point(verdict):
+    told = re.fullmatch(r"[a-z ]+( \(.*\))?", verdict.headline)[1] or ""
+    assert ("cases" in told) == (verdict.outcome in ("mostly holds", "rarely holds"))
+    assert ("point: yes" in told, "point: no" in told) == (verdict.here is True, verdict.here is False)
+
+
+def test_mathematics_is_latex_and_has_a_plain_form(verdict):
+    """No bare subscript, power or Greek letter stands in the prose, and none of LaTeX in what a terminal shows."""
+    for text in (verdict.plain, verdict.sentence, verdict.criterion, verdict.remedy or "", verdict.missing or ""):
+        assert text.count("$") % 2 == 0
+        prose = "".join(text.split("$")[::2])
+        assert not re.search(r"[_^\\{}]|\b(omega|varpi|psi|epsilon|kappa|lambda|phi|rho)\b|\de[-+]?\d", prose)
+        assert not re.search(r"[$\\{}]", plain_text(text))
 
 
 def test_thresholds_are_told(verdict):
@@ -66,14 +83,15 @@ def test_a_contradiction_carries_a_remedy(verdict):
 
 
 def test_no_outcome_is_typed():
-    """A claim's function may write 'undecidable', never a verdict: those come out of `outcome`."""
-    allowed = {"C01": {"holds", "holds where", "contradicted"}}
-    for path in FOLDER.glob("*.py"):
-        for call in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "Finding":
-                first = call.args[0]
-                if isinstance(first, ast.Constant):
-                    assert first.value == "undecidable" or (path.name == "modes.py" and first.value in allowed["C01"])
+    """A claim's function may write 'undecidable', never a verdict: those come out of `judged`."""
+    written = [
+        call.args[0].value
+        for path in FOLDER.glob("*.py")
+        if path.name != "verdict.py"
+        for call in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "Judgement"
+    ]
+    assert written == ["undecidable"]
 
 
 def test_each_is_drawn_in_its_own_axes(verdict):
@@ -110,9 +128,11 @@ def test_computed_once_and_for_each_arm():
 
 
 def test_outcomes():
-    assert outcome([True]) == "holds"
-    assert outcome([True, False], [True]) == "holds where"
-    assert outcome([True], [False, False]) == "contradicted"
+    assert judged([True]).outcome == "holds"
+    assert judged([True, False, True], [True]).outcome == "mostly holds"
+    assert judged([True, False], [True]).outcome == "rarely holds"
+    assert judged([True], [False, False]).outcome == "contradicted"
+    assert judged([True], here=[True, False]).here is False
 
 
 @pytest.mark.parametrize(
@@ -164,20 +184,19 @@ def test_command_prints_the_table(capsys):
 def test_the_table_of_a_page_has_three_cells_a_row():
     """Whatever a verdict says, with its remedy or what is missing."""
     verdicts = [claim(id) for id in ("C01", "C02", "C03")]
-    verdicts += [dataclasses.replace(verdicts[0], sentence="|v| is k_t^2.", missing="a figure", remedy="a spring")]
+    verdicts += [dataclasses.replace(verdicts[0], sentence="$|v|$ is $k_t^2$.", missing="a figure", remedy="a spring")]
     head, line, *rows = verdict_markdown(verdicts).splitlines()
     cells = [re.split(r"(?<!\\)\|", row)[1:-1] for row in (head, line, *rows)]
     assert {len(row) for row in cells} == {3} and len(rows) == 4
-    for verdict, (name, words, found) in zip(verdicts, cells[2:], strict=True):
-        assert verdict.id in name and verdict.outcome in name and verdict.source in words.replace("\\", "")
-        assert all(
-            text in found.replace("\\", "") for text in (verdict.sentence, verdict.remedy or "", verdict.missing or "")
-        )
-    assert r"\|v\| is k\_t\^2." in rows[-1]
+    for verdict, (words, verdict_cell, found) in zip(verdicts, cells[2:], strict=True):
+        assert verdict.id in words and verdict.source in words
+        assert verdict.headline in verdict_cell and verdict.plain in verdict_cell and verdict.criterion in found
+        assert all(text in found for text in (verdict.remedy or "", verdict.missing or ""))
+    assert r"$\vert v\vert $ is $k_t^2$." in rows[-1]
 
 
 def test_words():
-    assert number(np.inf) == "infinite" and number(12345.6) == "12300" and number(1e-9) == "1e-9"
+    assert number(np.inf) == "infinite" and number(12345.6) == "12300" and number(1e-9) == "$10^{-9}$"
     assert percent(0.5) == "50 %" and listed([1.0]) == "1"
     assert span([1, 2, 3], [False] * 3) == "nowhere"
     assert span([1, 2, 3], [True, False, True], "s") == "1 and 3 s"

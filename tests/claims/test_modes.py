@@ -14,9 +14,9 @@ BARE = ARM.replace(m_e=0.0)
 
 
 def test_c01_turns_with_the_numbers(judge):
-    assert judge("C01").outcome == "holds"
-    assert judge("C01", ARM.replace(h=0.004)).outcome == "holds where"
-    assert judge("C01", frequencies=(2.448, 15.4, 42.950)).outcome == "contradicted"  # no clamped beam has these
+    assert judge("C01").judgement.outcome == "holds"
+    assert judge("C01", ARM.replace(h=0.004)).judgement.outcome == "contradicted"
+    assert judge("C01", frequencies=(2.448, 15.4, 42.950)).judgement.outcome == "contradicted"
 
 
 def test_c01_scale_is_that_of_the_textbook():
@@ -37,7 +37,7 @@ def test_c03_is_reproduced_by_the_flipped_sign(judge, monkeypatch):
     assert claim("C03").outcome == "contradicted"
     monkeypatch.setattr(modes, "natural_frequencies", lambda arm, modes=3: _flipped_or_rigid(arm, modes))
     found = judge("C03")
-    assert found.outcome == "holds where"
+    assert found.judgement.outcome in ("mostly holds", "rarely holds")
     np.testing.assert_array_equal(found.evidence["region"].values, claim("C03")["flipped_region"])
 
 
@@ -65,7 +65,7 @@ def test_c06_tells_where_the_growth_ends():
     assert grows[:, 0].all() and not grows[:, 1:].all()
     for mode in (1, 2):
         np.testing.assert_array_equal(grows[:, mode], k_t[1:] >= turn[mode] * (1 - 1e-9))
-    assert verdict["factor"].min() > 1000
+    assert claim("C06b")["factor"].min() > 1000 and claim("C06b").outcome == "contradicted"
 
 
 def test_c18_holds_for_the_full_energy_only(judge, monkeypatch):
@@ -92,7 +92,7 @@ def test_c21_turns_with_a_sign_in_the_virtual_work(judge, monkeypatch):
     wrong = (*true[:1], true[1].func(true[1].lhs, -true[1].rhs), *true[2:])
     monkeypatch.setattr(joint, "boundary_conditions", lambda: wrong)
     found = judge("C21")
-    assert found.outcome == "holds where"
+    assert found.judgement.outcome in ("mostly holds", "rarely holds")
     np.testing.assert_array_equal(found.evidence["with_springs"].values, [True, False, True, True])
 
 

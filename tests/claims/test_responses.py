@@ -25,7 +25,7 @@ def test_the_plane_is_what_direct_calls_give():
 def test_c07_numbers():
     """10.2 against 11.0 mm at psi = pi and 10 rad/s; there it holds for about 125 to 230 deg and below 14 rad/s."""
     verdict = claim("C07")
-    assert verdict.outcome == "holds where"
+    assert verdict.outcome in ("mostly holds", "rarely holds")
     plane = Plane(verdict.setting, np.array([10.0]), np.radians([0.0, 120.0, 125.0, 180.0, 230.0, 235.0]))
     found, without = plane.peaks(velocity=0.1)
     np.testing.assert_array_equal(found[0] < without, [False, False, True, True, True, False])
@@ -36,7 +36,7 @@ def test_c07_numbers():
 
 
 def test_c07_and_c08_turn_with_disturbance_and_start(judge):
-    assert judge("C07", amplitude=0.0).outcome == "contradicted"
+    assert judge("C07", amplitude=0.0).judgement.outcome == "contradicted"
     assert claim("C07")["share_start_on_base"] == 0.0
     assert np.all(np.diff(claim("C08")["share"]) > 0)
 
@@ -51,7 +51,7 @@ def test_c08_is_lowered_near_a_quarter_turn():
 
 
 def test_c09_turns_when_the_mean_velocity_is_small(judge):
-    assert claim("C09").outcome == "holds where" and claim("C09")["absolute_gap"] < 1e-9
+    assert claim("C09").outcome in ("mostly holds", "rarely holds") and claim("C09")["absolute_gap"] < 1e-9
     gentle = judge("C09", velocity=1e-3)
     assert (gentle.evidence["log_ratio"].values < 0).mean() < 0.1
 
@@ -79,7 +79,7 @@ def test_softening_helps_above_the_resonance_only(id):
         assert (peaks[0] < peaks[1]) == helps
         if varpi == 10.0:
             np.testing.assert_allclose(verdict["nominal"], peaks, rtol=1e-12)
-    assert verdict.outcome == "holds where"
+    assert verdict.outcome in ("mostly holds", "rarely holds")
 
 
 def test_c12_is_proportional_without_disturbance():
@@ -91,19 +91,19 @@ def test_c13_signed_error_never_grows_for_any_arm(judge):
     rng = np.random.default_rng(13)
     arm = ARM.replace(k_t=10 ** rng.uniform(2, 5), k_r=10 ** rng.uniform(1, 4), m_e=rng.uniform(0, 0.05), zeta=0.02)
     found = judge("C13", arm, amplitude=rng.uniform(1e-4, 1e-2))
-    assert not found.evidence["grows"].values.any() and found.outcome == "contradicted"
-    assert "B proportional to a" in found.remedy
+    assert not found.evidence["grows"].values.any() and found.judgement.outcome == "contradicted"
+    assert "$B$ proportional to $a$" in found.remedy
 
 
 def test_c22_is_decided_by_the_printed_numbers(judge):
     verdict = claim("C22")
-    assert verdict.outcome == "undecidable" and "B, varpi and psi" in verdict.missing
-    assert judge("C22", peaks=tuple(verdict["computed"])).outcome == "holds"
+    assert verdict.outcome == "undecidable" and r"$B$, $\varpi$ and $\psi$" in verdict.missing
+    assert judge("C22", peaks=tuple(verdict["computed"])).judgement.outcome == "holds"
 
 
 def test_c23_border_is_statics(judge):
     """A steady acceleration loads the joint with m a and the moment m a L/2: shares 1/k_t and L^2/(2 k_r)."""
     found = judge("C23", ARM.replace(m_e=0.0)).evidence
     np.testing.assert_allclose(found["critical"].values, 2.0, rtol=1e-6)
-    assert claim("C23").outcome == "holds where"
+    assert claim("C23").outcome in ("mostly holds", "rarely holds")
     assert claim("C23")["critical"] < 2.0

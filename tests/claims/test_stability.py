@@ -15,7 +15,7 @@ def test_c14_tells_forced_from_parametric():
     verdict = claim("C14")
     np.testing.assert_array_equal(verdict["parametric"], [False, True, True])
     np.testing.assert_array_equal(verdict["forced"], [True, False, False])
-    assert verdict.outcome == "contradicted" and "k_t (1 + epsilon" in verdict.remedy and "u_0" in verdict.remedy
+    assert verdict.outcome == "contradicted" and r"k_t (1 + \epsilon" in verdict.remedy and "u_0" in verdict.remedy
     at_once, at_twice = verdict["envelope"]
     half = np.searchsorted(verdict["times"], verdict["times"][-1] / 2)
     assert 1.9 < at_once[-1] / at_once[half] < 2.1  # in proportion to time
@@ -54,13 +54,17 @@ def test_c16_widths_are_those_of_the_modal_matrices():
 
 def test_c16_holds_for_the_joint_in_absolute_width_only():
     verdict = claim("C16")
-    assert verdict.outcome == "holds where" and verdict["region"][1].any() and not verdict["region"][2].any()
+    assert (
+        verdict.outcome in ("mostly holds", "rarely holds")
+        and verdict["region"][1].any()
+        and not verdict["region"][2].any()
+    )
     assert not verdict["relative"].any()
 
 
 def test_c17_holds_on_stiff_joints():
     verdict = claim("C17")
-    assert verdict.outcome == "holds where"
+    assert verdict.outcome in ("mostly holds", "rarely holds")
     stiff = verdict["k_t"] > 2e3
     assert verdict["region"][1][stiff].all() and not verdict["region"][1].all()
 
@@ -69,7 +73,7 @@ def test_c19_powers_and_damping():
     verdict = claim("C19")
     np.testing.assert_allclose(verdict["powers"], [1.0, 2.0], atol=0.02)
     region = verdict["region"]
-    assert region[0].all() and not region[-1].any() and verdict.outcome == "holds where"
+    assert region[0].all() and not region[-1].any() and verdict.outcome in ("mostly holds", "rarely holds")
     assert (np.diff(region.astype(int), axis=1) >= 0).all()  # more fluctuation never stabilises here
 
 

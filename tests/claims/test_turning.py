@@ -1,6 +1,7 @@
 """Every verdict can change: each claim has a perturbation of the physics, or of what is not known, that turns it."""
 
 import copy
+import re
 
 import numpy as np
 import pytest
@@ -33,7 +34,7 @@ def turns(id, before, after):
     return register
 
 
-@turns("C01", "holds", "holds where")
+@turns("C01", "holds", "contradicted")
 def thicker_arm(patch):
     return {"arm": ARM.replace(h=0.004)}
 
@@ -46,7 +47,7 @@ def softer_spring_that_stiffens(patch):
     patch.setattr(modes, "natural_frequencies", mirrored)
 
 
-@turns("C03", "contradicted", "holds where")
+@turns("C03", "contradicted", "rarely holds")
 def sign_of_the_rotational_spring(patch):
     def flipped(arm, modes=3):
         frequencies = flipped_frequencies if np.all(np.isfinite(arm.k_r)) else cra.natural_frequencies
@@ -61,7 +62,7 @@ def slower_way_to_the_limit(patch):
     patch.setattr(modes, "frequency_parameters", lambda t, r, *rest: true(np.sqrt(t), np.sqrt(r), *rest))
 
 
-@turns("C05", "holds where", "contradicted")
+@turns("C05", "mostly holds", "contradicted")
 def no_strain_in_the_translational_spring(patch):
     def never(arm, modes=3):
         found = cra.sensitivities(arm, modes)
@@ -70,32 +71,42 @@ def no_strain_in_the_translational_spring(patch):
     patch.setattr(sensitivity, "sensitivities", never)
 
 
-@turns("C06", "holds where", "holds")
+@turns("C06", "mostly holds", "holds")
+def slope_that_falls_as_the_stiffness(patch):
+    def falling(arm, modes=3):
+        return changed(cra.sensitivities(arm, modes), df_dk_t=1 / np.asarray(arm.k_t)[..., None])
+
+    patch.setattr(sensitivity, "sensitivities", falling)
+
+
+@turns("C06b", "contradicted", "holds")
 def flat_slope_along_the_rotational_stiffness(patch):
     def flat(arm, modes=3):
         found = cra.sensitivities(arm, modes)
-        return changed(found, df_dk_r=1 + 0 * found.df_dk_r, df_dk_t=1 / np.asarray(arm.k_t)[..., None])
+        return changed(found, df_dk_r=1 + 0 * found.df_dk_r)
+
+    patch.setattr(sensitivity, "sensitivities", flat)
 
     patch.setattr(sensitivity, "sensitivities", flat)
 
 
-@turns("C07", "holds where", "contradicted")
+@turns("C07", "rarely holds", "contradicted")
 def arm_that_moves_with_the_base_at_the_start(patch):
     true = motions.tip
     patch.setattr(motions, "tip", lambda *given, **options: true(*given, **{**options, "start": "base"}))
 
 
-@turns("C08", "holds where", "contradicted")
+@turns("C08", "mostly holds", "contradicted")
 def no_disturbance(patch):
     return {"amplitude": 0.0}
 
 
-@turns("C09", "holds where", "holds")
+@turns("C09", "mostly holds", "holds")
 def hardly_any_mean_acceleration(patch):
     return {"accelerations": (1e-4,)}
 
 
-@turns("C10", "holds where", "contradicted")
+@turns("C10", "rarely holds", "contradicted")
 def joint_that_does_not_give(patch):
     true = motions.tip
 
@@ -105,12 +116,12 @@ def joint_that_does_not_give(patch):
     patch.setattr(comparisons, "tip", stiff)
 
 
-@turns("C11", "holds where", "contradicted")
+@turns("C11", "rarely holds", "contradicted")
 def joint_that_does_not_give_either(patch):
     joint_that_does_not_give(patch)
 
 
-@turns("C12", "holds where", "holds")
+@turns("C12", "mostly holds", "holds")
 def hardly_any_disturbance(patch):
     return {"amplitude": 1e-9}
 
@@ -141,13 +152,13 @@ def amplitude_equation_with_the_conjugate(patch):
     patch.setattr(boundaries, "forced_resonance", lambda: principal)
 
 
-@turns("C16", "holds where", "contradicted")
+@turns("C16", "rarely holds", "contradicted")
 def inverted_widths(patch):
     true = zones._widths
     patch.setattr(zones, "_widths", lambda *given: 1 / true(*given))
 
 
-@turns("C17", "holds where", "contradicted")
+@turns("C17", "mostly holds", "contradicted")
 def lighter_end_effectors(patch):
     return {"masses": claim("C17").setting.masses[::-1]}
 
@@ -158,7 +169,7 @@ def beam_that_stores_all_energy(patch):
     patch.setattr(modes, "_beam_stiffness", lambda arm: cra.modal_parameters(arm).omega ** 2)
 
 
-@turns("C19", "holds where", "contradicted")
+@turns("C19", "mostly holds", "contradicted")
 def no_second_tongue(patch):
     patch.setattr(stability, "_largest_growth", lambda arm, epsilon, tongue: epsilon * (tongue == 1))
 
@@ -172,7 +183,7 @@ def springs_loaded_alike(patch):
     patch.setattr(sensitivity, "modal_parameters", alike)
 
 
-@turns("C21", "holds", "holds where")
+@turns("C21", "holds", "mostly holds")
 def sign_in_the_virtual_work(patch):
     first, second, *others = joint.boundary_conditions()
     patch.setattr(joint, "boundary_conditions", lambda: (first, second.func(second.lhs, -second.rhs), *others))
@@ -183,7 +194,7 @@ def other_printed_peaks(patch):
     return {"peaks": (1.0, 2.0, 3.0, 4.0)}
 
 
-@turns("C23", "holds where", "holds")
+@turns("C23", "rarely holds", "holds")
 def joint_that_does_not_turn(patch):
     true = cra.frequency_response
     patch.setattr(responses, "frequency_response", lambda arm, *rest: true(arm.replace(k_r=1e9 * arm.k_r), *rest))
@@ -196,9 +207,15 @@ def test_each_claim_has_a_perturbation():
 @pytest.mark.parametrize("id", TURNS)
 def test_the_verdict_turns(id, judge, monkeypatch):
     perturb, before, after = TURNS[id]
-    assert claim(id).outcome == before
+    former = claim(id)
+    assert former.outcome == before
     changes = perturb(monkeypatch) or {}
     with np.errstate(divide="ignore", invalid="ignore"):
         found = judge(id, **changes)
-    assert found.outcome == after
-    assert found.sentence != claim(id).sentence
+    assert found.judgement.outcome == after
+    assert found.plain != former.plain and words(found.plain) != words(former.plain)
+    assert found.sentence != former.sentence
+
+
+def words(text):
+    return re.sub(r"[\d.]+", "", text)
