@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["claim", "claims"]
 
-_HOMES = ("modes", "sensitivity", "responses", "comparisons", "stability", "zones")
+_HOMES = ("modes", "energy", "sensitivity", "responses", "comparisons", "stability", "zones")
 
 
 @cache

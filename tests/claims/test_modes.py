@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import cra_sym as cra
-from cra_sym.claims import claim, modes, provenance_family
+from cra_sym.claims import claim, energy, modes, provenance_family
 from cra_sym.claims.family import common_scale
 from cra_sym.paper import joint
 from cra_sym.paper.flipped import flipped_frequencies
@@ -73,7 +73,7 @@ def test_c18_holds_for_the_full_energy_only(judge, monkeypatch):
     assert verdict.outcome == "contradicted" and "k_t v(0)^2/2" in verdict.remedy
     np.testing.assert_allclose(verdict["with_springs"], 1.0, rtol=1e-10)
     assert verdict["beam_only"].min() < 0.4
-    monkeypatch.setattr(modes, "_joint_stiffness", lambda arm: np.zeros((41, 3)))
+    monkeypatch.setattr(energy, "_joint_stiffness", lambda arm: np.zeros((41, 3)))
     assert judge("C18").remedy is None
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import cra_sym as cra
-from cra_sym.claims import claim, comparisons, ledger, modes, motions, responses, sensitivity, stability, zones
+from cra_sym.claims import claim, comparisons, energy, ledger, modes, motions, responses, sensitivity, stability, zones
 from cra_sym.mechanics import boundaries
 from cra_sym.paper import joint, parametric
 from cra_sym.paper.flipped import flipped_frequencies
@@ -165,8 +165,8 @@ def lighter_end_effectors(patch):
 
 @turns("C18", "contradicted", "holds")
 def beam_that_stores_all_energy(patch):
-    patch.setattr(modes, "_joint_stiffness", lambda arm: np.zeros((41, 3)))
-    patch.setattr(modes, "_beam_stiffness", lambda arm: cra.modal_parameters(arm).omega ** 2)
+    patch.setattr(energy, "_joint_stiffness", lambda arm: np.zeros((41, 3)))
+    patch.setattr(energy, "_beam_stiffness", lambda arm: cra.modal_parameters(arm).omega ** 2)
 
 
 @turns("C19", "mostly holds", "contradicted")
