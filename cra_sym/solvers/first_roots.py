@@ -1,0 +1,119 @@
+"""Where polynomials on [0, 1] first fall below zero: isolated by Descartes' rule of signs, so that none is missed."""
+
+from __future__ import annotations
+
+from functools import cache
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["first_roots", "hull", "rounding"]
+
+Array = NDArray[np.float64]
+_ROUNDING = 16 * np.finfo(float).eps  # of the sum of the magnitudes of the coefficients: what counts as zero
+_HALVINGS = 40
+_ITERATIONS = 80
+
+
+@cache
+def _bernstein(degree: int) -> Array:
+    """Return the matrix that takes coefficients of powers to those of Bernstein's polynomials on [0, 1].
+
+    A polynomial lies in the hull of the latter, and has at most as many roots as they have changes of sign; as many, if
+    that is none or one.
+    """
+    matrix = np.array([[comb(j, k) / comb(degree, k) for k in range(degree + 1)] for j in range(degree + 1)])
+    matrix.flags.writeable = False
+    return matrix
+
+
+def hull(coefficients: Array) -> tuple[Array, Array]:
+    """Return bounds of polynomials on [0, 1], rounding included.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (degree + 1, members)
+
+    Returns
+    -------
+    low, high : ndarray, shape (members,)
+    """
+    values = _bernstein(len(coefficients) - 1) @ coefficients
+    return values.min(axis=0), values.max(axis=0)
+
+
+def rounding(coefficients: Array) -> Array:
+    """Return what counts as zero among the values of polynomials, shape (members,)."""
+    return np.asarray(_ROUNDING * np.abs(coefficients).sum(axis=0))
+
+
+def first_roots(coefficients: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return how far on [0, 1] polynomials are followed, and whether they fall below zero there.
+
+    A polynomial with two roots or more in reach is followed to a place before the second; one that starts at zero and
+    falls does so at 0.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (degree + 1, members)
+
+    Returns
+    -------
+    place : ndarray, shape (members,)
+    falls : ndarray of bool, shape (members,)
+    """
+    powers = np.arange(len(coefficients))[:, None]
+    matrix, members = _bernstein(len(coefficients) - 1), coefficients.shape[1]
+    place, falls, open_ = np.ones(members), np.zeros(members, bool), np.arange(members)
+    bracketed = np.zeros(members, bool)
+    for halving in range(_HALVINGS + 1):
+        scaled = coefficients[:, open_] * place[open_] ** powers
+        values = matrix @ scaled
+        zero = np.abs(values) <= rounding(scaled)
+        lead, changes = _signs(np.where(zero, 0.0, np.sign(values)))
+        at_once, one = lead < 0, (lead >= 0) & (changes == 1)
+        place[open_[at_once]] = 0.0
+        falls[open_[at_once | one]] = True
+        bracketed[open_[one]] = True
+        open_ = open_[(lead > 0) & (changes > 1)]
+        if not open_.size:
+            break
+        if halving == _HALVINGS:  # roots that rounding does not tell apart
+            falls[open_] = (coefficients[:, open_] * place[open_] ** powers).sum(axis=0) < 0
+        else:
+            place[open_] /= 2
+    inside = np.flatnonzero(bracketed)
+    place[inside] = _roots(coefficients[:, inside], place[inside])
+    return place, falls
+
+
+def _signs(signs: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Return the first sign that is not zero, and how often the sign changes, of each column."""
+    lead, last = np.zeros(signs.shape[1]), np.zeros(signs.shape[1])
+    changes = np.zeros(signs.shape[1], np.intp)
+    for row in signs:
+        changes += row * last < 0
+        last = np.where(row != 0, row, last)
+        lead = np.where(lead == 0, row, lead)
+    return lead, changes
+
+
+def _roots(coefficients: Array, high: Array) -> Array:
+    """Return the only root of each polynomial in (0, high), before which it is positive: Newton's method, guarded."""
+    order = np.arange(len(coefficients))[:, None]
+    slopes = coefficients[1:] * order[1:]
+    low, high = np.zeros_like(high), high.copy()
+    place = high / 2
+    for _ in range(_ITERATIONS):
+        powers = place**order
+        value = (coefficients * powers).sum(axis=0)
+        slope = (slopes * powers[:-1]).sum(axis=0)
+        low, high = np.where(value > 0, place, low), np.where(value > 0, high, place)
+        with np.errstate(all="ignore"):
+            step = place - value / slope
+        settled = np.abs(step - place) <= np.finfo(float).eps
+        place = np.where(settled | ((step > low) & (step < high)), step, (low + high) / 2)
+        if (settled | (high - low <= np.finfo(float).eps)).all():
+            break
+    return np.clip(place, low, high)
