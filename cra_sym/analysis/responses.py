@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.complex_responses import complex_response
-from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
+from cra_sym.analysis.histories import History, driven
+from cra_sym.analysis.histories import histories as histories_of
+from cra_sym.analysis.modes import check_places, participation, section_place
 from cra_sym.analysis.nonlinear_response import nonlinear_response
-from cra_sym.checks import broadcastable, count, default_floating_point, instance, mapping, one_axis, shown
+from cra_sym.analysis.slipping import Slipping, slipping, slipping_outputs, slipping_residual
+from cra_sym.checks import broadcastable, count, default_floating_point, instance, one_axis, shown
 from cra_sym.kernels import derived_kernel
 from cra_sym.model.projection import Projected
 from cra_sym.model.routes import Modes
@@ -28,10 +31,12 @@ if TYPE_CHECKING:
     from sympy import Expr
     from sympy.core.function import AppliedUndef
 
-__all__ = ["History", "Stopped", "UndersamplingWarning", "residual_vibration", "response", "stopped", "tip_response"]
+__all__ = [
+    "History", "Stopped", "UndersamplingWarning", "residual_vibration", "response", "slipping_problem", "stopped",
+    "tip_response",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
-History = BaseMotion | Force
 
 
 class UndersamplingWarning(UserWarning):
@@ -113,7 +118,8 @@ def response(
     each. Of a system with local dampers, gyroscopic forces or forces that follow the motion the sum is that of the
     lowest complex modes, as many eigenvalues as ``modes`` oscillators have, by exponentials of their state matrix;
     velocities are those of the modes. A nonlinear system (not a batch) is integrated in time, its linear
-    modes exactly, to a relative error of about 1e-9.
+    modes exactly, to a relative error of about 1e-9. Of a system with elastic-slip elements (batches too) the sum is
+    that of its modes without them, followed exactly from event to event; see `slip_response`.
 
     Parameters
     ----------
@@ -183,7 +189,9 @@ def residual_vibration(
     Exact for one mode; without damping the least upper bound over all times (frequencies of modes are
     incommensurable); with damping an upper bound that ignores only that modes do not peak together. Being at rest
     after the stop is not a condition: what counts is that the base does not accelerate any more. A rigid-body mode
-    contributes its final offset.
+    contributes its final offset. Of a system with elastic-slip elements it is the largest displacement while they
+    slip, at most for ten periods of the lowest mode; from where they stick for good on it is the offset and the sum
+    over the modes.
 
     Parameters
     ----------
@@ -205,6 +213,12 @@ def residual_vibration(
         If a motion never stops accelerating or a force never ends, or the model has dampers, which couple the modes;
         otherwise as :func:`response`.
     """
+    instance("system", system, System)
+    if system.model.pieces["hysteresis"]:
+        still = stopped(system.without_hysteresis, motion, modes, zeta)
+        problem, rows = slipping_problem(system, motion, modes, zeta), system.without_hysteresis.modes(modes)
+        peak = slipping_residual(problem, rows.displacement(1, 0), still.stop)
+        return peak if peak.ndim else float(peak)
     found = stopped(system, motion, modes, zeta)
     total = np.sum(found.peaks(found.osc.omega, found.products), -1)
     return total if total.ndim else float(total)
@@ -255,7 +269,7 @@ class Stopped:
 def stopped(system: System, motion: Any, modes: int, zeta: Any) -> Stopped:
     """Return the modes driven until everything stops, or refuse what never stops or couples the modes."""
     instance("system", system, System)
-    histories = _histories(system, motion)
+    histories = histories_of(system, motion)
     if not histories:
         raise ValueError("motion: must be of what drives the model; nothing does")
     profiles = tuple(one.profile if isinstance(one, Force) else one for one in histories.values())
@@ -313,11 +327,14 @@ def _oscillation(
 ) -> Array:
     """Return outputs of the driven modes, rows (..., outputs, modes) times these, shape (..., outputs, times)."""
     check_start(start)
-    histories = _histories(system, motion)
     if initial is not None and not isinstance(initial, Mapping):
         raise TypeError(
             f"initial = {shown(initial)}: must be a mapping from fields and coordinates to expressions in x"
         )
+    if system.model.pieces["hysteresis"]:
+        problem = slipping_problem(system, motion, modes, zeta, start, initial)
+        return slipping_outputs(problem, outputs(problem.base.modes(modes)), t, derivative)
+    histories = histories_of(system, motion)
     if system.numerics("nonlinear") is not None:
         state = tuple(_initial_state(system, initial or {}, modes, order) for order in (0, 1))
         rows = outputs(system.modes(modes))
@@ -345,7 +362,7 @@ def _oscillation(
     if initial or not histories:
         q, u = (_initial_state(system, initial or {}, modes, order) for order in (0, 1))
         total = answer(still, BaseMotion(), "base", (q, u))
-    for gamma, history in _driven(system, histories, modes):
+    for gamma, history in driven(system, histories, modes):
         if isinstance(history, Force):
             added = answer(gamma, history.profile, "base")
         else:
@@ -353,6 +370,17 @@ def _oscillation(
         total = added if total is None else total + added
     assert total is not None
     return total
+
+
+def slipping_problem(
+    system: System, motion: Any, modes: int, zeta: Any, start: Start = "inertial", initial: Any = None
+) -> Slipping:
+    """Return the problem in time of a system with elastic-slip elements, its arguments checked as by `response`."""
+    check_start(start)
+    base = system.without_hysteresis
+    state = (_initial_state(base, initial or {}, modes, 0), _initial_state(base, initial or {}, modes, 1))
+    loads = driven(base, histories_of(base, motion), modes)
+    return slipping(system, loads, modes, _ratios(base, modes, zeta), start, state, _check_sampling)
 
 
 def _check_sampling(motion: BaseMotion, omega: Array) -> None:
@@ -370,52 +398,6 @@ def _check_sampling(motion: BaseMotion, omega: Array) -> None:
             UndersamplingWarning,
             stacklevel=6,
         )
-
-
-def _histories(system: System, motion: Any) -> dict[str, History]:
-    """Return what was given for each function of time that drives the model, by name."""
-    causes = dict(system.numerics("causes"))
-    terms = system.numerics("nonlinear")
-    others = [] if terms is None else [name for name, _ in terms.causes if name not in causes]
-    if isinstance(motion, BaseMotion):
-        motion = {only_motion(system): motion}
-    if motion is not None and not isinstance(motion, Mapping):
-        raise TypeError(f"motion = {shown(motion)}: must be a BaseMotion or a mapping from functions of t to motions")
-    given = {
-        key if isinstance(key, str) else getattr(getattr(key, "func", None), "__name__", str(key)): value
-        for key, value in mapping("motion", motion, "functions of t to BaseMotion or Force").items()
-    }
-    for name, history in given.items():
-        if name not in (*causes, *others):
-            raise ValueError(
-                f"motion: {name} does not drive the model; what drives it is {', '.join([*causes, *others]) or 'none'}"
-            )
-        if not isinstance(history, BaseMotion | Force):
-            raise TypeError(f"motion: {name} = {shown(history)}: must be a Force or a BaseMotion")
-        if name in others:  # in nonlinear terms alone, by any of its derivatives
-            continue
-        kind = "force" if isinstance(history, Force) else "motion"
-        if causes[name] not in ("force", "motion"):
-            raise ValueError(f"motion: the load {causes[name]} is neither a multiple of {name} nor of its acceleration")
-        if causes[name] != kind:
-            acts, cure = {
-                "motion": ("by its acceleration", "give a BaseMotion"),
-                "force": ("by itself", "give a Force, or measure the fields from the frame that moves"),
-            }[causes[name]]
-            raise ValueError(f"motion: {name} drives the model {acts}; {cure}")
-    missing = [name for name in (*causes, *others) if name not in given]
-    if missing:
-        raise ValueError(f"motion: no history for {', '.join(missing)}; must be a Force or a BaseMotion")
-    return given
-
-
-def _driven(system: System, histories: Mapping[str, History], modes: int) -> Iterator[tuple[Array, History]]:
-    """Yield minus the generalised force of one unit of each cause on every mode, and its history."""
-    for name, history in histories.items():
-        yield -system.project(system.numerics("load", name), modes), history
-    constant = system.numerics("constant")
-    if constant is not None:
-        yield -system.project(constant, modes), Force(1.0)
 
 
 def _initial_state(system: System, initial: Mapping[Any, Any], modes: int, order: int) -> Array:

@@ -119,6 +119,8 @@ class Ledger:
         self.energies = Energies(
             sums[0], sums[1], sums[2], sums[3], sums[4], np.zeros(each), np.zeros(each), moved, np.zeros(each, np.int8)
         )
+        self.q = np.zeros((*modes.omega.shape, times.size))
+        """Modal displacements."""
         self._work, self._drag, self._slid = np.zeros(members), np.zeros(members), np.zeros(each[:2])
         everyone = np.arange(members)
         self._write(everyone, np.zeros(members), *start, np.zeros(each[:2], np.int8))
@@ -156,6 +158,7 @@ class Ledger:
         total = here.total(force)
         give = here.given(total)
         at = (members, column)
+        self.q[:, members, column] = q
         kept.kinetic[at] = (u**2).sum(axis=0) / 2
         kept.potential[at] = ((here.omega * q) ** 2).sum(axis=0) / 2
         kept.elements[at] = ((force**2 / here.stiffness).sum(axis=0) + (total * give).sum(axis=0)) / 2

@@ -21,7 +21,7 @@ from .first_roots import first_roots, hull, rounding
 from .motion_terms import Harmonic, Piecewise
 from .slip_loads import Cause, add_acceleration, next_knot
 
-__all__ = ["ORDER", "Cause", "Events", "SlippingModes", "Start", "Step", "first_forces", "follow"]
+__all__ = ["ORDER", "Cause", "Events", "SlippingModes", "Start", "Step", "first_forces", "follow", "stuck_tangent"]
 
 Array = NDArray[np.float64]
 ORDER = 28
@@ -359,7 +359,7 @@ class _March:
 
 def _fastest(modes: SlippingModes, causes: Sequence[Cause]) -> Array:
     """Return a bound of the frequencies of the stuck modes, their damping included, and of the loads."""
-    tangent = _tangent(modes, np.zeros(modes.slip.shape, np.int8))
+    tangent = stuck_tangent(modes)
     size = np.sqrt((modes.rows**2).sum(axis=1))
     stiff = np.einsum("dp,dep,ep->p", size, np.abs(tangent), size)
     square = (modes.omega**2).max(axis=0) + stiff
@@ -382,6 +382,11 @@ def _tangent(modes: SlippingModes, state: NDArray[np.int8]) -> Array:
     stiff = np.einsum("dp,de->pde", k, np.eye(len(k)))
     matrix = np.eye(len(k)) + stiff @ np.moveaxis(modes.give, -1, 0)
     return np.asarray(np.moveaxis(np.linalg.solve(matrix, stiff), 0, -1))
+
+
+def stuck_tangent(modes: SlippingModes) -> Array:
+    """Return the rate of the forces on the displacements by that of `rows q` while all elements stick, (D, D, P)."""
+    return _tangent(modes, np.zeros(modes.slip.shape, np.int8))
 
 
 def _applied(matrix: Array, values: Array) -> Array:

@@ -1,0 +1,65 @@
+"""What drives a system: the histories that were given for its prescribed motions and forces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.analysis.modes import only_motion
+from cra_sym.checks import mapping, shown
+from cra_sym.model.system import System
+from cra_sym.solvers.motion import BaseMotion, Force
+
+__all__ = ["History", "driven", "histories"]
+
+Array = NDArray[np.float64]
+History = BaseMotion | Force
+
+
+def histories(system: System, motion: Any) -> dict[str, History]:
+    """Return what was given for each function of time that drives the model, by name."""
+    causes = dict(system.numerics("causes"))
+    terms = system.numerics("nonlinear")
+    others = [] if terms is None else [name for name, _ in terms.causes if name not in causes]
+    if isinstance(motion, BaseMotion):
+        motion = {only_motion(system): motion}
+    if motion is not None and not isinstance(motion, Mapping):
+        raise TypeError(f"motion = {shown(motion)}: must be a BaseMotion or a mapping from functions of t to motions")
+    given = {
+        key if isinstance(key, str) else getattr(getattr(key, "func", None), "__name__", str(key)): value
+        for key, value in mapping("motion", motion, "functions of t to BaseMotion or Force").items()
+    }
+    for name, history in given.items():
+        if name not in (*causes, *others):
+            raise ValueError(
+                f"motion: {name} does not drive the model; what drives it is {', '.join([*causes, *others]) or 'none'}"
+            )
+        if not isinstance(history, BaseMotion | Force):
+            raise TypeError(f"motion: {name} = {shown(history)}: must be a Force or a BaseMotion")
+        if name in others:  # in nonlinear terms alone, by any of its derivatives
+            continue
+        kind = "force" if isinstance(history, Force) else "motion"
+        if causes[name] not in ("force", "motion"):
+            raise ValueError(f"motion: the load {causes[name]} is neither a multiple of {name} nor of its acceleration")
+        if causes[name] != kind:
+            acts, cure = {
+                "motion": ("by its acceleration", "give a BaseMotion"),
+                "force": ("by itself", "give a Force, or measure the fields from the frame that moves"),
+            }[causes[name]]
+            raise ValueError(f"motion: {name} drives the model {acts}; {cure}")
+    missing = [name for name in (*causes, *others) if name not in given]
+    if missing:
+        raise ValueError(f"motion: no history for {', '.join(missing)}; must be a Force or a BaseMotion")
+    return given
+
+
+def driven(system: System, found: Mapping[str, History], modes: int) -> Iterator[tuple[Array, History]]:
+    """Yield minus the generalised force of one unit of each cause on every mode, and its history."""
+    for name, history in found.items():
+        yield -system.project(system.numerics("load", name), modes), history
+    constant = system.numerics("constant")
+    if constant is not None:
+        yield -system.project(constant, modes), Force(1.0)

@@ -1,0 +1,204 @@
+"""What the elastic-slip elements of a system do in time: forces, slip, events, and where the energy goes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.analysis.histories import History
+from cra_sym.analysis.modes import section_place
+from cra_sym.analysis.responses import slipping_problem
+from cra_sym.checks import count, default_floating_point, instance, one_axis
+from cra_sym.model.system import MOST_MODES, System
+from cra_sym.solvers.driven_modes import Start
+from cra_sym.solvers.slip_records import Ledger
+from cra_sym.solvers.slipping import Events, first_forces
+
+if TYPE_CHECKING:
+    from sympy import Expr
+    from sympy.core.function import AppliedUndef
+
+__all__ = ["SlipEvent", "SlipResponse", "slip_response"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SlipEvent:
+    """A change between stick and slip.
+
+    Attributes
+    ----------
+    time : float
+        s, to rounding.
+    element : int
+        Number of the Jenkins element, of all that the elements of the model stand for, from 0.
+    state : int
+        0 if it sticks from then on; 1 or -1 if it slips, force and velocity being positive or negative.
+    """
+
+    time: float
+    element: int
+    state: int
+
+
+@dataclass(frozen=True, eq=False)
+class SlipResponse:
+    """A motion with elastic-slip elements in time, seen from the frame that moves.
+
+    The elements are those that the elements of the model stand for: one for a Jenkins, several for an Iwan.
+
+    Attributes
+    ----------
+    time : ndarray, shape (T,)
+        s.
+    tip : ndarray, shape (..., T)
+        Displacement of the tip, m.
+    displacement : ndarray, shape (..., D, T)
+        Displacements that hold elements, m (rad).
+    force : ndarray, shape (..., E, T)
+        Forces of the elements, N (N m).
+    state : ndarray of int8, shape (..., E, T)
+        0 where an element sticks, 1 or -1 where it slips in that direction, just before each time.
+    kinetic, potential, elastic : ndarray, shape (..., T)
+        Stored energies, J: of the masses, of the structure, of the springs of the elements.
+    work, dampers : ndarray, shape (..., T)
+        What the loads, inertia forces of the moving frame among them, put in since t = 0 and what dampers and modal
+        damping took, J.
+    dissipated : ndarray, shape (..., E, T)
+        What each slider took, J.
+    initial : ndarray, shape (...)
+        Energy at t = 0, J.
+    events : ndarray of object, shape (...)
+        For each member of the batch a tuple of :class:`SlipEvent`, in the order of time.
+    """
+
+    time: Array
+    tip: Array
+    displacement: Array
+    force: Array
+    state: NDArray[np.int8]
+    kinetic: Array
+    potential: Array
+    elastic: Array
+    work: Array
+    dampers: Array
+    dissipated: Array
+    initial: Array
+    events: NDArray[np.object_]
+
+    @property
+    def imbalance(self) -> Array:
+        """Energy stored and taken less that put in, over the largest of these, shape (...): rounding."""
+        stored = self.kinetic + self.potential + self.elastic
+        taken = self.dampers + self.dissipated.sum(axis=-2)
+        there = self.initial[..., None] + self.work
+        scale = np.maximum(np.abs(there), stored).max(axis=-1)
+        gap = np.abs(stored + taken - there).max(axis=-1)
+        return np.asarray(gap / np.where(scale > 0, scale, 1.0))
+
+
+@default_floating_point
+def slip_response(
+    system: System,
+    motion: History | Mapping[AppliedUndef, History] | None,
+    t: Any,
+    modes: int = 5,
+    *,
+    zeta: Any = None,
+    start: Start = "inertial",
+    initial: Mapping[Any, Expr] | None = None,
+) -> SlipResponse:
+    """Return what elastic-slip elements do in time: states, forces, events, energies.
+
+    Between two events the modes move linearly, and are followed exactly; events are located to rounding, and none is
+    missed, however short the slip. The modes are those without the elements; what modes left out would give under the
+    forces of the elements counts as statics. Sliders are at zero at t = 0.
+
+    Parameters
+    ----------
+    system : System
+        Of a model with ``hysteresis``; batch axes broadcast with those of the motion.
+    motion, modes, zeta, start, initial
+        As in :func:`cra_sym.response`.
+    t : array_like
+        One axis of ascending times, s, not negative.
+
+    Returns
+    -------
+    SlipResponse
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the system has no elastic-slip elements, or nonlinear terms, gyroscopic or follower forces beside them;
+        otherwise as :func:`cra_sym.response`.
+
+    Examples
+    --------
+    >>> from sympy import symbols
+    >>> import cra_sym as cra
+    >>> from cra_sym.symbols import v
+    >>> k_d, f_s = symbols("k_d f_s")
+    >>> arm = cra.Arm.nominal().replace(k_t=1e3)
+    >>> model = arm.model.replace(hysteresis=[(cra.Jenkins(k_d, f_s), v, "left")])
+    >>> slipping = model.at({**arm.values, "k_d": 5e3, "f_s": 0.3})
+    >>> found = cra.slip_response(slipping, cra.BaseMotion.trapezoid(0.3, 0.5, 2.0), [0.0, 0.2, 2.0])
+    >>> [(round(event.time, 4), event.state) for event in found.events[()][:2]]
+    [(0.0344, -1), (0.041, 0)]
+    >>> bool(found.imbalance < 1e-12)
+    True
+    """
+    instance("system", system, System)
+    if not system.model.pieces["hysteresis"]:
+        raise ValueError("system: has no elastic-slip elements; give its model hysteresis=[..], or use response")
+    times = np.atleast_1d(one_axis("t", t, "times", low=0.0, unit="s"))
+    if (np.diff(times) <= 0).any():
+        raise ValueError(f"t[{int(np.argmax(np.diff(times) <= 0)) + 1}]: must ascend")
+    modes = count("modes", modes, high=MOST_MODES)
+    problem = slipping_problem(system, motion, modes, zeta, start, initial)
+    begin = (problem.start.displacement, problem.start.velocity)
+    force = first_forces(problem.modes, begin[0])
+    grid = np.unique(np.concatenate([[0.0], times]))  # what is at t = 0 goes into the balance
+    ledger = Ledger(problem.modes, grid, (*begin, force))
+    events = problem.follow(grid[-1], ledger, grid)
+    kept = ledger.energies
+    asked = slice(None) if times[0] == 0.0 else slice(1, None)
+    tip = problem.members(problem.base.modes(modes).displacement(1, section_place(problem.base, None))[..., None, :])[0]
+
+    def found(values: Array) -> Array:
+        """Return values (members, times) at the times that were asked for."""
+        return values.reshape(*problem.shape, grid.size)[..., asked]
+
+    def by_element(values: Array) -> Array:
+        return problem.shaped(values)[..., asked]
+
+    return SlipResponse(
+        time=times,
+        tip=found(np.einsum("np,npt->pt", tip, ledger.q)),
+        displacement=by_element(kept.displacement),
+        force=by_element(kept.force),
+        state=by_element(kept.state.astype(float)).astype(np.int8),
+        kinetic=found(kept.kinetic),
+        potential=found(kept.potential),
+        elastic=found(kept.elements),
+        work=found(kept.input),
+        dampers=found(kept.dampers),
+        dissipated=by_element(kept.sliders),
+        initial=(kept.kinetic + kept.potential + kept.elements)[:, 0].reshape(problem.shape),
+        events=_told(events, problem.modes.omega.shape[1]).reshape(problem.shape),
+    )
+
+
+def _told(events: Events, members: int) -> NDArray[np.object_]:
+    """Return the events of each member."""
+    order = np.searchsorted(events.member, np.arange(members + 1))
+    told = np.empty(members, object)
+    for k in range(members):
+        one = range(order[k], order[k + 1])
+        told[k] = tuple(SlipEvent(float(events.time[j]), int(events.element[j]), int(events.state[j])) for j in one)
+    return told
