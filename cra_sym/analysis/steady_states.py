@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from cra_sym import checks
 from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, samples, watched
 from cra_sym.analysis.periodic_forcing import Forced, forced
+from cra_sym.analysis.slip_states import MOST, SlipProblem
 from cra_sym.analysis.steady_seeds import seeds
 from cra_sym.model.excitations import Parametric
 from cra_sym.model.system import System
@@ -53,17 +54,26 @@ class SteadyState:
     stable: bool
     multipliers: Complex
     coefficients: Array
-    _problem: _Problem
+    _problem: _Problem | SlipProblem
+    _unknowns: Array
 
     @cached_property
     def error_modes(self) -> float:
         """Estimated relative error of the motion for want of modes: what three more change."""
-        return self._problem.changed(3, 0, self.coefficients, self.angular_frequency)
+        return self._problem.changed(3, 0, self._unknowns, self.angular_frequency)
 
     @cached_property
     def error_harmonics(self) -> float:
-        """Estimated relative error of the motion for want of harmonics: what four more change."""
-        return self._problem.changed(0, 4, self.coefficients, self.angular_frequency)
+        """Estimated relative error of the motion for want of harmonics: what four more change.
+
+        With elastic-slip elements, what twice as many change.
+        """
+        return self._problem.changed(0, 4, self._unknowns, self.angular_frequency)
+
+    @cached_property
+    def loss(self) -> float:
+        """Energy that elastic-slip elements take in a period of the answer, J."""
+        return self._problem.loss(self._unknowns)
 
     def __repr__(self) -> str:
         word = "stable" if self.stable else "unstable"
@@ -95,6 +105,22 @@ class _Problem:
     def causes(self, varpi: Array) -> Array:
         return self.driven.causes(varpi, self.basis.phase, self.period)
 
+    @property
+    def fastest(self) -> float:
+        return float(self.driven.equations.omega.max())
+
+    def coefficients(self, unknowns: Array) -> Array:
+        return self.balance.coefficients(unknowns)
+
+    def seeds(self, varpi: Array, order: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array, float]:
+        return seeds(self.driven, self.basis, varpi, order, self.period)
+
+    def loss(self, unknowns: Array) -> float:
+        return 0.0
+
+    def settled(self, found: list[list[Array]], varpi: Array) -> tuple[_Problem, list[list[Array]]]:
+        return self, found
+
     def solved(self, starts: Array, varpi: Array, floor: float) -> tuple[Array, NDArray[np.bool_]]:
         """Return answers from starts, and which converged."""
         return newton(self.balance, starts, varpi / self.period, self.causes(varpi), floor=floor)
@@ -109,14 +135,14 @@ class _Problem:
             self.driven.equations, self.basis, coefficients, varpi / self.period, causes, tolerance=1e-11
         )
 
-    def changed(self, more_modes: int, more_harmonics: int, coefficients: Array, varpi: float) -> float:
+    def changed(self, more_modes: int, more_harmonics: int, unknowns: Array, varpi: float) -> float:
         """Return by what share the motion changes when modes or harmonics are added: two steps of Newton's method."""
         options = dict(self.arguments)
         options["modes"] = min(options["modes"] + more_modes, options["system"].most_modes)
         options["harmonics"] += more_harmonics
-        rich, n, h = _Problem.of(**options), *coefficients.shape
+        coefficients: Array = self.balance.coefficients(unknowns)[0]
+        rich, n, h = _Problem.of(**options), len(coefficients), coefficients.shape[1] // 2
         x = np.zeros((options["modes"], rich.basis.size))
-        h = h // 2
         x[:n, : h + 1], start = coefficients[:, : h + 1], options["harmonics"] + 1
         x[:n, start : start + h] = coefficients[:, h + 1 :]
         before = x.ravel()[None].copy()
@@ -134,7 +160,7 @@ def steady_states(
     epsilon: float | None = None,
     drive: Mapping[Any, float] | None = None,
     modes: int = 3,
-    harmonics: int = 7,
+    harmonics: int | None = None,
     period: int = 1,
     zeta: ArrayLike | None = None,
     place: float | None = None,
@@ -149,7 +175,7 @@ def steady_states(
     epsilon: float | None = None,
     drive: Mapping[Any, float] | None = None,
     modes: int = 3,
-    harmonics: int = 7,
+    harmonics: int | None = None,
     period: int = 1,
     zeta: ArrayLike | None = None,
     place: float | None = None,
@@ -164,13 +190,16 @@ def steady_states(
     epsilon: Any = None,
     drive: Mapping[Any, Any] | None = None,
     modes: int = 3,
-    harmonics: int = 7,
+    harmonics: int | None = None,
     period: int = 1,
     zeta: Any = None,
     place: Any = None,
     field: Any = None,
 ) -> list[tuple[SteadyState, ...]] | tuple[SteadyState, ...]:
     """Return the periodic answers of a system that is excited parametrically, driven, or both.
+
+    Elastic-slip elements are exact between their events. Of the answers in which one sticks, which form a continuum,
+    it is the one whose slider is at rest at 0 or, if it does not hold there, as near as it does.
 
     Harmonic balance from many starts: rest, all answers of each mode alone with its nearest harmonic (by elimination,
     so that none of these is missed), free vibration with several phases, and the answers at neighbouring frequencies,
@@ -189,9 +218,11 @@ def steady_states(
     drive : mapping of function of t to float, optional
         Amplitudes of prescribed motions and of forces that go with cos(varpi t).
     modes : int
-        How many linear modes take part, 1 to 40.
-    harmonics : int
-        Highest multiple of ``varpi / period``; the constant is there too.
+        How many linear modes take part, 1 to 40; with elastic-slip elements those of the system without them, and the
+        statics of all others at the elements.
+    harmonics : int, optional
+        Highest multiple of ``varpi / period``; the constant is there too. Default: 7; with elastic-slip elements as
+        many as bring the motion within 1e-7, at most 127.
     period : int
         2 asks for answers of twice the period of the excitation.
     zeta : array_like, optional
@@ -228,22 +259,16 @@ def steady_states(
     """
     checks.instance("system", system, System)
     modes = checks.count("modes", modes, high=MOST_NONLINEAR_MODES)
-    harmonics, period = checks.count("harmonics", harmonics, high=60), checks.count("period", period, high=8)
+    slipping = bool(system.model.pieces["hysteresis"])
+    most = MOST if slipping else 60
+    harmonics = (None if slipping else 7) if harmonics is None else checks.count("harmonics", harmonics, high=most)
+    period = checks.count("period", period, high=8)
     varpi = checks.one_axis("angular_frequency", angular_frequency, "frequencies", low=1e-300, unit="rad/s")
-    problem = _Problem.of(
-        system=system,
-        modes=modes,
-        excitation=excitation,
-        epsilon=epsilon,
-        drive=drive,
-        zeta=zeta,
-        place=place,
-        field=field,
-        harmonics=harmonics,
-        period=period,
-    )
+    given = {"system": system, "modes": modes, "excitation": excitation, "epsilon": epsilon, "drive": drive}
+    given |= {"zeta": zeta, "place": place, "field": field, "period": period, "harmonics": harmonics}
+    problem = SlipProblem.of(**given) if slipping else _Problem.of(**given)
     flat = np.atleast_1d(varpi)
-    fastest = float(problem.driven.equations.omega.max())
+    fastest = problem.fastest
     low, high = period * fastest / _WIDE, fastest * _WIDE
     if not flat.size:
         return []
@@ -252,16 +277,15 @@ def steady_states(
         raise ValueError(
             f"angular_frequency = {bad:g} must be in [{low:.3g}, {high:.3g}], near the modes that take part"
         )
-    answers = _told(problem, flat, _found(problem, flat))
+    answers = _told(*_found(problem, flat), flat)
     return answers if varpi.ndim else answers[0]
 
 
-def _found(problem: _Problem, varpi: Array) -> list[list[Array]]:
-    """Return the distinct answers at every frequency."""
+def _found(problem: _Problem | SlipProblem, varpi: Array) -> tuple[_Problem | SlipProblem, list[list[Array]]]:
+    """Return the distinct answers at every frequency, and the problem they belong to."""
     order = np.argsort(varpi, kind="stable")
-    where, starts, size = seeds(problem.driven, problem.basis, varpi, order, problem.period)
-    frequency = problem.driven.equations.omega.max()
-    floor = 1e-14 * size * frequency**2
+    where, starts, size = problem.seeds(varpi, order)
+    floor = 1e-14 * size * problem.fastest**2
     found: list[list[Array]] = [[] for _ in varpi]
     neighbour = {int(a): [int(b) for b in near] for a, near in _neighbours(order)}
     for _ in range(_ROUNDS):
@@ -276,7 +300,7 @@ def _found(problem: _Problem, varpi: Array) -> list[list[Array]]:
         handed = [(near, answer) for at, answer in new for near in neighbour[at]]
         where = np.array([at for at, _ in handed], int)
         starts = np.array([answer for _, answer in handed])
-    return found
+    return problem.settled(found, varpi)
 
 
 def _neighbours(order: NDArray[np.intp]) -> list[tuple[int, list[int]]]:
@@ -284,12 +308,12 @@ def _neighbours(order: NDArray[np.intp]) -> list[tuple[int, list[int]]]:
     return [(int(order[k]), [int(order[j]) for j in (k - 1, k + 1) if 0 <= j <= last]) for k in range(len(order))]
 
 
-def _told(problem: _Problem, varpi: Array, found: list[list[Array]]) -> list[tuple[SteadyState, ...]]:
+def _told(problem: _Problem | SlipProblem, found: list[list[Array]], varpi: Array) -> list[tuple[SteadyState, ...]]:
     where = np.array([k for k, answers in enumerate(found) for _ in answers], int)
     if not where.size:
         return [() for _ in varpi]
     unknowns = np.array([answer for answers in found for answer in answers])
-    coefficients = problem.balance.coefficients(unknowns)
+    coefficients = problem.coefficients(unknowns)
     largest, _ = peak(problem.basis, problem.rows, coefficients)
     values = problem.multipliers(unknowns, varpi[where])
     damped = problem.driven.equations.damping.any() or bool(problem.driven.equations.forces)
@@ -298,6 +322,8 @@ def _told(problem: _Problem, varpi: Array, found: list[list[Array]]) -> list[tup
     for k in np.lexsort((largest, where)):
         stable = bool(np.abs(values[k]).max() <= bound)
         told[where[k]].append(
-            SteadyState(float(varpi[where[k]]), float(largest[k]), stable, values[k], coefficients[k], problem)
+            SteadyState(
+                float(varpi[where[k]]), float(largest[k]), stable, values[k], coefficients[k], problem, unknowns[k]
+            )
         )
     return [tuple(states) for states in told]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cra_sym.solvers.harmonic_balance import Basis
 from cra_sym.solvers.modal_polynomials import ModalPolynomials
 
-__all__ = ["even_monodromy", "monodromy", "multipliers"]
+__all__ = ["beside_linear", "even_monodromy", "monodromy", "multipliers"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -93,7 +93,7 @@ def _maps(
     q = np.einsum("pnm,sm->psn", coefficients, basis.values(phase)).reshape(-1, n)
     v = np.einsum("pnm,sm,p->psn", coefficients, basis.values(phase, 1), frequency).reshape(-1, n)
     known = None if causes is None else causes(phase, rows).swapaxes(0, 1).reshape(-1, points * steps)
-    rest = _beside_linear(equations, q, v, known)
+    rest = beside_linear(equations, q, v, known)
     h = 2 * np.pi * share / (frequency * steps)
     kick = _kick(equations, rest.reshape(points, steps, 2 * n, 2 * n), h)
     turn = _rotation(equations.omega, 0.5 * h)[:, None]
@@ -120,7 +120,7 @@ def _kick(equations: ModalPolynomials, rest: Array, h: Array) -> Array:
     return kick
 
 
-def _beside_linear(equations: ModalPolynomials, q: Array, v: Array, causes: Array | None) -> Array:
+def beside_linear(equations: ModalPolynomials, q: Array, v: Array, causes: Array | None) -> Array:
     """Return the matrix of the equations of variation in (q, p) without the undamped linear modes."""
     n, found = equations.modes, equations.derivatives(q, v, causes)
     matrix = np.zeros((len(q), 2 * n, 2 * n))

@@ -1,0 +1,280 @@
+"""Steady states of systems with elastic-slip elements: starts, as many harmonics as are needed, multipliers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.analysis.nonlinear import samples, watched
+from cra_sym.analysis.periodic_forcing import Forced, forced
+from cra_sym.model.excitations import Fluctuation, LagrangianTerms
+from cra_sym.model.system import System
+from cra_sym.solvers.harmonic_balance import Basis
+from cra_sym.solvers.slip_balance import Elements, SlipBalance, stuck
+from cra_sym.solvers.slip_stability import slip_multipliers
+
+__all__ = ["SlipProblem", "elements_of"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+FIRST, MOST = 15, 127
+"""Harmonics that are tried first, and at most, where none are asked for."""
+ACCURACY = 1e-7
+"""Relative change of a motion by twice as many harmonics that is aimed at."""
+_AMPLITUDES = np.geomspace(0.3, 300.0, 14)  # of the motion over that at which elements slip
+_PHASES = 6
+_SAMPLED = 9
+_FAR = 0.5
+_SAME = 1e-6
+_HELD = 1e-9  # force on a rigid-body mode over that of all sliders
+
+
+def elements_of(system: System, modes: int) -> Elements:
+    """Return the elements of a system with the statics of the modes left out in them."""
+    found = system.slip_elements(modes).absorbed()
+    groups = [
+        (found.stiffness[found.where == k], found.slip[found.where == k]) for k in range(len(found.displacements))
+    ]
+    return Elements(found.displacements, tuple(groups), found.flexibility)
+
+
+@dataclass(frozen=True, eq=False)
+class SlipProblem:
+    """A driven system with elements in so many modes and harmonics.
+
+    Attributes
+    ----------
+    arguments : mapping
+        It was made of.
+    rows : ndarray, shape (modes,)
+        Of the displacement that is watched.
+    driven : Forced
+    balance : SlipBalance
+    period : int
+    """
+
+    arguments: Mapping[str, Any]
+    rows: Array
+    driven: Forced
+    balance: SlipBalance
+    period: int
+
+    @classmethod
+    def of(cls, *, place: Any, field: Any, harmonics: int | None, period: int, **arguments: Any) -> SlipProblem:
+        """Return the problem; ``harmonics`` None is as many as are tried first."""
+        system, modes = arguments["system"], arguments["modes"]
+        if system.shape:
+            raise ValueError(f"system has the batch shape {system.shape}: must be a single one here")
+        own = {**arguments, "system": system.without_hysteresis}
+        own["excitation"] = _without_elements(system, arguments.get("excitation"))
+        driven = forced(**own)
+        if _pushes_rigid(driven):
+            raise ValueError("system: a constant load moves a rigid-body mode, which sliders alone hold")
+        options = {**arguments, "place": place, "field": field, "harmonics": harmonics, "period": period}
+        whole = FIRST if harmonics is None else harmonics
+        basis = Basis.whole(whole, samples(driven.equations.degree, whole, driven.order * period))
+        balance = SlipBalance(driven.equations, basis, elements_of(system, modes))
+        return cls(options, watched(own["system"], modes, place, field), driven, balance, period)
+
+    def richer(self, harmonics: int, more_modes: int = 0) -> SlipProblem:
+        """Return the same problem with so many harmonics, and more modes."""
+        options = dict(self.arguments)
+        most = options["system"].without_hysteresis.most_modes
+        options |= {"harmonics": harmonics, "modes": min(options["modes"] + more_modes, most)}
+        return self.of(**options)
+
+    @property
+    def basis(self) -> Basis:
+        """Constant and harmonics."""
+        return self.balance.basis
+
+    @property
+    def harmonics(self) -> int:
+        """Number of harmonics."""
+        return len(self.basis.sines)
+
+    @property
+    def fastest(self) -> float:
+        """Largest natural frequency with all elements stuck."""
+        return float(np.sqrt(np.linalg.eigvalsh(stuck(self.balance.equations, self.balance.elements)).max()))
+
+    def coefficients(self, unknowns: Array) -> Array:
+        """Return modal coefficients, shape (points, modes, functions)."""
+        return np.asarray(self.balance.coefficients(unknowns))
+
+    def _causes(self, varpi: Array) -> Array:
+        return self.driven.causes(varpi, self.basis.phase, self.period)
+
+    def solved(self, starts: Array, varpi: Array, floor: float = 0.0) -> tuple[Array, NDArray[np.bool_]]:
+        """Return answers from starts, and which converged."""
+        found, good = self.balance.newton(starts, varpi / self.period, self._causes(varpi))
+        rigid = self.balance.equations.omega == 0.0
+        if rigid.any():  # what holds it at rest is no part of the system
+            pull = np.abs(self.coefficients(found)[:, rigid, 0]).max(axis=1) * (varpi / self.period) ** 2
+            sliders = sum(float(f.sum()) for _, f in self.balance.elements.groups)
+            good = good & (pull <= _HELD * sliders * np.abs(self.balance.elements.rows).max())
+        return found, good
+
+    def multipliers(self, unknowns: Array, varpi: Array) -> Complex:
+        """Return Floquet multipliers over a period of each answer, shape (points, 2 modes)."""
+        found = np.zeros((len(unknowns), 2 * self.balance.equations.modes), complex)
+        coefficients, displacements = self.coefficients(unknowns), self.balance.displacements(unknowns)
+        for k, frequency in enumerate(varpi):
+
+            def waves(phase: Array, at: Array = varpi[k : k + 1]) -> Array:
+                return np.asarray(self.driven.causes(at, phase, self.period)[0])
+
+            cycles = self.balance.elements.cycles(displacements[k : k + 1])
+            found[k] = slip_multipliers(
+                self.balance.equations,
+                self.basis,
+                coefficients[k],
+                float(frequency / self.period),
+                self.balance.elements,
+                cycles,
+                waves,
+            )
+        return found
+
+    def loss(self, unknowns: Array) -> float:
+        """Return the energy that sliders take in a period of an answer, J."""
+        cycles = self.balance.elements.cycles(self.balance.displacements(unknowns[None]))
+        return float(sum(c.loss[0] for c in cycles))
+
+    def changed(self, more_modes: int, more_harmonics: int, unknowns: Array, varpi: float) -> float:
+        """Return by what share the motion changes with more modes, or with twice as many harmonics."""
+        rich = self.richer(2 * self.harmonics + 1 if more_harmonics else self.harmonics, more_modes)
+        start = np.zeros((1, rich.balance.equations.modes, rich.basis.size))
+        h, n = self.harmonics, self.balance.equations.modes
+        start[:, :n, : h + 1], start[:, :n, rich.harmonics + 1 : rich.harmonics + 1 + h] = np.split(
+            self.coefficients(unknowns[None]), [h + 1], axis=-1
+        )
+        size = np.linalg.norm(start)
+        if not size:
+            return 0.0
+        found, good = rich.solved(rich.balance.start(start), np.array([varpi]))
+        return float(np.linalg.norm(rich.coefficients(found) - start) / size) if good[0] else np.inf
+
+    def settled(self, found: list[list[Array]], varpi: Array) -> tuple[SlipProblem, list[list[Array]]]:
+        """Return a problem with as many harmonics as its answers need, and these; itself if a number was asked for."""
+        problem, open_ = self, self.arguments["harmonics"] is None
+        where = np.array([k for k, answers in enumerate(found) for _ in answers], int)
+        unknowns = np.array([answer for answers in found for answer in answers])
+        if not where.size or not unknowns.any():
+            return self, found
+        before = np.full(len(unknowns), np.inf)
+        while open_ and problem.harmonics < MOST:
+            rich = problem.richer(min(2 * problem.harmonics + 1, MOST))
+            start = rich.balance.embedded(unknowns, problem.harmonics)
+            after, good = rich.solved(start, varpi[where])
+            size = np.linalg.norm(start, axis=1)
+            change = np.linalg.norm(after - start, axis=1) / np.where(size > 0, size, 1.0)
+            unknowns, problem = np.where(good[:, None], after, start), rich
+            left = change * np.minimum(change / np.where(before > 0, before, 1.0), 1.0)  # what the next would change
+            open_, before = bool((np.where(np.isfinite(before), left, change) > ACCURACY).any()), change
+        return problem, [list(unknowns[where == k]) for k in range(len(found))]
+
+    # ----------------------------------------------------------------------------------------------------- starts
+
+    def seeds(self, varpi: Array, order: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array, float]:
+        """Return starts: rest, everything stuck to nothing stuck, and single modes with many amplitudes and phases.
+
+        Returns
+        -------
+        where : ndarray of int, shape (starts,)
+            The frequency each start belongs to.
+        starts : ndarray, shape (starts, unknowns)
+        size : float
+            Modal amplitude at which elements slip.
+        """
+        count, size = len(varpi), self._size
+        where, starts = [np.arange(count)], [np.zeros((count, self.balance.size))]
+        if not self.driven.rests:
+            for share in (1.0, 0.5, 0.0):
+                where.append(np.arange(count))
+                starts.append(self._linear(varpi, share))
+        if not self.balance.constant:
+            picked = order[np.unique(np.linspace(0, count - 1, _SAMPLED).round().astype(int))]
+            for mode in range(self.balance.equations.modes):
+                for at in picked:
+                    found = self._alone(mode, float(varpi[at]))
+                    where.append(np.full(len(found), at))
+                    starts.append(found)
+        return np.concatenate(where), np.concatenate(starts), size
+
+    @cached_property
+    def _size(self) -> float:
+        rows = np.abs(self.balance.elements.rows)
+        return float(self.balance.elements.limit / rows.max())
+
+    def _linear(self, varpi: Array, share: float) -> Array:
+        """Return the motion with springs that have a share of the elements' stiffness, nonlinear terms left out."""
+        balance, size = self.balance, self.basis.size
+        frequency = varpi / self.period
+        based = balance._based(np.zeros((len(varpi), balance.modal_size)), frequency, self._causes(varpi))
+        springs = np.repeat(share * balance.elements.stiffness, size)
+        matrix = np.eye(springs.size) + based.flexibility * springs
+        w = np.linalg.solve(matrix, based.displacement[..., None])[..., 0]
+        return np.concatenate([based.modal(springs * w, np.arange(len(varpi))), w], axis=1)
+
+    def _alone(self, mode: int, varpi: float) -> Array:
+        """Return answers of one mode with the harmonic nearest to it, from amplitudes and phases all around."""
+        equations = self.balance.equations.of(np.array([mode]))
+        omega = np.sqrt(equations.omega[0] ** 2 + self.balance.elements.stiffness @ self._row(mode) ** 2)
+        frequency = varpi / self.period
+        harmonic = int(np.clip(round(float(omega) / frequency), 1, self.harmonics))
+        slow = abs(harmonic * frequency - omega) > _FAR * omega
+        if slow and abs(harmonic * frequency - equations.omega[0]) > _FAR * equations.omega[0]:
+            return np.empty((0, self.balance.size))
+        alone = Forced(equations, self.driven.waves)
+        basis = Basis.whole(harmonic, samples(equations.degree, harmonic, alone.order * self.period))
+        small = SlipBalance(equations, basis, self.balance.elements.of(np.array([mode])))
+        scale = self.balance.elements.limit / max(np.abs(self._row(mode)).max(), 1e-300)
+        phases = 2 * np.pi * (np.arange(_PHASES) + 0.3) / _PHASES
+        starts = np.zeros((_AMPLITUDES.size * _PHASES, 1, basis.size))
+        starts[:, 0, harmonic] = scale * np.multiply.outer(_AMPLITUDES, np.cos(phases)).ravel()
+        starts[:, 0, 2 * harmonic] = scale * np.multiply.outer(_AMPLITUDES, np.sin(phases)).ravel()
+        causes = np.repeat(alone.causes(np.array([varpi]), basis.phase, self.period), len(starts), axis=0)
+        found, good = small.newton(small.start(starts), np.full(len(starts), frequency), causes, tolerance=1e-6)
+        kept: list[Array] = []
+        for answer in small.coefficients(found[good])[:, 0]:
+            if not any(np.linalg.norm(answer - other) <= 1e-4 * np.linalg.norm(answer) for other in kept):
+                kept.append(answer)
+        whole = np.zeros((len(kept), self.balance.equations.modes, self.basis.size))
+        for k, answer in enumerate(kept):
+            whole[k, mode, : harmonic + 1] = answer[: harmonic + 1]
+            whole[k, mode, self.harmonics + 1 : self.harmonics + 1 + harmonic] = answer[harmonic + 1 :]
+        return self.balance.start(whole)
+
+    def _row(self, mode: int) -> Array:
+        return self.balance.elements.rows[:, mode]
+
+
+def _pushes_rigid(driven: Forced) -> bool:
+    rigid = driven.equations.omega == 0.0
+    still = [t for t in driven.equations.forces if not (t.positions or t.velocities or t.causes)]
+    return bool(rigid.any()) and any(np.abs(term.tensor[rigid]).max() > 0 for term in still)
+
+
+def _without_elements(system: System, excitation: Any) -> Any:
+    """Return an excitation of the system without its elements."""
+    if isinstance(excitation, LagrangianTerms) and excitation == system.model.excitation:
+        return system.model.without_hysteresis.excitation
+    if isinstance(excitation, Fluctuation):
+        symbols = {
+            symbol.name
+            for element, _, _ in system.model.pieces["hysteresis"]
+            for value in element.parameters.values()
+            for symbol in getattr(value, "free_symbols", ())
+        }
+        both = [name for name in excitation.weights if name in symbols]
+        if both:
+            raise ValueError(
+                f"excitation = {excitation!r}: {both[0]} is of an elastic-slip element, which must not fluctuate"
+            )
+    return excitation

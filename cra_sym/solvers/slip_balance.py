@@ -1,0 +1,315 @@
+"""Harmonic balance with elastic-slip elements: the modes are eliminated, displacements of the elements are unknown.
+
+With the modal equations linearised at coordinates q the displacements obey w = w0 - G F(w): F are the harmonics of the
+elements' forces, exact between events, and G is the flexibility of the modes at each harmonic, dense where the
+equations are parametric or nonlinear.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.solvers.harmonic_balance import Balance, Basis
+from cra_sym.solvers.modal_polynomials import ModalPolynomials
+from cra_sym.solvers.slip_law import Cycle, cycle
+
+__all__ = ["Elements", "SlipBalance", "stuck"]
+
+Array = NDArray[np.float64]
+_HALVINGS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Elements:
+    """Elastic-slip elements on displacements w = B q - R F.
+
+    Attributes
+    ----------
+    rows : ndarray, shape (displacements, modes)
+        B.
+    groups : tuple of (stiffness, slip)
+        Of the elements on each displacement, arrays (elements,).
+    coupling : ndarray, shape (displacements, displacements)
+        R, zero on the diagonal: what different displacements owe to modes left out.
+    """
+
+    rows: Array
+    groups: tuple[tuple[Array, Array], ...]
+    coupling: Array
+
+    @cached_property
+    def stiffness(self) -> Array:
+        """Of all elements on each displacement, stuck."""
+        return np.array([k.sum() for k, _ in self.groups])
+
+    @property
+    def limit(self) -> float:
+        """Smallest displacement at which an element slips."""
+        return float(min((f / k).min() for k, f in self.groups))
+
+    @property
+    def reach(self) -> float:
+        """Largest displacement at which an element slips."""
+        return float(max((f / k).max() for k, f in self.groups))
+
+    def of(self, modes: NDArray[np.intp]) -> Elements:
+        """Return the same seen by some modes alone."""
+        return replace(self, rows=self.rows[:, modes], coupling=np.zeros_like(self.coupling))
+
+    def cycles(self, displacements: Array) -> list[Cycle]:
+        """Return what the elements do for displacements of shape (points, displacements, functions)."""
+        return [cycle(displacements[:, k], *group) for k, group in enumerate(self.groups)]
+
+
+def stuck(equations: ModalPolynomials, elements: Elements) -> Array:
+    """Return the stiffness of the modal equations with all elements stuck, shape (modes, modes)."""
+    k = np.diag(elements.stiffness)
+    force = np.linalg.solve(np.eye(len(k)) + k @ elements.coupling, k @ elements.rows)
+    return np.asarray(np.diag(equations.omega**2) + elements.rows.T @ force)
+
+
+class _Based(NamedTuple):
+    """Modal equations linearised: w0, G, and the modal coordinates that belong to forces (points, size)."""
+
+    displacement: Array
+    flexibility: Array
+    modal: Callable[[Array, slice | NDArray[np.intp]], Array]
+
+
+@dataclass(frozen=True, eq=False)
+class SlipBalance:
+    """The balance of modal equations with elements.
+
+    Attributes
+    ----------
+    equations : ModalPolynomials
+    basis : Basis
+        Constant and all harmonics up to one.
+    elements : Elements
+    """
+
+    equations: ModalPolynomials
+    basis: Basis
+    elements: Elements
+
+    @cached_property
+    def _balance(self) -> Balance:
+        return Balance(self.equations, self.basis)
+
+    @property
+    def modal_size(self) -> int:
+        """Number of modal unknowns; those of the displacements follow them."""
+        return self.equations.modes * self.basis.size
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.modal_size + len(self.elements.groups) * self.basis.size
+
+    @cached_property
+    def constant(self) -> bool:
+        """Whether the modal equations are linear with constant coefficients."""
+        terms = (*self.equations.energies, *self.equations.forces)
+        return not any(term.positions or term.velocities for term in terms)
+
+    @cached_property
+    def linear(self) -> bool:
+        """Whether the modal equations are linear."""
+        return self.equations.degree == 1
+
+    def coefficients(self, unknowns: Array) -> Array:
+        """Return the modal part of unknowns (points, size) as (points, modes, functions)."""
+        return unknowns[:, : self.modal_size].reshape(-1, self.equations.modes, self.basis.size)
+
+    def displacements(self, unknowns: Array) -> Array:
+        """Return the displacements of the elements, shape (points, displacements, functions)."""
+        return unknowns[:, self.modal_size :].reshape(len(unknowns), -1, self.basis.size)
+
+    def start(self, coefficients: Array) -> Array:
+        """Return unknowns of modal coefficients (points, modes, functions), their displacements without coupling."""
+        w = self.elements.rows @ coefficients
+        return np.concatenate([part.reshape(len(coefficients), -1) for part in (coefficients, w)], axis=1)
+
+    def embedded(self, unknowns: Array, harmonics: int) -> Array:
+        """Return unknowns with so many harmonics as unknowns of this balance with more."""
+        own, rows = len(self.basis.sines), self.equations.modes + len(self.elements.groups)
+        old = unknowns.reshape(len(unknowns), rows, 2 * harmonics + 1)
+        new = np.zeros((len(unknowns), rows, 2 * own + 1))
+        new[..., : harmonics + 1], new[..., own + 1 : own + 1 + harmonics] = np.split(old, [harmonics + 1], axis=-1)
+        return new.reshape(len(unknowns), -1)
+
+    # ------------------------------------------------------------------------------------------- linearised modes
+
+    def _based(self, q: Array, frequency: Array, causes: Array | None) -> _Based:
+        return self._receptance(frequency, causes) if self.constant else self._dense(q, frequency, causes)
+
+    def _rigid(self) -> NDArray[np.bool_]:
+        return np.asarray(self.equations.omega == 0.0)
+
+    def _receptance(self, frequency: Array, causes: Array | None) -> _Based:
+        """Return modes of constant coefficients at every harmonic."""
+        h, n, b = len(self.basis.sines), self.equations.modes, self.elements.rows
+        points, m = len(frequency), len(b)
+        k = np.arange(h + 1) * frequency[:, None]
+        z = (1j * k)[..., None, None] * self.equations.damping + np.diag(self.equations.omega**2)
+        z = z - (k**2)[..., None, None] * np.eye(n)
+        z[:, 0] += np.diag(self._rigid()) * frequency[:, None, None] ** 2  # where it stands, if nothing holds it
+        load = self._complex(self._loads(points, causes))
+        right = np.concatenate([load[..., None], np.broadcast_to(b.T, (points, h + 1, n, m))], axis=-1)
+        answer = np.linalg.solve(z, right.astype(complex))
+        own, by = answer[..., 0], answer[..., 1:]
+        flexibility = self._real(np.asarray(b @ by + self.elements.coupling, complex))
+
+        def modal(forces: Array, rows: slice | NDArray[np.intp]) -> Array:
+            total = own[rows] - (by[rows] @ self._complex(forces.reshape(len(forces), m, -1))[..., None])[..., 0]
+            return self._functions(total).reshape(len(forces), -1)
+
+        return _Based(self._functions(own @ b.T).reshape(points, -1), flexibility, modal)
+
+    def _loads(self, points: int, causes: Array | None) -> Array:
+        """Return the loads in the basis, shape (points, modes, functions)."""
+        basis, n = self.basis, self.equations.modes
+        if not self.equations.forces:
+            return np.zeros((points, n, basis.size))
+        still = np.zeros((points * basis.samples, n))
+        flat = None if causes is None else causes.swapaxes(0, 1).reshape(causes.shape[1], -1)
+        force = self.equations.derivatives(still, still, flat).force.reshape(points, basis.samples, n)
+        left = basis.weights / basis.samples * basis.values(basis.phase)
+        return np.asarray(np.einsum("psn,sm->pnm", force, left))
+
+    def _complex(self, coefficients: Array) -> NDArray[np.complex128]:
+        """Return (points, harmonics, ...) of (points, ..., functions)."""
+        h = len(self.basis.sines)
+        found = coefficients[..., : h + 1].astype(complex)
+        found[..., 1:] -= 1j * coefficients[..., h + 1 :]
+        return np.moveaxis(found, -1, 1)
+
+    def _functions(self, harmonics: NDArray[np.complex128]) -> Array:
+        """Return (points, ..., functions) of (points, harmonics, ...)."""
+        moved = np.moveaxis(harmonics, 1, -1)
+        return np.concatenate([moved.real, -moved.imag[..., 1:]], axis=-1)
+
+    def _real(self, factors: NDArray[np.complex128]) -> Array:
+        """Return factors at each harmonic, (points, harmonics, m, m), as matrices between functions."""
+        points, count, m, _ = factors.shape
+        found = np.zeros((points, m, 2 * count - 1, m, 2 * count - 1))
+        k, s = np.arange(count), np.arange(count, 2 * count - 1)
+        moved = factors.transpose(1, 0, 2, 3)
+        found[:, :, k, :, k] = moved.real
+        found[:, :, s, :, s] = moved.real[1:]
+        found[:, :, k[1:], :, s] = moved.imag[1:]
+        found[:, :, s, :, k[1:]] = -moved.imag[1:]
+        return found.reshape(points, m * (2 * count - 1), -1)
+
+    def _dense(self, q: Array, frequency: Array, causes: Array | None) -> _Based:
+        """Return parametric or nonlinear modes, linearised at coordinates (points, modal size)."""
+        b, size = self.elements.rows, self.basis.size
+        residual, jacobian, _, _ = self._balance.residual(q, frequency, causes)
+        still = np.flatnonzero(self._rigid()) * size
+        jacobian[:, still, still] -= frequency[:, None] ** 2
+        residual[:, still] -= frequency[:, None] ** 2 * q[:, still]
+        spread = np.kron(b.T, np.eye(size))
+        right = np.concatenate([residual[..., None], np.broadcast_to(spread, (len(q), *spread.shape))], axis=-1)
+        answer = np.linalg.solve(jacobian, right)
+        own, by = q - answer[..., 0], -answer[..., 1:]
+        flexibility = spread.T @ by + np.kron(self.elements.coupling, np.eye(size))
+
+        def modal(forces: Array, rows: slice | NDArray[np.intp]) -> Array:
+            return np.asarray(own[rows] - (by[rows] @ forces[..., None])[..., 0])
+
+        return _Based(own @ spread, flexibility, modal)
+
+    # --------------------------------------------------------------------------------------------------- answers
+
+    def newton(
+        self, unknowns: Array, frequency: Array, causes: Array | None = None, tolerance: float = 1e-11, most: int = 40
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Return answers from starts, many at once, and which converged.
+
+        Parameters
+        ----------
+        unknowns : ndarray, shape (points, size)
+        frequency : ndarray, shape (points,)
+            Of the basis.
+        causes : ndarray, shape (points, known functions, samples), optional
+        tolerance : float
+            What a displacement may change, relative to the motion or to where the first element slips.
+        most : int
+            Iterations.
+        """
+        n = self.modal_size
+        q, w = unknowns[:, :n].copy(), unknowns[:, n:].copy()
+        done, lost, open_ = np.zeros(len(q), bool), np.zeros(len(q), bool), np.arange(len(q))
+        based = self._based(q, frequency, causes)
+        share, before = np.ones(len(q)), np.full(len(q), np.inf)
+        step_w, step_q = np.zeros_like(w), np.zeros_like(q)
+        for _ in range(most):
+            rows: slice | NDArray[np.intp] = open_
+            if not self.linear:
+                some = None if causes is None else causes[open_]
+                based, rows = self._based(q[open_], frequency[open_], some), slice(None)
+            force, slope = self._forces(w[open_])
+            wrong = based.displacement[rows] - (based.flexibility[rows] @ force[..., None])[..., 0] - w[open_]
+            own = based.modal(force, rows) - q[open_] if not self.linear else np.zeros((len(open_), 0))
+            size = np.linalg.norm(wrong, axis=1) + np.linalg.norm(own, axis=1)
+            scale = np.linalg.norm(w[open_], axis=1) + np.linalg.norm(based.displacement[rows], axis=1)
+            good = size <= tolerance * (scale + self.elements.limit)
+            if self.linear and good.any():
+                q[open_[good]] = based.modal(force[good], open_[good])
+            done[open_[good]] = True
+            worse = ~good & (size > before[open_]) & (share[open_] > 0.5**_HALVINGS)
+            lost[open_] = ~np.isfinite(size)
+            self._halve(open_[worse], share, (w, step_w), (q, step_q))
+            keep = ~good & ~worse & np.isfinite(size)
+            moved = open_[keep]
+            if moved.size:
+                some_rows = moved if self.linear else np.flatnonzero(keep)
+                step_w[moved], step_q[moved] = self._step(
+                    based, some_rows, force[keep], slope[keep], wrong[keep], own[keep]
+                )
+                share[moved], before[moved] = 1.0, size[keep]
+                w[moved] += step_w[moved]
+                if not self.linear:
+                    q[moved] += step_q[moved]
+            open_ = np.flatnonzero(~done & ~lost)
+            if not open_.size:
+                break
+        return np.concatenate([q, w], axis=1), done
+
+    @staticmethod
+    def _halve(which: NDArray[np.intp], share: Array, *moved: tuple[Array, Array]) -> None:
+        """Take back half of the last step of some points."""
+        share[which] *= 0.5
+        for place, step in moved:
+            place[which] -= share[which, None] * step[which]
+
+    def _forces(self, w: Array) -> tuple[Array, Array]:
+        """Return the harmonics of the forces, and their rates (points, displacements, functions, functions)."""
+        cycles = self.elements.cycles(w.reshape(len(w), -1, self.basis.size))
+        force = np.concatenate([c.force for c in cycles], axis=1)
+        return force, np.stack([c.jacobian for c in cycles], axis=1)
+
+    def _step(
+        self, based: _Based, rows: NDArray[np.intp], force: Array, slope: Array, wrong: Array, own: Array
+    ) -> tuple[Array, Array]:
+        flexibility, size = based.flexibility[rows], self.basis.size
+        matrix = np.empty_like(flexibility)
+        for k in range(slope.shape[1]):
+            part = slice(k * size, (k + 1) * size)
+            matrix[:, :, part] = flexibility[:, :, part] @ slope[:, k]
+        diagonal = np.arange(matrix.shape[1])
+        matrix[:, diagonal, diagonal] += 1.0
+        try:
+            step: Array = np.asarray(np.linalg.solve(matrix, wrong[..., None])[..., 0], float)
+        except np.linalg.LinAlgError:
+            step = np.stack([np.linalg.lstsq(a, b, rcond=None)[0] for a, b in zip(matrix, wrong, strict=True)])
+        if self.linear:
+            return step, np.zeros((len(step), self.modal_size))
+        moved = np.einsum("pdml,pdl->pdm", slope, step.reshape(len(step), -1, size)).reshape(len(step), -1)
+        return step, own + based.modal(force + moved, rows) - based.modal(force, rows)
