@@ -63,6 +63,7 @@ _HOME = {
     "slow_flow_values": "analysis.slow_flow",
     "SteadyState": "analysis.steady_states",
     "steady_states": "analysis.steady_states",
+    "basins": "analysis.basins",
     "Iwan": "model.hysteresis",
     "Jenkins": "model.hysteresis",
     "Model": "model",

@@ -1,5 +1,6 @@
 from .analysis.backbone import Backbone as Backbone
 from .analysis.backbone import backbone as backbone
+from .analysis.basins import basins as basins
 from .analysis.certification import certify as certify
 from .analysis.certified_stability import certify_stability as certify_stability
 from .analysis.critical import critical_value as critical_value

@@ -63,7 +63,7 @@ CALLS = {
 ELSEWHERE = {
     "identify_joint",  # the case of the arm: k_t and k_r of its ends
     "eigenvalues", "damping_ratios", "count_eigenvalues", "critical_value",
-    "certify_stability", "backbone", "steady_states", "slow_flow", "slow_flow_values",
+    "certify_stability", "backbone", "steady_states", "basins", "slow_flow", "slow_flow_values",
     "nonlinear_modal_equations", "export",
     "explore",  # shows sliders: tests/test_explorer.py
 }  # fmt: skip

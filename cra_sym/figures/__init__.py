@@ -38,6 +38,9 @@ FIGURES = {
     "combinations": "cra_sym.figures.stability:figure_combinations",
     "accuracy": "cra_sym.figures.stability:figure_accuracy",
     "inside_tongues": "cra_sym.figures.nonlinear:figure_inside_tongues",
+    "shaken_along": "cra_sym.figures.large_amplitudes:figure_shaken_along",
+    "shaken_across": "cra_sym.figures.large_amplitudes:figure_shaken_across",
+    "backbone": "cra_sym.figures.nonlinear:figure_backbone",
     "frequency_response": "cra_sym.figures.vibration:figure_frequency_response",
     "residual_vibration": "cra_sym.figures.vibration:figure_residual_vibration",
     "input_shaping": "cra_sym.figures.vibration:figure_input_shaping",
@@ -51,6 +54,7 @@ FIGURES = {
 ANIMATIONS = {
     "moving_arm": "cra_sym.figures.animation:moving_arm",
     "moving_modes": "cra_sym.figures.animation:moving_modes",
+    "jumping_arm": "cra_sym.figures.sweep_film:jumping_arm",
 }
 """Name of an animation -> the function that returns it as an SVG document."""
 

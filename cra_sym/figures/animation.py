@@ -15,7 +15,7 @@ from cra_sym.arm.parameters import Arm
 from cra_sym.figures import described
 from cra_sym.solvers.motion import BaseMotion
 
-__all__ = ["moving_arm", "moving_modes"]
+__all__ = ["curve", "document", "film", "moved", "moving_arm", "moving_modes"]
 
 _LINES = (("#0072B2", ' stroke-dasharray="7 3"'), ("#D55E00", ""))  # rigid joint, elastic joint
 _LOOSE = {"k_t": 200.0, "k_r": 20.0}  # N/m, N m/rad: loose enough to be seen
@@ -64,7 +64,7 @@ def moving_arm(arm: Arm | None = None, k_t: float = _LOOSE["k_t"], k_r: float = 
         '<defs><rect id="moving-arm-base" x="37" y="-13" width="26" height="26" rx="3" fill="#444" stroke="none"/>'
         f'<circle id="moving-arm-tip" cx="{50 + _LENGTH}" r="5" fill="#444" stroke="none"/></defs>'
     )
-    return _document("moving-arm", 430, [things, *panels, _over_time(t, [v[-1] for v in give])])
+    return document("moving-arm", 430, [things, *panels, _over_time(t, [v[-1] for v in give])])
 
 
 def moving_modes(arm: Arm | None = None, k_t: float = _LOOSE["k_t"], k_r: float = _LOOSE["k_r"]) -> str:
@@ -93,8 +93,8 @@ def moving_modes(arm: Arm | None = None, k_t: float = _LOOSE["k_t"], k_r: float 
     up, panels = 75.0 / np.abs(shapes).max(), []
     for mode, slowest in enumerate((2.4, 1.8, 1.4)):
         films = [
-            _film(
-                (_curve(10 + 200 * x / x[-1], 85 - up * s * shapes[joint, mode], stroke, 2.5) for s in swing),
+            film(
+                (curve(10 + 200 * x / x[-1], 85 - up * s * shapes[joint, mode], stroke, 2.5) for s in swing),
                 220,
                 slowest * hertz[:, mode].min() / hertz[joint, mode],
             )
@@ -106,7 +106,7 @@ def moving_modes(arm: Arm | None = None, k_t: float = _LOOSE["k_t"], k_r: float 
             f'<text x="{120 + 235 * mode}" y="25">mode {mode + 1}</text><text x="{120 + 235 * mode}" y="232">'
             f"{hertz[0, mode]:.2f} Hz rigid, {hertz[1, mode]:.2f} Hz elastic</text></g>"
         )
-    return _document("moving-modes", 245, panels)
+    return document("moving-modes", 245, panels)
 
 
 def _joints(arm: Arm, k_t: float, k_r: float) -> tuple[Arm, Arm]:
@@ -118,11 +118,11 @@ def _seen_from_above(x: np.ndarray, base: np.ndarray, give: np.ndarray, colour: 
     scale = _LENGTH / x[-1]
     low = 175 - scale * base
     frames = (
-        f"{_curve(50 + scale * x, y - scale * v, (colour, ''), 3)}"
+        f"{curve(50 + scale * x, y - scale * v, (colour, ''), 3)}"
         f'<use href="#moving-arm-base" y="{y:.1f}"/><use href="#moving-arm-tip" y="{y - scale * v[-1]:.1f}"/>'
         for y, v in zip(low, give.T, strict=True)
     )
-    return _film(frames, 330, _DURATION * _SLOWER, still=1.0)
+    return film(frames, 330, _DURATION * _SLOWER, still=1.0)
 
 
 def _over_time(t: np.ndarray, tips: list[np.ndarray]) -> str:
@@ -135,7 +135,7 @@ def _over_time(t: np.ndarray, tips: list[np.ndarray]) -> str:
         for s in np.arange(0.0, _DURATION, 0.5)
     )
     curves = "".join(
-        _curve(left + across * t, middle - half * v / largest, line, 2) for v, line in zip(tips, _LINES, strict=True)
+        curve(left + across * t, middle - half * v / largest, line, 2) for v, line in zip(tips, _LINES, strict=True)
     )
     cursor = f'<path d="M{left} {middle - half}v{2 * half}" stroke="#333" stroke-width="1.5"/>'
     return (
@@ -143,22 +143,23 @@ def _over_time(t: np.ndarray, tips: list[np.ndarray]) -> str:
         f'<text x="{left - 8}" y="{middle - half + 5}">{1e3 * largest:.0f} mm</text>'
         f'<text x="{left - 8}" y="{middle + 5}">0</text></g>'
         f'<text x="{left}" y="{middle - half - 9}">the tip as seen from the base, v(L, t)</text>'
-        f"{_moved(cursor, wide, _FRAMES, _DURATION * _SLOWER, still=1.0)}"
+        f"{moved(cursor, wide, _FRAMES, _DURATION * _SLOWER, still=1.0)}"
     )
 
 
-def _film(frames: Iterable[str], width: int, seconds: float, still: float = 0.0) -> str:
+def film(frames: Iterable[str], width: int, seconds: float, still: float = 0.0) -> str:
     """Return frames as a strip; ``still`` is the time, in seconds of the arm's motion, at which it rests in print."""
     strip = [f'<g transform="translate({k * width})">{frame}</g>' for k, frame in enumerate(frames)]
-    return _moved("".join(strip), -width * len(strip), len(strip), seconds, still)
+    return moved("".join(strip), -width * len(strip), len(strip), seconds, still)
 
 
-def _moved(content: str, travel: int, steps: int, seconds: float, still: float = 0.0) -> str:
+def moved(content: str, travel: int, steps: int, seconds: float, still: float = 0.0) -> str:
+    """Return what is pulled by ``travel`` pixels in so many steps and seconds, again and again."""
     timing = f"animation-duration:{seconds:.3g}s;animation-timing-function:steps({steps})"
     return f'<g class="film" style="--travel:{travel}px;--still:-{_SLOWER * still:g}s;{timing}">{content}</g>'
 
 
-def _curve(x: np.ndarray, y: np.ndarray, line: tuple[str, str], width: float) -> str:
+def curve(x: np.ndarray, y: np.ndarray, line: tuple[str, str], width: float) -> str:
     """Return a curve through points given in pixels, to a tenth of one."""
     points = np.round(np.stack([x, y]), 1)
     steps = " ".join(f"{dx:g} {dy:g}" for dx, dy in np.diff(points, axis=1).T.round(1) + 0.0)
@@ -166,7 +167,7 @@ def _curve(x: np.ndarray, y: np.ndarray, line: tuple[str, str], width: float) ->
     return f'<path d="{start}" fill="none" stroke="{line[0]}" stroke-width="{width:g}"{line[1]}/>'
 
 
-def _document(name: str, height: int, parts: list[str]) -> str:
+def document(name: str, height: int, parts: list[str]) -> str:
     """Return an SVG with words for who cannot see it and the rules by which it moves."""
     title, description = described(name.replace("-", "_"))
     return (

@@ -224,7 +224,7 @@ def _largest(rows: np.ndarray, state: SteadyState) -> float:
 
 
 def figure_backbone(
-    system: System | None = None, *, mode: int = 1, modes: int = 6, points: int = 220, ax: Any = None
+    system: System | None = None, *, mode: int = 1, modes: int = 6, points: int = 150, ax: Any = None
 ) -> Figure:
     """Draw the frequency of free vibration over its energy, with the turns at internal resonances.
 

@@ -134,7 +134,7 @@ class Balance:
         turn = np.einsum("pnm,sm->psn", x, rate)
         v = frequency[:, None, None] * turn
         shape = (points * basis.samples, n)
-        flat = None if causes is None else causes.swapaxes(0, 1).reshape(causes.shape[1], -1)
+        flat = None if causes is None else causes.swapaxes(0, 1).reshape(causes.shape[1], shape[0])
         found = self.equations.derivatives(q.reshape(shape), v.reshape(shape), flat)
         force, momentum = (part.reshape(points, basis.samples, n) for part in found[:2])
         rates = [part.reshape(points, basis.samples, n * n).swapaxes(1, 2) for part in found[2:]]

@@ -1,0 +1,174 @@
+"""Basins of attraction: which steady state is reached from which initial motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import solve_ivp
+
+from cra_sym import checks
+from cra_sym.analysis.steady_states import SteadyState
+
+__all__ = ["basins"]
+
+Array = NDArray[np.float64]
+_DECAY = 4.0  # a transient has shrunk to exp(-4) of itself when the motion is told from the steady states
+_MOST_CYCLES = 20_000
+_CHUNK = 10  # cycles that are integrated at a time
+_TOLERANCE = 1e-6
+
+
+def basins(
+    states: Sequence[SteadyState],
+    displacement: ArrayLike,
+    velocity: ArrayLike,
+    *,
+    mode: int = 1,
+    cycles: int | None = None,
+) -> NDArray[np.intp]:
+    """Return which of the steady states at one frequency is reached from initial motions in one mode.
+
+    All initial motions are integrated together (DOP853, relative tolerance 1e-6) for whole periods, and told apart by
+    the stable state whose displacements and velocities at that phase are nearest.
+
+    Parameters
+    ----------
+    states : sequence of SteadyState
+        What :func:`cra_sym.steady_states` returns for one angular frequency.
+    displacement : array_like, shape (D,)
+        Initial displacement of the tip in the mode, or of what was chosen for ``states``, m.
+    velocity : array_like, shape (V,)
+        Its initial velocity, m/s.
+    mode : int
+        In which linear mode, from 1; the others start at rest.
+    cycles : int, optional
+        Periods of the answers to integrate; default: until the slowest mode has decayed to exp(-4).
+
+    Returns
+    -------
+    ndarray of int, shape (V, D)
+        Index into ``states``; -1 where the motion is nearer to no stable state than they are to each other.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If there is no stable state, the states have several frequencies, the system has no damping in a mode and
+        ``cycles`` is not given, or its nonlinear inertia depends on a known motion.
+
+    Examples
+    --------
+    A mass on a hardening spring: from rest it reaches the small vibration, from a large deflection the large one.
+
+    >>> from sympy import Function
+    >>> import cra_sym as cra
+    >>> from cra_sym.symbols import t, x
+    >>> q, F = Function("q")(t), Function("F")(t)
+    >>> duffing = cra.Model(0, fields=(), coordinates=[q], x=x, domain=(0, 1), t=t,
+    ...                     left=q.diff(t)**2/2 - q**2/2 - q**4/4, virtual_work=[(F, q, None)])
+    >>> states = cra.steady_states(duffing.at({}, zeta=0.02), 1.3, drive={F: 0.1}, modes=1)
+    >>> cra.basins(states, [0.0, 0.95], [0.0]).tolist()
+    [[0, 2]]
+    """
+    known = tuple(states)
+    for state in known:
+        checks.instance("states", state, SteadyState)
+    stable = [k for k, state in enumerate(known) if state.stable]
+    if not stable:
+        raise ValueError("states: must hold a stable one, no other is reached")
+    if len({state.angular_frequency for state in known}) > 1:
+        raise ValueError("states: must be those of one angular frequency")
+    flow = _Flow(known[0])
+    mode = checks.count("mode", mode, high=flow.modes)
+    row = flow.rows[mode - 1]
+    if not row:
+        raise ValueError(f"mode = {mode}: does not move the displacement that was chosen; place must not be its node")
+    places = checks.one_axis("displacement", displacement, "displacements", low=-1e60, high=1e60, unit="m")
+    rates = checks.one_axis("velocity", velocity, "velocities", low=-1e60, high=1e60, unit="m/s")
+    number = flow.cycles() if cycles is None else checks.count("cycles", cycles, high=_MOST_CYCLES)
+    v, q = (grid.ravel() for grid in np.meshgrid(np.atleast_1d(rates), np.atleast_1d(places), indexing="ij"))
+    start = np.zeros((2, q.size, flow.modes))
+    start[0, :, mode - 1], start[1, :, mode - 1] = q / row, v / row
+    reached = flow.after(start, number)
+    marks = np.stack([flow.mark(known[k]) for k in stable])
+    found = _nearest(flow.scaled(reached), marks, flow.scaled(start))
+    return np.append(np.array(stable), -1)[found].reshape(np.size(rates), np.size(places))
+
+
+def _nearest(points: Array, marks: Array, started: Array) -> NDArray[np.intp]:
+    """Return the mark next to each point, -1 if the point is not clearly nearer to it than marks are to each other.
+
+    If there is one mark, a tenth of the largest distance at the start is near.
+    """
+    apart = np.linalg.norm(points[:, None] - marks[None], axis=-1)
+    nearest = apart.argmin(axis=1)
+    between = np.linalg.norm(marks[:, None] - marks[None], axis=-1)
+    np.fill_diagonal(between, np.inf)
+    most = np.linalg.norm(started - marks[0], axis=-1).max(keepdims=True)
+    reach = 0.4 * between.min(axis=1) if len(marks) > 1 else 0.1 * most
+    good = apart[np.arange(len(points)), nearest] <= reach[nearest]
+    return np.where(good & np.isfinite(points).all(axis=1), nearest, -1)
+
+
+class _Flow:
+    """The modal equations that a steady state solves, for many motions at once."""
+
+    def __init__(self, state: SteadyState) -> None:
+        self._driven, self._period = state._problem.driven, state._problem.period
+        self._equations = self._driven.equations
+        self._varpi = np.array([state.angular_frequency])
+        self.rows, self.modes = state._problem.rows, self._equations.modes
+        if self._equations.moves_mass and any(term.causes for term in self._equations.energies if term.velocities):
+            raise ValueError("states: the nonlinear inertia must not depend on a known motion here")
+
+    @property
+    def _cycle(self) -> float:
+        return float(2 * np.pi * self._period / self._varpi[0])
+
+    def cycles(self) -> int:
+        """Return how many periods of the answers a transient takes."""
+        rates = np.linalg.eigvalsh((self._equations.damping + self._equations.damping.T) / 4)
+        if rates.min() <= 0:
+            raise ValueError("cycles = None: must be given where a mode has no damping: its transient does not decay")
+        return int(np.clip(np.ceil(_DECAY / (rates.min() * self._cycle)), 1, _MOST_CYCLES))
+
+    def after(self, start: Array, cycles: int) -> Array:
+        """Return displacements and velocities after so many periods, shape (2, motions, modes); nan if they run off."""
+        state, end = start.ravel(), 0
+        while end < cycles:
+            begin, end = end, min(end + _CHUNK, cycles)
+            span = begin * self._cycle, end * self._cycle
+            size = float(np.abs(state).max()) + 1e-12
+            run = solve_ivp(
+                self._rate, span, state, method="DOP853", rtol=_TOLERANCE, atol=1e-9 * size, t_eval=span[1:]
+            )
+            if not run.success:
+                return np.full_like(start, np.nan)
+            state = run.y[:, -1]
+        return np.asarray(state.reshape(start.shape))
+
+    def _rate(self, time: float, y: Array) -> Array:
+        q, u = y.reshape(2, -1, self.modes)
+        equations = self._equations
+        phase = np.array([2 * np.pi * time / self._cycle])
+        found = equations.derivatives(q, u, self._driven.causes(self._varpi, phase, self._period)[0])
+        force = found.force - u @ equations.damping.T - equations.omega**2 * q
+        if equations.moves_mass:
+            force = force - (found.momentum_q @ u[:, :, None])[:, :, 0]
+            force = np.linalg.solve(np.eye(self.modes) + found.momentum_v, force[:, :, None])[:, :, 0]
+        return np.stack([u, force]).ravel()
+
+    def mark(self, state: SteadyState) -> Array:
+        """Return where in the plane of displacements and velocities a steady state is at the phase 0."""
+        basis, coefficients = state._problem.basis, state.coefficients
+        at = np.zeros(1)
+        rate = float(self._varpi[0]) / self._period
+        q, u = coefficients @ basis.values(at)[0], rate * (coefficients @ basis.values(at, 1)[0])
+        return self.scaled(np.stack([q[None], u[None]]))[0]
+
+    def scaled(self, state: Array) -> Array:
+        """Return displacements and velocities over their frequency, shape (motions, 2 modes)."""
+        omega = np.maximum(self._equations.omega, float(self._varpi[0]) * 1e-3)
+        found: Array = np.concatenate([state[0], state[1] / omega], axis=-1)
+        return found

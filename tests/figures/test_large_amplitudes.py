@@ -1,0 +1,52 @@
+"""Figures of large amplitudes show what the analysis says."""
+
+import numpy as np
+import pytest
+
+import cra_sym as cra
+from cra_sym.figures.large_amplitudes import (
+    figure_basins,
+    figure_shaken_across,
+    figure_shaken_along,
+    foreshortened_arm,
+)
+from cra_sym.figures.nonlinear import cubic_joint
+from cra_sym.figures.sweep_film import jumping_arm
+from cra_sym.symbols import w
+
+ARM = cra.Arm.nominal().replace(k_t=1e3, zeta=2e-3)
+
+
+def test_a_small_foreshortened_arm_is_the_arm():
+    """Its linear part; and (36b) comes out of the motion along it."""
+    system = foreshortened_arm(ARM)
+    np.testing.assert_allclose(cra.natural_frequencies(system), cra.natural_frequencies(ARM), rtol=1e-13)
+    shaken = figure_shaken_along(ARM, amplitude=2e-3, points=5)
+    (ax,) = shaken.axes
+    rest = {tuple(point) for line in ax.lines for point in line.get_xydata() if point[1] == 0}
+    lower, upper = cra.stability_boundary(ARM, cra.AxialBase(1.0), 2e-3, (2, 2))
+    unstable = [x for line in ax.lines if line.get_markerfacecolor() == "white" for x, y in line.get_xydata() if y == 0]
+    assert len(rest) == 5 and all(lower < x < upper for x in unstable) and unstable
+
+
+def test_a_linear_joint_has_one_answer_and_a_hardening_one_up_to_three():
+    (ax,) = figure_shaken_across(points=9).axes
+    linear, hardening = (
+        np.concatenate([line.get_xdata() for line in ax.lines if line.get_marker() == marker]) for marker in "^o"
+    )
+    assert len(linear) == 9 and len(hardening) == 9 + 2 * (np.unique(hardening, return_counts=True)[1] == 3).sum() > 9
+
+
+def test_basins_are_named_by_their_answers():
+    joint = cubic_joint(ARM.replace(zeta=0.01), 1e9)
+    states = cra.steady_states(joint, 84.0, drive={w: 1e-4}, modes=2, harmonics=5)
+    figure = figure_basins(states, np.linspace(-2e-3, 2e-3, 3), [-0.05, 0.0, 0.05], mode=2, cycles=60)
+    words = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert words == [f"the answer of {1e3 * state.amplitude:.2f} mm" for state in states if state.stable]
+
+
+def test_the_film_of_the_jump_follows_both_sweeps():
+    svg = jumping_arm(points=7)
+    assert svg.count("<circle") == 14 and "<title" in svg and "stroke-dasharray" in svg
+    with pytest.raises(ValueError, match="mode"):
+        jumping_arm(mode=0)
