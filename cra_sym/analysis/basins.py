@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
 from cra_sym import checks
+from cra_sym.analysis.slip_states import SlipProblem
 from cra_sym.analysis.steady_states import SteadyState
 
 __all__ = ["basins"]
@@ -115,6 +116,10 @@ class _Flow:
     """The modal equations that a steady state solves, for many motions at once."""
 
     def __init__(self, state: SteadyState) -> None:
+        if isinstance(state._problem, SlipProblem):
+            raise ValueError(
+                "states: must be of a system without elastic-slip elements; cra.response follows one motion"
+            )
         self._driven, self._period = state._problem.driven, state._problem.period
         self._equations = self._driven.equations
         self._varpi = np.array([state.angular_frequency])
@@ -156,7 +161,8 @@ class _Flow:
         force = found.force - u @ equations.damping.T - equations.omega**2 * q
         if equations.moves_mass:
             force = force - (found.momentum_q @ u[:, :, None])[:, :, 0]
-            force = np.linalg.solve(np.eye(self.modes) + found.momentum_v, force[:, :, None])[:, :, 0]
+            inertia = np.eye(self.modes) + found.momentum_v
+            force = np.asarray(np.linalg.solve(inertia, force[:, :, None])[:, :, 0], float)
         return np.stack([u, force]).ravel()
 
     def mark(self, state: SteadyState) -> Array:
@@ -165,10 +171,9 @@ class _Flow:
         at = np.zeros(1)
         rate = float(self._varpi[0]) / self._period
         q, u = coefficients @ basis.values(at)[0], rate * (coefficients @ basis.values(at, 1)[0])
-        return self.scaled(np.stack([q[None], u[None]]))[0]
+        return np.asarray(self.scaled(np.stack([q[None], u[None]]))[0])
 
     def scaled(self, state: Array) -> Array:
         """Return displacements and velocities over their frequency, shape (motions, 2 modes)."""
         omega = np.maximum(self._equations.omega, float(self._varpi[0]) * 1e-3)
-        found: Array = np.concatenate([state[0], state[1] / omega], axis=-1)
-        return found
+        return np.concatenate([np.asarray(state[0], float), np.asarray(state[1] / omega, float)], axis=-1)
