@@ -12,6 +12,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "Arm": "arm.parameters",
+    "BoltedJoint": "arm.bolted_joint",
     "paper_lagrangian": "arm.lagrangian",
     "System": "model",
     "Member": "model.members",

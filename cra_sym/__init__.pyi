@@ -37,6 +37,7 @@ from .analysis.stability import stability_boundary as stability_boundary
 from .analysis.state_space import state_space as state_space
 from .analysis.steady_states import SteadyState as SteadyState
 from .analysis.steady_states import steady_states as steady_states
+from .arm.bolted_joint import BoltedJoint as BoltedJoint
 from .arm.excitations import JointStiffness as JointStiffness
 from .arm.frequency_parameters import frequency_parameters as frequency_parameters
 from .arm.lagrangian import paper_lagrangian as paper_lagrangian

@@ -1,0 +1,171 @@
+"""A bolted lap joint at the root of the arm: what its preload does to stiffnesses and slip force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.checks import count, instance, real_array
+
+if TYPE_CHECKING:
+    from cra_sym.arm.parameters import Arm
+    from cra_sym.model import Model
+    from cra_sym.model.system import System
+
+__all__ = ["BoltedJoint"]
+
+_UNITS = {
+    "rest": "N/m", "body_t": "N/m", "body_r": "N m/rad", "roughness": "m", "lever": "m", "friction": "1",
+    "poisson": "1", "exponent": "1", "reference": "N",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class BoltedJoint:
+    r"""Stiffnesses and slip force of a bolted lap joint over its preload N.
+
+    Rough faces touch at their summits, and at more of them as they are pressed. With summits whose heights are
+    distributed exponentially the normal stiffness of the contact is :math:`N/\sigma` (Greenwood and Williamson), with
+    others a power of N (Pohrt and Popov): :math:`K_n = n (N_0/\sigma) (N/N_0)^m` of n faces. Sideways it is :math:`2(1-\nu)/(2-\nu)`
+    times that (Mindlin). The members' own stiffness is in series:
+
+    .. math:: 1/k_d = 1/K_\tau + 1/k_{body,t}, \quad 1/k_r = 1/(K_n l^2) + 1/k_{body,r}.
+
+    The faces slide as a whole (macroslip) at Coulomb's force :math:`\mu N n`; what still holds then, bolts in bending
+    and bushings, is k_t. Microslip at smaller forces is left out: see :class:`cra_sym.Iwan`.
+
+    Parameters
+    ----------
+    rest : float
+        k_t, stiffness beside the friction, N/m, in [0, inf).
+    body_t, body_r : float
+        Stiffness of the members, N/m and N m/rad; positive, may be inf.
+    roughness : float
+        Sigma: the standard deviation of the summits' heights, m; positive.
+    lever : float
+        Radius of gyration of the contact, m; positive.
+    friction : float
+        Coefficient of friction; positive.
+    faces : int
+        Faces that slide: 1 of a single lap joint, 2 of a double one.
+    poisson : float
+        Of the members, in [0, 0.5].
+    exponent, reference : float
+        m in (0, 1] and N_0, N; with the exponent 1 the reference does not matter.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Names the parameter that is out of its range.
+
+    Notes
+    -----
+    The defaults are assumed, for the nominal arm: a joint in aluminium of which little holds without friction.
+
+    References
+    ----------
+    J. A. Greenwood, J. B. P. Williamson, "Contact of nominally flat surfaces", Proceedings of the Royal Society A 295
+    (1966), 300-319. R. D. Mindlin, "Compliance of elastic bodies in contact", Journal of Applied Mechanics 16 (1949),
+    259-268. R. Pohrt, V. L. Popov, "Normal contact stiffness of elastic solids with fractal rough surfaces", Physical
+    Review Letters 108 (2012), 104301.
+
+    Examples
+    --------
+    >>> joint = BoltedJoint()
+    >>> {name: float(f"{value:.3g}") for name, value in joint.values(10.0).items()}
+    {'k_t': 2000.0, 'k_r': 196.0, 'k_d': 615000.0, 'slip': 1.5}
+    """
+
+    rest: float = 2e3
+    body_t: float = 1e6
+    body_r: float = 1e4
+    roughness: float = 5e-6
+    lever: float = 1e-2
+    friction: float = 0.15
+    faces: int = 1
+    poisson: float = 0.33
+    exponent: float = 1.0
+    reference: float = 1.0
+
+    def __post_init__(self) -> None:
+        limits: dict[str, dict[str, Any]] = {name: {"low": 0.0, "open_low": True} for name in _UNITS}
+        limits["rest"] = {"low": 0.0}
+        limits["body_t"]["allow_infinite"] = limits["body_r"]["allow_infinite"] = True
+        limits["poisson"] = {"low": 0.0, "high": 0.5}
+        limits["exponent"] |= {"high": 1.0, "must": "a real number in (0, 1]"}
+        for name, limit in limits.items():
+            value = real_array(name, getattr(self, name), unit=_UNITS[name], **limit)
+            if value.ndim:
+                raise ValueError(f"{name} has shape {value.shape}: must be one number; preloads may be many")
+            object.__setattr__(self, name, float(value))
+        object.__setattr__(self, "faces", count("faces", self.faces))
+
+    def replace(self, **changes: Any) -> BoltedJoint:
+        """Return a validated copy with some parameters changed."""
+        unknown = [name for name in changes if name not in {field.name for field in fields(self)}]
+        if unknown:
+            raise TypeError(f"{unknown[0]!r} is not a parameter of BoltedJoint")
+        return replace(self, **changes)
+
+    def values(self, preload: Any) -> dict[str, NDArray[np.float64]]:
+        """Return k_t, k_r, the stiffness k_d and the slip of the Jenkins element, by name.
+
+        Parameters
+        ----------
+        preload : array_like
+            N, positive: the sum over the bolts.
+
+        Returns
+        -------
+        dict of str to ndarray
+            Each of the shape of the preload; N/m, N m/rad, N/m, N.
+        """
+        N = real_array("preload", preload, low=0.0, open_low=True, unit="N")
+        normal = self.faces * self.reference / self.roughness * (N / self.reference) ** self.exponent
+        sideways = 2 * (1 - self.poisson) / (2 - self.poisson) * normal
+        found = {
+            "k_t": np.full(N.shape, self.rest),
+            "k_r": 1.0 / (1.0 / (normal * self.lever**2) + 1.0 / self.body_r),
+            "k_d": 1.0 / (1.0 / sideways + 1.0 / self.body_t),
+            "slip": self.friction * self.faces * N,
+        }
+        return {name: value[()] for name, value in found.items()}
+
+    def on(self, arm: Arm, preload: Any) -> System:
+        """Return the arm with this joint: a System with a Jenkins element k_d, slip beside k_t and k_r.
+
+        Parameters
+        ----------
+        arm : Arm
+            Its own k_t and k_r do not matter.
+        preload : array_like
+            N, positive; an array is a batch.
+
+        Examples
+        --------
+        >>> import cra_sym as cra
+        >>> joint, arm = cra.BoltedJoint(), cra.Arm.nominal()
+        >>> cra.natural_frequencies(joint.on(arm, [1.0, 10.0, 1e3])).round(2)
+        array([[ 1.97, 13.31, 39.1 ],
+               [ 2.37, 14.93, 41.95],
+               [ 2.43, 15.21, 42.58]])
+        """
+        from cra_sym.arm.parameters import Arm
+
+        instance("arm", arm, Arm)
+        return _model(arm.model).at({**arm.values, **self.values(preload)}, zeta=arm.zeta)
+
+
+@cache
+def _model(model: Model) -> Model:
+    from sympy import Symbol
+
+    from cra_sym.model.hysteresis import Jenkins
+
+    k_d, slip = Symbol("k_d", positive=True), Symbol("slip", positive=True)
+    (field,) = model.equations.fields
+    return model.replace(hysteresis=[(Jenkins(k_d, slip), field, "left")])
