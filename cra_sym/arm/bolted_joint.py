@@ -30,8 +30,8 @@ class BoltedJoint:
 
     Rough faces touch at their summits, and at more of them as they are pressed. With summits whose heights are
     distributed exponentially the normal stiffness of the contact is :math:`N/\sigma` (Greenwood and Williamson), with
-    others a power of N (Pohrt and Popov): :math:`K_n = n (N_0/\sigma) (N/N_0)^m` of n faces. Sideways it is :math:`2(1-\nu)/(2-\nu)`
-    times that (Mindlin). The members' own stiffness is in series:
+    others a power of N (Pohrt and Popov): :math:`K_n = n (N_0/\sigma) (N/N_0)^m` of n faces. Sideways it
+    is :math:`2(1-\nu)/(2-\nu)` times that (Mindlin). The members' own stiffness is in series:
 
     .. math:: 1/k_d = 1/K_\tau + 1/k_{body,t}, \quad 1/k_r = 1/(K_n l^2) + 1/k_{body,r}.
 
@@ -77,7 +77,7 @@ class BoltedJoint:
     --------
     >>> joint = BoltedJoint()
     >>> {name: float(f"{value:.3g}") for name, value in joint.values(10.0).items()}
-    {'k_t': 2000.0, 'k_r': 196.0, 'k_d': 615000.0, 'slip': 1.5}
+    {'k_t': 2000.0, 'k_r': 196.0, 'k_d': 616000.0, 'slip': 1.5}
     """
 
     rest: float = 2e3
@@ -150,9 +150,9 @@ class BoltedJoint:
         >>> import cra_sym as cra
         >>> joint, arm = cra.BoltedJoint(), cra.Arm.nominal()
         >>> cra.natural_frequencies(joint.on(arm, [1.0, 10.0, 1e3])).round(2)
-        array([[ 1.97, 13.31, 39.1 ],
-               [ 2.37, 14.93, 41.95],
-               [ 2.43, 15.21, 42.58]])
+        array([[ 1.74, 12.4 , 36.65],
+               [ 2.32, 14.59, 40.93],
+               [ 2.42, 15.19, 42.53]])
         """
         from cra_sym.arm.parameters import Arm
 
