@@ -90,13 +90,11 @@ def first_roots(coefficients: Array) -> tuple[Array, NDArray[np.bool_]]:
 
 def _signs(signs: Array) -> tuple[Array, NDArray[np.intp]]:
     """Return the first sign that is not zero, and how often the sign changes, of each column."""
-    lead, last = np.zeros(signs.shape[1]), np.zeros(signs.shape[1])
-    changes = np.zeros(signs.shape[1], np.intp)
-    for row in signs:
-        changes += row * last < 0
-        last = np.where(row != 0, row, last)
-        lead = np.where(lead == 0, row, lead)
-    return lead, changes
+    there = signs != 0
+    last = np.maximum.accumulate(np.where(there, np.arange(len(signs))[:, None], 0), axis=0)
+    filled = np.take_along_axis(signs, last, axis=0)  # zeros take the sign before them
+    lead = np.take_along_axis(signs, there.argmax(axis=0)[None], axis=0)[0]
+    return lead, (filled[1:] * filled[:-1] < 0).sum(axis=0)
 
 
 def _roots(coefficients: Array, high: Array) -> Array:

@@ -24,9 +24,9 @@ from .slip_loads import Cause, add_acceleration, next_knot
 __all__ = ["ORDER", "Cause", "Events", "SlippingModes", "Start", "Step", "first_forces", "follow", "stuck_tangent"]
 
 Array = NDArray[np.float64]
-ORDER = 28
+ORDER = 36
 """Degree of the series of a step."""
-_REACH = 3.0  # length of a step times the highest frequency: the first term left out is 3^29/29! = 8e-18
+_REACH = 5.0  # length of a step times the highest frequency: the first term left out is 5^37/37! = 5e-18
 _MOST_STEPS = 1_000_000
 _STALLED = 8  # events at one time, after which a member moves on
 _WAYS = np.arange(1.0, ORDER + 1)[:, None, None]

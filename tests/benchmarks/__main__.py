@@ -23,6 +23,7 @@ from tests.benchmarks import (
     nodes,
     records,
     responses,
+    slipping,
     stability,
     targets,
     waves,
@@ -45,7 +46,7 @@ def run(quick: bool) -> dict[str, Any]:
     report["responses"], report["stability"] = responses.measured(), stability.measured()
     report["sweep"] = nodes.measured(40_000 if quick else 4_000_000)
     report["along x"] = along_x.measured(3 if quick else 5)
-    report["in practice"] = records.measured(quick)
+    report["in practice"], report["slip"] = records.measured(quick), slipping.measured()
     report["targets"] = targets.rows(report)
     return report
 
@@ -107,6 +108,8 @@ def table(report: dict[str, Any]) -> str:
     for title, unit in (("responses", "ns a sample"), ("stability", "ms a point")):
         lines += ["", f"## {title.capitalize()}", "", f"| route | {unit} | times as long |", "| --- | --: | --: |"]
         lines += [f"| {name} | {row[unit]:.3g} | {row['times as long']:.1f} |" for name, row in report[title].items()]
+    lines += ["", "## A thousand moves of 2 s with an element that slips, against solve_ivp with events", ""]
+    lines += ["| what | |", "| --- | --: |", *(f"| {name} | {value:.3g} |" for name, value in report["slip"].items())]
     lines += ["", "## Records of motion, and stores", "", *records.note(report["in practice"])]
     lines += ["", "## Sweeps", "", nodes.note(report["sweep"])]
     return "\n".join(lines) + "\n"
