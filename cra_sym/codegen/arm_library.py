@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 
 from cra_sym.arm.parameters import Arm
+from cra_sym.codegen.arm_batch import arm_batch
 from cra_sym.codegen.expressions import gauss_rule, modal_functions, spectrum_functions, stability_functions
 from cra_sym.codegen.frozen import stated
 from cra_sym.codegen.library import Check, Library, source
@@ -35,25 +36,59 @@ takes some three evaluations of the characteristic function, whatever the arm; r
 closed form.
 """
 
+_STACK = """\
+at most 10 kB, of which
+`modes_of` takes 8 kB for `NAME_MOST_MODES` = 1000 modes, and 160 kB in the functions for many arms at once, `_batch`,
+for blocks of `NAME_MOST_LANES` = 64 arms and up to `NAME_MOST_MODES_TOGETHER` = 16 modes; each may be set to less when
+compiling (`-DNAME_MOST_MODES=20`). These functions become SIMD code as wide as the compiler may use:
+`make ARCH=-march=native`"""
+_OF_PRECISION = {  # as _constants lists them
+    "float64": (1.7976931348623157e308, 2.2250738585072014e-308, 1e-16, 1e-13, 1e-12, 1e5),
+    "float32": (2.9e38, 1.1754944e-38, 5e-8, 1e-5, 1e-5, 1e4),
+}
+LEAST_SHARE = _OF_PRECISION["float32"][4]
+_SINGLE, _SINGLE_MODAL = 1e-5, 5e-4  # errors allowed in single precision: of frequencies, of all else
+_PRECISION = {
+    "float64": "",
+    "float32": f"""
+In single precision frequencies are right to {_SINGLE:g} and all else to {_SINGLE_MODAL:g} of the largest value, with
+dimensionless groups from 1e-9 to 1e9, 0 and infinity.
+""",
+}
+
 
 @lru_cache(maxsize=4)
-def arm_library(name: str) -> Library:
+def arm_library(name: str, real: str = "float64") -> Library:
     """Return the arm as a library."""
     parts = source("arm"), _with_widths(source("arm_modes")), source("arm_check")
-    text = "\n\n".join([_constants(), _generated(), *parts])
+    text = "\n\n".join([_constants(real), _generated(), *parts])
     summary = "A flexible Cartesian robotic arm: frequencies, modes, responses"
-    return Library(name, summary, text, stated(Arm.nominal().model), tuple(_checks()), _README)
+    told = stated(Arm.nominal().model)
+    checks = tuple(_checks(real))
+    batch = arm_batch(name, real, TOLERANCE if real == "float64" else _SINGLE)
+    stack = _STACK.replace("NAME", name.upper())
+    return Library(name, summary, text, told, checks, _README + _PRECISION[real], real, batch, stack)
 
 
-def _constants() -> str:
+def _constants(real: str) -> str:
     from cra_sym.solvers.one_wave import NEAR
     from cra_sym.solvers.one_wave_shapes import NEAR as NEAR_SHAPE
 
     nodes, weights = gauss_rule()
     terms = next(f.size for f in spectrum_functions() if f.name == "power_series")
+    kinds = {
+        "LARGEST": "what is larger is infinite",
+        "LEAST_NORMAL": "the least normal number",
+        "NEXT_STEP": "what the next step may be of z when it is left out",
+        "LAST_STEP": "what the last step may be of z",
+        "LEAST_SHARE": "of all mass, that the base alone moves",
+        "MOST_LAMBDA": "where powers of lambda stay in range",
+    }
+    numbers = zip(kinds.items(), _OF_PRECISION[real], strict=True)
     return (
         f"PI = {math.pi!r}  # half a turn\n"
-        f"NEAR = {float(NEAR[2])!r}  # lambda^4 below which the power series of the determinant serves\n"
+        + "".join(f"{key} = {value!r}  # {told}\n" for (key, told), value in numbers)
+        + f"NEAR = {float(NEAR[2])!r}  # lambda^4 below which the power series of the determinant serves\n"
         f"TERMS = {terms}  # of that series\n"
         f"GAUSS = {len(nodes)}  # points of a rule on (0, 1)\n"
         f"NODES = ({', '.join(map(repr, nodes))})\nWEIGHTS = ({', '.join(map(repr, weights))})\n"
@@ -80,11 +115,21 @@ def _generated() -> str:
     return FormPrinter.helped(text) + text
 
 
-def _checks() -> Iterator[Check]:
+def _checks(real: str) -> Iterator[Check]:
     """Yield the reference vectors of the package's own kernels, as far as the library goes."""
     for check in arm_checks(everything=True):
-        if all(map(math.isfinite, check.outputs)):  # others are the sensitivities of rigid-body modes
-            yield Check(_QUANTITIES[check.quantity], check.inputs, check.outputs, TOLERANCE, check.absolute)
+        if not all(map(math.isfinite, check.outputs)):  # the sensitivities of rigid-body modes
+            continue
+        quantity = _QUANTITIES[check.quantity]
+        if real == "float64":
+            yield Check(quantity, check.inputs, check.outputs, TOLERANCE, check.absolute)
+            continue
+        size = max(map(abs, check.outputs))
+        if check.quantity.startswith("state_space_force") and check.absolute * LEAST_SHARE > TOLERANCE * size:
+            yield Check(quantity, check.inputs, (), refused=True)  # the base has next to no share of the mass
+            continue
+        loss = _SINGLE if quantity <= _QUANTITIES["omega"] else _SINGLE_MODAL
+        yield Check(quantity, check.inputs, check.outputs, loss, loss / TOLERANCE * check.absolute)
     nominal = tuple(float(getattr(Arm.nominal(), name)) for name in ("L", "b", "h", "E", "rho", "m_b", "m_e", "J_e"))
     for bad in (math.nan, -1.0):
         yield Check(0, (bad, 0.0, 0.0, 0.0), (), refused=True)

@@ -4,31 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 from cra_sym.checks import choice, count, instance
 from cra_sym.codegen.arm_library import arm_library
-from cra_sym.codegen.expressions import gauss_rule, modal_functions, spectrum_functions, stability_functions
 from cra_sym.codegen.fmu import VERSIONS, fmu_archive
 from cra_sym.codegen.frozen import frozen_library
-from cra_sym.codegen.languages import LANGUAGES, Language
 from cra_sym.codegen.library import PRINTERS, check_name
-from cra_sym.codegen.program import Function
-from cra_sym.codegen.rendering import DIGEST, common_values, licence, rendered
+from cra_sym.codegen.rendering import DIGEST, licence
 from cra_sym.codegen.user_model import model_library
-from cra_sym.codegen.vectors import arm_checks, written
 from cra_sym.files import OutputError, path_of, staged_directory
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.system import MOST_MODES, System
 
 __all__ = ["Export", "export"]
 
-_BY_HAND = ("c", "fortran")
 _THINNED = 8  # of the reference vectors, those that Octave, some hundred times slower than the others, has
 
 
@@ -94,12 +87,13 @@ def export(
         Its first modes, frozen as numbers, are exported instead: exact steps under a held input, outputs, frequency
         response, input shapers. It may have dampers, vary along x, or be an arm; it is a single set of values.
     name : str, optional
-        In front of every public symbol, and the name of package, module, crate and target. Default: `cra`, with the
-        arm's package `cra_arm`; `model`; `system`.
+        In front of every public symbol, and the name of package, module, crate and target. Default: of the arm
+        `cra_arm`, in C and Fortran `cra`, so that its types are called `cra_arm`, `cra_mode`, ..; `model`; `system`.
     modes : int
         Modes of the system that are kept.
     real : {'float64', 'float32'}
-        Type of real numbers in the code of a system. Single precision is there for C, Fortran and Rust.
+        Type of real numbers in the code of an arm or a system. Single precision is there for C, Fortran and Rust; the
+        README says how exact it is.
     version : {'3.0', '2.0'}
         Of FMI.
     input, outputs
@@ -135,8 +129,10 @@ def export(
         raise TypeError("model and system: give one of them; a system is a model with values")
     if name is not None:
         check_name(name)
-    if system is None and real != "float64":
-        raise ValueError("real = 'float32': only the code of a system has it; give system=")
+    if model is not None and real != "float64":
+        raise ValueError("real = 'float32': only the code of an arm or a system has it; give system=")
+    if language in PRINTERS and real not in PRINTERS[language].reals:
+        raise ValueError(f"real = {real!r}: {PRINTERS[language].title} has {', '.join(PRINTERS[language].reals)}")
     if language == "fmu" and system is None:
         raise ValueError("language = 'fmu': is that of a system; give system=")
     target = Path(os.path.realpath(path_of("directory", directory)))
@@ -147,7 +143,7 @@ def export(
     elif model is not None:
         texts = dict(model_library(model, name or "model").texts(language))
     else:
-        texts = dict(_arm_texts(language, name))
+        texts = dict(_arm_texts(language, name or ("cra" if language in ("c", "fortran") else "cra_arm"), real))
     if language != "fmu":
         texts["LICENSE"] = licence()
     digest = _digest(texts)
@@ -167,18 +163,6 @@ def _system_texts(
     if real != "float64":
         raise ValueError(f"real = {real!r}: an FMU has float64")
     return {f"{name}.fmu": fmu_archive(library, given, names, version)}
-
-
-def _named(texts: dict[str, str], name: str | None) -> dict[str, str]:
-    """Return the arm's texts with another name in front of what is public."""
-    if name is None:
-        return texts
-
-    def put(text: str) -> str:
-        text = re.sub(r"cra_(?!sym)", f"{name}_", text).replace("CRA_", f"{name.upper()}_").replace("cra-", f"{name}-")
-        return text.replace("CraArm", "".join(map(str.capitalize, f"{name}_arm".split("_"))))
-
-    return {put(file): text if file == "reference.txt" else put(text) for file, text in texts.items()}
 
 
 def _digest(texts: Mapping[str, str | bytes]) -> str:
@@ -210,73 +194,11 @@ def _write(target: Path, texts: Mapping[str, str | bytes], keep: bool) -> None:
                 (folder / name).write_text(text, encoding="utf-8", newline="\n")
 
 
-@cache
-def _reference() -> str:
-    return written(arm_checks(everything=True), "a flexible Cartesian robotic arm")
+def _arm_texts(language: str, name: str, real: str) -> dict[str, str]:
+    from tqdm import tqdm
 
-
-def _arm_texts(language: str, name: str | None) -> dict[str, str]:
-    if language in _BY_HAND:
-        return _named(arm_sources(language) | {"reference.txt": _reference()}, name)
-    library = arm_library(name or "cra_arm")
+    with tqdm(total=0, desc=f"deriving and printing {language}", bar_format="{desc}", leave=False, disable=None):
+        library = arm_library(name, real)
     if language == "octave":
         library = replace(library, checks=library.checks[::_THINNED])
     return library.texts(language)
-
-
-def arm_sources(name: str) -> dict[str, str]:
-    """Return the texts of an arm's export to C or Fortran, by file, all but the reference vectors."""
-    from tqdm import tqdm
-
-    language = LANGUAGES[name]
-    with tqdm(total=0, desc=f"deriving and printing {language.title}", bar_format="{desc}", leave=False, disable=None):
-        values = common_values(language) | _spectrum_values(language) | _modal_values(language)
-        values["helpers"] = language.helped(values["spectrum_functions"] + values["modal_functions"])
-    values["nomenclature"] = nomenclature_rows()
-    return rendered(name, values)
-
-
-def _spectrum_values(language: Language) -> dict[str, Any]:
-    from cra_sym.solvers.one_wave import NEAR
-
-    functions = spectrum_functions()
-    terms = next(f.size for f in functions if f.name == "power_series")
-    return {"spectrum_functions": _texts(language, functions), "near": int(NEAR[2]), "terms": terms}
-
-
-def _modal_values(language: Language) -> dict[str, Any]:
-    from cra_sym.solvers.one_wave_shapes import NEAR
-
-    widths = stability_functions()
-    nodes, weights = gauss_rule()
-    return {
-        "modal_functions": _texts(language, (*modal_functions(), *widths)),
-        "near_shape": int(NEAR[2]),
-        "nodes": [repr(x) for x in nodes],
-        "weights": [repr(x) for x in weights],
-        "call": caller({f.name: f for f in widths}),
-    }
-
-
-def caller(functions: dict[str, Function]) -> Callable[..., str]:
-    """Return what writes a call with arguments given by name, in the function's own order."""
-
-    def call(name: str, **given: str) -> str:
-        return f"{name}({', '.join(given[a.name] for a in functions[name].arguments)})"
-
-    return call
-
-
-def _texts(language: Language, functions: tuple[Function, ...]) -> str:
-    return "\n\n".join(language.function(f) for f in functions)
-
-
-def nomenclature_rows() -> list[tuple[str, str, str]]:
-    """Return name, unit and meaning of every field of the arm."""
-    from dataclasses import fields
-
-    from cra_sym.arm.parameters import Arm
-    from cra_sym.symbols import nomenclature
-
-    rows = {row.name: row for row in nomenclature()}
-    return [(f.name, rows[f.name].unit, rows[f.name].meaning) for f in fields(Arm)]

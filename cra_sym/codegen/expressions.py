@@ -88,19 +88,39 @@ def modal_functions() -> tuple[Function, ...]:
         _make("Shape and derivatives at the tip from the wave amplitudes.", shapes.tip_far, _WAVES, circle, of=(2,)),
         _make("Shape and its three derivatives at xi from the wave amplitudes.", shapes.shape_far, _WAVES, of=(2,)),
         _make("Modal mass over rho A L, for z > 0.", _mass, pairs),
+        _make("Momentum of a mode over rho A L, for z > 0.", _momentum, pairs),
+        _make("Rigid-body motion, amplitudes, modal mass and momentum of a mode, z = 0.", _rigid_body, pairs),
         *_responses(),
     )
 
 
 def _mass() -> Any:
     """Return the modal mass with the tip's inertias by their own names."""
+    (mass,), arguments = _named(one_wave_rows.generalised_mass(arm_family().structure))
+    return mass, arguments
+
+
+def _momentum() -> Any:
+    """Return the integral of a shape with the masses, which the forces of the ends give."""
     structure = arm_family().structure
-    (mass,), arguments = one_wave_rows.generalised_mass(structure)
-    names = dict(zip(one_wave_rows.inertias(structure).values(), map(symbol, ("mu", "iota")), strict=True))
-    return mass.xreplace(names), [names.get(x, x) for x in arguments]
+    found, arguments = one_wave_rows.rows(structure)
+    momentum = found[2 * len(structure[0])]
+    return momentum, [x for x in arguments if x in momentum.free_symbols or x in one_wave.parameters(structure)]
 
 
-_mass.__name__ = "modal_mass"
+def _rigid_body() -> Any:
+    return _named(one_wave_rows.rigid_body(arm_family().structure))
+
+
+def _named(derivation: Any) -> Any:
+    """Return a derivation with the tip's inertias by their own names."""
+    expressions, arguments = derivation
+    inertias = one_wave_rows.inertias(arm_family().structure)
+    names = dict(zip(inertias.values(), map(symbol, ("mu", "iota")), strict=True))
+    return tuple(e.xreplace(names) for e in expressions), [names.get(x, x) for x in arguments]
+
+
+_mass.__name__, _momentum.__name__, _rigid_body.__name__ = "modal_mass", "momentum", "rigid_body"
 
 
 def _responses() -> list[Function]:

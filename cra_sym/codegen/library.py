@@ -32,7 +32,7 @@ _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 _ASIDE = {"_evaluate", "_example"}
 _LONGEST = 24  # a name of Fortran has 63 characters at most, ours are in front of others
 _C_HELPERS = {
-    name: f"static int {name}(int one, int other)\n{{\n    return one {sign} other ? one : other;\n}}"
+    name: f"static inline int {name}(int one, int other)\n{{\n    return one {sign} other ? one : other;\n}}"
     for name, sign in (("smaller_of", "<"), ("larger_of", ">"))
 }
 _FORTRAN_HELPERS = {
@@ -121,6 +121,10 @@ class Library:
     readme : str
         What only this library's README says, in Markdown.
     real : {'float64', 'float32'}
+    batch : tuple of three str
+        Declarations, definitions and self-test, in C, of functions for many sets at once.
+    stack : str
+        What the C code takes of it.
     """
 
     name: str
@@ -130,6 +134,8 @@ class Library:
     checks: tuple[Check, ...]
     readme: str = ""
     real: str = "float64"
+    batch: tuple[str, str, str] = ("", "", "")
+    stack: str = "a few hundred bytes"
 
     def texts(self, language: str) -> dict[str, str]:
         """Return the texts of all files, by name, but for the licence."""
@@ -149,6 +155,8 @@ class Library:
             printed["shown"] = length if isinstance(length, int) else whole.constants[str(length)].values[0]
         texts = rendered(f"library/{language}", printed) | rendered("library/common", printed)
         texts = {name.replace("NAME", self.name): _tidy(text) for name, text in texts.items()}
+        if language == "c" and self.batch[1]:
+            texts[f"{self.name}_batch.c"] = _tidy(f"{self._commented('/* ', ' * ', ' */')}\n{self.batch[1]}")
         texts["reference.txt"] = "".join(f"{check.line()}\n" for check in self.checks)
         return texts
 
@@ -179,6 +187,9 @@ class Library:
             "header": printer.header() if isinstance(printer, CPrinter) else "",
             "provenance": self._commented,
             "readme": self.readme,
+            "batch": self.batch[0],
+            "batch_test": self.batch[2],
+            "stack": self.stack,
             "checks": len(self.checks),
             "listed": [(f.name, f.doc.splitlines()[0]) for f in functions if f.public],
         }

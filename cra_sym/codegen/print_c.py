@@ -48,11 +48,14 @@ class CPrinter(Printer):
 
     def integers(self) -> str:
         """Return the whole numbers among the constants, which lengths need."""
-        return "\n".join(
-            self.documented_constant(c, f"enum {{ {self.variable(c.name)} = {c.values[0]} }};")
-            for c in self.form.constants.values()
-            if _counts(c)
-        )
+        found = []
+        for c in filter(_counts, self.form.constants.values()):
+            name = self.variable(c.name)
+            if c.name.startswith("MOST_"):  # what arrays have room for: may be set where memory is short
+                found += [f"#ifndef {name}", self.documented_constant(c, f"#define {name} {c.values[0]}"), "#endif"]
+            else:
+                found.append(self.documented_constant(c, f"enum {{ {name} = {c.values[0]} }};"))
+        return "\n".join(found)
 
     def constants(self) -> str:
         return "\n".join(self.constant(c) for c in self.form.constants.values() if not _counts(c))
@@ -123,7 +126,7 @@ class CPrinter(Printer):
         if function.name in self.failing:
             parameters += [] if function.result is None else [f"{result} *result"]
             result = f"{self.prefix}_status"
-        static = "" if function.public else "static "
+        static = "" if function.public else "static inline "
         head = f"{static}{result} {self.function_name(function)}("
         text, lines = head, []
         for number, parameter in enumerate(parameters or ["void"]):

@@ -62,8 +62,8 @@ class FortranPrinter(Printer):
         yield f"  type :: {self.record_name(record.name)}"
         for name, kind in record.fields.items():
             comment = f" ! {record.comments[name]}" if record.comments[name] else ""
-            zero = {"float": self.number(0.0), "int": "0", "bool": ".false."}[kind.name]
-            yield f"    {self.scalar(kind)} :: {name}{self.bounds(kind)} = {zero}{comment}"
+            start = "huge(1.0_dp)" if name in record.infinite else self.zero(kind)
+            yield f"    {self.scalar(kind)} :: {name}{self.bounds(kind)} = {start}{comment}"
         yield f"  end type {self.record_name(record.name)}"
 
     def record_name(self, name: str) -> str:

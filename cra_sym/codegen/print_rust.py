@@ -48,7 +48,6 @@ class RustPrinter(Printer):
 
     name, title = "rust", "Rust"
     choice_least = 0
-    infinity = "f64::INFINITY"
     reals: ClassVar = ("float64", "float32")
     functions: ClassVar = {n: n for n in _FUNCTIONS.split()} | {
         "log": "ln", "expm1": "exp_m1", "log1p": "ln_1p", "pow": "powf", "isfinite": "is_finite",
@@ -56,6 +55,7 @@ class RustPrinter(Printer):
 
     def __init__(self, form: Form, prefix: str, real: str = "float64") -> None:
         super().__init__(form, prefix, real)
+        self.infinity = f"{self.word}::INFINITY"
         self.needs_std: set[str] = set()
         for name, function in form.functions.items():
             if function.uses - _IN_CORE or function.calls & self.needs_std:

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import re
 import textwrap
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import sympy as sp
-from sympy.printing.c import C99CodePrinter
 from sympy.printing.codeprinter import CodePrinter
-from sympy.printing.fortran import FCodePrinter
 from sympy.printing.precedence import PRECEDENCE
 from sympy.printing.pycode import PythonCodePrinter
 
 from cra_sym.codegen.program import Argument, Function, Place
 
-__all__ = ["PRINTERS", "FormPrinter", "ScalarPrinter"]
+__all__ = ["FormPrinter", "ScalarPrinter"]
 
 _SAME = "sqrt exp expm1 log log1p sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh floor".split()
 _EXACT = 2**53  # integers up to this are doubles
@@ -164,60 +161,6 @@ def _double(value: Any) -> float:
     return number
 
 
-class CPrinter(ScalarPrinter, C99CodePrinter):
-    """C99: the functions of math.h."""
-
-    functions: ClassVar = {n: n for n in _SAME} | {"Abs": "fabs", "ceiling": "ceil", "Max": "fmax", "Min": "fmin"}
-
-
-class FortranPrinter(ScalarPrinter, FCodePrinter):
-    """Fortran 2008: its intrinsic functions, and few helpers for those it lacks."""
-
-    functions: ClassVar = {n: n for n in _SAME} | {
-        "Abs": "abs",
-        "Max": "max",
-        "Min": "min",
-        "floor": "floor_real",
-        "ceiling": "-floor_real",
-    }
-    entry, origin = "{name}({index})", 1
-    choice = "merge({value}, {otherwise}, {condition})"
-    both, either, negation, unequal = ".and.", ".or.", "(.not. {})", "/="
-
-    def number(self, value: float) -> str:
-        mantissa, _, exponent = repr(value).partition("e")
-        return f"{mantissa}{'' if '.' in mantissa else '.0'}{f'e{exponent}' if exponent else ''}_dp"
-
-    def _called(self, expr: Any) -> str:
-        if isinstance(expr, sp.ceiling):
-            return f"(-floor_real(-({self._print(expr.args[0])})))"
-        return super()._called(expr)
-
-    _print_Max = _print_Min = _called
-
-    def _powered(self, expr: sp.Pow) -> str:
-        strength = PRECEDENCE["Pow"]
-        base, exponent = (self.parenthesize(x, strength) for x in expr.args)
-        if expr.args[1].could_extract_minus_sign():
-            exponent = f"({exponent})"
-        return f"{base if expr.base.is_Atom and not expr.base.is_negative else f'({base})'}**{exponent}"
-
-    def _print_Relational(self, expr: Any) -> str:
-        ends = self._print(expr.lhs), self._print(expr.rhs)
-        if isinstance(expr, sp.Ne):  # strict compilers warn of == and /= between reals
-            return "({0} < {1} .or. {0} > {1})".format(*ends)
-        if isinstance(expr, sp.Eq):
-            return "({0} <= {1} .and. {0} >= {1})".format(*ends)
-        return super()._print_Relational(expr)
-
-    def wrapped(self, text: str, indent: str) -> str:
-        spaced = re.sub(r"(?<=[\w)])(\*\*|\*|/)(?=[\w(])", r"\1 ", text) if len(indent + text) > 110 else text
-        lines = textwrap.wrap(
-            spaced, 110, initial_indent=indent, subsequent_indent=f"{indent}    ", break_long_words=False
-        )
-        return " &\n".join(lines)
-
-
 class FormPrinter(ScalarPrinter, PythonCodePrinter):
     """The restricted form, which all languages are printed from."""
 
@@ -281,6 +224,3 @@ def _inverse(x: float) -> float:
 
 def _kind(argument: Argument) -> str:
     return f"Row[float, {len(argument.symbols)}]" if argument.row else "float"
-
-
-PRINTERS: dict[str, type[ScalarPrinter]] = {"c": CPrinter, "fortran": FortranPrinter}

@@ -6,11 +6,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-import cra_sym
-from cra_sym.codegen.languages import Language
-from cra_sym.codegen.vectors import TOLERANCE
-
-__all__ = ["DIGEST", "common_values", "licence", "rendered"]
+__all__ = ["DIGEST", "licence", "rendered"]
 
 #: Stands for the content hash, until all texts are there.
 DIGEST = "@content-hash@"
@@ -40,17 +36,6 @@ def _templates(root: Any, prefix: str = "") -> list[tuple[str, str]]:
         elif entry.name.endswith(".jinja"):
             found.append((prefix + entry.name, entry.read_text(encoding="utf-8")))
     return found
-
-
-def common_values(language: Language) -> dict[str, Any]:
-    """Return what every template may use."""
-    return {
-        "version": cra_sym.__version__,
-        "title": "cra_arm",
-        "language": language.title,
-        "digest": DIGEST,
-        "tolerance": f"{TOLERANCE:g}",
-    }
 
 
 def licence() -> str:

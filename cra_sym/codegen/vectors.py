@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import platform
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import fields
-from importlib.metadata import version
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +20,7 @@ from cra_sym.arm.parameters import Arm
 from cra_sym.codegen.characteristic import characteristic
 from cra_sym.model.excitations import AxialBase
 
-__all__ = ["SEED", "TOLERANCE", "Check", "arm_checks", "extreme_arms", "random_arms", "written"]
+__all__ = ["SEED", "TOLERANCE", "Check", "arm_checks", "extreme_arms", "random_arms"]
 
 SEED = 20240229
 TOLERANCE = 1e-12
@@ -37,12 +35,6 @@ class Check(NamedTuple):
     inputs: tuple[float, ...]
     outputs: tuple[float, ...]
     absolute: float = 0.0
-
-    def line(self) -> str:
-        """Return quantity, absolute tolerance, the two counts, inputs and outputs, separated by blanks."""
-        numbers = [f"{self.absolute:.3e}", str(len(self.inputs)), str(len(self.outputs))]
-        numbers += [repr(float(x)) for x in (*self.inputs, *self.outputs)]
-        return " ".join([self.quantity, *numbers])
 
 
 def random_arms(count: int, seed: int = SEED) -> list[Arm]:
@@ -210,15 +202,3 @@ def _stability_checks(arms: list[Arm], together: Arm) -> Iterator[Check]:
                 if np.isfinite(half_width):
                     inputs = _numbers(arm, *numbers, 0.2, *resonance)
                     yield Check(f"boundary_{name}", inputs, (centre - half_width, centre + half_width))
-
-
-def written(checks: Iterable[Check], subject: str) -> str:
-    """Return the text of the reference file: provenance, then one line a check."""
-    made_by = f"cra_sym {cra.__version__}, Python {platform.python_version()}, NumPy {np.__version__}"
-    head = [
-        f"# Reference vectors of {subject}.",
-        f"# Made by the kernels of {made_by}, SymPy {version('sympy')}; random arms from seed {SEED}.",
-        "# A line: quantity, absolute tolerance, number of inputs, number of outputs, inputs, outputs. SI units.",
-        f"# Agreement is |got - expected| <= {TOLERANCE:g} |expected| + absolute tolerance.",
-    ]
-    return "\n".join([*head, *(check.line() for check in checks)]) + "\n"

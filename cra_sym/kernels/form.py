@@ -86,7 +86,7 @@ class Constant:
 class Record:
     """A record: its fields by name, with the comment of each; those that are infinite unless they are given.
 
-    Only languages whose records have beginnings follow the latter; in C and Fortran a new record is zero.
+    Languages whose records have beginnings follow the latter; in C a new record is zero.
     """
 
     name: str

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from cra_sym.kernels.form import Constant, Form, FormError, Function, Record, Type, refused
 from cra_sym.kernels.form_check import Checker, literal, type_of
 
-__all__ = ["parse"]
+__all__ = ["comments_of", "parse"]
 
 
 def parse(text: str) -> Form:
@@ -28,7 +28,7 @@ def parse(text: str) -> Form:
     Type(name='float', length=None, access='in')
     """
     tree = ast.parse(text)
-    comments, alone = _comments(text)
+    comments, alone = comments_of(text)
     constants: dict[str, Constant] = {}
     records: dict[str, Record] = {}
     functions: dict[str, Function] = {}
@@ -52,7 +52,8 @@ def parse(text: str) -> Form:
     return Form(ast.get_docstring(tree) or "", constants, records, functions, comments, alone)
 
 
-def _comments(text: str) -> tuple[dict[int, str], frozenset[int]]:
+def comments_of(text: str) -> tuple[dict[int, str], frozenset[int]]:
+    """Return the comment of each line that has one, and the lines that hold nothing else."""
     found: dict[int, str] = {}
     alone = set()
     for token in tokenize.generate_tokens(io.StringIO(text).readline):

@@ -26,7 +26,7 @@ from warnings import warn
 from cra_sym.kernels import store
 from cra_sym.kernels.generated import Generated
 
-__all__ = ["compiled", "has_compiler", "is_compiled"]
+__all__ = ["compiled", "has_compiler", "is_compiled", "written_out"]
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "no_cfunc_wrapper": True}
 _UNKNOWN = (0, 69)  # the first version of Numba that was not tried
@@ -97,9 +97,9 @@ def compiled(template: str, kernels: Mapping[str, Generated], *, elementary: boo
     """
     if not has_compiler():
         raise ImportError("compiling needs numba: pip install numba")
-    prelude = _prelude(kernels, elementary)
+    head = _prelude(kernels, elementary)
     with _TURN:
-        return (_entries if _is_known() else _tried)(prelude, template)
+        return (_entries if _is_known() else _tried)(head, template)
 
 
 def is_compiled(template: str, kernels: Mapping[str, Generated]) -> bool:
@@ -125,11 +125,19 @@ def _prelude(kernels: Mapping[str, Generated], elementary: bool) -> str:
     return "\n\n".join(["\n".join(sorted(imports)), own, _WHERE, *bodies, ""])
 
 
+def written_out(template: str, kernels: Mapping[str, Generated]) -> tuple[str, dict[str, float | int]]:
+    """Return a specialised template as text, for printing in another language, and its constants by name."""
+    text = _prelude(kernels, True) + template
+    names: dict[str, Any] = {}
+    exec(text, names)
+    return text, {name: value for name, value in names.items() if isinstance(value, (int, float))}
+
+
 _MADE: set[str] = set()  # digests of what this process compiled or loaded
 
 
-def _digest(prelude: str, template: str) -> str:
-    return hashlib.sha256(repr((prelude, template, _OPTIONS, _COMPILER)).encode()).hexdigest()
+def _digest(head: str, template: str) -> str:
+    return hashlib.sha256(repr((head, template, _OPTIONS, _COMPILER)).encode()).hexdigest()
 
 
 def _remember(digest: str) -> None:
@@ -153,17 +161,17 @@ def _versions() -> list[str]:
 
 
 @cache
-def _entries(prelude: str, template: str) -> SimpleNamespace:
+def _entries(head: str, template: str) -> SimpleNamespace:
     import numba
 
     from cra_sym.kernels.inlined import inlined
 
-    digest = _digest(prelude, template)
+    digest = _digest(head, template)
     module = ModuleType(f"cra_sym_compiled_{digest[:32]}")
     sys.modules[module.__name__] = module  # where stored machine code looks for its constants
     namespace = module.__dict__
-    exec(prelude + template, namespace)
-    functions = {node.name: node for node in ast.parse(prelude + template).body if isinstance(node, ast.FunctionDef)}
+    exec(head + template, namespace)
+    functions = {node.name: node for node in ast.parse(head + template).body if isinstance(node, ast.FunctionDef)}
     entries, meanings = _names(template), namespace | functions
     for name in entries:
         written, arguments = f"{name}_written", ", ".join(a.arg for a in functions[name].args.args)
@@ -186,11 +194,11 @@ def _is_known() -> bool:
 
 
 @cache
-def _tried(prelude: str, template: str) -> SimpleNamespace:
+def _tried(head: str, template: str) -> SimpleNamespace:
     """Return the entries for a Numba that is not known: compiled as ever, or if that fails by its own means."""
     made = None
     with suppress(ImportError, AttributeError):
-        made = _entries(prelude, template)
+        made = _entries(head, template)
 
     def entry(name: str) -> Callable[..., Any]:
         def call(*arguments: Any) -> Any:
@@ -200,7 +208,7 @@ def _tried(prelude: str, template: str) -> SimpleNamespace:
                 return getattr(tried, name)(*arguments)
             except Exception:  # compiled code raises nothing
                 with _TURN:
-                    made = _plain(prelude, template)
+                    made = _plain(head, template)
                 if made is tried:
                     raise
             return getattr(made, name)(*arguments)
@@ -211,7 +219,7 @@ def _tried(prelude: str, template: str) -> SimpleNamespace:
 
 
 @cache
-def _plain(prelude: str, template: str) -> SimpleNamespace:
+def _plain(head: str, template: str) -> SimpleNamespace:
     """Return the entries as Numba compiles them by itself, which takes seconds and is not stored."""
     import numba
 
@@ -221,7 +229,7 @@ def _plain(prelude: str, template: str) -> SimpleNamespace:
         stacklevel=3,
     )
     module = ModuleType("cra_sym_compiled_by_numba")
-    exec(prelude + template, module.__dict__)
+    exec(head + template, module.__dict__)
     for name, value in list(vars(module).items()):
         if isinstance(value, FunctionType):
             setattr(module, name, numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})(value))

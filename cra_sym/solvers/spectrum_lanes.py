@@ -110,7 +110,7 @@ def _count(pairs, lane, lam, z, __BASIS__):
 
 def _linked(number, value, change):
     """Return the number, changed where the sign of the value is not that of ``(-1)**number``."""
-    return number + (0 if (value > 0) == (number & 1 == 0) else change)
+    return number + (change if (number + (value > 0)) & 1 == 0 else 0)
 
 
 def _counted(counts, values, fewest, most, pairs, zeros, tables, modes, size):

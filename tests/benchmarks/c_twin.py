@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from cra_sym.codegen.exporter import arm_sources
+from cra_sym.codegen.arm_library import arm_library
 
 WIDE = "-mprefer-vector-width=512"
 FLAGS = ["-std=c99", "-O3", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"]
@@ -32,7 +32,7 @@ def simd_width(text: str) -> int:
 #: One arm after the other, as a program that knows nothing of batches would ask.
 ONE_BY_ONE = """
 #include <stddef.h>
-#include "cra_arm.h"
+#include "cra.h"
 int one_by_one(size_t n, const double *kt, const double *kr, const double *mu, const double *io, int modes, double *out)
 {
     for (size_t i = 0; i < n; i++)
@@ -45,13 +45,13 @@ Fill = Callable[..., None]
 
 def build(folder: Path, *more: str) -> tuple[Fill, Fill, int]:
     """Return ``fill(out, kappa_t, kappa_r, mu, iota)`` by batches and one by one, and the SIMD width in bits."""
-    for name, text in {**arm_sources("c"), "one_by_one.c": ONE_BY_ONE}.items():
+    for name, text in {**arm_library("cra").texts("c"), "one_by_one.c": ONE_BY_ONE}.items():
         (folder / name).write_text(text, encoding="utf-8")
     flags, library = [*FLAGS, *more], folder / f"twin{''.join(more)}.so"
-    sources = ["spectrum.c", "batch.c", "modes.c", "one_by_one.c"]
+    sources = ["cra.c", "cra_batch.c", "one_by_one.c"]
     command = ["gcc", *flags, "-shared", "-fPIC", *sources, "-o", str(library), "-lm"]
     subprocess.run(command, cwd=folder, check=True)
-    command = ["gcc", *flags, "-S", "batch.c", "-o", "-"]
+    command = ["gcc", *flags, "-S", "cra_batch.c", "-o", "-"]
     assembly = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
     loaded = ctypes.CDLL(str(library))
     routes = [_filling(loaded[name]) for name in ("cra_frequency_parameters_batch", "one_by_one")]

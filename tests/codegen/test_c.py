@@ -6,13 +6,16 @@ import ctypes
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import cra_sym as cra
-from cra_sym.kernels import elementary
+from cra_sym.codegen.arm_library import arm_library
+from tests.codegen.kit import COMMANDS, arm_without_vectors, has, reference
+from tests.codegen.kit import run as kit_run
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None or shutil.which("make") is None, reason="needs gcc and make")
 
@@ -20,9 +23,8 @@ MATHEMATICS = (
     "sqrt", "exp", "expm1", "sin", "cos", "sincos", "atan2", "fmax", "fmin", "memset", "memcpy", "memmove",
     "_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail",
 )  # fmt: skip
-INTERNAL = (
-    "all_finite", "pair", "groups_of", "valid_groups", "frequency_parameters", "frequency_parameters_batch",
-)  # fmt: skip
+FLAGS = "-std=c99 -pedantic -Wall -Wextra -Wconversion -Wdouble-promotion -Wshadow -Werror -ffp-contract=off".split()
+SOURCES = ["cra.c", "cra_batch.c"]
 
 
 @pytest.fixture(scope="module")
@@ -44,26 +46,105 @@ def test_self_test_passes(folder):
 
 def test_self_test_can_fail(folder, tmp_path):
     run("make", "self_test", cwd=folder)
-    lines = (folder / "reference.txt").read_text().splitlines()
-    name, *numbers = lines[4].split()
-    numbers[-1] = repr(float(numbers[-1]) * (1 + 1e-9))
-    (tmp_path / "wrong.txt").write_text("\n".join([" ".join([name, *numbers])]) + "\n")
+    *numbers, last = (folder / "reference.txt").read_text().splitlines()[0].split()
+    (tmp_path / "wrong.txt").write_text(" ".join([*numbers, repr(float(last) * (1 + 1e-9))]) + "\n")
     done = subprocess.run([folder / "self_test", tmp_path / "wrong.txt"], capture_output=True, text=True)
-    assert done.returncode == 1 and name in done.stderr
+    assert done.returncode == 1 and f"quantity {numbers[0]}" in done.stderr
 
 
 def test_sanitizers_find_nothing(folder):
     assert ", 0 failures" in run("make", "sanitize", cwd=folder)
 
 
+def test_valgrind_finds_nothing(folder):
+    if shutil.which("valgrind") is None:
+        pytest.skip("needs valgrind")
+    run("make", "self_test", cwd=folder)
+    lines = (folder / "reference.txt").read_text().splitlines()
+    (folder / "few.txt").write_text("\n".join(lines[::40]) + "\n")
+    run("valgrind", "-q", "--error-exitcode=9", "--track-origins=no", "./self_test", "few.txt", cwd=folder)
+
+
+@pytest.mark.parametrize("compiler, real", [("gcc", "float64"), ("clang", "float64"), ("gcc", "float32")])
+def test_strict_compilers_say_nothing(compiler, real, tmp_path):
+    if shutil.which(compiler) is None:
+        pytest.skip(f"needs {compiler}")
+    for name, text in arm_without_vectors("crane", real).texts("c").items():
+        (tmp_path / name).write_text(text)
+    command = [compiler, *FLAGS, "-O2", "-fstack-usage", "-c", "crane.c", "crane_batch.c"]
+    run(*(word for word in command if compiler == "gcc" or word != "-fstack-usage"), cwd=tmp_path)
+    if compiler == "gcc":  # what the README says of the stack, less what functions called have
+        lines = [line for file in tmp_path.glob("*.su") for line in file.read_text().splitlines()]
+        of = [[int(x.split()[1]) for x in lines if x.startswith(name)] for name in ("crane.c:", "crane_batch.c:")]
+        assert max(of[0]) < 9.5e3 and sum(of[1]) < 1.6e5
+    less = ["-DCRANE_MOST_MODES=20", "-DCRANE_MOST_LANES=8", "-DCRANE_MOST_MODES_TOGETHER=4"]
+    run(compiler, *FLAGS, "-O1", *less, "-c", "crane.c", "crane_batch.c", cwd=tmp_path)
+    fast = [compiler, "-std=c99", "-ffast-math", "-c", "crane.c"]
+    done = subprocess.run(fast, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode and "do not compile with -ffast-math" in done.stderr
+
+
+def test_cmake_installs_a_target_that_c_plus_plus_finds(tmp_path):
+    if shutil.which("cmake") is None or shutil.which("g++") is None:
+        pytest.skip("needs cmake and g++")
+    library = arm_without_vectors("crane")
+    (tmp_path / "source").mkdir()
+    for name, text in library.texts("c").items():
+        (tmp_path / "source" / name).write_text(text)
+    build = ["cmake", "-S", "source", "-B", "build", f"-DCMAKE_INSTALL_PREFIX={tmp_path / 'installed'}"]
+    run(*build, "-DCMAKE_BUILD_TYPE=Debug", cwd=tmp_path)
+    run("cmake", "--build", "build", "--target", "install", cwd=tmp_path)
+    (tmp_path / "user").mkdir()
+    (tmp_path / "user" / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.16)\nproject(user LANGUAGES CXX)\nfind_package(crane REQUIRED CONFIG)\n"
+        "add_executable(user user.cpp)\ntarget_link_libraries(user PRIVATE crane::crane)\n"
+    )
+    (tmp_path / "user" / "user.cpp").write_text(
+        "#include <crane.h>\n#include <cstdio>\nint main() { double z[2];\n"
+        "  return crane_frequency_parameters(3, 0, 0.1, 0, 2, z) != CRANE_OK || !std::puts(CRANE_VERSION); }\n"
+    )
+    run("cmake", "-S", "user", "-B", "used", f"-DCMAKE_PREFIX_PATH={tmp_path / 'installed'}", cwd=tmp_path)
+    run("cmake", "--build", "used", cwd=tmp_path)
+    assert run("./used/user", cwd=tmp_path).strip() == cra.__version__
+
+
 def test_no_memory_no_input_no_output(folder):
-    run("make", "libcra_arm.a", cwd=folder)
+    run("make", "libcra.a", cwd=folder)
     if shutil.which("nm") is None:
         pytest.skip("needs nm")
-    symbols = [line.split() for line in run("nm", "libcra_arm.a", cwd=folder).splitlines()]
+    symbols = [line.split() for line in run("nm", "libcra.a", cwd=folder).splitlines()]
     wanted = {s[-1] for s in symbols if s[-2:-1] == ["U"]}
-    assert wanted <= {*MATHEMATICS, *(f"cra_{name}" for name in INTERNAL)}
+    assert wanted <= {*MATHEMATICS, "cra_groups_of", "cra_frequency_parameters"}
     assert not [s for s in symbols if s[-2:-1] and s[-2] in "BDCbd"]  # no variable
+
+
+@pytest.mark.parametrize("language", ["c", "fortran"])
+def test_bits_are_those_of_plain_python(language, tmp_path):
+    """Of everything that the self-test asks for, with the one mathematical library that the three have here."""
+    if not has(language):
+        pytest.skip(f"{language} needs {COMMANDS[language][0]}")
+    empty = arm_without_vectors("crane")
+    points = [(c.quantity, c.given, c.refused) for c in arm_library("cra").checks[::7]]
+    checks = reference(empty, tmp_path, points, dict.fromkeys(range(64), 256))
+    for name, text in replace(empty, checks=tuple(checks)).texts(language).items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    printed = run("make", "test", *(["SIMD="] if language == "c" else []), cwd=tmp_path)
+    assert f"{len(points)} checks, 0 failures" in printed and len(points) > 500
+
+
+@pytest.mark.parametrize("language", ["c", "fortran", "rust"])
+def test_single_precision_is_as_exact_as_it_says(language, tmp_path):
+    """All reference vectors: 1e-5 for frequencies, 5e-4 for everything else."""
+    if not has(language):
+        pytest.skip(f"{language} needs {COMMANDS[language][0]}")
+    made = cra.export(language, tmp_path / "single", real="float32", name="single")
+    for command in COMMANDS[language][1]:
+        printed = kit_run(command, tmp_path / "single")
+    assert ", 0 failures" in printed or "test result: ok" in printed
+    text = "".join((tmp_path / "single" / file).read_text() for file in made.files if "test" not in file)
+    assert not re.search(r"\bdouble \w|\bf64\b", re.sub(r"//.*|/\*.*|.*real64.*", "", text))
+    assert "right to 1e-05 and all else to 0.0005" in (tmp_path / "single" / "README.md").read_text()
 
 
 class _Arm(ctypes.Structure):
@@ -74,11 +155,8 @@ class _Arm(ctypes.Structure):
 
 @pytest.fixture(scope="module")
 def library(folder):
-    command = (
-        "cc -std=c99 -pedantic -Wall -Wextra -Werror -O2 -shared -fPIC -o libcra_arm.so spectrum.c batch.c modes.c -lm"
-    )
-    run(*command.split(), cwd=folder)
-    return ctypes.CDLL(str(folder / "libcra_arm.so"))
+    run("cc", *FLAGS, "-O2", "-shared", "-fPIC", "-o", "libcra.so", *SOURCES, "-lm", cwd=folder)
+    return ctypes.CDLL(str(folder / "libcra.so"))
 
 
 @pytest.mark.parametrize("modes", [1, 6, 40])
@@ -118,23 +196,32 @@ def test_the_most_modes_and_no_more(library):
     one = library.cra_frequency_parameters
     one.argtypes = [ctypes.c_double] * 4 + [ctypes.c_int, np.ctypeslib.ndpointer(np.float64)]
     found = np.zeros(1001)
-    assert one(3.0, 0.0, 0.1, 0.0, 1001, found) == 2 and not found.any()
+    assert one(3.0, 0.0, 0.1, 0.0, 1001, found) == ARGUMENT and not found.any()
     assert one(3.0, 0.0, 0.1, 0.0, 1000, found) == 0
     np.testing.assert_allclose(found[:1000], cra.frequency_parameters(3.0, 0.0, 0.1, modes=1000), rtol=1e-12)
 
 
-def test_branch_free_functions_are_those_of_the_kernels(folder):
-    """The constants of sine, cosine and exponential in batch.c are those of the package, digit for digit."""
-    text = (folder / "batch.c").read_text()
-    function = text[text.index("static inline void circle_at") : text.index("/* The steps of spectrum.c")]
-    digits = re.compile(r"\d\.\d{8,}(?:e-\d+)?")
-    kernels = Path(elementary.__file__).read_text()
-    assert set(digits.findall(function)) == set(digits.findall(kernels))
+BAD = [("L", 0.0), ("L", np.nan), ("k_t", -1.0), ("zeta", 1.0), ("m_e", np.inf), ("J_e", -1.0), ("E", np.nan)]
+NULL, ARGUMENT, ARM, OVERFLOW, STABLE = 1, 2, 4, 5, 6
+
+
+def test_numbers_of_the_statuses(folder):
+    header = (folder / "cra.h").read_text()
+    names = ("NULL_POINTER", "INVALID_ARGUMENT", "INVALID_ARM", "OVERFLOW", "NO_INSTABILITY")
+    for name, number in zip(names, (NULL, ARGUMENT, ARM, OVERFLOW, STABLE), strict=True):
+        assert f"CRA_{name} = {number}" in header
 
 
 @pytest.mark.parametrize(
     "change, status",
-    [({"L": 0.0}, 1), ({"L": np.nan}, 1), ({"k_t": -1.0}, 1), ({"zeta": 1.0}, 1), ({"m_e": np.inf}, 1), ({}, 0)],
+    [
+        ({"L": 0.0}, ARM),
+        ({"L": np.nan}, ARM),
+        ({"k_t": -1.0}, ARM),
+        ({"zeta": 1.0}, ARM),
+        ({"m_e": np.inf}, ARM),
+        ({}, 0),
+    ],
 )
 def test_status_of_bad_input(library, change, status):
     arm = cra.Arm.nominal()
@@ -142,13 +229,44 @@ def test_status_of_bad_input(library, change, status):
     frequencies = (ctypes.c_double * 3)()
     assert library.cra_natural_frequencies(ctypes.byref(_Arm(**values)), 3, frequencies) == status
     assert library.cra_natural_frequencies(ctypes.byref(_Arm(**values)), 0, frequencies) != 0
+    assert library.cra_natural_frequencies(None, 3, frequencies) == NULL
+    assert library.cra_natural_frequencies(ctypes.byref(_Arm(**values)), 3, None) == NULL
 
 
-def test_no_silent_infinity_or_nan(library):
+def _fields(folder: Path) -> int:
+    """How many doubles a mode has."""
+    header = (folder / "cra.h").read_text()
+    record = header[header.index("// One mode") : header.index("} cra_mode;")]
+    return sum(int(size or 1) for size in re.findall(r"double \w+(?:\[(\d+)\])?;", record))
+
+
+def test_modes_of_another_arm_are_refused(library, folder):
+    size, number = _fields(folder), ctypes.c_double
+    nominal = np.array([float(getattr(cra.Arm.nominal().replace(k_t=1e4, k_r=1e3), name)) for name, _ in _Arm._fields_])
+    pointer = lambda array: array.ctypes.data_as(ctypes.c_void_p)  # noqa: E731
+    modes, out = np.zeros((3, size)), np.zeros(64)
+    motion = np.array([0.1, 0.0, 0.0, 0.0, 0.0])
+    assert library.cra_modes_of(pointer(nominal), 3, pointer(modes)) == 0
+    respond = library.cra_tip_response
+    assert respond(pointer(nominal), 3, pointer(modes), pointer(motion), number(0.1), pointer(out)) == 0
+    for field in (0, 1, 2, 3, 4, 6, 7, 8, 9):  # all but the base's mass and the damping, which modes have not
+        other = nominal.copy()
+        other[field] = other[field] * 1.01 + (1e-6 if field == 7 else 0.0)
+        assert respond(pointer(other), 3, pointer(modes), pointer(motion), number(0.1), pointer(out)) == ARGUMENT
+    other = nominal.copy()
+    other[[5, 10]] = 7.0, 0.02
+    assert respond(pointer(other), 3, pointer(modes), pointer(motion), number(0.1), pointer(out)) == 0
+    rng = np.random.default_rng(3)
+    for foreign in (np.zeros(size), np.full(size, np.nan), rng.normal(size=size), np.full(size, 1e300)):
+        assert library.cra_mode_shape(pointer(foreign), number(0.0), 0, pointer(out)) == ARGUMENT
+        assert library.cra_sensitivity(pointer(foreign), pointer(out)) == ARGUMENT
+
+
+def test_no_silent_infinity_or_nan(library, folder):
     """Whatever is put in, a function that says all is well has given finite numbers."""
     rng = np.random.default_rng(5)
     special = np.array([0.0, 1e-300, 1e-30, 1e-6, 1e3, 1e12, 1e100, 1e300, np.inf, -1.0, np.nan])
-    fields = 25  # of a mode, all numbers
+    fields = _fields(folder)
     seen = set()
 
     def drawn(count, share):
@@ -168,16 +286,16 @@ def test_no_silent_infinity_or_nan(library):
         arm = np.where(rng.random(11) < 0.2, drawn(11, 0.3), arm)
         modes, out = np.zeros((4, fields)), np.zeros(64)
         checked("natural_frequencies", [out[:4]], arm, 4, out)
-        if checked("modes", [modes], arm, 4, modes):
+        if checked("modes_of", [np.zeros(0)], arm, 4, modes):
             continue
-        if (modes[:, 1] > 0.0).all():
-            checked("sensitivities", [out[:16]], arm, 4, modes, out)
+        assert np.isfinite(np.delete(modes, [fields - 5, fields - 4], axis=1)).all()  # all but stiffnesses of the arm
+        checked("sensitivity", [out[:4]], modes[1], out)
         checked("tip_response", [out[:1]], arm, 4, modes, drawn(5, 0.3), ctypes.c_double(drawn(1, 0.3)[0]), out)
         checked("mode_shape", [out[:1]], modes[3], ctypes.c_double(arm[0] / 2), 3, out)
         A, B, C = np.zeros(100), np.zeros(10), np.zeros(10)
-        checked("state_space_acceleration", [A, B, C], arm, 4, modes, A, B, C)
-        checked("state_space_force", [A, B, C], arm, 4, modes, A, B, C)
+        checked("state_space_acceleration", [A, B, C], arm, 4, modes, 8, 64, A, B, C)
+        checked("state_space_force", [A, B, C], arm, 4, modes, 10, 100, A, B, C)
         excitation, ratio = drawn(3, 0.3), ctypes.c_double(drawn(1, 0.3)[0])
-        checked("excitation_matrix", [out[:16]], arm, 4, modes, excitation, ratio, out)
-        checked("stability_boundary", [A[:1], B[:1]], arm, 4, modes, excitation, ratio, 1, 2, A, B)
-    assert seen >= {0, 1, 2, 4, 5}
+        checked("coupling", [out[:1]], arm, excitation, modes[1], modes[2], ratio, out)
+        checked("stability_boundary", [out[:2]], arm, excitation, ratio, modes[0], modes[1], 0, out)
+    assert seen >= {0, ARGUMENT, ARM, OVERFLOW, STABLE}

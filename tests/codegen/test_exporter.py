@@ -7,7 +7,6 @@ import re
 import shutil
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 
 import pytest
@@ -17,35 +16,39 @@ from cra_sym.codegen import arm_library, exporter
 from cra_sym.codegen.library import Library
 from tests.codegen import kit
 
-once = cache(exporter.arm_sources)
-
 
 @pytest.fixture
 def short(monkeypatch):
-    """Exports with sources printed once and a short reference file: how they are written is all that matters here."""
-    monkeypatch.setattr(exporter, "arm_sources", lambda name: dict(once(name)))
-    monkeypatch.setattr(exporter, "_reference", lambda: "# nothing\n")
-    monkeypatch.setattr(exporter, "arm_library", lambda name: Library(name, "Every construct.", kit.TEXT, (), ()))
+    """Exports of another text: how they are written is all that matters here."""
+    monkeypatch.setattr(exporter, "arm_library", lambda name, real: Library(name, "Constructs.", kit.TEXT, (), ()))
+
+
+@pytest.fixture
+def without_vectors(monkeypatch):
+    """Exports of the arm without reference vectors."""
+    made = arm_library.arm_library.__wrapped__
+    monkeypatch.setattr(arm_library, "_checks", lambda real: ())
+    monkeypatch.setattr(exporter, "arm_library", made)
 
 
 def test_the_result_lists_what_was_written(short, tmp_path):
     made = cra.export("c", tmp_path / "out")
-    assert {"cra_arm.h", "README.md", "Makefile", "reference.txt"} <= set(made.files)
-    assert "cra_arm.h" in repr(made)
+    assert {"cra.h", "README.md", "Makefile", "reference.txt"} <= set(made.files)
+    assert "cra.h" in repr(made)
     assert made.digest in (tmp_path / "out" / "README.md").read_text()
     assert {*made.files, "manifest.json"} == {p.name for p in (tmp_path / "out").iterdir()}
 
 
 DIGESTS = """
 import cra_sym.codegen.arm_library as arm
-from cra_sym.codegen.exporter import _digest, arm_sources
+from cra_sym.codegen.exporter import _digest
 from cra_sym.codegen.library import PRINTERS
-from cra_sym.codegen.vectors import arm_checks, written
+from cra_sym.codegen.vectors import arm_checks
 
-text = written(arm_checks(everything=False), "an arm")
-arm._checks = tuple
-digests = [*map(_digest, map(arm_sources, ("c", "fortran"))), _digest({"reference": text})]
-digests += [_digest(arm.arm_library.__wrapped__("crane").texts(language)) for language in PRINTERS]
+text = repr([*arm_checks(everything=False)])
+arm._checks = lambda real: ()
+library = arm.arm_library.__wrapped__("crane")
+digests = [_digest({"reference": text}), *(_digest(library.texts(language)) for language in PRINTERS)]
 """
 
 
@@ -57,7 +60,7 @@ def test_same_input_same_bytes(monkeypatch):
     command = [sys.executable, "-c", f"{DIGESTS}print(*digests)"]
     environment = os.environ | {"PYTHONHASHSEED": "1"}
     there = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
-    assert there.split() == here["digests"] and len(here["digests"]) == 10
+    assert there.split() == here["digests"] and len(here["digests"]) == 8
 
 
 def test_a_folder_with_content_is_left_alone(short, tmp_path):
@@ -68,9 +71,9 @@ def test_a_folder_with_content_is_left_alone(short, tmp_path):
         cra.export("c", folder)
     assert [p.name for p in folder.iterdir()] == ["mine.txt"]
     cra.export("c", folder, overwrite=True)
-    assert (folder / "mine.txt").read_text() == "mine" and (folder / "cra_arm.h").exists()
+    assert (folder / "mine.txt").read_text() == "mine" and (folder / "cra.h").exists()
     cra.export("python", folder, overwrite=True)
-    assert (folder / "mine.txt").exists() and not (folder / "cra_arm.h").exists()
+    assert (folder / "mine.txt").exists() and not (folder / "cra.h").exists()
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
 
 
@@ -87,7 +90,7 @@ def test_a_failed_export_leaves_everything_as_it_was(short, tmp_path, monkeypatc
         if left[0] <= 0:
             raise error
 
-    monkeypatch.setattr(*((exporter, "_reference") if place == "reference" else (Path, "write_text")), failing)
+    monkeypatch.setattr(*((exporter, "arm_library") if place == "reference" else (Path, "write_text")), failing)
     for target, overwrite in (("old", True), ("new/deep", False)):
         left[0] = 3
         with pytest.raises(error):
@@ -102,31 +105,38 @@ def test_unknown_language_is_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_two_arms_link_into_one_program(short, tmp_path):
+def test_two_arms_link_into_one_program(without_vectors, tmp_path):
     if shutil.which("g++") is None or shutil.which("make") is None:
         pytest.skip("needs g++ and make")
     for name in ("left", "right_one"):
         made = cra.export("c", tmp_path / name, name=name)
-        assert {f"{name}_arm.h", f"{name}_internal.h"} <= set(made.files)
+        assert {f"{name}.h", f"{name}_batch.c"} <= set(made.files)
         text = "".join((tmp_path / name / file).read_text() for file in made.files if file != "README.md")
         assert not re.search(r"\bcra_(?!sym)|CRA_", text)
-        kit.run(["make", f"lib{name}_arm.a"], tmp_path / name)
+        kit.run(["make", f"lib{name}.a", "SIMD=-O0"], tmp_path / name)
     (tmp_path / "main.cpp").write_text(
-        '#include "left/left_arm.h"\n#include "right_one/right_one_arm.h"\n'
+        '#include "left/left.h"\n#include "right_one/right_one.h"\n'
         "int main() { double one[2], two[2];\n"
         "  int bad = left_frequency_parameters(3, 0, 0.1, 0, 2, one) != LEFT_OK;\n"
         "  bad += right_one_frequency_parameters(3, 0, 0.1, 0, 2, two) != RIGHT_ONE_OK;\n"
         "  return bad || one[1] != two[1]; }\n"
     )
-    libraries = ["left/libleft_arm.a", "right_one/libright_one_arm.a"]
+    libraries = ["left/libleft.a", "right_one/libright_one.a"]
     kit.run(["g++", "-Wall", "-Werror", "main.cpp", *libraries, "-lm", "-o", "main"], tmp_path)
     kit.run(["./main"], tmp_path)
 
 
 @pytest.mark.parametrize("language", ["fortran", "python", "rust", "julia"])
-def test_a_name_stands_in_front_of_everything(short, tmp_path, language):
+def test_a_name_stands_in_front_of_everything(without_vectors, tmp_path, language):
     made = cra.export(language, tmp_path / "out", name="crane")
     assert not any("cra_" in file for file in made.files)
     text = "".join((tmp_path / "out" / file).read_text() for file in made.files if file != "README.md")
     assert not re.search(r"\bcra_(?!sym)|CRA_|CraArm", text)
     assert re.search(r"\bcrane", text)
+
+
+def test_what_has_no_single_precision_says_so(tmp_path):
+    for language in ("python", "javascript", "octave", "julia"):
+        with pytest.raises(ValueError, match=r"real = 'float32': .* has float64"):
+            cra.export(language, tmp_path / "out", real="float32")
+    assert not list(tmp_path.iterdir())

@@ -21,7 +21,7 @@ def test_the_grammar_sees_an_error():
 
 
 def test_every_file_parses(tmp_path, monkeypatch):
-    monkeypatch.setattr(arm_library, "_checks", tuple)
+    monkeypatch.setattr(arm_library, "_checks", lambda real: ())
     arm_library.arm_library.cache_clear()
     made = cra.export("julia", tmp_path / "julia")
     sources = [name for name in made.files if name.endswith(".jl")]
