@@ -129,8 +129,8 @@ def count_eigenvalues(system: System, radius: Any) -> NDArray[np.int64]:
     Raises
     ------
     ValueError
-        If the radius is out of range, an eigenvalue lies on the circle, it reaches to waves too short to follow or to
-        where rounding leaves no digits, or the model has supports at interior places.
+        If the radius is out of range, an eigenvalue lies on the circle, or it reaches to waves too short to follow or
+        to where rounding leaves no digits.
 
     Examples
     --------
@@ -152,7 +152,7 @@ def count_eigenvalues(system: System, radius: Any) -> NDArray[np.int64]:
     columns, radii = flat_columns(system.parameters, shape), np.broadcast_to(radii, shape).ravel()
     found = np.empty(len(radii), dtype=np.int64)
     squared = not system.numerics("damped")
-    for rows, _, problem in system.numerics("damped_spatial").problems(columns):
+    for rows, _, problem in system.numerics("driven_spatial").problems(columns):
         for number, row in enumerate(rows):
             reach = float(radii[row])
             try:
@@ -198,7 +198,7 @@ def _by_newton(system: System, columns: Array, guesses: Complex) -> Complex:
     """Return guesses refined on the exact problem; within the last of them there must be no other eigenvalue."""
     roots = np.empty(guesses.shape, dtype=complex)
     squared = not system.numerics("damped")
-    for rows, _, problem in system.numerics("damped_spatial").problems(columns):
+    for rows, _, problem in system.numerics("driven_spatial").problems(columns):
         found = refine(problem, guesses[rows], squared=squared)
         if np.isnan(found).any():
             raise ArithmeticError("eigenvalues: the refinement of a Ritz value did not settle; ask for fewer modes")

@@ -9,7 +9,8 @@ from sympy import Expr, Matrix, S, zeros
 from cra_sym.kernels import kernel
 from cra_sym.mechanics.jets import Jet
 from cra_sym.mechanics.weak import WeakForm, weak_form
-from cra_sym.model.spatial import SpatialProblem
+from cra_sym.model.driven import reacting
+from cra_sym.model.spatial import SpatialProblem, spatial_problem
 from cra_sym.model.stress_route import StressRoute
 from cra_sym.model.symmetry import vanishes
 
@@ -48,7 +49,15 @@ def stress_route(model: Model, spatial: SpatialProblem) -> StressRoute | None:
         orders,
         kernel(values, (x, *model.symbols), backend="numpy"),
         tuple(entries),
+        _reacting(model, spatial),
     )
+
+
+def _reacting(model: Model, spatial: SpatialProblem) -> SpatialProblem:
+    """Return the spatial problem with the reactions of interior supports as coordinates."""
+    form = model.conservative
+    supported = reacting(form)
+    return spatial if supported is form else spatial_problem(supported, model.symbols, model.equations.domain[0])
 
 
 def _solved(leading: Matrix, coupled: Matrix) -> Matrix:

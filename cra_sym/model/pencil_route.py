@@ -189,11 +189,13 @@ def pencil_route(model: Model) -> PencilRoute | None:
                 if (j >= i or name in "BNC") and value != 0 and not (name in "BR" and vanishes(value)):
                     entries[name, i, j] = value
     x = weak.variation.space.x
+    spatial = model.numerics("damped_spatial")
     return PencilRoute(
-        model.numerics("damped_spatial"),
+        spatial,
         orders,
         kernel(tuple(entries.values()), (x, *model.symbols), backend="numpy"),
         tuple(entries),
+        spatial,
         kernel(tuple(end), model.symbols, backend="numpy"),
         kernel(tuple(points), model.symbols, backend="numpy"),
         1 in weak.powers,

@@ -146,7 +146,7 @@ class GeneralRoute:
         if self.spatial.uniform:
             return self.angular_frequencies(values, shape, modes), np.full(shape, ROUNDING)
         columns = flat_columns(values, shape)
-        first = max(self._needed(columns), _FEWEST)
+        first = max(self.needed(columns), _FEWEST)
         before, least = self._squares(columns, modes, first), np.full((columns.shape[1], modes), np.inf)
         with refinement() as told:
             for halvings in range(first + 1, _MOST + 1):
@@ -171,8 +171,14 @@ class GeneralRoute:
             f"from the coefficients near x = {self._steepest(columns[:, row]):.6g}; {cure(least[row, mode])}"
         )
 
-    def _needed(self, columns: Array) -> int:
-        """Return how often the parts must be halved for steps on which every coefficient is a polynomial."""
+    def needed(self, columns: Array) -> int:
+        """Return how often the parts must be halved for steps on which every coefficient is a polynomial.
+
+        Raises
+        ------
+        ValueError
+            If it is too often: names the place.
+        """
         needed = 0
         for some, edges in self._between_breaks(columns):
             ends, _, _ = resolved(

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from cra_sym.kernels import Kernel
 from cra_sym.model.announced import refinement
-from cra_sym.model.routes import TOLERANCE, Values, mode_sign, overview_places
-from cra_sym.model.spatial import SpatialProblem
+from cra_sym.model.routes import TOLERANCE, GeneralRoute, Values, mode_sign, overview_places
+from cra_sym.model.spatial import HALVINGS, SpatialProblem
 from cra_sym.model.values import flat_columns, infinite_patterns
 from cra_sym.solvers.continuum import Continuum, Entries, PointTerm
 from cra_sym.solvers.stress_refine import Found, solved
@@ -39,12 +39,15 @@ class StressRoute:
         Of (x, parameters): the entries, named by ``entries``.
     entries : tuple of (str, int, int)
         Which entry of 'W', 'B', 'D', 'R' or 'M' each is; see `cra_sym.solvers.continuum.Continuum`.
+    reacting : SpatialProblem
+        For counts by the dynamic stiffness: the reactions of supports at interior places are its last coordinates.
     """
 
     spatial: SpatialProblem
     orders: tuple[int, ...]
     coefficients: Kernel
     entries: tuple[tuple[str, int, int], ...]
+    reacting: SpatialProblem
 
     def covers(self, values: Values) -> bool:
         """Return True: values that are out of range are refused by name."""
@@ -102,9 +105,30 @@ class StressRoute:
                     variation=self.spatial.variation(some[:, members]),
                 )
                 with refinement() as told:
-                    solutions = solved(problem, modes, 2.0 * tolerance, target, told)
+                    solutions = solved(
+                        problem, modes, 2.0 * tolerance, target, told, self._counter(columns, rows[members])
+                    )
                 for found in solutions:
                     yield Found(rows[members][found.rows], found.fields, found.accuracy)
+
+    def _counter(self, columns: Array, members: Index) -> Callable[[Index, Array], NDArray[np.intp] | None]:
+        """Return the count of squared frequencies below z by Wittrick and Williams, for some of the sets.
+
+        None where the dynamic stiffness does not follow the coefficients.
+        """
+
+        def counted(rows: Index, z: Array) -> NDArray[np.intp] | None:
+            some = columns[:, members[rows]]
+            number = np.empty(len(z), dtype=np.intp)
+            try:
+                halvings = max(GeneralRoute(self.reacting).needed(some), HALVINGS)
+                for part, _, problem in self.reacting.problems(some, halvings):
+                    number[part] = problem.evaluate(z[part], np.arange(len(part))).count
+            except (ValueError, np.linalg.LinAlgError):
+                return None
+            return number - (self.reacting.coordinates - self.spatial.coordinates)
+
+        return counted
 
     def _edges(self, columns: Array, left: Array, length: Array) -> list[tuple[Index, Array, tuple[int, ...]]]:
         if self.spatial.breaks is None:

@@ -229,6 +229,15 @@ class Columns:
         return self._quadratic(direct, total)
 
     @cached_property
+    def potential_size(self) -> Array | None:
+        """The same with the magnitudes of all coefficients, or None where displacements or strains are coupled."""
+        direct = self.coefficient["R"]
+        if self.coefficient["D"] or any(i != j for i, j in direct):
+            return None
+        sizes = {pair: np.abs(entry) for pair, entry in direct.items()}
+        return self._quadratic(sizes, np.zeros((self.sets, self.size, self.size)))
+
+    @cached_property
     def mass(self) -> Array:
         """Mass matrix, (sets, size, size)."""
         total = self._quadratic(self.coefficient["M"], np.zeros((self.sets, self.size, self.size)))

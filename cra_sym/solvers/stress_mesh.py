@@ -162,10 +162,16 @@ class Mesh:
         return oscillations + (self.smoothness + 1) // 2 + 4
 
     def split(self, marked: NDArray[np.bool_]) -> Mesh:
-        """Return the mesh with some elements halved; where one spans several breakpoints, at one of them."""
+        """Return the mesh with some elements parted: so that half of their pieces, or of breakpoints, lie on each side.
+
+        Pieces are small where the coefficients vary fast.
+        """
         left, right = self.elements[:-1], self.elements[1:]
         middle = 0.5 * (left + right)
         middle = np.where(right - left > 1.5, np.round(middle), middle)
+        starts = np.searchsorted(self.pieces, self.elements)
+        pieces = self.pieces[(starts[:-1] + starts[1:]) // 2]
+        middle = np.where((right - left < 1.5) & (np.diff(starts) > 1), pieces, middle)
         inner = middle[marked]
         elements = np.union1d(self.elements, inner)
         parents = np.searchsorted(self.elements, 0.5 * (elements[1:] + elements[:-1])) - 1

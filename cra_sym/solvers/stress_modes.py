@@ -216,13 +216,9 @@ class ModeFields:
         The sum over the elements, divided by the relative distance to the next compliance, bounds the relative error
         of z (Temple's inequality). Rigid-body modes have none.
         """
-        energies = ((r**2 * self._softness(field)).sum(axis=-1) for field, r in enumerate(self.unbalanced))
-        per_piece = sum(energies)
-        elements = len(self.columns.mesh.elements) - 1
-        share = np.zeros((*self.z.shape, elements))
-        owner = self.columns.mesh.owner
-        starts = np.searchsorted(owner, np.arange(elements))
-        share[...] = np.add.reduceat(np.asarray(per_piece), starts, axis=-1)
+        energies = sum((r**2 * self._softness(field)).sum(axis=-1) for field, r in enumerate(self.unbalanced))
+        starts = np.searchsorted(self.columns.mesh.owner, np.arange(len(self.columns.mesh.elements) - 1))
+        share = np.add.reduceat(np.asarray(energies), starts, axis=-1)
         return np.where(self.z[..., None] > 0.0, share / np.where(self.z > 0.0, self.z, 1.0)[..., None], 0.0)
 
     # ------------------------------------------------------------------------------------------ any place

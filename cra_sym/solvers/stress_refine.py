@@ -20,9 +20,14 @@ __all__ = ["Found", "alike", "cure", "meshed", "solved"]
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Told = Callable[[float, str], None]
+Counted = Callable[[Index, Array], "NDArray[np.intp] | None"]
 _ROUNDS, _MOST_UNKNOWNS, _MOST_DEGREE = 24, 1500, 40
 _MOST_ELEMENTS = 12  # to begin with: more spans than that share elements
 _FURTHER = 3  # times that the stresses which equilibrium asks for are added
+_GONE = 1e-9
+"""Stiffness at an end over that at 1e-7 of the span from there, below which it vanishes."""
+_SHARE = 0.1
+"""Compliance of what a basis leaves out, over that of the last mode, that hides no mode by itself."""
 _LANES = 1_000_000  # numbers in the largest array of a chunk
 
 
@@ -43,7 +48,14 @@ class Found:
     accuracy: Array
 
 
-def solved(problem: Continuum, modes: int, tolerance: float, target: float, told: Told | None = None) -> list[Found]:
+def solved(
+    problem: Continuum,
+    modes: int,
+    tolerance: float,
+    target: float,
+    told: Told | None = None,
+    counted: Counted | None = None,
+) -> list[Found]:
     """Return the lowest modes of every row.
 
     Parameters
@@ -56,6 +68,9 @@ def solved(problem: Continuum, modes: int, tolerance: float, target: float, told
         What is aimed at; a smaller one gives better mode shapes, whose error is as its square root.
     told : callable, optional
         Is told the error of the frequencies that each mesh has reached, and which mesh that is, before the next one.
+    counted : callable, optional
+        ``counted(rows, z)`` returns how many squared frequencies of rows are below z, or None if it cannot. It is asked
+        where the basis does not prove by itself that it misses no mode.
 
     Raises
     ------
@@ -64,7 +79,7 @@ def solved(problem: Continuum, modes: int, tolerance: float, target: float, told
     """
     found: list[Found] = []
     for rows, ends in alike(problem):
-        found += _group(problem.take(rows), rows, ends, _Aim(modes, tolerance, target, told))
+        found += _group(problem.take(rows), rows, ends, _Aim(modes, tolerance, target, told, counted))
     return found
 
 
@@ -79,7 +94,7 @@ def _vanishes(problem: Continuum, end: int) -> NDArray[np.bool_]:
     """Return in which rows a stiffness vanishes at an end; refuse one with a continuous spectrum."""
     edges = problem.edges
     width = edges[:, 1] - edges[:, 0] if end == 0 else edges[:, -1] - edges[:, -2]
-    inward = np.array([1e-7, 2e-7])
+    inward = np.array([0.0, 1e-7, 2e-7])
     at = edges[:, :1] + width[:, None] * inward if end == 0 else edges[:, -1:] - width[:, None] * inward
     rows = np.arange(len(edges))
     found = problem.coefficients(at, rows)
@@ -87,7 +102,7 @@ def _vanishes(problem: Continuum, end: int) -> NDArray[np.bool_]:
     def exponent(entry: Array) -> Array:
         entry = np.broadcast_to(entry, at.shape)
         with np.errstate(divide="ignore", invalid="ignore"):
-            power = np.log2(np.abs(entry[:, 1] / entry[:, 0]))
+            power = np.log2(np.abs(entry[:, 2] / entry[:, 1]))
         return np.where(np.isfinite(power), power, 0.0)
 
     tops = problem.tops()
@@ -96,7 +111,9 @@ def _vanishes(problem: Continuum, end: int) -> NDArray[np.bool_]:
         power = exponent(found["W"][field, field])
         place = tops[field] - order + 1
         weight = exponent(found["M"][place, place]) if (place, place) in found["M"] else np.zeros(len(edges))
-        vanishes |= power > 0.05
+        stiff = np.abs(np.broadcast_to(found["W"][field, field], at.shape))
+        with np.errstate(invalid="ignore"):
+            vanishes |= (power > 0.05) & ~(stiff[:, 0] > _GONE * stiff[:, 1])
         steep = power - weight > 2 * order - 1e-3
         if steep.any():
             name, value = ("left", "right")[end], float((power - weight)[steep][0])
@@ -174,7 +191,7 @@ def _refined(problem: Continuum, rows: Index, mesh: Mesh, unresolved: Array, aim
     found: list[Found] = []
     open_, before, degree_before = np.arange(len(rows)), np.inf, 0
     for turn in range(_ROUNDS):
-        solutions = [_solved(problem, part, mesh, aim) for part in _chunks(problem, mesh, open_)]
+        solutions = [_solved(problem, part, mesh, aim).checked(rows, aim) for part in _chunks(problem, mesh, open_)]
         worst = max(solution.error.max(initial=0.0) for solution in solutions)
         size = solutions[0].fields.columns.size
         last = turn == _ROUNDS - 1 or size > _MOST_UNKNOWNS or (turn > 8 and worst > 0.5 * before)
@@ -192,7 +209,8 @@ def _refined(problem: Continuum, rows: Index, mesh: Mesh, unresolved: Array, aim
         marks, open_ = np.max([s.marks(aim.target) for s in solutions], axis=0), np.concatenate(still)
         degree = mesh.degree
         falling = worst > aim.target and (turn == 0 or (degree > degree_before and worst < 1e-3 * before))
-        if falling and degree < _MOST_DEGREE - 6 and len(mesh.elements) < 20:
+        detailed = turn == 0 and len(mesh.pieces) > len(mesh.elements)
+        if falling and not detailed and degree < _MOST_DEGREE - 6 and len(mesh.elements) < 20:
             mesh = replace(mesh, degree=degree + 6)
         else:
             mesh = mesh.split(marks >= 0.03 * marks.max())
@@ -202,19 +220,21 @@ def _refined(problem: Continuum, rows: Index, mesh: Mesh, unresolved: Array, aim
 
 @dataclass(frozen=True)
 class _Aim:
-    """How many modes are asked for, the relative errors of z to accept and to aim at, and whom to tell."""
+    """How many modes are asked for, the relative errors of z to accept and to aim at, whom to tell, and who counts."""
 
     modes: int
     tolerance: float
     target: float
     told: Told | None
+    counted: Counted | None = None
 
 
 @dataclass(frozen=True)
 class _Solution:
     """Modes of a chunk on one mesh, with the estimated relative error of z, in all and by element.
 
-    ``missing`` has a bound of the compliance that the basis leaves out, by element, where a mode may be missing.
+    ``left_out`` bounds the compliance that the basis leaves out, by element; ``missing`` is that where a mode may be
+    missing, and ``unproved`` tells where none is as far as the basis knows.
     """
 
     part: Index
@@ -222,7 +242,10 @@ class _Solution:
     rounding: Array
     error: Array
     share: Array
+    left_out: Array
     missing: Array
+    unproved: NDArray[np.bool_]
+    compliances: Array
 
     def good(self, level: float) -> NDArray[np.bool_]:
         """Return which sets have an error below a level and all their modes."""
@@ -232,6 +255,27 @@ class _Solution:
         """Return the share of each element in what is not good enough yet, (elements,)."""
         shares: Array = self.share[self.error.max(axis=1) > level].max(axis=(0, 1), initial=0.0)
         return shares if shares.any() else self.missing.max(axis=0)
+
+    def checked(self, rows: Index, aim: _Aim) -> _Solution:
+        """Return the same after a count of the modes where it is needed: in the widest gap behind the last of them."""
+        which = np.nonzero(self.unproved & (self.error.max(axis=1) <= aim.target))[0]
+        if aim.counted is None or not len(which):
+            return self
+        rigid = (self.fields.z[which] == 0.0).sum(axis=1)
+        compliances = self.compliances[which]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            gaps = compliances[:, :-1] / compliances[:, 1:]
+        behind = np.arange(1, compliances.shape[1]) >= aim.modes - rigid[:, None]
+        place = np.where(behind & np.isfinite(gaps), gaps, 0.0).argmax(axis=1)[:, None]
+        first, second = (np.take_along_axis(compliances, place + k, axis=1)[:, 0] for k in (0, 1))
+        with np.errstate(divide="ignore"):
+            number = aim.counted(rows[self.part[which]], 1.0 / np.sqrt(first * second))
+        if number is None:
+            return self
+        missing = self.missing.copy()
+        wrong = which[number != place[:, 0] + 1 + rigid]
+        missing[wrong] = self.left_out[wrong]
+        return replace(self, missing=missing)
 
 
 def _solved(problem: Continuum, part: Index, mesh: Mesh, aim: _Aim) -> _Solution:
@@ -252,10 +296,16 @@ def _solved(problem: Continuum, part: Index, mesh: Mesh, aim: _Aim) -> _Solution
             return best  # the further stresses depend on the others to rounding
         fields = ModeFields(columns, result.z, result.vectors)
         share = 2.0 * fields.residual
-        left_out = tail(columns)
-        whole = complete(result.compliances, (result.z > 0.0).sum(axis=1), left_out.max(axis=1))
-        missing = np.where(whole[:, None], 0.0, left_out)
-        solution = _Solution(part, fields, result.rounding, share.sum(axis=-1), share, missing)
+        left_out, loading = tail(columns)
+        most_left_out, elastic = left_out.max(axis=1), (result.z > 0.0).sum(axis=1)
+        proved = complete(result.compliances, elastic, most_left_out, loading.max(axis=1), result.load)
+        last = np.take_along_axis(result.compliances, np.clip(elastic - 1, 0, None)[:, None], axis=1)[:, 0]
+        small = most_left_out < _SHARE * last
+        missing = np.where((proved | small)[:, None], 0.0, left_out)
+        solution = _Solution(
+            part, fields, result.rounding, share.sum(axis=-1), share, left_out, missing, small & ~proved,
+            result.compliances,
+        )  # fmt: skip
         if best is not None and solution.error.max() > best.error.max():
             return best
         best = solution

@@ -53,12 +53,15 @@ class Spectrum:
         Estimated relative rounding of z.
     compliances : ndarray, shape (sets, more than modes)
         1 / z of elastic modes as far as computed, descending, of each set.
+    load : ndarray, shape (sets,)
+        Bound of the potential energy of displacements, by magnitude, over the whole energy of a motion; inf if unknown.
     """
 
     z: Array
     vectors: Array
     rounding: Array
     compliances: Array
+    load: Array
 
 
 def spectrum(columns: Columns, modes: int) -> Spectrum:
@@ -174,8 +177,10 @@ class _Problem:
     def solved(self, modes: int) -> Spectrum:
         """Return the lowest modes, those of rigid-body motions first."""
         operator = self.unloaded()
+        load = np.full(len(self.sets), 0.0 if self.potential is None else 1.0)
         if self.potential is not None and self._loaded:
             operator, loading = self._loaded_factor(operator)
+            load = self._load(operator)
         else:
             loading = np.ones((len(self.sets), 1))
         matrix = operator @ self.mass @ operator.swapaxes(-1, -2)
@@ -189,7 +194,7 @@ class _Problem:
         self._check_number(values, number)
         unknowns = vectors @ operator  # x = L^-T u
         kinetic = self._kinetic(unknowns)
-        return self._spectrum(unknowns, kinetic, values, loading, number)
+        return self._spectrum(unknowns, kinetic, values, loading, number, load)
 
     def unloaded(self) -> Array:
         """Return L^-1 of the structure with its springs, without potential that may be negative."""
@@ -283,6 +288,14 @@ class _Problem:
         loaded = (frame / np.sqrt(values)[:, None, :]) @ frame.swapaxes(-1, -2)
         return loaded @ operator, 1.0 / values[:, :1]
 
+    def _load(self, operator: Array) -> Array:
+        """Return the sum, not less than the largest, of the magnitudes of the potential energy over the whole one."""
+        size = self.columns.potential_size
+        if size is None:
+            return np.full(len(self.sets), np.inf)
+        total: Array = ((operator @ size[self.sets]) * operator).sum(axis=(-2, -1))
+        return total
+
     # ------------------------------------------------------------------------------------------ the modes
 
     @staticmethod
@@ -352,7 +365,9 @@ class _Problem:
             total += ((moved_there @ point.mass[self.sets]) * moved_there).sum(axis=-1)
         return total
 
-    def _spectrum(self, unknowns: Array, kinetic: Array, values: Array, loading: Array, number: int) -> Spectrum:
+    def _spectrum(
+        self, unknowns: Array, kinetic: Array, values: Array, loading: Array, number: int, load: Array
+    ) -> Spectrum:
         with np.errstate(divide="ignore", invalid="ignore"):
             compliances = np.where(kinetic > 0.0, kinetic, values)
             order = np.argsort(-compliances, axis=1, kind="stable")
@@ -368,7 +383,7 @@ class _Problem:
             pad = ((0, 0), (rigid, 0))
             z, rounding = np.pad(z, pad)[:, :keep], np.pad(rounding, pad)[:, :keep]
             vectors = np.concatenate([self.still, vectors], axis=1)[:, :keep]
-        return Spectrum(z, vectors, rounding, compliances)
+        return Spectrum(z, vectors, rounding, compliances, load)
 
 
 def _root(mass: Array) -> Array:

@@ -4,6 +4,11 @@ Ritz's method bounds compliances from below. With the largest compliance t of al
 to the basis, the k-th compliance is between the k-th one of the basis and that plus t. Such motions vanish at the ends
 of every element: the integral over an element of length h of what is orthogonal to polynomials of degree p is at most
 h / (2 p) times as large in the mean square, and at most its root at any place.
+
+With the compliance 1 / W as the weight of the orthogonality, what counts is the largest ``(1 - x^2) / W`` for x from
+-1 to 1 on the element, so that a stiffness may all but vanish at an end. For the integral F of a load over the element,
+less a straight line, vanishes at both ends, and Gegenbauer's polynomials y with ``(1 - x^2) y'' = -n (n - 1) y`` expand
+it: beyond degree p the mean square of the sum over ``1 - x^2`` is less than that of ``F'`` over p (p + 1).
 """
 
 from __future__ import annotations
@@ -18,15 +23,18 @@ from .stress import Columns
 __all__ = ["complete", "tail"]
 
 Array = NDArray[np.float64]
-SHARE = 0.1
-"""Compliance of what is left out, relative to that of the last mode, that hides no mode by itself."""
+_SHARES = 0.0, 0.2, 0.5, 0.8
+"""Of the gap between two compliances (of its logarithm) that a potential energy may take; inertia has the rest."""
 
 
-def complete(compliances: Array, elastic: NDArray[np.intp], left_out: Array) -> NDArray[np.bool_]:
-    """Return for each set whether no mode is missing among the first elastic ones.
+def complete(
+    compliances: Array, elastic: NDArray[np.intp], left_out: Array, loading: Array, load: Array
+) -> NDArray[np.bool_]:
+    """Return for each set whether it is proved that no mode is missing among the first elastic ones.
 
-    Proved where some gap between compliances, at the last mode or one of the next, is larger than what is left out.
-    Where frequencies lie closer, what is left out must be smaller than a tenth of the last compliance.
+    It is where some gap between compliances, at the last mode or one of the next, is larger than what is left out can
+    hide. With motions v of the basis and w left out, stiffness and mass of ``v + w`` obey, for any positive a and b,
+    ``K >= (1 - b load) K(v) + (1 - loading - loading / b) K(w)`` and ``M <= (1 + a) M(v) + (1 + 1 / a) M(w)``.
 
     Parameters
     ----------
@@ -34,21 +42,30 @@ def complete(compliances: Array, elastic: NDArray[np.intp], left_out: Array) -> 
         Of the basis, descending.
     elastic : ndarray of int, shape (sets,)
         How many modes are asked for, rigid-body motions apart.
-    left_out : ndarray, shape (sets,)
+    left_out, loading : ndarray, shape (sets,)
         As `tail` returns.
+    load : ndarray, shape (sets,)
+        Largest potential energy of displacements, by magnitude, over the energy of a motion of the basis.
     """
     number = np.arange(1, compliances.shape[1])
-    gaps = np.where(number >= elastic[:, None], -np.diff(compliances, axis=1), 0.0)
-    last = np.take_along_axis(compliances, np.clip(elastic - 1, 0, None)[:, None], axis=1)[:, 0]
-    allowed = np.maximum(gaps.max(axis=1, initial=0.0), SHARE * last)
-    return np.asarray((left_out < allowed) | (elastic == 0))
+    first = compliances[:, :-1]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        gap = first / np.where(compliances[:, 1:] > 0.0, compliances[:, 1:], 1e-300 * first)
+        good = np.zeros(first.shape, dtype=bool)
+        for share in _SHARES:
+            taken = 1.0 - gap**-share  # b times load
+            per_b = np.where(load[:, None] > 0.0, load[:, None] / taken, 0.0)
+            stiff = 1.0 - np.where(loading[:, None] > 0.0, loading[:, None] * (1.0 + per_b), 0.0)
+            rest = gap ** (1.0 - share)  # 1 + a
+            good |= (stiff > 0.0) & (rest / (rest - 1.0) * left_out[:, None] < stiff * first)
+    return np.asarray((good & (number >= elastic[:, None])).any(axis=1) | (elastic == 0))
 
 
-def tail(columns: Columns) -> Array:
-    """Return a bound of the largest compliance of what the basis leaves out, of each element, (sets, elements).
+def tail(columns: Columns) -> tuple[Array, Array]:
+    """Return bounds of what the basis leaves out, of each element, both (sets, elements).
 
-    Of elements at whose end a stiffness vanishes there is none, and 0 is returned. A potential energy of displacements
-    is taken as if it were not there, which bounds the compliance if it is positive and small beside that of strains.
+    That of its largest compliance, without any potential energy of displacements, and that of this energy by magnitude
+    over that of the strains. Of elements at whose end a stiffness vanishes there are none, and 0 is returned.
     """
     mesh, problem = columns.mesh, columns.problem
     starts = np.searchsorted(mesh.owner, np.arange(len(mesh.elements) - 1))
@@ -64,17 +81,26 @@ def tail(columns: Columns) -> Array:
         found: Array = np.add.reduceat((np.abs(entry) * weights).sum(axis=-1), starts, axis=-1)
         return found
 
-    mean, peak = _amplitudes(columns, reach, most)
-    total = np.zeros((columns.sets, len(mesh.elements) - 1))
-    for (i, j), entry in columns.coefficient["M"].items():
-        if max(i, j) < problem.displacements:
-            smooth, lumped = most(entry) * mean[i] * mean[j], whole(entry) * peak[i] * peak[j]
-            total += (1 if i == j else 2) * np.minimum(smooth, lumped)
-    return np.where(mesh.strained, 0.0, total)
+    mean, peak = _amplitudes(columns, reach, most, 1.0 - columns.grid.local**2)
+
+    def held(name: str) -> Array:
+        total = np.zeros((columns.sets, len(mesh.elements) - 1))
+        for (i, j), entry in columns.coefficient[name].items():
+            if max(i, j) < problem.displacements:
+                smooth, lumped = most(entry) * mean[i] * mean[j], whole(entry) * peak[i] * peak[j]
+                total += (1 if i == j else 2) * np.minimum(smooth, lumped)
+        return np.where(mesh.strained, 0.0, total)
+
+    return held("M"), held("R")
 
 
-def _amplitudes(columns: Columns, reach: Array, most: Callable[[Array], Array]) -> tuple[list[Array], list[Array]]:
-    """Return what unit strain energy displaces at most, in the mean square and at any place, by displacement."""
+def _amplitudes(
+    columns: Columns, reach: Array, most: Callable[[Array], Array], inner: Array
+) -> tuple[list[Array], list[Array]]:
+    """Return what unit strain energy displaces at most, in the mean square and at any place, by displacement.
+
+    ``inner`` is ``1 - x^2`` on the element at the points.
+    """
     problem = columns.problem
     tops, fields = problem.tops(), len(problem.orders)
     mean: dict[int, Array] = {}
@@ -82,15 +108,18 @@ def _amplitudes(columns: Columns, reach: Array, most: Callable[[Array], Array]) 
     while len(mean) < problem.displacements:
         for place in (k for k in reversed(range(problem.displacements)) if k not in mean):
             rate = np.zeros((fields, *reach.shape))  # by the strain that causes it
+            anywhere = np.zeros_like(rate)
             needed = [place + 1]
             if place in tops:
                 field = tops.index(place)
-                rate[field] = np.sqrt(most(columns.compliance[field, field]))
+                soft = columns.compliance[field, field]
+                rate[field], anywhere[field] = np.sqrt(most(soft * inner)), np.sqrt(most(soft))
                 needed = [j for i, j in columns.coefficient["B"] if i == field and j < problem.displacements]
             if all(j in mean for j in needed):
                 for j in needed:
-                    rate += mean[j] if place not in tops else most(columns.coefficient["B"][field, j]) * mean[j]
-                mean[place], peak[place] = reach * rate, np.sqrt(reach) * rate
+                    own = mean[j] if place not in tops else most(columns.coefficient["B"][field, j]) * mean[j]
+                    rate, anywhere = rate + own, anywhere + own
+                mean[place], peak[place] = reach * rate, np.sqrt(reach) * anywhere
                 break
     order = range(problem.displacements)
     return [np.sqrt((mean[k] ** 2).sum(axis=0)) for k in order], [np.sqrt((peak[k] ** 2).sum(axis=0)) for k in order]

@@ -203,6 +203,35 @@ def test_the_argument_principle_counts_as_many(name):
         cra.count_eigenvalues(system, -1.0)
 
 
+INSIDE = {
+    "support": (model(essential=[*CLAMPED, v.subs(x, HALF)], virtual_work=END_DAMPER), {c: 2.0}),
+    "clamp": (
+        model(
+            essential=[v.subs(x, 0), v.subs(x, 1), v.subs(x, 0.3), v.diff(x).subs(x, 0.3)],
+            virtual_work=[(-c * v.diff(t), v, HALF)],
+        ),
+        {c: 2.0},
+    ),
+    "damped turning": (
+        model(
+            inside=[(HALF, HALF * m * v.diff(t) ** 2)],
+            virtual_work=[(-c * v.diff(x, t), v.diff(x), HALF), *END_DAMPER],
+        ),
+        {c: 0.5, m: 0.5},
+    ),
+    "no damper": (model(essential=[v.subs(x, 0), v.subs(x, 1), v.subs(x, sp.sqrt(2) / 3)]), {}),
+}
+
+
+@pytest.mark.parametrize("name", INSIDE)
+def test_what_is_at_interior_places_is_counted(name):
+    system = INSIDE[name][0].at(INSIDE[name][1])
+    every = cra.eigenvalues(system, 3, oscillating=False)
+    size = np.abs(every)
+    number = 4 - np.count_nonzero(every[:2].imag == 0.0)
+    assert cra.count_eigenvalues(system, np.sqrt(size[1] * size[2])) == number
+
+
 def test_random_beams_against_the_elements():
     """Springs, masses, dampers at both ends and along x, tension, steps: Hermite elements with a node on the step."""
     g, T = sp.symbols("g T")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 from scipy.integrate import solve_ivp
+from scipy.linalg import eigh
 from scipy.optimize import brentq
 
 from cra_sym.solvers.continuum import Continuum
@@ -219,7 +220,7 @@ def test_compliances_lie_between_those_of_the_basis_and_what_it_leaves_out(order
     for elements in (np.array([0.0, 1.0]), np.array([0.0, 0.25, 0.5, 1.0])):
         mesh = Mesh(elements, elements, degree, np.zeros(len(elements) - 1, dtype=bool), 0)
         columns = Columns(problem, mesh)
-        bound = float(tail(columns).max())
+        bound = float(tail(columns)[0].max())
         found = spectrum(columns, 1).compliances[0]
         assert (found <= exact[: len(found)] * (1 + 1e-6)).all()  # roots from the sixth on are asymptotic
         assert (exact[: len(found)] <= found + bound).all()
@@ -227,12 +228,67 @@ def test_compliances_lie_between_those_of_the_basis_and_what_it_leaves_out(order
             assert bound < 12.0 * exact[degree]  # and it is not much larger than what is really left out
 
 
+PULLED = {("W", 0): np.ones_like, ("M", 0): lambda x: 1 + x, ("R", 1): lambda x: 30 * (1 - x), ("R", 0): lambda x: -x}
+SLACK = {("W", 0): lambda x: 1e-3 + 1 - x**2, ("M", 0): np.ones_like, ("R", 0): lambda x: 5 + x}
+
+
+@pytest.mark.parametrize(("coefficients", "order"), [(PULLED, 2), (SLACK, 1)], ids=["tension", "vanishing stiffness"])
+@pytest.mark.parametrize("degree", [4, 9])
+def test_what_is_left_out_is_bounded_with_potentials_too(coefficients, order, degree):
+    """In the motions of 26 further degrees that cost no strain energy together with the basis."""
+    fixed = [np.inf] * order + [0.0] * order
+    problem = continuum(coefficients, [0.0, 1.0], fixed, [0.0] * 2 * order, order)
+    pieces = 1.0 - np.array([1.0, 0.1, 0.01, 1e-3, 1e-4, 0.0])
+    for elements in (np.array([0.0, 1.0]), np.array([0.0, 0.9, 1.0])):
+        strained = np.zeros(len(elements) - 1, dtype=bool)
+        wide, narrow = (Columns(problem, Mesh(pieces, elements, p, strained, 31)) for p in (degree + 26, degree))
+        inside, stiffness = narrow.size, wide.elastic_stiffness[0]
+        basis, rest = np.arange(order, inside), np.arange(inside, wide.size)
+        mixed = np.linalg.solve(stiffness[np.ix_(basis, basis)], stiffness[np.ix_(basis, rest)])
+        motions = np.zeros((wide.size, len(rest)))
+        motions[rest, np.arange(len(rest))] = 1.0
+        motions[basis] = -mixed
+        energy = motions.T @ stiffness @ motions
+        for bound, matrix in zip(tail(narrow), (wide.mass[0], wide.potential_size[0]), strict=True):
+            largest = eigh(motions.T @ matrix @ motions, energy, eigvals_only=True)[-1]
+            assert largest <= bound.max() < 60.0 * largest
+
+
 def test_completeness_is_proved_by_a_gap_or_is_open():
     compliances = np.array([[1.0, 0.5, 0.4999, 0.1], [1.0, 0.5, 0.4999, 0.1]])
-    elastic = np.array([2, 3])
-    np.testing.assert_array_equal(complete(compliances, elastic, np.array([0.3, 0.3])), [True, True])
-    np.testing.assert_array_equal(complete(compliances, elastic, np.array([0.45, 0.45])), [False, False])
-    assert complete(compliances[:1], np.array([0]), np.array([9.0])).all()
+    elastic, none = np.array([2, 3]), np.zeros(2)
+    for left_out, proved in ((0.3, True), (0.45, False)):
+        found = complete(compliances, elastic, np.full(2, left_out), none, none)
+        np.testing.assert_array_equal(found, [proved, proved])
+    assert complete(compliances[:1], np.array([0]), np.array([9.0]), none[:1], none[:1]).all()
+    # a potential takes its share of the gap; one that is not known proves nothing
+    for load, loading, proved in ((1.0, 1e-3, True), (1.0, 0.9, False), (1e3, 1e-3, False), (np.inf, 1e-9, False)):
+        found = complete(compliances[:1], elastic[:1], np.array([0.1]), np.array([loading]), np.array([load]))
+        assert found.all() == proved
+
+
+def test_a_mode_that_a_count_does_not_find_is_not_silent():
+    """On a foundation of 1e6 frequencies lie so close that they are counted: one more, and elements get finer.
+
+    As fine as needed for the basis to prove by itself that none is missing.
+    """
+    stiff = {("W", 0): np.ones_like, ("M", 0): np.ones_like, ("R", 0): lambda x: np.full_like(x, 1e6)}
+    problem = continuum(stiff, [0.0, 1.0], [np.inf] * 2 + [0.0] * 2, [0.0] * 4)
+    asked = []
+
+    def counted(rows, z):
+        asked.append(z)
+        return np.array([np.count_nonzero(np.append(exact, np.inf) < below) for below in z])
+
+    k = np.array([1.875104068711961, 4.694091132974175, 7.854757438237613, 10.995540734875467, 14.13716839104647])
+    exact = np.append(k, np.pi * (np.arange(5, 20) + 0.5)) ** 4 + 1e6
+    (found,) = solved(problem, 4, 2e-10, 2e-11, counted=counted)
+    np.testing.assert_allclose(found.fields.z[0], exact[:4], rtol=1e-11)
+    assert asked
+    right, exact = exact, np.append(exact[0], exact)
+    (other,) = solved(problem, 4, 2e-10, 2e-11, counted=counted)
+    np.testing.assert_allclose(other.fields.z[0], right[:4], rtol=1e-11)
+    assert other.fields.columns.size > found.fields.columns.size
 
 
 def test_a_mode_that_the_first_basis_cannot_hold_is_found():
