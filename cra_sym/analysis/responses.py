@@ -37,6 +37,7 @@ __all__ = [
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
+_UNCOUPLED = 1e-8  # of the damping between two modes, over the geometric mean of their own
 
 
 class UndersamplingWarning(UserWarning):
@@ -117,9 +118,11 @@ def response(
     resonance, with and without damping, and for rigid-body modes. Uniform times of 64 and more cost a few nanoseconds
     each. Of a system with local dampers, gyroscopic forces or forces that follow the motion the sum is that of the
     lowest complex modes, as many eigenvalues as ``modes`` oscillators have, by exponentials of their state matrix;
-    velocities are those of the modes. A nonlinear system (not a batch) is integrated in time, its linear
-    modes exactly, to a relative error of about 1e-9. Of a system with elastic-slip elements (batches too) the sum is
-    that of its modes without them, followed exactly from event to event; see `slip_response`.
+    velocities are those of the modes. Damping of the material (Kelvin-Voigt) that couples the natural modes has
+    eigenvalues that crowd: then all motions of a basis are summed in which that many modes have settled. A nonlinear
+    system (not a batch) is integrated in time, its linear modes exactly, to a relative error of about 1e-9. Of a system
+    with elastic-slip elements (batches too) the sum is that of its modes without them, followed exactly from event to
+    event; see `slip_response`.
 
     Parameters
     ----------
@@ -340,7 +343,8 @@ def _oscillation(
         rows = outputs(system.modes(modes))
         return nonlinear_response(system, histories, rows, t, modes, derivative, state, start, zeta)
     ratio = np.asarray(system.zeta if zeta is None else checked_damping(zeta))
-    if system.numerics("complex_modes") and (ratio.ndim == 0 or ratio.shape[-1] == 1 or zeta is None):
+    alike = ratio.ndim == 0 or ratio.shape[-1] == 1 or zeta is None
+    if alike and _has_complex_modes(system, modes):
         ratio = ratio[..., 0] if zeta is not None and ratio.ndim else ratio
         return complex_response(
             system, histories, outputs, t, modes, derivative, ratio, start, initial, _check_sampling
@@ -381,6 +385,17 @@ def slipping_problem(
     state = (_initial_state(base, initial or {}, modes, 0), _initial_state(base, initial or {}, modes, 1))
     loads = driven(base, histories_of(base, motion), modes)
     return slipping(system, loads, modes, _ratios(base, modes, zeta), start, state, _check_sampling)
+
+
+def _has_complex_modes(system: System, modes: int) -> bool:
+    """Return whether the motion is a sum of complex modes: whether dampers couple natural modes, or there are none."""
+    kind = system.numerics("complex_modes")
+    if kind != "if coupled":
+        return bool(kind == "always")
+    matrix = Projected(system.domain, system.modes(modes), system.numerics("damping"))["damping"]
+    own = np.sqrt(np.abs(np.einsum("...ii->...i", matrix)))
+    coupling = np.abs(matrix) - own[..., :, None] * own[..., None, :] * (np.eye(modes) + _UNCOUPLED)
+    return bool((coupling > 0.0).any())
 
 
 def _check_sampling(motion: BaseMotion, omega: Array) -> None:

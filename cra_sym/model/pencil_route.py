@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -202,23 +202,23 @@ def pencil_route(model: Model) -> PencilRoute | None:
     )
 
 
-def complex_modes(model: Model) -> bool:
-    """Return whether motions are sums of complex modes.
+def complex_modes(model: Model) -> Literal["none", "always", "if coupled"]:
+    """Return whether motions are sums of complex modes: where dampers couple the natural modes, or there are none.
 
-    They are where dampers couple the natural modes, or there are none. Dampers of the highest derivatives
-    (Kelvin-Voigt) have eigenvalues that crowd: there the natural modes serve.
+    Dampers of the highest derivatives (Kelvin-Voigt) couple them or do not.
     """
     from cra_sym.mechanics.weak import weak_form
 
     if model.numerics("conservative") or model.numerics("pencil") is None:
-        return False
+        return "none"
     try:
         _ = model.conservative
     except ValueError:
-        return True
+        return "always"
     weak = weak_form(model.linearised.variation)
     _, highest, _ = weak.fields()
-    return not any(jet in highest for pair, powers in weak.inside.items() for jet in pair if 1 in powers)
+    resisted = any(jet in highest for pair, powers in weak.inside.items() for jet in pair if 1 in powers)
+    return "if coupled" if resisted else "always"
 
 
 def inertia(model: Model) -> Form:

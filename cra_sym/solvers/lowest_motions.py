@@ -22,6 +22,7 @@ __all__ = ["BasisModes", "LowestMotions", "lowest_motions"]
 _SETTLED = 1e-9
 """Relative difference of the eigenvalues on two meshes."""
 _SAME = 1e-6  # relative difference of moduli that are not told apart: a pair is not split
+_AT_ONCE = 1e3  # rate of decay over the last oscillating eigenvalue asked for
 _LIGHT = 1e-7  # square root of a mass, relative to the largest, below which a coordinate has none
 
 
@@ -123,6 +124,9 @@ class LowestMotions:
 def lowest_motions(problem: GeneralContinuum, modes: int, zeta: float) -> LowestMotions:
     """Return the motions of as many eigenvalues as that many oscillators have, or one more than splits a pair.
 
+    Where dampers resist the strains (Kelvin-Voigt) eigenvalues crowd, and none of these can be left out: then all
+    motions of a basis are returned in which the first oscillating ones have settled, but for what decays at once.
+
     Parameters
     ----------
     problem : GeneralContinuum
@@ -139,12 +143,21 @@ def lowest_motions(problem: GeneralContinuum, modes: int, zeta: float) -> Lowest
     ((_, chosen, mesh),) = meshes(problem, 2 * modes, 1e-10)
     before: NDArray[np.complex128] | None = None
     worst = np.inf
-    for finer in sequence(mesh):
+    for turn, finer in enumerate(sequence(mesh)):
         (one,) = reduced(chosen, finer)
         first, second = one.pencil()
         first, second = first[0], second[0]
         second[: len(one.stiffness[0]), : len(one.stiffness[0])] += _modal(one, zeta)
         s = _all(first, second)
+        if one.columns.resists_strains:
+            swinging = s[s.imag > _SAME * np.abs(s)][:modes]
+            if before is not None and (len(swinging) or turn > 1):
+                worst = float((np.abs(matched(swinging[None], before[None])[0] / swinging - 1.0)).max(initial=0.0))
+                if worst < _SETTLED:
+                    radius = _AT_ONCE * float(np.abs(swinging[-1])) if len(swinging) else np.inf
+                    return _motions(one, first, second, min(radius, 2.0 * float(np.abs(s[-1]))))
+            before = s
+            continue
         number = _number(s, 2 * modes)
         if before is not None:
             near = matched(s[None, :number], before[None])[0]

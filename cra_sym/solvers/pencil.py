@@ -110,6 +110,11 @@ class Forces(Columns):
         highest = [self._rate(place, tops, [*moved]) for place in tops]
         return [h for h in highest if h is not None] + moved
 
+    @property
+    def resists_strains(self) -> bool:
+        """Whether there are dampers of the highest derivatives."""
+        return any(min(pair) < len(self.problem.orders) for pair in self.coefficient["C"])
+
     def forces(self, power: int) -> Array:
         """Return the matrix of the forces of displacements (0) or velocities (1), (sets, size, size)."""
         total = np.zeros((self.sets, self.size, self.size))

@@ -164,15 +164,33 @@ def _compared(fine: Complex, coarse: Complex, rate: Array, modes: int, oscillati
 
 
 def matched(fine: Complex, coarse: Complex) -> Complex:
-    """Return the nearest eigenvalue of the coarser mesh for each, none twice."""
+    """Return the nearest eigenvalue of the coarser mesh for each, none twice.
+
+    Those that are each other's nearest come first: where many crowd, one that has no partner takes none of another.
+    """
     free = np.where(np.isnan(coarse), np.inf, coarse)
     near = np.empty_like(fine)
-    rows = np.arange(len(fine))
-    for k in range(fine.shape[1]):
-        with np.errstate(invalid="ignore"):
-            distance = np.abs(free - fine[:, k : k + 1])
-        distance = np.where(np.isnan(distance), np.inf, distance)
-        place = distance.argmin(axis=1)
-        near[:, k] = free[rows, place]
-        free[rows, place] = np.inf
+    rows, number = np.arange(len(fine)), fine.shape[1]
+    place = np.empty(fine.shape, dtype=np.intp)
+    best, owner = np.full(free.shape, np.inf), np.full(free.shape, -1)
+    for k in range(number):
+        distance = _distance(free, fine[:, k])
+        place[:, k] = distance.argmin(axis=1)
+        owner[distance < best] = k
+        best = np.minimum(best, distance)
+    mutual = np.take_along_axis(owner, place, axis=1) == np.arange(number)
+    for first in (True, False):
+        for k in range(number):
+            some = rows[mutual[:, k] == first]
+            if not len(some):
+                continue
+            at = place[some, k] if first else _distance(free[some], fine[some, k]).argmin(axis=1)
+            near[some, k] = free[some, at]
+            free[some, at] = np.inf
     return near
+
+
+def _distance(free: Complex, values: Complex) -> Array:
+    with np.errstate(invalid="ignore"):
+        distance = np.abs(free - values[:, None])
+    return np.where(np.isnan(distance), np.inf, distance)

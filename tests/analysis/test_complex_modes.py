@@ -175,6 +175,49 @@ def test_a_force_at_the_end_against_elements_in_time(name):
     assert errors[0] < 2e-2 and errors[1] < 3e-3 and errors[2] < 5e-4
 
 
+HALF_OF_IT = sp.Piecewise((1, x < HALF), (0, True))
+RESISTED = [(-c * HALF_OF_IT * v.diff(x, 2, t), v.diff(x, 2), "domain")]
+WHOLE = [(-c * v.diff(x, 2, t), v.diff(x, 2), "domain")]
+MATERIAL = {
+    "half": (BEAM, RESISTED, {c: 0.01}, CLAMPED, {}),
+    "half, strong": (BEAM, RESISTED, {c: 0.3}, CLAMPED, {}),
+    "elastic root": (BEAM, WHOLE, {c: 0.01}, [], {"left": -5 * v**2 / 2 - v.diff(x) ** 2}),
+    "and a damper": (BEAM, [*WHOLE, (-v.diff(t), v, "right")], {c: 0.01}, CLAMPED, {}),
+}
+
+
+@pytest.mark.parametrize("name", MATERIAL)
+def test_damping_of_the_material_that_couples_the_modes(name):
+    """Kelvin-Voigt: eigenvalues, response in time and at one frequency against 24 elements a span with nodes there."""
+    density, work, values, essential, options = MATERIAL[name]
+    driven = model(density, essential, virtual_work=[*work, *PULL], **options)
+    ritz = driven.ritz(24, nodes=[HALF])
+    ((_, stiffness, damping, mass),) = ritz._numbers(ritz._columns(values)[0])
+    push = {F: cra.Force(level=0.5, amplitude=1.0, angular_frequency=20.0, phase=0.3)}
+    expected = in_time(stiffness, damping, mass, TIMES)
+    for modes in (3, 12):  # how many are asked for does not matter: nothing is left out
+        found = driven.tip_response(values, push, TIMES, modes=modes)
+        assert_allclose(found, expected, atol=2e-6 * np.abs(expected).max())  # h^4 of the elements
+    size = len(mass)
+    inverse = np.linalg.inv(mass)
+    every = np.linalg.eigvals(np.block([[0 * mass, np.eye(size)], [-inverse @ stiffness, -inverse @ damping]]))
+    s = driven.eigenvalues(values, 2)
+    assert max(np.abs(every - one).min() / abs(one) for one in s) < 2e-6
+    assert_allclose(driven.damping_ratios(values, 2), -s.real / np.abs(s))
+    for Omega in (0.0, 3.0, 20.0):
+        force = np.eye(size)[-2]
+        moved = np.linalg.solve(stiffness + 1j * Omega * damping - Omega**2 * mass, force)[-2]
+        assert_allclose(cra.frequency_response(driven.at(values), Omega, drive=F), moved, rtol=2e-6)
+
+
+def test_damping_of_the_material_that_leaves_the_modes_alone():
+    """In proportion to the stiffness: the sum over natural modes, each by itself."""
+    omega = 2 * np.pi * model().natural_frequencies({}, 2)
+    found = model(virtual_work=WHOLE).tip_response({c: 0.02}, None, TIMES, modes=2, initial={v: x**2})
+    other = model().tip_response({}, None, TIMES, modes=2, initial={v: x**2}, zeta=0.01 * omega)  # c omega / 2
+    assert_allclose(found, other, atol=1e-9)
+
+
 def test_one_complex_mode_swings_and_decays_alone():
     """Let go in the shape of a complex mode with the velocity that belongs to it: Re phi exp(s t), in one mode."""
     string = model(STRING, [v.subs(x, 0)], virtual_work=END_DAMPER)
