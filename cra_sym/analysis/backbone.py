@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from cra_sym import checks
 from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, ConvergenceWarning, equations_of, samples, watched
+from cra_sym.analysis.slip_backbone import held_curve
 from cra_sym.model.system import System
 from cra_sym.solvers.continuation import Curve, Measure, Point, correct, first_point, follow
 from cra_sym.solvers.harmonic_balance import Balance, Basis, peak
@@ -49,6 +50,9 @@ class Backbone:
     multiples : tuple of int
     crossings : ndarray, shape (branch points,)
         Angular frequencies at which the curve meets another one on the way.
+    damping_ratio, loss : ndarray, shape (...)
+        With elastic-slip elements: the ratio of the modal damping that holds the motion, and the energy that it makes
+        up for in a cycle, J; zero of free motions without damping.
     """
 
     angular_frequency: Array
@@ -60,6 +64,8 @@ class Backbone:
     coefficients: Array
     multiples: tuple[int, ...]
     crossings: Array
+    damping_ratio: Array
+    loss: Array
 
 
 @checks.default_floating_point
@@ -70,7 +76,7 @@ def backbone(
     energy: Any = None,
     amplitude: Any = None,
     modes: int = 6,
-    harmonics: int = 9,
+    harmonics: int | None = None,
     points: int = 400,
     place: Any = None,
     field: Any = None,
@@ -79,6 +85,11 @@ def backbone(
 
     Harmonic balance, continued by arclength from the linear mode through every fold. No internal resonance is jumped:
     a change of the number of negative eigenvalues of the Jacobian tells where a step was too long.
+
+    With elastic-slip elements the motion is damped, and dampers and damping ratios count too: it is held periodic by
+    damping of opposite sign, -2 zeta omega times the velocity of every mode (EPMC, Krack 2015). Its amplitude must be
+    given; it is stable if no multiplier of the equations without this damping has a modulus beyond 1 + 1e-6. Its
+    coefficients are of the constant, cosines and sines.
 
     Parameters
     ----------
@@ -90,9 +101,10 @@ def backbone(
         Where the motion is wanted: the first along the curve with that energy (J, at zero velocity), or with that peak
         at the tip. Neither: the whole curve with its turns, up to ``points`` points.
     modes : int
-        How many linear modes take part, 1 to 40.
-    harmonics : int
-        Highest multiple of the frequency, 1 to 60. Internal resonances with higher ones do not show.
+        How many linear modes take part, 1 to 40; with elastic-slip elements those of the system without them.
+    harmonics : int, optional
+        Highest multiple of the frequency, 1 to 60. Internal resonances with higher ones do not show. Default: 9; with
+        elastic-slip elements as many as bring frequency and damping ratio within 1e-7, at most 127.
     points : int
         Length of the whole curve.
     place, field : optional
@@ -129,20 +141,53 @@ def backbone(
     np.float64(1.317776)
     """
     checks.instance("system", system, System)
-    modes, harmonics = (
-        checks.count("modes", modes, high=MOST_NONLINEAR_MODES),
-        checks.count("harmonics", harmonics, high=60),
-    )
+    modes = checks.count("modes", modes, high=MOST_NONLINEAR_MODES)
+    harmonics = None if harmonics is None else checks.count("harmonics", harmonics, high=60)
     mode, points = checks.count("mode", mode, high=modes), checks.count("points", points, low=2, high=_MOST_POINTS)
     if energy is not None and amplitude is not None:
         raise ValueError("energy, amplitude: one of them must be None")
-    problem = _Problem.of(system, mode, modes, harmonics, place, field)
+    if system.model.pieces["hysteresis"]:
+        return _held(system, mode, energy, amplitude, modes, harmonics, place, field)
+    problem = _Problem.of(system, mode, modes, 9 if harmonics is None else harmonics, place, field)
     if energy is None and amplitude is None:
         return _whole(problem, points)
     name, value = ("energy", energy) if amplitude is None else ("amplitude", amplitude)
     unit = "J" if amplitude is None else None
     targets = checks.real_array(name, value, low=1e-60, high=1e60, unit=unit)
     return _at_targets(problem, targets, problem.energy if amplitude is None else problem.peak, name)
+
+
+def _held(
+    system: System, mode: int, energy: Any, amplitude: Any, modes: int, harmonics: int | None, place: Any, field: Any
+) -> Backbone:
+    """Return damped motions with elastic-slip elements."""
+    if amplitude is None:
+        raise ValueError(f"energy = {energy}: must be None and amplitude given, as the model has hysteresis")
+    if system.shape:
+        raise ValueError(f"system has the batch shape {system.shape}: must be a single one here")
+    targets = checks.real_array("amplitude", amplitude, low=1e-60, high=1e60)
+    found = held_curve(system, mode, targets.ravel(), modes, harmonics, place, field)
+    missing = np.flatnonzero(np.isnan(found.angular_frequency))
+    if missing.size:
+        first = targets.ravel()[missing[0]]
+        warnings.warn(f"no motion was found at amplitude = {first:g}", ConvergenceWarning, stacklevel=3)
+
+    def shaped(values: NDArray[Any]) -> NDArray[Any]:
+        return np.asarray(values.reshape((*targets.shape, *values.shape[1:])))[()]
+
+    return Backbone(
+        shaped(found.angular_frequency),
+        shaped(found.energy),
+        targets[()],
+        shaped(found.stable),
+        shaped(found.error_modes),
+        shaped(found.error_harmonics),
+        shaped(found.coefficients),
+        tuple(range(found.coefficients.shape[-1] // 2 + 1)),
+        np.zeros(0),
+        shaped(found.damping_ratio),
+        shaped(found.loss),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -353,6 +398,8 @@ def _told(
         coefficients.reshape(*shape, *coefficients.shape[1:]),
         multiples,
         crossings,
+        np.zeros(shape)[()],
+        np.zeros(shape)[()],
     )
 
 

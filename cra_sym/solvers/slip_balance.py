@@ -254,7 +254,7 @@ class SlipBalance:
             if not self.linear:
                 some = None if causes is None else causes[open_]
                 based, rows = self._based(q[open_], frequency[open_], some), slice(None)
-            force, slope = self._forces(w[open_])
+            force, slope = self.forces(w[open_])
             wrong = based.displacement[rows] - (based.flexibility[rows] @ force[..., None])[..., 0] - w[open_]
             own = based.modal(force, rows) - q[open_] if not self.linear else np.zeros((len(open_), 0))
             size = np.linalg.norm(wrong, axis=1) + np.linalg.norm(own, axis=1)
@@ -289,7 +289,7 @@ class SlipBalance:
         for place, step in moved:
             place[which] -= share[which, None] * step[which]
 
-    def _forces(self, w: Array) -> tuple[Array, Array]:
+    def forces(self, w: Array) -> tuple[Array, Array]:
         """Return the harmonics of the forces, and their rates (points, displacements, functions, functions)."""
         cycles = self.elements.cycles(w.reshape(len(w), -1, self.basis.size))
         force = np.concatenate([c.force for c in cycles], axis=1)

@@ -137,6 +137,17 @@ class Cycle:
         way = np.abs(np.roll(self.sliders, -1, axis=1) - self.sliders)
         return np.asarray((way * self.slip).sum(axis=(1, 2)))
 
+    def energy(self, phase: float) -> float:
+        """Return the energy of all springs of the first motion at a phase."""
+        start = self.reversals[0]
+        turned = np.where(phase < start[0], phase + _TURN, phase) % _TURN if phase < 0 else phase
+        turned = turned + _TURN if turned < start[0] else turned
+        number = int(np.flatnonzero(turned >= start)[-1])
+        sticks = turned <= self.onsets[0, number]
+        place = float(values(np.array(turned), self.harmonics) @ self.coefficients[0])
+        pull = np.where(sticks, self.stiffness * (place - self.sliders[0, number]), self.slip)
+        return float(0.5 * (pull**2 / self.stiffness).sum())
+
 
 def values(phase: Array, harmonics: int, derivative: int = 0) -> Array:
     """Return constant, cosines and sines, or their derivatives, at phases, shape (..., 2 harmonics + 1)."""

@@ -1,0 +1,176 @@
+"""Damped motions of a mode with elastic-slip elements: frequency, damping ratio and loss over amplitude."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.analysis.nonlinear import equations_of, samples, watched
+from cra_sym.analysis.slip_states import ACCURACY, FIRST, elements_of
+from cra_sym.model.system import System
+from cra_sym.solvers.harmonic_balance import Basis, peak
+from cra_sym.solvers.slip_balance import SlipBalance
+from cra_sym.solvers.slip_modes import Held, HeldMotions
+from cra_sym.solvers.slip_stability import slip_multipliers
+
+__all__ = ["HeldCurve", "held_curve"]
+
+Array = NDArray[np.float64]
+_MOST = 127  # harmonics
+_RATIO, _FINEST = 1.5, 1.005  # of neighbouring amplitudes, where a curve is followed
+_UNSTABLE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class HeldCurve:
+    """Motions at given amplitudes, arrays with one axis; nan where none was found."""
+
+    angular_frequency: Array
+    damping_ratio: Array
+    loss: Array
+    energy: Array
+    stable: NDArray[np.bool_]
+    error_modes: Array
+    error_harmonics: Array
+    coefficients: Array
+
+
+def held_curve(
+    system: System, mode: int, amplitudes: Array, modes: int, harmonics: int | None, place: Any, field: Any
+) -> HeldCurve:
+    """Return the motions of a mode at amplitudes; arguments are those of :func:`cra_sym.backbone`."""
+    problem = _problem(system, mode, modes, FIRST if harmonics is None else min(FIRST, harmonics), place, field)
+    if not problem.stuck_frequency() > 0:
+        raise ValueError(f"mode = {mode}: is a rigid-body mode and does not vibrate")
+    found = _at(problem, amplitudes)
+    if harmonics is not None and harmonics > FIRST:
+        whole = _problem(system, mode, modes, harmonics, place, field)
+        problem, found = whole, whole.solved(_embedded(found, problem, whole), amplitudes)
+    while True:
+        number = len(problem.balance.basis.sines)
+        rich = _problem(system, mode, modes, 2 * number + 1, place, field)
+        finer = rich.solved(_embedded(found, problem, rich), amplitudes)
+        change = _change(found, finer)
+        if harmonics is not None or number >= _MOST or not (change[found.good & finer.good] > ACCURACY).any():
+            break
+        problem, found = rich, finer
+    more = min(modes + 3, system.without_hysteresis.most_modes)
+    wide = _problem(system, mode, more, number, place, field)
+    changed = wide.solved(_widened(found, more), amplitudes)
+    return _told(problem, found, change, _change(found, changed))
+
+
+def _problem(system: System, mode: int, modes: int, harmonics: int, place: Any, field: Any) -> HeldMotions:
+    base = system.without_hysteresis
+    whole = equations_of(base, modes)
+    if base.numerics("constant") is not None:
+        raise ValueError("a backbone starts from rest at zero; the model has a constant load, which moves it away")
+    energies = tuple(term for term in whole.energies if not term.causes)
+    if any(term.velocities % 2 for term in energies):
+        raise ValueError("a backbone needs a Lagrangian that is even in time; it has gyroscopic terms")
+    forces = tuple(term for term in whole.forces if not term.causes)
+    equations = type(whole)(whole.omega, whole.damping, energies, forces)
+    basis = Basis.whole(harmonics, samples(equations.degree, harmonics))
+    balance = SlipBalance(equations, basis, elements_of(system, modes))
+    rows = watched(base, modes, place, field)
+    if not np.abs(rows).max() > 0:
+        raise ValueError("amplitude: no mode moves there; choose another place or field")
+    return HeldMotions(balance, mode - 1, rows)
+
+
+def _at(problem: HeldMotions, amplitudes: Array) -> Held:
+    """Return the motions: all at once from linear ones, what is left along the amplitudes from smaller ones."""
+    found = problem.solved(problem.linear(amplitudes), amplitudes)
+    if problem.balance.equations.energies or problem.balance.equations.forces:
+        found.good[:] = False  # linear starts do not know polynomial terms: the curve is followed
+    order = np.argsort(amplitudes)
+    if found.good.all():
+        return found
+    small = np.array([min(amplitudes.min(), 0.5 * _first_slip(problem))])
+    last, at = problem.solved(problem.linear(small), small), float(small[0])
+    for number in order:
+        target, step = float(amplitudes[number]), _RATIO
+        if found.good[number]:
+            last, at = found[np.array([number])], target
+            continue
+        while last.good[0]:
+            new = min(target, at * step)
+            trial = problem.solved(last.scaled(np.array([new / at])), np.array([new]))
+            if trial.good[0] and abs(trial.frequency[0] / last.frequency[0] - 1) < 0.2:
+                last, at, step = trial, new, min(step * 1.3, _RATIO)
+                if at >= target:
+                    break
+            else:
+                step = step**0.5
+                if step < _FINEST:
+                    break
+        if at == target and last.good[0]:
+            for mine, theirs in (
+                (found.coefficients, last.coefficients),
+                (found.displacements, last.displacements),
+                (found.frequency, last.frequency),
+                (found.ratio, last.ratio),
+                (found.good, last.good),
+            ):
+                mine[number] = theirs[0]
+    return found
+
+
+def _first_slip(problem: HeldMotions) -> float:
+    """Return the amplitude of the stuck mode at which an element begins to slip."""
+    one = problem.linear(np.array([1e-12 * problem.balance.elements.limit]))
+    moved = np.abs(one.displacements[0, :, 1])
+    limits = [float((f / k).min()) for k, f in problem.balance.elements.groups]
+    shares = [size / limit for size, limit in zip(moved, limits, strict=True)]
+    return float(1e-12 * problem.balance.elements.limit / max(max(shares), 1e-300))
+
+
+def _embedded(found: Held, old: HeldMotions, new: HeldMotions) -> Held:
+    h, more = len(old.balance.basis.sines), len(new.balance.basis.sines)
+
+    def whole(given: Array) -> Array:
+        out = np.zeros((*given.shape[:2], 2 * more + 1))
+        out[..., : h + 1], out[..., more + 1 : more + 1 + h] = np.split(given, [h + 1], axis=-1)
+        return out
+
+    return Held(whole(found.coefficients), whole(found.displacements), found.frequency, found.ratio, found.good)
+
+
+def _widened(found: Held, modes: int) -> Held:
+    points, n, size = found.coefficients.shape
+    whole = np.zeros((points, modes, size))
+    whole[:, :n] = found.coefficients
+    return Held(whole, found.displacements, found.frequency, found.ratio, found.good)
+
+
+def _change(one: Held, other: Held) -> Array:
+    """Return by what share the frequency changes, and the damping ratio by how much; the larger of both."""
+    both = one.good & other.good
+    change = np.maximum(np.abs(other.frequency / one.frequency - 1.0), np.abs(other.ratio - one.ratio))
+    return np.where(both, change, np.nan)
+
+
+def _told(problem: HeldMotions, found: Held, harmonics: Array, modes: Array) -> HeldCurve:
+    balance, good = problem.balance, found.good
+    basis, equations = balance.basis, balance.equations
+    _, phase = peak(basis, problem.rows, found.coefficients)
+    energy, loss, stable = np.full(good.size, np.nan), np.full(good.size, np.nan), np.zeros(good.size, bool)
+    for k in np.flatnonzero(good):
+        x, omega = found.coefficients[k], float(found.frequency[k])
+        cycles = balance.elements.cycles(found.displacements[k : k + 1])
+        q, v = x @ basis.values(phase[k]), omega * (x @ basis.values(phase[k], 1))
+        energy[k] = equations.energy(q, v) + sum(c.energy(float(phase[k])) for c in cycles)
+        speed = (basis.orders**2 * x**2).sum()  # the integral of the squared velocities over pi omega
+        loss[k] = 2 * found.ratio[k] * np.pi * omega**2 * speed
+        values = slip_multipliers(equations, basis, x, omega, balance.elements, cycles)
+        stable[k] = np.abs(values).max() <= 1.0 + _UNSTABLE
+
+    def only(values: Array) -> Array:
+        return np.where(good.reshape(-1, *(1,) * (values.ndim - 1)), values, np.nan)
+
+    return HeldCurve(
+        only(found.frequency), only(found.ratio), loss, energy, stable, modes, harmonics, only(found.coefficients)
+    )
