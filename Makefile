@@ -9,10 +9,15 @@ RUN = .venv/bin/python
 NOTEBOOKS = --nbval --nbval-current-env --nbval-sanitize-with tests/notebooks/sanitize.cfg notebooks
 SHARED = -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
-.PHONY: reproduce test check lock coverage lab notebooks oldest newest lint mutation campaign clean
+.PHONY: reproduce site test check lock coverage lab notebooks oldest newest lint mutation campaign clean
 
 reproduce: .venv/.ready
 	$(RUN) -m cra_sym reproduce --output "$(OUTPUT)"
+
+# The notebooks as they are stored, as pages to read offline.
+site: OUTPUT = site
+site: .venv/.ready
+	$(RUN) -m cra_sym site --output "$(OUTPUT)"
 
 # The processes share the processors: linear algebra takes one thread in each. The longest files come first, so that all
 # end together.
@@ -89,5 +94,5 @@ clean:
 	        echo "Setting up .venv with $$python (once; takes a few minutes)"; "$$python" -m venv .venv; exit; \
 	    fi; \
 	done; echo "Python 3.11 to 3.14 is needed and was not found: set PYTHON to one, as in make PYTHON=/path/to/python3.12 ..." >&2; exit 1
-	$(RUN) -m pip install --quiet --no-compile --disable-pip-version-check -r requirements.txt
+	$(RUN) -m pip install -qq --no-compile --disable-pip-version-check -r requirements.txt
 	@touch .venv/.ready

@@ -63,3 +63,4 @@ from .studies import sweep as sweep
 
 __version__: str
 _LOADED: float
+_HOME: dict[str, str]

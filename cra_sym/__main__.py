@@ -61,6 +61,17 @@ def _reproduce(options: Options) -> None:
     print(reproduce(options.output, notebooks=options.notebooks))
 
 
+def _site_options(parser: argparse.ArgumentParser) -> None:
+    _add_output(parser, "site")
+    parser.add_argument("--notebooks", metavar="DIR", type=Path, help="folder of the notebooks (that of the checkout)")
+
+
+def _site(options: Options) -> None:
+    from cra_sym.report.run import site
+
+    print(site(options.output, notebooks=options.notebooks))
+
+
 def _figures_options(parser: argparse.ArgumentParser) -> None:
     from cra_sym.figures import FIGURES
 
@@ -186,7 +197,8 @@ def _export(options: Options) -> None:
 
 COMMANDS = {
     "export": Command("write the arm as tested source code of another language", _export_options, _export),
-    "reproduce": Command("run every notebook; write them, figures, tables and report", _reproduce_options, _reproduce),
+    "reproduce": Command("run every notebook; write them, figures, tables and site", _reproduce_options, _reproduce),
+    "site": Command("write the site of the notebooks as they are stored", _site_options, _site),
     "claims": Command("judge the paper's claims", _claims_options, _claims),
     "figures": Command("draw the figures as PNG and SVG", _figures_options, _figures),
     "frequencies": Command("natural frequencies of an arm", _modes_options, _frequencies),
@@ -211,6 +223,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from cra_sym.ending import run_command
     from cra_sym.extras import MissingExtraError
     from cra_sym.report.notebooks import NotebookError
+    from cra_sym.report.site.build import SiteError
 
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     parser = _Parser(
@@ -229,7 +242,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return run_command(
         f"{parser.prog} {options.command}",
         lambda: options.run(options),
-        {UsageError: 2, MissingExtraError: 2, NotebookError: 1},
+        {UsageError: 2, MissingExtraError: 2, NotebookError: 1, SiteError: 1},
     )
 
 

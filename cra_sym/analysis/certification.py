@@ -76,6 +76,15 @@ def certify(system: System, modes: int = 3) -> Certificate:
         model vary along x or its forces are not conservative.
     MissingExtraError
         If python-flint is not installed (extra ``certify``).
+
+    Examples
+    --------
+    >>> import cra_sym as cra
+    >>> proof = cra.certify(cra.Arm.nominal())
+    >>> bool(proof.complete), bool((proof.upper - proof.lower < 1e-12).all())
+    (True, True)
+    >>> ((proof.lower + proof.upper) / 2).round(4)
+    array([ 2.4277, 15.2161, 42.6099])
     """
     instance("system", system, System)
     modes = count("modes", modes, high=MOST_MODES)

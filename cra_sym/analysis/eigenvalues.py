@@ -102,7 +102,21 @@ def eigenvalues(system: System, modes: int = 3, *, oscillating: bool = True) -> 
 
 @default_floating_point
 def damping_ratios(system: System, modes: int = 3) -> NDArray[np.float64]:
-    """Return ``-Re s / |s|`` of the :func:`eigenvalues`, zero for a rigid motion, shape (..., modes)."""
+    """Return ``-Re s / |s|`` of the :func:`eigenvalues`, zero for a rigid motion, shape (..., modes).
+
+    Examples
+    --------
+    A string that is held by a damper at its right end:
+
+    >>> import cra_sym as cra
+    >>> from sympy import Symbol
+    >>> from cra_sym.symbols import L, t, v, x
+    >>> c, end = Symbol("c"), v.subs(x, L)
+    >>> string = cra.Model(v.diff(t)**2 / 2 - v.diff(x)**2 / 2, fields=[v], x=x, domain=(0, L), t=t,
+    ...                    essential=[v.subs(x, 0)], virtual_work=[(-c * v.diff(t), v, "right")])
+    >>> cra.damping_ratios(string.at({L: 1.0, c: 0.1}), modes=2).round(4)
+    array([0.0637, 0.0213])
+    """
     s = eigenvalues(system, modes)
     return -s.real / np.where(s == 0.0, 1.0, np.abs(s))
 

@@ -124,6 +124,17 @@ def floquet_exponents(
     ------
     TypeError, ValueError
         As :func:`growth_rate`.
+
+    Examples
+    --------
+    In the middle of the principal zone of the first mode one exponent has a positive real part:
+
+    >>> from math import pi
+    >>> import cra_sym as cra
+    >>> soft = cra.Arm.nominal().replace(k_t=1e3, k_r=1e2)
+    >>> varpi = 4 * pi * cra.natural_frequencies(soft)[0]
+    >>> cra.floquet_exponents(soft, cra.JointStiffness(), varpi, epsilon=0.3, modes=1).real.round(4)
+    array([ 0.0316, -0.0316])
     """
     found = _taken(system, excitation, angular_frequency, epsilon, modes, residual)
     if isinstance(found, tuple):

@@ -132,6 +132,13 @@ def mode_shapes(
     TypeError, ValueError
         If ``x`` does not hold real numbers, has more than one axis or a point outside the domain of any member of the
         batch, or another argument is out of its range.
+
+    Examples
+    --------
+    >>> from cra_sym import Arm, mode_shapes
+    >>> mode_shapes(Arm.nominal(), [0.0, 0.5, 1.0], modes=2).round(2)
+    array([[ 0.  ,  1.37,  4.03],
+           [ 0.  , -2.89,  3.97]])
     """
     checks.instance("system", system, System)
     derivative = checks.count("derivative", derivative, low=0, high=_MOST_DERIVATIVES)

@@ -20,7 +20,25 @@ MOST_NONLINEAR_MODES = 40
 
 
 class ConvergenceWarning(UserWarning):
-    """An answer was not found; the last good one is returned."""
+    """An answer was not found; the last good one is returned.
+
+    Examples
+    --------
+    A spring that softens has no free vibration beyond its barrier at the amplitude 1:
+
+    >>> import warnings
+    >>> from sympy import Function
+    >>> import cra_sym as cra
+    >>> from cra_sym.symbols import t, x
+    >>> q = Function("q")(t)
+    >>> soft = cra.Model(0, fields=(), coordinates=[q], x=x, domain=(0, 1), t=t,
+    ...                  left=q.diff(t)**2/2 - q**2/2 + q**4/4)
+    >>> with warnings.catch_warnings(record=True) as said:
+    ...     warnings.simplefilter("always")
+    ...     curve = cra.backbone(soft.at({}), amplitude=[0.5, 1.5], modes=1)
+    >>> said[0].category.__name__, curve.angular_frequency.round(2)
+    ('ConvergenceWarning', array([0.9, nan]))
+    """
 
 
 @checks.default_floating_point

@@ -41,7 +41,21 @@ _UNCOUPLED = 1e-8  # of the damping between two modes, over the geometric mean o
 
 
 class UndersamplingWarning(UserWarning):
-    """Modes lie above half the sampling rate of a record, which does not tell what excites them."""
+    """Modes lie above half the sampling rate of a record, which does not tell what excites them.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import numpy as np
+    >>> import cra_sym as cra
+    >>> t = np.linspace(0.0, 1.0, 132)
+    >>> record = cra.BaseMotion.sampled(t, 0.01 * np.sin(3 * t))
+    >>> with warnings.catch_warnings(record=True) as said:
+    ...     warnings.simplefilter("always")
+    ...     tip = cra.tip_response(cra.Arm.nominal(), record, t)
+    >>> print(said[0].category.__name__, str(said[0].message)[:55])
+    UndersamplingWarning the record is sampled at 131 Hz and tells nothing above
+    """
 
 
 _free = derived_kernel("cra_sym.model.oscillator:free_kernel", backend="numpy")
@@ -164,6 +178,16 @@ def response(
     ------
     TypeError, ValueError
         Names the argument that is out of its range, the load without a history, the function that is not known.
+
+    Examples
+    --------
+    The middle and the tip of an arm whose base starts to move at 0.1 m/s, in mm:
+
+    >>> import cra_sym as cra
+    >>> start = cra.BaseMotion(velocity=0.1)
+    >>> (1e3 * cra.response(cra.Arm.nominal(), start, [0.0, 0.1, 0.2], x=[0.5, 1.0])).round(2)
+    array([[  0.  ,  -3.34,  -0.53],
+           [  0.  , -10.42,  -0.7 ]])
     """
     instance("system", system, System)
     places = one_axis("x", x, "places", unit="m")
@@ -215,6 +239,18 @@ def residual_vibration(
     TypeError, ValueError
         If a motion never stops accelerating or a force never ends, or the model has dampers, which couple the modes;
         otherwise as :func:`response`.
+
+    Examples
+    --------
+    A move of 0.2 m, in mm, before and after it is shaped for the first mode:
+
+    >>> from math import pi
+    >>> import cra_sym as cra
+    >>> arm = cra.Arm.nominal()
+    >>> move = cra.BaseMotion.s_curve(0.2, v_max=1.0, a_max=2.0, j_max=40.0)
+    >>> shaper = cra.input_shaper(2 * pi * cra.natural_frequencies(arm)[0])
+    >>> [round(float(1e3 * cra.residual_vibration(arm, motion)), 1) for motion in (move, move.shaped(*shaper))]
+    [21.1, 0.1]
     """
     instance("system", system, System)
     if system.model.pieces["hysteresis"]:

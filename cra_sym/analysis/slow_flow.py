@@ -85,6 +85,18 @@ def slow_flow_values(flow: SlowFlow, system: System) -> dict[Symbol, float]:
     -------
     dict of Symbol to float
         ``sigma``, ``varpi``, forces f_n and couplings P_mn are not among them.
+
+    Examples
+    --------
+    >>> from sympy import Symbol
+    >>> import cra_sym as cra
+    >>> k_3, arm = Symbol("k_3"), cra.Arm.nominal().replace(k_t=1e4)
+    >>> v, left = arm.model.equations.fields[0], cra.paper_lagrangian()[1]
+    >>> system = arm.model.replace(left=left - k_3 * v**4 / 4).at({**arm.values, "k_3": 1e9})
+    >>> flow = system.model.slow_flow(("free", 1))
+    >>> values = cra.slow_flow_values(flow, system)
+    >>> print({symbol.name: round(value, 3) for symbol, value in values.items()})
+    {'c_1': 0.0, 'omega_1': 15.227, 'K_1111': 3.263}
     """
     from cra_sym.mechanics.slow_flow import SlowFlow
 

@@ -23,11 +23,34 @@ _REACH = 0.5  # share of the half-width by which second order may move the zone
 
 
 class ResonanceWarning(UserWarning):
-    """A resonance asked for has no instability; the boundary is nan there."""
+    """A resonance asked for has no instability; the boundary is nan there.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import cra_sym as cra
+    >>> with warnings.catch_warnings(record=True) as said:
+    ...     warnings.simplefilter("always")
+    ...     bounds = cra.stability_boundary(cra.Arm.nominal(), cra.AxialBase(0.001), 0.1, resonance=(1, -2))
+    >>> print(said[0].category.__name__, *(float(bound) for bound in bounds))
+    ResonanceWarning nan nan
+    """
 
 
 class AsymptoticWarning(UserWarning):
-    """A boundary is returned where its expansion in epsilon cannot be trusted."""
+    """A boundary is returned where its expansion in epsilon cannot be trusted.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import cra_sym as cra
+    >>> soft = cra.Arm.nominal().replace(k_t=1e3, k_r=1e2)
+    >>> with warnings.catch_warnings(record=True) as said:
+    ...     warnings.simplefilter("always")
+    ...     bounds = cra.stability_boundary(soft, cra.JointStiffness(), epsilon=0.9)
+    >>> print(said[0].category.__name__, said[0].message)
+    AsymptoticWarning resonance (1, 1): epsilon = 0.9 is beyond the reach of the expansion
+    """
 
 
 @checks.default_floating_point
@@ -134,9 +157,9 @@ def judged_boundary(
 
 @checks.default_floating_point
 def forced_width(system: System, excitation: TransverseBase, modes: int = 3) -> np.ndarray:
-    """Return the measure |Gamma_n phi_n(L)| omega_n w_1 / (2 M_n) of the forced resonances of a transverse base, (49a).
+    """Return the measure of the forced resonances of a transverse base, (49a).
 
-    It is not a boundary. A base that shakes across the span at a natural frequency makes the tip's amplitude grow in
+    It is ``|Gamma_n phi_n(L)| omega_n w_1 / (2 M_n)``, and not a boundary. A base that shakes across the span at a natural frequency makes the tip's amplitude grow in
     proportion to time, without damping at this rate for epsilon = 1. It does not depend on how modes are scaled.
 
     Parameters
@@ -158,6 +181,12 @@ def forced_width(system: System, excitation: TransverseBase, modes: int = 3) -> 
     TypeError, ValueError
         If ``system`` is not a :class:`System`, ``excitation`` not a :class:`TransverseBase`, ``modes`` not an
         integer from 1 to 1000, or shapes do not broadcast together.
+
+    Examples
+    --------
+    >>> import cra_sym as cra
+    >>> cra.forced_width(cra.Arm.nominal(), cra.TransverseBase(0.001), modes=2).round(4)
+    array([0.0119, 0.0407])
     """
     if not isinstance(excitation, TransverseBase):
         raise TypeError(

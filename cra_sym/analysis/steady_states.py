@@ -47,6 +47,20 @@ class SteadyState:
         Over one period of the answer, largest first.
     coefficients : ndarray, shape (modes, 2 harmonics + 1)
         Modal coordinates as sums of the constant, the cosines and then the sines of k varpi t / period.
+
+    Examples
+    --------
+    What :func:`cra_sym.steady_states` returns several of:
+
+    >>> from sympy import Function
+    >>> import cra_sym as cra
+    >>> from cra_sym.symbols import t, x
+    >>> q, F = Function("q")(t), Function("F")(t)
+    >>> duffing = cra.Model(0, fields=(), coordinates=[q], x=x, domain=(0, 1), t=t,
+    ...                     left=q.diff(t)**2/2 - q**2/2 - q**4/4, virtual_work=[(F, q, None)])
+    >>> (state,) = cra.steady_states(duffing.at({}, zeta=0.02), 0.5, drive={F: 0.1}, modes=1)
+    >>> round(state.amplitude, 4), state.stable
+    (0.1315, True)
     """
 
     angular_frequency: float

@@ -279,6 +279,13 @@ class AxialBase(_ShakenBase, Parametric):
     ------
     TypeError, ValueError
         If the amplitude is not made of finite real numbers or is negative.
+
+    Examples
+    --------
+    >>> import cra_sym as cra
+    >>> lower, upper = cra.stability_boundary(cra.Arm.nominal(), cra.AxialBase(0.001), epsilon=0.1)
+    >>> print(f"{lower:.3f} to {upper:.3f} rad/s")
+    30.503 to 30.513 rad/s
     """
 
     def drives(self, system: System, modes: int) -> list[Drive]:
@@ -301,4 +308,10 @@ class TransverseBase(_ShakenBase):
     ------
     TypeError, ValueError
         If the amplitude is not made of finite real numbers or is negative.
+
+    Examples
+    --------
+    >>> import cra_sym as cra
+    >>> cra.forced_width(cra.Arm.nominal(), cra.TransverseBase(0.001)).round(4)
+    array([0.0119, 0.0407, 0.066 ])
     """

@@ -34,6 +34,19 @@ class Member:
         Direction of the member in its plane, rad, counter-clockwise.
     inside : sequence of (place, Expr), optional
         Lagrangian terms at places between 0 and the length.
+
+    Examples
+    --------
+    A post that stands on its end, stretched and bent: along the axes of the plane its foot moves by
+
+    >>> from sympy import Function, pi, symbols
+    >>> import cra_sym as cra
+    >>> from cra_sym.symbols import t, x
+    >>> u, v = Function("u")(x, t), Function("v")(x, t)
+    >>> l, m, EA, EI = symbols("l m EA EI")
+    >>> density = m * (u.diff(t)**2 + v.diff(t)**2) / 2 - EA * u.diff(x)**2 / 2 - EI * v.diff(x, 2)**2 / 2
+    >>> cra.Member(density, (u, v), x, l, angle=pi / 2).start[:2]
+    (-v(0, t), u(0, t))
     """
 
     density: Expr

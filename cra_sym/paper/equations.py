@@ -365,7 +365,16 @@ def equation(number: Number) -> Equation:
 
 
 def equations(*, companions: bool = False) -> tuple[Equation, ...]:
-    """Return all equations in the paper's order; with ``companions``, also those the paper does not number."""
+    """Return all equations in the paper's order; with ``companions``, also those the paper does not number.
+
+    Examples
+    --------
+    >>> from cra_sym import equations
+    >>> len(equations()), equations()[0]
+    (49, Equation (1), displacement)
+    >>> [e.number for e in equations(companions=True)][9:13]
+    [10, '10a', '10b', '10c']
+    """
     _load()
     return tuple(_EQUATIONS[key] for key in sorted(_EQUATIONS, key=_order) if companions or isinstance(key, int))
 

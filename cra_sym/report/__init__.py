@@ -1,1 +1,1 @@
-"""The whole work in one folder: executed notebooks, figures, tables and a report to read offline."""
+"""The whole work in one folder: executed notebooks, figures, tables and a site to read offline."""

@@ -186,7 +186,12 @@ def refresh(paths: Sequence[Path], *, svg: bool = False) -> None:
         tqdm(total=cells_to_run(paths), unit="cell", disable=None) as progress,
         ThreadPoolExecutor(max_workers=min(len(paths), os.cpu_count() or 1)) as pool,
     ):
-        jobs = {pool.submit(execute, path, progress.update, svg=svg, begun=running.append): path for path in paths}
+
+        def run(path: Path) -> NotebookNode:
+            _tell(progress, path.stem)
+            return execute(path, progress.update, svg=svg, begun=running.append)
+
+        jobs = {pool.submit(run, path): path for path in paths}
         try:
             for finished in as_completed(jobs):
                 write_text(jobs[finished], nbformat.writes(finished.result()) + "\n")
@@ -196,6 +201,13 @@ def refresh(paths: Sequence[Path], *, svg: bool = False) -> None:
                 with suppress(RuntimeError):  # its loop is closed: it has ended
                     end()
             raise
+
+
+def _tell(progress: tqdm[Any], chapter: str) -> None:
+    """Name the chapter begun last: before the bar or, where there is none, in a line."""
+    progress.set_description(chapter)
+    if progress.disable:
+        print(chapter, file=sys.stderr, flush=True)
 
 
 def _refresh_as_asked() -> None:

@@ -1,25 +1,28 @@
-"""``make reproduce``: every notebook, figure and table, and a report of them, in one folder."""
+"""``make reproduce`` and ``make site``: every notebook, figure and table in one folder, and the site of them."""
 
 from __future__ import annotations
 
 import shutil
+import sys
 import textwrap
+import time
+from collections.abc import Iterable
 from pathlib import Path
 
 from tqdm import tqdm
 
 from cra_sym.claims import claims
+from cra_sym.extras import require
 from cra_sym.files import staged_directory, write_text
 from cra_sym.report.notebooks import find_notebooks, refresh
-from cra_sym.report.page import write_page
 from cra_sym.report.pictures import save_animations, save_claims, save_figures
 from cra_sym.report.tables import TABLES
 
-__all__ = ["reproduce"]
+__all__ = ["reproduce", "site"]
 
 
 def reproduce(output: str | Path, notebooks: str | Path | None = None) -> str:
-    """Run every notebook and write them, the figures, the tables and the report to one folder.
+    """Run every notebook and write them, the figures, the tables and the site to one folder.
 
     Parameters
     ----------
@@ -35,26 +38,77 @@ def reproduce(output: str | Path, notebooks: str | Path | None = None) -> str:
 
     Raises
     ------
+    cra_sym.extras.MissingExtraError
+        If what runs notebooks or makes the site is not installed.
     cra_sym.files.OutputError
         If the folder cannot be written, before any work.
     cra_sym.report.notebooks.NotebookError
         If a notebook does not run to its end; nothing is left behind.
     """
+    _require("notebooks", "nbclient", "nbconvert", "ipykernel")
+    _require_site()
     sources = find_notebooks(notebooks)
+    begun = time.monotonic()
     with staged_directory(output) as folder:
-        _run_notebooks(sources[0].parent, folder / "notebooks")
+        _say(f"Running {len(sources)} chapters, drawing, judging: some ten minutes on two processors")
+        shutil.copytree(sources[0].parent, folder / "notebooks", ignore=shutil.ignore_patterns(".*"))
+        refresh(find_notebooks(folder / "notebooks"), svg=True)
+        _say("Drawing the figures")
         save_figures(folder / "figures")
         save_animations(folder / "figures")
+        _say("Judging the claims")
         save_claims(folder / "claims", claims())
         _write_tables(folder / "tables")
-        write_page(folder)
+        _write_site(folder / "site", find_notebooks(folder / "notebooks"), (folder / "figures", folder / "claims"))
         listing = _listing(folder)
-    return f"{listing}\n\nTo read everything, open {Path(output) / 'report.html'}"
+    minutes = (time.monotonic() - begun) / 60
+    return (
+        f"{listing}\n\nMade in {minutes:.0f} minutes. To read everything, open {Path(output) / 'site' / 'index.html'}"
+    )
 
 
-def _run_notebooks(source: Path, folder: Path) -> None:
-    shutil.copytree(source, folder, ignore=shutil.ignore_patterns(".*"))
-    refresh(find_notebooks(folder), svg=True)
+def site(output: str | Path, notebooks: str | Path | None = None) -> str:
+    """Write the site of the notebooks as they are stored to a folder; arguments and errors as for :func:`reproduce`."""
+    from cra_sym.figures import FIGURES, shows_any_system
+
+    _require_site()
+    sources = find_notebooks(notebooks)
+    with staged_directory(output) as folder:
+        pictures = folder.with_name(f"{folder.name}.pictures")
+        try:
+            _say("Judging the claims")
+            save_claims(pictures, claims())
+            save_animations(pictures)
+            save_figures(pictures, filter(shows_any_system, FIGURES), kinds=["svg"])
+            _write_site(folder, sources, (pictures,))
+        finally:
+            shutil.rmtree(pictures, ignore_errors=True)
+    return f"To read the site, open {Path(output) / 'index.html'}"
+
+
+def _require_site() -> None:
+    _require("site", "sphinx", "myst_nb", "furo", "sphinx-mathjax-offline", "nbconvert")
+
+
+def _require(extra: str, *modules: str) -> None:
+    for module in modules:
+        require(module, extra)
+
+
+def _say(what: str) -> None:
+    """Tell on standard error how far the work is."""
+    print(what, file=sys.stderr, flush=True)
+
+
+def _write_site(folder: Path, notebooks: list[Path], pictures: Iterable[Path]) -> None:
+    from cra_sym.report.site.build import write_site
+
+    _say("Checking the equations and writing the site")
+    warnings = write_site(
+        folder, notebooks, claims(), [path for place in pictures for path in sorted(place.glob("*.svg"))]
+    )
+    if warnings:
+        _say(warnings)
 
 
 def _write_tables(folder: Path) -> None:
@@ -66,13 +120,13 @@ def _write_tables(folder: Path) -> None:
 
 
 def _listing(folder: Path) -> str:
-    """A line for each entry of a folder: its size, the kinds and the names of the files in it."""
+    """A line for each entry of a folder: its size, and the kinds and the names of the files that lie in it."""
     lines = []
     for entry in sorted(folder.iterdir(), key=lambda path: (path.is_file(), path.name)):
-        files = [entry] if entry.is_file() else sorted(path for path in entry.iterdir() if path.is_file())
+        files = [entry] if entry.is_file() else [path for path in sorted(entry.rglob("*")) if path.is_file()]
         size = sum(path.stat().st_size for path in files) / 1e6
         lines.append(f"{size:6.1f} MB  {entry.name}")
-        if entry.is_dir():
+        if entry.is_dir() and entry.name != "site":
             kinds = ", ".join(sorted({path.suffix[1:] for path in files}))
             names = f"{kinds}: {' '.join(sorted({path.stem for path in files}))}"
             lines.append(textwrap.indent(textwrap.fill(names, 90), " " * 11))
