@@ -159,8 +159,9 @@ def judged_boundary(
 def forced_width(system: System, excitation: TransverseBase, modes: int = 3) -> np.ndarray:
     """Return the measure of the forced resonances of a transverse base, (49a).
 
-    It is ``|Gamma_n phi_n(L)| omega_n w_1 / (2 M_n)``, and not a boundary. A base that shakes across the span at a natural frequency makes the tip's amplitude grow in
-    proportion to time, without damping at this rate for epsilon = 1. It does not depend on how modes are scaled.
+    It is ``|Gamma_n phi_n(L)| omega_n w_1 / (2 M_n)``, and not a boundary. A base that shakes across the span at a
+    natural frequency makes the tip's amplitude grow in proportion to time, without damping at this rate for
+    epsilon = 1. It does not depend on how modes are scaled.
 
     Parameters
     ----------

@@ -34,7 +34,6 @@ autodoc_typehints = "none"  # the docstrings say more than the annotations
 autodoc_default_options = {"members": True, "show-inheritance": False}
 napoleon_google_docstring = False
 napoleon_use_rtype = False
-python_maximum_signature_line_length = 88
 toc_object_entries_show_parents = "hide"
 
 # Mathematics without a network: the extension copies MathJax beside the pages.
