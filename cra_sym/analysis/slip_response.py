@@ -39,6 +39,13 @@ class SlipEvent:
         Number of the Jenkins element, of all that the elements of the model stand for, from 0.
     state : int
         0 if it sticks from then on; 1 or -1 if it slips, force and velocity being positive or negative.
+
+    Examples
+    --------
+    >>> import cra_sym as cra
+    >>> first = cra.SlipEvent(time=0.2, element=0, state=-1)
+    >>> "sticks" if first.state == 0 else "slips"
+    'slips'
     """
 
     time: float
@@ -75,6 +82,20 @@ class SlipResponse:
         Energy at t = 0, J.
     events : ndarray of object, shape (...)
         For each member of the batch a tuple of :class:`SlipEvent`, in the order of time.
+
+    Examples
+    --------
+    What :func:`cra_sym.slip_response` returns: what one slider of a joint takes while the base moves and stops.
+
+    >>> from sympy import symbols
+    >>> import cra_sym as cra
+    >>> from cra_sym.symbols import v
+    >>> arm, (k_d, f_s) = cra.Arm.nominal().replace(k_t=1e3), symbols("k_d f_s")
+    >>> model = arm.model.replace(hysteresis=[(cra.Jenkins(k_d, f_s), v, "left")])
+    >>> move = cra.BaseMotion.trapezoid(0.3, 0.5, 2.0)
+    >>> found = cra.slip_response(model.at({**arm.values, "k_d": 5e3, "f_s": 0.3}), move, [0.5, 1.0])
+    >>> found.tip.shape, found.dissipated.shape, bool((found.dissipated > 0).all())
+    ((2,), (1, 2), True)
     """
 
     time: Array

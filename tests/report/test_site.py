@@ -148,7 +148,10 @@ def test_claims_come_first_with_what_they_rest_on(pages):
     page = pages["claims.html"]
     assert "claims.html" in pages["index.html"].all("href")
     for verdict in JUDGED:
-        assert verdict.id.lower() in page.all("id") and verdict.source in page.text
+        assert verdict.id.lower() in page.all("id") and verdict.source in page.text and verdict.headline in page.text
+        for told in (verdict.plain, verdict.sentence, verdict.criterion, verdict.remedy or "", verdict.missing or ""):
+            prose = " ".join(told.split("$")[::2])  # mathematics stands between
+            assert {*re.findall("[a-z]{4,}", prose)} <= {*re.findall("[a-z]{4,}", page.text)}
         assert all(name in page.text for name in verdict.evidence)
         assert f"../claims.html#{verdict.id.lower()}" in pages["chapters/10_claims.html"].all("href")
 

@@ -18,7 +18,7 @@ __all__ = ["setup"]
 LINKS = "links.json"
 """File among the sources that names the equations and claims of the site, and the page each is found on."""
 
-_CITED = re.compile(r"(?<![\w)])\((\d{1,2}[a-z]?)\)|\b(C\d\d)\b")
+_CITED = re.compile(r"(?<![\w)])\((\d{1,2}[a-z]?)\)|\b(C\d\d[a-z]?)\b")
 _TAG = re.compile(r"\\qquad \((\d{1,2}[a-z]?)\)\s*$|\\tag\{(\d{1,2}[a-z]?)\}")
 _UNTOUCHED = (nodes.reference, nodes.literal, nodes.literal_block, nodes.math, nodes.math_block, nodes.title, nodes.raw)
 _MATHJAX = ("tex-svg.js", "input/tex/extensions")

@@ -30,7 +30,14 @@ _GROUPS = {
         "arm.excitations",
         "model.excitations",
     ),
-    "Large amplitudes": ("analysis.backbone", "analysis.nonlinear", "analysis.slow_flow", "analysis.steady_states"),
+    "Large amplitudes and slip": (
+        "analysis.backbone",
+        "analysis.nonlinear",
+        "analysis.slip_response",
+        "analysis.slow_flow",
+        "analysis.steady_states",
+        "model.hysteresis",
+    ),
     "The paper's equations": ("paper",),
     "Sweeps, code, sliders": ("studies", "kernels", "codegen", "explorer"),
 }
