@@ -56,17 +56,10 @@ class Backbone:
 
     Examples
     --------
-    What :func:`cra_sym.backbone` returns:
-
-    >>> from sympy import Function
     >>> import cra_sym as cra
-    >>> from cra_sym.symbols import t, x
-    >>> q = Function("q")(t)
-    >>> duffing = cra.Model(0, fields=(), coordinates=[q], x=x, domain=(0, 1), t=t,
-    ...                     left=q.diff(t)**2/2 - q**2/2 - q**4/4)
-    >>> curve = cra.backbone(duffing.at({}), amplitude=[0.5, 1.0], modes=1)
-    >>> curve.energy.round(6), curve.stable
-    (array([0.140625, 0.75    ]), array([ True,  True]))
+    >>> line = cra.backbone(cra.Arm.nominal(), amplitude=[0.01, 0.1], modes=1)
+    >>> line.angular_frequency.round(3), line.stable  # of a linear system
+    (array([15.254, 15.254]), array([ True,  True]))
     """
 
     angular_frequency: Array

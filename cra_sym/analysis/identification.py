@@ -44,8 +44,7 @@ class MisfitWarning(UserWarning):
     --------
     >>> import warnings
     >>> import cra_sym as cra
-    >>> with warnings.catch_warnings(record=True) as said:
-    ...     warnings.simplefilter("always")
+    >>> with warnings.catch_warnings(record=True, action="always") as said:
     ...     fit = cra.identify(cra.Arm.nominal(), [2.3, 13.0, 50.0], 0.01, unknown=("k_t", "k_r"))
     >>> any(issubclass(warning.category, cra.MisfitWarning) for warning in said), bool(fit.fits)
     (True, False)
@@ -63,8 +62,7 @@ class AmbiguityWarning(UserWarning):
     >>> import cra_sym as cra
     >>> arm = cra.Arm.nominal()
     >>> measured = cra.natural_frequencies(arm.replace(k_t=2.57, k_r=8.28), modes=2)
-    >>> with warnings.catch_warnings(record=True) as said:
-    ...     warnings.simplefilter("always")
+    >>> with warnings.catch_warnings(record=True, action="always") as said:
     ...     fit = cra.identify_joint(arm, measured, 1e-3 * measured)
     >>> any(issubclass(warning.category, cra.AmbiguityWarning) for warning in said), len(fit.solutions)
     (True, 2)

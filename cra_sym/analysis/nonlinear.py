@@ -33,8 +33,7 @@ class ConvergenceWarning(UserWarning):
     >>> q = Function("q")(t)
     >>> soft = cra.Model(0, fields=(), coordinates=[q], x=x, domain=(0, 1), t=t,
     ...                  left=q.diff(t)**2/2 - q**2/2 + q**4/4)
-    >>> with warnings.catch_warnings(record=True) as said:
-    ...     warnings.simplefilter("always")
+    >>> with warnings.catch_warnings(record=True, action="always") as said:
     ...     curve = cra.backbone(soft.at({}), amplitude=[0.5, 1.5], modes=1)
     >>> said[0].category.__name__, curve.angular_frequency.round(2)
     ('ConvergenceWarning', array([0.9, nan]))

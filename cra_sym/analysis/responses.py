@@ -46,15 +46,11 @@ class UndersamplingWarning(UserWarning):
     Examples
     --------
     >>> import warnings
-    >>> import numpy as np
     >>> import cra_sym as cra
-    >>> t = np.linspace(0.0, 1.0, 132)
-    >>> record = cra.BaseMotion.sampled(t, 0.01 * np.sin(3 * t))
-    >>> with warnings.catch_warnings(record=True) as said:
-    ...     warnings.simplefilter("always")
-    ...     tip = cra.tip_response(cra.Arm.nominal(), record, t)
-    >>> print(said[0].category.__name__, str(said[0].message)[:55])
-    UndersamplingWarning the record is sampled at 131 Hz and tells nothing above
+    >>> with warnings.catch_warnings(record=True, action="always") as said:
+    ...     tip = cra.tip_response(cra.Arm.nominal(), cra.BaseMotion.sampled(None, [0.0] * 66, sampling_rate=99.0), 0.1)
+    >>> said[0].category.__name__
+    'UndersamplingWarning'
     """
 
 
@@ -181,8 +177,6 @@ def response(
 
     Examples
     --------
-    The middle and the tip of an arm whose base starts to move at 0.1 m/s, in mm:
-
     >>> import cra_sym as cra
     >>> start = cra.BaseMotion(velocity=0.1)
     >>> (1e3 * cra.response(cra.Arm.nominal(), start, [0.0, 0.1, 0.2], x=[0.5, 1.0])).round(2)
@@ -242,15 +236,10 @@ def residual_vibration(
 
     Examples
     --------
-    A move of 0.2 m, in mm, before and after it is shaped for the first mode:
-
-    >>> from math import pi
     >>> import cra_sym as cra
-    >>> arm = cra.Arm.nominal()
     >>> move = cra.BaseMotion.s_curve(0.2, v_max=1.0, a_max=2.0, j_max=40.0)
-    >>> shaper = cra.input_shaper(2 * pi * cra.natural_frequencies(arm)[0])
-    >>> [round(float(1e3 * cra.residual_vibration(arm, motion)), 1) for motion in (move, move.shaped(*shaper))]
-    [21.1, 0.1]
+    >>> print(f"{1e3 * cra.residual_vibration(cra.Arm.nominal(), move):.1f} mm")
+    21.1 mm
     """
     instance("system", system, System)
     if system.model.pieces["hysteresis"]:

@@ -29,8 +29,7 @@ class ResonanceWarning(UserWarning):
     --------
     >>> import warnings
     >>> import cra_sym as cra
-    >>> with warnings.catch_warnings(record=True) as said:
-    ...     warnings.simplefilter("always")
+    >>> with warnings.catch_warnings(record=True, action="always") as said:
     ...     bounds = cra.stability_boundary(cra.Arm.nominal(), cra.AxialBase(0.001), 0.1, resonance=(1, -2))
     >>> print(said[0].category.__name__, *(float(bound) for bound in bounds))
     ResonanceWarning nan nan
@@ -45,8 +44,7 @@ class AsymptoticWarning(UserWarning):
     >>> import warnings
     >>> import cra_sym as cra
     >>> soft = cra.Arm.nominal().replace(k_t=1e3, k_r=1e2)
-    >>> with warnings.catch_warnings(record=True) as said:
-    ...     warnings.simplefilter("always")
+    >>> with warnings.catch_warnings(record=True, action="always") as said:
     ...     bounds = cra.stability_boundary(soft, cra.JointStiffness(), epsilon=0.9)
     >>> print(said[0].category.__name__, said[0].message)
     AsymptoticWarning resonance (1, 1): epsilon = 0.9 is beyond the reach of the expansion
