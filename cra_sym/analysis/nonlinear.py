@@ -81,6 +81,8 @@ def nonlinear_modal_equations(system: System, modes: int = 3, zeta: Any = None) 
     (2, 2, 2, 2)
     """
     checks.instance("system", system, System)
+    if system.model.pieces["hysteresis"]:
+        raise ValueError("system: has elastic-slip elements, which are no polynomials; take system.without_hysteresis")
     modes = checks.count("modes", modes, high=MOST_NONLINEAR_MODES)
     ratios = None
     if zeta is not None:

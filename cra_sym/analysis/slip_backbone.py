@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.nonlinear import equations_of, samples, watched
-from cra_sym.analysis.slip_states import ACCURACY, FIRST, elements_of
+from cra_sym.analysis.slip_states import ACCURACY, FIRST, elements_of, statics_of
 from cra_sym.model.system import System
 from cra_sym.solvers.harmonic_balance import Basis, peak
 from cra_sym.solvers.slip_balance import SlipBalance
@@ -78,7 +78,8 @@ def _problem(system: System, mode: int, modes: int, harmonics: int, place: Any, 
     rows = watched(base, modes, place, field)
     if not np.abs(rows).max() > 0:
         raise ValueError("amplitude: no mode moves there; choose another place or field")
-    return HeldMotions(balance, mode - 1, rows)
+    statics = statics_of(system, modes, (), place, field)[len(balance.elements.groups)]
+    return HeldMotions(balance, mode - 1, rows, statics)
 
 
 def _at(problem: HeldMotions, amplitudes: Array) -> Held:
@@ -156,7 +157,8 @@ def _change(one: Held, other: Held) -> Array:
 def _told(problem: HeldMotions, found: Held, harmonics: Array, modes: Array) -> HeldCurve:
     balance, good = problem.balance, found.good
     basis, equations = balance.basis, balance.equations
-    _, phase = peak(basis, problem.rows, found.coefficients)
+    force = balance.forces(found.displacements.reshape(good.size, -1))[0]
+    _, phase = peak(basis, np.ones(1), problem.series(found.coefficients, force)[:, None])
     energy, loss, stable = np.full(good.size, np.nan), np.full(good.size, np.nan), np.zeros(good.size, bool)
     for k in np.flatnonzero(good):
         x, omega = found.coefficients[k], float(found.frequency[k])

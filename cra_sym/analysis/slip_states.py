@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym import checks
+from cra_sym.analysis.modes import section_place
 from cra_sym.analysis.nonlinear import samples, watched
-from cra_sym.analysis.periodic_forcing import Forced, forced
+from cra_sym.analysis.periodic_forcing import Forced, Wave, forced
 from cra_sym.model.excitations import Fluctuation, LagrangianTerms
+from cra_sym.model.projection import Load, Place
+from cra_sym.model.slip_elements import slip_statics
 from cra_sym.model.system import System
-from cra_sym.solvers.harmonic_balance import Basis
+from cra_sym.solvers.harmonic_balance import Basis, peak
 from cra_sym.solvers.slip_balance import Elements, SlipBalance, stuck
 from cra_sym.solvers.slip_stability import slip_multipliers
 
@@ -43,6 +47,51 @@ def elements_of(system: System, modes: int) -> Elements:
     return Elements(found.displacements, tuple(groups), found.flexibility)
 
 
+class Watched(NamedTuple):
+    """A displacement by modes, and by the statics of others from forces of elements and known functions of time."""
+
+    modes: Array
+    elements: Array
+    waves: Array
+
+
+def watched_load(system: System, place: Any, field: Any) -> Load:
+    """Return one unit of force on the displacement that is watched, the tip unless another is chosen."""
+    base = system.without_hysteresis
+    coordinates = list(base.model.linearised.coordinates)
+    if field is None and not base.model.linearised.fields:
+        field = coordinates[0]
+    left, right = float(base.domain.left), float(base.domain.left) + float(base.domain.length)
+    at = right if place is None else float(checks.real_array("place", place, unit="m"))
+    if field in coordinates:
+        where = Place("lumped", coordinates.index(field), 0)
+    elif at in (left, right):
+        where = Place("left" if at == left else "right", section_place(base, field), 0)
+    else:
+        where = Place("point", section_place(base, field), 0, 0)
+    return Load.unit(where, at, system.numerics("slip_terms").forced.symbols)
+
+
+def statics_of(system: System, modes: int, causes: tuple[str, ...], place: Any, field: Any) -> Array:
+    """Return :func:`cra_sym.model.slip_elements.slip_statics` for what is watched, computed once."""
+
+    def found(number: int) -> Array:
+        return slip_statics(system, number, causes, watched_load(system, place, field))
+
+    return np.asarray(system._once(f"statics of {causes} at {place} {field}", modes, found))
+
+
+def driven_by(drive: Any, system: System) -> dict[str, tuple[float, int]]:
+    """Return amplitude, and how often it is differentiated, of what drives linearly, by name."""
+    kinds = dict(system.numerics("causes"))
+    given = {key if isinstance(key, str) else key.func.__name__: float(value) for key, value in (drive or {}).items()}
+    return {
+        name: (value, 2 if kinds[name] == "motion" else 0)
+        for name, value in given.items()
+        if value and kinds.get(name) in ("motion", "force")
+    }
+
+
 @dataclass(frozen=True, eq=False)
 class SlipProblem:
     """A driven system with elements in so many modes and harmonics.
@@ -51,15 +100,14 @@ class SlipProblem:
     ----------
     arguments : mapping
         It was made of.
-    rows : ndarray, shape (modes,)
-        Of the displacement that is watched.
+    rows : Watched
     driven : Forced
     balance : SlipBalance
     period : int
     """
 
     arguments: Mapping[str, Any]
-    rows: Array
+    rows: Watched
     driven: Forced
     balance: SlipBalance
     period: int
@@ -78,8 +126,17 @@ class SlipProblem:
         options = {**arguments, "place": place, "field": field, "harmonics": harmonics, "period": period}
         whole = FIRST if harmonics is None else harmonics
         basis = Basis.whole(whole, samples(driven.equations.degree, whole, driven.order * period))
-        balance = SlipBalance(driven.equations, basis, elements_of(system, modes))
-        return cls(options, watched(own["system"], modes, place, field), driven, balance, period)
+        elements, given = elements_of(system, modes), driven_by(arguments.get("drive"), system)
+        found = statics_of(system, modes, tuple(given), place, field)
+        m = len(elements.groups)
+        statics = np.zeros((m + 1, len(driven.waves)))
+        for number, (amplitude, power) in enumerate(given.values()):
+            wave = Wave(1, power, 0.5 * np.pi * power, amplitude)
+            if wave in driven.waves:
+                statics[:, driven.waves.index(wave)] += found[:, m + number]
+        balance = SlipBalance(driven.equations, basis, elements, statics[:m])
+        rows = Watched(watched(own["system"], modes, place, field), found[m, :m], statics[m])
+        return cls(options, rows, driven, balance, period)
 
     def richer(self, harmonics: int, more_modes: int = 0) -> SlipProblem:
         """Return the same problem with so many harmonics, and more modes."""
@@ -141,6 +198,14 @@ class SlipProblem:
             )
         return found
 
+    def peaks(self, unknowns: Array, varpi: Array) -> Array:
+        """Return the largest displacement of what is watched in a period of each answer."""
+        w = self.balance.displacements(unknowns)
+        force = self.balance.forces(w.reshape(len(w), -1))[0].reshape(w.shape)
+        series = self.rows.modes @ self.coefficients(unknowns) - self.rows.elements @ force
+        series = series + self.rows.waves @ self.balance.waves(self._causes(varpi))
+        return peak(self.basis, np.ones(1), series[:, None])[0]
+
     def loss(self, unknowns: Array) -> float:
         """Return the energy that sliders take in a period of an answer, J."""
         cycles = self.balance.elements.cycles(self.balance.displacements(unknowns[None]))
@@ -182,7 +247,10 @@ class SlipProblem:
     # ----------------------------------------------------------------------------------------------------- starts
 
     def seeds(self, varpi: Array, order: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array, float]:
-        """Return starts: rest, everything stuck to nothing stuck, and single modes with many amplitudes and phases.
+        """Return starts: rest, everything stuck, nothing stuck, and single modes with many amplitudes and phases.
+
+        A linear structure of constant coefficients that is driven has one answer but for what sticks: elements lose
+        energy whichever way two motions differ.
 
         Returns
         -------
@@ -193,11 +261,11 @@ class SlipProblem:
             Modal amplitude at which elements slip.
         """
         count, size = len(varpi), self._size
-        where, starts = [np.arange(count)], [np.zeros((count, self.balance.size))]
-        if not self.driven.rests:
-            for share in (1.0, 0.5, 0.0):
-                where.append(np.arange(count))
-                starts.append(self._linear(varpi, share))
+        shares = () if self.driven.rests else (1.0, 0.0)
+        where, starts = [np.arange(count)] * len(shares), [self._linear(varpi, share) for share in shares]
+        if self.driven.rests or not self.balance.constant:
+            where.append(np.arange(count))
+            starts.append(np.zeros((count, self.balance.size)))
         if not self.balance.constant:
             picked = order[np.unique(np.linspace(0, count - 1, _SAMPLED).round().astype(int))]
             for mode in range(self.balance.equations.modes):

@@ -132,6 +132,9 @@ class _Problem:
     def loss(self, unknowns: Array) -> float:
         return 0.0
 
+    def peaks(self, unknowns: Array, varpi: Array) -> Array:
+        return peak(self.basis, self.rows, self.balance.coefficients(unknowns))[0]
+
     def settled(self, found: list[list[Array]], varpi: Array) -> tuple[_Problem, list[list[Array]]]:
         return self, found
 
@@ -328,7 +331,7 @@ def _told(problem: _Problem | SlipProblem, found: list[list[Array]], varpi: Arra
         return [() for _ in varpi]
     unknowns = np.array([answer for answers in found for answer in answers])
     coefficients = problem.coefficients(unknowns)
-    largest, _ = peak(problem.basis, problem.rows, coefficients)
+    largest = problem.peaks(unknowns, varpi[where])
     values = problem.multipliers(unknowns, varpi[where])
     damped = problem.driven.equations.damping.any() or bool(problem.driven.equations.forces)
     bound = 1.0 + (UNSTABLE if damped else UNSTABLE_UNDAMPED)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.kernels import Kernel
+from cra_sym.kernels import Kernel, kernel
 from cra_sym.model.moving import Jumps
 from cra_sym.model.routes import Modes, RigidShare, Stations
 
@@ -72,6 +72,12 @@ class Load:
     rest: Kernel | None = None
     rest_ends: tuple[Place, ...] = ()
     places: Kernel | None = None
+
+    @classmethod
+    def unit(cls, place: Place, at: float, symbols: Sequence[Any]) -> Load:
+        """Return one unit of force on a displacement; ``at`` is where an interior place is."""
+        none, one = (kernel(values, symbols, backend="numpy") for values in ((), (1.0,)))
+        return cls((), (place,), none, one, True, places=kernel((at,), symbols, backend="numpy"))
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cra_sym.model.slip_terms import SlipTerms
     from cra_sym.model.system import System
 
-__all__ = ["SlipElements", "slip_elements"]
+__all__ = ["SlipElements", "slip_elements", "slip_statics"]
 
 Array = NDArray[np.float64]
 
@@ -111,38 +111,77 @@ def slip_elements(system: System, modes: int) -> SlipElements:
 
 def _seen(system: System, terms: SlipTerms, modes: int) -> tuple[Array, Array]:
     """Return the displacements in the modes, and the flexibility of the modes left out."""
-    base = system.without_hysteresis
-    values = {symbol.name: system.values[symbol.name] for symbol in terms.forced.symbols}
-    forced = terms.forced.at(values, tolerance=system.tolerance)
-    loads: list[Load] = [forced.numerics("load", name) for name in terms.forces]
-    most = base.most_modes
-    number = most if not forced.numerics("sizes")[0] else min(modes + 1, most)
-    found = [project(forced.domain, base.modes(number), load) for load in loads]
-    shape = (*system.shape, number)
-    whole = np.stack([np.broadcast_to(row, shape) for row in found], axis=-2)
-    for k, row in enumerate(found):
-        if (np.abs(row).max(axis=-1) == 0.0).any():
+    forced, base = _forced(system, terms), system.without_hysteresis
+    loads = [forced.numerics("load", name) for name in terms.forces]
+    rows = _rows(base, forced, loads, modes, system.shape)
+    for k in range(len(loads)):
+        if (np.abs(rows[..., k, :]).max(axis=-1) == 0.0).any():
             _, displacement, place = system.model.pieces["hysteresis"][terms.displacements.index(k)]
             raise ValueError(f"hysteresis: {displacement} at {place} is held, so nothing can slip there")
-    omega = np.broadcast_to(base.natural_frequencies(number), shape)
-    rows, left_out = whole[..., :modes], whole[..., modes:]
+    return rows, _left_out(base, forced, loads, terms.forces, modes, system.shape)
+
+
+def slip_statics(system: System, modes: int, causes: tuple[str, ...], watched: Load) -> Array:
+    """Return what the modes left out add by their statics to what is watched, and what drives them beside elements.
+
+    Parameters
+    ----------
+    system : System
+    modes : int
+    causes : tuple of str
+        Prescribed motions, by one unit of their acceleration, and forces.
+    watched : Load
+        Of one unit on the displacement that is watched.
+
+    Returns
+    -------
+    ndarray, shape (..., displacements + 1, displacements + causes)
+        Displacements of the elements, and then that which is watched, by forces on the former and by the causes.
+    """
+    terms: SlipTerms = system.numerics("slip_terms")
+    forced = _forced(system, terms)
+    outputs = [*(forced.numerics("load", name) for name in terms.forces), watched]
+    return _left_out(system.without_hysteresis, forced, outputs, (*terms.forces, *causes), modes, system.shape)
+
+
+def _forced(system: System, terms: SlipTerms) -> System:
+    values = {symbol.name: system.values[symbol.name] for symbol in terms.forced.symbols}
+    return terms.forced.at(values, tolerance=system.tolerance)
+
+
+def _rows(base: System, forced: System, loads: list[Load], modes: int, shape: tuple[int, ...]) -> Array:
+    """Return how loads act on the modes, shape (..., loads, modes)."""
+    own = base.modes(modes)
+    found = [np.broadcast_to(project(forced.domain, own, load), (*shape, modes)) for load in loads]
+    return np.stack(found, axis=-2)
+
+
+def _left_out(
+    base: System, forced: System, outputs: list[Load], names: tuple[str, ...], modes: int, shape: tuple[int, ...]
+) -> Array:
+    """Return displacements by unit loads less those of the first modes at rest, shape (..., outputs, loads)."""
+    most = base.most_modes
+    number = most if not forced.numerics("sizes")[0] else min(modes + 1, most)
+    of = _rows(base, forced, outputs, number, shape)
+    by = _rows(base, forced, [forced.numerics("load", name) for name in names], number, shape)
+    omega = np.broadcast_to(base.natural_frequencies(number), (*shape, number))
     if number == most:  # all of them are known
-        compliance = np.where(omega > 0, 1.0 / np.where(omega > 0, omega, 1.0) ** 2, 0.0)[..., modes:]
-        return rows, np.asarray((left_out * compliance[..., None, :]) @ left_out.swapaxes(-1, -2))
+        compliance = np.where(omega > 0, 1.0 / np.where(omega > 0, omega, 1.0) ** 2, 0.0)[..., None, modes:]
+        return np.asarray((of[..., modes:] * compliance) @ by[..., modes:].swapaxes(-1, -2))
     squares = omega.reshape(-1, number) ** 2
-    flat = rows.reshape(len(squares), len(loads), modes)
-    products = np.einsum("rkm,rlm->rmkl", flat, flat)
+    flat = [part.reshape(len(squares), -1, number)[..., :modes] for part in (of, by)]
+    products = np.einsum("rkm,rlm->rmkl", *flat)
     limit = squares[:, -1]
-    receptance = _receptance(forced, terms.forces, loads, nodes(limit))
+    receptance = _receptance(forced, names, outputs, nodes(limit))
     static, _ = moments(receptance, squares[:, :-1], products, limit)
-    return rows, np.asarray(static.reshape(*system.shape, len(loads), len(loads)))
+    return np.asarray(static.reshape(*shape, len(outputs), len(names)))
 
 
 def _receptance(forced: System, names: tuple[str, ...], loads: list[Load], z: Array) -> Array:
-    """Return the displacements by unit forces on each other at omega^2 = z, shape (rows, nodes, of, by)."""
+    """Return displacements by unit loads at omega^2 = z, shape (rows, nodes, of, by)."""
     columns = flat_columns(forced.parameters, forced.shape)
     columns = np.broadcast_to(columns, (len(columns), len(z)))
-    found = np.zeros((*z.shape, len(loads), len(loads)))
+    found = np.zeros((*z.shape, len(loads), len(names)))
     for by, name in enumerate(names):
         problem: SpatialProblem = forced.numerics("driven", name)
         driven = problem.displacements + forced.numerics("driven_coordinate", name)

@@ -92,11 +92,14 @@ class SlipBalance:
     basis : Basis
         Constant and all harmonics up to one.
     elements : Elements
+    statics : ndarray, shape (displacements, known functions), optional
+        What of the displacements follows known functions of time without the modes.
     """
 
     equations: ModalPolynomials
     basis: Basis
     elements: Elements
+    statics: Array | None = None
 
     @cached_property
     def _balance(self) -> Balance:
@@ -147,7 +150,16 @@ class SlipBalance:
     # ------------------------------------------------------------------------------------------- linearised modes
 
     def _based(self, q: Array, frequency: Array, causes: Array | None) -> _Based:
-        return self._receptance(frequency, causes) if self.constant else self._dense(q, frequency, causes)
+        found = self._receptance(frequency, causes) if self.constant else self._dense(q, frequency, causes)
+        if self.statics is None or causes is None:
+            return found
+        own = self.statics @ self.waves(causes)
+        return found._replace(displacement=found.displacement + own.reshape(len(own), -1))
+
+    def waves(self, causes: Array) -> Array:
+        """Return known functions, (points, known functions, samples), in the basis."""
+        left = self.basis.weights / self.basis.samples * self.basis.values(self.basis.phase)
+        return np.asarray(causes @ left)
 
     def _rigid(self) -> NDArray[np.bool_]:
         return np.asarray(self.equations.omega == 0.0)

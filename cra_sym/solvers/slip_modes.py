@@ -58,7 +58,7 @@ class Held:
 
 
 class _State(NamedTuple):
-    """Motions on the way, with forces, their rates, the gradient of the peak, and by how much it is too large."""
+    """Motions on the way: forces, their rates, rates of the peak by modes and forces, by how much it is too large."""
 
     coefficients: Array
     displacements: Array
@@ -67,6 +67,7 @@ class _State(NamedTuple):
     force: Array
     slope: Array
     gradient: Array
+    by_force: Array
     beyond: Array
 
 
@@ -82,11 +83,14 @@ class HeldMotions:
         From 0.
     rows : ndarray, shape (modes,)
         Of the displacement whose peak is the amplitude.
+    statics : ndarray, shape (displacements,)
+        What a force on each displacement of elements adds to it without the modes, with opposite sign.
     """
 
     balance: SlipBalance
     mode: int
     rows: Array
+    statics: Array
 
     @cached_property
     def active(self) -> NDArray[np.intp]:
@@ -163,12 +167,19 @@ class HeldMotions:
         """Return the steps of the active coefficients, the displacements, omega and zeta."""
         basis, points = self.balance.basis, len(x)
         force, slope = self.balance.forces(w.reshape(points, -1))
-        largest, phase = peak(basis, self.rows, x)
+        series = self.series(x, force)
+        largest, phase = peak(basis, np.ones(1), series[:, None])
         values = basis.values(phase)
-        sign = np.sign(((self.rows @ x) * values).sum(axis=1))
-        gradient = sign[:, None, None] * self.rows[:, None] * values[:, None, self.active]
-        state = _State(x, w, frequency, ratio, force, slope, gradient, largest - amplitudes)
+        values *= np.sign((series * values).sum(axis=1))[:, None]
+        gradient = self.rows[:, None] * values[:, None, self.active]
+        by_force = -self.statics[:, None] * values[:, None]
+        state = _State(x, w, frequency, ratio, force, slope, gradient, by_force, largest - amplitudes)
         return self._condensed(state) if self._linear else self._whole(state)
+
+    def series(self, coefficients: Array, force: Array) -> Array:
+        """Return the displacement whose peak is the amplitude, shape (points, functions)."""
+        shape = len(coefficients), self.statics.size, -1
+        return np.asarray(self.rows @ coefficients - self.statics @ force.reshape(shape))
 
     def _whole(self, state: _State) -> tuple[Array, Array, Array, Array]:
         """Return the step from the equations of all modes."""
@@ -196,8 +207,10 @@ class HeldMotions:
         matrix[:, :number, number] = by_frequency[..., active].reshape(points, -1)
         matrix[:, :number, number + 1] = by_ratio[..., active].reshape(points, -1)
         right[:, :number] = residual[..., active].reshape(points, -1)
-        matrix[:, number, :number] = state.gradient.reshape(points, -1)
-        right[:, number] = state.beyond
+        followed = (state.by_force.reshape(points, 1, -1) @ effective).reshape(points, m, size)
+        whole_gradient = state.gradient + (b.T @ followed)[..., active]
+        matrix[:, number, :number] = whole_gradient.reshape(points, -1)
+        right[:, number] = state.beyond + (followed.reshape(points, -1) * wrong).sum(axis=1)
         first_sine = self.mode * active.size + int(np.flatnonzero(active == len(balance.basis.cosines))[0])
         matrix[:, number + 1, first_sine] = 1.0
         right[:, number + 1] = x[:, self.mode, len(balance.basis.cosines)]
@@ -276,7 +289,9 @@ class HeldMotions:
         pulled = np.einsum("pnk,pknd->pdk", gradient, by_force)
         pull = np.concatenate([pulled.real, pulled.imag], axis=-1)
         pull = np.concatenate([pull[:, None, j] @ slope[:, j] for j in range(m)], axis=2)[:, 0]
-        matrix[:, size + 2, :size] = -pull
+        own_force = state.by_force[..., active]
+        followed = np.concatenate([own_force[:, None, j] @ slope[:, j] for j in range(m)], axis=2)[:, 0]
+        matrix[:, size + 2, :size] = followed - pull
         matrix[:, size + 2, size] = along(answer[..., 3])
         matrix[:, size + 2, size + 1] = along(-1j * answer[..., 3])
         matrix[:, size + 2, size + 2], matrix[:, size + 2, size + 3] = along(answer[..., 1]), along(answer[..., 2])

@@ -213,7 +213,7 @@ def test_clamped_beam_with_an_element_at_its_tip(level):
         hysteresis=[(cra.Jenkins(spring, slip), v, "right")],
     ).at({"L": 1.0}, zeta=zeta)  # fmt: skip
     (state,) = cra.steady_states(beam, frequency, drive={F: level}, modes=5)
-    whole, stiff = clamped_elements(6)
+    whole, stiff = clamped_elements(10)
     omega, shapes = np.linalg.eig(np.linalg.solve(whole, stiff))
     shapes = shapes / np.sqrt(np.einsum("ij,ik,kj->j", shapes, whole, shapes))
     damping = whole @ shapes @ np.diag(2 * zeta * np.sqrt(omega)) @ shapes.T @ whole
@@ -221,7 +221,7 @@ def test_clamped_beam_with_an_element_at_its_tip(level):
     tip[-2] = 1.0
     referee = Structure(whole, damping, stiff, tip, spring, slip, level * tip, frequency)
     assert state.stable and state.loss > 0
-    np.testing.assert_allclose(state.amplitude, referee.settled(60), rtol=1e-2)  # five modes against all
+    np.testing.assert_allclose(state.amplitude, referee.settled(250), rtol=1e-4)  # the error of the elements
 
 
 # refused -----------------------------------------------------------------------------------------------------------
