@@ -25,6 +25,7 @@ __all__ = [
     "growth_rate",
     "monodromy",
     "rate_of",
+    "whole_period",
 ]
 
 _NODES, KICKS = (0.5 * np.array(row) for row in np.polynomial.legendre.leggauss(3))
@@ -130,10 +131,15 @@ class Oscillators:
         return batch, shape
 
     @property
-    def conservative(self) -> bool:
-        """Whether all systems are undamped with symmetric couplings, and half of a period mirrors the other."""
+    def mirrored(self) -> bool:
+        """Whether couplings are symmetric and the excitation even in time: half of a period then tells the other."""
         even = all(kind == "cos" for _, kind, _ in self.oscillations)
-        return even and not self.decay.any() and bool(np.array_equal(self.coupling, self.coupling.swapaxes(1, 2)))
+        return even and bool(np.array_equal(self.coupling, self.coupling.swapaxes(1, 2)))
+
+    @property
+    def conservative(self) -> bool:
+        """Whether all systems are mirrored without damping."""
+        return self.mirrored and not self.decay.any()
 
     def steps(self, tolerance: float) -> np.ndarray:
         """Return the number of steps a period for each system, even, for a relative error of about ``tolerance``."""
@@ -289,10 +295,42 @@ def _maps(batch: Oscillators, share: float, tolerance: float, loop: Loop | None)
     return out
 
 
+def _whole_maps(batch: Oscillators, tolerance: float, loop: Loop | None) -> np.ndarray:
+    """Return the maps over the period, shape (points, 2N, 2N)."""
+    if not batch.mirrored:
+        return _maps(batch, 1.0, tolerance, loop)
+    damping = np.eye(len(batch.omega)) * 2 * batch.decay.T[:, None]
+    return whole_period(_maps(batch, 0.5, tolerance, loop), damping, np.ones(len(batch.omega)))
+
+
+def whole_period(half: np.ndarray, damping: np.ndarray, parity: np.ndarray) -> np.ndarray:
+    r"""Return maps of (q, dq/dt) over a period from those over its first half, shape (points, 2N, 2N).
+
+    With the matrix A(t) of the equations even in time and X constant such that :math:`AX = XA^T`, time reversed is X
+    times the adjoint equation, so that the second half of the period is :math:`X\Phi^TX^{-1}`. There is one where a
+    change of the signs of some q turns K(t) and the constant C into their transposes.
+
+    Parameters
+    ----------
+    half : ndarray, shape (points, 2N, 2N)
+    damping : ndarray, shape (points, N, N) or (1, N, N)
+        C.
+    parity : ndarray, shape (N,)
+        The signs, 1 or -1.
+    """
+    n = len(parity)
+    swapped = half.swapaxes(1, 2)
+    # X = [[0, P], [P, -C P]], its inverse [[P C, P], [P, 0]]
+    above, below = parity[:, None] * swapped[:, :n], parity[:, None] * swapped[:, n:]
+    left = np.concatenate([below, above - damping @ below], axis=1)
+    first, second = left[:, :, :n] * parity, left[:, :, n:] * parity
+    return np.concatenate([first @ damping + second, first], axis=2) @ half
+
+
 def monodromy(*system: Any, tolerance: float = 1e-8, loop: Loop | None = None, **more: Any) -> np.ndarray:
     """Return the monodromy matrices of (q, dq/dt), shape (..., 2N, 2N); arguments of :class:`Oscillators`."""
     batch, shape = Oscillators.of(*system, **more)
-    maps = _maps(batch, 1.0, tolerance, loop)
+    maps = _whole_maps(batch, tolerance, loop)
     return maps.reshape(*shape, *maps.shape[1:])
 
 
@@ -324,7 +362,7 @@ def floquet_exponents(*system: Any, tolerance: float = 1e-8, loop: Loop | None =
         growing = _conservative_exponents(batch, tolerance, loop)
         exponents = _ordered(np.concatenate([growing, -growing], axis=-1), batch.period)
     else:
-        exponents = exponents_of(_maps(batch, 1.0, tolerance, loop), batch.period)
+        exponents = exponents_of(_whole_maps(batch, tolerance, loop), batch.period)
     return exponents.reshape(*shape, exponents.shape[-1])
 
 
@@ -350,5 +388,5 @@ def growth_rate(*system: Any, tolerance: float = 1e-8, loop: Loop | None = None,
     if batch.conservative:
         rates = np.maximum(_conservative_exponents(batch, tolerance, loop).real.max(axis=-1), 0.0)
     else:
-        rates = rate_of(_maps(batch, 1.0, tolerance, loop), batch.period)
+        rates = rate_of(_whole_maps(batch, tolerance, loop), batch.period)
     return rates.reshape(shape)

@@ -13,20 +13,25 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import factorial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.solvers.floquet import MOST_STEPS, Oscillation, exponents_of, flat, rate_of
+from cra_sym.solvers.floquet import MOST_STEPS, Oscillation, exponents_of, flat, rate_of, whole_period
 
 __all__ = ["PeriodicSystem", "Swing", "floquet_exponents", "growth_rate", "monodromy", "step_coefficients"]
 
 Array = NDArray[np.float64]
-_ORDER = 16
-_STEPS = 100.0  # a period, whose errors add up: more where the fastest motion is faster, but its rate is a bound
-_BLOCK = 256  # systems propagated together, small enough for the cache
+_HIGHEST = 24
+"""Order of the series, at most."""
+_WIDEST = 3.0  # step, in units of the fastest motion's time: beyond, the terms of a series lose digits
+_FASTER, _MUCH_FASTER = 1.25, 2.0
+"""How much faster than the rate a series may grow where stiffness oscillates, and where masses and speeds do too."""
+_PRODUCTS = (
+    31  # what the products of matrices for one term cost, in halves of one term of a sum over products of series
+)
+_BLOCK = 384  # systems propagated together, small enough for the cache
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,11 @@ class Swing:
     damping: Array | None
     momentum: Array | None
     mass: Array | None
+
+    @property
+    def only_stiffness(self) -> bool:
+        """Whether nothing else oscillates."""
+        return self.damping is None and self.momentum is None and self.mass is None
 
     def take(self, index: NDArray[np.intp]) -> Swing:
         """Return some of the systems."""
@@ -129,6 +139,33 @@ class PeriodicSystem:
                 "stays positive"
             )
 
+    def parity(self) -> NDArray[np.int8] | None:
+        """Return signs of q that turn an even K(t) and a constant C into their transposes, None if there are none."""
+        if any(s.oscillation.kind == "sin" or not s.only_stiffness for s in self.swings):
+            return None
+        matrices = (self.stiffness, self.damping, *(s.stiffness for s in self.swings if s.stiffness is not None))
+        size = len(self.stiffness)
+        same, opposite = np.zeros((2, size, size), bool)  # signs of two
+        for matrix in matrices:
+            turned = matrix.swapaxes(0, 1)
+            there = ((matrix != 0) | (turned != 0)).any(axis=-1)
+            even, odd = ((matrix == sign * turned).all(axis=-1) for sign in (1, -1))
+            if (there & ~even & ~odd & ~np.eye(size, dtype=bool)).any():
+                return None
+            same, opposite = same | (there & even), opposite | (there & ~even)
+        signs = np.zeros(size, np.int8)
+        while not signs.all():
+            fresh = [int(np.argmin(signs != 0))]
+            signs[fresh] = 1
+            while fresh:
+                row = fresh.pop()
+                for sign, joined in ((1, same[row]), (-1, opposite[row])):
+                    found = np.nonzero(joined & (signs == 0))[0]
+                    signs[found] = sign * signs[row]
+                    fresh.extend(found.tolist())
+        product = signs[:, None] * signs
+        return None if (same & (product < 0)).any() or (opposite & (product > 0)).any() else signs
+
     def rate(self) -> Array:
         """Return a bound of how fast anything moves, 1/s, shape (points,)."""
         stiffness, damping, heavy = _rows(self.stiffness), _rows(self.damping), np.zeros(1)
@@ -175,6 +212,7 @@ class _Series:
         self.system, self.h, self.order = system, h, order
         size, points = len(system.stiffness), system.period.size
         self.shape = (size, 2 * size, points)
+        self.damped = bool(system.damping.any())
         store = (order + 1, *self.shape)
         names = {"stiffness": "q", "momentum": "q", "damping": "u", "mass": "u"}
         self.products = [
@@ -187,8 +225,9 @@ class _Series:
         mass = self._mass(waves)
         end_q, end_p = q.copy(), p.copy()
         for k in range(self.order):
-            rate, force = self._rates(k, q, p, waves, mass)
-            q, p = self.h / (k + 1) * rate, self.h / (k + 1) * force
+            rate, resistance = self._rates(k, q, p, waves, mass)
+            step_size = self.h / (k + 1)
+            q, p = step_size * rate, -step_size * resistance
             end_q += q
             end_p += p
         return end_q, end_p
@@ -202,29 +241,33 @@ class _Series:
         return np.moveaxis(np.linalg.inv(np.moveaxis(total, -1, 0)), 0, -1)
 
     def _rates(self, k: int, q: Array, p: Array, waves: list[Array], mass: Array | None) -> tuple[Array, Array]:
-        """Return the coefficients k of dq/dt and dp/dt."""
-        rate = p.copy()
+        """Return the coefficients k of dq/dt and of -dp/dt."""
+        rate = p
         for swing, kept, wave in zip(self.system.swings, self.products, waves, strict=True):
             if "momentum" in kept:
-                rate -= swing.size * self._convolved(kept["momentum"], swing.momentum, q, wave, k)
+                rate = rate - self._convolved(kept["momentum"], swing.momentum, q, wave, k, swing.size)
             if "mass" in kept and k:
-                rate -= swing.size * _weighed(wave[1 : k + 1], kept["mass"][:k])
+                rate = rate - swing.size * _weighed(wave[1 : k + 1], kept["mass"][:k])
         rate = rate if mass is None else _applied(mass, rate)
-        force = -_applied(self.system.stiffness, q) - _applied(self.system.damping, rate)
+        resistance = _applied(self.system.stiffness, q)
+        if self.damped:
+            resistance += _applied(self.system.damping, rate)
         for swing, kept, wave in zip(self.system.swings, self.products, waves, strict=True):
             if "stiffness" in kept:
-                force -= swing.size * self._convolved(kept["stiffness"], swing.stiffness, q, wave, k)
+                resistance += self._convolved(kept["stiffness"], swing.stiffness, q, wave, k, swing.size)
             if "damping" in kept:
-                force -= swing.size * self._convolved(kept["damping"], swing.damping, rate, wave, k)
+                resistance += self._convolved(kept["damping"], swing.damping, rate, wave, k, swing.size)
             if "mass" in kept:
                 assert swing.mass is not None
                 kept["mass"][k] = _applied(swing.mass, rate)
-        return rate, force
+        return rate, resistance
 
-    def _convolved(self, kept: Array, matrix: Array | None, states: Array, wave: Array, k: int) -> Array:
+    def _convolved(self, kept: Array, matrix: Array | None, states: Array, wave: Array, k: int, size: Array) -> Array:
         assert matrix is not None
         kept[k] = _applied(matrix, states)
-        return _weighed(wave[: k + 1], kept[: k + 1])
+        found = _weighed(wave[: k + 1], kept[: k + 1])
+        found *= size
+        return found
 
 
 def _weighed(wave: Array, kept: Array) -> Array:
@@ -232,37 +275,52 @@ def _weighed(wave: Array, kept: Array) -> Array:
     return np.asarray((wave[::-1] @ kept.reshape(len(kept), -1)).reshape(kept.shape[1:]))
 
 
-def propagated(system: PeriodicSystem, steps: int, order: int = _ORDER) -> Iterator[tuple[Array, Array]]:
-    """Yield (q, p), shape (N, 2N, points), at the end of every step of a period, from every unit state."""
+def propagated(system: PeriodicSystem, steps: int, order: int, *, half: bool = False) -> Iterator[tuple[Array, Array]]:
+    """Yield (q, p), shape (N, 2N, points), after every step of a period, or of half of it, from every unit state."""
     h = system.period / steps
     series = _Series(system, h, order)
     q, p = (
         np.ascontiguousarray(np.broadcast_to(half[..., None], series.shape))
         for half in np.split(np.eye(series.shape[1]), 2)
     )
-    for step in range(steps):
+    for step in range(steps // 2 if half else steps):
         q, p = series.advanced(step, steps, q, p)
         yield q, p
 
 
 def monodromy(system: PeriodicSystem, tolerance: float = 1e-8) -> Array:
     """Return the monodromy matrices of (q, p), shape (points, 2N, 2N), for a relative error of about ``tolerance``."""
-    # a series of a motion with the rate 1 that ends with the term of this order leaves angle^n / n! of the next one
-    angle = min((tolerance / _STEPS * factorial(_ORDER + 1)) ** (1.0 / (_ORDER + 1)), 2.0)
-    steps = np.ceil(system.period * system.rate() / angle)
-    if not (steps <= MOST_STEPS).all():
-        raise ValueError(
-            f"a period takes {steps.max():.2g} steps, must be at most {MOST_STEPS:g}: the excitation is too slow "
-            "against the fastest mode, or too strong"
-        )
+    angle, parity = system.period * system.rate(), system.parity()
+    angle = angle * (_FASTER if all(swing.only_stiffness for swing in system.swings) else _MUCH_FASTER)
     size, points = 2 * len(system.stiffness), system.period.size
     out = np.empty((points, size, size))
-    order = np.argsort(steps, kind="stable")
+    rank = np.argsort(angle, kind="stable")
     for start in range(0, points, _BLOCK):
-        block = order[start : start + _BLOCK]
-        end = deque(propagated(system.take(block), int(steps[block[-1]])), maxlen=1)
+        block = rank[start : start + _BLOCK]
+        steps, order = _cheapest(float(angle[rank[min(start + _BLOCK, points) - 1]]), tolerance)
+        end = deque(propagated(system.take(block), steps, order, half=parity is not None), maxlen=1)
         out[block] = np.moveaxis(np.concatenate(end[0]), -1, 0)
-    return out
+    # without oscillating masses and speeds the momentum is dq/dt
+    return out if parity is None else whole_period(out, np.moveaxis(system.damping, -1, 0), parity)
+
+
+def _cheapest(angle: float, tolerance: float) -> tuple[int, int]:
+    """Return an even number of steps a period and the order of their series that reach the tolerance at least cost.
+
+    The series of a motion with the rate 1 that ends with the term of order n leaves ``h**(n + 1) / (n + 1)!`` a step.
+    """
+    orders = np.arange(6, _HIGHEST + 1)
+    logs = (orders + 1) * np.log(angle) - np.cumsum(np.log(np.arange(1, _HIGHEST + 2)))[orders] - np.log(tolerance)
+    with np.errstate(over="ignore"):
+        steps = 2 * np.ceil(np.maximum(np.exp(logs / orders), angle / _WIDEST) / 2)
+    cost = steps * orders * (_PRODUCTS + orders)
+    best = int(np.argmin(cost))
+    if not steps[best] <= MOST_STEPS:
+        raise ValueError(
+            f"a period takes {steps[best]:.2g} steps, must be at most {MOST_STEPS:g}: the excitation is too slow "
+            "against the fastest mode, or too strong"
+        )
+    return int(steps[best]), int(orders[best])
 
 
 def growth_rate(*given: Any, tolerance: float = 1e-8) -> Array:

@@ -486,3 +486,36 @@ def test_the_monodromy_matrix_is_as_accurate_as_it_is_asked_for(tolerance):
         system = periodic.PeriodicSystem(still, random[4], (swing,), np.array([2 * np.pi / rng.uniform(0.5, 5.0)]))
         found, exact = periodic.monodromy(system, tolerance), periodic.monodromy(system, 1e-17)
         assert np.abs(found - exact).max() < max(tolerance, 1e-12) * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("kind", ["damped", "gyroscopic", "both", "any"])
+def test_half_a_period_tells_the_other_where_signs_make_it_so(kind):
+    """Dampers, a gyroscopic coupling of odd with even modes, both; of any matrices half a period tells nothing."""
+    rng = np.random.default_rng(5)
+    stiffness, swung, damping = rng.normal(size=(3, 4, 4))
+    stiffness, swung = stiffness + stiffness.T + 12 * np.eye(4), swung + swung.T
+    parts = {"damped": damping @ damping.T / 10, "any": damping / 5}
+    if kind in ("gyroscopic", "both"):
+        signs = np.array([1, -1, 1, -1])
+        same = signs[:, None] * signs > 0
+        stiffness, swung = stiffness * same, swung * same
+        skew = np.where(same, 0.0, damping - damping.T)
+        parts |= {"gyroscopic": skew, "both": skew + np.where(same, damping @ damping.T / 10, 0.0)}
+    wave = floquet.Oscillation(1, "cos", 0)
+    drives = [(wave, (swung, None, None, None))]
+    system, _ = periodic.PeriodicSystem.of(stiffness, parts[kind], drives, [2.0, 5.5], 0.6)
+    assert (system.parity() is None) == (kind == "any")
+
+    def rates(time, y, rate):
+        q, p = y.reshape(2, 4, 8)
+        return np.concatenate(
+            [p, -parts[kind] @ p - (stiffness + 0.6 * np.cos(rate * time) * swung) @ q]
+        ).ravel()  # fmt: skip
+
+    for found, rate in zip(periodic.monodromy(system, 1e-12), (2.0, 5.5), strict=True):
+        end = solve_ivp(rates, (0, 2 * np.pi / rate), np.eye(8).ravel(), "DOP853", args=(rate,), rtol=1e-12, atol=1e-13)
+        np.testing.assert_allclose(found, end.y[:, -1].reshape(8, 8), rtol=0, atol=3e-10 * np.abs(found).max())
+    shifted, _ = periodic.PeriodicSystem.of(
+        stiffness, parts[kind], [(wave._replace(kind="sin"), drives[0][1])], 2.0, 0.6
+    )
+    assert shifted.parity() is None  # not even about t = 0
