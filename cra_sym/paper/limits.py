@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from sympy import Eq, Expr, Limit, Matrix, Mul, Pow, cancel, limit, oo, pi, solve
+from sympy import Eq, Expr, Limit, Matrix, Mul, Pow, cancel, limit, oo, pi, solve, sqrt
 
 from cra_sym.arm.lagrangian import HALF
 from cra_sym.paper.energy import L, modal_numbers, phi_i
@@ -159,15 +159,20 @@ def prove_cantilever_frequency() -> Proof:
     yield cantilever_frequency().lhs - cantilever_frequency().rhs + determinant
 
 
-@derived(30, "natural frequency", (17,))
+def _apart() -> Eq:
+    """Return (30) with the wave number and the speed of waves apart."""
+    speed = Pow((2 * pi * natural_frequency().rhs * L**2 / lamda**2) ** 2, HALF, evaluate=False)
+    return Eq(symbol("f_i"), Mul(lamda**2 / (2 * pi * L**2), speed, evaluate=False), evaluate=False)
+
+
+@derived(30, "natural frequency", (17,), shown=_apart)
 def natural_frequency() -> Derivation[Eq]:
     """The wave number of (17) turned into a frequency in hertz."""
     wave = mode_form()[1].subs(beta, lamda / L)
     yield "wave number", "(17) with λ = β L.", wave
     (square,) = solve(wave, omega_i**2)
     yield "angular frequency", "Solved, by 2 π to hertz.", Eq(omega_i**2, square)
-    speed = Pow(square * L**4 / lamda**4, HALF, evaluate=False)
-    return Eq(symbol("f_i"), Mul(lamda**2 / (2 * pi * L**2), speed, evaluate=False), evaluate=False)
+    return Eq(symbol("f_i"), sqrt(square) / (2 * pi))
 
 
 @proves(30)

@@ -42,6 +42,11 @@ class ModalSum(Sum):  # type: ignore[misc]  # SymPy has no types
         """Take the term of mode i."""
         return super().__new__(cls, term, *(limits or [(symbol("i"), 1, oo)]))
 
+    def _sympyrepr(self, printer: Any) -> str:
+        """Return text that evaluates to the same sum: its class is not one of those that SymPy brings."""
+        arguments = ", ".join(printer._print(part) for part in self.args)
+        return f"__import__({__name__!r}, fromlist=['ModalSum']).ModalSum({arguments})"
+
     def doit(self, **_: Any) -> Expr:
         """Return the sum itself: it has no closed form."""
         return self
