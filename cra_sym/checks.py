@@ -17,6 +17,7 @@ __all__ = [
     "count",
     "default_floating_point",
     "equal",
+    "flag",
     "instance",
     "listed",
     "mapping",
@@ -130,6 +131,13 @@ def instance(name: str, value: Any, kind: type) -> None:
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
         raise TypeError(f"{name} = {shown(value)}: must be {article} {kind.__name__}")
+
+
+def flag(name: str, value: Any) -> bool:
+    """Return a truth value as a bool, or raise an error that names the field."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"{name} = {shown(value)}: must be True or False")
+    return bool(value)
 
 
 def choice(name: str, value: Any, allowed: Collection[str]) -> str:

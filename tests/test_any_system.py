@@ -15,7 +15,7 @@ from tests.systems import NAMES, system
 
 GRID = np.linspace(0.0, 0.3, 4)
 MOVE = cra.BaseMotion.trapezoid(0.1, 0.2, 1.0)
-PULSE = cra.Force.sampled([0.0, 0.1, 0.2], [0.0, 2.0, 0.0])
+PULSE = cra.Force.sampled([0.0, 0.1, 0.2], [0.0, 2.0, 0.0], exact=True)
 
 
 def driven(given):

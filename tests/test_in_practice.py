@@ -171,7 +171,9 @@ WORK = {
     "response": lambda: cra.response(ARM, cra.BaseMotion(velocity=0.1), TIMES, [0.5, 1.0]),
     "damped response": lambda: cra.tip_response(ARM.replace(zeta=0.5), cra.BaseMotion(velocity=0.1), 1e3 * TIMES),
     "sampled response": lambda: cra.tip_response(
-        ARM.replace(zeta=0.9), cra.BaseMotion.sampled(TIMES[:31], np.exp(-(30.0 * TIMES[:31] ** 2))), 100.0 * TIMES
+        ARM.replace(zeta=0.9),
+        cra.BaseMotion.sampled(TIMES[:31], np.exp(-(30.0 * TIMES[:31] ** 2)), exact=True),
+        100.0 * TIMES,
     ),
     "harmonic response": lambda: cra.tip_response(
         ARM.replace(zeta=0.1), cra.BaseMotion(amplitude=1e-3, angular_frequency=10.0), TIMES

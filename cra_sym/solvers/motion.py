@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..checks import broadcastable, choice, equal, one_axis, real_array
+from ..checks import broadcastable, choice, equal, flag, one_axis, real_array
 from ..si import paired
 from .motion_terms import Harmonic, Piecewise, Term
 from .moves import check_feasible, fastest, quotient
@@ -14,7 +14,6 @@ from .records import KINDS, spline_motion, uniform_times
 
 __all__ = ["BaseMotion", "Force", "Harmonic", "Piecewise"]
 
-_RECORD = 32  # samples; fewer are the corners of a motion
 _FASTEST = 1e15  # rad/s, beyond which responses are not even finite
 
 Array = np.ndarray
@@ -49,9 +48,10 @@ class BaseMotion:
     1.5
     """
 
+    __array_ufunc__ = None  # an array times a motion is a batch of motions, not an array of objects
     terms: tuple[Term, ...]
     sample_step: float | None = None
-    """Time between the samples of a record, s; None of a motion that is not one, or one of fewer than 32 samples."""
+    """Time between the samples of a record, s; None of a motion that is not one."""
 
     def __init__(
         self,
@@ -105,6 +105,7 @@ class BaseMotion:
         *,
         kind: Literal["acceleration", "velocity", "position"] = "acceleration",
         sampling_rate: Any = None,
+        exact: bool = False,
     ) -> BaseMotion:
         """Return the motion that a record of samples describes; outside the record the base does not accelerate.
 
@@ -123,6 +124,9 @@ class BaseMotion:
             (of at least four samples), which is measured from the first sample.
         sampling_rate : float, optional
             Samples per second, Hz, where ``t`` is None: the first sample is at t = 0.
+        exact : bool
+            Whether the samples are the corners of the motion, with nothing between them that the record does not tell.
+            Else responses warn where modes lie above half the sampling rate (`UndersamplingWarning`).
 
         Raises
         ------
@@ -137,6 +141,7 @@ class BaseMotion:
         [0.05 0.2  0.2 ]
         """
         choice("kind", kind, KINDS)
+        exact = flag("exact", exact)
         units = {"acceleration": "m/s^2", "velocity": "m/s", "position": "m"}
         samples = real_array(kind, record, unit=units[kind])
         if samples.ndim == 0:
@@ -150,7 +155,7 @@ class BaseMotion:
         shape = broadcastable(**{kind: samples[..., 0], "velocity": v})
         own, level, slope = spline_motion(times, samples, kind)
         motion = cls._of([Piecewise(v + own, times, level, slope)], shape)
-        motion.sample_step = float((times[-1] - times[0]) / (times.size - 1)) if times.size >= _RECORD else None
+        motion.sample_step = None if exact else float((times[-1] - times[0]) / (times.size - 1))
         return motion
 
     @classmethod
@@ -370,10 +375,10 @@ class Force:
         self.profile = BaseMotion(acceleration=constant, amplitude=size, angular_frequency=varpi, phase=psi)
 
     @classmethod
-    def sampled(cls, t: Any, force: Any, *, sampling_rate: Any = None) -> Force:
+    def sampled(cls, t: Any, force: Any, *, sampling_rate: Any = None, exact: bool = False) -> Force:
         """Return a sampled force, linear between uniform times and zero outside the record; shape (..., T).
 
-        Times or a sampling rate as :meth:`BaseMotion.sampled` takes them.
+        Times or a sampling rate, and ``exact``, as :meth:`BaseMotion.sampled` takes them.
 
         Raises
         ------
@@ -381,7 +386,7 @@ class Force:
             As :meth:`BaseMotion.sampled`.
         """
         history = cls()
-        history.profile = BaseMotion.sampled(t, real_array("force", force), sampling_rate=sampling_rate)
+        history.profile = BaseMotion.sampled(t, real_array("force", force), sampling_rate=sampling_rate, exact=exact)
         return history
 
     def __call__(self, t: Any) -> Any:

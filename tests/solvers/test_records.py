@@ -5,9 +5,10 @@ from datetime import timedelta
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import cra_sym as cra
-from cra_sym import BaseMotion, Force
+from cra_sym import BaseMotion, Force, symbols
 from cra_sym.analysis.responses import UndersamplingWarning
 from cra_sym.solvers import modal_response
 
@@ -159,7 +160,7 @@ def test_a_velocity_record_drives_as_its_derivative():
         pushed = cra.tip_response(ARM, BaseMotion(acceleration=step - previous), np.maximum(later - start, 0.0))
         expected = expected + np.where(later >= start, pushed, 0.0)
         previous = step
-    found = cra.tip_response(ARM, BaseMotion.sampled(t, velocity, kind="velocity"), later)
+    found = cra.tip_response(ARM, BaseMotion.sampled(t, velocity, kind="velocity", exact=True), later)
     # sums of responses that cancel: rounding of the largest
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
@@ -178,7 +179,36 @@ def test_modes_above_half_the_sampling_rate_are_said():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         cra.tip_response(ARM, motion, t, modes=3)
-        cra.tip_response(ARM, BaseMotion.sampled(t[:20], np.sin(t[:20])), t)  # the corners of a motion
+
+
+@pytest.mark.parametrize("samples", [2, 20, 31, 32])
+@pytest.mark.parametrize("kind", ["acceleration", "velocity"])
+def test_a_record_of_few_samples_is_undersampled_too_unless_it_is_the_motion(samples, kind):
+    t = np.arange(samples) / 100.0
+    with pytest.warns(UndersamplingWarning, match="sampled at 100 Hz"):
+        cra.tip_response(ARM, BaseMotion.sampled(t, np.cos(t), kind=kind), 1.0)
+    with pytest.warns(UndersamplingWarning):
+        cra.tip_response(ARM, np.ones(2) * BaseMotion.sampled(t, np.cos(t), kind=kind), 1.0)
+    corners = BaseMotion.sampled(t, np.cos(t), kind=kind, exact=True)
+    assert corners == BaseMotion.sampled(t, np.cos(t), kind=kind)  # the same motion
+    cra.tip_response(ARM, corners + 2.0 * corners, 1.0)
+
+
+def test_a_sampled_force_and_a_nonlinear_system_tell_it_too():
+    from tests.systems import system
+
+    given, t = system("beam with an interior mass"), np.arange(8) / 100.0
+    still = cra.BaseMotion()
+    with pytest.warns(UndersamplingWarning, match="sampled at 100 Hz"):
+        cra.tip_response(given, {"w": still, "p": Force.sampled(t, np.cos(t))}, 0.1, 6)
+    cra.tip_response(given, {"w": still, "p": Force.sampled(t, np.cos(t), exact=True)}, 0.1, 6)
+    _, left, _ = cra.paper_lagrangian()
+    k_3 = sp.Symbol("k_3")
+    hardening = ARM.model.replace(left=left - k_3 * symbols.v**4 / 4).at({**ARM.values, "k_3": 1e9})
+    with pytest.warns(UndersamplingWarning, match="sampled at 100 Hz"):
+        cra.tip_response(hardening, BaseMotion.sampled(t, 1e-3 * np.cos(t)), 0.01)
+    with pytest.raises(TypeError, match="exact = 1: must be True or False"):
+        BaseMotion.sampled(t, t, exact=1)
 
 
 # Long records -----------------------------------------------------------------------------------------------------
