@@ -69,6 +69,17 @@ print(json.dumps([found, messages, has_compiler(), sorted(set(ABSENT) & set(sys.
 """
 
 
+def test_reproduce_names_the_extra_it_needs():
+    """As from a plain wheel: one line, no traceback, nothing written."""
+    code = (
+        BLOCK.replace(repr(ABSENT), repr(("nbconvert",)))
+        + "from cra_sym.__main__ import main\nsys.exit(main(['reproduce']))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 2 and done.stdout == ""
+    assert done.stderr.count("\n") == 1 and "cra_sym[notebooks]" in done.stderr and "nbconvert" in done.stderr
+
+
 def test_every_number_without_the_extras():
     """The fallback gives the numbers of this process, which may compile, and says what an extra would bring."""
     code = f"{BLOCK}{NUMBERS}ABSENT = {ABSENT!r}\n{REPORT}"
