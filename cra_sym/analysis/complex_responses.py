@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,10 +15,11 @@ from cra_sym.model.system import System
 from cra_sym.model.values import flat_columns
 from cra_sym.solvers.coupled_modes import driven_system
 from cra_sym.solvers.driven_modes import Start, checked
+from cra_sym.solvers.free_peaks import free_peaks
 from cra_sym.solvers.lowest_motions import LowestMotions, lowest_motions
 from cra_sym.solvers.motion import BaseMotion, Force
 
-__all__ = ["complex_response"]
+__all__ = ["complex_residual", "complex_response"]
 
 Array = NDArray[np.float64]
 
@@ -62,30 +63,95 @@ def complex_response(
     times = np.empty(0)
     for cause in (None, *causes):
         times, derivative = checked(BaseMotion() if cause is None else cause.profile, t, derivative, start)
+    found = []
+    shape, members = _members(system, causes, outputs, modes, zeta, _momenta(system, initial), check)
+    for one in members:
+        y = one.start
+        total = driven_system(one.motions.system, 0.0 * y, one.rows, BaseMotion(), (), y, times, derivative)
+        for profile, member, push, strike in one.causes:
+            total += driven_system(one.motions.system, push, one.rows, profile, member, strike, times, derivative)
+        found.append(total)
+    return np.array(found).reshape(*shape, *found[0].shape)
+
+
+def complex_residual(
+    system: System,
+    histories: Mapping[str, BaseMotion | Force],
+    tip: Callable[[Modes], Array],
+    stop: Array | float,
+    modes: int,
+    zeta: Array,
+    check: Callable[[BaseMotion, Array], None],
+) -> Array:
+    """Return the sum over the lowest complex modes of the largest displacements of the tip after the stop, shape (...).
+
+    Parameters
+    ----------
+    system, histories, modes, zeta, check
+        As in :func:`complex_response`, from rest.
+    tip : callable
+        ``tip(modes)`` returns the row (modes,) of a basis.
+    stop : float or ndarray
+        When nothing drives any more, s.
+    """
+    found = []
+    shape, members = _members(system, _causes(system, histories, "inertial"), tip, modes, zeta, (None, None), check)
+    for one, end in zip(members, np.broadcast_to(stop, shape).ravel(), strict=True):
+        matrix, state, moment = one.motions.system, 0.0 * one.start, np.array([end])
+        for profile, member, push, strike in one.causes:
+            every = np.eye(len(state))
+            state = state + driven_system(matrix, push, every, profile, member, strike, moment, 0)[:, 0]
+        found.append(free_peaks(matrix, one.rows, state, one.motions.basis.problem.rigid))
+    return np.array(found).reshape(shape)
+
+
+class _Member(NamedTuple):
+    """One of a batch: its motions, rows of the outputs, state at t = 0, and what acts on it.
+
+    Each of the causes is its profile, the member of the profile's batch, its effect on the state, and its strike.
+    """
+
+    motions: LowestMotions
+    rows: Array
+    start: Array
+    causes: list[tuple[BaseMotion, tuple[int, ...], Array, Array]]
+
+
+def _members(
+    system: System,
+    causes: Sequence[_Cause],
+    outputs: Callable[[Modes], Array],
+    modes: int,
+    zeta: Array,
+    momenta: tuple[Load | None, Load | None],
+    check: Callable[[BaseMotion, Array], None],
+) -> tuple[tuple[int, ...], Iterator[_Member]]:
+    """Return the shape of the batch and its members."""
     shapes = {f"motion {k}": np.empty(cause.profile.shape) for k, cause in enumerate(causes)}
     shape = broadcastable(values=np.empty(system.shape), zeta=zeta, **shapes)
     columns, ratios = flat_columns(system.parameters, shape), np.broadcast_to(zeta, shape).ravel()
-    momenta = _momenta(system, initial)
-    found, kept, motions = [], b"", None
-    for number, index in enumerate(np.ndindex(shape)):
-        column = columns[:, number : number + 1]
-        key = np.append(column, ratios[number]).tobytes()
-        if motions is None or key != kept:  # the motion varies fastest
-            ((_, problem),) = system.numerics("pencil").problems(column)
-            motions, kept = lowest_motions(problem, modes, float(ratios[number])), key
-        one = system.model.at(dict(zip(system.numerics("names"), column[:, 0], strict=True)))
-        rows = outputs(motions.basis) @ motions.shapes
-        omega = np.sort(np.abs(motions.eigenvalues.imag))
-        state = _projected(one, motions, motions.start, momenta[0]) + _projected(one, motions, motions.push, momenta[1])
-        total = driven_system(motions.system, 0.0 * state, rows, BaseMotion(), (), state, times, derivative)
-        for cause in causes:
-            check(cause.profile, omega)
-            push = _projected(one, motions, motions.push, cause.load)
-            speed = float(np.broadcast_to(cause.profile.velocity(0.0), shape)[index]) if cause.strikes else 0.0
-            member = _member(index, cause.profile.shape)
-            total += driven_system(motions.system, push, rows, cause.profile, member, push * speed, times, derivative)
-        found.append(total)
-    return np.array(found).reshape(*shape, *found[0].shape)
+
+    def members() -> Iterator[_Member]:
+        kept, motions = b"", None
+        for number, index in enumerate(np.ndindex(shape)):
+            column = columns[:, number : number + 1]
+            key = np.append(column, ratios[number]).tobytes()
+            if motions is None or key != kept:  # the motion varies fastest
+                ((_, problem),) = system.numerics("pencil").problems(column)
+                motions, kept = lowest_motions(problem, modes, float(ratios[number])), key
+            one = system.model.at(dict(zip(system.numerics("names"), column[:, 0], strict=True)))
+            omega = np.sort(np.abs(motions.eigenvalues.imag))
+            start = _projected(one, motions, motions.start, momenta[0])
+            start = start + _projected(one, motions, motions.push, momenta[1])
+            acting = []
+            for cause in causes:
+                check(cause.profile, omega)
+                push = _projected(one, motions, motions.push, cause.load)
+                speed = float(np.broadcast_to(cause.profile.velocity(0.0), shape)[index]) if cause.strikes else 0.0
+                acting.append((cause.profile, _member(index, cause.profile.shape), push, push * speed))
+            yield _Member(motions, outputs(motions.basis) @ motions.shapes, start, acting)
+
+    return shape, members()
 
 
 def _causes(system: System, histories: Mapping[str, BaseMotion | Force], start: Start) -> list[_Cause]:

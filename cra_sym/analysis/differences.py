@@ -13,7 +13,7 @@ from cra_sym.model.system import System
 if TYPE_CHECKING:
     from cra_sym.analysis.sensitivities import Sensitivities
 
-__all__ = ["by_differences"]
+__all__ = ["by_differences", "central_weights"]
 
 Array = NDArray[np.float64]
 Quantity = Callable[[System], Array]
@@ -60,7 +60,7 @@ def by_differences(
 
 def _own_stiffness(system: System, name: str) -> Array:
     """Return the stiffness beside which the structure gives as much as a spring of an end, shape of the batch."""
-    rigid = system.replace(**{name: np.inf})
+    rigid = system.conservative_part.replace(**{name: np.inf})
     end, place, factor = system.numerics("stiffnesses")[name]
     force, unit = rigid.modes(1).force(end, place)[..., 0], factor.function(*rigid.domain.values)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -106,6 +106,12 @@ def _differences(system: System, found: Sensitivities, name: str, quantity: Quan
     more = (None,) * (values_there.ndim - offsets.ndim)
     weights = _weights(offsets) / step
     return np.asarray((weights[(..., *more)] * values_there).sum(axis=0))
+
+
+def central_weights() -> tuple[Array, Array]:
+    """Return the offsets and the weights of the central difference of eighth order."""
+    offsets = np.arange(-(_POINTS // 2), _POINTS // 2 + 1.0)
+    return offsets, _weights(offsets)
 
 
 def _weights(offsets: Array) -> Array:

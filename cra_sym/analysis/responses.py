@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.analysis.complex_responses import complex_response
+from cra_sym.analysis.complex_responses import complex_residual, complex_response
 from cra_sym.analysis.histories import History, driven
 from cra_sym.analysis.histories import histories as histories_of
 from cra_sym.analysis.modes import check_places, participation, section_place
@@ -212,7 +212,8 @@ def residual_vibration(
     after the stop is not a condition: what counts is that the base does not accelerate any more. A rigid-body mode
     contributes its final offset. Of a system with elastic-slip elements it is the largest displacement while they
     slip, at most for ten periods of the lowest mode; from where they stick for good on it is the offset and the sum
-    over the modes.
+    over the modes. Where dampers, gyroscopic forces or forces that follow the motion couple the modes, the sum is over
+    complex modes: two real eigenvalues count as one mode, and what grows leaves inf.
 
     Parameters
     ----------
@@ -231,8 +232,7 @@ def residual_vibration(
     Raises
     ------
     TypeError, ValueError
-        If a motion never stops accelerating or a force never ends, or the model has dampers, which couple the modes;
-        otherwise as :func:`response`.
+        If a motion never stops accelerating or a force never ends; otherwise as :func:`response`.
 
     Examples
     --------
@@ -243,12 +243,17 @@ def residual_vibration(
     """
     instance("system", system, System)
     if system.model.pieces["hysteresis"]:
+        if couples(system.without_hysteresis):
+            raise ValueError("system: dampers beside elastic-slip elements leave no sum over modes; use response")
         still = stopped(system.without_hysteresis, motion, modes, zeta)
         problem, rows = slipping_problem(system, motion, modes, zeta), system.without_hysteresis.modes(modes)
         peak = slipping_residual(problem, rows.displacement(1, 0), still.stop)
         return peak if peak.ndim else float(peak)
-    found = stopped(system, motion, modes, zeta)
-    total = np.sum(found.peaks(found.osc.omega, found.products), -1)
+    if couples(system):
+        total = _complex_residual(system, motion, modes, zeta)
+    else:
+        found = stopped(system, motion, modes, zeta)
+        total = np.sum(found.peaks(found.osc.omega, found.products), -1)
     return total if total.ndim else float(total)
 
 
@@ -294,8 +299,35 @@ class Stopped:
         return solver.free_peak(self.osc._replace(omega=omega), q, u)
 
 
-def stopped(system: System, motion: Any, modes: int, zeta: Any) -> Stopped:
-    """Return the modes driven until everything stops, or refuse what never stops or couples the modes."""
+def couples(system: System) -> bool:
+    """Tell whether dampers, gyroscopic or follower forces couple the natural modes; refuse what has no complex ones."""
+    instance("system", system, System)
+    if system.numerics("complex_modes"):
+        return True
+    if system.numerics("damping") is not None:
+        raise ValueError(
+            "system: dampers that resist the highest derivatives have no complex modes here; use modal damping (zeta), "
+            "or response after the stop"
+        )
+    return False
+
+
+def _complex_residual(system: System, motion: Any, modes: int, zeta: Any) -> Array:
+    histories, _, stop = _ended(system, motion)
+    modes = count("modes", modes, high=MOST_MODES)
+    ratio = np.asarray(system.zeta if zeta is None else checked_damping(zeta))
+    if zeta is not None and ratio.ndim:
+        if ratio.shape[-1] != 1:
+            raise ValueError(f"zeta has shape {ratio.shape}: its last axis must have one value where modes are complex")
+        ratio = ratio[..., 0]
+    place = section_place(system, None)
+    return complex_residual(
+        system, histories, lambda found: found.displacement(1, place), stop, modes, ratio, _check_sampling
+    )
+
+
+def _ended(system: System, motion: Any) -> tuple[dict[str, History], tuple[BaseMotion, ...], Any]:
+    """Return what drives, the motions it is, and when the last of them stops; refuse what never does."""
     instance("system", system, System)
     histories = histories_of(system, motion)
     if not histories:
@@ -306,19 +338,21 @@ def stopped(system: System, motion: Any, modes: int, zeta: Any) -> Stopped:
             if isinstance(one, Force):
                 raise ValueError(f"motion: the force {name} never ends: must be a sampled record")
             raise ValueError("motion never stops accelerating: must be a move with a stop, or a sampled record")
-    if system.numerics("damping") is not None:
-        raise ValueError(
-            "the dampers of the model couple its modes: use modal damping (zeta), or response after the stop"
-        )
     if system.numerics("constant") is not None:
         raise ValueError("system: a constant load acts too and never ends; use response after the stop")
+    stop = profiles[0].duration
+    for profile in profiles[1:]:
+        stop = np.maximum(stop, profile.duration)
+    return histories, profiles, stop
+
+
+def stopped(system: System, motion: Any, modes: int, zeta: Any) -> Stopped:
+    """Return the natural modes driven until everything stops, or refuse what never stops."""
+    histories, profiles, stop = _ended(system, motion)
     modes = count("modes", modes, high=MOST_MODES)
     osc = oscillators(system, np.zeros(modes), np.zeros((1, modes)), modes, zeta)
     for profile in profiles:
         _check_sampling(profile, osc.omega)
-    stop = profiles[0].duration
-    for profile in profiles[1:]:
-        stop = np.maximum(stop, profile.duration)
     tip = system.modes(modes).displacement(1, 0)
     products = [participation(system, modes, name) * tip for name in histories]
     return Stopped(osc, tuple(histories), profiles, stop, products)

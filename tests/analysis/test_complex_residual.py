@@ -1,0 +1,105 @@
+"""Residual vibration where dampers and gyroscopic forces couple the modes: against time histories and input shapers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.linalg import block_diag, expm
+
+import cra_sym as cra
+from cra_sym.solvers.free_peaks import free_peaks
+from tests.systems import BENT, VALUES, _model, m, t, v, w, x
+
+c, g = sp.symbols("c g")
+MOVE = cra.BaseMotion.trapezoid(0.1, 0.4, 3.0)
+END = {"right": m * (v + w).diff(t) ** 2 / 2}
+DAMPED = _model(BENT, **END, virtual_work=[(-c * v.diff(t), v, "right")])
+TURNING = _model(BENT + g * v.diff(t) * v.diff(x), **END)
+AFTER = np.linspace(0.0, 4.0, 8001)
+
+
+def damped(**changes):
+    return DAMPED.at(VALUES | {"c": 0.3} | changes)
+
+
+def test_no_damper_is_the_sum_over_natural_modes():
+    still = _model(BENT, **END).at(VALUES)
+    assert cra.residual_vibration(damped(c=0.0), MOVE, 3) == pytest.approx(
+        cra.residual_vibration(still, MOVE, 3), rel=1e-8
+    )
+
+
+@pytest.mark.parametrize("system", [damped(), damped(c=8.0), TURNING.at(VALUES | {"g": 0.2})], ids=str)
+def test_one_mode_is_its_largest_value_and_several_bound_theirs(system):
+    one, three = (np.abs(cra.tip_response(system, MOVE, MOVE.duration + AFTER, modes)).max() for modes in (1, 3))
+    # the grid misses a peak by (omega h)^2 / 8; with the strong damper the lowest motions are no single pair
+    assert system.values.get("c") == 8.0 or cra.residual_vibration(system, MOVE, 1) == pytest.approx(one, rel=1e-3)
+    assert three <= cra.residual_vibration(system, MOVE, 3) * (1 + 1e-9) <= 1.2 * three
+
+
+def test_a_batch_is_its_members():
+    dampers, ways = np.array([0.1, 0.5]), cra.BaseMotion.trapezoid([[0.1], [0.2]], 0.4, 3.0)
+    found = cra.residual_vibration(damped(c=dampers), ways, 2)
+    for (i, k), value in np.ndenumerate(found):
+        assert value == pytest.approx(cra.residual_vibration(damped(c=dampers[k]), ways[i, 0], 2), rel=1e-9)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_shaper_for_a_complex_mode_leaves_nothing_of_it(order):
+    system = damped(c=1.0)
+    first = cra.eigenvalues(system, 1)[0]
+    shaper = cra.input_shaper(abs(first), -first.real / abs(first), order)
+    whole = cra.residual_vibration(system, MOVE, 1)
+    # eigenvalues settle to 1e-9
+    assert cra.residual_vibration(system, MOVE.shaped(*shaper), 1) < 1e-8 * whole
+
+
+def test_the_gradient_is_the_slope():
+    system, by = damped(), ("k", "c", "m", "duration")
+    value, gradient = cra.residual_vibration_gradient(system, MOVE, by, 2)
+    assert value == cra.residual_vibration(system, MOVE, 2)
+    slopes, small = [], 1e-3
+    for name in by[:3]:
+        place = system.values[name]
+        sides = [cra.residual_vibration(system.replace(**{name: place * f}), MOVE, 2) for f in (1 + small, 1 - small)]
+        slopes.append((sides[0] - sides[1]) / (2 * small * place))
+    last, longer = (cra.BaseMotion.trapezoid(0.1, 0.4, 3.0, MOVE.duration + part * 2e-4) for part in (1, 2))
+    ends = [cra.residual_vibration(system, one, 2) for one in (MOVE, last, longer)]
+    slopes.append((-3 * ends[0] + 4 * ends[1] - ends[2]) / 4e-4)
+    np.testing.assert_allclose(gradient, slopes, rtol=2e-5)  # of the differences of second order here
+
+
+def test_what_has_no_such_sum_is_named():
+    with pytest.raises(ValueError, match=r"zeta has shape \(2,\): its last axis must have one value"):
+        cra.residual_vibration(damped(), MOVE, 2, zeta=[0.01, 0.02])
+    inner = _model(BENT, **END, virtual_work=[(-c * v.diff(x, 2).diff(t), v.diff(x, 2), "domain")]).at(
+        VALUES | {"c": 1e-3}
+    )
+    with pytest.raises(ValueError, match=r"dampers that resist the highest derivatives .*use modal damping"):
+        cra.residual_vibration(inner, MOVE, 2)
+    with pytest.raises(ValueError, match="motion never stops accelerating"):
+        cra.residual_vibration(damped(), cra.BaseMotion(acceleration=1.0), 2)
+
+
+def oscillator(omega, ratio):
+    return np.array([[0.0, 1.0], [-(omega**2), -2 * ratio * omega]])
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.1, 0.9, 0.9999, 1.0, 1.0001, 1.5, 20.0])
+@pytest.mark.parametrize("state", [(1.0, 0.0), (1.0, 3.0), (-0.2, 1.0), (0.3, -5.0), (0.0, 1.0)])
+def test_a_pair_swings_as_far_as_its_history_does(ratio, state):
+    system = oscillator(2.0, ratio)
+    times = np.linspace(0.0, 4.0, 4001)
+    history = np.abs((expm(times[:, None, None] * system) @ np.array(state))[:, 0]).max()
+    turn = np.array([[1.0, 0.4], [-0.3, 0.8]])  # the same in other coordinates
+    found = free_peaks(turn @ system @ np.linalg.inv(turn), np.linalg.inv(turn)[0], turn @ state, 0)
+    assert found == pytest.approx(history, rel=1e-5)  # near critical damping half the digits are lost
+
+
+def test_what_grows_has_no_largest_value_and_a_rigid_body_keeps_its_place():
+    assert free_peaks(oscillator(1.0, -0.1), np.array([1.0, 0.0]), np.array([1e-3, 0.0]), 0) == np.inf
+    free = block_diag([[0.0, 1.0], [0.0, 0.0]], oscillator(2.0, 0.0))
+    row = np.array([1.0, 0.0, 1.0, 0.0])
+    assert free_peaks(free, row, np.array([0.5, 0.0, 0.25, 0.0]), 1) == pytest.approx(0.75, rel=1e-12)
+    assert free_peaks(free, row, np.array([0.5, 0.1, 0.25, 0.0]), 1) == np.inf
