@@ -80,7 +80,7 @@ def residual_vibration_gradient(
     1.696 mm, 52.49 mm/s
     """
     modes = count("modes", modes, high=MOST_MODES)
-    coupled = couples(system)
+    coupled = couples(system, modes) or system.numerics("damping") is not None
     driven = stopped(system.conservative_part, motion, modes, None if coupled else zeta)
     stretch = ["duration"] if isinstance(motion, BaseMotion) or (len(driven.names) == 1 and _moves(system)) else []
     compliances = {f"1/{name}": name for name in system.numerics("stiffnesses")}

@@ -243,13 +243,13 @@ def residual_vibration(
     """
     instance("system", system, System)
     if system.model.pieces["hysteresis"]:
-        if couples(system.without_hysteresis):
+        if couples(system.without_hysteresis, modes):
             raise ValueError("system: dampers beside elastic-slip elements leave no sum over modes; use response")
         still = stopped(system.without_hysteresis, motion, modes, zeta)
         problem, rows = slipping_problem(system, motion, modes, zeta), system.without_hysteresis.modes(modes)
         peak = slipping_residual(problem, rows.displacement(1, 0), still.stop)
         return peak if peak.ndim else float(peak)
-    if couples(system):
+    if couples(system, modes):
         total = _complex_residual(system, motion, modes, zeta)
     else:
         found = stopped(system, motion, modes, zeta)
@@ -299,17 +299,15 @@ class Stopped:
         return solver.free_peak(self.osc._replace(omega=omega), q, u)
 
 
-def couples(system: System) -> bool:
+def couples(system: System, modes: int) -> bool:
     """Tell whether dampers, gyroscopic or follower forces couple the natural modes; refuse what has no complex ones."""
     instance("system", system, System)
-    if system.numerics("complex_modes"):
-        return True
-    if system.numerics("damping") is not None:
+    if system.numerics("complex_modes") == "none" and system.numerics("damping") is not None:
         raise ValueError(
-            "system: dampers that resist the highest derivatives have no complex modes here; use modal damping (zeta), "
-            "or response after the stop"
+            "system: its dampers couple modes, and with third derivatives by x or inertia of the highest derivatives "
+            "there are no complex ones; use modal damping (zeta), or response after the stop"
         )
-    return False
+    return _has_complex_modes(system, count("modes", modes, high=MOST_MODES))
 
 
 def _complex_residual(system: System, motion: Any, modes: int, zeta: Any) -> Array:
@@ -351,11 +349,27 @@ def stopped(system: System, motion: Any, modes: int, zeta: Any) -> Stopped:
     histories, profiles, stop = _ended(system, motion)
     modes = count("modes", modes, high=MOST_MODES)
     osc = oscillators(system, np.zeros(modes), np.zeros((1, modes)), modes, zeta)
+    if system.numerics("complex_modes") == "if coupled" and not _has_complex_modes(system, modes):
+        osc = osc._replace(zeta=_with_dampers(system, osc.omega, osc.zeta))
     for profile in profiles:
         _check_sampling(profile, osc.omega)
     tip = system.modes(modes).displacement(1, 0)
     products = [participation(system, modes, name) * tip for name in histories]
     return Stopped(osc, tuple(histories), profiles, stop, products)
+
+
+def _with_dampers(system: System, omega: Array, zeta: Array) -> Array:
+    """Return damping ratios with those of dampers that leave the natural modes apart."""
+    matrix = Projected(system.domain, system.modes(omega.shape[-1]), system.numerics("damping"))["damping"]
+    rate = np.einsum("...ii->...i", matrix)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = zeta + np.where(omega > 0.0, rate / (2.0 * omega), 0.0)
+    if not (ratio < 1.0).all():
+        raise ValueError(
+            f"modes = {omega.shape[-1]}: dampers give one of these a ratio of {ratio.max():.3g}, must be below 1; take "
+            "fewer modes"
+        )
+    return np.asarray(ratio)
 
 
 def oscillators(system: System, gamma: Array, rows: Array, modes: int, zeta: Any) -> solver.Oscillators:
