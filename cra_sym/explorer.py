@@ -254,7 +254,8 @@ class Explorer:
         """Show the sliders where the extra ``explore`` is installed, and a picture of the same state elsewhere."""
         shown: dict[str, Any] = {"text/plain": repr(self), "image/png": b64encode(self.picture()).decode("ascii")}
         try:
-            return self.panel._repr_mimebundle_() | shown
+            sliders: dict[str, Any] = self.panel._repr_mimebundle_()
+            return sliders | shown
         except MissingExtraError:
             return shown
 

@@ -39,7 +39,7 @@ class Dimension(NamedTuple):
     kg: int = 0
     s: int = 0
 
-    def __mul__(self, other: Any) -> Dimension:  # type: ignore[override]
+    def __mul__(self, other: Any) -> Dimension:
         """Dimension of a product."""
         return Dimension(*(a + b for a, b in zip(self, other, strict=True)))
 
@@ -51,7 +51,7 @@ class Dimension(NamedTuple):
 _POSITIVE, _NONNEGATIVE, _INTEGER, _COMPLEX = "positive", "nonnegative", "positive integer", "complex"
 _X, _T, _XT = ("x",), ("t",), ("x", "t")
 
-_TABLE: dict[str, list[tuple]] = {
+_TABLE: dict[str, list[tuple[Any, ...]]] = {
     "coordinates and motion": [
         ("x", "x", "m", "coordinate along the manipulator from the bolted joint, 0 to L"),
         ("t", "t", "s", "time"),

@@ -129,7 +129,8 @@ def _counted(
     exact = [0.0 if math.isinf(value) else value for value in values.values()]
 
     def evaluated(kernel: Any, *first: Any) -> Sequence[Any]:
-        return kernel(flint.arb, flint.arb.pi(), *first, *map(flint.arb, exact))
+        found: Sequence[Any] = kernel(flint.arb, flint.arb.pi(), *first, *map(flint.arb, exact))
+        return found
 
     def matrix(kernel: Any, columns: int) -> Callable[[Any], list[list[Any]]]:
         def rows(z: Any) -> list[list[Any]]:

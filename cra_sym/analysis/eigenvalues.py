@@ -184,7 +184,7 @@ def _unsettled(system: System, columns: Array, found: Settled, oscillating: bool
         kind = "oscillating motions; oscillating=False gives real ones too" if oscillating else "eigenvalues"
         raise ValueError(f"modes = {modes}: there are only {there} {kind}")
     try:
-        return _by_newton(system, columns, found.values)[0]
+        return np.asarray(_by_newton(system, columns, found.values)[0])
     except (ArithmeticError, ValueError):
         bad = ~(found.error[0] <= tolerance)
     first, error = int(bad.argmax()), float(found.error[0, bad.argmax()])

@@ -156,7 +156,7 @@ def _with_modal_damping(undamped: _Undamped, grid: NDArray[np.float64], zeta: ND
     rest = np.where(static, 0.0, 4j * zeta * grid * step / np.pi)[..., None, :] * (smooth @ integrand)
     # a rigid-body mode has no damping: what the formula does with it is taken back
     rigid = undamped.rigid_share(np.where(static, 1.0, alpha)), undamped.rigid_share(np.where(static, 1.0, grid))
-    return response + rest + np.where(static[..., None, :], 0.0, rigid[1] - weight[..., None, :] * rigid[0])
+    return np.asarray(response + rest + np.where(static[..., None, :], 0.0, rigid[1] - weight[..., None, :] * rigid[0]))
 
 
 class _Undamped:
@@ -239,7 +239,7 @@ class _Undamped:
         modes = min(2, system.most_modes)
         driven = self._drive_of_modes(modes)
         still = system.natural_frequencies(modes) == 0
-        return (still & (np.abs(driven) > 1e-9 * np.abs(driven).max(axis=-1, keepdims=True))).any(axis=-1)
+        return np.asarray((still & (np.abs(driven) > 1e-9 * np.abs(driven).max(axis=-1, keepdims=True))).any(axis=-1))
 
     def _drive_of_modes(self, modes: int) -> NDArray[np.float64]:
         if self.motion is not None:

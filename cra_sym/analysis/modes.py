@@ -380,7 +380,7 @@ def only_motion(system: System) -> str:
         if not motions and causes:
             found += f" ({', '.join(name for name, _ in causes)} acts in another way)"
         raise ValueError(f"the model must have one prescribed motion that acts by its acceleration; it has {found}")
-    return motions[0]
+    return str(motions[0])
 
 
 def participation(system: System, modes: int, motion: str | None = None) -> Array:

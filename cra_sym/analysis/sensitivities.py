@@ -229,7 +229,7 @@ class Sensitivities:
         own = np.diagonal(block, axis1=-2, axis2=-1)
         off = np.maximum(np.abs(block), np.abs(own[..., :, None] - own[..., None, :]))
         size = np.maximum(np.abs(own[..., :, None]), np.abs(own[..., None, :])) + np.abs(block)
-        return np.any((self._repeated & (off > _MIXED * size))[..., : self._modes, :], axis=-1)
+        return np.asarray(np.any((self._repeated & (off > _MIXED * size))[..., : self._modes, :], axis=-1))
 
     @default_floating_point
     def _raw(self, name: str) -> Array:
@@ -295,7 +295,7 @@ class Sensitivities:
 
     @cached_property
     def _still(self) -> Array:
-        return self.frequency == 0
+        return np.asarray(self.frequency == 0)
 
 
 @default_floating_point

@@ -196,7 +196,8 @@ def forced_width(system: System, excitation: TransverseBase, modes: int = 3) -> 
     modes = checks.count("modes", modes, high=MOST_MODES)
     amplitude = np.asarray(excitation.amplitude)[..., None]
     tip = system.modes(modes).displacement(1, 0)
-    return _FORCED(system.natural_frequencies(modes), participation(system, modes), tip, 1.0, amplitude)
+    width: np.ndarray = _FORCED(system.natural_frequencies(modes), participation(system, modes), tip, 1.0, amplitude)
+    return width
 
 
 def _resonance(resonance: Any, modes: int) -> tuple[int, int]:

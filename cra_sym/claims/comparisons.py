@@ -199,7 +199,7 @@ def error_grows_with_acceleration(setting: Setting) -> Finding:
     def error(acceleration: float, scale: float = 1.0) -> np.ndarray:
         mean, shaken = {"acceleration": acceleration}, {"amplitude": scale * setting.amplitude}
         with_disturbance = tip(setting, setting.arm, setting.disturbance | shaken | mean)
-        return with_disturbance - tip(setting, setting.arm, mean)
+        return np.asarray(with_disturbance - tip(setting, setting.arm, mean))
 
     errors = np.stack([error(value) for value in a])
     gap = float(peak(errors - errors[0]).max() / peak(errors[0]))

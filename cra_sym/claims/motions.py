@@ -28,12 +28,12 @@ def tip(
     """Return the tip's elastic displacement v(L, t), or v(L, t) - v(0, t) if ``relative``, shape (..., times), m."""
     places = [0.0, float(arm.L)] if relative else float(np.min(arm.L))
     found = response(arm, BaseMotion(**motion), setting.times, places, modes=setting.modes, start=start)
-    return found[..., 1, :] - found[..., 0, :] if relative else found
+    return np.asarray(found[..., 1, :] - found[..., 0, :] if relative else found)
 
 
 def peak(signal: np.ndarray) -> np.ndarray:
     """Return the largest magnitude along time."""
-    return np.abs(signal).max(axis=-1)
+    return np.asarray(np.abs(signal).max(axis=-1))
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Plane:
         sine, cosine = (
             tip(self.setting, arm, {**unit, "phase": phase}, start=self.start) for phase in (0.0, np.pi / 2)
         )
-        return np.cos(self.psi)[:, None] * sine[:, None, :] + np.sin(self.psi)[:, None] * cosine[:, None, :]
+        return np.asarray(np.cos(self.psi)[:, None] * sine[:, None, :] + np.sin(self.psi)[:, None] * cosine[:, None, :])
 
     def peaks(self, amplitude: float | None = None, **mean: float) -> tuple[np.ndarray, float]:
         """Return the peaks with the disturbance, shape (K, P), and the one without, m."""

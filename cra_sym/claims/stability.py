@@ -267,7 +267,7 @@ def _largest_growth(arm: Arm, epsilon: np.ndarray, tongue: int) -> np.ndarray:
     low, high = zone(arm, JointStiffness(), epsilon, (2, 2), order=2, tongue=tongue)
     centre, half = (low + high) / 2, (high - low) / 2
     probes = centre + np.linspace(-2.5, 2.5, 101)[:, None] * half
-    return growth_rate(arm, JointStiffness(), probes, epsilon, residual=True, tolerance=1e-10).max(axis=0)
+    return np.asarray(growth_rate(arm, JointStiffness(), probes, epsilon, residual=True, tolerance=1e-10).max(axis=0))
 
 
 @pictured("C19")

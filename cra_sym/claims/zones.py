@@ -68,7 +68,7 @@ def zone_1_stays(setting: Setting) -> Finding:
     def as_printed(measure: np.ndarray) -> np.ndarray:
         change = measure[:, 1:] - measure[:, :1]
         others = change[..., 1:].min(axis=-1)
-        return (others > 0) & (np.abs(change[..., 0]) <= minor * others)
+        return np.asarray((others > 0) & (np.abs(change[..., 0]) <= minor * others))
 
     region, relative = as_printed(widths), as_printed(np.log(widths))
     evidence = {

@@ -122,7 +122,7 @@ def _with_free_motion(blocks: Blocks, A: Array, B: Array, C: Array) -> Blocks:
 
 def _response(A: Array, B: Array, C: Array, omega: Array) -> NDArray[np.complex128]:
     solved = [np.linalg.solve(1j * w * np.eye(len(A)) - A, B[:, 0].astype(complex)) for w in omega]
-    return C @ np.column_stack(solved)
+    return np.asarray(C @ np.column_stack(solved))
 
 
 def _disagreement(blocks: Blocks, A: Array, B: Array, C: Array) -> float:

@@ -19,7 +19,7 @@ _SAME = "sqrt exp expm1 log log1p sin cos tan asin acos atan atan2 sinh cosh tan
 _EXACT = 2**53  # integers up to this are doubles
 
 
-class ScalarPrinter(CodePrinter):
+class ScalarPrinter(CodePrinter):  # type: ignore[misc]
     """What the printers share: arithmetic of doubles, written so that no language reads it in another way.
 
     Attributes
@@ -49,7 +49,7 @@ class ScalarPrinter(CodePrinter):
         """Return a literal that reads back as exactly this double."""
         return repr(value)
 
-    def doprint(self, expression: Any) -> str:  # type: ignore[override]
+    def doprint(self, expression: Any) -> str:
         """Return the expression as text on one line.
 
         Raises
@@ -107,7 +107,7 @@ class ScalarPrinter(CodePrinter):
     _print_Pi = _print_Exp1 = _print_GoldenRatio = _print_EulerGamma = _print_Catalan = _print_Float
 
     def _print_Mul(self, expr: sp.Mul) -> str:
-        return CodePrinter._print_Mul(self, expr)
+        return str(CodePrinter._print_Mul(self, expr))
 
     def _print_Pow(self, expr: sp.Pow) -> str:
         if expr.exp == -1:
@@ -161,7 +161,7 @@ def _double(value: Any) -> float:
     return number
 
 
-class FormPrinter(ScalarPrinter, PythonCodePrinter):
+class FormPrinter(ScalarPrinter, PythonCodePrinter):  # type: ignore[misc]
     """The restricted form, which all languages are printed from."""
 
     functions: ClassVar = {n: n for n in _SAME} | {"Abs": "abs", "ceiling": "ceil", "Max": "max", "Min": "min"}

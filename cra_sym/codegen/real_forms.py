@@ -66,7 +66,7 @@ def _is_free_of_roots(e: sp.Expr) -> bool:
 
 
 def _degree(e: sp.Expr, wave: sp.Symbol) -> int:
-    return max(sum(powers) for powers in _hyperbolic(e, wave).monoms())
+    return int(max(sum(powers) for powers in _hyperbolic(e, wave).monoms()))
 
 
 def _hyperbolic(e: sp.Expr, wave: sp.Symbol) -> sp.Poly:

@@ -182,7 +182,7 @@ def _system_checks(arm: Arm) -> Iterator[Check]:
     whole = float(arm.numerics("carried", "w").function(*arm.domain.values)[0])
     rest = whole - np.sum(modal_parameters(arm, 3).participation ** 2)
     for name, kind in (("acceleration", "base_acceleration"), ("force", "drive_force")):
-        system = state_space_module.state_space(arm, 3, kind)  # type: ignore[arg-type]
+        system = state_space_module.state_space(arm, 3, kind)
         loss = float(whole / rest) if name == "force" else 1.0  # the base alone moves what the modes leave of the mass
         for part in "ABC":
             yield _check(f"state_space_{name}_{part}", _numbers(arm), getattr(system, part), loss)

@@ -107,7 +107,8 @@ def draw(name: str, system: System | None = None, **options: Any) -> Figure:
     from matplotlib import style
 
     with style.context(STYLE):
-        return _function(name)(**subject, **options)
+        figure: Figure = _function(name)(**subject, **options)
+        return figure
 
 
 def shows_an_arm(name: str) -> bool:
@@ -129,7 +130,7 @@ def animate(name: str) -> str:
         If there is no such animation.
     """
     choice("animation", name, ANIMATIONS)
-    return _function(name)()
+    return str(_function(name)())
 
 
 def described(name: str) -> tuple[str, str]:
@@ -144,4 +145,5 @@ def _function(name: str) -> Callable[..., Any]:
     homes = {**FIGURES, **ANIMATIONS}
     choice("figure", name, homes)
     module, function = homes[name].split(":")
-    return getattr(import_module(module), function)
+    found: Callable[..., Any] = getattr(import_module(module), function)
+    return found

@@ -14,7 +14,7 @@ from cra_sym.model.system import System
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["BLUE", "GREEN", "INK", "ORANGE", "canvas", "deflection", "panels"]
+__all__ = ["BLUE", "GREEN", "INK", "ORANGE", "canvas", "deflection", "figure_of", "panels"]
 
 #: The style's first colours by value: "C0" would take the colour of whoever shows the figure, not of the style.
 INK, BLUE, ORANGE, GREEN = "#222222", "#0072B2", "#D55E00", "#009E73"
@@ -36,10 +36,17 @@ def panels(axes: Any, rows: int, columns: int, size: tuple[float, float], **opti
     return np.asarray(axes).reshape(rows, columns)
 
 
+def figure_of(ax: Axes) -> Figure:
+    """Return the figure that axes belong to."""
+    figure = ax.figure
+    assert isinstance(figure, Figure)
+    return figure
+
+
 def deflection(arm: System | None, xi: np.ndarray) -> np.ndarray:
     """First mode shape of ``arm`` at ``xi = x / L``, 1 at the tip; by default of an arm whose joint gives visibly."""
     if arm is None:
         nominal = Arm.nominal()
         arm = nominal.replace(k_t=20 * nominal.EI / nominal.L**3, k_r=5 * nominal.EI / nominal.L)
     shape = mode_shapes(arm, xi * arm.values["L"], modes=1)[0]
-    return shape / shape[-1]
+    return np.asarray(shape / shape[-1])

@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from cra_sym.analysis.identification import Identification
 from cra_sym.checks import instance
 from cra_sym.figures import STYLE
+from cra_sym.figures.drawing import figure_of
 
 __all__ = ["figure_fit"]
 
@@ -46,4 +47,4 @@ def figure_fit(fit: Identification, *, axes: Any = None) -> Figure:
         for ax in (left, right):
             ax.set_xlabel("mode")
             ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    return right.figure
+    return figure_of(right)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -16,16 +16,18 @@ if TYPE_CHECKING:
 
 __all__ = ["figure_2"]
 
+Point: TypeAlias = tuple[float, float]
+
 _GREEN, _GREY = "#009E73", "#8A949E"
 _LENGTH, _DATUM, _LEDGE = 7.6, -2.1, -1.25  # where the arm ends, the fixed frame lies and the spring k_t stands
 
 
-def _line(ax: Axes, start, end, colour: str = _GREY, **options) -> None:
+def _line(ax: Axes, start: Point, end: Point, colour: str = _GREY, **options: Any) -> None:
     style = {"linewidth": 1.0, "linestyle": "-", "solid_capstyle": "butt", **options}
     ax.plot(*np.transpose([start, end]), color=colour, **style)
 
 
-def _measure(ax: Axes, start, end, text: str, colour: str = INK, side: float = 0.12) -> None:
+def _measure(ax: Axes, start: Point, end: Point, text: str, colour: str = INK, side: float = 0.12) -> None:
     """Draw an arrow from ``start`` to ``end`` and name the distance on its left (``side`` < 0) or right."""
     shape = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.3, "mutation_scale": 11, "shrinkA": 0, "shrinkB": 0}
     ax.annotate("", end, start, arrowprops=shape, zorder=20)
@@ -45,7 +47,7 @@ def _coil(ax: Axes, x: float, bottom: float, top: float) -> None:
     ax.plot(*points, color=_GREEN, linewidth=1.8, solid_joinstyle="round", linestyle="-", zorder=6)
 
 
-def _spiral(ax: Axes, centre, slope: float) -> None:
+def _spiral(ax: Axes, centre: Point, slope: float) -> None:
     """Draw a spiral spring from the pin's hub to the inclined arm."""
     angle = np.linspace(0.0, 1.0, 200)
     radius, turn = 0.07 + 0.35 * angle, np.pi + (3 * np.pi + np.arctan(slope)) * angle
@@ -53,7 +55,7 @@ def _spiral(ax: Axes, centre, slope: float) -> None:
     ax.plot(x, y, color=_GREEN, linewidth=1.6, linestyle="-", zorder=12)
 
 
-def _block(ax: Axes, corner, width: float, height: float, colour: str, zorder: float = 3) -> None:
+def _block(ax: Axes, corner: Point, width: float, height: float, colour: str, zorder: float = 3) -> None:
     from matplotlib.patches import Rectangle
 
     ax.add_patch(Rectangle(corner, width, height, facecolor=colour, edgecolor=INK, linewidth=0.9, zorder=zorder))

@@ -50,7 +50,7 @@ class LiveFigure:
     ) -> None:
         self._draw = draw
         self._frame: Any = None
-        self._look: list[tuple] = []
+        self._look: list[tuple[Any, ...]] = []
         with style.context(STYLE):
             self.figure = Figure(figsize=size, dpi=dpi, layout="constrained")
             self.canvas = FigureCanvasAgg(self.figure)

@@ -9,6 +9,7 @@ from matplotlib import style
 from matplotlib.figure import Figure
 
 from cra_sym.figures import STYLE
+from cra_sym.figures.drawing import figure_of
 
 __all__ = ["figure_damped_joint", "figure_slenderness"]
 
@@ -39,7 +40,7 @@ def figure_slenderness(slenderness: Any, thin: Any, thick: Any, *, axes: Any = N
         for ax in (left, right):
             ax.set_xlabel("slenderness $L/h$")
             ax.legend()
-    return right.figure
+    return figure_of(right)
 
 
 def figure_damped_joint(damper: Any, ratio: Any, *, ax: Any = None) -> Figure:
@@ -60,4 +61,4 @@ def figure_damped_joint(damper: Any, ratio: Any, *, ax: Any = None) -> Figure:
         ax.set_ylabel("damping ratio $\\zeta$")
         ax.set_title("Too weak dissipates little, too strong holds the joint still")
         ax.legend()
-    return ax.figure
+    return figure_of(ax)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from cra_sym.analysis.modes import mode_shapes, natural_frequencies
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import choice, one_axis
-from cra_sym.figures.drawing import BLUE, ORANGE, panels
+from cra_sym.figures.drawing import BLUE, ORANGE, figure_of, panels
 from cra_sym.figures.subject import (
     around,
     field_label,
@@ -55,7 +55,7 @@ def figure_3(arm: System | None = None, k_t: Any = None, *, axes: Any = None) ->
     _relative(right, k_t, found / rigid, "k_t")
     left.set_title("Fig. 3  A softer joint lowers every mode")
     right.set_title("higher modes feel it first", fontweight="normal")
-    return left.figure
+    return figure_of(left)
 
 
 def figure_4(arm: Arm | None = None, k_r: Any = None, *, axes: Any = None) -> Figure:
@@ -89,7 +89,7 @@ def figure_4(arm: Arm | None = None, k_r: Any = None, *, axes: Any = None) -> Fi
     top_right.set_title("Sign flipped: $EI\\,v_{xx}(0)=-k_r\\,v_x(0)$")
     low_left.set_title("all fall, near the rigid joint by the same fraction", fontweight="normal")
     low_right.set_title("all rise; in hertz f1 only seems unchanged", fontweight="normal")
-    return grid[0, 0].figure
+    return figure_of(grid[0, 0])
 
 
 def figure_frequencies(
@@ -176,7 +176,7 @@ def figure_mode_shapes(
         ax.set_title(f"mode {mode + 1}")
     for ax in grid[-1]:
         ax.set_xlabel(along)
-    return grid[0, 0].figure
+    return figure_of(grid[0, 0])
 
 
 def _shapes_of_field(

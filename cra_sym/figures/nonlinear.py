@@ -15,7 +15,7 @@ from cra_sym.analysis.steady_states import SteadyState, steady_states
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
 from cra_sym.figures import STYLE
-from cra_sym.figures.drawing import BLUE, INK, ORANGE, panels
+from cra_sym.figures.drawing import BLUE, INK, ORANGE, figure_of, panels
 from cra_sym.model.system import System
 from cra_sym.solvers.harmonic_balance import Basis, peak
 
@@ -144,7 +144,7 @@ def figure_inside_tongues(
         ax.set_ylim(bottom=0.0)
     row[0].set_ylabel("peak at the tip / mm")
     row[0].legend(loc="upper left")
-    return row[0].figure
+    return figure_of(row[0])
 
 
 def swept(states: Sequence[Sequence[SteadyState]]) -> np.ndarray:
@@ -186,7 +186,7 @@ def figure_sweep(states: Sequence[Sequence[SteadyState]], *, ax: Any = None) -> 
         ax.set_xlabel("excitation frequency $\\varpi$ / (rad/s)")
         ax.set_ylabel("peak at the tip / mm")
         ax.legend()
-    return ax.figure
+    return figure_of(ax)
 
 
 def figure_amplitude_map(
@@ -214,7 +214,7 @@ def figure_amplitude_map(
         ax.set_xlim(np.min(frequency), np.max(frequency))
         ax.set_xlabel("excitation frequency $\\varpi$ / (rad/s)")
         ax.set_ylabel("$\\epsilon$")
-    return ax.figure
+    return figure_of(ax)
 
 
 def _largest(rows: np.ndarray, state: SteadyState) -> float:
@@ -243,7 +243,7 @@ def figure_backbone(
         _show_curve(ax, curve)
         ax.set_xlabel("energy / J")
         ax.set_ylabel("frequency / Hz")
-    return ax.figure
+    return figure_of(ax)
 
 
 def _show_curve(ax: Axes, curve: Backbone) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from cra_sym.analysis.responses import History, response, tip_response
 from cra_sym.arm.parameters import Arm
-from cra_sym.figures.drawing import BLUE, ORANGE, panels
+from cra_sym.figures.drawing import BLUE, ORANGE, figure_of, panels
 from cra_sym.figures.subject import fields, moving_place, rigid_ends, single, span
 from cra_sym.model.system import System
 from cra_sym.solvers.motion import BaseMotion, Force
@@ -43,7 +43,7 @@ def _name(arm: System) -> str:
 
 
 def _finish(grid: np.ndarray, scenario: str) -> Figure:
-    figure = grid.flat[0].figure
+    figure = figure_of(grid.flat[0])
     for ax in grid[-1]:
         ax.set_xlabel("time $t$ / s")
     figure.supxlabel(scenario, fontsize=8, color="0.35")
@@ -105,7 +105,7 @@ def figure_response(
     ax.set_title("Response of the tip", pad=8)
     ax.set_xlabel("time $t$ / s")
     ax.set_ylabel(label)
-    return ax.figure
+    return figure_of(ax)
 
 
 def _short(value: float) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -11,10 +11,13 @@ from cra_sym.figures.drawing import BLUE, INK, ORANGE, canvas, deflection
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
     from cra_sym.model.system import System
 
 __all__ = ["figure_1"]
+
+Bounds: TypeAlias = tuple[float, float]
 
 # Directions on paper of the arm's axis x, of the base's transverse motion w and of the vertical.
 _TO_PAPER = np.array([[0.90, -0.33], [-0.80, -0.46], [0.0, 1.0]])
@@ -22,12 +25,12 @@ _STEEL, _DARK, _STRIP = "#AEB8C2", "#6F7C89", "#9CC7E4"
 _LENGTH, _ROOT = 6.2, 1.2
 
 
-def _paper(points) -> np.ndarray:
+def _paper(points: ArrayLike) -> np.ndarray:
     """Project points (x, w, z) onto the paper, shape (..., 2)."""
-    return np.asarray(points, dtype=float) @ _TO_PAPER
+    return np.asarray(np.asarray(points, dtype=float) @ _TO_PAPER)
 
 
-def _at(point, offset=(0.0, 0.0)) -> tuple[float, float]:
+def _at(point: ArrayLike, offset: ArrayLike = (0.0, 0.0)) -> tuple[float, float]:
     """Place on paper of one point (x, w, z), moved by ``offset``."""
     across, up = _paper(point) + offset
     return float(across), float(up)
@@ -40,14 +43,14 @@ def _tint(colour: str, factor: float) -> np.ndarray:
     return rgb * factor if factor <= 1 else 1 - (1 - rgb) * (2 - factor)
 
 
-def _face(ax: Axes, corners, colour, **options) -> None:
+def _face(ax: Axes, corners: ArrayLike, colour: Any, **options: Any) -> None:
     from matplotlib.patches import Polygon
 
     style = {"edgecolor": INK, "linewidth": 0.7, "joinstyle": "round", **options}
     ax.add_patch(Polygon(_paper(corners), closed=True, facecolor=colour, **style))
 
 
-def _box(ax: Axes, x, w, z, colour: str, zorder: float) -> None:
+def _box(ax: Axes, x: Bounds, w: Bounds, z: Bounds, colour: str, zorder: float) -> None:
     """Draw the three faces one sees of the box ``x`` by ``w`` by ``z`` (pairs of bounds)."""
     (x0, x1), (w0, w1), (z0, z1) = x, w, z
     top = [(x0, w0, z1), (x1, w0, z1), (x1, w1, z1), (x0, w1, z1)]
@@ -57,7 +60,7 @@ def _box(ax: Axes, x, w, z, colour: str, zorder: float) -> None:
         _face(ax, corners, _tint(colour, light), zorder=zorder)
 
 
-def _arrow(ax: Axes, middle, along, text: str, offset, colour: str = ORANGE) -> None:
+def _arrow(ax: Axes, middle: ArrayLike, along: ArrayLike, text: str, offset: ArrayLike, colour: str = ORANGE) -> None:
     """Draw a double arrow through ``middle`` with its name beside it."""
     start, end = _at(np.subtract(middle, along)), _at(np.add(middle, along))
     shape = {"arrowstyle": "<|-|>", "color": colour, "linewidth": 1.6, "mutation_scale": 12, "shrinkA": 0, "shrinkB": 0}
@@ -65,7 +68,7 @@ def _arrow(ax: Axes, middle, along, text: str, offset, colour: str = ORANGE) -> 
     ax.text(*_at(middle, offset), text, color=colour, fontsize=12, ha="center", va="center", zorder=30)
 
 
-def _label(ax: Axes, point, place, text: str) -> None:
+def _label(ax: Axes, point: ArrayLike, place: tuple[float, float], text: str) -> None:
     """Name a part, with a thin line to a point (x, w, z) of it."""
     line = {"arrowstyle": "-", "color": INK, "linewidth": 0.7, "shrinkA": 3, "shrinkB": 0}
     ax.annotate(text, _at(point), place, arrowprops=line, ha="center", va="center", fontsize=10.5, zorder=40)

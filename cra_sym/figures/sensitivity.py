@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.arm.parameters import Arm
+from cra_sym.figures.drawing import figure_of
 from cra_sym.figures.modes import decades
 from cra_sym.model.system import System
 
@@ -59,7 +60,7 @@ def figure_5(arm: System | None = None, *, axes: Any = None) -> Figure:
     where: dict[str, Any] = {"transform": log_t.get_yaxis_transform(), "ha": "right", "va": "bottom"}
     log_t.text(0.98, 0.503, "all strain energy in the spring", fontsize=8, color="0.35", **where)
     raw_t.legend(loc="lower left")
-    return raw_t.figure
+    return figure_of(raw_t)
 
 
 def _curves(ax: Axes, name: str, stiffness: np.ndarray, found: np.ndarray, marked: np.ndarray) -> None:

@@ -13,7 +13,7 @@ from cra_sym.analysis.floquet_boundary import floquet_boundary
 from cra_sym.analysis.stability import forced_width, judged_boundary
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
-from cra_sym.figures.drawing import panels
+from cra_sym.figures.drawing import figure_of, panels
 from cra_sym.figures.subject import default_excitation, single
 from cra_sym.model.excitations import AxialBase, Fluctuation, TransverseBase
 from cra_sym.model.system import System
@@ -142,7 +142,7 @@ def _principal_zones(
     for mode, ax in enumerate(grid[-1], start=first):
         ax.set_xlabel(rf"$\varpi - 2\omega_{mode}$ / (rad/s)")
     handles = [grid[0, 0].plot([], [], **look)[0] for look in (_FIRST, _SECOND)]
-    figure = grid[0, 0].figure
+    figure = figure_of(grid[0, 0])
     names = ("multiple scales, first order", "second order, all modes")
     note = f"shaded: growth by Floquet theory; {_described(excitation)}; widths at ε = {epsilon:g}, scales differ"
     figure.legend(handles, names, loc="outside lower center", ncols=2, title=note, title_fontsize=8)
@@ -281,7 +281,7 @@ def figure_widths(arm: System | None = None, *, axes: Any = None) -> Figure:
         row[0].set_ylabel("width / ε / (rad/s)")
         row[2].set_ylabel("growth of the tip / ε / (m/s)")
     grid[0, 0].legend()
-    figure = grid[0, 0].figure
+    figure = figure_of(grid[0, 0])
     note = "first order, no damping; the base moves 10 mm along or 1 mm across at ε = 1; the last column is no zone"
     figure.supxlabel(note, fontsize=8, color="0.35")
     return figure
@@ -392,7 +392,7 @@ def figure_accuracy(arm: System | None = None, epsilon: Any = None, *, axes: Any
     grid[0].set_ylabel("largest error of the two sides / (rad/s)")
     grid[0].set_title("Joint stiffness: error against Floquet")
     grid[1].set_title("Base along the arm, 50 mm × ε")
-    return grid[0].figure
+    return figure_of(grid[0])
 
 
 def boundary_errors(arm: System, excitation: Any, epsilon: Any, resonance: tuple[int, int]) -> np.ndarray:

@@ -14,7 +14,7 @@ from cra_sym.analysis.responses import residual_vibration, tip_response
 from cra_sym.analysis.shaping import input_shaper
 from cra_sym.analysis.state_space import state_space
 from cra_sym.arm.parameters import Arm
-from cra_sym.figures.drawing import GREEN, ORANGE, panels
+from cra_sym.figures.drawing import GREEN, ORANGE, figure_of, panels
 from cra_sym.figures.subject import fields, moving_place, single
 from cra_sym.model.system import System
 from cra_sym.solvers.motion import BaseMotion, Piecewise
@@ -31,7 +31,7 @@ _MOVE = "0.5 m S-curve, at most 1 m/s, 4 m/s², 40 m/s³"
 
 
 def _caption(row: np.ndarray, scenario: str) -> Figure:
-    figure = row[0].figure
+    figure = figure_of(row[0])
     figure.supxlabel(scenario, fontsize=8, color="0.35")
     return figure
 

@@ -27,7 +27,7 @@ _LARGEST = 20_000  # nodes up to which sums and products are searched for common
 _LONGEST_CHAIN = 64  # integer powers up to this become products
 
 
-class _Printer(SciPyPrinter):
+class _Printer(SciPyPrinter):  # type: ignore[misc]  # SymPy has no types
     """SciPy's printer with names of our choosing, and conditions as operators and ``where``: they serve scalars too."""
 
     def __init__(self, names: Mapping[sp.Symbol, str]) -> None:
@@ -57,7 +57,7 @@ class _Printer(SciPyPrinter):
             return f"{base}*{base}"
         if expr.exp == -1:
             return f"1.0/{base}"
-        return super()._print_Pow(expr, rational)
+        return str(super()._print_Pow(expr, rational))
 
     def _print_coth(self, expr: sp.coth) -> str:
         """Write 1/tanh: SymPy's exponentials cancel near 0 and overflow."""
@@ -108,7 +108,7 @@ class _Printer(SciPyPrinter):
         text = self._print(terms[-1])
         for term in reversed(terms[:-1]):
             text = f"{function}({self._print(term)}, {text})"
-        return text
+        return str(text)
 
 
 def check_arguments(arguments: Any) -> tuple[sp.Symbol, ...]:

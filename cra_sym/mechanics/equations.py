@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from sympy import Add, Eq, Equality, Expr, Integral, Limit, S
 
@@ -17,7 +17,7 @@ from cra_sym.mechanics.variation import Forces, Variation, lagrange_forces
 __all__ = ["BoundaryCondition", "GeneralisedForces", "JumpCondition", "varied_form"]
 
 
-class BoundaryCondition(Equality):
+class BoundaryCondition(Equality):  # type: ignore[misc]  # SymPy has no types
     """An equation at one end; equal to, and usable as, the plain ``Eq`` of its two sides.
 
     Attributes
@@ -36,10 +36,10 @@ class BoundaryCondition(Equality):
     end: End
     variation: Expr
     displacement: Expr
-    kind: Literal["natural", "essential"]
+    kind: str
     variables: tuple[str, str]
 
-    def __new__(  # type: ignore[override]
+    def __new__(
         cls,
         lhs: Expr,
         rhs: Expr,
@@ -49,7 +49,7 @@ class BoundaryCondition(Equality):
         kind: str = "natural",
         variables: tuple[str, str] = ("x", "t"),
     ) -> BoundaryCondition:
-        made = super().__new__(cls, lhs, rhs, evaluate=False)
+        made: BoundaryCondition = super().__new__(cls, lhs, rhs, evaluate=False)
         made.end, made.variation, made.displacement, made.kind = end, variation, displacement, kind
         made.variables = variables
         return made
@@ -91,7 +91,7 @@ class JumpCondition(BoundaryCondition):
     @property
     def place(self) -> Expr:
         """The interior place."""
-        return self.end  # type: ignore[return-value]
+        return self.end
 
 
 @dataclass(frozen=True)
@@ -175,12 +175,12 @@ class GeneralisedForces:
         moved = write(space.symbol(displacement)).subs(space.x, point.place)
         tags = point.place, varied, moved, "essential" if held else "natural", space.names
         if held:
-            return JumpCondition(moved, S.Zero, *tags)  # type: ignore[arg-type]
+            return JumpCondition(moved, S.Zero, *tags)
         sign = (-1) ** (self.variation.orders[displacement.unknown] - displacement.space)
         inner = write(sign * self.boundary_force(displacement.unknown, displacement.space))
         after, before = (Limit(inner, space.x, point.place, side) for side in "+-")
         outer = write(sign * forces.get(displacement, S.Zero))
-        return JumpCondition(after - before, outer.subs(space.x, point.place), *tags)  # type: ignore[arg-type]
+        return JumpCondition(after - before, outer.subs(space.x, point.place), *tags)
 
     def interior_factors(self) -> Forces:
         """Return the factor of every variation in the interval, coordinates included."""

@@ -262,7 +262,7 @@ class JetSpace:
     def _check_strangers(self, term: Expr) -> None:
         for own in (self.x, self.t):
             for symbol in term.free_symbols:
-                if symbol.name == own.name and symbol != own:  # type: ignore[attr-defined]
+                if symbol.name == own.name and symbol != own:
                     raise HamiltonError(f"the symbol {symbol} here differs from {own} in its assumptions")
         if term.has(S.ComplexInfinity, S.NaN, S.Infinity, S.NegativeInfinity):
             raise HamiltonError("it is not finite")

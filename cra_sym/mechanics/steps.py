@@ -22,7 +22,7 @@ def variation_of(unknown: AppliedUndef) -> AppliedUndef:
     return Function(_DELTA + unknown.func.__name__)(*unknown.args)
 
 
-class _CompactPrinter(LatexPrinter):
+class _CompactPrinter(LatexPrinter):  # type: ignore[misc]  # SymPy has no types
     r"""Writes derivatives as subscripts (``v_{xx}``), dots (``\dot{w}``) or primes (``\phi'(0)``), by their function.
 
     A field ``v(x, t)`` takes subscripts, at an end too (``v_{x}(0,t)``); a function of time alone takes dots; any other
@@ -51,7 +51,7 @@ class _CompactPrinter(LatexPrinter):
 
     def _print_Function(self, expr: Any, exp: str | None = None) -> str:
         if not isinstance(expr, AppliedUndef):
-            return super()._print_Function(expr, exp)
+            return str(super()._print_Function(expr, exp))
         return "".join(self._head(expr)) + self._place(expr.args) + (f"^{{{exp}}}" if exp else "")
 
     def _derivative(self, derivative: Derivative, arguments: Iterable[Basic]) -> str | None:
@@ -79,12 +79,12 @@ class _CompactPrinter(LatexPrinter):
             point = dict(zip(subs.variables, subs.point, strict=True))
             short = self._derivative(inner, (point.get(argument, argument) for argument in inner.expr.args))
             return short or super()._print_Subs(subs)
-        return super()._print_Subs(subs)
+        return str(super()._print_Subs(subs))
 
     def parenthesize(self, item: Any, *args: Any, **kwargs: Any) -> str:
         if isinstance(item, (Derivative, Subs)) and isinstance(item.expr, (AppliedUndef, Derivative)):
-            return self._print(item)
-        return super().parenthesize(item, *args, **kwargs)
+            return str(self._print(item))
+        return str(super().parenthesize(item, *args, **kwargs))
 
 
 def _dotted(name: str, order: int) -> str:
@@ -117,7 +117,7 @@ def compact_latex(expression: Any, variables: tuple[str, str] = ("x", "t")) -> s
     printer = _CompactPrinter(variables)
     if isinstance(expression, Iterable) and not isinstance(expression, Basic):
         return r"\begin{gathered}" + r" \\ ".join(map(printer.doprint, expression)) + r"\end{gathered}"
-    return printer.doprint(expression)
+    return str(printer.doprint(expression))
 
 
 def display_latex(expression: Any, variables: tuple[str, str] = ("x", "t"), tag: int | str | None = None) -> str:

@@ -80,7 +80,7 @@ def vary(
             label = f"virtual work of {space.write(force)} on {space.form(jet)}"
             _check_end_term(space, label, [jet], orders)
             elimination.check_effective(space.symbol(jet), label)
-    points = read_points(space, inside, held, there, orders)  # type: ignore[arg-type]
+    points = read_points(space, inside, held, there, orders)
     return Variation(space, along, terms["left"] + terms["right"], applied, orders, elimination, points)
 
 

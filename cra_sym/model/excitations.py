@@ -49,7 +49,7 @@ class Excitation:
         return tuple((name, np.shape(value), np.asarray(value).tobytes()) for name, value in numbers)
 
     def __eq__(self, other: object) -> bool:
-        return self._key() == other._key() if type(other) is type(self) else NotImplemented  # type: ignore[attr-defined]
+        return self._key() == other._key() if type(other) is type(self) else NotImplemented
 
     def __hash__(self) -> int:
         return hash((type(self), self._key()))

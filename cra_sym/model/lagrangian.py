@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from sympy import Expr, Symbol, sympify
@@ -387,36 +387,37 @@ class Model:
 
     def slow_flow(self, resonance: Any, order: int = 1, modes: int | None = None) -> SlowFlow:
         """Return :func:`cra_sym.analysis.slow_flow.slow_flow` of the model: multiple scales of its modal equations."""
-        return _analysis("slow_flow").slow_flow(self, resonance, order, modes)
+        return cast("SlowFlow", _analysis("slow_flow").slow_flow(self, resonance, order, modes))
 
     # ------------------------------------------------------------------------------- one line each on the analysis
 
     def natural_frequencies(self, values: Mapping[Any, Any], modes: int = 3) -> np.ndarray:
         """Return ``cra_sym.natural_frequencies(self.at(values), modes)``."""
-        return _analysis("modes").natural_frequencies(self.at(values), modes)
+        return cast("np.ndarray", _analysis("modes").natural_frequencies(self.at(values), modes))
 
     def mode_shapes(self, values: Mapping[Any, Any], x_values: Any, modes: int = 3, **options: Any) -> np.ndarray:
         """Return ``cra_sym.mode_shapes(self.at(values), x_values, modes, **options)``."""
-        return _analysis("modes").mode_shapes(self.at(values), x_values, modes, **options)
+        return cast("np.ndarray", _analysis("modes").mode_shapes(self.at(values), x_values, modes, **options))
 
     def modal_parameters(self, values: Mapping[Any, Any], modes: int = 3) -> ModalParameters:
         """Return ``cra_sym.modal_parameters(self.at(values), modes)``."""
-        return _analysis("modes").modal_parameters(self.at(values), modes)
+        return cast("ModalParameters", _analysis("modes").modal_parameters(self.at(values), modes))
 
     def eigenvalues(self, values: Mapping[Any, Any], modes: int = 3, *, oscillating: bool = True) -> np.ndarray:
         """Return :func:`cra_sym.analysis.eigenvalues.eigenvalues` of the model at the values."""
-        return _analysis("eigenvalues").eigenvalues(self.at(values), modes, oscillating=oscillating)
+        return cast("np.ndarray", _analysis("eigenvalues").eigenvalues(self.at(values), modes, oscillating=oscillating))
 
     def damping_ratios(self, values: Mapping[Any, Any], modes: int = 3) -> np.ndarray:
         """Return :func:`cra_sym.analysis.eigenvalues.damping_ratios` of the model at the values."""
-        return _analysis("eigenvalues").damping_ratios(self.at(values), modes)
+        return cast("np.ndarray", _analysis("eigenvalues").damping_ratios(self.at(values), modes))
 
     def frequency_response(
         self, values: Mapping[Any, Any], angular_frequency: Any, x_values: Any = None, **options: Any
     ) -> np.ndarray:
         """Return ``cra_sym.frequency_response(self.at(values), angular_frequency, x_values, **options)``."""
-        return _analysis("frequency_response").frequency_response(
-            self.at(values), angular_frequency, x_values, **options
+        return cast(
+            "np.ndarray",
+            _analysis("frequency_response").frequency_response(self.at(values), angular_frequency, x_values, **options),
         )
 
     def response(
@@ -430,13 +431,15 @@ class Model:
         **options: Any,
     ) -> np.ndarray:
         """Return ``cra_sym.response(self.at(values), motion, t, x, modes, derivative, **options)``."""
-        return _analysis("responses").response(self.at(values), motion, t, x, modes, derivative, **options)
+        return cast(
+            "np.ndarray", _analysis("responses").response(self.at(values), motion, t, x, modes, derivative, **options)
+        )
 
     def tip_response(
         self, values: Mapping[Any, Any], motion: Any, t: Any, modes: int = 5, **options: Any
     ) -> np.ndarray:
         """Return ``cra_sym.tip_response(self.at(values), motion, t, modes, **options)``."""
-        return _analysis("responses").tip_response(self.at(values), motion, t, modes, **options)
+        return cast("np.ndarray", _analysis("responses").tip_response(self.at(values), motion, t, modes, **options))
 
 
 def _analysis(module: str) -> Any:

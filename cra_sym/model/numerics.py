@@ -48,4 +48,5 @@ def derive(path: str, name: str, *arguments: Any) -> Any:
 
 
 def _derivation(name: str) -> Callable[..., Any]:
-    return getattr(import_module("cra_sym.model.derivations"), name)
+    derivation: Callable[..., Any] = getattr(import_module("cra_sym.model.derivations"), name)
+    return derivation

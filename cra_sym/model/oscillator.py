@@ -10,6 +10,7 @@ takes over.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
@@ -133,11 +134,12 @@ def guarded_responses() -> UnitResponses:
 def _power_series(cause: str) -> sp.Expr:
     """Return the power series in t of the response from rest: its coefficients obey the modal equation term by term."""
     t, omega, zeta, varpi = _symbols()
-    force = {
+    forces: dict[str, Callable[[int], sp.Expr]] = {
         "step": lambda n: sp.Integer(n == 0),
         "ramp": lambda n: sp.Integer(n == 1),
         "harmonic": lambda n: (sp.I * varpi) ** n,
-    }[cause]
+    }
+    force = forces[cause]
     before, last, total = sp.Integer(0), sp.Integer(0), sp.Integer(0)
     for n in range(_SERIES_TERMS - 1):
         before, last = last, force(n) - 2 * zeta * omega * last - omega**2 * before

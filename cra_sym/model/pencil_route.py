@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,7 +157,7 @@ def pencil_route(model: Model) -> PencilRoute | None:
         return None
     state, jets, fields = [*section, *lumped], [*highest, *section, *lumped], len(highest)
 
-    def part(form: dict, rows: list[Jet], columns: list[Jet], power: int) -> Matrix:
+    def part(form: dict[Any, Any], rows: list[Jet], columns: list[Jet], power: int) -> Matrix:
         return Matrix(len(rows), len(columns), [form.get((p, q), {}).get(power, 0) for p in rows for q in columns])
 
     whole, drag, mass = (part(weak.inside, jets, jets, power) for power in (0, 1, 2))

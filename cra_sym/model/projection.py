@@ -336,7 +336,7 @@ class Projected:
         first, second = (along(self._modes, place, x) for place in self._form.inside[entry])
         weighted = np.broadcast_to(factor * weights, np.broadcast_shapes(np.shape(factor), np.shape(weights)))
         if self._diagonal:
-            return (weighted[..., None, :] * first * second).sum(axis=-1)
+            return np.asarray((weighted[..., None, :] * first * second).sum(axis=-1))
         stations = np.broadcast_shapes(first.shape[-1:], second.shape[-1:], weighted.shape[-1:])
         second = np.broadcast_to(second, (*second.shape[:-1], *stations))
         product = (first * weighted[..., None, :]) @ second.swapaxes(-1, -2)

@@ -194,7 +194,7 @@ class SpatialProblem:
             matrix = self.system(x, *arguments)[0]
             for _ in range(order - len(known) + 1):
                 row = (row[..., None, :] @ matrix)[..., 0, :]
-        return row[..., :size]
+        return np.asarray(row[..., :size])
 
     def problems(self, columns: Array, halvings: int = HALVINGS) -> Iterator[tuple[np.ndarray, np.ndarray, Stiffness]]:
         """Yield (rows, left ends, problem) for each pattern of infinite stiffness.
@@ -259,7 +259,7 @@ class SpatialProblem:
         return Stiffness(section, ends, length, n, m, free, self.uniform, halvings, spans, jumps)
 
     def _coefficients(self, x: Array | float, z: np.ndarray, columns: Array) -> tuple[np.ndarray, np.ndarray]:
-        found = self.system(x, z[:, None], *columns[..., None])
+        found: tuple[np.ndarray, np.ndarray] = self.system(x, z[:, None], *columns[..., None])
         if np.isfinite(found[0]).all():
             return found
         zero = [f"{name} = 0" for name, column in zip(self.names, columns, strict=True) if (column == 0).any()]
@@ -273,7 +273,7 @@ class SpatialProblem:
         if position not in self.end_stiffness:
             able = ", ".join(self.names[k] for k in self.end_stiffness) or "none here"
             raise ValueError(f"{self.names[position]} = inf: only the stiffness of an end may be infinite ({able})")
-        return self.end_stiffness[position](*columns)
+        return np.asarray(self.end_stiffness[position](*columns))
 
 
 def spatial_problem(form: StateForm, symbols: tuple[Symbol, ...], left: Expr) -> SpatialProblem:
@@ -352,7 +352,7 @@ def shares(x: np.ndarray, left: np.ndarray, length: np.ndarray, name: str = "x")
     share = (x - left[:, None]) / length[:, None]
     if (share < -1e-12).any() or (share > 1.0 + 1e-12).any():
         raise ValueError(f"{name} = {x}: must be in the domain, {left.max():g} to {(left + length).min():g}")
-    return np.clip(share, 0.0, 1.0)
+    return np.asarray(np.clip(share, 0.0, 1.0))
 
 
 def _finite(matrices: tuple[np.ndarray, np.ndarray], what: str) -> tuple[np.ndarray, np.ndarray]:
@@ -368,4 +368,4 @@ def _without(free: np.ndarray, held: np.ndarray) -> np.ndarray:
     rank = (size > 1e-12 * np.maximum(size.max(axis=-1, initial=0.0), 1e-300)[..., None]).sum(axis=-1)
     if rank.min() != rank.max():
         raise ValueError("values: an infinite stiffness must act alike in all parameter sets")
-    return free @ np.swapaxes(adjoint[..., int(rank.max()) :, :], -1, -2)
+    return np.asarray(free @ np.swapaxes(adjoint[..., int(rank.max()) :, :], -1, -2))

@@ -12,7 +12,7 @@ __all__ = ["asymmetry", "odd_in_time", "vanishes"]
 def odd_in_time(term: Expr, t: Symbol) -> bool:
     """Tell whether a force term changes sign when time runs backwards."""
     orders = (number for node in term.atoms(Derivative) for symbol, number in node.variable_count if symbol == t)
-    return sum(orders) % 2 == 1
+    return bool(sum(orders) % 2 == 1)
 
 
 def vanishes(expression: Expr) -> bool:

@@ -150,7 +150,8 @@ class System:
         ValueError
             If the system has none, or what one of them acts on is held.
         """
-        return self._once("slip", modes, lambda n: slip_elements(self, n))
+        found: SlipElements = self._once("slip", modes, lambda n: slip_elements(self, n))
+        return found
 
     # ------------------------------------------------------------------------------------------ numbers, once
 
@@ -185,7 +186,7 @@ class System:
 
     def natural_frequencies(self, modes: int) -> Array:
         """Return the first natural frequencies, rad/s, shape (..., modes); read-only."""
-        return self._once("omega", count("modes", modes, high=MOST_MODES), self._find_frequencies)
+        return np.asarray(self._once("omega", count("modes", modes, high=MOST_MODES), self._find_frequencies))
 
     def _find_frequencies(self, modes: int) -> Array:
         _ = self.domain  # refuses a length that is not positive
@@ -249,7 +250,8 @@ class System:
 
     def modes(self, modes: int) -> Modes:
         """Return the first natural modes."""
-        return self._once("modes", modes, lambda n: self._find_modes(n))
+        found: Modes = self._once("modes", modes, lambda n: self._find_modes(n))
+        return found
 
     def _find_modes(self, modes: int) -> Modes:
         omega = self.natural_frequencies(modes)

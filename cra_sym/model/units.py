@@ -112,7 +112,7 @@ def _is_table_symbol(atom: Any, name: str) -> bool:
         return False
     if isinstance(atom, AppliedUndef):
         return isinstance(entry, AppliedUndef) and atom.func == entry.func and len(atom.args) == len(entry.args)
-    return atom == entry
+    return bool(atom == entry)
 
 
 def _written(dimension: Dimension | None) -> str:

@@ -125,7 +125,7 @@ def execute(
     from nbconvert.filters import strip_ansi
 
     path = Path(path)
-    notebook = nbformat.read(path, as_version=4)
+    notebook: NotebookNode = nbformat.read(path, as_version=4)
     # No kernel directories: of the kernels called python3, only that of the running Python is meant.
     manager = AsyncKernelManager(kernel_name="python3", kernel_spec_manager=KernelSpecManager(kernel_dirs=[]))
     client: Any = NotebookClient(

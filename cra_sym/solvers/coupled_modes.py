@@ -67,7 +67,7 @@ def coupled_response(
 
 
 def _member(values: np.ndarray, shape: tuple[int, ...], index: tuple[int, ...], axes: int) -> np.ndarray:
-    return np.broadcast_to(values, (*shape, *values.shape[values.ndim - axes :]))[index]
+    return np.asarray(np.broadcast_to(values, (*shape, *values.shape[values.ndim - axes :]))[index])
 
 
 def _member_term(term: Harmonic | Piecewise, shape: tuple[int, ...], index: tuple[int, ...]) -> Harmonic | Piecewise:
@@ -137,7 +137,7 @@ def _driven(
         total += rows @ moved.T
         if derivative == 2:
             total += direct[:, None] * force
-    return total
+    return np.asarray(total)
 
 
 def _moved(
@@ -180,7 +180,7 @@ def _free(system: np.ndarray, start: np.ndarray, times: np.ndarray) -> np.ndarra
     number = len(times)
     step = (times[-1] - times[0]) / (number - 1) if number > _FEW else 0.0
     if not step or np.abs(np.diff(times) - step).max() > 8 * np.finfo(float).eps * np.abs(times).max():
-        return _exponentials(system, times) @ start
+        return np.asarray(_exponentials(system, times) @ start)
     block = int(np.sqrt(number))
     coarse = _exponentials(system, times[::block]) @ start
     fine = _exponentials(system, step * np.arange(block))

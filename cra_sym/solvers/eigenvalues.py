@@ -103,10 +103,12 @@ def _rigid_count(static: Evaluation) -> np.ndarray:
         where = f", in {np.count_nonzero(unstable)} of {sets} parameter sets" if sets > 1 else ""
         plural = "s" if number > 1 else ""
         raise ValueError(f"the structure has buckled: {number} unstable mode{plural} (omega^2 < 0){where}")
-    return (np.abs(value) <= rounding).sum(axis=1)
+    return np.asarray((np.abs(value) <= rounding).sum(axis=1))
 
 
-def _upper_bounds(problem: DynamicStiffness, bounds: np.ndarray, modes: int):
+def _upper_bounds(
+    problem: DynamicStiffness, bounds: np.ndarray, modes: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return, for every mode, a z with that many frequencies below it, the count there and a guess.
 
     Static deflections are admissible motions: their Rayleigh-Ritz values bound the lowest frequencies from above.
@@ -143,14 +145,16 @@ def _static_bounds(static: Evaluation) -> np.ndarray:
     return np.linalg.eigvalsh(np.swapaxes(whitener, -1, -2) @ static.matrix @ whitener)
 
 
-def _next_point(guess, low, high, below, above, mode):
+def _next_point(
+    guess: np.ndarray, low: np.ndarray, high: np.ndarray, below: np.ndarray, above: np.ndarray, mode: np.ndarray
+) -> np.ndarray:
     """Take the guess if it lies inside the bracket, else split the bracket in proportion to the counts at its ends."""
     share = (mode - below - 0.5) / np.maximum(above - below, 1)
     split = (np.sqrt(low) + share * (np.sqrt(high) - np.sqrt(low))) ** 2
     return np.where((guess > low) & (guess < high), guess, split)
 
 
-def _newton(here: Evaluation, mode: np.ndarray):
+def _newton(here: Evaluation, mode: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return whether the eigenvalue of K that vanishes at a mode exists, the Newton step on it, the count, rounding."""
     value, vector = np.linalg.eigh(here.matrix)
     count = here.fixed_count + (value < 0.0).sum(axis=1)
@@ -166,7 +170,16 @@ def _newton(here: Evaluation, mode: np.ndarray):
     return exists, np.where(exists, step, 0.0), count, noise
 
 
-def _tighten(low, high, below, above, row, z, count, wanted) -> None:
+def _tighten(
+    low: np.ndarray,
+    high: np.ndarray,
+    below: np.ndarray,
+    above: np.ndarray,
+    row: np.ndarray,
+    z: np.ndarray,
+    count: np.ndarray,
+    wanted: np.ndarray,
+) -> None:
     """Use the count at every visited point for all modes of its row (in place)."""
     order = np.argsort(row, kind="stable")
     turn = np.arange(len(row)) - np.searchsorted(row[order], row[order])

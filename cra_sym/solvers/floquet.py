@@ -157,7 +157,7 @@ class Oscillators:
                 f"a period takes {steps.max():.2g} steps, must be at most {MOST_STEPS:g}: the excitation is too slow "
                 "against the fastest mode, or too strong"
             )
-        return 2 * np.ceil(np.maximum(steps, 8) / 2).astype(np.int64)
+        return np.asarray(2 * np.ceil(np.maximum(steps, 8) / 2).astype(np.int64))
 
     def take(self, index: np.ndarray) -> Oscillators:
         """Return some of the systems."""
@@ -225,7 +225,7 @@ def drift_matrix(omega: np.ndarray, decay: np.ndarray, h: np.ndarray) -> np.ndar
     ratio = np.where(small, 1.0 - np.where(swinging, 1.0, -1.0) * root**2 / 6, ratio) * h
     fall = np.exp(-decay * h)
     level = np.where(swinging, np.cos(root), np.cosh(root))
-    return fall * np.array([[level + decay * ratio, ratio], [-(omega**2) * ratio, level - decay * ratio]])
+    return np.asarray(fall * np.array([[level + decay * ratio, ratio], [-(omega**2) * ratio, level - decay * ratio]]))
 
 
 def _propagate(part: Oscillators, steps: int, share: float, loop: Loop | None) -> np.ndarray:
@@ -276,10 +276,10 @@ def _drift(m: np.ndarray, q: np.ndarray, p: np.ndarray) -> None:
 
 def _force(coupling: np.ndarray, weights: np.ndarray, q: np.ndarray) -> np.ndarray:
     if coupling.shape[-1] == 1:
-        return sum(
-            g * (m[..., 0] @ q.reshape(len(q), -1)).reshape(q.shape) for m, g in zip(coupling, weights, strict=True)
-        )
-    return sum(np.einsum("ijp,jkp->ikp", g * m, q) for m, g in zip(coupling, weights, strict=True))
+        flat = q.reshape(len(q), -1)
+        total: np.ndarray = sum(g * (m[..., 0] @ flat).reshape(q.shape) for m, g in zip(coupling, weights, strict=True))
+        return total
+    return np.asarray(sum(np.einsum("ijp,jkp->ikp", g * m, q) for m, g in zip(coupling, weights, strict=True)))
 
 
 def _maps(batch: Oscillators, share: float, tolerance: float, loop: Loop | None) -> np.ndarray:
@@ -349,7 +349,7 @@ def _conservative_exponents(batch: Oscillators, tolerance: float, loop: Loop | N
     nearest = np.abs(1.0 + sines[:, :, None] - cosines[:, None, :]).argmin(axis=-1)
     cosines = np.take_along_axis(cosines, nearest, axis=-1)
     half = np.where(sines.real > -0.5, np.arcsinh(np.sqrt(sines)), np.arccosh(np.sqrt(cosines)))
-    return 2 * half / batch.period[:, None]
+    return np.asarray(2 * half / batch.period[:, None])
 
 
 def floquet_exponents(*system: Any, tolerance: float = 1e-8, loop: Loop | None = None, **more: Any) -> np.ndarray:
@@ -379,7 +379,8 @@ def _ordered(exponents: np.ndarray, period: np.ndarray) -> np.ndarray:
 def rate_of(maps: np.ndarray, period: np.ndarray) -> np.ndarray:
     """Return max(0, largest real part of the exponents) of monodromy matrices (points, 2N, 2N)."""
     rates = np.log(np.abs(np.linalg.eigvals(maps)).max(axis=-1)) / period
-    return np.maximum(rates, 0.0)
+    clipped: np.ndarray = np.maximum(rates, 0.0)
+    return clipped
 
 
 def growth_rate(*system: Any, tolerance: float = 1e-8, loop: Loop | None = None, **more: Any) -> np.ndarray:
@@ -389,4 +390,5 @@ def growth_rate(*system: Any, tolerance: float = 1e-8, loop: Loop | None = None,
         rates = np.maximum(_conservative_exponents(batch, tolerance, loop).real.max(axis=-1), 0.0)
     else:
         rates = rate_of(_whole_maps(batch, tolerance, loop), batch.period)
-    return rates.reshape(shape)
+    found: np.ndarray = rates.reshape(shape)
+    return found

@@ -72,7 +72,7 @@ class Basis:
         """Mean products B B, B D and D D at the samples, weighted, shape (samples, size * size)."""
         value, rate = self.values(self.phase), self.values(self.phase, 1)
         left = self.weights / self.samples
-        return tuple(  # type: ignore[return-value]
+        return tuple(
             np.einsum("sm,sl->sml", left * one, other).reshape(self.samples, -1)
             for one, other in ((value, value), (value, rate), (rate, rate))
         )

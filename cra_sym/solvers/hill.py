@@ -56,4 +56,4 @@ def _one_strip(values: np.ndarray, frequency: float, wanted: int) -> np.ndarray:
     if found.size != wanted:
         raise ValueError(f"harmonics: too few to separate the {wanted} exponents ({found.size} found)")
     found = found - 1j * frequency * np.round(found.imag / frequency)
-    return found[np.lexsort((found.imag, -found.real))]
+    return np.asarray(found[np.lexsort((found.imag, -found.real))])

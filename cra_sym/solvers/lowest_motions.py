@@ -39,11 +39,11 @@ class BasisModes:
 
     @cached_property
     def _motions(self) -> Array:
-        return self.problem.motions[0]
+        return np.asarray(self.problem.motions[0])
 
     @cached_property
     def _ends(self) -> Array:
-        return self._motions @ self.problem.columns.ends[self.problem.sets[0]].T
+        return np.asarray(self._motions @ self.problem.columns.ends[self.problem.sets[0]].T)
 
     def displacement(self, end: int, place: int) -> Array:
         """Return a displacement of an end section, shape (k,)."""
@@ -212,7 +212,7 @@ def _modal(one: Reduced, zeta: float) -> Array | float:
     value, turn = np.linalg.eigh(inverse @ (root[:elastic, None] ** 2 * inverse))
     found = np.zeros_like(stiffness)
     found[:elastic, :elastic] = 2.0 * zeta * half @ ((turn * np.sqrt(np.maximum(value, 0.0))) @ turn.T) @ half
-    return found
+    return np.asarray(found)
 
 
 def _motions(one: Reduced, first: Array, second: Array, radius: float) -> LowestMotions:

@@ -143,7 +143,7 @@ class ModalPolynomials:
         for term in self.energies:
             if not term.velocities and not term.causes:
                 value = value - _contracted(term.tensor, term.positions, 0, flat, flat).reshape(len(flat))
-        return value.reshape(q.shape[:-1])
+        return np.asarray(value.reshape(q.shape[:-1]))
 
     def energy(self, q: Array, v: Array) -> Array:
         """Return the energy v dL/dv - L, J, for q and v of shape (..., modes)."""
@@ -153,7 +153,7 @@ class ModalPolynomials:
             if not term.causes:
                 part = _contracted(term.tensor, term.positions, term.velocities, flat, rates)
                 value = value + (term.velocities - 1) * part.reshape(len(flat))
-        return value.reshape(q.shape[:-1])
+        return np.asarray(value.reshape(q.shape[:-1]))
 
     def derivatives(self, q: Array, v: Array, causes: Array | None = None) -> Derivatives:
         """Return forces, momenta and their rates of the terms beside the linear ones.
@@ -197,7 +197,7 @@ def _scale(term: Term, causes: Array | None) -> Array | float:
     if not term.causes:
         return 1.0
     assert causes is not None
-    return causes[list(term.causes)].prod(axis=0)
+    return np.asarray(causes[list(term.causes)].prod(axis=0))
 
 
 def _add(total: Array, factor: int, part: Array, scale: Array | float) -> None:

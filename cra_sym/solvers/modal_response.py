@@ -52,7 +52,7 @@ class Harmonics(NamedTuple):
 
     def phasor(self, t: Array | float) -> Array:
         """Return B varpi^2 exp(i (varpi t + psi)); its imaginary part is minus the base acceleration."""
-        return self.B * self.varpi**2 * np.exp(1j * (self.varpi * t + self.psi))
+        return np.asarray(self.B * self.varpi**2 * np.exp(1j * (self.varpi * t + self.psi)))
 
 
 class Steady(NamedTuple):
@@ -254,7 +254,7 @@ def segment(knots: Array, t: Array) -> Array:
     """Return the last knot not after each time, -1 before the first; shape (..., T)."""
     if knots.ndim == 1:
         return np.searchsorted(knots, t, side="right") - 1
-    return np.sum([t >= knot[..., None] for knot in np.moveaxis(knots, -1, 0)], axis=0) - 1
+    return np.asarray(np.sum([t >= knot[..., None] for knot in np.moveaxis(knots, -1, 0)], axis=0) - 1)
 
 
 def pick(values: Array, segment: Array, shape: tuple[int, ...]) -> Array:
@@ -268,7 +268,7 @@ def _outputs(osc: Oscillators, q: Array, u: Array, acceleration: Array, derivati
     if derivative == 2:
         omega, zeta, gamma = _with_axis(osc[:3], -1)
         q = -(omega**2 * q + 2 * zeta * omega * u + gamma * acceleration)
-    return np.matmul(osc.rows, u if derivative == 1 else q)
+    return np.asarray(np.matmul(osc.rows, u if derivative == 1 else q))
 
 
 def _in_parts(function: Callable[[Array], Array], t: Array, width: int) -> Array:
@@ -300,7 +300,7 @@ def _grid_response(osc: Oscillators, cause: Steady, start: float, step: float, c
     states = _state_table(osc, cause, start + step * length * np.arange(blocks), step * length)
     rows = _row_table(osc, cause, step, length, derivative)
     out = np.matmul(states[..., None, :, :], np.swapaxes(rows, -1, -2))
-    return out.reshape(*out.shape[:-2], -1)[..., :count]
+    return np.asarray(out.reshape(*out.shape[:-2], -1)[..., :count])
 
 
 def _state_table(osc: Oscillators, cause: Steady, times: Array, step: float) -> Array:

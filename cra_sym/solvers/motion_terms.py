@@ -52,7 +52,7 @@ class Piecewise(NamedTuple):
         """Return some of a batch of a shape."""
 
         def rows(values: Array) -> Array:
-            return np.broadcast_to(values, (*shape, values.shape[-1]))[index]
+            return np.asarray(np.broadcast_to(values, (*shape, values.shape[-1]))[index])
 
         knots = self.knots if self.knots.ndim == 1 else rows(self.knots)
         velocity = np.asarray(np.broadcast_to(self.velocity, shape)[index])

@@ -205,7 +205,7 @@ class Reduced:
         gyroscopic = own <= 1e-10 * np.abs(self.damping).max(axis=(1, 2))
         potential = follower <= 1e-10 * np.abs(self.stiffness).max(axis=(1, 2))
         unused = (np.abs(self.damping).max(axis=(1, 2)) == 0.0) & ~self.constants.any(axis=1)
-        return unused | (gyroscopic & potential & ~self.constants.any(axis=1))
+        return np.asarray(unused | (gyroscopic & potential & ~self.constants.any(axis=1)))
 
     def _of_squares(self) -> Complex:
         """Return both s of every s^2: for forces of displacements alone."""

@@ -237,7 +237,7 @@ class _Series:
         terms = [(s, w[0]) for s, w in zip(self.system.swings, waves, strict=True) if s.mass is not None]
         if not terms:
             return None
-        total = np.eye(self.shape[0])[..., None] + sum(s.mass * (s.size * w) for s, w in terms)  # type: ignore[operator]
+        total = np.eye(self.shape[0])[..., None] + sum(s.mass * (s.size * w) for s, w in terms)
         return np.moveaxis(np.linalg.inv(np.moveaxis(total, -1, 0)), 0, -1)
 
     def _rates(self, k: int, q: Array, p: Array, waves: list[Array], mass: Array | None) -> tuple[Array, Array]:

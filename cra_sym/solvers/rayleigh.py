@@ -131,7 +131,9 @@ def _energies(
     return strain, kinetic
 
 
-def _energy_densities(system, slope, z, n: int, m: int) -> tuple[np.ndarray, np.ndarray]:
+def _energy_densities(
+    system: np.ndarray, slope: np.ndarray, z: np.ndarray, n: int, m: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the quadratic forms of strain and kinetic energy density in (q, w, P).
 
     With H = P q' - (U - z T) and A = [[H_P], [-H_q]]: T = dH/dz, and U = P H_P - H + z T.

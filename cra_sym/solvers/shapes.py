@@ -112,7 +112,7 @@ def _null_vectors(here: Evaluation, place: np.ndarray, rows: int, modes: int) ->
         unit = np.concatenate(
             [unit, unit[:, : nodal.shape[1] - unit.shape[1]]], axis=1
         )  # the middle's as the left end's
-        return vector / np.abs(nodal * unit).max(axis=1, keepdims=True)
+        return np.asarray(vector / np.abs(nodal * unit).max(axis=1, keepdims=True))
     value, vector = np.linalg.eigh(here.matrix)
     order = np.argsort(np.abs(value), axis=1)[np.arange(len(pick)), pick]
     # K has as many negative eigenvalues as modes lie below: the next one is this mode's, however close its neighbours
@@ -130,7 +130,7 @@ def _null_vectors(here: Evaluation, place: np.ndarray, rows: int, modes: int) ->
     return u.reshape(rows * modes, -1)
 
 
-def _spread(problem: DynamicStiffness, tree: Tree, nodal, member, level: int) -> np.ndarray:
+def _spread(problem: DynamicStiffness, tree: Tree, nodal: np.ndarray, member: np.ndarray, level: int) -> np.ndarray:
     """Back-substitute to all nodes; return the state at the left of every piece, (part, member, piece, state)."""
     n, m = problem.displacements, problem.coordinates
     left, w = nodal[:, :n], nodal[:, n : n + m]
@@ -153,7 +153,9 @@ def _with_lumped(start: np.ndarray, w: np.ndarray, end: np.ndarray) -> np.ndarra
     return np.concatenate([start, lumped, end], axis=-1)
 
 
-def _carry(problem: DynamicStiffness, z, row, start, level: int, share) -> np.ndarray:
+def _carry(
+    problem: DynamicStiffness, z: np.ndarray, row: np.ndarray, start: np.ndarray, level: int, share: np.ndarray
+) -> np.ndarray:
     """Carry the state from the node left of each station to the station by the Taylor series of ``exp(Omega)``."""
     n, m = problem.displacements, problem.coordinates
     part = (share > GOLDEN).astype(int)
@@ -167,4 +169,4 @@ def _carry(problem: DynamicStiffness, z, row, start, level: int, share) -> np.nd
     for j in range(1, TERMS + 1):
         term = exponent @ term / j
         total = total + term
-    return total[..., : 2 * n + m, 0]
+    return np.asarray(total[..., : 2 * n + m, 0])

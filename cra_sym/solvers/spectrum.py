@@ -126,7 +126,7 @@ def _start(
     guess = _second_from_zero(characteristic, lane[second])
     inside = (low[second] < guess) & (guess < high[second])
     z[second[inside]] = guess[inside]
-    return z
+    return np.asarray(z)
 
 
 def _separate(
@@ -152,7 +152,7 @@ def _separate(
 def _from_zero(characteristic: Characteristic, lane: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Return the lower bound of the first positive zero that the first step from z = 0 gives; it is close."""
     value, slope, curvature = characteristic.evaluate(np.zeros(lane.size), lane)
-    return np.minimum(_step(value, slope, curvature), high)
+    return np.asarray(np.minimum(_step(value, slope, curvature), high))
 
 
 def _second_from_zero(characteristic: Characteristic, lane: np.ndarray) -> np.ndarray:
@@ -160,7 +160,7 @@ def _second_from_zero(characteristic: Characteristic, lane: np.ndarray) -> np.nd
     value, slope, curvature = characteristic.evaluate(np.zeros(lane.size), lane)
     discriminant = slope * slope - 2 * value * curvature
     apart = np.where(discriminant > 0.1 * slope * slope, discriminant, np.nan)
-    return (np.abs(slope) + np.sqrt(apart)) / np.abs(curvature)
+    return np.asarray((np.abs(slope) + np.sqrt(apart)) / np.abs(curvature))
 
 
 def _by_phase(lane: np.ndarray, right: np.ndarray, points: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -174,14 +174,14 @@ def _by_phase(lane: np.ndarray, right: np.ndarray, points: np.ndarray, values: n
     growth = np.sqrt((here * here + after * after) / (before * before + left * left))
     growth = np.where(inside, np.sqrt(growth), growth)  # over two intervals, or over one
     opposite = np.abs(left) * np.where(right > 2, growth, 1.0)
-    return points[right - 1] + _quarters(opposite, np.abs(here)) * (points[right] - points[right - 1])
+    return np.asarray(points[right - 1] + _quarters(opposite, np.abs(here)) * (points[right] - points[right - 1]))
 
 
 def _quarters(opposite: np.ndarray, adjacent: np.ndarray) -> np.ndarray:
     """Return the angle whose tangent is the first over the second, neither negative, in right angles to 2e-4."""
     share = opposite / (opposite + adjacent)
     product = share * (1 - share)
-    return share + product * (1 - 2 * share) * (-0.3664 - product * (0.3404 + product * 1.5))
+    return np.asarray(share + product * (1 - 2 * share) * (-0.3664 - product * (0.3404 + product * 1.5)))
 
 
 def _step(

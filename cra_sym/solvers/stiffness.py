@@ -70,16 +70,16 @@ class Evaluation:
     @property
     def count(self) -> np.ndarray:
         """Exact number of natural frequencies below z (Wittrick and Williams 1971)."""
-        return self.fixed_count + negatives(self.matrix)
+        return np.asarray(self.fixed_count + negatives(self.matrix))
 
     def solve(self, load: np.ndarray) -> np.ndarray:
         """Return the free coordinates that a load on them, shape (rows, f), moves."""
-        return (_inverse(self.matrix) @ load[..., None])[..., 0]
+        return np.asarray((_inverse(self.matrix) @ load[..., None])[..., 0])
 
     @property
     def logarithmic_derivative(self) -> np.ndarray:
         """F'/F of the entire function F whose zeros are the eigenvalues: det K with all its poles removed."""
-        return self.poles + np.trace(_inverse(self.matrix) @ self.derivative, axis1=-2, axis2=-1)
+        return np.asarray(self.poles + np.trace(_inverse(self.matrix) @ self.derivative, axis1=-2, axis2=-1))
 
 
 Coefficients = Callable[..., Dual]
@@ -202,7 +202,7 @@ class DynamicStiffness:
         """
         width = (self.length[rows][:, None] * share)[..., None, None]
         if self.uniform:
-            return tuple(a * width for a in self.system(z, rows, start))  # type: ignore[return-value]
+            return tuple(a * width for a in self.system(z, rows, start))
         first, second, third = (self.system(z, rows, start + share * point) for point in _GAUSS)
         b1 = _combine((width, second))
         b2 = _combine((width * np.sqrt(15.0) / 3.0, third), (-width * np.sqrt(15.0) / 3.0, first))
@@ -216,7 +216,17 @@ class DynamicStiffness:
         """Return states left of the pieces, (part, row, piece, state), as they enter the pieces."""
         return start
 
-    def _assemble(self, z, rows, matrix, slope, unit, fixed, growth, tree) -> Evaluation:
+    def _assemble(
+        self,
+        z: np.ndarray,
+        rows: np.ndarray,
+        matrix: np.ndarray,
+        slope: np.ndarray,
+        unit: np.ndarray,
+        fixed: np.ndarray,
+        growth: np.ndarray,
+        tree: Tree | None,
+    ) -> Evaluation:
         """Join the two parts at a node that stays, add the ends, keep the free coordinates, balance."""
         n, m = self.displacements, self.coordinates
         size = 2 * n + m
@@ -244,11 +254,11 @@ class DynamicStiffness:
 
 def negatives(matrix: np.ndarray) -> np.ndarray:
     """Return the number of negative eigenvalues of each symmetric matrix of a stack."""
-    return (np.linalg.eigvalsh(matrix) < 0.0).sum(axis=-1)
+    return np.asarray((np.linalg.eigvalsh(matrix) < 0.0).sum(axis=-1))
 
 
 def _combine(*terms: tuple[Any, Dual]) -> Dual:
-    return sum(c * a for c, (a, _) in terms), sum(c * da for c, (_, da) in terms)  # type: ignore[return-value]
+    return sum(c * a for c, (a, _) in terms), sum(c * da for c, (_, da) in terms)
 
 
 def _commutator(first: Dual, second: Dual) -> Dual:
@@ -278,7 +288,9 @@ def transfer(a: np.ndarray) -> np.ndarray:
     return total
 
 
-def _short_piece(t: np.ndarray, dt: np.ndarray, n: int, m: int):
+def _short_piece(
+    t: np.ndarray, dt: np.ndarray, n: int, m: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return K, K', W and tr(T_qP^-1 T_qP') of one piece from its transfer matrix, in the order (q0, w, qh)."""
     flexible = _inverse(t[..., :n, n + m : 2 * n + m])
     flexible_slope = -flexible @ dt[..., :n, n + m : 2 * n + m] @ flexible
@@ -299,12 +311,14 @@ def _short_piece(t: np.ndarray, dt: np.ndarray, n: int, m: int):
     return _symmetric(matrix), _symmetric(slope), start, growth
 
 
-def _join(left, right, left_slope, right_slope, n: int, m: int):
+def _join(
+    left: np.ndarray, right: np.ndarray, left_slope: np.ndarray, right_slope: np.ndarray, n: int, m: int
+) -> tuple[np.ndarray, ...]:
     """Join each piece to its right neighbour; return K, K', X, the eliminated matrix, and tr(K_mm^-1 K_mm')."""
     a, b = slice(0, n), slice(n + m, 2 * n + m)
     w = slice(n, n + m)
 
-    def blocks(k, h):
+    def blocks(k: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         outer = np.zeros_like(k)
         outer[..., a, a], outer[..., b, b], outer[..., w, w] = k[..., a, a], h[..., b, b], k[..., w, w] + h[..., w, w]
         outer[..., a, w], outer[..., w, a] = k[..., a, w], k[..., w, a]
@@ -325,11 +339,11 @@ def _join(left, right, left_slope, right_slope, n: int, m: int):
 
 def form(u: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     """Return the quadratic form ``u' A u`` of each member of a stack."""
-    return (u * (matrix @ u[..., None])[..., 0]).sum(axis=-1)
+    return np.asarray((u * (matrix @ u[..., None])[..., 0]).sum(axis=-1))
 
 
 def _rescale(matrix: np.ndarray, unit: np.ndarray) -> np.ndarray:
-    return unit[..., :, None] * matrix * unit[..., None, :]
+    return np.asarray(unit[..., :, None] * matrix * unit[..., None, :])
 
 
 def _symmetric(matrix: np.ndarray) -> np.ndarray:

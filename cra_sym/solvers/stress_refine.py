@@ -249,7 +249,7 @@ class _Solution:
 
     def good(self, level: float) -> NDArray[np.bool_]:
         """Return which sets have an error below a level and all their modes."""
-        return (self.error.max(axis=1) <= level) & ~self.missing.any(axis=1)
+        return np.asarray((self.error.max(axis=1) <= level) & ~self.missing.any(axis=1))
 
     def marks(self, level: float) -> Array:
         """Return the share of each element in what is not good enough yet, (elements,)."""
