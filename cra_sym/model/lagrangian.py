@@ -415,10 +415,8 @@ class Model:
         self, values: Mapping[Any, Any], angular_frequency: Any, x_values: Any = None, **options: Any
     ) -> np.ndarray:
         """Return ``cra_sym.frequency_response(self.at(values), angular_frequency, x_values, **options)``."""
-        return cast(
-            "np.ndarray",
-            _analysis("frequency_response").frequency_response(self.at(values), angular_frequency, x_values, **options),
-        )
+        respond = _analysis("frequency_response").frequency_response
+        return cast("np.ndarray", respond(self.at(values), angular_frequency, x_values, **options))
 
     def response(
         self,
