@@ -324,7 +324,7 @@ def whole_period(half: np.ndarray, damping: np.ndarray, parity: np.ndarray) -> n
     above, below = parity[:, None] * swapped[:, :n], parity[:, None] * swapped[:, n:]
     left = np.concatenate([below, above - damping @ below], axis=1)
     first, second = left[:, :, :n] * parity, left[:, :, n:] * parity
-    return np.concatenate([first @ damping + second, first], axis=2) @ half
+    return np.asarray(np.concatenate([first @ damping + second, first], axis=2) @ half)
 
 
 def monodromy(*system: Any, tolerance: float = 1e-8, loop: Loop | None = None, **more: Any) -> np.ndarray:
