@@ -77,10 +77,10 @@ class BoltedJoint:
     --------
     >>> joint = BoltedJoint()
     >>> {name: float(f"{value:.3g}") for name, value in joint.values(10.0).items()}
-    {'k_t': 2000.0, 'k_r': 196.0, 'k_d': 616000.0, 'slip': 1.5}
+    {'k_t': 100.0, 'k_r': 196.0, 'k_d': 616000.0, 'slip': 1.5}
     """
 
-    rest: float = 2e3
+    rest: float = 100.0
     body_t: float = 1e6
     body_r: float = 1e4
     roughness: float = 5e-6
