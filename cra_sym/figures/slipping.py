@@ -1,0 +1,172 @@
+"""A joint that slips: loops of force over displacement, frequency and damping over amplitude, what preload does."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import numpy as np
+from matplotlib import style
+from matplotlib.figure import Figure
+
+from cra_sym.analysis.backbone import Backbone, backbone
+from cra_sym.analysis.modes import natural_frequencies
+from cra_sym.analysis.slip_response import SlipResponse, slip_response
+from cra_sym.arm.bolted_joint import BoltedJoint
+from cra_sym.arm.parameters import Arm
+from cra_sym.figures import STYLE
+from cra_sym.figures.drawing import BLUE, GREEN, INK, ORANGE, panels
+from cra_sym.model.system import System
+from cra_sym.solvers.motion import BaseMotion
+
+__all__ = ["figure_preload", "figure_slip_amplitude", "figure_slip_loop", "show_loop"]
+
+_MOVE = {"distance": 0.3, "v_max": 0.5, "a_max": 2.0}
+_ZETA = 0.002
+
+
+def show_loop(found: SlipResponse, *, ax: Any = None) -> Figure:
+    """Draw force over displacement of the first place that slips, and mark where it does.
+
+    Parameters
+    ----------
+    found : SlipResponse
+        Of one system, its times close enough to be joined by lines.
+    ax : Axes, optional
+    """
+    with style.context(STYLE):
+        ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
+        moved, force = 1e3 * found.displacement[0], found.force.sum(axis=0)
+        ax.plot(moved, force, "-", color=INK, linewidth=0.8, label="sticks")
+        slips = (found.state != 0).any(axis=0)
+        ax.plot(moved[slips], force[slips], ".", color=ORANGE, markersize=3, linestyle="none", label="slips")
+        ax.set_xlabel("displacement of the joint / mm")
+        ax.set_ylabel("force of the faces / N")
+        ax.legend()
+    return cast(Figure, ax.figure)
+
+
+def figure_slip_loop(
+    arm: Arm | None = None,
+    *,
+    joint: BoltedJoint | None = None,
+    preload: float = 2.0,
+    duration: float = 1.5,
+    ax: Any = None,
+) -> Figure:
+    """Draw the force of the faces of a bolted joint over its displacement during a move: each loop is work lost.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        Default: the nominal one, slightly damped.
+    joint : BoltedJoint, optional
+    preload : float
+        N.
+    duration : float
+        s.
+    ax : Axes, optional
+    """
+    arm = Arm.nominal().replace(zeta=_ZETA) if arm is None else arm
+    system = (BoltedJoint() if joint is None else joint).on(arm, preload)
+    found = slip_response(system, BaseMotion.trapezoid(**_MOVE), np.linspace(0.0, duration, 1501), modes=4)
+    return show_loop(found, ax=ax)
+
+
+def figure_slip_amplitude(
+    system: System | None = None,
+    *,
+    mode: int = 1,
+    modes: int = 2,
+    amplitude: Any = None,
+    curve: Backbone | None = None,
+    axes: Any = None,
+) -> Figure:
+    """Draw frequency and damping ratio of a mode with elastic-slip elements over the amplitude of its tip.
+
+    Parameters
+    ----------
+    system : System, optional
+        With elastic-slip elements; default: the nominal arm on a joint that is soft and slips at 0.1 N.
+    mode, modes : int
+    amplitude : array_like, optional
+        m.
+    curve : Backbone, optional
+        What was computed already.
+    axes : sequence of two Axes, optional
+    """
+    if curve is None:
+        if system is None:
+            joint = BoltedJoint(rest=20.0, body_t=20.0, lever=0.05)
+            system = joint.on(Arm.nominal().replace(zeta=_ZETA), 0.1 / joint.friction)
+        amplitude = np.geomspace(4e-3, 0.3, 25) if amplitude is None else amplitude
+        curve = backbone(system, mode, amplitude=amplitude, modes=modes)
+    with style.context(STYLE):
+        left, right = panels(axes, 1, 2, (8.8, 3.7)).ravel()
+        size = 1e3 * np.asarray(curve.amplitude)
+        left.semilogx(size, curve.angular_frequency / (2 * np.pi), "-o", color=BLUE, markersize=3)
+        right.loglog(size, curve.damping_ratio, "-o", color=ORANGE, markersize=3)
+        for ax, label in ((left, "frequency / Hz"), (right, "damping ratio")):
+            ax.set_xlabel("amplitude at the tip / mm")
+            ax.set_ylabel(label)
+    return cast(Figure, left.figure)
+
+
+def figure_preload(
+    arm: Arm | None = None,
+    *,
+    joint: BoltedJoint | None = None,
+    preload: Any = None,
+    shown: Any = (1.0, 3.0, 100.0),
+    duration: float = 4.0,
+    modes: int = 4,
+    axes: Any = None,
+) -> Figure:
+    """Draw what the preload of a bolted joint does to frequencies, to the vibration after a move and to its course.
+
+    Left: natural frequencies while the faces stick, over those of a rigid joint. Middle: the tip's largest displacement
+    in the last quarter, and what friction took of the work put in. Right: the tip during and after the move.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        Default: the nominal one, slightly damped.
+    joint : BoltedJoint, optional
+    preload : array_like, optional
+        N, ascending.
+    shown : sequence of three float
+        Preloads whose move is drawn, N.
+    duration : float
+        Of what is followed, s.
+    modes : int
+    axes : sequence of three Axes, optional
+    """
+    arm = Arm.nominal().replace(zeta=_ZETA) if arm is None else arm
+    joint = BoltedJoint() if joint is None else joint
+    forces = np.geomspace(0.3, 100.0, 25) if preload is None else np.asarray(preload, float)
+    times = np.linspace(0.0, duration, 401)
+    move, systems = BaseMotion.trapezoid(**_MOVE), joint.on(arm, forces)
+    found = slip_response(systems, move, times, modes=modes)
+    some = slip_response(joint.on(arm, np.asarray(shown, float)), move, times, modes=modes)
+    late = 1e3 * np.abs(found.tip[..., times >= 0.75 * duration]).max(axis=-1)
+    rigid = natural_frequencies(arm.replace(k_t=np.inf, k_r=np.inf))
+    with style.context(STYLE):
+        left, middle, right = panels(axes, 1, 3, (12.0, 3.7)).ravel()
+        kinds = ((INK, "-", "mode 1"), (BLUE, "--", "mode 2"), (ORANGE, ":", "mode 3"))
+        for column, (color, line, label) in zip((natural_frequencies(systems) / rigid).T, kinds, strict=True):
+            left.semilogx(forces, column, color=color, linestyle=line, label=label)
+        left.set_ylabel("frequency over that of a rigid joint")
+        left.legend()
+        middle.semilogx(forces, late, color=BLUE, label="late vibration / mm")
+        taken = 100 * found.dissipated[..., -1].sum(axis=-1) / found.work.max(axis=-1)
+        middle.semilogx(forces, taken, color=ORANGE, linestyle="--", label="lost by friction / %")
+        middle.set_ylabel("late vibration / mm, share of the work / %")
+        middle.legend()
+        for ax in (left, middle):
+            ax.set_xlabel("preload / N")
+        lines = ((ORANGE, ":"), (GREEN, "-"), (INK, "--"))
+        for force, tip, (color, line) in zip(shown, some.tip, lines, strict=True):
+            right.plot(times, 1e3 * tip, color=color, linestyle=line, linewidth=0.9, label=f"{force:g} N")
+        right.set_xlabel("time $t$ / s")
+        right.set_ylabel("$v(L, t)$ / mm")
+        right.legend(title="preload")
+    return cast(Figure, left.figure)
