@@ -18,7 +18,7 @@ from cra_sym.figures.drawing import BLUE, GREEN, INK, ORANGE, panels
 from cra_sym.model.system import System
 from cra_sym.solvers.motion import BaseMotion
 
-__all__ = ["figure_preload", "figure_slip_amplitude", "figure_slip_loop", "show_loop"]
+__all__ = ["figure_preload", "figure_slip_amplitude", "figure_slip_loop", "figure_tongue_bounds", "show_loop"]
 
 _MOVE = {"distance": 0.3, "v_max": 0.5, "a_max": 2.0}
 _ZETA = 0.002
@@ -109,6 +109,34 @@ def figure_slip_amplitude(
             ax.set_xlabel("amplitude at the tip / mm")
             ax.set_ylabel(label)
     return cast(Figure, left.figure)
+
+
+def figure_tongue_bounds(epsilon: Any, bounded: Any, threshold: Any, *, ax: Any = None) -> Figure:
+    """Draw to which amplitude friction bounds vibration in a tongue, and from which on it holds nothing in another.
+
+    Parameters
+    ----------
+    epsilon : array_like, shape (n,)
+        Size of the excitation.
+    bounded : array_like, shape (n,)
+        Amplitude of the stable vibration at twice the stuck frequency, m; nan where there is none.
+    threshold : array_like, shape (n,)
+        Amplitude of the unstable one at twice the sliding frequency, m: smaller vibrations decay, larger ones grow.
+    ax : Axes, optional
+    """
+    with style.context(STYLE):
+        ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
+        curves = (
+            (bounded, BLUE, "-", "o", "bounded, at twice the stuck"),
+            (threshold, ORANGE, "--", "^", "threshold, at twice the sliding"),
+        )
+        for size, color, line, marker, label in curves:
+            ax.plot(epsilon, 1e3 * np.asarray(size), color=color, linestyle=line, marker=marker, ms=4, label=label)
+        ax.set_ylim(bottom=0.0)
+        ax.set_xlabel("size of the excitation $\\epsilon$")
+        ax.set_ylabel("amplitude at the tip / mm")
+        ax.legend(title="frequency of the joint")
+    return cast(Figure, ax.figure)
 
 
 def figure_preload(

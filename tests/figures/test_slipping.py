@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import cra_sym as cra
-from cra_sym.figures.slipping import figure_preload, figure_slip_amplitude, figure_slip_loop
+from cra_sym.figures.slipping import figure_preload, figure_slip_amplitude, figure_slip_loop, figure_tongue_bounds
 
 
 @pytest.fixture(scope="module")
@@ -40,3 +40,8 @@ def test_frequency_falls_and_damping_has_a_top(arm):
     frequency, damping = left.lines[0].get_ydata(), right.lines[0].get_ydata()
     assert (np.diff(frequency) < 0).all()
     assert damping[1] > 10 * damping[0] and damping[1] > 2 * damping[2]
+
+
+def test_bounds_of_tongues_are_drawn():
+    bounded, threshold = figure_tongue_bounds([0.1, 0.2], [0.01, 0.011], [0.2, np.nan]).axes[0].lines
+    assert bounded.get_ydata().tolist() == [10.0, 11.0] and threshold.get_ydata()[0] == 200.0

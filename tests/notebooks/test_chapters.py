@@ -69,7 +69,7 @@ def following():
 
 
 #: Take longest; `python -m pytest tests/notebooks/test_chapters.py -k follows --all-chapters` runs them too.
-DEAR = ("05_sensitivity", "06b_moves", "07b_zones", "07c_inside_the_tongue")
+DEAR = ("05_sensitivity", "06b_moves", "07b_zones", "07c_inside_the_tongue", "07d_the_joint_that_slips")
 
 
 @pytest.fixture
