@@ -45,22 +45,25 @@ def held_curve(
     problem = _problem(system, mode, modes, FIRST if harmonics is None else min(FIRST, harmonics), place, field)
     if not problem.stuck_frequency() > 0:
         raise ValueError(f"mode = {mode}: is a rigid-body mode and does not vibrate")
-    found = _at(problem, amplitudes)
+    first = found = _at(problem, amplitudes)
+    more = min(modes + 3, system.without_hysteresis.most_modes)
+    wide = _problem(system, mode, more, len(problem.balance.basis.sines), place, field)
+    missing = _change(first, wide.solved(_widened(first, problem, wide), amplitudes))
     if harmonics is not None and harmonics > FIRST:
         whole = _problem(system, mode, modes, harmonics, place, field)
         problem, found = whole, whole.solved(_embedded(found, problem, whole), amplitudes)
+    before: Array | None = None
     while True:
-        number = len(problem.balance.basis.sines)
-        rich = _problem(system, mode, modes, 2 * number + 1, place, field)
+        rich = _problem(system, mode, modes, 2 * len(problem.balance.basis.sines) + 1, place, field)
         finer = rich.solved(_embedded(found, problem, rich), amplitudes)
         change = _change(found, finer)
-        if harmonics is not None or number >= _MOST or not (change[found.good & finer.good] > ACCURACY).any():
-            break
-        problem, found = rich, finer
-    more = min(modes + 3, system.without_hysteresis.most_modes)
-    wide = _problem(system, mode, more, number, place, field)
-    changed = wide.solved(_widened(found, more), amplitudes)
-    return _told(problem, found, change, _change(found, changed))
+        if harmonics is not None:
+            return _told(problem, found, change, missing)
+        # where the last two changes fall, the next would fall alike
+        left = change if before is None else change * np.minimum(change / np.maximum(before, 1e-300), 1.0)
+        problem, found, before = rich, finer, change
+        if len(rich.balance.basis.sines) >= _MOST or not (left[finer.good] > ACCURACY).any():
+            return _told(problem, found, left, missing)
 
 
 def _problem(system: System, mode: int, modes: int, harmonics: int, place: Any, field: Any) -> HeldMotions:
@@ -140,11 +143,16 @@ def _embedded(found: Held, old: HeldMotions, new: HeldMotions) -> Held:
     return Held(whole(found.coefficients), whole(found.displacements), found.frequency, found.ratio, found.good)
 
 
-def _widened(found: Held, modes: int) -> Held:
+def _widened(found: Held, old: HeldMotions, new: HeldMotions) -> Held:
+    """Return starts with more modes, which follow the forces of the elements as if at rest."""
     points, n, size = found.coefficients.shape
-    whole = np.zeros((points, modes, size))
+    force = old.balance.forces(found.displacements.reshape(points, -1))[0].reshape(found.displacements.shape)
+    omega, rows = new.balance.equations.omega, new.balance.elements.rows
+    whole = np.zeros((points, omega.size, size))
     whole[:, :n] = found.coefficients
-    return Held(whole, found.displacements, found.frequency, found.ratio, found.good)
+    whole[:, n:] = -(rows[:, n:].T @ force) / omega[n:, None] ** 2
+    w = rows @ whole - new.balance.elements.coupling @ force
+    return Held(whole, w, found.frequency, found.ratio, found.good)
 
 
 def _change(one: Held, other: Held) -> Array:

@@ -30,10 +30,11 @@ FIRST, MOST = 15, 127
 """Harmonics that are tried first, and at most, where none are asked for."""
 ACCURACY = 1e-7
 """Relative change of a motion by twice as many harmonics that is aimed at."""
-_AMPLITUDES = np.geomspace(0.3, 300.0, 14)  # of the motion over that at which elements slip
-_PHASES = 6
+_SMALLEST, _LARGEST, _STEP, _PHASES, _ITERATIONS = 0.01, 100.0, 2.0, 3, 14
+"""Amplitudes of starts over that at which the last element slips, their ratio, phases, iterations from each."""
+_SHARES = (1.0, 0.3, 0.0)  # of the elements' stiffness, whose shapes are tried
 _SAMPLED = 9
-_FAR = 0.5
+_FAR = 0.4
 _SAME = 1e-6
 _HELD = 1e-9  # force on a rigid-body mode over that of all sliders
 
@@ -247,7 +248,7 @@ class SlipProblem:
     # ----------------------------------------------------------------------------------------------------- starts
 
     def seeds(self, varpi: Array, order: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array, float]:
-        """Return starts: rest, everything stuck, nothing stuck, and single modes with many amplitudes and phases.
+        """Return starts: rest, everything stuck, nothing stuck, and single shapes with many amplitudes and phases.
 
         A linear structure of constant coefficients that is driven has one answer but for what sticks: elements lose
         energy whichever way two motions differ.
@@ -268,11 +269,13 @@ class SlipProblem:
             starts.append(np.zeros((count, self.balance.size)))
         if not self.balance.constant:
             picked = order[np.unique(np.linspace(0, count - 1, _SAMPLED).round().astype(int))]
-            for mode in range(self.balance.equations.modes):
-                for at in picked:
-                    found = self._alone(mode, float(varpi[at]))
-                    where.append(np.full(len(found), at))
-                    starts.append(found)
+            for share in _SHARES:
+                shapes = np.linalg.eigh(stuck(self.balance.equations, self.balance.elements, share))[1]
+                for shape in shapes.T:
+                    for at in picked:
+                        found = self._alone(shape, float(varpi[at]))
+                        where.append(np.full(len(found), at))
+                        starts.append(found)
         return np.concatenate(where), np.concatenate(starts), size
 
     @cached_property
@@ -290,37 +293,40 @@ class SlipProblem:
         w = np.linalg.solve(matrix, based.displacement[..., None])[..., 0]
         return np.concatenate([based.modal(springs * w, np.arange(len(varpi))), w], axis=1)
 
-    def _alone(self, mode: int, varpi: float) -> Array:
-        """Return answers of one mode with the harmonic nearest to it, from amplitudes and phases all around."""
-        equations = self.balance.equations.of(np.array([mode]))
-        omega = np.sqrt(equations.omega[0] ** 2 + self.balance.elements.stiffness @ self._row(mode) ** 2)
+    def _alone(self, shape: Array, varpi: float) -> Array:
+        """Return answers in one shape with the harmonic nearest to it, from amplitudes and phases all around."""
+        equations, elements = self.balance.equations.along(shape), self.balance.elements.along(shape)
+        stiff, free = np.sqrt(stuck(equations, elements)[0, 0]), float(equations.omega[0])
         frequency = varpi / self.period
-        harmonic = int(np.clip(round(float(omega) / frequency), 1, self.harmonics))
-        slow = abs(harmonic * frequency - omega) > _FAR * omega
-        if slow and abs(harmonic * frequency - equations.omega[0]) > _FAR * equations.omega[0]:
+        harmonic = int(np.clip(round(float(stiff) / frequency), 1, self.harmonics))
+        if min(abs(harmonic * frequency - one) / max(one, 1e-300) for one in (float(stiff), free)) > _FAR:
             return np.empty((0, self.balance.size))
         alone = Forced(equations, self.driven.waves)
-        basis = Basis.whole(harmonic, samples(equations.degree, harmonic, alone.order * self.period))
-        small = SlipBalance(equations, basis, self.balance.elements.of(np.array([mode])))
-        scale = self.balance.elements.limit / max(np.abs(self._row(mode)).max(), 1e-300)
-        phases = 2 * np.pi * (np.arange(_PHASES) + 0.3) / _PHASES
-        starts = np.zeros((_AMPLITUDES.size * _PHASES, 1, basis.size))
-        starts[:, 0, harmonic] = scale * np.multiply.outer(_AMPLITUDES, np.cos(phases)).ravel()
-        starts[:, 0, 2 * harmonic] = scale * np.multiply.outer(_AMPLITUDES, np.sin(phases)).ravel()
+        number = samples(equations.degree, harmonic, alone.order * self.period)
+        basis = Basis((0, harmonic), (harmonic,), number)
+        small = SlipBalance(equations, basis, elements)
+        smallest, largest = max(elements.limit, _SMALLEST * elements.reach), _LARGEST * elements.reach
+        number = int(np.ceil(np.log(largest / smallest) / np.log(_STEP)))
+        sizes = np.geomspace(0.3 * smallest, largest, number) / max(np.abs(elements.rows).max(), 1e-300)
+        mirrored = self.driven.rests and equations.odd  # reversed displacements are an answer too
+        phases = (1 if mirrored else 2) * np.pi * (np.arange(_PHASES) + 0.3) / _PHASES
+        starts = np.zeros((number * _PHASES, 1, basis.size))
+        starts[:, 0, 1] = np.multiply.outer(sizes, np.cos(phases)).ravel()
+        starts[:, 0, 2] = np.multiply.outer(sizes, np.sin(phases)).ravel()
         causes = np.repeat(alone.causes(np.array([varpi]), basis.phase, self.period), len(starts), axis=0)
-        found, good = small.newton(small.start(starts), np.full(len(starts), frequency), causes, tolerance=1e-6)
+        found, good = small.newton(
+            small.start(starts), np.full(len(starts), frequency), causes, tolerance=1e-5, most=_ITERATIONS
+        )
         kept: list[Array] = []
         for answer in small.coefficients(found[good])[:, 0]:
-            if not any(np.linalg.norm(answer - other) <= 1e-4 * np.linalg.norm(answer) for other in kept):
+            if not any(np.linalg.norm(answer - other) <= 1e-3 * np.linalg.norm(answer) for other in kept):
                 kept.append(answer)
-        whole = np.zeros((len(kept), self.balance.equations.modes, self.basis.size))
+        if mirrored:
+            kept += [-answer for answer in kept]
+        whole = np.zeros((len(kept), shape.size, self.basis.size))
         for k, answer in enumerate(kept):
-            whole[k, mode, : harmonic + 1] = answer[: harmonic + 1]
-            whole[k, mode, self.harmonics + 1 : self.harmonics + 1 + harmonic] = answer[harmonic + 1 :]
+            whole[k][:, [0, harmonic, self.harmonics + harmonic]] = np.outer(shape, answer)
         return self.balance.start(whole)
-
-    def _row(self, mode: int) -> Array:
-        return self.balance.elements.rows[:, mode]
 
 
 def _pushes_rigid(driven: Forced) -> bool:

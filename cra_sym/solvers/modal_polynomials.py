@@ -136,6 +136,23 @@ class ModalPolynomials:
         damping = self.damping[np.ix_(numbers, numbers)]
         return ModalPolynomials(self.omega[numbers], damping, some(self.energies), some(self.forces))
 
+    def along(self, shape: Array) -> ModalPolynomials:
+        """Return the equation of the modes moving in one shape, a vector (modes,) of length one."""
+
+        def contracted(terms: Sequence[Term]) -> tuple[Term, ...]:
+            found = []
+            for term in terms:
+                tensor = term.tensor
+                for _ in range(tensor.ndim):
+                    tensor = np.tensordot(tensor, shape, axes=(0, 0))
+                found.append(term._replace(tensor=np.asarray(tensor).reshape((1,) * term.tensor.ndim)))
+            return tuple(found)
+
+        omega, damping = np.linalg.norm(self.omega * shape), shape @ self.damping @ shape
+        return ModalPolynomials(
+            np.array([omega]), np.array([[damping]]), contracted(self.energies), contracted(self.forces)
+        )
+
     def potential(self, q: Array) -> Array:
         """Return minus the Lagrangian at zero velocity, J, for q of shape (..., modes)."""
         flat = q.reshape(-1, self.modes)

@@ -58,18 +58,18 @@ class Elements:
         """Largest displacement at which an element slips."""
         return float(max((f / k).max() for k, f in self.groups))
 
-    def of(self, modes: NDArray[np.intp]) -> Elements:
-        """Return the same seen by some modes alone."""
-        return replace(self, rows=self.rows[:, modes], coupling=np.zeros_like(self.coupling))
+    def along(self, shape: Array) -> Elements:
+        """Return the same seen by modes that move in one shape."""
+        return replace(self, rows=(self.rows @ shape)[:, None], coupling=np.zeros_like(self.coupling))
 
     def cycles(self, displacements: Array) -> list[Cycle]:
         """Return what the elements do for displacements of shape (points, displacements, functions)."""
         return [cycle(displacements[:, k], *group) for k, group in enumerate(self.groups)]
 
 
-def stuck(equations: ModalPolynomials, elements: Elements) -> Array:
-    """Return the stiffness of the modal equations with all elements stuck, shape (modes, modes)."""
-    k = np.diag(elements.stiffness)
+def stuck(equations: ModalPolynomials, elements: Elements, share: float = 1.0) -> Array:
+    """Return the stiffness of the modal equations with a share of all elements stuck, shape (modes, modes)."""
+    k = np.diag(share * elements.stiffness)
     force = np.linalg.solve(np.eye(len(k)) + k @ elements.coupling, k @ elements.rows)
     return np.asarray(np.diag(equations.omega**2) + elements.rows.T @ force)
 
@@ -90,7 +90,7 @@ class SlipBalance:
     ----------
     equations : ModalPolynomials
     basis : Basis
-        Constant and all harmonics up to one.
+        Constant and all harmonics up to one, or the constant and one harmonic, of which elements know no other.
     elements : Elements
     statics : ndarray, shape (displacements, known functions), optional
         What of the displacements follows known functions of time without the modes.
@@ -168,7 +168,7 @@ class SlipBalance:
         """Return modes of constant coefficients at every harmonic."""
         h, n, b = len(self.basis.sines), self.equations.modes, self.elements.rows
         points, m = len(frequency), len(b)
-        k = np.arange(h + 1) * frequency[:, None]
+        k = np.array(self.basis.cosines) * frequency[:, None]
         z = (1j * k)[..., None, None] * self.equations.damping + np.diag(self.equations.omega**2)
         z = z - (k**2)[..., None, None] * np.eye(n)
         z[:, 0] += np.diag(self._rigid()) * frequency[:, None, None] ** 2  # where it stands, if nothing holds it
