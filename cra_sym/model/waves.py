@@ -1,7 +1,9 @@
-"""The route of a uniform Lagrangian with up to three displacements a section and as many wave numbers.
+"""The route of a uniform Lagrangian: parts along the span with up to three wave numbers each, joined at their ends.
 
-Strings on foundations, beams under tension or with shear, bending with torsion, a beam joined to a string: whatever is
-even under a reflection of x.
+Strings on foundations, beams under tension or with shear, bending with torsion, several beams: whatever is even under a
+reflection of x, with any springs, masses, lumped coordinates and links of the ends. A coordinate that acts along the
+whole span in another way than to carry it, such as the base of a foundation, keeps the dynamic stiffness: there the
+motion of the span has a part that is no free wave.
 """
 
 from __future__ import annotations
@@ -32,6 +34,7 @@ from cra_sym.solvers.waves import (
     template,
 )
 from cra_sym.solvers.waves_modes import wave_states
+from cra_sym.solvers.waves_problem import idle_coordinates, negative_motions
 
 if TYPE_CHECKING:
     from sympy import Symbol
@@ -41,7 +44,8 @@ if TYPE_CHECKING:
 __all__ = ["Waves", "waves_route"]
 
 Array = NDArray[np.float64]
-_MOST = 3  # displacements of a section
+_MOST = 6  # displacements of a section
+_MOST_COUPLED = 3  # of these inside, which have as many wave numbers
 _COST = 10  # roots of one wave number that one of these costs, to judge whether machine code pays
 
 
@@ -57,25 +61,31 @@ class Waves:
     structure : Structure
     matrices : Kernel
         Of the parameters: entries of A_OE and A_EO without z, then their factors of z.
-    ends : Kernel
-        Of the parameters: for the left end and then the right one stiffness and mass matrices of the displacements, in
-        order, and the matrix that ties those that are held.
-    held : tuple of (int, int)
-        End and position, in order, of displacements that essential conditions hold.
-    stiffnesses : dict of int to (int, int)
-        Position of each parameter that may be infinite, with the end and the position of what it then holds.
+    conditions : Kernel
+        Of the parameters: stiffness and mass matrices of the ends and coordinates, the matrix that ties those that are
+        held, stiffness and stretch of links.
+    carried : Kernel or None
+        Of the parameters: what a unit of each lumped coordinate gives the displacements all along.
+    held : tuple of int
+        Places that essential conditions hold.
+    stiffnesses : dict of int to tuple of int
+        Position of each parameter that may be infinite, with the places and links that it then holds.
     known : tuple of (0, 1 or None)
         Coefficients of the problem that are the same for all parameters.
+    coordinates : tuple of str
+        Lumped coordinates, for messages.
     """
 
     spatial: SpatialProblem
     order: tuple[int, ...]
     structure: Structure
     matrices: Kernel
-    ends: Kernel
-    held: tuple[tuple[int, int], ...]
-    stiffnesses: dict[int, tuple[int, int]]
+    conditions: Kernel
+    carried: Kernel | None
+    held: tuple[int, ...]
+    stiffnesses: dict[int, tuple[int, ...]]
     known: tuple[int | None, ...]
+    coordinates: tuple[str, ...] = ()
 
     @cached_property
     def _functions(self) -> Functions:
@@ -115,7 +125,7 @@ class Waves:
     def _covered(self, columns: Array) -> tuple[UniformProblem, NDArray[np.bool_]]:
         """Return the problem, and for which sets its closed forms hold.
 
-        They do where infinite values hold one displacement each and no end has negative stiffness or mass.
+        They do where infinite values hold one displacement or link each and nothing has negative stiffness or mass.
         """
         others = [position for position in range(len(columns)) if position not in self.stiffnesses]
         simple = ~np.isinf(columns[others]).any(axis=0)
@@ -123,7 +133,11 @@ class Waves:
         for matrix in (problem.odd_by_even, problem.even_by_odd):
             simple &= np.isfinite(matrix).all(axis=(0, 2, 3))
         for ends in (problem.stiffness, problem.mass):
-            simple &= (ends >= 0).all(axis=(0, 2))
+            simple &= (ends >= 0).all(axis=1)
+        simple &= ~negative_motions(problem, 1)
+        if (simple & idle_coordinates(problem)).any():
+            names = ", ".join(self.coordinates)
+            raise ValueError(f"values: a motion of the lumped coordinates {names} alone has neither mass nor stiffness")
         return problem, np.asarray(simple & (problem.length > 0))
 
     def _fill(self, problem: UniformProblem, squares: Array) -> None:
@@ -140,30 +154,37 @@ class Waves:
             in_parts(part, len(squares), squares.shape[1], threads=None, compiled=True)
 
     def _states(self, columns: Array, problem: UniformProblem, z: Array, x: Array) -> Array:
-        """Return the state of every mode at places x (rows, stations), shape (rows, modes, stations, 2 n)."""
-        _, left = self.spatial.geometry.function(*np.where(np.isinf(columns), 0.0, columns))
+        """Return the state of every mode at places x (rows, stations), shape (rows, modes, stations, 2 n + m)."""
+        finite = np.where(np.isinf(columns), 0.0, columns)
+        _, left = self.spatial.geometry.function(*finite)
         share = np.clip((x - np.broadcast_to(left, len(x))[:, None]) / problem.length[:, None], 0.0, 1.0)
         found = wave_states(problem, z, share)
-        n = len(self.order)
+        n, m = len(self.order), self.structure.coordinates
+        if self.carried is not None:
+            carried = np.moveaxis(_stacked(self.carried, finite, len(x)).reshape(n, m, -1), -1, 0)
+            found[..., :n] -= found[..., n : n + m] @ np.swapaxes(carried, 1, 2)[:, None]
         back = np.argsort(self.order)
-        return found[..., [*back, *(n + back)]]
+        return found[..., [*back, *range(n, n + m), *(n + m + back)]]
 
     def _problem(self, columns: Array) -> UniformProblem:
-        rows, n = columns.shape[1], len(self.order)
+        rows, n, structure = columns.shape[1], len(self.order), self.structure
         finite = np.where(np.isinf(columns), 0.0, columns)
         with np.errstate(all="ignore"):
             matrices = _stacked(self.matrices, finite, rows).reshape(2, 2, n, n, rows)
-            ends = _stacked(self.ends, finite, rows)
+            entries = _stacked(self.conditions, finite, rows)
             length, _ = self.spatial.geometry.function(*finite)
-        matrix = np.moveaxis(ends.reshape(2, 3, n, n, rows), -1, 2)
-        diagonal = np.arange(n)
-        stiffness, mass = (matrix[:, kind][..., diagonal, diagonal].copy() for kind in (0, 1))
-        for end, place in self.held:
-            stiffness[end, :, place] = np.inf
-        for position, (end, place) in self.stiffnesses.items():
-            stiffness[end, np.isinf(columns[position]), place] = np.inf
-        couplings = np.moveaxis(matrix[:, :2], 1, 0).copy()
-        couplings[..., diagonal, diagonal] = 0.0
+        size = structure.moving
+        found = entries[: 3 * size**2].reshape(3, size, size, rows)
+        links = entries[3 * size**2 :].reshape(structure.links, 1 + size, rows)
+        diagonal = np.arange(size)
+        stiffness = np.concatenate([found[0, diagonal, diagonal], links[:, 0]]).T.copy()
+        mass = np.concatenate([found[1, diagonal, diagonal], np.zeros((structure.links, rows))]).T.copy()
+        stiffness[:, self.held] = np.inf
+        for position, places in self.stiffnesses.items():
+            for place in places:
+                stiffness[np.isinf(columns[position]), place] = np.inf
+        matrix = np.moveaxis(found, -1, 1)
+        matrix[:2, :, diagonal, diagonal] = 0.0
         odd_by_even, even_by_odd = (np.moveaxis(matrices[:, k], -1, 1) for k in (0, 1))
         return UniformProblem(
             np.array(np.broadcast_to(length, rows), dtype=np.float64),
@@ -171,12 +192,15 @@ class Waves:
             even_by_odd,
             stiffness,
             mass,
-            self.structure.odd,
-            couplings if couplings.any() else None,
-            matrix[:, 2] if matrix[:, 2].any() else None,
-            self.structure.sizes,
+            structure.odd,
+            matrix[:2] if matrix[:2].any() else None,
+            matrix[2] if matrix[2].any() else None,
+            structure.sizes,
             self.known,
-        )
+            structure.coordinates,
+            structure.linked,
+            np.moveaxis(links[:, 1:], -1, 0) if structure.links else None,
+        ).without_idle_links()
 
 
 def _stacked(function: Kernel, columns: Array, rows: int) -> Array:
@@ -198,7 +222,7 @@ def _search(parts: Parts) -> Search:
 
 
 def waves_route(form: StateForm, spatial: SpatialProblem, symbols: Sequence[Symbol]) -> Waves | None:
-    """Return the route of a uniform spatial problem with up to three displacements a section, else None.
+    """Return the route of a uniform spatial problem with up to three wave numbers that are coupled inside, else None.
 
     Parameters
     ----------
@@ -209,42 +233,39 @@ def waves_route(form: StateForm, spatial: SpatialProblem, symbols: Sequence[Symb
     symbols : sequence of Symbol
         The parameters, in the order in which their values are given.
     """
-    from cra_sym.model.waves_form import end_matrices, known_coefficients, only_entry, parity, powers
+    from cra_sym.model.waves_form import conditions, known_coefficients, parity, powers
 
     n = len(form.displacements)
-    if n > _MOST or form.coordinates or not form.uniform or form.damped:
+    if n > _MOST or not n or not form.uniform or form.damped:
         return None
-    split = parity(form.system, n)
-    ends = None if split is None else end_matrices(form, *split[:2])
-    if split is None or ends is None:
+    m = len(form.coordinates)
+    section = [*range(n), *range(n + m, 2 * n + m)]
+    system = form.system.extract(section, section)
+    split = parity(system, n)
+    ends = None if split is None else conditions(form, split[0], symbols)
+    if split is None or ends is None or max(split[2]) > _MOST_COUPLED:
         return None
     order, odd, sizes = split
     even_state = [n + i if odd[at] else i for at, i in enumerate(order)]
     odd_state = [(place + n) % (2 * n) for place in even_state]
-    matrices = [form.system.extract(odd_state, even_state), form.system.extract(even_state, odd_state)]
+    matrices = [system.extract(odd_state, even_state), system.extract(even_state, odd_state)]
     entries = [powers(entry, form.parameter) for matrix in matrices for entry in matrix]
     if None in entries:
         return None
     flat = tuple(entry[power] for power in (0, 1) for entry in entries)  # type: ignore[index]
-    if not any((*flat[len(entries) :], *(entry for end in ends for entry in end[1]))):
+    if not any((*flat[len(entries) :], *ends.mass)):
         return None  # nothing has mass: the general route says so
-    place = {displacement: position for position, displacement in enumerate(order)}
-    held = tuple((end, at) for end in (0, 1) for at in range(n) if at not in ends[end][3])
-    stiffnesses = {
-        symbols.index(symbol): (i // n, place[i % n])
-        for symbol in symbols
-        for i in range(2 * n)
-        if only_entry(form, symbol) == i
-    }
-    structure = Structure(odd, sizes)
-    known = known_coefficients(structure, flat, ends, set(stiffnesses.values()))
+    structure = Structure(odd, sizes, m, ends.links.rows, ends.linked)
+    known = known_coefficients(structure, flat, ends)
     return Waves(
         spatial,
         order,
         structure,
         kernel(flat, tuple(symbols), backend="numpy"),
-        kernel(tuple(entry for end in ends for matrix in end[:3] for entry in matrix), tuple(symbols), backend="numpy"),
-        held,
-        stiffnesses,
+        kernel((*ends.stiffness, *ends.mass, *ends.ties, *ends.links), tuple(symbols), backend="numpy"),
+        kernel(tuple(ends.carried), tuple(symbols), backend="numpy") if m else None,
+        tuple(place for place in range(2 * n + m) if place not in ends.free),
+        {symbols.index(symbol): acting for symbol, acting in ends.springs.items()},
         tuple(kept(structure, known)),
+        tuple(str(coordinate) for coordinate in form.coordinates),
     )

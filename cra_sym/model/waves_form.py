@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
+from typing import NamedTuple
 
-from sympy import Expr, Matrix, Symbol, zeros
+from sympy import Dummy, Expr, Matrix, S, Symbol, cancel, eye, solve, zeros
 
 from cra_sym.mechanics import StateForm
 from cra_sym.solvers.waves import Structure
 
-__all__ = ["End", "end_matrices", "known_coefficients", "only_entry", "parity", "powers"]
+__all__ = ["Conditions", "conditions", "known_coefficients", "parity", "powers"]
 
 
 def parity(system: Matrix, n: int) -> tuple[tuple[int, ...], tuple[bool, ...], tuple[int, ...]] | None:
@@ -58,60 +59,184 @@ def powers(entry: Expr, parameter: Symbol) -> tuple[Expr, Expr] | None:
     return None if slope.has(parameter) else (entry.subs(parameter, 0), slope)
 
 
-End = tuple[Matrix, Matrix, Matrix, set[int]]
+class Conditions(NamedTuple):
+    """What holds at both ends and of the lumped coordinates; a place is one of (q left, q right, w), in order.
 
-
-def end_matrices(form: StateForm, order: tuple[int, ...], odd: tuple[bool, ...]) -> list[End] | None:
-    """Return stiffness, mass, ties and the free displacements of each end, in order.
-
-    None if the ends are linked, not linear in z, or link what the count does not.
+    Attributes
+    ----------
+    stiffness, mass : Matrix, shape (places, places)
+        Of what is free, without the links.
+    ties : Matrix, shape (places, places)
+        Of a displacement that follows others, by these.
+    free : tuple of int
+        Places that are held by nothing but springs.
+    springs : dict of Symbol to tuple of int
+        Parameters that hold places, and links (counted on from the places), if they are infinite.
+    links : Matrix, shape (links, 1 + places)
+        Stiffness of springs between places, and what each place stretches them.
+    carried : Matrix, shape (n, coordinates)
+        ``q = v + carried w`` has no coordinate inside, v in the Lagrangian has.
+    linked : bool
+        Whether ends or coordinates are joined.
     """
-    n, found = len(order), []
-    places = [*order, *(n + i for i in order)]
-    boundary = form.boundary.extract(places, places)
-    motions = form.free.extract(places, list(range(form.free.cols)))
-    if any(entry.expand() != 0 for entry in boundary[:n, n:]):
+
+    stiffness: Matrix
+    mass: Matrix
+    ties: Matrix
+    free: tuple[int, ...]
+    springs: dict[Symbol, tuple[int, ...]]
+    links: Matrix
+    carried: Matrix
+    linked: bool
+
+
+def conditions(form: StateForm, order: tuple[int, ...], symbols: Sequence[Symbol]) -> Conditions | None:
+    """Return the conditions of ends and coordinates.
+
+    None if they are not linear in z, or if a coordinate does more inside than to carry whole fields: a beam on a
+    foundation that itself moves follows it less at a higher frequency.
+    """
+    n, m = len(order), len(form.coordinates)
+    carried = _carried(form)
+    if carried is None:
         return None
-    for end in (0, 1):
-        here = slice(end * n, (end + 1) * n)
-        free = _leaders(motions, n, end)
-        if free is None:
-            return None
-        allowed = zeros(n, n)
-        for i, column in free.items():
-            allowed[:, i] = motions[here, column]
-        ties = Matrix(n, n, lambda i, j, free=free, allowed=allowed: 0 if i in free else allowed[i, j])
-        whole = (allowed.T * boundary[here, here] * allowed).applyfunc(lambda entry: entry.expand())
-        pairs = [pair for pair in (powers(entry, form.parameter) for entry in whole) if pair is not None]
-        mixed = any(ties[i, j] != 0 and odd[i] != odd[j] for i in range(n) for j in range(n))
-        both_odd = any(whole[i, j] != 0 and odd[i] and odd[j] for i in range(n) for j in range(i))
-        if len(pairs) < n * n or mixed or both_odd:
-            return None
-        stiffness, mass = (Matrix(n, n, [pair[k] * sign for pair in pairs]) for k, sign in ((0, 1), (1, -1)))
-        found.append((stiffness, mass, ties, set(free)))
-    return found
+    shift, own = carried
+    back = eye(2 * n + m)
+    back[:n, n : n + m], back[n + m :, n : n + m] = -shift, -shift
+    boundary = back.T * form.boundary * back
+    boundary[n : n + m, n : n + m] += own * form.length
+    places = [*order, *(n + m + i for i in order), *range(n, n + m)]
+    boundary = boundary.extract(places, places)
+    every = list(range(form.free.cols))
+    free = _leaders(form.free.extract(places, every))
+    if free is None:
+        return None
+    motions = (back.inv() * form.free).extract(places, every)
+    motions *= motions.extract(free, every).inv()
+    whole = (motions.T * boundary * motions).applyfunc(_expanded)
+    inside = form.system.free_symbols | form.length.free_symbols | motions.free_symbols
+    springs, links = _springs(whole, [symbol for symbol in symbols if symbol not in inside], form.parameter)
+    for link in range(links.rows):
+        stretch = links[link, 1:]
+        whole -= links[link, 0] * stretch.T * stretch
+    pairs = [powers(entry, form.parameter) for entry in whole.applyfunc(_expanded)]
+    if None in pairs:
+        return None
+    size = 2 * n + m
+    stiffness, mass, ties, stretches = (
+        zeros(size, size),
+        zeros(size, size),
+        zeros(size, size),
+        zeros(links.rows, 1 + size),
+    )
+    for i, row in enumerate(free):
+        for j, column in enumerate(free):
+            stiffness[row, column], slope = pairs[i * len(free) + j]  # type: ignore[misc]
+            mass[row, column] = -slope
+        stretches[:, 1 + row] = links[:, 1 + i]
+        for place in range(size):
+            ties[place, row] = motions[place, i] if place not in free else 0
+    stretches[:, 0] = links[:, 0]
+    joined = any(
+        part[i, j] != 0 and i // n != j // n
+        for part in (stiffness, mass, ties)
+        for i in range(2 * n)
+        for j in range(2 * n)
+    )
+    number = [*free, *range(size, size + links.rows)]
+    found = {symbol: tuple(number[place] for place in acting) for symbol, acting in springs.items()}
+    linked = bool(m) or joined or links.rows > 0
+    return Conditions(
+        stiffness, mass, ties, tuple(free), found, stretches, shift.extract(list(order), list(range(m))), linked
+    )
 
 
-def _leaders(motions: Matrix, n: int, end: int) -> dict[int, int] | None:
-    """Return the displacements of an end that are free, each with its column of the motions that are allowed.
+def _expanded(entry: Expr) -> Expr:
+    return entry.expand()
 
-    None if a motion moves both ends.
+
+def _carried(form: StateForm) -> tuple[Matrix, Matrix] | None:
+    """Return the displacements that each coordinate gives all along, and its own stiffness per length; or None.
+
+    In displacements with those in them nothing inside depends on the coordinate.
     """
-    found = {}
+    n, m = len(form.displacements), len(form.coordinates)
+    if not m:
+        return zeros(n, 0), zeros(0, 0)
+    q, w, force, reaction = (
+        slice(a, b) for a, b in ((0, n), (n, n + m), (n + m, 2 * n + m), (2 * n + m, 2 * n + 2 * m))
+    )
+    system, z = form.system, form.parameter
+    rows = [system[q, :], system[force, :]]
+    parts = [part for row in rows for part in (row.subs(z, 0), row.diff(z))]
+    whole = Matrix.vstack(*parts)
+    unknown = [Dummy() for _ in range(n * m)]
+    shift = Matrix(n, m, unknown)
+    found = solve(list(whole[:, q] * shift - whole[:, w]), unknown, dict=True) if any(whole[:, w]) else [{}]
+    if not found:
+        return None
+    shift = shift.subs(found[0]).subs(dict.fromkeys(unknown, 0))
+    rest = system[reaction, :] - shift.T * system[force, :]
+    own = rest[:, w].applyfunc(_expanded)
+    moving = Matrix.hstack(rest[:, q], rest[:, force], rest[:, reaction])
+    return (shift, own) if all(entry.expand() == 0 for entry in moving) and not shift.has(z) else None
+
+
+def _leaders(motions: Matrix) -> list[int] | None:
+    """Return the place whose displacement is each of the motions that are allowed; None if one has none of its own."""
+    found = []
     for column in range(motions.cols):
-        moved = [i for i in range(2 * n) if motions[i, column] != 0]
-        if not any(i // n == end for i in moved):
-            continue
-        lead = [i for i in moved if motions[i, column] == 1 and sum(entry != 0 for entry in motions[i, :]) == 1]
-        if not lead or any(i // n != end for i in moved):
+        own = [i for i in range(motions.rows) if motions[i, column] == 1 and sum(e != 0 for e in motions[i, :]) == 1]
+        if not own:
             return None
-        found[lead[0] - end * n] = column
+        found.append(own[0])
     return found
 
 
-def known_coefficients(
-    structure: Structure, matrices: Sequence[Expr], ends: Sequence[End], stiffnesses: set[tuple[int, int]]
-) -> list[int | None]:
+def _springs(
+    whole: Matrix, symbols: Sequence[Symbol], parameter: Symbol
+) -> tuple[dict[Symbol, tuple[int, ...]], Matrix]:
+    """Return the places and links that each stiffness with a symbol of its own acts on; stiffness and stretch of links.
+
+    Links are counted on from the places.
+    """
+    springs: dict[Symbol, tuple[int, ...]] = {}
+    links: list[list[Expr]] = []
+    for symbol in symbols:
+        slope = whole.diff(symbol)
+        parts = [] if slope.has(parameter, symbol) else _squares(slope)
+        acting = []
+        for factor, stretch in parts:
+            moved = [place for place, entry in enumerate(stretch) if entry != 0]
+            if len(moved) == 1:
+                acting.append(moved[0])
+                continue
+            number = next((number for number, (_, *known) in enumerate(links) if known == stretch), len(links))
+            if number == len(links):
+                links.append([S.Zero, *stretch])
+            links[number][0] += symbol * factor
+            acting.append(whole.rows + number)
+        if acting:
+            springs[symbol] = tuple(acting)
+    return springs, Matrix(len(links), 1 + whole.rows, [entry for link in links for entry in link])
+
+
+def _squares(matrix: Matrix) -> list[tuple[Expr, list[Expr]]]:
+    """Return factors d and vectors h, the first entry of each 1, such that a matrix is the sum of ``d h h^T``.
+
+    None of them if one of the factors is negative.
+    """
+    found = []
+    for place in range(matrix.rows):
+        factor = matrix[place, place]
+        if factor != 0:
+            stretch = (matrix[:, place] / factor).applyfunc(cancel)
+            matrix = (matrix - factor * stretch * stretch.T).applyfunc(cancel)
+            found.append((factor, list(stretch)))
+    return found if matrix.is_zero_matrix and not any(factor.is_negative for factor, _ in found) else []
+
+
+def known_coefficients(structure: Structure, matrices: Sequence[Expr], ends: Conditions) -> list[int | None]:
     """Return which coefficients of a problem are 0 or 1 whatever the parameters are."""
     n = structure.n
     known: list[int | None] = [None] * structure.coefficients
@@ -120,26 +245,26 @@ def known_coefficients(
         power, (matrix, place) = at // half, divmod(at % half, n * n)
         if entry == 0:
             known[structure.matrices[matrix] + power * n * n + place] = 0
-    for end in (0, 1):
-        stiffness, mass, ties, free = ends[end]
-        for i in range(n):
-            first = structure.condition(end, i)
-            for j in range(n):
-                q: int | None = 1 if i == j else None if ties[i, j] != 0 else 0
-                inertia: int | None = 0
-                force: int | None = 0
-                if i in free:
-                    loose = stiffness[i, i] == 0 and mass[i, i] == 0 and (end, i) not in stiffnesses
-                    q = 0 if stiffness[i, j] == 0 and (i != j or (end, i) not in stiffnesses) else None
-                    inertia = 0 if mass[i, j] == 0 else None
-                    force = (1 if loose else None) if i == j else None if ties[j, i] != 0 else 0
-                known[first + j], known[first + n + j], known[first + 2 * n + j] = q, inertia, force
+    for place in range(structure.moving):
+        first, reach, free = structure.condition(place), structure.reach(place), place in ends.free
+        size, sprung = len(reach), any(place in acting for acting in ends.springs.values())
+        loose = free and not sprung and ends.stiffness[place, place] == 0 and ends.mass[place, place] == 0
+        for j, other in enumerate(reach):
+            own = other == place
+            some = ends.stiffness[place, other] != 0 or (own and sprung)
+            follows = 1 if own else None if ends.ties[place, other] != 0 else 0
+            known[first + j] = follows if not free else None if some else 0
+            known[first + size + j] = None if free and ends.mass[place, other] != 0 else 0
+        for j, other in enumerate(structure.forces(place)):
+            link = other - structure.moving
+            factor = ends.links[link, 1 + place] if link >= 0 else ends.ties[other, place] + int(other == place)
+            one = 1 if loose and factor * structure.turned[place] * structure.turned[other] == 1 else None
+            known[first + 2 * size + j] = one if free and factor != 0 else 0
+    for link in range(structure.links):
+        first, size = structure.condition(structure.moving + link), structure.moving
+        for other in range(size):
+            known[first + other] = None if ends.links[link, 1 + other] != 0 else 0
+            known[first + size + other] = 0
+        for j, other in enumerate(structure.forces(0)):
+            known[first + 2 * size + j] = None if other == structure.moving + link else 0
     return known
-
-
-def only_entry(form: StateForm, symbol: Symbol) -> int | None:
-    """Return the displacement of an end that a stiffness alone holds, None if there is none or it does more."""
-    inside = form.system.free_symbols | form.length.free_symbols | form.free.free_symbols
-    slope = form.boundary.diff(symbol)
-    places = [i for i in range(slope.rows) if slope[i, i] != 0 and not slope[i, i].has(symbol, form.parameter)]
-    return places[0] if symbol not in inside and len(places) == 1 and sum(e != 0 for e in slope) == 1 else None

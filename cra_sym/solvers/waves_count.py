@@ -10,12 +10,12 @@ import numpy as np
 
 from . import waves_kernel, waves_three
 from .straight import Exact, straight
-from .waves_problem import Floats, Integers, Structure
+from .waves_problem import Floats, Integers
+from .waves_structure import Structure
 
 __all__ = [
-    "KINDS", "Determinant", "Functions", "assembled", "block_waves", "direct", "displacements",
-    "formulas", "kept", "lowest_branch", "regime",
-    "sections", "signs",
+    "KINDS", "Determinant", "Functions", "assembled", "block_waves", "condition", "direct", "displacements", "end_rows",
+    "formulas", "kept", "lowest_branch", "regime", "sections", "signs",
 ]  # fmt: skip
 
 kernel: Any = waves_kernel  # formulas of arrays and terms, without types
@@ -24,6 +24,7 @@ three: Any = waves_three
 ZERO = Exact(0)
 Functions = Mapping[str, Callable[..., Any]]
 Entries = Any  # a sequence of numbers, arrays or terms
+Rows = list[tuple[Any, ...]]
 
 
 def sections(structure: Structure, k: Entries, z: Any) -> list[tuple[Any, Any]]:
@@ -55,7 +56,13 @@ def block_columns(structure: Structure, block: tuple[int, int], a: Any, b: Any, 
 
 
 KINDS = {1: ("any",), 2: ("near", "close", "mixed", "distant"), 3: ("near", "close", "mixed", "distant", "series")}
-"""Regimes, by the size of the largest block."""
+"""Regimes of a block, by its size."""
+
+
+def kinds(structure: Structure) -> tuple[str, ...]:
+    """Return the regimes of a problem: of the blocks with several waves if all are in the same, else 'any'."""
+    several = sum(size > 1 for size in structure.sizes) > 1
+    return (*KINDS[max(structure.sizes)], *(("any",) if several else ()))
 
 
 def regime(waves: Any) -> Any:
@@ -126,16 +133,78 @@ def displacements(structure: Structure, even: list[Any], odd: list[Any]) -> tupl
     return q, [even[i] if structure.odd[i] else odd[i] for i in range(structure.n)]
 
 
+def end_rows(structure: Structure, even: list[Any], odd: list[Any], *, reflected: bool = True) -> tuple[Rows, Rows]:
+    """Return displacements of all places and the forces, links' too, on all columns, in turned signs.
+
+    Of a displacement that a reflection turns both have the other sign. A force of the left end is -P. Behind the
+    columns of the section there is one for each coordinate and each link.
+    """
+    n, size = structure.n, structure.places
+    q, force = displacements(structure, even, odd)
+
+    def row(values: Any, end: int) -> tuple[Any, ...]:
+        second = values[n:] if end or not reflected else [-value for value in values[n:]]
+        return *values[:n], *second, *([ZERO] * (size - 2 * n))
+
+    units = [tuple(Exact(int(c == place)) for c in range(size)) for place in range(2 * n, size)]
+    moved, forces = ([row(values, end) for end in (0, 1) for values in part] for part in (q, force))
+    return [*moved, *units[: structure.coordinates]], [*forces, *units[structure.coordinates :]]
+
+
+def condition(structure: Structure, k: Entries, z: Any, place: int, moved: Rows, forces: Rows) -> tuple[Any, ...]:
+    """Return the condition of a place on all columns."""
+    acting = dict(zip((*range(2 * structure.n), *range(structure.moving, structure.places)), forces, strict=True))
+    own = [moved[e] for e in structure.reach(place)], [acting[d] for d in structure.forces(place)]
+    found: tuple[Any, ...] = kernel.condition(k, z, structure.condition(place), *own)
+    return found
+
+
 def _value(structure: Structure, k: Entries, z: Any, columns: Sequence[Any], basis: Any) -> Any:
-    """Return the determinant of all conditions."""
-    q, force = displacements(structure, *assembled(structure, columns))
-    ends = [
-        kernel.minors([
-            kernel.condition(k, z, structure.condition(end, i), q, force) for i in range(structure.n)
-        ])
-        for end in (1, 0)
-    ]  # fmt: skip
-    return kernel.joined(*ends, structure.n) / basis
+    """Return the determinant of all conditions: by those of the last block, or of one those of the left end alone."""
+    n, width, several = structure.n, structure.places, len(structure.blocks) > 1
+    parts, last = assembled(structure, columns), structure.block(n - 1)
+    left = [p for p in range(n) if all(max(found, default=0) < n for found in structure.touched(k, p))]
+    apart = [p for p in structure.order if structure.block(p) == last] if several else left
+    others = [p for p in structure.order if p not in apart]
+    found = []
+    for places, reflected in ((others, True), (apart, several)):
+        ends = end_rows(structure, *parts, reflected=reflected)
+        found.append(kernel.minors([condition(structure, k, z, place, *ends) for place in places]))
+    sign = structure.sign([*others, *apart])
+    return kernel.joined(*found, len(others), width, sign, () if several else range(n, 2 * n)) / basis
+
+
+def _chain(structure: Structure, k: Entries, z: Any, parts: tuple[Any, Any]) -> Iterator[tuple[Any, Any]]:
+    """Yield determinants on the way from E = 0, w = 0 and no links to what is, with what each may add to the count.
+
+    The odd displacements come first, which are free at the start: sprung takes 0 or 1 away, or adds it where inertia
+    outweighs the spring. Those that have to do with others are held. Then nothing moves that has to do with others: to
+    release one gives 0 or 1 more, whatever it is tied to. A spring between places takes 0 or 1 away.
+    """
+    moved, forces = end_rows(structure, *parts)
+    units, way = [*moved, *forces[2 * structure.n :]], structure.chain(k)
+    final = {place: condition(structure, k, z, place, moved, forces) for place in structure.order}
+    rows = {place: forces[place] if structure.is_odd(place) else units[place] for place in structure.order}
+    places = [*way.lumped, *way.same, *way.following, *way.first, *way.last]
+    places.sort(key=lambda place: structure.block(place) if place not in way.lumped else -2)
+    sign = structure.sign(places)
+
+    def changed(place: int, row: tuple[Any, ...]) -> Any:
+        rows[place] = row
+        size = max(1 + places.index(place), len(way.lumped))
+        upper, lower = [rows[p] for p in places[:size]], [rows[p] for p in places[: size - 1 : -1]]
+        back = -1.0 if len(lower) % 4 in (2, 3) else 1.0
+        return kernel.joined(kernel.minors(upper), kernel.minors(lower), size, structure.places, sign * back)
+
+    for place in way.first:
+        own = structure.own(place)
+        sprung = k[own] - z * k[own + len(structure.reach(place))] > 0.0
+        yield changed(place, final[place]), kernel.where(sprung, -1.0, 1.0)
+    for place in way.bound:
+        yield changed(place, units[place]), -1.0
+    rows |= {place: final[place] for place in way.following}
+    for place in (*way.last, *way.lumped):
+        yield changed(place, final[place]), -1.0 if place >= structure.moving else 1.0
 
 
 def _count(
@@ -147,12 +216,8 @@ def _count(
     columns: Sequence[Any],
     bases: Sequence[Any],
 ) -> tuple[Any, Any]:
-    """Return the count by a chain of end conditions, and the last determinant.
-
-    From E = 0 at both ends, one condition at a time becomes what it is. Free to sprung takes 0 or 1 away, or adds it
-    where inertia outweighs the spring; held to whatever it is gives 0 or 1 more.
-    """
-    n, number, basis = structure.n, 0.0, 1.0
+    """Return the count by a chain of conditions, and the last determinant."""
+    number, basis = 0.0, 1.0
     for block, (_, b), wave, column, own in zip(structure.blocks, matrices, waves, columns, bases, strict=True):
         size = block[1] - block[0]
         table = [k[structure.table(i) : structure.table(i) + 4] for i in range(*block)]
@@ -163,19 +228,10 @@ def _count(
         shear = _shears(structure, block, b)
         number = kernel.reference(_mu(wave, slopes), shear, held[0] * held[1] * own) + number
         basis = own if isinstance(basis, float) else basis * own
-    even, odd = assembled(structure, columns)
-    q, force = displacements(structure, even, odd)
-    rows = {0: list(even), 1: list(even)}
-    found = {end: kernel.minors(rows[end]) for end in (0, 1)}
-    value = kernel.joined(found[1], found[0], n)
-    for end, i in structure.steps(k):
-        first = structure.condition(end, i)
-        rows[end][i] = kernel.condition(k, z, first, q, force)
-        found[end] = kernel.minors(rows[end])
-        value = kernel.joined(found[1], found[0], n)
-        sprung = k[first + i] - z * k[first + n + i] > 0.0
-        number = kernel.adaptable(value * basis, number, kernel.where(sprung, -1.0, 1.0) if structure.odd[i] else 1.0)
-    return number, value / basis
+    value = None
+    for value, change in _chain(structure, k, z, assembled(structure, columns)):
+        number = kernel.adaptable(value * basis, number, change)
+    return number, _value(structure, k, z, columns, basis) if value is None else value / basis
 
 
 def _prepared(structure: Structure, k: Entries, z: Any, kind: str) -> tuple[Any, ...]:
@@ -189,7 +245,7 @@ def _prepared(structure: Structure, k: Entries, z: Any, kind: str) -> tuple[Any,
     return matrices, waves, columns, bases
 
 
-def _functions(structure: Structure, kinds: Sequence[str]) -> dict[str, Callable[[Entries, Any], Sequence[Any]]]:
+def _functions(structure: Structure, wanted: Sequence[str]) -> dict[str, Callable[[Entries, Any], Sequence[Any]]]:
     """Return the functions of the coefficients of a lane and of z, or of half waves along the length."""
 
     def value(kind: str) -> Callable[[Entries, Any], Sequence[Any]]:
@@ -203,23 +259,26 @@ def _functions(structure: Structure, kinds: Sequence[str]) -> dict[str, Callable
         return lambda k, z: _count(structure, k, z, *_prepared(structure, k, z, kind))
 
     def kind_of(k: Entries, z: Any) -> Sequence[Any]:
-        largest = max(structure.blocks, key=lambda block: block[1] - block[0])
-        (a, b) = sections(structure, k, z)[structure.blocks.index(largest)]
-        return [0.0 if len(a) == 1 else regime(block_waves(structure, largest, a, b))]
+        found = None
+        for block, (a, b) in zip(structure.blocks, sections(structure, k, z), strict=True):
+            if len(a) > 1:
+                place = regime(block_waves(structure, block, a, b))
+                found = place if found is None else kernel.where(place == found, found, len(kinds(structure)) - 1.0)
+        return [0.0 if found is None else found]
 
-    found = {f"_value_{kind}": value(kind) for kind in kinds}
-    found |= {f"_count_{kind}": count(kind) for kind in kinds}
+    found = {f"_value_{kind}": value(kind) for kind in wanted}
+    found |= {f"_count_{kind}": count(kind) for kind in wanted}
     return found | {"_regime": kind_of, "_branch": lambda k, turns: [lowest_branch(structure, k, turns)]}
 
 
 @cache
-def formulas(structure: Structure, known: tuple[int | None, ...], kinds: tuple[str, ...] = ()) -> str:
-    """Return the text of ``_value_kind`` and ``_count_kind`` for kinds of regimes, of ``_regime`` and ``_branch``.
+def formulas(structure: Structure, known: tuple[int | None, ...], wanted: tuple[str, ...] = ()) -> str:
+    """Return the text of ``_value_kind`` and ``_count_kind`` for some kinds of regimes, of ``_regime`` and ``_branch``.
 
-    They take coefficients, of which some are known, a lane or lanes, and z or half waves along the length. Default: the
-    kinds that `Determinant` needs.
+    They take coefficients, of which some are known, a lane or lanes, and z or half waves along the length. Wanted by
+    default are the kinds that `Determinant` needs.
     """
-    functions = _functions(structure, kinds or KINDS[max(structure.sizes)])
+    functions = _functions(structure, wanted or kinds(structure))
     waves = {"_wave": kernel.wave_anywhere, "_rising": kernel.rising, "_turning": kernel.turning}
     texts = [straight(name, lambda _, m, function=function: function(m), ["m"]) for name, function in waves.items()]
     texts += [straight(name, function, ["z"], known) for name, function in functions.items()]
@@ -237,7 +296,7 @@ def direct(structure: Structure, known: tuple[int | None, ...]) -> Functions:
 
         return found
 
-    return {name: of_lanes(function) for name, function in _functions(structure, KINDS[max(structure.sizes)]).items()}
+    return {name: of_lanes(function) for name, function in _functions(structure, kinds(structure)).items()}
 
 
 def _product(bases: Sequence[Any]) -> Any:
@@ -287,7 +346,7 @@ class Determinant:
 
     def __init__(self, k: Floats, structure: Structure, functions: Functions, zeros: Integers) -> None:
         self.k, self.structure, self.zeros = k, structure, zeros
-        self._functions, self._kinds = functions, KINDS[max(structure.sizes)]
+        self._functions, self._kinds = functions, kinds(structure)
 
     def take(self, rows: Integers) -> Determinant:
         """Return the functions of some of the rows."""

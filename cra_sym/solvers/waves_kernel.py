@@ -202,11 +202,13 @@ def distant_columns(a, b, half, product, square, e, e12, e21, o, o12, o21, big_c
     )  # fmt: skip
 
 
-def condition(k, z, first, q, p):
-    """Return one condition of an end on all columns: factors of q, linear in z, and of P from ``first`` on."""
-    n = len(q)
-    factors = [k[first + j] - z * k[first + n + j] for j in range(n)]
-    return tuple(total([factors[j] * q[j][c] + k[first + 2 * n + j] * p[j][c] for j in range(n)]) for c in range(2 * n))
+def condition(k, z, first, motions, forces):
+    """Return one condition on all columns: factors of motions, linear in z, and of forces from ``first`` on."""
+    size = len(motions)
+    factors = [k[first + j] - z * k[first + size + j] for j in range(size)]
+    factors += [k[first + 2 * size + j] for j in range(len(forces))]
+    rows = [*motions, *forces]
+    return tuple(total([x * row[c] for x, row in zip(factors, rows, strict=True)]) for c in range(len(rows[0])))
 
 
 def grown(minors, row, size):
@@ -222,23 +224,25 @@ def grown(minors, row, size):
 
 
 def minors(rows):
-    """Return the minors of the conditions of an end, by sets of columns in order."""
-    found = rows[0]
+    """Return the minors of rows, by sets of columns in order; of none it is 1."""
+    found = rows[0] if rows else (Exact(1),)
     for size in range(1, len(rows)):
         found = grown(found, rows[size], size)
     return found
 
 
-def joined(right, left, n):
-    """Return the determinant of all conditions from the minors of both ends; those at the left have odd columns."""
-    sets = list(combinations(range(2 * n), n))
-    place = {columns: at for at, columns in enumerate(sets)}
-    signed = {0: [], 1: []}
-    for columns in sets:
-        rest = tuple(c for c in range(2 * n) if c not in columns)
-        turns = sum(columns) - n * (n - 1) // 2 + sum(c >= n for c in rest) + n
-        signed[turns % 2].append(right[place[columns]] * left[place[rest]])
-    return total(signed[0]) - total(signed[1]) if signed[1] else total(signed[0])
+def joined(upper, lower, size, width, sign=1.0, turned=()):
+    """Return a determinant times a sign from the minors of its first ``size`` rows and of the others (Laplace).
+
+    The others have the other sign in the columns ``turned``.
+    """
+    place = {columns: at for at, columns in enumerate(combinations(range(width), width - size))}
+    signed = [Exact(0)], [Exact(0)]
+    for minor, columns in zip(upper, combinations(range(width), size), strict=True):
+        rest = tuple(c for c in range(width) if c not in columns)
+        turns = sum(columns) - size * (size - 1) // 2 + sum(c in turned for c in rest) + (sign < 0.0)
+        signed[turns % 2].append(minor * lower[place[rest]])
+    return total(signed[0]) - total(signed[1])
 
 
 def adaptable(value, number, change):

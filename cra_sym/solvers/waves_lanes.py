@@ -2,9 +2,9 @@
 # mypy: ignore-errors
 """Template of the compiled twin of `cra_sym.solvers.waves`: the same steps, for blocks of lanes at once.
 
-The functions of a lane stand behind it (see `waves.template`): ``_value`` and ``_count``, in any regime or for waves of
-both signs, ``_regime`` and ``_branch``. In any regime all are evaluated and one is taken, so that loops over lanes have
-no branch.
+Behind it stand (see `waves.template`) the largest multiplicity of a zero and functions of a lane: ``_value`` and
+``_count``, in any regime or for waves of both signs, ``_regime`` and ``_branch``. In any regime all are evaluated and
+one is taken, so that loops over lanes have no branch.
 """
 
 import numpy as np
@@ -57,7 +57,7 @@ def lowest_waves(out, evaluations, k, zeros):
 
 
 def _deflated(value, z, zeros):
-    for multiplicity in range(3):
+    for multiplicity in range(_MOST_ZEROS):
         value = value / (z if zeros > multiplicity else 1.0)
     return value
 

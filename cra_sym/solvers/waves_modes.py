@@ -14,8 +14,21 @@ from numpy.typing import NDArray
 
 from . import waves_kernel, waves_three
 from .shapes import clusters
-from .waves_count import KINDS, assembled, block_waves, displacements, lowest_branch, regime, sections, signs
-from .waves_problem import Floats, Structure, UniformProblem
+from .straight import Exact
+from .waves_count import (
+    KINDS,
+    assembled,
+    block_waves,
+    condition,
+    displacements,
+    end_rows,
+    lowest_branch,
+    regime,
+    sections,
+    signs,
+)
+from .waves_problem import Floats, UniformProblem
+from .waves_structure import Structure
 
 __all__ = ["wave_states"]
 
@@ -35,7 +48,7 @@ _STEP = 1e-30  # of the lowest frequency of half a wave along the length
 
 
 def wave_states(problem: UniformProblem, z: Floats, share: Floats) -> Floats:
-    """Return the state (q, P) of every mode at the stations, mass-normalised; the sign is arbitrary.
+    """Return the state (q, w, P) of every mode at the stations, mass-normalised; the sign is arbitrary.
 
     Parameters
     ----------
@@ -47,8 +60,8 @@ def wave_states(problem: UniformProblem, z: Floats, share: Floats) -> Floats:
 
     Returns
     -------
-    ndarray, shape (rows, modes, stations, 2 n)
-        q in the order of the problem, then P.
+    ndarray, shape (rows, modes, stations, 2 n + m)
+        q in the order of the problem, lumped coordinates, then P.
     """
     rows, modes = z.shape
     row = np.repeat(np.arange(rows), modes)
@@ -63,10 +76,12 @@ def wave_states(problem: UniformProblem, z: Floats, share: Floats) -> Floats:
         conditions = _conditions(structure, k, joined.ravel(), columns.real)
         null = _null_vectors(np.moveaxis(conditions, -1, 0), place.ravel())
         mass = _mass(problem, row, columns[..., 0], step, null.shape[0] // modes)
-        null = _normalised(null.reshape(rows, modes, 2 * structure.n), place, mass)
+        null = _normalised(null.reshape(rows, modes, structure.places), place, mass).reshape(row.size, -1)
         along = _columns(structure, k, moved, 2.0 * share[row] - 1.0).real
-    even, odd = _parts(along, null.reshape(row.size, -1)[..., None])
-    states = np.moveaxis(np.concatenate(displacements(structure, list(even), list(odd))), 0, -1)
+    even, odd = _parts(along, null[..., None])
+    q, force = displacements(structure, list(even), list(odd))
+    lumped = np.broadcast_to(null.T[2 * structure.n : structure.moving, :, None], (structure.coordinates, *q[0].shape))
+    states = np.moveaxis(np.concatenate([q, lumped, force]), 0, -1)
     size = np.abs(states).max(axis=(1, 2), keepdims=True, initial=0.0)
     return np.where(np.abs(states) > _TINY_SHARE * size, states, 0.0).reshape(rows, modes, *states.shape[1:])
 
@@ -151,20 +166,19 @@ def _waves(m: Complexes, x: Floats) -> tuple[Complexes, Complexes]:
 
 def _parts(columns: Any, null: Any) -> tuple[Any, Any]:
     """Return E and O of combinations of the columns, shape (n, ...) each."""
-    even, odd = (columns * np.moveaxis(null, 1, 0)).sum(axis=2)
+    even, odd = (columns * np.moveaxis(null, 1, 0)[: columns.shape[2]]).sum(axis=2)
     return even, odd
 
 
 def _conditions(structure: Structure, k: Floats, z: Floats, columns: Floats) -> Floats:
-    """Return the matrix of the end conditions on the columns, shape (roots, 2 n, 2 n, places)."""
-    n, rows = structure.n, []
-    q, force = displacements(structure, *columns)
-    entries = k[:, :, None]
-    for end, sign in ((1, 1.0), (0, -1.0)):
-        for i in range(n):
-            found = kernel.condition(entries, z[:, None], structure.condition(end, i), q, force)
-            rows.append([*found[:n], *(sign * value for value in found[n:])])
-    return np.moveaxis(np.array(rows), 2, 0)
+    """Return the matrix of all conditions on the columns, shape (roots, places, places, stations)."""
+    ends, entries = end_rows(structure, *(list(part) for part in columns)), k[:, :, None]
+    result = np.zeros((structure.places, structure.places, *columns.shape[3:]))
+    for place, row in enumerate(result):
+        found = condition(structure, entries, z[:, None], place, *ends)
+        for c, value in enumerate(found):
+            row[c] = float(value.value) if isinstance(value, Exact) else value
+    return np.moveaxis(result, 2, 0)
 
 
 def _null_vectors(matrices: Floats, place: NDArray[np.int64]) -> Floats:
@@ -190,20 +204,25 @@ def _mass(problem: UniformProblem, row: NDArray[np.int64], ends: Complexes, step
     sign = np.where(problem.odd, -1.0, 1.0)[:, None]
     columns, rate = ends.real, ends.imag / step
     modes = row.size // rows
+    masses = problem.springs_and_masses()[1]
 
     def mass(i: int, first: Floats, second: Floats) -> Floats:
         here = slice(i, None, modes)
-        total = np.zeros(rows)
-        for end, side in ((1, 1.0), (0, -1.0)):
-            flip = np.repeat([1.0, side], n)
+        total, moved = np.zeros(rows), []
+        for side in (-1.0, 1.0):
+            flip = np.repeat([1.0, side, 1.0], [n, n, structure.places - 2 * n])
             # at the left end E of O-columns and O of E-columns have the other sign
             states = [_parts(columns[..., here], vector * flip) for vector in (first, second)]
             (e1, o1), (e2, o2) = ((e, side * o) for e, o in states)
             e_rate, o_rate = _parts(rate[..., here], first * flip)
             total += side * (sign * (e_rate * o2 - side * o_rate * e2)).sum(axis=0)
-            q1, q2 = (np.array(displacements(structure, list(e), list(o))[0]) for e, o in ((e1, o1), (e2, o2)))
-            total += np.einsum("ir,rij,jr->r", q1, problem.end_rows(end)[1], q2)
-        return total
+            moved.append([displacements(structure, list(e), list(o))[0] for e, o in ((e1, o1), (e2, o2))])
+        one, other = (
+            np.concatenate([*(end[at] for end in moved), vector.T[2 * n : structure.moving]])
+            for at, vector in enumerate((first, second))
+        )
+        kinetic: Floats = total + np.einsum("ir,rij,jr->r", one, masses, other)
+        return kinetic
 
     return mass
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
-from itertools import accumulate, combinations, pairwise
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -13,80 +12,23 @@ from numpy.typing import NDArray
 
 from .straight import Exact
 from .waves_kernel import minors, total
+from .waves_structure import TERMS, Structure
 
-__all__ = ["Floats", "Integers", "Structure", "UniformProblem", "negative_energy", "rigid_motions"]
+__all__ = [
+    "Floats",
+    "Integers",
+    "UniformProblem",
+    "idle_coordinates",
+    "negative_energy",
+    "negative_motions",
+    "rigid_motions",
+]
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _DEPENDENT = 1e-14  # a row of unit size that rounding leaves of a dependent one
-_TERMS = 4  # coefficients of polynomials in z
-
-
-@dataclass(frozen=True)
-class Structure:
-    """What the rows of a problem have in common.
-
-    Attributes
-    ----------
-    odd : tuple of bool
-        Which displacements are odd under reflection.
-    sizes : tuple of int
-        Displacements that are coupled inside, block by block.
-    """
-
-    odd: tuple[bool, ...]
-    sizes: tuple[int, ...]
-
-    @property
-    def n(self) -> int:
-        """Displacements of a section."""
-        return len(self.odd)
-
-    @cached_property
-    def blocks(self) -> tuple[tuple[int, int], ...]:
-        """First displacement of each block, and the first that follows it."""
-        ends = list(accumulate(self.sizes, initial=0))
-        return tuple(pairwise(ends))
-
-    @property
-    def matrices(self) -> tuple[int, int]:
-        """Where the entries of both matrices begin among the coefficients."""
-        return 0, 2 * self.n**2
-
-    def condition(self, end: int, displacement: int) -> int:
-        """Return where the factors of a condition begin: those of q, of -z q and of P."""
-        return (4 + 3 * (1 - end)) * self.n**2 + 3 * self.n * displacement
-
-    def table(self, displacement: int) -> int:
-        """Return where the polynomials of a block begin whose first displacement this is."""
-        return 10 * self.n**2 + _TERMS * displacement
-
-    @property
-    def coefficients(self) -> int:
-        """Number of all coefficients."""
-        return self.table(self.n)
-
-    def steps(self, entries: Sequence[Any]) -> tuple[tuple[int, int], ...]:
-        """Return end and displacement of the conditions that differ from E = 0, in the order in which they replace it.
-
-        Odd displacements come first: while the even ones are held, what couples both is idle. Displacements that follow
-        others come before these if they are even, which are held, and after them if they are odd, which are free.
-        """
-
-        def place(end: int, i: int) -> tuple[bool, bool]:
-            force = entries[self.condition(end, i) + 2 * self.n + i]
-            follows = isinstance(force, Exact) and not force.value
-            return not self.odd[i], follows == self.odd[i]
-
-        ordered = {end: sorted(range(self.n), key=lambda i: place(end, i)) for end in (1, 0)}
-        return tuple((end, i) for end in (1, 0) for i in ordered[end] if not self._is_reference(entries, end, i))
-
-    def _is_reference(self, entries: Sequence[Any], end: int, i: int) -> bool:
-        first = self.condition(end, i)
-        row = [entry.value if isinstance(entry, Exact) else None for entry in entries[first : first + 3 * self.n]]
-        one = i + (2 * self.n if self.odd[i] else 0)
-        return row == [int(j == one) for j in range(3 * self.n)]
+_MOST = 3  # displacements that are coupled inside
 
 
 @dataclass(frozen=True)
@@ -102,23 +44,29 @@ class UniformProblem:
     length : ndarray, shape (rows,)
         In (0, inf).
     odd_by_even, even_by_odd : ndarray, shape (2, rows, n, n)
-        A_OE and A_EO: the part without z, and the factor of z; n is 1 to 3.
-    stiffness, mass : ndarray, shape (2, rows, n)
-        Of the end conditions at the left (first) and right end, in the units of P over those of q:
-        ``P + (k - z m) q = 0`` at the right end, ``-P + (k - z m) q = 0`` at the left. Stiffness in [0, inf], inf holds
-        the displacement; masses in [0, inf).
+        A_OE and A_EO: the part without z, and the factor of z.
+    stiffness, mass : ndarray, shape (rows, places)
+        Of the conditions of the left end, of the right end, of the m lumped coordinates and of links, in the units of P
+        over those of q: ``P + (k - z m) q = 0`` at the right end, ``-P + (k - z m) q = 0`` at the left, and
+        ``(k - z m) w = 0``. Stiffness in [0, inf], inf holds what it acts on; masses in [0, inf), of links 0.
     odd : tuple of bool
         Which displacements are odd. (If all of a block are, call them even.)
-    couplings : ndarray, shape (2, 2, rows, n, n), optional
-        Off-diagonal entries of the end matrices: stiffness and mass, of the left and the right end. An offset mass m at
-        the distance e has m e. The end matrices must be positive semidefinite, and couple no two odd displacements.
-    ties : ndarray, shape (2, rows, n, n), optional
-        A displacement i that is held at an end is ``sum_j ties[end, row, i, j] q_j`` there, of displacements j of the
-        same parity that are not held; stiffness, mass and couplings of these are those of the motion that is left.
+    couplings : ndarray, shape (2, rows, 2 n + m, 2 n + m), optional
+        Off-diagonal entries of stiffness and mass. An offset mass m at the distance e has m e. Both matrices must be
+        positive semidefinite.
+    ties : ndarray, shape (rows, 2 n + m, 2 n + m), optional
+        A displacement i that is held is ``sum_j ties[row, i, j] q_j`` of others that are not held; stiffness, mass and
+        couplings of these are those of the motion that is left. What may be tied must be `known`.
     sizes : tuple of int, optional
-        Displacements that the matrices couple, block by block in order. Default: one block of all.
+        Displacements that the matrices couple, block by block in order, 1 to 3 each. Default: one block of all.
     known : tuple of (0, 1 or None), optional
         Coefficients, as `Structure` orders them, that are 0 or 1 in all rows: formulas for them are shorter.
+    coordinates : int
+        m.
+    linked : bool
+        Whether couplings or ties join the ends; with coordinates or links they always may.
+    stretches : ndarray, shape (rows, links, 2 n + m), optional
+        What each link is stretched by a unit of each displacement and coordinate.
     """
 
     length: Floats
@@ -131,22 +79,26 @@ class UniformProblem:
     ties: Floats | None = None
     sizes: tuple[int, ...] | None = None
     known: tuple[int | None, ...] | None = None
+    coordinates: int = 0
+    linked: bool = False
+    stretches: Floats | None = None
 
     def __post_init__(self) -> None:
-        rows, n = len(self.length), self.odd_by_even.shape[-1]
+        rows, n, structure = len(self.length), self.odd_by_even.shape[-1], self.structure
+        moving, places = 2 * n + self.coordinates, 2 * n + self.coordinates + structure.links
         shapes: dict[str, tuple[int, ...]] = {"odd_by_even": (2, rows, n, n), "even_by_odd": (2, rows, n, n)}
-        shapes |= {"stiffness": (2, rows, n), "mass": (2, rows, n)}
-        shapes |= {"couplings": (2, 2, rows, n, n), "ties": (2, rows, n, n)}
+        shapes |= {"stiffness": (rows, places), "mass": (rows, places), "stretches": (rows, structure.links, moving)}
+        shapes |= {"couplings": (2, rows, moving, moving), "ties": (rows, moving, moving)}
         for name, shape in shapes.items():
             value = getattr(self, name)
             if value is not None and value.shape != shape:
                 raise ValueError(f"{name}: the shape {value.shape} must be {shape}")
-        if not 1 <= n <= 3:
-            raise ValueError(f"odd_by_even: the number of displacements {n} must be 1, 2 or 3")
         if len(self.odd) != n:
             raise ValueError(f"odd = {self.odd}: must tell of each of {n} displacements whether it is odd")
-        if sum(self.structure.sizes) != n:
-            raise ValueError(f"sizes = {self.sizes}: the sum must be {n}")
+        if sum(structure.sizes) != n or not all(1 <= size <= _MOST for size in structure.sizes):
+            raise ValueError(f"sizes = {self.sizes}: the sum must be {n}, each 1 to {_MOST}")
+        if self.ties is not None and self.known is None:
+            raise ValueError("known = None: must be given with ties")
         for start, stop in self.structure.blocks:
             if all(self.odd[start:stop]):
                 raise ValueError(f"odd = {self.odd}: not all displacements of a block must be odd")
@@ -154,34 +106,46 @@ class UniformProblem:
     @cached_property
     def structure(self) -> Structure:
         """What all rows have in common."""
-        return Structure(tuple(self.odd), self.sizes or (len(self.odd),))
+        links = 0 if self.stretches is None else self.stretches.shape[1]
+        linked = self.linked or self.coordinates > 0 or links > 0
+        return Structure(tuple(self.odd), self.sizes or (len(self.odd),), self.coordinates, links, linked)
+
+    def without_idle_links(self) -> UniformProblem:
+        """Return the problem without rigid links between what other infinite stiffness holds already."""
+        size = self.structure.moving
+        rigid = np.isinf(self.stiffness[:, size:])
+        if self.stretches is None or not rigid.any():
+            return self
+        rows = np.flatnonzero(rigid.any(axis=1))
+        movable = np.where(np.isinf(self.stiffness[rows, :size])[:, None], 0.0, self.stretches[rows])
+        held = np.where(rigid[rows, :, None], movable, 0.0)
+        stiffness = self.stiffness.copy()
+        for link in range(held.shape[1]):
+            idle = rigid[rows, link] & (_ranks(held[:, : link + 1]) == _ranks(held[:, :link]))
+            stiffness[rows[idle], size + link] = 0.0
+        return replace(self, stiffness=stiffness)
 
     def take(self, rows: Integers | slice) -> UniformProblem:
         """Return the problem of some of the parameter sets."""
-        names = ("odd_by_even", "even_by_odd", "stiffness", "mass", "ties")
-        parts = {name: getattr(self, name) for name in names}
-        parts = {name: None if part is None else part[:, rows] for name, part in parts.items()}
-        couplings = None if self.couplings is None else self.couplings[:, :, rows]
-        return replace(self, length=self.length[rows], couplings=couplings, **parts)
+        parts = {name: getattr(self, name)[:, rows] for name in ("odd_by_even", "even_by_odd")}
+        parts |= {name: getattr(self, name)[rows] for name in ("length", "stiffness", "mass")}
+        couplings = None if self.couplings is None else self.couplings[:, rows]
+        ties, stretches = (None if part is None else part[rows] for part in (self.ties, self.stretches))
+        return replace(self, couplings=couplings, ties=ties, stretches=stretches, **parts)
 
-    def end_rows(self, end: int, rows: Integers | slice = slice(None)) -> tuple[Floats, Floats, Floats]:
-        """Return the factors of q, of -z q and of P in the conditions of an end, shape (rows, n, n) each.
+    def springs_and_masses(self, rows: Integers | slice = slice(None)) -> tuple[Floats, Floats]:
+        """Return the factors of displacements and of -z times these in all conditions, (rows, 2 n + m, 2 n + m) each.
 
-        A condition of a displacement that is held has no force.
+        Links are left out. The condition of a displacement that is held says so.
         """
-        stiffness, mass = self.stiffness[end, rows], self.mass[end, rows]
-        held, unit = np.isinf(stiffness), np.eye(stiffness.shape[1])
-        springs, masses = np.where(held, 1.0, stiffness)[:, :, None] * unit, mass[:, :, None] * unit
-        force = np.where(held, 0.0, 1.0)[:, :, None] * unit
+        size = self.structure.moving
+        stiffness, mass = self.stiffness[rows, :size], self.mass[rows, :size]
+        held, unit = np.isinf(stiffness)[:, :, None], np.eye(size)
+        springs, masses = np.where(held[..., 0], 1.0, stiffness)[:, :, None] * unit, mass[:, :, None] * unit
         if self.couplings is not None:
-            springs, masses = springs + self.couplings[0, end, rows], masses + self.couplings[1, end, rows]
-        ties = 0.0 if self.ties is None else self.ties[end, rows]
-        if self.couplings is not None or self.ties is not None:
-            springs = np.where(held[:, :, None], unit - ties, springs)
-        if self.ties is not None:
-            force = force + np.where(held[:, :, None], 0.0, np.swapaxes(ties, 1, 2))
-        masses = np.where(held[:, :, None], 0.0, masses)
-        return springs, masses, force
+            springs, masses = springs + self.couplings[0, rows], masses + self.couplings[1, rows]
+        ties = 0.0 if self.ties is None else self.ties[rows]
+        return np.where(held, unit - ties, springs), np.where(held, 0.0, masses)
 
     @cached_property
     def varying(self) -> list[int]:
@@ -204,39 +168,49 @@ class UniformProblem:
             if at in row:
                 (which, power), (i, j) = divmod(at // (n * n), 2), divmod(at % (n * n), n)
                 np.multiply(matrices[which][power, :, i, j], half, out=row[at])
-        for end in (1, 0):
-            for i in range(n):
-                first = structure.condition(end, i)
-                if any(place in row for place in range(first, first + 3 * n)):
-                    self._enter_condition(row, first, end, i)
+        for place in range(structure.places):
+            if any(at in row for at in range(structure.condition(place), structure.condition(place + 1))):
+                self._enter_condition(row, place)
         self._enter_dispersion(row)
         return k
 
     def all_coefficients(self) -> Floats:
         """Return all coefficients, those that are known too."""
-        return replace(self, known=None).coefficients()
+        return replace(self, known=(None,) * self.structure.coefficients).coefficients()
 
-    def _enter_condition(self, row: dict[int, Floats], first: int, end: int, i: int) -> None:
-        """Enter the factors of a condition over 1 + k + m; O is reflected at the left end."""
-        n = len(self.odd)
-        stiffness, mass = self.stiffness[end, :, i], self.mass[end, :, i]
-        held = np.isinf(stiffness)
-        some = held.any()
-        share = 1.0 / (1.0 + stiffness + mass)
-        for j in range(n):
-            sign = -1.0 if end == 0 and self.odd[i] != self.odd[j] else 1.0
-            unit = 1.0 if i == j else 0.0
-            ties = (0.0, 0.0) if self.ties is None else (self.ties[end, :, i, j], self.ties[end, :, j, i])
+    def _enter_condition(self, row: dict[int, Floats], place: int) -> None:
+        """Enter the factors of a condition over 1 + k + m, in turned signs."""
+        structure, turned = self.structure, self.structure.turned
+        stiffness, mass = self.stiffness[:, place], self.mass[:, place]
+        held, link = np.isinf(stiffness), place - structure.moving
+        some, share = held.any(), 1.0 / (1.0 + stiffness + mass)
+        reach, first = structure.reach(place), structure.condition(place)
+        for j, other in enumerate(reach):
+            sign, unit = turned[place] * turned[other], 1.0 if other == place else 0.0
+            if link >= 0 and first + j in row:
+                assert self.stretches is not None
+                row[first + j][:] = np.where(held, -1.0, -stiffness * share) * self.stretches[:, link, other] * sign
+                continue
+            tie = 0.0 if self.ties is None or link >= 0 else self.ties[:, place, other]
             for part, own in ((0, stiffness), (1, mass)):
-                if first + part * n + j in row:
-                    value = own * share if i == j else 0.0
+                at = first + part * len(reach) + j
+                if at in row and link < 0:
+                    value = own * share if other == place else 0.0
                     if self.couplings is not None:
-                        value = value + self.couplings[part, end, :, i, j] * (share * sign)
-                    row[first + part * n + j][:] = (
-                        np.where(held, unit - ties[0] if part == 0 else 0.0, value) if some else value
-                    )
-            if first + 2 * n + j in row:
-                row[first + 2 * n + j][:] = share * (unit + ties[1])
+                        value = value + self.couplings[part, :, place, other] * (share * sign)
+                    row[at][:] = np.where(held, (unit - tie) * sign if part == 0 else 0.0, value) if some else value
+        for j, other in enumerate(structure.forces(place), start=first + 2 * len(reach)):
+            if j in row:
+                row[j][:] = share * self._force(place, other) * (turned[place] * turned[other])
+
+    def _force(self, place: int, other: int) -> Floats | float:
+        """Return how a force enters the condition of a place: by what the place moves of what it acts on."""
+        link, moving = other - self.structure.moving, self.structure.moving
+        if place >= moving or link < 0:
+            tie = 0.0 if self.ties is None or max(place, other) >= moving else self.ties[:, other, place]
+            return (1.0 if place == other else 0.0) + tie
+        assert self.stretches is not None
+        return self.stretches[:, link, place]
 
     def _enter_dispersion(self, row: dict[int, Floats]) -> None:
         structure, n = self.structure, len(self.odd)
@@ -250,8 +224,8 @@ class UniformProblem:
             )
             for order in range(1, stop - start + 1):
                 first = structure.table(start + order - 1)
-                if any(place in row for place in range(first, first + _TERMS)):
-                    for place, value in enumerate(_symmetric(b, a, order)[:_TERMS], start=first):
+                if any(place in row for place in range(first, first + TERMS)):
+                    for place, value in enumerate(_symmetric(b, a, order)[:TERMS], start=first):
                         if place in row:
                             row[place][:] = 0.0 if isinstance(value, Exact) else value
 
@@ -291,31 +265,37 @@ def rigid_motions(problem: UniformProblem) -> Integers:
     Exact: such a motion has P = 0, so ``q' = A_qq q`` with ``A_Pq q = 0``, and is zero where an end has stiffness. Only
     linear dependence of a few rows of numbers decides.
     """
-    rows, n = problem.stiffness.shape[1:]
-    result = np.zeros(rows, dtype=np.int64)
-    sprung = problem.stiffness > 0.0
-    coupled = np.zeros(rows, dtype=bool)
+    structure, n, m = problem.structure, problem.structure.n, problem.coordinates
+    result = np.zeros(len(problem.length), dtype=np.int64)
+    coupled = np.full(len(problem.length), structure.linked)
     if problem.couplings is not None:
-        coupled |= problem.couplings[0].any(axis=(0, 2, 3))
+        coupled |= problem.couplings[0].any(axis=(1, 2))
     if problem.ties is not None:
-        coupled |= problem.ties.any(axis=(0, 2, 3))
-    open_ = np.flatnonzero(coupled | ~sprung.all(axis=2).any(axis=0))
+        coupled |= problem.ties.any(axis=(1, 2))
+    sprung = problem.stiffness > 0.0
+    open_ = np.flatnonzero(coupled | ~(sprung[:, :n].all(axis=1) | sprung[:, n : 2 * n].all(axis=1)))
     if not open_.size:
         return result
     gradient, force = _static_blocks(problem, open_)
     right, left = np.eye(n), np.eye(n)
     power = term = np.broadcast_to(np.eye(n), gradient.shape)
-    conditions = [force]
+    inside = [force]
     for j in range(1, n):
         power = power @ gradient
-        conditions.append(force @ power)
+        inside.append(force @ power)
         term = power / float(np.prod(range(1, j + 1)))
         right, left = right + term, left + (-1.0) ** j * term
-    for end, motion in ((0, left), (1, right)):
-        stiffness = problem.end_rows(end, open_)[0]
-        size = np.abs(stiffness).max(axis=2, keepdims=True)
-        conditions.append(stiffness / np.where(size > 0.0, size, 1.0) @ motion)
-    result[open_] = n - _ranks(np.concatenate(conditions, axis=1))
+    moved = np.zeros((open_.size, 2 * n + m, n + m))  # by the displacements of mid-span, and coordinates
+    moved[:, :n, :n], moved[:, n : 2 * n, :n], moved[:, 2 * n :, n:] = left, right, np.eye(m)
+    stiffness = problem.springs_and_masses(open_)[0]
+    if problem.stretches is not None:
+        stretched = problem.stiffness[open_, structure.moving :, None] > 0.0
+        stiffness = np.concatenate([stiffness, np.where(stretched, problem.stretches[open_], 0.0)], axis=1)
+    size = np.abs(stiffness).max(axis=2, keepdims=True)
+    ends = stiffness / np.where(size > 0.0, size, 1.0) @ moved
+    still = np.concatenate(inside, axis=1)
+    still = np.concatenate([still, np.zeros((*still.shape[:2], m))], axis=2)
+    result[open_] = n + m - _ranks(np.concatenate([still, ends], axis=1))
     return result
 
 
@@ -335,7 +315,7 @@ def _ranks(matrix: Floats) -> Integers:
     rest = matrix.copy()
     rank = np.zeros(len(rest), dtype=np.int64)
     every = np.arange(len(rest))
-    for _ in range(matrix.shape[2]):
+    for _ in range(min(matrix.shape[1:])):
         size = np.abs(rest).max(axis=2)
         rest = rest / np.where(size > 0.0, size, 1.0)[:, :, None]
         best = np.abs(rest).max(axis=1).argmax(axis=1)
@@ -352,18 +332,58 @@ def _ranks(matrix: Floats) -> Integers:
 def negative_energy(problem: UniformProblem) -> NDArray[np.bool_]:
     """Return where static strain energy may be negative, as in compression: only there can a row buckle."""
     _, force = _static_blocks(problem, np.arange(len(problem.length)))
-    found = ~_are_semidefinite(force)
-    if problem.couplings is not None:
-        for end in (0, 1):
-            held = np.isinf(problem.stiffness[end])
-            stiffness = np.where(held[:, :, None] | held[:, None, :], 0.0, problem.end_rows(end)[0])
-            found |= ~_are_semidefinite(stiffness)
+    found = np.zeros(len(force), dtype=bool)
+    for start, stop in problem.structure.blocks:
+        found |= ~_are_semidefinite(force[:, start:stop, start:stop])
+    return found | negative_motions(problem, 0)
+
+
+@np.errstate(invalid="ignore", over="ignore", divide="ignore")
+def negative_motions(problem: UniformProblem, part: int) -> NDArray[np.bool_]:
+    """Return where the stiffness (part 0) or the mass (1) of the conditions may be negative in some motion."""
+    found = np.zeros(len(problem.length), dtype=bool)
+    if problem.couplings is None:
+        return found
+    held = np.isinf(problem.stiffness[:, : problem.structure.moving])
+    matrix = np.where(held[:, :, None] | held[:, None, :], 0.0, problem.springs_and_masses()[part])
+    pattern = problem.couplings[part].any(axis=0)
+    for group in _groups(pattern | pattern.T):
+        found |= ~_are_semidefinite(matrix[:, group][:, :, group])
     return found
 
 
+def idle_coordinates(problem: UniformProblem) -> NDArray[np.bool_]:
+    """Return where coordinates have a motion without any spring, mass or displacement of an end."""
+    found, first, structure = np.zeros(len(problem.length), dtype=bool), 2 * problem.structure.n, problem.structure
+    if problem.coordinates:
+        lumped = slice(first, structure.moving)
+        parts = [part[:, :, lumped] for part in problem.springs_and_masses()]
+        if problem.ties is not None:
+            parts.append(problem.ties[:, :first, lumped])
+        if problem.stretches is not None:
+            stiff = problem.stiffness[:, structure.moving :, None] > 0.0
+            parts.append(np.where(stiff, problem.stretches[:, :, lumped], 0.0))
+        found |= _ranks(np.concatenate(parts, axis=1)) < problem.coordinates
+    return found
+
+
+def _groups(pattern: NDArray[np.bool_]) -> list[list[int]]:
+    """Return the places that a pattern of entries couples, group by group."""
+    label = np.arange(len(pattern))
+    for i, j in zip(*np.nonzero(pattern), strict=True):
+        label[label == label[i]] = label[j]
+    groups = [np.flatnonzero(label == value).tolist() for value in np.unique(label)]
+    return [group for group in groups if len(group) > 1]
+
+
 def _are_semidefinite(matrices: Floats) -> NDArray[np.bool_]:
-    """Return where all principal minors of symmetric matrices are not negative, but for rounding."""
+    """Return where symmetric matrices have no negative eigenvalue, but for rounding: small ones by principal minors."""
     n = matrices.shape[1]
+    if n > _MOST:
+        scale = np.sqrt(np.abs(np.diagonal(matrices, axis1=1, axis2=2)))
+        scale = np.where(scale > 0.0, scale, 1.0)
+        values = np.linalg.eigvalsh(matrices / (scale[:, :, None] * scale[:, None, :]))
+        return np.asarray(values[:, 0] >= -1e-14 * n)
     every = np.ones(len(matrices), dtype=bool)
     for size in range(1, n + 1):
         for places in combinations(range(n), size):

@@ -155,10 +155,3 @@ def test_rigid_motions_of_tied_fields_are_exact_zeros():
     )  # fmt: skip
     omega = system.natural_frequencies(4)
     assert (omega[:2] == 0.0).all() and omega[2] > 0.0
-
-
-def test_what_the_count_does_not_know_takes_the_dynamic_stiffness():
-    """Springs between the slopes of a beam and another slope, and ends that are linked."""
-    between = -HALF * k * (v.subs(x, 0) - v.subs(x, L)) ** 2
-    linked = cra.Model(BEAM, fields=[v], x=x, domain=(0, L), t=t, left=between)
-    assert isinstance(linked.at({s.name: GIVEN[s.name] for s in linked.symbols})._route, GeneralRoute)

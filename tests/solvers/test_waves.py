@@ -182,7 +182,7 @@ def coupled_strings(springs, ends, masses):
     a, b = np.zeros((2, 1, 2, 2)), np.zeros((2, 1, 2, 2))
     a[0, 0] = [[first + between, -between], [-between, second + between]]
     a[1, 0], b[0, 0] = np.diag([-1.0, -0.7]), np.diag([1.0, 1 / 1.9])
-    ends, masses = (np.asarray(values)[:, None] for values in (ends, masses))
+    ends, masses = (np.ravel(values)[None] for values in (ends, masses))
     return UniformProblem(np.array([1.3]), a, b, ends, masses, odd=(False, False))
 
 
@@ -227,8 +227,8 @@ def test_offset_end_masses(family, offset):
 def test_coupled_end_springs():
     """A spring at an arm beyond the end: one direction of the end stays free, and the beam turns about the spring."""
     problem = beams(FREE, (4.0, 4.0 * 0.3**2))
-    couplings = np.zeros((2, 2, 1, 2, 2))
-    couplings[0, 1, 0] = [[0.0, 4.0 * 0.3], [4.0 * 0.3, 0.0]]
+    couplings = np.zeros((2, 1, 4, 4))
+    couplings[0, 0, 2:, 2:] = [[0.0, 4.0 * 0.3], [4.0 * 0.3, 0.0]]
     parts = problem.length, problem.odd_by_even, problem.even_by_odd, problem.stiffness, problem.mass
     problem = UniformProblem(*parts, couplings=couplings)
     assert rigid_motions(problem)[0] == 1
@@ -240,7 +240,7 @@ def test_coupled_end_springs():
 def section(ends, masses, odd_by_even, even_by_odd, odd, length=1.0):
     """Return a problem with one row from its matrices: constants and factors of z."""
     matrices = (np.array(matrix, dtype=float)[:, None] for matrix in (odd_by_even, even_by_odd))
-    ends, masses = (np.array(values, dtype=float)[:, None] for values in (ends, masses))
+    ends, masses = (np.ravel(np.array(values, dtype=float))[None] for values in (ends, masses))
     return UniformProblem(np.array([length]), *matrices, ends, masses, odd=odd)
 
 

@@ -17,7 +17,7 @@ from tests.solvers.test_waves import (
     random_bending_and_torsion,
     random_string,
 )
-from tests.solvers.wave_problems import INF, beams, positions, stiffness, system
+from tests.solvers.wave_problems import INF, beams, end_matrices, positions, stiffness, system
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(200)
 ENDS = np.array([0.0, 1.0])
@@ -25,17 +25,12 @@ ENDS = np.array([0.0, 1.0])
 
 def inner_products(problem, states):
     """Return the mass matrix of modes whose states stand at the Gauss points, then at both ends."""
-    n = len(problem.odd)
+    n, m = len(problem.odd), problem.coordinates
     mass = -system(problem)[1, 0, n:, :n]  # P' = ... - z mass q
-    q = states[..., :n]
-    inside, left, right = q[:, :-2], q[:, -2], q[:, -1]
+    inside = states[:, :-2, :n]
     total = np.einsum("isa,ab,jsb,s->ij", inside, mass, inside, WEIGHTS * problem.length[0] / 2)
-    for end, motion in enumerate((left, right)):
-        matrix = np.diag(problem.mass[end, 0])
-        if problem.couplings is not None:
-            matrix += problem.couplings[1, end, 0]
-        total += motion @ matrix @ motion.T
-    return total
+    motion = np.concatenate([states[:, -2, : n + m], states[:, -1, :n]], axis=1)
+    return total + motion @ end_matrices(problem)[1][0] @ motion.T
 
 
 def random_soft_beam(rng):
@@ -76,7 +71,7 @@ def test_modes_meet_equations_and_end_conditions(seed):
     assert (np.abs(slope - rate) <= bound[:, None] * size).all()
     for end, sign in ((0, -1.0), (1, 1.0)):
         q, force = states[:, 5 + end, :2], states[:, 5 + end, 2:]
-        spring, mass = problem.stiffness[end, 0], problem.mass[end, 0]
+        spring, mass = (values[0, 2 * end : 2 * end + 2] for values in (problem.stiffness, problem.mass))
         held = np.isinf(spring)
         size = np.abs(states).max(axis=1)
         assert (np.abs(q[:, held]) <= 1e-12 * size[:, :2][:, held]).all()

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from mpmath import mp, mpf
+from scipy.linalg import null_space
 
 from cra_sym.solvers.stiffness import DynamicStiffness
 from cra_sym.solvers.waves import UniformProblem
@@ -46,9 +47,10 @@ def beams(
     couplings = None
     if offset is not None:
         springs[3, :, 1] += springs[3, :, 0] * offset**2
-        couplings = np.zeros((2, 2, *shape, 2, 2))
-        couplings[1, 1, :, 0, 1] = couplings[1, 1, :, 1, 0] = springs[3, :, 0] * offset
-    return UniformProblem(length.copy(), a, b, springs[:2], springs[2:], couplings=couplings)
+        couplings = np.zeros((2, *shape, 4, 4))
+        couplings[1, :, 2, 3] = couplings[1, :, 3, 2] = springs[3, :, 0] * offset
+    stiffness, mass = (np.concatenate(list(part), axis=1) for part in (springs[:2], springs[2:]))
+    return UniformProblem(length.copy(), a, b, stiffness, mass, couplings=couplings)
 
 
 def positions(problem: UniformProblem) -> tuple[list[int], list[int]]:
@@ -68,28 +70,52 @@ def system(problem: UniformProblem) -> np.ndarray:
 
 
 def end_matrices(problem: UniformProblem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return stiffness and mass of both ends, shape (rows, 2 n, 2 n), and the motions that they allow as columns."""
-    rows, n = problem.stiffness.shape[1:]
-    stiff, heavy = np.zeros((2, rows, 2 * n, 2 * n))
-    held = np.isinf(problem.stiffness)
-    assert (held == held[:, :1]).all()
-    basis = np.eye(2 * n)
-    for end in (0, 1):
-        here = slice(end * n, (end + 1) * n)
-        stiff[:, here, here] = np.where(held[end], 0.0, problem.stiffness[end])[:, :, None] * np.eye(n)
-        heavy[:, here, here] = problem.mass[end][:, :, None] * np.eye(n)
-        if problem.couplings is not None:
-            stiff[:, here, here] += problem.couplings[0, end]
-            heavy[:, here, here] += problem.couplings[1, end]
-        if problem.ties is not None:
-            assert (problem.ties[end] == problem.ties[end, :1]).all()
-            basis[here, here] += problem.ties[end, 0]
-    return stiff, heavy, basis[:, ~held[:, 0].ravel()]
+    """Return stiffness and mass of (q left, w, q right), shape (rows, size, size), and allowed motions as columns.
+
+    Rows hold the same. The stiffness of links is left out, see `links`.
+    """
+    size = problem.structure.moving
+    springs, rigid = problem.stiffness[:, :size], np.isinf(problem.stiffness[:, size:])
+    held = np.isinf(springs)
+    assert (held == held[:1]).all() and (rigid == rigid[:1]).all()
+    unit = np.eye(size)
+    matrices = [np.where(held, 0.0, springs)[:, :, None] * unit, problem.mass[:, :size, None] * unit]
+    if problem.couplings is not None:
+        matrices = [matrix + more for matrix, more in zip(matrices, problem.couplings, strict=True)]
+    allowed = unit.copy()
+    if problem.ties is not None:
+        assert (problem.ties == problem.ties[:1]).all()
+        allowed += problem.ties[0]
+    allowed = allowed[:, ~held[0]]
+    if rigid.any():
+        assert problem.stretches is not None
+        assert (problem.stretches == problem.stretches[:1]).all()
+        allowed = allowed @ null_space(problem.stretches[0, rigid[0]] @ allowed)
+    order = in_state(problem)
+    stiff, heavy = (matrix[:, order][:, :, order] for matrix in matrices)
+    return stiff, heavy, allowed[order]
+
+
+def in_state(problem: UniformProblem) -> list[int]:
+    """Return the places in the order (q left, w, q right)."""
+    n, size = len(problem.odd), problem.structure.moving
+    return [*range(n), *range(2 * n, size), *range(n, 2 * n)]
+
+
+def links(problem: UniformProblem) -> tuple[np.ndarray, np.ndarray]:
+    """Return stiffness of each link, (rows, links), rigid ones left out, and what (q left, w, q right) stretch it."""
+    found = problem.stiffness[:, problem.structure.moving :]
+    stretches = np.zeros((len(found), 0, problem.structure.moving)) if problem.stretches is None else problem.stretches
+    return np.where(np.isinf(found), 0.0, found), stretches[..., in_state(problem)]
 
 
 def stiffness(problem: UniformProblem) -> DynamicStiffness:
     """Return the dynamic stiffness of a problem whose rows hold the same displacements."""
-    section, (stiff, heavy, free) = system(problem), end_matrices(problem)
+    n, m, found, (stiff, heavy, free) = len(problem.odd), problem.coordinates, system(problem), end_matrices(problem)
+    stiff = stiff + np.einsum("rl,rli,rlj->rij", links(problem)[0], *[links(problem)[1]] * 2)
+    size, place = 2 * (n + m), [*range(n), *range(n + m, 2 * n + m)]  # the state is (q, w, P, r)
+    section = np.zeros((*found.shape[:2], size, size))
+    section[:, :, np.array(place)[:, None], place] = found
 
     def at(z, rows, share):
         return (section[0, rows] + z[:, None, None] * section[1, rows])[:, None], section[1, rows][:, None]
@@ -97,17 +123,20 @@ def stiffness(problem: UniformProblem) -> DynamicStiffness:
     def ends(z, rows):
         return stiff[rows] - z[:, None, None] * heavy[rows], -heavy[rows]
 
-    return DynamicStiffness(at, ends, problem.length, len(problem.odd), 0, free)
+    return DynamicStiffness(at, ends, problem.length, len(problem.odd), problem.coordinates, free)
 
 
 def determinant(problem: UniformProblem, row: int, z: Any) -> Any:
     """Return the determinant of the end conditions on the transfer matrix of the whole length, in many digits."""
     n, constant, slope = len(problem.odd), *system(problem)[:, row]
     transfer = mp.expm((mp.matrix(constant) + z * mp.matrix(slope)) * mpf(problem.length[row]))
-    stiff, heavy, free = end_matrices(problem.take(np.array([row])))
+    alone = problem.take(np.array([row]))
+    stiff, heavy, free = end_matrices(alone)
     boundary, free = mp.matrix(stiff[0]) - z * mp.matrix(heavy[0]), mp.matrix(free)
-    # unknown: P at the left end and the free motions of both; q of the right end, then forces on the free motions
-    left, right = free[:n, :], free[n:, :]
+    for size, stretch in zip(links(alone)[0][0], links(alone)[1][0], strict=True):
+        boundary += mpf(size) * mp.matrix(stretch) * mp.matrix(stretch).T
+    # unknown: P at the left end and the free motions of all places; q of the right end, then forces on the free motions
+    left, right = free[:n, :], free[free.rows - n :, :]
     size = free.cols
     found = mp.zeros(n + size)
     found[:n, :n], found[:n, n:] = transfer[:n, n:], transfer[:n, :n] * left - right
