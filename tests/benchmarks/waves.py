@@ -84,8 +84,8 @@ def problem(values: dict[str, np.ndarray]) -> UniformProblem:
     a[0, :, 0, 0], a[1, :, 0, 0], a[0, :, 1, 1] = values.get("K", zero), -1.0, 1.0
     b[0, :, 0, 0], b[0, :, 0, 1] = 1.0 / values["G"] if "G" in values else 0.0, 1.0
     b[0, :, 1, 0], b[0, :, 1, 1], b[1, :, 1, 1] = -1.0, values.get("T", zero), -values.get("I", zero)
-    stiffness = np.stack([np.stack([values["k_t"], values["k_r"]], axis=1), np.zeros((size, 2))])
-    mass = np.stack([np.zeros((size, 2)), np.stack([values["m_e"], zero], axis=1)])
+    stiffness = np.stack([values["k_t"], values["k_r"], zero, zero], axis=1)
+    mass = np.stack([zero, zero, values["m_e"], zero], axis=1)
     return UniformProblem(np.ones(size), a, b, stiffness, mass)
 
 
