@@ -8,6 +8,7 @@ from functools import lru_cache
 
 from cra_sym.arm.parameters import Arm
 from cra_sym.codegen.arm_batch import arm_batch
+from cra_sym.codegen.arm_time_checks import arm_time_checks
 from cra_sym.codegen.expressions import gauss_rule, modal_functions, spectrum_functions, stability_functions
 from cra_sym.codegen.frozen import stated
 from cra_sym.codegen.library import Check, Library, source
@@ -26,7 +27,7 @@ _QUANTITIES = {"frequency_parameters": 0, "characteristic": 1, "natural_frequenc
     name: 11 + i for i, name in enumerate((
         "mode_shape", "tip_response", "df_dk_t", "df_dk_r", "log_k_t", "log_k_r", "state_space_acceleration_A",
         "state_space_acceleration_B", "state_space_acceleration_C", "state_space_force_A", "state_space_force_B",
-        "state_space_force_C", "excitation_joint", "excitation_axial", "boundary_joint", "boundary_axial",
+        "state_space_force_C", "excitation_joint", "excitation_axial", "boundary_joint", "boundary_axial", "in_time", "response", "input_shaper",
     ))
 }  # fmt: skip
 _README = """\
@@ -47,6 +48,7 @@ _OF_PRECISION = {  # as _constants lists them
     "float32": (2.9e38, 1.1754944e-38, 5e-8, 1e-5, 1e-5, 1e4),
 }
 LEAST_SHARE = _OF_PRECISION["float32"][4]
+_IN_TIME = 1e-12  # error of the outputs in time, relative to the largest term
 _SINGLE, _SINGLE_MODAL = 1e-5, 5e-4  # errors allowed in single precision: of frequencies, of all else
 _PRECISION = {
     "float64": "",
@@ -60,7 +62,8 @@ dimensionless groups from 1e-9 to 1e9, 0 and infinity.
 @lru_cache(maxsize=4)
 def arm_library(name: str, real: str = "float64") -> Library:
     """Return the arm as a library."""
-    parts = source("arm"), _with_widths(source("arm_modes")), source("arm_check")
+    names = "arm", "arm_modes", "sampling", "arm_time", "arm_check"
+    parts = (_with_widths(source(part)) for part in names)
     text = "\n\n".join([_constants(real), _generated(), *parts])
     summary = "A flexible Cartesian robotic arm: frequencies, modes, responses"
     told = stated(Arm.nominal().model)
@@ -130,6 +133,9 @@ def _checks(real: str) -> Iterator[Check]:
             continue
         loss = _SINGLE if quantity <= _QUANTITIES["omega"] else _SINGLE_MODAL
         yield Check(quantity, check.inputs, check.outputs, loss, loss / TOLERANCE * check.absolute)
+    for name, given, expected, size in arm_time_checks():
+        single = _SINGLE_MODAL if real == "float32" else 0.0
+        yield Check(_QUANTITIES[name], given, expected, single or _IN_TIME, (single or _IN_TIME) * size)
     nominal = tuple(float(getattr(Arm.nominal(), name)) for name in ("L", "b", "h", "E", "rho", "m_b", "m_e", "J_e"))
     for bad in (math.nan, -1.0):
         yield Check(0, (bad, 0.0, 0.0, 0.0), (), refused=True)

@@ -17,7 +17,7 @@ from cra_sym.codegen.library import Check, Library, source
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.system import System
 
-__all__ = ["OUTPUTS", "frozen_library", "frozen_system", "stated"]
+__all__ = ["OUTPUTS", "frozen_library", "frozen_system", "stated", "stepped"]
 
 Array = NDArray[np.float64]
 OUTPUTS = ("y", "v", "w", "root_force", "root_moment", "tip_acceleration")
@@ -87,7 +87,7 @@ def frozen_library(
     told += [f"Input u: {given}. Outputs y: {', '.join(names)}."]
     lines = (*stated(system.model), *(line for text in told for line in textwrap.wrap(text, 96)))
     text = constants(blocks, names, system.natural_frequencies(modes))
-    text += "\n\n".join(source(part) for part in ("frozen", "frozen_check", "frozen_example"))
+    text += "\n\n".join(source(part) for part in ("sampling", "frozen", "frozen_check", "frozen_example"))
     summary = "A flexible system frozen as numbers, to be stepped in real time"
     checks = tuple(_checks(blocks, system.natural_frequencies(modes), real))
     return Library(name, summary, text, lines, checks, _readme(given, names), real), given, names
@@ -128,7 +128,7 @@ def _checks(blocks: Blocks, omegas: Array, real: str) -> Iterator[Check]:
     fastest, slowest = float(rates.max()) or 1.0, float(np.min(rates[rates > 0.0], initial=1.0))
     for time in (0.03 / fastest, 0.7 / fastest, 0.3 / slowest):
         for steps in (0, 1, 7, 40):
-            found, size = _stepped(blocks, time, 0.25, steps)
+            found, size = stepped(blocks, time, 0.25, steps)
             for_one = loss * size * max(1.0, time * steps * fastest * 1e-3)
             yield Check(0, (time, 0.25, steps), tuple(found), 0.0, float(for_one))
     for omega in (0.0, 0.31 * slowest, 1.37 * fastest):
@@ -154,7 +154,7 @@ def _checks(blocks: Blocks, omegas: Array, real: str) -> Iterator[Check]:
     yield Check(2, (1.0, 1.0), (), refused=True)
 
 
-def _stepped(blocks: Blocks, time: float, push: float, steps: int) -> tuple[Array, float]:
+def stepped(blocks: Blocks, time: float, push: float, steps: int) -> tuple[Array, float]:
     """Return the outputs after steps of the input that the self-test gives, and the largest size met in the sum."""
     from scipy.linalg import expm
 
