@@ -71,6 +71,7 @@ _HOME = {
     "stations": "mechanics.stations",
     "sweep": "studies",
     "kernel": "kernels",
+    "Controller": "codegen",
     "export": "codegen",
     "explore": "explorer",
 }

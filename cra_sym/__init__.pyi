@@ -42,6 +42,7 @@ from .arm.excitations import JointStiffness as JointStiffness
 from .arm.frequency_parameters import frequency_parameters as frequency_parameters
 from .arm.lagrangian import paper_lagrangian as paper_lagrangian
 from .arm.parameters import Arm as Arm
+from .codegen import Controller as Controller
 from .codegen import export as export
 from .explorer import explore as explore
 from .kernels import kernel as kernel

@@ -1,4 +1,4 @@
-"""Reference vectors of the arm in time: matrix exponentials, shapes fitted to displacements, and the package's shapers."""
+"""Reference vectors of the arm in time: matrix exponentials, fitted shapes, the package's shapers."""
 
 from __future__ import annotations
 

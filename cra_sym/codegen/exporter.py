@@ -11,6 +11,7 @@ from typing import Any
 
 from cra_sym.checks import choice, count, instance
 from cra_sym.codegen.arm_library import arm_library
+from cra_sym.codegen.controllers import Controller
 from cra_sym.codegen.fmu import VERSIONS, fmu_archive
 from cra_sym.codegen.frozen import frozen_library
 from cra_sym.codegen.library import PRINTERS, check_name
@@ -63,6 +64,7 @@ def export(
     version: str = "3.0",
     input: Any = "base_acceleration",
     outputs: Any = None,
+    controller: Controller | None = None,
 ) -> Export:
     """Write the arm, a model, or the modes of any system, as tested source code that does not need this package.
 
@@ -99,6 +101,8 @@ def export(
     input, outputs
         Of a system, as :func:`cra_sym.state_space` takes them; one input. Default outputs: y, v, w, root_force,
         root_moment and tip_acceleration, as far as the system has them.
+    controller : Controller, optional
+        Of a system: a regulator and an observer are exported too, with gains that are computed now.
 
     Returns
     -------
@@ -133,13 +137,17 @@ def export(
         raise ValueError("real = 'float32': only the code of an arm or a system has it; give system=")
     if language in PRINTERS and real not in PRINTERS[language].reals:
         raise ValueError(f"real = {real!r}: {PRINTERS[language].title} has {', '.join(PRINTERS[language].reals)}")
+    if controller is not None:
+        instance("controller", controller, Controller)
+        if system is None or language == "fmu":
+            raise ValueError("controller: is exported with the code of a system; give system=")
     if language == "fmu" and system is None:
         raise ValueError("language = 'fmu': is that of a system; give system=")
     target = Path(os.path.realpath(path_of("directory", directory)))
     _check_free(target, overwrite)
     texts: dict[str, str | bytes]
     if system is not None:
-        texts = _system_texts(language, system, name or "system", modes, real, version, input, outputs)
+        texts = _system_texts(language, system, name or "system", modes, real, version, input, outputs, controller)
     elif model is not None:
         texts = dict(model_library(model, name or "model").texts(language))
     else:
@@ -153,11 +161,19 @@ def export(
 
 
 def _system_texts(
-    language: str, system: System, name: str, modes: int, real: str, version: str, drive: Any, outputs: Any
+    language: str,
+    system: System,
+    name: str,
+    modes: int,
+    real: str,
+    version: str,
+    drive: Any,
+    outputs: Any,
+    controller: Controller | None,
 ) -> dict[str, str | bytes]:
     instance("system", system, System)
     modes = count("modes", modes, high=MOST_MODES)
-    library, given, names = frozen_library(system, name, modes, real, drive, outputs)
+    library, given, names = frozen_library(system, name, modes, real, drive, outputs, controller)
     if language != "fmu":
         return dict(library.texts(language))
     if real != "float64":

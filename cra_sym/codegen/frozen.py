@@ -13,7 +13,10 @@ from numpy.typing import NDArray
 
 from cra_sym.analysis.state_space import state_space
 from cra_sym.codegen.blocks import Blocks, blocks_of
+from cra_sym.codegen.controllers import Controller, controller_checks
 from cra_sym.codegen.library import Check, Library, source
+from cra_sym.codegen.operations import operations
+from cra_sym.kernels.form_parse import parse
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.system import System
 
@@ -76,7 +79,13 @@ def _has(system: System, drive: Any, output: str) -> bool:
 
 
 def frozen_library(
-    system: System, name: str, modes: int, real: str, drive: Any, outputs: Sequence[str] | Mapping[str, Any] | None
+    system: System,
+    name: str,
+    modes: int,
+    real: str,
+    drive: Any,
+    outputs: Sequence[str] | Mapping[str, Any] | None,
+    controller: Controller | None = None,
 ) -> tuple[Library, str, tuple[str, ...]]:
     """Return a system as a library, with the names of its input and its outputs."""
     blocks, names, given = frozen_system(system, modes, drive, outputs)
@@ -87,15 +96,39 @@ def frozen_library(
     told += [f"Input u: {given}. Outputs y: {', '.join(names)}."]
     lines = (*stated(system.model), *(line for text in told for line in textwrap.wrap(text, 96)))
     text = constants(blocks, names, system.natural_frequencies(modes))
-    text += "\n\n".join(source(part) for part in ("sampling", "frozen", "frozen_check", "frozen_example"))
+    checks = [*_checks(blocks, system.natural_frequencies(modes), real)]
+    parts = [source(part) for part in ("sampling", "frozen", "frozen_check", "frozen_example")]
+    if controller is not None:
+        gains = controller.gains(blocks, names)
+        text += _gains(controller, names, *gains)
+        parts[2:3] = [source("controller"), parts[2].rstrip("\n") + "\n    " + source("controller_check")]
+        checks += controller_checks(controller, blocks, gains, list(names), _ERRORS[real])
+    text += "\n\n".join(parts)
     summary = "A flexible system frozen as numbers, to be stepped in real time"
-    checks = tuple(_checks(blocks, system.natural_frequencies(modes), real))
-    return Library(name, summary, text, lines, checks, _readme(given, names), real), given, names
+    return Library(name, summary, text, lines, tuple(checks), _readme(given, names, text), real), given, names
 
 
-def _readme(given: str, names: Sequence[str]) -> str:
+def _gains(controller: Controller, names: Sequence[str], regulator: Array, observer: Array) -> str:
+    """Return the numbers of a controller as a text in the restricted form."""
+    measured = [list(names).index(name) for name in controller.measured]
+    return (
+        f"CONTROL_TIME = {float(controller.time)!r}  # s, sampling time of regulator and observer\n"
+        f"SENSORS = {len(measured)}  # measured outputs: {', '.join(controller.measured)}\n"
+        f"SENSOR_OUTPUTS = ({', '.join(map(str, measured))},)  # their numbers among the outputs\n"
+        f"REGULATOR = ({_numbers(regulator)},)  # gain on all positions, then on all rates\n"
+        f"OBSERVER = ({_numbers(observer)},)  # gain on the measured outputs, state by state\n\n\n"
+    )
+
+
+def _readme(given: str, names: Sequence[str], text: str) -> str:
+    form = parse(text)
     listed = "\n".join(f"| {i} | `{name}` |" for i, name in enumerate(names))
-    return f"The input u is `{given}`; the outputs, in SI units, are\n\n| entry | output |\n| --- | --- |\n{listed}\n"
+    timed = [name for name in ("step", "outputs", "derivative", "control", "correct") if name in form.functions]
+    counts = ", ".join(f"`{name}` {operations(form, name, {})}" for name in timed)
+    return (
+        f"The input u is `{given}`; the outputs, in SI units, are\n\n| entry | output |\n| --- | --- |\n{listed}\n\n"
+        f"Floating-point operations of a call, at most: {counts}.\n"
+    )
 
 
 def constants(blocks: Blocks, names: Sequence[str], omega: Array) -> str:

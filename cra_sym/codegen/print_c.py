@@ -47,18 +47,26 @@ class CPrinter(Printer):
         return "\n\n".join(filter(None, [status, self.integers(), self.records(), *declarations]))
 
     def integers(self) -> str:
-        """Return the whole numbers among the constants, which lengths need."""
+        """Return the constants of the caller: whole numbers, which lengths need, and numbers that no function uses."""
         found = []
-        for c in filter(_counts, self.form.constants.values()):
+        for c in filter(self.told, self.form.constants.values()):
             name = self.variable(c.name)
-            if c.name.startswith("MOST_"):  # what arrays have room for: may be set where memory is short
+            if not _counts(c):
+                found.append(self.documented_constant(c, f"#define {name} {self.literal(c)[0]}"))
+            elif c.name.startswith("MOST_"):  # what arrays have room for: may be set where memory is short
                 found += [f"#ifndef {name}", self.documented_constant(c, f"#define {name} {c.values[0]}"), "#endif"]
             else:
                 found.append(self.documented_constant(c, f"enum {{ {name} = {c.values[0]} }};"))
         return "\n".join(found)
 
     def constants(self) -> str:
-        return "\n".join(self.constant(c) for c in self.form.constants.values() if not _counts(c))
+        return "\n".join(self.constant(c) for c in self.form.constants.values() if not self.told(c))
+
+    def told(self, constant: Constant) -> bool:
+        """Return whether a constant stands in the header."""
+        functions = self.form.functions.values()
+        used = any(isinstance(n, ast.Name) and n.id == constant.name for f in functions for n in ast.walk(f.node))
+        return _counts(constant) or (constant.type.length is None and not used)
 
     def constant(self, constant: Constant) -> str:
         kind, values = self.scalar(constant.type), self.literal(constant)

@@ -1,0 +1,146 @@
+"""A regulator and an observer for exported code, from the Riccati equations of the sampled system."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.checks import real_array
+from cra_sym.codegen.blocks import Blocks
+from cra_sym.codegen.library import Check
+
+__all__ = ["Controller", "controller_checks", "sampled_matrices"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Controller:
+    """What :func:`cra_sym.export` makes a linear-quadratic regulator and a stationary Kalman filter of.
+
+    Parameters
+    ----------
+    time : float
+        Sampling time, s.
+    measured : sequence of str
+        Outputs of the system that are measured.
+    noise : sequence of float
+        Standard deviation of each, from sample to sample, in its unit.
+    disturbance : float
+        Standard deviation of what is added to the input, from sample to sample, in its unit.
+    weights : mapping of str to float
+        Of the squares of outputs, in what the regulator makes least.
+    effort : float
+        Weight of the square of the input.
+
+    Raises
+    ------
+    ValueError
+        If a number is not positive, or there are not as many noises as measured outputs.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import cra_sym as cra
+    >>> sensors = {"measured": ["w", "root_moment"], "noise": [1e-5, 1e-3]}
+    >>> loop = cra.Controller(1e-3, **sensors, disturbance=0.1, weights={"y": 1e4})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     made = cra.export("c", folder, system=cra.Arm.nominal(), controller=loop)
+    """
+
+    time: float
+    measured: Sequence[str]
+    noise: Sequence[float]
+    disturbance: float
+    weights: Mapping[str, float] = field(default_factory=dict)
+    effort: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("time", "disturbance", "effort"):
+            _positive(name, getattr(self, name))
+        if isinstance(self.measured, str) or not len(self.measured):
+            raise ValueError(f"measured = {self.measured!r}: must be names of outputs")
+        if len(self.measured) != len(self.noise):
+            raise ValueError(f"noise: must have {len(self.measured)} numbers, one for each measured output")
+        if not self.weights:
+            raise ValueError("weights: must have an output and its weight")
+        for number in self.noise:
+            _positive("noise", number)
+        for output, number in self.weights.items():
+            _positive(f"weights[{output!r}]", number)
+
+    def gains(self, blocks: Blocks, names: Sequence[str]) -> tuple[Array, Array]:
+        """Return the regulator's gain, shape (states,), and the observer's, shape (states, measured).
+
+        States are the positions of all blocks, then their rates.
+
+        Raises
+        ------
+        ValueError
+            If an output is unknown, or the weighted or the measured ones do not see every block.
+        """
+        for argument, wanted in (("measured", self.measured), ("weights", self.weights)):
+            for name in wanted:
+                if name not in names:
+                    raise ValueError(f"{argument}: {name!r} is not one of the outputs {', '.join(names)}")
+        A, B = sampled_matrices(blocks, self.time)
+        C, D = np.hstack([blocks.on_position, blocks.on_rate]), blocks.through[:, None]
+        weight = np.diag([float(self.weights.get(name, 0.0)) for name in names])
+        cost = D.T @ weight @ D + float(self.effort)
+        cross = C.T @ weight @ D
+        future = _riccati("weights", A, B, C.T @ weight @ C, cost, cross)
+        regulator = np.linalg.solve(cost + B.T @ future @ B, B.T @ future @ A + cross.T)
+        seen = C[[list(names).index(name) for name in self.measured]]
+        noise = np.diag(np.square(np.asarray(self.noise, float)))
+        spread = _riccati("measured", A.T, seen.T, B @ B.T * float(self.disturbance) ** 2, noise, None)
+        observer = np.linalg.solve(seen @ spread @ seen.T + noise, seen @ spread).T
+        return np.asarray(regulator[0]), np.asarray(observer, np.float64)
+
+
+def sampled_matrices(blocks: Blocks, time: float) -> tuple[Array, Array]:
+    """Return A and B of x(t + time) = A x + B u for a held input; x are all positions, then all rates."""
+    from scipy.linalg import expm
+
+    count = len(blocks.stiffness)
+    A, B = np.zeros((2 * count, 2 * count)), np.zeros((2 * count, 1))
+    for i, (k, d) in enumerate(zip(blocks.stiffness, blocks.damping, strict=True)):
+        move = expm(time * np.array([[0.0, 1.0, 0.0], [-k, -d, 1.0], [0.0, 0.0, 0.0]]))
+        A[np.ix_([i, count + i], [i, count + i])], B[[i, count + i], 0] = move[:2, :2], move[:2, 2]
+    return A, B
+
+
+def controller_checks(
+    controller: Controller, blocks: Blocks, gains: tuple[Array, Array], names: list[str], loss: float
+) -> Iterator[Check]:
+    """Yield the input and the corrected outputs after some steps, by matrices."""
+    A, B = sampled_matrices(blocks, controller.time)
+    C, D = np.hstack([blocks.on_position, blocks.on_rate]), blocks.through
+    regulator, observer = gains
+    measured = [names.index(name) for name in controller.measured]
+    x = np.zeros(len(A))
+    for steps in range(9):
+        error = 1e-3 * (1.0 + np.arange(len(measured))) - (C @ x + D * 0.25)[measured]
+        y = C @ (x + observer @ error) + D * 0.25
+        expected = (float(0.125 - regulator @ x), *y)
+        sizes = np.abs(regulator) @ np.abs(x), *(np.abs(C) @ (np.abs(x) + np.abs(observer) @ np.abs(error)))
+        yield Check(4, (0.25, float(steps), 0.125, 1e-3), expected, loss, 10 * loss * float(max(sizes)))
+        x = A @ x + B[:, 0] * 0.25
+    yield Check(4, (0.25, 1.0, 0.125, np.nan), (), refused=True)
+
+
+def _riccati(name: str, A: Array, B: Array, Q: Array, R: Array, S: Array | None) -> Array:
+    from scipy.linalg import solve_discrete_are
+
+    try:
+        return np.asarray(solve_discrete_are(A, B, Q, R, s=S))
+    except np.linalg.LinAlgError as error:
+        raise ValueError(f"{name}: these outputs do not see every mode and the base; add one, such as 'y'") from error
+
+
+def _positive(name: str, value: object) -> None:
+    number = real_array(name, value)
+    if number.ndim or not 0.0 < float(number) < np.inf:
+        raise ValueError(f"{name} = {value!r}: must be in (0, inf)")
