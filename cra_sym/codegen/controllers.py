@@ -15,6 +15,7 @@ from cra_sym.codegen.library import Check
 __all__ = ["Controller", "controller_checks", "sampled_matrices"]
 
 Array = NDArray[np.float64]
+_UNSEEN = "{}: these outputs do not see every mode and the base; add one, such as 'y'"
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,8 @@ class Controller:
         noise = np.diag(np.square(np.asarray(self.noise, float)))
         spread = _riccati("measured", A.T, seen.T, B @ B.T * float(self.disturbance) ** 2, noise, None)
         observer = np.linalg.solve(seen @ spread @ seen.T + noise, seen @ spread).T
+        _settles("weights", A - B @ regulator)
+        _settles("measured", A - A @ observer @ seen)
         return np.asarray(regulator[0]), np.asarray(observer, np.float64)
 
 
@@ -137,7 +140,12 @@ def _riccati(name: str, A: Array, B: Array, Q: Array, R: Array, S: Array | None)
     try:
         return np.asarray(solve_discrete_are(A, B, Q, R, s=S))
     except np.linalg.LinAlgError as error:
-        raise ValueError(f"{name}: these outputs do not see every mode and the base; add one, such as 'y'") from error
+        raise ValueError(_UNSEEN.format(name)) from error
+
+
+def _settles(name: str, closed: Array) -> None:
+    if not np.abs(np.linalg.eigvals(closed)).max() < 1.0 - 1e-10:  # a base that nobody sees stays at 1
+        raise ValueError(_UNSEEN.format(name))
 
 
 def _positive(name: str, value: object) -> None:

@@ -13,7 +13,7 @@ from cra_sym.report.notebooks import execute
 
 FOLDER = Path(__file__).parents[2] / "notebooks"
 DERIVATION = sorted(FOLDER.glob("0[1-7]*.ipynb"))
-TAUGHT = [*DERIVATION, *sorted(FOLDER.glob("1*.ipynb"))]
+TAUGHT = [*DERIVATION, FOLDER / "09_code_export.ipynb", *sorted(FOLDER.glob("1*.ipynb"))]
 #: Another arm: longer, with a heavier tip and a rotary inertia, on a joint that gives; and another Lagrangian.
 OTHER = 'fields |= {"L": 0.8, "m_e": 0.004, "J_e": 1e-6, "k_t": 5e3, "k_r": 4e2}'
 TENSIONED = OTHER + "; tension = 2.0"
