@@ -32,7 +32,7 @@ _HOME = {
     "UndersamplingWarning": "analysis.responses",
     "response": "analysis.responses",
     "tip_response": "analysis.responses",
-    "residual_vibration": "analysis.responses",
+    "residual_vibration": "analysis.residual_vibration",
     "SlipEvent": "analysis.slip_response",
     "SlipResponse": "analysis.slip_response",
     "slip_response": "analysis.slip_response",

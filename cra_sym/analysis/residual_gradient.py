@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.differences import by_differences, central_weights
+from cra_sym.analysis.histories import History
 from cra_sym.analysis.modes import participation
-from cra_sym.analysis.responses import History, Stopped, couples, residual_vibration, stopped
+from cra_sym.analysis.residual_vibration import Stopped, couples, residual_vibration, stopped
 from cra_sym.analysis.sensitivities import Sensitivities, sensitivities
 from cra_sym.checks import count, default_floating_point, names
 from cra_sym.model.one_wave import Change, OneWaveModes

@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from cra_sym.analysis.responses import History, response, tip_response
+from cra_sym.analysis.histories import History
+from cra_sym.analysis.responses import response, tip_response
 from cra_sym.arm.parameters import Arm
 from cra_sym.figures.drawing import BLUE, ORANGE, figure_of, panels
 from cra_sym.figures.subject import fields, moving_place, rigid_ends, single, span

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 
 from cra_sym.analysis.frequency_response import frequency_response
 from cra_sym.analysis.modes import modal_parameters, mode_shapes
-from cra_sym.analysis.responses import residual_vibration, tip_response
+from cra_sym.analysis.residual_vibration import residual_vibration
+from cra_sym.analysis.responses import tip_response
 from cra_sym.analysis.shaping import input_shaper
 from cra_sym.analysis.state_space import state_space
 from cra_sym.arm.parameters import Arm

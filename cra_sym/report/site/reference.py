@@ -18,6 +18,7 @@ _GROUPS = {
         "analysis.frequency_response",
         "analysis.residual_gradient",
         "analysis.responses",
+        "analysis.residual_vibration",
         "analysis.shaping",
         "analysis.state_space",
         "solvers",

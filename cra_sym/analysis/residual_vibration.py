@@ -1,0 +1,206 @@
+"""What is left after a stop: the peak of the tip when all motions and forces have ended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.analysis.complex_responses import complex_residual
+from cra_sym.analysis.histories import History
+from cra_sym.analysis.histories import histories as histories_of
+from cra_sym.analysis.modes import participation, section_place
+from cra_sym.analysis.responses import check_sampling, has_complex_modes, oscillators, slipping_problem
+from cra_sym.analysis.slipping import slipping_residual
+from cra_sym.checks import count, default_floating_point, instance
+from cra_sym.model.projection import Projected
+from cra_sym.model.system import MOST_MODES, System
+from cra_sym.model.values import checked_damping
+from cra_sym.solvers import modal_response as solver
+from cra_sym.solvers.driven_modes import state_at_stop
+from cra_sym.solvers.motion import BaseMotion, Force
+
+if TYPE_CHECKING:
+    from sympy.core.function import AppliedUndef
+
+__all__ = ["Stopped", "couples", "residual_vibration", "stopped"]
+
+Array = NDArray[np.float64]
+
+
+@default_floating_point
+def residual_vibration(
+    system: System,
+    motion: BaseMotion | Mapping[AppliedUndef, History],
+    modes: int = 5,
+    *,
+    zeta: Any = None,
+) -> Any:
+    """Return the peak amplitude of the tip after all motions and forces have stopped, m: the sum over the modes.
+
+    Exact for one mode; without damping the least upper bound over all times (frequencies of modes are
+    incommensurable); with damping an upper bound that ignores only that modes do not peak together. Being at rest
+    after the stop is not a condition: what counts is that the base does not accelerate any more. A rigid-body mode
+    contributes its final offset. Of a system with elastic-slip elements it is the largest displacement while they
+    slip, at most for ten periods of the lowest mode; from where they stick for good on it is the offset and the sum
+    over the modes. Where dampers, gyroscopic forces or forces that follow the motion couple the modes, the sum is over
+    complex modes: two real eigenvalues count as one mode, and what grows leaves inf.
+
+    Parameters
+    ----------
+    system, motion, modes, zeta
+        As in :func:`cra_sym.response`; the system is at rest before t = 0. Every motion and every force must end.
+
+    Returns
+    -------
+    float or ndarray, shape (...)
+
+    Warns
+    -----
+    UndersamplingWarning
+        As :func:`cra_sym.response`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a motion never stops accelerating or a force never ends; otherwise as :func:`cra_sym.response`.
+
+    Examples
+    --------
+    >>> import cra_sym as cra
+    >>> move = cra.BaseMotion.s_curve(0.2, v_max=1.0, a_max=2.0, j_max=40.0)
+    >>> print(f"{1e3 * cra.residual_vibration(cra.Arm.nominal(), move):.1f} mm")
+    21.1 mm
+    """
+    instance("system", system, System)
+    if system.model.pieces["hysteresis"]:
+        if couples(system.without_hysteresis, modes):
+            raise ValueError("system: dampers beside elastic-slip elements leave no sum over modes; use response")
+        still = stopped(system.without_hysteresis, motion, modes, zeta)
+        problem, rows = slipping_problem(system, motion, modes, zeta), system.without_hysteresis.modes(modes)
+        peak = slipping_residual(problem, rows.displacement(1, 0), still.stop)
+        return peak if peak.ndim else float(peak)
+    if couples(system, modes):
+        total = _complex_residual(system, motion, modes, zeta)
+    else:
+        found = stopped(system, motion, modes, zeta)
+        total = np.sum(found.peaks(found.osc.omega, found.products), -1)
+    return total if total.ndim else float(total)
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """Modes that are driven until everything stops.
+
+    Attributes
+    ----------
+    osc : Oscillators
+        Of which omega and zeta count.
+    names : tuple of str
+        What drives.
+    profiles : tuple of BaseMotion
+        Their motions; that of a force is the one whose acceleration it is.
+    stop : float or ndarray
+        When the last of them stops, s.
+    products : list of ndarray, shape (..., modes)
+        Participation in each times the displacement of the tip.
+    """
+
+    osc: solver.Oscillators
+    names: tuple[str, ...]
+    profiles: tuple[BaseMotion, ...]
+    stop: Any
+    products: list[Array]
+
+    def peaks(self, omega: NDArray[Any], products: Sequence[NDArray[Any]]) -> NDArray[Any]:
+        """Return the largest displacement of the tip by each mode after the stop, shape (..., modes).
+
+        Complex frequencies and products carry a derivative along in their imaginary parts.
+        """
+        q: Any = 0.0
+        u: Any = 0.0
+        for profile, product in zip(self.profiles, products, strict=True):
+            one = self.osc._replace(omega=omega, gamma=product)
+            q_one, u_one = state_at_stop(one, profile, self.stop)
+            # a rigid-body mode keeps its inertial momentum: its velocity is the base's, rounding if it has really
+            # stopped
+            speed = np.asarray(profile.velocity(np.max(self.stop)), float)[..., None]
+            drift = np.where(np.abs(speed) > 1e-9, -product * speed, 0.0)
+            q, u = q + q_one, u + np.where(omega.real > 0, u_one, drift)
+        return solver.free_peak(self.osc._replace(omega=omega), q, u)
+
+
+def couples(system: System, modes: int) -> bool:
+    """Tell whether dampers, gyroscopic or follower forces couple the natural modes; refuse what has no complex ones."""
+    instance("system", system, System)
+    if system.numerics("complex_modes") == "none" and system.numerics("damping") is not None:
+        raise ValueError(
+            "system: its dampers couple modes, and with third derivatives by x or inertia of the highest derivatives "
+            "there are no complex ones; use modal damping (zeta), or response after the stop"
+        )
+    return has_complex_modes(system, count("modes", modes, high=MOST_MODES))
+
+
+def _complex_residual(system: System, motion: Any, modes: int, zeta: Any) -> Array:
+    histories, _, stop = _ended(system, motion)
+    modes = count("modes", modes, high=MOST_MODES)
+    ratio = np.asarray(system.zeta if zeta is None else checked_damping(zeta))
+    if zeta is not None and ratio.ndim:
+        if ratio.shape[-1] != 1:
+            raise ValueError(f"zeta has shape {ratio.shape}: its last axis must have one value where modes are complex")
+        ratio = ratio[..., 0]
+    place = section_place(system, None)
+    return complex_residual(
+        system, histories, lambda found: found.displacement(1, place), stop, modes, ratio, check_sampling
+    )
+
+
+def _ended(system: System, motion: Any) -> tuple[dict[str, History], tuple[BaseMotion, ...], Any]:
+    """Return what drives, the motions it is, and when the last of them stops; refuse what never does."""
+    instance("system", system, System)
+    histories = histories_of(system, motion)
+    if not histories:
+        raise ValueError("motion: must be of what drives the model; nothing does")
+    profiles = tuple(one.profile if isinstance(one, Force) else one for one in histories.values())
+    for (name, one), profile in zip(histories.items(), profiles, strict=True):
+        if not np.all(np.isfinite(profile.duration)):
+            if isinstance(one, Force):
+                raise ValueError(f"motion: the force {name} never ends: must be a sampled record")
+            raise ValueError("motion never stops accelerating: must be a move with a stop, or a sampled record")
+    if system.numerics("constant") is not None:
+        raise ValueError("system: a constant load acts too and never ends; use response after the stop")
+    stop = profiles[0].duration
+    for profile in profiles[1:]:
+        stop = np.maximum(stop, profile.duration)
+    return histories, profiles, stop
+
+
+def stopped(system: System, motion: Any, modes: int, zeta: Any) -> Stopped:
+    """Return the natural modes driven until everything stops, or refuse what never stops."""
+    histories, profiles, stop = _ended(system, motion)
+    modes = count("modes", modes, high=MOST_MODES)
+    osc = oscillators(system, np.zeros(modes), np.zeros((1, modes)), modes, zeta)
+    if system.numerics("complex_modes") == "if coupled" and not has_complex_modes(system, modes):
+        osc = osc._replace(zeta=_with_dampers(system, osc.omega, osc.zeta))
+    for profile in profiles:
+        check_sampling(profile, osc.omega)
+    tip = system.modes(modes).displacement(1, 0)
+    products = [participation(system, modes, name) * tip for name in histories]
+    return Stopped(osc, tuple(histories), profiles, stop, products)
+
+
+def _with_dampers(system: System, omega: Array, zeta: Array) -> Array:
+    """Return damping ratios with those of dampers that leave the natural modes apart."""
+    matrix = Projected(system.domain, system.modes(omega.shape[-1]), system.numerics("damping"))["damping"]
+    rate = np.einsum("...ii->...i", matrix)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = zeta + np.where(omega > 0.0, rate / (2.0 * omega), 0.0)
+    if not (ratio < 1.0).all():
+        raise ValueError(
+            f"modes = {omega.shape[-1]}: dampers give one of these a ratio of {ratio.max():.3g}, must be below 1; take "
+            "fewer modes"
+        )
+    return np.asarray(ratio)
