@@ -47,4 +47,5 @@ html_css_files = ["site.css"]
 html_js_files = [("site.js", {"defer": "defer"})]
 html_copy_source = False
 html_show_sphinx = False
+html_show_search_summary = False  # it would fetch the pages found, which a folder does not allow
 html_theme_options = {"navigation_with_keys": False}

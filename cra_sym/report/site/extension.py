@@ -50,15 +50,22 @@ def link_numbers(app: Sphinx, doctree: nodes.document, docname: str) -> None:
         place = 0
         for found in _CITED.finditer(text):
             home = homes.get(found[1] or found[2])
-            if home is None:
+            page, _, anchor = (home or "").partition("#")
+            if home is None or (page == docname and _inside_section(text, anchor)):
                 continue
-            page, _, anchor = home.partition("#")
             address = f"#{anchor}" if page == docname else f"{app.builder.get_relative_uri(docname, page)}#{anchor}"
             pieces += [nodes.Text(text[place : found.start()])]
             pieces += [nodes.reference("", found[0], internal=True, refuri=address)]
             place = found.end()
         if pieces:
             text.parent.replace(text, [*pieces, nodes.Text(text[place:])])
+
+
+def _inside_section(node: nodes.Node, anchor: str) -> bool:
+    up: Any = node.parent
+    while up is not None and not isinstance(up, nodes.section):
+        up = up.parent
+    return up is not None and anchor in up["ids"]
 
 
 def _inside(node: nodes.Node, kinds: tuple[type[nodes.Node], ...]) -> bool:

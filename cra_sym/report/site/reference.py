@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from inspect import cleandoc, isclass
 from pathlib import Path
 
@@ -81,4 +82,5 @@ def _directive(name: str) -> str:
 def _summary(name: str) -> str:
     """Return the first paragraph of a docstring as a cell of a table."""
     text = cleandoc(getattr(cra_sym, name).__doc__ or "").partition("\n\n")[0]
-    return " ".join(text.split()).replace("``", "`").replace("|", r"\|")
+    text = " ".join(text.split()).replace("``", "`").replace("|", r"\|")
+    return re.sub(r":\w+:(`[^`]+`)", r"{py:obj}\1", text)
