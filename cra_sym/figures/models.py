@@ -1,8 +1,8 @@
-"""Model against model: what a thicker beam theory and a damper in the joint change."""
+"""Model against model: what a thicker beam theory and a damper in the joint change; how eigenvalues move."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import style
@@ -11,7 +11,10 @@ from matplotlib.figure import Figure
 from cra_sym.figures import STYLE
 from cra_sym.figures.drawing import figure_of
 
-__all__ = ["figure_damped_joint", "figure_slenderness"]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["figure_damped_joint", "figure_eigenvalues", "figure_slenderness"]
 
 
 def figure_slenderness(slenderness: Any, thin: Any, thick: Any, *, axes: Any = None) -> Figure:
@@ -61,4 +64,31 @@ def figure_damped_joint(damper: Any, ratio: Any, *, ax: Any = None) -> Figure:
         ax.set_ylabel("damping ratio $\\zeta$")
         ax.set_title("Too weak dissipates little, too strong holds the joint still")
         ax.legend()
+    return figure_of(ax)
+
+
+def figure_eigenvalues(eigenvalues: Any, parameter: Any, *, label: str, ax: Axes | None = None) -> Figure:
+    """Draw how complex eigenvalues move as a parameter grows.
+
+    Parameters
+    ----------
+    eigenvalues : array_like of complex, shape (n, modes)
+        1/s.
+    parameter : array_like, shape (n,)
+    label : str
+        What the parameter is, with its unit, for the colour bar.
+    ax : Axes, optional
+    """
+    eigenvalues, parameter = np.asarray(eigenvalues, dtype=complex), np.asarray(parameter, dtype=float)
+    with style.context(STYLE):
+        ax = Figure(figsize=(6.4, 4.4), layout="constrained").subplots() if ax is None else ax
+        ax.axvline(0.0, color="0.75", linewidth=0.8)
+        for number, values in enumerate(eigenvalues.T):
+            points = ax.scatter(
+                values.real, values.imag, c=parameter, s=12, marker="os^Dv"[number % 5], cmap="viridis", linewidths=0
+            )
+        figure_of(ax).colorbar(points, ax=ax, label=label)
+        ax.set_xlabel("growth Re $s$ / (1/s)")
+        ax.set_ylabel("oscillation Im $s$ / (rad/s)")
+        ax.set_title("Right of the line motions grow")
     return figure_of(ax)

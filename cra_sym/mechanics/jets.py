@@ -190,7 +190,7 @@ class JetSpace:
             for j in self.jets(expression)
             if self.is_field(j.unknown)
         )
-        return Add(expression.diff(self.x), *chain)
+        return Add(_real_rate(expression, self.x), *chain)
 
     def at(self, end: End, expression: Expr) -> Expr:
         """Take an expression in the interval to one end."""
@@ -405,3 +405,12 @@ def _signed(coefficient: Expr, factor: Expr) -> Expr:
     if coefficient.is_Add and coefficient.could_extract_minus_sign():
         return Mul(S.NegativeOne, -coefficient, factor)
     return Mul(coefficient, factor)
+
+
+def _real_rate(expression: Expr, symbol: Symbol) -> Expr:
+    """Return the derivative by a symbol; that of a magnitude as of real numbers, which all symbols are."""
+    if not expression.has(Abs):
+        return expression.diff(symbol)
+    real = {s: Dummy(s.name, real=True) for s in expression.free_symbols | {symbol} if isinstance(s, Symbol)}
+    rate = expression.xreplace(real).diff(real[symbol])
+    return rate.xreplace({dummy: s for s, dummy in real.items()})

@@ -5,7 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from sympy import Abs, Add, DiracDelta, Dummy, Expr, SingularityFunction, Subs, Symbol, expand, sympify
+from sympy import (
+    Abs,
+    Add,
+    DiracDelta,
+    Dummy,
+    Expr,
+    Heaviside,
+    SingularityFunction,
+    Subs,
+    Symbol,
+    ceiling,
+    expand,
+    floor,
+    frac,
+    sign,
+    sympify,
+)
 from sympy.core.function import AppliedUndef, Derivative
 
 from cra_sym.checks import shown
@@ -52,6 +68,10 @@ def in_points(density: Expr, x: Symbol) -> tuple[Expr, list[tuple[Expr, Expr]]]:
     """
     if not isinstance(density, Expr):
         return density, []
+    for node in density.atoms(SingularityFunction):
+        if node.args[2].is_integer is False:
+            base = node.args[0] - node.args[1]
+            raise HamiltonError(f"density: the exponent of {node} must be a whole number; write Heaviside({base}) * ..")
     steps = {n: DiracDelta(n.args[0] - n.args[1]) for n in density.atoms(SingularityFunction) if n.args[2] == -1}
     density = density.xreplace(steps)
     found = []
@@ -93,7 +113,9 @@ def read_points(
             raise HamiltonError(f"inside: {shown(given)} must be a pair (place, term)") from None
         place = _place(space, place)
         label = f"term inside at {space.x} = {place}"
-        read = space.read(_moved(sympify(term, strict=True), space.x, place), "domain", label)
+        term = _moved(sympify(term, strict=True), space.x, place)
+        _check_jumps(term, space.x, place, label)
+        read = space.read(term, "domain", label)
         for jet in space.jets(read):
             _check(space, jet, orders, label)
         at(place)[0].append(read)
@@ -121,6 +143,14 @@ def read_points(
         )
         for place, (terms, jets, forces) in found.items()
     )
+
+
+def _check_jumps(term: Expr, x: Symbol, place: Expr, label: str) -> None:
+    """Refuse a factor that jumps right at the place."""
+    for node in term.atoms(Heaviside, sign, floor, ceiling, frac):
+        argument = node.args[0].subs(x, place)
+        if node.has(x) and (argument.is_integer if isinstance(node, (floor, ceiling, frac)) else argument.is_zero):
+            raise HamiltonError(f"{label}: the factor {node} jumps right there; state which value it has")
 
 
 def linear_work(space: JetSpace, force: Expr, moved: Expr, label: str) -> list[tuple[Expr, Jet]]:

@@ -100,6 +100,13 @@ class Continuum:
             variation=None if self.variation is None else self.variation.take(rows),
         )
 
+    def acts_at(self, end: int, place: int) -> NDArray[np.bool_]:
+        """Return in which rows springs, conditions or masses act on a displacement of the left (0) or right (1) end."""
+        k = end * (self.displacements + self.lumped) + place
+        sprung = ((self.directions[..., k] != 0.0) & (self.springs != 0.0)).any(axis=1)
+        acts: NDArray[np.bool_] = sprung | (self.end_mass[:, k] != 0.0).any(axis=1)
+        return acts
+
     def tops(self) -> list[int]:
         """Return the position of the highest displacement of each field in a section."""
         return [sum(self.orders[: k + 1]) - 1 for k in range(len(self.orders))]

@@ -73,6 +73,14 @@ class GeneralContinuum(Continuum):
             dampers=(self.dampers[0][rows], self.dampers[1][rows]),
         )
 
+    def acts_at(self, end: int, place: int) -> NDArray[np.bool_]:
+        """Return in which rows anything acts on a displacement of the left (0) or right (1) end."""
+        k = end * (self.displacements + self.lumped) + place
+        pull, constants = self.dampers
+        damped = ((pull[..., k] != 0.0) & (constants != 0.0)).any(axis=1)
+        moved = (self.end_forces[:, :, k] != 0.0).any(axis=(0, 2)) | (self.end_forces[..., k] != 0.0).any(axis=(0, 2))
+        return np.asarray(super().acts_at(end, place) | damped | moved)
+
     def sample(self, strained: bool) -> Callable[[Array], Array]:
         """Return all coefficients as one array."""
         energies, rows = super().sample(strained), np.arange(len(self.edges))

@@ -24,7 +24,7 @@ Counted = Callable[[Index, Array], "NDArray[np.intp] | None"]
 _ROUNDS, _MOST_UNKNOWNS, _MOST_DEGREE = 24, 1500, 40
 _MOST_ELEMENTS = 12  # to begin with: more spans than that share elements
 _FURTHER = 3  # times that the stresses which equilibrium asks for are added
-_GONE = 1e-9
+_GONE = 1e-7
 """Stiffness at an end over that at 1e-7 of the span from there, below which it vanishes."""
 _SHARE = 0.1
 """Compliance of what a basis leaves out, over that of the last mode, that hides no mode by itself."""
@@ -113,7 +113,16 @@ def _vanishes(problem: Continuum, end: int) -> NDArray[np.bool_]:
         weight = exponent(found["M"][place, place]) if (place, place) in found["M"] else np.zeros(len(edges))
         stiff = np.abs(np.broadcast_to(found["W"][field, field], at.shape))
         with np.errstate(invalid="ignore"):
-            vanishes |= (power > 0.05) & ~(stiff[:, 0] > _GONE * stiff[:, 1])
+            gone = (power > 0.05) & ~(stiff[:, 0] > _GONE * stiff[:, 1])
+        vanishes |= gone
+        for k in range(order):  # a force there makes a stress like the distance to the power order - 1 - k
+            held = gone & (power > order - 1 - k + 0.05) & problem.acts_at(end, tops[field] - order + 1 + k)
+            if held.any():
+                name, moved = ("left", "right")[end], ("displacement", "slope")[k]
+                raise ValueError(
+                    f"the stiffness vanishes at the {name} end like the distance to the power {power[held][0]:.3g}: a "
+                    f"force on the {moved} there makes the strain infinite; leave out its spring, mass, damper or support"
+                )
         steep = power - weight > 2 * order - 1e-3
         if steep.any():
             name, value = ("left", "right")[end], float((power - weight)[steep][0])
@@ -191,10 +200,11 @@ def _refined(problem: Continuum, rows: Index, mesh: Mesh, unresolved: Array, aim
     found: list[Found] = []
     open_, before, degree_before = np.arange(len(rows)), np.inf, 0
     for turn in range(_ROUNDS):
-        solutions = [_solved(problem, part, mesh, aim).checked(rows, aim) for part in _chunks(problem, mesh, open_)]
+        solutions = [_solved(problem, part, mesh, aim) for part in _chunks(problem, mesh, open_)]
         worst = max(solution.error.max(initial=0.0) for solution in solutions)
         size = solutions[0].fields.columns.size
         last = turn == _ROUNDS - 1 or size > _MOST_UNKNOWNS or (turn > 8 and worst > 0.5 * before)
+        solutions = [solution.checked(rows, aim, last) for solution in solutions]
         for solution in solutions:
             good = solution.good(aim.tolerance if last else aim.target)
             if last and not good.all():
@@ -256,9 +266,10 @@ class _Solution:
         shares: Array = self.share[self.error.max(axis=1) > level].max(axis=(0, 1), initial=0.0)
         return shares if shares.any() else self.missing.max(axis=0)
 
-    def checked(self, rows: Index, aim: _Aim) -> _Solution:
+    def checked(self, rows: Index, aim: _Aim, last: bool) -> _Solution:
         """Return the same after a count of the modes where it is needed: in the widest gap behind the last of them."""
-        which = np.nonzero(self.unproved & (self.error.max(axis=1) <= aim.target))[0]
+        good = self.error.max(axis=1) <= (aim.tolerance if last else aim.target)
+        which = np.nonzero(good & (self.unproved | (last & self.missing.any(axis=1))))[0]
         if aim.counted is None or not len(which):
             return self
         rigid = (self.fields.z[which] == 0.0).sum(axis=1)
@@ -273,8 +284,8 @@ class _Solution:
         if number is None:
             return self
         missing = self.missing.copy()
-        wrong = which[number != place[:, 0] + 1 + rigid]
-        missing[wrong] = self.left_out[wrong]
+        right = number == place[:, 0] + 1 + rigid
+        missing[which] = np.where(right[:, None], 0.0, self.left_out[which])
         return replace(self, missing=missing)
 
 

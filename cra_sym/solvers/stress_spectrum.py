@@ -284,7 +284,11 @@ class _Problem:
         unstable = (values < -64 * EPS).sum(axis=1)
         if unstable.any():
             raise BuckledError(unstable)
-        values = np.maximum(values, EPS)
+        if (values < 64 * EPS).any():
+            raise ValueError(
+                "values: the load takes the whole stiffness of a motion, to rounding: a natural frequency is 0, or too "
+                "small for doubles; change the load by more than 1e-13 of it"
+            )
         loaded = (frame / np.sqrt(values)[:, None, :]) @ frame.swapaxes(-1, -2)
         return loaded @ operator, 1.0 / values[:, :1]
 

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from cra_sym.figures.models import figure_damped_joint, figure_slenderness
+from cra_sym.figures.models import figure_damped_joint, figure_eigenvalues, figure_slenderness
 
 
 def drawn(ax):
@@ -28,3 +28,14 @@ def test_damping_ratios_against_the_damper():
     np.testing.assert_array_equal(drawn(ax), ratio.T)
     assert len({line.get_linestyle() for line in ax.lines}) == 2
     assert ax.get_xscale() == ax.get_yscale() == "log" and "N s/m" in ax.get_xlabel()
+
+
+def test_eigenvalues_in_their_plane():
+    eigenvalues, load = np.array([[1j, 3j], [1.5j, 2.5j], [-0.5 + 2j, 0.5 + 2j]]), np.array([0.0, 1.0, 2.0])
+    axes = figure_eigenvalues(eigenvalues, load, label="load / N").axes
+    clouds = axes[0].collections
+    for points, values in zip(clouds, eigenvalues.T, strict=True):
+        np.testing.assert_array_equal(points.get_offsets(), np.column_stack([values.real, values.imag]))
+        np.testing.assert_array_equal(points.get_array(), load)
+    assert len({len(points.get_paths()[0]) for points in clouds}) == 2  # the markers differ
+    assert "1/s" in axes[0].get_xlabel() and "rad/s" in axes[0].get_ylabel() and axes[1].get_ylabel() == "load / N"
