@@ -28,7 +28,8 @@ QUIET = (
     "--LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate",
 )
 DONE = """(count) => {
-    const prompts = [...document.querySelectorAll('.jp-CodeCell .jp-InputPrompt')].map(p => p.textContent.trim());
+    const shown = '.jp-CodeCell .jp-InputPrompt:not(.jp-Placeholder-prompt)';
+    const prompts = [...document.querySelectorAll(shown)].map(p => p.textContent.trim());
     return prompts.length === count && prompts.every(text => /^\\[\\d+\\]:?$/.test(text));
 }"""
 FRAMED = "() => [...document.querySelectorAll('.jp-RenderedImage img')].every(i => i.complete && i.naturalWidth > 200)"
@@ -115,24 +116,26 @@ def run_all(page, address, name):
     """Open a notebook, clear it, run it by the menu, and return what it shows at the end."""
     stored = json.loads((ROOT / "notebooks" / name).read_text(encoding="utf-8"))["cells"]
     code = [cell for cell in stored if cell["cell_type"] == "code"]
+    folded = sum(cell["metadata"].get("jupyter", {}).get("source_hidden", False) for cell in code)
     address = address.replace("00_overview.ipynb", name) + "&reset"  # without the tabs of the test before
     try:
-        clear_and_run(page, address, len(code))
+        clear_and_run(page, address, len(code), folded)
     except playwright.TimeoutError:  # a command given while the kernel connects can get lost: again, as a reader would
-        clear_and_run(page, address, len(code))
+        clear_and_run(page, address, len(code), folded)
     page.wait_for_function(FRAMED)
     page.wait_for_function("() => document.querySelectorAll('mjx-container').length > 0")
     return page.evaluate(SHOWN), sum("image/png" in o.get("data", {}) for cell in code for o in cell["outputs"])
 
 
-def clear_and_run(page, address, cells):
+def clear_and_run(page, address, cells, folded):
+    """Clear a notebook and run it until all cells have their number; folded ones show none."""
     page.goto(address)
     page.wait_for_function("count => document.querySelectorAll('.jp-CodeCell').length === count", arg=cells)
     menu(page, "Edit", "Clear Outputs of All Cells")
     page.wait_for_function("() => !document.querySelector('.jp-RenderedImage')")
     page.get_by_text("Python 3 (ipykernel) | Idle").wait_for()
     menu(page, "Run", "Run All Cells")
-    page.wait_for_function(DONE, arg=cells, timeout=PATIENCE / 2)
+    page.wait_for_function(DONE, arg=cells - folded, timeout=PATIENCE / 2)
 
 
 def menu(page, title, entry):
