@@ -16,7 +16,7 @@ from cra_sym.analysis.nonlinear import samples, watched
 from cra_sym.analysis.periodic_forcing import Forced, Wave, forced
 from cra_sym.model.excitations import Fluctuation, LagrangianTerms
 from cra_sym.model.projection import Load, Place
-from cra_sym.model.slip_elements import slip_statics
+from cra_sym.model.slip_elements import slip_statics, slip_terms_of
 from cra_sym.model.system import System
 from cra_sym.solvers.harmonic_balance import Basis, peak
 from cra_sym.solvers.slip_balance import Elements, SlipBalance, stuck
@@ -70,7 +70,7 @@ def watched_load(system: System, place: Any, field: Any) -> Load:
         where = Place("left" if at == left else "right", section_place(base, field), 0)
     else:
         where = Place("point", section_place(base, field), 0, 0)
-    return Load.unit(where, at, system.numerics("slip_terms").forced.symbols)
+    return Load.unit(where, at, slip_terms_of(system).forced.symbols)
 
 
 def statics_of(system: System, modes: int, causes: tuple[str, ...], place: Any, field: Any) -> Array:

@@ -29,7 +29,6 @@ from cra_sym.model.pencil_route import complex_modes, inertia
 from cra_sym.model.pencil_route import pencil_route as pencil
 from cra_sym.model.projection import EndParameter, Form, Load
 from cra_sym.model.routes import GeneralRoute, Route
-from cra_sym.model.slip_terms import slip_terms
 from cra_sym.model.spatial import SpatialProblem, spatial_problem
 from cra_sym.model.symmetry import asymmetry
 from cra_sym.model.waves import waves_route
@@ -58,7 +57,6 @@ __all__ = [
     "pushed",
     "rates",
     "route",
-    "slip_terms",
     "spatial",
     "stiffness_beside",
 ]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cra_sym.model.slip_terms import SlipTerms
     from cra_sym.model.system import System
 
-__all__ = ["SlipElements", "slip_elements", "slip_statics"]
+__all__ = ["SlipElements", "slip_elements", "slip_statics", "slip_terms_of"]
 
 Array = NDArray[np.float64]
 
@@ -95,7 +95,7 @@ def slip_elements(system: System, modes: int) -> SlipElements:
     """Return the elements of a system, see :meth:`cra_sym.model.system.System.slip_elements`."""
     if not system.model.pieces["hysteresis"]:
         raise ValueError("system: has no elastic-slip elements; give its model hysteresis=[..]")
-    terms: SlipTerms = system.numerics("slip_terms")
+    terms = slip_terms_of(system)
     stiffness, slip, where = [], [], []
     for element, displacement in zip(terms.at(system.parameters), terms.displacements, strict=True):
         single = isinstance(element, Jenkins)
@@ -121,6 +121,13 @@ def _seen(system: System, terms: SlipTerms, modes: int) -> tuple[Array, Array]:
     return rows, _left_out(base, forced, loads, terms.forces, modes, system.shape)
 
 
+def slip_terms_of(system: System) -> SlipTerms:
+    """Return the elements of the system's model, compiled."""
+    from cra_sym.model.slip_terms import slip_terms  # SymPy is there: a model with elements was made
+
+    return slip_terms(system.model)
+
+
 def slip_statics(system: System, modes: int, causes: tuple[str, ...], watched: Load) -> Array:
     """Return what the modes left out add by their statics to what is watched, and what drives them beside elements.
 
@@ -138,7 +145,7 @@ def slip_statics(system: System, modes: int, causes: tuple[str, ...], watched: L
     ndarray, shape (..., displacements + 1, displacements + causes)
         Displacements of the elements, and then that which is watched, by forces on the former and by the causes.
     """
-    terms: SlipTerms = system.numerics("slip_terms")
+    terms = slip_terms_of(system)
     forced = _forced(system, terms)
     outputs = [*(forced.numerics("load", name) for name in terms.forces), watched]
     return _left_out(system.without_hysteresis, forced, outputs, (*terms.forces, *causes), modes, system.shape)

@@ -111,7 +111,15 @@ class SlipTerms:
 
 
 def slip_terms(model: Model) -> SlipTerms:
-    """Return the elements of a model, compiled; those on the same displacement share it."""
+    """Return the elements of a model, compiled, once; those on the same displacement share it."""
+    kept = model.__dict__
+    if "_slip_terms" not in kept:
+        kept["_slip_terms"] = _compiled(model)
+    found: SlipTerms = kept["_slip_terms"]
+    return found
+
+
+def _compiled(model: Model) -> SlipTerms:
     triples = model.pieces["hysteresis"]
     different = list(dict.fromkeys((u, place) for _, u, place in triples))
     moved = forced(model.without_hysteresis, tuple((triples[0][0], u, place) for u, place in different))

@@ -14,7 +14,7 @@ from cra_sym.checks import broadcastable, count, default_floating_point, instanc
 from cra_sym.model.cross_check import CrossCheck, cross_check
 from cra_sym.model.projection import Domain, Load, Projected, project
 from cra_sym.model.routes import ROUNDING, TOLERANCE, Estimated, Modes, Route
-from cra_sym.model.slip_elements import SlipElements, slip_elements
+from cra_sym.model.slip_elements import SlipElements, slip_elements, slip_terms_of
 from cra_sym.model.spatial import check_range
 from cra_sym.model.values import Value, checked_damping, checked_values, frozen
 
@@ -82,7 +82,7 @@ class System:
         object.__setattr__(self, "tolerance", float(given))
         broadcastable(zeta=self._zeta, **self._values)
         if model.pieces["hysteresis"]:
-            self.numerics("slip_terms").at(self.parameters)  # refuses elements that are out of range
+            slip_terms_of(self).at(self.parameters)  # refuses elements that are out of range
 
     def __setattr__(self, name: str, value: Any) -> None:
         if not name.startswith("_"):
