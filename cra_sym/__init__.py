@@ -44,6 +44,7 @@ _HOME = {
     "MisfitWarning": "analysis.identification",
     "identify": "analysis.identification",
     "identify_joint": "analysis.identification",
+    "identify_slip": "analysis.slip_identification",
     "input_shaper": "analysis.shaping",
     "certify": "analysis.certification",
     "certify_stability": "analysis.certified_stability",

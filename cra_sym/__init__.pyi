@@ -26,6 +26,7 @@ from .analysis.responses import response as response
 from .analysis.responses import tip_response as tip_response
 from .analysis.sensitivities import sensitivities as sensitivities
 from .analysis.shaping import input_shaper as input_shaper
+from .analysis.slip_identification import identify_slip as identify_slip
 from .analysis.slip_response import SlipEvent as SlipEvent
 from .analysis.slip_response import SlipResponse as SlipResponse
 from .analysis.slip_response import slip_response as slip_response

@@ -24,7 +24,7 @@ _GROUPS = {
         "analysis.state_space",
         "solvers",
     ),
-    "Identification": ("analysis.identification",),
+    "Identification": ("analysis.identification", "analysis.slip_identification"),
     "Parametric stability": (
         "analysis.certified_stability",
         "analysis.floquet",
