@@ -46,6 +46,7 @@ __all__ = ["Waves", "waves_route"]
 Array = NDArray[np.float64]
 _MOST = 6  # displacements of a section
 _MOST_COUPLED = 3  # of these inside, which have as many wave numbers
+_BLOCK = 8192  # sets of values at a time
 _COST = 10  # roots of one wave number that one of these costs, to judge whether machine code pays
 
 
@@ -103,16 +104,33 @@ class Waves:
         """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""
         columns = flat_columns(values, shape)
         squares = np.empty((columns.shape[1], modes))
+        parts = _parts(self.structure, self.known)
+        search = _search(parts) if wants_compiler(_COST * squares.size, parts) else None
+
+        def fill(rows: slice) -> None:
+            for start in range(rows.start, rows.stop, _BLOCK):  # what belongs to a block stays in the processor's cache
+                block = slice(start, min(start + _BLOCK, rows.stop))
+                self._fill(columns[:, block], squares[block], search)
+
+        if search is None:
+            fill(slice(0, len(squares)))
+        else:
+            in_parts(fill, len(squares), modes, threads=None, compiled=True)
+        return np.sqrt(squares).reshape(*shape, modes)
+
+    @np.errstate(all="ignore")
+    def _fill(self, columns: Array, squares: Array, search: Search | None) -> None:
+        """Fill in the squared frequencies of some sets of values."""
+        modes = squares.shape[1]
         problem, simple = self._covered(columns)
         if simple.all():
-            self._fill(problem, squares)
-        else:
-            part = np.empty((int(simple.sum()), modes))
-            self._fill(problem.take(np.flatnonzero(simple)), part)
-            squares[simple] = part
-            rest = columns[:, ~simple]
-            squares[~simple] = self._general.angular_frequencies(list(rest), rest.shape[1:], modes) ** 2
-        return np.sqrt(squares).reshape(*shape, modes)
+            squares[...] = lowest_waves(problem, modes, search, self._functions)
+            return
+        if simple.any():
+            part = problem.take(np.flatnonzero(simple))
+            squares[simple] = lowest_waves(part, modes, search, self._functions)
+        rest = columns[:, ~simple]
+        squares[~simple] = self._general.angular_frequencies(list(rest), rest.shape[1:], modes) ** 2
 
     def modes(self, values: Values, shape: tuple[int, ...], omega: Array) -> StateModes:
         """Return the modes of all the first frequencies."""
@@ -139,19 +157,6 @@ class Waves:
             names = ", ".join(self.coordinates)
             raise ValueError(f"values: a motion of the lumped coordinates {names} alone has neither mass nor stiffness")
         return problem, np.asarray(simple & (problem.length > 0))
-
-    def _fill(self, problem: UniformProblem, squares: Array) -> None:
-        roots = _COST * squares.size
-        parts = _parts(self.structure, self.known)
-        search = _search(parts) if wants_compiler(roots, parts) else None
-
-        def part(rows: slice) -> None:
-            squares[rows] = lowest_waves(problem.take(rows), squares.shape[1], search, self._functions)
-
-        if search is None:
-            part(slice(None))
-        else:
-            in_parts(part, len(squares), squares.shape[1], threads=None, compiled=True)
 
     def _states(self, columns: Array, problem: UniformProblem, z: Array, x: Array) -> Array:
         """Return the state of every mode at places x (rows, stations), shape (rows, modes, stations, 2 n + m)."""
