@@ -1,7 +1,7 @@
 """All benchmarks in one go: ``python -m tests.benchmarks [--quick] [--output DIR]``.
 
-Writes ``results.md``, ``results.json`` and ``results.png``. Times are medians with quartiles; only ratios within a run
-say anything.
+Writes ``results.md``, ``results.json`` and ``results.png``; a run that was there gives the columns of the run before.
+Times are medians with quartiles; only ratios within a run say anything.
 """
 
 from __future__ import annotations
@@ -51,16 +51,23 @@ def run(quick: bool) -> dict[str, Any]:
     return report
 
 
-def table(report: dict[str, Any]) -> str:
-    """Return the report as Markdown."""
-    lines = ["# Benchmarks", "", "| machine | |", "| --- | --- |"]
-    lines += [f"| {name} | {value} |" for name, value in report["machine"].items()]
-    lines += [f"| {name} | {value:.2f} |" for name, value in report["floor"].items()]
-    lines += ["", "## Targets", "", "| what | measured | target | |", "| --- | --: | --: | --- |"]
-    for row in report["targets"]:
+def table(report: dict[str, Any], former: dict[str, Any] | None = None) -> str:
+    """Return the report as Markdown, with what a former one measured of the same targets."""
+    earlier = {} if former is None else former["machine"]
+    lines = ["# Benchmarks", "", "| machine | | the run before |", "| --- | --- | --- |"]
+    lines += [f"| {name} | {value} | {earlier.get(name, '')} |" for name, value in report["machine"].items()]
+    earlier = {} if former is None else former["floor"]
+    for name, value in report["floor"].items():
         lines.append(
-            f"| {row['what']} | {row['measured']:.3g} | {row['target']} | {'met' if row['met'] else 'missed'} |"
+            f"| {name} | {value:.2f} | {earlier[name]:.2f} |" if name in earlier else f"| {name} | {value:.2f} | |"
         )
+    lines += ["", "## Targets", "", "| what | measured | the run before | target | |"]
+    lines.append("| --- | --: | --: | --: | --- |")
+    before = {} if former is None else {row["what"]: f"{row['measured']:.3g}" for row in former["targets"]}
+    for row in report["targets"]:
+        met = "met" if row["met"] else "missed"
+        what = row["what"]
+        lines.append(f"| {what} | {row['measured']:.3g} | {before.get(what, '')} | {row['target']} | {met} |")
     for case in report["frequencies"]:
         lines += ["", f"## {case['modes']} frequencies of an arm", ""]
         lines += [
@@ -108,8 +115,9 @@ def table(report: dict[str, Any]) -> str:
     for title, unit in (("responses", "ns a sample"), ("stability", "ms a point")):
         lines += ["", f"## {title.capitalize()}", "", f"| route | {unit} | times as long |", "| --- | --: | --: |"]
         lines += [f"| {name} | {row[unit]:.3g} | {row['times as long']:.1f} |" for name, row in report[title].items()]
-    lines += ["", "## A thousand moves of 2 s with an element that slips, against solve_ivp with events", ""]
-    lines += ["| what | |", "| --- | --: |", *(f"| {name} | {value:.3g} |" for name, value in report["slip"].items())]
+    if "slip" in report:  # a report of an earlier day has none
+        lines += ["", "## A thousand moves of 2 s with an element that slips, against solve_ivp with events", ""]
+        lines += ["| what | |", "| --- | --: |", *(f"| {key} | {value:.3g} |" for key, value in report["slip"].items())]
     lines += ["", "## Records of motion, and stores", "", *records.note(report["in practice"])]
     lines += ["", "## Sweeps", "", nodes.note(report["sweep"])]
     return "\n".join(lines) + "\n"
@@ -145,8 +153,9 @@ def main() -> None:
     options = parser.parse_args()
     report = run(options.quick)
     options.output.mkdir(parents=True, exist_ok=True)
-    text = table(report)
-    (options.output / "results.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    last = options.output / "results.json"
+    text = table(report, json.loads(last.read_text(encoding="utf-8")) if last.exists() else None)
+    last.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     (options.output / "results.md").write_text(text, encoding="utf-8")
     picture(report, options.output / "results.png")
     print(text)

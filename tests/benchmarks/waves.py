@@ -36,7 +36,9 @@ MODES, POINTS = 3, 120
 
 x, t = sp.symbols("x t")
 L, T, K, G, I, k_t, k_r, m_e = sp.symbols("L T K G I k_t k_r m_e", positive=True)
+k_b, k_p = sp.symbols("k_b k_p")
 v, theta = sp.Function("v")(x, t), sp.Function("theta")(x, t)
+w, p = sp.Function("w")(t), sp.Function("p")(t)
 KINETIC, BENDING, HALF = v.diff(t) ** 2 / 2, v.diff(x, 2) ** 2 / 2, sp.Rational(1, 2)
 JOINT, TIP = -HALF * k_t * v**2, HALF * m_e * v.diff(t) ** 2
 
@@ -214,7 +216,11 @@ def measured(size: int, rounds: int) -> dict[str, dict[str, Any]]:
 
 
 def models(size: int, rounds: int, seed: int = SEED) -> dict[str, dict[str, float]]:
-    """Return microseconds a set for the arm, for its Lagrangian as a Model and for a string, with random ends."""
+    """Return microseconds a set for the arm and for other models, with random ends.
+
+    The arm's Lagrangian as a Model; a string; a beam that a base mass carries, with a payload on a spring; two beams
+    whose ends a carriage joins.
+    """
     rng = np.random.default_rng(seed)
     ends = {"k_t": 10 ** rng.uniform(-1, 6, size), "m_e": rng.uniform(0, 1, size)}
     turning = {"k_r": 10 ** rng.uniform(-2, 4, size)}
@@ -223,10 +229,13 @@ def models(size: int, rounds: int, seed: int = SEED) -> dict[str, dict[str, floa
     as_model = cra.Model(density, fields=[s.v], prescribed=[s.w], x=s.x, domain=(0, s.L), t=s.t, left=left, right=right)
     numbers = {"E": arm.E, "I_z": arm.I, "rho": arm.rho, "A": arm.A, "L": arm.L, "m_b": arm.m_b, "J_e": arm.J_e}
     string = cra.Model(KINETIC - HALF * T * v.diff(x) ** 2, fields=[v], x=x, domain=(0, L), t=t, left=JOINT, right=TIP)
+    lumped = {"k_b": 10 ** rng.uniform(0, 4, size), "k_p": 10 ** rng.uniform(0, 4, size), "m_e": ends["m_e"]}
     systems: dict[str, Callable[[], cra.System]] = {
         ARM: lambda: arm.replace(**ends, **turning),
         ARM_AS_MODEL: lambda: as_model.at({**numbers, **ends, **turning}),
         STRING: lambda: string.at({"T": 1.0, "L": 1.0, **ends}),
+        "a beam on a base mass with a payload": lambda: carried().at({**lumped, **ends, **turning, "L": 1.0}),
+        "two beams joined by a carriage": lambda: gantry().at({**lumped, "L": 1.0}),
     }
     found = cra.natural_frequencies(systems[ARM](), MODES)
     different = np.abs(cra.natural_frequencies(systems[ARM_AS_MODEL](), MODES) / found - 1)
@@ -237,6 +246,25 @@ def models(size: int, rounds: int, seed: int = SEED) -> dict[str, dict[str, floa
     for row in report.values():
         row["times the arm"] = row["median"] / report[ARM]["median"]
     return report
+
+
+@cache
+def carried() -> cra.Model:
+    """Return a beam that a base mass on a spring carries through a joint, with a payload on a spring at its tip."""
+    base = HALF * w.diff(t) ** 2 - HALF * k_b * w**2 + JOINT - HALF * k_r * v.diff(x) ** 2
+    tip = HALF * m_e * p.diff(t) ** 2 - HALF * k_p * (v + w - p) ** 2
+    kinetic = HALF * (v + w).diff(t) ** 2
+    return cra.Model(kinetic - BENDING, fields=[v], coordinates=[w, p], x=x, domain=(0, L), t=t, left=base, right=tip)
+
+
+@cache
+def gantry() -> cra.Model:
+    """Return two clamped beams whose tips a carriage joins by springs."""
+    u = sp.Function("u")(x, t)
+    density = KINETIC - BENDING + HALF * u.diff(t) ** 2 - u.diff(x, 2) ** 2
+    tip = HALF * m_e * p.diff(t) ** 2 - HALF * k_b * (v - p) ** 2 - HALF * k_p * (u - p) ** 2
+    clamped = [part.subs(x, 0) for field in (v, u) for part in (field, field.diff(x))]
+    return cra.Model(density, fields=[v, u], coordinates=[p], x=x, domain=(0, L), t=t, right=tip, essential=clamped)
 
 
 def table(waves: dict[str, dict[str, Any]], others: dict[str, dict[str, float]]) -> list[str]:
