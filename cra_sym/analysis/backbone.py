@@ -111,7 +111,7 @@ def backbone(
         How many linear modes take part, 1 to 40; with elastic-slip elements those of the system without them.
     harmonics : int, optional
         Highest multiple of the frequency, 1 to 60. Internal resonances with higher ones do not show. Default: 9; with
-        elastic-slip elements as many as bring frequency and damping ratio within 1e-7, at most 127.
+        elastic-slip elements as many as bring frequency and damping ratio within 3e-7, at most 127.
     points : int
         Length of the whole curve.
     place, field : optional

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 FIRST, MOST = 15, 127
 """Harmonics that are tried first, and at most, where none are asked for."""
-ACCURACY = 1e-7
+ACCURACY = 3e-7
 """Relative change of a motion by twice as many harmonics that is aimed at."""
 _SMALLEST, _LARGEST, _STEP, _PHASES, _ITERATIONS = 0.01, 100.0, 2.0, 3, 14
 """Amplitudes of starts over that at which the last element slips, their ratio, phases, iterations from each."""
@@ -157,6 +157,11 @@ class SlipProblem:
         return len(self.basis.sines)
 
     @property
+    def unique(self) -> bool:
+        """Whether there is one answer: with constant coefficients elements lose energy whichever way two differ."""
+        return self.balance.constant
+
+    @property
     def fastest(self) -> float:
         """Largest natural frequency with all elements stuck."""
         return float(np.sqrt(np.linalg.eigvalsh(stuck(self.balance.equations, self.balance.elements)).max()))
@@ -170,7 +175,8 @@ class SlipProblem:
 
     def solved(self, starts: Array, varpi: Array, floor: float = 0.0) -> tuple[Array, NDArray[np.bool_]]:
         """Return answers from starts, and which converged."""
-        found, good = self.balance.newton(starts, varpi / self.period, self._causes(varpi))
+        alike = np.unique(varpi, return_inverse=True)[1] if self.unique else None
+        found, good = self.balance.newton(starts, varpi / self.period, self._causes(varpi), alike=alike)
         rigid = self.balance.equations.omega == 0.0
         if rigid.any():  # what holds it at rest is no part of the system
             pull = np.abs(self.coefficients(found)[:, rigid, 0]).max(axis=1) * (varpi / self.period) ** 2
@@ -249,9 +255,6 @@ class SlipProblem:
 
     def seeds(self, varpi: Array, order: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array, float]:
         """Return starts: rest, everything stuck, nothing stuck, and single shapes with many amplitudes and phases.
-
-        A linear structure of constant coefficients that is driven has one answer but for what sticks: elements lose
-        energy whichever way two motions differ.
 
         Returns
         -------

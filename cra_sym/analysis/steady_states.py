@@ -119,6 +119,8 @@ class _Problem:
     def causes(self, varpi: Array) -> Array:
         return self.driven.causes(varpi, self.basis.phase, self.period)
 
+    unique = False
+
     @property
     def fastest(self) -> float:
         return float(self.driven.equations.omega.max())
@@ -239,7 +241,7 @@ def steady_states(
         statics of all others at the elements.
     harmonics : int, optional
         Highest multiple of ``varpi / period``; the constant is there too. Default: 7; with elastic-slip elements as
-        many as bring the motion within 1e-7, at most 127.
+        many as bring the motion within 3e-7, at most 127.
     period : int
         2 asks for answers of twice the period of the excitation.
     zeta : array_like, optional
@@ -314,7 +316,8 @@ def _found(problem: _Problem | SlipProblem, varpi: Array) -> tuple[_Problem | Sl
             if not any(np.linalg.norm(answer - other) <= _SAME * (size + np.linalg.norm(other)) for other in found[at]):
                 found[at].append(answer)
                 new.append((int(at), answer))
-        handed = [(near, answer) for at, answer in new for near in neighbour[at]]
+        wanted = [not (problem.unique and answers) for answers in found]
+        handed = [(near, answer) for at, answer in new for near in neighbour[at] if wanted[near]]
         where = np.array([at for at, _ in handed], int)
         starts = np.array([answer for _, answer in handed])
     return problem.settled(found, varpi)

@@ -240,7 +240,13 @@ class SlipBalance:
     # --------------------------------------------------------------------------------------------------- answers
 
     def newton(
-        self, unknowns: Array, frequency: Array, causes: Array | None = None, tolerance: float = 1e-11, most: int = 40
+        self,
+        unknowns: Array,
+        frequency: Array,
+        causes: Array | None = None,
+        tolerance: float = 1e-11,
+        most: int = 40,
+        alike: NDArray[np.intp] | None = None,
     ) -> tuple[Array, NDArray[np.bool_]]:
         """Return answers from starts, many at once, and which converged.
 
@@ -254,6 +260,8 @@ class SlipBalance:
             What a displacement may change, relative to the motion or to where the first element slips.
         most : int
             Iterations.
+        alike : ndarray of int, shape (points,), optional
+            Points of one number have one answer: when one of them has it, the others are left.
         """
         n = self.modal_size
         q, w = unknowns[:, :n].copy(), unknowns[:, n:].copy()
@@ -275,8 +283,10 @@ class SlipBalance:
             if self.linear and good.any():
                 q[open_[good]] = based.modal(force[good], open_[good])
             done[open_[good]] = True
+            if alike is not None and good.any():
+                lost |= np.isin(alike, alike[done]) & ~done
             worse = ~good & (size > before[open_]) & (share[open_] > 0.5**_HALVINGS)
-            lost[open_] = ~np.isfinite(size)
+            lost[open_] |= ~np.isfinite(size)
             self._halve(open_[worse], share, (w, step_w), (q, step_q))
             keep = ~good & ~worse & np.isfinite(size)
             moved = open_[keep]

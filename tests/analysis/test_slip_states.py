@@ -118,6 +118,68 @@ def test_polynomial_terms_and_friction_together():
             np.testing.assert_allclose(state.amplitude, largest, rtol=1e-6)
 
 
+def stepped(states, sliders, number, load, frequency):
+    """Move two masses with three elements over a period in small steps; states (4, columns), sliders (3, columns)."""
+    stiffness = np.array([[4.0, -3.0], [-3.0, 3.0]])
+    springs, limits, rows = TWO_SPRINGS[:, None], (TWO_SLIPS / TWO_SPRINGS)[:, None], TWO_ROWS
+    h = 2 * np.pi / frequency / number
+
+    def dragged(x, z):
+        return np.clip(z, rows @ x - limits, rows @ x + limits)
+
+    def acceleration(time, x, v, z):
+        force = np.array([[load * np.cos(frequency * time)], [0.0]]) - stiffness @ x - 0.1 * v
+        return (force - rows.T @ (springs * (rows @ x - z))) / np.array([[1.0], [2.0]])
+
+    x, v = states[:2], states[2:]
+    for k in range(number):
+        half_x = x + h / 2 * v
+        half_v = v + h / 2 * acceleration(k * h, x, v, sliders)
+        middle = dragged(half_x, sliders)
+        new = x + h * half_v
+        v = v + h * acceleration((k + 0.5) * h, half_x, half_v, middle)
+        x, sliders = new, dragged(new, middle)
+    return np.concatenate([x, v]), sliders
+
+
+TWO_SPRINGS, TWO_SLIPS = np.array([2.0, 1.0, 0.7]), np.array([0.3, 0.6, 0.2])
+TWO_ROWS = np.array([[0.0, 1.0], [0.0, 1.0], [1.0, -1.0]])
+
+
+def test_several_elements_on_two_displacements_and_their_multipliers():
+    one, two = sp.Function("q_1")(t), sp.Function("q_2")(t)
+    lagrangian = (one.diff(t) ** 2 + 2 * two.diff(t) ** 2 - one**2 - 3 * (two - one) ** 2) / 2
+    places = (two, two, one - two)
+    elements = [
+        (cra.Jenkins(a, b), u, None) for a, b, u in zip(TWO_SPRINGS.tolist(), TWO_SLIPS.tolist(), places, strict=True)
+    ]
+    work = [(F - 0.1 * one.diff(t), one, None), (-0.1 * two.diff(t), two, None)]
+    system = cra.Model(
+        0, fields=(), coordinates=[one, two], x=x, domain=(0, 1), t=t, left=lagrangian, virtual_work=work,
+        hysteresis=elements,
+    ).at({})  # fmt: skip
+    load, frequency, number = 0.9, 0.8, 4000
+    (state,) = cra.steady_states(system, frequency, drive={F: load}, modes=2, field=two)
+    found, sliders = np.zeros((4, 1)), np.zeros((3, 1))
+    for _ in range(25):
+        found, sliders = stepped(found, sliders, 400, load, frequency)
+    for _ in range(3):
+        found, sliders = stepped(found, sliders, number, load, frequency)
+    modes = system.without_hysteresis.modes(2)
+    shapes = np.stack([modes.coordinate(0), modes.coordinate(1)])
+    harmonics = state.coefficients.shape[1] // 2
+    np.testing.assert_allclose(shapes @ state.coefficients[:, : harmonics + 1].sum(axis=1), found[:2, 0], atol=2e-4)
+    moves = 1e-5 * np.concatenate([np.eye(7), -np.eye(7)], axis=1)
+    limits = (TWO_SLIPS / TWO_SPRINGS)[:, None]
+    start = found + moves[:4]
+    held = np.clip(sliders + moves[4:], TWO_ROWS @ start[:2] - limits, TWO_ROWS @ start[:2] + limits)
+    end = np.concatenate(stepped(start, held, number, load, frequency))
+    values = np.linalg.eigvals((end[:, :7] - end[:, 7:]) / 2e-5)
+    wanted = values[np.argsort(-np.abs(values))][:4]
+    assert state.stable and state.loss > 0 and np.abs(values).max() > 0.05
+    np.testing.assert_allclose(np.abs(state.multipliers), np.abs(wanted), atol=3e-3)
+
+
 # inside a tongue ---------------------------------------------------------------------------------------------------
 
 
