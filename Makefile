@@ -84,6 +84,7 @@ campaign: .venv/.ready
 	$(RUN) -m tests.campaigns.along_x
 	$(RUN) -m tests.campaigns.attacks
 	$(RUN) -m tests.campaigns.workers
+	$(RUN) -m tests.campaigns.languages
 
 clean:
 	rm -rf .venv .venv-oldest .venv-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage .coverage.*

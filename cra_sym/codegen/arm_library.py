@@ -12,8 +12,10 @@ from cra_sym.codegen.arm_time_checks import arm_time_checks
 from cra_sym.codegen.expressions import gauss_rule, modal_functions, spectrum_functions, stability_functions
 from cra_sym.codegen.frozen import stated
 from cra_sym.codegen.library import Check, Library, source
+from cra_sym.codegen.operations import operations
 from cra_sym.codegen.printers import FormPrinter
 from cra_sym.codegen.vectors import TOLERANCE, arm_checks
+from cra_sym.kernels.form_parse import parse
 
 __all__ = ["arm_library"]
 
@@ -71,7 +73,16 @@ def arm_library(name: str, real: str = "float64") -> Library:
     checks = tuple(_checks(real))
     batch = arm_batch(name, real, TOLERANCE if real == "float64" else _SINGLE)
     stack = _STACK.replace("NAME", name.upper())
-    return Library(name, summary, text, told, checks, _README + _PRECISION[real], real, batch, stack)
+    readme = _README + _PRECISION[real] + _counted(text)
+    return Library(name, summary, text, told, checks, readme, real, batch, stack)
+
+
+def _counted(text: str) -> str:
+    """Return how many operations the functions in time take."""
+    form = parse(text)
+    most = int(form.constants["MOST_KEPT"].values[0])
+    counts = ", ".join(f"`{name}` {operations(form, name, {'_kept(sampled)': most})}" for name in ("step", "outputs"))
+    return f"\nFloating-point operations of a call with {most} modes, at most: {counts}.\n"
 
 
 def _constants(real: str) -> str:

@@ -12,6 +12,8 @@ import pytest
 
 import cra_sym as cra
 from cra_sym.codegen import arm_library
+from tests.campaigns.languages import worst
+from tests.codegen import kit
 from tests.codegen.kit import arm_without_vectors
 
 FIELDS = ("L", "b", "h", "E", "rho", "m_b", "m_e", "J_e", "k_t", "k_r", "zeta")
@@ -70,3 +72,12 @@ def test_stiffnesses_are_rigid_unless_given():
     assert arm.k_t == arm.k_r == math.inf
     text = arm_library.source("arm")
     assert text.count("float = inf") == 2
+
+
+@pytest.mark.parametrize("language", ["c", "fortran", "javascript"])
+def test_random_arms_in_languages(language):
+    """A sample of `tests.campaigns.languages`, which has 10 000 arms."""
+    if not kit.has(language):
+        pytest.skip(f"{language} needs {kit.COMMANDS[language][0]}")
+    frequencies, modal = worst(language, 60)
+    assert frequencies < 1e-14 and modal < 1e-12
