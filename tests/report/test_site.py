@@ -24,7 +24,7 @@ from cra_sym.report.notebooks import find_notebooks
 from cra_sym.report.pictures import save_animations, save_claims, save_figures
 from cra_sym.report.site.build import write_site
 
-JUDGED = [claim(id) for id in ("C03", "C07", "C20", "C22")]  # each fares differently
+JUDGED = ("C03", "C07", "C20", "C22")  # each fares differently
 LARGEST = 1.5e6  # bytes of a page
 CHAPTERS = [path.stem for path in find_notebooks()]
 
@@ -52,12 +52,13 @@ def site(tmp_path_factory):
     """The site of the notebooks as they are stored; the equations' checks have tests of their own."""
     folder = tmp_path_factory.mktemp("a site") / "pages"
     pictures = folder.parent / "pictures"
-    save_claims(pictures, JUDGED)
+    verdicts = list(map(claim, JUDGED))
+    save_claims(pictures, verdicts)
     save_animations(pictures)
     save_figures(pictures, ["frequencies"], kinds=["svg"])
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Equation, "check", lambda self: self.number != 7)
-        assert write_site(folder, find_notebooks(), JUDGED, sorted(pictures.iterdir())) == ""
+        assert write_site(folder, find_notebooks(), verdicts, sorted(pictures.iterdir())) == ""
     assert sorted(path.name for path in folder.parent.iterdir()) == ["pages", "pictures"]
     return folder
 
@@ -147,7 +148,7 @@ def test_every_equation_is_in_the_ledger_with_the_chapter_that_shows_it(site, pa
 def test_claims_come_first_with_what_they_rest_on(pages):
     page = pages["claims.html"]
     assert "claims.html" in pages["index.html"].all("href")
-    for verdict in JUDGED:
+    for verdict in map(claim, JUDGED):
         assert verdict.id.lower() in page.all("id") and verdict.source in page.text and verdict.headline in page.text
         for told in (verdict.plain, verdict.sentence, verdict.criterion, verdict.remedy or "", verdict.missing or ""):
             prose = " ".join(told.split("$")[::2])  # mathematics stands between

@@ -140,6 +140,10 @@ def _animation(path: Path) -> str:
 
 def _section_of_the_readme(title: str) -> str:
     """Return a section of the README: of the checkout, or of the installed distribution, which carries it."""
-    readme = _HERE.parents[2] / "README.md"
-    text = readme.read_text(encoding="utf-8") if readme.is_file() else metadata.metadata("cra_sym").json["description"]
+    checkout = _HERE.parents[2]
+    text = (
+        (checkout / "README.md").read_text(encoding="utf-8")
+        if (checkout / "pyproject.toml").is_file()
+        else metadata.metadata("cra_sym").json["description"]
+    )
     return str(text).partition(f"\n## {title}\n")[2].partition("\n## ")[0].strip()
