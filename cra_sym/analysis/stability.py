@@ -84,7 +84,8 @@ def stability_boundary(
     Returns
     -------
     lower, upper : ndarray
-        rad/s, shape broadcast from system, excitation and epsilon; nan where there is no instability.
+        rad/s, shape broadcast from system, excitation and epsilon; nan where there is no instability. Where one of two
+        modes is damped and the other is not, vibration grows at every detuning, slowly at large ones: 0 and inf.
 
     Warns
     -----
@@ -147,9 +148,10 @@ def judged_boundary(
     ]
     if order == 1:
         zone = first_order_zone(system, excitation, epsilon, first, second, modes, tongue)
-    middle = zone.centre + zone.shift
-    sides = (np.broadcast_to(middle + sign * zone.half_width, shape) for sign in (-1.0, 1.0))
-    lower, upper = (side[()] + 0.0 for side in sides)
+    if np.isinf(zone.half_width).any():
+        text = "one of the two modes is not damped: vibration grows at every detuning, slowly at large ones"
+        doubts.append((AsymptoticWarning, f"resonance {(first, second)}: {text}; see growth_rate"))
+    lower, upper = (np.broadcast_to(side, shape)[()] + 0.0 for side in zone.bounds)
     return lower, upper, doubts
 
 

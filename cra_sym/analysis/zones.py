@@ -40,6 +40,8 @@ class Zone:
         How far the second order moves the zone, rad/s; 0 in a zone to first order.
     strength : ndarray
         Positive where the coupling can feed both modes, zero without coupling, negative where it cannot.
+    sides : pair of ndarray, optional
+        Where they are not told by centre, shift and half-width.
     """
 
     centre: np.ndarray
@@ -47,6 +49,14 @@ class Zone:
     free_half_width: np.ndarray
     shift: np.ndarray
     strength: np.ndarray
+    sides: tuple[np.ndarray, np.ndarray] | None = None
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Both sides, rad/s: 0 and inf where a zone has no end."""
+        if self.sides is not None:
+            return self.sides
+        return self.centre + self.shift - self.half_width, self.centre + self.shift + self.half_width
 
 
 @cache
@@ -168,14 +178,23 @@ def _reduced(
     modes: int,
     order: int,
 ) -> Zone:
-    positive = np.where(epsilon > 0, epsilon, _SMALLEST)
-    centre, sides = reduced_zone(system, excitation, positive, resonance, tongue, modes, order)
-    middle, half_width = (sides.lower + sides.upper) / 2, (sides.upper - sides.lower) / 2
+    positive = np.clip(np.where(epsilon > 0, epsilon, _SMALLEST), 1e-100, 1e60)  # their squares are numbers
+    with np.errstate(over="ignore", invalid="ignore"):
+        centre, sides = reduced_zone(system, excitation, positive, resonance, tongue, modes, order)
+        half_width = (sides.upper - sides.lower) / 2
+        middle = np.where(np.isinf(half_width), centre, (sides.lower + sides.upper) / 2)
     strength = sides.strength / positive**2
     strength = np.where(np.abs(strength) < _UNCOUPLED * centre**2, 0.0, strength)
     there = (strength > 0) & (centre > 0)
-    half_width = np.where(there, np.where(epsilon > 0, half_width, 0.0 * half_width), np.nan)
-    return Zone(centre, half_width, half_width, np.where(there, middle - centre, 0.0), strength)
+    half_width = np.where(there, np.where(epsilon > 0, half_width, 0.0), np.nan)
+    shift = np.where(there, middle - centre, 0.0)
+    endless = np.isinf(half_width)
+    bounds = (
+        np.where(endless, np.maximum(side, 0.0), centre + shift + sign * half_width)
+        for sign, side in ((-1.0, sides.lower), (1.0, sides.upper))
+    )
+    lower, upper = bounds
+    return Zone(centre, half_width, half_width, shift, strength, (lower, upper))
 
 
 def first_order_zone(

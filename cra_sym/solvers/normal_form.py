@@ -100,8 +100,9 @@ def boundary(expansion: Expansion, pair: Pair, tongue: int, epsilon: Array, orde
         varpi, exponent = centre, np.asarray(1j * pair.values[0].imag)
         for _ in range(1 if order == 1 else _TURNS):
             own, through = _reduced(expansion, pair, tongue, epsilon, order, varpi, exponent)
-            varpi, exponent = _marginal(own, through, tongue, varpi, side)
-        sides.append(varpi)
+            side_at, exponent = _marginal(own, through, tongue, varpi, side)
+            varpi = np.where(np.isfinite(side_at), side_at, centre)
+        sides.append(side_at)
         strength = through.real
     return Boundary(sides[0], sides[1], strength)
 
@@ -109,7 +110,10 @@ def boundary(expansion: Expansion, pair: Pair, tongue: int, epsilon: Array, orde
 def _marginal(
     own: tuple[Complex, Complex], through: Complex, tongue: int, varpi: Array, side: float
 ) -> tuple[Array, Complex]:
-    """Return the frequency at which ``(s - own[0]) (s - own[1] + detuning) = through`` has s imaginary, and that s."""
+    """Return the frequency at which ``(s - own[0]) (s - own[1] + detuning) = through`` has s imaginary, and that s.
+
+    With damping of one of the two alone a real ``through > 0`` makes s grow at every detuning: infinite frequencies.
+    """
     fall, other = -own[0].real, -own[1].real
     total, product = fall + other, fall * other
     now = (own[0] - own[1]).imag
@@ -120,7 +124,13 @@ def _marginal(
         damped = half - side * np.sqrt(np.where(root >= 0, root, np.nan))
         free = -side * 2.0 * np.sqrt(np.where(through.real >= 0, through.real, np.nan))
         still = total <= 1e-12 * np.abs(own[0])
-        d = np.where(still, free, damped)
+        undamped = ~still & (np.minimum(fall, other) <= 1e-12 * np.abs(own[0])) & (total > 0)
+        # s (s + total + i d) = through has one side where through is complex: y = Im through / total
+        level = through.imag / total
+        tilted = np.abs(through.imag) > 1e-9 * np.abs(through.real)
+        open_side = ~tilted | (side * through.imag < 0)
+        single = np.where(open_side, -side * np.inf, -through.real / np.where(tilted, level, 1.0) - level)
+        d = np.where(still, free, np.where(undamped, np.where(through.real > 0, single, np.nan), damped))
         y = np.where(still, -d / 2, (through.imag - fall * d) / total)
     # d falls with the excitation frequency: the upper side has the smaller one
     return varpi + (now - d) / tongue, np.asarray(1j * (own[0].imag + y))

@@ -519,3 +519,56 @@ def test_half_a_period_tells_the_other_where_signs_make_it_so(kind):
         stiffness, parts[kind], [(wave._replace(kind="sin"), drives[0][1])], 2.0, 0.6
     )
     assert shifted.parity() is None  # not even about t = 0
+
+
+def coupled_planes(damper, other):
+    """Two planes that a spring between their tips couples, which pulsates about zero; a damper along each."""
+    u, e, c_u = sp.Function("u")(x, t), sp.Symbol("e"), sp.Symbol("c_u")
+    planes = model(
+        BEAM + rhoA * u.diff(t) ** 2 / 2 - 2 * EI * u.diff(x, 2) ** 2 / 2,
+        fields=(v, u),
+        right=-k * epsilon * cos(varpi * t) * v * u,
+        essential=[*CLAMPED, u.subs(x, 0), u.diff(x).subs(x, 0)],
+        virtual_work=[(-c_u * u.diff(t), u, "domain"), (-e * v.diff(t), v, "domain")],
+        small=SMALL,
+    )
+    return planes.at({**UNIT, k: 3.0, c_u: damper, e: other})
+
+
+@pytest.mark.filterwarnings("ignore:resonance:cra_sym.AsymptoticWarning")
+def test_a_sum_zone_with_one_mode_damped_has_no_end_to_first_order():
+    """The width (c_m + c_n) sqrt(R/(c_m c_n) - 1) grows without bound; growth s at a detuning d: s(s + c + i d) = R."""
+    size, damper = 0.2, 0.1
+    widths = []
+    for other in (0.1, 1e-3, 1e-5):
+        system = coupled_planes(damper, other)
+        lower, upper = cra.stability_boundary(system, system.model.excitation, size, (1, 2), modes=2)
+        widths.append(upper - lower)
+        omega = 2 * np.pi * cra.natural_frequencies(coupled_planes(0.0, 0.0), 2)
+        strength = (size * 3.0 * 2.0 * 2.0) ** 2 / (16 * omega.prod())  # both tips move by 2 in their mode
+        c_1, c_2 = damper / 2, other / 2
+        expected = 2 * (c_1 + c_2) * np.sqrt(strength / (c_1 * c_2) - 1)
+        assert widths[-1] == pytest.approx(expected, rel=1e-3)
+    assert widths[0] < widths[1] < widths[2]
+    for one, other in ((damper, 0.0), (0.0, damper)):
+        system = coupled_planes(one, other)
+        with pytest.warns(cra.AsymptoticWarning, match="one of the two modes is not damped: vibration grows at every"):
+            assert cra.stability_boundary(system, system.model.excitation, size, (1, 2), modes=2) == (0.0, np.inf)
+        detuning = np.array([-0.8, -0.4, 0.4, 0.8])
+        found = cra.growth_rate(system, system.model.excitation, omega.sum() + detuning, size, 2)
+        still = damper / 2 + 1j * detuning
+        growing = (-still + np.sqrt(still**2 + 4 * strength)).real / 2
+        # what the other terms of the excitation, of order epsilon^2 too, do to slow growth
+        np.testing.assert_allclose(
+            found, np.maximum(growing, (-still - np.sqrt(still**2 + 4 * strength)).real / 2), rtol=0.1
+        )
+    lower, upper = cra.stability_boundary(system, system.model.excitation, [0.0, size], (1, 2), modes=2)
+    assert lower[0] == upper[0] == pytest.approx(omega.sum(), rel=1e-3) and upper[1] == np.inf
+
+
+@pytest.mark.parametrize("size", [5e-324, 1e-200, 1e300])
+@pytest.mark.filterwarnings("ignore:resonance:UserWarning")
+def test_boundaries_of_extreme_excitations_are_numbers_or_none(size):
+    system = coupled_planes(0.1, 0.1)
+    for side in cra.stability_boundary(system, system.model.excitation, size, (1, 2), order=2, modes=2):
+        assert np.isnan(side) or np.isfinite(side)
