@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -9,10 +10,10 @@ from numpy.typing import NDArray
 
 from cra_sym.analysis.floquet import Matrices, batch_shape, checked_point, matrices_of
 from cra_sym.checks import default_floating_point
-from cra_sym.model.excitations import Excitation
+from cra_sym.model.excitations import Drive, Excitation
 from cra_sym.model.routes import ROUNDING
 from cra_sym.model.system import System
-from cra_sym.solvers.floquet import flat
+from cra_sym.solvers.floquet import Oscillation, flat
 from cra_sym.solvers.periodic import PeriodicSystem
 from cra_sym.solvers.proved_stability import STABLE, UNSTABLE, proved_stability
 
@@ -36,7 +37,7 @@ def certify_stability(
     ----------
     system : System
     excitation : Fluctuation, JointStiffness, AxialBase or the model's own `excitation`
-        Of stiffness and damping.
+        Of stiffnesses, dampers and gyroscopic terms; not of masses.
     angular_frequency : array_like
         Excitation frequency varpi, rad/s, positive.
     epsilon : array_like
@@ -52,7 +53,7 @@ def certify_stability(
     Raises
     ------
     TypeError, ValueError
-        As :func:`cra_sym.growth_rate`; if a mass or a speed oscillates.
+        As :func:`cra_sym.growth_rate`; if a mass oscillates.
 
     Examples
     --------
@@ -64,7 +65,7 @@ def certify_stability(
     given, frequency, epsilon, modes = checked_point(system, excitation, angular_frequency, epsilon, modes)
     shape = batch_shape(system, given, angular_frequency=frequency, epsilon=epsilon)
     matrices = matrices_of(system, given, modes)
-    drives = [(d.oscillation, (d.stiffness, d.damping, d.momentum, d.mass)) for d in matrices.drives]
+    drives = [part for drive in matrices.drives for part in _without_momentum(drive)]
     whole = np.broadcast_to(epsilon, shape)
     batch, _ = PeriodicSystem.of(matrices.stiffness, matrices.damping, drives, frequency, whole)
     omega = matrices.modal.omega
@@ -76,9 +77,33 @@ def certify_stability(
     return words.reshape(shape)[()]
 
 
+def _without_momentum(drive: Drive) -> Iterator[tuple[Oscillation, tuple[Any, ...]]]:
+    """Yield what oscillates with stiffness and damping alone: d/dt(g B q) is g B q' and g' B q."""
+    oscillation, stiffness, damping, momentum, mass = drive
+    if mass is not None:
+        raise ValueError(
+            "excitation: a mass oscillates; only of oscillating stiffnesses, dampers and gyroscopic terms is there a "
+            "proof: use growth_rate"
+        )
+    if momentum is None:
+        yield oscillation, (stiffness, damping, None, None)
+    else:
+        yield oscillation, (stiffness, momentum if damping is None else momentum + damping, None, None)
+        rate, factor = oscillation.rate()
+        yield rate, (factor * momentum, None, None, None)
+
+
 def _conservative(matrices: Matrices) -> bool:
-    """Return whether nothing damps or drives but what oscillates with a potential."""
-    damping = [matrices.damping, *(d.damping for d in matrices.drives if d.damping is not None)]
+    """Return whether nothing damps or drives but what oscillates with a potential or in a gyroscopic term."""
+    still = matrices.damping
+    skew = np.array_equal(still, -still.swapaxes(-1, -2))
+    for drive in matrices.drives:
+        # of the Lagrangian g q' B q come d/dt(g B q) and -g B' q'
+        if drive.damping is not None or drive.momentum is not None:
+            nothing = np.zeros_like(still)
+            damping = nothing if drive.damping is None else drive.damping
+            momentum = nothing if drive.momentum is None else drive.momentum
+            size = np.abs(damping).max(axis=(-2, -1), keepdims=True)
+            skew &= bool((np.abs(damping + momentum.swapaxes(-1, -2)) <= ROUNDING * size).all())
     stiffness = [matrices.stiffness, *(d.stiffness for d in matrices.drives if d.stiffness is not None)]
-    skew = all(np.array_equal(c, -c.swapaxes(-1, -2)) for c in damping)
     return skew and all(np.array_equal(k, k.swapaxes(-1, -2)) for k in stiffness)

@@ -101,7 +101,7 @@ def _bounds(system: PeriodicSystem, unit: Array) -> _Bounds:
     swings, points = [], system.period.size
     for swing in system.swings:
         if swing.mass is not None or swing.momentum is not None:
-            raise ValueError("excitation: a mass or a momentum oscillates; stiffness and damping alone can be proved")
+            raise ValueError("swings: a mass or a momentum oscillates; must be stiffness and damping alone")
         size, total = np.abs(swing.size), np.zeros(points)
         if swing.stiffness is not None:
             total = total + size * _rows(swing.stiffness / unit)
