@@ -70,6 +70,9 @@ CALLS = {
     "identify_joint": lambda s: {"measured_frequencies": cra.natural_frequencies(s, 2), "uncertainty": 1e-3},
     "export": lambda s: {"language": "python", "modes": 2},
     "explore": lambda s: {},
+    "identify_slip": lambda s: {
+        "amplitude": [1e-3, 2e-3], "frequency": [1.0, 1.0], "damping_ratio": [0.01, 0.01], "uncertainty": (0.01, 0.01),
+        "unknown": (density(s),)},
     "slip_response": lambda s: {"motion": driven(s), "t": GRID},
     "sweep": lambda s: {
         "quantity": "natural_frequencies", leading_parameter(s): s.values[leading_parameter(s)] * np.array([1, 1.1])},
@@ -79,7 +82,8 @@ REFUSED = {("certify", name): "constant along x" for name in VARIES}
 # more mass buckles nothing: where stability is lost is tested in tests/analysis/test_critical.py
 REFUSED |= {("critical_value", name): "between: the system is stable at all" for name in (*NAMES, "the arm")}
 # what slips: tests/analysis/test_slip_response.py
-REFUSED |= {("slip_response", name): "system: .*elastic-slip" for name in (*NAMES, "the arm")}
+SLIPPING = ("slip_response", "identify_slip")
+REFUSED |= {(of, name): "system: .*elastic-slip" for of in SLIPPING for name in (*NAMES, "the arm")}
 # the case of the arm, its joint: of other systems 'identify'
 REFUSED |= {("identify_joint", name): "system: k_t must be the stiffness of an end" for name in NAMES}
 
