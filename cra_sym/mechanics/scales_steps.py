@@ -193,7 +193,7 @@ def _first_order(e: Expansion) -> list[Step]:
         ),
         Step(
             "secular terms",
-            "On the right of order 1, these multiply exp(i omega T0) of the mode itself and would grow without bound.",
+            "On the right of order 1, these multiply exp(i omega T_0) of the mode itself and would grow without bound.",
             tuple(secular.values()),
             ("order 1", "free vibration", "excitation in exponentials"),
             "",

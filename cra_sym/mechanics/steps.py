@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +13,7 @@ from sympy.printing.latex import LatexPrinter
 
 from cra_sym.mechanics.layout import arranged
 
-__all__ = ["Step", "Steps", "compact_latex", "display_latex", "variation_of"]
+__all__ = ["Step", "Steps", "compact_latex", "display_latex", "mathematics", "variation_of"]
 
 _DELTA = "δ"
 
@@ -145,6 +146,27 @@ def display_latex(expression: Any, variables: tuple[str, str] = ("x", "t"), tag:
     return rf"\begin{{gathered}} {body} \end{{gathered}}{number}"
 
 
+_GREEK = "Delta|epsilon|iota|kappa|lambda|mu|omega|phi|psi|rho|sigma|varpi|zeta"
+_NAMES = re.compile(rf"\b({_GREEK}|[^\W\d_](?=_))(?:_([A-Za-z0-9]+))?(?:\^([A-Za-z0-9]+))?(?![A-Za-z0-9_])")
+
+
+def mathematics(prose: str) -> str:
+    r"""Return prose in which names of Greek letters, and letters with an index, are LaTeX between dollar signs.
+
+    >>> print(mathematics("D_k is the derivative with respect to T_k = epsilon^k t, $x_1$ stays."))
+    $D_{k}$ is the derivative with respect to $T_{k}$ = $\epsilon^{k}$ t, $x_1$ stays.
+    """
+    parts = prose.split("$")
+    parts[::2] = (_NAMES.sub(_as_latex, part) for part in parts[::2])
+    return "$".join(parts)
+
+
+def _as_latex(name: re.Match[str]) -> str:
+    letter = name[1] if len(name[1]) == 1 else f"\\{name[1]}"
+    index, power = (f"{mark}{{{text}}}" if text else "" for mark, text in (("_", name[2]), ("^", name[3])))
+    return f"${letter}{index}{power}$"
+
+
 @dataclass(frozen=True, repr=False)
 class Step:
     """One step of a derivation.
@@ -185,7 +207,7 @@ class Step:
         return rf"$\displaystyle {self._formula()}$"
 
     def _repr_markdown_(self) -> str:
-        return f"**{self.name}.** {self.statement}\n\n$${self._formula()}$$"
+        return f"**{self.name}.** {mathematics(self.statement)}\n\n$${self._formula()}$$"
 
 
 class Steps(tuple[Step, ...]):

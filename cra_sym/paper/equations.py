@@ -215,9 +215,11 @@ class Equation:
         return rf"$\displaystyle {self._formula()}$"
 
     def _repr_markdown_(self) -> str:
+        from cra_sym.mechanics.steps import mathematics
+
         sources = ", ".join(f"({number})" for number in self.derived_from)
         origin = f"{self.kind} from {sources}" if sources else self.kind
-        return f"**({self.number}) {self.title}**, {origin}. {self.statement}\n\n$${self._formula()}$$"
+        return f"**({self.number}) {self.title}**, {origin}. {mathematics(self.statement)}\n\n$${self._formula()}$$"
 
 
 def _text(function: Callable[..., Any]) -> str:
