@@ -116,6 +116,23 @@ def identify_slip(
     ------
     TypeError, ValueError
         If an argument is out of its range; it is named.
+
+    Examples
+    --------
+    A mass on a spring and a slider, the frequency and damping of which were measured at three amplitudes:
+
+    >>> from math import pi
+    >>> from sympy import Function, Symbol
+    >>> import cra_sym as cra
+    >>> from cra_sym.symbols import t, x
+    >>> q, f_s = Function("q")(t), Symbol("f_s")
+    >>> rig = cra.Model(0, fields=(), coordinates=[q], x=x, domain=(0, 1), t=t,
+    ...                 left=q.diff(t)**2 / 2 - 2 * q**2, hysteresis=[(cra.Jenkins(3.0, f_s), q, None)])
+    >>> curve = cra.backbone(rig.at({"f_s": 0.5}), amplitude=[0.1, 0.3, 1.0], modes=1)
+    >>> data = [0.1, 0.3, 1.0], curve.angular_frequency / (2 * pi), curve.damping_ratio
+    >>> fit = cra.identify_slip(rig.at({"f_s": 0.7}), *data, (1e-3, 1e-3), ["f_s"], modes=1)
+    >>> round(fit.values["f_s"], 4)
+    0.5
     """
     fit = _checked(system, amplitude, frequency, damping_ratio, uncertainty, unknown, mode, modes)
     places = list(itertools.product((-_REACH, 0.0, _REACH), repeat=len(fit.unknown)))
