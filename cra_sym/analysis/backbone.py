@@ -177,7 +177,7 @@ def _held(
     missing = np.flatnonzero(np.isnan(found.angular_frequency))
     if missing.size:
         first = targets.ravel()[missing[0]]
-        warnings.warn(f"no motion was found at amplitude = {first:g}", ConvergenceWarning, stacklevel=3)
+        warnings.warn(f"no motion was found at amplitude = {first:g}", ConvergenceWarning, stacklevel=4)
 
     def shaped(values: NDArray[Any]) -> NDArray[Any]:
         return np.asarray(values.reshape((*targets.shape, *values.shape[1:])))[()]

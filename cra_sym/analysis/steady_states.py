@@ -46,7 +46,8 @@ class SteadyState:
     multipliers : complex ndarray, shape (2 modes,)
         Over one period of the answer, largest first.
     coefficients : ndarray, shape (modes, 2 harmonics + 1)
-        Modal coordinates as sums of the constant, the cosines and then the sines of k varpi t / period.
+        Modal coordinates as sums of the constant, the cosines and then the sines of k varpi t / period. With
+        elastic-slip elements the amplitude holds the statics of the modes left out besides.
 
     Examples
     --------

@@ -105,7 +105,7 @@ def test_loss_is_the_work_of_the_force_less_that_of_the_damper():
 
 def test_polynomial_terms_and_friction_together():
     level, frequency = 0.35, 1.3
-    states = cra.steady_states(mass(alpha=0.8), frequency, drive={F: level}, modes=1)
+    states = cra.steady_states(mass(alpha=0.8), frequency, drive={F: level}, modes=1, harmonics=31)
     assert states and all(state.error_harmonics < 1e-6 for state in states)
 
     def acceleration(time, place, speed):
