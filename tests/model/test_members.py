@@ -43,6 +43,24 @@ def test_an_l_shaped_arm_with_a_tip_mass():
     np.testing.assert_allclose(found, frame.frequencies(foot, 4), rtol=CLOSE)
 
 
+@pytest.mark.parametrize(("place", "spring"), [(0.25, 3.0), (0.75, 1e6)])
+def test_an_l_shaped_frame_with_an_elastic_support_on_its_beam(place, spring):
+    """A spring, soft or next to rigid, that holds a place of the beam across; stepped bending stiffness."""
+    column, arm = beam(1, H, sp.pi / 2), beam(2, B, EI=EI / 3)
+    across = arm.fields[1]
+    arm = beam(2, B, EI=EI / 3, inside=((place * B, -k * across**2 / 2),))
+    model = cra.joined([column, arm], t=t, joints=[(column.end, arm.start)], essential=column.start)
+    system = model.at({**VALUES, k: spring})
+    found = system.natural_frequencies(4)
+    assert system.accuracy < 1e-10
+    frame = Frame()
+    foot, corner, end = frame.node(), frame.node(), frame.node()
+    frame.member(foot, corner, 0.8, np.pi / 2, 2.0, 3e3, 0.7, ELEMENTS)
+    there = frame.member(corner, end, 1.3, 0.0, 2.0 / 3, 3e3, 0.7, ELEMENTS, place)
+    frame.add(there[1:2], stiffness=[spring])
+    np.testing.assert_allclose(found, frame.frequencies(foot, 4), rtol=CLOSE)
+
+
 @pytest.mark.parametrize("angle", [90, 75])
 def test_a_portal(angle):
     """Two legs, upright or inclined, and a beam; clamped feet."""
