@@ -3,7 +3,8 @@
 Strings on foundations, beams under tension or with shear, bending with torsion, several beams: whatever is even under a
 reflection of x, with any springs, masses, lumped coordinates and links of the ends. A coordinate that acts along the
 whole span in another way than to carry it, such as the base of a foundation, keeps the dynamic stiffness: there the
-motion of the span has a part that is no free wave.
+motion of the span has a part that is no free wave. So do more than twelve conditions (two for each displacement of a
+section, one for each coordinate and each spring between places): the formulas would be too long.
 """
 
 from __future__ import annotations
@@ -44,8 +45,8 @@ if TYPE_CHECKING:
 __all__ = ["Waves", "waves_route"]
 
 Array = NDArray[np.float64]
-_MOST = 6  # displacements of a section
-_MOST_COUPLED = 3  # of these inside, which have as many wave numbers
+_MOST_COUPLED = 3  # displacements of a section inside, which have as many wave numbers
+_MOST_PLACES = 12  # conditions, whose minors double in number with each
 _BLOCK = 8192  # sets of values at a time
 _COST = 10  # roots of one wave number that one of these costs, to judge whether machine code pays
 
@@ -241,7 +242,7 @@ def waves_route(form: StateForm, spatial: SpatialProblem, symbols: Sequence[Symb
     from cra_sym.model.waves_form import conditions, known_coefficients, parity, powers
 
     n = len(form.displacements)
-    if n > _MOST or not n or not form.uniform or form.damped:
+    if not n or 2 * n > _MOST_PLACES or not form.uniform or form.damped:
         return None
     m = len(form.coordinates)
     section = [*range(n), *range(n + m, 2 * n + m)]
@@ -261,6 +262,8 @@ def waves_route(form: StateForm, spatial: SpatialProblem, symbols: Sequence[Symb
     if not any((*flat[len(entries) :], *ends.mass)):
         return None  # nothing has mass: the general route says so
     structure = Structure(odd, sizes, m, ends.links.rows, ends.linked)
+    if structure.places > _MOST_PLACES:
+        return None
     known = known_coefficients(structure, flat, ends)
     return Waves(
         spatial,

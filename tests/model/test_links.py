@@ -287,9 +287,17 @@ def test_unstable_links_are_refused():
 
 
 def test_what_keeps_the_dynamic_stiffness():
-    """A foundation that moves, and four waves that are coupled."""
+    """A foundation that moves, four waves that are coupled, three beams on two carriages."""
     moving = HALF * K * (v - w) ** 2
     base = model(BEAM - moving, [v], BASE, None, [w])
     layer = model(BEAM + OTHER - HALF * K * (v - u) ** 2, [v, u], JOINT, TIP)
-    for kind in (base, layer):
+    carriages = (
+        HALF * m_w * w.diff(t) ** 2
+        + PAYLOAD
+        - sum(HALF * k * (f - w) ** 2 for f in (v, u))
+        - HALF * k_2 * (theta - p) ** 2
+    )
+    third = HALF * m * theta.diff(t) ** 2 - HALF * EI * theta.diff(x, 2) ** 2
+    many = model(BEAM + OTHER + third, [v, u, theta], JOINT, carriages, [w, p])
+    for kind in (base, layer, many):
         assert isinstance(kind.at({s.name: GIVEN[s.name] for s in kind.symbols})._route, GeneralRoute)
