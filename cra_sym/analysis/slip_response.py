@@ -178,6 +178,8 @@ def slip_response(
     if not system.model.pieces["hysteresis"]:
         raise ValueError("system: has no elastic-slip elements; give its model hysteresis=[..], or use response")
     times = np.atleast_1d(one_axis("t", t, "times", low=0.0, unit="s"))
+    if not times.size:
+        raise ValueError("t = []: must be one time or more")
     if (np.diff(times) <= 0).any():
         raise ValueError(f"t[{int(np.argmax(np.diff(times) <= 0)) + 1}]: must ascend")
     modes = count("modes", modes, high=MOST_MODES)

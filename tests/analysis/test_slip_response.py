@@ -205,6 +205,8 @@ def test_bad_input_is_named(arm, joint):
         cra.slip_response(arm, MOVE, TIMES)
     with pytest.raises(ValueError, match=r"t\[1\]: must ascend"):
         cra.slip_response(joint, MOVE, [0.1, 0.1])
+    with pytest.raises(ValueError, match="must be one time or more"):
+        cra.slip_response(joint, MOVE, [])
     with pytest.raises(ValueError, match="must be real numbers in"):
         cra.slip_response(joint, MOVE, [-0.1, 0.1])
     with pytest.raises(ValueError, match="no history for w"):
