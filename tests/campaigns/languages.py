@@ -120,7 +120,8 @@ def main() -> None:
             frequencies, modal = worst(language, arms, real)
             result[f"{language} {real}"] = {"frequency parameters": frequencies, "modal quantities": modal}
             print(f"{language:12} {real}: {frequencies:.1e} {modal:.1e}", flush=True)
-    RECORD.write_text(json.dumps({"date": str(date.today()), "arms": arms, "worst": result}, indent=1) + "\n")
+    told = {"date": str(date.today()), "arms": arms, "thinned": THINNED, "worst": result}
+    RECORD.write_text(json.dumps(told, indent=1) + "\n")
 
 
 if __name__ == "__main__":
