@@ -99,11 +99,10 @@ def draw(name: str, system: System | None = None, **options: Any) -> Figure:
     if system is not None:
         if not shows_an_arm(name):
             raise ValueError(f"figure = {name!r}: it shows no arm, so none can be given")
-        from cra_sym.arm.parameters import Arm
         from cra_sym.figures.subject import parameters_of
         from cra_sym.model.system import System
 
-        instance("system", system, Arm if name == "fig04" else System)
+        instance("system", system, System)
         if not shows_any_system(name):
             parameters_of(system)
         subject = {"system" if shows_any_system(name) else "arm": system}

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from cra_sym.analysis.modes import mode_shapes, natural_frequencies
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import choice, one_axis
+from cra_sym.checks import choice, instance, one_axis
 from cra_sym.figures.drawing import BLUE, ORANGE, figure_of, panels
 from cra_sym.figures.subject import (
     around,
@@ -73,7 +73,8 @@ def figure_4(arm: Arm | None = None, k_r: Any = None, *, axes: Any = None) -> Fi
         Stiffnesses in N m/rad, by default 1e2 to 1e5 for the nominal EI / L.
     axes : 2 x 2 array of Axes, optional
     """
-    arm = arm or Arm.nominal()
+    arm = Arm.nominal() if arm is None else arm
+    instance("system", arm, Arm)  # the sign is flipped in the paper's Lagrangian
     k_r = decades(arm, "k_r", 2, 5) if k_r is None else np.asarray(k_r, dtype=float)
     grid = panels(axes, 2, 2, (8.6, 6.6), sharey="row")
     (top_left, top_right), (low_left, low_right) = grid

@@ -56,7 +56,10 @@ def parameters_of(system: System) -> Arm:
     names = Arm.nominal().values
     missing = [name for name in names if name not in system.values]
     if missing:
-        raise ValueError(f"system has no parameter {missing[0]!r}: this figure is of an arm, with {', '.join(names)}")
+        raise ValueError(
+            f"system has no parameter {missing[0]!r}: this figure is of an arm, with {', '.join(names)}; "
+            "'frequencies', 'mode_shapes', 'response', 'frequency_response', 'zones' and 'combinations' show any system"
+        )
     return Arm(**{name: system.values[name] for name in names}, zeta=system.zeta)
 
 

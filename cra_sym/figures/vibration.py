@@ -9,13 +9,14 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from cra_sym.analysis.frequency_response import frequency_response
-from cra_sym.analysis.modes import modal_parameters, mode_shapes
+from cra_sym.analysis.modes import modal_parameters, mode_shapes, natural_frequencies
 from cra_sym.analysis.residual_vibration import residual_vibration
 from cra_sym.analysis.responses import tip_response
 from cra_sym.analysis.shaping import input_shaper
 from cra_sym.analysis.state_space import state_space
 from cra_sym.arm.parameters import Arm
 from cra_sym.figures.drawing import GREEN, ORANGE, figure_of, panels
+from cra_sym.figures.modes import decades
 from cra_sym.figures.subject import fields, moving_place, single
 from cra_sym.model.system import System
 from cra_sym.solvers.motion import BaseMotion, Piecewise
@@ -125,10 +126,12 @@ def figure_residual_vibration(arm: System | None = None, *, ax: Any = None) -> F
     """
     arm = arm or Arm.nominal()
     panel = panels(ax, 1, 1, _SIZE)[0, 0]
-    k_t, fastest = np.geomspace(10.0, 1e5, 161), BaseMotion.s_curve(**_LIMITS).duration
-    duration = np.linspace(fastest, 2.6, 281)
+    k_t, fastest = decades(arm, "k_t", 1, 5, 161), BaseMotion.s_curve(**_LIMITS).duration
+    duration = np.linspace(fastest, fastest + 4.25 / natural_frequencies(arm.replace(k_t=np.inf), 1)[0], 281)
     left = residual_vibration(arm.replace(k_t=k_t[:, None]), BaseMotion.s_curve(**_LIMITS, duration=duration))
-    mesh = panel.pcolormesh(duration, k_t, 1e3 * left, norm=LogNorm(1e-2, 1e2), shading="gouraud", rasterized=True)
+    top = 10.0 ** np.ceil(np.log10(1e3 * left[np.isfinite(left)].max()))
+    norm = LogNorm(1e-4 * top, top)
+    mesh = panel.pcolormesh(duration, k_t, 1e3 * left, norm=norm, shading="gouraud", rasterized=True)
     panel.set_yscale("log")
     panel.figure.colorbar(mesh, ax=panel, label="residual tip amplitude / mm", extend="both")
     period, move = 1 / modal_parameters(arm.replace(k_t=k_t), 1).frequency[:, 0], BaseMotion.s_curve(**_LIMITS)
@@ -159,8 +162,10 @@ def figure_input_shaping(arm: System | None = None, *, axes: Any = None) -> Figu
     arm = arm or Arm.nominal().replace(**_LOOSE, zeta=0.01)
     (row,) = panels(axes, 1, 2, _SIZE)
     left, right = row
-    t, k_t = np.linspace(0, 2.5, 1601), np.geomspace(0.1, 10.0, 201) * arm.values["k_t"]
-    for name, move in shaped_moves(arm).items():
+    moves, period = shaped_moves(arm), 1 / natural_frequencies(arm, 1)[0]
+    end = float(f"{moves['ZVD'].duration + 2.65 * period:.2g}")
+    t, k_t = np.linspace(0, end, 1601), np.geomspace(0.1, 10.0, 201) * arm.values["k_t"]
+    for name, move in moves.items():
         left.plot(t, 1e3 * tip_response(arm, move, t), label=f"{name}, {move.duration:.2f} s", linewidth=1.4)
         right.loglog(k_t / arm.values["k_t"], 1e3 * residual_vibration(arm.replace(k_t=k_t), move), linewidth=1.4)
     left.legend(loc="lower left", bbox_to_anchor=(0.0, 0.98), ncols=2, borderaxespad=0, fontsize=8)

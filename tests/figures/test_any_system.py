@@ -106,3 +106,18 @@ def test_a_string_held_at_both_ends_is_shown_where_it_moves():
 def test_what_cannot_be_drawn_is_named(name, given, options, words):
     with pytest.raises((TypeError, ValueError), match=words):
         draw(name, given, **options)
+
+
+def test_axes_of_what_is_left_after_moves_follow_the_arm():
+    """Another length and joint: time, stiffness and colour reach as far as its vibration does."""
+    long = cra.Arm.nominal().replace(L=2.0, k_t=300.0, k_r=20.0, zeta=0.01)
+    names = ("residual_vibration", "input_shaping")
+    paper, other = ([draw(name, *given).axes for name in names] for given in ((), (long,)))
+    assert paper[0][0].get_xlim() == pytest.approx((0.85, 2.6), abs=0.02)
+    assert paper[0][0].get_ylim() == pytest.approx((10.0, 1e5))
+    assert other[0][0].get_xlim()[1] > 2 * paper[0][0].get_xlim()[1] and other[0][0].get_ylim()[1] < 1e5
+    lines = [curves(axes[1][0])[0] for axes in (paper, other)]
+    assert lines[0][-1, 0] == 2.5 and lines[1][-1, 0] > 5.0
+    for axes in (paper[0], other[0]):
+        (mesh, *_) = axes[0].collections
+        assert mesh.norm.vmax / 10 < mesh.get_array().max() <= mesh.norm.vmax == pytest.approx(1e4 * mesh.norm.vmin)
