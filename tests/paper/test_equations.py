@@ -310,3 +310,15 @@ def test_what_is_shown_of_a_long_equation_is_the_equation():
         assert shown.lhs == whole.lhs
         assert float(found) == pytest.approx(float(whole.rhs.subs(pair).subs(numbers)), rel=1e-12)
     assert len(e._repr_latex_()) < 1000
+
+
+def test_every_equation_survives_srepr():
+    """Evaluated with SymPy's names alone, the text is the same expression, sums over modes included."""
+    from sympy import srepr
+
+    names = {}
+    exec("from sympy import *", names)
+    for entry in registry.equations(companions=True):
+        parts = entry.expression if isinstance(entry.expression, tuple) else (entry.expression,)
+        for part in parts:
+            assert eval(srepr(part), dict(names)) == part, entry
