@@ -138,6 +138,8 @@ ELSEWHERE = {
     "Model", "Member", "joined", "kernel", "stations",  # take SymPy expressions: their own tests
     "export",  # writes a folder: below
     "explore",  # shows sliders: its own tests
+    "BoltedJoint", "Iwan", "Jenkins", "SlipEvent", "SlipResponse", "identify_slip", "slip_response",  # of joints that
+    "Controller", "basins",  # slip, of nonlinear systems: their own tests
 }  # fmt: skip
 PLACES = [(name, argument) for name, arguments in GOOD.items() for argument in arguments]
 
