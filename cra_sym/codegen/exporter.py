@@ -14,7 +14,7 @@ from cra_sym.codegen.arm_library import arm_library
 from cra_sym.codegen.controllers import Controller
 from cra_sym.codegen.fmu import VERSIONS, fmu_archive
 from cra_sym.codegen.frozen import frozen_library
-from cra_sym.codegen.library import PRINTERS, check_name
+from cra_sym.codegen.library import PRINTERS, Library, check_name
 from cra_sym.codegen.rendering import DIGEST, licence
 from cra_sym.codegen.user_model import model_library
 from cra_sym.files import OutputError, path_of, staged_directory
@@ -66,7 +66,7 @@ def export(
     outputs: Any = None,
     controller: Controller | None = None,
 ) -> Export:
-    """Write the arm, a model, or the modes of any system, as tested source code that does not need this package.
+    """Write the arm, any model, or the modes of any system, as tested source code that does not need this package.
 
     The folder holds source, build files, reference vectors computed by this package, a self-test that compares with
     them, and a README. The same input gives the same bytes.
@@ -81,7 +81,9 @@ def export(
     directory : path
         Folder to make, with its parents.
     model : Model, optional
-        Its characteristic function with the derivative by omega is exported instead of the arm.
+        It is exported instead of the arm, for any values of its parameters: characteristic function, count, natural
+        frequencies, modes, sensitivities, responses to prescribed motions, state space. Its coefficients must be
+        constant, with at most three wave numbers and without dampers or lumped coordinates; for others give `system`.
     overwrite : bool
         Whether a folder that is not empty is replaced by one that holds the new files and, of the old ones, those no
         earlier export made. The folder changes in one step: a failed export leaves it as it was.
@@ -94,8 +96,8 @@ def export(
     modes : int
         Modes of the system that are kept.
     real : {'float64', 'float32'}
-        Type of real numbers in the code of an arm or a system. Single precision is there for C, Fortran and Rust; the
-        README says how exact it is.
+        Type of real numbers in the code. Single precision is there for C, Fortran and Rust; the README says how exact
+        it is.
     version : {'3.0', '2.0'}
         Of FMI.
     input, outputs
@@ -114,7 +116,7 @@ def export(
         If the language or the name is not text, the directory not a path, the model not a Model, or the system not a
         System.
     ValueError
-        If the language is unknown, the folder is not empty, the model has no real closed form, or the system cannot be
+        If the language is unknown, the folder is not empty, the model has no closed form, or the system cannot be
         frozen. Nothing is written.
 
     Examples
@@ -133,8 +135,6 @@ def export(
         raise TypeError("model and system: give one of them; a system is a model with values")
     if name is not None:
         check_name(name)
-    if model is not None and real != "float64":
-        raise ValueError("real = 'float32': only the code of an arm or a system has it; give system=")
     if language in PRINTERS and real not in PRINTERS[language].reals:
         raise ValueError(f"real = {real!r}: {PRINTERS[language].title} has {', '.join(PRINTERS[language].reals)}")
     if controller is not None:
@@ -149,7 +149,7 @@ def export(
     if system is not None:
         texts = _system_texts(language, system, name or "system", modes, real, version, input, outputs, controller)
     elif model is not None:
-        texts = dict(model_library(model, name or "model").texts(language))
+        texts = dict(_thinned(model_library(model, name or "model", real), language).texts(language))
     else:
         texts = dict(_arm_texts(language, name or ("cra" if language in ("c", "fortran") else "cra_arm"), real))
     if language != "fmu":
@@ -215,6 +215,8 @@ def _arm_texts(language: str, name: str, real: str) -> dict[str, str]:
 
     with tqdm(total=0, desc=f"deriving and printing {language}", bar_format="{desc}", leave=False, disable=None):
         library = arm_library(name, real)
-    if language == "octave":
-        library = replace(library, checks=library.checks[::_THINNED])
-    return library.texts(language)
+    return _thinned(library, language).texts(language)
+
+
+def _thinned(library: Library, language: str) -> Library:
+    return replace(library, checks=library.checks[::_THINNED]) if language == "octave" else library

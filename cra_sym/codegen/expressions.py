@@ -15,7 +15,7 @@ from cra_sym.mechanics import multiple_scales, one_wave, one_wave_rows, one_wave
 from cra_sym.model import oscillator
 from cra_sym.symbols import symbol
 
-__all__ = ["gauss_rule", "modal_functions", "spectrum_functions", "stability_functions"]
+__all__ = ["gauss_rule", "modal_functions", "response_functions", "spectrum_functions", "stability_functions"]
 
 _BASIS = ("basis_row", one_wave.BASIS[2])
 _KRYLOV = ("krylov", one_wave_shapes.KRYLOV)
@@ -90,7 +90,7 @@ def modal_functions() -> tuple[Function, ...]:
         _make("Modal mass over rho A L, for z > 0.", _mass, pairs),
         _make("Momentum of a mode over rho A L, for z > 0.", _momentum, pairs),
         _make("Rigid-body motion, amplitudes, modal mass and momentum of a mode, z = 0.", _rigid_body, pairs),
-        *_responses(),
+        *response_functions(),
     )
 
 
@@ -123,12 +123,13 @@ def _named(derivation: Any) -> Any:
 _mass.__name__, _momentum.__name__, _rigid_body.__name__ = "modal_mass", "momentum", "rigid_body"
 
 
-def _responses() -> list[Function]:
+@cache
+def response_functions() -> tuple[Function, ...]:
     """Return the closed forms of Duhamel's integral, in real numbers."""
     t, omega, zeta, varpi = (symbol(name) for name in ("t", "omega_i", "zeta_i", "varpi"))
     unit = oscillator.guarded_responses()
     times = [("t", t), ("omega", omega), ("zeta", zeta)]
-    return [
+    return (
         function("free_response", "Answers to unit displacement and to unit velocity.", unit[:2], times),
         function("mean_response", "Answers to a unit step and to a unit ramp.", unit[2:4], times),
         function(
@@ -137,7 +138,7 @@ def _responses() -> list[Function]:
             complex_parts(unit.harmonic),
             [*times, ("varpi", varpi)],
         ),
-    ]
+    )
 
 
 @cache

@@ -30,6 +30,8 @@ PRINTERS: dict[str, type[Printer]] = {
 }  # fmt: skip
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 _ASIDE = {"_evaluate", "_example"}
+_OF_TESTS = frozenset("line file numbers inputs given expected failed failures found got near good".split())
+"""Variables of the self-test in Octave, which a function of that name would hide."""
 _LONGEST = 24  # a name of Fortran has 63 characters at most, ours are in front of others
 _C_HELPERS = {
     name: f"static inline int {name}(int one, int other)\n{{\n    return one {sign} other ? one : other;\n}}"
@@ -63,7 +65,7 @@ def check_name(name: object) -> str:
     """
     if not isinstance(name, str):
         raise TypeError(f"name = {name!r}: must be a text")
-    if not _NAME.fullmatch(name) or len(name) > _LONGEST or name in RESERVED | FORTRAN:
+    if not _NAME.fullmatch(name) or len(name) > _LONGEST or name in RESERVED | FORTRAN | _OF_TESTS:
         raise ValueError(
             f"name = {name!r}: must be lower-case letters, digits and single underscores, begin with a letter, have at "
             f"most {_LONGEST} characters and be no word of a programming language"

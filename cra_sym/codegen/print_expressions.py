@@ -81,7 +81,8 @@ class ExpressionPrinter:
             case ast.Subscript(value=base, slice=index):
                 return self.entry(self.expression(base), self.index(index)), ALWAYS
             case ast.UnaryOp(op=ast.USub(), operand=part):
-                return f"-{self.expression(part, _UNARY)}", _UNARY
+                text = self.expression(part, _UNARY)
+                return f"-({text})" if text.startswith("-") else f"-{text}", _UNARY
             case ast.UnaryOp(operand=part):
                 return f"{self.negation}{self.expression(part, ALWAYS)}", 3
             case ast.BinOp(left=left, op=op, right=right):

@@ -1,114 +1,100 @@
-"""Export of a model of one's own: its characteristic function with the derivative by the angular frequency."""
+"""Export of a model of one's own: frequencies, modes, sensitivities, responses, for any values of its parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import textwrap
 from functools import lru_cache
-
-import numpy as np
-import sympy as sp
 
 from cra_sym.checks import instance
 from cra_sym.codegen.frozen import stated
-from cra_sym.codegen.library import Check, Library, source
-from cra_sym.codegen.printers import FormPrinter
-from cra_sym.codegen.program import Function, function, scalars
-from cra_sym.codegen.real_forms import characteristic_pair
-from cra_sym.codegen.vectors import SEED, TOLERANCE
+from cra_sym.codegen.library import Library, source
+from cra_sym.codegen.model_checks import model_checks, sample
+from cra_sym.codegen.model_text import ModelText
 from cra_sym.model import Model
+from cra_sym.model.waves_form import WavesForm, waves_form
 
-__all__ = ["model_library"]
+__all__ = ["model_library", "model_text"]
 
-_POINTS = 40
-_MOST = 64  # numbers in a line of the reference vectors
+_MOST = 32  # parameters that a line of the reference vectors has place for
+_INSTEAD = "give system= with the model at its values, whose modes are exported as numbers"
 
 
-def model_library(model: Model, name: str) -> Library:
-    """Return a model's characteristic function as a library.
+def model_library(model: Model, name: str, real: str = "float64") -> Library:
+    """Return a model as a library.
 
     Raises
     ------
     TypeError
         If it is not a Model.
     ValueError
-        If its characteristic function has no real closed form: dampers, several wave numbers or varying coefficients.
+        If it cannot be exported for any values of its parameters: the message says why.
     """
     instance("model", model, Model)
-    return _library(model, name)
+    return _library(model, name, real)
 
 
-@lru_cache(maxsize=4)
-def _library(model: Model, name: str) -> Library:
-    pair, plain, arguments = _characteristic(model)
-    made = function(
-        "characteristic",
-        "Compute the characteristic function and its derivative by the first argument, both times one positive factor.",
-        pair,
-        scalars(arguments),
+def model_text(model: Model, real: str = "float64") -> ModelText:
+    """Return what writes the text of a model; raise a ValueError if there is none."""
+    return ModelText(model, _form(model), real)
+
+
+def _form(model: Model) -> WavesForm:
+    """Return a model as the solver of waves takes it."""
+    form = model.state_form
+    if form.damped or not model.numerics("conservative"):
+        raise ValueError(f"model: has dampers, gyroscopic or follower forces; {_INSTEAD}")
+    if not form.displacements or form.coordinates:
+        raise ValueError(f"model: has lumped coordinates; {_INSTEAD}")
+    if not form.uniform:
+        raise ValueError(f"model: has coefficients that vary along the length, or terms inside; {_INSTEAD}")
+    if len(form.displacements) > 3:
+        raise ValueError(f"model: has {len(form.displacements)} wave numbers, at most 3 can be exported; {_INSTEAD}")
+    found = waves_form(form, model.symbols)
+    if found is None or found.structure.linked:
+        raise ValueError(f"model: is not even under reflection, has linked ends or no mass; {_INSTEAD}")
+    if not 0 < len(model.symbols) <= _MOST:
+        raise ValueError(f"model: has {len(model.symbols)} parameters, must have 1 to {_MOST}; {_INSTEAD}")
+    return found
+
+
+@lru_cache(maxsize=8)
+def _library(model: Model, name: str, real: str) -> Library:
+    written = model_text(model, real)
+    fields = list(written.names.values())
+    lines = ["def _given_parameters(given: Row[float, 64], parameters: Out[Parameters]) -> None:"]
+    lines += [f"    parameters.{field} = given[{at}]" for at, field in enumerate(fields)]
+    driven = source("model_check_drives") if written.drives else ""
+    check = source("model_check").replace("# GIVEN", "\n".join(lines)).replace("# DRIVEN", driven.strip())
+    values = sample(written)
+    shown = "\n".join(
+        f"    parameters.{field} = {float(value)!r}" for field, value in zip(fields, values, strict=True)
+    ).replace("inf", "HUGE * 2.0")
+    text = "\n\n\n".join(
+        part.strip("\n") for part in (written.text(), check, _EXAMPLE.replace("# VALUES", shown.strip()))
     )
-    if len(made.arguments) > _MOST:
-        raise ValueError(f"model: has {len(made.arguments)} parameters; at most {_MOST - 1} can be exported")
-    given = ", ".join(f"given[{i}]" for i in range(len(made.arguments)))
-    checks = tuple(_checks(made, pair, plain))
-    sample = ", ".join(map(repr, checks[1].given))
-    rest = source("characteristic_check").replace("GIVEN", given).replace("SAMPLE", sample)
-    text = FormPrinter.text_of(made, "characteristic", checked=True)
-    text = f"{FormPrinter.helped(text)}{text}\n\n{rest}"
-    summary = f"The characteristic function of a {repr(model).strip('<>')}".replace("\\", "")
-    units = ["rad/s", *[""] * len(made.arguments)]
+    summary = f"A {repr(model).strip('<>')}: frequencies, modes, sensitivities, responses".replace("\\", "")
+    checks = tuple(model_checks(written, values))
+    return Library(name, summary, text + "\n", stated(model), checks, _readme(written), real)
+
+
+_EXAMPLE = '''\
+def _example(found: Out[Row[float, 3]]) -> None:
+    """Return the first natural frequencies, Hz."""
+    parameters = Parameters()
+    # VALUES
+    natural_frequencies(parameters, 3, found)
+'''
+
+
+def _readme(written: ModelText) -> str:
+    units = written.model.units or {}
     rows = "".join(
-        f"| `{a.name}` | {unit} | {a.symbols[0]} |\n" for a, unit in zip(made.arguments, units, strict=False)
+        f"| `{name}` | {units.get(symbol.name, '')} | {symbol} |\n" for symbol, name in written.names.items()
     )
-    readme = (
-        "The zeros of `characteristic` in its first argument are the natural angular frequencies, on both sides of a\n"
-        "cut-off frequency; the factor keeps it finite. Parameters it does not depend on are left out.\n\n"
-        f"| argument | unit | symbol |\n| --- | --- | --- |\n{rows}"
+    drives = f" Prescribed motions, by number: {', '.join(written.drives)}." if written.drives else ""
+    words = (
+        "The frequencies are complete: an exact count says how many there are below any omega. The characteristic "
+        "function is finite and right below, at and above cut-off frequencies. Fields, by number: "
+        f"{', '.join(written.fields)}; displacements of a section: {', '.join(written.displacements)}.{drives}"
     )
-    return Library(name, summary, text, stated(model), checks, readme)
-
-
-def _characteristic(model: Model) -> tuple[list[sp.Expr], list[sp.Expr], tuple[sp.Symbol, ...]]:
-    """Return the exported functions, those they were made from, and their arguments."""
-    if model.state_form.damped:
-        raise ValueError(
-            "a damped model has a complex characteristic function: exported code computes with real numbers; "
-            "give system= with the model at its values"
-        )
-    modal = model.separate()
-    waves = modal.basis.wave_numbers
-    if None in waves.values() or len(waves) > 1:
-        raise ValueError(
-            f"wave numbers {', '.join(map(str, waves))}: with one in closed form the characteristic function is real"
-            " at every frequency, and only then it can be exported; give system= with the model at its values"
-        )
-    pair = characteristic_pair(modal.characteristic_function, waves, modal.frequency)
-    value = modal.characteristic_function.xreplace(waves)
-    return pair, [value, sp.diff(value, modal.frequency)], (modal.frequency, *model.symbols)
-
-
-def _checks(made: Function, pair: list[sp.Expr], plain: list[sp.Expr]) -> Iterator[Check]:
-    """Yield reference vectors of 40 digits; each is compared with the function as it was derived, and none is dropped.
-
-    Raises
-    ------
-    ArithmeticError
-        If one disagrees.
-    """
-    import mpmath
-
-    rng = np.random.default_rng(SEED)
-    names = [a.symbols[0] for a in made.arguments]
-    functions = [sp.lambdify(names, e, "mpmath") for e in (*pair, *plain)]
-    for number in range(_POINTS):
-        inputs = [float(f"{x:.6g}") for x in rng.uniform(0.5, 2.0, len(names))]
-        inputs[0] = float(f"{inputs[0] * 10 ** rng.uniform(-2, 4):.6g}") if number else 0.0
-        with mpmath.workdps(40):
-            value, rate = (f(*map(mpmath.mpf, inputs)) for f in functions[:2])
-        with mpmath.workdps(120):  # near 0 the function as derived loses 60 digits
-            beside = [mpmath.mpf(inputs[0] or 1e-15), *map(mpmath.mpf, inputs[1:])]  # as derived it is 0/0 at 0
-            near, climb, whole, slope = (f(*beside) for f in functions)
-            if abs(climb * whole - near * slope) > 1e-18 * (abs(climb * whole) + abs(near * slope)):
-                raise ArithmeticError(f"the characteristic function in real arithmetic is wrong at {inputs}")
-        outputs = float(value), float(rate)
-        size = max(abs(outputs[0]), abs(outputs[1]) * max(inputs[0], 1.0))
-        yield Check(0, tuple(inputs), outputs, TOLERANCE, 1e2 * TOLERANCE * size)
+    return f"{textwrap.fill(words, 112)}\n\n| parameter | unit | symbol |\n| --- | --- | --- |\n{rows}"

@@ -49,6 +49,7 @@ __all__ = [
     "geometry",
     "inertia",
     "load",
+    "load_coefficients",
     "named_observables",
     "names",
     "nonlinear",
@@ -132,11 +133,17 @@ def _kind(weak: WeakForm, function: AppliedUndef) -> str:
 def load(model: Model, name: str) -> Load:
     """Return the load of one unit of a cause: of the acceleration of a motion, or of a force."""
     weak = weak_form(model.linearised.variation)
+    return load_of(weak, *load_coefficients(model, name), model.symbols)
+
+
+def load_coefficients(model: Model, name: str) -> tuple[dict[Jet, Expr], dict[Jet, Expr]]:
+    """Return what the same load is on displacements: per length inside, and at ends, coordinates and places."""
+    weak = weak_form(model.linearised.variation)
     t = weak.variation.space.t
     function = next(f for f in model.driving if f.func.__name__ == name)
     cause = function.diff(t, 2) if _kind(weak, function) == "motion" else function
     inside, discrete = (_coefficients(weak, part, cause) for part in (weak.inside_load, weak.discrete_load))
-    return load_of(weak, inside, discrete, model.symbols)
+    return inside, discrete
 
 
 def _coefficients(weak: WeakForm, part: dict[Jet, Expr], cause: Expr) -> dict[Jet, Expr]:

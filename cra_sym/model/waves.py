@@ -30,7 +30,6 @@ from cra_sym.solvers.waves import (
     Structure,
     UniformProblem,
     formulas,
-    kept,
     lowest_waves,
     template,
 )
@@ -45,8 +44,6 @@ if TYPE_CHECKING:
 __all__ = ["Waves", "waves_route"]
 
 Array = NDArray[np.float64]
-_MOST_COUPLED = 3  # displacements of a section inside, which have as many wave numbers
-_MOST_PLACES = 12  # conditions, whose minors double in number with each
 _BLOCK = 8192  # sets of values at a time
 _COST = 10  # roots of one wave number that one of these costs, to judge whether machine code pays
 
@@ -239,41 +236,21 @@ def waves_route(form: StateForm, spatial: SpatialProblem, symbols: Sequence[Symb
     symbols : sequence of Symbol
         The parameters, in the order in which their values are given.
     """
-    from cra_sym.model.waves_form import conditions, known_coefficients, parity, powers
+    from cra_sym.model.waves_form import waves_form
 
-    n = len(form.displacements)
-    if not n or 2 * n > _MOST_PLACES or not form.uniform or form.damped:
+    found = waves_form(form, symbols)
+    if found is None:
         return None
-    m = len(form.coordinates)
-    section = [*range(n), *range(n + m, 2 * n + m)]
-    system = form.system.extract(section, section)
-    split = parity(system, n)
-    ends = None if split is None else conditions(form, split[0], symbols)
-    if split is None or ends is None or max(split[2]) > _MOST_COUPLED:
-        return None
-    order, odd, sizes = split
-    even_state = [n + i if odd[at] else i for at, i in enumerate(order)]
-    odd_state = [(place + n) % (2 * n) for place in even_state]
-    matrices = [system.extract(odd_state, even_state), system.extract(even_state, odd_state)]
-    entries = [powers(entry, form.parameter) for matrix in matrices for entry in matrix]
-    if None in entries:
-        return None
-    flat = tuple(entry[power] for power in (0, 1) for entry in entries)  # type: ignore[index]
-    if not any((*flat[len(entries) :], *ends.mass)):
-        return None  # nothing has mass: the general route says so
-    structure = Structure(odd, sizes, m, ends.links.rows, ends.linked)
-    if structure.places > _MOST_PLACES:
-        return None
-    known = known_coefficients(structure, flat, ends)
+    order, ends, structure = found.order, found.conditions, found.structure
     return Waves(
         spatial,
         order,
         structure,
-        kernel(flat, tuple(symbols), backend="numpy"),
+        kernel(found.matrices, tuple(symbols), backend="numpy"),
         kernel((*ends.stiffness, *ends.mass, *ends.ties, *ends.links), tuple(symbols), backend="numpy"),
-        kernel(tuple(ends.carried), tuple(symbols), backend="numpy") if m else None,
-        tuple(place for place in range(2 * n + m) if place not in ends.free),
+        kernel(tuple(ends.carried), tuple(symbols), backend="numpy") if structure.coordinates else None,
+        tuple(place for place in range(structure.moving) if place not in ends.free),
         {symbols.index(symbol): acting for symbol, acting in ends.springs.items()},
-        tuple(kept(structure, known)),
+        found.known,
         tuple(str(coordinate) for coordinate in form.coordinates),
     )

@@ -9,9 +9,12 @@ from typing import NamedTuple
 from sympy import Dummy, Expr, Matrix, S, Symbol, cancel, eye, solve, zeros
 
 from cra_sym.mechanics import StateForm
-from cra_sym.solvers.waves import Structure
+from cra_sym.solvers.waves import Structure, kept
 
-__all__ = ["Conditions", "conditions", "known_coefficients", "parity", "powers"]
+__all__ = ["Conditions", "WavesForm", "conditions", "known_coefficients", "parity", "powers", "waves_form"]
+
+_MOST_COUPLED = 3  # displacements of a section inside, which have as many wave numbers
+_MOST_PLACES = 12  # conditions, whose minors double in number with each
 
 
 def parity(system: Matrix, n: int) -> tuple[tuple[int, ...], tuple[bool, ...], tuple[int, ...]] | None:
@@ -234,6 +237,57 @@ def _squares(matrix: Matrix) -> list[tuple[Expr, list[Expr]]]:
             matrix = (matrix - factor * stretch * stretch.T).applyfunc(cancel)
             found.append((factor, list(stretch)))
     return found if matrix.is_zero_matrix and not any(factor.is_negative for factor, _ in found) else []
+
+
+class WavesForm(NamedTuple):
+    """A Lagrangian as the solver of waves takes it, in symbols.
+
+    Attributes
+    ----------
+    order : tuple of int
+        Displacements in the order of the problem: those that are coupled inside together.
+    structure : Structure
+    matrices : tuple of Expr
+        Entries of A_OE and A_EO without z, then their factors of z.
+    conditions : Conditions
+    known : tuple of (0, 1 or None)
+        Coefficients of the problem that are the same for all parameters.
+    """
+
+    order: tuple[int, ...]
+    structure: Structure
+    matrices: tuple[Expr, ...]
+    conditions: Conditions
+    known: tuple[int | None, ...]
+
+
+def waves_form(form: StateForm, symbols: Sequence[Symbol]) -> WavesForm | None:
+    """Return what a conservative problem is to the solver of waves, or None if it is too much for that."""
+    n = len(form.displacements)
+    if not n or 2 * n > _MOST_PLACES or not form.uniform or form.damped:
+        return None
+    m = len(form.coordinates)
+    section = [*range(n), *range(n + m, 2 * n + m)]
+    system = form.system.extract(section, section)
+    split = parity(system, n)
+    ends = None if split is None else conditions(form, split[0], symbols)
+    if split is None or ends is None or max(split[2]) > _MOST_COUPLED:
+        return None
+    order, odd, sizes = split
+    even_state = [n + i if odd[at] else i for at, i in enumerate(order)]
+    odd_state = [(place + n) % (2 * n) for place in even_state]
+    parts = [system.extract(odd_state, even_state), system.extract(even_state, odd_state)]
+    entries = [powers(entry, form.parameter) for matrix in parts for entry in matrix]
+    if None in entries:
+        return None
+    matrices = tuple(entry[power] for power in (0, 1) for entry in entries)  # type: ignore[index]
+    if not any((*matrices[len(entries) :], *ends.mass)):
+        return None  # nothing has mass: the general route says so
+    structure = Structure(odd, sizes, m, ends.links.rows, ends.linked)
+    if structure.places > _MOST_PLACES:
+        return None
+    known = known_coefficients(structure, matrices, ends)
+    return WavesForm(order, structure, matrices, ends, tuple(kept(structure, known)))
 
 
 def known_coefficients(structure: Structure, matrices: Sequence[Expr], ends: Conditions) -> list[int | None]:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from itertools import count
 from typing import Any
 
-__all__ = ["Exact", "straight"]
+__all__ = ["Exact", "Term", "straight", "wanted_lines"]
 
 _NAMES = re.compile(r"\bt\d+\w*")
 _OF_NUMPY = {"floor", "sqrt"}  # the others are functions of the text around it
@@ -108,6 +108,10 @@ class Term:
             return value if condition else otherwise
         return self._new(f"where({', '.join(map(_written, given))})")
 
+    def quotient(self, value: Any) -> Term:
+        """Return a value over this one, and 0 where this one is 0."""
+        return self._new(f"_quotient({_written(value)}, {self.name})")
+
     def __neg__(self) -> Term:
         return self._new(f"-{self.name}")
 
@@ -195,12 +199,12 @@ def straight(
     origin, row = Term("", lines), count()
     given = [Exact(x) if x is not None else origin._new(f"k[{next(row)}, i]") for x in entries]
     results = function(given, *(Term(argument, lines) for argument in arguments))
-    kept = _wanted(lines, [_written(result) for result in results])
+    kept = wanted_lines(lines, [_written(result) for result in results])
     body, answers = _with_few_names(kept, [_written(result) for result in results])
     return f"def {name}(k, i, {', '.join(arguments)}):\n{body}    return {', '.join(answers)}"
 
 
-def _wanted(lines: dict[str, str], results: Sequence[str]) -> list[tuple[list[str], str]]:
+def wanted_lines(lines: dict[str, str], results: Sequence[str]) -> list[tuple[list[str], str]]:
     """Return names and text of the lines that the results need."""
     wanted, kept = set(results), []
     for text, names in reversed(lines.items()):

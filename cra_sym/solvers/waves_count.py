@@ -14,8 +14,8 @@ from .waves_problem import Floats, Integers
 from .waves_structure import Structure
 
 __all__ = [
-    "KINDS", "Determinant", "Functions", "assembled", "block_waves", "condition", "direct", "displacements", "end_rows",
-    "formulas", "kept", "lowest_branch", "regime", "sections", "signs",
+    "KINDS", "Determinant", "Functions", "assembled", "block_columns", "block_waves", "condition", "count_of", "direct",
+    "displacements", "end_rows", "formulas", "kept", "lowest_branch", "regime", "sections", "signs", "value_of",
 ]  # fmt: skip
 
 kernel: Any = waves_kernel  # formulas of arrays and terms, without types
@@ -159,7 +159,7 @@ def condition(structure: Structure, k: Entries, z: Any, place: int, moved: Rows,
     return found
 
 
-def _value(structure: Structure, k: Entries, z: Any, columns: Sequence[Any], basis: Any) -> Any:
+def value_of(structure: Structure, k: Entries, z: Any, columns: Sequence[Any], basis: Any) -> Any:
     """Return the determinant of all conditions: by those of the last block, or of one those of the left end alone."""
     n, width, several = structure.n, structure.places, len(structure.blocks) > 1
     parts, last = assembled(structure, columns), structure.block(n - 1)
@@ -207,7 +207,7 @@ def _chain(structure: Structure, k: Entries, z: Any, parts: tuple[Any, Any]) -> 
         yield changed(place, final[place]), -1.0 if place >= structure.moving else 1.0
 
 
-def _count(
+def count_of(
     structure: Structure,
     k: Entries,
     z: Any,
@@ -231,7 +231,7 @@ def _count(
     value = None
     for value, change in _chain(structure, k, z, assembled(structure, columns)):
         number = kernel.adaptable(value * basis, number, change)
-    return number, _value(structure, k, z, columns, basis) if value is None else value / basis
+    return number, value_of(structure, k, z, columns, basis) if value is None else value / basis
 
 
 def _prepared(structure: Structure, k: Entries, z: Any, kind: str) -> tuple[Any, ...]:
@@ -251,12 +251,12 @@ def _functions(structure: Structure, wanted: Sequence[str]) -> dict[str, Callabl
     def value(kind: str) -> Callable[[Entries, Any], Sequence[Any]]:
         def found(k: Entries, z: Any) -> Sequence[Any]:
             _, _, columns, bases = _prepared(structure, k, z, kind)
-            return [_value(structure, k, z, columns, _product(bases))]
+            return [value_of(structure, k, z, columns, _product(bases))]
 
         return found
 
     def count(kind: str) -> Callable[[Entries, Any], Sequence[Any]]:
-        return lambda k, z: _count(structure, k, z, *_prepared(structure, k, z, kind))
+        return lambda k, z: count_of(structure, k, z, *_prepared(structure, k, z, kind))
 
     def kind_of(k: Entries, z: Any) -> Sequence[Any]:
         found = None

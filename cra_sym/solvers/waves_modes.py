@@ -30,7 +30,7 @@ from .waves_count import (
 from .waves_problem import Floats, UniformProblem
 from .waves_structure import Structure
 
-__all__ = ["wave_states"]
+__all__ = ["block_at", "block_integrals", "wave_states"]
 
 kernel: Any = waves_kernel  # formulas of arrays and terms, without types
 three: Any = waves_three
@@ -104,7 +104,7 @@ def _columns(structure: Structure, k: Floats, z: Complexes, place: Floats) -> Co
             if part.size:
                 x = np.where(place[part] == 0.0, _TINY, place[part])  # quotients of sizes that vanish at mid-span
                 a_part, b_part, own = _members((a, b, waves), part)
-                columns = _block(signs(structure, block), a_part, b_part, own, x, kind)
+                columns = block_at(signs(structure, block), a_part, b_part, own, x, kind)
                 found[:, part] = np.array([np.broadcast_to(entry, x.shape) for entry in columns])
         blocks.append(found)
     for half, rows in enumerate(assembled(structure, blocks)):
@@ -125,7 +125,7 @@ def _members(values: Any, part: Any) -> Any:
     return values[part] if isinstance(values, np.ndarray) and values.ndim else values
 
 
-def _block(reflected: list[int], a: Any, b: Any, waves: Any, x: Floats, kind: str) -> Any:
+def block_at(reflected: list[int], a: Any, b: Any, waves: Any, x: Any, kind: str) -> Any:
     """Return the columns of a block at places x, in one regime."""
     if len(a) == 1:
         c, s = _waves(waves[0], x)
@@ -141,7 +141,39 @@ def _block(reflected: list[int], a: Any, b: Any, waves: Any, x: Floats, kind: st
     return three.joined_columns(single, _pair(matrices[:4], matrices[4:], pair, x, kind), vectors, masks)
 
 
-def _pair(a: Any, b: Any, waves: Any, x: Floats, kind: str) -> Any:
+def block_integrals(reflected: list[int], a: Any, b: Any, waves: Any, kind: str) -> Any:
+    """Return half the integrals over the length of E of the E-columns (first) and of O of the O-columns (third part).
+
+    They are what the columns are with ``sinh(sqrt mu) / sqrt mu`` in place of ``cosh(sqrt mu)``.
+    """
+    if len(a) == 1:
+        _, s = kernel.wave(waves[0])
+        return kernel.columns_of_one(a[0], b[0], s, s)
+    if len(a) == 4:
+        return _pair_integrals(a, b, waves, kind)
+    _, mu, pair, matrices, vectors, masks, _ = waves
+    if kind == "series":
+        _, s, reflected_s = three.near_functions(a, b, reflected, 1.0)
+        return (*s, *s, *reflected_s, *s)
+    _, s = kernel.wave(mu)
+    single = kernel.columns_of_one(*vectors[:2], s, s)
+    return three.joined_columns(single, _pair_integrals(matrices[:4], matrices[4:], pair, kind), vectors, masks)
+
+
+def _pair_integrals(a: Any, b: Any, waves: Any, kind: str) -> Any:
+    if kind == "near":
+        series = kernel.near_series(*waves[:3])
+    else:
+        pair = (kernel.half_sums if kind == "close" else kernel.eigenvalues)(*waves[:3])
+        big_c, big_s, small_c, small_s = (value for m in pair for value in kernel.wave(m))
+        if kind != "close":
+            return kernel.distant_columns(a, b, *waves, big_s, big_s, small_s, small_s)[:16]
+        series = kernel.close_series(*pair, big_c, big_s, small_c, small_s)
+    _, _, s0, s1, _ = series
+    return kernel.close_columns(a, b, *waves, s0, s1, s0, s1)
+
+
+def _pair(a: Any, b: Any, waves: Any, x: Any, kind: str) -> Any:
     """Return the columns of a block of two at places x, in one regime."""
     square = x * x
     if kind == "near":
@@ -157,9 +189,9 @@ def _pair(a: Any, b: Any, waves: Any, x: Floats, kind: str) -> Any:
     return kernel.close_columns(a, b, *waves, c0, square * c1, x * s0, x * square * s1)
 
 
-def _waves(m: Complexes, x: Floats) -> tuple[Complexes, Complexes]:
+def _waves(m: Any, x: Any) -> tuple[Any, Any]:
     """Return cosh(sqrt(m) x) and sinh(sqrt(m) x) / (sqrt(m) x) over exp(sqrt m) for positive m."""
-    c, s = kernel.wave(m * x**2)
+    c, s = kernel.wave(m * (x * x))
     decay = np.exp(kernel.positive_root(m) * (np.abs(x) - 1.0))
     return decay * c, decay * s
 

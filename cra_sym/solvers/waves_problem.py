@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from itertools import combinations
@@ -18,6 +19,7 @@ __all__ = [
     "Floats",
     "Integers",
     "UniformProblem",
+    "dispersion",
     "idle_coordinates",
     "negative_energy",
     "negative_motions",
@@ -213,21 +215,25 @@ class UniformProblem:
         return self.stretches[:, link, place]
 
     def _enter_dispersion(self, row: dict[int, Floats]) -> None:
-        structure, n = self.structure, len(self.odd)
-        for start, stop in structure.blocks:
-            a, b = (
-                [
-                    [[row.get(first + shift + n * i + j, Exact(0)) for shift in (0, n * n)] for j in range(start, stop)]
-                    for i in range(start, stop)
-                ]
-                for first in structure.matrices
-            )
-            for order in range(1, stop - start + 1):
-                first = structure.table(start + order - 1)
-                if any(place in row for place in range(first, first + TERMS)):
-                    for place, value in enumerate(_symmetric(b, a, order)[:TERMS], start=first):
-                        if place in row:
-                            row[place][:] = 0.0 if isinstance(value, Exact) else value
+        entries = [row.get(place, Exact(0)) for place in range(self.structure.condition(0))]
+        for place, value in dispersion(self.structure, entries):
+            if place in row:
+                row[place][:] = 0.0 if isinstance(value, Exact) else value
+
+
+def dispersion(structure: Structure, entries: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+    """Yield the coefficients of the dispersion relation, with their numbers, from those of the matrices."""
+    n = structure.n
+    for start, stop in structure.blocks:
+        a, b = (
+            [
+                [[entries[first + shift + n * i + j] for shift in (0, n * n)] for j in range(start, stop)]
+                for i in range(start, stop)
+            ]
+            for first in structure.matrices
+        )
+        for order in range(1, stop - start + 1):
+            yield from enumerate(_symmetric(b, a, order)[:TERMS], start=structure.table(start + order - 1))
 
 
 Polynomial = list[Any]

@@ -13,7 +13,7 @@ from numpy import exp
 
 from .waves_kernel import _COSH, _SINH, columns_of_one, growth, positive_root, total, wave, wave_numbers, where
 
-__all__ = ["alone", "near_columns", "three_waves"]
+__all__ = ["alone", "joined_columns", "near_columns", "near_functions", "three_waves"]
 
 _ORDERS = (0, 1, 2), (1, 0, 2), (2, 1, 0)
 _STEPS = 6  # Newton's, from at most 1.5 times the root down to rounding
@@ -114,6 +114,12 @@ def near_columns(a, b, signs, square=1.0):
 
     With ``square`` they are those at another place, x^2, but for a factor x of O of the E-columns and E of the others.
     """
+    c, s, _ = near_functions(a, b, signs, square)
+    return (*c, *_product(a, s), *_reflected(c, signs), *_product(s, b))
+
+
+def near_functions(a, b, signs, square):
+    """Return cosh(sqrt G x) and sinh(sqrt G x) / (sqrt G x) of ``G = b a``, and the second of ``a b``."""
     g = _product(b, a)
     first, second, third = _symmetric_functions(g)
     first, second, third = first * square, second * square * square, third * square * square * square
@@ -126,8 +132,11 @@ def near_columns(a, b, signs, square=1.0):
         rest = [c1 * e1 + c2 * e2 for e1, e2 in zip(g, twice, strict=True)]
         found.append(tuple(c0 + entry if at in (0, 4, 8) else entry for at, entry in enumerate(rest)))
     c, s = found
-    reflected = tuple(signs[i] * signs[j] * c[3 * j + i] for i in range(3) for j in range(3))
-    return (*c, *_product(a, s), *reflected, *_product(s, b))
+    return c, s, _reflected(s, signs)
+
+
+def _reflected(m, signs):
+    return tuple(signs[i] * signs[j] * m[3 * j + i] for i in range(3) for j in range(3))
 
 
 def joined_columns(single, pair, vectors, masks):

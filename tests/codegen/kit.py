@@ -37,7 +37,7 @@ def brackets(a: float, b: float, c: float) -> float:
     total += a / (b * c) + a * (b / c) - a / b / c  # not the same
     total = total * (a + b) - -(a * b) - (-a) * b
     total -= (a - b) * (a + b) / (c + 3.0)
-    return total / 1e-5 + -c
+    return total / 1e-5 + -(-(-c))
 
 
 def halves(k: int) -> float:

@@ -1,29 +1,241 @@
-"""The characteristic function of a model, as it is exported."""
+"""Models as exported code: each language against the package, right values of others, what is refused."""
 
-import importlib.util
+from __future__ import annotations
+
+import math
+import re
+import shutil
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
+import pytest
 import sympy as sp
 
 import cra_sym as cra
+from cra_sym.codegen.user_model import model_library
 from cra_sym.symbols import L, t, v, x
+from tests import exported_models
+from tests.codegen import kit
+from tests.systems import system
+
+LONG = ("tension", "bending and torsion")  # what all compiled languages run
+TRIALS = 6  # of each model; a campaign runs a thousand
 
 
-def test_a_function_without_a_zero_at_rest_is_exported(tmp_path):
-    """A string between fixed ends: sin(z)/z, of which 60 digits cancel in the derivative as derived, next to rest."""
+@cache
+def library(name: str, real: str = "float64"):
+    return model_library(exported_models.model(name), "span", real)
+
+
+def python(made) -> dict:
+    names: dict = {}
+    exec(compile(made.texts("python")[f"{made.name}.py"], made.name, "exec"), names)
+    return names
+
+
+def write(texts, folder):
+    for name, text in texts.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    return folder
+
+
+def passes(made, language, folder):
+    write(made.texts(language), folder)
+    for command in kit.COMMANDS[language][1]:
+        printed = kit.run(command, folder)
+    assert ", 0 failures" in printed or "test result: ok" in printed
+
+
+@pytest.mark.parametrize("name", ["tension", "Timoshenko with end mass and spring", "string on a foundation"])
+def test_python_passes_its_self_test(name, tmp_path):
+    passes(library(name), "python", tmp_path)
+
+
+@pytest.mark.parametrize("language", ["c", "fortran", "rust", "javascript", "octave"])
+@pytest.mark.parametrize("name", LONG)
+def test_self_test_passes(name, language, tmp_path):
+    if not kit.has(language):
+        pytest.skip(f"{language} needs {kit.COMMANDS[language][0]}")
+    if language in ("rust", "octave") and name != LONG[0]:
+        pytest.skip("one is enough of a language that starts slowly")
+    made = library(name)
+    if language == "octave":  # some hundred times slower than the others
+        made = replace(made, checks=made.checks[::30])
+    passes(made, language, tmp_path)
+
+
+@pytest.mark.parametrize("language", ["c", "fortran"])
+def test_single_precision_is_a_whole_path(language, tmp_path):
+    if not kit.has(language):
+        pytest.skip(f"{language} needs {kit.COMMANDS[language][0]}")
+    made = library("foundation with end mass", "float32")
+    source = next(text for name, text in made.texts(language).items() if name.endswith(("span.c", "span.f90")))
+    assert not re.search(r"\bdouble\b", source) and "real64" not in source
+    passes(made, language, tmp_path)
+
+
+def test_a_wrong_number_fails_the_self_test(tmp_path):
+    """A line of each quantity, spoiled by a part in 1e9."""
+    made = library("tension")
+    lines = {check.quantity: check for check in made.checks if not check.refused and np.any(check.expected)}
+    assert sorted(lines) == list(range(9))
+    names = python(made)
+    test = made.texts("python")["self_test.py"]
+    exec(test[test.index("def _given") : test.index("def agree")], names)
+    for check in lines.values():
+        found = [0.0] * 256
+        names["_evaluate"](check.quantity, [*check.given, *[0.0] * (64 - len(check.given))], found)
+        size = np.abs(check.expected).max()
+        off = np.abs(np.array(found[: len(check.expected)]) - check.expected)
+        allowed = check.relative * np.abs(check.expected) + check.absolute
+        assert (off <= allowed).all() and (allowed <= 1e-9 * size).any()
+
+
+@pytest.mark.parametrize("name", exported_models.NAMES)
+def test_random_parameters(name):
+    """Stiffnesses from 0 to infinity, foundations and tensions of twelve decades: frequencies as the package's."""
+    names, model = python(library(name)), exported_models.model(name)
+    fields = [symbol.name for symbol in model.symbols]
+    for number in range(TRIALS):
+        values = exported_models.drawn(name, number)
+        expected = cra.natural_frequencies(model.at(dict(zip(fields, values, strict=True))), 4)
+        found = names["natural_frequencies"](names["Parameters"](*values), 4)
+        three = len(model.state_form.displacements) == 3  # a frequency of three waves loses some more digits
+        assert found == pytest.approx(expected, rel=1e-11 if three else 1e-12, abs=1e-300), values
+
+
+def test_a_function_without_a_zero_at_rest():
+    """A string between fixed ends: sin(z)/z with z = omega L sqrt(m/N)."""
     m, N = sp.symbols("m N")
     string = cra.Model(
         m * v.diff(t) ** 2 / 2 - N * v.diff(x) ** 2 / 2,
         fields=[v], x=x, domain=(0, L), t=t, essential=[v.subs(x, 0), v.subs(x, L)],
     )  # fmt: skip
-    made = cra.export("python", tmp_path / "out", model=string, name="fixed_string")
-    (path,) = [path for path in made.directory.rglob("fixed_string.py")]
-    spec = importlib.util.spec_from_file_location("fixed_string", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    names = [str(symbol) for symbol in string.symbols]
-    values = dict(zip(names, (1.0,) * len(names), strict=True)) | {"L": 0.5, "m": 2.0, "N": 8.0}
-    for omega in (0.0, 1.0, 3.9 * np.pi, 4.1 * np.pi):  # k L = omega / 4
-        found = module.characteristic(omega, *(values[name] for name in names))
-        value = found[0] if np.ndim(found) else found
-        assert np.isclose(value, np.sinc(omega / 4 / np.pi), atol=1e-14)
+    names = python(model_library(string, "fixed_string"))
+    parameters = names["Parameters"](**{"L": 0.5, "m": 2.0, "N": 8.0})
+    start = names["characteristic"](parameters, 0.0)[0]
+    for omega in (1.0, 3.9 * np.pi, 4.1 * np.pi):  # k L = omega / 4
+        value, rate = names["characteristic"](parameters, omega)
+        assert np.isclose(value / start, np.sinc(omega / 4 / np.pi), atol=1e-14)
+        z = omega / 4
+        assert np.isclose(rate / start, (math.cos(z) / z - math.sin(z) / z**2) / 4, atol=1e-14)
+    assert "Motion" not in names  # nothing drives it
+
+
+def test_right_below_the_cut_off():
+    """A beam on a foundation with an end mass: omega_1 = 1.49597602, below the cut-off 10 (rho A = E I = L = 1)."""
+    names = python(library("foundation with end mass"))
+    beam = names["Parameters"](EI=1.0, L=1.0, k_f=100.0, m_e=10.0, rhoA=1.0)
+    found = 2 * np.pi * np.array(names["natural_frequencies"](beam, 4))
+    assert found[0] == pytest.approx(1.49597602, abs=1e-8)
+    for number, omega in enumerate(found):
+        near = [names["characteristic"](beam, omega * (1 + side * 1e-6))[0] for side in (-1, 1)]
+        assert near[0] * near[1] < 0
+        assert [names["count_below"](beam, omega * (1 + side * 1e-6)) for side in (-1, 1)] == [number, number + 1]
+    assert all(np.isfinite(names["characteristic"](beam, omega)).all() for omega in (0.0, 10.0, 1e6))
+
+
+def test_rigid_body_modes_and_close_pairs():
+    """A free Timoshenko beam has two motions at rest; two strings of one tension have equal frequencies."""
+    names = python(library("Timoshenko with end mass and spring"))
+    loose = names["Parameters"](EI=1.0, I_r=0.01, L=1.0, kGA=30.0, k_r=0.0, k_t=0.0, m_e=0.5, rhoA=1.0)
+    modes = names["modes_of"](loose, 4)
+    assert [mode.omega for mode in modes[:2]] == [0.0, 0.0] and modes[2].omega > 1.0
+    # two motions of unit mass at rest, without common mass, take all of the mass in a translation
+    assert sum(mode.participation[0] ** 2 for mode in modes[:2]) == pytest.approx(1.5, rel=1e-12)
+    m, n, T = sp.symbols("m n T")
+    u = sp.Function("u")(x, t)
+    pair = cra.Model(
+        m * v.diff(t) ** 2 / 2 + n * u.diff(t) ** 2 / 2 - T * (v.diff(x) ** 2 + u.diff(x) ** 2) / 2,
+        fields=[v, u], x=x, domain=(0, L), t=t,
+        essential=[v.subs(x, 0), v.subs(x, L), u.subs(x, 0), u.subs(x, L)],
+    )  # fmt: skip
+    names = python(model_library(pair, "pair"))
+    for ratio in (1.0, 1.0 + 1e-13, 1.0 + 1e-7):
+        parameters = names["Parameters"](L=1.0, T=1.0, m=1.0, n=ratio)
+        found = np.array(names["natural_frequencies"](parameters, 4))
+        exact = np.sort(np.concatenate([np.array([0.5, 1.0]), np.array([0.5, 1.0]) / math.sqrt(ratio)]))
+        assert found == pytest.approx(exact, rel=1e-14)
+        modes = names["modes_of"](parameters, 4)
+        shapes = np.array([[names["mode_shape"](parameters, mode, k, 0.5, 0) for k in (0, 1)] for mode in modes[:2]])
+        assert shapes.T @ shapes == pytest.approx(2 * np.eye(2), abs=1e-6)  # sqrt(2) sin(pi x) each
+
+
+def test_bad_parameters_are_refused_by_name():
+    names = python(library("tension"))
+    good = {"EI": 1.0, "L": 1.0, "T": 2.0, "k_r": math.inf, "k_t": 5.0, "rhoA": 1.0}
+    assert names["natural_frequencies"](names["Parameters"](**good), 2)[0] > 0.0
+    wrong = {
+        "EI": (math.nan, math.inf, 0.0, -1.0), "rhoA": (math.nan, -1.0, math.inf), "L": (0.0, -1.0, math.nan),
+        "k_t": (-1.0, math.nan, -math.inf), "T": (math.nan, math.inf, -1e3),
+    }  # fmt: skip
+    for name, values in wrong.items():
+        for value in values:
+            with pytest.raises((names["InvalidParameters"], names["Buckled"])) as caught:
+                names["natural_frequencies"](names["Parameters"](**(good | {name: value})), 2)
+            assert "must" in str(caught.value) or "buckled" in str(caught.value)
+    with pytest.raises(TypeError):
+        names["natural_frequencies"](names["Parameters"](**(good | {"EI": "stiff"})), 2)
+    with pytest.raises(names["InvalidArgument"], match="modes"):
+        names["natural_frequencies"](names["Parameters"](**good), 0)
+
+
+def test_two_models_link_into_one_program(tmp_path):
+    if shutil.which("g++") is None:
+        pytest.skip("needs g++")
+    heads, objects = set(), []
+    for name in ("string on a foundation", "hinged-hinged beam"):
+        made = replace(library(name), name=name.split()[0].split("-")[0])
+        texts = made.texts("c")
+        write({key: text for key, text in texts.items() if key.endswith((".c", ".h"))}, tmp_path)
+        head = texts[f"{made.name}.h"]
+        assert "Lagrangian density" in head and "Boundary conditions" in head
+        heads.add(re.search(r"SHA-256 of the above: ([0-9a-f]{64})", head)[1])
+        kit.run(["cc", "-std=c99", "-O1", "-c", f"{made.name}.c"], tmp_path)
+        objects.append(f"{made.name}.o")
+    (tmp_path / "main.cpp").write_text(
+        '#include "string.h"\n#include "hinged.h"\n#include <cstdio>\n'
+        "int main() { double one[1], two[1]; string_parameters s = { 0 }; hinged_parameters h = { 0 };\n"
+        "  s.L = s.T = s.rhoA = h.L = h.EI = h.rhoA = 1; s.k_t = 1;\n"
+        "  if (string_natural_frequencies(&s, 1, one) || hinged_natural_frequencies(&h, 1, two)) return 1;\n"
+        '  std::printf("%.12f\\n", two[0]); }\n'
+    )
+    kit.run(["g++", "-I.", "main.cpp", *objects, "-lm", "-o", "both"], tmp_path)
+    assert float(kit.run(["./both"], tmp_path)) == pytest.approx(math.pi / 2, rel=1e-11)
+    assert len(heads) == 2
+
+
+def test_dampers_and_linked_ends_are_refused(tmp_path):
+    c, m, T = sp.symbols("c m T", positive=True)
+    u = sp.Function("u")(x, t)
+    density = (m * v.diff(t) ** 2 + m * u.diff(t) ** 2 - T * (v.diff(x) ** 2 + u.diff(x) ** 2)) / 2
+    options = {"fields": [v, u], "x": x, "domain": (0, L), "t": t}
+    damped = cra.Model(density, virtual_work=[(-c * v.diff(t), v, "right")], **options)
+    with pytest.raises(ValueError, match="dampers"):
+        cra.export("c", tmp_path / "out", model=damped)
+    ring = cra.Model(density, essential=[v.subs(x, L) - u.subs(x, 0)], **options)
+    with pytest.raises(ValueError, match="linked ends"):
+        cra.export("c", tmp_path / "out", model=ring)
+    with pytest.raises(TypeError, match="must be a Model"):
+        cra.export("c", tmp_path / "out", model="beam")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="float32"):
+        cra.export("python", tmp_path / "out", model=exported_models.model("tension"), real="float32")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "name, reason",
+    [
+        ("hanging beam", "vary along the length"), ("gantry", "lumped coordinates"),
+        ("two planes", "4 wave numbers"), ("beam with an interior mass", "terms inside"),
+    ],
+)  # fmt: skip
+def test_others_are_refused_and_frozen(name, reason, tmp_path):
+    """One line says why, and what to do, which works."""
+    with pytest.raises(ValueError, match=reason) as caught:
+        cra.export("c", tmp_path / "out", model=system(name).model)
+    assert "system=" in str(caught.value) and "\n" not in str(caught.value) and not list(tmp_path.iterdir())
+    frozen = cra.export("c", tmp_path / "out", system=system(name), input="w", outputs=["v"], modes=2)
+    assert "system.c" in frozen.files

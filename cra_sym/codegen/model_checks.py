@@ -1,0 +1,325 @@
+"""Reference vectors of an exported model: values of the package; its characteristic function by exponentials.
+
+Points are drawn in the range of parameters; what the package refuses there, the exported code has to refuse. Modes are
+compared where all frequencies are apart: others have no shapes of their own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+
+from cra_sym.analysis.modes import mode_shapes, participation
+from cra_sym.analysis.responses import response
+from cra_sym.analysis.sensitivities import sensitivities
+from cra_sym.analysis.state_space import state_space
+from cra_sym.codegen.library import Check
+from cra_sym.codegen.model_text import ModelText
+from cra_sym.codegen.vectors import SEED
+from cra_sym.model.system import System
+from cra_sym.model.waves_form import WavesForm
+from cra_sym.solvers.motion import BaseMotion
+
+__all__ = ["ERRORS", "model_checks", "sample"]
+
+Array = NDArray[np.float64]
+ERRORS = {"float64": 1e-12, "float32": 2e-3}
+"""Error allowed, relative to the largest value of a kind, by the type of real numbers."""
+_POINTS, _MODES = 8, 6
+_APART = 1e-3
+_BELOW = 340  # frequencies, of which more than all lie below the last point
+_TURNS = (0.3, 4.0, 40.0, 1000.0)
+"""Wave number times length of the points of the characteristic function."""
+
+
+def sample(written: ModelText) -> list[float]:
+    """Return parameters of a structure that stands."""
+    for values in _drawn(written):
+        system = _system(written, values)
+        try:
+            system.natural_frequencies(_MODES)
+        except ValueError:
+            continue
+        return values
+    raise ValueError("model: no parameters were found for which the structure stands; give system= with the model")
+
+
+def _drawn(written: ModelText, tries: int = 400) -> Iterator[list[float]]:
+    """Yield parameters within a factor of three, then within two orders, then with either sign."""
+    rng = np.random.default_rng(SEED)
+    for number in range(tries):
+        width = 0.5 if number < tries // 2 else 1.0
+        found = 10.0 ** rng.uniform(-width, width, len(written.names))
+        if number >= 3 * tries // 4:
+            found *= rng.choice((-1.0, 1.0), len(found))
+        yield [float(f"{x:.6g}") for x in found]
+
+
+def _system(written: ModelText, values: Sequence[float]) -> System:
+    return written.model.at(dict(zip(written.names, values, strict=True)))
+
+
+def model_checks(written: ModelText, values: Sequence[float]) -> Iterator[Check]:
+    """Yield the reference vectors of a model, for parameters around some that are good."""
+    loss = ERRORS[written.real]
+    for point in _around(written, values):
+        system = _system(written, point)
+        try:
+            omega = system.natural_frequencies(_MODES)
+        except ValueError:
+            yield Check(0, (*point, 3.0), (), refused=True)
+            continue
+        yield Check(0, (*point, float(_MODES)), tuple(omega / (2 * np.pi)), loss, loss * float(omega[-1]) * 1e-3)
+        yield from _counts(point, omega, written.real)
+        yield from _modal(written, system, point, omega, loss)
+    last = 2 if written.real == "float32" else 3 if written.form.structure.n == 3 else 4  # three waves lose 2600 digits
+    for turns in (0.0, *_TURNS[:last]):
+        yield _characteristic(written, values, turns, loss)
+    yield from _refused(written, values)
+
+
+def _around(written: ModelText, values: Sequence[float]) -> Iterator[list[float]]:
+    rng = np.random.default_rng(SEED + 1)
+    yield list(values)
+    stiffnesses = [list(written.names).index(symbol) for symbol in written.form.conditions.springs]
+    for at in stiffnesses:
+        for value in (math.inf, 0.0):
+            yield [value if place == at else x for place, x in enumerate(values)]
+    if len(stiffnesses) > 1:
+        for value in (math.inf, 0.0):
+            yield [value if place in stiffnesses else x for place, x in enumerate(values)]
+    for _ in range(_POINTS):
+        width = rng.choice((0.1, 0.5, 1.0)) if written.real == "float64" else 0.1
+        yield [float(f"{x:.6g}") for x in np.array(values) * 10.0 ** rng.uniform(-width, width, len(values))]
+
+
+def _counts(point: Sequence[float], omega: Array, real: str) -> Iterator[Check]:
+    least = 1e-9 if real == "float64" else 1e-2
+    edges = [(a, b) for a, b in pairwise(omega) if b - a > least * b]
+    for low, high in edges[-2:]:
+        between = float(0.5 * (low + high))
+        yield Check(2, (*point, between), (float((omega < between).sum()),))
+
+
+def _modal(written: ModelText, system: System, point: Sequence[float], omega: Array, loss: float) -> Iterator[Check]:
+    if (np.diff(omega[:5]) < _APART * omega[1:5]).any():
+        return
+    loss *= 10.0 if written.form.structure.n == 3 else 1.0  # the package's own is 1e-12 there
+    modes, order = system.modes(4), written.form.order
+    quantities = [[modes.displacement(end, at) for at in order] for end in (0, 1)]
+    quantities += [[modes.force(end, at) for at in order] for end in (0, 1)]
+    found = np.array(quantities)  # (what, displacement, mode)
+    sizes = _largest(written, system)  # (displacement, mode)
+    moved = sizes > 1e-9 * sizes.max(axis=1, keepdims=True)
+    forces = np.where(moved, omega[3] ** 2 / np.where(moved, sizes, 1.0), 0.0).max()  # the modal mass is 1
+    for at in range(len(order)):
+        for what, size in ((0, sizes[at].max()), (1, forces)):
+            own = found[2 * what : 2 * what + 2, at].T
+            yield Check(3, (*point, 0.0, at, what), tuple(own.ravel()), loss, loss * float(size))
+    left, length = (float(x) for x in (system.domain.left, system.domain.length))
+    for field, function in enumerate(system.model.equations.fields):
+        for share, derivative in ((0.37, 0), (1.0, 1), (0.81, 2)):
+            x = left + share * length
+            shapes = mode_shapes(system, x, 4, derivative, field=function)
+            size = float(
+                np.abs(mode_shapes(system, left + length * np.linspace(0, 1, 21), 4, derivative, field=function)).max()
+            )
+            yield Check(4, (*point, derivative, x, field), tuple(shapes), loss, loss * size)
+    yield from _sensitivities(written, system, point, omega, loss)
+    yield from _driven(written, system, point, loss)
+
+
+def _largest(written: ModelText, system: System) -> Array:
+    """Return the largest value along the length of every displacement of a section in four modes."""
+    places = float(system.domain.left) + float(system.domain.length) * np.linspace(0.0, 1.0, 33)
+    displacements = system.model.conservative.displacements
+    found = []
+    for at in written.form.order:
+        field, order = displacements[at], 0
+        if isinstance(field, sp.Derivative):
+            field, order = field.expr, sum(int(count) for _, count in field.variable_count)
+        found.append(np.abs(mode_shapes(system, places, 4, order, field=field)).max(axis=-1))
+    return np.array(found)
+
+
+def _sensitivities(
+    written: ModelText, system: System, point: Sequence[float], omega: Array, loss: float
+) -> Iterator[Check]:
+    found, first = sensitivities(system, 4), int((omega[:4] == 0.0).sum())
+    if first:
+        yield Check(5, (*point, 0.0, 0.0, 0.0), (), refused=True)
+    rows = [
+        [kind[symbol.name][mode] for kind in (found.rate, found.log) for symbol in written.names]
+        for mode in range(first, 4)
+    ]
+    size = max(1.0, float(np.abs(rows).max()))
+    yield Check(5, (*point, first, 0.0, 0.0), tuple(float(x) for row in rows for x in row), loss, loss * size)
+
+
+def _driven(written: ModelText, system: System, point: Sequence[float], loss: float) -> Iterator[Check]:
+    left, length = (float(x) for x in (system.domain.left, system.domain.length))
+    x, field = left + length, system.model.equations.fields[0]
+    last = float(system.natural_frequencies(4)[-1])
+    for drive, name in enumerate(written.drives):
+        taken = participation(system, 4, name)
+        yield Check(6, (*point, drive, 0.0, 0.0), tuple(taken), loss, loss * float(np.abs(taken).max()))
+        zeta, time = 0.02, 7.3 / last
+        motion = {
+            "velocity": 0.3,
+            "acceleration": -0.2,
+            "amplitude": 0.1,
+            "angular_frequency": 0.7 * last,
+            "phase": 0.4,
+        }
+        damped = system.replace(zeta=zeta)
+        moved = response(damped, {name: BaseMotion(**motion)}, time, x, 4)
+        size = float(np.abs(taken * _largest(written, system)[written.form.order.index(0)]).sum()) * (0.5 * time + 0.1)
+        given = (*point, drive, x, 0.0, zeta, time, *motion.values())
+        yield Check(7, given, (float(moved),), loss, loss * size)
+        linear = state_space(damped, 4, name, {"y": field.subs(system.model.equations.x, x)})
+        numbers = (*np.ravel(linear.A), *np.ravel(linear.B), *np.ravel(linear.C))
+        yield Check(
+            8, (*point, drive, x, 0.0, zeta), tuple(map(float, numbers)), loss, loss * float(np.abs(taken).max())
+        )
+
+
+# The characteristic function -----------------------------------------------------------------------------------------
+
+
+def _characteristic(written: ModelText, values: Sequence[float], turns: float, loss: float) -> Check:
+    """Return the function and its derivative from matrix exponentials with as many digits as they lose."""
+    import mpmath
+
+    found = _Exact(written, values)
+    omega = found.frequency(turns)
+    with mpmath.workdps(found.digits(omega)):
+        value, rate = found.scaled(omega)
+        size = max(abs(value), abs(rate) * max(omega, 1e-3))
+    return Check(1, (*values, omega), (float(value), float(rate)), loss, loss * float(size) / max(omega, 1.0))
+
+
+def _of_ends(form: WavesForm) -> list[sp.Expr]:
+    """Return the entries of stiffness, mass and ties of the left end, then of the right one."""
+    n, ends = form.structure.n, form.conditions
+    rows = range(n)
+    return [
+        matrix[end * n + i, end * n + j]
+        for end in (0, 1)
+        for matrix in (ends.stiffness, ends.mass, ends.ties)
+        for i in rows
+        for j in rows
+    ]
+
+
+class _Exact:
+    """The determinant of the end conditions in any number of digits."""
+
+    def __init__(self, written: ModelText, values: Sequence[float]) -> None:
+        self._form, self._structure = written.form, written.form.structure
+        left, right = written.model.equations.domain
+        entries = [*self._form.matrices, right - left, *_of_ends(self._form)]
+        self._entries = sp.lambdify(list(written.names), entries, "mpmath")
+        self._values, self._system = values, _system(written, values)
+        self._first = float(self._system.natural_frequencies(2)[1])
+
+    def _parts(self) -> tuple[Any, ...]:
+        """Return the matrices a and b without z and their factors of z, times half the length, and the ends."""
+        import mpmath
+
+        found, n = self._entries(*map(mpmath.mpf, self._values)), self._structure.n
+        half = found[4 * n * n] / 2
+        matrices = [mpmath.matrix(n, n) for _ in range(4)]
+        for at in range(4 * n * n):
+            matrices[at // (n * n)][at % (n * n) // n, at % n] = found[at] * half
+        return matrices, found[4 * n * n + 1 :]
+
+    def _waves(self, omega: float) -> Array:
+        """Return the square roots of the eigenvalues of b a, in 1 / half the length."""
+        a, b, a_slope, b_slope = (np.array(m.tolist(), dtype=float) for m in self._parts()[0])
+        z = omega**2
+        return np.asarray(np.sqrt(np.linalg.eigvals((b + z * b_slope) @ (a + z * a_slope)).astype(complex)))
+
+    def frequency(self, turns: float) -> float:
+        """Return the angular frequency from which on the shortest wave has so many radians along the length."""
+        if not turns:
+            return 0.0
+        low, high = 1e-9 * self._first, 1e12 * self._first
+        for _ in range(200):
+            middle = math.sqrt(low * high)
+            low, high = (middle, high) if 2 * np.abs(self._waves(middle)).max() < turns else (low, middle)
+        return float(f"{high:.6g}")
+
+    def digits(self, omega: float) -> int:
+        """Return how many decimal digits the determinant loses, and 90."""
+        return 90 + int(4 * self._structure.n * float(np.real(self._waves(omega)).max()) / math.log(10))
+
+    def scaled(self, omega: float) -> tuple[Any, Any]:
+        """Return the determinant and its derivative by omega, over what its waves grow by."""
+        import mpmath
+
+        (a, b, a_slope, b_slope), _ = self._parts()
+        z = mpmath.mpf(omega) ** 2
+        product = (b + z * b_slope) * (a + z * a_slope)
+        values = mpmath.eig(product, left=False, right=False) if len(product) > 1 else [product[0]]
+        growth = mpmath.exp(-2 * sum(mpmath.re(mpmath.sqrt(mu)) for mu in values))
+        value, step = self._determinant(mpmath.mpf(omega)), mpmath.mpf(10) ** -35
+        rate = (self._determinant(mpmath.mpf(omega) + step) - value) / step if omega else mpmath.mpf(0)
+        below = int((self._system.natural_frequencies(_BELOW) < omega).sum())
+        sign = 1 if (value > 0) == (below % 2 == 0) else -1  # one for all omega
+        return sign * value * growth, sign * rate * growth
+
+    def _determinant(self, omega: Any) -> Any:
+        import mpmath
+
+        n, odd = self._structure.n, self._structure.odd
+        (a, b, a_slope, b_slope), ends = self._parts()
+        z = omega * omega
+        whole = mpmath.matrix(2 * n, 2 * n)  # (E, O)' by (E, O)
+        for i in range(n):
+            for j in range(n):
+                whole[i, n + j] = b[i, j] + z * b_slope[i, j]
+                whole[n + i, j] = a[i, j] + z * a_slope[i, j]
+        matrix = mpmath.matrix(2 * n, 2 * n)
+        right = mpmath.expm(whole, method="taylor")
+        for end, side in ((1, 1), (0, -1)):
+            state = right.copy()
+            for i in range(n):
+                for j in range(n):  # the left end is the mirror image
+                    state[i, n + j], state[n + i, j] = side * state[i, n + j], side * state[n + i, j]
+            stiffness, mass, ties = (ends[(3 * end + kind) * n * n :][: n * n] for kind in range(3))
+            for i in range(n):
+                held = end * n + i not in self._form.conditions.free
+                share = 1 if held else 1 / (1 + stiffness[n * i + i] + mass[n * i + i])
+                for column in range(2 * n):
+                    q = [state[n + j if odd[j] else j, column] for j in range(n)]
+                    force = [state[j if odd[j] else n + j, column] for j in range(n)]
+                    if held:
+                        found = q[i] - sum(ties[n * i + j] * q[j] for j in range(n))
+                    else:
+                        found = side * (force[i] + sum(ties[n * j + i] * force[j] for j in range(n)))
+                        found += sum((stiffness[n * i + j] - z * mass[n * i + j]) * q[j] for j in range(n))
+                    matrix[i if end else n + i, column] = share * found
+        return mpmath.det(matrix)
+
+
+def _refused(written: ModelText, values: Sequence[float]) -> Iterator[Check]:
+    for place, symbol in enumerate(written.names):
+        bad = [math.nan, -math.inf] + ([] if symbol in written.form.conditions.springs else [math.inf])
+        for wrong in bad:
+            given = [wrong if number == place else x for number, x in enumerate(values)]
+            for quantity in (0, 1, 2):
+                yield Check(quantity, (*given, 1.0), (), refused=True)
+    for modes in (0.0, -1.0, 1001.0):
+        yield Check(0, (*values, modes), (), refused=True)
+    for omega in (math.nan, -1.0, math.inf):
+        yield Check(1, (*values, omega), (), refused=True)
+        yield Check(2, (*values, omega), (), refused=True)
+    yield Check(4, (*values, 9.0, 0.0, 0.0), (), refused=True)
+    yield Check(4, (*values, 0.0, math.nan, 0.0), (), refused=True)
+    yield Check(4, (*values, 0.0, 0.0, 99.0), (), refused=True)

@@ -1,0 +1,402 @@
+"""A model as a text in the restricted form: what its Lagrangian derives to, around one source for all models."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import sympy as sp
+
+from cra_sym.codegen.expressions import response_functions
+from cra_sym.codegen.library import source
+from cra_sym.codegen.printers import FormPrinter
+from cra_sym.codegen.program import christen, function, scalars
+from cra_sym.codegen.unused import without_unused
+from cra_sym.codegen.waves_text import WavesText
+from cra_sym.model import Model
+from cra_sym.model.derivations import load_coefficients
+from cra_sym.model.waves_form import WavesForm
+
+__all__ = ["ModelText"]
+
+_NUMBERS = {
+    "float64": {
+        "HUGE": (1.7976931348623157e308, "what is larger is infinite"),
+        "EPS": (2.0**-52, "of rounding"),
+        "TINY": (1e-300, "of what is as good as nothing"),
+        "DEPENDENT": (1e-14, "what rounding leaves of a row of unit size"),
+        "SLIGHT": (1e-12, "beside 1"),
+        "TWO_SMALL": (1e-140, "share of the line's own z below which two zeros cannot be told apart"),
+        "THREE_SMALL": (1e-95, "the same of three"),
+        "SAME": (1e-9, "relative distance below which squared frequencies are taken as equal"),
+        "NODE": (1e-7, "of the largest displacement: a node"),
+        "BESIDE": (1e-12, "of the largest displacement beside a node"),
+    },
+    "float32": {
+        "HUGE": (2.9e38, "what is larger is infinite"),
+        "EPS": (2.0**-23, "of rounding"),
+        "TINY": (1e-37, "of what is as good as nothing"),
+        "DEPENDENT": (1e-6, "what rounding leaves of a row of unit size"),
+        "SLIGHT": (1e-4, "beside 1"),
+        "TWO_SMALL": (1e-16, "share of the line's own z below which two zeros cannot be told apart"),
+        "THREE_SMALL": (1e-11, "the same of three"),
+        "SAME": (1e-4, "relative distance below which squared frequencies are taken as equal"),
+        "NODE": (1e-3, "of the largest displacement: a node"),
+        "BESIDE": (1e-5, "of the largest displacement beside a node"),
+    },
+}
+_PLACES = (-1.0, -0.56, 0.06, 0.62, 1.0 - 2e-4, 1.0)
+"""Places where the size of a motion is measured, in half lengths from mid-span."""
+
+
+@dataclass(frozen=True)
+class ModelText:
+    """Writes the text of a model.
+
+    Attributes
+    ----------
+    model : Model
+    form : WavesForm
+    real : {'float64', 'float32'}
+    """
+
+    model: Model
+    form: WavesForm
+    real: str = "float64"
+
+    @cached_property
+    def names(self) -> dict[sp.Symbol, str]:
+        """The field of every parameter."""
+        taken: set[str] = set()
+        return {symbol: christen(symbol.name, taken) for symbol in self.model.symbols}
+
+    @cached_property
+    def drives(self) -> list[str]:
+        """Prescribed motions that act by their acceleration."""
+        return [name for name, kind in self.model.numerics("causes") if kind == "motion"]
+
+    @cached_property
+    def fields(self) -> list[str]:
+        """Names of the fields."""
+        return [field.func.__name__ for field in self.model.equations.fields]
+
+    @cached_property
+    def displacements(self) -> list[str]:
+        """Displacements of a section, in the order of the text."""
+        found = self.model.conservative.displacements
+        return [_plain(found[at]) for at in self.form.order]
+
+    @cached_property
+    def held(self) -> list[int]:
+        """Displacements of the left end, and of the right one counted on, that essential conditions hold."""
+        return [place for place in range(2 * self.form.structure.n) if place not in self.form.conditions.free]
+
+    @cached_property
+    def _waves(self) -> WavesText:
+        return WavesText(self.form.structure, self.form.known)
+
+    # The whole --------------------------------------------------------------------------------------------------------
+
+    def text(self) -> str:
+        """Return the text."""
+        spectrum = source("model").replace("# FORMULAS", self._formulas()).replace("# PREPARE", self._prepare())
+        modes = self._placed(source("model_modes")).replace("DISPLACEMENTS_LISTED", ", ".join(self.displacements))
+        parts = [self._constants(), self._parameters(), spectrum, self._rates(), modes]
+        if self.drives:
+            parts += ["".join(f"{self._function(f, f'_{f.name}')}\n\n" for f in response_functions())]
+            parts += [source("model_drives")]
+        whole = "\n\n\n".join(part.strip("\n") for part in parts) + "\n"
+        return without_unused(FormPrinter.helped(whole) + whole)
+
+    def _constants(self) -> str:
+        n = self.form.structure.n
+        place = [self.form.order.index(at) for at in self._field_places()]
+        integers = {
+            "PARAMETER_COUNT": (len(self.names), "of the model"),
+            "FIELDS": (len(self.fields), f"of the model: {', '.join(self.fields)}"),
+            "ENDS": (2 * n * n, "entries of the matrices of both ends"),
+            "END_RATES": (6 * n * n, "rates of stiffness, mass and ties"),
+            "RESTS": (n * (n + 2), "conditions of a motion without energy"),
+            "RESTING": (n * n * (n + 2), "their factors"),
+            "STATIONS": (len(_PLACES), "places where the size of a motion is measured"),
+        }
+        if self.drives:
+            integers["DRIVES"] = (len(self.drives), f"prescribed motions: {', '.join(self.drives)}")
+            integers["LOADS"] = (3 * n, "factors of a load")
+        lines = [f"PI = {math.pi!r}  # half a turn"]
+        lines += [f"{name} = {value!r}  # {words}" for name, (value, words) in _NUMBERS[self.real].items()]
+        lines += [f"{name} = {value}  # {words}" for name, (value, words) in integers.items()]
+        lines += [f"PLACES = {_PLACES!r}  # of these, in half lengths from mid-span"]
+        lines += [f"FIELD_PLACES = ({', '.join(map(str, place))},)  # displacement of a section that each field is"]
+        return self._waves.constants() + "\n".join(lines) + "\n"
+
+    def _field_places(self) -> list[int]:
+        found = list(self.model.conservative.displacements)
+        return [found.index(field) for field in self.model.equations.fields]
+
+    def _parameters(self) -> str:
+        lines = [
+            "class Parameters:",
+            '    """The parameters of the model, in units that fit together, such as SI."""',
+            "",
+        ]
+        for symbol, name in self.names.items():
+            unit = self.model.units.get(symbol.name, "") if self.model.units else ""
+            words = ", ".join(filter(None, [unit, "may be infinite" if symbol in self.form.conditions.springs else ""]))
+            lines.append(f"    {name}: float{'  # ' + words if words else ''}")
+        return "\n".join(lines)
+
+    def _formulas(self) -> str:
+        waves = self._waves
+        return "\n\n".join([waves.functions(loads=bool(self.drives)), waves.static(), waves.sections()]).strip("\n")
+
+    # Parameters to coefficients ---------------------------------------------------------------------------------------
+
+    def _function(self, made: object, name: str) -> str:
+        return FormPrinter.text_of(made, name, checked=False)  # type: ignore[arg-type]
+
+    def _call(self, name: str, entries: Sequence[sp.Expr], row: str, words: str) -> tuple[str, list[str]]:
+        """Return a function of the parameters, and the statements that fill a row with what it returns."""
+        made = function(name, words, list(entries), scalars(sorted(_free(entries), key=list(self.names).index)))
+        given = [f"parameters.{self.names[argument.symbols[0]]}" for argument in made.arguments]
+        call = f"_{name}({', '.join([*given, row])})"
+        return self._function(made, f"_{name}"), [f"{row} = zeros({len(entries)})", call]
+
+    @cached_property
+    def _length(self) -> sp.Expr:
+        left, right = self.model.equations.domain
+        return sp.sympify(right - left, strict=True)
+
+    @cached_property
+    def _entries(self) -> dict[int, sp.Expr]:
+        """Entries of the matrices times half the length, by their number among the coefficients, that are not 0."""
+        n = self.form.structure.n
+        found = {}
+        for at, entry in enumerate(self.form.matrices):  # A_OE and A_EO, then their factors of z
+            power, rest = divmod(at, 2 * n * n)
+            matrix, place = divmod(rest, n * n)
+            if entry != 0:
+                found[self.form.structure.matrices[matrix] + power * n * n + place] = entry * self._length / 2
+        return found
+
+    @cached_property
+    def _ends(self) -> dict[str, sp.Expr]:
+        """Entries of the matrices of both ends that are not 0."""
+        n = self.form.structure.n
+        found = {}
+        for name in ("stiffness", "mass", "ties"):
+            matrix = getattr(self.form.conditions, name)
+            for end in (0, 1):
+                for at in range(n * n):
+                    entry = matrix[end * n + at // n, end * n + at % n]
+                    if entry != 0:
+                        found[f"{name}[{end * n * n + at}]"] = entry
+        return found
+
+    def _prepare(self) -> str:
+        """Return the functions that check the parameters and compute what all else starts from."""
+        left, _ = self.model.equations.domain
+        places = self._waves.places
+        texts, lines = [], ["_check(parameters)"]
+        lines += [f"problem.held[{place}] = 1" for place in self.held]
+        for symbol, acting in self.form.conditions.springs.items():
+            lines.append(f"if parameters.{self.names[symbol]} > HUGE:")
+            lines += [f"    problem.held[{place}] = 1" for place in acting]
+        groups = (
+            ("inside", {f"k[{places[at]}]": entry for at, entry in self._entries.items() if at in places},
+             "Return the matrices of a section times half the length, entry by entry."),
+            ("outside", {"length": self._length, "left": sp.sympify(left, strict=True)} | self._ends,
+             "Return the length, the left end, and stiffness, inertia and ties of both ends."),
+        )  # fmt: skip
+        for name, entries, words in groups:
+            text, call = self._call(f"{name}_entries", list(entries.values()), name, words)
+            texts.append(text)
+            lines += call
+            lines += [f"problem.{target} = {name}[{at}]" for at, target in enumerate(entries)]
+        lines += ["_check_ends(problem)", *self._condition_lines()]
+        table, filled = self._waves.dispersion()
+        texts.append(table)
+        lines += [f"table = zeros({len(filled)})", "_dispersion(problem.k, table)"]
+        lines += [f"problem.k[{place}] = table[{at}]" for at, place in enumerate(filled)]
+        lines += [
+            "for i in range(COEFFICIENTS):",
+            "    if not isfinite(problem.k[i]):",
+            '        raise Overflow("the parameters lead out of the range of numbers")',
+            "if _indefinite(problem.k) > 0.5:",
+            '    raise InvalidParameters("stiffness and mass along the length must not be negative")',
+            "problem.zeros_at_rest = _rigid_motions(problem)",
+            "_check_stable(problem)",
+        ]
+        head = "def _prepare(parameters: Parameters, problem: Out[Problem]) -> None:"
+        texts.append(self._check())
+        texts.append("\n    ".join([head, '"""Check the parameters and compute what all else starts from."""', *lines]))
+        return "\n\n".join(texts)
+
+    def _condition_lines(self) -> Iterator[str]:
+        """Yield statements that enter the factors of the end conditions, over 1 + stiffness + mass."""
+        structure, places = self.form.structure, self._waves.places
+        n, odd = structure.n, structure.odd
+        for end in (1, 0):
+            for i in range(n):
+                first = structure.condition(end * n + i)
+                found = []
+                for j in range(n):
+                    at, back = end * n * n + i * n + j, end * n * n + j * n + i
+                    sign = "-" if end == 0 and odd[i] != odd[j] else ""
+                    whole = f"problem.stiffness[{at}]"
+                    stiff = f"1.0 if {whole} > HUGE else {whole} * share" if i == j else f"{sign}{whole} * share"
+                    if end * n + i in self.held:
+                        stiff = "1.0" if i == j else f"{'' if sign else '-'}problem.ties[{at}]"
+                    force = "share" if i == j else f"{sign}problem.ties[{back}] * share"
+                    values = stiff, f"{sign if i != j else ''}problem.mass[{at}] * share", force
+                    for part, value in enumerate(values):
+                        place = first + part * n + j
+                        if place in places:
+                            found.append(f"problem.k[{places[place]}] = {value}")
+                if any("share" in line for line in found):
+                    own = end * n * n + i * n + i
+                    parts = "".join(
+                        f" + problem.{kind}[{own}]" for kind in ("stiffness", "mass") if f"{kind}[{own}]" in self._ends
+                    )
+                    name = f"share_{'right' if end else 'left'}_{i}"
+                    yield f"{name} = 1.0 / (1.0{parts})"
+                    found = [line.replace("share", name) for line in found]
+                yield from found
+
+    def _check(self) -> str:
+        lines = ['"""Refuse what is no number, infinite, or a divisor that is 0."""']
+        for symbol, name in self.names.items():
+            if symbol in self.form.conditions.springs:
+                lines.append(f"if not (parameters.{name} >= -HUGE):")
+                lines.append(f'    raise InvalidParameters("{name}: must be a number or infinity")')
+            else:
+                lines.append(f"if not isfinite(parameters.{name}):")
+                lines.append(f'    raise InvalidParameters("{name}: must be finite")')
+        texts = []
+        for number, divisor in enumerate(self._divisors()):
+            if divisor.is_Symbol:
+                value, words = f"parameters.{self.names[divisor]}", f"{self.names[divisor]}: must not be 0"
+            else:
+                made = function("divisor", "Return a divisor of the coefficients.", divisor,
+                                scalars(sorted(divisor.free_symbols, key=list(self.names).index)))  # fmt: skip
+                texts.append(self._function(made, f"_divisor_{number}"))
+                given = ", ".join(f"parameters.{self.names[a.symbols[0]]}" for a in made.arguments)
+                value, words = f"_divisor_{number}({given})", "a coefficient of the equations becomes infinite"
+            lines += [f"if {value} == 0.0:", f'    raise InvalidParameters("{words}")']
+        return "\n\n".join([*texts, "\n    ".join(["def _check(parameters: Parameters) -> None:", *lines])]) + "\n"
+
+    def _divisors(self) -> list[sp.Expr]:
+        """Return what coefficients are divided by."""
+        found: dict[sp.Expr, None] = {}
+        left, _ = self.model.equations.domain
+        for entry in (*self._entries.values(), *self._ends.values(), self._length, sp.sympify(left, strict=True)):
+            for power in sp.sympify(entry, strict=True).atoms(sp.Pow):
+                if power.exp.is_negative or power.exp.could_extract_minus_sign():
+                    for factor in sp.Mul.make_args(power.base):
+                        found |= {} if factor.is_number else {factor: None}
+        return list(found)
+
+    def _rates(self) -> str:
+        """Return the functions of the parameters by number and of how the coefficients change with each."""
+        places = self._waves.places
+        names = list(self.names.values())
+        value = ["def _parameter(parameters: Parameters, number: int) -> float:",
+                 *(f"    if number == {at}:\n        return parameters.{name}" for at, name in enumerate(names[:-1])),
+                 f"    return parameters.{names[-1]}"]  # fmt: skip
+        n = self.form.structure.n
+        offsets = {"stiffness": 0, "mass": 2 * n * n, "ties": 4 * n * n}
+        texts: list[str] = []
+        lines: list[str] = []
+        for number, symbol in enumerate(self.names):
+            entries = {f"k_rate[{places[at]}]": e.diff(symbol) for at, e in self._entries.items() if at in places}
+            for target, entry in self._ends.items():
+                name, at = target[:-1].split("[")
+                entries[f"end_rate[{offsets[name] + int(at)}]"] = entry.diff(symbol)
+            entries = {target: entry for target, entry in entries.items() if entry != 0}
+            if not entries:
+                continue
+            row = f"by_{self.names[symbol]}"
+            text, call = self._call(row, list(entries.values()), f"rate_{number}",
+                                    f"Return how coefficients change with {self.names[symbol]}.")  # fmt: skip
+            texts.append(text)
+            lines.append(f"{'el' if lines else ''}if number == {number}:")
+            lines += [f"    {line}" for line in call]
+            lines += [f"    {target} = rate_{number}[{at}]" for at, target in enumerate(entries)]
+        head = (
+            "def _parameter_rates(\n    parameters: Parameters, number: int, k_rate: Out[Row[float, COEFFICIENTS]],\n"
+            "    end_rate: Out[Row[float, END_RATES]]\n) -> None:"
+        )
+        start = ["for i in range(COEFFICIENTS):", "    k_rate[i] = 0.0"]
+        start += ["for i in range(END_RATES):", "    end_rate[i] = 0.0"]
+        return "\n\n\n".join([*texts, "\n".join(value), "\n    ".join([head, *start, *lines])])
+
+    # Drives -----------------------------------------------------------------------------------------------------------
+
+    def _placed(self, text: str) -> str:
+        """Put what the prescribed motions need into the text of the modes, or leave it out."""
+        if not self.drives:
+            return re.sub(r"\n *# PARTICIPATION\w*", "", text)
+        words = ", ".join(self.drives)
+        text = text.replace(
+            "# PARTICIPATION_FIELD", f"participation: Row[float, DRIVES]  # in {words}, by acceleration"
+        )
+        text = text.replace("# PARTICIPATION_PUT", "_put_participation(parameters, problem, mode[first + number])")
+        turned = "for i in range(DRIVES):\n            mode.participation[i] = -mode.participation[i]"
+        return text.replace("# PARTICIPATION_TURN", turned).replace("# PARTICIPATION_LOADS", self._loads())
+
+    def _loads(self) -> str:
+        """Return the function of a load, and the one that puts in what it does to a mode."""
+        texts: list[str] = []
+        lines: list[str] = []
+        for number, name in enumerate(self.drives):
+            factors = self._load(name)
+            entries = {at: value for at, value in enumerate(factors) if value != 0}
+            text, call = self._call(f"load_of_{name}", list(entries.values()), f"load_{number}",
+                                    f"Return the load of a unit acceleration of {name}.")  # fmt: skip
+            texts.append(text)
+            lines.append(f"{'el' if number else ''}if drive == {number}:")
+            lines += [f"    {line}" for line in call]
+            lines += [f"    load[{at}] = load_{number}[{row}]" for row, at in enumerate(entries)]
+        head = "def _load_of(parameters: Parameters, drive: int, load: Mut[Row[float, LOADS]]) -> None:"
+        words = '"""Put in the forces of a unit acceleration: at the left end, at the right one, and per length."""'
+        return "\n\n\n".join([*texts, "\n    ".join([head, words, *lines]), source("model_participation").strip("\n")])
+
+    def _load(self, name: str) -> list[sp.Expr]:
+        """Return the factors of displacements of the left end, of the right one and of their integrals."""
+        n, order = self.form.structure.n, self.form.order
+        load = self.model.numerics("load", name)
+        inside, ends = (list(part.values()) for part in load_coefficients(self.model, name))
+        found = [sp.S.Zero] * (3 * n)
+        place = {displacement: position for position, displacement in enumerate(order)}
+        for where, value in zip(load.ends, ends, strict=True):
+            found[(n if where.where == "right" else 0) + place[where.entry]] += value
+        for where, value in zip(load.inside, inside, strict=True):
+            if value.has(self.model.equations.x):
+                raise ValueError(
+                    f"model: the load of {name} varies along the length; give system= with the model at its values"
+                )
+            at = place[where.entry]
+            if where.order == 0:
+                found[2 * n + at] += value
+            elif where.order == 1:
+                found[n + at] += value
+                found[at] -= value
+            else:
+                raise ValueError(
+                    f"model: {name} acts on the highest derivative of a field; give system= with its values"
+                )
+        return found
+
+
+def _plain(displacement: sp.Expr) -> str:
+    """Return a field, or a derivative of one by x, as text."""
+    if isinstance(displacement, sp.Derivative):
+        return str(displacement.expr.func.__name__) + "'" * sum(int(count) for _, count in displacement.variable_count)
+    return str(displacement.func.__name__)
+
+
+def _free(entries: Sequence[sp.Expr]) -> set[sp.Symbol]:
+    return set().union(*(sp.sympify(entry, strict=True).free_symbols for entry in entries))

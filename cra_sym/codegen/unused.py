@@ -1,0 +1,48 @@
+"""Texts in the restricted form without parameters that nothing uses."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+
+__all__ = ["without_unused"]
+
+
+def without_unused(text: str) -> str:
+    """Return the text without parameters that private functions do not use, in their heads and in calls of them.
+
+    Calls stand on one line with arguments that hold no commas, as all of private functions do.
+    """
+    unused = next(_unused(text), None)
+    while unused is not None:
+        text = _without(text, *unused)
+        unused = next(_unused(text), None)
+    return text
+
+
+def _unused(text: str) -> Iterator[tuple[str, int]]:
+    """Yield private functions with the places of parameters that they do not use."""
+    for node in ast.parse(text).body:
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("_"):
+            used = {n.id for statement in node.body for n in ast.walk(statement) if isinstance(n, ast.Name)}
+            for at, argument in enumerate(node.args.args):
+                if argument.arg not in used:
+                    yield node.name, at
+
+
+def _without(text: str, name: str, place: int) -> str:
+    found, end = [], 0
+    for match in re.finditer(rf"\b{name}\(", text):
+        depth, at, start, spans = 0, match.end(), match.end(), []
+        while depth >= 0:
+            letter = text[at]
+            depth += (letter in "([") - (letter in ")]")
+            if (letter == "," and depth == 0) or depth < 0:
+                spans.append((start, at))
+                start = at + 1
+            at += 1
+        kept = [text[a:b].strip() for number, (a, b) in enumerate(spans) if number != place]
+        found.append(text[end : match.end()] + ", ".join(kept))
+        end = spans[-1][1]
+    return "".join(found) + text[end:]
