@@ -85,6 +85,7 @@ campaign: .venv/.ready
 	$(RUN) -m tests.campaigns.attacks
 	$(RUN) -m tests.campaigns.workers
 	$(RUN) -m tests.campaigns.languages
+	$(RUN) -m tests.campaigns.models
 
 clean:
 	rm -rf .venv .venv-oldest .venv-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage .coverage.*
