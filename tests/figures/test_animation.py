@@ -74,5 +74,5 @@ def test_modes_swing_through_their_shapes():
 
 
 def test_a_wrong_name_is_refused():
-    with pytest.raises(ValueError, match="must be 'moving_arm' or 'moving_modes'"):
+    with pytest.raises(ValueError, match="must be one of moving_arm, moving_modes, jumping_arm"):
         animate("dance")
