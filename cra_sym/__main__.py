@@ -58,7 +58,7 @@ def _reproduce_options(parser: argparse.ArgumentParser) -> None:
 def _reproduce(options: Options) -> None:
     from cra_sym.extras import require
 
-    for library in ("nbclient", "nbconvert", "nbformat", "ipykernel", "IPython", "latex2mathml"):
+    for library in ("nbclient", "nbconvert", "nbformat", "ipykernel", "IPython"):
         require(library, "notebooks")
     from cra_sym.report.run import reproduce
 

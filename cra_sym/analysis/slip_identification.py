@@ -14,14 +14,13 @@ from scipy.optimize import least_squares
 from scipy.special import chdtrc
 
 from cra_sym.analysis import fit_words
-from cra_sym.analysis.backbone import backbone
 from cra_sym.analysis.identification import (
     AmbiguityWarning,
     IdentifiabilityWarning,
     Identification,
     MisfitWarning,
 )
-from cra_sym.analysis.nonlinear import ConvergenceWarning
+from cra_sym.analysis.slip_backbone import held_curve
 from cra_sym.checks import broadcastable, count, default_floating_point, instance, names, real_array
 from cra_sym.model.system import System
 
@@ -53,13 +52,11 @@ class _Fit:
 
     def curves(self, logs: Array) -> Array:
         """Return frequencies, Hz, and damping ratios, one after the other; nan where there is no such motion."""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ConvergenceWarning)
-            try:
-                system = self.system.replace(**self.values(logs))
-                found = backbone(system, self.mode, amplitude=self.amplitude, modes=self.modes)
-            except ValueError:  # a value out of its range, such as an exponent of -1
-                return np.full(self.measured.size, np.nan)
+        try:
+            system = self.system.replace(**self.values(logs))
+            found = held_curve(system, self.mode, self.amplitude, self.modes, None, None, None)
+        except ValueError:  # a value out of its range, such as an exponent of -1
+            return np.full(self.measured.size, np.nan)
         return np.concatenate([found.angular_frequency / (2 * np.pi), found.damping_ratio])
 
     def residuals(self, logs: Array) -> Array:
