@@ -93,11 +93,18 @@ def figure_slip_amplitude(
     curve : Backbone, optional
         What was computed already.
     axes : sequence of two Axes, optional
+
+    Raises
+    ------
+    ValueError
+        If the system has no elastic-slip elements.
     """
     if curve is None:
         if system is None:
             joint = BoltedJoint(rest=20.0, body_t=20.0, lever=0.05)
             system = joint.on(Arm.nominal().replace(zeta=_ZETA), 0.1 / joint.friction)
+        if not system.model.pieces["hysteresis"]:
+            raise ValueError("system: must have elastic-slip elements: Model(.., hysteresis=[(cra.Jenkins(..), ..)])")
         amplitude = np.geomspace(4e-3, 0.3, 25) if amplitude is None else amplitude
         curve = backbone(system, mode, amplitude=amplitude, modes=modes)
     with style.context(STYLE):
