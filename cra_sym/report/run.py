@@ -51,7 +51,7 @@ def reproduce(output: str | Path, notebooks: str | Path | None = None) -> str:
     begun = time.monotonic()
     with staged_directory(output) as folder:
         shutil.copytree(sources[0].parent, folder / "notebooks", ignore=shutil.ignore_patterns(".*"))
-        _say(f"Running {len(sources)} chapters, drawing, judging: some ten minutes on two processors")
+        _say(f"Running {len(sources)} chapters, drawing, judging: some six minutes on two processors")
         refresh(find_notebooks(folder / "notebooks"), svg=True)
         _say("Drawing the figures")
         save_figures(folder / "figures")
