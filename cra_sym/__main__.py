@@ -56,10 +56,6 @@ def _reproduce_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _reproduce(options: Options) -> None:
-    from cra_sym.extras import require
-
-    for library in ("nbclient", "nbconvert", "nbformat", "ipykernel", "IPython"):
-        require(library, "notebooks")
     from cra_sym.report.run import reproduce
 
     print(reproduce(options.output, notebooks=options.notebooks))

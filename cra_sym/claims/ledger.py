@@ -6,7 +6,6 @@ import copyreg
 from dataclasses import fields
 from functools import cache
 from importlib import import_module
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from cra_sym.checks import choice, default_floating_point
@@ -51,24 +50,15 @@ copyreg.pickle(Verdict, _reduced)  # a picture is a function that no name leads 
 @cache
 def _verdict(id: str, setting: Setting) -> Verdict:
     entry = _entry(id)
-    found = entry.find(setting)
-    return Verdict(
+    return Verdict.of(
+        entry.find(setting),
         id=id,
         theme=entry.theme,
         title=entry.title,
         claim=entry.claim,
         source=entry.source,
-        outcome=found.judgement.outcome,
-        share=found.judgement.share,
-        here=found.judgement.here,
-        plain=found.plain,
-        sentence=" ".join(found.sentence.split()),
-        evidence=MappingProxyType(dict(found.evidence)),
         setting=setting,
         picture=entry.picture,
-        remedy=found.remedy,
-        missing=found.missing,
-        criterion=found.criterion,
     )
 
 

@@ -8,6 +8,7 @@ falls".
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -240,19 +241,13 @@ SLIPPING = tuple(_JUDGES)
 @cache
 def _verdict(id: str, setting: Setting) -> Verdict:
     paper, found = claim(id, setting.arm), _JUDGES[id](setting)
-    return Verdict(
+    return Verdict.of(
+        replace(found, sentence=f"{found.sentence} With springs alone it {_told(paper)}."),
         id=id,
         theme=paper.theme,
         title=f"{paper.title}, with slip",
         claim=paper.claim,
         source=paper.source,
-        outcome=found.judgement.outcome,
-        share=found.judgement.share,
-        here=found.judgement.here,
-        plain=found.plain,
-        sentence=f"{found.sentence} With springs alone it {_told(paper)}.",
-        evidence=found.evidence,
-        criterion=found.criterion,
         setting=setting,
         picture=None,
     )

@@ -147,6 +147,23 @@ class Verdict:
     def __post_init__(self) -> None:
         object.__setattr__(self, "evidence", MappingProxyType(dict(self.evidence)))
 
+    @classmethod
+    def of(cls, found: Finding, **known: Any) -> Verdict:
+        """Return the verdict that a finding makes of a claim: of its id, theme, title, words, source and setting."""
+        judgement = found.judgement
+        return cls(
+            **known,
+            outcome=judgement.outcome,
+            share=judgement.share,
+            here=judgement.here,
+            plain=found.plain,
+            sentence=" ".join(found.sentence.split()),
+            evidence=found.evidence,
+            criterion=found.criterion,
+            remedy=found.remedy,
+            missing=found.missing,
+        )
+
     def __getitem__(self, name: str) -> np.ndarray:
         """Return the values of one quantity of the evidence."""
         values: np.ndarray = self.evidence[name].values

@@ -45,7 +45,7 @@ def reproduce(output: str | Path, notebooks: str | Path | None = None) -> str:
     cra_sym.report.notebooks.NotebookError
         If a notebook does not run to its end; nothing is left behind.
     """
-    _require("notebooks", "nbclient", "nbconvert", "ipykernel")
+    _require("notebooks", "nbclient", "nbconvert", "nbformat", "ipykernel", "IPython")
     _require_site()
     sources = find_notebooks(notebooks)
     begun = time.monotonic()

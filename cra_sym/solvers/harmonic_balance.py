@@ -14,9 +14,15 @@ from numpy.typing import NDArray
 
 from cra_sym.solvers.modal_polynomials import ModalPolynomials
 
-__all__ = ["Balance", "Basis", "newton", "peak"]
+__all__ = ["Balance", "Basis", "flattened", "newton", "peak"]
 
 Array = NDArray[np.float64]
+
+
+def flattened(known: Array) -> Array:
+    """Return known functions, shape (points, known functions, samples a point), with one axis of samples."""
+    points, functions, samples = known.shape
+    return known.swapaxes(0, 1).reshape(functions, points * samples)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +140,7 @@ class Balance:
         turn = np.einsum("pnm,sm->psn", x, rate)
         v = frequency[:, None, None] * turn
         shape = (points * basis.samples, n)
-        flat = None if causes is None else causes.swapaxes(0, 1).reshape(causes.shape[1], shape[0])
+        flat = None if causes is None else flattened(causes)
         found = self.equations.derivatives(q.reshape(shape), v.reshape(shape), flat)
         force, momentum = (part.reshape(points, basis.samples, n) for part in found[:2])
         rates = [part.reshape(points, basis.samples, n * n).swapaxes(1, 2) for part in found[2:]]

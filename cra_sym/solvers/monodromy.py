@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.solvers.harmonic_balance import Basis
+from cra_sym.solvers.harmonic_balance import Basis, flattened
 from cra_sym.solvers.modal_polynomials import ModalPolynomials
 
 __all__ = ["beside_linear", "even_monodromy", "monodromy", "multipliers"]
@@ -92,7 +92,7 @@ def _maps(
     phase = 2 * np.pi * share * (np.arange(steps) + 0.5) / steps
     q = np.einsum("pnm,sm->psn", coefficients, basis.values(phase)).reshape(-1, n)
     v = np.einsum("pnm,sm,p->psn", coefficients, basis.values(phase, 1), frequency).reshape(-1, n)
-    known = None if causes is None else _flat(causes(phase, rows), points * steps)
+    known = None if causes is None else flattened(causes(phase, rows))
     rest = beside_linear(equations, q, v, known)
     h = 2 * np.pi * share / (frequency * steps)
     kick = _kick(equations, rest.reshape(points, steps, 2 * n, 2 * n), h)
@@ -101,11 +101,6 @@ def _maps(
     while maps.shape[1] > 1:
         maps = maps[:, 1::2] @ maps[:, 0::2]
     return maps[:, 0]
-
-
-def _flat(known: Array, samples: int) -> Array:
-    """Return known functions, shape (points, known functions, samples a point), with one axis of samples."""
-    return known.swapaxes(0, 1).reshape(known.shape[1], samples)
 
 
 def _kick(equations: ModalPolynomials, rest: Array, h: Array) -> Array:
