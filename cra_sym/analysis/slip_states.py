@@ -178,7 +178,7 @@ class SlipProblem:
         alike = np.unique(varpi, return_inverse=True)[1] if self.unique else None
         found, good = self.balance.newton(starts, varpi / self.period, self._causes(varpi), alike=alike)
         rigid = self.balance.equations.omega == 0.0
-        if rigid.any():  # what holds it at rest is no part of the system
+        if rigid.any():  # what holds it at rest is not a part of the system
             pull = np.abs(self.coefficients(found)[:, rigid, 0]).max(axis=1) * (varpi / self.period) ** 2
             sliders = sum(float(f.sum()) for _, f in self.balance.elements.groups)
             good = good & (pull <= _HELD * sliders * np.abs(self.balance.elements.rows).max())

@@ -21,7 +21,7 @@ def operations(form: Form, name: str, most: Mapping[str, int]) -> int:
     name : str
         Of the function.
     most : mapping of str to int
-        The most that the end of a loop may be, by its text, where it is no constant.
+        The most that the end of a loop may be, by its text, where it is not a constant.
 
     Raises
     ------

@@ -54,7 +54,7 @@ def expressions_of(pieces: Mapping[str, Any]) -> tuple[Expr, ...]:
 
 
 def check_displacements(model: Model) -> None:
-    """Refuse an element on what is no displacement of an unknown, or on one that is held."""
+    """Refuse an element on what is not a displacement of an unknown, or on one that is held."""
     for number, (element, displacement, place) in enumerate(model.pieces["hysteresis"]):
         try:
             forced(model.without_hysteresis, ((element, displacement, place),))

@@ -3,7 +3,7 @@
 Strings on foundations, beams under tension or with shear, bending with torsion, several beams: whatever is even under a
 reflection of x, with any springs, masses, lumped coordinates and links of the ends. A coordinate that acts along the
 whole span in another way than to carry it, such as the base of a foundation, keeps the dynamic stiffness: there the
-motion of the span has a part that is no free wave. So do more than twelve conditions (two for each displacement of a
+motion of the span has a part that is not a free wave. So do more than twelve conditions (two for each displacement of a
 section, one for each coordinate and each spring between places): the formulas would be too long.
 """
 
