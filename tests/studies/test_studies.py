@@ -596,32 +596,3 @@ def test_a_store_opens_without_warnings(tmp_path):
     assert opened.tip_stiffness.shape == (300, 4, 2) and opened.k_t.attrs["units"] == "N/m"
     lazy = cra.sweep(cra.Arm.nominal(), tip_stiffness, k_t=np.linspace(1.0, 2.0, 300), m_e=M_E, chunks=1)
     assert lazy.tip_stiffness.chunks[0] == (1,) * 300
-
-
-def test_a_store_costs_at_most_twice_what_zarr_does(tmp_path):
-    """A ratio of medians in one process: 100 regions of 100 values."""
-    zarr = pytest.importorskip("zarr")
-    k_t, values = np.geomspace(1e2, 1e6, 10_000), np.random.default_rng(1).random((10_000, 3))
-
-    def prepared(arm):
-        return np.zeros(3) + np.asarray(arm.k_t)[..., None]
-
-    def swept(number):
-        cra.sweep(cra.Arm.nominal(), prepared, k_t=k_t, chunks=100, store=tmp_path / f"sweep {number}")
-
-    def alone(number):
-        group = zarr.open_group(tmp_path / f"zarr {number}", mode="w", zarr_format=2)
-        array = group.create_array("values", shape=(10_000, 3), chunks=(100, 3), dtype=float)
-        group.create_array("k_t", data=k_t)
-        zarr.consolidate_metadata(tmp_path / f"zarr {number}", zarr_format=2)
-        for start in range(0, 10_000, 100):
-            array[start : start + 100] = values[start : start + 100]
-
-    def seconds(function, number):
-        start = time.perf_counter()
-        function(number)
-        return time.perf_counter() - start
-
-    swept(-1), alone(-1)  # libraries are loaded
-    pairs = [(seconds(swept, number), seconds(alone, number)) for number in range(5)]
-    assert np.median([one / other for one, other in pairs]) < 2.0
