@@ -72,7 +72,8 @@ lock: .venv/.ready
 	    --custom-compile-command "make lock" --format pylock.toml --output-file .ci/pylock.toml -
 
 # Hours on one processor: every mutant of every module, or those left by the run before. ARGS="--sample 10" takes the
-# first ten of each, ARGS=arm/lagrangian one module, and --again starts anew. The record stays out of version control.
+# first ten of each, ARGS=arm/lagrangian one module, "--minutes 60" an hour of those least tried, and --again starts anew.
+# The record stays out of version control.
 mutation: .venv/.ready
 	$(RUN) -m tests.mutation $(ARGS)
 

@@ -57,8 +57,13 @@ class Record:
 
     @property
     def sites(self) -> int:
-        """How many signs, exponents and constants there are, each with one or two mutants."""
+        """How many places there are to change, each with one or two mutants."""
         return self._data["sites"]
+
+    @property
+    def share(self) -> float:
+        """Which part of the module's mutants was tried."""
+        return self._data["tried"] / max(1, self._data["mutants"])
 
     def drawn(self, sample: int | None) -> list[Mutant]:
         """Return the first mutants of the order, or all, without those that were tried before."""

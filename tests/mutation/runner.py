@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["Laboratory", "Verdict"]
 
 LIKELY = 3
-SECONDS = 90  # of processor time; several times what the tests of a module need
+SECONDS = 90  # of processor time, beside three times what the module's tests need
 BYTES = 8 << 30
 _LIBRARIES = ("mpmath", "scipy.integrate", "scipy.linalg", "scipy.optimize", "scipy.special", "scipy.stats")
 _REGISTRY = "cra_sym.paper.equations"  # names the homes of the equations, and is the same whatever they hold
@@ -57,6 +57,7 @@ class Laboratory:
         self._tests = tests
         self._noticed: dict[str, list[tuple[str, str]]] = {}  # of a module: function and what noticed, latest first
         self._sound: set[str] = set()  # checks and tests that pass without a mutant
+        self._needed: dict[str, float] = {}  # s of processor time of a module's tests without a mutant
         _warm_up()
 
     def mutants(self, module: str) -> tuple[str, list[Mutant]]:
@@ -84,7 +85,7 @@ class Laboratory:
                 or ""
             )
 
-        verdict, by = _in_a_fork(noticed, SECONDS)
+        verdict, by = _in_a_fork(noticed, SECONDS + round(3.0 * self._needed[module]))
         if by:
             self._confirm(by)
             self._noticed.setdefault(module, []).insert(0, (mutant.function, by))
@@ -93,10 +94,11 @@ class Laboratory:
     def _prepare(self, module: str) -> None:
         """Run the tests on the package as it is; what they derive goes to the store, from which mutants read it."""
         tests = {name for part in rounds(module) for name in part} if self._tests else set()
-        if missing := sorted(tests - self._sound):
-            if failing := _in_a_fork(lambda: _first_failing_test([missing]))[1]:
+        start = _spent()
+        if module not in self._needed:
+            if tests and (failing := _in_a_fork(lambda: _first_failing_test([sorted(tests)]))[1]):
                 raise RuntimeError(f"{failing} fails without a mutant")
-            self._sound |= tests
+            self._needed[module] = _spent() - start
 
     def _confirm(self, check: str) -> None:
         """Run a check that noticed a mutant, here; what it derives stays, ready for mutants that do not change it."""
@@ -197,6 +199,12 @@ def _in_a_fork(noticed: Callable[[], str], seconds: int = resource.RLIM_INFINITY
     if os.WIFSIGNALED(status):
         return Verdict.EXHAUSTED, ""
     return (Verdict.CAUGHT if by else Verdict.SURVIVED), by
+
+
+def _spent() -> float:
+    """Return the processor time of ended child processes, in s."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return children.ru_utime + children.ru_stime
 
 
 def _isolate(seconds: int) -> None:

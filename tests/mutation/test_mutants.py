@@ -36,7 +36,7 @@ def package(monkeypatch):
     monkeypatch.syspath_prepend(ROOT)
 
 
-def test_signs_exponents_and_constants_change_one_at_a_time():
+def test_operators_and_constants_change_one_at_a_time():
     found = {mutant.after for mutant in tool.mutants(SOURCE)}
     kept = "if x[0, 4:] > 1e-09 else 0"
     assert found == {
@@ -51,12 +51,38 @@ def test_signs_exponents_and_constants_change_one_at_a_time():
         "return -x ** 2 + 0.5 if x[0, 3:] > 1e-09 else 0",
         "return -x ** 2 + 0.5 if x[0, 4:] > 1e-09 else 1",
         "return -x ** 2 + 0.5 if x[0, 4:] > 1e-09 else -1",
+        "return -x ** 2 + 0.5 if x[0, 4:] <= 1e-09 else 0",
     }
     assert {mutant.function for mutant in tool.mutants(SOURCE)} == {"energy"}
 
 
+@pytest.mark.parametrize(
+    ("statement", "changed"),
+    [
+        ("y = a * b", {"y = a / b"}),
+        ("y = a and b", {"y = a or b"}),
+        ("y = not a", {"y = a"}),
+        ("y = a in b", {"y = a not in b"}),
+        ("y = a is b", {"y = a is not b"}),
+        ("y = a == b", {"y = a != b"}),
+        ("y = a < b", {"y = a >= b"}),
+        ("y = a < len(b)", {"y = a >= len(b)", "y = a <= len(b)"}),
+        ("y = a.size >= b", {"y = a.size < b", "y = a.size > b"}),
+        ("f(a, b)", {"pass", "f(b, a)"}),
+        ("y = f(a, a, *b)", set()),
+        ("y[a] = b", {"pass"}),
+        ("y += b", {"y -= b", "pass"}),
+        ("raise ValueError(1 - a)", {"pass"}),
+        ("for y in a: break", {"pass"}),
+        ("match a:\n case 0: y = b", {"case 1", "case -1"}),
+    ],
+)
+def test_what_else_changes(statement, changed):
+    assert {mutant.after for mutant in tool.mutants(statement)} == changed
+
+
 def test_every_mutant_of_a_module_differs_and_compiles():
-    for name in ("paper/resonance", "model/oscillator"):
+    for name in ("paper/resonance", "model/oscillator", "kernels/writer"):
         source = (ROOT / "cra_sym" / f"{name}.py").read_text(encoding="utf-8")
         found = tool.mutants(source)
         assert len(found) > 30

@@ -7,14 +7,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["EXEMPT", "PACKAGE", "ROOMS", "rounds", "watched_modules"]
+__all__ = ["EXEMPT", "PACKAGE", "rounds", "watched_modules"]
 
 PACKAGE = Path(__file__).resolve().parents[2] / "cra_sym"
 
-ROOMS = ("analysis", "arm", "model", "paper", "solvers")
-
-#: Modules in which nothing stands for physics.
+#: Modules of which no mutant is made, with the reason.
 EXEMPT = {
+    "__init__": "names of the public functions and where they live",
+    "__main__": "the command line, which tests run in processes of their own",
+    "kernels/derived": "keeps derivations for the process that examines mutants",
+    "kernels/store": "keeps derivations for the process that examines mutants",
     "paper/equations": "the registry of equations and how wide a printed line may be",
 }
 
@@ -252,8 +254,8 @@ _ROUNDS: dict[str, list[list[str]]] = {
 
 
 def watched_modules() -> tuple[str, ...]:
-    """Return all modules of the rooms from the solvers up to the paper, as ``arm/lagrangian``, but those exempt."""
-    files = sorted(file for room in ROOMS for file in (PACKAGE / room).rglob("*.py") if file.stem != "__init__")
+    """Return all modules of the package, as ``arm/lagrangian``, but those exempt."""
+    files = sorted(file for file in PACKAGE.rglob("*.py") if file.stem != "__init__")
     names = (file.relative_to(PACKAGE).with_suffix("").as_posix() for file in files)
     return tuple(name for name in names if name not in EXEMPT)
 
@@ -261,5 +263,10 @@ def watched_modules() -> tuple[str, ...]:
 def rounds(module: str) -> list[list[str]]:
     """Return the rounds of a module; without an entry, the tests of the same name, or else all those of its room."""
     room, _, name = module.rpartition("/")
-    own = f"tests/{room}/test_{name}.py"
-    return _ROUNDS.get(module, [[own if (PACKAGE.parent / own).exists() else f"tests/{room}"]])
+    candidates = [f"tests/{room}/test_{name}.py"]
+    while room:
+        above, _, name = room.rpartition("/")
+        candidates += [f"tests/{room}", f"tests/{above}/test_{name}.py"]
+        room = above
+    there = [file for file in candidates if (PACKAGE.parent / file).exists()]
+    return _ROUNDS.get(module, [there[:1] or ["tests/test_bad_input.py"]])
