@@ -16,6 +16,7 @@ from cra_sym.claims import OUTCOMES, Setting, Verdict
 from cra_sym.claims.pictures import MARKS
 from cra_sym.figures import ANIMATIONS, FIGURES, described
 from cra_sym.files import write_text
+from cra_sym.report.orders import orders
 from cra_sym.report.site.chapters import Chapter, write_chapters
 from cra_sym.report.site.extension import LINKS
 from cra_sym.report.site.ledger import Entry, entries, numbers
@@ -124,6 +125,7 @@ def _known(
         "arm": Arm.provenance,
         "units": {row.name: row.unit for row in nomenclature()},
         "setting": Setting(),
+        "orders": orders(),
         "frequencies": TABLES["frequencies"]().markdown(),
         "comparison": _section_of_the_readme("Beside other packages"),
         "versions": {"Python": ".".join(map(str, sys.version_info[:3]))} | {n: metadata.version(n) for n in _VERSIONS},
