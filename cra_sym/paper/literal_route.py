@@ -12,7 +12,9 @@ from cra_sym.symbols import Dimension, dimension, symbol
 
 __all__: list[str] = []
 
-epsilon, sigma, varpi, omega_n, M_n, Gamma_n = (symbol(n) for n in "epsilon sigma varpi omega_n M_n Gamma_n".split())
+epsilon, sigma, varpi, omega_n, M_n, Gamma_n, T_0, T_1 = (
+    symbol(n) for n in "epsilon sigma varpi omega_n M_n Gamma_n T_0 T_1".split()
+)
 
 
 @numbered("42a", "detuning from the natural frequency", "definition")
@@ -23,10 +25,13 @@ def forced_detuning() -> Eq:
 
 @proves("42a")
 def prove_forced_detuning() -> Proof:
-    """Frequencies; at the exact resonance both periods are the same, and sigma in slow time is the distance from it."""
+    """Frequencies; the excitation exp(i varpi T_0) turns against the motion exp(i omega_n T_0) in slow time alone, at
+    the rate sigma."""
     yield dimension(forced_detuning()) == Dimension(s=-1)
     yield forced_detuning().lhs == varpi
-    yield forced_detuning().rhs - omega_n - epsilon * sigma
+    angle = ((forced_detuning().rhs - omega_n) * T_0).expand().subs(epsilon * T_0, T_1)
+    yield angle.diff(T_0)
+    yield angle.diff(T_1) - sigma
 
 
 @derived("48a", "amplitude equation of the literal route", (36, "42a"))

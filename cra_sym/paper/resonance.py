@@ -244,11 +244,13 @@ def prove_order_0_solution() -> Proof:
 
 @proves(42)
 def prove_detuning() -> Proof:
-    """Frequencies; at the exact resonance one excitation period is half a period of the mode, and sigma in slow time
-    is the distance from it."""
+    """Frequencies; what the excitation makes of the conjugate motion, exp(i (varpi - omega_n) T_0), turns against the
+    motion itself, exp(i omega_n T_0), in slow time alone, at the rate sigma."""
     yield dimension(detuning()) == Dimension(s=-1)
     yield detuning().lhs == varpi
-    yield detuning().rhs - 2 * omega_n - epsilon * sigma
+    angle = ((detuning().rhs - omega_n - omega_n) * T_0).expand().subs(epsilon * T_0, T_1)
+    yield angle.diff(T_0)
+    yield angle.diff(T_1) - sigma
 
 
 @proves(43)
@@ -328,13 +330,14 @@ def distributed() -> Derivation[Eq]:
 
 @proves(47)
 def prove_distributed() -> Proof:
-    """The inner product (46) of any factor times a real mode with that mode is the factor times the mass of (6); with
-    that mass in front, (45)."""
-    f, g, factor = Function("f")(x), Function("g")(x), Symbol("c")
-    product = put(inner_product().rhs, {f: factor * phi_i, g: phi_i}).replace(conjugate, lambda e: e)
-    before, after = (e.lhs - e.rhs for e in (solvability()[0], distributed()))
-    yield termwise(product - factor * generalised()[0].rhs)
-    yield (after - M_n * before).expand() == 0
+    """For a shape that is written out, x^2, the integrals (46) of every term of (45) times the shape with the shape
+    add up to (47), in which M_n is the mass (6) of that shape."""
+    f, g, factor, shape = Function("f")(x), Function("g")(x), Symbol("c"), x**2
+    mass = put(generalised()[0].rhs, {phi_i: shape}).doit()
+    product = put(inner_product().rhs, {f: factor * shape, g: shape}).replace(conjugate, lambda e: e).doit()
+    (before,), after = solvability(), distributed()
+    total = sum((product.subs(factor, term) for term in (before.lhs - before.rhs).expand().args), S.Zero)
+    yield (total - (after.lhs - after.rhs).subs(M_n, mass)).expand() == 0
 
 
 # Amplitude equation and boundary (48)-(49) ----------------------------------------------------------------------
