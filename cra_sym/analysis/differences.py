@@ -90,7 +90,7 @@ def _differences(system: System, found: Sensitivities, name: str, quantity: Quan
     given = np.broadcast_to(system.values[name], system.shape)
     with np.errstate(divide="ignore"):
         place = 1 / given if compliance else given
-    fixed = np.isinf(place)  # nothing to differ from; the caller knows the answer
+    fixed = np.isinf(place)  # no finite difference exists there; the caller returns the limit
     place = np.where(fixed, 1.0, place)
     reach = _reach(found.frequency, found.compliance[name] if compliance else found.rate[name], place)
     if not compliance and name not in {*system.numerics("stiffnesses"), *system.numerics("inertias")}:

@@ -20,8 +20,8 @@ __all__ = ["count_eigenvalues", "damping_ratios", "eigenvalues"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-_LEAST = 1e-11  # tolerance that rounding lets two meshes keep
-_SHRINK = 0.85  # of a circle in which eigenvalues are counted, over one in which rounding does not let them be
+_LEAST = 1e-11  # smallest relative tolerance that two meshes can agree to, because of rounding
+_SHRINK = 0.85  # radius to try next, over one at which rounding spoils the count
 
 
 @default_floating_point

@@ -77,7 +77,7 @@ class Search:
         """Return computed minus measured frequencies, and values minus priors, in units of their uncertainty."""
         try:
             frequency = self.found(place).frequency[..., data.modes]
-        except ValueError:  # of a structure that has buckled or is none
+        except ValueError:  # the structure has buckled, or these values describe none
             frequency = np.full((*place.shape[:-1], data.modes.size), np.nan)
         values = self.values(place)
         prior = [(values[u.name] - u.prior[0]) / u.prior[1] for u in self.unknowns if u.prior is not None]
@@ -141,7 +141,7 @@ class Search:
         return self._rounded(found.x)
 
     def _rounded(self, place: Array) -> Array:
-        """Return a place with a stiffness that is rigid, and an addition that is nothing, to the margin as such."""
+        """Return a place at which a value within the margin of rigid, or of zero, is set to exactly that."""
         stiff = np.array([unknown.kind != "signed" for unknown in self.unknowns])
         return np.where(stiff & (place <= 2 * _MARGIN), 0.0, place)
 
@@ -264,7 +264,7 @@ class Search:
         return omega / (2 * np.pi)
 
     def _linked(self, places: Array, other: Array, data: Data) -> NDArray[np.bool]:
-        """Tell from which minima a path leads to another on which the misfit stays within the uncertainty."""
+        """Tell which minima are joined to another by a path along which the misfit stays within the uncertainty."""
         step = other - places
         distance = np.linalg.norm(step, axis=-1)
         limit = np.array([max(self.chi2(place, data), self.chi2(other, data)) for place in places]) + _LINKED

@@ -175,12 +175,12 @@ class _Undamped:
         self.motion = _cause_name(system, drive)
         if self.motion is not None:
             if kind is not None:
-                raise ValueError(f"kind = {kind!r}: {self.motion} drives by its acceleration or itself; leave kind out")
+                raise ValueError(f"kind = {kind!r}: must be left out for {self.motion}, which is not a displacement")
             self._problem: SpatialProblem = system.numerics("driven", self.motion)
             self._driven = self._problem.displacements + system.numerics("driven_coordinate", self.motion)
         else:
             self._problem = system.numerics("driven_spatial")
-            from cra_sym.model.derivations import driven_displacement  # SymPy is there: the drive is an expression
+            from cra_sym.model.derivations import driven_displacement  # the drive is SymPy's already
 
             self._driven = driven_displacement(system.model, drive)
         sizes = system.numerics("sizes")

@@ -125,7 +125,7 @@ class _Moving:
         return total
 
     def beside(self, time: float, q: Array, u: Array) -> Array:
-        """Return the acceleration without the share of the undamped linear modes."""
+        """Return the acceleration less that of the undamped linear modes."""
         polynomials = self.equations.polynomials
         found = polynomials.derivatives(q[None], u[None], self._known(time))
         force = found.force[0] - polynomials.damping @ u + self._load(time)

@@ -58,8 +58,8 @@ class Sensitivities:
     ones, d ln f / d ln p, can: that of a spring is half its share of the strain energy of the mode, that of a mass
     minus half its share of the kinetic energy.
 
-    A rigid-body mode, f = 0, leaves zero like a square root: its raw derivative by the stiffness that would hold it
-    is inf, its other raw derivatives are 0 and its logarithmic ones nan. Where there are several such modes, which is
+    The frequency of a rigid-body mode, f = 0, grows from zero as a square root: its raw derivative by the stiffness
+    that would hold it is inf, its other raw derivatives are 0 and its logarithmic ones nan. Where there are several such modes, which is
     which depends on the direction of change: nan, as where a parameter splits a repeated frequency. An infinite
     stiffness has derivatives 0; those by the compliance 1/k say what the first give of a rigid support costs.
 

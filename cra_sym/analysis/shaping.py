@@ -15,7 +15,7 @@ __all__ = ["input_shaper"]
 Array = NDArray[np.float64]
 _MOST_IMPULSES = 50
 _MOST_HUMPS = 10
-_HALVINGS = 60  # of the interval of the tolerance that damping leaves: to rounding
+_HALVINGS = 60  # bisections, which reach rounding
 _BAND = np.linspace(-1.0, 1.0, 201)
 
 

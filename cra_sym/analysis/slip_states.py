@@ -158,7 +158,7 @@ class SlipProblem:
 
     @property
     def unique(self) -> bool:
-        """Whether there is one answer: with constant coefficients elements lose energy whichever way two differ."""
+        """Whether the answer is unique, as with constant coefficients: the difference of two answers loses energy."""
         return self.balance.constant
 
     @property

@@ -60,7 +60,7 @@ class Slipping:
     def follow(self, end: Any, visit: Callable[[Step], object], pauses: Array | None = None) -> Events:
         """Follow all members, some at a time, to the end of each; every step is shown to ``visit``."""
         size = self.modes.omega.shape[1]
-        last, found = np.broadcast_to(np.maximum(end, 1e-12), (size,)), []  # of no length, one look at the start
+        last, found = np.broadcast_to(np.maximum(end, 1e-12), (size,)), []  # a motion of zero length is sampled once
         for first in range(0, size, _TOGETHER):
             part = np.arange(first, min(first + _TOGETHER, size))
             state = State(self.start.displacement[:, part], self.start.velocity[:, part])

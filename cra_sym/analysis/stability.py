@@ -131,7 +131,7 @@ def judged_boundary(
     *,
     tongue: int = 1,
 ) -> tuple[np.ndarray, np.ndarray, list[tuple[type[UserWarning], str]]]:
-    """Return what :func:`stability_boundary` does, and what that warns of as kinds and texts, for those who know it."""
+    """Return the result of :func:`stability_boundary` with its warnings as pairs of category and text, not issued."""
     excitation = parametric(excitation)
     epsilon = checks.real_array("epsilon", epsilon, low=0.0, unit="1")
     modes = checks.count("modes", modes)

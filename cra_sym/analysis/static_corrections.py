@@ -31,7 +31,7 @@ def moments_of_other_modes(system: System, excitation: Fluctuation, modes: int) 
         1 and s2; 0 for an infinite stiffness.
     """
     names = excitation.springs(system)
-    if modes >= system.most_modes:  # there are no others
+    if modes >= system.most_modes:  # no modes are left out
         nothing = np.zeros((*system.shape, len(names), len(names)))
         return nothing, nothing
     problem: SpatialProblem = system.numerics("spatial")

@@ -111,8 +111,8 @@ def _sums(
 ) -> dict[str, np.ndarray]:
     """Return the sums over all modes of the system."""
     spectators = np.setdiff1d(np.arange(omega.shape[-1]), list(labels.values()))
-    alone = not spectators.size  # one mode, where there is no other: a path that does not count
-    spectators = np.zeros(1, int) if alone else spectators
+    alone = not spectators.size
+    spectators = np.zeros(1, int) if alone else spectators  # a placeholder whose contribution is discarded below
     columns = {key: np.asarray(value)[..., None] for key, value in values.items()}
     kernel = _kernel(name)
     sums = {}

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def _softened(setting: Setting, mean: dict[str, float], what: str) -> Finding:
-    """Judge whether peaks on elastic joints are smaller than on the rigid one: those of ``what`` the response is to."""
+    """Judge whether elastic joints lower the peak of the response to ``what``, compared with the rigid joint."""
     k_t = np.logspace(2, 6, 33)
     varpi = Plane.of(setting).varpi
     elastic = setting.arm.replace(k_t=k_t[:, None])

@@ -42,7 +42,7 @@ STYLES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
 """Colours and line styles of the house's cycle, for panels that draw a mode more than once."""
 
 TINTS = ("#9AD3BE", "#F1F1F1", "#FBE7DA")
-"""Where a claim holds (darker), where nothing is to be seen, and where the opposite holds."""
+"""Where a claim holds (darker), where no effect is visible, and where the opposite holds."""
 
 _LABELS = {
     "k_t": "translational stiffness $k_t$ / (N/m)",
@@ -91,7 +91,7 @@ def region_map(
     here: Any = None,
     visible: float = 0.0,
 ) -> None:
-    """Tint the plane: green where the claim holds, orange where the opposite does, grey where nothing is to be seen.
+    """Tint the plane: green where the claim holds, orange where the opposite does, grey where no effect is visible.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where the claims' modules enter one function that judges and one that draws a claim.
+"""The registry of the claims: for each, one function that judges it and one that draws it.
 
 ::
 

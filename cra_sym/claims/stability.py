@@ -31,7 +31,7 @@ _WORDS = {
 }
 
 
-_NO_GROWTH = 1e-9  # 1/s: what rounding makes of no growth at all
+_NO_GROWTH = 1e-9  # 1/s: rates below this are rounding
 
 
 def zone(arm: Arm, excitation: Any, epsilon: Any, resonance: tuple[int, int], **options: Any) -> tuple[Any, Any]:

@@ -177,7 +177,7 @@ def kernel(expression: Any, arguments: Any, *, backend: str | None = None) -> Ke
 def _numeric(name: str, value: Any) -> np.ndarray:
     try:
         array = np.asarray(value)
-    except Exception:  # whatever an object does when it is asked for its numbers
+    except Exception:  # a conversion to an array may raise anything
         raise TypeError(f"{name} = {shown(value)}: must be real or complex numbers") from None
     if array.dtype == np.float64 and type(value) in (np.ndarray, float):
         return array
