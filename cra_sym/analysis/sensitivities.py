@@ -59,9 +59,10 @@ class Sensitivities:
     minus half its share of the kinetic energy.
 
     The frequency of a rigid-body mode, f = 0, grows from zero as a square root: its raw derivative by the stiffness
-    that would hold it is inf, its other raw derivatives are 0 and its logarithmic ones nan. Where there are several such modes, which is
-    which depends on the direction of change: nan, as where a parameter splits a repeated frequency. An infinite
-    stiffness has derivatives 0; those by the compliance 1/k say what the first give of a rigid support costs.
+    that would hold it is inf, its other raw derivatives are 0 and its logarithmic ones nan. Where there are several
+    such modes, which is which depends on the direction of change: nan, as where a parameter splits a repeated
+    frequency. An infinite stiffness has derivatives 0; those by the compliance 1/k say what the first give of a
+    rigid support costs.
 
     Attributes
     ----------
