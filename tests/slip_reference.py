@@ -117,7 +117,7 @@ class Structure:
         state, slider = np.zeros(2 * n), 0.0
         for _ in range(30):
             state, slider, _ = self.run(state, slider, 0.0, period)
-        found = fsolve(wrong, np.append(state, slider), xtol=1e-13)
+        found = fsolve(wrong, np.append(state, slider), xtol=1e-13, full_output=True)[0]  # judged by what is wrong
         assert np.abs(wrong(found)).max() < 1e-9
         return found[:-1], found[-1], self.run(found[:-1], found[-1], 0.0, period, 4000)[2]
 

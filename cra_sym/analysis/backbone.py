@@ -22,6 +22,7 @@ __all__ = ["Backbone", "backbone"]
 
 Array = NDArray[np.float64]
 _START = 1e-5  # nonlinear share of the forces at the first point
+_COARSE = 1e-3  # relative change of frequency or damping ratio by more harmonics of which a user is told
 _MOST_POINTS = 1000
 _MORE_MODES, _MORE_HARMONICS = 3, 4  # in which the error is estimated
 UNSTABLE = 1e-6
@@ -111,7 +112,9 @@ def backbone(
         How many linear modes take part, 1 to 40; with elastic-slip elements those of the system without them.
     harmonics : int, optional
         Highest multiple of the frequency, 1 to 60. Internal resonances with higher ones do not show. Default: 9; with
-        elastic-slip elements as many as bring frequency and damping ratio within 3e-7, at most 127.
+        elastic-slip elements as many as bring frequency and damping ratio within 3e-7, at most 127; fewer where these
+        do not converge, as stiff elements excite modes that hardly anything damps: ``error_harmonics`` is then what the
+        last of them changed.
     points : int
         Length of the whole curve.
     place, field : optional
@@ -125,7 +128,8 @@ def backbone(
     Warns
     -----
     ConvergenceWarning
-        If the curve could not be followed as far as asked; what was not reached is nan.
+        If the curve could not be followed as far as asked; what was not reached is nan. With elastic-slip elements
+        also if ``error_harmonics`` exceeds 1e-3.
 
     Raises
     ------
@@ -178,6 +182,15 @@ def _held(
     if missing.size:
         first = targets.ravel()[missing[0]]
         warnings.warn(f"no motion was found at amplitude = {first:g}", ConvergenceWarning, stacklevel=4)
+    coarse = np.flatnonzero(found.error_harmonics > _COARSE)
+    if coarse.size:
+        first = targets.ravel()[coarse[0]]
+        warnings.warn(
+            f"at amplitude = {first:g} more harmonics do not converge, as they meet other modes; error_harmonics tells "
+            "what the last of them changed. Fewer modes have fewer of these resonances",
+            ConvergenceWarning,
+            stacklevel=4,
+        )
 
     def shaped(values: NDArray[Any]) -> NDArray[Any]:
         return np.asarray(values.reshape((*targets.shape, *values.shape[1:])))[()]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,9 @@ __all__ = ["HeldCurve", "held_curve"]
 Array = NDArray[np.float64]
 _MOST = 127  # harmonics
 _RATIO, _FINEST = 1.5, 1.005  # of neighbouring amplitudes, where a curve is followed
+_FOLLOWED = 3  # harmonics with which a curve is followed where motions with fewer do not lead to it
+_TRIALS = 60  # steps towards the next amplitude
+_JUMP = 0.05  # of frequency and damping ratio by more harmonics: another motion
 _UNSTABLE = 1e-6
 
 
@@ -45,25 +48,85 @@ def held_curve(
     problem = _problem(system, mode, modes, FIRST if harmonics is None else min(FIRST, harmonics), place, field)
     if not problem.stuck_frequency() > 0:
         raise ValueError(f"mode = {mode}: is a rigid-body mode and does not vibrate")
-    first = found = _at(problem, amplitudes)
+    found, change = _found(problem, amplitudes)
+    stopped = ~found.good | (change > 0)
     more = min(modes + 3, system.without_hysteresis.most_modes)
     wide = _problem(system, mode, more, len(problem.balance.basis.sines), place, field)
-    missing = _change(first, wide.solved(_widened(first, problem, wide), amplitudes))
+    missing = _change(found, wide.solved(_widened(found, problem, wide), amplitudes))
     if harmonics is not None and harmonics > FIRST:
-        whole = _problem(system, mode, modes, harmonics, place, field)
-        problem, found = whole, whole.solved(_embedded(found, problem, whole), amplitudes)
-    before: Array | None = None
+        problem, found, change, stopped = _richer(problem, found, amplitudes, harmonics, change, stopped)
+    before = np.full(len(amplitudes), np.inf)
     while True:
-        rich = _problem(system, mode, modes, 2 * len(problem.balance.basis.sines) + 1, place, field)
-        finer = rich.solved(_embedded(found, problem, rich), amplitudes)
-        change = _change(found, finer)
+        more = 2 * len(problem.balance.basis.sines) + 1
+        rich, finer, change, stopped = _richer(problem, found, amplitudes, more, change, stopped)
         if harmonics is not None:
             return _told(problem, found, change, missing)
         # where the last two changes fall, the next would fall alike
-        left = change if before is None else change * np.minimum(change / np.maximum(before, 1e-300), 1.0)
+        with np.errstate(invalid="ignore"):
+            left = np.where(stopped, change, change * np.minimum(change / np.maximum(before, 1e-300), 1.0))
+            first = np.isinf(before) & ~stopped
+        left = np.where(first, change, left)
         problem, found, before = rich, finer, change
-        if len(rich.balance.basis.sines) >= _MOST or not (left[finer.good] > ACCURACY).any():
+        if len(rich.balance.basis.sines) >= _MOST or not (left[~stopped] > ACCURACY).any():
             return _told(problem, found, left, missing)
+
+
+Flags = NDArray[np.bool_]
+
+
+def _with(problem: HeldMotions, harmonics: int) -> HeldMotions:
+    """Return the same problem with so many harmonics."""
+    degree = problem.balance.equations.degree
+    balance = replace(problem.balance, basis=Basis.whole(harmonics, samples(degree, harmonics)))
+    return HeldMotions(balance, problem.mode, problem.rows, problem.statics)
+
+
+def _richer(
+    problem: HeldMotions, found: Held, amplitudes: Array, harmonics: int, change: Array, stopped: Flags
+) -> tuple[HeldMotions, Held, Array, Flags]:
+    """Return the problem with more harmonics, its motions, what these change, and which keep those they have.
+
+    A motion whose next harmonics do not converge is kept as it is, with what the last ones changed.
+    """
+    rich = _with(problem, harmonics)
+    start = _embedded(found, problem, rich)
+    open_ = np.flatnonzero(~stopped)
+    finer = rich.solved(start[open_], amplitudes[open_])
+    new = _change(start[open_], finer)
+    good = finer.good & (new < _JUMP)
+    change, stopped = change.copy(), stopped.copy()
+    change[open_[good]], stopped[open_[~good]] = new[good], True
+    start.put(open_[good], finer[np.flatnonzero(good)])
+    return rich, start, change, stopped
+
+
+def _found(problem: HeldMotions, amplitudes: Array) -> tuple[Held, Array]:
+    """Return the motions, and what the last harmonics changed where not all of them converge: nan elsewhere.
+
+    A mode that slips may meet an odd multiple of its frequency in another mode, which has hardly any damping there.
+    """
+    change = np.full(len(amplitudes), np.nan)
+    if problem.balance.equations.energies or problem.balance.equations.forces:
+        return _at(problem, amplitudes), change  # linear starts do not know polynomial terms: the curve is followed
+    found, total = problem.solved(problem.linear(amplitudes), amplitudes), len(problem.balance.basis.sines)
+    missing = np.flatnonzero(~found.good)
+    if not missing.size:
+        return found, change
+    wanted, poor = amplitudes[missing], _with(problem, 1)
+    low, last = _at(poor, wanted), np.full(missing.size, np.inf)
+    stopped = ~low.good
+    while len(poor.balance.basis.sines) < total:
+        more = min(2 * len(poor.balance.basis.sines) + 1, total)
+        poor, low, last, stopped = _richer(poor, low, wanted, more, last, stopped)
+        again = np.flatnonzero(stopped)
+        if more <= _FOLLOWED and again.size:
+            other = _at(poor, wanted[again])
+            last[again] = np.where(other.good, _change(low[again], other), last[again])
+            stopped[again] = ~other.good
+            low.put(again[other.good], other[np.flatnonzero(other.good)])
+    found.put(missing, low)
+    change[missing[stopped]] = last[stopped]
+    return found, change
 
 
 def _problem(system: System, mode: int, modes: int, harmonics: int, place: Any, field: Any) -> HeldMotions:
@@ -86,10 +149,12 @@ def _problem(system: System, mode: int, modes: int, harmonics: int, place: Any, 
 
 
 def _at(problem: HeldMotions, amplitudes: Array) -> Held:
-    """Return the motions: all at once from linear ones, what is left along the amplitudes from smaller ones."""
+    """Return the motions: those found at once from linear ones, what is left along the amplitudes from smaller ones."""
     found = problem.solved(problem.linear(amplitudes), amplitudes)
     if problem.balance.equations.energies or problem.balance.equations.forces:
-        found.good[:] = False  # linear starts do not know polynomial terms: the curve is followed
+        found.good[:] = False
+    if found.good.all():
+        return found
     order = np.argsort(amplitudes)
     if found.good.all():
         return found
@@ -100,7 +165,9 @@ def _at(problem: HeldMotions, amplitudes: Array) -> Held:
         if found.good[number]:
             last, at = found[np.array([number])], target
             continue
-        while last.good[0]:
+        for _ in range(_TRIALS):
+            if not last.good[0]:
+                break
             new = min(target, at * step)
             trial = problem.solved(last.scaled(np.array([new / at])), np.array([new]))
             if trial.good[0] and abs(trial.frequency[0] / last.frequency[0] - 1) < 0.2:
@@ -112,14 +179,7 @@ def _at(problem: HeldMotions, amplitudes: Array) -> Held:
                 if step < _FINEST:
                     break
         if at == target and last.good[0]:
-            for mine, theirs in (
-                (found.coefficients, last.coefficients),
-                (found.displacements, last.displacements),
-                (found.frequency, last.frequency),
-                (found.ratio, last.ratio),
-                (found.good, last.good),
-            ):
-                mine[number] = theirs[0]
+            found.put(np.array([number]), last)
     return found
 
 
@@ -140,7 +200,8 @@ def _embedded(found: Held, old: HeldMotions, new: HeldMotions) -> Held:
         out[..., : h + 1], out[..., more + 1 : more + 1 + h] = np.split(given, [h + 1], axis=-1)
         return out
 
-    return Held(whole(found.coefficients), whole(found.displacements), found.frequency, found.ratio, found.good)
+    numbers = found.frequency.copy(), found.ratio.copy()
+    return Held(whole(found.coefficients), whole(found.displacements), *numbers, found.good.copy())
 
 
 def _widened(found: Held, old: HeldMotions, new: HeldMotions) -> Held:

@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 FIRST, MOST = 15, 127
 """Harmonics that are tried first, and at most, where none are asked for."""
+LED = 63
+"""Harmonics up to which answers are led from softer elements."""
 ACCURACY = 3e-7
 """Relative change of a motion by twice as many harmonics that is aimed at."""
 _SMALLEST, _LARGEST, _STEP, _PHASES, _ITERATIONS = 0.01, 100.0, 2.0, 3, 14
@@ -174,9 +176,15 @@ class SlipProblem:
         return self.driven.causes(varpi, self.basis.phase, self.period)
 
     def solved(self, starts: Array, varpi: Array, floor: float = 0.0) -> tuple[Array, NDArray[np.bool_]]:
-        """Return answers from starts, and which converged."""
+        """Return answers from starts, and which converged; where no start leads to the only one, it is led there."""
         alike = np.unique(varpi, return_inverse=True)[1] if self.unique else None
-        found, good = self.balance.newton(starts, varpi / self.period, self._causes(varpi), alike=alike)
+        frequency, causes = varpi / self.period, self._causes(varpi)
+        found, good = self.balance.newton(starts, frequency, causes, alike=alike)
+        if alike is not None and self.harmonics <= LED:
+            left = np.flatnonzero(~np.isin(alike, alike[good]))
+            left = left[np.unique(alike[left], return_index=True)[1]]
+            if left.size:
+                found[left], good[left] = self.balance.stiffened(frequency[left], causes[left])
         rigid = self.balance.equations.omega == 0.0
         if rigid.any():  # what holds it at rest is not a part of the system
             pull = np.abs(self.coefficients(found)[:, rigid, 0]).max(axis=1) * (varpi / self.period) ** 2
@@ -219,18 +227,26 @@ class SlipProblem:
         return float(sum(c.loss[0] for c in cycles))
 
     def changed(self, more_modes: int, more_harmonics: int, unknowns: Array, varpi: float) -> float:
-        """Return by what share the motion changes with more modes, or with twice as many harmonics."""
-        rich = self.richer(2 * self.harmonics + 1 if more_harmonics else self.harmonics, more_modes)
-        start = np.zeros((1, rich.balance.equations.modes, rich.basis.size))
-        h, n = self.harmonics, self.balance.equations.modes
-        start[:, :n, : h + 1], start[:, :n, rich.harmonics + 1 : rich.harmonics + 1 + h] = np.split(
-            self.coefficients(unknowns[None]), [h + 1], axis=-1
-        )
-        size = np.linalg.norm(start)
-        if not size:
+        """Return by what share the motion changes with more modes, or with twice as many harmonics.
+
+        Of harmonics it is what the last doubling changed, where the next does not converge.
+        """
+        own, at = self.coefficients(unknowns[None]), np.array([varpi])
+        if not own.any():
             return 0.0
-        found, good = rich.solved(rich.balance.start(start), np.array([varpi]))
-        return float(np.linalg.norm(rich.coefficients(found) - start) / size) if good[0] else np.inf
+        if not more_harmonics:
+            return self._apart(self.richer(min(self.harmonics, LED), more_modes), own, at)
+        found = self._apart(self.richer(2 * self.harmonics + 1), own, at)
+        return found if np.isfinite(found) else self._apart(self.richer(max(self.harmonics // 2, 1)), own, at)
+
+    def _apart(self, other: SlipProblem, own: Array, varpi: Array) -> float:
+        """Return by what share the answer of another problem, from this one's, differs; inf where there is none."""
+        start = np.zeros((1, other.balance.equations.modes, other.basis.size))
+        h, n, m = min(self.harmonics, other.harmonics), self.balance.equations.modes, other.harmonics
+        start[:, :n, : h + 1] = own[..., : h + 1]
+        start[:, :n, m + 1 : m + 1 + h] = own[..., self.harmonics + 1 : self.harmonics + 1 + h]
+        found, good = other.solved(other.balance.start(start), varpi)
+        return float(np.linalg.norm(other.coefficients(found) - start) / np.linalg.norm(own)) if good[0] else np.inf
 
     def settled(self, found: list[list[Array]], varpi: Array) -> tuple[SlipProblem, list[list[Array]]]:
         """Return a problem with as many harmonics as its answers need, and these; itself if a number was asked for."""
@@ -244,6 +260,8 @@ class SlipProblem:
             rich = problem.richer(min(2 * problem.harmonics + 1, MOST))
             start = rich.balance.embedded(unknowns, problem.harmonics)
             after, good = rich.solved(start, varpi[where])
+            if self.unique and not good.all():
+                break  # those found tell by how much more harmonics would change them
             size = np.linalg.norm(start, axis=1)
             change = np.linalg.norm(after - start, axis=1) / np.where(size > 0, size, 1.0)
             unknowns, problem = np.where(good[:, None], after, start), rich
@@ -266,7 +284,9 @@ class SlipProblem:
         """
         count, size = len(varpi), self._size
         shares = () if self.driven.rests else (1.0, 0.0)
-        where, starts = [np.arange(count)] * len(shares), [self._linear(varpi, share) for share in shares]
+        frequency, causes = varpi / self.period, self._causes(varpi)
+        where = [np.arange(count)] * len(shares)
+        starts = [self.balance.stuck_motion(frequency, causes, share) for share in shares]
         if self.driven.rests or not self.balance.constant:
             where.append(np.arange(count))
             starts.append(np.zeros((count, self.balance.size)))
@@ -285,16 +305,6 @@ class SlipProblem:
     def _size(self) -> float:
         rows = np.abs(self.balance.elements.rows)
         return float(self.balance.elements.limit / rows.max())
-
-    def _linear(self, varpi: Array, share: float) -> Array:
-        """Return the motion with springs that have a share of the elements' stiffness, nonlinear terms left out."""
-        balance, size = self.balance, self.basis.size
-        frequency = varpi / self.period
-        based = balance._based(np.zeros((len(varpi), balance.modal_size)), frequency, self._causes(varpi))
-        springs = np.repeat(share * balance.elements.stiffness, size)
-        matrix = np.eye(springs.size) + based.flexibility * springs
-        w = np.linalg.solve(matrix, based.displacement[..., None])[..., 0]
-        return np.concatenate([based.modal(springs * w, np.arange(len(varpi))), w], axis=1)
 
     def _alone(self, shape: Array, varpi: float) -> Array:
         """Return answers in one shape with the harmonic nearest to it, from amplitudes and phases all around."""

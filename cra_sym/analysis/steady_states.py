@@ -81,7 +81,7 @@ class SteadyState:
     def error_harmonics(self) -> float:
         """Estimated relative error of the motion for want of harmonics: what four more change.
 
-        With elastic-slip elements, what twice as many change.
+        With elastic-slip elements, what twice as many change, or if these do not converge what the last doubling did.
         """
         return self._problem.changed(0, 4, self._unknowns, self.angular_frequency)
 
@@ -242,7 +242,7 @@ def steady_states(
         statics of all others at the elements.
     harmonics : int, optional
         Highest multiple of ``varpi / period``; the constant is there too. Default: 7; with elastic-slip elements as
-        many as bring the motion within 3e-7, at most 127.
+        many as bring the motion within 3e-7, at most 127, fewer where these do not converge (see `error_harmonics`).
     period : int
         2 asks for answers of twice the period of the excitation.
     zeta : array_like, optional

@@ -23,6 +23,7 @@ __all__ = ["Elements", "SlipBalance", "stuck"]
 
 Array = NDArray[np.float64]
 _HALVINGS = 6
+_PARTS, _LED = 7, 20  # how often a step of stiffness is halved, and Newton's iterations in each
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +62,10 @@ class Elements:
     def along(self, shape: Array) -> Elements:
         """Return the same seen by modes that move in one shape."""
         return replace(self, rows=(self.rows @ shape)[:, None], coupling=np.zeros_like(self.coupling))
+
+    def softened(self, share: float) -> Elements:
+        """Return elements with a share of the stiffness that slip with the same forces."""
+        return replace(self, groups=tuple((share * k, f) for k, f in self.groups))
 
     def cycles(self, displacements: Array) -> list[Cycle]:
         """Return what the elements do for displacements of shape (points, displacements, functions)."""
@@ -303,6 +308,43 @@ class SlipBalance:
             if not open_.size:
                 break
         return np.concatenate([q, w], axis=1), done
+
+    def stuck_motion(self, frequency: Array, causes: Array | None, share: float) -> Array:
+        """Return unknowns of the motion with springs of a share of the elements' stiffness, linearised at rest."""
+        based = self._based(np.zeros((len(frequency), self.modal_size)), frequency, causes)
+        springs = np.repeat(share * self.elements.stiffness, self.basis.size)
+        matrix = np.eye(springs.size) + based.flexibility * springs
+        w = np.linalg.solve(matrix, based.displacement[..., None])[..., 0]
+        return np.concatenate([based.modal(springs * w, np.arange(len(frequency))), w], axis=1)
+
+    def stiffened(self, frequency: Array, causes: Array | None) -> tuple[Array, NDArray[np.bool_]]:
+        """Return answers led from elements so soft that all of them stick to the ones there are, and which arrived.
+
+        The slip forces stay. Where elements are stiff over the modes, answers move little on the way, and starts with
+        everything stuck or nothing stuck lie far from them.
+        """
+        free = self.stuck_motion(frequency, causes, 0.0)
+        largest = np.abs(free[:, self.modal_size :]).sum(axis=1).max()
+        softest = 0.5 * min(1.0, self.elements.limit / max(float(largest), 1e-300))
+        found = self.stuck_motion(frequency, causes, softest)
+        return self._led(found, (softest, 1.0), frequency, causes, _PARTS)
+
+    def _led(
+        self, start: Array, shares: tuple[float, float], frequency: Array, causes: Array | None, parts: int
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Return answers with the second share of the stiffness from those with the first, by halves if need be."""
+        soft = replace(self, elements=self.elements.softened(shares[1]))
+        found, good = soft.newton(start, frequency, causes, most=_LED)
+        left = np.flatnonzero(~good)
+        middle = float(np.sqrt(shares[0] * shares[1]))
+        for pair in ((shares[0], middle), (middle, shares[1])):
+            if left.size and parts:
+                some = None if causes is None else causes[left]
+                found[left], good[left] = self._led(
+                    start[left] if pair[1] == middle else found[left], pair, frequency[left], some, parts - 1
+                )
+                left = left[good[left]]
+        return found, good
 
     @staticmethod
     def _halve(which: NDArray[np.intp], share: Array, *moved: tuple[Array, Array]) -> None:

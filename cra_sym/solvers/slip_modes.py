@@ -51,6 +51,11 @@ class Held:
             self.coefficients[rows], self.displacements[rows], self.frequency[rows], self.ratio[rows], self.good[rows]
         )
 
+    def put(self, rows: NDArray[np.intp], others: Held) -> None:
+        """Replace some of them."""
+        self.coefficients[rows], self.displacements[rows] = others.coefficients, others.displacements
+        self.frequency[rows], self.ratio[rows], self.good[rows] = others.frequency, others.ratio, others.good
+
     def scaled(self, factor: Array) -> Held:
         """Return starts of other amplitudes."""
         by = factor[:, None, None]
@@ -141,7 +146,7 @@ class HeldMotions:
         w, frequency, ratio = start.displacements.copy(), start.frequency.copy(), start.ratio.copy()
         good, open_ = np.zeros(len(x), bool), np.arange(len(x))
         active = self.active
-        for _ in range(_ITERATIONS):
+        for _ in range(_ITERATIONS if len(x) else 0):
             step_x, step_w, step_f, step_z = self._step(
                 x[open_], w[open_], frequency[open_], ratio[open_], amplitudes[open_]
             )

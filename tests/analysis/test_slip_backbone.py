@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 
 import cra_sym as cra
+from cra_sym.analysis.slip_states import elements_of
 from cra_sym.solvers.slip_modes import HeldMotions
 from cra_sym.symbols import L, t, v, x
 from tests.nonlinear_models import oscillator, q
@@ -140,6 +141,32 @@ def test_beam_on_a_slipping_joint_resonates_where_its_damped_mode_says():
     curve = cra.backbone(beam, amplitude=float(np.polyval(bend, resonance)), modes=3)
     np.testing.assert_allclose(curve.angular_frequency, resonance, rtol=3e-3)
     assert 0.001 < curve.damping_ratio < 0.2 and curve.error_modes < 1e-4
+
+
+def test_stiff_joint_is_answered_with_fewer_harmonics_and_says_so():
+    """One mode closes upon itself; three meet each other, and the motion keeps the harmonics that converge."""
+    system, amplitude = cra.BoltedJoint().on(cra.Arm.nominal().replace(zeta=0.005), 1.0), 0.03
+    one = cra.backbone(system, amplitude=amplitude, modes=1, harmonics=31)
+    elements = elements_of(system, 1)
+    (spring,), (slip,) = elements.groups[0]
+    omega, ratio = float(system.without_hysteresis.natural_frequencies(1)[0]), float(one.damping_ratio)
+    frequency, order = float(one.angular_frequency), np.arange(32)
+    cosines, sines = one.coefficients[0, :32], one.coefficients[0, 32:]
+    referee = Structure.one_mass(omega, 0.005, spring, slip, 0.0, frequency)
+    referee.damping = referee.damping - 2 * ratio * frequency
+    referee.row = elements.rows[0]
+    phase, slider = 2 * np.pi * np.linspace(0, 2, 8001)[:, None], 0.0
+    for q_ in np.cos(phase * order) @ cosines + np.sin(phase * order[1:]) @ sines:
+        u = q_ * elements.rows[0, 0]
+        slider = min(max(slider, u - slip / spring), u + slip / spring)
+    start = np.array([cosines.sum(), frequency * (order[1:] * sines).sum()])
+    end, _, _ = referee.run(start, slider, 0.0, 2 * np.pi / frequency)
+    np.testing.assert_allclose(end, start, atol=1e-3 * abs(start[0]))  # corners of the force, 31 harmonics
+    with pytest.warns(cra.ConvergenceWarning, match="more harmonics do not converge"):
+        three = cra.backbone(system, amplitude=amplitude, modes=3)
+    assert 0 < three.error_harmonics < 0.05
+    np.testing.assert_allclose(three.angular_frequency, frequency, rtol=three.error_harmonics + 0.01)  # of the mode
+    np.testing.assert_allclose(three.damping_ratio, ratio, atol=three.error_harmonics)
 
 
 @pytest.mark.parametrize(

@@ -180,6 +180,37 @@ def test_several_elements_on_two_displacements_and_their_multipliers():
     np.testing.assert_allclose(np.abs(state.multipliers), np.abs(wanted), atol=3e-3)
 
 
+def test_stiff_elements_are_led_to_from_soft_ones():
+    """A spring 500 times as stiff as the rest: starts with everything stuck or nothing stuck lie too far away."""
+    one, two = sp.Function("q_1")(t), sp.Function("q_2")(t)
+    lagrangian = (one.diff(t) ** 2 + 2 * two.diff(t) ** 2 - one**2 - 3 * (two - one) ** 2) / 2
+    frequency, spring, slip, load = 0.8, 500.0, 0.3, 0.45
+    work = [(F - 0.02 * one.diff(t), one, None), (-0.02 * two.diff(t), two, None)]
+    system = cra.Model(
+        0, fields=(), coordinates=[one, two], x=x, domain=(0, 1), t=t, left=lagrangian, virtual_work=work,
+        hysteresis=[(cra.Jenkins(spring, slip), two, None)],
+    ).at({})  # fmt: skip
+    (state,) = cra.steady_states(system, frequency, drive={F: load}, modes=2, field=one, harmonics=31)
+    stiffness = np.array([[4.0, -3.0], [-3.0, 3.0]])
+    referee = Structure(
+        np.diag([1.0, 2.0]), 0.02 * np.eye(2), stiffness, np.array([0.0, 1.0]), spring, slip, load * np.array([1.0, 0]),
+        frequency,
+    )  # fmt: skip
+    modes = system.without_hysteresis.modes(2)
+    shapes = np.stack([modes.coordinate(0), modes.coordinate(1)])
+    order = np.arange(state.coefficients.shape[1] // 2 + 1)
+    cosines, sines = np.split(state.coefficients, [order.size], axis=1)
+    start = np.concatenate([shapes @ cosines.sum(axis=1), frequency * shapes @ (sines * order[1:]).sum(axis=1)])
+    phase = 2 * np.pi * np.linspace(0, 2, 40001)[:, None]
+    along, slider = shapes[1] @ (cosines @ np.cos(phase * order).T + sines @ np.sin(phase * order[1:]).T), 0.0
+    for u in along:
+        slider = min(max(slider, u - slip / spring), u + slip / spring)
+    end, _, _ = referee.run(start, slider, 0.0, 2 * np.pi / frequency)
+    assert state.stable and state.loss > 0
+    # corners of the force: 31 harmonics leave 3e-3 of the motion, 127 leave 3e-6 and take longer
+    np.testing.assert_allclose(end, start, atol=5e-3 * np.abs(start).max())
+
+
 # inside a tongue ---------------------------------------------------------------------------------------------------
 
 
