@@ -258,7 +258,7 @@ class ModalParameters:
             raise ValueError("root_moment: no force of the section is conjugate to the slope; use left_force")
         return self._modes.force(0, place)
 
-    @property
+    @cached_property
     def root_shear(self) -> Array:
         """EI phi'''(0), N kg^-1/2/m."""
         return -self._modes.force(0, 0)
@@ -385,7 +385,8 @@ def only_motion(system: System) -> str:
 
 def participation(system: System, modes: int, motion: str | None = None) -> Array:
     """Return the participation of the modes in a prescribed motion, kg^1/2, shape (..., modes)."""
-    return -system.project(system.numerics("load", motion or only_motion(system)), modes)
+    load = system.project(system.numerics("load", motion or only_motion(system)), modes)
+    return np.negative(load, out=load)
 
 
 @checks.default_floating_point

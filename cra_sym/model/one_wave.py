@@ -112,44 +112,24 @@ class OneWave:
             )
         return numbers[_SCALES - 1 :]
 
-    def groups(self, values: Sequence[Value]) -> list[Array]:
-        """Return kappa and mu of the channels, as the layout has them; not broadcast.
-
-        Raises
-        ------
-        ValueError
-            If a stiffness or an inertia is negative, or an inertia infinite.
-        """
-        return self._groups(self._numbers(values))
-
-    def frequency_parameters(self, values: Sequence[Value], shape: tuple[int, ...], modes: int) -> Array:
-        """Return lambda of the first modes, shape (*shape, modes): ascending, complete, 0 for rigid-body modes."""
-        return self.parameters_of_groups(self.groups(values), shape, modes)
-
-    def parameters_of_groups(self, groups: Sequence[Array], shape: tuple[int, ...], modes: int) -> Array:
-        """Return lambda of the first modes from the dimensionless groups themselves, shape (*shape, modes)."""
-        common = np.broadcast_shapes(*(x.shape for x in groups)) if groups else ()
-        lam = put_soft(self.layout, [np.broadcast_to(x, common) for x in groups], self._solved, modes)
-        return lam if common == shape else np.ascontiguousarray(np.broadcast_to(lam, (*shape, modes)))
-
     def _solved(self, groups: list[Array], modes: int) -> Array:
         lam = self.family.frequency_parameters(*groups, modes=modes)
         resolve_close_pairs(self.family, lam, *groups)
         return lam
 
     def angular_frequencies(self, values: Sequence[Value], shape: tuple[int, ...], modes: int) -> Array:
-        """Return the natural angular frequencies, rad/s, shape (*shape, modes)."""
-        return self.in_radians(values, self.frequency_parameters(values, shape, modes))
-
-    def in_radians(self, values: Sequence[Value], lam: Array) -> Array:
-        """Return ``scale lambda^n``, rad/s."""
-        omega = lam.copy() if self.layout.n == 1 else lam**2
-        omega *= _column(self._numbers(values)[4])  # in place: fresh memory costs more than the product
+        """Return the natural angular frequencies, rad/s, shape (*shape, modes): ascending, complete."""
+        numbers = self._numbers(values)
+        groups = self._groups(numbers)
+        common = np.broadcast_shapes(*(x.shape for x in groups)) if groups else ()
+        omega = put_soft(self.layout, [np.broadcast_to(x, common) for x in groups], self._solved, modes)
+        omega = omega if common == shape else np.array(np.broadcast_to(omega, (*shape, modes)))
+        if self.layout.n == 2:
+            omega *= omega  # in place: fresh memory costs more than the product
+        omega *= _column(numbers[4])
         return omega
 
-    def modes(
-        self, values: Sequence[Value], shape: tuple[int, ...], omega: Array, lam: Array | None = None
-    ) -> OneWaveModes:
+    def modes(self, values: Sequence[Value], shape: tuple[int, ...], omega: Array) -> OneWaveModes:
         """Return the modes, given all their first angular frequencies.
 
         Parameters
@@ -157,17 +137,15 @@ class OneWave:
         values : sequence of float or ndarray
         shape : tuple of int
         omega : ndarray, shape (*shape, modes)
-        lam : ndarray, shape (*shape, modes), optional
-            From `frequency_parameters`, if it is at hand.
         """
         numbers = self._numbers(values)
         left, length, inertia, stiffness, scale = numbers[: _SCALES - 1]
-        if lam is None:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                lam = omega / _column(scale)
-            if not np.isfinite(lam).all():
-                raise ValueError("values: they lead beyond the range of double precision")
-            lam = lam if self.layout.n == 1 else np.sqrt(lam)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            lam = omega / _column(scale)
+        if not np.isfinite(lam).all():
+            raise ValueError("values: they lead beyond the range of double precision")
+        if self.layout.n == 2:
+            np.sqrt(lam, out=lam)
         given = [np.broadcast_to(x, shape) for x in self._groups(numbers)]
         groups = felt(self.layout, given)
         if any(a is not b for a, b in zip(groups, given, strict=True)):  # as free where nothing else holds them

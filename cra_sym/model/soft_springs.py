@@ -54,9 +54,9 @@ def put_soft(
     """
     real = felt(layout, groups)
     lam = solve(real, modes)
-    lanes = np.any([a != b for a, b in zip(real, groups, strict=True)], axis=0) if groups else np.zeros((), bool)
-    if not levels or not lanes.any():
+    if not levels or all(a is b for a, b in zip(real, groups, strict=True)):
         return lam
+    lanes = np.any([a != b for a, b in zip(real, groups, strict=True)], axis=0)
     (limit, target), *others = levels
     here = [x[lanes] for x in groups]
     letters = [letter for _, letter in layout.groups]
