@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from cra_sym.analysis.modes import natural_frequencies
+from cra_sym.analysis.frequency_response import frequency_response
+from cra_sym.analysis.modes import modal_parameters, natural_frequencies
 from cra_sym.arm.frequency_parameters import frequency_parameters
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import mapping, one_axis, real_array, shown
 from cra_sym.claims.setting import Setting
+from cra_sym.symbols import symbol
 
 __all__ = ["MATERIALS", "ArmFamily", "common_scale", "provenance_family"]
 
@@ -73,7 +75,7 @@ class ArmFamily:
     published : ndarray, shape (modes,)
         Hz.
     mass, stiffness : ndarray, shape (materials, K)
-        Mass rho A L (kg) and tip stiffness 3 EI / L^3 (N/m) of a strip as wide as the nominal one: these do differ.
+        Mass (kg) and stiffness against a force at the tip (N/m) of a strip as wide as the nominal one: these do differ.
     """
 
     materials: tuple[str, ...]
@@ -123,5 +125,7 @@ def provenance_family(
     bare = Arm.nominal().replace(m_e=0.0, J_e=0.0, k_t=np.inf, k_r=np.inf)
     arms = bare.replace(L=length, h=thickness, E=modulus, rho=density)
     found = natural_frequencies(arms, modes=published.size)
-    mass, stiffness = arms.rhoA * arms.L, 3 * arms.EI / arms.L**3
-    return ArmFamily(tuple(materials), length, thickness, found, published, np.asarray(mass), np.asarray(stiffness))
+    stiffness = 1 / frequency_response(arms, 0.0, drive=symbol("v").subs(symbol("x"), symbol("L"))).real
+    free = modal_parameters(arms.replace(k_t=0.0, k_r=0.0), 2)  # which move as rigid bodies, with all the mass
+    mass = np.sum(free.participation**2, axis=-1)
+    return ArmFamily(tuple(materials), length, thickness, found, published, mass, stiffness)

@@ -18,13 +18,15 @@ def arm_family() -> Family:
     Raises
     ------
     ValueError
-        If the Lagrangian has changed so that the exports, which are written for springs at the joint and inertias at
-        the tip, do not say what it says.
+        If the Lagrangian has changed so that the exports, which are written for springs at the joint, inertias at the
+        tip and a base that carries all of it, do not say what it says.
     """
-    route = Arm.nominal().numerics("route")
-    if not isinstance(route, OneWave) or route.family.structure != _STRUCTURE:
+    arm = Arm.nominal()
+    route, load = arm.numerics("route"), arm.numerics("load", "w")
+    carried = load.share is not None and load.share.function(*arm.parameters) == -1 and not load.rest_ends
+    if not isinstance(route, OneWave) or route.family.structure != _STRUCTURE or not carried:
         raise ValueError(
-            "the arm's Lagrangian must be that of a beam with springs at x = 0 and inertias at x = L; "
+            "the arm's Lagrangian must be that of a beam with springs at x = 0 and inertias at x = L, all on the base; "
             "export it as a model"
         )
     return route.family

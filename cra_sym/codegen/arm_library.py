@@ -8,6 +8,7 @@ from functools import lru_cache
 
 from cra_sym.arm.parameters import Arm
 from cra_sym.codegen.arm_batch import arm_batch
+from cra_sym.codegen.arm_energies import energy_functions
 from cra_sym.codegen.arm_time_checks import arm_time_checks
 from cra_sym.codegen.expressions import gauss_rule, modal_functions, spectrum_functions, stability_functions
 from cra_sym.codegen.frozen import stated
@@ -125,7 +126,7 @@ def _with_widths(text: str) -> str:
 
 
 def _generated() -> str:
-    functions = (*spectrum_functions(), *modal_functions(), *stability_functions())
+    functions = (*energy_functions(), *spectrum_functions(), *modal_functions(), *stability_functions())
     text = "\n\n".join(FormPrinter.text_of(f, f"_{f.name}", checked=False) for f in functions)
     return FormPrinter.helped(text) + text
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = [
     "PeriodicForms",
     "axial",
+    "axial_load",
     "checked_small",
     "fluctuating",
     "fluctuation",
@@ -241,8 +242,27 @@ def axial(model: Model) -> Form:
     on a rigid lever e, of velocity v_t + e v_xt, adds m e v_x^2 / 2; m e is its coupling of both.
     """
     weak = weak_form(model.linearised.variation)
+    slope = Jet(0, 1, 0, None)
+    levers: dict[tuple[Jet, Jet], dict[int, Expr]] = {}
+    for end in (*END_NAMES, *range(len(weak.points))):
+        displacement, turn = Jet(0, 0, 0, end), Jet(0, 1, 0, end)
+        moment = weak.discrete.get((displacement, turn), {}).get(2, S.Zero)
+        if moment != 0:
+            levers[turn, turn] = {0: moment}
+    return form_of(weak, {"axial": ({(slope, slope): {0: axial_load(model)}}, levers)}, model.symbols)
+
+
+def axial_load(model: Model) -> Expr:
+    """Return the compression at x by a unit acceleration of the frame along x: the mass beyond.
+
+    Raises
+    ------
+    ValueError
+        If a lumped coordinate carries a mass of which it is not known where it is.
+    """
+    weak = weak_form(model.linearised.variation)
     space = weak.variation.space
-    field, tip, slope = Jet(0, 0, 0, None), Jet(0, 0, 0, "right"), Jet(0, 1, 0, None)
+    field, tip = Jet(0, 0, 0, None), Jet(0, 0, 0, "right")
     density = weak.inside.get((field, field), {}).get(2, S.Zero)
     place = Dummy("x")
     beyond = integrate(density.subs(space.x, place), (place, space.x, space.ends["right"]))
@@ -258,10 +278,4 @@ def axial(model: Model) -> Form:
                 f"axial: the place along x of the mass that moves by {unknown} is not known; state the work of the "
                 "axial load in the Lagrangian and let its amplitude fluctuate"
             )
-    levers: dict[tuple[Jet, Jet], dict[int, Expr]] = {}
-    for end in (*END_NAMES, *range(len(weak.points))):
-        displacement, turn = Jet(0, 0, 0, end), Jet(0, 1, 0, end)
-        moment = weak.discrete.get((displacement, turn), {}).get(2, S.Zero)
-        if moment != 0:
-            levers[turn, turn] = {0: moment}
-    return form_of(weak, {"axial": ({(slope, slope): {0: load}}, levers)}, model.symbols)
+    return load

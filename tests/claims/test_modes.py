@@ -5,7 +5,7 @@ import pytest
 
 import cra_sym as cra
 from cra_sym.claims import claim, energy, modes, provenance_family
-from cra_sym.claims.family import common_scale
+from cra_sym.claims.family import MATERIALS, common_scale
 from cra_sym.paper import joint
 from cra_sym.paper.flipped import flipped_frequencies
 
@@ -101,5 +101,9 @@ def test_family_shares_the_published_frequencies():
     shape = (len(family.materials), family.length.size, 3)
     np.testing.assert_array_equal(family.frequencies.round(3), np.broadcast_to(family.published, shape))
     assert family.mass.max() > 20 * family.mass.min() and family.stiffness.max() > 20 * family.stiffness.min()
+    b, h = cra.Arm.nominal().b, family.thickness
+    E, rho = np.array(list(MATERIALS.values())).T[:, :, None]
+    np.testing.assert_allclose(family.mass, rho * b * h * family.length, rtol=1e-12)
+    np.testing.assert_allclose(family.stiffness, E * b * h**3 / 4 / family.length**3, rtol=1e-10)
     with pytest.raises(ValueError, match="no clamped uniform arm"):
         provenance_family([2.0, 15.0, 43.0])

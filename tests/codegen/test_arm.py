@@ -9,9 +9,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from sympy import Add, Rational
 
 import cra_sym as cra
-from cra_sym.codegen import arm_library
+from cra_sym.arm.lagrangian import arm_model
+from cra_sym.codegen import arm_energies, arm_library
+from cra_sym.symbols import E, J_e, k_r, k_t, m_b, m_e, rho
 from tests.campaigns.languages import worst
 from tests.codegen import kit
 from tests.codegen.kit import arm_without_vectors
@@ -55,6 +58,34 @@ def test_random_arms_agree_with_the_package():
     expected = cra.frequency_parameters(*groups, modes=8)
     found = np.array([exported().frequency_parameters(*column, 8) for column in groups.T.tolist()])
     assert np.max(np.abs(found - expected) / expected) < 1e-12
+
+
+def test_another_lagrangian_is_exported_as_its_model_says(monkeypatch):
+    """Every term times its own factor: nothing that is printed is typed in beside the Lagrangian."""
+    factors = {m_b: 1.3, m_e: 1.7, J_e: 0.6, k_t: 1.9, k_r: 0.7, rho: 1.4, E: 0.8}
+    changed = {
+        name: Add(*(n * f for n in Add.make_args(arm_model().pieces[name].expand()) for s, f in exact if n.has(s)))
+        for exact in [[(s, Rational(f)) for s, f in factors.items()]]
+        for name in ("density", "left", "right")
+    }
+    model = arm_model().replace(**changed)
+    monkeypatch.setattr(arm_energies, "arm_model", lambda: model)
+    names: dict = {}
+    exec(compile(arm_without_vectors("crane").texts("python")["crane.py"], "crane", "exec"), names)
+    arm = cra.Arm.nominal().replace(k_t=2e3, k_r=50.0, m_e=0.05, J_e=1e-4, zeta=0.01)
+    given = names["Arm"](**{name: float(getattr(arm, name)) for name in FIELDS})
+    system, modes = model.at(arm.values, zeta=arm.zeta), names["modes_of"](given, 3)
+    modal, rates = cra.modal_parameters(system, 3), cra.sensitivities(system, 3, by=("k_t", "k_r"))
+    for name in ("frequency", "participation", "root_displacement", "root_slope", "root_moment", "tip_slope"):
+        np.testing.assert_allclose([getattr(mode, name) for mode in modes], getattr(modal, name), rtol=1e-11)
+    found = np.array([names["sensitivity"](mode) for mode in modes])
+    expected = [rates.rate["k_t"], rates.rate["k_r"], rates.log["k_t"], rates.log["k_r"]]
+    np.testing.assert_allclose(found.T, expected, rtol=1e-10)
+    states = np.array(names["state_space_force"](given, 3, modes, 8, 64)[0]).reshape(8, 8)
+    np.testing.assert_allclose(states, cra.state_space(system, 3, input="drive_force").A, rtol=1e-9, atol=1e-9)
+    shaken = names["Excitation"](k_t=0.0, k_r=0.0, amplitude=1.0)
+    axial = [[names["coupling"](given, shaken, one, other, 1.0) for other in modes] for one in modes]
+    np.testing.assert_allclose(axial, modal.axial, rtol=1e-11)
 
 
 def test_modes_that_are_refused():
