@@ -143,13 +143,13 @@ class Waves:
 
         They do where infinite values hold one displacement or link each and nothing has negative stiffness or mass.
         """
-        others = [position for position in range(len(columns)) if position not in self.stiffnesses]
-        simple = ~np.isinf(columns[others]).any(axis=0)
-        problem = self._problem(columns)
-        for matrix in (problem.odd_by_even, problem.even_by_odd):
-            simple &= np.isfinite(matrix).all(axis=(0, 2, 3))
-        for ends in (problem.stiffness, problem.mass):
-            simple &= (ends >= 0).all(axis=1)
+        problem, simple = self._problem(columns)
+        for position, column in enumerate(columns):
+            if position not in self.stiffnesses:
+                simple &= ~np.isinf(column)
+        for ends in (problem.stiffness.T, problem.mass.T):
+            for end in ends:
+                simple &= end >= 0
         simple &= ~negative_motions(problem, 1)
         if (simple & idle_coordinates(problem)).any():
             names = ", ".join(self.coordinates)
@@ -164,51 +164,70 @@ class Waves:
         found = wave_states(problem, z, share)
         n, m = len(self.order), self.structure.coordinates
         if self.carried is not None:
-            carried = np.moveaxis(_stacked(self.carried, finite, len(x)).reshape(n, m, -1), -1, 0)
+            carried = _rows_first(self.carried.function(*finite), len(x), (n, m), 0)
             found[..., :n] -= found[..., n : n + m] @ np.swapaxes(carried, 1, 2)[:, None]
         back = np.argsort(self.order)
         return found[..., [*back, *range(n, n + m), *(n + m + back)]]
 
-    def _problem(self, columns: Array) -> UniformProblem:
+    def _problem(self, columns: Array) -> tuple[UniformProblem, NDArray[np.bool_]]:
+        """Return the problem, and for which sets the matrices are finite."""
         rows, n, structure = columns.shape[1], len(self.order), self.structure
-        finite = np.where(np.isinf(columns), 0.0, columns)
+        finite = [np.where(np.isinf(column), 0.0, column) for column in columns]
         with np.errstate(all="ignore"):
-            matrices = _stacked(self.matrices, finite, rows).reshape(2, 2, n, n, rows)
-            entries = _stacked(self.conditions, finite, rows)
+            entries, given = self.matrices.function(*finite), self.conditions.function(*finite)
             length, _ = self.spatial.geometry.function(*finite)
-        size = structure.moving
-        found = entries[: 3 * size**2].reshape(3, size, size, rows)
-        links = entries[3 * size**2 :].reshape(structure.links, 1 + size, rows)
-        diagonal = np.arange(size)
-        stiffness = np.concatenate([found[0, diagonal, diagonal], links[:, 0]]).T.copy()
-        mass = np.concatenate([found[1, diagonal, diagonal], np.zeros((structure.links, rows))]).T.copy()
+        good = np.ones(rows, dtype=bool)
+        for entry in entries:
+            good &= np.isfinite(entry)
+        matrices = _filled(entries, rows).reshape(2, 2, n, n, rows)
+        size, links = structure.moving, structure.links
+        parts = [given[size**2 * part :][: size**2] for part in range(3)]
+        joined = given[3 * size**2 :]
+        stiffness = _filled([*parts[0][:: size + 1], *joined[:: 1 + size]], rows).T
+        mass = _filled([*parts[1][:: size + 1], *[0.0] * links], rows).T
         stiffness[:, self.held] = np.inf
         for position, places in self.stiffnesses.items():
-            for place in places:
-                stiffness[np.isinf(columns[position]), place] = np.inf
-        matrix = np.moveaxis(found, -1, 1)
-        matrix[:2, :, diagonal, diagonal] = 0.0
+            infinite = np.isinf(columns[position])
+            if infinite.any():
+                for place in places:
+                    stiffness[infinite, place] = np.inf
+        aside = [[0.0 if at % (size + 1) == 0 else entry for at, entry in enumerate(part)] for part in parts[:2]]
+        couplings, ties = [*aside[0], *aside[1]], parts[2]
+        stretches = [entry for at, entry in enumerate(joined) if at % (1 + size)]
         odd_by_even, even_by_odd = (np.moveaxis(matrices[:, k], -1, 1) for k in (0, 1))
-        return UniformProblem(
+        problem = UniformProblem(
             np.array(np.broadcast_to(length, rows), dtype=np.float64),
             odd_by_even,
             even_by_odd,
             stiffness,
             mass,
             structure.odd,
-            matrix[:2] if matrix[:2].any() else None,
-            matrix[2] if matrix[2].any() else None,
+            _rows_first(couplings, rows, (2, size, size), 1) if _any(couplings) else None,
+            _rows_first(ties, rows, (size, size), 0) if _any(ties) else None,
             structure.sizes,
             self.known,
             structure.coordinates,
             structure.linked,
-            np.moveaxis(links[:, 1:], -1, 0) if structure.links else None,
-        ).without_idle_links()
+            _rows_first(stretches, rows, (links, size), 0) if links else None,
+        )
+        return problem.without_idle_links(), good
 
 
-def _stacked(function: Kernel, columns: Array, rows: int) -> Array:
-    """Return the outputs of a kernel as rows of an array."""
-    return np.array([np.broadcast_to(value, rows) for value in function.function(*columns)], dtype=np.float64)
+def _filled(values: Sequence[float | Array], rows: int) -> Array:
+    """Return numbers and arrays as rows of an array."""
+    found = np.empty((len(values), rows))
+    for row, value in zip(found, values, strict=True):
+        row[:] = value
+    return found
+
+
+def _any(values: Sequence[float | Array]) -> bool:
+    return any(np.any(value) for value in values)
+
+
+def _rows_first(values: Sequence[float | Array], rows: int, shape: tuple[int, ...], axis: int) -> Array:
+    """Return the entries of matrices of a shape, with the axis of the sets of values put in."""
+    return np.moveaxis(_filled(values, rows).reshape(*shape, rows), -1, axis)
 
 
 @cache

@@ -337,11 +337,13 @@ def _ranks(matrix: Floats) -> Integers:
 @np.errstate(invalid="ignore", over="ignore", divide="ignore")
 def negative_energy(problem: UniformProblem) -> NDArray[np.bool_]:
     """Return where static strain energy may be negative, as in compression: only there can a row buckle."""
-    _, force = _static_blocks(problem, np.arange(len(problem.length)))
-    found = np.zeros(len(force), dtype=bool)
+    found = negative_motions(problem, 0)
     for start, stop in problem.structure.blocks:
-        found |= ~_are_semidefinite(force[:, start:stop, start:stop])
-    return found | negative_motions(problem, 0)
+        for matrix, odd in ((problem.odd_by_even[0], False), (problem.even_by_odd[0], True)):  # A_Pq at z = 0
+            places = [place for place in range(start, stop) if problem.odd[place] == odd]
+            if places:
+                found |= ~_are_semidefinite(matrix[:, places][:, :, places])
+    return found
 
 
 @np.errstate(invalid="ignore", over="ignore", divide="ignore")

@@ -102,7 +102,7 @@ def values_of(name, rows, decades, seed=0):
 
 def problem_of(system):
     parameters = [np.broadcast_to(np.asarray(value, dtype=float), system.shape).ravel() for value in system.parameters]
-    return system._route._problem(np.array(parameters))
+    return system._route._problem(np.array(parameters))[0]
 
 
 def by_dynamic_stiffness(system, modes):

@@ -115,7 +115,7 @@ def test_what_is_known_of_the_coefficients_is_so(name):
         values["k_2"] = np.array([INF, 0.0, 2.0])
     system = model.at(values)
     route = system._route
-    problem = route._problem(np.array([np.broadcast_to(value, 3) for value in system.parameters]))
+    problem = route._problem(np.array([np.broadcast_to(value, 3) for value in system.parameters]))[0]
     coefficients = problem.all_coefficients()
     for value, row in zip(route.known, coefficients, strict=True):
         assert value is None or (row == value).all()
@@ -130,7 +130,7 @@ def test_what_is_known_of_the_coefficients_is_so(name):
 def test_compiled_twins_agree(name):
     system = models()[name].at(random_values(name, 300))
     route = system._route
-    problem = route._problem(np.array([np.broadcast_to(value, 300) for value in system.parameters]))
+    problem = route._problem(np.array([np.broadcast_to(value, 300) for value in system.parameters]))[0]
     search = compiled(template(route.structure, route.known), {}).lowest_waves
     # three waves that are coupled: roundings of the split, over the distance of the waves
     np.testing.assert_allclose(lowest_waves(problem, 4, search), lowest_waves(problem, 4), rtol=1e-11)
