@@ -14,6 +14,7 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
+from llvmlite import ir
 from numba.core import cgutils, errors
 
 from cra_sym.kernels.arithmetic import CONDITION, INTEGER, Arithmetic, is_constant, kind_named, kind_of
@@ -45,7 +46,8 @@ def call(
         A name keeps the type it is given first. Arrays that it makes are gone when it returns.
     arguments : sequence of number, LLVM value, or Array
     namespace : dict
-        What other names mean: constants, NumPy and its functions of numbers, further functions as ast.FunctionDef.
+        What other names mean: constants, NumPy and its functions of numbers, further functions as ast.FunctionDef, of
+        which those that ``_CALLED`` names are written once and called, all others wherever they are called.
 
     Returns
     -------
@@ -316,6 +318,8 @@ class _Body(Arithmetic):
 
     def called(self, function: Any, arguments: Sequence[Any]) -> Any:
         if isinstance(function, ast.FunctionDef):
+            if function.name in self.namespace.get("_CALLED", ()):
+                return self.called_apart(function, arguments)
             return call(self.context, self.builder, function, arguments, self.namespace)
         if function in (np.float64, np.int64):
             return self.cast(function, *arguments)
@@ -324,6 +328,36 @@ class _Body(Arithmetic):
         if function in _BUILT_IN.values():
             return function(self, *arguments)
         return self.known_to_numba(function, arguments)
+
+    def called_apart(self, function: ast.FunctionDef, arguments: Sequence[Any]) -> None:
+        """Call a function that is written once for arguments of the same types, beside the one that calls.
+
+        It returns nothing, and none of the arrays it takes overlaps another. Numbers are passed, so are lengths.
+        """
+        numbers, types = [], []
+        for argument in arguments:
+            parts = (argument.data, *argument.shape) if isinstance(argument, Array) else (argument,)
+            numbers.append([part if isinstance(part, ir.Value) else self.typed(part) for part in parts])
+            types.append((argument.writable if isinstance(argument, Array) else None, *(n.type for n in numbers[-1])))
+        module = self.builder.module
+        name = f"{function.name} {types}"
+        if name not in module.globals:
+            made = ir.Function(module, ir.FunctionType(ir.VoidType(), [k for own in types for k in own[1:]]), name)
+            made.linkage = "internal"
+            made.attributes.add("noinline")
+            given, own = iter(made.args), []
+            for writable, *kinds in types:
+                first, *rest = (next(given) for _ in kinds)
+                if writable is None:
+                    own.append(first)
+                    continue
+                first.add_attribute("noalias")
+                own.append(Array(first, tuple(rest), writable))
+            builder = ir.IRBuilder(made.append_basic_block())
+            if call(self.context, builder, function, own, self.namespace) is not None:
+                raise errors.TypingError(f"{function.name} is called, and must return nothing")
+            builder.ret_void()
+        self.builder.call(module.globals[name], [number for own in numbers for number in own])
 
     def indices(self, node: ast.expr) -> tuple[Any, ...]:
         index = self.value(node)

@@ -4,7 +4,8 @@
 
 Behind it stand (see `waves.template`) the largest multiplicity of a zero and functions of a lane: ``_value`` and
 ``_count``, in any regime or for waves of both signs, ``_regime`` and ``_branch``. In any regime all are evaluated and
-one is taken, so that loops over lanes have no branch.
+one is taken, so that loops over lanes have no branch. These texts are long: each stands in one place, in a function
+that is called.
 """
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 _LANES = 128
 _MOST_STEPS = 400
 _EPS = 2.220446049250313e-16
+_CALLED = ("_counts", "_values")  # not written out where they are called
 
 
 def lowest_waves(out, evaluations, k, zeros):
@@ -41,8 +43,8 @@ def lowest_waves(out, evaluations, k, zeros):
             return 1 + first
         for number in range(modes):
             _bracketed(bracket, at, points, counts, values, number, last, size)
-            evaluations[1] += _isolated(bracket, at, place, left, moved, own, rigid, number, size)
-            _opened(bracket, own, rigid, number, size)
+            evaluations[1] += _isolated(bracket, at, state, place, left, moved, own, rigid, number, size)
+            _opened(bracket, state, moved, own, rigid, number, size)
             many = _started(z, state, bracket, at, place, rigid, number, size)
             for entry in range(k.shape[0]):
                 for i in range(many):
@@ -64,24 +66,32 @@ def _deflated(value, z, zeros):
 
 def _counted(points, counts, values, k, zeros, modes, most, size):
     """Count at one point after the other until every lane has enough roots; return the last point."""
-    for lane in range(size):
-        value = _value_any(k, lane, 0.0)
-        points[0, lane], counts[0, lane] = 0.0, zeros[lane]
-        values[0, lane] = value if (zeros[lane] == 0) & (value > 0.0) else np.nan
-    for point in range(1, most):
+    for point in range(most):
         for lane in range(size):
             z = _branch(k, lane, point + 0.0625)
-            before = points[point - 1, lane]
-            points[point, lane] = z if (z > before) & (z < np.inf) else (4.0 * before if before > 0.0 else 1.0)
+            before = points[point - 1, lane] if point > 0 else 0.0
+            further = z if (z > before) & (z < np.inf) else (4.0 * before if before > 0.0 else 1.0)
+            points[point, lane] = further if point > 0 else 0.0
+        _counts(counts[point], values[point], points[point], k, size)
         least = modes
         for lane in range(size):
-            z = points[point, lane]
-            number, value = _count_any(k, lane, z)
-            counts[point, lane], values[point, lane] = np.int64(number), _deflated(value, z, zeros[lane])
-            least = min(least, np.int64(number))
-        if least >= modes:
+            z, value = points[point, lane], values[point, lane]
+            values[point, lane] = _deflated(value, z, zeros[lane])
+            least = min(least, counts[point, lane])
+        if point == 0:
+            for lane in range(size):
+                value = values[0, lane]
+                counts[0, lane], values[0, lane] = zeros[lane], value if (zeros[lane] == 0) & (value > 0.0) else np.nan
+        elif least >= modes:
             return point
     return most
+
+
+def _counts(counts, values, z, k, size):
+    """Fill in the number of roots below the points z, and the values there."""
+    for lane in range(size):
+        number, value = _count_any(k, lane, z[lane])
+        counts[lane], values[lane] = np.int64(number), value
 
 
 def _bracketed(bracket, at, points, counts, values, number, last, size):
@@ -106,7 +116,7 @@ def _is_crowded(bracket, at, number, lane):
     return wide & ((at[0, lane] < number) | (at[1, lane] > number + 1))
 
 
-def _isolated(bracket, at, place, left, moved, k, zeros, number, size):
+def _isolated(bracket, at, state, place, left, moved, k, zeros, number, size):
     """Shrink brackets until each holds its root alone, or no number between its ends; return the number of counts."""
     many, counted = 0, 0
     for lane in range(size):
@@ -120,11 +130,13 @@ def _isolated(bracket, at, place, left, moved, k, zeros, number, size):
         steps += 1
         counted += many
         for i in range(many):
-            lane = place[i]
+            low, high = bracket[0, place[i]], bracket[1, place[i]]
+            state[0, i] = np.sqrt(low * high) if low > 0.0 else high / 64.0
+        _counts(left, state[1], state[0], moved, many)
+        for i in range(many):
+            lane, middle, found = place[i], state[0, i], left[i]
             low, high = bracket[0, lane], bracket[1, lane]
-            middle = np.sqrt(low * high) if low > 0.0 else high / 64.0
-            counts, determinant = _count_any(moved, i, middle)
-            found, value = np.int64(counts), _deflated(determinant, middle, zeros[lane])
+            value = _deflated(state[1, i], middle, zeros[lane])
             up = found <= number
             bracket[0, lane], bracket[1, lane] = middle if up else low, high if up else middle
             bracket[2, lane], bracket[3, lane] = value if up else bracket[2, lane], bracket[3, lane] if up else value
@@ -142,14 +154,18 @@ def _isolated(bracket, at, place, left, moved, k, zeros, number, size):
     return counted
 
 
-def _opened(bracket, k, zeros, number, size):
+def _opened(bracket, state, moved, k, zeros, number, size):
     """Replace lower ends at z = 0 where the value is not known by small z on the same side of the root."""
     for lane in range(size):
         if (bracket[0, lane] == 0.0) & (not bracket[2, lane] == bracket[2, lane]) & (zeros[lane] <= number):
             share, before = 1e-3, 0
             while (before == 0) & (share > 1e-300):
                 z = share * bracket[1, lane]
-                value = _deflated(_value_any(k, lane, z), z, zeros[lane])
+                for entry in range(k.shape[0]):
+                    moved[entry, 0] = k[entry, lane]
+                state[5, 0] = z
+                _values(state, moved, 1)
+                value = _deflated(state[7, 0], z, zeros[lane])
                 side = 0 if (value > 0.0) == ((number & 1) == 0) else 2
                 before = 1 - side // 2
                 bracket[side // 2, lane], bracket[2 + side // 2, lane] = z, value

@@ -242,3 +242,35 @@ def test_strides_are_refused(written):
 
     with pytest.raises(numba.errors.NumbaError, match="contiguous"):
         written.rows(np.empty(4), np.ones((2, 4)).T, np.array([1, 1]))
+
+
+CALLED = '''
+import numpy as np
+
+_CALLED = ("_filled",)
+
+
+def fill(out, x):
+    """Rows of arrays and single arrays, a constant and a number, from two places each; and what it refuses."""
+    for row in range(out.shape[0]):
+        _filled(out[row], x, row)
+    _filled(out[0], x, 7)
+    _filled(out[1], x, out.shape[1])
+
+
+def _filled(out, x, n):
+    for lane in range(out.size):
+        out[lane] = x[lane] * x[lane] + n
+'''
+
+
+def test_a_function_that_is_called_is_written_once():
+    """It does the same, and is refused where only what is written out at each call can be."""
+    out, x, expected = np.zeros((3, 5)), np.arange(5.0), np.zeros((3, 5))
+    compiled(CALLED, {}).fill(out, x)
+    names: dict = {}
+    exec(CALLED, names)
+    names["fill"](expected, x)
+    np.testing.assert_array_equal(out, expected)
+    with pytest.raises(Exception, match="must return nothing"):
+        compiled(CALLED + "    return n\n", {}).fill(out, x)
