@@ -77,12 +77,13 @@ lock: .venv/.ready
 mutation: .venv/.ready
 	$(RUN) -m tests.mutation $(ARGS)
 
-# Random joints against their own frequencies and coefficients along x against other methods, which go on where
-# they were stopped; bad values in every argument; a sweep past the memory of its workers, of which one is
+# Random joints against their own frequencies, coefficients along x and whole Lagrangians against other methods, which go
+# on where they were stopped; bad values in every argument; a sweep past the memory of its workers, of which one is
 # killed.
 campaign: .venv/.ready
 	$(RUN) -m tests.campaigns.joints $(ARGS)
 	$(RUN) -m tests.campaigns.along_x
+	$(RUN) -m tests.campaigns.lagrangians
 	$(RUN) -m tests.campaigns.attacks
 	$(RUN) -m tests.campaigns.workers
 	$(RUN) -m tests.campaigns.languages

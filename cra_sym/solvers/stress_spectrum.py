@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .continuum import Entries
 from .stress import Columns
 
 __all__ = ["BuckledError", "Spectrum", "bases", "spectrum"]
@@ -207,9 +208,9 @@ class _Problem:
 
     @property
     def _loaded(self) -> bool:
-        """Whether some potential energy may be negative: tensions below zero, coupling."""
+        """Whether some potential energy may be negative: tensions below zero, coupling with strains."""
         parts = self.columns.coefficient
-        return bool(parts["D"]) or any(bool((entry < 0.0).any()) or i != j for (i, j), entry in parts["R"].items())
+        return bool(parts["D"]) or not _semidefinite(parts["R"])
 
     def _base(self) -> tuple[Array, Array]:
         """Return a positive stiffness with springs up to the size of what is there, and what it has of each spring."""
@@ -395,3 +396,15 @@ def _root(mass: Array) -> Array:
     size, frame = np.linalg.eigh(mass)
     root: Array = np.sqrt(np.maximum(size, 0.0))[..., None] * frame.swapaxes(-1, -2)
     return root
+
+
+def _semidefinite(entries: Entries) -> bool:
+    """Return whether a quadratic form with these entries is nowhere negative, but for rounding."""
+    if all(i == j for i, j in entries):
+        return all(bool((entry >= 0.0).all()) for entry in entries.values())
+    size = 1 + max(max(pair) for pair in entries)
+    form = np.zeros((*np.broadcast_shapes(*(entry.shape for entry in entries.values())), size, size))
+    for (i, j), entry in entries.items():
+        form[..., i, j] = form[..., j, i] = entry
+    values = np.linalg.eigvalsh(form)
+    return bool((values[..., 0] >= -size * EPS * np.abs(values).max(axis=-1)).all())
