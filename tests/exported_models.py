@@ -1,4 +1,4 @@
-"""Six models whose code is exported, with the ranges their parameters are drawn from."""
+"""Seven models whose code is exported, with the ranges their parameters are drawn from."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from cra_sym.symbols import L, t, v, x
 __all__ = ["NAMES", "drawn", "model"]
 
 rhoA, EI, T, k_f, m_e, kGA, I_r, k_t, k_r, GJ, J_p, d, a = sp.symbols("rhoA EI T k_f m_e kGA I_r k_t k_r GJ J_p d a")
+k_b, k_p, m_b, m_p = sp.symbols("k_b k_p m_b m_p")
+base, payload = sp.Function("base")(t), sp.Function("payload")(t)
 phi, w = sp.Function("phi")(x, t), sp.Function("w")(t)
 ROOT = -k_t * v**2 / 2 - k_r * v.diff(x) ** 2 / 2
 
@@ -44,6 +46,12 @@ MODELS = {
     "string on a foundation": lambda: _model(
         MOVED - T * v.diff(x) ** 2 / 2 - k_f * v**2 / 2, left=-k_t * v**2 / 2, right=m_e * (v + w).diff(t) ** 2 / 2
     ),
+    "string on a base with a payload": lambda: _model(
+        rhoA * (v + base + w).diff(t) ** 2 / 2 - T * v.diff(x) ** 2 / 2, coordinates=[base, payload],
+        left=m_b * (base + w).diff(t) ** 2 / 2 - k_b * base**2 / 2 - k_t * v**2 / 2,
+        right=m_e * (v + base + w).diff(t) ** 2 / 2 + m_p * (payload + w).diff(t) ** 2 / 2
+        - k_p * (v + a * base - payload) ** 2 / 2,
+    ),
     "hinged-hinged beam": lambda: _model(BENT, essential=[v.subs(x, 0), v.subs(x, L)]),
 }  # fmt: skip
 NAMES = tuple(MODELS)
@@ -60,12 +68,12 @@ def drawn(name: str, number: int) -> list[float]:
     rng = np.random.default_rng([20, NAMES.index(name), number])
     found = []
     for symbol in model(name).symbols:
-        wide = symbol in (k_t, k_r, T, k_f, m_e)
+        wide = symbol in (k_t, k_r, k_b, k_p, T, k_f, m_e)
         value = 10.0 ** rng.uniform(-4, 8) if wide and rng.random() < 0.5 else 10.0 ** rng.uniform(-1, 1)
-        if symbol in (k_t, k_r) and rng.random() < 0.3:
+        if symbol in (k_t, k_r, k_p) and rng.random() < 0.3:
             value = float(rng.choice([0.0, 1e-9, 1e12, np.inf]))
         if symbol in (T, k_f, m_e) and rng.random() < 0.2:
-            value = 0.0 if name != "string on a foundation" or symbol != T else 1.0
+            value = 0.0 if not name.startswith("string") or symbol != T else 1.0
         if symbol in (d, a):
             value *= 0.1 * float(rng.choice([-1.0, 1.0]))
         found.append(float(f"{value:.6g}"))

@@ -202,6 +202,7 @@ class Sensitivities:
     def _squared(self, name: str) -> Array:
         """Return the derivative of omega^2 by a parameter, by first-order perturbation."""
         rate = self._forms[f"{name} stiffness"] - self._omega**2 * self._forms[f"{name} mass"]
+        rate = rate + self._system.numerics("held_motions").rate(self._system, name, self._modes)
         if self._repeated is not None:
             rate = np.where(self._splits(name), np.nan, rate)
         return np.where(np.isinf(column(np.asarray(self._system.values[name]))), 0.0, rate)

@@ -83,7 +83,8 @@ def export(
     model : Model, optional
         It is exported instead of the arm, for any values of its parameters: characteristic function, count, natural
         frequencies, modes, sensitivities, responses to prescribed motions, state space. Its coefficients must be
-        constant, with at most three wave numbers and without dampers or lumped coordinates; for others give `system`.
+        constant, with at most three wave numbers and without dampers; its ends may be joined and carry lumped
+        coordinates. For others give `system`.
     overwrite : bool
         Whether a folder that is not empty is replaced by one that holds the new files and, of the old ones, those no
         earlier export made. The folder changes in one step: a failed export leaves it as it was.

@@ -108,7 +108,7 @@ def _counts(point: Sequence[float], omega: Array, real: str) -> Iterator[Check]:
 
 
 def _modal(written: ModelText, system: System, point: Sequence[float], omega: Array, loss: float) -> Iterator[Check]:
-    if (np.diff(omega[:5]) < _APART * omega[1:5]).any():
+    if (np.diff(omega[:5]) <= _APART * omega[1:5]).any():
         return
     loss *= 10.0 if written.form.structure.n == 3 else 1.0  # the package's own is 1e-12 there
     modes, order = system.modes(4), written.form.order
@@ -122,6 +122,9 @@ def _modal(written: ModelText, system: System, point: Sequence[float], omega: Ar
         for what, size in ((0, sizes[at].max()), (1, forces)):
             own = found[2 * what : 2 * what + 2, at].T
             yield Check(3, (*point, 0.0, at, what), tuple(own.ravel()), loss, loss * float(size))
+    for at in range(len(written.coordinates)):
+        own = modes.coordinate(at)
+        yield Check(3, (*point, 0.0, at, 2.0), tuple(own), loss, loss * float(max(np.abs(own).max(), sizes[0].max())))
     left, length = (float(x) for x in (system.domain.left, system.domain.length))
     for field, function in enumerate(system.model.equations.fields):
         for share, derivative in ((0.37, 0), (1.0, 1), (0.81, 2)):
@@ -205,16 +208,9 @@ def _characteristic(written: ModelText, values: Sequence[float], turns: float, l
 
 
 def _of_ends(form: WavesForm) -> list[sp.Expr]:
-    """Return the entries of stiffness, mass and ties of the left end, then of the right one."""
-    n, ends = form.structure.n, form.conditions
-    rows = range(n)
-    return [
-        matrix[end * n + i, end * n + j]
-        for end in (0, 1)
-        for matrix in (ends.stiffness, ends.mass, ends.ties)
-        for i in rows
-        for j in rows
-    ]
+    """Return the entries of stiffness, mass and ties of what moves, then stiffness and stretch of links."""
+    ends = form.conditions
+    return [*ends.stiffness, *ends.mass, *ends.ties, *ends.links]
 
 
 class _Exact:
@@ -277,7 +273,7 @@ class _Exact:
     def _determinant(self, omega: Any) -> Any:
         import mpmath
 
-        n, odd = self._structure.n, self._structure.odd
+        n, odd, size, width = self._structure.n, self._structure.odd, self._structure.moving, self._structure.places
         (a, b, a_slope, b_slope), ends = self._parts()
         z = omega * omega
         whole = mpmath.matrix(2 * n, 2 * n)  # (E, O)' by (E, O)
@@ -285,27 +281,46 @@ class _Exact:
             for j in range(n):
                 whole[i, n + j] = b[i, j] + z * b_slope[i, j]
                 whole[n + i, j] = a[i, j] + z * a_slope[i, j]
-        matrix = mpmath.matrix(2 * n, 2 * n)
         right = mpmath.expm(whole, method="taylor")
-        for end, side in ((1, 1), (0, -1)):
-            state = right.copy()
+        moved, forces = mpmath.matrix(width, width), mpmath.matrix(width, width)  # by E and O at mid-span, and others
+        for end, side in ((0, -1), (1, 1)):
             for i in range(n):
-                for j in range(n):  # the left end is the mirror image
-                    state[i, n + j], state[n + i, j] = side * state[i, n + j], side * state[n + i, j]
-            stiffness, mass, ties = (ends[(3 * end + kind) * n * n :][: n * n] for kind in range(3))
-            for i in range(n):
-                held = end * n + i not in self._form.conditions.free
-                share = 1 if held else 1 / (1 + stiffness[n * i + i] + mass[n * i + i])
-                for column in range(2 * n):
-                    q = [state[n + j if odd[j] else j, column] for j in range(n)]
-                    force = [state[j if odd[j] else n + j, column] for j in range(n)]
-                    if held:
-                        found = q[i] - sum(ties[n * i + j] * q[j] for j in range(n))
-                    else:
-                        found = side * (force[i] + sum(ties[n * j + i] * force[j] for j in range(n)))
-                        found += sum((stiffness[n * i + j] - z * mass[n * i + j]) * q[j] for j in range(n))
-                    matrix[i if end else n + i, column] = share * found
-        return mpmath.det(matrix)
+                for column in range(2 * n):  # the left end is the mirror image
+                    even, force = (
+                        right[i, column] * (side if column >= n else 1),
+                        right[n + i, column] * (side if column < n else 1),
+                    )
+                    moved[end * n + i, column] = force if odd[i] else even
+                    forces[end * n + i, column] = side * (even if odd[i] else force)
+        for at in range(2 * n, width):  # coordinates, and the forces of links
+            (moved if at < size else forces)[at, at] = 1
+        stiffness, mass, ties = (mpmath.matrix(size, size) for _ in range(3))
+        for kind, target in enumerate((stiffness, mass, ties)):
+            for at in range(size * size):
+                target[at // size, at % size] = ends[kind * size * size + at]
+        matrix = mpmath.matrix(width, width)
+        links = [ends[3 * size * size + link * (1 + size) :][: 1 + size] for link in range(width - size)]
+        for place in range(size):
+            free = place in self._form.conditions.free
+            row = moved[place, :] - (ties * moved[:size, :])[place, :]
+            share = 1
+            if free:
+                row = ((stiffness - z * mass) * moved[:size, :])[place, :] + forces[place, :]
+                for other in range(2 * n):
+                    row += ties[other, place] * forces[other, :]
+                for link, (_, *stretch) in enumerate(links):
+                    row += stretch[place] * forces[size + link, :]
+                share = 1 / (1 + stiffness[place, place] + mass[place, place])
+            matrix[place, :] = share * row
+        for link, (stiff, *stretch) in enumerate(links):
+            row = forces[size + link, :]
+            for place in range(size):
+                row -= stiff * stretch[place] * moved[place, :]
+            matrix[size + link, :] = row / (1 + stiff)
+        try:
+            return mpmath.det(matrix)
+        except TypeError:  # of a column that is exactly 0
+            return mpmath.mpf(0)
 
 
 def _refused(written: ModelText, values: Sequence[float]) -> Iterator[Check]:

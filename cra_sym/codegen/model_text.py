@@ -12,12 +12,12 @@ import sympy as sp
 
 from cra_sym.codegen.expressions import response_functions
 from cra_sym.codegen.library import source
+from cra_sym.codegen.model_loads import load_factors
 from cra_sym.codegen.printers import FormPrinter
 from cra_sym.codegen.program import christen, function, scalars
-from cra_sym.codegen.unused import without_unused
+from cra_sym.codegen.unused import marked, without_unused
 from cra_sym.codegen.waves_text import WavesText
 from cra_sym.model import Model
-from cra_sym.model.derivations import load_coefficients
 from cra_sym.model.waves_form import WavesForm
 
 __all__ = ["ModelText"]
@@ -90,9 +90,27 @@ class ModelText:
         return [_plain(found[at]) for at in self.form.order]
 
     @cached_property
+    def coordinates(self) -> list[str]:
+        """Names of the lumped coordinates."""
+        return [str(coordinate.func.__name__) for coordinate in self.model.conservative.coordinates]
+
+    @cached_property
     def held(self) -> list[int]:
-        """Displacements of the left end, and of the right one counted on, that essential conditions hold."""
-        return [place for place in range(2 * self.form.structure.n) if place not in self.form.conditions.free]
+        """What moves (displacements of the left end, of the right one, coordinates) and follows others or stands."""
+        return [place for place in range(self.form.structure.moving) if place not in self.form.conditions.free]
+
+    @cached_property
+    def parts(self) -> set[str]:
+        """Marks of the lines of the text that this model needs."""
+        size, mass = self.form.structure.moving, self.form.conditions.mass
+        coupled = any(mass[i, j] != 0 for i in range(size) for j in range(size) if i != j)
+        found = {
+            "DRIVEN": self.drives,
+            "LUMPED": self.coordinates,
+            "LINKED": self.form.structure.links,
+            "COUPLED": coupled,
+        }
+        return {mark for mark, wanted in found.items() if wanted}
 
     @cached_property
     def _waves(self) -> WavesText:
@@ -102,30 +120,43 @@ class ModelText:
 
     def text(self) -> str:
         """Return the text."""
-        spectrum = source("model").replace("# FORMULAS", self._formulas()).replace("# PREPARE", self._prepare())
-        modes = self._placed(source("model_modes")).replace("DISPLACEMENTS_LISTED", ", ".join(self.displacements))
-        parts = [self._constants(), self._parameters(), spectrum, self._rates(), modes]
+        modes = source("model_modes")
+        for word in ("displacements", "coordinates", "drives"):
+            modes = modes.replace(f"{word.upper()}_LISTED", ", ".join(getattr(self, word)))
+        modes = modes.replace("# LOADS", self._loads() if self.drives else "")
+        parts = [self._constants(), self._parameters(), source("model"), self._rates(), modes]
         if self.drives:
             parts += ["".join(f"{self._function(f, f'_{f.name}')}\n\n" for f in response_functions())]
             parts += [source("model_drives")]
-        whole = "\n\n\n".join(part.strip("\n") for part in parts) + "\n"
+        whole = marked("\n\n\n".join(part.strip("\n") for part in parts) + "\n", self.parts)
+        whole = whole.replace("# FORMULAS", self._formulas()).replace("# PREPARE", self._prepare())
         return without_unused(FormPrinter.helped(whole) + whole)
 
     def _constants(self) -> str:
-        n = self.form.structure.n
+        structure = self.form.structure
+        n, m, links, moving = structure.n, structure.coordinates, structure.links, structure.moving
         place = [self.form.order.index(at) for at in self._field_places()]
+        ranks = ((n * n + moving + links) * (n + m), (2 * moving + links) * m, (links + 1) * moving if links else 0)
         integers = {
             "PARAMETER_COUNT": (len(self.names), "of the model"),
             "FIELDS": (len(self.fields), f"of the model: {', '.join(self.fields)}"),
-            "ENDS": (2 * n * n, "entries of the matrices of both ends"),
-            "END_RATES": (6 * n * n, "rates of stiffness, mass and ties"),
-            "RESTS": (n * (n + 2), "conditions of a motion without energy"),
-            "RESTING": (n * n * (n + 2), "their factors"),
+            "ENDS": (moving**2, "entries of the matrices of what moves"),
+            "END_RATES": (3 * moving**2 + links * (1 + moving), "rates of stiffness, mass, ties and links"),
+            "MOTIONS": (n + m, "independent motions without strain"),
+            "RESTRAINTS": (moving + links, "conditions of ends, coordinates and links"),
+            "RESTING": (max(ranks), "factors of conditions of a motion without energy"),
+            "MOST_EQUAL": (moving if structure.linked else n, "frequencies that may be equal"),
             "STATIONS": (len(_PLACES), "places where the size of a motion is measured"),
         }
         if self.drives:
             integers["DRIVES"] = (len(self.drives), f"prescribed motions: {', '.join(self.drives)}")
-            integers["LOADS"] = (3 * n, "factors of a load")
+            integers["LOADS"] = (3 * n + m, "factors of a load")
+        if m:
+            integers["COORDINATES"] = (m, f"lumped: {', '.join(self.coordinates)}")
+            integers["CARRIED"] = (n * m, "displacements by coordinates")
+        if links:
+            integers["LINKS"] = (links, "springs between what moves")
+            integers["STRETCHES"] = (links * moving, "links by what moves")
         lines = [f"PI = {math.pi!r}  # half a turn"]
         lines += [f"{name} = {value!r}  # {words}" for name, (value, words) in _NUMBERS[self.real].items()]
         lines += [f"{name} = {value}  # {words}" for name, (value, words) in integers.items()]
@@ -184,17 +215,19 @@ class ModelText:
 
     @cached_property
     def _ends(self) -> dict[str, sp.Expr]:
-        """Entries of the matrices of both ends that are not 0."""
-        n = self.form.structure.n
-        found = {}
-        for name in ("stiffness", "mass", "ties"):
-            matrix = getattr(self.form.conditions, name)
-            for end in (0, 1):
-                for at in range(n * n):
-                    entry = matrix[end * n + at // n, end * n + at % n]
-                    if entry != 0:
-                        found[f"{name}[{end * n * n + at}]"] = entry
-        return found
+        """Entries of the matrices of both ends and coordinates, and of links, that are not 0."""
+        structure, ends = self.form.structure, self.form.conditions
+        size, m = structure.moving, structure.coordinates
+        found = {
+            f"{name}[{at}]": matrix[at]
+            for name, matrix in (("stiffness", ends.stiffness), ("mass", ends.mass), ("ties", ends.ties))
+            for at in range(size**2)
+        }
+        for link in range(structure.links):
+            found[f"link_stiffness[{link}]"] = ends.links[link, 0]
+            found |= {f"stretch[{link * size + at}]": ends.links[link, 1 + at] for at in range(size)}
+        found |= {f"carried[{at}]": ends.carried[at] for at in range(structure.n * m)}
+        return {target: entry for target, entry in found.items() if entry != 0}
 
     def _prepare(self) -> str:
         """Return the functions that check the parameters and compute what all else starts from."""
@@ -202,21 +235,24 @@ class ModelText:
         places = self._waves.places
         texts, lines = [], ["_check(parameters)"]
         lines += [f"problem.held[{place}] = 1" for place in self.held]
+        moving = self.form.structure.moving
         for symbol, acting in self.form.conditions.springs.items():
-            lines.append(f"if parameters.{self.names[symbol]} > HUGE:")
-            lines += [f"    problem.held[{place}] = 1" for place in acting]
+            if any(place < moving for place in acting):
+                lines.append(f"if parameters.{self.names[symbol]} > HUGE:")
+                lines += [f"    problem.held[{place}] = 1" for place in acting if place < moving]
         groups = (
             ("inside", {f"k[{places[at]}]": entry for at, entry in self._entries.items() if at in places},
              "Return the matrices of a section times half the length, entry by entry."),
             ("outside", {"length": self._length, "left": sp.sympify(left, strict=True)} | self._ends,
-             "Return the length, the left end, and stiffness, inertia and ties of both ends."),
+             "Return the length, the left end, and stiffness, inertia, ties and links of what moves."),
         )  # fmt: skip
         for name, entries, words in groups:
             text, call = self._call(f"{name}_entries", list(entries.values()), name, words)
             texts.append(text)
             lines += call
             lines += [f"problem.{target} = {name}[{at}]" for at, target in enumerate(entries)]
-        lines += ["_check_ends(problem)", *self._condition_lines()]
+        released = ["_release_links(problem)"] if self.form.structure.links else []
+        lines += ["_check_ends(problem)", *released, *self._condition_lines()]
         table, filled = self._waves.dispersion()
         texts.append(table)
         lines += [f"table = zeros({len(filled)})", "_dispersion(problem.k, table)"]
@@ -236,35 +272,53 @@ class ModelText:
         return "\n\n".join(texts)
 
     def _condition_lines(self) -> Iterator[str]:
-        """Yield statements that enter the factors of the end conditions, over 1 + stiffness + mass."""
+        """Yield statements that enter the factors of all conditions, over 1 + stiffness + mass."""
         structure, places = self.form.structure, self._waves.places
-        n, odd = structure.n, structure.odd
-        for end in (1, 0):
-            for i in range(n):
-                first = structure.condition(end * n + i)
-                found = []
-                for j in range(n):
-                    at, back = end * n * n + i * n + j, end * n * n + j * n + i
-                    sign = "-" if end == 0 and odd[i] != odd[j] else ""
-                    whole = f"problem.stiffness[{at}]"
-                    stiff = f"1.0 if {whole} > HUGE else {whole} * share" if i == j else f"{sign}{whole} * share"
-                    if end * n + i in self.held:
-                        stiff = "1.0" if i == j else f"{'' if sign else '-'}problem.ties[{at}]"
-                    force = "share" if i == j else f"{sign}problem.ties[{back}] * share"
-                    values = stiff, f"{sign if i != j else ''}problem.mass[{at}] * share", force
-                    for part, value in enumerate(values):
-                        place = first + part * n + j
-                        if place in places:
-                            found.append(f"problem.k[{places[place]}] = {value}")
-                if any("share" in line for line in found):
-                    own = end * n * n + i * n + i
-                    parts = "".join(
-                        f" + problem.{kind}[{own}]" for kind in ("stiffness", "mass") if f"{kind}[{own}]" in self._ends
-                    )
-                    name = f"share_{'right' if end else 'left'}_{i}"
-                    yield f"{name} = 1.0 / (1.0{parts})"
-                    found = [line.replace("share", name) for line in found]
-                yield from found
+        for place in range(structure.places):
+            found = []
+            for at, value in enumerate(self._condition(place), start=structure.condition(place)):
+                if at in places:
+                    found.append(f"problem.k[{places[at]}] = {value}")
+            if any("share" in line for line in found):
+                link, own = place - structure.moving, place * (structure.moving + 1)
+                wanted = (
+                    [f"link_stiffness[{link}]"] if link >= 0 else [f"{kind}[{own}]" for kind in ("stiffness", "mass")]
+                )
+                parts = "".join(f" + problem.{entry}" for entry in wanted if entry in self._ends)
+                yield f"share_{place} = 1.0 / (1.0{parts})"
+                if link >= 0:
+                    stiff = f"problem.link_stiffness[{link}]"
+                    yield f"pull_{place} = 1.0 if {stiff} > HUGE else {stiff} * share_{place}"
+            yield from (re.sub(r"\b(share|pull)\b", rf"\1_{place}", line) for line in found)
+
+    def _condition(self, place: int) -> Iterator[str]:
+        """Yield the factors of a condition: of displacements, of -z times these and of forces, in turned signs."""
+        structure = self.form.structure
+        size, link, reach = structure.moving, place - structure.moving, structure.reach(place)
+
+        def signed(other: int, name: str, at: int, minus: bool = False) -> str:
+            turned = structure.turned[place] * structure.turned[other] < 0.0
+            return f"{'-' if turned != minus else ''}problem.{name}[{at}]"
+
+        for other in reach:
+            at = place * size + other
+            if link >= 0:
+                yield f"{signed(other, 'stretch', link * size + other, True)} * pull"
+            elif place in self.held:
+                yield "1.0" if other == place else signed(other, "ties", at, True)
+            elif other == place:
+                yield f"1.0 if problem.stiffness[{at}] > HUGE else problem.stiffness[{at}] * share"
+            else:
+                yield f"{signed(other, 'stiffness', at)} * share"
+        for other in reach:
+            yield f"{signed(other, 'mass', place * size + other)} * share"
+        for other in structure.forces(place):
+            if other == place:
+                yield "share"
+            elif other < size:
+                yield f"{signed(other, 'ties', other * size + place)} * share"
+            else:
+                yield f"{signed(other, 'stretch', (other - size) * size + place)} * share"
 
     def _check(self) -> str:
         lines = ['"""Refuse what is no number, infinite, or a divisor that is 0."""']
@@ -306,14 +360,22 @@ class ModelText:
         value = ["def _parameter(parameters: Parameters, number: int) -> float:",
                  *(f"    if number == {at}:\n        return parameters.{name}" for at, name in enumerate(names[:-1])),
                  f"    return parameters.{names[-1]}"]  # fmt: skip
-        n = self.form.structure.n
-        offsets = {"stiffness": 0, "mass": 2 * n * n, "ties": 4 * n * n}
+        ends, links = self.form.structure.moving**2, self.form.structure.links
+        offsets = {
+            "stiffness": 0,
+            "mass": ends,
+            "ties": 2 * ends,
+            "link_stiffness": 3 * ends,
+            "stretch": 3 * ends + links,
+        }
         texts: list[str] = []
         lines: list[str] = []
         for number, symbol in enumerate(self.names):
             entries = {f"k_rate[{places[at]}]": e.diff(symbol) for at, e in self._entries.items() if at in places}
             for target, entry in self._ends.items():
                 name, at = target[:-1].split("[")
+                if name not in offsets:
+                    continue  # what coordinates carry has no energy of its own
                 entries[f"end_rate[{offsets[name] + int(at)}]"] = entry.diff(symbol)
             entries = {target: entry for target, entry in entries.items() if entry != 0}
             if not entries:
@@ -335,24 +397,12 @@ class ModelText:
 
     # Drives -----------------------------------------------------------------------------------------------------------
 
-    def _placed(self, text: str) -> str:
-        """Put what the prescribed motions need into the text of the modes, or leave it out."""
-        if not self.drives:
-            return re.sub(r"\n *# PARTICIPATION\w*", "", text)
-        words = ", ".join(self.drives)
-        text = text.replace(
-            "# PARTICIPATION_FIELD", f"participation: Row[float, DRIVES]  # in {words}, by acceleration"
-        )
-        text = text.replace("# PARTICIPATION_PUT", "_put_participation(parameters, problem, mode[first + number])")
-        turned = "for i in range(DRIVES):\n            mode.participation[i] = -mode.participation[i]"
-        return text.replace("# PARTICIPATION_TURN", turned).replace("# PARTICIPATION_LOADS", self._loads())
-
     def _loads(self) -> str:
         """Return the function of a load, and the one that puts in what it does to a mode."""
         texts: list[str] = []
         lines: list[str] = []
         for number, name in enumerate(self.drives):
-            factors = self._load(name)
+            factors = load_factors(self.model, self.form, self._length, name)
             entries = {at: value for at, value in enumerate(factors) if value != 0}
             text, call = self._call(f"load_of_{name}", list(entries.values()), f"load_{number}",
                                     f"Return the load of a unit acceleration of {name}.")  # fmt: skip
@@ -363,32 +413,6 @@ class ModelText:
         head = "def _load_of(parameters: Parameters, drive: int, load: Mut[Row[float, LOADS]]) -> None:"
         words = '"""Put in the forces of a unit acceleration: at the left end, at the right one, and per length."""'
         return "\n\n\n".join([*texts, "\n    ".join([head, words, *lines]), source("model_participation").strip("\n")])
-
-    def _load(self, name: str) -> list[sp.Expr]:
-        """Return the factors of displacements of the left end, of the right one and of their integrals."""
-        n, order = self.form.structure.n, self.form.order
-        load = self.model.numerics("load", name)
-        inside, ends = (list(part.values()) for part in load_coefficients(self.model, name))
-        found = [sp.S.Zero] * (3 * n)
-        place = {displacement: position for position, displacement in enumerate(order)}
-        for where, value in zip(load.ends, ends, strict=True):
-            found[(n if where.where == "right" else 0) + place[where.entry]] += value
-        for where, value in zip(load.inside, inside, strict=True):
-            if value.has(self.model.equations.x):
-                raise ValueError(
-                    f"model: the load of {name} varies along the length; give system= with the model at its values"
-                )
-            at = place[where.entry]
-            if where.order == 0:
-                found[2 * n + at] += value
-            elif where.order == 1:
-                found[n + at] += value
-                found[at] -= value
-            else:
-                raise ValueError(
-                    f"model: {name} acts on the highest derivative of a field; give system= with its values"
-                )
-        return found
 
 
 def _plain(displacement: sp.Expr) -> str:

@@ -1,4 +1,4 @@
-"""Texts in the restricted form without parameters that nothing uses."""
+"""Texts in the restricted form without lines that a model does not need and parameters that nothing uses."""
 
 from __future__ import annotations
 
@@ -6,7 +6,21 @@ import ast
 import re
 from collections.abc import Iterator
 
-__all__ = ["without_unused"]
+__all__ = ["marked", "without_unused"]
+
+_MARKED = re.compile(r"( *)# ((?:(?:DRIVEN|LUMPED|LINKED|COUPLED): )+)(.*)")
+
+
+def marked(text: str, marks: set[str]) -> str:
+    """Return a text with the lines ``# MARK: statement`` as statements if all marks are wanted, without others."""
+    lines = []
+    for line in text.split("\n"):
+        found = _MARKED.fullmatch(line)
+        if found is None:
+            lines.append(line)
+        elif set(found[2].split(": ")[:-1]) <= marks:
+            lines.append(found[1] + found[3])
+    return "\n".join(lines)
 
 
 def without_unused(text: str) -> str:

@@ -10,6 +10,7 @@ from cra_sym.codegen.frozen import stated
 from cra_sym.codegen.library import Library, source
 from cra_sym.codegen.model_checks import model_checks, sample
 from cra_sym.codegen.model_text import ModelText
+from cra_sym.codegen.unused import marked
 from cra_sym.model import Model
 from cra_sym.model.waves_form import WavesForm, waves_form
 
@@ -43,15 +44,18 @@ def _form(model: Model) -> WavesForm:
     form = model.state_form
     if form.damped or not model.numerics("conservative"):
         raise ValueError(f"model: has dampers, gyroscopic or follower forces; {_INSTEAD}")
-    if not form.displacements or form.coordinates:
-        raise ValueError(f"model: has lumped coordinates; {_INSTEAD}")
+    if not form.displacements:
+        raise ValueError(f"model: has lumped coordinates alone; {_INSTEAD}")
     if not form.uniform:
         raise ValueError(f"model: has coefficients that vary along the length, or terms inside; {_INSTEAD}")
     if len(form.displacements) > 3:
         raise ValueError(f"model: has {len(form.displacements)} wave numbers, at most 3 can be exported; {_INSTEAD}")
     found = waves_form(form, model.symbols)
-    if found is None or found.structure.linked:
-        raise ValueError(f"model: is not even under reflection, has linked ends or no mass; {_INSTEAD}")
+    if found is None:
+        raise ValueError(
+            "model: is not even under reflection, has no mass, more than twelve conditions, or "
+            f"coordinates that act along the whole length; {_INSTEAD}"
+        )
     if not 0 < len(model.symbols) <= _MOST:
         raise ValueError(f"model: has {len(model.symbols)} parameters, must have 1 to {_MOST}; {_INSTEAD}")
     return found
@@ -64,7 +68,8 @@ def _library(model: Model, name: str, real: str) -> Library:
     lines = ["def _given_parameters(given: Row[float, 64], parameters: Out[Parameters]) -> None:"]
     lines += [f"    parameters.{field} = given[{at}]" for at, field in enumerate(fields)]
     driven = source("model_check_drives") if written.drives else ""
-    check = source("model_check").replace("# GIVEN", "\n".join(lines)).replace("# DRIVEN", driven.strip())
+    check = marked(source("model_check").replace("# GIVEN", "\n".join(lines)), written.parts)
+    check = check.replace("# DRIVEN", driven.strip())
     values = sample(written)
     shown = "\n".join(
         f"    parameters.{field} = {float(value)!r}" for field, value in zip(fields, values, strict=True)
@@ -92,9 +97,10 @@ def _readme(written: ModelText) -> str:
         f"| `{name}` | {units.get(symbol.name, '')} | {symbol} |\n" for symbol, name in written.names.items()
     )
     drives = f" Prescribed motions, by number: {', '.join(written.drives)}." if written.drives else ""
+    lumped = f" Lumped coordinates, in their order: {', '.join(written.coordinates)}." if written.coordinates else ""
     words = (
         "The frequencies are complete: an exact count says how many there are below any omega. The characteristic "
         "function is finite and right below, at and above cut-off frequencies. Fields, by number: "
-        f"{', '.join(written.fields)}; displacements of a section: {', '.join(written.displacements)}.{drives}"
+        f"{', '.join(written.fields)}; displacements of a section: {', '.join(written.displacements)}.{lumped}{drives}"
     )
     return f"{textwrap.fill(words, 112)}\n\n| parameter | unit | symbol |\n| --- | --- | --- |\n{rows}"

@@ -85,9 +85,11 @@ class WavesText:
         rows = [(start, size, offset) for (start, _), size, offset in blocks]
         sizes = {
             "DISPLACEMENTS": (n, "of a section"),
-            "COLUMNS": (2 * n, "waves there and back"),
-            "ENTRIES": (4 * n * n, "entries of a matrix of that size"),
-            "PLANE": (n * n, "entries of a matrix of an end"),
+            "COLUMNS": (2 * n, "waves there and back, or a state: displacements and forces"),
+            "MOVING": (self.structure.moving, "displacements of both ends, then lumped coordinates"),
+            "UNKNOWNS": (self.structure.places, "waves, lumped coordinates, forces of links"),
+            "ENTRIES": (self.structure.places**2, "entries of a matrix of that size"),
+            "PLANE": (n * n, "entries of a matrix of a section"),
             "COEFFICIENTS": (len(self.places), "of the matrices of a section, of end conditions and dispersion"),
             "SECTION": (self.section, "entries of the columns at a place"),
             "WAVE_ENTRIES": (self.wave_numbers, "and what follows from them"),
@@ -347,15 +349,15 @@ class WavesText:
         )
 
     def _conditions(self) -> str:
-        words = "Return the end conditions, those of the right end first, on all waves: a matrix, row by row."
+        words = "Return the conditions, those of the right end first, on all unknowns: a matrix, row by row."
         traced = Traced("_conditions", words, [("k", "COEFFICIENTS"), ("c", "SECTION")], ["z"])
         columns, _ = self._at_end(traced)
         k, z, n = self._coefficients(traced), traced.number("z"), self.structure.n
         ends = waves_count.end_rows(self.structure, *waves_count.assembled(self.structure, columns))
         found: list[Any] = []
-        for place in (*range(n, 2 * n), *range(n)):
+        for place in (*range(n, 2 * n), *range(n), *range(2 * n, self.structure.places)):
             found += waves_count.condition(self.structure, k, z, place, *ends)
-        return traced.text(found, [("matrix", "ENTRIES", 4 * n * n)])
+        return traced.text(found, [("matrix", "ENTRIES", self.structure.places**2)])
 
     def sections(self) -> str:
         """Return the functions of the matrices of a section, and of whether they say that it loses energy."""

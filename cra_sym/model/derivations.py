@@ -20,6 +20,8 @@ from cra_sym.model.energies import stress_route
 from cra_sym.model.exact import BallProblem, exact_kernel
 from cra_sym.model.excited import axial, fluctuating, fluctuation
 from cra_sym.model.forms import form_of, load_of
+from cra_sym.model.held_motions import HeldMotions
+from cra_sym.model.held_motions import held_motions as motions_held
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.moving import jumps
 from cra_sym.model.nonlinear import nonlinear
@@ -47,6 +49,7 @@ __all__ = [
     "fluctuating",
     "fluctuation",
     "geometry",
+    "held_motions",
     "inertia",
     "load",
     "load_coefficients",
@@ -98,6 +101,11 @@ def route(model: Model) -> Route:
         return stress_route(model, compiled) or GeneralRoute(compiled)
     fast = one_wave_route(form, model.symbols, left) or waves_route(form, compiled, model.symbols)
     return fast or GeneralRoute(compiled)
+
+
+def held_motions(model: Model) -> HeldMotions:
+    """Return the conditions of ends and coordinates that turn with a parameter."""
+    return motions_held(model.conservative, model.symbols)
 
 
 def general_route(model: Model) -> Route:

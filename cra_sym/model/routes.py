@@ -287,8 +287,9 @@ class StateModes:
 
     @cached_property
     def _sign(self) -> Array:
-        watched = self.spatial.displacements or self.spatial.coordinates  # coordinates where there is no field
-        return mode_sign(self._overview[..., :watched])
+        n, m = self.spatial.displacements, self.spatial.coordinates
+        watched = n or m  # coordinates where there is no field
+        return mode_sign(self._overview[..., :watched], self._overview[..., -1, n : n + m])
 
     def _signed(self, states: Array) -> Array:
         signed: Array = states * self._sign[..., None]
@@ -335,20 +336,24 @@ def overview_places(spatial: SpatialProblem, values: Array, rows: int) -> Array:
     return np.asarray(left[:, None] + np.multiply.outer(length, _SHARES))
 
 
-def mode_sign(displacements: NDArray[Any]) -> NDArray[Any]:
+def mode_sign(displacements: NDArray[Any], coordinates: NDArray[Any] | None = None) -> NDArray[Any]:
     """Return the sign of every mode, shape (rows, modes, 1).
 
-    It makes positive the first displacement of the right end that is not zero, or else the first one beside that end;
-    of complex modes it is the phase that does.
+    It makes positive the first displacement of the right end that is not zero, or else the first one beside that end,
+    or else the first lumped coordinate; of complex modes it is the phase that does.
 
     Parameters
     ----------
     displacements : ndarray, shape (rows, modes, stations, n)
         At the places of :func:`overview_places`.
+    coordinates : ndarray, shape (rows, modes, m), optional
     """
+    coordinates = displacements[:, :, 0, :0] if coordinates is None else coordinates
     size = np.abs(displacements).max(axis=(1, 2), initial=0.0)[:, None]
-    entries = np.concatenate([displacements[:, :, -1], displacements[:, :, -2]], axis=-1)
-    moving = np.abs(entries) > np.concatenate([1e-7 * size, 1e-12 * size], axis=-1)  # more than rounding there
+    lumped = np.abs(coordinates).max(axis=1, initial=0.0)[:, None]
+    entries = np.concatenate([displacements[:, :, -1], displacements[:, :, -2], coordinates], axis=-1)
+    least = np.concatenate([1e-7 * size, 1e-12 * size, 1e-12 * lumped], axis=-1)  # more than rounding there
+    moving = np.abs(entries) > least
     first = np.take_along_axis(entries, moving.argmax(axis=-1)[..., None], axis=-1)
     if np.iscomplexobj(first):
         return np.asarray(np.conj(first) / np.where(first == 0.0, 1.0, np.abs(first)))

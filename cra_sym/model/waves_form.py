@@ -11,7 +11,7 @@ from sympy import Dummy, Expr, Matrix, S, Symbol, cancel, eye, solve, zeros
 from cra_sym.mechanics import StateForm
 from cra_sym.solvers.waves import Structure, kept
 
-__all__ = ["Conditions", "WavesForm", "conditions", "known_coefficients", "parity", "powers", "waves_form"]
+__all__ = ["Conditions", "WavesForm", "conditions", "known_coefficients", "parity", "powers", "squares", "waves_form"]
 
 _MOST_COUPLED = 3  # displacements of a section inside, which have as many wave numbers
 _MOST_PLACES = 12  # conditions, whose minors double in number with each
@@ -121,7 +121,7 @@ def conditions(form: StateForm, order: tuple[int, ...], symbols: Sequence[Symbol
     springs, links = _springs(whole, [symbol for symbol in symbols if symbol not in inside], form.parameter)
     for link in range(links.rows):
         stretch = links[link, 1:]
-        whole -= links[link, 0] * stretch.T * stretch
+        whole = (whole - links[link, 0] * stretch.T * stretch).applyfunc(cancel)
     pairs = [powers(entry, form.parameter) for entry in whole.applyfunc(_expanded)]
     if None in pairs:
         return None
@@ -207,7 +207,7 @@ def _springs(
     links: list[list[Expr]] = []
     for symbol in symbols:
         slope = whole.diff(symbol)
-        parts = [] if slope.has(parameter, symbol) else _squares(slope)
+        parts = [] if slope.has(parameter, symbol) else squares(slope)
         acting = []
         for factor, stretch in parts:
             moved = [place for place, entry in enumerate(stretch) if entry != 0]
@@ -224,13 +224,15 @@ def _springs(
     return springs, Matrix(len(links), 1 + whole.rows, [entry for link in links for entry in link])
 
 
-def _squares(matrix: Matrix) -> list[tuple[Expr, list[Expr]]]:
-    """Return factors d and vectors h, the first entry of each 1, such that a matrix is the sum of ``d h h^T``.
+def squares(matrix: Matrix) -> list[tuple[Expr, list[Expr]]]:
+    """Return factors d and vectors h, an entry of each 1, such that a matrix is the sum of ``d h h^T``.
 
-    None of them if one of the factors is negative.
+    None of them if one of the factors is negative. Factors that are numbers come first: nothing is divided by what may
+    be zero, if that can be.
     """
     found = []
-    for place in range(matrix.rows):
+    for _ in range(matrix.rows):
+        place = min(range(matrix.rows), key=lambda at: (matrix[at, at] == 0, not matrix[at, at].is_number, at))
         factor = matrix[place, place]
         if factor != 0:
             stretch = (matrix[:, place] / factor).applyfunc(cancel)

@@ -12,6 +12,7 @@ import cra_sym as cra
 from cra_sym import Arm
 from cra_sym.paper.modes import frequency_function
 from cra_sym.paper.oracles.implicit_rates import implicit_rates
+from cra_sym.symbols import L, t, v, x
 from tests.systems import system
 
 FIELDS = ("k_t", "k_r", "m_e", "J_e", "L", "b", "h", "E", "rho")
@@ -181,3 +182,27 @@ def test_the_mass_alone_scales_shapes():
         found.shapes("A", 0.5)
     with pytest.raises(ValueError, match="x = 2 must be in the domain"):
         found.shapes("rho", 2.0)
+
+
+@pytest.mark.parametrize("name", ["a", "L"])
+def test_parameters_of_what_holds_a_motion(name):
+    """Joined ends, a clamp that turns and a rigid link: by differences of frequencies."""
+    a, k, m = sp.symbols("a k m")
+    payload = sp.Function("p")(t)
+    string, bending = (m * v.diff(t) ** 2 / 2 - v.diff(x, order) ** 2 / 2 for order in (1, 2))
+    common = {"fields": [v], "x": x, "domain": (0, L), "t": t}
+    models = [
+        cra.Model(string, left=-(v**2), essential=[v.subs(x, 0) - a * v.subs(x, L)], **common),
+        cra.Model(bending, essential=[v.subs(x, 0), v.subs(x, L) - a * v.diff(x).subs(x, L)], **common),
+        cra.Model(string, essential=[v.subs(x, 0)], coordinates=[payload], **common,
+                  right=m * payload.diff(t) ** 2 / 2 - k * (v - a * payload) ** 2 / 2),
+        cra.Model(bending, essential=[v.subs(x, 0)], coordinates=[payload], **common,
+                  right=m * payload.diff(t) ** 2 / 2 - k * (v.diff(x) - a * payload) ** 2 / 2),
+    ]  # fmt: skip
+    for model in models:
+        values = {s.name: {"a": 0.7, "k": np.inf, "m": 1.3, "L": 1.1}[s.name] for s in model.symbols}
+        step = 1e-5  # the error is of the order of its square, and 1e-13 over it
+        moved = [cra.natural_frequencies(model.at(values | {name: values[name] * (1 + s)}), 3) for s in (-step, step)]
+        rate = (moved[1] - moved[0]) / (2 * step * values[name])
+        found = cra.sensitivities(model.at(values), 3).rate[name]
+        np.testing.assert_allclose(found, rate, atol=1e-7 * np.abs(rate).max())
