@@ -14,8 +14,8 @@ from cra_sym.codegen.expressions import response_functions
 from cra_sym.codegen.library import source
 from cra_sym.codegen.model_loads import load_factors
 from cra_sym.codegen.printers import FormPrinter
-from cra_sym.codegen.program import christen, function, scalars
-from cra_sym.codegen.unused import marked, without_unused
+from cra_sym.codegen.program import christen, function
+from cra_sym.codegen.unused import marked, top_names, without_unused
 from cra_sym.codegen.waves_text import WavesText
 from cra_sym.model import Model
 from cra_sym.model.waves_form import WavesForm
@@ -48,6 +48,17 @@ _NUMBERS = {
         "BESIDE": (1e-5, "of the largest displacement beside a node"),
     },
 }
+_SOURCES = ("model", "model_modes", "model_participation", "model_drives", "model_check")
+_WRITTEN = {
+    "prepare",
+    "dispersion",
+    "check",
+    "parameter",
+    "parameter_rates",
+    "load_of",
+    "inside_entries",
+    "outside_entries",
+}
 _PLACES = (-1.0, -0.56, 0.06, 0.62, 1.0 - 2e-4, 1.0)
 """Places where the size of a motion is measured, in half lengths from mid-span."""
 
@@ -70,7 +81,8 @@ class ModelText:
     @cached_property
     def names(self) -> dict[sp.Symbol, str]:
         """The field of every parameter."""
-        taken: set[str] = set()
+        taken = top_names(*(source(name) for name in _SOURCES), self._constants(), self._formulas) | _WRITTEN
+        taken |= {f"by_{symbol.name}" for symbol in self.model.symbols} | {f"load_of_{name}" for name in self.drives}
         return {symbol: christen(symbol.name, taken) for symbol in self.model.symbols}
 
     @cached_property
@@ -129,7 +141,7 @@ class ModelText:
             parts += ["".join(f"{self._function(f, f'_{f.name}')}\n\n" for f in response_functions())]
             parts += [source("model_drives")]
         whole = marked("\n\n\n".join(part.strip("\n") for part in parts) + "\n", self.parts)
-        whole = whole.replace("# FORMULAS", self._formulas()).replace("# PREPARE", self._prepare())
+        whole = whole.replace("# FORMULAS", self._formulas).replace("# PREPARE", self._prepare())
         return without_unused(FormPrinter.helped(whole) + whole)
 
     def _constants(self) -> str:
@@ -138,7 +150,7 @@ class ModelText:
         place = [self.form.order.index(at) for at in self._field_places()]
         ranks = ((n * n + moving + links) * (n + m), (2 * moving + links) * m, (links + 1) * moving if links else 0)
         integers = {
-            "PARAMETER_COUNT": (len(self.names), "of the model"),
+            "PARAMETER_COUNT": (len(self.model.symbols), "of the model"),
             "FIELDS": (len(self.fields), f"of the model: {', '.join(self.fields)}"),
             "ENDS": (moving**2, "entries of the matrices of what moves"),
             "END_RATES": (3 * moving**2 + links * (1 + moving), "rates of stiffness, mass, ties and links"),
@@ -180,6 +192,7 @@ class ModelText:
             lines.append(f"    {name}: float{'  # ' + words if words else ''}")
         return "\n".join(lines)
 
+    @cached_property
     def _formulas(self) -> str:
         waves = self._waves
         return "\n\n".join([waves.functions(loads=bool(self.drives)), waves.static(), waves.sections()]).strip("\n")
@@ -191,10 +204,14 @@ class ModelText:
 
     def _call(self, name: str, entries: Sequence[sp.Expr], row: str, words: str) -> tuple[str, list[str]]:
         """Return a function of the parameters, and the statements that fill a row with what it returns."""
-        made = function(name, words, list(entries), scalars(sorted(_free(entries), key=list(self.names).index)))
+        made = function(name, words, list(entries), self._given(_free(entries)))
         given = [f"parameters.{self.names[argument.symbols[0]]}" for argument in made.arguments]
         call = f"_{name}({', '.join([*given, row])})"
         return self._function(made, f"_{name}"), [f"{row} = zeros({len(entries)})", call]
+
+    def _given(self, symbols: set[sp.Symbol]) -> list[tuple[str, sp.Symbol]]:
+        """Return parameters as arguments, in their order."""
+        return [(name, symbol) for symbol, name in self.names.items() if symbol in symbols]
 
     @cached_property
     def _length(self) -> sp.Expr:
@@ -334,8 +351,7 @@ class ModelText:
             if divisor.is_Symbol:
                 value, words = f"parameters.{self.names[divisor]}", f"{self.names[divisor]}: must not be 0"
             else:
-                made = function("divisor", "Return a divisor of the coefficients.", divisor,
-                                scalars(sorted(divisor.free_symbols, key=list(self.names).index)))  # fmt: skip
+                made = function("divisor", "Return a divisor.", divisor, self._given(divisor.free_symbols))
                 texts.append(self._function(made, f"_divisor_{number}"))
                 given = ", ".join(f"parameters.{self.names[a.symbols[0]]}" for a in made.arguments)
                 value, words = f"_divisor_{number}({given})", "a coefficient of the equations becomes infinite"

@@ -208,7 +208,7 @@ class FortranPrinter(Printer):
 
     def built_in(self, name: str, arguments: Sequence[ast.expr]) -> tuple[str, int]:
         if name == "pow":
-            return f"{self.expression(arguments[0], 9)} ** {self.expression(arguments[1], 10)}", 9
+            return f"{self.expression(arguments[0], 10)} ** {self.expression(arguments[1], 10)}", 9  # from the right
         return super().built_in(name, arguments)
 
     def number(self, value: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 from collections.abc import Sequence
 from typing import ClassVar
 
@@ -79,7 +80,7 @@ class JuliaPrinter(BracketingPrinter):
 
     def raised(self, error: str, message: str) -> str:
         kind = "DomainError(nothing, " if error.startswith("Invalid") else "ErrorException("
-        return f'throw({kind}"{message}"))'
+        return f"throw({kind}{json.dumps(message)}))".replace("$", "\\$")
 
     def built_in(self, name: str, arguments: Sequence[ast.expr]) -> tuple[str, int]:
         if name == "pow":

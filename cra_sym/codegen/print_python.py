@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 from collections.abc import Sequence
 from typing import ClassVar
 
@@ -105,7 +106,7 @@ class PythonPrinter(BracketingPrinter):
         return f"{self.expression(left, 7)} {'%' if rest else '//'} {self.expression(right, 8)}", 7
 
     def raised(self, error: str, message: str) -> str:
-        return f'raise {error}("{message}")'
+        return f"raise {error}({json.dumps(message)})"
 
     def to_float(self, node: ast.expr) -> tuple[str, int]:
         return f"float({self.expression(node)})", 10

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import json
+import re
 from collections.abc import Sequence
 from typing import ClassVar
 
@@ -14,6 +16,10 @@ __all__ = ["SAME", "BracketingPrinter", "JavaScriptPrinter", "OctavePrinter", "S
 SAME = (
     "sqrt exp expm1 log log1p sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh floor ceil atan2 pow".split()
 )
+
+
+_STATEMENT = re.compile(r"return |[^\s\"'].*? [-+*/]?= ")
+"""What stands in front of a value."""
 
 
 class ScriptPrinter(Printer):
@@ -81,13 +87,12 @@ class BracketingPrinter(ScriptPrinter):
         if len(indent + text) <= self.width:
             yield indent + text
             return
-        head, sign, value = text.partition(" = ")
-        if text.startswith("return "):
-            head, sign, value = "return", " ", text.removeprefix("return ")
-        if not sign or "(" in head:
+        found = _STATEMENT.match(text)
+        if found is None:
             yield from super().wrapped(text, indent)
             return
-        yield f"{indent}{head}{sign}("
+        head, value = found[0], text[found.end() :]
+        yield f"{indent}{head}("
         yield from super().wrapped(value, f"{indent}    ")
         yield f"{indent})"
 
@@ -149,7 +154,7 @@ class JavaScriptPrinter(ScriptPrinter):
 
     def raised(self, error: str, message: str) -> str:
         kind = "RangeError" if error.startswith("Invalid") else "Error"
-        return f'throw new {kind}("{message}")'
+        return f"throw new {kind}({json.dumps(message)})"
 
     def integer_function(self, name: str) -> str:
         return f"Math.{name}"
@@ -269,7 +274,8 @@ end
         return f"floor({super().divided(left, right, rest)[0]})", 10
 
     def raised(self, error: str, message: str) -> str:
-        return f"error('{self.prefix}:{snake(error)}', '{message}')"
+        plain = message.replace("'", "''")  # a format, which reads what follows % and \\
+        return f"error('{self.prefix}:{snake(error)}', '%s', '{plain}')"
 
     def to_float(self, node: ast.expr) -> tuple[str, int]:
         return self.printed(node)

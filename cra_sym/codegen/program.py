@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -167,7 +168,7 @@ def _free_symbols(branch: Branch) -> set[sp.Symbol]:
 
 def christen(wish: str, taken: set[str]) -> str:
     """Return a name valid in every language and unlike those taken, even where case does not count; take it."""
-    base = re.sub(r"_+", "_", re.sub(r"[^0-9A-Za-z]", "_", wish)).strip("_") or "value"
+    base = re.sub(r"_+", "_", re.sub(r"[^0-9A-Za-z]", "_", _latin(wish))).strip("_") or "value"
     base = base if base[0].isalpha() else f"n_{base}"
     base = base[:40]
     name, number = base, 1
@@ -177,6 +178,16 @@ def christen(wish: str, taken: set[str]) -> str:
         name = f"{base}_{number}"
     taken.add(name)
     return name
+
+
+def _latin(text: str) -> str:
+    """Return a text with Greek letters by their names."""
+    found = []
+    for letter in unicodedata.normalize("NFKD", text):
+        word = unicodedata.name(letter, "")
+        greek = word.split()[-1].lower() if word.startswith("GREEK ") else letter
+        found.append(greek.capitalize() if letter.isupper() and greek != letter else greek)
+    return "".join(found)
 
 
 _REWRITTEN: dict[Any, Any] = {

@@ -6,7 +6,7 @@ import ast
 import re
 from collections.abc import Iterator
 
-__all__ = ["marked", "without_unused"]
+__all__ = ["marked", "top_names", "without_unused"]
 
 _MARKED = re.compile(r"( *)# ((?:(?:DRIVEN|LUMPED|LINKED|COUPLED): )+)(.*)")
 
@@ -21,6 +21,12 @@ def marked(text: str, marks: set[str]) -> str:
         elif set(found[2].split(": ")[:-1]) <= marks:
             lines.append(found[1] + found[3])
     return "\n".join(lines)
+
+
+def top_names(*texts: str) -> set[str]:
+    """Return the names of constants, records and functions of texts, without leading underscores."""
+    found = re.findall(r"^(?:# \w+: )*(?:def |class )?_*(\w+)(?: = |\(|:$)", "\n".join(texts), re.MULTILINE)
+    return set(found)
 
 
 def without_unused(text: str) -> str:

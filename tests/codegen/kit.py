@@ -167,6 +167,33 @@ def functions(x: float, a: float, out: Mut[Row[float, 24]]) -> None:
     out[23] = 1.0 if isfinite(x * a) and isfinite(PI) else 0.0
 
 
+def traps(a: float, b: float, k: int, n: int, row: Mut[Row[float, 12]]) -> None:
+    """Put in what precedence, long lines and text may spoil; it isn't "100 %" safe otherwise."""
+    if a < 0.0:
+        raise InvalidArgument("a: isn't 100 % \\"positive\\" \\\\n")
+    row[0] = -pow(a, 2.0) - pow(-a, 2.0) * -b + pow(a, -b) / pow(pow(a, b), -0.5) - pow(a, pow(b, 0.5))
+    row[1] = (-a) * b - -a * -b - (a - (-b)) / -(a + b) + -1e-3
+    row[2] = (1.0 if a > b else 2.0 if a == b else 3.0) * 2.0 - (a if not (a > b and b > 0.5) else -b) * 3.0
+    row[3] = 1.0 if (1.0 if a > b else -1.0) > 0.0 else (0.5 if (not a > b) == (k > n) else 0.25)
+    row[4] = float(k) / float(n) if float(k) < a * float(n) else float(k - (n - 1)) * 0.5 - float(k % n * n) / 3.0
+    row[5] = float(k // n * n + k % n - k // (n + 1) % n) + (-float(k)) - float(-k + n * -1)
+    for i in range(3):
+        pair = zeros(2)
+        pair[0] += a + float(i)
+        pair[1] -= b
+        row[6] += pair[0] * pair[1]
+    # lines so long that some languages break them: a sum, an update, a choice, a condition and a call
+    one = a * b * 1.0000000001
+    row[7] = one + one * 1.000000001 + one * 1.000000002 + one * 1.000000003 - one * 1.000000004 / (a + b + 1.0) + one
+    row[7 + int(float(n) * 0.0)] -= one + one * 1.000000001 + one * 1.000000002 - one * 1.000000003 * (a + b + 1.0)
+    row[8] = one + one * 1.000000001 + one * 1.00000002 if one + one * 1.00000001 > b * 1.00000003 + a else b * a - one
+    if one + one * 1.000000001 + one * 1.000000002 > b * 1.000000003 + a * 1.000000004 and not (a > 3.0 and b > 4.0):
+        row[9] = brackets(one + one * 1.000000001, one * 1.000000002 + b * 1.000000003, a * a * 1.000000004 + b * b)
+    while row[10] < a * 1.000000001 + b * 1.000000002 and row[10] * 1.000000003 < 2.0 and not (row[10] > a * 1e9 + b):
+        row[10] += 0.25 + a * 1e-3
+    row[11] = max(min(a, b), -max(-a, abs(-b))) - min(a, -b) + floor(-a) * ceil(-b)
+
+
 def _evaluate(quantity: int, given: Row[float, 64], found: Mut[Row[float, 256]]) -> None:
     if quantity == 0:
         found[0] = brackets(given[0], given[1], given[2])
@@ -197,6 +224,11 @@ def _evaluate(quantity: int, given: Row[float, 64], found: Mut[Row[float, 256]])
         functions(given[0], given[1], values)
         for i in range(24):
             found[i] = values[i]
+    elif quantity == 7:
+        trapped = zeros(12)
+        traps(given[0], given[1], int(given[2]), int(given[3]), trapped)
+        for i in range(12):
+            found[i] = trapped[i]
 '''
 
 
@@ -209,7 +241,7 @@ def arm_without_vectors(name: str, real: str = "float64") -> Library:
         arm_library._checks = kept
 
 
-SIZES = {0: 1, 1: 2, 2: 1, 3: 1, 4: 7, 5: 7, 6: 24}
+SIZES = {0: 1, 1: 2, 2: 1, 3: 1, 4: 7, 5: 7, 6: 24, 7: 12}
 EDGE = [0.0, -0.0, 1.0, -1.0, 5e-324, 2.2250738585072014e-308, 1e-200, 1e12, 1.7e308, 0.1, 1 / 3, math.inf, -math.inf]
 
 
@@ -227,6 +259,8 @@ def points() -> list[tuple[int, tuple[float, ...], bool]]:
     found += [(5, (x, n), False) for x in (0.0, 1.0, 2.0, 1e300, 5e-324) for n in (1, 6)]
     found += [(5, (-1.0, 2), True), (5, (4.0, 0), True), (5, (-math.inf, 3), True)]
     found += [(6, (x, a), False) for x in (-0.9, -1e-9, 1e-300, 0.3, 0.99) for a in (1e-12, 0.5, 3.0, 1e6)]
+    found += [(7, (a, b, k, n), False) for a, b in ((0.3, 0.7), (2.5, 2.5), (3.5, 0.1)) for k, n in ((7, 3), (2, 5))]
+    found += [(7, (-1.0, 1.0, 1, 1), True)]
     return found
 
 

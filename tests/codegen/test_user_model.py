@@ -13,7 +13,9 @@ import pytest
 import sympy as sp
 
 import cra_sym as cra
-from cra_sym.codegen.user_model import model_library
+from cra_sym.codegen.frozen import stated
+from cra_sym.codegen.library import Library
+from cra_sym.codegen.user_model import model_library, model_text
 from cra_sym.symbols import L, t, v, x
 from tests import exported_models
 from tests.codegen import kit
@@ -180,6 +182,33 @@ def test_bad_parameters_are_refused_by_name():
         names["natural_frequencies"](names["Parameters"](**(good | {"EI": "stiff"})), 2)
     with pytest.raises(names["InvalidArgument"], match="modes"):
         names["natural_frequencies"](names["Parameters"](**good), 0)
+
+
+@pytest.mark.parametrize(
+    "symbols, fields",
+    [
+        (("lambda", "pi", "PI", "\u03bb"), ["PI_2", "lambda_2", "pi_3", "lamda"]),
+        (("k_t", "K_t", "EPS", "determinant"), ["EPS_2", "K_t", "determinant_2", "k_t_2"]),
+        (("in", "by_T", "prepare", "a*/b"), ["a_b", "by_T", "in_2", "prepare_2"]),
+    ],
+)
+def test_any_name_of_a_parameter(symbols, fields):
+    """Words of languages and of the text, case that Fortran folds, Greek letters, what would end a comment."""
+    m, T, k, m_e = sp.symbols(symbols)
+    string = cra.Model(
+        m * v.diff(t) ** 2 / 2 - T * v.diff(x) ** 2 / 2, fields=[v], x=x, domain=(0, L), t=t, left=-k * v**2 / 2,
+        right=m_e * v.diff(t) ** 2 / 2,
+    )  # fmt: skip
+    written = model_text(string)
+    assert sorted(set(written.names.values()) - {"L"}) == sorted(fields)
+    asked = "def _evaluate(quantity: int, given: Row[float, 64], found: Mut[Row[float, 256]]) -> None:\n"
+    asked += "    found[0] = 0.0\n"
+    made = Library("span", "", f"{written.text()}\n\n{asked}", tuple(stated(string)), ())
+    assert all("*/" not in line for line in made.provenance)
+    names = python(made)
+    given = dict.fromkeys(fields, 1.0) | {"L": 1.0}
+    z = 2 * np.pi * names["natural_frequencies"](names["Parameters"](**given), 1)[0]
+    assert np.tan(z) == pytest.approx((1 - z**2) / (2 * z), rel=1e-12)
 
 
 def test_two_models_link_into_one_program(tmp_path):
