@@ -11,6 +11,7 @@ import numpy as np
 from cra_sym.si import plain_numbers
 
 __all__ = [
+    "ByValue",
     "broadcastable",
     "choice",
     "common_shape",
@@ -183,6 +184,18 @@ def equal(one: Any, other: Any) -> bool:
     if isinstance(one, (list, tuple)):
         return type(one) is type(other) and len(one) == len(other) and all(map(equal, one, other))
     return bool(one == other) or (isinstance(one, float) and isinstance(other, float) and one != one and other != other)
+
+
+class ByValue:
+    """Base of dataclasses that are equal if all their public fields are, arrays by their elements."""
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        names = [name for name in getattr(self, "__dataclass_fields__", {}) if not name.startswith("_")]
+        return all(equal(getattr(self, name), getattr(other, name)) for name in names)
+
+    __hash__ = None  # type: ignore[assignment]
 
 
 def broadcastable(**arrays: Any) -> tuple[int, ...]:

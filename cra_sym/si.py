@@ -16,7 +16,7 @@ import numpy as np
 
 from cra_sym.symbols import Dimension, unit_dimension
 
-__all__ = ["dimensions", "paired", "plain_numbers", "real_number"]
+__all__ = ["check_rows", "dimensions", "paired", "plain_numbers"]
 
 _EXACT = {int, float}
 _BASE = {"[length]": "meter", "[mass]": "kilogram", "[time]": "second"}
@@ -32,9 +32,10 @@ def plain_numbers(name: str, value: Any, unit: str | None = None) -> Any:
     name : str
         Name of the argument, used in errors.
     value : array_like
-        Numbers, also of SymPy, ``fractions`` and ``decimal``; quantities of Pint or Astropy; xarray objects.
+        Numbers, also of SymPy, ``fractions`` and ``decimal``; quantities of Pint or Astropy; xarray and pandas objects.
     unit : str, optional
-        Unit that a quantity must be convertible to, such as ``"N m/rad"``; without it every unit is converted to SI.
+        Unit that a quantity must be convertible to, such as ``"N m/rad"`` or ``"N or N m"``; without it every unit is
+        converted to SI.
 
     Raises
     ------
@@ -48,10 +49,10 @@ def plain_numbers(name: str, value: Any, unit: str | None = None) -> Any:
         return _timed(value, unit)
     if kind is np.ndarray and value.dtype.kind != "O":
         return _timed(value, unit)
-    if isinstance(value, np.ma.MaskedArray):
-        if np.ma.is_masked(value):
+    if isinstance(value, np.ma.MaskedArray) or hasattr(kind, "unmasked"):
+        if np.any(value.mask):
             raise TypeError(f"{name}: element {_first_masked(value)} is masked; must be real numbers")
-        return plain_numbers(name, np.asarray(value), unit)
+        return plain_numbers(name, value.unmasked if hasattr(kind, "unmasked") else np.asarray(value), unit)
     if hasattr(kind, "dimensionality") and hasattr(kind, "to_base_units"):
         return plain_numbers(name, _from_pint(name, value, unit))
     if hasattr(kind, "decompose") and hasattr(kind, "unit"):
@@ -65,7 +66,16 @@ def plain_numbers(name: str, value: Any, unit: str | None = None) -> Any:
         return _each(name, value, unit)
     if unit == "s" and hasattr(kind, "total_seconds"):
         return value.total_seconds()
-    return value if isinstance(value, bool) else real_number(value)
+    if hasattr(kind, "__array__") or hasattr(kind, "__array_interface__"):  # of pandas, SymPy and others
+        try:
+            array = np.asarray(value)
+        except Exception as error:  # whatever an object does when it is asked for its numbers
+            raise TypeError(f"{name} = {_text(value)}: must be real numbers") from error
+        if array.ndim:
+            return plain_numbers(name, array, unit)
+    if kind is bytearray:
+        raise TypeError(f"{name} = {_text(value)}: must be real numbers, not bytes")
+    return value if isinstance(value, bool) else _real_number(name, value)
 
 
 def paired(values: Mapping[str, Any], units: Mapping[str, str] | None = None) -> dict[str, Any]:
@@ -76,9 +86,10 @@ def paired(values: Mapping[str, Any], units: Mapping[str, str] | None = None) ->
     Raises
     ------
     ValueError
-        If a dimension has two lengths or two coordinates, arrays without names are given beside labelled ones, or a
-        unit is not that of ``units``.
+        If a dimension has two lengths or two coordinates, arrays without names are given beside labelled ones, the
+        indexes of two series of pandas differ, or a unit is not that of ``units``.
     """
+    check_rows(values)
     labelled = {name: value for name, value in values.items() if _is_labelled(value) and value.dims}
     if not labelled:
         return dict(values)
@@ -112,6 +123,16 @@ def _is_labelled(value: Any) -> bool:
     return all(hasattr(type(value), attribute) for attribute in ("dims", "attrs", "data"))
 
 
+def check_rows(tables: Mapping[str, Any]) -> None:
+    """Refuse series and tables of pandas that would be paired by position though their rows have other names."""
+    tables = {name: value for name, value in tables.items() if hasattr(type(value), "iloc")}
+    rows = {name: table.axes[0] for name, table in tables.items()}
+    first = next(iter(rows), "")
+    for name, index in rows.items():
+        if not index.equals(rows[first]):
+            raise ValueError(f"{name}: its index is not that of {first}; align them, or give plain arrays")
+
+
 def _check_dimension(dimension: Any, values: Mapping[str, Any]) -> None:
     (first, one), *others = values.items()
     for name, other in others:
@@ -125,11 +146,19 @@ def _check_dimension(dimension: Any, values: Mapping[str, Any]) -> None:
                 raise ValueError(f"dimension {dimension!r}: its coordinate in {first} is not that in {name}")
 
 
-def real_number(value: Any) -> Any:
+def _real_number(name: str, value: Any) -> Any:
     """Return a real number of any kind as a float, everything else as it is."""
     exact = isinstance(value, (Real, Decimal)) and not isinstance(value, (bool, np.generic))
     symbolic = getattr(value, "is_extended_real", False) is True and getattr(value, "is_number", False) is True
-    return float(value) if exact or symbolic else value
+    if not exact and not symbolic:
+        return value
+    try:
+        number = float(value)
+        if np.isinf(number) and abs(value) != np.inf:
+            raise OverflowError
+    except (ArithmeticError, ValueError):  # too large, or a nan that signals
+        raise ValueError(f"{name} = {_text(value)}: must be a real number in the range of floating point") from None
+    return number
 
 
 def _timed(value: Any, unit: str | None) -> Any:
@@ -148,13 +177,16 @@ def _each(name: str, value: Any, unit: str | None) -> Any:
     if np.ma.core.MaskedConstant in kinds:
         raise TypeError(f"{name}: an element is masked; must be real numbers")
     if isinstance(value, np.ndarray):
-        flat = np.array([plain_numbers(name, entry, unit) for entry in value.ravel()])
-        return flat.reshape(value.shape) if flat.ndim == 1 else value
+        flat = [plain_numbers(name, entry, unit) for entry in value.ravel()]
+        shapes = set(map(np.shape, flat))
+        if len(shapes) != 1:
+            raise TypeError(f"{name} = {_text(value)}: its elements have different shapes; must be real numbers")
+        return np.array(flat).reshape(value.shape + shapes.pop())
     return [plain_numbers(name, entry, unit) for entry in value]
 
 
 def _first_masked(value: Any) -> Any:
-    place = tuple(int(i) for i in np.argwhere(np.ma.getmaskarray(value))[0])
+    place = tuple(int(i) for i in np.argwhere(np.broadcast_to(value.mask, value.shape))[0])
     return place[0] if len(place) == 1 else place
 
 
@@ -163,7 +195,7 @@ def _from_pint(name: str, value: Any, unit: str | None) -> Any:
     bases = _BASE | _OTHERS
     if not set(powers) <= set(bases):
         raise ValueError(f"{name} = {_text(value)}: its unit is not one of SI; must be in {unit or 'SI units'}")
-    turning = "radian" in str(value.to_base_units().units)
+    turning = any(str(unit) == "radian" for unit, _ in value.to_base_units().unit_items())
     found = Dimension(*(powers.get(dimension, 0) for dimension in _BASE))
     _check(name, value, unit, found, bool(set(powers) & set(_OTHERS)), turning)
     return value.to(" * ".join(f"{bases[dimension]} ** {power}" for dimension, power in powers.items())).magnitude
@@ -199,9 +231,10 @@ def _check_stated(name: str, stated: Any, unit: str | None) -> None:
 def _check(name: str, value: Any, unit: str | None, found: Dimension, more: bool, turning: bool) -> None:
     if unit is None:
         return
-    wanted = unit_dimension(unit)
-    if more or found != wanted or (wanted == _RATE and unit in ("Hz", "rad/s") and turning != ("rad" in unit)):
-        cure = "; a frequency in Hz times 2 pi is one in rad/s" if wanted == _RATE == found else ""
+    wanted = [unit_dimension(one) for one in unit.split(" or ")]
+    rate = wanted == [_RATE]
+    if more or found not in wanted or (rate and unit in ("Hz", "rad/s") and turning != ("rad" in unit)):
+        cure = "; a frequency in Hz times 2 pi is one in rad/s" if rate and found == _RATE else ""
         raise ValueError(f"{name} = {_text(value)}: must be in {unit}{cure}")
 
 

@@ -9,9 +9,11 @@ from concurrent.futures import ThreadPoolExecutor
 import mpmath
 import numpy as np
 import pytest
+import sympy as sp
 
 import cra_sym as cra
 from cra_sym.checks import equal
+from cra_sym.symbols import v
 
 ARM = cra.Arm.nominal().replace(k_t=1e3, k_r=50.0)
 BATCH = ARM.replace(m_e=np.linspace(0.0, 0.1, 5), k_t=[[1e2], [np.inf]])
@@ -28,6 +30,14 @@ def claimed():
 def certified(modes):
     pytest.importorskip("flint", reason="the extra 'certify' brings python-flint")
     return cra.certify(ARM, modes)
+
+
+def slipped():
+    k_d, f_s = sp.symbols("k_d f_s")
+    model = ARM.model.replace(hysteresis=[(cra.Jenkins(k_d, f_s), v, "left")])
+    return cra.slip_response(
+        model.at({**ARM.values, "k_d": 5e3, "f_s": 0.3}), VALUES["motion"]()[0], [0.1, 0.2], modes=1
+    )
 
 
 VALUES = {
@@ -48,6 +58,12 @@ VALUES = {
     "fluctuation": lambda: cra.Fluctuation(k_t=1.0),
     "transverse base": lambda: cra.TransverseBase(0.01),
     "equation": lambda: cra.equation(23),
+    "elements": lambda: ARM.model.ritz(2),
+    "backbone": lambda: cra.backbone(ARM, amplitude=1e-3, modes=1, harmonics=1),
+    "steady states": lambda: cra.steady_states(ARM, [28.0], drive={"w": 1e-4}, modes=1, harmonics=1),
+    "modal equations": lambda: cra.nonlinear_modal_equations(ARM, 1),
+    "fit": lambda: cra.identify(ARM, cra.natural_frequencies(ARM), 0.01, unknown=("k_t",)),
+    "slip": slipped,
     "verdict": claimed,
 }  # fmt: skip
 
@@ -55,7 +71,7 @@ VALUES = {
 @pytest.mark.parametrize("name", VALUES)
 @pytest.mark.parametrize(
     "made_again",
-    [lambda v: pickle.loads(pickle.dumps(v)), copy.copy, copy.deepcopy],
+    [lambda one: pickle.loads(pickle.dumps(one)), copy.copy, copy.deepcopy],
     ids=["pickle", "copy", "deepcopy"],
 )
 def test_results_are_values(name, made_again):

@@ -44,6 +44,9 @@ class PintQuantity:
         base.units = "radian / second" if self.unit_name.startswith("degree") else self.unit_name
         return base
 
+    def unit_items(self):
+        return [tuple((*part.split(), 1)[:2]) for part in self.units.split(" / ")]
+
     def to(self, unit):
         return type(self)(np.asarray(self.magnitude) * SI[self.unit_name][0], unit)
 
@@ -75,6 +78,32 @@ class AstropyQuantity(np.ndarray):
         )
 
 
+class ShortQuantity(PintQuantity):
+    """One of a registry that writes its units short, as ``rad/s``."""
+
+    def to_base_units(self):
+        base = super().to_base_units()
+        base.unit_items, base.units = base.unit_items, "rad/s"
+        return base
+
+    def unit_items(self):
+        return [("radian", 1), ("second", -1)] if self.unit_name.startswith("degree") else [("second", -1)]
+
+
+class MaskedQuantity(np.ndarray):
+    """The documented attributes of a masked array of Astropy, which is an array that NumPy would strip of its mask."""
+
+    @classmethod
+    def of(cls, values, mask):
+        made = np.asarray(values, float).view(cls)
+        made.mask = np.array(mask)
+        return made
+
+    @property
+    def unmasked(self):
+        return np.asarray(self)
+
+
 class UnknownQuantity:
     units = "furlong"
 
@@ -100,6 +129,9 @@ class UnknownQuantity:
         ("m_e", np.array([Decimal("0.5"), Fraction(1, 4)]), [0.5, 0.25]),
         ("m_e", np.ma.masked_array([1.0, 2.0], mask=[False, False]), [1.0, 2.0]),
         ("m_e", np.float32(0.5), 0.5),
+        ("m_e", MaskedQuantity.of([1.0, 2.0], [False, False]), [1.0, 2.0]),
+        ("m_e", np.array([np.array([1.0, 2.0]), np.array([3.0, 4.0])], dtype=object), [[1.0, 2.0], [3.0, 4.0]]),
+        ("L", sp.Matrix([1, sp.Rational(1, 2)]), [[1.0], [0.5]]),
         ("m_e", np.array([1, 2], dtype=np.uint8), [1.0, 2.0]),
     ],
 )
@@ -121,6 +153,13 @@ def test_numbers_and_quantities_are_converted(field, value, expected):
         ("m_e", np.ma.masked_array([1.0, 2.0], mask=[False, True]), "m_e: element 1 is masked"),
         ("m_e", [1.0, np.ma.masked], "m_e: an element is masked"),
         ("L", [True, 2.0], "L = .*booleans"),
+        ("m_e", MaskedQuantity.of([1.0, 2.0], [False, True]), "m_e: element 1 is masked"),
+        ("k_t", Decimal("1e400"), "k_t = 1E.400: must be a real number in the range of floating point"),
+        ("k_t", Fraction(10**400), "k_t = 1000.*in the range of floating point"),
+        ("k_t", sp.Integer(10) ** 400, "k_t = 1000.*in the range of floating point"),
+        ("k_t", Decimal("sNaN"), "k_t = sNaN: must be a real number"),
+        ("k_t", bytearray(b"12"), "k_t = bytearray.*not bytes"),
+        ("k_t", np.array([[1.0], [2.0, 3.0]], dtype=object), "k_t = .*different shapes"),
         ("L", np.array([True, 2.0], dtype=object), "L = .*booleans"),
         ("L", sp.I, "L = I: must be real numbers"),
         ("L", sp.Symbol("a"), "L = a: must be real numbers"),
@@ -141,6 +180,30 @@ def test_a_frequency_is_not_an_angular_frequency():
         cra.BaseMotion(amplitude=1.0, angular_frequency=PintQuantity(10.0, "hertz"))
     with pytest.raises(ValueError, match="must be in Hz"):
         cra.identify_joint(ARM, AstropyQuantity.of([10.0, 20.0], rad=1, s=-1), 0.1)
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        (lambda: cra.identify_joint(ARM, ShortQuantity([180.0, 360.0], "degree / second"), 0.1), "must be in Hz"),
+        (lambda: cra.frequency_response(ARM, ShortQuantity(1.0, "hertz")), "must be in rad/s"),
+        (lambda: cra.Force(PintQuantity(1.0, "kilogram")), "level = .*must be in N or N m or N/m"),
+        (lambda: cra.Force.sampled([0.0, 1.0], PintQuantity([1.0, 2.0], "kilogram")), "force = .*must be in N or"),
+        (lambda: cra.frequency_parameters(PintQuantity(1.0, "kilogram"), 1.0, 0.0), "kappa_t = .*must be in 1"),
+        (lambda: cra.BaseMotion(velocity=0.1) * PintQuantity(2.0, "meter"), "factor = .*must be in 1"),
+        (lambda: cra.BaseMotion(amplitude=1e300, angular_frequency=1e10), "amplitude, angular_frequency: .*finite"),
+        (lambda: list(cra.BaseMotion(velocity=0.1)), "no batch axis"),
+    ],
+)
+def test_what_is_not_the_unit_of_an_argument_is_refused(asked, message):
+    with pytest.raises((TypeError, ValueError), match=message):
+        asked()
+
+
+def test_a_unit_is_known_by_what_it_is_and_not_by_how_it_is_written():
+    turning = ShortQuantity(180.0, "degree / second")
+    assert real_array("omega", turning, unit="rad/s") == pytest.approx(np.pi)
+    assert cra.Force(PintQuantity(2.0, "newton / millimeter"))(0.0) == 2e3
 
 
 def test_times_are_seconds():
@@ -211,6 +274,39 @@ def test_a_units_attribute_is_that_of_si_or_refused(units, good):
             ARM.replace(k_t=value)
 
 
+@pytest.mark.parametrize(
+    "shape",
+    [
+        lambda a, b: cra.frequency_parameters(a, b, 0.0).shape[:-1],
+        lambda a, b: cra.BaseMotion.trapezoid(a, b, 1.0).shape,
+        lambda a, b: cra.Force(a, b, 1.0).shape,
+        lambda a, b: cra.JointStiffness(k_t=a, k_r=b).shape,
+        lambda a, b: cra.input_shaper(a, 0.1 * b)[0].shape[:-1],
+        lambda a, b: np.shape(cra.growth_rate(ARM.replace(k_t=1e3), cra.JointStiffness(), 28 * a, 0.1 * b, 1)),
+    ],
+)
+def test_labelled_arguments_pair_by_dimension(shape):
+    one, other = labelled([0.1, 0.2], "a"), labelled([0.3, 0.4], "b")
+    assert shape(one, other) == (2, 2) and shape(one, one) == (2,)
+
+
+def test_labelled_arguments_beside_a_batch_without_names_are_refused():
+    batch, size = ARM.replace(k_t=[1e3, 2e3]), labelled([0.1, 0.2], "a")
+    for asked in (lambda: cra.growth_rate(batch, cra.JointStiffness(), 28.0, size, 1),
+                  lambda: cra.stability_boundary(batch, cra.JointStiffness(), size)):  # fmt: skip
+        with pytest.raises(ValueError, match="system has axes without names, and epsilon has the dimensions"):
+            asked()
+
+
+def test_tables_of_other_rows_are_not_paired():
+    pandas = pytest.importorskip("pandas", reason="the extra 'scale' brings pandas")
+    values, rows = pandas.Series([1.0, 2.0], index=["a", "b"]), pandas.Series([Decimal(1), 2], index=["a", "b"])
+    assert ARM.replace(k_t=values, m_e=rows).m_e.tolist() == [1.0, 2.0]
+    with pytest.raises(ValueError, match="k_t: its index is not that of m_e"):
+        ARM.replace(k_t=values, m_e=rows[::-1])
+    assert (values * cra.BaseMotion(velocity=0.1)).shape == (2,)
+
+
 def test_labelled_arrays_that_do_not_fit_are_refused():
     with pytest.raises(ValueError, match="dimension 'k': m_e has 3 entries, k_t has 2"):
         ARM.replace(k_t=labelled([1.0, 2.0], "k"), m_e=labelled([1.0, 2.0, 3.0], "k"))
@@ -248,6 +344,18 @@ def test_a_parameter_of_the_nomenclature_carries_its_own(term):
     with pytest.raises(ValueError, match="its dimension is"):
         clamped(v.diff(t) ** 2 / 2 - sp.Symbol("E", positive=True) * v.diff(x, 2) ** 2 / 2
                 - cra.symbols.symbol(term) * v**2 / 2)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("density", "message"),
+    [
+        (v.diff(t) ** 2 / 2 + v.diff(x, 2) ** 2 / 2, "buckled"),
+        (-(v.diff(t) ** 2) / 2 - v.diff(x, 2) ** 2 / 2, "negative kinetic energy"),
+    ],
+)
+def test_an_energy_of_the_wrong_sign_is_said(density, message):
+    with pytest.raises(ValueError, match=message):
+        cra.natural_frequencies(clamped(density).at({}))
 
 
 OTHER = sp.Function("u")(x, t)
@@ -322,6 +430,27 @@ def test_what_is_asked_of_a_mode_that_a_spring_of_nothing_holds():
     stiff = arm.replace(E=1e100)
     for asked in (lambda a: cra.tip_response(a, motion, [0.01, 0.02]), lambda a: cra.frequency_response(a, [3.0, 1e3])):
         np.testing.assert_allclose(asked(arm), asked(stiff), rtol=1e-10)
+
+
+@pytest.mark.parametrize("k_t", [1e-8, 1e-25, 1e-40, 1e-160])
+@pytest.mark.parametrize("zeta", [0.0, 0.1])
+def test_a_base_that_hardly_holds_leaves_the_tip_behind(k_t, zeta):
+    """The way of the base, less what an oscillator of mass rho A L + m_e loses in the time of the move.
+
+    Rounding of the momentum over a frequency of nothing made it 2742 m of 0.1 m at 1e-40 N/m.
+    """
+    move = cra.BaseMotion.trapezoid(0.1, 0.2, 1.0)
+    arm = ARM.replace(k_t=k_t, zeta=zeta)
+    omega = np.sqrt(k_t / (arm.rhoA * arm.L + arm.m_e))
+    # at rest after the move q = -0.1 + O(omega T) and q' = 2 zeta omega 0.1: the peak is q itself, to omega T
+    assert cra.residual_vibration(arm, move, 1) == pytest.approx(0.1, rel=2 * omega + 1e-12)
+    loose = cra.BaseMotion.sampled(None, [0.0, 1.0, 1.0, 0.0], sampling_rate=10.0)
+    assert cra.residual_vibration(arm.replace(k_t=0.0), loose, 1) == np.inf
+    if zeta == 0.0:
+        _, gradient = cra.residual_vibration_gradient(arm, move, by=("k_t",), modes=1)
+        # d/dk of omega^2 (0.1 T2 - area^2 / 0.2), T2 by the trapezoid: as of any soft spring
+        soft = cra.residual_vibration_gradient(ARM.replace(k_t=1e-4), move, by=("k_t",), modes=1)[1]
+        assert np.isnan(gradient) if k_t < 1e-10 else gradient == pytest.approx(soft, rel=1e-4)
 
 
 # Signs ------------------------------------------------------------------------------------------------------------

@@ -30,7 +30,7 @@ UNSTABLE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Backbone:
+class Backbone(checks.ByValue):
     """Free periodic motions that grow from a linear mode.
 
     Attributes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import count, default_floating_point, equal, instance
+from cra_sym.checks import ByValue, count, default_floating_point, instance
 from cra_sym.extras import require
 from cra_sym.model.exact import BallProblem
 from cra_sym.model.projection import EndParameter
@@ -26,7 +26,7 @@ Number = Callable[[Any], Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Certificate:
+class Certificate(ByValue):
     """Proved enclosures of natural frequencies.
 
     Attributes
@@ -42,11 +42,6 @@ class Certificate:
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
     complete: NDArray[np.bool_]
-
-    def __eq__(self, other: object) -> bool:
-        return equal(astuple(self), astuple(other)) if isinstance(other, Certificate) else NotImplemented
-
-    __hash__ = None  # type: ignore[assignment]
 
 
 @default_floating_point

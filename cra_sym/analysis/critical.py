@@ -129,7 +129,9 @@ def _checked(system: System, parameter: Any, between: Any) -> tuple[str, float, 
     name = getattr(parameter, "name", parameter)
     if not isinstance(name, str) or name not in system.numerics("names"):
         raise ValueError(f"parameter = {shown(parameter)}: must be one of {', '.join(system.numerics('names'))}")
-    ends = real_array("between", between, must="two real numbers, the lower one first")
+    ends = real_array(
+        "between", between, unit=system.model.units.get(name), must="two real numbers, the lower one first"
+    )
     if ends.shape != (2,) or not (np.isfinite(ends).all() and ends[0] < ends[1]):
         raise ValueError(f"between = {shown(between)}: must be two real numbers, the lower one first")
     if system.numerics("pencil") is None:

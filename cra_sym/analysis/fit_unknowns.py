@@ -126,7 +126,7 @@ def natural_stiffnesses(system: System, names: Sequence[str]) -> dict[str, float
     for name in names:
         spring = system.numerics("stiffnesses")[name]
         factor = float(spring.factor.function(*rigid.domain.values))
-        ratio = modes.force(spring.end, spring.place)[omega > 0] ** 2 / (factor * omega[omega > 0] ** 2)
+        ratio = (modes.force(spring.end, spring.place)[omega > 0] / (np.sqrt(factor) * omega[omega > 0])) ** 2
         units[name] = float(ratio[0] if ratio[0] > 1e-6 * ratio.max() else ratio.max())
     return units
 

@@ -84,10 +84,8 @@ def misfit(
 ) -> str:
     """Say that no values fit, by how much, and what would."""
     worst = int(np.argmax(np.abs(residuals)))
-    size = f"chi2 = {chi2:.3g} with {freedom} degrees of freedom (p = {p_value:.2g})" if freedom > 0 else "residuals"
-    text = (
-        f"no values of the unknown parameters fit: {size}, mode {modes[worst]} is off by {residuals[worst]:.3g} sigma"
-    )
+    size = f"chi2 = {chi2:.3g} with {freedom} degrees of freedom (p = {p_value:.2g}), " if freedom > 0 else ""
+    text = f"no values of the unknown parameters fit: {size}mode {modes[worst]} is off by {residuals[worst]:.3g} sigma"
     return "; ".join([text, *hints])
 
 

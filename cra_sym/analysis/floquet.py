@@ -15,6 +15,7 @@ from cra_sym.kernels.parts import wants_compiler
 from cra_sym.model.excitations import Drive, Excitation, Fluctuation, Parametric, TransverseBase
 from cra_sym.model.modal_matrices import ModalMatrices, modal_matrices
 from cra_sym.model.system import MOST_MODES, System
+from cra_sym.si import paired
 from cra_sym.solvers import floquet, periodic
 
 __all__ = [
@@ -219,8 +220,10 @@ def checked_point(
 ) -> tuple[Parametric, np.ndarray, np.ndarray, int]:
     """Return the arguments of a chart, or raise an error that names what is not allowed."""
     excitation = parametric(excitation)
-    frequency = checks.real_array("angular_frequency", angular_frequency, low=1e-300, unit="rad/s")
-    epsilon = checks.real_array("epsilon", epsilon, low=0.0, unit="1")
+    checks.instance("system", system, System)
+    given = paired({"system": np.empty(system.shape), "angular_frequency": angular_frequency, "epsilon": epsilon})
+    frequency = checks.real_array("angular_frequency", given["angular_frequency"], low=1e-300, unit="rad/s")
+    epsilon = checks.real_array("epsilon", given["epsilon"], low=0.0, unit="1")
     batch_shape(system, excitation, angular_frequency=frequency, epsilon=epsilon)
     return excitation, frequency, epsilon, checks.count("modes", modes, high=MOST_MODES)
 

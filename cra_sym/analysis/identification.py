@@ -14,7 +14,7 @@ from cra_sym.analysis import fit_words
 from cra_sym.analysis.fit_arguments import checked_data, checked_names, checked_priors
 from cra_sym.analysis.fit_search import Data, Search
 from cra_sym.analysis.fit_unknowns import Unknown, unknowns
-from cra_sym.checks import default_floating_point, instance
+from cra_sym.checks import ByValue, default_floating_point, instance
 from cra_sym.model.system import System
 
 __all__ = [
@@ -70,7 +70,7 @@ class AmbiguityWarning(UserWarning):
 
 
 @dataclass(frozen=True, eq=False)
-class Identification:
+class Identification(ByValue):
     """Parameters that fit measured natural frequencies, and what the measurement says about them.
 
     Attributes
@@ -122,18 +122,6 @@ class Identification:
     identifiable: bool
     message: str
     solutions: tuple[Identification, ...] = ()
-
-    def __eq__(self, other: object) -> bool:
-        if type(other) is not type(self):
-            return NotImplemented
-        pairs = ((getattr(self, name), getattr(other, name)) for name in self.__dataclass_fields__)
-        return all(np.array_equal(a, b, equal_nan=True) if _is_number(a) else a == b for a, b in pairs)
-
-    __hash__ = None  # type: ignore[assignment]
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (float, np.ndarray))
 
 
 class JointEstimate(Identification):

@@ -28,6 +28,7 @@ __all__ = ["residual_vibration_gradient"]
 Array = NDArray[np.float64]
 _TURN = 0.05  # rad of the fastest mode: step of a difference by the duration
 _TINY = 1e-30  # an imaginary part whose square is nothing
+_SLOWEST = 1e-5  # rad until everything stops
 
 
 @default_floating_point
@@ -65,7 +66,8 @@ def residual_vibration_gradient(
     gradient : ndarray, shape (..., len(by))
         In m over the SI unit of the parameter. By an infinite stiffness it is 0. Where a mode leaves exactly nothing
         behind the residual has a kink: the mode counts as 0. By a stiffness that is zero, or a compliance that is
-        infinite, it is nan where a rigid-body mode is about to become a vibration.
+        infinite, it is nan where a rigid-body mode is about to become a vibration; so it is where a mode turns by less
+        than 1e-5 rad until everything stops, of which rounding leaves nothing.
 
     Raises
     ------
@@ -97,7 +99,7 @@ def residual_vibration_gradient(
             gradient[..., place] = _coupled(system, motion, driven, found, compliances, name, modes, zeta)
         return value, gradient
     for place, name in enumerate(by):
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(all="ignore"):
             if name == "duration":  # frequency and duration count by their product alone
                 rate = _along(driven, still, np.ones(modes)) / np.asarray(driven.stop)[..., None]
             else:
@@ -107,6 +109,9 @@ def residual_vibration_gradient(
                     for cause in driven.names
                 ]
                 rate = _along(driven, [change for change, _ in pairs], pairs[0][1])
+                turned = driven.osc.omega * np.asarray(driven.stop)[..., None]
+                held = (stiffness or name) in system.numerics("stiffnesses")
+                rate = np.where(held & (0 < turned) & (turned < _SLOWEST), np.nan, rate)
         gradient[..., place] = rate.sum(axis=-1)
     return value, gradient
 

@@ -125,11 +125,7 @@ class Stopped:
         for profile, product in zip(self.profiles, products, strict=True):
             one = self.osc._replace(omega=omega, gamma=product)
             q_one, u_one = state_at_stop(one, profile, self.stop)
-            # a rigid-body mode keeps its momentum in the inertial frame: its velocity is that of the base, zero but
-            # for rounding if the base has stopped
-            speed = np.asarray(profile.velocity(np.max(self.stop)), float)[..., None]
-            drift = np.where(np.abs(speed) > 1e-9, -product * speed, 0.0)
-            q, u = q + q_one, u + np.where(omega.real > 0, u_one, drift)
+            q, u = q + q_one, u + u_one
         return solver.free_peak(self.osc._replace(omega=omega), q, u)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.checks import broadcastable, count, default_floating_point, real_array
+from cra_sym.si import paired
 
 __all__ = ["input_shaper"]
 
@@ -72,8 +73,11 @@ def input_shaper(
     >>> print(input_shaper(2 * np.pi, humps=1, tolerance=0.05)[0])
     [0.2625 0.475  0.2625]
     """
-    omega = real_array("angular_frequency", angular_frequency, low=1e-300, unit="rad/s")
-    ratio = real_array("zeta", zeta, low=0.0, high=np.nextafter(1.0, 0.0), unit="1", must="real numbers in [0, 1)")
+    given = paired({"angular_frequency": angular_frequency, "zeta": zeta}, {"angular_frequency": "rad/s", "zeta": "1"})
+    omega = real_array("angular_frequency", given["angular_frequency"], low=1e-300, unit="rad/s")
+    ratio = real_array(
+        "zeta", given["zeta"], low=0.0, high=np.nextafter(1.0, 0.0), unit="1", must="real numbers in [0, 1)"
+    )
     order, humps = count("order", order, high=_MOST_IMPULSES), count("humps", humps, low=0, high=_MOST_HUMPS)
     if tolerance is not None and not humps:
         raise ValueError("tolerance: must be left out for humps = 0, which leaves no vibration")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cra_sym.analysis.histories import History
 from cra_sym.analysis.modes import section_place
 from cra_sym.analysis.responses import slipping_problem
-from cra_sym.checks import count, default_floating_point, instance, one_axis
+from cra_sym.checks import ByValue, count, default_floating_point, instance, one_axis
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.solvers.driven_modes import Start
 from cra_sym.solvers.slip_records import Ledger
@@ -54,7 +54,7 @@ class SlipEvent:
 
 
 @dataclass(frozen=True, eq=False)
-class SlipResponse:
+class SlipResponse(ByValue):
     """A motion with elastic-slip elements in time, seen from the frame that moves.
 
     The elements are those that the elements of the model stand for: one for a Jenkins, several for an Iwan.

@@ -15,6 +15,7 @@ from cra_sym.analysis.zones import Zone, derived, first_order_zone, zone_of
 from cra_sym.kernels import derived_kernel
 from cra_sym.model.excitations import Excitation, Fluctuation, Parametric, TransverseBase
 from cra_sym.model.system import MOST_MODES, System
+from cra_sym.si import paired
 
 __all__ = ["AsymptoticWarning", "ResonanceWarning", "forced_width", "judged_boundary", "stability_boundary"]
 
@@ -133,6 +134,8 @@ def judged_boundary(
 ) -> tuple[np.ndarray, np.ndarray, list[tuple[type[UserWarning], str]]]:
     """Return the result of :func:`stability_boundary` with its warnings as pairs of category and text, not issued."""
     excitation = parametric(excitation)
+    checks.instance("system", system, System)
+    epsilon = paired({"system": np.empty(system.shape), "epsilon": epsilon})["epsilon"]
     epsilon = checks.real_array("epsilon", epsilon, low=0.0, unit="1")
     modes = checks.count("modes", modes)
     first, second = _resonance(resonance, modes)

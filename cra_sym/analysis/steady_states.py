@@ -32,7 +32,7 @@ UNSTABLE, UNSTABLE_UNDAMPED = 1e-9, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class SteadyState:
+class SteadyState(checks.ByValue):
     """A periodic answer.
 
     Attributes

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from cra_sym import checks
 from cra_sym.arm.parameters import Arm
 from cra_sym.model.system import MOST_MODES
+from cra_sym.si import paired
 
 __all__ = ["frequency_parameters"]
 
@@ -43,12 +44,10 @@ def frequency_parameters(kappa_t: Any, kappa_r: Any, mu: Any, iota: Any = 0.0, m
     [1.875104 4.694091 7.854757]
     """
     modes = checks.count("modes", modes, high=MOST_MODES)
-    stiffness: dict[str, Any] = {"low": 0.0, "allow_infinite": True}
+    given = paired({"kappa_t": kappa_t, "kappa_r": kappa_r, "mu": mu, "iota": iota})
     arrays = {
-        "kappa_t": checks.real_array("kappa_t", kappa_t, **stiffness),
-        "kappa_r": checks.real_array("kappa_r", kappa_r, **stiffness),
-        "mu": checks.real_array("mu", mu, low=0.0),
-        "iota": checks.real_array("iota", iota, low=0.0),
+        name: checks.real_array(name, value, low=0.0, allow_infinite=name.startswith("kappa"), unit="1")
+        for name, value in given.items()
     }
     checks.broadcastable(**arrays)
     groups = {"k_t": "kappa_t", "k_r": "kappa_r", "m_e": "mu", "J_e": "iota"}

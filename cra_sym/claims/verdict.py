@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import astuple, dataclass, field
+from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from cra_sym.checks import equal
+from cra_sym.checks import ByValue
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,7 +29,7 @@ THEMES = ("modes", "responses", "stability")
 
 
 @dataclass(frozen=True, eq=False)
-class Quantity:
+class Quantity(ByValue):
     """An array of the evidence.
 
     Attributes
@@ -50,11 +50,6 @@ class Quantity:
         values = np.array(self.values)
         values.flags.writeable = False
         object.__setattr__(self, "values", values)
-
-    def __eq__(self, other: object) -> bool:
-        return equal(astuple(self), astuple(other)) if isinstance(other, Quantity) else NotImplemented
-
-    __hash__ = None  # type: ignore[assignment]
 
 
 @dataclass(frozen=True)

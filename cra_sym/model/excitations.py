@@ -13,6 +13,7 @@ from cra_sym.model.modal_matrices import between_modes
 from cra_sym.model.projection import Load, project
 from cra_sym.model.system import System
 from cra_sym.model.values import Value, frozen
+from cra_sym.si import paired
 from cra_sym.solvers.floquet import Oscillation
 
 if TYPE_CHECKING:
@@ -29,7 +30,8 @@ class Excitation:
     def __init__(self, **numbers: Any) -> None:
         units = {"amplitude": "m"}  # the others are weights
         checked = {
-            name: frozen(real_array(name, value, low=0.0, unit=units.get(name, "1"))) for name, value in numbers.items()
+            name: frozen(real_array(name, value, low=0.0, unit=units.get(name, "1")))
+            for name, value in paired(numbers, {name: units.get(name, "1") for name in numbers}).items()
         }
         broadcastable(**{name: np.asarray(value) for name, value in checked.items()})
         self._numbers: dict[str, Value] = checked

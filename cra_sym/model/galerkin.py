@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import block_diag, eig, eigh, solve_triangular, svd, svdvals
 from sympy import Expr, Symbol
 
-from cra_sym.checks import broadcastable, count
+from cra_sym.checks import ByValue, broadcastable, count
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics import RitzMatrices
 from cra_sym.model.spatial import check_range
@@ -25,7 +25,7 @@ in the last place, and a row has at most a dozen of them."""
 
 
 @dataclass(frozen=True, eq=False)
-class Ritz:
+class Ritz(ByValue):
     """Hermite elements of a model.
 
     Parameters

@@ -103,7 +103,8 @@ class OneWave:
         """Return the scales and the groups, not broadcast."""
         with np.errstate(all="ignore"):
             found = self.scales.function(*(np.asarray(value, dtype=np.float64) for value in values))
-        return [np.asarray(x, dtype=np.float64) for x in found[1:]]
+        parts = (np.asarray(x) for x in found[1:])  # the root of a negative number is none that is covered
+        return [np.where(x.imag == 0, x.real, np.nan).astype(np.float64) for x in parts]
 
     def _groups(self, numbers: list[Array]) -> list[Array]:
         if not self._are_covered(numbers):

@@ -91,6 +91,7 @@ class Curve:
         scale = 1.0 / np.sqrt(weights)
         matrix = rates[:, :-1] * scale[:, None] / scale[None, :]
         size = np.sqrt(np.maximum(np.abs(np.diag(matrix)), 1e-12 * np.abs(matrix).max()))
+        size[size == 0.0] = 1.0  # of a linear system, at its own frequency
         matrix = matrix / size[:, None] / size[None, :]
         return int((np.linalg.eigvalsh(0.5 * (matrix + matrix.T)) < 0).sum())
 

@@ -94,7 +94,11 @@ def _steady(osc: solver.Oscillators, motion: BaseMotion, start: Start) -> solver
 
 
 def state_at_stop(osc: solver.Oscillators, motion: BaseMotion, stop: Any = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return q and q' when the base stops accelerating, or at a later time, shape (..., modes)."""
+    """Return q and q' when the base stops accelerating, or at a later time, shape (..., modes).
+
+    Of a slow mode q' is the difference of integrals that are nearly equal, of which rounding would leave nothing. There
+    it follows from the integral of q'' + 2 zeta omega q' + omega^2 q = -Gamma w'' over time, in which q is -Gamma w.
+    """
     stop = _column(motion.duration if stop is None else stop)
     rest = np.zeros(1), -osc.gamma * _column(motion.velocity(0.0))
     q, u = solver.free_motion(osc, stop, rest)
@@ -103,4 +107,34 @@ def state_at_stop(osc: solver.Oscillators, motion: BaseMotion, stop: Any = None)
         end = q_knots[..., -1], u_knots[..., -1]
         q_piece, u_piece = solver.free_motion(osc, stop - piece.knots[..., -1:], end)
         q, u = q + q_piece, u + u_piece
-    return q, u
+    speed = _column(motion.velocity(np.max(stop)))
+    still = np.abs(speed) <= _STOPPED * _column(_way_of_velocity(motion))
+    impulse = np.where(still, 0.0, -osc.gamma * speed)
+    omega = osc.omega
+    slow = impulse - 2 * osc.zeta * omega * q + omega**2 * osc.gamma * _column(_area(motion, stop[..., 0]))
+    return q, np.where(omega.real * stop < _SLOW, slow, u)
+
+
+_SLOW = 3e-5  # rad in the time of the move: beyond the square of it, an eps of q' over omega counts more
+_STOPPED = 1e-9  # of all changes of the velocity: what is left of them is rounding
+
+
+def _way_of_velocity(motion: BaseMotion) -> np.ndarray:
+    """Return the sum of all changes of the velocity, m/s."""
+    total = np.zeros(motion.shape)
+    for piece in (term for term in motion.terms if isinstance(term, Piecewise)):
+        span, a, j = np.diff(piece.knots), piece.acceleration[..., :-1], piece.jerk[..., :-1]
+        total = total + np.abs(piece.velocity) + np.sum(np.abs((a + j * span / 2) * span), -1)
+    return total
+
+
+def _area(motion: BaseMotion, stop: np.ndarray) -> np.ndarray:
+    """Return the integral of the displacement up to a time, m s: that of y^2 w'' / 2 over the time y left, by parts."""
+    total = np.zeros(motion.shape)
+    for piece in (term for term in motion.terms if isinstance(term, Piecewise)):
+        left = stop[..., None] - piece.knots
+        after = np.concatenate([left[..., 1:], np.zeros_like(left[..., :1])], -1)
+        level = piece.acceleration + piece.jerk * left
+        terms = level * (left**3 - after**3) / 6 - piece.jerk * (left**4 - after**4) / 8
+        total = total + piece.velocity * stop**2 / 2 + np.sum(terms, -1)
+    return total

@@ -18,6 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import ByValue
+
 __all__ = ["Derivatives", "ModalPolynomials", "Term", "symmetrised"]
 
 Array = NDArray[np.float64]
@@ -77,7 +79,7 @@ def symmetrised(tensor: Array, positions: int, first: int = 0) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class ModalPolynomials:
+class ModalPolynomials(ByValue):
     """Modal equations with polynomial terms.
 
     Attributes

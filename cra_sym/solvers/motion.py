@@ -10,11 +10,12 @@ from ..checks import broadcastable, choice, equal, flag, one_axis, real_array
 from ..si import paired
 from .motion_terms import Harmonic, Piecewise, Term
 from .moves import check_feasible, fastest, quotient
-from .records import KINDS, spline_motion, uniform_times
+from .records import KINDS, spline_motion, timed_last, uniform_times
 
 __all__ = ["BaseMotion", "Force", "Harmonic", "Piecewise"]
 
 _FASTEST = 1e15  # rad/s, beyond which responses are not even finite
+_FORCES = "N or N m or N/m"  # of a place, of a turn, along a line
 
 Array = np.ndarray
 
@@ -49,6 +50,7 @@ class BaseMotion:
     """
 
     __array_ufunc__ = None  # an array times a motion is a batch of motions, not an array of objects
+    __pandas_priority__ = 5000  # and a series too
     terms: tuple[Term, ...]
     sample_step: float | None = None
     """Time between the samples of a record, s; None of a motion that is not one."""
@@ -74,6 +76,9 @@ class BaseMotion:
         )
         varpi = real_array("angular_frequency", varpi, low=0.0, high=_FASTEST)
         broadcastable(velocity=v, acceleration=a, amplitude=B, angular_frequency=varpi, phase=psi)
+        with np.errstate(over="ignore", under="ignore"):
+            if not np.isfinite(B * varpi**2).all():
+                raise ValueError("amplitude, angular_frequency: must leave amplitude angular_frequency^2 finite")
         v, a = np.broadcast_arrays(v, a)
         terms: list[Term] = []
         if np.any(v) or np.any(a):
@@ -113,10 +118,11 @@ class BaseMotion:
         ----------
         t : array_like, shape (T,), or None
             Uniform increasing times from 0 or later, s, to 1 % of a step; at least two. Numbers may be rounded or of
-            single precision, dates and time differences of NumPy are taken too. Dates, and times that begin after
-            1e8 s, are counted from the first sample.
+            single precision, dates and time differences of NumPy, pandas and Python are taken too. Dates, and times
+            that begin after 1e8 s, are counted from the first sample.
         record : array_like, shape (..., T)
-            Samples, m/s2, m/s or m; leading axes are a batch.
+            Samples, m/s2, m/s or m; leading axes are a batch. Of labelled times and records (xarray) the dimension of
+            the times need not be the last.
         velocity : float or ndarray
             Velocity at t = 0, m/s, of a record of acceleration; the others have their own, that of the first sample.
         kind : {'acceleration', 'velocity', 'position'}
@@ -143,7 +149,7 @@ class BaseMotion:
         choice("kind", kind, KINDS)
         exact = flag("exact", exact)
         units = {"acceleration": "m/s^2", "velocity": "m/s", "position": "m"}
-        samples = real_array(kind, record, unit=units[kind])
+        samples = real_array(kind, timed_last(t, record, kind), unit=units[kind])
         if samples.ndim == 0:
             raise ValueError(f"{kind} has shape (): its last axis must have the sample times")
         v = real_array("velocity", velocity, unit="m/s")
@@ -198,12 +204,17 @@ class BaseMotion:
             As :meth:`trapezoid`.
         """
         limit: dict[str, Any] = {"low": 0.0, "open_low": True}
-        d, a_max = real_array("distance", distance, unit="m"), real_array("a_max", a_max, unit="m/s^2", **limit)
-        v_max = real_array("v_max", v_max, unit="m/s", allow_infinite=True, **limit)
-        j_max = real_array("j_max", j_max, unit="m/s^3", allow_infinite=True, **limit)
-        wanted = None if duration is None else real_array("duration", duration, unit="s", **limit)
-        shapes = {"distance": d, "v_max": v_max, "a_max": a_max, "j_max": j_max}
-        shape = broadcastable(**shapes, **({} if wanted is None else {"duration": wanted}))
+        units = {"distance": "m", "v_max": "m/s", "a_max": "m/s^2", "j_max": "m/s^3", "duration": "s"}
+        numbers = dict(zip(units, (distance, v_max, a_max, j_max, duration), strict=True))
+        if duration is None:
+            del numbers["duration"]
+        given = {
+            name: real_array(name, value, unit=units[name], allow_infinite=name in ("v_max", "j_max"),
+                             **({} if name == "distance" else limit))
+            for name, value in paired(numbers, units).items()
+        }  # fmt: skip
+        shape, wanted = broadcastable(**given), given.get("duration")
+        d, v_max, a_max, j_max = (given[name] for name in ("distance", "v_max", "a_max", "j_max"))
         t_j, t_a, t_v = (np.broadcast_to(value, shape) for value in fastest(np.abs(d), v_max, a_max, j_max))
         least = 2 * (2 * t_j + t_a) + t_v
         if not np.isfinite(least).all():
@@ -263,7 +274,7 @@ class BaseMotion:
 
     def __mul__(self, factor: Any) -> BaseMotion:
         """Scale the motion by real factors; an array is a batch."""
-        scale = real_array("factor", factor)
+        scale = real_array("factor", factor, unit="1")
         shape = broadcastable(motion=np.empty(self.shape), factor=scale)
         terms: list[Term] = []
         for term in self.terms:
@@ -316,7 +327,7 @@ class BaseMotion:
     def __getitem__(self, index: Any) -> BaseMotion:
         """Return one of a batch, or some."""
         if not self.shape:
-            raise IndexError("a single motion has no batch axis")
+            raise TypeError("a single motion has no batch axis")
         terms = [term.picked(self.shape, index) for term in self.terms]
         return self._like(terms, np.empty(self.shape)[index].shape)
 
@@ -362,9 +373,10 @@ class Force:
     """The motion whose acceleration the force is."""
 
     def __init__(self, level: Any = 0.0, amplitude: Any = 0.0, angular_frequency: Any = 0.0, phase: Any = 0.0) -> None:
-        constant, size = real_array("level", level), real_array("amplitude", amplitude)
-        varpi = real_array("angular_frequency", angular_frequency, low=0.0, high=_FASTEST, unit="rad/s")
-        psi = real_array("phase", phase, unit="rad")
+        units = {"level": _FORCES, "amplitude": _FORCES, "angular_frequency": "rad/s", "phase": "rad"}
+        numbers = paired(dict(zip(units, (level, amplitude, angular_frequency, phase), strict=True)), units)
+        constant, size, varpi, psi = (real_array(name, value, unit=units[name]) for name, value in numbers.items())
+        varpi = real_array("angular_frequency", varpi, low=0.0, high=_FASTEST)
         broadcastable(level=constant, amplitude=size, angular_frequency=varpi, phase=psi)
         constant = constant + np.where(varpi == 0.0, size * np.sin(psi), 0.0)
         with np.errstate(all="ignore"):
@@ -386,7 +398,8 @@ class Force:
             As :meth:`BaseMotion.sampled`.
         """
         history = cls()
-        history.profile = BaseMotion.sampled(t, real_array("force", force), sampling_rate=sampling_rate, exact=exact)
+        samples = real_array("force", timed_last(t, force, "force"), unit=_FORCES)
+        history.profile = BaseMotion.sampled(t, samples, sampling_rate=sampling_rate, exact=exact)
         return history
 
     def __call__(self, t: Any) -> Any:

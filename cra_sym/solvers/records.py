@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import real_array
+from ..checks import real_array, shown
+from ..si import check_rows, dimensions
 
-__all__ = ["KINDS", "spline_motion", "uniform_times"]
+__all__ = ["KINDS", "spline_motion", "timed_last", "uniform_times"]
 
 Array = NDArray[np.float64]
 KINDS = ("acceleration", "velocity", "position")
@@ -53,6 +54,23 @@ def uniform_times(t: Any, sampling_rate: Any, number: int, name: str) -> Array:
     return _gridded(times, resolution)
 
 
+def timed_last(t: Any, record: Any, name: str) -> Any:
+    """Return a record with the dimension of the times as its last one, where both have names.
+
+    Raises
+    ------
+    ValueError
+        If the record has other dimensions, or other rows.
+    """
+    check_rows({"t": t, name: record})
+    times, found = dimensions(t), dimensions(record)
+    if not times or not found:
+        return record
+    if times[0] not in found:
+        raise ValueError(f"{name} has the dimensions {found}: must have that of t, {times[0]!r}")
+    return record.transpose(*(one for one in found if one != times[0]), times[0])
+
+
 def _enough(times: Array, name: str) -> Array:
     if times.size < 2:
         raise ValueError(f"{name} has {times.size} samples: must be at least two")
@@ -61,7 +79,17 @@ def _enough(times: Array, name: str) -> Array:
 
 def _seconds(t: Any) -> tuple[Array, float]:
     """Return times in seconds, and how finely their numbers tell them."""
-    given = np.asarray(getattr(t, "values", t)) if not isinstance(t, (list, tuple)) else t
+    if hasattr(getattr(t, "dtype", None), "tz"):  # of pandas
+        given = np.asarray(t, dtype=f"M8[{t.dtype.unit}]")
+    elif isinstance(t, (list, tuple)) or hasattr(type(t), "dimensionality"):  # of Pint: no array without its unit
+        given = t
+    else:
+        given = np.asarray(getattr(t, "values", t))
+    if len(np.shape(given)) == 1 and len(given) and hasattr(given[0], "timestamp"):  # dates of Python
+        try:
+            return np.array([(one - given[0]).total_seconds() for one in given]), 1e-6
+        except (AttributeError, TypeError) as error:
+            raise TypeError(f"t = {shown(t)}: must be dates of one kind") from error
     if isinstance(given, np.ndarray) and given.dtype.kind == "M":
         if np.isnat(given).any():
             raise ValueError(f"t[{int(np.argmax(np.isnat(given).ravel()))}] is not a time (NaT)")
@@ -86,7 +114,8 @@ def _gridded(times: Array, resolution: float) -> Array:
                 f"t[{at + 1}] = {times[at + 1]:g} is t[{at}]: the numbers tell times to {resolution:.2g} s only; "
                 "give sampling_rate instead"
             )
-        raise ValueError(f"t[{at + 1}] = {times[at + 1]:g} after {times[at]:g}: sample times must increase")
+        cure = "; where they are rounded, give sampling_rate instead" if span[at] == 0 else ""
+        raise ValueError(f"t[{at + 1}] = {times[at + 1]:g} after {times[at]:g}: sample times must increase{cure}")
     step = float(np.sort(span)[(span.size - 1) // 2])
     slack = _UNEVEN * step + resolution
     gap = np.flatnonzero(span > 1.5 * step + slack)

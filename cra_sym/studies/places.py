@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -62,8 +63,11 @@ class Folder(Place):
         return str(self.path)
 
     def exists(self) -> bool:
-        """Tell whether anything is there."""
-        return os.path.exists(self.path)
+        """Tell whether anything but an empty folder is there."""
+        try:
+            return os.path.exists(self.path) and not (self.path.is_dir() and not any(self.path.iterdir()))
+        except OSError:  # what cannot be looked into is not empty
+            return True
 
     def opened(self) -> Path:
         """Return the path."""
@@ -143,6 +147,8 @@ def place_of(store: str | Path) -> Place:
         If it is neither a path nor the URL of an object store.
     """
     if not isinstance(store, str) or "://" not in store:
+        if re.match(r"[A-Za-z][A-Za-z0-9+.-]+:/", str(store)):  # a path made of a URL has lost a stroke
+            raise ValueError(f"store = {str(store)!r}: must be a local path, or the URL of an object store as a text")
         return Folder(path_of("store", store))
     protocol = store.partition("://")[0]
     if protocol not in _OBJECTS:

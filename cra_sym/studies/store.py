@@ -91,7 +91,7 @@ def _opened(study: Study, place: Place) -> Any:
     """Return the variable of a store that holds this sweep."""
     zarr = require("zarr", "scale")
     try:
-        group = zarr.open_group(place.opened(), mode="r", zarr_format=2)
+        group = zarr.open_group(place.opened(), mode="r", zarr_format=2, use_consolidated=True)
         there = dict(group.attrs).get(_DESCRIBED)
     except (OSError, ValueError, KeyError):
         there = None
@@ -102,7 +102,10 @@ def _opened(study: Study, place: Place) -> Any:
     differences = _differences(there, study.described())
     if differences:
         raise ValueError(f"store = {place.name!r}: holds another sweep ({'; '.join(differences)}); must be a new place")
-    return _array(place, study.quantity.name, "r")
+    try:
+        return _array(place, study.quantity.name, "r")
+    except (OSError, ValueError, KeyError):
+        raise ValueError(f"store = {place.name!r}: a part of the sweep is missing there; must be a new path") from None
 
 
 def _differences(there: dict[str, str], here: dict[str, str]) -> list[str]:

@@ -23,6 +23,8 @@ from cra_sym.studies.quantities import Quantity, named_quantity
 __all__ = ["Study", "Swept", "make_study"]
 
 Index = NDArray[np.intp]
+Noted = dict[str, tuple[Any, bool]]
+"""Labels of the dimensions, and whether they are stated or only counted."""
 _BLOCK = 1 << 17  # systems evaluated at once in memory
 _KINDS = "biufc"  # truth values, integers, real and complex numbers
 
@@ -90,6 +92,11 @@ class Study:
         """Evaluate the product of some places of every dimension."""
         values = self._evaluated(dict(zip(self.dims, places, strict=True)))
         whole = (*(place.size for place in places), *self.added.values())
+        if not np.can_cast(values.dtype, self.dtype):
+            raise TypeError(
+                f"quantity = {self.quantity.name}: it returns {values.dtype} here and {self.dtype} at the first point; "
+                f"must be of one kind, as numpy.asarray(..., {values.dtype}) makes it"
+            )
         return np.broadcast_to(values, whole).astype(self.dtype, copy=False)
 
     def _evaluated(self, at: Mapping[str, Index]) -> NDArray[Any]:
@@ -105,7 +112,10 @@ class Study:
             objects = {name: s.values[int(here[s.dims[0]][0])] for name, s in self.objects.items()}
             parts[corner] = self._called(here, objects)
         first = parts[(0,) * len(shape)]
-        found = np.empty((*(places.size for places in at.values()), *first.shape[len(at) :]), first.dtype)
+        if all(places.size == 1 for places in at.values()):
+            self.check_point(first)
+        kind = np.result_type(*(part.dtype for part in parts.values()))
+        found = np.empty((*(places.size for places in at.values()), *first.shape[len(at) :]), kind)
         order = list(at)
         for corner, part in parts.items():
             place: list[Any] = [slice(None)] * len(at)
@@ -118,7 +128,24 @@ class Study:
         fields = {name: swept.over(at) for name, swept in self.fields.items()}
         numbers = {name: swept.over(at) for name, swept in self.numbers.items()}
         system = self.system.replace(**fields) if fields else self.system
-        return np.asarray(self.quantity.function(system, **self.options, **numbers, **objects))
+        return self._numbers(self.quantity.function(system, **self.options, **numbers, **objects))
+
+    def _numbers(self, value: Any) -> NDArray[Any]:
+        """Return what the quantity gave as an array, units converted to SI."""
+        if isinstance(value, (list, tuple)):
+            return np.asarray([self._numbers(entry) for entry in value])
+        return np.asarray(plain_numbers(f"quantity = {self.quantity.name}", value))
+
+    def check_point(self, corner: NDArray[Any]) -> None:
+        """Refuse what the quantity returns for one entry an axis unless its shape is that of the system, and more."""
+        number = len(self.dims)
+        if corner.shape[:number] != (1,) * number:
+            options = ", ".join(self.options)
+            doubt = f"; an array among the options ({options}) may be paired with it" if options else ""
+            raise ValueError(
+                f"quantity = {self.quantity.name}: with one entry an axis it returns the shape {corner.shape}, which "
+                f"must begin with {(1,) * number}, that of the system{doubt}"
+            )
 
     def evaluate(self) -> NDArray[Any]:
         """Evaluate everything, in slabs along the first dimension."""
@@ -202,14 +229,14 @@ def make_study(system: System, quantity: str | Callable[..., Any], parameters: M
     known = (*system.values, "zeta")
     chosen.check_options([name for name in parameters if name not in known], known)
     units = {**system.model.units, "zeta": "1", **chosen.axes}
-    labels: dict[str, Any] = {}
+    noted: dict[str, tuple[Any, bool]] = {}
     fields: dict[str, Swept] = {}
     numbers: dict[str, Swept] = {}
     objects: dict[str, Swept] = {}
     options = {}
     for name, value in parameters.items():
         if name in known or name in chosen.axes:
-            axis = _axis(system, name, value, units.get(name, ""), labels, name in known)
+            axis = _axis(system, name, value, units.get(name, ""), noted, name in known)
             if axis is not None:
                 (fields if name in known else numbers)[name] = axis
             elif name in known:
@@ -217,11 +244,17 @@ def make_study(system: System, quantity: str | Callable[..., Any], parameters: M
             else:
                 options[name] = value
         elif _is_batch(value):
-            objects[name] = _batch(name, value, labels)
+            objects[name] = _batch(name, value, noted)
         else:
             options[name] = value
     first = {name: np.ravel(s.values)[0] for name, s in fields.items()}
     system = system.replace(**first) if first else system
+    labels = {dimension: label for dimension, (label, _) in noted.items()}
+    for dimension in labels:
+        if dimension in known and (dimension not in fields or fields[dimension].dims != (dimension,)):
+            raise ValueError(
+                f"dimension {dimension!r}: is the name of a parameter that is not swept along it; rename it"
+            )
     study = Study(system, chosen, labels, fields, numbers, objects, options, {}, np.dtype(float))
     corner = study._evaluated({name: np.zeros(1, dtype=np.intp) for name in labels})
     return _with_axes(study, corner)
@@ -232,23 +265,21 @@ def _with_axes(study: Study, corner: NDArray[Any]) -> Study:
     quantity, number = study.quantity, len(study.dims)
     if corner.dtype.kind not in _KINDS:
         raise TypeError(f"quantity = {quantity.name}: it returns {corner.dtype}; must be numbers or truth values")
-    if corner.ndim < number or corner.shape[:number] != (1,) * number:
-        held = ", ".join(study.options) or "none"
-        raise ValueError(
-            f"quantity = {quantity.name}: with one entry an axis it returns the shape {corner.shape}, which must "
-            f"begin with {(1,) * number}, that of the system; an array among the options ({held}) may be paired with it"
-        )
+    study.check_point(corner)
     lengths = corner.shape[number:]
     names = quantity.dims or tuple(f"component_{index}" for index in range(len(lengths)))
     if len(names) != len(lengths):
         raise ValueError(
             f"quantity = {quantity.name}: it adds {len(lengths)} axes, must be {len(names)} ({', '.join(names)})"
         )
+    for dimension in study.dims:
+        if dimension in (*names[: len(lengths)], quantity.name):
+            raise ValueError(f"dimension {dimension!r}: is a name of the quantity {quantity.name}; rename it")
     values = {name: getattr(study, name) for name in study.__dataclass_fields__}
     return Study(**(values | {"added": dict(zip(names, lengths, strict=True)), "dtype": corner.dtype}))
 
 
-def _axis(system: System, name: str, value: Any, unit: str, labels: dict[str, Any], is_field: bool) -> Swept | None:
+def _axis(system: System, name: str, value: Any, unit: str, noted: Noted, is_field: bool) -> Swept | None:
     """Return a parameter as an axis, or as part of the labelled one it shares; None if it is a number."""
     dims = dimensions(value)
     numbers = plain_numbers(name, value, unit or None) if dims is not None else value
@@ -266,20 +297,23 @@ def _axis(system: System, name: str, value: Any, unit: str, labels: dict[str, An
     if array.size == 0:
         raise ValueError(f"{name}: an array of shape {array.shape}; must not be empty")
     for dimension, length in zip(dims, array.shape, strict=True):
+        if not isinstance(dimension, str):
+            raise TypeError(f"{name}: dimension {dimension!r}: must have a text for a name")
         given = getattr(value, "coords", {})
         own = array if dims == (name,) else np.arange(length)
         label = np.asarray(given[dimension]) if dimension in given and dims != (name,) else own
-        _put(labels, dimension, label, name, stated=dimension in given or dims == (name,))
+        _put(noted, dimension, label, name, stated=dimension in given or dims == (name,))
     return Swept(dims, array, unit)
 
 
-def _put(labels: dict[str, Any], dimension: str, label: Any, name: str, stated: bool) -> None:
-    """Note the labels of a dimension, or refuse others than those it has."""
-    if dimension not in labels:
-        labels[dimension] = label
-    elif len(labels[dimension]) != len(label):
-        raise ValueError(f"{name}: dimension {dimension!r} has {len(label)} entries, another {len(labels[dimension])}")
-    elif stated and not np.array_equal(labels[dimension], label):
+def _put(noted: Noted, dimension: str, label: Any, name: str, stated: bool) -> None:
+    """Note the labels of a dimension, or refuse others than those stated for it."""
+    known, before = noted.setdefault(dimension, (label, stated))
+    if len(known) != len(label):
+        raise ValueError(f"{name}: dimension {dimension!r} has {len(label)} entries, another {len(known)}")
+    if stated and not before:
+        noted[dimension] = label, True
+    elif stated and not np.array_equal(known, label):
         raise ValueError(f"{name}: the coordinate of dimension {dimension!r} is not that of another parameter")
 
 
@@ -290,9 +324,9 @@ def _is_batch(value: Any) -> bool:
     )
 
 
-def _batch(name: str, value: Any, labels: dict[str, Any]) -> Swept:
+def _batch(name: str, value: Any, noted: Noted) -> Swept:
     """Return a motion, force or excitation that is a batch as an axis."""
     if len(value.shape) != 1 or not hasattr(type(value), "__getitem__"):
         raise ValueError(f"{name} is a batch of shape {value.shape}: must be a single one, or a batch along one axis")
-    _put(labels, name, np.arange(value.shape[0]), name, stated=True)
+    _put(noted, name, np.arange(value.shape[0]), name, stated=True)
     return Swept((name,), value, "")

@@ -242,6 +242,40 @@ def test_what_no_joint_explains_is_said(frequencies):
         assert np.isinf(fit.covariance).all()
 
 
+@pytest.mark.parametrize(
+    ("measured", "uncertainty", "said"),
+    [
+        (cra.natural_frequencies(JOINT, 4)[1:], 0.01, "give modes=(2, 3, 4)"),  # the first was missed
+        (2 * np.pi * cra.natural_frequencies(JOINT, 2), 0.01, "no values"),  # rad/s taken for Hz
+        (cra.natural_frequencies(NOMINAL, 2) * 1.05, 0.01, "fit: mode 2 is off by"),  # above those of a rigid joint
+        ([1e6, 2e6], 1.0, "mode 2 is off by 2e+06 sigma"),
+    ],
+)
+def test_neighbours_of_what_does_not_fit(measured, uncertainty, said):
+    with pytest.warns(MisfitWarning, match=re.escape(said)), warnings.catch_warnings():
+        warnings.simplefilter("ignore", IdentifiabilityWarning)
+        fit = cra.identify_joint(NOMINAL, measured, uncertainty)
+    assert not fit.fits and not fit.identifiable and len(fit.solutions) == 1
+
+
+@pytest.mark.parametrize(
+    ("k_t", "k_r", "number"), [(0.5, 0.05, 3), (1e5, 0.05, 3), (0.5, 1e4, 3), (300.0, 1e4, 2)]
+)
+def test_neighbours_of_a_joint_that_a_local_search_misses(k_t, k_r, number):
+    exact = cra.natural_frequencies(NOMINAL.replace(k_t=k_t, k_r=k_r), number)
+    fit = cra.identify_joint(NOMINAL, exact, 1e-5 * exact)
+    # what the frequencies tell of the stiffer spring: a hundredth of its deviation, and rounding of the search
+    assert len(fit.solutions) == 1
+    np.testing.assert_allclose([fit.k_t, fit.k_r], [k_t, k_r], rtol=1e-6, atol=0)
+
+
+def test_extreme_sizes_make_no_warnings_of_numpy():
+    """The square of the force at the root of a beam of E = 1e300 Pa overflowed."""
+    with pytest.warns(UserWarning) as said:
+        cra.identify_joint(NOMINAL.replace(E=1e300), [32.22], 0.1)
+    assert {type(warning.message) for warning in said} <= {MisfitWarning, IdentifiabilityWarning}
+
+
 def test_the_frequency_in_the_way_is_named():
     measured = cra.natural_frequencies(JOINT, 5)
     measured[1] *= 1.1

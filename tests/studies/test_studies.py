@@ -7,6 +7,7 @@ import pickle
 import subprocess
 import sys
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -402,6 +403,51 @@ def test_what_a_quantity_is_made_of_stays(quantity, kind, way, tmp_path):
     np.testing.assert_allclose(found.values, expected, rtol=1e-12)
 
 
+LAST = K_T[:2].max()
+
+
+@pytest.mark.parametrize(
+    ("quantity", "message"),
+    [
+        (lambda arm: arm.k_t + 1j * np.any(arm.k_t == LAST) if np.any(arm.k_t == LAST) else arm.k_t,
+         "it returns complex128 here and float64 at the first point"),
+        (lambda arm: arm.k_t + 0.5 if np.any(arm.k_t == LAST) else np.ones(arm.shape, int), "float64 here and int64"),
+        (lambda arm: arm.k_t if np.any(arm.k_t == LAST) else arm.k_t > 1, "float64 here and bool"),
+        (lambda arm: np.ma.masked_equal(arm.k_t, LAST), "quantity = <lambda>: element .*1.* is masked"),
+        (lambda arm: 3.0, r"it returns the shape \(\), which must begin with \(1,.*, that of the system$"),
+    ],
+    ids=["complex", "float", "not truth values", "masked", "one number"],
+)  # fmt: skip
+@pytest.mark.parametrize("way", [{}, {"chunks": 2}, {"motion": cra.BaseMotion(velocity=[0.1, 0.2])}],
+                         ids=["memory", "store", "batch"])  # fmt: skip
+def test_what_is_of_another_kind_than_the_first_point_is_refused(quantity, message, way, tmp_path):
+    """Else the imaginary part is lost, 10000.5 is 10000, and a number is True."""
+    asked = (lambda arm, motion: quantity(arm)) if "motion" in way else quantity
+    store = {"store": tmp_path / "study.zarr"} if "chunks" in way else {}
+    with pytest.raises((TypeError, ValueError), match=message):
+        cra.sweep(cra.Arm.nominal(), asked, k_t=K_T[:2], **way, **store)
+
+
+def test_units_of_a_quantity_are_converted():
+    class Quantity:  # the documented attributes of one of Pint
+        dimensionality = property(lambda _: {"[length]": 1})
+
+        def __init__(self, magnitude):
+            self.magnitude = magnitude
+
+        def to_base_units(self):
+            return self
+
+        def unit_items(self):
+            return [("meter", 1)]
+
+        def to(self, unit):
+            return Quantity(1e-3 * self.magnitude)
+
+    study = cra.sweep(cra.Arm.nominal(), lambda arm: Quantity(arm.k_t), k_t=K_T[:2])
+    np.testing.assert_allclose(study["<lambda>"], 1e-3 * K_T[:2])
+
+
 def test_what_is_not_a_number_is_refused():
     with pytest.raises(TypeError, match="quantity = <lambda>: it returns <U4; must be numbers"):
         cra.sweep(cra.Arm.nominal(), lambda arm: np.full(arm.shape, "text"), k_t=[1.0, 2.0])
@@ -447,6 +493,26 @@ def test_labelled_parameters_that_do_not_fit_are_refused(k_t, m_e, message):
     }
     with pytest.raises(ValueError, match=message):
         cra.sweep(cra.Arm.nominal(), **given)
+
+
+@pytest.mark.parametrize(
+    ("dims", "message"),
+    [
+        ("mode", "dimension 'mode': is a name of the quantity"),
+        ("natural_frequencies", "is a name of the quantity"),
+        ("m_e", "dimension 'm_e': is the name of a parameter that is not swept along it"),
+    ],
+)
+def test_a_dimension_of_a_name_that_is_taken_is_refused(dims, message):
+    with pytest.raises(ValueError, match=message):
+        cra.sweep(cra.Arm.nominal(), k_t=xarray.DataArray([1e3, 1e4], dims=dims))
+
+
+@pytest.mark.parametrize("order", [("k_t", "m_e"), ("m_e", "k_t")])
+def test_a_parameter_may_lie_along_another_in_any_order(order):
+    given = {"k_t": xarray.DataArray([1e3, 1e4], dims="m_e"), "m_e": [0.0, 0.1]}
+    study = cra.sweep(cra.Arm.nominal(), **{name: given[name] for name in order})
+    assert study.natural_frequencies.dims == ("m_e", "mode") and study.m_e.values.tolist() == [0.0, 0.1]
 
 
 def test_units_of_labelled_parameters_are_kept_or_refused():
@@ -520,6 +586,54 @@ def test_a_callable_object_resumes_until_its_state_changes(tmp_path):
         cra.sweep(cra.Arm.nominal(), quantity_of(tmp_path, OBJECT.format(scale=2.0), "own"), k_t=K_T[:2], store=place)
     with pytest.raises(ValueError, match=r"holds another sweep .*quantity"):
         cra.sweep(cra.Arm.nominal(), quantity_of(tmp_path, OBJECT.format(scale=3.0), "own"), k_t=K_T[:2], store=place)
+
+
+HELPED = """
+import functools
+FACTOR = {factor}
+def helper(arm):
+    return [{helped} for _ in range(1)][0]
+def own(arm):
+    return FACTOR * helper(arm)
+class Own:
+    def __call__(self, arm):
+        return self.factor() * helper(arm)
+    def factor(self):
+        return FACTOR
+kept, made = functools.lru_cache(own), Own()
+"""
+
+
+@pytest.mark.parametrize("name", ["own", "kept", "made"])
+@pytest.mark.parametrize("changes", [{"factor": 3.0}, {"helped": "2 * arm.k_t"}])
+def test_what_a_function_takes_from_its_module_counts(tmp_path, name, changes):
+    """A constant or a helper that changed gave the numbers of before."""
+    place, first = tmp_path / "study.zarr", {"factor": 2.0, "helped": "arm.k_t"}
+    for _ in range(2):
+        quantity = quantity_of(tmp_path, HELPED.format(**first), name)
+        cra.sweep(cra.Arm.nominal(), quantity, k_t=K_T[:2], store=place)
+    with pytest.raises(ValueError, match=r"holds another sweep .*quantity"):
+        changed = quantity_of(tmp_path, HELPED.format(**(first | changes)), name)
+        cra.sweep(cra.Arm.nominal(), changed, k_t=K_T[:2], store=place)
+
+
+def test_an_empty_folder_is_a_new_store_and_a_broken_one_is_said(tmp_path):
+    place = tmp_path / "study.zarr"
+    place.mkdir()
+    cra.sweep(cra.Arm.nominal(), k_t=K_T[:2], store=place)
+    (place / "natural_frequencies" / ".zarray").unlink()
+    with pytest.raises(ValueError, match=r"store = .*a part of the sweep is missing there"):
+        cra.sweep(cra.Arm.nominal(), k_t=K_T[:2], store=place)
+    (place / ".zmetadata").unlink()
+    with pytest.raises(ValueError, match="holds something else than a sweep"):
+        cra.sweep(cra.Arm.nominal(), k_t=K_T[:2], store=place)
+
+
+def test_a_url_that_was_made_a_path_makes_no_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ValueError, match=r"store = 's3:/bucket/study': must be .* URL of an object store as a text"):
+        cra.sweep(cra.Arm.nominal(), k_t=K_T[:2], store=Path("s3:/" + "/bucket/study"))
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
