@@ -258,9 +258,7 @@ def test_neighbours_of_what_does_not_fit(measured, uncertainty, said):
     assert not fit.fits and not fit.identifiable and len(fit.solutions) == 1
 
 
-@pytest.mark.parametrize(
-    ("k_t", "k_r", "number"), [(0.5, 0.05, 3), (1e5, 0.05, 3), (0.5, 1e4, 3), (300.0, 1e4, 2)]
-)
+@pytest.mark.parametrize(("k_t", "k_r", "number"), [(0.5, 0.05, 3), (1e5, 0.05, 3), (0.5, 1e4, 3), (300.0, 1e4, 2)])
 def test_neighbours_of_a_joint_that_a_local_search_misses(k_t, k_r, number):
     exact = cra.natural_frequencies(NOMINAL.replace(k_t=k_t, k_r=k_r), number)
     fit = cra.identify_joint(NOMINAL, exact, 1e-5 * exact)
