@@ -167,17 +167,22 @@ def _certify(options: Options) -> None:
 
 def _claims_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("id", nargs="*", metavar="ID", help="claims to judge, such as C03 (all)")
+    parser.add_argument(
+        "--slipping", action="store_true", help="ask those again that a bolted joint that slips changes"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON, evidence included")
     _arm_options(parser)
 
 
 def _claims(options: Options) -> None:
     from cra_sym.claims import claim, claims
+    from cra_sym.claims.slipping import slipping_claim, slipping_claims
     from cra_sym.claims.table import verdict_text
 
+    one, every = (slipping_claim, slipping_claims) if options.slipping else (claim, claims)
     with _reading_input():
         arm = _chosen_arm(options)
-        verdicts = [claim(id, arm) for id in options.id] if options.id else claims(arm)
+        verdicts = [one(id, arm) for id in options.id] if options.id else every(arm)
     print(json.dumps([v.as_dict() for v in verdicts], indent=1) if options.json else verdict_text(verdicts))
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from cra_sym.analysis import fit_words
 from cra_sym.analysis.fit_arguments import checked_data, checked_names, checked_priors
+from cra_sym.analysis.fit_quality import SMALLEST_P, Goodness, goodness, information_inverse
 from cra_sym.analysis.fit_search import Data, Search
 from cra_sym.analysis.fit_unknowns import Unknown, unknowns
 from cra_sym.checks import ByValue, default_floating_point, instance
@@ -29,8 +30,6 @@ __all__ = [
 
 Array = NDArray[np.float64]
 _JOINT = ("k_t", "k_r")
-_SMALLEST_P = 0.01
-_LARGEST_RESIDUAL = 3.0  # sigma, where there are no degrees of freedom
 
 
 class IdentifiabilityWarning(UserWarning):
@@ -286,21 +285,13 @@ def _estimates(kind: type[Identification], search: Search, data: Data) -> list[I
     best = _estimate(kind, search, data, places[0])
     if not best.fits or search.residuals(places[0], data).size < len(search.unknowns):
         return [best]
-    good = [place for place in places if _goodness(search, data, place)[-1]]
+    good = [place for place in places if _goodness(search, data, place).fits]
     return [_estimate(kind, search, data, place) for place in search.distinct(good, data)]
 
 
-def _goodness(search: Search, data: Data, place: Array) -> tuple[float, int, float, bool]:
-    """Return chi2, degrees of freedom, p value and whether the place fits."""
-    from scipy.special import chdtrc
-
-    residuals = search.residuals(place, data)
-    freedom = residuals.size - len(search.unknowns)
-    chi2 = float(np.sum(residuals**2))
-    if freedom <= 0:
-        return chi2, freedom, float("nan"), bool(np.abs(residuals).max() < _LARGEST_RESIDUAL)
-    p_value = float(chdtrc(freedom, chi2))
-    return chi2, freedom, p_value, p_value >= _SMALLEST_P
+def _goodness(search: Search, data: Data, place: Array) -> Goodness:
+    """Return how well a place fits."""
+    return goodness(search.residuals(place, data), len(search.unknowns))
 
 
 def _estimate(kind: type[Identification], search: Search, data: Data, place: Array) -> Identification:
@@ -308,7 +299,7 @@ def _estimate(kind: type[Identification], search: Search, data: Data, place: Arr
     chi2, freedom, p_value, fits = _goodness(search, data, place)
     stiff = [unknown.kind == "stiffness" for unknown in search.unknowns]
     jacobian = _jacobian(search.unknowns, values, found, data)
-    spread = _covariance(jacobian)
+    spread = information_inverse(jacobian)
     if not fits:
         spread = spread * (chi2 / freedom if freedom > 0 else np.inf)
     size = np.array([abs(value) for value in values.values()])
@@ -341,35 +332,23 @@ def _jacobian(parameters: Iterable[Unknown], values: Mapping[str, float], found:
     return np.nan_to_num(np.vstack([rows, prior]), nan=0.0, posinf=0.0, neginf=0.0)
 
 
-def _covariance(jacobian: Array) -> Array:
-    """Return the inverse of the Fisher information of weighted residuals; inf where it is singular."""
-    rows, columns = jacobian.shape
-    size = np.linalg.norm(jacobian, axis=0)
-    if rows < columns or not size.all():
-        return np.full((columns, columns), np.inf)
-    _, values, basis = np.linalg.svd(jacobian / size)
-    if values[-1] <= 1e-12 * values[0]:
-        return np.full((columns, columns), np.inf)
-    return np.asarray((basis.T / values**2) @ basis / np.outer(size, size))
-
-
 def _hints(search: Search, data: Data, lowest: bool) -> list[str]:
     """Say which single frequency is in the way, and which single mode may have been missed."""
     spare = data.measured.size + sum(unknown.prior is not None for unknown in search.unknowns) - len(search.unknowns)
     hints = []
     if spare >= 2:
         p_values = [_best_p(search, data.without(entry)) for entry in range(data.measured.size)]
-        if max(p_values) >= _SMALLEST_P:
+        if max(p_values) >= SMALLEST_P:
             hints.append(f"without mode {data.modes[int(np.argmax(p_values))] + 1} they fit")
     if spare >= 1 and lowest:
         number = data.measured.size
         trials = [np.delete(np.arange(number + 1), skipped) for skipped in range(number)]
         p_values = [_best_p(search, replace(data, modes=trial)) for trial in trials]
-        if max(p_values) >= _SMALLEST_P:
+        if max(p_values) >= SMALLEST_P:
             modes = tuple((trials[int(np.argmax(p_values))] + 1).tolist())
             hints.append(f"taken as modes {', '.join(map(str, modes))} they fit: give modes={modes}")
     return hints
 
 
 def _best_p(search: Search, data: Data) -> float:
-    return max(_goodness(search, data, place)[2] for place in search.minima(data, most=3))
+    return max(_goodness(search, data, place).p_value for place in search.minima(data, most=3))

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from scipy.special import chdtrc
 
 from cra_sym.analysis import fit_words
+from cra_sym.analysis.fit_quality import goodness, information_inverse
 from cra_sym.analysis.identification import (
     AmbiguityWarning,
     IdentifiabilityWarning,
@@ -29,7 +29,6 @@ __all__ = ["identify_slip"]
 Array = NDArray[np.float64]
 _REACH = np.log(3.0)  # of the grid of starts, up and down
 _STEP = 1e-4  # of the logarithms, for differences: harmonic balance settles to 1e-7
-_SMALLEST_P, _LARGEST_RESIDUAL = 0.01, 3.0  # as of `cra_sym.identify`
 _BAD = 1e3  # residual, in sigma, where there is no motion
 
 
@@ -207,12 +206,8 @@ def _estimate(fit: _Fit, logs: Array) -> Identification:
     residuals, values = fit.residuals(logs), fit.values(logs)
     steps = _STEP * np.eye(logs.size)
     jacobian = np.stack([(fit.residuals(logs + step) - fit.residuals(logs - step)) / (2 * _STEP) for step in steps], -1)
-    chi2, freedom = float(np.sum(residuals**2)), residuals.size - logs.size
-    p_value = float(chdtrc(freedom, chi2)) if freedom > 0 else float("nan")
-    fits = bool(p_value >= _SMALLEST_P if freedom > 0 else np.abs(residuals).max() < _LARGEST_RESIDUAL)
-    information = jacobian.T @ jacobian
-    known = freedom >= 0 and np.linalg.cond(information) < 1e12
-    spread = np.linalg.inv(information) if known else np.full_like(information, np.inf)
+    chi2, freedom, p_value, fits = goodness(residuals, logs.size)
+    spread = information_inverse(jacobian)
     if not fits:
         spread = spread * (chi2 / freedom if freedom > 0 else np.inf)
     size, deviation = np.array(list(values.values())), np.sqrt(np.diag(spread))

@@ -64,14 +64,18 @@ class BoltedJoint:
 
     Notes
     -----
-    The defaults are assumed, for the nominal arm: a joint in aluminium of which little holds without friction.
+    The defaults are assumed, for the nominal arm: a joint in aluminium of which little holds without friction. A load
+    that falls exponentially with the distance of the faces has a stiffness proportional to it; Pohrt and Popov computed
+    exponents of 0.51 to 0.77. Mindlin's ratio is that of one circular contact; that it holds between rough faces too is
+    what Campana, Persson and Muser found.
 
     References
     ----------
     J. A. Greenwood, J. B. P. Williamson, "Contact of nominally flat surfaces", Proceedings of the Royal Society A 295
     (1966), 300-319. R. D. Mindlin, "Compliance of elastic bodies in contact", Journal of Applied Mechanics 16 (1949),
     259-268. R. Pohrt, V. L. Popov, "Normal contact stiffness of elastic solids with fractal rough surfaces", Physical
-    Review Letters 108 (2012), 104301.
+    Review Letters 108 (2012), 104301. C. Campana, B. N. J. Persson, M. H. Muser, "Transverse and normal interfacial
+    stiffness of solids with randomly rough surfaces", Journal of Physics: Condensed Matter 23 (2011), 085001.
 
     Examples
     --------

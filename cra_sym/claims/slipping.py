@@ -24,6 +24,7 @@ from cra_sym.checks import choice, default_floating_point
 from cra_sym.claims.ledger import claim
 from cra_sym.claims.motions import peak
 from cra_sym.claims.setting import Setting
+from cra_sym.claims.slipping_pictures import PICTURES
 from cra_sym.claims.verdict import Finding, Quantity, Verdict, judged
 from cra_sym.claims.words import by_outcome, listed, number, percent, span
 from cra_sym.model.excitations import Fluctuation
@@ -43,6 +44,8 @@ def _axes(**more: Quantity) -> dict[str, Quantity]:
     return {
         "preload": Quantity(_PRELOAD, "N", "preload of the joint"),
         "size": Quantity(_SIZES, "1", "size of mean motion and disturbance, over the nominal ones"),
+        "soft_preload": Quantity(_SOFT_PRELOAD, "N", "preload of the soft joint"),
+        "amplitude": Quantity(_AMPLITUDE, "m", "amplitude at the tip on the soft joint"),
         **more,
     }
 
@@ -249,7 +252,7 @@ def _verdict(id: str, setting: Setting) -> Verdict:
         claim=paper.claim,
         source=paper.source,
         setting=setting,
-        picture=None,
+        picture=PICTURES[id],
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import cra_sym as cra
+from cra_sym.__main__ import main
 from cra_sym.claims import judged
 from cra_sym.claims.slipping import SLIPPING, slipping_claim, slipping_claims
 from cra_sym.claims.table import verdict_markdown
@@ -23,6 +24,22 @@ def test_every_verdict_says_what_and_why(verdicts):
         assert "nan" not in verdict.sentence.split() and verdict.title.endswith(", with slip")
         assert verdict.share is None or 0 <= verdict.share <= 1
     assert verdict_markdown(tuple(verdicts.values())).count("\n") == len(SLIPPING) + 1
+
+
+def test_pictures_show_the_evidence(verdicts):
+    for verdict in verdicts.values():
+        (ax,) = verdict.draw().axes
+        assert ax.get_xlabel() and ax.get_ylabel() and len(ax.get_legend().get_texts()) >= 3
+    drawn = verdicts["C16"].draw().axes[0].lines
+    for line, width in zip(drawn, verdicts["C16"]["width"], strict=True):
+        np.testing.assert_array_equal(line.get_ydata(), width)
+
+
+def test_command_line_asks_them_again(capsys):
+    assert main(["claims", "--slipping", "C16"]) == 0
+    assert "C16" in capsys.readouterr().out
+    assert main(["claims", "--slipping", "C01"]) == 2
+    assert "must be one of C02" in capsys.readouterr().err
 
 
 def test_regions_are_those_of_the_evidence(verdicts):
