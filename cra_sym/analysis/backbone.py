@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cra_sym import checks
 from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, ConvergenceWarning, equations_of, samples, watched
-from cra_sym.analysis.slip_backbone import held_curve
+from cra_sym.analysis.slip_backbone import held_curve, warn_of_missing
 from cra_sym.model.system import System
 from cra_sym.solvers.continuation import Curve, Measure, Point, correct, first_point, follow
 from cra_sym.solvers.harmonic_balance import Balance, Basis, peak
@@ -22,7 +22,6 @@ __all__ = ["Backbone", "backbone"]
 
 Array = NDArray[np.float64]
 _START = 1e-5  # nonlinear share of the forces at the first point
-_COARSE = 1e-3  # relative change of frequency or damping ratio by more harmonics of which a user is told
 _MOST_POINTS = 1000
 _MORE_MODES, _MORE_HARMONICS = 3, 4  # in which the error is estimated
 UNSTABLE = 1e-6
@@ -178,19 +177,7 @@ def _held(
         raise ValueError(f"system has the batch shape {system.shape}: must be a single one here")
     targets = checks.real_array("amplitude", amplitude, low=1e-60, high=1e60)
     found = held_curve(system, mode, targets.ravel(), modes, harmonics, place, field)
-    missing = np.flatnonzero(np.isnan(found.angular_frequency))
-    if missing.size:
-        first = targets.ravel()[missing[0]]
-        warnings.warn(f"no motion was found at amplitude = {first:g}", ConvergenceWarning, stacklevel=4)
-    coarse = np.flatnonzero(found.error_harmonics > _COARSE)
-    if coarse.size:
-        first = targets.ravel()[coarse[0]]
-        warnings.warn(
-            f"at amplitude = {first:g} more harmonics do not converge, as they meet other modes; error_harmonics tells "
-            "what the last of them changed. Fewer modes have fewer of these resonances",
-            ConvergenceWarning,
-            stacklevel=4,
-        )
+    warn_of_missing(found, targets.ravel())
 
     def shaped(values: NDArray[Any]) -> NDArray[Any]:
         return np.asarray(values.reshape((*targets.shape, *values.shape[1:])))[()]

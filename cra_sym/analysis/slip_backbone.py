@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.analysis.nonlinear import equations_of, samples, watched
+from cra_sym.analysis.nonlinear import ConvergenceWarning, equations_of, samples, watched
 from cra_sym.analysis.slip_states import ACCURACY, FIRST, elements_of, statics_of
 from cra_sym.model.system import System
 from cra_sym.solvers.harmonic_balance import Basis, peak
@@ -16,7 +17,7 @@ from cra_sym.solvers.slip_balance import SlipBalance
 from cra_sym.solvers.slip_modes import Held, HeldMotions
 from cra_sym.solvers.slip_stability import slip_multipliers
 
-__all__ = ["HeldCurve", "held_curve"]
+__all__ = ["HeldCurve", "held_curve", "warn_of_missing"]
 
 Array = NDArray[np.float64]
 _MOST = 127  # harmonics
@@ -25,6 +26,7 @@ _FOLLOWED = 3  # harmonics with which a curve is followed where motions with few
 _TRIALS = 60  # steps towards the next amplitude
 _JUMP = 0.05  # of frequency and damping ratio by more harmonics: another motion
 _UNSTABLE = 1e-6
+_COARSE = 1e-3  # change of frequency or damping ratio by the last harmonics of which a user is told
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +71,21 @@ def held_curve(
         problem, found, before = rich, finer, change
         if len(rich.balance.basis.sines) >= _MOST or not (left[~stopped] > ACCURACY).any():
             return _told(problem, found, left, missing)
+
+
+def warn_of_missing(found: HeldCurve, amplitudes: Array) -> None:
+    """Warn the caller of the caller's public function of motions that were not found, or in few harmonics only."""
+    missing = np.flatnonzero(np.isnan(found.angular_frequency))
+    if missing.size:
+        text = f"no motion was found at amplitude = {amplitudes[missing[0]]:g}"
+        warnings.warn(text, ConvergenceWarning, stacklevel=5)
+    coarse = np.flatnonzero(found.error_harmonics > _COARSE)
+    if coarse.size:
+        text = (
+            f"at amplitude = {amplitudes[coarse[0]]:g} more harmonics do not converge, as they meet other modes; "
+            "error_harmonics tells what the last of them changed. Fewer modes have fewer of these resonances"
+        )
+        warnings.warn(text, ConvergenceWarning, stacklevel=5)
 
 
 Flags = NDArray[np.bool_]
