@@ -37,7 +37,8 @@ def asymmetry(form: StateForm) -> str:
         return "the Lagrangian has terms of first order in time"
     half = form.system.rows // 2
     a, b, c, d = (form.system[i : i + half, j : j + half] for i in (0, half) for j in (0, half))
-    pairs = ((b, b.T), (c, c.T), (d, -a.T), (form.boundary, form.boundary.T))
+    points = ((matrix, matrix.T) for _, matrix, _ in form.points)
+    pairs = ((b, b.T), (c, c.T), (d, -a.T), (form.boundary, form.boundary.T), *points)
     if all(vanishes(entry) for left, right in pairs for entry in left - right):
         return ""
     return "the virtual work has forces that follow the motion"

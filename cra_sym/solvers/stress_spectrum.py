@@ -155,6 +155,7 @@ class _Problem:
         held = self.still @ self.mass
         self.rows = np.concatenate([rows, held], axis=1)
         self.springs = np.concatenate([springs, np.full(held.shape[:2], np.inf)], axis=1)
+        self.softened = np.ones(len(sets))  # least share of the stiffness that negative springs leave of a motion
         self.elastic = columns.elastic_stiffness[sets]
         self.potential = None if columns.potential is None else columns.potential[sets]
 
@@ -184,6 +185,7 @@ class _Problem:
             load = self._load(operator)
         else:
             loading = np.ones((len(self.sets), 1))
+        loading = loading / self.softened[:, None]
         matrix = operator @ self.mass @ operator.swapaxes(-1, -2)
         number = modes - self.still.shape[1]
         wanted = min(max(number, 0) + EXTRA, matrix.shape[-1])
@@ -264,13 +266,20 @@ class _Problem:
             return None
         size = projected.shape[1]
         factor = np.broadcast_to(np.eye(size), (len(left), size, size)).copy()
-        for k in np.argsort(np.isinf(left).any(axis=0), kind="stable"):
+        # what is held is held before a negative spring takes its part
+        order = np.argsort(np.where(left < 0.0, 2, np.isinf(left)), axis=1, kind="stable")
+        left, projected = (
+            np.take_along_axis(left, order, axis=1),
+            np.take_along_axis(projected, order[:, None], axis=2),
+        )
+        for k in range(left.shape[1]):
             row = (projected[:, :, k][:, None, :] @ factor)[:, 0]
             square = (row**2).sum(axis=1)
             with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
                 growth = 1.0 + left[:, k] * square
                 if (growth < -1e-12).any():
                     raise BuckledError((growth < 0.0).astype(int))
+                self.softened = np.minimum(self.softened, np.maximum(growth, EPS))
                 shrink = np.where(np.isinf(growth), 0.0, 1.0 / np.sqrt(np.maximum(growth, 1e-300)))
                 pull = np.where(square > 0.0, (1.0 - shrink) / square, 0.0)
             factor -= pull[:, None, None] * (factor @ row[:, :, None]) * row[:, None, :]

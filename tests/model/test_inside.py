@@ -65,6 +65,37 @@ def test_a_string_with_a_bead_and_a_spring(place):
     np.testing.assert_allclose(found, exact[:3], rtol=CLOSE)
 
 
+@pytest.mark.parametrize("spring", [-0.1, -6.0, -40.0, -47.9])
+def test_a_negative_spring_between_supports(spring):
+    """1 + k (tan y - tanh y) / (32 y^3) = 0 with y = sqrt(omega) / 2: the beam buckles at k = -48."""
+
+    def condition(y):
+        return 1 + spring * (np.tan(y) - np.tanh(y)) / (32 * y**3)
+
+    first = (2 * brentq(condition, 0.1, np.pi / 2 - 1e-9, xtol=1e-15, rtol=1e-15)) ** 2
+    found = beam(essential=PINNED, inside=[(HALF, -k * v**2 / 2)]).at({k: spring}).natural_frequencies(2)
+    np.testing.assert_allclose(found, [first, 4 * np.pi**2], rtol=10 * CLOSE)
+    with pytest.raises(ValueError, match="buckled: 1 unstable mode"):
+        beam(essential=PINNED, inside=[(HALF, -k * v**2 / 2)]).at({k: -48.1}).natural_frequencies(1)
+
+
+def test_a_form_of_displacement_and_slope_that_is_not_definite():
+    """At the middle of a cantilever k v v' takes and gives: lumped mass tip and stiffness [[96, -24], [-24, 8]]."""
+    massless = -(v.diff(x, 2) ** 2) / 2
+    short = cra.Model(
+        massless,
+        fields=[v],
+        x=x,
+        domain=(0, 1),
+        t=t,
+        essential=CLAMPED,
+        inside=[(HALF, KINETIC - k * v * v.diff(x))],
+    )
+    found = short.at({k: [[4.0], [3.0]]}).natural_frequencies(1)[..., 0]
+    exact = [96 - (k_ - 24) ** 2 / 8 for k_ in (4.0, 3.0)]
+    np.testing.assert_allclose(found.ravel() ** 2, exact, rtol=CLOSE)
+
+
 def test_supports_and_springs_that_become_supports():
     """A pinned beam held at its middle: two spans, omega = (2 pi)^2 and 4 (3.9266...)^2."""
     exact = [(2 * np.pi) ** 2, 4 * 3.92660231204792**2]

@@ -143,6 +143,12 @@ RELATED = {
     "hanging from a hinge": ({"more": SLACK, "essential": (ROOT,)}, [END], {c: 0.3}),
     "damped halfway": ({"more": SLACK}, [MIDDLE], {c: 3}),
     "critical on a foundation": ({"more": -25 * v**2}, [ALONG], {c: 2 * np.sqrt(3.516015268500394**2 + 50) - 1e-3}),
+    "pressed to the middle": (
+        {"more": P * sp.Heaviside(HALF - x) * v.diff(x) ** 2 / 2}, [(-P * v.diff(x), v, HALF)], {P: 15}
+    ),
+    "a moment inside that follows": ({"essential": PINNED[:1], "left": -9 * v.diff(x) ** 2}, [
+        (-P * v, v.diff(x), R(1, 4)), MIDDLE], {P: 8, c: 0.2}
+    ),
     "damped over a half": ({}, [(-c * sp.Heaviside(x - HALF) * v.diff(t), v, "domain")], {c: 20}),
 }  # fmt: skip
 
@@ -152,7 +158,7 @@ def test_what_is_damped_or_pressed_agrees_with_elements(name):
     """Eigenvalues, a response in time and one at a frequency, by 24 elements with a node halfway."""
     options, work, values = RELATED[name]
     model = line(**options, virtual_work=[*work, (F, v, "right")])
-    ritz = model.ritz(12, nodes=[HALF])
+    ritz = model.ritz(12, nodes=[R(1, 4), HALF])
     ((_, stiffness, damping, mass),) = ritz._numbers(ritz._columns(values)[0])
     size = len(mass)
     whole = np.zeros((2 * size + 1, 2 * size + 1))
@@ -169,6 +175,12 @@ def test_what_is_damped_or_pressed_agrees_with_elements(name):
     assert_allclose(found, expected, atol=5e-3 * np.abs(expected).max())  # the static share of the modes beyond
     moved = np.linalg.solve(stiffness + 7.3j * damping - 7.3**2 * mass, np.eye(size)[-2])[-2]
     assert_allclose(cra.frequency_response(system, 7.3, drive=F), moved, rtol=5e-4)
+
+
+def test_what_follows_at_an_interior_place_has_no_natural_frequencies():
+    model = line(virtual_work=[(-P * v.diff(x), v, HALF)])
+    with pytest.raises(ValueError, match="forces that follow the motion; use eigenvalues"):
+        model.at({P: 1.0}).natural_frequencies(1)
 
 
 @pytest.mark.parametrize(
