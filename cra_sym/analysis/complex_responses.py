@@ -64,7 +64,7 @@ def complex_response(
     for cause in (None, *causes):
         times, derivative = checked(BaseMotion() if cause is None else cause.profile, t, derivative, start)
     found = []
-    shape, members = _members(system, causes, outputs, modes, zeta, _momenta(system, initial), check)
+    shape, members = _members(system, causes, outputs, modes, zeta, _momenta(system, initial), check, whole=True)
     for one in members:
         y = one.start
         total = driven_system(one.motions.system, 0.0 * y, one.rows, BaseMotion(), (), y, times, derivative)
@@ -95,7 +95,8 @@ def complex_residual(
         When nothing drives any more, s.
     """
     found = []
-    shape, members = _members(system, _causes(system, histories, "inertial"), tip, modes, zeta, (None, None), check)
+    causes = _causes(system, histories, "inertial")
+    shape, members = _members(system, causes, tip, modes, zeta, (None, None), check, whole=False)
     for one, end in zip(members, np.broadcast_to(stop, shape).ravel(), strict=True):
         matrix, state, moment = one.motions.system, 0.0 * one.start, np.array([end])
         for profile, member, push, strike in one.causes:
@@ -125,8 +126,10 @@ def _members(
     zeta: Array,
     momenta: tuple[Load | None, Load | None],
     check: Callable[[BaseMotion, Array], None],
+    *,
+    whole: bool,
 ) -> tuple[tuple[int, ...], Iterator[_Member]]:
-    """Return the shape of the batch and its members."""
+    """Return the shape of the batch and its members; see :func:`lowest_motions` for ``whole``."""
     shapes = {f"motion {k}": np.empty(cause.profile.shape) for k, cause in enumerate(causes)}
     shape = broadcastable(values=np.empty(system.shape), zeta=zeta, **shapes)
     columns, ratios = flat_columns(system.parameters, shape), np.broadcast_to(zeta, shape).ravel()
@@ -138,7 +141,7 @@ def _members(
             key = np.append(column, ratios[number]).tobytes()
             if motions is None or key != kept:  # the motion varies fastest
                 ((_, problem),) = system.numerics("pencil").problems(column)
-                motions, kept = lowest_motions(problem, modes, float(ratios[number])), key
+                motions, kept = lowest_motions(problem, modes, float(ratios[number]), whole=whole), key
             one = system.model.at(dict(zip(system.numerics("names"), column[:, 0], strict=True)))
             omega = np.sort(np.abs(motions.eigenvalues.imag))
             start = _projected(one, motions, motions.start, momenta[0])

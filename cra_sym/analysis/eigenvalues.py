@@ -143,8 +143,8 @@ def count_eigenvalues(system: System, radius: Any) -> NDArray[np.int64]:
     Raises
     ------
     ValueError
-        If the radius is out of range, an eigenvalue lies on the circle, or it reaches to waves too short to follow or
-        to where rounding leaves no digits.
+        If the radius is out of range, an eigenvalue lies on the circle, it reaches to waves too short to follow or to
+        where rounding leaves no digits, or a stiffness vanishes at an end.
 
     Examples
     --------
@@ -166,6 +166,11 @@ def count_eigenvalues(system: System, radius: Any) -> NDArray[np.int64]:
     columns, radii = flat_columns(system.parameters, shape), np.broadcast_to(radii, shape).ravel()
     found = np.empty(len(radii), dtype=np.int64)
     squared = not system.numerics("damped")
+    if system.numerics("driven_spatial").singular(columns).any():
+        raise ValueError(
+            "values: a stiffness vanishes at an end, where the characteristic function is infinite; count the "
+            "eigenvalues of a domain that ends a thousandth of its length before"
+        )
     for rows, _, problem in system.numerics("driven_spatial").problems(columns):
         for number, row in enumerate(rows):
             reach = float(radii[row])

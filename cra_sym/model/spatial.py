@@ -26,6 +26,7 @@ __all__ = ["HALVINGS", "SpatialProblem", "check_range", "shares", "spatial_probl
 Array = NDArray[np.float64]
 HALVINGS = 6
 """How often the two parts of a problem that varies along x are halved: then it has 128 steps."""
+_NEAR_END = 1e-7  # share of the length from an end at which a coefficient is compared with that at the end
 _LONGEST_ROW = 400  # operations from where on a further derivative of a coefficient takes too long
 
 
@@ -179,6 +180,24 @@ class SpatialProblem:
         """Return how fast the system of some parameter sets may vary along x, or None if as polynomials do."""
         found, decaying = self.exponents
         return None if found is None else Variation(found.function, columns, decaying)
+
+    def singular(self, columns: Array) -> NDArray[np.bool_]:
+        """Return in which parameter sets a coefficient of the system becomes infinite at an end: a stiffness vanishes.
+
+        Parameters
+        ----------
+        columns : ndarray, shape (parameters, sets)
+        """
+        sets = columns.shape[1]
+        if self.uniform or not self.displacements:
+            return np.zeros(sets, dtype=bool)
+        finite = np.where(np.isinf(columns), 0.0, columns)
+        length, left = (np.broadcast_to(value, sets)[:, None] for value in self.geometry.function(*finite))
+        x = np.concatenate([left, left + _NEAR_END * length, left + (1.0 - _NEAR_END) * length, left + length], axis=1)
+        with np.errstate(all="ignore"):
+            found = np.abs(np.asarray(self.system(x, 1.0, *finite[..., None])[0]))
+        size = np.broadcast_to(found, (*x.shape, *found.shape[-2:])).max(axis=(-2, -1))
+        return np.asarray(~((size[:, 0] * _NEAR_END < size[:, 1]) & (size[:, 3] * _NEAR_END < size[:, 2])))
 
     def derivative_row(self, place: int, order: int, z: np.ndarray, x: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Return the row c with ``D^order q[place] = c (q, w, P)``, shape (rows, modes, stations, 2 n + m)."""

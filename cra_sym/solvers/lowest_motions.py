@@ -17,10 +17,13 @@ from .pencil import SHIFT, Array, GeneralContinuum, Reduced, reduced
 from .pencil_refine import matched, meshes, sequence
 from .stress_mesh import rule
 
-__all__ = ["BasisModes", "LowestMotions", "lowest_motions"]
+__all__ = ["BasisModes", "LowestMotions", "lowest_motions", "modal_damping"]
 
 _SETTLED = 1e-9
 """Relative difference of the eigenvalues on two meshes."""
+_MIDDLE, _ASTRAY = 2, 1e-2  # mesh of all motions, and relative difference of eigenvalues that are none
+_OBLIQUE = 3.0
+"""How much larger than a state a part of it may be: of orthogonal modes, as without dampers, never."""
 _SAME = 1e-6  # relative difference of moduli that are not told apart: a pair is not split
 _AT_ONCE = 1e3  # rate of decay over the last oscillating eigenvalue asked for
 _LIGHT = 1e-7  # square root of a mass, relative to the largest, below which a coordinate has none
@@ -107,6 +110,8 @@ class LowestMotions:
         Coordinates of the basis for a unit of each y.
     start : ndarray, shape (r, k)
         y for a unit of each momentum of given displacements, ``M d``; that of given velocities is ``push``.
+    oblique : float
+        Norm, by the energies, of the projection of states on these motions: one if the others are orthogonal to them.
     """
 
     basis: BasisModes
@@ -114,6 +119,7 @@ class LowestMotions:
     push: Array
     shapes: Array
     start: Array
+    oblique: float
 
     @property
     def eigenvalues(self) -> NDArray[np.complex128]:
@@ -121,7 +127,7 @@ class LowestMotions:
         return np.asarray(eigvals(self.system))
 
 
-def lowest_motions(problem: GeneralContinuum, modes: int, zeta: float) -> LowestMotions:
+def lowest_motions(problem: GeneralContinuum, modes: int, zeta: float, *, whole: bool = False) -> LowestMotions:
     """Return the motions of as many eigenvalues as that many oscillators have, or one more than splits a pair.
 
     Where dampers resist the strains (Kelvin-Voigt) eigenvalues crowd, and none of these can be left out: then all
@@ -134,6 +140,10 @@ def lowest_motions(problem: GeneralContinuum, modes: int, zeta: float) -> Lowest
     modes : int
     zeta : float
         Modal damping ratio of the structure without dampers.
+    whole : bool
+        Return all motions of a basis for so many natural modes without dampers where the eigenvalues do not settle, or
+        their modes make a poor sum: an end that takes up the waves, or nearly so, leaves a motion without eigenvalues,
+        or with modes that all but depend on each other.
 
     Raises
     ------
@@ -142,13 +152,15 @@ def lowest_motions(problem: GeneralContinuum, modes: int, zeta: float) -> Lowest
     """
     ((_, chosen, mesh),) = meshes(problem, 2 * modes, 1e-10)
     before: NDArray[np.complex128] | None = None
-    worst = np.inf
+    worst, middle = np.inf, None
     for turn, finer in enumerate(sequence(mesh)):
         (one,) = reduced(chosen, finer)
         first, second = one.pencil()
         first, second = first[0], second[0]
-        second[: len(one.stiffness[0]), : len(one.stiffness[0])] += _modal(one, zeta)
+        second[: len(one.stiffness[0]), : len(one.stiffness[0])] += modal_damping(one, zeta)
         s = _all(first, second)
+        if turn == _MIDDLE:
+            middle = one, first, second, 2.0 * float(np.abs(s[-1]))
         if one.columns.resists_strains:
             swinging = s[s.imag > _SAME * np.abs(s)][:modes]
             if before is not None and (len(swinging) or turn > 1):
@@ -165,8 +177,15 @@ def lowest_motions(problem: GeneralContinuum, modes: int, zeta: float) -> Lowest
             # where some meet each is known to half its digits
             worst = float((np.abs(near - s[:number]) / scale).max())
             if worst < _SETTLED or _moments(near, s[:number]) < _SETTLED:
-                return _motions(one, first, second, float(np.sqrt(np.abs(s[number - 1] * s[number]))))
+                found = _motions(one, first, second, float(np.sqrt(np.abs(s[number - 1] * s[number]))))
+                if not whole or found.oblique < _OBLIQUE:
+                    return found
+                return _motions(one, first, second, 2.0 * float(np.abs(s[-1])))
         before = s
+        if whole and turn > _MIDDLE and worst > _ASTRAY:
+            break
+    if whole and middle is not None:
+        return _motions(*middle)
     raise ValueError(
         f"modes = {modes}: the eigenvalues of so many modes settle to {worst:.1g} only; ask for fewer modes. An end "
         "that takes up the waves leaves none"
@@ -197,8 +216,8 @@ def _moments(near: NDArray[np.complex128], s: NDArray[np.complex128]) -> float:
     return float(max(abs((near - s).sum()) / size, abs((near**2 - s**2).sum()) / size**2))
 
 
-def _modal(one: Reduced, zeta: float) -> Array | float:
-    """Return the damping matrix of a ratio of every mode of the structure without dampers."""
+def modal_damping(one: Reduced, zeta: float) -> Array | float:
+    """Return the damping matrix of a ratio of every mode of the structure without dampers, in units of the rate."""
     if not zeta:
         return 0.0
     stiffness, root = one.stiffness[0], one.root_mass[0]
@@ -244,4 +263,5 @@ def _motions(one: Reduced, first: Array, second: Array, radius: float) -> Lowest
         rate * inverse @ left[:k].T,
         right[:k],
         rate**2 * inverse @ (project @ units),
+        float(np.linalg.norm(right @ (inverse @ project), 2)),
     )

@@ -1,0 +1,86 @@
+"""Frequency responses from the basis on the stresses: dampers along x, stiffnesses that vanish at an end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import nullcontext, suppress
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.model.projection import project
+from cra_sym.model.routes import Modes
+from cra_sym.model.system import System
+from cra_sym.solvers.driven_basis import driven_on_basis
+
+__all__ = ["on_basis"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+def on_basis(
+    system: System,
+    columns: Array,
+    s: Complex,
+    drive: str | Callable[[Modes], Array],
+    place: int,
+    x: Array | None,
+    *,
+    motion: bool = False,
+    zeta: Array | None = None,
+) -> tuple[Complex, NDArray[np.bool_]]:
+    """Return responses ``exp(s t)`` of parameter sets, (sets, places, K), and which sets have one.
+
+    Parameters
+    ----------
+    system : System
+    columns : ndarray, shape (parameters, sets)
+    s : ndarray of complex, shape (sets, K)
+        rad/s.
+    drive : str or callable
+        The name of a motion or a force, or ``drive(modes)`` returns what each mode displaces of what is driven.
+    place : int
+        Which displacement of the section answers.
+    x : ndarray or None
+        Places; None is the right end.
+    motion : bool
+        Whether what is driven moves by one unit.
+    zeta : ndarray, shape (sets,), optional
+        Modal damping ratios.
+
+    Raises
+    ------
+    ValueError
+        If the response does not settle where there is no other method: where a coefficient is infinite at an end, or
+        with modal damping.
+    """
+    count = 1 if x is None else len(x)
+    found = np.empty((len(s), count, s.shape[1]), dtype=complex)
+    there = np.zeros(len(s), dtype=bool)
+    pencil = system.numerics("pencil")
+    if pencil is None and zeta is not None:
+        raise ValueError(
+            "zeta: too few modes reach the accuracy of 1e-6 where the problem varies along x; set damping='structural' "
+            "or lower angular_frequency or zeta"
+        )
+    if pencil is None:
+        return found, there
+    alone = system.numerics("damped_spatial").singular(columns) | (zeta is not None)
+
+    def outputs(basis: Modes) -> Array:
+        return basis.displacement(1, place)[None] if x is None else basis.shape(place, 0, x).T
+
+    for row in range(len(s)):
+        column = columns[:, row : row + 1]
+        domain = system.model.at(dict(zip(system.numerics("names"), column[:, 0], strict=True))).domain
+
+        def load(basis: Modes, domain=domain) -> Array:  # type: ignore[no-untyped-def]
+            return project(domain, basis, system.numerics("load", drive)) if isinstance(drive, str) else drive(basis)
+
+        with nullcontext() if alone[row] else suppress(ValueError):
+            ((_, problem),) = pencil.problems(column)
+            ratio = 0.0 if zeta is None else float(zeta[row])
+            found[row] = driven_on_basis(problem, s[row], load, outputs, motion=motion, zeta=ratio)
+            there[row] = True
+    return found, there
