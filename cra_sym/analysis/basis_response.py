@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from cra_sym.model.projection import project
 from cra_sym.model.routes import Modes
 from cra_sym.model.system import System
+from cra_sym.model.vanishing import check_forces
 from cra_sym.solvers.driven_basis import driven_on_basis
 
 __all__ = ["on_basis"]
@@ -71,6 +72,8 @@ def on_basis(
     def outputs(basis: Modes) -> Array:
         return basis.displacement(1, place)[None] if x is None else basis.shape(place, 0, x).T
 
+    if isinstance(drive, str):
+        check_forces(system, system.numerics("load", drive), pencil)
     for row in range(len(s)):
         column = columns[:, row : row + 1]
         domain = system.model.at(dict(zip(system.numerics("names"), column[:, 0], strict=True))).domain

@@ -13,6 +13,7 @@ from cra_sym.model.projection import Load, project
 from cra_sym.model.routes import Modes
 from cra_sym.model.system import System
 from cra_sym.model.values import flat_columns
+from cra_sym.model.vanishing import check_forces
 from cra_sym.solvers.coupled_modes import driven_system
 from cra_sym.solvers.driven_modes import Start, checked
 from cra_sym.solvers.free_peaks import free_peaks
@@ -162,7 +163,9 @@ def _causes(system: System, histories: Mapping[str, BaseMotion | Force], start: 
     for name, history in histories.items():
         force = isinstance(history, Force)
         profile = history.profile if isinstance(history, Force) else history
-        found.append(_Cause(profile, system.numerics("load", name), not force and start == "inertial"))
+        load = system.numerics("load", name)
+        check_forces(system, load, system.numerics("pencil"))
+        found.append(_Cause(profile, load, not force and start == "inertial"))
     constant = system.numerics("constant")
     return found if constant is None else [*found, _Cause(Force(1.0).profile, constant, False)]
 

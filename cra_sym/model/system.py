@@ -17,6 +17,7 @@ from cra_sym.model.routes import ROUNDING, TOLERANCE, Estimated, Modes, Route
 from cra_sym.model.slip_elements import SlipElements, slip_elements, slip_terms_of
 from cra_sym.model.spatial import check_range
 from cra_sym.model.values import Value, checked_damping, checked_values, frozen
+from cra_sym.model.vanishing import check_forces
 
 if TYPE_CHECKING:
     from sympy import Expr
@@ -279,6 +280,7 @@ class System:
 
     def project(self, load: Load, modes: int) -> Array:
         """Return the generalised force of a load on every mode, shape (..., modes)."""
+        check_forces(self, load, self._route)
         return project(self.domain, self.modes(modes), load)
 
     def form(self, name: str, modes: int, *, diagonal: bool = False) -> Projected:

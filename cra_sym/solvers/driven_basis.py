@@ -76,6 +76,7 @@ def driven_on_basis(
         raise ValueError(
             f"angular_frequency: the response settles to {worst:.1g} only, on {size} coordinates; lower it"
             + (" or zeta, or set damping='structural'" if zeta else "")
+            + ". A force has no finite response where a stiffness vanishes"
         )
     return found
 

@@ -121,7 +121,8 @@ def _vanishes(problem: Continuum, end: int) -> NDArray[np.bool_]:
                 name, moved = ("left", "right")[end], ("displacement", "slope")[k]
                 raise ValueError(
                     f"the stiffness vanishes at the {name} end like the distance to the power {power[held][0]:.3g}: a "
-                    f"force on the {moved} there makes the strain infinite; leave out its spring, mass or damper"
+                    f"force on the {moved} there makes the strain infinite; leave out its spring, mass or damper, or "
+                    "the load"
                 )
         steep = power - weight > 2 * order - 1e-3
         if steep.any():

@@ -50,6 +50,21 @@ def test_a_force_on_a_hanging_chain(drag):
     assert_allclose(inside, chain_receptance(0.7, drag, [1.0])[0], rtol=1e-9)
 
 
+@pytest.mark.parametrize("drag", [0.3, 0.0])
+def test_a_force_on_the_tip_of_a_chain_is_refused(drag):
+    """It would move without bounds: the sum of squared tip displacements over squared frequencies diverges."""
+    system = line(CHAIN, virtual_work=[(F, v, "right"), ALONG]).at({c: drag})
+    for asked in (
+        lambda: cra.tip_response(system, {F: cra.Force(1.0)}, [0.5]),
+        lambda: cra.frequency_response(system, 2.0, drive=F),
+        lambda: cra.state_space(system, 2, F),
+    ):
+        with pytest.raises(ValueError, match=r"vanishes at the right end .* or the load"):
+            asked()
+    with pytest.raises(ValueError, match="no finite response where a stiffness vanishes"):
+        cra.frequency_response(system, 2.0, drive=v.subs(x, 1))
+
+
 def test_a_chain_at_rest_and_one_that_is_shaken():
     model = line(CHAIN, virtual_work=[(F, v, HALF)])
     assert_allclose(cra.frequency_response(model.at({}), 0.0, [0.3, 1.0], drive=F), -np.log([0.7, 0.5]), rtol=1e-10)

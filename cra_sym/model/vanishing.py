@@ -1,0 +1,47 @@
+"""Forces on ends at which a stiffness vanishes: they make the strain infinite there, whatever method sums it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cra_sym.model.projection import Load
+from cra_sym.model.stress_route import StressRoute
+from cra_sym.model.values import flat_columns
+from cra_sym.solvers.stress_refine import alike
+
+if TYPE_CHECKING:
+    from cra_sym.model.system import System
+
+__all__ = ["check_forces"]
+
+
+def check_forces(system: System, load: Load, route: object) -> None:
+    """Raise a ValueError if a load acts on a displacement of an end where that makes the strain infinite.
+
+    A stiffness like the distance to the power a lets no force act on the displacement of a string from a = 1 on, of a
+    beam from a = 3 on, on its slope from a = 1 on. ``route`` is what gives the system its modes.
+    """
+    ends = [place for place in load.ends if place.where in ("left", "right")]
+    if not ends or not isinstance(route, StressRoute):
+        return
+    columns, spatial = flat_columns(system.parameters, system.shape), route.spatial
+    if not spatial.singular(columns).any():
+        return
+    pencil = system.numerics("pencil")
+    size = 2 * spatial.displacements + spatial.coordinates
+    units = np.eye(size)
+    acting = [k.entry + (k.where == "right") * (spatial.displacements + spatial.coordinates) for k in ends]
+    for rows, problem in pencil.problems(columns):
+        pulled = np.broadcast_to(units[acting], (len(rows), len(acting), size))
+        ones = np.ones((len(rows), len(acting)))
+        for _ in alike(
+            replace(
+                problem,
+                directions=np.concatenate([problem.directions, pulled], axis=1),
+                springs=np.concatenate([problem.springs, ones], axis=1),
+            )
+        ):
+            pass
