@@ -16,7 +16,7 @@ from cra_sym.model.system import System
 from cra_sym.solvers.continuation import Curve, Measure, Point, correct, first_point, follow
 from cra_sym.solvers.harmonic_balance import Balance, Basis, peak
 from cra_sym.solvers.modal_polynomials import ModalPolynomials
-from cra_sym.solvers.monodromy import even_monodromy
+from cra_sym.solvers.monodromy import multipliers
 
 __all__ = ["Backbone", "backbone"]
 
@@ -414,10 +414,7 @@ def _stable(problem: _Problem, coefficients: Array, frequency: Array) -> NDArray
     """Return whether no multiplier leaves the unit circle, but for the pair that belongs to the curve itself."""
     if not len(frequency):
         return np.zeros(0, bool)
-    turns = float((problem.equations.omega.max() / frequency).max())
-    steps = 2 ** int(np.ceil(np.log2(max(128.0, 2.5 * turns, 8.0 * max(problem.balance.basis.cosines)))))
-    maps = even_monodromy(problem.equations, problem.balance.basis, coefficients, frequency, steps)
-    values = np.linalg.eigvals(maps)
+    values = multipliers(problem.equations, problem.balance.basis, coefficients, frequency, tolerance=1e-7, even=True)
     order = np.argsort(np.abs(values - 1.0), axis=1)
     others = np.take_along_axis(values, order[:, 2:], axis=1)
     return np.asarray(np.abs(others).max(axis=1, initial=0.0) <= 1.0 + UNSTABLE)

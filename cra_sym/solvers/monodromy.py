@@ -1,8 +1,8 @@
 """Floquet multipliers of periodic answers: the equations of variation over one period, many answers at once.
 
-A step turns the linear modes exactly and applies what is left at its middle by a Cayley transform, so that a system
-without damping stays symplectic: multipliers of stable motions lie on the unit circle to rounding, however coarse the
-steps are for the highest modes.
+A step is exact for the stiffness at its middle, so that steps need only follow how the stiffness changes, however fast
+the modes are. Where velocities mix the modes it turns the linear ones exactly and applies the rest at its middle by a
+Cayley transform. Both keep a system without damping symplectic: multipliers of stable motions lie on the unit circle.
 """
 
 from __future__ import annotations
@@ -93,31 +93,45 @@ def _maps(
     q = np.einsum("pnm,sm->psn", coefficients, basis.values(phase)).reshape(-1, n)
     v = np.einsum("pnm,sm,p->psn", coefficients, basis.values(phase, 1), frequency).reshape(-1, n)
     known = None if causes is None else flattened(causes(phase, rows))
-    rest = beside_linear(equations, q, v, known)
+    rest = beside_linear(equations, q, v, known).reshape(points, steps, 2 * n, 2 * n)
     h = 2 * np.pi * share / (frequency * steps)
-    kick = _kick(equations, rest.reshape(points, steps, 2 * n, 2 * n), h)
-    turn = _rotation(equations.omega, 0.5 * h)[:, None]
-    maps = turn @ kick @ turn
+    maps = _turned_and_kicked(equations, rest, h) if _mixes(equations) else _frozen(equations, rest, h)
     while maps.shape[1] > 1:
         maps = maps[:, 1::2] @ maps[:, 0::2]
     return maps[:, 0]
 
 
-def _kick(equations: ModalPolynomials, rest: Array, h: Array) -> Array:
-    """Return the maps of what is beside the undamped linear modes over a step of length h (points,)."""
-    n, one = equations.modes, np.eye(2 * equations.modes)
-    drag = np.diag(equations.damping)
-    if equations.moves_mass or np.any(equations.damping != np.diag(drag)):
-        scaled = rest * h[:, None, None, None]
-        return np.asarray(np.linalg.solve(one - 0.5 * scaled, one + 0.5 * scaled))
-    # displacements stand still: momenta decay under a constant force, exactly
-    rate = drag * h[:, None]
-    lasting = np.where(rate > 0, -np.expm1(-rate) / np.where(rate > 0, rate, 1.0), 1.0) * h[:, None]
-    kick = np.broadcast_to(one, rest.shape).copy()
-    kick[:, :, n:, :n] = lasting[:, None, :, None] * rest[:, :, n:, :n]
-    place = np.arange(n, 2 * n)
-    kick[:, :, place, place] = np.exp(-rate)[:, None, :]
-    return kick
+def _mixes(equations: ModalPolynomials) -> bool:
+    """Whether forces depend on velocities, but for the damping of each mode, or have no energy."""
+    diagonal = np.diag(np.diag(equations.damping))
+    return equations.moves_mass or bool(equations.forces) or bool(np.any(equations.damping != diagonal))
+
+
+def _frozen(equations: ModalPolynomials, rest: Array, h: Array) -> Array:
+    """Return the maps over steps of length h (points,), each with the stiffness of its middle: by its own modes."""
+    n, damping = equations.modes, np.diag(equations.damping)
+    square, shape = np.linalg.eigh(np.diag(equations.omega**2) - rest[:, :, n:, :n])
+    h = h[:, None, None]
+    angle = np.sqrt(np.abs(square)) * h
+    cosine = np.where(square > 0, np.cos(angle), np.cosh(angle))
+    sine = h * np.where(square > 0, np.sinc(angle / np.pi), np.sinh(angle) / np.where(angle > 0, angle, 1.0))
+    sine = np.where(angle > 0, sine, h)
+    maps, across = np.empty_like(rest), shape.swapaxes(-1, -2)
+    maps[:, :, :n, :n] = maps[:, :, n:, n:] = (shape * cosine[:, :, None]) @ across
+    maps[:, :, :n, n:] = (shape * sine[:, :, None]) @ across
+    maps[:, :, n:, :n] = -(shape * (square * sine)[:, :, None]) @ across
+    if damping.any():  # momenta decay over half a step before and after
+        decay = np.exp(-0.5 * damping * h)
+        maps[:, :, n:] *= decay[..., None]
+        maps[:, :, :, n:] *= decay[:, :, None]
+    return maps
+
+
+def _turned_and_kicked(equations: ModalPolynomials, rest: Array, h: Array) -> Array:
+    """Return the maps over steps of length h (points,): the linear modes, and what is beside them at the middle."""
+    one, scaled = np.eye(2 * equations.modes), rest * h[:, None, None, None]
+    turn = _rotation(equations.omega, 0.5 * h)[:, None]
+    return np.asarray(turn @ np.linalg.solve(one - 0.5 * scaled, one + 0.5 * scaled) @ turn)
 
 
 def beside_linear(equations: ModalPolynomials, q: Array, v: Array, causes: Array | None) -> Array:
@@ -154,6 +168,7 @@ def multipliers(
     frequency: Array,
     causes: Causes | None = None,
     tolerance: float = 1e-9,
+    even: bool = False,
 ) -> Complex:
     """Return the Floquet multipliers, by extrapolation of the maps to infinitely many steps.
 
@@ -163,34 +178,67 @@ def multipliers(
         As in :func:`monodromy`.
     tolerance : float
         Error of the maps relative to their size.
+    even : bool
+        Whether the motions are those of :func:`even_monodromy`.
 
     Returns
     -------
     complex ndarray, shape (points, 2 modes)
-        Largest first.
+        Largest first; infinite where they are beyond the range of numbers.
     """
-    found = np.empty((len(frequency), 2 * equations.modes), complex)
+    maps = _extrapolated(equations, basis, coefficients, frequency, causes, tolerance, even)
+    if not (equations.damping.any() or equations.forces):
+        maps = _symplectic(maps)
+    values = np.full(maps.shape[:2], np.inf, complex)
+    finite = np.isfinite(maps).all(axis=(1, 2))
+    values[finite] = np.linalg.eigvals(maps[finite])
+    return np.take_along_axis(values, np.argsort(-np.abs(values), axis=1, kind="stable"), axis=1)
+
+
+@np.errstate(over="ignore", invalid="ignore")  # what is beyond the range of numbers is told as such
+def _extrapolated(
+    equations: ModalPolynomials,
+    basis: Basis,
+    coefficients: Array,
+    frequency: Array,
+    causes: Causes | None,
+    tolerance: float,
+    even: bool,
+) -> Array:
+    """Return the limit of the maps over one period for ever more steps."""
+    found = np.empty((len(frequency), 2 * equations.modes, 2 * equations.modes))
     open_ = np.arange(len(frequency))
-    turns = float((equations.omega.max() / frequency).max(initial=1.0))
+    turns = float((equations.omega.max() / frequency).max(initial=1.0)) if _mixes(equations) else 0.0
     steps = 2 ** int(np.ceil(np.log2(max(32.0, 2.0 * turns, 4.0 * basis.orders.max(initial=1.0)))))
     table: list[Array] = []
     for level in range(_LEVELS):
+        chosen = equations, basis, coefficients[open_], frequency[open_], steps << level
         some = None if causes is None else _of(causes, open_)
-        row = [monodromy(equations, basis, coefficients[open_], frequency[open_], steps << level, some)]
+        row = [even_monodromy(*chosen) if even else monodromy(*chosen, some)]
         for k, before in enumerate(table):
             row.append(row[k] + (row[k] - before) / (4.0 ** (k + 1) - 1))
         if table:
             size = np.abs(row[-1]).max(axis=(1, 2))
             good = np.abs(row[-1] - row[-2]).max(axis=(1, 2)) <= tolerance * size
             good |= level == _LEVELS - 1
-            values = np.linalg.eigvals(row[-1][good])
-            order = np.argsort(-np.abs(values), axis=1, kind="stable")
-            found[open_[good]] = np.take_along_axis(values, order, axis=1)
+            found[open_[good]] = row[-1][good]
             open_, row = open_[~good], [entry[~good] for entry in row]
         table = row
         if not open_.size:
             break
     return found
+
+
+def _symplectic(maps: Array) -> Array:
+    """Return the nearby maps that keep volumes in phase, which extrapolated ones of a system with an energy do not.
+
+    Newton's method for M' J M = J: its steps are M (1 + J E / 2) with E = M' J M - J.
+    """
+    n = maps.shape[-1] // 2
+    j = np.block([[np.zeros((n, n)), np.eye(n)], [-np.eye(n), np.zeros((n, n))]])
+    for _ in range(2):
+        maps = maps + 0.5 * maps @ (j @ (maps.swapaxes(1, 2) @ j @ maps - j))
+    return maps
 
 
 def _of(causes: Causes, members: NDArray[np.intp]) -> Causes:

@@ -8,6 +8,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.special import ellipk
 
 import cra_sym as cra
+from cra_sym.figures.nonlinear import cubic_joint
 from tests.nonlinear_models import BEAM, EI, L, beam, inextensible, mass, oscillator, q, sprung, t, v, x
 
 
@@ -116,6 +117,33 @@ def test_inextensible_arm_against_time_integration_and_its_coefficient():
     period = 2 * np.pi / found.angular_frequency
     end = solve_ivp(rate, (0, period), start, method="DOP853", rtol=1e-12, atol=1e-15).y[:, -1]
     np.testing.assert_allclose(end[:3], start[:3], atol=1e-8 * np.abs(start).max())
+
+
+def test_stability_far_out_is_that_of_time_integration():
+    """Where a joint is 1e4 times as stiff as at rest, its force is faster than every linear mode."""
+    arm, modes = cra.Arm.nominal().replace(L=0.8, m_e=0.004, J_e=1e-6, k_t=5e3, k_r=4e2), 3
+    cubic = 1e6 * arm.k_t
+    curve = cra.backbone(cubic_joint(arm, cubic), points=80, modes=modes)
+    root, square = cra.mode_shapes(arm, [0.0], modes)[:, 0], (2 * np.pi * cra.natural_frequencies(arm, modes)) ** 2
+
+    def largest(point):
+        """The multiplier farthest out by plain integration of the variation, from the shapes at the joint alone."""
+        frequency, coefficients = curve.angular_frequency[point], root @ curve.coefficients[point]
+
+        def rate(time, state):
+            give = coefficients @ np.cos(np.array(curve.multiples) * frequency * time)
+            near = state.reshape(2 * modes, 2 * modes)
+            stiffness = np.diag(square) + 3 * cubic * give**2 * np.outer(root, root)
+            return np.concatenate([near[modes:], -stiffness @ near[:modes]]).ravel()
+
+        start = np.eye(2 * modes).ravel()
+        end = solve_ivp(rate, (0, 2 * np.pi / frequency), start, method="DOP853", rtol=1e-9, atol=1e-9).y[:, -1]
+        return np.abs(np.linalg.eigvals(end.reshape(2 * modes, 2 * modes))).max()
+
+    far = np.arange(50, 80)
+    kept, left = far[curve.stable[far]][-1], far[~curve.stable[far]][-1]
+    # the curve's own pair is a double one, known to half the digits of the integration
+    assert largest(kept) < 1.01 and largest(left) > 1.1
 
 
 @pytest.mark.parametrize(
