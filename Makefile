@@ -79,7 +79,7 @@ mutation: .venv/.ready
 
 # Random joints against their own frequencies, coefficients along x and whole Lagrangians against other methods, which go
 # on where they were stopped; bad values in every argument; a sweep past the memory of its workers, of which one is
-# killed.
+# killed; every chapter with another arm.
 campaign: .venv/.ready
 	$(RUN) -m tests.campaigns.joints $(ARGS)
 	$(RUN) -m tests.campaigns.along_x
@@ -88,6 +88,7 @@ campaign: .venv/.ready
 	$(RUN) -m tests.campaigns.workers
 	$(RUN) -m tests.campaigns.languages
 	$(RUN) -m tests.campaigns.models
+	$(RUN) -m pytest -q tests/notebooks/test_chapters.py -k follows --all-chapters
 
 clean:
 	rm -rf .venv .venv-oldest .venv-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage .coverage.*

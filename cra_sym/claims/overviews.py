@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
 from matplotlib import style
 from matplotlib.figure import Figure
 
@@ -15,6 +14,7 @@ from cra_sym.claims.family import ArmFamily, provenance_family
 from cra_sym.claims.ledger import claims
 from cra_sym.claims.verdict import THEMES, Verdict
 from cra_sym.figures import STYLE
+from cra_sym.figures.subject import single
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,19 +47,24 @@ def figure_claims(theme: str, verdicts: Sequence[Verdict] | None = None, columns
     return figure
 
 
-def figure_family(family: ArmFamily | None = None, ax: Axes | None = None) -> Figure:
-    """Draw the arms that share the published frequencies: thickness against length, a curve a material."""
+def figure_family(family: ArmFamily | None = None, arm: Arm | None = None, ax: Axes | None = None) -> Figure:
+    """Draw the arms that share the published frequencies: thickness against length, a curve a material, and an arm."""
     family = provenance_family() if family is None else family
     instance("family", family, ArmFamily)
+    arm = Arm.nominal() if arm is None else arm
+    instance("arm", arm, Arm)
+    single(arm)
     with style.context(STYLE):
         if ax is None:
             ax = Figure(figsize=(5.6, 3.8), layout="constrained").subplots()
         for name, thickness in zip(family.materials, family.thickness, strict=True):
             ax.plot(family.length, 1e3 * thickness, label=name)
-        nominal = Arm.nominal()
-        ax.plot(nominal.L, 1e3 * np.asarray(nominal.h), "o", color="0.15", ms=6, ls="")
-        ax.annotate("nominal arm", (float(nominal.L), 1e3 * float(nominal.h)), xytext=(-6, 7), ha="right",
-                    textcoords="offset points", fontsize=8.5)  # fmt: skip
+        place = float(arm.L), 1e3 * float(arm.h)
+        ax.plot(*place, "o", color="0.15", ms=6, ls="")
+        ax.annotate(
+            "nominal arm" if arm == Arm.nominal() else "this arm",
+            place, xytext=(-6, 7), ha="right", textcoords="offset points", fontsize=8.5
+        )  # fmt: skip
         printed = ", ".join(f"{f:.3f}" for f in family.published)
         ax.set_title(f"Every arm on these curves has {printed} Hz")
         ax.set(xlabel="length $L$ / m", ylabel="thickness $h$ / mm", ylim=(0, None))
