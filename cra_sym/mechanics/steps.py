@@ -142,7 +142,8 @@ def display_latex(expression: Any, variables: tuple[str, str] = ("x", "t"), tag:
     several = isinstance(expression, Iterable) and not isinstance(expression, Basic)
     parts = tuple(expression) if several else (expression,)
     body = r" \\[4pt] ".join(arranged(part, lambda line: compact_latex(line, variables)) for part in parts)
-    number = "" if tag is None else rf" \qquad ({tag})"
+    upright = f"({tag})" if str(tag).isdigit() else rf"\mathrm{{({tag})}}"
+    number = "" if tag is None else rf" \qquad {upright}"
     return rf"\begin{{gathered}} {body} \end{{gathered}}{number}"
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["NUMBERED", "Chapter", "write_chapters"]
 
-NUMBERED = re.compile(r"\\qquad \((\d{1,2}[a-z]?)\)|\\tag\{(\d{1,2}[a-z]?)\}")
+NUMBERED = re.compile(r"\\qquad (?:\\mathrm\{)?\((\d{1,2}[a-z]?)\)|\\tag\{(\d{1,2}[a-z]?)\}")
 """How a displayed formula carries the number of an equation."""
 _DRAWN = re.compile(r'\bdraw\("(\w+)"[^()]*\)\s*$')
 
