@@ -86,11 +86,11 @@ class NamedSystem(StateSpace):  # type: ignore[misc]
 
 
 class DiscreteSystem(NamedSystem, dlti):  # type: ignore[misc]
-    """The same, from sample to sample of a step ``dt``."""
+    """A linear system from sample to sample of a step ``dt``, with names of its states, inputs and outputs."""
 
 
 class LinearSystem(NamedSystem, lti):  # type: ignore[misc]
-    """The same, continuous in time."""
+    """A linear system, continuous in time, with names of its states, inputs and outputs."""
 
     def discrete(self, dt: float) -> DiscreteSystem:
         """Return the system from sample to sample, exact for an input held between the samples.

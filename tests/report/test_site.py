@@ -22,7 +22,9 @@ from cra_sym.paper.equations import Equation
 from cra_sym.report import run
 from cra_sym.report.notebooks import find_notebooks
 from cra_sym.report.pictures import save_animations, save_claims, save_figures
+from cra_sym.report.site import build
 from cra_sym.report.site.build import write_site
+from cra_sym.report.site.reference import results
 
 JUDGED = ("C03", "C07", "C20", "C22")  # each fares differently
 LARGEST = 1.5e6  # bytes of a page
@@ -58,6 +60,7 @@ def site(tmp_path_factory):
     save_figures(pictures, ["frequencies"], kinds=["svg"])
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Equation, "check", lambda self: self.number != 7)
+        patch.setattr(build, "accuracy_table", lambda: "| a | b |\n| --- | --- |\n| 1 | 2 |\n")  # has tests of its own
         assert write_site(folder, find_notebooks(), verdicts, sorted(pictures.iterdir())) == ""
     assert sorted(path.name for path in folder.parent.iterdir()) == ["pages", "pictures"]
     return folder
@@ -168,6 +171,29 @@ def test_every_public_name_is_in_the_reference(pages):
     assert {f"#cra_sym.{name}" for name in cra._HOME} <= {
         f"#{link.partition('#')[2]}" for link in pages["reference/index.html"].all("href", "a")
     }
+
+
+def test_what_functions_return_is_in_the_reference_and_linked(pages):
+    there = {id for name, page in pages.items() if name.startswith("reference/") for id in page.all("id")}
+    kinds = [f"{kind.__module__}.{kind.__name__}" for group in results().values() for kind in group]
+    assert {"cra_sym.analysis.certification.Certificate", "cra_sym.analysis.identification.Identification"} <= set(
+        kinds
+    )
+    assert set(kinds) <= set(there) and all(
+        getattr(kind, "__doc__", "") for group in results().values() for kind in group
+    )
+    links = pages["reference/frequencies_and_modes.html"].all("href", "a")
+    assert "#cra_sym.analysis.certification.Certificate" in links
+
+
+def test_every_equation_is_a_node_of_the_graph(site):
+    graph = re.search(
+        r'<div class="graph".*?</svg></div>', (site / "equations.html").read_text(encoding="utf-8"), re.S
+    )[0]
+    nodes = dict(re.findall(r'<a href="#eq-(\w+)">.*?<text>(.*?)</text></a>', graph))
+    for e in cra.equations(companions=True):
+        words = " ".join(re.findall(r"<tspan[^>]*>(.*?)</tspan>", nodes[str(e.number)]))
+        assert words == f"({e.number}) {e.title}"
 
 
 @pytest.mark.parametrize("name", sorted(cra._HOME))

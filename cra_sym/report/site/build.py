@@ -17,8 +17,10 @@ from cra_sym.claims.pictures import MARKS
 from cra_sym.figures import ANIMATIONS, FIGURES, described
 from cra_sym.files import write_text
 from cra_sym.report.orders import orders
+from cra_sym.report.site.accuracy import accuracy_table
 from cra_sym.report.site.chapters import Chapter, write_chapters
 from cra_sym.report.site.extension import LINKS
+from cra_sym.report.site.graph import equation_graph
 from cra_sym.report.site.ledger import Entry, entries, numbers
 from cra_sym.report.site.reference import write_reference
 
@@ -80,6 +82,7 @@ def _write_sources(
     chapters = write_chapters(notebooks, folder)
     ledger = entries(chapters)
     write_reference(folder / "reference")
+    write_text(folder / "accuracy.txt", accuracy_table())
     (folder / "pictures").mkdir()
     for path in pictures:
         shutil.copy(path, folder / "pictures")
@@ -117,6 +120,7 @@ def _known(
         "version": metadata.version("cra_sym"),
         "chapters": chapters,
         "entries": ledger,
+        "graph": equation_graph([e.equation for e in ledger]),
         "verdicts": verdicts,
         "marks": {name: mark for name, (mark, _) in MARKS.items()},
         "counts": [(name, MARKS[name][0], outcomes[name]) for name in OUTCOMES if outcomes[name]],

@@ -31,9 +31,10 @@ myst_links_external_new_tab = False
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the docstrings say more than the annotations
-autodoc_default_options = {"members": True, "show-inheritance": False}
+autodoc_default_options = {"members": True}
 napoleon_google_docstring = False
 napoleon_use_rtype = False
+napoleon_use_ivar = True  # attributes as a list: properties among them have entries of their own
 toc_object_entries_show_parents = "hide"
 
 # Mathematics without a network: the extension copies MathJax beside the pages.

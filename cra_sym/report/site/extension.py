@@ -13,13 +13,15 @@ from docutils import nodes
 from sphinx import addnodes
 from sphinx.application import Sphinx
 
+from cra_sym.report.site.reference import results
+
 __all__ = ["setup"]
 
 LINKS = "links.json"
 """File among the sources that names the equations and claims of the site, and the page each is found on."""
 
 _CITED = re.compile(r"(?<![\w)])\((\d{1,2}[a-z]?)\)|\b(C\d\d[a-z]?)\b")
-_TAG = re.compile(r"\\qquad \((\d{1,2}[a-z]?)\)\s*$|\\tag\{(\d{1,2}[a-z]?)\}")
+_TAG = re.compile(r"\\qquad (?:\\mathrm\{)?\((\d{1,2}[a-z]?)\)\}?\s*$|\\tag\{(\d{1,2}[a-z]?)\}")
 _UNTOUCHED = (nodes.reference, nodes.literal, nodes.literal_block, nodes.math, nodes.math_block, nodes.title, nodes.raw)
 _MATHJAX = ("tex-svg.js", "input/tex/extensions")
 
@@ -123,8 +125,11 @@ def copy_mathjax(app: Sphinx, error: Exception | None) -> None:
 
 
 def plain_types(app: Sphinx, doctree: nodes.document) -> None:
-    """Leave the words of a type, as of ``ndarray, shape (3,)``, unlinked but for names of classes."""
+    """Leave the words of a type, as of ``ndarray, shape (3,)``, unlinked but for names of classes, given in full."""
+    known = {kind.__name__: f"{kind.__module__}.{kind.__name__}" for kinds in results().values() for kind in kinds}
     for link in list(doctree.findall(addnodes.pending_xref)):
         if link.get("refdomain") == "py" and not link.get("refexplicit") and _inside(link, (nodes.field,)):
-            if not link["reftarget"].rpartition(".")[2][:1].isupper():
+            name = link["reftarget"].rpartition(".")[2]
+            if not name[:1].isupper():
                 link.replace_self(link.children)
+            link["reftarget"] = known.get(name, link["reftarget"])
