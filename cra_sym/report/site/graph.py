@@ -19,7 +19,7 @@ _WORDS = "The numbered equations, from what is put in to what comes out; arrows 
 def equation_graph(chosen: Sequence[Equation]) -> str:
     """Return the graph as a figure of HTML: what is put in stands left, what comes out right."""
     depth = layers(chosen)
-    lines = {e.number: textwrap.wrap(f"({e.number}) {e.title}", _LETTERS) for e in chosen}
+    lines = {e.number: textwrap.wrap(f"({e.number}) {e.title}", _LETTERS, break_on_hyphens=False) for e in chosen}
     columns = [[e for e in chosen if depth[e.number] == k] for k in range(max(depth.values()) + 1)]
     heights = [sum(_tall(lines[e.number]) + _ROW for e in column) for column in columns]
     place: dict[int | str, tuple[float, float]] = {}
@@ -52,7 +52,7 @@ def _mean(heights: Sequence[float]) -> float:
 
 def _node(e: Equation, lines: Sequence[str], left: float, top: float, tall: float) -> str:
     spans = "".join(
-        f'<tspan x="{left + 6:g}" y="{top + 5 + _LINE * (k + 0.8):g}">{escape(line)}</tspan>'
+        f'<tspan x="{left + 6:g}" y="{top + 5 + _LINE * (k + 0.8):g}">{escape(line, quote=False)}</tspan>'
         for k, line in enumerate(lines)
     )
     box = f'x="{left:g}" y="{top:g}" width="{_WIDE}" height="{tall}"'
