@@ -13,7 +13,7 @@ from cra_sym import checks
 from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, ConvergenceWarning, equations_of, samples, watched
 from cra_sym.analysis.slip_backbone import held_curve, warn_of_missing
 from cra_sym.model.system import System
-from cra_sym.solvers.continuation import Curve, Measure, Point, correct, first_point, follow
+from cra_sym.solvers.continuation import Curve, Measure, Point, correct, first_crossing, first_point, follow
 from cra_sym.solvers.harmonic_balance import Balance, Basis, peak
 from cra_sym.solvers.modal_polynomials import ModalPolynomials
 from cra_sym.solvers.monodromy import multipliers
@@ -311,7 +311,7 @@ def _at_targets(problem: _Problem, targets: Array, measure: Measure, name: str) 
         new_value, new_slope = _rate(measure, following)
         for k, target in enumerate(flat):
             if answers[k] is None and following is not point:
-                share = _first_crossing(value, slope, new_value, new_slope, following.step, np.log(target))
+                share = first_crossing(value, slope, new_value, new_slope, following.step, np.log(target))
                 if share is not None:
                     answers[k] = _refined(curve, point, following, share, measure, float(target))
         point, value, slope = following, new_value, new_slope
@@ -340,21 +340,6 @@ def _rate(measure: Measure, point: Point) -> tuple[float, float]:
     """Return the logarithm of the measure and its rate along the curve."""
     value, gradient = measure(point.unknowns)
     return float(np.log(value)), float(gradient @ point.tangent[:-1] / value)
-
-
-def _first_crossing(
-    value: float, slope: float, end: float, end_slope: float, step: float, target: float
-) -> float | None:
-    """Return the share of a step at which a cubic through both ends first takes a value, or None."""
-    first, last = slope * step, end_slope * step
-    rise = end - value
-    cubic = [first + last - 2 * rise, 3 * rise - 2 * first - last, first, value - target]
-    if not np.any(cubic[:3]):
-        return None
-    roots = np.roots(cubic)
-    real = np.sort(roots[np.abs(roots.imag) < 1e-9].real)
-    inside = real[(real >= -1e-12) & (real <= 1 + 1e-12)]
-    return float(inside[0]) if inside.size else None
 
 
 def _refined(curve: Curve, before: Point, after: Point, share: float, measure: Measure, target: float) -> Array | None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cra_sym.solvers.harmonic_balance import Balance
 
-__all__ = ["Curve", "Measure", "Point", "correct", "follow"]
+__all__ = ["Curve", "Measure", "Point", "correct", "first_crossing", "follow"]
 
 Array = NDArray[np.float64]
 Measure = Callable[[Array], tuple[float, Array]]
@@ -206,3 +206,18 @@ def _step(curve: Curve, point: Point, length: float) -> Point | None:
     if not plain and length >= 2 * _SMALLEST:
         return None
     return Point(vector[:-1], float(vector[-1]), new, negative, length, not plain)
+
+
+def first_crossing(
+    value: float, slope: float, end: float, end_slope: float, step: float, target: float
+) -> float | None:
+    """Return the share of a step at which a cubic through both ends first takes a value, or None."""
+    first, last = slope * step, end_slope * step
+    rise = end - value
+    cubic = [first + last - 2 * rise, 3 * rise - 2 * first - last, first, value - target]
+    if not np.any(cubic[:3]):
+        return None
+    roots = np.roots(cubic)
+    real = np.sort(roots[np.abs(roots.imag) < 1e-9].real)
+    inside = real[(real >= -1e-12) & (real <= 1 + 1e-12)]
+    return float(inside[0]) if inside.size else None
