@@ -296,16 +296,16 @@ class ModelText:
             for at, value in enumerate(self._condition(place), start=structure.condition(place)):
                 if at in places:
                     found.append(f"problem.k[{places[at]}] = {value}")
-            if any("share" in line for line in found):
-                link, own = place - structure.moving, place * (structure.moving + 1)
-                wanted = (
-                    [f"link_stiffness[{link}]"] if link >= 0 else [f"{kind}[{own}]" for kind in ("stiffness", "mass")]
-                )
-                parts = "".join(f" + problem.{entry}" for entry in wanted if entry in self._ends)
+            link, own = place - structure.moving, place * (structure.moving + 1)
+            stiff = f"link_stiffness[{link}]"
+            wanted = [stiff] if link >= 0 else [f"{kind}[{own}]" for kind in ("stiffness", "mass")]
+            parts = "".join(f" + problem.{entry}" for entry in wanted if entry in self._ends)
+            if not parts:  # of one that is 1
+                found = [line.replace(" * share", "").replace("share", "1.0") for line in found]
+            elif any("share" in line for line in found):
                 yield f"share_{place} = 1.0 / (1.0{parts})"
                 if link >= 0:
-                    stiff = f"problem.link_stiffness[{link}]"
-                    yield f"pull_{place} = 1.0 if {stiff} > HUGE else {stiff} * share_{place}"
+                    yield f"pull_{place} = 1.0 if problem.{stiff} > HUGE else problem.{stiff} * share_{place}"
             yield from (re.sub(r"\b(share|pull)\b", rf"\1_{place}", line) for line in found)
 
     def _condition(self, place: int) -> Iterator[str]:
