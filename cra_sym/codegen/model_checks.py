@@ -26,7 +26,7 @@ from cra_sym.model.system import System
 from cra_sym.model.waves_form import WavesForm
 from cra_sym.solvers.motion import BaseMotion
 
-__all__ = ["ERRORS", "model_checks", "sample"]
+__all__ = ["ERRORS", "largest", "model_checks", "sample"]
 
 Array = NDArray[np.float64]
 ERRORS = {"float64": 1e-12, "float32": 2e-3}
@@ -115,7 +115,7 @@ def _modal(written: ModelText, system: System, point: Sequence[float], omega: Ar
     quantities = [[modes.displacement(end, at) for at in order] for end in (0, 1)]
     quantities += [[modes.force(end, at) for at in order] for end in (0, 1)]
     found = np.array(quantities)  # (what, displacement, mode)
-    sizes = _largest(written, system)  # (displacement, mode)
+    sizes = largest(written, system)  # (displacement, mode)
     moved = sizes > 1e-9 * sizes.max(axis=1, keepdims=True)
     forces = np.where(moved, omega[3] ** 2 / np.where(moved, sizes, 1.0), 0.0).max()  # the modal mass is 1
     for at in range(len(order)):
@@ -138,7 +138,7 @@ def _modal(written: ModelText, system: System, point: Sequence[float], omega: Ar
     yield from _driven(written, system, point, loss)
 
 
-def _largest(written: ModelText, system: System) -> Array:
+def largest(written: ModelText, system: System) -> Array:
     """Return the largest value along the length of every displacement of a section in four modes."""
     places = float(system.domain.left) + float(system.domain.length) * np.linspace(0.0, 1.0, 33)
     displacements = system.model.conservative.displacements
@@ -182,7 +182,7 @@ def _driven(written: ModelText, system: System, point: Sequence[float], loss: fl
         }
         damped = system.replace(zeta=zeta)
         moved = response(damped, {name: BaseMotion(**motion)}, time, x, 4)
-        size = float(np.abs(taken * _largest(written, system)[written.form.order.index(0)]).sum()) * (0.5 * time + 0.1)
+        size = float(np.abs(taken * largest(written, system)[written.form.order.index(0)]).sum()) * (0.5 * time + 0.1)
         given = (*point, drive, x, 0.0, zeta, time, *motion.values())
         yield Check(7, given, (float(moved),), loss, loss * size)
         linear = state_space(damped, 4, name, {"y": field.subs(system.model.equations.x, x)})
