@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.solvers.floquet import MOST_STEPS, Oscillation, exponents_of, flat, rate_of, whole_period
+from cra_sym.solvers.floquet import MOST_STEPS, Oscillation, exponents_of, rate_of, whole_period
+from cra_sym.solvers.periodic_systems import LIGHTEST, PeriodicSystem, Sizes, Swing
 
 __all__ = ["PeriodicSystem", "Swing", "floquet_exponents", "growth_rate", "monodromy", "step_coefficients"]
 
@@ -26,291 +26,229 @@ Array = NDArray[np.float64]
 _HIGHEST = 24
 """Order of the series, at most."""
 _WIDEST = 3.0  # step, in units of the fastest motion's time: beyond, the terms of a series lose digits
-_FASTER, _MUCH_FASTER = 1.25, 2.0
-"""How much faster than the rate a series may grow where stiffness oscillates, and where masses and speeds do too."""
+_SHARE = 1e-4
+"""Coefficients of cosines below this share of the tolerance are left out: what follows sums to far less than it."""
 _PRODUCTS = (
     31  # what the products of matrices for one term cost, in halves of one term of a sum over products of series
 )
 _BLOCK = 384  # systems propagated together, small enough for the cache
 
 
-@dataclass(frozen=True)
-class Swing:
-    """One oscillating term; matrices (N, N, points) or (N, N, 1), None where there is nothing.
-
-    Attributes
-    ----------
-    oscillation : Oscillation
-    size : ndarray, shape (points,)
-        epsilon times the power of varpi.
-    stiffness, damping, momentum, mass : ndarray or None
-        K_r, C_r, B_r, M_r.
-    """
-
-    oscillation: Oscillation
-    size: Array
-    stiffness: Array | None
-    damping: Array | None
-    momentum: Array | None
-    mass: Array | None
-
-    @property
-    def only_stiffness(self) -> bool:
-        """Whether nothing else oscillates."""
-        return self.damping is None and self.momentum is None and self.mass is None
-
-    def take(self, index: NDArray[np.intp]) -> Swing:
-        """Return some of the systems."""
-        matrices = (self.stiffness, self.damping, self.momentum, self.mass)
-        return Swing(self.oscillation, self.size[index], *(_some(matrix, index) for matrix in matrices))
-
-
-@dataclass(frozen=True)
-class PeriodicSystem:
-    """A flat batch of systems, the batch axis last.
-
-    Attributes
-    ----------
-    stiffness, damping : ndarray, shape (N, N, points) or (N, N, 1)
-        K and C.
-    swings : tuple of Swing
-    period : ndarray, shape (points,)
-    """
-
-    stiffness: Array
-    damping: Array
-    swings: tuple[Swing, ...]
-    period: Array
-
-    @classmethod
-    def of(
-        cls,
-        stiffness: Any,
-        damping: Any,
-        drives: Sequence[tuple[Oscillation, Sequence[Any]]],
-        angular_frequency: Any,
-        epsilon: Any,
-    ) -> tuple[PeriodicSystem, tuple[int, ...]]:
-        """Return the batch and its shape.
-
-        Parameters
-        ----------
-        stiffness, damping : array_like, shape (..., N, N)
-        drives : sequence of (oscillation, (stiffness, damping, momentum, mass))
-            Matrices (..., N, N) or None.
-        angular_frequency, epsilon : array_like, shape (...)
-            varpi, rad/s, positive; epsilon.
-        """
-        given = [np.asarray(m, float) for m in (stiffness, damping)]
-        some = [np.asarray(m, float) for _, matrices in drives for m in matrices if m is not None]
-        varpi, epsilon = np.asarray(angular_frequency, float), np.asarray(epsilon, float)
-        shape = np.broadcast_shapes(*(m.shape[:-2] for m in (*given, *some)), varpi.shape, epsilon.shape)
-
-        def columns(matrix: Any) -> Array | None:
-            if matrix is None:
-                return None
-            matrix = np.asarray(matrix, float)
-            single = matrix.size == matrix.shape[-1] * matrix.shape[-2]
-            return matrix.reshape(*matrix.shape[-2:], 1) if single else flat(matrix, shape, 2)
-
-        frequency, size = flat(varpi, shape, 0), flat(epsilon, shape, 0)
-        swings = tuple(Swing(wave, size * frequency**wave.power, *map(columns, m)) for wave, m in drives)
-        whole = [columns(matrix) for matrix in given]
-        assert whole[0] is not None and whole[1] is not None
-        batch = cls(whole[0], whole[1], swings, 2 * np.pi / frequency)
-        batch.check_mass()
-        return batch, shape
-
-    def take(self, index: NDArray[np.intp]) -> PeriodicSystem:
-        """Return some of the systems."""
-        stiffness, damping = (_some(matrix, index) for matrix in (self.stiffness, self.damping))
-        assert stiffness is not None and damping is not None
-        return PeriodicSystem(stiffness, damping, tuple(s.take(index) for s in self.swings), self.period[index])
-
-    def check_mass(self) -> None:
-        """Refuse a mass that need not be positive throughout the period."""
-        total = np.zeros_like(self.period)
-        for swing in self.swings:
-            if swing.mass is not None:
-                total = total + np.abs(swing.size) * np.linalg.norm(np.moveaxis(swing.mass, -1, 0), 2, axis=(-2, -1))
-        if (total >= 1.0).any():
-            raise ValueError(
-                f"epsilon: the mass fluctuates by {total.max():.3g} times itself; must be less than once, so that it "
-                "stays positive"
-            )
-
-    def parity(self) -> NDArray[np.int8] | None:
-        """Return signs of q that turn an even K(t) and a constant C into their transposes, None if there are none."""
-        if any(s.oscillation.kind == "sin" or not s.only_stiffness for s in self.swings):
-            return None
-        matrices = (self.stiffness, self.damping, *(s.stiffness for s in self.swings if s.stiffness is not None))
-        size = len(self.stiffness)
-        same, opposite = np.zeros((2, size, size), bool)  # signs of two
-        for matrix in matrices:
-            turned = matrix.swapaxes(0, 1)
-            there = ((matrix != 0) | (turned != 0)).any(axis=-1)
-            even, odd = ((matrix == sign * turned).all(axis=-1) for sign in (1, -1))
-            if (there & ~even & ~odd & ~np.eye(size, dtype=bool)).any():
-                return None
-            same, opposite = same | (there & even), opposite | (there & ~even)
-        signs = np.zeros(size, np.int8)
-        while not signs.all():
-            fresh = [int(np.argmin(signs != 0))]
-            signs[fresh] = 1
-            while fresh:
-                row = fresh.pop()
-                for sign, joined in ((1, same[row]), (-1, opposite[row])):
-                    found = np.nonzero(joined & (signs == 0))[0]
-                    signs[found] = sign * signs[row]
-                    fresh.extend(found.tolist())
-        product = signs[:, None] * signs
-        return None if (same & (product < 0)).any() or (opposite & (product > 0)).any() else signs
-
-    def rate(self) -> Array:
-        """Return a bound of how fast anything moves, 1/s, shape (points,)."""
-        stiffness, damping, heavy = _rows(self.stiffness), _rows(self.damping), np.zeros(1)
-        turns = 1
-        for swing in self.swings:
-            size = np.abs(swing.size)
-            stiffness = stiffness + size * _rows(swing.stiffness)
-            damping = damping + size * (_rows(swing.damping) + _rows(swing.momentum))
-            heavy = heavy + size * _rows(swing.mass)
-            turns = max(turns, swing.oscillation.order)
-        light = np.maximum(1.0 - heavy, 0.1)
-        return np.asarray(np.sqrt(stiffness / light) + damping / light + 2 * np.pi * turns / self.period)
-
-
-def _some(matrix: Array | None, index: NDArray[np.intp]) -> Array | None:
-    return matrix if matrix is None or matrix.shape[-1] == 1 else matrix[..., index]
-
-
-def _rows(matrix: Array | None) -> Array:
-    """Return the largest sum of absolute values in a row, shape (points,) or (1,)."""
-    return np.zeros(1) if matrix is None else np.asarray(np.abs(matrix).sum(axis=1).max(axis=0))
-
-
 def _applied(matrix: Array, states: Array) -> Array:
     """Return matrix times states, (N, N, points or 1) times (N, columns, points)."""
     if matrix.shape[-1] == 1:
-        return np.asarray((matrix[..., 0] @ states.reshape(len(states), -1)).reshape(states.shape))
+        return np.asarray((matrix[..., 0] @ states.reshape(len(states), -1)).reshape(len(matrix), *states.shape[1:]))
     return np.asarray(np.einsum("ijp,jkp->ikp", matrix, states))
 
 
-def step_coefficients(wave: Oscillation, step: int, steps: int, order: int) -> Array:
-    """Return the Taylor coefficients of a cosine or sine over one step of a period, as a function of 0 <= tau <= 1."""
+def step_coefficients(wave: Oscillation, step: int, steps: int, order: int, least: float = 0.0) -> Array:
+    """Return the Taylor coefficients of a cosine or sine over one step of a period, as a function of 0 <= tau <= 1.
+
+    Without those at the end that are below ``least``.
+    """
     turn = 2 * np.pi * wave.order / steps
     phase = turn * step + (0.0 if wave.kind == "cos" else -np.pi / 2)
     k = np.arange(order + 1)
     factors = np.cumprod(np.concatenate([[1.0], turn / k[1:]]))
+    k = k[: np.nonzero(factors >= least)[0][-1] + 1]
+    factors = factors[: len(k)]
     return np.asarray(np.array([np.cos(phase), -np.sin(phase), -np.cos(phase), np.sin(phase)])[k % 4] * factors)
 
 
 class _Series:
-    """Taylor coefficients of q, dq/dtau and p over one step, found one after the other."""
+    """Taylor coefficients of q, dq/dtau and p over one step, found one after the other.
 
-    def __init__(self, system: PeriodicSystem, h: Array, order: int) -> None:
-        self.system, self.h, self.order = system, h, order
+    What oscillates with one cosine adds to forces as K_r q + C_r u, and to momenta as B_r q + M_r u, with u = dq/dt:
+    one sum over products of series each.
+    """
+
+    def __init__(self, system: PeriodicSystem, steps: int, order: int, least: float) -> None:
+        self.system, self.h, self.order = system, system.period / steps, order
+        self.steps, self.least = steps, least
         size, points = len(system.stiffness), system.period.size
         self.shape = (size, 2 * size, points)
-        self.damped = bool(system.damping.any())
+        swings = system.swings
+        pushes = [s.stiffness is not None or s.damping is not None for s in swings]
+        carries = [s.momentum is not None or s.mass is not None for s in swings]
         store = (order + 1, *self.shape)
-        names = {"stiffness": "q", "momentum": "q", "damping": "u", "mass": "u"}
-        self.products = [
-            {name: np.empty(store) for name in names if getattr(swing, name) is not None} for swing in system.swings
-        ]
+        self.forces = [np.empty(store) if there else None for there in pushes]
+        self.momenta = [np.empty(store) if there else None for there in carries]
+        # all products with q are one product, those with u another
+        own = system.damping if system.damping.any() else None
+        self.of_q = _Stack([system.stiffness, *(s.stiffness for s in swings), *(s.momentum for s in swings)])
+        self.of_u = _Stack([own, *(s.damping for s in swings), *(s.mass for s in swings)])
 
-    def advanced(self, step: int, steps: int, q: Array, p: Array) -> tuple[Array, Array]:
+    def advanced(self, step: int, q: Array, p: Array) -> tuple[Array, Array]:
         """Return the state at the end of a step."""
-        waves = [step_coefficients(swing.oscillation, step, steps, self.order) for swing in self.system.swings]
+        waves = [
+            step_coefficients(swing.oscillation, step, self.steps, self.order, self.least)
+            for swing in self.system.swings
+        ]
         mass = self._mass(waves)
-        end_q, end_p = q.copy(), p.copy()
+        end_q, end_p, p = q.copy(), p.copy(), p.copy()
         for k in range(self.order):
             rate, resistance = self._rates(k, q, p, waves, mass)
             step_size = self.h / (k + 1)
-            q, p = step_size * rate, -step_size * resistance
+            q, p = np.multiply(rate, step_size, out=rate), np.multiply(resistance, -step_size, out=resistance)
             end_q += q
             end_p += p
         return end_q, end_p
 
     def _mass(self, waves: list[Array]) -> Array | None:
-        """Return the inverse mass at the start of the step, (N, N, points), or None for unit mass."""
-        terms = [(s, w[0]) for s, w in zip(self.system.swings, waves, strict=True) if s.mass is not None]
+        """Return the inverse mass at the start of the step, its diagonal (N, 1, points) if it has no more, or None."""
+        swings = zip(self.system.swings, waves, strict=True)
+        terms = [(s.mass, s.size * wave[0]) for s, wave in swings if s.mass is not None]
         if not terms:
             return None
-        total = np.eye(self.shape[0])[..., None] + sum(s.mass * (s.size * w) for s, w in terms)
-        return np.moveaxis(np.linalg.inv(np.moveaxis(total, -1, 0)), 0, -1)
+        total = sum(mass * size for mass, size in terms)
+        if all(_is_diagonal(mass) for mass, _ in terms):
+            return np.asarray(1.0 / (1.0 + np.einsum("iip->ip", total)))[:, None]
+        total = np.moveaxis(np.eye(self.shape[0])[..., None] + total, -1, 0)
+        return np.moveaxis(np.linalg.inv(total), 0, -1)
 
     def _rates(self, k: int, q: Array, p: Array, waves: list[Array], mass: Array | None) -> tuple[Array, Array]:
         """Return the coefficients k of dq/dt and of -dp/dt."""
-        rate = p
-        for swing, kept, wave in zip(self.system.swings, self.products, waves, strict=True):
-            if "momentum" in kept:
-                rate = rate - self._convolved(kept["momentum"], swing.momentum, q, wave, k, swing.size)
-            if "mass" in kept and k:
-                rate = rate - swing.size * _weighed(wave[1 : k + 1], kept["mass"][:k])
-        rate = rate if mass is None else _applied(mass, rate)
-        resistance = _applied(self.system.stiffness, q)
-        if self.damped:
-            resistance += _applied(self.system.damping, rate)
-        for swing, kept, wave in zip(self.system.swings, self.products, waves, strict=True):
-            if "stiffness" in kept:
-                resistance += self._convolved(kept["stiffness"], swing.stiffness, q, wave, k, swing.size)
-            if "damping" in kept:
-                resistance += self._convolved(kept["damping"], swing.damping, rate, wave, k, swing.size)
-            if "mass" in kept:
-                assert swing.mass is not None
-                kept["mass"][k] = _applied(swing.mass, rate)
+        number = len(self.system.swings)
+        of_q = self.of_q(q)
+        rate, resistance = p, of_q[0]
+        assert resistance is not None
+        for r, kept in enumerate(self.momenta):
+            if kept is not None:
+                of_both = of_q[1 + number + r]
+                kept[k] = 0.0 if of_both is None else of_both
+                rate -= self._weighed(r, waves[r], kept, k)
+        if mass is not None:
+            rate = np.multiply(rate, mass, out=rate) if mass.shape[1] == 1 else _applied(mass, rate)
+        of_u = self.of_u(rate)
+        if of_u[0] is not None:
+            resistance += of_u[0]
+        for r, kept in enumerate(self.momenta):
+            if kept is not None and (carried := of_u[1 + number + r]) is not None:
+                kept[k] += carried
+        for r, kept in enumerate(self.forces):
+            if kept is not None:
+                parts = [part for part in (of_q[1 + r], of_u[1 + r]) if part is not None]
+                kept[k] = parts[0] if len(parts) == 1 else np.add(*parts)
+                resistance += self._weighed(r, waves[r], kept, k)
         return rate, resistance
 
-    def _convolved(self, kept: Array, matrix: Array | None, states: Array, wave: Array, k: int, size: Array) -> Array:
-        assert matrix is not None
-        kept[k] = _applied(matrix, states)
-        found = _weighed(wave[: k + 1], kept[: k + 1])
-        found *= size
-        return found
+    def _weighed(self, swing: int, wave: Array, kept: Array, k: int) -> Array:
+        """Return the coefficient k of the product of an oscillation and a series."""
+        length = min(k + 1, len(wave))
+        found = wave[length - 1 :: -1] @ kept[k + 1 - length : k + 1].reshape(length, -1)
+        found = found.reshape(self.shape)
+        return np.multiply(found, self.system.swings[swing].size, out=found)
 
 
-def _weighed(wave: Array, kept: Array) -> Array:
-    """Return the sum of wave[j] kept[-1 - j]."""
-    return np.asarray((wave[::-1] @ kept.reshape(len(kept), -1)).reshape(kept.shape[1:]))
+class _Stack:
+    """Several matrices, some of them None, applied to a state as one."""
+
+    def __init__(self, matrices: Sequence[Array | None]) -> None:
+        there = [matrix for matrix in matrices if matrix is not None]
+        self.there = [matrix is not None for matrix in matrices]
+        if there:
+            points = max(matrix.shape[-1] for matrix in there)
+            self.whole = np.concatenate([np.broadcast_to(m, (*m.shape[:2], points)) for m in there])
+
+    def __call__(self, states: Array) -> list[Array | None]:
+        """Return the products, None for None."""
+        if not any(self.there):
+            return [None] * len(self.there)
+        parts = iter(_applied(self.whole, states).reshape(-1, *states.shape))
+        return [next(parts) if there else None for there in self.there]
 
 
-def propagated(system: PeriodicSystem, steps: int, order: int, *, half: bool = False) -> Iterator[tuple[Array, Array]]:
-    """Yield (q, p), shape (N, 2N, points), after every step of a period, or of half of it, from every unit state."""
-    h = system.period / steps
-    series = _Series(system, h, order)
+def _is_diagonal(matrix: Array) -> bool:
+    return not matrix[~np.eye(len(matrix), dtype=bool)].any()
+
+
+def propagated(
+    system: PeriodicSystem, steps: int, order: int, *, half: bool = False, least: float = 0.0
+) -> Iterator[tuple[Array, Array]]:
+    """Yield (q, p), shape (N, 2N, points), after every step of a period, or of half of it, from every unit state.
+
+    Coefficients of cosines below ``least`` are left out.
+    """
+    series = _Series(system, steps, order, least)
     q, p = (
         np.ascontiguousarray(np.broadcast_to(half[..., None], series.shape))
         for half in np.split(np.eye(series.shape[1]), 2)
     )
     for step in range(steps // 2 if half else steps):
-        q, p = series.advanced(step, steps, q, p)
+        q, p = series.advanced(step, q, p)
         yield q, p
 
 
 def monodromy(system: PeriodicSystem, tolerance: float = 1e-8) -> Array:
     """Return the monodromy matrices of (q, p), shape (points, 2N, 2N), for a relative error of about ``tolerance``."""
-    angle, parity = system.period * system.rate(), system.parity()
-    angle = angle * (_FASTER if all(swing.only_stiffness for swing in system.swings) else _MUCH_FASTER)
+    parity, damping = system.parity(), system.damping
+    system, axes = system.in_axes_of_mass()
+    angle = system.period * system.rate()
     size, points = 2 * len(system.stiffness), system.period.size
     out = np.empty((points, size, size))
+    if not points:
+        return out
     rank = np.argsort(angle, kind="stable")
-    for start in range(0, points, _BLOCK):
-        block = rank[start : start + _BLOCK]
-        steps, order = _cheapest(float(angle[rank[min(start + _BLOCK, points) - 1]]), tolerance)
-        end = deque(propagated(system.take(block), steps, order, half=parity is not None), maxlen=1)
+    blocks = [rank[start : start + _BLOCK] for start in range(0, points, _BLOCK)]
+    for block, series in zip(blocks, _majorants(system, blocks).T, strict=True):
+        steps, order = _cheapest(series, tolerance)
+        states = propagated(system.take(block), steps, order, half=parity is not None, least=_SHARE * tolerance)
+        end = deque(states, maxlen=1)
         out[block] = np.moveaxis(np.concatenate(end[0]), -1, 0)
-    # without oscillating masses and speeds the momentum is dq/dt
-    return out if parity is None else whole_period(out, np.moveaxis(system.damping, -1, 0), parity)
+    if axes is not None:
+        turn = np.kron(np.eye(2), axes)
+        out = turn @ out @ turn.T
+    return out if parity is None else whole_period(out, np.moveaxis(damping, -1, 0), parity)
 
 
-def _cheapest(angle: float, tolerance: float) -> tuple[int, int]:
+def _majorants(system: PeriodicSystem, blocks: Sequence[NDArray[np.intp]]) -> Array:
+    """Return bounds of the Taylor coefficients of all motions, the time in periods, as logarithms.
+
+    They are those of the scalar equations with norms in place of matrices and exponentials in place of cosines, of
+    masses hyperbolic cosines: their inverse is no entire function. Shape (highest order + 2, blocks).
+    """
+    sizes = system.sizes()
+    largest = Sizes(
+        *(np.stack([part[:, block].max(axis=1, initial=0.0) for block in blocks], axis=-1) for part in sizes)
+    )
+    period = np.array([system.period[block].max() for block in blocks])
+    unit = period * np.array([system.rate()[block].max() for block in blocks])  # of time: angles
+    count = _HIGHEST + 2
+    k = np.arange(count)
+    factorials = np.cumprod(np.concatenate([[1.0], k[1:]]))
+    turns = np.array([s.oscillation.order for s in system.swings]).reshape(-1, 1)
+    waves = (2 * np.pi * turns / unit) ** k[:, None, None] / factorials[:, None, None]
+
+    def series(rows: Array, still: Any = 0.0, waves: Array = waves) -> Array:
+        found = np.einsum("krb,rb->kb", waves, rows)
+        found[0] += still
+        return np.asarray(found)
+
+    inverse = 1.0 / np.maximum(1.0 - largest.mass.sum(axis=0), LIGHTEST)
+    stiffness = series(largest.stiffness, largest.still[0]) * (period / unit) ** 2
+    damping = series(largest.damping, largest.still[1]) * period / unit
+    momentum = series(largest.momentum) * period / unit
+    mass = series(largest.mass, waves=np.where(k[:, None, None] % 2 == 0, waves, 0.0))
+    scale = np.sqrt(np.maximum(stiffness[0], np.finfo(float).tiny) / inverse)
+    q, u, p = np.ones((3, count, len(blocks)))
+    for n in range(count - 1):
+        u[n] = p[n] + (momentum[: n + 1] * q[n::-1]).sum(axis=0) / scale
+        if n:
+            u[n] += (mass[1 : n + 1] * u[n - 1 :: -1]).sum(axis=0)
+        u[n] *= inverse
+        pushed = (stiffness[: n + 1] * q[n::-1]).sum(axis=0) / scale + (damping[: n + 1] * u[n::-1]).sum(axis=0)
+        q[n + 1], p[n + 1] = scale * u[n] / (n + 1), pushed / (n + 1)
+    return np.asarray(np.log(np.maximum(np.maximum(q, p), np.finfo(float).tiny)) + k[:, None] * np.log(unit))
+
+
+def _cheapest(series: Array, tolerance: float) -> tuple[int, int]:
     """Return an even number of steps a period and the order of their series that reach the tolerance at least cost.
 
-    The series of a motion with the rate 1 that ends with the term of order n leaves ``h**(n + 1) / (n + 1)!`` a step.
+    A series that ends with the term of order n leaves the coefficient n + 1 times ``h**(n + 1)`` a step.
     """
     orders = np.arange(6, _HIGHEST + 1)
-    logs = (orders + 1) * np.log(angle) - np.cumsum(np.log(np.arange(1, _HIGHEST + 2)))[orders] - np.log(tolerance)
+    angle = np.exp(series[1])
+    logs = series[orders + 1] - np.log(tolerance)
     with np.errstate(over="ignore"):
         steps = 2 * np.ceil(np.maximum(np.exp(logs / orders), angle / _WIDEST) / 2)
     cost = steps * orders * (_PRODUCTS + orders)

@@ -487,37 +487,74 @@ def test_the_monodromy_matrix_is_as_accurate_as_it_is_asked_for(tolerance):
         assert np.abs(found - exact).max() < max(tolerance, 1e-12) * np.abs(exact).max()
 
 
-@pytest.mark.parametrize("kind", ["damped", "gyroscopic", "both", "any"])
+def integrated(stiffness, damping, matrices, varpi, size):
+    """The map of (q, p) over a period by a general integrator."""
+    swung, drag, momentum, mass = matrices
+    n = len(stiffness)
+
+    def rates(time, y):
+        q, p = y.reshape(2, n, 2 * n)
+        g = size * np.cos(varpi * time)
+        u = np.linalg.solve(np.eye(n) + g * mass, p - g * momentum @ q)
+        return np.concatenate([u, -(damping + g * drag) @ u - (stiffness + g * swung) @ q]).ravel()
+
+    end = solve_ivp(rates, (0, 2 * np.pi / varpi), np.eye(2 * n).ravel(), "DOP853", rtol=1e-12, atol=1e-13)
+    return end.y[:, -1].reshape(2 * n, 2 * n)
+
+
+@pytest.mark.parametrize("kind", ["damped", "gyroscopic", "both", "speed", "mass", "all", "damper", "any"])
 def test_half_a_period_tells_the_other_where_signs_make_it_so(kind):
-    """Dampers, a gyroscopic coupling of odd with even modes, both; of any matrices half a period tells nothing."""
+    """Dampers, a gyroscopic coupling of odd with even modes that stands still or oscillates, and masses do; an
+    oscillating damper and matrices of no symmetry do not."""
     rng = np.random.default_rng(5)
-    stiffness, swung, damping = rng.normal(size=(3, 4, 4))
-    stiffness, swung = stiffness + stiffness.T + 12 * np.eye(4), swung + swung.T
-    parts = {"damped": damping @ damping.T / 10, "any": damping / 5}
-    if kind in ("gyroscopic", "both"):
-        signs = np.array([1, -1, 1, -1])
-        same = signs[:, None] * signs > 0
-        stiffness, swung = stiffness * same, swung * same
-        skew = np.where(same, 0.0, damping - damping.T)
-        parts |= {"gyroscopic": skew, "both": skew + np.where(same, damping @ damping.T / 10, 0.0)}
-    wave = floquet.Oscillation(1, "cos", 0)
-    drives = [(wave, (swung, None, None, None))]
-    system, _ = periodic.PeriodicSystem.of(stiffness, parts[kind], drives, [2.0, 5.5], 0.6)
-    assert (system.parity() is None) == (kind == "any")
-
-    def rates(time, y, rate):
-        q, p = y.reshape(2, 4, 8)
-        return np.concatenate(
-            [p, -parts[kind] @ p - (stiffness + 0.6 * np.cos(rate * time) * swung) @ q]
-        ).ravel()  # fmt: skip
-
+    stiffness, swung, damping, mass = rng.normal(size=(4, 4, 4))
+    stiffness, swung, mass = stiffness + stiffness.T + 12 * np.eye(4), swung + swung.T, (mass + mass.T) / 6
+    drag, momentum = np.zeros((2, 4, 4))
+    odd = {"gyroscopic", "both", "speed", "all"}
+    signs = np.array([1, -1, 1, -1])
+    same = signs[:, None] * signs > 0
+    if kind in odd:
+        stiffness, swung, mass = stiffness * same, swung * same, mass * same
+        momentum = np.where(same, 0.0, damping) * (kind in ("speed", "all"))
+        drag = -momentum.T
+    skew = np.where(same, 0.0, damping - damping.T) * (kind in odd)
+    positive = np.where(same | (kind not in odd), damping @ damping.T / 10, 0.0)
+    still = {"gyroscopic": skew, "speed": skew, "any": damping / 5}.get(kind, positive + skew)
+    if kind == "damper":
+        drag = positive
+    if kind not in ("mass", "all"):
+        mass = np.zeros((4, 4))
+    wave, given = floquet.Oscillation(1, "cos", 0), (swung, drag, momentum, mass)
+    drives = [(wave, [part if part.any() else None for part in given])]
+    system, _ = periodic.PeriodicSystem.of(stiffness, still, drives, [2.0, 5.5], 0.6)
+    assert (system.parity() is None) == (kind in ("any", "damper"))
     for found, rate in zip(periodic.monodromy(system, 1e-12), (2.0, 5.5), strict=True):
-        end = solve_ivp(rates, (0, 2 * np.pi / rate), np.eye(8).ravel(), "DOP853", args=(rate,), rtol=1e-12, atol=1e-13)
-        np.testing.assert_allclose(found, end.y[:, -1].reshape(8, 8), rtol=0, atol=3e-10 * np.abs(found).max())
-    shifted, _ = periodic.PeriodicSystem.of(
-        stiffness, parts[kind], [(wave._replace(kind="sin"), drives[0][1])], 2.0, 0.6
-    )
+        exact = integrated(stiffness, still, given, rate, 0.6)
+        np.testing.assert_allclose(found, exact, rtol=0, atol=3e-10 * np.abs(exact).max())
+    shifted, _ = periodic.PeriodicSystem.of(stiffness, still, [(wave._replace(kind="sin"), drives[0][1])], 2.0, 0.6)
     assert shifted.parity() is None  # not even about t = 0
+
+
+@pytest.mark.parametrize("heavy", [0.3, 0.9])
+@pytest.mark.parametrize("shapes", [1, 2, 3])
+def test_a_mass_that_nearly_vanishes_is_followed(heavy, shapes):
+    """Its inverse has a pole near the real axis, where the cosine is -1/heavy: steps must not reach it, however slow
+    the system is. Masses that differ in their axes are inverted as matrices, the others as numbers."""
+    rng = np.random.default_rng(shapes)
+    point = rng.normal(size=(shapes, 3))
+    masses = np.array([np.outer(row, row) / (row @ row) for row in point])
+    drives = [(floquet.Oscillation(1, "cos", 0), (None, None, None, masses.sum(axis=0)))]
+    if shapes == 3:
+        drives = [(floquet.Oscillation(k + 1, "cos", 0), (None, None, None, m / 4)) for k, m in enumerate(masses)]
+    still, drag = np.diag([0.01, 0.3, 4.0]), np.diag([0.0, 0.1, 0.0])
+    size = heavy if shapes == 3 else heavy / np.linalg.norm(masses.sum(axis=0), 2)
+    system, _ = periodic.PeriodicSystem.of(still, drag, drives, [0.7, 40.0], size)
+    for found, exact in zip(periodic.monodromy(system), periodic.monodromy(system, 1e-15), strict=True):
+        assert np.abs(found - exact).max() < 1e-8 * np.abs(exact).max()
+    if shapes < 3:
+        none = np.zeros((3, 3))
+        other = integrated(still, drag, (none, none, none, drives[0][1][3]), 40.0, size)
+        np.testing.assert_allclose(exact, other, rtol=0, atol=1e-10 * np.abs(other).max())
 
 
 def coupled_planes(damper, other):

@@ -1,0 +1,250 @@
+"""Equations of second order with periodic coefficients, many at once: what :mod:`cra_sym.solvers.periodic` solves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.solvers.floquet import Oscillation, flat
+
+__all__ = ["LIGHTEST", "PeriodicSystem", "Sizes", "Swing"]
+
+Array = NDArray[np.float64]
+LIGHTEST = 1e-3
+"""Share of the mass that is left, at least, in estimates."""
+_SAME = 1e-14
+"""Relative size of what is beside the diagonal, of matrices that are diagonal but for rounding."""
+
+
+@dataclass(frozen=True)
+class Swing:
+    """One oscillating term; matrices (N, N, points) or (N, N, 1), None where there is nothing.
+
+    Attributes
+    ----------
+    oscillation : Oscillation
+    size : ndarray, shape (points,)
+        epsilon times the power of varpi.
+    stiffness, damping, momentum, mass : ndarray or None
+        K_r, C_r, B_r, M_r.
+    """
+
+    oscillation: Oscillation
+    size: Array
+    stiffness: Array | None
+    damping: Array | None
+    momentum: Array | None
+    mass: Array | None
+
+    @property
+    def only_stiffness(self) -> bool:
+        """Whether nothing else oscillates."""
+        return self.damping is None and self.momentum is None and self.mass is None
+
+    def take(self, index: NDArray[np.intp]) -> Swing:
+        """Return some of the systems."""
+        matrices = (self.stiffness, self.damping, self.momentum, self.mass)
+        return Swing(self.oscillation, self.size[index], *(_some(matrix, index) for matrix in matrices))
+
+
+@dataclass(frozen=True)
+class PeriodicSystem:
+    """A flat batch of systems, the batch axis last.
+
+    Attributes
+    ----------
+    stiffness, damping : ndarray, shape (N, N, points) or (N, N, 1)
+        K and C.
+    swings : tuple of Swing
+    period : ndarray, shape (points,)
+    """
+
+    stiffness: Array
+    damping: Array
+    swings: tuple[Swing, ...]
+    period: Array
+
+    @classmethod
+    def of(
+        cls,
+        stiffness: Any,
+        damping: Any,
+        drives: Sequence[tuple[Oscillation, Sequence[Any]]],
+        angular_frequency: Any,
+        epsilon: Any,
+    ) -> tuple[PeriodicSystem, tuple[int, ...]]:
+        """Return the batch and its shape.
+
+        Parameters
+        ----------
+        stiffness, damping : array_like, shape (..., N, N)
+        drives : sequence of (oscillation, (stiffness, damping, momentum, mass))
+            Matrices (..., N, N) or None.
+        angular_frequency, epsilon : array_like, shape (...)
+            varpi, rad/s, positive; epsilon.
+        """
+        given = [np.asarray(m, float) for m in (stiffness, damping)]
+        some = [np.asarray(m, float) for _, matrices in drives for m in matrices if m is not None]
+        varpi, epsilon = np.asarray(angular_frequency, float), np.asarray(epsilon, float)
+        shape = np.broadcast_shapes(*(m.shape[:-2] for m in (*given, *some)), varpi.shape, epsilon.shape)
+
+        def columns(matrix: Any) -> Array | None:
+            if matrix is None:
+                return None
+            matrix = np.asarray(matrix, float)
+            single = matrix.size == matrix.shape[-1] * matrix.shape[-2]
+            return matrix.reshape(*matrix.shape[-2:], 1) if single else flat(matrix, shape, 2)
+
+        frequency, size = flat(varpi, shape, 0), flat(epsilon, shape, 0)
+        swings = tuple(Swing(wave, size * frequency**wave.power, *map(columns, m)) for wave, m in _joined(drives))
+        whole = [columns(matrix) for matrix in given]
+        assert whole[0] is not None and whole[1] is not None
+        batch = cls(whole[0], whole[1], swings, 2 * np.pi / frequency)
+        batch.check_mass()
+        return batch, shape
+
+    def take(self, index: NDArray[np.intp]) -> PeriodicSystem:
+        """Return some of the systems."""
+        stiffness, damping = (_some(matrix, index) for matrix in (self.stiffness, self.damping))
+        assert stiffness is not None and damping is not None
+        return PeriodicSystem(stiffness, damping, tuple(s.take(index) for s in self.swings), self.period[index])
+
+    def check_mass(self) -> None:
+        """Refuse a mass that need not be positive throughout the period."""
+        total = np.zeros_like(self.period)
+        for swing in self.swings:
+            if swing.mass is not None:
+                total = total + np.abs(swing.size) * np.linalg.norm(np.moveaxis(swing.mass, -1, 0), 2, axis=(-2, -1))
+        if (total >= 1.0).any():
+            raise ValueError(
+                f"epsilon: the mass fluctuates by {total.max():.3g} times itself; must be less than once, so that it "
+                "stays positive"
+            )
+
+    def parity(self) -> NDArray[np.int8] | None:
+        """Return signs of q that make half a period tell the other, None if there are none.
+
+        With all cosines even in time they are to turn what stands still, oscillating stiffnesses and masses into their
+        transposes, and every oscillating damping matrix into the transpose of its momentum.
+        """
+        if any(s.oscillation.kind == "sin" for s in self.swings):
+            return None
+        pairs = [
+            (m, m) for m in (self.stiffness, self.damping, *(m for s in self.swings for m in (s.stiffness, s.mass)))
+        ]
+        pairs += [(s.damping, s.momentum) for s in self.swings]
+        size = len(self.stiffness)
+        same, opposite = np.zeros((2, size, size), bool)  # signs of two
+        for matrix, other in pairs:
+            if matrix is None and other is None:
+                continue
+            if matrix is None or other is None:
+                return None
+            turned = other.swapaxes(0, 1)
+            there = ((matrix != 0) | (turned != 0)).any(axis=-1)
+            even, odd = ((matrix == sign * turned).all(axis=-1) for sign in (1, -1))
+            if (there & ~even & ~(odd & ~np.eye(size, dtype=bool))).any():
+                return None
+            same, opposite = same | (there & even), opposite | (there & ~even)
+        signs = np.zeros(size, np.int8)
+        while not signs.all():
+            fresh = [int(np.argmin(signs != 0))]
+            signs[fresh] = 1
+            while fresh:
+                row = fresh.pop()
+                for sign, joined in ((1, same[row]), (-1, opposite[row])):
+                    found = np.nonzero(joined & (signs == 0))[0]
+                    signs[found] = sign * signs[row]
+                    fresh.extend(found.tolist())
+        product = signs[:, None] * signs
+        return None if (same & (product < 0)).any() or (opposite & (product > 0)).any() else signs
+
+    def in_axes_of_mass(self) -> tuple[PeriodicSystem, Array | None]:
+        """Return the same in axes that make all oscillating masses diagonal, and these as columns; None if none do."""
+        masses = [s.mass[..., 0] for s in self.swings if s.mass is not None and s.mass.shape[-1] == 1]
+        if not masses or len(masses) < sum(s.mass is not None for s in self.swings):
+            return self, None
+        if not all(np.array_equal(mass, mass.T) for mass in masses):
+            return self, None
+        _, axes = np.linalg.eigh(sum(mass / (k + np.linalg.norm(mass)) for k, mass in enumerate(masses, 1)))
+
+        def turned(matrix: Array) -> Array:
+            return np.asarray(np.einsum("ji,jkp,kl->ilp", axes, matrix, axes))
+
+        def some(matrix: Array | None) -> Array | None:
+            return None if matrix is None else turned(matrix)
+
+        one = np.eye(len(axes))[..., None]
+
+        for mass in masses:
+            off = axes.T @ mass @ axes
+            if np.abs(off - np.diag(np.diag(off))).max() > _SAME * np.linalg.norm(mass):
+                return self, None
+        swings = tuple(
+            Swing(
+                *(s.oscillation, s.size, some(s.stiffness), some(s.damping), some(s.momentum)),
+                None if s.mass is None else one * turned(s.mass),
+            )
+            for s in self.swings
+        )
+        return PeriodicSystem(turned(self.stiffness), turned(self.damping), swings, self.period), axes
+
+    def rate(self) -> Array:
+        """Return a bound of how fast anything moves, 1/s, shape (points,)."""
+        sizes = self.sizes()
+        light = 1.0 / np.maximum(1.0 - sizes.mass.sum(axis=0), LIGHTEST)
+        still, swung = sizes.still, sizes.damping.sum(axis=0) + sizes.momentum.sum(axis=0)
+        turns = max((s.oscillation.order for s in self.swings), default=1)
+        moved = np.sqrt((still[0] + sizes.stiffness.sum(axis=0)) * light) + (still[1] + swung) * light
+        return np.asarray(moved + 2 * np.pi * turns / self.period)
+
+    def sizes(self) -> Sizes:
+        """Return norms of what stands still and of what oscillates."""
+        points = self.period.size
+        still = np.array([np.broadcast_to(norm_bound(m), points) for m in (self.stiffness, self.damping)])
+
+        def rows(name: str) -> Array:
+            found = [np.abs(s.size) * np.broadcast_to(norm_bound(getattr(s, name)), points) for s in self.swings]
+            return np.array(found).reshape(len(self.swings), points)
+
+        return Sizes(still, *(rows(name) for name in ("stiffness", "damping", "momentum", "mass")))
+
+
+class Sizes(NamedTuple):
+    """Norms of a batch: ``still`` of K and C, shape (2, points); of what oscillates, one row a term."""
+
+    still: Array
+    stiffness: Array
+    damping: Array
+    momentum: Array
+    mass: Array
+
+
+def _joined(
+    drives: Sequence[tuple[Oscillation, Sequence[Any]]],
+) -> list[tuple[Oscillation, list[Any]]]:
+    """Return one drive for each oscillation, its matrices summed."""
+    found: dict[Oscillation, list[Any]] = {}
+    for wave, matrices in drives:
+        sums = found.setdefault(wave, [None] * len(matrices))
+        for k, matrix in enumerate(matrices):
+            if matrix is not None:
+                sums[k] = matrix if sums[k] is None else np.asarray(sums[k]) + matrix
+    return list(found.items())
+
+
+def _some(matrix: Array | None, index: NDArray[np.intp]) -> Array | None:
+    return matrix if matrix is None or matrix.shape[-1] == 1 else matrix[..., index]
+
+
+def norm_bound(matrix: Array | None) -> Array:
+    """Return a bound of the spectral norm, shape (points,) or (1,)."""
+    if matrix is None:
+        return np.zeros(1)
+    sizes = np.abs(matrix)
+    sums = np.sqrt(sizes.sum(axis=1).max(axis=0) * sizes.sum(axis=0).max(axis=0))
+    return np.asarray(np.fmin(sums, np.sqrt((sizes**2).sum(axis=(0, 1)))))
