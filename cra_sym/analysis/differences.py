@@ -22,7 +22,13 @@ _POINTS = 8  # on one side of a parameter that cannot be negative, or four on ea
 
 
 def by_differences(
-    system: System, found: Sensitivities, name: str, quantity: Quantity, *, compliance: bool = False
+    system: System,
+    found: Sensitivities,
+    name: str,
+    quantity: Quantity,
+    *,
+    compliance: bool = False,
+    step: float = _STEP,
 ) -> Array:
     """Return the derivative of a modal quantity by a parameter, of a stiff spring of an end by way of its compliance.
 
@@ -36,24 +42,27 @@ def by_differences(
         Takes a system, returns an array of shape (..., modes, ...) that begins with the shape of the batch.
     compliance : bool
         Whether the derivative is by one over the stiffness.
+    step : float
+        Of the differences, over the change of the parameter at which two modes would meet: small where the quantity has
+        kinks, such as a peak that comes at once or a period later.
 
     Returns
     -------
     ndarray
-        As the quantity; its relative error is about 1e-11.
+        As the quantity; its relative error is about 1e-11, or that of the quantity over the step where this is more.
     """
     given = np.broadcast_to(system.values[name], system.shape)
     if compliance or name not in found.compliance:
-        return _differences(system, found, name, quantity, compliance=compliance)
+        return _differences(system, found, name, quantity, compliance=compliance, step=step)
     stiff = given > _own_stiffness(system, name)
     if not stiff.any():
-        return _differences(system, found, name, quantity, compliance=False)
-    by_compliance = _differences(system, found, name, quantity, compliance=True)
+        return _differences(system, found, name, quantity, compliance=False, step=step)
+    by_compliance = _differences(system, found, name, quantity, compliance=True, step=step)
     more = (None,) * (by_compliance.ndim - given.ndim)
     with np.errstate(divide="ignore"):
         total = -((1 / given) ** 2)[(..., *more)] * by_compliance
     if not stiff.all():
-        soft = _differences(system, found, name, quantity, compliance=False)
+        soft = _differences(system, found, name, quantity, compliance=False, step=step)
         total = np.where(stiff[(..., *more)], total, soft)
     return np.asarray(total)
 
@@ -85,7 +94,9 @@ def _reach(frequency: Array, rate: Array, place: Array) -> Array:
     return np.where(np.isfinite(reach), reach, np.where(place > 0, place, 1.0))
 
 
-def _differences(system: System, found: Sensitivities, name: str, quantity: Quantity, *, compliance: bool) -> Array:
+def _differences(
+    system: System, found: Sensitivities, name: str, quantity: Quantity, *, compliance: bool, step: float
+) -> Array:
     """Return the derivative by differences: central where the parameter allows, else one-sided."""
     given = np.broadcast_to(system.values[name], system.shape)
     with np.errstate(divide="ignore"):
@@ -95,16 +106,16 @@ def _differences(system: System, found: Sensitivities, name: str, quantity: Quan
     reach = _reach(found.frequency, found.compliance[name] if compliance else found.rate[name], place)
     if not compliance and name not in {*system.numerics("stiffnesses"), *system.numerics("inertias")}:
         reach = np.where(place == 0, reach, np.minimum(reach, np.abs(place)))  # such as a density: nothing beyond 0
-    step = _STEP * reach
+    width = step * reach
     half = _POINTS // 2
-    room = np.floor(place / step).clip(0, half)
+    room = np.floor(place / width).clip(0, half)
     offsets = np.arange(-half, half + 1)[:, *(None,) * place.ndim] + (half - room)
-    values = place + offsets * step
+    values = place + offsets * width
     with np.errstate(divide="ignore"):
         moved = system.replace(**{name: 1 / values if compliance else values})
     values_there = quantity(moved)
     more = (None,) * (values_there.ndim - offsets.ndim)
-    weights = _weights(offsets) / step
+    weights = _weights(offsets) / width
     return np.asarray((weights[(..., *more)] * values_there).sum(axis=0))
 
 

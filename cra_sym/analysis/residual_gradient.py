@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 __all__ = ["residual_vibration_gradient"]
 
 Array = NDArray[np.float64]
-_TURN = 0.05  # rad of the fastest mode: step of a difference by the duration
+_SHORT = 1e-4  # step of a difference of a peak, which has a kink where it comes at once or a period later
+_TURN = 1e-3  # rad of the fastest mode: the same of a difference by the duration
 _TINY = 1e-30  # an imaginary part whose square is nothing
 _SLOWEST = 1e-5  # rad until everything stops
 
@@ -133,7 +134,7 @@ def _coupled(
         def moved(one: System) -> Array:
             return np.asarray(residual_vibration(one, motion, modes, zeta=zeta))
 
-        return by_differences(system, found, stiffness or name, moved, compliance=stiffness is not None)
+        return by_differences(system, found, stiffness or name, moved, compliance=stiffness is not None, step=_SHORT)
     (cause,), (profile,) = driven.names, driven.profiles
     offsets, weights = central_weights()
     duration = np.asarray(driven.stop)

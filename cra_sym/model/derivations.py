@@ -266,11 +266,14 @@ def _rate(weak: WeakForm, form: Bilinear, symbol: Symbol, dimension: int) -> Bil
             rate += derivative(value, space.x) * drift if dimension else S.Zero
             if rate != 0:
                 _add(found, (p, q), power, rate)
-            if isinstance(p.place, int) or isinstance(q.place, int):
-                place = weak.place(p if isinstance(p.place, int) else q)
-                moved = value * (place.diff(symbol) - drift.subs(space.x, place))
-                if moved != 0:
-                    for pair in ((p._replace(space=p.space + 1), q), (p, q._replace(space=q.space + 1))):
+            for jet, pair in (
+                (p, (p._replace(space=p.space + 1), q)),
+                (q, (p, q._replace(space=q.space + 1))),
+            ):
+                if isinstance(jet.place, int):
+                    place = weak.place(jet)
+                    moved = value * (place.diff(symbol) - drift.subs(space.x, place))
+                    if moved != 0:
                         _add(found, pair, power, moved)
     return found
 

@@ -68,6 +68,8 @@ class NamedSystem(StateSpace):  # type: ignore[misc]
     def to_control(self) -> control.StateSpace:
         """Return the system as one of python-control, names and step kept.
 
+        python-control allows no dot in a name: ``v(0.3)`` is ``v(0_3)`` there.
+
         Returns
         -------
         control.StateSpace
@@ -77,7 +79,7 @@ class NamedSystem(StateSpace):  # type: ignore[misc]
         MissingExtraError
             If python-control, from the extra ``control``, is not installed.
         """
-        states, inputs, outputs = map(list, self._names)
+        states, inputs, outputs = ([name.replace(".", "_") for name in names] for names in self._names)
         step = 0.0 if self.dt is None else self.dt
         made: control.StateSpace = require("control", "control").ss(
             self.A, self.B, self.C, self.D, step, states=states, inputs=inputs, outputs=outputs

@@ -206,3 +206,24 @@ def test_parameters_of_what_holds_a_motion(name):
         rate = (moved[1] - moved[0]) / (2 * step * values[name])
         found = cra.sensitivities(model.at(values), 3).rate[name]
         np.testing.assert_allclose(found, rate, atol=1e-7 * np.abs(rate).max())
+
+
+def test_places_where_springs_of_one_mass_are_fixed_move_on_their_own():
+    """A mass that hangs on the span by springs at two places: rates by each place and by the length."""
+    length, density, bending, spring, mass, near, far, x, t = sp.symbols("l d B s m a b x t")
+    field, hung = sp.Function("v")(x, t), sp.Function("q")(t)
+    model = cra.Model(
+        density * field.diff(t) ** 2 / 2 - bending * field.diff(x, 2) ** 2 / 2,
+        fields=[field], coordinates=[hung], x=x, domain=(0, length), t=t,
+        left=mass * hung.diff(t) ** 2 / 2, essential=[field.subs(x, 0), field.subs(x, length)],
+        inside=[(near, -spring * (field - hung) ** 2 / 2), (far, -spring * (field - hung / 2) ** 2)],
+    )  # fmt: skip
+    values = {"l": 1.0, "d": 0.5, "B": 4.0, "s": 200.0, "m": 0.15, "a": 0.37, "b": 0.71}
+    system = model.at(values)
+    found = cra.sensitivities(system, 3)
+    h = 1e-3
+    for name in ("a", "b", "l"):
+        at = {k: cra.natural_frequencies(system.replace(**{name: values[name] + k * h}), 3) for k in (-2, -1, 1, 2)}
+        slope = (8 * (at[1] - at[-1]) - at[2] + at[-2]) / (12 * h)
+        # fourth order: h^4 times a fifth derivative of about (4 pi)^5/30 f; rounding 1e-13 f/h
+        np.testing.assert_allclose(found.rate[name], slope, rtol=0, atol=1e-7 * at[1].max())

@@ -169,6 +169,8 @@ def test_the_held_input_is_exact():
 def test_names_survive_in_python_control():
     control = pytest.importorskip("control", reason="needs the extra control: python-control")
     system = cra.state_space(ARM, 2, ["base_acceleration", v.subs(x, L)], {"angle": v.diff(x).subs(x, L), "y": "y"})
+    there = cra.state_space(ARM, 2, outputs=[("v", 0.25)])
+    assert there.output_names == ("v(0.25)",) and there.to_control().output_labels == ["v(0_25)"]  # no dots there
     made = system.to_control()
     assert made.input_labels == ["base_acceleration", "v(L, t)"] and made.output_labels == ["angle", "y"]
     assert made.state_labels == list(system.state_names) and made.isctime()
