@@ -70,7 +70,7 @@ def draw(name: str, system: System | None = None, **options: Any) -> Figure:
     Parameters
     ----------
     name : str
-        'frequencies', 'mode_shapes', 'response', 'frequency_response', 'zones' and 'combinations' show any system, the
+        'frequencies', 'mode_shapes', 'response', 'residual_vibration', 'zones' and others show any system, the
         others of `shows_an_arm` one with the parameters of an arm, whose Lagrangian may be another; 'fig04' an arm.
     system : System, optional
         A single one. An arm is one.

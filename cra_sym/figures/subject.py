@@ -58,7 +58,7 @@ def parameters_of(system: System) -> Arm:
     if missing:
         raise ValueError(
             f"system has no parameter {missing[0]!r}: this figure is of an arm, with {', '.join(names)}; "
-            "'frequencies', 'mode_shapes', 'response', 'frequency_response', 'zones' and 'combinations' show any system"
+            "'frequencies', 'mode_shapes', 'response', 'residual_vibration', 'zones' and others show any system"
         )
     return Arm(**{name: system.values[name] for name in names}, zeta=system.zeta)
 

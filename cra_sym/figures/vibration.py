@@ -9,17 +9,26 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from cra_sym.analysis.frequency_response import frequency_response
-from cra_sym.analysis.modes import modal_parameters, mode_shapes, natural_frequencies
+from cra_sym.analysis.modes import mode_shapes, natural_frequencies, only_motion
 from cra_sym.analysis.residual_vibration import residual_vibration
 from cra_sym.analysis.responses import tip_response
 from cra_sym.analysis.shaping import input_shaper
 from cra_sym.analysis.state_space import state_space
 from cra_sym.arm.parameters import Arm
+from cra_sym.checks import choice
 from cra_sym.figures.drawing import GREEN, ORANGE, figure_of, panels
 from cra_sym.figures.modes import decades
-from cra_sym.figures.subject import fields, moving_place, single
+from cra_sym.figures.subject import (
+    around,
+    fields,
+    leading_parameter,
+    moving_place,
+    parameter_label,
+    parameter_name,
+    single,
+)
 from cra_sym.model.system import System
-from cra_sym.solvers.motion import BaseMotion, Piecewise
+from cra_sym.solvers.motion import BaseMotion, Force, Piecewise
 
 if TYPE_CHECKING:
     from sympy import Expr
@@ -115,75 +124,125 @@ def _values(system: System) -> str:
     return f"$\\zeta$ = {system.zeta:g}"
 
 
-def figure_residual_vibration(arm: System | None = None, *, ax: Any = None) -> Figure:
-    """Draw the vibration left after a move over the time the move takes and the joint's translational stiffness.
+def figure_residual_vibration(
+    system: System | None = None, parameter: str | None = None, *, ax: Any = None, points: int = 161
+) -> Figure:
+    """Draw the vibration left after a move over the time the move takes and a parameter, of an arm k_t.
 
     Parameters
     ----------
-    arm : Arm, optional
-        By default the nominal one.
+    system : System, optional
+        With one prescribed motion; by default the nominal arm.
+    parameter : str, optional
+        By default the first stiffness of an end, or else what the first frequency owes most to.
     ax : Axes, optional
+    points : int
+        Values of the parameter drawn; of the time there are more.
     """
-    arm = arm or Arm.nominal()
+    system, name = _subject(system or Arm.nominal(), parameter)
     panel = panels(ax, 1, 1, _SIZE)[0, 0]
-    k_t, fastest = decades(arm, "k_t", 1, 5, 161), BaseMotion.s_curve(**_LIMITS).duration
-    duration = np.linspace(fastest, fastest + 4.25 / natural_frequencies(arm.replace(k_t=np.inf), 1)[0], 281)
-    left = residual_vibration(arm.replace(k_t=k_t[:, None]), BaseMotion.s_curve(**_LIMITS, duration=duration))
+    joint = isinstance(system, Arm) and name == "k_t"
+    values = decades(system, name, 1, 5, points) if joint else around(system, name, 1, points)
+    stiffest = system.replace(**{name: np.inf if joint else values[-1]})
+    fastest = BaseMotion.s_curve(**_LIMITS).duration
+    duration = np.linspace(fastest, fastest + 4.25 / _first(stiffest), 7 * points // 4)
+    move = _alone(system, BaseMotion.s_curve(**_LIMITS, duration=duration))
+    left = np.asarray(residual_vibration(system.replace(**{name: values[:, None]}), move))
+    if not np.nanmax(left) > 0:
+        raise ValueError("system: its right end does not move; 'response' shows the place that moves most")
     top = 10.0 ** np.ceil(np.log10(1e3 * left[np.isfinite(left)].max()))
     norm = LogNorm(1e-4 * top, top)
-    mesh = panel.pcolormesh(duration, k_t, 1e3 * left, norm=norm, shading="gouraud", rasterized=True)
-    panel.set_yscale("log")
+    mesh = panel.pcolormesh(duration, values, 1e3 * left, norm=norm, shading="gouraud", rasterized=True)
+    panel.set_yscale("log" if values[0] > 0 and values[-1] > 30 * values[0] else "linear")
     panel.figure.colorbar(mesh, ax=panel, label="residual tip amplitude / mm", extend="both")
-    period, move = 1 / modal_parameters(arm.replace(k_t=k_t), 1).frequency[:, 0], BaseMotion.s_curve(**_LIMITS)
-    (profile,) = move.terms
+    period = 1 / _first(system.replace(**{name: values}))
+    (profile,) = BaseMotion.s_curve(**_LIMITS).terms
     assert isinstance(profile, Piecewise)
     braking = float(profile.knots[4]) / fastest  # from the start to the braking, as a fraction of the move
     for number in (1, 2, 3):
-        panel.plot(number * period / braking, k_t, color="white", linestyle=(0, (1, 2)), linewidth=1.0)
+        panel.plot(number * period / braking, values, color="white", linestyle=(0, (1, 2)), linewidth=1.0)
     panel.set_xlim(duration[0], duration[-1])
     panel.set_xlabel("time the move takes / s")
-    panel.set_ylabel("translational stiffness $k_t$ / (N/m)")
-    panel.set_title("Residual vibration: dark valleys are move times in tune with the joint")
+    label = parameter_label(system, name)
+    panel.set_ylabel("translational stiffness $k_t$ / (N/m)" if joint else label)
+    in_tune = "the joint" if joint else "mode 1"
+    panel.set_title(f"Residual vibration: dark valleys are move times in tune with {in_tune}")
     panel.grid(False)
     dotted = "dotted: braking 1, 2, 3 periods of mode 1 after the start"
-    return _caption(np.array([panel]), f"{_MOVE}, slowed down; {dotted}; undamped")
+    damping = "" if system.zeta or system.numerics("damping") is not None else "; undamped"
+    return _caption(np.array([panel]), f"{_MOVE}, slowed down; {dotted}{damping}")
 
 
-def figure_input_shaping(arm: System | None = None, *, axes: Any = None) -> Figure:
-    """Draw a move shaped for the computed modes against an S-curve of the same duration, and with a joint wrongly
-    known.
+def figure_input_shaping(
+    system: System | None = None, parameter: str | None = None, *, axes: Any = None, points: int = 201
+) -> Figure:
+    """Draw a move shaped for the computed modes against an S-curve of the same duration, and with a parameter, of an
+    arm k_t, wrongly known.
 
     Parameters
     ----------
-    arm : Arm, optional
-        The arm the shapers are made for, by default the nominal one with an elastic joint and 1 % of damping.
+    system : System, optional
+        What the shapers are made for, with one prescribed motion: by default the nominal arm with an elastic joint and
+        1 % of damping.
+    parameter : str, optional
+        As in :func:`figure_residual_vibration`; neither zero nor infinite.
     axes : pair of Axes, optional
+    points : int
+        Values of the parameter drawn; of the time there are more.
     """
-    arm = arm or Arm.nominal().replace(**_LOOSE, zeta=0.01)
+    system, name = _subject(system or Arm.nominal().replace(**_LOOSE, zeta=0.01), parameter)
+    value = float(system.values[name])
+    if not 0 < abs(value) < np.inf:
+        raise ValueError(f"parameter: {name} = {value:g} must be finite and not zero, to be wrongly known")
     (row,) = panels(axes, 1, 2, _SIZE)
     left, right = row
-    moves, period = shaped_moves(arm), 1 / natural_frequencies(arm, 1)[0]
+    moves, period = shaped_moves(system), 1 / _first(system)
     end = float(f"{moves['ZVD'].duration + 2.65 * period:.2g}")
-    t, k_t = np.linspace(0, end, 1601), np.geomspace(0.1, 10.0, 201) * arm.values["k_t"]
-    for name, move in moves.items():
-        left.plot(t, 1e3 * tip_response(arm, move, t), label=f"{name}, {move.duration:.2f} s", linewidth=1.4)
-        right.loglog(k_t / arm.values["k_t"], 1e3 * residual_vibration(arm.replace(k_t=k_t), move), linewidth=1.4)
+    stiff = name in system.numerics("stiffnesses")
+    wrong = np.geomspace(0.1, 10.0, points) if stiff else np.geomspace(0.5, 2.0, points)
+    t, others = np.linspace(0, end, 8 * points - 7), system.replace(**{name: wrong * value})
+    for kind, move in moves.items():
+        given, label = _alone(system, move), f"{kind}, {move.duration:.2f} s"
+        left.plot(t, 1e3 * tip_response(system, given, t), label=label, linewidth=1.4)
+        right.loglog(wrong, 1e3 * residual_vibration(others, given), linewidth=1.4)
     left.legend(loc="lower left", bbox_to_anchor=(0.0, 0.98), ncols=2, borderaxespad=0, fontsize=8)
     left.set_title("Input shaping from the computed modes", pad=36)
     left.set_xlabel("time $t$ / s")
-    left.set_ylabel("tip displacement $v(L,t)$ / mm")
+    arm, symbol = isinstance(system, Arm), parameter_name(system, name)[0]
+    left.set_ylabel("tip displacement $v(L,t)$ / mm" if arm else "tip displacement / mm")
     right.axvline(1.0, color="0.6", linewidth=0.8)
-    right.set_title("with a joint other than assumed", pad=36, fontweight="normal")
-    right.set_xlabel("true $k_t$ / assumed $k_t$")
+    what = "a joint" if arm and name == "k_t" else symbol
+    right.set_title(f"with {what} other than assumed", pad=36, fontweight="normal")
+    right.set_xlabel(f"true {symbol} / assumed {symbol}")
     right.set_ylabel("residual tip amplitude / mm")
-    k_t_assumed, k_r_assumed = arm.values["k_t"], arm.values["k_r"]
-    assumed = f"assumed $k_t$ = {k_t_assumed:g} N/m, $k_r$ = {k_r_assumed:g} N m/rad, $\\zeta$ = {arm.zeta:g}"
-    return _caption(row, f"{_MOVE}; {assumed}")
+    assumed = _values(system) if arm else f"{symbol} = {value:g}, {_values(system)}"
+    return _caption(row, f"{_MOVE}; assumed {assumed}")
 
 
-def shaped_moves(arm: System) -> dict[str, BaseMotion]:
+def _subject(system: System, parameter: str | None) -> tuple[System, str]:
+    """Return a system that one motion moves, and the parameter that is drawn over."""
+    only_motion(single(system))
+    if parameter is None:
+        return system, leading_parameter(system)
+    return system, choice("parameter", parameter, tuple(system.values))
+
+
+def _alone(system: System, move: BaseMotion) -> dict[Any, BaseMotion | Force]:
+    """Return the motion of what moves a system, with every force zero."""
+    cause, none = only_motion(system), Force.sampled([0.0, 1.0], [0.0, 0.0], exact=True)
+    return {name: move if name == cause else none for name, _ in system.numerics("causes")}
+
+
+def _first(system: System) -> np.ndarray:
+    """Return the frequency of the first mode that vibrates, Hz."""
+    found = natural_frequencies(system, 3)
+    elastic = np.where(found > 0, found, np.inf).min(axis=-1)
+    return np.asarray(elastic)
+
+
+def shaped_moves(system: System) -> dict[str, BaseMotion]:
     """Return the fastest S-curve, the same shaped for mode 1 (ZV, ZVD), and an S-curve as slow as the ZVD move."""
-    omega = modal_parameters(arm, 1).omega[0]
+    omega = 2 * np.pi * _first(system)
     fast = BaseMotion.s_curve(**_LIMITS)
-    zv, zvd = (fast.shaped(*input_shaper(omega, arm.zeta, order)) for order in (1, 2))
+    zv, zvd = (fast.shaped(*input_shaper(omega, system.zeta, order)) for order in (1, 2))
     return {"S-curve": fast, "ZV": zv, "ZVD": zvd, "slow S-curve": BaseMotion.s_curve(**_LIMITS, duration=zvd.duration)}

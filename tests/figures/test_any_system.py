@@ -8,17 +8,25 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import cra_sym as cra
 from cra_sym.figures import FIGURES, draw, shows_any_system
+from cra_sym.figures.vibration import shaped_moves
 from tests.systems import NAMES, system
 
 COARSE = {
     "zones": {"points": 5, "tolerance": 1e-3},
     "combinations": {"points": 21},
     "frequency_response": {"points": 50},
+    "residual_vibration": {"points": 9},
+    "input_shaping": {"points": 9},
 }
 SHOWN = [name for name in FIGURES if shows_any_system(name) and name != "slip_amplitude"]
 
 
-DEAR = {"combinations": ("string", "gantry")}  # that of the others costs seconds and takes no other way
+# those of the others cost seconds and take no other way
+DEAR = {
+    "combinations": ("string", "gantry"),
+    "residual_vibration": ("string", "two planes"),
+    "input_shaping": ("string", "gantry"),
+}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -105,6 +113,8 @@ def test_a_string_held_at_both_ends_is_shown_where_it_moves():
         ("frequencies", None, {"parameter": "k"}, "parameter = 'k': must be one of L, b"),
         ("frequencies", None, {"colour": 1}, r"colour = 1: 'frequencies' takes system, parameter"),
         ("derivation", cra.Arm.nominal(), {}, "it shows no arm"),
+        ("input_shaping", None, {"parameter": "J_e"}, "J_e = 0 must be finite and not zero"),
+        ("residual_vibration", None, {"parameter": "q"}, "parameter = 'q': must be one of L, b"),
         ("response", cra.Arm.nominal().replace(m_e=[0.1, 0.2]), {}, r"system has shape \(2,\)"),
     ],
 )
@@ -123,3 +133,19 @@ def test_axes_of_what_is_left_after_moves_follow_the_arm():
     assert curves(shaped)[0][-1, 0] > 5.0
     (mesh, *_) = panel.collections
     assert mesh.norm.vmax / 10 < mesh.get_array().max() <= mesh.norm.vmax == pytest.approx(1e4 * mesh.norm.vmin)
+
+
+def test_what_is_left_after_moves_of_any_system_is_the_public_function():
+    given = system("gantry", 0.02)
+    panel = draw("residual_vibration", given, parameter="c", points=9).axes[0]
+    (mesh, *_) = panel.collections
+    duration, stiffness = mesh.get_coordinates()[-1, -1]
+    none, (fast, *_) = cra.Force.sampled([0.0, 1.0], [0.0, 0.0], exact=True), shaped_moves(given).values()
+    slow = cra.BaseMotion.s_curve(0.5, 1.0, 4.0, 40.0, duration=duration)
+    left = cra.residual_vibration(given.replace(c=stiffness), {"w": slow, "p": none})
+    assert mesh.get_array().reshape(mesh.get_coordinates().shape[:2])[-1, -1] == pytest.approx(1e3 * left, rel=1e-9)
+    assert panel.get_ylabel() == "$c$" and stiffness > 900.0
+    shaped, wrong = draw("input_shaping", given, parameter="c", points=9).axes
+    first = curves(shaped)[0]
+    np.testing.assert_allclose(first[:, 1], 1e3 * cra.tip_response(given, {"w": fast, "p": none}, first[:, 0]))
+    assert wrong.get_xlabel() == "true $c$ / assumed $c$"
