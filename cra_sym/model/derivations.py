@@ -366,7 +366,10 @@ def ball_problem(model: Model) -> BallProblem:
     """
     form = model.conservative
     if not form.uniform:
-        raise ValueError("certification needs coefficients that are constant along x")
+        raise ValueError(
+            "system: certification needs coefficients that are constant along x, without terms inside; "
+            "natural_frequencies with system.accuracy estimates the error, system.check() compares two routes"
+        )
     weak = weak_form(model.linearised.variation)
     kinds = {"stiffness": 0, "mass": 2}
     parts = {kind: (_power(weak.inside, power), _power(weak.ends, power)) for kind, power in kinds.items()}
