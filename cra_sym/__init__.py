@@ -65,6 +65,8 @@ _HOME = {
     "slow_flow_values": "analysis.slow_flow",
     "SteadyState": "analysis.steady_states",
     "steady_states": "analysis.steady_states",
+    "ResponseCurve": "analysis.response_curves",
+    "response_curves": "analysis.response_curves",
     "basins": "analysis.basins",
     "Iwan": "model.hysteresis",
     "Jenkins": "model.hysteresis",

@@ -21,6 +21,8 @@ from .analysis.nonlinear import ConvergenceWarning as ConvergenceWarning
 from .analysis.nonlinear import nonlinear_modal_equations as nonlinear_modal_equations
 from .analysis.residual_gradient import residual_vibration_gradient as residual_vibration_gradient
 from .analysis.residual_vibration import residual_vibration as residual_vibration
+from .analysis.response_curves import ResponseCurve as ResponseCurve
+from .analysis.response_curves import response_curves as response_curves
 from .analysis.responses import UndersamplingWarning as UndersamplingWarning
 from .analysis.responses import response as response
 from .analysis.responses import tip_response as tip_response

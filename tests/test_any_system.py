@@ -65,6 +65,9 @@ CALLS = {
     "backbone": lambda s: {"amplitude": [1e-3, 2e-3], "modes": 2, "harmonics": 3},
     "steady_states": lambda s: {
         "angular_frequency": [0.9 * s.natural_frequencies(2)[-1]], "drive": {"w": 1e-3}, "modes": 2, "harmonics": 2},
+    "response_curves": lambda s: {
+        "between": (0.9 * s.natural_frequencies(2)[-1], 0.95 * s.natural_frequencies(2)[-1]), "drive": {"w": 1e-3},
+        "modes": 2, "harmonics": 2},
     "nonlinear_modal_equations": lambda s: {"modes": 2},
     "slow_flow_values": lambda s: {"flow": s.model.slow_flow(("free", 1))},
     "identify_joint": lambda s: {"measured_frequencies": cra.natural_frequencies(s, 2), "uncertainty": 1e-3},

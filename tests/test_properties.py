@@ -199,6 +199,7 @@ NOT_NUMERIC = {
     "AmbiguityWarning", "Arm", "AsymptoticWarning", "AxialBase", "BaseMotion", "Fluctuation", "Force", "JointStiffness",
     "Backbone", "ConvergenceWarning", "Member", "SteadyState", "backbone", "certify_stability", "count_eigenvalues",
     "critical_value", "joined", "nonlinear_modal_equations", "slow_flow_values", "steady_states", "basins",
+    "ResponseCurve", "response_curves",
     "MisfitWarning", "Model", "ResonanceWarning", "BoltedJoint", "Controller", "Iwan", "Jenkins", "SlipEvent",
     "SlipResponse", "identify_slip", "slip_response", "System", "TransverseBase", "UndersamplingWarning", "equation",
     "equations", "explore", "export", "kernel", "paper_lagrangian", "stations", "sweep",

@@ -10,10 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym import checks
-from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, ConvergenceWarning, equations_of, samples, watched
+from cra_sym.analysis.nonlinear import (
+    MOST_NONLINEAR_MODES,
+    ConvergenceWarning,
+    equations_of,
+    samples,
+    warn_of_slopes,
+    watched,
+)
 from cra_sym.analysis.slip_backbone import held_curve, warn_of_missing
 from cra_sym.model.system import System
-from cra_sym.solvers.continuation import Curve, Measure, Point, correct, first_crossing, first_point, follow
+from cra_sym.solvers.continuation import Curve, Measure, Point, between, correct, first_point, follow, shares
 from cra_sym.solvers.harmonic_balance import Balance, Basis, peak
 from cra_sym.solvers.modal_polynomials import ModalPolynomials
 from cra_sym.solvers.monodromy import multipliers
@@ -129,6 +136,8 @@ def backbone(
     ConvergenceWarning
         If the curve could not be followed as far as asked; what was not reached is nan. With elastic-slip elements
         also if ``error_harmonics`` exceeds 1e-3.
+    AsymptoticWarning
+        If slopes are beyond what ``quadratures`` of squared slopes hold.
 
     Raises
     ------
@@ -311,9 +320,9 @@ def _at_targets(problem: _Problem, targets: Array, measure: Measure, name: str) 
         new_value, new_slope = _rate(measure, following)
         for k, target in enumerate(flat):
             if answers[k] is None and following is not point:
-                share = first_crossing(value, slope, new_value, new_slope, following.step, np.log(target))
-                if share is not None:
-                    answers[k] = _refined(curve, point, following, share, measure, float(target))
+                places = shares(value, slope, new_value, new_slope, following.step, float(np.log(target)))
+                if places.size:
+                    answers[k] = _refined(curve, point, following, float(places[0]), measure, float(target))
         point, value, slope = following, new_value, new_slope
         if all(a is not None for a in answers) or len(passed) == _MOST_POINTS:
             break
@@ -343,14 +352,7 @@ def _rate(measure: Measure, point: Point) -> tuple[float, float]:
 
 
 def _refined(curve: Curve, before: Point, after: Point, share: float, measure: Measure, target: float) -> Array | None:
-    h = after.step
-    s = share
-    guess = (
-        (1 + 2 * s) * (1 - s) ** 2 * before.vector
-        + s * (1 - s) ** 2 * h * before.tangent
-        + s**2 * (3 - 2 * s) * after.vector
-        + s**2 * (s - 1) * h * after.tangent
-    )
+    guess = between(before, after, share)
 
     def constraint(vector: Array) -> tuple[float, Array]:
         value, gradient = measure(vector[:-1])
@@ -372,6 +374,7 @@ def _told(
     for k in np.flatnonzero(good):
         energy[k] = problem.energy(unknowns[k])[0]
     coefficients = problem.balance.coefficients(unknowns)
+    warn_of_slopes(problem.system, problem.balance.basis, coefficients[good], 6)
     largest[good] = peak(problem.balance.basis, problem.rows, coefficients[good])[0]
     stable = np.zeros(size, bool)
     stable[good] = _stable(problem, coefficients[good], frequency[good])

@@ -120,8 +120,8 @@ class _Flow:
             raise ValueError(
                 "states: must be of a system without elastic-slip elements; cra.response follows one motion"
             )
-        self._driven, self._period = state._problem.driven, state._problem.period
-        self._equations = self._driven.equations
+        self._problem, self._period, self._point = state._problem, state._problem.period, state._at[None]
+        self._equations = self._problem.driven.equations
         self._varpi = np.array([state.angular_frequency])
         self.rows, self.modes = state._problem.rows, self._equations.modes
         if self._equations.moves_mass and any(term.causes for term in self._equations.energies if term.velocities):
@@ -155,15 +155,9 @@ class _Flow:
 
     def _rate(self, time: float, y: Array) -> Array:
         q, u = y.reshape(2, -1, self.modes)
-        equations = self._equations
         phase = np.array([2 * np.pi * time / self._cycle])
-        found = equations.derivatives(q, u, self._driven.causes(self._varpi, phase, self._period)[0])
-        force = found.force - u @ equations.damping.T - equations.omega**2 * q
-        if equations.moves_mass:
-            force = force - (found.momentum_q @ u[:, :, None])[:, :, 0]
-            inertia = np.eye(self.modes) + found.momentum_v
-            force = np.asarray(np.linalg.solve(inertia, force[:, :, None])[:, :, 0], float)
-        return np.stack([u, force]).ravel()
+        causes = self._problem.causes(self._point, phase)[0]
+        return np.stack([u, self._equations.acceleration(q, u, causes)]).ravel()
 
     def mark(self, state: SteadyState) -> Array:
         """Return where in the plane of displacements and velocities a steady state is at the phase 0."""

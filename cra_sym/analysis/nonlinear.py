@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -9,14 +10,20 @@ from numpy.typing import NDArray
 
 from cra_sym import checks
 from cra_sym.analysis.modes import check_places, section_place
+from cra_sym.analysis.stability import AsymptoticWarning
 from cra_sym.model.modal_equations import ModalEquations, modal_equations
+from cra_sym.model.nonlinear import NonlinearTerms
+from cra_sym.model.projection import along
 from cra_sym.model.system import MOST_MODES, System
+from cra_sym.solvers.harmonic_balance import Basis
 from cra_sym.solvers.modal_polynomials import ModalPolynomials
 
-__all__ = ["ConvergenceWarning", "equations_of", "nonlinear_modal_equations", "samples", "watched"]
+__all__ = ["ConvergenceWarning", "equations_of", "nonlinear_modal_equations", "samples", "warn_of_slopes", "watched"]
 
 Array = NDArray[np.float64]
 MOST_NONLINEAR_MODES = 40
+_STEEP = 0.2  # v_x^2/2 at which terms of the next order, of size v_x^4, are 0.4 of those kept
+_PLACES = 41
 
 
 class ConvergenceWarning(UserWarning):
@@ -135,3 +142,34 @@ def watched(system: System, modes: int, place: Any = None, field: Any = None) ->
 def samples(degree: int, harmonics: int, causes: int = 0) -> int:
     """Return how many samples of a period make the sums of harmonic balance exact."""
     return 4 * int(np.ceil(((degree + 1) * harmonics + causes + 1) / 4))
+
+
+def warn_of_slopes(system: System, basis: Basis, coefficients: Array, stacklevel: int = 5) -> None:
+    """Warn if squared slopes, whose integral a quadrature is, are beyond what their expansion holds for.
+
+    Parameters
+    ----------
+    system : System
+    basis : Basis
+    coefficients : ndarray, shape (answers, modes, functions)
+    stacklevel : int
+        Of the warning.
+    """
+    terms: NonlinearTerms | None = system.numerics("nonlinear")
+    if terms is None or not len(coefficients):
+        return
+    domain, modes = system.domain, system.modes(coefficients.shape[1])
+    x = float(domain.left) + float(domain.length) * np.linspace(0.0, 1.0, _PLACES)
+    phase = 2 * np.pi * np.arange(4 * int(basis.orders.max(initial=1.0)) + 4) / (4 * basis.orders.max(initial=1.0) + 4)
+    q = (coefficients @ basis.values(phase).T).swapaxes(1, 2)
+    weights = iter(np.broadcast_arrays(x, *terms.weights.function(x, *(float(v) for v in domain.values)))[1:])
+    for integrand in terms.integrands:
+        value = np.zeros((*q.shape[:2], x.size))
+        for places in integrand:
+            parts = [q @ along(modes, place, x) for place in places]
+            value += np.prod(parts, axis=0) * next(weights)
+        slopes = all(place.order == 1 for places in integrand for place in places)
+        most = float(np.abs(value).max())
+        if slopes and all(len(places) > 1 for places in integrand) and most > _STEEP:
+            text = f"quadratures: an integrand reaches {most:.3g}, beyond the reach of the expansion, about {_STEEP:g}"
+            warnings.warn(text, AsymptoticWarning, stacklevel=stacklevel)

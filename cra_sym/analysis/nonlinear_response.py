@@ -126,23 +126,15 @@ class _Moving:
 
     def beside(self, time: float, q: Array, u: Array) -> Array:
         """Return the acceleration less that of the undamped linear modes."""
-        polynomials = self.equations.polynomials
-        found = polynomials.derivatives(q[None], u[None], self._known(time))
-        force = found.force[0] - polynomials.damping @ u + self._load(time)
-        if not polynomials.moves_mass:
-            return np.asarray(force)
-        if self.equations.causes:  # momenta may follow known motions
+        polynomials, load = self.equations.polynomials, self._load(time)
+        if polynomials.moves_mass and self.equations.causes:  # momenta may follow known motions
             step = 1e-6 / max(float(polynomials.omega.max()), 1e-12)
             ends = [
                 polynomials.derivatives(q[None], u[None], self._known(max(time + side * step, 0.0))).momentum[0]
                 for side in (-1.0, 1.0)
             ]
-            width = min(time, step) + step
-            force = force - (ends[1] - ends[0]) / width
-        inertia = found.momentum_v[0]
-        pull = polynomials.omega**2 * q
-        rest = force - found.momentum_q[0] @ u + inertia @ pull
-        return np.asarray(np.linalg.solve(np.eye(q.size) + inertia, rest))
+            load = load - (ends[1] - ends[0]) / (min(time, step) + step)
+        return np.asarray(polynomials.acceleration(q[None], u[None], self._known(time), load, whole=False)[0])
 
     def acceleration(self, time: float, q: Array, u: Array) -> Array:
         """Return the acceleration."""

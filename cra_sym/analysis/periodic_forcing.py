@@ -28,12 +28,15 @@ class Wave(NamedTuple):
     ----------
     order, power : int
     phase, factor : float
+    small : bool
+        Whether it is times epsilon besides.
     """
 
     order: int = 1
     power: int = 0
     phase: float = 0.0
     factor: float = 1.0
+    small: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +64,11 @@ class Forced:
         """Whether no motion is an answer."""
         return not any(not t.positions and not t.velocities and t.tensor.any() for t in self.equations.forces)
 
-    def causes(self, varpi: Array, phase: Array, period: int) -> Array:
+    def causes(self, varpi: Array, phase: Array, period: int, epsilon: Array | float = 1.0) -> Array:
         """Return the waves at phases of a period of ``period`` cycles, shape (points, waves, samples)."""
         values = np.zeros((len(varpi), len(self.waves), phase.size))
         for k, wave in enumerate(self.waves):
-            size = wave.factor * varpi**wave.power
+            size = wave.factor * varpi**wave.power * (epsilon if wave.small else 1.0)
             values[:, k] = size[:, None] * np.cos(wave.order * period * phase + wave.phase)
         return values
 
@@ -95,6 +98,8 @@ def forced(
     epsilon: Any = None,
     drive: Mapping[Any, Any] | None = None,
     zeta: Any = None,
+    *,
+    small: bool = False,
 ) -> Forced:
     """Return the modal equations of a system that is excited, driven, or both.
 
@@ -108,6 +113,8 @@ def forced(
     drive : mapping of function of t, or its name, to float, optional
         Amplitudes of prescribed motions and forces that go with cos(varpi t).
     zeta : array_like, optional
+    small : bool
+        Leave epsilon to :meth:`Forced.causes`.
 
     Raises
     ------
@@ -128,7 +135,7 @@ def forced(
         size = checks.real_array("epsilon", epsilon, low=0.0, unit="1")
         if size.ndim:
             raise ValueError(f"epsilon has shape {size.shape}: must be one number here")
-        _add_excitation(found, system, modes, excitation, float(size))
+        _add_excitation(found, system, modes, excitation, float(size), small)
     polynomials = whole.polynomials
     equations = ModalPolynomials(polynomials.omega, polynomials.damping, tuple(found.energies), tuple(found.forces))
     return Forced(equations, tuple(found.waves))
@@ -171,10 +178,12 @@ def _add_loads(found: _Collected, system: System, modes: int, amplitudes: Mappin
         found.forces.append(Term(system.project(constant, modes), 0, 0))
 
 
-def _add_excitation(found: _Collected, system: System, modes: int, excitation: Parametric, epsilon: float) -> None:
+def _add_excitation(
+    found: _Collected, system: System, modes: int, excitation: Parametric, epsilon: float, small: bool
+) -> None:
     _refuse_nonlinear(system, excitation)
     for drive in excitation.drives(system, modes):
-        wave = (found.number(_wave(drive.oscillation, epsilon)),)
+        wave = (found.number(_wave(drive.oscillation, epsilon, small)),)
         for matrix, positions, velocities in ((drive.stiffness, 1, 0), (drive.damping, 0, 1)):
             if matrix is not None:
                 found.forces.append(Term(-matrix, positions, velocities, wave))
@@ -184,13 +193,14 @@ def _add_excitation(found: _Collected, system: System, modes: int, excitation: P
             found.energies.append(Term(drive.momentum.T, 1, 1, wave))
             found.forces.append(Term(-drive.momentum.T, 0, 1, wave))
     if isinstance(excitation, LagrangianTerms):
-        for oscillation, small, force in excitation.forces(system, modes):
-            wave = (found.number(_wave(oscillation, epsilon if small else 1.0)),)
+        for oscillation, times, force in excitation.forces(system, modes):
+            wave = (found.number(_wave(oscillation, epsilon if times else 1.0, small and times)),)
             found.forces.append(Term(force, 0, 0, wave))
 
 
-def _wave(oscillation: Oscillation, size: float) -> Wave:
-    return Wave(oscillation.order, oscillation.power, 0.0 if oscillation.kind == "cos" else -0.5 * np.pi, size)
+def _wave(oscillation: Oscillation, size: float, small: bool) -> Wave:
+    phase = 0.0 if oscillation.kind == "cos" else -0.5 * np.pi
+    return Wave(oscillation.order, oscillation.power, phase, size, small)
 
 
 def _refuse_nonlinear(system: System, excitation: Parametric) -> None:

@@ -10,7 +10,7 @@ from cra_sym.analysis.periodic_forcing import Forced
 from cra_sym.solvers.harmonic_balance import Balance, Basis
 from cra_sym.solvers.polynomial_roots import monomials_up_to, polynomial_roots
 
-__all__ = ["seeds"]
+__all__ = ["sampled", "seeds"]
 
 Array = NDArray[np.float64]
 _SAMPLED = 9  # frequencies at which each mode alone is solved, unless that is the whole problem
@@ -19,7 +19,7 @@ _FAR = 0.5  # a harmonic this far from a natural frequency, relative to it, is n
 
 
 def seeds(
-    driven: Forced, basis: Basis, varpi: Array, order: NDArray[np.intp], period: int
+    driven: Forced, basis: Basis, points: Array, order: NDArray[np.intp], period: int
 ) -> tuple[NDArray[np.intp], Array, float]:
     """Return starts for Newton's method.
 
@@ -28,23 +28,24 @@ def seeds(
     driven : Forced
     basis : Basis
         Constant and harmonics of varpi / period.
-    varpi : ndarray, shape (frequencies,)
+    points : ndarray, shape (points, 2)
+        Angular frequencies and sizes of the excitation.
     order : ndarray of int
-        That sorts them.
+        That sorts them, frequencies of each size in turn.
     period : int
 
     Returns
     -------
     where : ndarray of int, shape (starts,)
-        The frequency each start belongs to.
+        The point each start belongs to.
     starts : ndarray, shape (starts, unknowns)
     size : float
         Modal amplitude at which nonlinear forces are as large as linear ones, or that of the linear answer.
     """
     n, harmonics = driven.equations.modes, len(basis.cosines) - 1
     only = n == 1 and harmonics == 1
-    picked = order if only else order[np.unique(np.linspace(0, len(order) - 1, _SAMPLED).round().astype(int))]
-    where, starts = list(range(len(varpi))), [np.zeros(n * basis.size) for _ in varpi]
+    picked = order if only else sampled(points, order)
+    where, starts = list(range(len(points))), [np.zeros(n * basis.size) for _ in points]
     sizes = []
     for mode in range(n):
         alone = Forced(driven.equations.of(np.array([mode])), driven.waves)
@@ -53,8 +54,8 @@ def seeds(
         if not np.isfinite(size):
             continue
         for at in picked:
-            for harmonic in _harmonics(alone, varpi[at] / period, harmonics, only):
-                small = _One(alone, harmonic, period, float(varpi[at]), size)
+            for harmonic in _harmonics(alone, points[at, 0] / period, harmonics, only):
+                small = _One(alone, harmonic, period, points[at], size)
                 for constant, cosine, sine in small.answers(with_free=not only):
                     x = np.zeros((n, basis.size))
                     x[mode, [0, harmonic, harmonics + harmonic]] = constant, cosine, sine
@@ -62,6 +63,14 @@ def seeds(
                     starts.append(x.ravel())
     size = min((s for s in sizes if np.isfinite(s)), default=1.0)
     return np.array(where, int), np.array(starts), float(size)
+
+
+def sampled(points: Array, order: NDArray[np.intp], most: int = _SAMPLED) -> NDArray[np.intp]:
+    """Return the numbers of some points: a few frequencies of the smallest, middle and largest excitation."""
+    sizes = np.unique(points[:, 1])
+    chosen = sizes[np.unique([0, len(sizes) // 2, len(sizes) - 1])]
+    rows = [order[points[order, 1] == size] for size in chosen]
+    return np.concatenate([row[np.unique(np.linspace(0, len(row) - 1, most).round().astype(int))] for row in rows])
 
 
 def _harmonics(alone: Forced, frequency: float, harmonics: int, only: bool) -> list[int]:
@@ -78,34 +87,31 @@ def _size(alone: Forced) -> float:
     free = equations.free()
     forces = tuple(t for t in equations.forces if not t.causes and t.positions + t.velocities > 1)
     omega = max(float(equations.omega[0]), 1e-300)
-    low, high = -40.0, 40.0
-
-    def share(exponent: float) -> float:
-        q = np.array([[10.0**exponent]])
+    exponents = np.linspace(-40.0, 40.0, 81)
+    for _ in range(4):  # ever finer tables about the first exponent at which they are alike
+        q = 10.0 ** exponents[:, None]
         found = free.derivatives(q, omega * q)
         other = type(free)(free.omega, free.damping, (), forces).derivatives(q, omega * q)
-        force = np.abs(found.force).max() + omega * np.abs(found.momentum).max() + np.abs(other.force).max()
-        return float(force / (omega**2 * 10.0**exponent))
-
-    if share(high) < 1:
-        return np.inf
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if share(middle) < 1 else (low, middle)
+        force = np.abs(found.force) + omega * np.abs(found.momentum) + np.abs(other.force)
+        large = np.flatnonzero(force[:, 0] >= omega**2 * q[:, 0])
+        if not large.size:
+            return np.inf
+        high = exponents[large[0]]
+        exponents = np.linspace(exponents[max(large[0] - 1, 0)], high, 81)
     return float(10.0**high)
 
 
 class _One:
     """One mode with a constant and one harmonic: polynomials in three unknowns."""
 
-    def __init__(self, alone: Forced, harmonic: int, period: int, varpi: float, size: float) -> None:
+    def __init__(self, alone: Forced, harmonic: int, period: int, point: Array, size: float) -> None:
         self._size, self._degree = size, alone.equations.degree
         number = samples(self._degree, harmonic, alone.order * period)
         basis = Basis((0, harmonic), (harmonic,), number)
         self._balance = Balance(alone.equations, basis)
         self._free = Balance(alone.equations.free(), basis)
-        self._frequency = varpi / period
-        self._causes = alone.causes(np.array([varpi]), basis.phase, period)
+        self._frequency = float(point[0]) / period
+        self._causes = alone.causes(point[:1], basis.phase, period, point[1:])
 
     def _residual(self, balance: Balance, unknowns: Array) -> Array:
         frequency = np.full(len(unknowns), self._frequency)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, overload
@@ -11,24 +12,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cra_sym import checks
-from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, samples, watched
-from cra_sym.analysis.periodic_forcing import Forced, forced
+from cra_sym.analysis.driven_problem import DrivenProblem
+from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, ConvergenceWarning, warn_of_slopes
 from cra_sym.analysis.slip_states import MOST, SlipProblem
-from cra_sym.analysis.steady_seeds import seeds
+from cra_sym.analysis.steady_search import Answers, answers_at, is_stable
 from cra_sym.model.excitations import Parametric
 from cra_sym.model.system import System
-from cra_sym.solvers.harmonic_balance import Balance, Basis, newton, peak
-from cra_sym.solvers.monodromy import multipliers
 
 __all__ = ["SteadyState", "steady_states"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-_SAME = 1e-6  # of the size of two answers that are one
 _WIDE = 1e4  # ratio of the frequencies of modes and excitation
-_ROUNDS = 60  # in which answers are handed to neighbouring frequencies
-UNSTABLE, UNSTABLE_UNDAMPED = 1e-9, 1e-6
-"""Beyond the unit circle a multiplier means instability; without damping pairs on the circle split by rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +34,8 @@ class SteadyState(checks.ByValue):
     ----------
     angular_frequency : float
         Of the excitation, rad/s.
+    epsilon : float or None
+        Of the excitation, if there is one.
     amplitude : float
         Peak at the tip, or of what was chosen.
     stable : bool
@@ -65,17 +62,19 @@ class SteadyState(checks.ByValue):
     """
 
     angular_frequency: float
+    epsilon: float | None
     amplitude: float
     stable: bool
     multipliers: Complex
     coefficients: Array
-    _problem: _Problem | SlipProblem
+    _problem: DrivenProblem | SlipProblem
     _unknowns: Array
+    _at: Any
 
     @cached_property
     def error_modes(self) -> float:
         """Estimated relative error of the motion for want of modes: what three more change."""
-        return self._problem.changed(3, 0, self._unknowns, self.angular_frequency)
+        return self._problem.changed(3, 0, self._unknowns, self._at)
 
     @cached_property
     def error_harmonics(self) -> float:
@@ -83,7 +82,7 @@ class SteadyState(checks.ByValue):
 
         With elastic-slip elements, what twice as many change, or if these do not converge what the last doubling did.
         """
-        return self._problem.changed(0, 4, self._unknowns, self.angular_frequency)
+        return self._problem.changed(0, 4, self._unknowns, self._at)
 
     @cached_property
     def loss(self) -> float:
@@ -93,82 +92,6 @@ class SteadyState(checks.ByValue):
     def __repr__(self) -> str:
         word = "stable" if self.stable else "unstable"
         return f"<SteadyState at {self.angular_frequency:.6g} rad/s, amplitude {self.amplitude:.6g}, {word}>"
-
-
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    """A driven system in so many modes and harmonics."""
-
-    arguments: dict[str, Any]
-    rows: Array
-    driven: Forced
-    basis: Basis
-    period: int
-
-    @classmethod
-    def of(cls, *, place: Any, field: Any, harmonics: int, period: int, **arguments: Any) -> _Problem:
-        driven = forced(**arguments)
-        number = samples(driven.equations.degree, harmonics, driven.order * period)
-        rows = watched(arguments["system"], arguments["modes"], place, field)
-        options = {**arguments, "place": place, "field": field, "harmonics": harmonics, "period": period}
-        return cls(options, rows, driven, Basis.whole(harmonics, number), period)
-
-    @cached_property
-    def balance(self) -> Balance:
-        return Balance(self.driven.equations, self.basis)
-
-    def causes(self, varpi: Array) -> Array:
-        return self.driven.causes(varpi, self.basis.phase, self.period)
-
-    unique = False
-
-    @property
-    def fastest(self) -> float:
-        return float(self.driven.equations.omega.max())
-
-    def coefficients(self, unknowns: Array) -> Array:
-        return self.balance.coefficients(unknowns)
-
-    def seeds(self, varpi: Array, order: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array, float]:
-        return seeds(self.driven, self.basis, varpi, order, self.period)
-
-    def loss(self, unknowns: Array) -> float:
-        return 0.0
-
-    def peaks(self, unknowns: Array, varpi: Array) -> Array:
-        return peak(self.basis, self.rows, self.balance.coefficients(unknowns))[0]
-
-    def settled(self, found: list[list[Array]], varpi: Array) -> tuple[_Problem, list[list[Array]]]:
-        return self, found
-
-    def solved(self, starts: Array, varpi: Array, floor: float) -> tuple[Array, NDArray[np.bool_]]:
-        """Return answers from starts, and which converged."""
-        return newton(self.balance, starts, varpi / self.period, self.causes(varpi), floor=floor)
-
-    def multipliers(self, unknowns: Array, varpi: Array) -> Complex:
-        coefficients = self.balance.coefficients(unknowns)
-
-        def causes(phase: Array, rows: NDArray[np.intp]) -> Array:
-            return self.driven.causes(varpi[rows], phase, self.period)
-
-        return multipliers(
-            self.driven.equations, self.basis, coefficients, varpi / self.period, causes, tolerance=1e-11
-        )
-
-    def changed(self, more_modes: int, more_harmonics: int, unknowns: Array, varpi: float) -> float:
-        """Return by what share the motion changes when modes or harmonics are added: two steps of Newton's method."""
-        options = dict(self.arguments)
-        options["modes"] = min(options["modes"] + more_modes, options["system"].most_modes)
-        options["harmonics"] += more_harmonics
-        coefficients: Array = self.balance.coefficients(unknowns)[0]
-        rich, n, h = _Problem.of(**options), len(coefficients), coefficients.shape[1] // 2
-        x = np.zeros((options["modes"], rich.basis.size))
-        x[:n, : h + 1], start = coefficients[:, : h + 1], options["harmonics"] + 1
-        x[:n, start : start + h] = coefficients[:, h + 1 :]
-        before = x.ravel()[None].copy()
-        after, _ = newton(rich.balance, before, np.array([varpi / self.period]), rich.causes(np.array([varpi])), most=2)
-        size = np.linalg.norm(before)
-        return float(np.linalg.norm(after - before) / size) if size > 0 else 0.0
 
 
 @overload
@@ -201,6 +124,36 @@ def steady_states(
     place: float | None = None,
     field: Any = None,
 ) -> list[tuple[SteadyState, ...]]: ...
+@overload
+def steady_states(
+    system: System,
+    angular_frequency: float,
+    *,
+    excitation: Parametric | None = None,
+    epsilon: Sequence[float] | Array,
+    drive: Mapping[Any, float] | None = None,
+    modes: int = 3,
+    harmonics: int | None = None,
+    period: int = 1,
+    zeta: ArrayLike | None = None,
+    place: float | None = None,
+    field: Any = None,
+) -> list[tuple[SteadyState, ...]]: ...
+@overload
+def steady_states(
+    system: System,
+    angular_frequency: ArrayLike,
+    *,
+    excitation: Parametric | None = None,
+    epsilon: Sequence[float] | Array,
+    drive: Mapping[Any, float] | None = None,
+    modes: int = 3,
+    harmonics: int | None = None,
+    period: int = 1,
+    zeta: ArrayLike | None = None,
+    place: float | None = None,
+    field: Any = None,
+) -> list[list[tuple[SteadyState, ...]]]: ...
 @checks.default_floating_point
 def steady_states(
     system: System,
@@ -215,15 +168,17 @@ def steady_states(
     zeta: Any = None,
     place: Any = None,
     field: Any = None,
-) -> list[tuple[SteadyState, ...]] | tuple[SteadyState, ...]:
+) -> list[list[tuple[SteadyState, ...]]] | list[tuple[SteadyState, ...]] | tuple[SteadyState, ...]:
     """Return the periodic answers of a system that is excited parametrically, driven, or both.
 
     Elastic-slip elements are exact between their events. Of the answers in which one sticks, which form a continuum,
     it is the one whose slider is at rest at 0 or, if it does not hold there, as near as it does.
 
     Harmonic balance from many starts: rest, all answers of each mode alone with its nearest harmonic (by elimination,
-    so that none of these is missed), free vibration with several phases, and the answers at neighbouring frequencies,
-    handed on until no new one appears. For one mode and one harmonic the answers are complete.
+    so that none of these is missed), free vibration with several phases, the curve of answers to loads that grow from
+    zero, and the answers at neighbouring frequencies and sizes, handed on until no new one appears. Where all of them
+    are unstable, motions are integrated until they settle. For one mode and one harmonic the answers are complete;
+    else one that is far from all others may be missed.
 
     Parameters
     ----------
@@ -233,8 +188,8 @@ def steady_states(
         Of the excitation, rad/s: a number or one axis.
     excitation : Fluctuation, JointStiffness, AxialBase or ``model.excitation``, optional
         What of the Lagrangian fluctuates with cos(varpi t).
-    epsilon : float, optional
-        Its size.
+    epsilon : array_like, optional
+        Its size: a number, or one axis for a chart.
     drive : mapping of function of t to float, optional
         Amplitudes of prescribed motions and of forces that go with cos(varpi t).
     modes : int
@@ -253,8 +208,15 @@ def steady_states(
     Returns
     -------
     tuple of SteadyState, or list of tuples
-        For a number, or for each entry of the axis; smallest first. Answers that differ by a shift of time, such as
-        the two of a principal parametric resonance, are two.
+        For a number, or for each entry of the axis; smallest first. With an axis of sizes a list of these, one for
+        each size. Answers that differ by a shift of time, such as the two of a principal parametric resonance, are two.
+
+    Warns
+    -----
+    ConvergenceWarning
+        If no answer was found at a frequency.
+    AsymptoticWarning
+        If slopes of an answer are beyond what ``quadratures`` of squared slopes hold.
 
     Raises
     ------
@@ -284,67 +246,64 @@ def steady_states(
     harmonics = (None if slipping else 7) if harmonics is None else checks.count("harmonics", harmonics, high=most)
     period = checks.count("period", period, high=8)
     varpi = checks.one_axis("angular_frequency", angular_frequency, "frequencies", low=1e-300, unit="rad/s")
+    sizes = np.ones(()) if epsilon is None else checks.one_axis("epsilon", epsilon, "sizes", low=0.0, unit="1")
     given = {"system": system, "modes": modes, "excitation": excitation, "epsilon": epsilon, "drive": drive}
     given |= {"zeta": zeta, "place": place, "field": field, "period": period, "harmonics": harmonics}
-    problem = SlipProblem.of(**given) if slipping else _Problem.of(**given)
+    if slipping and sizes.ndim:
+        raise ValueError(f"epsilon has shape {sizes.shape}: must be one number with elastic-slip elements")
+    problem = SlipProblem.of(**given) if slipping else DrivenProblem.of(**given)
     flat = np.atleast_1d(varpi)
     fastest = problem.fastest
     low, high = period * fastest / _WIDE, fastest * _WIDE
-    if not flat.size:
-        return []
-    if not (flat.min() >= low and flat.max() <= high):
+    if flat.size and not (flat.min() >= low and flat.max() <= high):
         bad = flat.min() if flat.min() < low else flat.max()
         raise ValueError(
             f"angular_frequency = {bad:g} must be in [{low:.3g}, {high:.3g}], near the modes that take part"
         )
-    answers = _told(*_found(problem, flat), flat)
-    return answers if varpi.ndim else answers[0]
+    grid = np.stack(np.broadcast_arrays(flat, np.atleast_1d(sizes)[:, None]), axis=-1)
+    points = flat if slipping else grid.reshape(-1, 2)
+    told = _told(answers_at(problem, points, grid.shape[:2]), points) if points.size else []
+    _say(told, points, problem)
+    rows = [told[k * flat.size : (k + 1) * flat.size] for k in range(np.size(sizes))]
+    found = rows if varpi.ndim else [row[0] for row in rows]
+    return found if sizes.ndim else found[0]
 
 
-def _found(problem: _Problem | SlipProblem, varpi: Array) -> tuple[_Problem | SlipProblem, list[list[Array]]]:
-    """Return the distinct answers at every frequency, and the problem they belong to."""
-    order = np.argsort(varpi, kind="stable")
-    where, starts, size = problem.seeds(varpi, order)
-    floor = 1e-14 * size * problem.fastest**2
-    found: list[list[Array]] = [[] for _ in varpi]
-    neighbour = {int(a): [int(b) for b in near] for a, near in _neighbours(order)}
-    for _ in range(_ROUNDS):
-        if not where.size:
-            break
-        solved, good = problem.solved(starts, varpi[where], floor)
-        new: list[tuple[int, Array]] = []
-        for at, answer in zip(where[good], solved[good], strict=True):
-            if not any(np.linalg.norm(answer - other) <= _SAME * (size + np.linalg.norm(other)) for other in found[at]):
-                found[at].append(answer)
-                new.append((int(at), answer))
-        wanted = [not (problem.unique and answers) for answers in found]
-        handed = [(near, answer) for at, answer in new for near in neighbour[at] if wanted[near]]
-        where = np.array([at for at, _ in handed], int)
-        starts = np.array([answer for _, answer in handed])
-    return problem.settled(found, varpi)
+def _say(told: list[tuple[SteadyState, ...]], points: Array, problem: DrivenProblem | SlipProblem) -> None:
+    """Warn of frequencies without an answer, and of answers that the expansion does not hold for."""
+    none = [k for k, answers in enumerate(told) if not answers]
+    if none:
+        more = f" and {len(none) - 1} others" if len(none) > 1 else ""
+        where = float(np.reshape(points[none[0]], -1)[0])
+        warnings.warn(f"no answer was found at {where:.6g} rad/s{more}", ConvergenceWarning, stacklevel=4)
+    if isinstance(problem, DrivenProblem) and problem.arguments["system"].model.pieces["quadratures"]:
+        coefficients = [state.coefficients for answers in told for state in answers]
+        if coefficients:
+            warn_of_slopes(problem.arguments["system"], problem.basis, np.array(coefficients))
 
 
-def _neighbours(order: NDArray[np.intp]) -> list[tuple[int, list[int]]]:
-    last = len(order) - 1
-    return [(int(order[k]), [int(order[j]) for j in (k - 1, k + 1) if 0 <= j <= last]) for k in range(len(order))]
-
-
-def _told(problem: _Problem | SlipProblem, found: list[list[Array]], varpi: Array) -> list[tuple[SteadyState, ...]]:
-    where = np.array([k for k, answers in enumerate(found) for _ in answers], int)
-    if not where.size:
-        return [() for _ in varpi]
-    unknowns = np.array([answer for answers in found for answer in answers])
-    coefficients = problem.coefficients(unknowns)
-    largest = problem.peaks(unknowns, varpi[where])
-    values = problem.multipliers(unknowns, varpi[where])
-    damped = problem.driven.equations.damping.any() or bool(problem.driven.equations.forces)
-    bound = 1.0 + (UNSTABLE if damped else UNSTABLE_UNDAMPED)
-    told: list[list[SteadyState]] = [[] for _ in varpi]
-    for k in np.lexsort((largest, where)):
-        stable = bool(np.abs(values[k]).max() <= bound)
-        told[where[k]].append(
-            SteadyState(
-                float(varpi[where[k]]), float(largest[k]), stable, values[k], coefficients[k], problem, unknowns[k]
+def _told(answers: Answers, points: Array) -> list[tuple[SteadyState, ...]]:
+    problem, where, unknowns, values = answers
+    told: list[list[SteadyState]] = [[] for _ in points]
+    if where.size:
+        coefficients, largest = problem.coefficients(unknowns), problem.peaks(unknowns, points[where])
+        stable = is_stable(problem, values)
+        for k in np.lexsort((largest, where)):
+            at = points[where[k]]
+            varpi, epsilon = np.append(at, 1.0)[:2]
+            size = None if problem.arguments["excitation"] is None else float(epsilon)
+            size = problem.arguments["epsilon"] if isinstance(problem, SlipProblem) else size
+            told[where[k]].append(
+                SteadyState(
+                    float(varpi),
+                    size,
+                    float(largest[k]),
+                    bool(stable[k]),
+                    values[k],
+                    coefficients[k],
+                    problem,
+                    unknowns[k],
+                    at,
+                )
             )
-        )
     return [tuple(states) for states in told]

@@ -1,21 +1,36 @@
-"""Arclength continuation of the free periodic motions of modal equations, through folds, with nothing jumped silently.
+"""Arclength continuation of periodic motions of modal equations, through folds, with nothing jumped silently.
 
-The Jacobian of a conservative system is symmetric. Along the curve the number of its negative eigenvalues changes by
-one exactly where the curve turns back in frequency; where it changes otherwise, a step has jumped an internal resonance
-or passed a branch point, and the step is repeated with half its length until one or the other is plain.
+Free motions: the Jacobian of a conservative system is symmetric. Along the curve the number of its negative eigenvalues
+changes by one exactly where the curve turns back in frequency; where it changes otherwise, a step has jumped an
+internal resonance or passed a branch point, and the step is repeated with half its length until one or the other is
+plain. Driven ones: :mod:`cra_sym.solvers.driven_curve`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.solvers.harmonic_balance import Balance
 
-__all__ = ["Curve", "Measure", "Point", "correct", "first_crossing", "follow"]
+__all__ = [
+    "Curve",
+    "Followed",
+    "Measure",
+    "Point",
+    "at_value",
+    "between",
+    "correct",
+    "first_point",
+    "follow",
+    "point_at",
+    "shares",
+    "started",
+]
 
 Array = NDArray[np.float64]
 Measure = Callable[[Array], tuple[float, Array]]
@@ -35,11 +50,11 @@ class Point:
     ----------
     unknowns : ndarray, shape (size,)
     frequency : float
-        Angular frequency, rad/s.
+        Angular frequency, rad/s, or what else changes along the curve.
     tangent : ndarray, shape (size + 1,)
         By unknowns and frequency, of length one in the metric of the point.
-    negative : int
-        Negative eigenvalues of the Jacobian.
+    mark : int
+        Negative eigenvalues of the Jacobian, or the sign of the determinant.
     step : float
         Length of the step that led here.
     crossing : bool
@@ -49,7 +64,7 @@ class Point:
     unknowns: Array
     frequency: float
     tangent: Array
-    negative: int
+    mark: int
     step: float = 0.0
     crossing: bool = False
 
@@ -59,9 +74,32 @@ class Point:
         return np.append(self.unknowns, self.frequency)
 
 
+class Followed(Protocol):
+    """The equations of a curve, its metric, and what tells that a step was too long."""
+
+    @property
+    def lowest(self) -> float:
+        """Below the frequencies, or what else changes along the curve."""
+
+    def metric(self, unknowns: Array, frequency: float) -> Array:
+        """Return the factors of unknowns and frequency that make a change of all of the motion of size one."""
+
+    def linearised(self, vector: Array) -> tuple[Array, Array, float]:
+        """Return residual, its rates (size, size + 1), and the scale of the residual."""
+
+    def mark(self, rates: Array, tangent: Array, metric: Array) -> int:
+        """Return a number that changes where another curve crosses."""
+
+    def plain(self, before: int, after: int, turned: bool) -> bool:
+        """Tell whether a change of the mark is that of a step along one curve."""
+
+    def longest(self, frequency: float) -> float:
+        """Return the longest step."""
+
+
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The equations of a curve and its metric.
+    """The equations of free motions and their metric.
 
     Attributes
     ----------
@@ -72,6 +110,7 @@ class Curve:
 
     balance: Balance
     linear: float
+    lowest: float = 0.0
 
     def metric(self, unknowns: Array, frequency: float) -> Array:
         """Return the factors that make a change of all the energy, and of all the frequency, of size one."""
@@ -85,7 +124,7 @@ class Curve:
         residual, jacobian, rate, scale = self.balance.residual(vector[None, :-1], vector[-1:])
         return residual[0], np.concatenate([jacobian[0], rate[0][:, None]], axis=1), float(scale[0])
 
-    def negative(self, rates: Array) -> int:
+    def mark(self, rates: Array, tangent: Array, metric: Array) -> int:
         """Return the number of negative eigenvalues of the symmetric Jacobian."""
         weights = np.tile(self.balance.basis.weights, self.balance.equations.modes)
         scale = 1.0 / np.sqrt(weights)
@@ -95,23 +134,32 @@ class Curve:
         matrix = matrix / size[:, None] / size[None, :]
         return int((np.linalg.eigvalsh(0.5 * (matrix + matrix.T)) < 0).sum())
 
-    def tangent(self, rates: Array, metric: Array, along: Array) -> Array:
-        """Return the tangent of length one, in the sense of ``along``."""
-        matrix = np.vstack([rates / metric, along * metric])
-        right = np.zeros(len(matrix))
-        right[-1] = 1.0
-        found = np.linalg.solve(matrix, right)
-        return np.asarray(found / np.linalg.norm(found) / metric)
+    def plain(self, before: int, after: int, turned: bool) -> bool:
+        """Tell whether the number changes as it does along one curve."""
+        return abs(after - before) == int(turned)
+
+    def longest(self, frequency: float) -> float:
+        """Return the longest step."""
+        return _LARGEST_NEAR if abs(frequency / self.linear - 1.0) < _NEAR else _LARGEST
+
+
+def _tangent(rates: Array, metric: Array, along: Array) -> Array:
+    """Return the tangent of length one, in the sense of ``along``, a direction in the metric."""
+    matrix = np.vstack([rates / metric, along])
+    right = np.zeros(len(matrix))
+    right[-1] = 1.0
+    found = np.linalg.solve(matrix, right)
+    return np.asarray(found / np.linalg.norm(found) / metric)
 
 
 def correct(
-    curve: Curve, start: Array, constraint: Callable[[Array], tuple[float, Array]], most: int = 10
+    curve: Followed, start: Array, constraint: Callable[[Array], tuple[float, Array]], most: int = 10
 ) -> tuple[Array, Array] | None:
     """Return the point of the curve near a start that obeys one more equation, with the rates there, or None.
 
     Parameters
     ----------
-    curve : Curve
+    curve : Followed
     start : ndarray, shape (size + 1,)
     constraint : callable
         Residual of the further equation, of the size of a relative error, and its gradient.
@@ -134,7 +182,7 @@ def correct(
         except np.linalg.LinAlgError:
             return None
         vector = vector - step
-        if vector[-1] <= 0:
+        if vector[-1] <= curve.lowest:
             return None
         if size < 1e-9 and np.linalg.norm(step * metric) < 1e-13:
             return vector, rates
@@ -153,19 +201,31 @@ def first_point(curve: Curve, unknowns: Array, measure: Measure) -> Point | None
     if found is None:
         return None
     vector, rates = found
+    return point_at(curve, vector, rates, np.append(measure(vector[:-1])[1], 0.0))
+
+
+def started(curve: Followed, unknowns: Array, frequency: float, sense: float = 1.0) -> Point | None:
+    """Return the point of a curve at a frequency, looking towards higher ones, or lower ones if ``sense`` is -1."""
+    plane = np.zeros(len(unknowns) + 1)
+    plane[-1] = 1.0 / curve.metric(unknowns, frequency)[-1]
+    found = correct(curve, np.append(unknowns, frequency), lambda z: (float(z[-1] - frequency) * plane[-1], plane), 20)
+    return None if found is None else point_at(curve, *found, sense * plane)
+
+
+def point_at(curve: Followed, vector: Array, rates: Array, gradient: Array) -> Point:
+    """Return the point of a curve, looking to where a function of this gradient grows."""
     metric = curve.metric(vector[:-1], vector[-1])
-    along = np.append(measure(vector[:-1])[1], 0.0) / metric
-    tangent = curve.tangent(rates, metric, along / np.linalg.norm(along))
-    return Point(vector[:-1], float(vector[-1]), tangent, curve.negative(rates))
+    along = gradient / metric
+    tangent = _tangent(rates, metric, along / np.linalg.norm(along))
+    return Point(vector[:-1], float(vector[-1]), tangent, curve.mark(rates, tangent, metric))
 
 
-def follow(curve: Curve, start: Point) -> Iterator[Point]:
+def follow(curve: Followed, start: Point) -> Iterator[Point]:
     """Yield the points of a curve, the first included, until no step converges."""
     yield start
-    point, length = start, _LARGEST_NEAR
+    point, length = start, curve.longest(start.frequency)
     while True:
-        near = abs(point.frequency / curve.linear - 1.0) < _NEAR
-        length = min(length, _LARGEST_NEAR if near else _LARGEST)
+        length = min(length, curve.longest(point.frequency))
         following = None
         while following is None and length >= _SMALLEST:
             following = _step(curve, point, length)
@@ -178,7 +238,7 @@ def follow(curve: Curve, start: Point) -> Iterator[Point]:
         length *= 2.0 if point.step == length else 1.0
 
 
-def _step(curve: Curve, point: Point, length: float) -> Point | None:
+def _step(curve: Followed, point: Point, length: float) -> Point | None:
     """Return the next point, or None if the step is too long for what happens along it."""
     metric = curve.metric(point.unknowns, point.frequency)
     tangent = point.tangent / np.linalg.norm(point.tangent * metric)
@@ -196,28 +256,41 @@ def _step(curve: Curve, point: Point, length: float) -> Point | None:
         return None
     here = curve.metric(vector[:-1], vector[-1])
     ahead = tangent * here
-    new = curve.tangent(rates, here, ahead / np.linalg.norm(ahead))
+    new = _tangent(rates, here, ahead / np.linalg.norm(ahead))
     cosine = (new * here) @ ahead / np.linalg.norm(new * here) / np.linalg.norm(ahead)
     if cosine < _TURN:
         return None
-    negative = curve.negative(rates)
-    turned = (new[-1] > 0) != (point.tangent[-1] > 0)
-    plain = abs(negative - point.negative) == int(turned)
+    mark = curve.mark(rates, new, here)
+    plain = curve.plain(point.mark, mark, (new[-1] > 0) != (point.tangent[-1] > 0))
     if not plain and length >= 2 * _SMALLEST:
         return None
-    return Point(vector[:-1], float(vector[-1]), new, negative, length, not plain)
+    return Point(vector[:-1], float(vector[-1]), new, mark, length, not plain)
 
 
-def first_crossing(
-    value: float, slope: float, end: float, end_slope: float, step: float, target: float
-) -> float | None:
-    """Return the share of a step at which a cubic through both ends first takes a value, or None."""
-    first, last = slope * step, end_slope * step
-    rise = end - value
-    cubic = [first + last - 2 * rise, 3 * rise - 2 * first - last, first, value - target]
+def at_value(curve: Followed, before: Point, after: Point, share: float, frequency: float) -> Array | None:
+    """Return the unknowns of the curve at a frequency that it passes at a share of a step."""
+    guess = between(before, after, share)
+    found = started(curve, guess[:-1], frequency)
+    return None if found is None else found.unknowns
+
+
+def between(before: Point, after: Point, share: float) -> Array:
+    """Return unknowns and frequency at a share of a step, by a cubic through both ends."""
+    s, h = share, after.step
+    return np.asarray(
+        (1 + 2 * s) * (1 - s) ** 2 * before.vector
+        + s * (1 - s) ** 2 * h * before.tangent
+        + s**2 * (3 - 2 * s) * after.vector
+        + s**2 * (s - 1) * h * after.tangent
+    )
+
+
+def shares(start: float, slope: float, end: float, end_slope: float, step: float, target: float) -> Array:
+    """Return the shares of a step at which a cubic through both ends takes a value, ascending."""
+    first, last, rise = slope * step, end_slope * step, end - start
+    cubic = [first + last - 2 * rise, 3 * rise - 2 * first - last, first, start - target]
     if not np.any(cubic[:3]):
-        return None
+        return np.zeros(0)
     roots = np.roots(cubic)
     real = np.sort(roots[np.abs(roots.imag) < 1e-9].real)
-    inside = real[(real >= -1e-12) & (real <= 1 + 1e-12)]
-    return float(inside[0]) if inside.size else None
+    return np.asarray(real[(real >= -1e-12) & (real <= 1 + 1e-12)])

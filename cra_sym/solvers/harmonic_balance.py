@@ -12,11 +12,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.solvers.modal_polynomials import ModalPolynomials
+from cra_sym.solvers.modal_polynomials import Derivatives, ModalPolynomials
 
 __all__ = ["Balance", "Basis", "flattened", "newton", "peak"]
 
 Array = NDArray[np.float64]
+_SHORTEST = 1.0 / 64  # share of a step of Newton's method
 
 
 def flattened(known: Array) -> Array:
@@ -136,42 +137,52 @@ class Balance:
         points = len(unknowns)
         x = self.coefficients(unknowns)
         value, rate = basis.values(basis.phase), basis.values(basis.phase, 1)
-        q = np.einsum("pnm,sm->psn", x, value)
-        turn = np.einsum("pnm,sm->psn", x, rate)
-        v = frequency[:, None, None] * turn
+        q = (x @ value.T).swapaxes(1, 2)
+        turn = (x @ rate.T).swapaxes(1, 2) if self.equations.moves_mass else np.zeros_like(q)
+        w = frequency[:, None, None]
         shape = (points * basis.samples, n)
         flat = None if causes is None else flattened(causes)
-        found = self.equations.derivatives(q.reshape(shape), v.reshape(shape), flat)
-        force, momentum = (part.reshape(points, basis.samples, n) for part in found[:2])
-        rates = [part.reshape(points, basis.samples, n * n).swapaxes(1, 2) for part in found[2:]]
-        bb, bd, dd = basis.products
+        found = self.equations.derivatives(q.reshape(shape), (w * turn).reshape(shape), flat)
+        force, momentum = (part.reshape(points, basis.samples, n).swapaxes(1, 2) for part in found[:2])
         left, left_rate = (basis.weights / basis.samples * b for b in (value, rate))
-        w = frequency[:, None, None]
+        moves, pushes = self.equations.by_velocity[1], self.equations.by_velocity[0]
 
-        stiff = self.equations.omega[:, None] ** 2 - (frequency[:, None, None] * basis.orders) ** 2
+        stiff = self.equations.omega[:, None] ** 2 - (w * basis.orders) ** 2
         damped = self.equations.damping @ x @ basis.turned.T
-        nonlinear = np.einsum("psn,sm->pnm", force, left) + w * np.einsum("psn,sm->pnm", momentum, left_rate)
-        residual = -stiff * x - w * damped + nonlinear
-        by_q_q, by_q_v, by_v_q, by_v_v = rates
-        db = bd.reshape(-1, m, m).swapaxes(1, 2).reshape(-1, m * m)
-        db = db * (basis.weights[:, None] / basis.weights[None, :]).reshape(-1)
-        blocks = by_q_q @ bb + w * (by_q_v @ bd) + w * (by_v_q @ db) + w**2 * (by_v_v @ dd)
+        pulse = momentum @ left_rate if self.equations.moves_mass else np.zeros_like(x)
+        residual = -stiff * x - w * damped + force @ left + w * pulse
+        blocks = self._blocks(found, w, points)
         jacobian = blocks.reshape(points, n, n, m, m).transpose(0, 1, 3, 2, 4).copy()
         if self.equations.damping.any():
             jacobian -= w[..., None, None] * np.einsum("ij,ml->imjl", self.equations.damping, basis.turned)
         jacobian = jacobian.reshape(points, n * m, n * m)
         diagonal = np.arange(n * m)
         jacobian[:, diagonal, diagonal] -= stiff.reshape(points, -1)
+        by_frequency = 2 * w * basis.orders**2 * x - damped + pulse
         moving = turn.reshape(*shape, 1)
-        slopes = [(part @ moving).reshape(points, basis.samples, n) for part in (found.force_v, found.momentum_v)]
-        by_frequency = (
-            2 * w * basis.orders**2 * x
-            - damped
-            + np.einsum("psn,sm->pnm", slopes[0], left)
-            + np.einsum("psn,sm->pnm", momentum + w * slopes[1], left_rate)
-        )
+        for depends, part, test in ((pushes, found.force_v, left), (moves, found.momentum_v, w * left_rate)):
+            if depends:
+                slope = (part @ moving).reshape(points, basis.samples, n).swapaxes(1, 2)
+                by_frequency = by_frequency + slope @ test
         scale = np.sqrt(((self.equations.omega[:, None] ** 2 + (w * basis.orders) ** 2) ** 2 * x**2).sum(axis=(1, 2)))
         return residual.reshape(points, -1), jacobian, by_frequency.reshape(points, -1), scale
+
+    def _blocks(self, found: Derivatives, w: Array, points: int) -> Array:
+        """Return the rates of the nonlinear terms by the unknowns, shape (points, modes * modes, size * size)."""
+        n, m = self.equations.modes, self.basis.size
+        by_q_q, by_q_v, by_v_q, by_v_v = (
+            part.reshape(points, self.basis.samples, n * n).swapaxes(1, 2) for part in found[2:]
+        )
+        bb, bd, dd = self.basis.products
+        pushes, moves = self.equations.by_velocity
+        blocks = by_q_q @ bb
+        if pushes:
+            db = bd.reshape(-1, m, m).swapaxes(1, 2).reshape(-1, m * m)
+            db = db * (self.basis.weights[:, None] / self.basis.weights[None, :]).reshape(-1)
+            blocks = blocks + w * (by_q_v @ bd) + w * (by_v_q @ db)
+        if moves:
+            blocks = blocks + w**2 * (by_v_v @ dd)
+        return np.asarray(blocks)
 
 
 def newton(
@@ -182,9 +193,11 @@ def newton(
     *,
     floor: float = 0.0,
     tolerance: float = 1e-11,
-    most: int = 30,
+    most: int = 40,
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Return answers of harmonic balance at given frequencies, many at once, and which converged.
+
+    Newton's method; a step that does not lessen the residual is halved.
 
     Parameters
     ----------
@@ -203,25 +216,31 @@ def newton(
     x = unknowns.copy()
     done = np.zeros(len(x), bool)
     open_ = np.arange(len(x))
+    last, step, share = np.full(len(x), np.inf), np.zeros_like(x), np.ones(len(x))
     for _ in range(most):
-        if not open_.size:
-            break
         some = None if causes is None else causes[open_]
         residual, jacobian, _, scale = balance.residual(x[open_], frequency[open_], some)
         size = np.linalg.norm(residual, axis=1)
-        good = size <= tolerance * scale + floor
-        alive = np.isfinite(size) & (size < 1e60)
-        done[open_[good & alive]] = True
-        keep = alive & ~good
-        open_, residual, jacobian = open_[keep], residual[keep], jacobian[keep]
+        done[open_[size <= tolerance * scale + floor]] = True
+        rises = ~(size < last[open_]) & (share[open_] > _SHORTEST)  # then the step was too long
+        back = open_[rises & ~done[open_]]
+        share[back] *= 0.5
+        x[back] += share[back, None] * step[back]
+        on = ~rises & np.isfinite(size) & ~done[open_]
+        at = open_[on]
+        step[at], last[at], share[at] = _solved(jacobian[on], residual[on]), size[on], 1.0
+        x[at] -= step[at]
+        open_ = np.sort(np.concatenate([back, at]))
         if not open_.size:
             break
-        try:
-            step = np.linalg.solve(jacobian, residual[:, :, None])[:, :, 0]
-        except np.linalg.LinAlgError:
-            step = np.stack([np.linalg.lstsq(j, r, rcond=None)[0] for j, r in zip(jacobian, residual, strict=True)])
-        x[open_] -= step
     return x, done
+
+
+def _solved(jacobian: Array, residual: Array) -> Array:
+    try:
+        return np.asarray(np.linalg.solve(jacobian, residual[:, :, None])[:, :, 0])
+    except np.linalg.LinAlgError:
+        return np.stack([np.linalg.lstsq(j, r, rcond=None)[0] for j, r in zip(jacobian, residual, strict=True)])
 
 
 def peak(basis: Basis, rows: Array, coefficients: Array) -> tuple[Array, Array]:

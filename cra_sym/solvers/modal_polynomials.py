@@ -120,6 +120,12 @@ class ModalPolynomials(ByValue):
         """Whether the nonlinear terms hold velocities."""
         return any(term.velocities for term in (*self.energies, *self.forces))
 
+    @cached_property
+    def by_velocity(self) -> tuple[bool, bool]:
+        """Whether forces, and whether momenta, of the terms beside the linear ones depend on velocities."""
+        mixed = any(term.positions and term.velocities for term in self.energies)
+        return mixed or any(term.velocities for term in self.forces), any(t.velocities > 1 for t in self.energies)
+
     def free(self) -> ModalPolynomials:
         """Return the same without damping, forces and known functions of time."""
         kept = tuple(term for term in self.energies if not term.causes)
@@ -210,6 +216,29 @@ class ModalPolynomials(ByValue):
             if b:
                 _add(found.force_v, b, _slots(term, q, v, 0, 1, equation=True), scale)
         return found
+
+    def acceleration(
+        self, q: Array, v: Array, causes: Array | None = None, load: Array | float = 0.0, *, whole: bool = True
+    ) -> Array:
+        """Return accelerations.
+
+        Parameters
+        ----------
+        q, v : ndarray, shape (samples, modes)
+        causes : ndarray, shape (known functions, samples), optional
+        load : ndarray, shape (samples, modes), optional
+            Further forces.
+        whole : bool
+            False leaves out those of the undamped linear modes.
+        """
+        found, pull = self.derivatives(q, v, causes), self.omega**2 * q
+        force = found.force - v @ self.damping.T + load
+        if not self.moves_mass:
+            return np.asarray(force - pull if whole else force)
+        force = force - (found.momentum_q @ v[:, :, None])[:, :, 0] + (found.momentum_v @ pull[:, :, None])[:, :, 0]
+        inertia = np.eye(self.modes) + found.momentum_v
+        beside = np.linalg.solve(inertia, force[:, :, None])[:, :, 0]
+        return np.asarray(beside - pull if whole else beside)
 
 
 def _scale(term: Term, causes: Array | None) -> Array | float:

@@ -45,6 +45,18 @@ def test_parametron_has_one_three_and_five_states():
     assert counts == [1, 3, 5, 5] and stable == [1, 2, 3, 3]
 
 
+def test_a_chart_is_what_its_sizes_give_one_by_one():
+    frequency, sizes = np.array([2.05, 1.97]), [0.03, 0.06]
+    options = {"excitation": cra.Fluctuation(k=1.0), "modes": 1, "harmonics": 3, "period": 2}
+    chart = cra.steady_states(parametron(), frequency, epsilon=sizes, **options)
+    for size, row in zip(sizes, chart, strict=True):
+        single = cra.steady_states(parametron(), frequency, epsilon=size, **options)
+        for here, alone in zip(row, single, strict=True):
+            np.testing.assert_allclose([s.amplitude for s in here], [s.amplitude for s in alone], rtol=1e-9)
+            assert [s.stable for s in here] == [s.stable for s in alone] and {s.epsilon for s in here} == {size}
+    assert [[len(here) for here in row] for row in chart][1] == [5, 1]
+
+
 def test_excitation_of_the_lagrangian_itself_and_a_force_together():
     """The published parametron: the spring pulsates at 2 varpi, and a force goes with varpi."""
     epsilon, varpi, push = sp.symbols("epsilon varpi push")
@@ -211,7 +223,7 @@ def test_a_base_that_shakes_along_a_shortened_arm_is_the_axial_excitation():
     ("options", "message"),
     [
         ({"epsilon": 0.1}, "excitation, epsilon: both or neither"),
-        ({"excitation": cra.Fluctuation(k=1.0), "epsilon": [0.1, 0.2]}, "epsilon has shape"),
+        ({"excitation": cra.Fluctuation(k=1.0), "epsilon": [[0.1, 0.2]]}, "epsilon has shape"),
         ({"excitation": 3, "epsilon": 0.1}, "excitation = 3: must be a Parametric"),
         ({"drive": {"G": 1.0}}, "drive: G does not drive the model"),
         ({"drive": {"F": np.nan}}, "drive: F = nan"),

@@ -43,6 +43,7 @@ _GROUPS = {
         "analysis.slip_response",
         "analysis.slow_flow",
         "analysis.steady_states",
+        "analysis.response_curves",
         "model.hysteresis",
     ),
     "The paper's equations": ("paper",),

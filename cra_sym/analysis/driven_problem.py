@@ -1,0 +1,129 @@
+"""A nonlinear system that is driven, in so many modes and harmonics, at points of excitation frequency and size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.analysis.nonlinear import samples, watched
+from cra_sym.analysis.periodic_forcing import Forced, forced
+from cra_sym.analysis.steady_seeds import seeds
+from cra_sym.solvers.harmonic_balance import Balance, Basis, newton, peak
+from cra_sym.solvers.monodromy import multipliers
+
+__all__ = ["DrivenProblem"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+_NEAR_CIRCLE = 1e-5  # multipliers so near the unit circle are computed as well as can be
+_ROUGH, _FINE = 1e-7, 1e-11
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenProblem:
+    """A driven system in so many modes and harmonics.
+
+    Points are pairs of angular frequency and size of the excitation, shape (points, 2).
+
+    Attributes
+    ----------
+    arguments : mapping
+        It was made of.
+    rows : ndarray, shape (modes,)
+        What is watched.
+    driven : Forced
+        With an excitation of size one.
+    basis : Basis
+    period : int
+    """
+
+    arguments: dict[str, Any]
+    rows: Array
+    driven: Forced
+    basis: Basis
+    period: int
+
+    @classmethod
+    def of(cls, *, place: Any, field: Any, harmonics: int, period: int, **arguments: Any) -> DrivenProblem:
+        """Return the problem of the arguments of :func:`cra_sym.steady_states`."""
+        own = {**arguments, "epsilon": None if arguments["epsilon"] is None else 1.0}
+        driven = forced(**own, small=True)
+        number = samples(driven.equations.degree, harmonics, driven.order * period)
+        rows = watched(arguments["system"], arguments["modes"], place, field)
+        options = {**arguments, "place": place, "field": field, "harmonics": harmonics, "period": period}
+        return cls(options, rows, driven, Basis.whole(harmonics, number), period)
+
+    @cached_property
+    def balance(self) -> Balance:
+        """Its equations in harmonics."""
+        return Balance(self.driven.equations, self.basis)
+
+    def causes(self, at: Array, phase: Array | None = None) -> Array:
+        """Return the known functions at points, shape (points, waves, samples)."""
+        return self.driven.causes(at[:, 0], self.basis.phase if phase is None else phase, self.period, at[:, 1])
+
+    unique = False
+
+    @property
+    def fastest(self) -> float:
+        """Largest natural frequency, rad/s."""
+        return float(self.driven.equations.omega.max())
+
+    def coefficients(self, unknowns: Array) -> Array:
+        """Return modal coefficients, shape (points, modes, functions)."""
+        return self.balance.coefficients(unknowns)
+
+    def seeds(self, at: Array, order: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array, float]:
+        """Return starts."""
+        return seeds(self.driven, self.basis, at, order, self.period)
+
+    def loss(self, unknowns: Array) -> float:
+        """Return the energy that elastic-slip elements take: there are none."""
+        return 0.0
+
+    def peaks(self, unknowns: Array, at: Array) -> Array:
+        """Return the largest displacement of what is watched in a period of each answer."""
+        return peak(self.basis, self.rows, self.balance.coefficients(unknowns))[0]
+
+    def settled(self, found: list[list[Array]], at: Array) -> tuple[DrivenProblem, list[list[Array]]]:
+        """Return the problem and the answers: their harmonics are as many as were asked for."""
+        return self, found
+
+    def solved(self, starts: Array, at: Array, floor: float, most: int = 40) -> tuple[Array, NDArray[np.bool_]]:
+        """Return answers from starts, and which converged."""
+        return newton(self.balance, starts, at[:, 0] / self.period, self.causes(at), floor=floor, most=most)
+
+    def multipliers(self, unknowns: Array, at: Array) -> Complex:
+        """Return Floquet multipliers over a period of each answer: to 1e-7, to 1e-11 if the largest is of size one."""
+        found = self._multipliers(unknowns, at, _ROUGH)
+        near = np.abs(np.abs(found[:, 0]) - 1.0) < _NEAR_CIRCLE
+        found[near] = self._multipliers(unknowns[near], at[near], _FINE)
+        return found
+
+    def _multipliers(self, unknowns: Array, at: Array, tolerance: float) -> Complex:
+        coefficients = self.balance.coefficients(unknowns)
+
+        def causes(phase: Array, rows: NDArray[np.intp]) -> Array:
+            return self.causes(at[rows], phase)
+
+        frequency = at[:, 0] / self.period
+        return multipliers(self.driven.equations, self.basis, coefficients, frequency, causes, tolerance=tolerance)
+
+    def changed(self, more_modes: int, more_harmonics: int, unknowns: Array, at: Array) -> float:
+        """Return by what share the motion changes when modes or harmonics are added: two steps of Newton's method."""
+        options = dict(self.arguments)
+        options["modes"] = min(options["modes"] + more_modes, options["system"].most_modes)
+        options["harmonics"] += more_harmonics
+        coefficients: Array = self.balance.coefficients(unknowns)[0]
+        rich, n, h = DrivenProblem.of(**options), len(coefficients), coefficients.shape[1] // 2
+        x = np.zeros((options["modes"], rich.basis.size))
+        x[:n, : h + 1], start = coefficients[:, : h + 1], options["harmonics"] + 1
+        x[:n, start : start + h] = coefficients[:, h + 1 :]
+        before = x.ravel()[None].copy()
+        after, _ = newton(rich.balance, before, at[None, 0] / self.period, rich.causes(at[None]), most=2)
+        size = np.linalg.norm(before)
+        return float(np.linalg.norm(after - before) / size) if size > 0 else 0.0

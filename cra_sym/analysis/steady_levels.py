@@ -1,0 +1,130 @@
+"""Further starts of steady states: loads that grow from zero, and motions that are integrated until they settle."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from cra_sym.analysis.driven_problem import DrivenProblem
+from cra_sym.solvers.continuation import at_value, follow, shares, started
+from cra_sym.solvers.driven_curve import Driven
+
+__all__ = ["mirrored", "settling", "shifted", "traced"]
+
+Array = NDArray[np.float64]
+_MOST_POINTS = 250  # of a curve over the level
+_FULL, _HIGHEST = np.arcsinh(1.0), np.arcsinh(10.0)  # the level is the hyperbolic sine of what steps are taken in
+_CYCLES, _DECAY = (60, 200), 12.0  # periods that are integrated; decay of a transient that is enough
+_TOLERANCE, _PUSH = 1e-5, 1e-2  # of the integration; of what an unstable answer is pushed by
+
+
+def traced(problem: DrivenProblem, point: Array, size: float, start: Array | None = None) -> Array:
+    """Return the answers on a curve over the level of all that excites, through its folds.
+
+    Parameters
+    ----------
+    problem : DrivenProblem
+    point : ndarray, shape (2,)
+        Angular frequency and size of the excitation.
+    size : float
+        Modal amplitude at which nonlinear forces matter.
+    start : ndarray, shape (unknowns,), optional
+        An answer on the curve; default: rest, with nothing that excites.
+
+    Returns
+    -------
+    ndarray, shape (answers, unknowns)
+    """
+    frequency = float(point[0]) / problem.period
+    causes = problem.causes(point[None])
+    energetic = 0.1 * size * float(np.hypot(problem.driven.equations.omega, frequency).min())
+    curve = Driven(
+        problem.balance, lambda step: (frequency, 0.0, np.sinh(step) * causes), energetic, 1.0, lowest=-np.inf
+    )
+    if start is None:
+        first = started(curve, np.zeros(problem.balance.size), 0.0)
+    else:
+        first = started(curve, start, _FULL, -1.0)
+    found: list[Array] = []
+    before = first
+    for number, after in enumerate(follow(curve, first) if first is not None else ()):
+        if before is None or after.frequency > _HIGHEST or after.frequency < -0.01 or number == _MOST_POINTS:
+            break
+        if number:
+            ends = before.frequency, before.tangent[-1], after.frequency, after.tangent[-1]
+            passed = [s for s in shares(*ends, after.step, _FULL) if s > 1e-6 or number > 1]
+            answers = [at_value(curve, before, after, float(s), _FULL) for s in passed]
+            found += [answer for answer in answers if answer is not None]
+            if (
+                start is not None
+                and passed
+                and found
+                and np.linalg.norm(found[-1] - start) < 1e-6 * np.linalg.norm(start)
+            ):
+                break  # the curve is closed
+        before = after
+    return np.array(found).reshape(-1, problem.balance.size)
+
+
+def shifted(problem: DrivenProblem, unknowns: Array) -> list[Array]:
+    """Return answers shifted by one, two .. periods of the excitation, each of shape (answers, unknowns)."""
+    return [_moved(problem, unknowns, float(number), 1.0) for number in range(1, problem.period)]
+
+
+def mirrored(problem: DrivenProblem, unknowns: Array) -> Array:
+    """Return answers mirrored, and shifted by half a period of what pushes; some systems have these answers too."""
+    return _moved(problem, unknowns, 0.0 if problem.driven.rests else 0.5, -1.0)
+
+
+def _moved(problem: DrivenProblem, unknowns: Array, shift: float, sign: float) -> Array:
+    x, n = problem.coefficients(unknowns), len(problem.basis.sines)
+    angle = 2 * np.pi * shift / problem.period * np.arange(1, n + 1)
+    cosine, sine, c, s = x[..., 1 : n + 1], x[..., n + 1 :], np.cos(angle), np.sin(angle)
+    parts = [x[..., :1], c * cosine + s * sine, c * sine - s * cosine]
+    return np.asarray(sign * np.concatenate(parts, axis=-1).reshape(len(unknowns), -1))
+
+
+def settling(problem: DrivenProblem, points: Array, starts: Array, size: float) -> Array:
+    """Return what motions have become that leave unstable answers, as harmonics of their last period.
+
+    Parameters
+    ----------
+    problem : DrivenProblem
+    points : ndarray, shape (motions, 2)
+    starts : ndarray, shape (motions, unknowns)
+        Answers; each is pushed a little.
+    size : float
+        Modal amplitude at which nonlinear forces matter.
+
+    Returns
+    -------
+    ndarray, shape (motions, unknowns)
+        nan where a motion runs away.
+    """
+    basis, equations, n = problem.basis, problem.driven.equations, problem.driven.equations.modes
+    frequency, x = points[:, 0] / problem.period, problem.coefficients(starts)
+    at, m = np.zeros(1), len(points)
+    push = _PUSH * size * np.random.default_rng(0).normal(size=(2, m, n))
+    q = x @ basis.values(at)[0] + push[0]
+    u = (x @ basis.values(at, 1)[0] + push[1]) * frequency[:, None]
+    bound = 1e6 * (size + np.abs(starts).max(initial=0.0))
+
+    def rate(phase: float, y: Array) -> Array:
+        q, u = y.reshape(2, m, n)
+        causes = problem.causes(points, np.array([phase]))[:, :, 0].T
+        force = equations.acceleration(np.clip(q, -bound, bound), u, causes)
+        return np.asarray(np.stack([u, force]) / frequency[:, None]).ravel()
+
+    decay = float(np.linalg.eigvalsh((equations.damping + equations.damping.T) / 4).min())
+    cycles = int(np.clip(np.ceil(_DECAY * frequency.max() / (2 * np.pi * max(decay, 1e-300))), *_CYCLES))
+    end = 2 * np.pi * cycles
+    samples = end - 2 * np.pi + basis.phase
+    scale = size + float(np.abs(q).max())
+    run = solve_ivp(
+        rate, (0.0, end), np.stack([q, u]).ravel(), method="DOP853", t_eval=samples, rtol=_TOLERANCE, atol=1e-6 * scale
+    )
+    if not run.success:
+        return np.full_like(starts, np.nan)
+    values = run.y.reshape(2, m, n, samples.size)[0]
+    return np.asarray((values @ (basis.weights * basis.values(samples)) / samples.size).reshape(m, -1))
