@@ -19,6 +19,7 @@ __all__ = ["DrivenProblem"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+_WHOLE = 15  # whole steps, which lead somewhere soon or not at all
 _NEAR_CIRCLE = 1e-5  # multipliers so near the unit circle are computed as well as can be
 _ROUGH, _FINE = 1e-7, 1e-11
 
@@ -94,8 +95,14 @@ class DrivenProblem:
         return self, found
 
     def solved(self, starts: Array, at: Array, floor: float, most: int = 40) -> tuple[Array, NDArray[np.bool_]]:
-        """Return answers from starts, and which converged."""
-        return newton(self.balance, starts, at[:, 0] / self.period, self.causes(at), floor=floor, most=most)
+        """Return answers from starts, and which converged; whole steps are taken where halved ones lead nowhere."""
+        given = at[:, 0] / self.period, self.causes(at)
+        found, good = newton(self.balance, starts, *given, floor=floor, most=most)
+        left = np.flatnonzero(~good) if most > 1 else np.zeros(0, int)
+        if left.size:
+            again = (part[left] for part in given)
+            found[left], good[left] = newton(self.balance, starts[left], *again, floor=floor, most=_WHOLE, whole=True)
+        return found, good
 
     def multipliers(self, unknowns: Array, at: Array) -> Complex:
         """Return Floquet multipliers over a period of each answer: to 1e-7, to 1e-11 if the largest is of size one."""

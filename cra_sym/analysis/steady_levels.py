@@ -14,6 +14,7 @@ __all__ = ["mirrored", "settling", "shifted", "traced"]
 
 Array = NDArray[np.float64]
 _MOST_POINTS = 250  # of a curve over the level
+_FAR = 300.0  # a step beyond this has gone astray; its exponential is still a number
 _FULL, _HIGHEST = np.arcsinh(1.0), np.arcsinh(10.0)  # the level is the hyperbolic sine of what steps are taken in
 _CYCLES, _DECAY = (60, 200), 12.0  # periods that are integrated; decay of a transient that is enough
 _TOLERANCE, _PUSH = 1e-5, 1e-2  # of the integration; of what an unstable answer is pushed by
@@ -40,7 +41,11 @@ def traced(problem: DrivenProblem, point: Array, size: float, start: Array | Non
     causes = problem.causes(point[None])
     energetic = 0.1 * size * float(np.hypot(problem.driven.equations.omega, frequency).min())
     curve = Driven(
-        problem.balance, lambda step: (frequency, 0.0, np.sinh(step) * causes), energetic, 1.0, lowest=-np.inf
+        problem.balance,
+        lambda step: (frequency, 0.0, np.sinh(np.clip(step, -_FAR, _FAR)) * causes),
+        energetic,
+        1.0,
+        lowest=-np.inf,
     )
     if start is None:
         first = started(curve, np.zeros(problem.balance.size), 0.0)

@@ -21,7 +21,7 @@ _SAME = 1e-6  # of the size of two answers that are one
 _ALIKE = 0.05  # relative distance of answers that neighbouring points turn into the same one
 _ROUNDS = 60  # in which answers are handed to neighbouring points
 _TRACED, _FEW = 5, 3  # points at which curves over the level are followed from rest, and if so few from answers too
-_LONELY, _TRIES = 9, 3  # points without a stable answer at which motions are integrated, and how often
+_LONELY, _TRIES = 3, 3  # points without a stable answer at which motions are integrated; how often for few points
 UNSTABLE, UNSTABLE_UNDAMPED = 1e-9, 1e-6
 """Beyond the unit circle a multiplier means instability; without damping pairs on the circle split by rounding."""
 
@@ -83,7 +83,8 @@ def _search_on(problem: DrivenProblem, points: Array, order: NDArray[np.intp], s
             if answer.any() and not _among(answer, known, size):
                 known += list(traced(problem, points[at], size, answer))
         search.run_at(at, np.array(known).reshape(-1, problem.balance.size))
-    for _ in range(_TRIES if _damped(problem) else 0):
+    tries = _TRIES if len(points) <= _FEW else 1
+    for _ in range(tries if _damped(problem) else 0):
         lonely = search.without_stable()
         if not lonely:
             break

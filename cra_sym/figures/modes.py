@@ -14,10 +14,10 @@ from cra_sym.arm.parameters import Arm
 from cra_sym.checks import choice, instance, one_axis
 from cra_sym.figures.drawing import BLUE, ORANGE, figure_of, panels
 from cra_sym.figures.subject import (
-    around,
     field_label,
     fields,
     leading_parameter,
+    over_what_is_stable,
     parameter_label,
     parameters_of,
     rigid_ends,
@@ -117,7 +117,7 @@ def figure_frequencies(
     system = single(Arm.nominal().replace(k_t=1e4) if system is None else system)
     name = leading_parameter(system) if parameter is None else choice("parameter", parameter, system.values)
     if values is None:
-        x, found = _over_what_is_stable(system, name, modes)
+        x, found = over_what_is_stable(system, name, modes)
     else:
         x = one_axis("values", values, "values", allow_infinite=True)
         found = natural_frequencies(system.replace(**{name: x}), modes)
@@ -136,18 +136,6 @@ def figure_frequencies(
     ax.set_ylabel("natural frequency / Hz")
     ax.legend(loc="lower left", ncols=modes, bbox_to_anchor=(0.0, 0.98), borderaxespad=0)
     return cast(Figure, ax.figure)
-
-
-def _over_what_is_stable(system: System, name: str, modes: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return values of a parameter and the frequencies there, over a range where nothing buckles."""
-    for narrowing in range(5):
-        x = around(system, name, narrowing)
-        try:
-            return x, natural_frequencies(system.replace(**{name: x}), modes)
-        except ValueError:
-            if narrowing == 4:
-                raise
-    raise AssertionError
 
 
 def figure_mode_shapes(

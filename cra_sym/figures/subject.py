@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.analysis.modes import mode_shapes
+from cra_sym.analysis.modes import mode_shapes, natural_frequencies
 from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import instance
@@ -22,6 +22,7 @@ __all__ = [
     "fields",
     "leading_parameter",
     "moving_place",
+    "over_what_is_stable",
     "parameter_label",
     "parameter_name",
     "parameters_of",
@@ -141,6 +142,26 @@ def around(system: System, name: str, narrowing: int = 0, points: int = 81) -> A
     reach = float((found.frequency[good] / rate[good]).min())  # by which a first order would halve or double one
     middle = 1 / reach if np.isinf(value) else reach
     return np.geomspace(middle / far, middle * far, points) if stiff else np.linspace(0.0, (far - 1) * reach, points)
+
+
+def over_what_is_stable(
+    system: System, name: str, modes: int, narrowing: int = 0, points: int = 81
+) -> tuple[Array, Array]:
+    """Return values of a parameter and the natural frequencies there, over a range where nothing buckles.
+
+    Raises
+    ------
+    ValueError
+        As `around`, or if the structure has buckled however small the range.
+    """
+    for more in range(narrowing, 5):
+        values = around(system, name, more, points)
+        try:
+            return values, natural_frequencies(system.replace(**{name: values}), modes)
+        except ValueError:
+            if more == 4:
+                raise
+    raise AssertionError
 
 
 def moving_place(system: System, modes: int = 3) -> float:

@@ -19,10 +19,10 @@ from cra_sym.checks import choice
 from cra_sym.figures.drawing import GREEN, ORANGE, figure_of, panels
 from cra_sym.figures.modes import decades
 from cra_sym.figures.subject import (
-    around,
     fields,
     leading_parameter,
     moving_place,
+    over_what_is_stable,
     parameter_label,
     parameter_name,
     single,
@@ -142,7 +142,7 @@ def figure_residual_vibration(
     system, name = _subject(system or Arm.nominal(), parameter)
     panel = panels(ax, 1, 1, _SIZE)[0, 0]
     joint = isinstance(system, Arm) and name == "k_t"
-    values = decades(system, name, 1, 5, points) if joint else around(system, name, 1, points)
+    values = decades(system, name, 1, 5, points) if joint else over_what_is_stable(system, name, 1, 1, points)[0]
     stiffest = system.replace(**{name: np.inf if joint else values[-1]})
     fastest = BaseMotion.s_curve(**_LIMITS).duration
     duration = np.linspace(fastest, fastest + 4.25 / _first(stiffest), 7 * points // 4)

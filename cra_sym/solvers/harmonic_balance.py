@@ -194,10 +194,12 @@ def newton(
     floor: float = 0.0,
     tolerance: float = 1e-11,
     most: int = 40,
+    whole: bool = False,
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Return answers of harmonic balance at given frequencies, many at once, and which converged.
 
-    Newton's method; a step that does not lessen the residual is halved.
+    Newton's method; a step that does not lessen the residual is halved, unless ``whole`` steps are asked for: these
+    may leave the neighbourhood of the start, and find answers that others do not.
 
     Parameters
     ----------
@@ -222,7 +224,7 @@ def newton(
         residual, jacobian, _, scale = balance.residual(x[open_], frequency[open_], some)
         size = np.linalg.norm(residual, axis=1)
         done[open_[size <= tolerance * scale + floor]] = True
-        rises = ~(size < last[open_]) & (share[open_] > _SHORTEST)  # then the step was too long
+        rises = ~(size < last[open_]) & (share[open_] > _SHORTEST) & (not whole)  # then the step was too long
         back = open_[rises & ~done[open_]]
         share[back] *= 0.5
         x[back] += share[back, None] * step[back]
