@@ -18,6 +18,8 @@ _WORDS = "The numbered equations, from what is put in to what comes out; arrows 
 
 def equation_graph(chosen: Sequence[Equation]) -> str:
     """Return the graph as a figure of HTML: what is put in stands left, what comes out right."""
+    if not chosen:
+        return ""
     depth = layers(chosen)
     lines = {e.number: textwrap.wrap(f"({e.number}) {e.title}", _LETTERS, break_on_hyphens=False) for e in chosen}
     columns = [[e for e in chosen if depth[e.number] == k] for k in range(max(depth.values()) + 1)]
