@@ -147,7 +147,7 @@ GOOD = {
 ELSEWHERE = {
     "paper_lagrangian",  # takes no values
     "AmbiguityWarning", "AsymptoticWarning", "MisfitWarning",  # nothing to call with values
-    "ResonanceWarning", "UndersamplingWarning", "ConvergenceWarning", "Backbone", "SteadyState",  # likewise
+    "ResonanceWarning", "UndersamplingWarning", "ConvergenceWarning", "Backbone", "SteadyState", "ResponseCurve",  # likewise
     "Model", "Member", "joined", "kernel", "stations",  # take SymPy expressions: their own tests
     "export",  # writes a folder: below
     "explore",  # shows sliders: its own tests

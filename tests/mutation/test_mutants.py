@@ -153,8 +153,8 @@ def test_a_file_that_cannot_be_imported_is_noticed_and_a_name_that_has_gone_is_n
 
 def test_a_sample_of_a_section_is_caught(tmp_path):
     """The tool at work on mutants of one section, seeded, by the equations' own checks."""
-    command = [sys.executable, "-m", "tests.mutation", "paper/driven", "--checks", "--sample", "3"]
+    command = [sys.executable, "-m", "tests.mutation", "paper/driven", "--checks", "--sample", "1"]
     run = subprocess.run(
         [*command, "--seed", "2", "--results", str(tmp_path)], cwd=ROOT, capture_output=True, text=True
     )
-    assert run.returncode == 0 and run.stdout.count("caught") == 3, run.stdout + run.stderr
+    assert run.returncode == 0 and run.stdout.count("caught") == 1, run.stdout + run.stderr
