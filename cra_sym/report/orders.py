@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -63,9 +62,7 @@ def orders() -> tuple[Order, ...]:
     tuple of Order
         It takes some seconds.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", cra.AsymptoticWarning)
-        return tuple(Order(*words, theory, measure()) for words, theory, measure in _ROWS)
+    return tuple(Order(*words, theory, measure()) for words, theory, measure in _ROWS)
 
 
 def _power(sizes: ArrayLike, errors: ArrayLike) -> float:
