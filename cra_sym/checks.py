@@ -24,6 +24,7 @@ __all__ = [
     "mapping",
     "names",
     "one_axis",
+    "one_number",
     "real_array",
     "shown",
 ]
@@ -110,6 +111,14 @@ def one_axis(name: str, value: Any, of: str, **limits: Any) -> np.ndarray:
     if array.ndim > 1:
         raise ValueError(f"{name} has shape {array.shape}: must be a number or one axis of {of}")
     return array
+
+
+def one_number(name: str, value: Any, **limits: Any) -> float:
+    """Return a single number as a float, checked as :func:`real_array` does, or raise an error that names the field."""
+    array = real_array(name, value, **limits)
+    if array.ndim:
+        raise ValueError(f"{name} has shape {array.shape}: must be one number")
+    return float(array)
 
 
 def count(name: str, value: Any, *, low: int = 1, high: int | None = None) -> int:

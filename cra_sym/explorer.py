@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import instance, real_array, shown
+from cra_sym.checks import instance, one_number, real_array, shown
 from cra_sym.extras import MissingExtraError, require
 from cra_sym.figures.live import LiveFigure
 from cra_sym.figures.modes import figure_mode_shapes
@@ -134,9 +134,7 @@ class Explorer:
         if unknown:
             raise TypeError(f"{', '.join(sorted(unknown))}: must be among {', '.join(self.values)}")
         for name, value in values.items():
-            shape = real_array(name, value, allow_infinite=True).shape
-            if shape:
-                raise ValueError(f"{name} has shape {shape}: must be one number")
+            one_number(name, value, allow_infinite=True)
         self._given.replace(**{name: values[name] for name in self._names if name in values})
         BaseMotion(**{self._motion[name]: values[name] for name in self._motion if name in values})
         if "epsilon" in values and "epsilon" not in self._names:

@@ -132,10 +132,8 @@ def watched(system: System, modes: int, place: Any = None, field: Any = None) ->
     entry = section_place(system, field)
     if place is None:
         return found.displacement(1, entry)
-    at = checks.real_array("place", place, unit="m")
-    if at.ndim:
-        raise ValueError(f"place has shape {at.shape}: must be one number")
-    check_places(system, at, "place")
+    at = checks.one_number("place", place, unit="m")
+    check_places(system, np.asarray(at), "place")
     return found.shape(entry, 0, np.atleast_1d(at))[..., 0]
 
 

@@ -132,10 +132,8 @@ def forced(
         raise ValueError("excitation, epsilon: both or neither must be given")
     if excitation is not None:
         checks.instance("excitation", excitation, Parametric)
-        size = checks.real_array("epsilon", epsilon, low=0.0, unit="1")
-        if size.ndim:
-            raise ValueError(f"epsilon has shape {size.shape}: must be one number here")
-        _add_excitation(found, system, modes, excitation, float(size), small)
+        size = checks.one_number("epsilon", epsilon, low=0.0, unit="1")
+        _add_excitation(found, system, modes, excitation, size, small)
     polynomials = whole.polynomials
     equations = ModalPolynomials(polynomials.omega, polynomials.damping, tuple(found.energies), tuple(found.forces))
     return Forced(equations, tuple(found.waves))
@@ -155,10 +153,7 @@ def _amplitudes(system: System, drive: Any, others: set[str]) -> dict[str, float
             raise ValueError(
                 f"drive: {name} does not drive the model; what drives it is {', '.join(dict.fromkeys(known)) or 'none'}"
             )
-        amplitude = checks.real_array(f"drive: {name}", value)
-        if amplitude.ndim:
-            raise ValueError(f"drive: {name} has shape {amplitude.shape}: must be one number")
-        found[name] = float(amplitude)
+        found[name] = checks.one_number(f"drive: {name}", value)
     return found
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.signal import StateSpace, dlti, lti
 
-from ..checks import equal, real_array
+from ..checks import equal, one_number
 from ..extras import require
 
 if TYPE_CHECKING:
@@ -121,11 +121,9 @@ class LinearSystem(NamedSystem, lti):  # type: ignore[misc]
         >>> held.A.shape, held.dt, held.output_names
         ((4, 4), 0.001, ('v',))
         """
-        step = real_array("dt", dt, low=0.0, open_low=True, unit="s")
-        if step.ndim:
-            raise ValueError(f"dt has shape {step.shape}: must be one number")
+        step = one_number("dt", dt, low=0.0, open_low=True, unit="s")
         size, inputs = self.B.shape
         whole = np.zeros((size + inputs, size + inputs))
         whole[:size, :size], whole[:size, size:] = self.A, self.B
-        moved = expm(whole * float(step))[:size]
-        return DiscreteSystem(moved[:, :size], moved[:, size:], self.C, self.D, *self._names, dt=float(step))
+        moved = expm(whole * step)[:size]
+        return DiscreteSystem(moved[:, :size], moved[:, size:], self.C, self.D, *self._names, dt=step)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import real_array, shown
+from ..checks import one_number, real_array, shown
 from ..si import check_rows, dimensions
 
 __all__ = ["KINDS", "spline_motion", "timed_last", "uniform_times"]
@@ -42,10 +42,8 @@ def uniform_times(t: Any, sampling_rate: Any, number: int, name: str) -> Array:
     if (t is None) == (sampling_rate is None):
         raise TypeError("t, sampling_rate: must be one of the two")
     if t is None:
-        rate = real_array("sampling_rate", sampling_rate, low=_SLOWEST, high=_FASTEST, unit="Hz")
-        if rate.ndim:
-            raise ValueError(f"sampling_rate has shape {rate.shape}: must be one number")
-        return _enough(np.arange(number) / float(rate), name)
+        rate = one_number("sampling_rate", sampling_rate, low=_SLOWEST, high=_FASTEST, unit="Hz")
+        return _enough(np.arange(number) / rate, name)
     times, resolution = _seconds(t)
     if times.ndim != 1 or times.size < 2:
         raise ValueError(f"t has shape {times.shape}: must be one axis of at least two sample times")
