@@ -2,7 +2,7 @@
 
 import pytest
 
-from cra_sym.report import orders
+from cra_sym.report.site import orders
 
 
 @pytest.mark.parametrize("row", orders._ROWS, ids=lambda row: row[0][0])

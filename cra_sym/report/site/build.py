@@ -16,12 +16,12 @@ from cra_sym.claims import OUTCOMES, Setting, Verdict
 from cra_sym.claims.pictures import MARKS
 from cra_sym.figures import ANIMATIONS, FIGURES, described
 from cra_sym.files import write_text
-from cra_sym.report.orders import orders
 from cra_sym.report.site.accuracy import accuracy_table
 from cra_sym.report.site.chapters import Chapter, write_chapters
 from cra_sym.report.site.extension import LINKS
 from cra_sym.report.site.graph import equation_graph
 from cra_sym.report.site.ledger import Entry, entries, numbers
+from cra_sym.report.site.orders import orders
 from cra_sym.report.site.reference import write_reference
 
 if TYPE_CHECKING:
