@@ -56,7 +56,7 @@ class Laboratory:
     def __init__(self, tests: bool = True) -> None:
         self._tests = tests
         self._noticed: dict[str, list[tuple[str, str]]] = {}  # of a module: function and what noticed, latest first
-        self._sound: set[str] = set()  # checks and tests that pass without a mutant
+        self._sound: set[str] = set()  # checks that pass without a mutant
         self._needed: dict[str, float] = {}  # s of processor time of a module's tests without a mutant
         _warm_up()
 
@@ -93,12 +93,12 @@ class Laboratory:
 
     def _prepare(self, module: str) -> None:
         """Run the tests on the package as it is; what they derive goes to the store, from which mutants read it."""
-        tests = {name for part in rounds(module) for name in part} if self._tests else set()
-        start = _spent()
-        if module not in self._needed:
-            if tests and (failing := _in_a_fork(lambda: _first_failing_test([sorted(tests)]))[1]):
-                raise RuntimeError(f"{failing} fails without a mutant")
-            self._needed[module] = _spent() - start
+        if module in self._needed:
+            return
+        start, tests = _spent(), {name for part in rounds(module) for name in part} if self._tests else set()
+        if tests and (failing := _in_a_fork(lambda: _first_failing_test([sorted(tests)]))[1]):
+            raise RuntimeError(f"{failing} fails without a mutant")
+        self._needed[module] = _spent() - start
 
     def _confirm(self, check: str) -> None:
         """Run a check that noticed a mutant, here; what it derives stays, ready for mutants that do not change it."""
