@@ -70,7 +70,7 @@ def draw(name: str, system: System | None = None, **options: Any) -> Figure:
     Parameters
     ----------
     name : str
-        'frequencies', 'mode_shapes', 'response', 'residual_vibration', 'zones' and others show any system, the
+        Some show any system, such as 'frequencies', 'mode_shapes', 'response', 'residual_vibration' and 'zones'; the
         others of `shows_an_arm` one with the parameters of an arm, whose Lagrangian may be another; 'fig04' an arm.
     system : System, optional
         A single one. An arm is one.

@@ -205,7 +205,7 @@ def _majorants(system: PeriodicSystem, blocks: Sequence[NDArray[np.intp]]) -> Ar
     """Return bounds of the Taylor coefficients of all motions, the time in periods, as logarithms.
 
     They are those of the scalar equations with norms in place of matrices and exponentials in place of cosines, of
-    masses hyperbolic cosines: their inverse is no entire function. Shape (highest order + 2, blocks).
+    masses hyperbolic cosines: their inverse is not an entire function. Shape (highest order + 2, blocks).
     """
     sizes = system.sizes()
     largest = Sizes(
