@@ -122,14 +122,14 @@ class _Flow:
             )
         self._problem, self._period, self._point = state._problem, state._problem.period, state._at[None]
         self._equations = self._problem.driven.equations
-        self._varpi = np.array([state.angular_frequency])
+        self._varpi = state.angular_frequency
         self.rows, self.modes = state._problem.rows, self._equations.modes
         if self._equations.moves_mass and any(term.causes for term in self._equations.energies if term.velocities):
             raise ValueError("states: the nonlinear inertia must not depend on a known motion here")
 
     @property
     def _cycle(self) -> float:
-        return float(2 * np.pi * self._period / self._varpi[0])
+        return float(2 * np.pi * self._period / self._varpi)
 
     def cycles(self) -> int:
         """Return how many periods of the answers a transient takes."""
@@ -163,11 +163,11 @@ class _Flow:
         """Return where in the plane of displacements and velocities a steady state is at the phase 0."""
         basis, coefficients = state._problem.basis, state.coefficients
         at = np.zeros(1)
-        rate = float(self._varpi[0]) / self._period
+        rate = self._varpi / self._period
         q, u = coefficients @ basis.values(at)[0], rate * (coefficients @ basis.values(at, 1)[0])
         return np.asarray(self.scaled(np.stack([q[None], u[None]]))[0])
 
     def scaled(self, state: Array) -> Array:
         """Return displacements and velocities over their frequency, shape (motions, 2 modes)."""
-        omega = np.maximum(self._equations.omega, float(self._varpi[0]) * 1e-3)
+        omega = np.maximum(self._equations.omega, self._varpi * 1e-3)
         return np.concatenate([np.asarray(state[0], float), np.asarray(state[1] / omega, float)], axis=-1)

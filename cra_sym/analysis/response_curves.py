@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import itertools
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cra_sym import checks
 from cra_sym.analysis.driven_problem import DrivenProblem
 from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, ConvergenceWarning, warn_of_slopes
 from cra_sym.analysis.steady_levels import shifted
 from cra_sym.analysis.steady_search import answers_at, is_stable
+from cra_sym.model.excitations import Parametric
 from cra_sym.model.system import System
-from cra_sym.solvers.continuation import Point, at_value, follow, shares, started
+from cra_sym.solvers.continuation import Point, at_value, follow, passings, started
 from cra_sym.solvers.driven_curve import Driven, beside, turning
 
 __all__ = ["ResponseCurve", "response_curves"]
@@ -76,17 +77,17 @@ class ResponseCurve:
 @checks.default_floating_point
 def response_curves(
     system: System,
-    between: Any,
+    between: Sequence[float] | Array,
     *,
-    excitation: Any = None,
-    epsilon: Any = None,
-    drive: Mapping[Any, Any] | None = None,
+    excitation: Parametric | None = None,
+    epsilon: float | None = None,
+    drive: Mapping[Any, float] | None = None,
     modes: int = 3,
     harmonics: int = 7,
     period: int = 1,
-    zeta: Any = None,
+    zeta: ArrayLike | None = None,
     points: int = 600,
-    place: Any = None,
+    place: float | None = None,
     field: Any = None,
 ) -> tuple[ResponseCurve, ...]:
     """Follow the steady states of a system over the excitation frequency, through folds and onto all branches.
@@ -148,12 +149,7 @@ def response_curves(
     harmonics, period = checks.count("harmonics", harmonics, high=60), checks.count("period", period, high=8)
     points = checks.count("points", points, low=2, high=_MOST_POINTS)
     low, high = _interval(between)
-    size = 1.0
-    if epsilon is not None:
-        sizes = checks.real_array("epsilon", epsilon, low=0.0, unit="1")
-        if sizes.ndim:
-            raise ValueError(f"epsilon has shape {sizes.shape}: must be one number here")
-        size = float(sizes)
+    size = 1.0 if epsilon is None else checks.one_number("epsilon", epsilon, low=0.0, unit="1")
     problem = DrivenProblem.of(
         system=system,
         modes=modes,
@@ -255,7 +251,7 @@ class _Curves:
                 last = self._at_end(before, after, low if after.frequency < low else high)
                 return _Line(found + ([] if last is None else [last]), folds, False, False)
             found.append(after)
-            if (after.tangent[-1] > 0) != (before.tangent[-1] > 0):
+            if _turns(before, after):
                 turn = turning(self._curve, before, after)
                 folds.append(before.frequency if turn is None else turn.frequency)
             if self._closes(found):
@@ -263,8 +259,7 @@ class _Curves:
         return _Line(found, folds, False, True)
 
     def _at_end(self, before: Point, after: Point, bound: float) -> Point | None:
-        ends = before.frequency, before.tangent[-1], after.frequency, after.tangent[-1]
-        share = shares(*ends, after.step, bound)
+        share = passings(before, after, bound)
         if not share.size:
             return None
         unknowns = at_value(self._curve, before, after, float(share[0]), bound)
@@ -291,8 +286,7 @@ class _Curves:
                 apart = np.linalg.norm(after.unknowns - before.unknowns)
                 if min(np.linalg.norm(before.unknowns - x) for x in alike) > 3 * apart + same:
                     continue
-                ends = before.frequency, before.tangent[-1], after.frequency, after.tangent[-1]
-                for share in shares(*ends, after.step, frequency):
+                for share in passings(before, after, frequency):
                     found = at_value(self._curve, before, after, float(share), frequency)
                     if found is not None and min(np.linalg.norm(found - x) for x in alike) <= same:
                         return True

@@ -7,14 +7,13 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from cra_sym.analysis.driven_problem import DrivenProblem
-from cra_sym.solvers.continuation import at_value, follow, shares, started
+from cra_sym.solvers.continuation import at_value, follow, passings, started
 from cra_sym.solvers.driven_curve import Driven
 
 __all__ = ["mirrored", "settling", "shifted", "traced"]
 
 Array = NDArray[np.float64]
 _MOST_POINTS = 250  # of a curve over the level
-_FAR = 300.0  # a step beyond this has gone astray; its exponential is still a number
 _FULL, _HIGHEST = np.arcsinh(1.0), np.arcsinh(10.0)  # the level is the hyperbolic sine of what steps are taken in
 _CYCLES, _DECAY = (60, 200), 12.0  # periods that are integrated; decay of a transient that is enough
 _TOLERANCE, _PUSH = 1e-5, 1e-2  # of the integration; of what an unstable answer is pushed by
@@ -42,7 +41,7 @@ def traced(problem: DrivenProblem, point: Array, size: float, start: Array | Non
     energetic = 0.1 * size * float(np.hypot(problem.driven.equations.omega, frequency).min())
     curve = Driven(
         problem.balance,
-        lambda step: (frequency, 0.0, np.sinh(np.clip(step, -_FAR, _FAR)) * causes),
+        lambda step: (frequency, 0.0, np.sinh(step) * causes),
         energetic,
         1.0,
         lowest=-np.inf,
@@ -57,8 +56,7 @@ def traced(problem: DrivenProblem, point: Array, size: float, start: Array | Non
         if before is None or after.frequency > _HIGHEST or after.frequency < -0.01 or number == _MOST_POINTS:
             break
         if number:
-            ends = before.frequency, before.tangent[-1], after.frequency, after.tangent[-1]
-            passed = [s for s in shares(*ends, after.step, _FULL) if s > 1e-6 or number > 1]
+            passed = [s for s in passings(before, after, _FULL) if s > 1e-6 or number > 1]
             answers = [at_value(curve, before, after, float(s), _FULL) for s in passed]
             found += [answer for answer in answers if answer is not None]
             if (

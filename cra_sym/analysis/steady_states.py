@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, overload
+from typing import Any, TypedDict, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -94,65 +94,34 @@ class SteadyState(checks.ByValue):
         return f"<SteadyState at {self.angular_frequency:.6g} rad/s, amplitude {self.amplitude:.6g}, {word}>"
 
 
+class _Options(TypedDict, total=False):
+    """What the overloads of :func:`steady_states` have in common."""
+
+    excitation: Parametric | None
+    drive: Mapping[Any, float] | None
+    modes: int
+    harmonics: int | None
+    period: int
+    zeta: ArrayLike | None
+    place: float | None
+    field: Any
+
+
 @overload
 def steady_states(
-    system: System,
-    angular_frequency: float,
-    *,
-    excitation: Parametric | None = None,
-    epsilon: float | None = None,
-    drive: Mapping[Any, float] | None = None,
-    modes: int = 3,
-    harmonics: int | None = None,
-    period: int = 1,
-    zeta: ArrayLike | None = None,
-    place: float | None = None,
-    field: Any = None,
+    system: System, angular_frequency: float, *, epsilon: float | None = None, **options: Unpack[_Options]
 ) -> tuple[SteadyState, ...]: ...
 @overload
 def steady_states(
-    system: System,
-    angular_frequency: ArrayLike,
-    *,
-    excitation: Parametric | None = None,
-    epsilon: float | None = None,
-    drive: Mapping[Any, float] | None = None,
-    modes: int = 3,
-    harmonics: int | None = None,
-    period: int = 1,
-    zeta: ArrayLike | None = None,
-    place: float | None = None,
-    field: Any = None,
+    system: System, angular_frequency: ArrayLike, *, epsilon: float | None = None, **options: Unpack[_Options]
 ) -> list[tuple[SteadyState, ...]]: ...
 @overload
 def steady_states(
-    system: System,
-    angular_frequency: float,
-    *,
-    excitation: Parametric | None = None,
-    epsilon: Sequence[float] | Array,
-    drive: Mapping[Any, float] | None = None,
-    modes: int = 3,
-    harmonics: int | None = None,
-    period: int = 1,
-    zeta: ArrayLike | None = None,
-    place: float | None = None,
-    field: Any = None,
+    system: System, angular_frequency: float, *, epsilon: Sequence[float] | Array, **options: Unpack[_Options]
 ) -> list[tuple[SteadyState, ...]]: ...
 @overload
 def steady_states(
-    system: System,
-    angular_frequency: ArrayLike,
-    *,
-    excitation: Parametric | None = None,
-    epsilon: Sequence[float] | Array,
-    drive: Mapping[Any, float] | None = None,
-    modes: int = 3,
-    harmonics: int | None = None,
-    period: int = 1,
-    zeta: ArrayLike | None = None,
-    place: float | None = None,
-    field: Any = None,
+    system: System, angular_frequency: ArrayLike, *, epsilon: Sequence[float] | Array, **options: Unpack[_Options]
 ) -> list[list[tuple[SteadyState, ...]]]: ...
 @checks.default_floating_point
 def steady_states(

@@ -27,6 +27,7 @@ __all__ = [
     "correct",
     "first_point",
     "follow",
+    "passings",
     "point_at",
     "shares",
     "started",
@@ -152,6 +153,7 @@ def _tangent(rates: Array, metric: Array, along: Array) -> Array:
     return np.asarray(found / np.linalg.norm(found) / metric)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # an iterate that runs off is told by its residual
 def correct(
     curve: Followed, start: Array, constraint: Callable[[Array], tuple[float, Array]], most: int = 10
 ) -> tuple[Array, Array] | None:
@@ -272,6 +274,11 @@ def at_value(curve: Followed, before: Point, after: Point, share: float, frequen
     guess = between(before, after, share)
     found = started(curve, guess[:-1], frequency)
     return None if found is None else found.unknowns
+
+
+def passings(before: Point, after: Point, frequency: float) -> Array:
+    """Return the shares of a step at which the curve passes a frequency, ascending, by a cubic through both ends."""
+    return shares(before.frequency, before.tangent[-1], after.frequency, after.tangent[-1], after.step, frequency)
 
 
 def between(before: Point, after: Point, share: float) -> Array:
