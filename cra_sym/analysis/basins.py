@@ -55,8 +55,8 @@ def basins(
     Raises
     ------
     TypeError, ValueError
-        If there is no stable state, the states have several frequencies, the system has no damping in a mode and
-        ``cycles`` is not given, or its nonlinear inertia depends on a known motion.
+        If there is no stable state, the states have several frequencies or epsilons, the system has no damping in a
+        mode and ``cycles`` is not given, or its nonlinear inertia depends on a known motion.
 
     Examples
     --------
@@ -78,8 +78,8 @@ def basins(
     stable = [k for k, state in enumerate(known) if state.stable]
     if not stable:
         raise ValueError("states: must hold a stable one, no other is reached")
-    if len({state.angular_frequency for state in known}) > 1:
-        raise ValueError("states: must be those of one angular frequency")
+    if len({(state.angular_frequency, state.epsilon) for state in known}) > 1:
+        raise ValueError("states: must be those of one angular frequency and one epsilon")
     flow = _Flow(known[0])
     mode = checks.count("mode", mode, high=flow.modes)
     row = flow.rows[mode - 1]

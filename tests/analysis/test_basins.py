@@ -1,5 +1,7 @@
 """Basins of attraction against an integration of each motion by itself, and their limits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -51,6 +53,7 @@ def test_inertia_that_moves_with_the_arm_is_followed():
         (STATES[1:2], {}, "states: must hold a stable one"),
         ([3], {}, "states = 3: must be a SteadyState"),
         ((*STATES, *cra.steady_states(DUFFING, 1.4, drive={F: 0.1}, modes=1)), {}, "one angular frequency"),
+        ((*STATES, replace(STATES[0], epsilon=0.1)), {}, "one epsilon"),
         (STATES, {"mode": 2}, "mode = 2"),
         (STATES, {"displacement": [np.nan]}, "displacement"),
         (STATES, {"cycles": 0}, "cycles = 0"),
