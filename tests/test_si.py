@@ -350,7 +350,7 @@ def test_a_parameter_of_the_nomenclature_carries_its_own(term):
     ("density", "message"),
     [
         (v.diff(t) ** 2 / 2 + v.diff(x, 2) ** 2 / 2, "buckled"),
-        (-(v.diff(t) ** 2) / 2 - v.diff(x, 2) ** 2 / 2, "negative kinetic energy"),
+        (-(v.diff(t) ** 2) / 2 - v.diff(x, 2) ** 2 / 2, "the kinetic energy of a section is negative"),
     ],
 )
 def test_an_energy_of_the_wrong_sign_is_said(density, message):

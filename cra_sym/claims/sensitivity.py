@@ -206,13 +206,13 @@ def _factor(value: float) -> str:
 )
 def two_mechanisms(setting: Setting) -> Finding:
     """Judge C20."""
-    rigid = modal_parameters(setting.rigid)
     length, bending = float(setting.arm.L), float(setting.arm.EI)
-    twice = 2 * bending * rigid.omega**2
-    drop_t, drop_r = rigid.root_shear**2 * length**3 / twice, rigid.root_moment**2 * length / twice
+    give = sensitivities(setting.rigid)
+    drop_t = -give.df_dc_t * length**3 / (bending * give.frequency)
+    drop_r = -give.df_dc_r * length / (bending * give.frequency)
     kappa = np.logspace(1, 6, 51)
     soft = [setting.rigid.replace(k_t=kappa * bending / length**3), setting.rigid.replace(k_r=kappa * bending / length)]
-    drop = np.stack([1 - natural_frequencies(arm) / rigid.frequency for arm in soft])
+    drop = np.stack([1 - natural_frequencies(arm) / give.frequency for arm in soft])
     spread_t, spread_r = drop_t.max() / drop_t.min() - 1, drop_r.max() / drop_r.min() - 1
     differ = np.abs(drop_t / drop_r / (drop_t / drop_r)[0] - 1)[1:] > setting.visible
     evidence = {

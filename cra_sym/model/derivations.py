@@ -22,6 +22,7 @@ from cra_sym.model.excited import axial, fluctuating, fluctuation
 from cra_sym.model.forms import form_of, load_of
 from cra_sym.model.held_motions import HeldMotions
 from cra_sym.model.held_motions import held_motions as motions_held
+from cra_sym.model.kinetic import masses
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.moving import jumps
 from cra_sym.model.nonlinear import nonlinear
@@ -53,6 +54,7 @@ __all__ = [
     "inertia",
     "load",
     "load_coefficients",
+    "masses",
     "named_observables",
     "names",
     "nonlinear",

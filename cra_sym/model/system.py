@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from cra_sym.checks import broadcastable, count, default_floating_point, instance, real_array, shown
 from cra_sym.model.cross_check import CrossCheck, cross_check
+from cra_sym.model.kinetic import refuse_negative_mass
 from cra_sym.model.projection import Domain, Load, Projected, project
 from cra_sym.model.routes import ROUNDING, TOLERANCE, Estimated, Modes, Route
 from cra_sym.model.slip_elements import SlipElements, slip_elements, slip_terms_of
@@ -177,7 +178,9 @@ class System:
             bad = given[~((given > 0) & np.isfinite(given))]
             first = bad.flat[0] if bad.size else np.inf
             raise ValueError(f"domain: the length {name} = {first:g} must be in (0, inf)")
-        return Domain(finite, left, length)
+        found = Domain(finite, left, length)
+        refuse_negative_mass(self.numerics("masses"), found, self.shape, self.values)
+        return found
 
     @cached_property
     def conservative_part(self) -> System:

@@ -95,6 +95,40 @@ def _jacobi(matrix: np.ndarray) -> np.ndarray:
     return np.diagonal(a, axis1=1, axis2=2)
 
 
+def energies_of_springs(stiffness: np.ndarray, motions: np.ndarray) -> np.ndarray:
+    """Return ``motions @ stiffness @ motions.T`` of a stack of small matrices, as a sum over elongations.
+
+    A spring between two places that move together stores nothing: the product would leave the rounding of its terms,
+    the elongation, by elimination with diagonal pivots, does not. What a pivot leaves below rounding is zero.
+
+    Parameters
+    ----------
+    stiffness : ndarray, shape (rows, places, places)
+        Symmetric.
+    motions : ndarray, shape (rows, modes, places)
+
+    Returns
+    -------
+    ndarray, shape (rows, modes, modes)
+    """
+    rest, size = stiffness.copy(), np.abs(stiffness)
+    every, rounding = np.arange(len(rest)), 4.0 * np.finfo(float).eps
+    result = np.zeros((*motions.shape[:2], motions.shape[1]))
+    for _ in range(rest.shape[-1]):
+        place = np.abs(np.diagonal(rest, axis1=1, axis2=2)).argmax(axis=1)
+        pivot, column = rest[every, place, place], rest[every, :, place]
+        direction = column / np.where(pivot == 0.0, np.inf, pivot)[:, None]
+        elongation = (motions @ direction[..., None])[..., 0]
+        result += pivot[:, None, None] * elongation[:, :, None] * elongation[:, None, :]
+        eliminated = column[:, :, None] * direction[:, None, :]
+        size = size + np.abs(eliminated)
+        rest = rest - eliminated
+        rest[np.abs(rest) <= rounding * size] = 0.0
+        own = pivot != 0.0
+        rest[every[own], place[own]] = rest[every[own], :, place[own]] = 0.0
+    return np.asarray(result + motions @ rest @ np.swapaxes(motions, -1, -2))
+
+
 def _energies(
     problem: DynamicStiffness,
     rows: np.ndarray,
@@ -113,8 +147,8 @@ def _energies(
     pieces = 1 if problem.uniform else start.shape[3]
     index, modes = np.repeat(rows, z.shape[1]), z.shape[1]
     end, end_slope = problem.boundary(reference, rows)
-    lumped = end - reference[:, None, None] * end_slope, -end_slope
-    strain, kinetic = (edge @ ends @ np.swapaxes(edge, -1, -2) for ends in lumped)
+    strain = energies_of_springs(end - reference[:, None, None] * end_slope, edge)
+    kinetic = edge @ -end_slope @ np.swapaxes(edge, -1, -2)
     points, weights = np.polynomial.legendre.leggauss(8 if problem.uniform else 5)  # of pieces with exponents to 1, 1/4
     for part, (origin, share) in enumerate(((0.0, GOLDEN), (GOLDEN, 1.0 - GOLDEN))):
         width = np.full((1, pieces), share / 2.0**level)

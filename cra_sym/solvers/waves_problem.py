@@ -19,6 +19,7 @@ __all__ = [
     "Floats",
     "Integers",
     "UniformProblem",
+    "are_semidefinite",
     "dispersion",
     "idle_coordinates",
     "negative_energy",
@@ -342,7 +343,7 @@ def negative_energy(problem: UniformProblem) -> NDArray[np.bool_]:
         for matrix, odd in ((problem.odd_by_even[0], False), (problem.even_by_odd[0], True)):  # A_Pq at z = 0
             places = [place for place in range(start, stop) if problem.odd[place] == odd]
             if places:
-                found |= ~_are_semidefinite(matrix[:, places][:, :, places])
+                found |= ~are_semidefinite(matrix[:, places][:, :, places])
     return found
 
 
@@ -356,7 +357,7 @@ def negative_motions(problem: UniformProblem, part: int) -> NDArray[np.bool_]:
     matrix = np.where(held[:, :, None] | held[:, None, :], 0.0, problem.springs_and_masses()[part])
     pattern = problem.couplings[part].any(axis=0)
     for group in _groups(pattern | pattern.T):
-        found |= ~_are_semidefinite(matrix[:, group][:, :, group])
+        found |= ~are_semidefinite(matrix[:, group][:, :, group])
     return found
 
 
@@ -384,7 +385,7 @@ def _groups(pattern: NDArray[np.bool_]) -> list[list[int]]:
     return [group for group in groups if len(group) > 1]
 
 
-def _are_semidefinite(matrices: Floats) -> NDArray[np.bool_]:
+def are_semidefinite(matrices: Floats) -> NDArray[np.bool_]:
     """Return where symmetric matrices have no negative eigenvalue, but for rounding: small ones by principal minors."""
     n = matrices.shape[1]
     if n > _MOST:

@@ -67,7 +67,7 @@ def test_values_by_symbol_or_by_name_and_broadcasting(arm):
         ({m_e: np.inf}, "m_e = inf: only the stiffness of an end may be infinite"),
         ({k_t: -np.inf}, "k_t = -inf"),
         ({EI: 0.0}, "infinite"),
-        ({rhoA: -0.24, m_e: 0.0}, "negative kinetic energy"),
+        ({rhoA: -0.24, m_e: 0.0}, "rhoA = -0.24: the kinetic energy of a section is negative; it must be at least 0"),
     ],
 )
 def test_values_that_are_refused(arm, change, message):
