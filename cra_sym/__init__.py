@@ -28,7 +28,7 @@ _HOME = {
     "count_eigenvalues": "analysis.eigenvalues",
     "critical_value": "analysis.critical",
     "BaseMotion": "solvers.motion",
-    "Force": "solvers.motion",
+    "Force": "solvers.force",
     "UndersamplingWarning": "analysis.responses",
     "response": "analysis.responses",
     "tip_response": "analysis.responses",

@@ -61,8 +61,8 @@ from .model.members import Member as Member
 from .model.members import joined as joined
 from .paper.equations import equation as equation
 from .paper.equations import equations as equations
+from .solvers.force import Force as Force
 from .solvers.motion import BaseMotion as BaseMotion
-from .solvers.motion import Force as Force
 from .studies import sweep as sweep
 
 __version__: str

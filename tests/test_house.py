@@ -33,7 +33,7 @@ RANK = {room: rank for rank, floor in enumerate(FLOORS) for room in floor}
 STRANGERS = ({"mechanics", "kernels", "solvers"}, {"analysis", "arm"})  # rooms that do not know each other
 # A module that names one of a higher room, to load it when a function asks for it: the only ways up.
 UPWARDS = {
-    ("cra_sym/model/lagrangian.py", "analysis"),  # a model has its tools at hand
+    ("cra_sym/model/asked.py", "analysis"),  # a model has its tools at hand
 }
 KNOW_ORACLES = {"paper", "claims"}
 

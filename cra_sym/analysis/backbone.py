@@ -10,25 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym import checks
-from cra_sym.analysis.nonlinear import (
-    MOST_NONLINEAR_MODES,
-    ConvergenceWarning,
-    equations_of,
-    samples,
-    warn_of_slopes,
-    watched,
-)
+from cra_sym.analysis.backbone_problem import FollowedMode
+from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, ConvergenceWarning, warn_of_slopes
 from cra_sym.analysis.slip_backbone import held_curve, warn_of_missing
 from cra_sym.model.system import System
 from cra_sym.solvers.continuation import Curve, Measure, Point, between, correct, first_point, follow, shares
-from cra_sym.solvers.harmonic_balance import Balance, Basis, peak
-from cra_sym.solvers.modal_polynomials import ModalPolynomials
+from cra_sym.solvers.harmonic_balance import peak
 from cra_sym.solvers.monodromy import multipliers
 
 __all__ = ["Backbone", "backbone"]
 
 Array = NDArray[np.float64]
-_START = 1e-5  # nonlinear share of the forces at the first point
 _MOST_POINTS = 1000
 _MORE_MODES, _MORE_HARMONICS = 3, 4  # in which the error is estimated
 UNSTABLE = 1e-6
@@ -167,7 +159,7 @@ def backbone(
         raise ValueError("energy, amplitude: one of them must be None")
     if system.model.pieces["hysteresis"]:
         return _held(system, mode, energy, amplitude, modes, harmonics, place, field)
-    problem = _Problem.of(system, mode, modes, 9 if harmonics is None else harmonics, place, field)
+    problem = FollowedMode.of(system, mode, modes, 9 if harmonics is None else harmonics, place, field)
     if energy is None and amplitude is None:
         return _whole(problem, points)
     name, value = ("energy", energy) if amplitude is None else ("amplitude", amplitude)
@@ -206,79 +198,7 @@ def _held(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    """A mode to be followed, in so many modes and harmonics."""
-
-    system: System
-    mode: int
-    balance: Balance
-    rows: Array
-    arguments: tuple[int, int, Any, Any]
-
-    @classmethod
-    def of(cls, system: System, mode: int, modes: int, harmonics: int, place: Any, field: Any) -> _Problem:
-        whole = equations_of(system, modes)
-        if system.numerics("constant") is not None:
-            raise ValueError("a backbone starts from rest at zero; the model has a constant load, which moves it away")
-        forces = [force for force in whole.forces if not force.causes]
-        if any(force.velocities % 2 == 0 for force in forces):
-            raise ValueError("virtual_work: a backbone needs forces with a potential, or dampers, which it leaves out")
-        if any(term.velocities % 2 for term in whole.energies if not term.causes):
-            raise ValueError("a backbone needs a Lagrangian that is even in time; it has gyroscopic terms")
-        equations = whole.free()
-        if not equations.omega[mode - 1] > 0:
-            raise ValueError(f"mode = {mode}: is a rigid-body mode and does not vibrate")
-        multiples = tuple(range(1, harmonics + 1, 2)) if equations.odd else tuple(range(harmonics + 1))
-        basis = Basis(multiples, (), samples(equations.degree, harmonics))
-        rows = watched(system, modes, place, field)
-        return cls(system, mode, Balance(equations, basis), rows, (modes, harmonics, place, field))
-
-    def richer(self, more_modes: int, more_harmonics: int) -> _Problem:
-        modes, harmonics, place, field = self.arguments
-        return self.of(self.system, self.mode, modes + more_modes, harmonics + more_harmonics, place, field)
-
-    @property
-    def equations(self) -> ModalPolynomials:
-        return self.balance.equations
-
-    def energy(self, unknowns: Array) -> tuple[float, Array]:
-        """Return the energy at zero velocity and its gradient."""
-        start = self.balance.basis.values(np.zeros(1))[0]
-        q = self.balance.coefficients(unknowns)[0] @ start
-        force = self.equations.derivatives(q[None], np.zeros_like(q)[None]).force[0]
-        return float(self.equations.potential(q)), np.outer(self.equations.omega**2 * q - force, start).ravel()
-
-    def peak(self, unknowns: Array) -> tuple[float, Array]:
-        """Return the peak and its gradient."""
-        basis, coefficients = self.balance.basis, self.balance.coefficients(unknowns)
-        largest, phase = peak(basis, self.rows, coefficients)
-        values = basis.values(phase)[0]
-        sign = np.sign(self.rows @ coefficients[0] @ values)
-        return float(largest[0]), sign * np.outer(self.rows, values).ravel()
-
-    def linear_motion(self, size: float) -> Array:
-        """Return the unknowns of the linear mode with a modal amplitude."""
-        x = np.zeros((self.equations.modes, self.balance.basis.size))
-        x[self.mode - 1, self.balance.basis.cosines.index(1)] = size
-        return x.ravel()
-
-    def small(self) -> float:
-        """Return a modal amplitude at which nonlinear forces are a small share of the linear ones."""
-        square = self.equations.omega[self.mode - 1] ** 2
-        low, high = -40.0, 40.0
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            q = np.zeros((1, self.equations.modes))
-            q[0, self.mode - 1] = 10.0**middle
-            v = np.roll(q, 0) * self.equations.omega[self.mode - 1]
-            found = self.equations.derivatives(q, v)
-            share = np.abs(found.force).max() + np.abs(found.momentum).max() * np.sqrt(square)
-            low, high = (middle, high) if share < _START * square * 10.0**middle else (low, middle)
-        return float(10.0**low)
-
-
-def _started(problem: _Problem, measure: Measure, below: float | None) -> tuple[Curve, Point]:
+def _started(problem: FollowedMode, measure: Measure, below: float | None) -> tuple[Curve, Point]:
     curve = Curve(problem.balance, float(problem.equations.omega[problem.mode - 1]))
     size = problem.small()
     if below is not None:
@@ -295,7 +215,7 @@ def _started(problem: _Problem, measure: Measure, below: float | None) -> tuple[
     raise ValueError(f"mode = {problem.mode}: harmonic balance does not converge even for a small motion")
 
 
-def _whole(problem: _Problem, points: int) -> Backbone:
+def _whole(problem: FollowedMode, points: int) -> Backbone:
     if not problem.equations.energies:
         raise ValueError("system: is linear, so its backbone has no end; ask for an energy or an amplitude")
     curve, start = _started(problem, problem.energy, None)
@@ -309,7 +229,7 @@ def _whole(problem: _Problem, points: int) -> Backbone:
     return _told(problem, [p.vector for p in found], [p.tangent for p in found], (len(found),), _crossings(found))
 
 
-def _at_targets(problem: _Problem, targets: Array, measure: Measure, name: str) -> Backbone:
+def _at_targets(problem: FollowedMode, targets: Array, measure: Measure, name: str) -> Backbone:
     flat = targets.ravel()
     curve, point = _started(problem, measure, float(flat.min()))
     answers: list[Array | None] = [None] * flat.size
@@ -363,7 +283,7 @@ def _refined(curve: Curve, before: Point, after: Point, share: float, measure: M
 
 
 def _told(
-    problem: _Problem, vectors: list[Array], normals: list[Array], shape: tuple[int, ...], crossings: Array
+    problem: FollowedMode, vectors: list[Array], normals: list[Array], shape: tuple[int, ...], crossings: Array
 ) -> Backbone:
     """Return the result at points of the curve; the normals fix a point when modes or harmonics are added."""
     stacked = np.array(vectors)
@@ -398,7 +318,7 @@ def _told(
     )
 
 
-def _stable(problem: _Problem, coefficients: Array, frequency: Array) -> NDArray[np.bool_]:
+def _stable(problem: FollowedMode, coefficients: Array, frequency: Array) -> NDArray[np.bool_]:
     """Return whether no multiplier leaves the unit circle, but for the pair that belongs to the curve itself."""
     if not len(frequency):
         return np.zeros(0, bool)
@@ -408,7 +328,7 @@ def _stable(problem: _Problem, coefficients: Array, frequency: Array) -> NDArray
     return np.asarray(np.abs(others).max(axis=1, initial=0.0) <= 1.0 + UNSTABLE)
 
 
-def _changed(problem: _Problem, more: tuple[int, int], vectors: Array, normals: Array) -> Array:
+def _changed(problem: FollowedMode, more: tuple[int, int], vectors: Array, normals: Array) -> Array:
     """Return by what share the frequency changes when modes and harmonics are added: two steps of Newton's method."""
     try:
         rich = problem.richer(*more)

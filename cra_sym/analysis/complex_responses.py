@@ -16,9 +16,10 @@ from cra_sym.model.values import flat_columns
 from cra_sym.model.vanishing import check_forces
 from cra_sym.solvers.coupled_modes import driven_system
 from cra_sym.solvers.driven_modes import Start, checked
+from cra_sym.solvers.force import Force
 from cra_sym.solvers.free_peaks import free_peaks
 from cra_sym.solvers.lowest_motions import LowestMotions, lowest_motions
-from cra_sym.solvers.motion import BaseMotion, Force
+from cra_sym.solvers.motion import BaseMotion
 
 __all__ = ["complex_residual", "complex_response"]
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from cra_sym.analysis.modes import only_motion
 from cra_sym.checks import mapping, shown
 from cra_sym.model.system import System
-from cra_sym.solvers.motion import BaseMotion, Force
+from cra_sym.solvers.force import Force
+from cra_sym.solvers.motion import BaseMotion
 
 __all__ = ["History", "driven", "histories"]
 

@@ -18,7 +18,8 @@ from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, nonlinear_modal_equ
 from cra_sym.checks import count, one_axis
 from cra_sym.model.modal_equations import ModalEquations
 from cra_sym.model.system import System
-from cra_sym.solvers.motion import BaseMotion, Force
+from cra_sym.solvers.force import Force
+from cra_sym.solvers.motion import BaseMotion
 from cra_sym.solvers.motion_terms import Piecewise
 
 __all__ = ["nonlinear_response"]

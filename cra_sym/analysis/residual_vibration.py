@@ -21,7 +21,8 @@ from cra_sym.model.system import MOST_MODES, System
 from cra_sym.model.values import checked_damping
 from cra_sym.solvers import modal_response as solver
 from cra_sym.solvers.driven_modes import state_at_stop
-from cra_sym.solvers.motion import BaseMotion, Force
+from cra_sym.solvers.force import Force
+from cra_sym.solvers.motion import BaseMotion
 
 if TYPE_CHECKING:
     from sympy.core.function import AppliedUndef

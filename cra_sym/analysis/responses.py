@@ -24,7 +24,8 @@ from cra_sym.model.values import checked_damping
 from cra_sym.solvers import modal_response as solver
 from cra_sym.solvers.coupled_modes import CoupledModes, coupled_response
 from cra_sym.solvers.driven_modes import Start, check_start, driven_response
-from cra_sym.solvers.motion import BaseMotion, Force
+from cra_sym.solvers.force import Force
+from cra_sym.solvers.motion import BaseMotion
 
 if TYPE_CHECKING:
     from sympy import Expr

@@ -13,7 +13,8 @@ from cra_sym.checks import broadcastable
 from cra_sym.model.projection import Projected
 from cra_sym.model.system import System
 from cra_sym.solvers.driven_modes import Start, checked
-from cra_sym.solvers.motion import BaseMotion, Force, Harmonic, Piecewise
+from cra_sym.solvers.force import Force
+from cra_sym.solvers.motion import BaseMotion, Harmonic, Piecewise
 from cra_sym.solvers.slip_loads import Cause
 from cra_sym.solvers.slip_records import Peak, Sampler
 from cra_sym.solvers.slipping import Events, SlippingModes, Step, follow

@@ -15,7 +15,8 @@ from cra_sym.arm.parameters import Arm
 from cra_sym.figures.drawing import BLUE, ORANGE, figure_of, panels
 from cra_sym.figures.subject import fields, moving_place, rigid_ends, single, span
 from cra_sym.model.system import System
-from cra_sym.solvers.motion import BaseMotion, Force
+from cra_sym.solvers.force import Force
+from cra_sym.solvers.motion import BaseMotion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -28,7 +28,8 @@ from cra_sym.figures.subject import (
     single,
 )
 from cra_sym.model.system import System
-from cra_sym.solvers.motion import BaseMotion, Force, Piecewise
+from cra_sym.solvers.force import Force
+from cra_sym.solvers.motion import BaseMotion, Piecewise
 
 if TYPE_CHECKING:
     from sympy import Expr

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.model.projection import Domain, Form, Place
-from cra_sym.solvers.waves_problem import are_semidefinite
+from cra_sym.solvers.waves_static import are_semidefinite
 
 if TYPE_CHECKING:
     from cra_sym.model.lagrangian import Model

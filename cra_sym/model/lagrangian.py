@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from importlib import import_module
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any
 
-import numpy as np
 from sympy import Expr, Symbol, sympify
 from sympy.core.function import AppliedUndef
 
@@ -18,6 +16,7 @@ from cra_sym.mechanics import HamiltonResult, Modal, StateForm, hamilton, ritz, 
 from cra_sym.mechanics.jets import listed
 from cra_sym.mechanics.polynomials import linearised
 from cra_sym.mechanics.weak import weak_form
+from cra_sym.model.asked import Asked
 from cra_sym.model.excitations import LagrangianTerms
 from cra_sym.model.excited import checked_small, refuse_small, without_oscillations
 from cra_sym.model.galerkin import Ritz
@@ -31,14 +30,10 @@ from cra_sym.model.system import TOLERANCE, System
 from cra_sym.model.units import check_dimensions, named_units, symbol_units
 from cra_sym.model.work import work_as_energy
 
-if TYPE_CHECKING:
-    from cra_sym.analysis.modes import ModalParameters
-    from cra_sym.mechanics.slow_flow import SlowFlow
-
 __all__ = ["Model"]
 
 
-class Model:
+class Model(Asked):
     r"""A one-dimensional continuum defined by its Lagrangian.
 
     Parameters
@@ -384,65 +379,6 @@ class Model:
         if None in waves.values():
             raise ValueError(f"the wave numbers have no closed form, only {modal.basis.dispersion}")
         return kernel(modal.characteristic_function.xreplace(waves), (modal.frequency, *self.symbols))
-
-    def slow_flow(self, resonance: Any, order: int = 1, modes: int | None = None) -> SlowFlow:
-        """Return :func:`cra_sym.analysis.slow_flow.slow_flow` of the model: multiple scales of its modal equations."""
-        return cast("SlowFlow", _analysis("slow_flow").slow_flow(self, resonance, order, modes))
-
-    # ------------------------------------------------------------------------------- one line each on the analysis
-
-    def natural_frequencies(self, values: Mapping[Any, Any], modes: int = 3) -> np.ndarray:
-        """Return ``cra_sym.natural_frequencies(self.at(values), modes)``."""
-        return cast("np.ndarray", _analysis("modes").natural_frequencies(self.at(values), modes))
-
-    def mode_shapes(self, values: Mapping[Any, Any], x_values: Any, modes: int = 3, **options: Any) -> np.ndarray:
-        """Return ``cra_sym.mode_shapes(self.at(values), x_values, modes, **options)``."""
-        return cast("np.ndarray", _analysis("modes").mode_shapes(self.at(values), x_values, modes, **options))
-
-    def modal_parameters(self, values: Mapping[Any, Any], modes: int = 3) -> ModalParameters:
-        """Return ``cra_sym.modal_parameters(self.at(values), modes)``."""
-        return cast("ModalParameters", _analysis("modes").modal_parameters(self.at(values), modes))
-
-    def eigenvalues(self, values: Mapping[Any, Any], modes: int = 3, *, oscillating: bool = True) -> np.ndarray:
-        """Return :func:`cra_sym.analysis.eigenvalues.eigenvalues` of the model at the values."""
-        return cast("np.ndarray", _analysis("eigenvalues").eigenvalues(self.at(values), modes, oscillating=oscillating))
-
-    def damping_ratios(self, values: Mapping[Any, Any], modes: int = 3) -> np.ndarray:
-        """Return :func:`cra_sym.analysis.eigenvalues.damping_ratios` of the model at the values."""
-        return cast("np.ndarray", _analysis("eigenvalues").damping_ratios(self.at(values), modes))
-
-    def frequency_response(
-        self, values: Mapping[Any, Any], angular_frequency: Any, x_values: Any = None, **options: Any
-    ) -> np.ndarray:
-        """Return ``cra_sym.frequency_response(self.at(values), angular_frequency, x_values, **options)``."""
-        respond = _analysis("frequency_response").frequency_response
-        return cast("np.ndarray", respond(self.at(values), angular_frequency, x_values, **options))
-
-    def response(
-        self,
-        values: Mapping[Any, Any],
-        motion: Any,
-        t: Any,
-        x: Any,
-        modes: int = 5,
-        derivative: int = 0,
-        **options: Any,
-    ) -> np.ndarray:
-        """Return ``cra_sym.response(self.at(values), motion, t, x, modes, derivative, **options)``."""
-        return cast(
-            "np.ndarray", _analysis("responses").response(self.at(values), motion, t, x, modes, derivative, **options)
-        )
-
-    def tip_response(
-        self, values: Mapping[Any, Any], motion: Any, t: Any, modes: int = 5, **options: Any
-    ) -> np.ndarray:
-        """Return ``cra_sym.tip_response(self.at(values), motion, t, modes, **options)``."""
-        return cast("np.ndarray", _analysis("responses").tip_response(self.at(values), motion, t, modes, **options))
-
-
-def _analysis(module: str) -> Any:
-    """Return a module of the analysis: the one import that leads upwards, so that a model has its tools at hand."""
-    return import_module(f"cra_sym.analysis.{module}")
 
 
 def _rebuilt(pieces: dict[str, Any]) -> Model:

@@ -34,7 +34,7 @@ from cra_sym.solvers.waves import (
     template,
 )
 from cra_sym.solvers.waves_modes import wave_states
-from cra_sym.solvers.waves_problem import idle_coordinates, negative_motions
+from cra_sym.solvers.waves_static import idle_coordinates, negative_motions
 
 if TYPE_CHECKING:
     from sympy import Symbol

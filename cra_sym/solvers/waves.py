@@ -16,7 +16,8 @@ import numpy as np
 
 from .waves_count import Determinant, Functions, direct, formulas, kept
 from .waves_kernel import rising, turning, wave
-from .waves_problem import Floats, Integers, UniformProblem, negative_energy, rigid_motions
+from .waves_problem import Floats, Integers, UniformProblem
+from .waves_static import negative_energy, rigid_motions
 from .waves_structure import Structure
 
 __all__ = [

@@ -215,6 +215,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "solvers/driven_modes": [_COUPLED, ["tests/analysis/test_responses.py"]],
     "solvers/eigenvalues": _STIFFNESS,
     "solvers/floquet": _FLOQUET,
+    "solvers/force": [["tests/solvers/test_motion.py"]],
     "solvers/hill": [_HILL],
     "solvers/modal_response": [
         ["tests/solvers/test_modal_response.py", *_COUPLED],

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cra_sym.solvers.motion import BaseMotion, Force
+from cra_sym.solvers.force import Force
+from cra_sym.solvers.motion import BaseMotion
 
 
 def test_mean_motion_and_disturbance_follow_equation_33():

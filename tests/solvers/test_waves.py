@@ -8,7 +8,7 @@ import pytest
 from cra_sym.kernels.plain import functions_of
 from cra_sym.solvers.eigenvalues import lowest
 from cra_sym.solvers.waves import QUICK, UniformProblem, determinant, formulas, lowest_waves
-from cra_sym.solvers.waves_problem import rigid_motions
+from cra_sym.solvers.waves_static import rigid_motions
 from tests.solvers.wave_problems import INF, beams, distance, stiffness
 
 HELD, HINGED, FREE = (INF, INF), (INF, 0.0), (0.0, 0.0)

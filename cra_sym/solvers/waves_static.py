@@ -1,0 +1,134 @@
+"""What a uniform problem does at rest: motions without energy, negative energy, coordinates that nothing holds."""
+
+from __future__ import annotations
+
+from functools import reduce
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .waves_kernel import minors
+from .waves_problem import Floats, Integers, UniformProblem, ranks
+
+__all__ = ["are_semidefinite", "idle_coordinates", "negative_energy", "negative_motions", "rigid_motions"]
+
+_SMALL = 3  # matrices up to this size are judged by their principal minors
+
+
+def rigid_motions(problem: UniformProblem) -> Integers:
+    """Return how many independent motions without strain energy and without deflected springs each row has.
+
+    Exact: such a motion has P = 0, so ``q' = A_qq q`` with ``A_Pq q = 0``, and is zero where an end has stiffness. Only
+    linear dependence of a few rows of numbers decides.
+    """
+    structure, n, m = problem.structure, problem.structure.n, problem.coordinates
+    result = np.zeros(len(problem.length), dtype=np.int64)
+    coupled = np.full(len(problem.length), structure.linked)
+    if problem.couplings is not None:
+        coupled |= problem.couplings[0].any(axis=(1, 2))
+    if problem.ties is not None:
+        coupled |= problem.ties.any(axis=(1, 2))
+    sprung = problem.stiffness > 0.0
+    open_ = np.flatnonzero(coupled | ~(sprung[:, :n].all(axis=1) | sprung[:, n : 2 * n].all(axis=1)))
+    if not open_.size:
+        return result
+    gradient, force = _static_blocks(problem, open_)
+    right, left = np.eye(n), np.eye(n)
+    power = term = np.broadcast_to(np.eye(n), gradient.shape)
+    inside = [force]
+    for j in range(1, n):
+        power = power @ gradient
+        inside.append(force @ power)
+        term = power / float(np.prod(range(1, j + 1)))
+        right, left = right + term, left + (-1.0) ** j * term
+    moved = np.zeros((open_.size, 2 * n + m, n + m))  # by the displacements of mid-span, and coordinates
+    moved[:, :n, :n], moved[:, n : 2 * n, :n], moved[:, 2 * n :, n:] = left, right, np.eye(m)
+    stiffness = problem.springs_and_masses(open_)[0]
+    if problem.stretches is not None:
+        stretched = problem.stiffness[open_, structure.moving :, None] > 0.0
+        stiffness = np.concatenate([stiffness, np.where(stretched, problem.stretches[open_], 0.0)], axis=1)
+    size = np.abs(stiffness).max(axis=2, keepdims=True)
+    ends = stiffness / np.where(size > 0.0, size, 1.0) @ moved
+    still = np.concatenate(inside, axis=1)
+    still = np.concatenate([still, np.zeros((*still.shape[:2], m))], axis=2)
+    result[open_] = n + m - ranks(np.concatenate([still, ends], axis=1))
+    return result
+
+
+def _static_blocks(problem: UniformProblem, rows: Integers) -> tuple[Floats, Floats]:
+    """Return A_qq and A_Pq at z = 0 times half the length, shape (rows, n, n) each."""
+    h = 0.5 * problem.length[rows, None, None]
+    a, b = problem.odd_by_even[0, rows] * h, problem.even_by_odd[0, rows] * h
+    odd = np.array(problem.odd)
+    even_row, even_column = ~odd[:, None], ~odd[None, :]
+    gradient = np.where(even_row & ~even_column, b, np.where(~even_row & even_column, a, 0.0))
+    force = np.where(even_row & even_column, a, np.where(~even_row & ~even_column, b, 0.0))
+    return gradient, force
+
+
+@np.errstate(invalid="ignore", over="ignore", divide="ignore")
+def negative_energy(problem: UniformProblem) -> NDArray[np.bool_]:
+    """Return where static strain energy may be negative, as in compression: only there can a row buckle."""
+    found = negative_motions(problem, 0)
+    for start, stop in problem.structure.blocks:
+        for matrix, odd in ((problem.odd_by_even[0], False), (problem.even_by_odd[0], True)):  # A_Pq at z = 0
+            places = [place for place in range(start, stop) if problem.odd[place] == odd]
+            if places:
+                found |= ~are_semidefinite(matrix[:, places][:, :, places])
+    return found
+
+
+@np.errstate(invalid="ignore", over="ignore", divide="ignore")
+def negative_motions(problem: UniformProblem, part: int) -> NDArray[np.bool_]:
+    """Return where the stiffness (part 0) or the mass (1) of the conditions may be negative in some motion."""
+    found = np.zeros(len(problem.length), dtype=bool)
+    if problem.couplings is None:
+        return found
+    held = np.isinf(problem.stiffness[:, : problem.structure.moving])
+    matrix = np.where(held[:, :, None] | held[:, None, :], 0.0, problem.springs_and_masses()[part])
+    pattern = problem.couplings[part].any(axis=0)
+    for group in _groups(pattern | pattern.T):
+        found |= ~are_semidefinite(matrix[:, group][:, :, group])
+    return found
+
+
+def idle_coordinates(problem: UniformProblem) -> NDArray[np.bool_]:
+    """Return where coordinates have a motion without any spring, mass or displacement of an end."""
+    found, first, structure = np.zeros(len(problem.length), dtype=bool), 2 * problem.structure.n, problem.structure
+    if problem.coordinates:
+        lumped = slice(first, structure.moving)
+        parts = [part[:, :, lumped] for part in problem.springs_and_masses()]
+        if problem.ties is not None:
+            parts.append(problem.ties[:, :first, lumped])
+        if problem.stretches is not None:
+            stiff = problem.stiffness[:, structure.moving :, None] > 0.0
+            parts.append(np.where(stiff, problem.stretches[:, :, lumped], 0.0))
+        found |= ranks(np.concatenate(parts, axis=1)) < problem.coordinates
+    return found
+
+
+def _groups(pattern: NDArray[np.bool_]) -> list[list[int]]:
+    """Return the places that a pattern of entries couples, group by group."""
+    label = np.arange(len(pattern))
+    for i, j in zip(*np.nonzero(pattern), strict=True):
+        label[label == label[i]] = label[j]
+    groups = [np.flatnonzero(label == value).tolist() for value in np.unique(label)]
+    return [group for group in groups if len(group) > 1]
+
+
+def are_semidefinite(matrices: Floats) -> NDArray[np.bool_]:
+    """Return where symmetric matrices have no negative eigenvalue, but for rounding: small ones by principal minors."""
+    n = matrices.shape[1]
+    if n > _SMALL:
+        scale = np.sqrt(np.abs(np.diagonal(matrices, axis1=1, axis2=2)))
+        scale = np.where(scale > 0.0, scale, 1.0)
+        values = np.linalg.eigvalsh(matrices / (scale[:, :, None] * scale[:, None, :]))
+        return np.asarray(values[:, 0] >= -1e-14 * n)
+    every = np.ones(len(matrices), dtype=bool)
+    for size in range(1, n + 1):
+        for places in combinations(range(n), size):
+            entries = [[matrices[:, i, j] for j in places] for i in places]
+            scale = reduce(np.multiply, [np.abs(entries[i][i]) for i in range(size)])
+            every &= minors(entries)[0] >= (0.0 if size == 1 else -1e-14 * scale)
+    return every
