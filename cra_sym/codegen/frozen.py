@@ -88,6 +88,10 @@ def frozen_library(
     controller: Controller | None = None,
 ) -> tuple[Library, str, tuple[str, ...]]:
     """Return a system as a library, with the names of its input and its outputs."""
+    if system.model.pieces["hysteresis"]:
+        raise ValueError(
+            "system: has elastic-slip elements, whose slip the exported steps leave out; give system.without_hysteresis"
+        )
     blocks, names, given = frozen_system(system, modes, drive, outputs)
     if not len(blocks.stiffness):
         raise ValueError(f"input = {given!r}: it moves nothing")

@@ -41,6 +41,11 @@ def model_text(model: Model, real: str = "float64") -> ModelText:
 
 def _form(model: Model) -> WavesForm:
     """Return a model as the solver of waves takes it."""
+    if model.pieces["hysteresis"]:
+        raise ValueError(
+            "model: has elastic-slip elements, whose slip has no frequencies; give model.without_hysteresis, or springs "
+            "in their place"
+        )
     form = model.state_form
     if form.damped or not model.numerics("conservative"):
         raise ValueError(f"model: has dampers, gyroscopic or follower forces; {_INSTEAD}")
