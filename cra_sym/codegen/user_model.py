@@ -43,8 +43,7 @@ def _form(model: Model) -> WavesForm:
     """Return a model as the solver of waves takes it."""
     if model.pieces["hysteresis"]:
         raise ValueError(
-            "model: has elastic-slip elements, whose slip has no frequencies; give model.without_hysteresis, or springs "
-            "in their place"
+            "model: has elastic-slip elements, whose slip has no frequencies; give model.without_hysteresis, or system="
         )
     form = model.state_form
     if form.damped or not model.numerics("conservative"):
