@@ -1,4 +1,4 @@
-"""What can be asked of a model at given values, one line each on the analysis: the one import that leads upwards."""
+"""Methods of Model that call the analysis functions at given values: the one upward import of the package."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ Complex = NDArray[np.complex128]
 
 
 class Asked(ABC):
-    """A model has its tools at hand; each takes the values of all parameters first, as :meth:`at` does."""
+    """Base class of Model with the analysis functions as methods.
+
+    The first argument of each is the values of all parameters, as of :meth:`at`.
+    """
 
     @abstractmethod
     def at(self, values: Mapping[Any, Any]) -> System:
@@ -80,5 +83,5 @@ class Asked(ABC):
 
 
 def _analysis(module: str) -> Any:
-    """Return a module of the analysis: the import that leads upwards."""
+    """Import a module of ``cra_sym.analysis``."""
     return import_module(f"cra_sym.analysis.{module}")

@@ -51,10 +51,10 @@ class Breaks:
     places: Kernel
 
     def edges(self, columns: Array, left: Array, length: Array) -> list[tuple[Index, Array, tuple[int, ...]]]:
-        """Return groups of sets that have as many breakpoints, and the interior places of terms at the same of them.
+        """Return parameter sets grouped by their number of breakpoints and by which of these carry terms.
 
-        Of each group the rows, (left end, breakpoints, right end) of shape (sets, breakpoints + 2) and the number of
-        the breakpoint of each interior place, -1 if it is not in the domain.
+        For each group: the rows; (left end, breakpoints, right end), shape (sets, breakpoints + 2); and for each
+        interior place the index of its breakpoint, -1 if it is outside the domain.
 
         Parameters
         ----------
@@ -92,7 +92,7 @@ class Breaks:
     def moving(self, columns: Array, left: Array, length: Array) -> tuple[Array, Array]:
         """Return every breakpoint in the domain, (sets, breakpoints), and its rates by every parameter.
 
-        Where a set has fewer breakpoints the places are the left end, and the rates zero; their shape is
+        A set with fewer breakpoints is padded with the left end and rates of zero; the shape of the rates is
         (parameters, sets, breakpoints).
         """
         places, rates = [np.zeros((len(left), 0))], [np.zeros((len(columns), len(left), 0))]
@@ -119,7 +119,7 @@ class Breaks:
             for k in range(0, len(values), 2):
                 value, slope = (np.broadcast_to(v, ends.shape) for v in values[k : k + 2])
                 if self.levels[k // 2]:
-                    level = _integers(value)
+                    level = _integers_within(value)
                     yield k // 2, ends[:, :1] + (level - value[:, :1]) / slope[:, :1]
                 else:
                     yield k // 2, ends[:, :1] - value[:, :1] / slope[:, :1]
@@ -127,15 +127,17 @@ class Breaks:
                 yield from self._sampled(columns, self._samples(columns, left, length))
 
     def _samples(self, columns: Array, left: Array, length: Array) -> Array:
-        """Return places between which no switch passes a value twice, (sets, samples), ascending."""
+        """Return ascending positions between which no switch takes a value twice, (sets, samples)."""
         ends = left[:, None] + length[:, None] * np.array([0.0, 1.0])
         values = self.affine.function(ends, *columns[..., None])
         grid = left[:, None] + length[:, None] * np.linspace(0.0, 1.0, _SAMPLES)
         kinks = [ends[:, :1] - values[k] / values[k + 1] for k in range(0, len(values), 2)]
-        grid = _inserted(grid, [np.broadcast_to(kink, ends.shape)[:, :1] for kink in kinks])
+        grid = _insert_positions(grid, [np.broadcast_to(kink, ends.shape)[:, :1] for kink in kinks])
         turning = self.turns.function(grid, *columns[..., None])
         values = [np.broadcast_to(value, grid.shape) for value in turning]
-        return _inserted(grid, [_roots(self.turns, k, 0.0, columns, grid, value) for k, value in enumerate(values)])
+        return _insert_positions(
+            grid, [_roots(self.turns, k, 0.0, columns, grid, value) for k, value in enumerate(values)]
+        )
 
     def _sampled(self, columns: Array, grid: Array) -> Iterator[tuple[int, Array]]:
         number = len(self.others.layout)
@@ -143,13 +145,13 @@ class Breaks:
         for k in range(number):
             value = np.broadcast_to(sampled[k], grid.shape)
             switch = len(self.levels) - number + k
-            levels = _integers(value) if self.levels[switch] else np.zeros((1, 1))
+            levels = _integers_within(value) if self.levels[switch] else np.zeros((1, 1))
             for level in np.unique(levels[np.isfinite(levels)]):
                 yield switch, _roots(self.others, k, level, columns, grid, value)
 
 
 def _roots(function: Kernel, number: int, level: float, columns: Array, grid: Array, value: Array) -> Array:
-    """Return where one of some functions passes a level between samples, (sets, roots), filled up with inf."""
+    """Return where one of the functions crosses a level between samples, (sets, roots), padded with inf."""
     above = value >= level
     row, cell = np.nonzero(above[:, 1:] != above[:, :-1])
     low, high, start = grid[row, cell], grid[row, cell + 1], above[row, cell]
@@ -162,15 +164,15 @@ def _roots(function: Kernel, number: int, level: float, columns: Array, grid: Ar
     return found
 
 
-def _inserted(grid: Array, places: list[Array]) -> Array:
-    """Return samples with further places among them, ascending; what is not within is left out."""
+def _insert_positions(grid: Array, places: list[Array]) -> Array:
+    """Insert further positions into ascending samples; those outside their range are dropped."""
     every = np.concatenate([grid, *places], axis=1)
     inside = (every >= grid[:, :1]) & (every <= grid[:, -1:])
     return np.sort(np.where(inside, every, grid[:, -1:]), axis=1)
 
 
-def _integers(value: Array) -> Array:
-    """Return the integers within the range of each row, (sets, integers), filled up with inf."""
+def _integers_within(value: Array) -> Array:
+    """Return the integers within the range of each row, (sets, integers), padded with inf."""
     low, high = np.ceil(np.nanmin(value, axis=1)), np.floor(np.nanmax(value, axis=1))
     count = int(np.max(high - low, initial=-1.0)) + 1
     if count > _MOST:

@@ -1,9 +1,9 @@
-"""Neighbouring modes whose frequencies nearly coincide: Rayleigh-Ritz values keep digits that a determinant loses.
+"""Closely spaced natural frequencies: a Rayleigh-Ritz step restores the digits that the determinant loses.
 
-A heavy end-effector on a soft joint moves as a rigid body, along and about itself; two heavy ends on springs take no
-notice of each other. Tuned alike, such motions have frequencies as close as their coupling is weak, and zeros of the
-determinant at a relative distance g are known to eps / g only. The energies of the two motions have no such loss: the
-shapes at approximate frequencies span those of the pair up to the error, which enters the values squared.
+A heavy end-effector on a soft joint translates and rotates as a rigid body; two heavy ends on springs are almost
+uncoupled. The weaker the coupling of two such motions of equal frequency, the closer their frequencies, and two zeros
+of the determinant at a relative distance g are accurate to eps / g only. A Rayleigh-Ritz step with the two approximate
+shapes has no such loss, since the error of the shapes enters the frequencies squared.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ Array = NDArray[np.float64]
 CLOSE = 0.1
 """Distance of two frequency parameters, relative below 1, under which Rayleigh-Ritz values replace the zeros."""
 
-_APART = 1e-9  # relative distance of what spans the pair at least: its square is nothing
+_APART = 1e-9  # least relative distance of the two frequencies at which shapes are taken; its square is below rounding
 _TURNS = 3  # the first may start from shapes that are nearly parallel
-_LANES = 1000  # at once, which bounds the memory
+_LANES = 1000  # lanes at once, to bound memory
 
 
 def resolve_close_pairs(family: Family, lam: Array, *groups: Array) -> None:
@@ -44,10 +44,12 @@ def resolve_close_pairs(family: Family, lam: Array, *groups: Array) -> None:
         close = close[high[close] - low[close] < CLOSE * np.minimum(high[close], 1.0)]
         for start in range(0, close.size, _LANES):
             some = close[start : start + _LANES]
-            rows[some, lower : lower + 2] = _resolved(family, rows[some, lower : lower + 2], [x[some] for x in flat])
+            rows[some, lower : lower + 2] = _rayleigh_ritz(
+                family, rows[some, lower : lower + 2], [x[some] for x in flat]
+            )
 
 
-def _resolved(family: Family, pairs: Array, groups: list[Array]) -> Array:
+def _rayleigh_ritz(family: Family, pairs: Array, groups: list[Array]) -> Array:
     """Return pairs of frequency parameters, shape (lanes, 2), from the energies of their shapes."""
     for _ in range(_TURNS):
         middle, half = pairs.mean(axis=1), np.maximum(np.diff(pairs)[:, 0], _APART * pairs[:, 1]) / 2
@@ -61,7 +63,7 @@ def _resolved(family: Family, pairs: Array, groups: list[Array]) -> Array:
 def _energies(modes: DimensionlessModes, groups: list[Array]) -> tuple[Array, Array]:
     """Return the matrices of twice the strain and twice the kinetic energy, each of shape (lanes, modes, modes).
 
-    The end values are those that the conditions of the right end give; the shapes are bent to them.
+    The end values follow from the conditions of the right end; the shapes are corrected to have these values.
     """
     table, n = modes.family.layout, modes.family.layout.n
     points, weights = np.polynomial.legendre.leggauss(int(np.ceil(modes.lam.max())) + 24)  # more than products need

@@ -17,7 +17,7 @@ __all__ = ["ComplexShapes", "TooFineError"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-_STEPS = 5, 6, 7, 8  # halvings of the two parts; with more, rounding takes the digits of shears
+_STEPS = 5, 6, 7, 8  # halvings of the two parts; with more, rounding spoils the shear forces
 _GOOD, _POOR = 1e-9, 1e-6
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 
@@ -94,7 +94,7 @@ class ComplexShapes:
 
     @cached_property
     def _halvings(self) -> int:
-        """How often each part is halved for the integration along x: as few as give the eigenvalues."""
+        """Number of halvings of each part for the integration along x: the fewest that reproduce the eigenvalues."""
         best, least = _STEPS[0], np.inf
         for halvings in _STEPS if not self.spatial.uniform else ():
             error = self._error(halvings)

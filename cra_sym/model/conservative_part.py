@@ -18,10 +18,12 @@ __all__ = ["conservative_part", "stiffness_beside"]
 
 
 def conservative_part(model: Model) -> Model | None:
-    """Return the model without terms that are odd in time and without virtual work; None if it has natural modes.
+    """Return the model without terms that are odd in time and without virtual work.
 
-    Dampers alone are left out of natural frequencies anyway. Where forces follow the motion, the potential energy of
-    the highest derivatives alone stays: what such forces keep from buckling would buckle without them.
+    None if the model itself has natural modes already.
+
+    Dampers alone do not count, since natural frequencies leave them out anyway. With follower forces only the potential
+    energy of the highest derivatives is kept: without these forces the structure may buckle under its other loads.
     """
     try:
         _ = model.conservative
@@ -36,7 +38,7 @@ def conservative_part(model: Model) -> Model | None:
         if expression is None:
             return None
         terms = Add.make_args(expand(sympify(expression, strict=True)))
-        return sum((term for term in terms if not _turns(term, t)), S.Zero)
+        return sum((term for term in terms if not _is_odd_in_time(term, t)), S.Zero)
 
     changes: dict[str, Any] = {"density": even(density)} | {end: even(options[end]) for end in END_NAMES}
     inside = tuple((place, even(term)) for place, term in options["inside"])
@@ -51,29 +53,29 @@ def _leading(model: Model) -> Expr:
     variation = model.linearised.variation
     space, orders = variation.space, variation.orders
 
-    def stays(term: Expr) -> bool:
+    def is_kept(term: Expr) -> bool:
         return all(j.time or (space.is_field(j.unknown) and j.space == orders[j.unknown]) for j in space.jets(term))
 
-    return space.restore(Add(*(term for term in Add.make_args(expand(variation.density)) if stays(term))))
+    return space.restore(Add(*(term for term in Add.make_args(expand(variation.density)) if is_kept(term))))
 
 
-def _turns(term: Expr, t: Symbol) -> bool:
+def _is_odd_in_time(term: Expr, t: Symbol) -> bool:
     """Tell whether a term of a Lagrangian changes sign when time runs backwards."""
     odd = {node for node in term.atoms(Derivative) if sum(n for s, n in node.variable_count if s == t) % 2}
     return bool(odd) and expand(term.xreplace({node: -node for node in odd}) + term) == 0
 
 
 def stiffness_beside(model: Model) -> Form | None:
-    """Return the stiffness that the conservative part does not have, of follower forces; None if there is none."""
+    """Return the stiffness of the model minus that of its conservative part (follower forces); None if they agree."""
     part = conservative_part(model)
     if part is None:
         return None
     whole, own = weak_form(model.linearised.variation), weak_form(part.linearised.variation)
-    parts = _beyond(whole.inside, own.inside), _beyond(whole.discrete, own.discrete)
+    parts = _stiffness_difference(whole.inside, own.inside), _stiffness_difference(whole.discrete, own.discrete)
     return form_of(whole, {"stiffness": parts}, model.symbols) if any(parts) else None
 
 
-def _beyond(whole: Bilinear, own: Bilinear) -> Bilinear:
+def _stiffness_difference(whole: Bilinear, own: Bilinear) -> Bilinear:
     found: Bilinear = {}
     for pair in {**whole, **own}:
         value = expand(whole.get(pair, {}).get(0, S.Zero) - own.get(pair, {}).get(0, S.Zero))

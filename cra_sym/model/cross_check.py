@@ -1,4 +1,4 @@
-"""Frequencies of a system by its own route against Ritz's method on Hermite elements, which shares none of it."""
+"""Natural frequencies of a system compared with those of Ritz's method on Hermite elements, an independent method."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ class CrossCheck:
     Attributes
     ----------
     difference : ndarray, shape (...)
-        Ritz's frequency over that of the system's own route, minus one, where this is largest among the modes.
+        Largest relative difference among the modes: frequency by Ritz's method over that of the system, minus one.
     mode : ndarray of int, shape (...)
         Which mode that is, from 1.
     expected : ndarray, shape (...)
-        What the estimates of both routes allow there.
+        Largest difference that the error estimates of both methods allow for that mode.
     agree : ndarray of bool, shape (...)
         Whether no mode differs by more than that.
     cause : str
-        What the largest difference of all sets is owed to.
+        Most likely cause of the largest difference of all sets.
     """
 
     difference: Array
@@ -89,7 +89,7 @@ def _cause(difference: float, mode: int, accuracy: float, falling: float) -> str
 
 
 def _by_ritz(system: System, modes: int) -> tuple[Array, Array, Array]:
-    """Return frequencies in Hz of some elements and of twice as many, (sets, modes), and the number of the former."""
+    """Return frequencies in Hz on a mesh and a refined one, (sets, modes), and the number of elements of the first."""
     from cra_sym.mechanics import ritz
     from cra_sym.model.galerkin import Ritz
 
@@ -112,7 +112,7 @@ def _by_ritz(system: System, modes: int) -> tuple[Array, Array, Array]:
 def _nodes(
     system: System, columns: Array
 ) -> Iterator[tuple[NDArray[np.intp], tuple[Expr, ...], tuple[tuple[Symbol, ...], tuple[Array, ...]]]]:
-    """Yield sets with as many breakpoints, these as symbols or stated places, and (symbols, their values)."""
+    """Yield sets with equal numbers of breakpoints, the nodes as symbols or places, and (symbols, their values)."""
     from sympy import Symbol
 
     spatial = system.numerics("spatial")

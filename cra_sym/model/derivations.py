@@ -1,4 +1,4 @@
-"""What analyses need of a Lagrangian: each function takes a model, derives one thing and compiles it."""
+"""Derivations from a Lagrangian for the analyses: each function takes a model, derives one quantity and compiles it."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def spatial(model: Model) -> SpatialProblem:
 
 
 def damped_spatial(model: Model) -> SpatialProblem:
-    """Return the spatial problem with everything in it."""
+    """Return the spatial problem with all forces, dampers included."""
     return spatial_problem(model.state_form, model.symbols, model.equations.domain[0])
 
 
@@ -106,12 +106,12 @@ def route(model: Model) -> Route:
 
 
 def held_motions(model: Model) -> HeldMotions:
-    """Return the conditions of ends and coordinates that turn with a parameter."""
+    """Return the conditions of ends and coordinates whose direction depends on a parameter."""
     return motions_held(model.conservative, model.symbols)
 
 
 def general_route(model: Model) -> Route:
-    """Return the route that serves all values."""
+    """Return the route that is valid for all values."""
     return GeneralRoute(model.numerics("spatial"))
 
 
@@ -123,7 +123,8 @@ Kind = Literal["motion", "force"]
 def causes(model: Model) -> tuple[tuple[str, Kind | str], ...]:
     """Return the functions of time that drive the model, with their kind.
 
-    'motion' acts by its acceleration alone, 'force' by itself; of anything else the kind is the term that is neither.
+    A 'motion' acts through its acceleration only, a 'force' through its value; for any other function the kind is the
+    offending term.
     """
     weak = weak_form(model.linearised.variation)
     return tuple((f.func.__name__, _kind(weak, f)) for f in model.driving)
@@ -141,13 +142,13 @@ def _kind(weak: WeakForm, function: AppliedUndef) -> str:
 
 
 def load(model: Model, name: str) -> Load:
-    """Return the load of one unit of a cause: of the acceleration of a motion, or of a force."""
+    """Return the load of a unit input: a unit acceleration of a prescribed motion, or a unit force."""
     weak = weak_form(model.linearised.variation)
     return load_of(weak, *load_coefficients(model, name), model.symbols)
 
 
 def load_coefficients(model: Model, name: str) -> tuple[dict[Jet, Expr], dict[Jet, Expr]]:
-    """Return what the same load is on displacements: per length inside, and at ends, coordinates and places."""
+    """Return the same load's coefficients by displacement: per length inside, and at ends, coordinates and places."""
     weak = weak_form(model.linearised.variation)
     t = weak.variation.space.t
     function = next(f for f in model.driving if f.func.__name__ == name)
@@ -286,7 +287,7 @@ def _add(form: Bilinear, pair: tuple[Jet, Jet], power: int, value: Expr) -> None
 
 
 def carried(model: Model, name: str) -> Kernel:
-    """Return the (mass, damping, stiffness) that a prescribed motion moves when nothing deforms, by the parameters."""
+    """Return the kernel of the rigid-body (mass, damping, stiffness) that a prescribed motion sees."""
     freed = model.freed(name)
     weak = weak_form(freed.linearised.variation)
     space = weak.variation.space

@@ -1,4 +1,4 @@
-"""What drives a model at one frequency: a prescribed motion, a force, or a displacement that a unit force acts on."""
+"""Harmonic inputs of a model: a prescribed motion, a force, or a displacement that a unit force acts on."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ __all__ = ["driven", "driven_coordinate", "driven_displacement", "driven_spatial
 def driven(model: Model, name: str) -> SpatialProblem:
     """Return the spatial problem with the acceleration of a prescribed motion, or a force, as a lumped coordinate.
 
-    A motion w is freed, and its acceleration a takes its place: w = -a / omega^2, so its column and its row are
-    divided by -omega^2 (by s^2 where the parameter is s). A force is freed as it is. What either does to itself is left
-    out; it is given.
+    A prescribed motion w becomes a free coordinate and is replaced by its acceleration a: w = -a / omega^2, so its
+    column and its row are divided by -omega^2 (by s^2 where the parameter is s). A force becomes a coordinate
+    unchanged. The diagonal entry is left out, since the input is given.
     """
     freed = model.freed(name)
     form = freed.state_form
@@ -49,12 +49,12 @@ def driven(model: Model, name: str) -> SpatialProblem:
 
 
 def driven_spatial(model: Model) -> SpatialProblem:
-    """Return the spatial problem with everything in it, the reactions of interior supports as lumped coordinates."""
+    """Return the spatial problem with all forces, the reactions of interior supports as lumped coordinates."""
     return spatial_problem(reacting(model.state_form), model.symbols, model.equations.domain[0])
 
 
 def reacting(form: StateForm) -> StateForm:
-    """Return the same problem without supports at interior places: their reactions are further lumped coordinates.
+    """Return the same problem with interior supports replaced by their reactions, as further lumped coordinates.
 
     A reaction R works against the displacement that is held: its Lagrangian is R v(a). The force jumps by R there, and
     the equation of R says that the displacement vanishes.
@@ -67,7 +67,7 @@ def reacting(form: StateForm) -> StateForm:
     added = tuple(Function(f"reaction_{k}")(t) for k in range(len(reactions)))
     points = []
     for number, (place, matrix, _) in enumerate(form.points):
-        extended = _inserted(matrix, (n + m,), len(reactions))
+        extended = _insert_zeros(matrix, (n + m,), len(reactions))
         for row, (own, k) in enumerate(reactions):
             if own == number:
                 extended[k, n + m + row] = extended[n + m + row, k] = S.One
@@ -78,15 +78,15 @@ def reacting(form: StateForm) -> StateForm:
     return replace(
         form,
         coordinates=(*form.coordinates, *added),
-        system=_inserted(form.system, (n + m, 2 * (n + m)), len(reactions)).as_immutable(),
-        boundary=_inserted(form.boundary, (n + m,), len(reactions)).as_immutable(),
+        system=_insert_zeros(form.system, (n + m, 2 * (n + m)), len(reactions)).as_immutable(),
+        boundary=_insert_zeros(form.boundary, (n + m,), len(reactions)).as_immutable(),
         free=free.row_join(own).as_immutable(),
         points=tuple(points),
     )
 
 
-def _inserted(matrix: Matrix, places: tuple[int, ...], number: int) -> Matrix:
-    """Return a square matrix with so many rows and columns of zeros before each of some places, ascending."""
+def _insert_zeros(matrix: Matrix, places: tuple[int, ...], number: int) -> Matrix:
+    """Insert ``number`` rows and columns of zeros into a square matrix before each index in ``places`` (ascending)."""
     found = matrix.as_mutable()
     for place in reversed(places):
         found = found.row_insert(place, zeros(number, found.cols))
@@ -95,7 +95,7 @@ def _inserted(matrix: Matrix, places: tuple[int, ...], number: int) -> Matrix:
 
 
 def driven_coordinate(model: Model, name: str) -> int:
-    """Return the position of a prescribed motion among the lumped coordinates once it is freed."""
+    """Return the index of a prescribed motion among the lumped coordinates of the model in which it is free."""
     return [c.func.__name__ for c in model.freed(name).state_form.coordinates].index(name)
 
 
@@ -122,14 +122,14 @@ def driven_displacement(model: Model, drive: Expr) -> int:
 
 
 def pushed(model: Model, drive: Expr) -> tuple[Model, str, Kernel] | None:
-    """Return the model with a force on a displacement of an interior place, its name and its place, or None.
+    """Return the model with a force on a displacement at an interior place, the force's name and the place.
 
-    None is for what is not at an interior place.
+    None if ``drive`` is not at an interior place.
 
     Raises
     ------
     ValueError
-        If what is there is no displacement of a section.
+        If the expression is not a displacement of a section.
     """
     local = at_place(drive, model.equations.x) if isinstance(drive, Expr) else None
     if local is None or local[0] in model.equations.domain:

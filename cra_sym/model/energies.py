@@ -1,4 +1,4 @@
-"""The energies of a model with coefficients that vary along x, as Ritz's method on the stresses takes them."""
+"""Energies of a model with coefficients that vary along x, in the form that Ritz's method on the stresses needs."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def stress_route(model: Model, spatial: SpatialProblem) -> StressRoute | None:
         return None
     state = [*section, *lumped]
     leading, coupled = _matrix(weak, highest, highest, 0), _matrix(weak, highest, state, 0)
-    strain = _solved(leading, coupled)
+    strain = _apply_inverse(leading, coupled)
     cross = zeros(*coupled.shape)
-    if not _one_after_the_other(strain, section, highest):
+    if not _integrates_in_sequence(strain, section, highest):
         strain, cross = cross, coupled
     rest = _matrix(weak, state, state, 0) - (coupled.T * strain if cross.is_zero_matrix else zeros(len(state)))
     named = {"W": leading, "B": strain, "D": cross, "R": rest, "M": _matrix(weak, state, state, 2)}
@@ -60,7 +60,7 @@ def _reacting(model: Model, spatial: SpatialProblem) -> SpatialProblem:
     return spatial if supported is form else spatial_problem(supported, model.symbols, model.equations.domain[0])
 
 
-def _solved(leading: Matrix, coupled: Matrix) -> Matrix:
+def _apply_inverse(leading: Matrix, coupled: Matrix) -> Matrix:
     """Return the inverse of the leading stiffness times the coupling; entry by entry if it is diagonal."""
     if coupled.is_zero_matrix:
         return coupled
@@ -75,8 +75,8 @@ def _matrix(weak: WeakForm, rows: list[Jet], columns: list[Jet], power: int) -> 
     )
 
 
-def _one_after_the_other(strain: Matrix, section: list[Jet], highest: list[Jet]) -> bool:
-    """Return whether the strains give the displacements by integration, one after the other."""
+def _integrates_in_sequence(strain: Matrix, section: list[Jet], highest: list[Jet]) -> bool:
+    """Return whether the displacements follow from the strains by successive integration."""
     waiting = list(range(len(section)))
     while waiting:
         for place in waiting:

@@ -59,7 +59,7 @@ def _fraction(number: Any) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class BallProblem:
-    """A uniform conservative spatial problem as functions of exact numbers.
+    """A uniform conservative spatial problem, as functions in exact arithmetic.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What of a Lagrangian fluctuates with time: parametric excitations of any system."""
+"""Parametric excitations of any system: the parts of its Lagrangian that are periodic in time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 class Excitation:
-    """What excitations share: named numbers that may be arrays, compared by value."""
+    """Base class of excitations: named numbers that may be arrays, compared by value."""
 
     def __init__(self, **numbers: Any) -> None:
         units = {"amplitude": "m"}  # the others are weights
@@ -68,7 +68,7 @@ def _rebuilt(kind: type[Excitation], numbers: dict[str, Any]) -> Excitation:
 
 
 class Drive(NamedTuple):
-    r"""One oscillation and what it moves: with g = epsilon varpi^power cos or sin(order varpi t) the equations are
+    r"""One oscillation and its matrices. With g = epsilon varpi^power cos or sin(order varpi t) the equations are
 
     :math:`\frac{d}{dt}(\dot q + g(M\dot q + Bq)) + C_0\dot q + gC\dot q + K_0q + gKq = 0`.
 
@@ -76,7 +76,7 @@ class Drive(NamedTuple):
     ----------
     oscillation : Oscillation
     stiffness, damping, momentum, mass : ndarray, shape (..., modes, modes), or None
-        K, C, B and M; None is nothing.
+        K, C, B and M; None stands for zero.
     """
 
     oscillation: Oscillation
@@ -129,7 +129,7 @@ class LagrangianTerms(Parametric):
         return found
 
     def forces(self, system: System, modes: int) -> list[tuple[Oscillation, bool, Array]]:
-        """Return (oscillation, whether times epsilon, force on each mode (..., modes)) of what acts directly."""
+        """Return (oscillation, whether proportional to epsilon, force on each mode (..., modes)) of direct forces."""
         self._check(system)
         found = []
         for part in self._model._periodic:
@@ -172,8 +172,8 @@ class LagrangianTerms(Parametric):
 class Fluctuation(Parametric):
     """Parameters that fluctuate about their values: each is p (1 + weight epsilon cos(varpi t)).
 
-    Stiffnesses, masses, dampers, tensions, speeds: any that the Lagrangian and the virtual work are linear in. What
-    moves with a changing mass keeps its momentum; nothing else enters or leaves with it.
+    Stiffnesses, masses, dampers, tensions, speeds: any parameter in which the Lagrangian and the virtual work are
+    linear. A changing mass keeps its momentum: the mass that is added or removed carries none.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ class Fluctuation(Parametric):
         return [Drive(_COSINE, **totals)]
 
     def _fluctuating(self, system: System) -> dict[str, Value]:
-        """Return the weights but for those that are 0 of what the model has not."""
+        """Return the weights, without those that are 0 and belong to no parameter of the model."""
         return {name: weight for name, weight in self.weights.items() if name in system.values or np.any(weight)}
 
     def springs(self, system: System) -> list[str]:
@@ -255,7 +255,7 @@ class Fluctuation(Parametric):
 
 
 class _ShakenBase(Excitation):
-    """A base that shakes with an amplitude."""
+    """Base class of oscillating bases with an amplitude."""
 
     def __init__(self, amplitude: Any) -> None:
         super().__init__(amplitude=amplitude)
@@ -267,7 +267,7 @@ class _ShakenBase(Excitation):
 
 
 class AxialBase(_ShakenBase, Parametric):
-    """A frame that shakes along x, towards the right end and back, u = epsilon amplitude cos(varpi t), (35a).
+    """A frame that oscillates along x: u = epsilon amplitude cos(varpi t), (35a).
 
     The foreshortening of the first field feels the inertia of all mass beyond, so that P grows with the square of the
     excitation frequency.
@@ -297,7 +297,7 @@ class AxialBase(_ShakenBase, Parametric):
 
 
 class TransverseBase(_ShakenBase):
-    """A base that shakes across the span, w = epsilon amplitude sin(varpi t), (35).
+    """A base that oscillates across the span, w = epsilon amplitude sin(varpi t), (35).
 
     The only prescribed motion of the model; it forces vibration and has no boundary.
 

@@ -1,4 +1,4 @@
-"""What of a model oscillates: fluctuating parameters, shaken frames, and the periodic terms of its own Lagrangian."""
+"""Time-periodic terms of a model: fluctuating parameters, shaken frames, and periodic terms of its own Lagrangian."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ _TERMS = ("density", "left", "right")
 
 
 class PeriodicForms(NamedTuple):
-    """What of a Lagrangian goes with one oscillation.
+    """The terms of a Lagrangian that are proportional to one oscillation.
 
     Attributes
     ----------
     oscillation : Oscillation
     small : bool
-        Whether it is times epsilon.
+        Whether they are proportional to epsilon.
     matrices : Form or None
-        Stiffness, damping, momentum and mass, as far as they occur.
+        Stiffness, damping, momentum and mass, where they occur.
     force, momentum : Load or None
-        What acts by itself, and what acts by its derivative by time.
+        Direct loads: one acts with the oscillation, the other with its time derivative.
     """
 
     oscillation: Oscillation
@@ -81,7 +81,7 @@ def refuse_small(small: tuple[Symbol, Symbol] | None, values: Any) -> None:
 
 
 def split_options(options: Options, small: tuple[Symbol, Symbol]) -> tuple[Options, Parts]:
-    """Return what Hamilton's principle takes without the terms that oscillate, and these by oscillation.
+    """Split the arguments of Hamilton's principle: those without oscillating terms, and these terms by oscillation.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def split_options(options: Options, small: tuple[Symbol, Symbol]) -> tuple[Optio
 def without_oscillations(
     model: Model, options: Options, units: Mapping[Any, str]
 ) -> tuple[Model, tuple[PeriodicForms, ...]]:
-    """Return the model without what oscillates, with the same parameters, and that."""
+    """Return the model without its oscillating terms, with the same parameters, and these terms."""
     still, parts = split_options(options, model._pieces["small"])
     steady = type(model)(**still | {"quadratures": dict(still["quadratures"])})
     steady.symbols = model.symbols
@@ -205,7 +205,7 @@ def fluctuation(model: Model, name: str) -> str:
     places = [*variation.space.ends.values(), *(point.place for point in variation.points)]
     if any(place.has(symbol) for place in places):
         return "is a length"
-    forms = _by(variation, symbol).named()
+    forms = _derivative_by(variation, symbol).named()
     if not forms:
         return "changes neither stiffness, damping nor mass"
     values = (value for pair in forms.values() for part in pair for entry in part.values() for value in entry.values())
@@ -215,14 +215,14 @@ def fluctuation(model: Model, name: str) -> str:
 def fluctuating(model: Model, name: str) -> tuple[Form, tuple[str, ...]]:
     """Return the matrices that a unit of a parameter gives, and the parameters they depend on."""
     variation = model.linearised.variation
-    named = _by(variation, next(s for s in model.symbols if s.name == name)).named()
+    named = _derivative_by(variation, next(s for s in model.symbols if s.name == name)).named()
     values = (value for pair in named.values() for part in pair for entry in part.values() for value in entry.values())
     used = sorted({symbol.name for value in values for symbol in value.free_symbols if isinstance(symbol, Symbol)})
     form = form_of(weak_form(variation), named, model.symbols)
     return form, tuple(name for name in used if name in {s.name for s in model.symbols})
 
 
-def _by(variation: Variation, symbol: Symbol) -> TimeForms:
+def _derivative_by(variation: Variation, symbol: Symbol) -> TimeForms:
     """Return the derivative of all matrices by a parameter."""
     terms: list[Term] = [("density", variation.density.diff(symbol), None, True)]
     terms.append(("end", variation.ends.diff(symbol), None, False))
@@ -237,8 +237,9 @@ def _by(variation: Variation, symbol: Symbol) -> TimeForms:
 def axial(model: Model) -> Form:
     """Return the stiffness that a unit acceleration of the frame along x, towards the right, gives the first field.
 
-    What moves across the domain moves along it too: the inertia of all mass beyond x, at the right end included, acts
-    on the foreshortening v_x^2 / 2 there, so that (36b) follows from the kinetic energy. A mass m that an end carries
+    All mass that moves across the domain is also accelerated along it: the inertia of the mass beyond x, the right end
+    included, does work on the foreshortening v_x^2 / 2 there, so that (36b) follows from the kinetic energy. A mass m
+    that an end carries
     on a rigid lever e, of velocity v_t + e v_xt, adds m e v_x^2 / 2; m e is its coupling of both.
     """
     weak = weak_form(model.linearised.variation)
@@ -253,12 +254,12 @@ def axial(model: Model) -> Form:
 
 
 def axial_load(model: Model) -> Expr:
-    """Return the compression at x by a unit acceleration of the frame along x: the mass beyond.
+    """Return the compression at x due to a unit acceleration of the frame along x: the mass beyond x.
 
     Raises
     ------
     ValueError
-        If a lumped coordinate carries a mass of which it is not known where it is.
+        If a lumped coordinate carries a mass whose position along x is not known.
     """
     weak = weak_form(model.linearised.variation)
     space = weak.variation.space

@@ -53,7 +53,7 @@ def _translation_share(weak: WeakForm, inside: Mapping[Jet, Expr]) -> Expr | Non
 
 
 def form_of(weak: WeakForm, named: Mapping[str, tuple[Bilinear, Bilinear]], symbols: Symbols) -> Form:
-    """Return bilinear forms with common entries; each is given inside and at the ends, its powers of time summed."""
+    """Return bilinear forms with common entries, each given by its parts inside and at the ends."""
     x = weak.variation.space.x
     pairs = [tuple(dict.fromkeys(pair for forms in named.values() for pair in forms[part])) for part in (0, 1)]
     values = [

@@ -20,8 +20,10 @@ from cra_sym.model.values import checked_values, flat_columns, infinite_patterns
 __all__ = ["Ritz"]
 
 _ROUNDING = 16 * np.finfo(float).eps
-"""Relative to the largest: eigenvalues of a scaled stiffness that rounding makes. Its entries are right to a few units
-in the last place, and a row has at most a dozen of them."""
+"""Eigenvalues of a scaled stiffness that are rounding errors, relative to the largest.
+
+Its entries are accurate to a few units in the last place, and a row has at most a dozen of them.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,14 +53,14 @@ class Ritz(ByValue):
         -----
         Dampers are left out. What rounding does to the first frequencies grows like the condition of the stiffness
         scaled to ones on its diagonal, with the fourth power of the number of elements where the density has second
-        derivatives: 3e-10 for 40 elements of a beam, 3e-8 for 160. However stiff an end is, they do not lose more. A
-        motion that only stores what rounding leaves of the stiffness is rigid.
+        derivatives: 3e-10 for 40 elements of a beam, 3e-8 for 160. A stiff end adds nothing to this error. A motion
+        whose strain energy is below rounding counts as rigid.
         """
         modes = count("modes", modes, high=self.matrices.free)
         columns, shape = self._columns(values)
         omega = np.empty((columns.shape[1], modes))
         for row, stiffness, damping, mass in self._numbers(columns):
-            if _asymmetric(damping) or _asymmetric(_scaled(stiffness)[0]):
+            if _asymmetric(damping) or _asymmetric(_unit_diagonal(stiffness)[0]):
                 raise ValueError("natural frequencies need symmetric stiffness and damping; use eigenvalues")
             omega[row] = _angular_frequencies(stiffness, mass)[:modes]
         return (omega / (2.0 * np.pi)).reshape(*shape, modes)
@@ -148,7 +150,7 @@ class Ritz(ByValue):
         return matrices, restraint
 
     def _held(self, position: int, column: np.ndarray, restraint: np.ndarray) -> np.ndarray:
-        """Return the free motions that an infinite stiffness of an end leaves."""
+        """Return the free motions that remain under an infinite stiffness of an end."""
         symbol, total = self.symbols[position], len(restraint)
         slopes = {place: entry.diff(symbol) for place, entry in self.matrices.end_stiffness.items()}
         inside = self.matrices.element_stiffness.free_symbols | self.matrices.element_mass.free_symbols
@@ -166,10 +168,10 @@ def _asymmetric(matrix: np.ndarray) -> bool:
     return bool(np.abs(matrix - matrix.T).max() > 1e-12 * np.abs(matrix).max())
 
 
-def _scaled(stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the stiffness in unknowns that make ones of its diagonal, and their factors in a column.
+def _unit_diagonal(stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the stiffness scaled to a unit diagonal, and the scale factors of the unknowns in a column.
 
-    Rounding of a root depends on the condition of this matrix: on the mesh, hardly on how stiff one unknown is.
+    The rounding error of a root depends on the condition of this matrix: on the mesh, hardly on the stiffest unknown.
     """
     size = np.abs(stiffness)
     own, most = np.diag(size), np.maximum(size.max(axis=0), size.max(axis=1))
@@ -188,7 +190,7 @@ def _angular_frequencies(stiffness: np.ndarray, mass: np.ndarray) -> np.ndarray:
         factor = np.linalg.cholesky(mass)
     except np.linalg.LinAlgError:
         raise ValueError("values: the kinetic energy is not positive for all motions of the elements") from None
-    scaled, factors = _scaled(stiffness)
+    scaled, factors = _unit_diagonal(stiffness)
     momenta = factors * factor
     weights, motions = eigh(scaled)
     noise = _ROUNDING * np.abs(weights).max()
@@ -206,11 +208,12 @@ def _angular_frequencies(stiffness: np.ndarray, mass: np.ndarray) -> np.ndarray:
 def _quadratic_eigenvalues(mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
     """Return the finite roots of ``det(s^2 M + s C + K)`` by ascending modulus, an undamped rigid motion once, as 0.
 
-    ``X^T K Y = 1`` in motions Y, tested by X, from the singular values of the scaled K, which may be unsymmetric. The
-    unknowns are velocities Y u and spring forces f: ``s M u + C u + f = 0``, ``s f = u``; M is then the largest for the
-    lowest root, which no higher one can spoil. A rigid motion has a velocity and no force.
+    The singular value decomposition of the scaled K, which may be unsymmetric, gives bases Y of motions and X of test
+    functions with ``X^T K Y = 1``. The unknowns are velocities Y u and spring forces f: ``s M u + C u + f = 0``,
+    ``s f = u``. The lowest root then belongs to the largest entries of M, so the higher ones cannot spoil it. A rigid
+    motion has a velocity and no force.
     """
-    scaled, factors = _scaled(stiffness)
+    scaled, factors = _unit_diagonal(stiffness)
     left, weights, right = svd(scaled)
     rigid = weights <= _ROUNDING * weights[0]
     size = np.sqrt(np.where(rigid, 1.0, weights))

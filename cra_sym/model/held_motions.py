@@ -1,7 +1,7 @@
-"""What holds a motion may change with a parameter: its share of the rate of a squared natural frequency.
+"""Constraints that depend on a parameter: their contribution to the derivative of a squared natural frequency.
 
-Where conditions ``C(p) u = 0`` hold the displacements u of the ends and the lumped coordinates, by forces ``C' l``, the
-rate of omega^2 by p has the term ``2 l' (dC/dp) u`` beside those of stiffness and mass.
+With conditions ``C(p) u = 0`` on the displacements u of the ends and the lumped coordinates, and constraint forces
+``C' l``, the derivative of omega^2 by p has the term ``2 l' (dC/dp) u`` besides those of stiffness and mass.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ class HeldMotions:
     rows : Kernel
         Of the parameters: the matrix C.
     rates : dict of str to Kernel
-        Its rate by each parameter that turns one of its rows; displacements are fixed over the length.
+        Its derivative by each parameter that changes the direction of a row, at fixed displacements over the length.
     stiff : tuple of int
-        For each row the position of the parameter that holds it if it is infinite; -1 of those that always hold.
+        For each row the index of the parameter whose infinite value imposes the condition; -1 if it always holds.
     """
 
     rows: Kernel
@@ -47,7 +47,7 @@ class HeldMotions:
     stiff: tuple[int, ...]
 
     def rate(self, system: System, name: str, modes: int) -> Array | float:
-        """Return the share of the rate of omega^2 by a parameter, shape (..., modes)."""
+        """Return the contribution to the derivative of omega^2 by a parameter, shape (..., modes)."""
         if name not in self.rates:
             return 0.0
         columns = flat_columns(system.parameters, system.shape)
@@ -65,7 +65,7 @@ class HeldMotions:
         ends = np.r_[0:n, n + m : 2 * n + m]
         held = -acting[..., ends] @ np.linalg.pinv(rows[..., ends])  # forces of the conditions, (sets, modes, rows)
         turned = (rate[:, None] @ moved[..., None])[..., 0]
-        found = np.where(z > 0.0, 2.0 * (held * turned).sum(axis=-1), 0.0)  # at rest nothing is strained
+        found = np.where(z > 0.0, 2.0 * (held * turned).sum(axis=-1), 0.0)  # a rigid-body motion has no strain
         return np.asarray(found.reshape(*system.shape, modes))
 
 
@@ -77,7 +77,7 @@ def _matrices(function: Kernel, columns: Array, rows: int) -> Array:
 
 
 def _ends(system: System, modes: int) -> tuple[Array, Array]:
-    """Return what moves at the ends and the forces of the span on it, shape (sets, modes, 2 n + m) each."""
+    """Return displacements of ends and coordinates, and forces of the span on them, (sets, modes, 2 n + m) each."""
     found, (n, m) = system.modes(modes), system.numerics("sizes")
     moved = [found.displacement(0, i) for i in range(n)] + [found.coordinate(j) for j in range(m)]
     moved += [found.displacement(1, i) for i in range(n)]
@@ -87,7 +87,7 @@ def _ends(system: System, modes: int) -> tuple[Array, Array]:
 
 
 def held_motions(form: StateForm, symbols: Sequence[Symbol]) -> HeldMotions:
-    """Return the conditions of a conservative problem that turn with a parameter.
+    """Return the conditions of a conservative problem whose direction depends on a parameter.
 
     Those on lumped coordinates alone are left out: their forces are not known from the ends.
     """
@@ -106,7 +106,7 @@ def held_motions(form: StateForm, symbols: Sequence[Symbol]) -> HeldMotions:
     rates = {}
     for symbol in symbols:
         turn = [row.diff(symbol) - row * scale * form.length.diff(symbol) / form.length for _, row in kept]
-        if any(_turns(row, rate) for (_, row), rate in zip(kept, turn, strict=True)):
+        if any(_changes_direction(row, rate) for (_, row), rate in zip(kept, turn, strict=True)):
             rates[symbol.name] = kernel(tuple(Matrix.vstack(*turn)), tuple(symbols), backend="numpy")
     rows = Matrix.vstack(*(row for _, row in kept)) if kept else zeros(0, size)
     return HeldMotions(
@@ -115,10 +115,10 @@ def held_motions(form: StateForm, symbols: Sequence[Symbol]) -> HeldMotions:
 
 
 def _order(displacement: Expr) -> int:
-    """Return how often a displacement of a section is a derivative of a field by x."""
+    """Return the order in x of the derivative that a displacement of a section is."""
     return sum(int(count) for _, count in displacement.variable_count) if isinstance(displacement, Derivative) else 0
 
 
-def _turns(row: Matrix, rate: Matrix) -> bool:
-    """Return whether the rate of a row is more than a multiple of it."""
+def _changes_direction(row: Matrix, rate: Matrix) -> bool:
+    """Return whether the derivative of a row is not just a multiple of the row."""
     return any(cancel(row[i] * rate[j] - row[j] * rate[i]) != S.Zero for i, j in combinations(range(row.cols), 2))

@@ -1,4 +1,4 @@
-"""Elastic-slip elements: Jenkins's spring in series with a slider, and Iwan's many of them in parallel."""
+"""Elastic-slip elements: the Jenkins element (a spring in series with a slider) and Iwan's distribution of them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _POSITIVE = {"low": 0.0, "open_low": True}
 
 
 class Element:
-    """What elastic-slip elements share: checked parameters, and closed forms of their distribution.
+    """Base class of elastic-slip elements: checked parameters, and closed forms of their distribution.
 
     Parameters are numbers, arrays that broadcast together, or SymPy expressions; closed forms need numbers.
     """
@@ -57,11 +57,11 @@ class Element:
 
     @property
     def distribution(self) -> Distribution:
-        """The elements in parallel, in numbers."""
+        """The distribution of the elements in parallel, with numbers for its parameters."""
         raise NotImplementedError
 
     def force(self, displacement: Any) -> Array:
-        """Return the force on the way from rest to a displacement; after a reversal twice that of half the way."""
+        """Return the force on first loading from rest to a displacement (the backbone of the loop, Masing's rules)."""
         return self._numbers().force(real_array("displacement", displacement, unit=None))[()]
 
     def loss(self, amplitude: Any) -> Array:
@@ -73,18 +73,18 @@ class Element:
         return self._numbers().equivalent(_amplitude(amplitude))[()]
 
     def secant_stiffness(self, amplitude: Any) -> Array:
-        """Return the largest force of a cycle over the amplitude; that of everything stuck for the amplitude 0."""
+        """Return the largest force of a cycle over the amplitude; for zero amplitude the stuck stiffness."""
         size, found = _amplitude(amplitude), self._numbers()
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(size > 0, found.force(size) / np.where(size > 0, size, 1.0), found.stiffness)[()]
 
     def elements(self, number: int = 60) -> tuple[Array, Array]:
-        """Return stiffness and slip of single elements that stand for it, shape (..., about ``number``).
+        """Return stiffness and slip of the Jenkins elements that approximate it, shape (..., about ``number``).
 
         Stiffness and slip of the whole are exact. For the four-parameter law and amplitudes from 2e-3 to any multiple
         of the largest slip displacement, the relative error of the loss is below 0.05, 0.01 and 0.003 for 30, 60 and
         120 elements, and falls with the square of their number; that of the equivalent stiffness is below 1e-3 for 60.
-        Two elements stand for all that slip below 1e-3 of that displacement.
+        Two elements represent all that slip below 1e-3 of that displacement.
         """
         stiffness, slip = self._numbers().elements(count("number", number, high=10_000))
         return stiffness, slip
@@ -252,7 +252,7 @@ class Iwan(Element):
 
     @property
     def phi_max(self) -> Any:
-        """Displacement at which everything slips, m."""
+        """Displacement at which all sliders slip, m."""
         return self.slip * (1 + self.beta) / (self.stiffness * (self.beta + self._shape))
 
     @property
@@ -305,12 +305,12 @@ class Tabulated(Element):
 
     @property
     def stiffness(self) -> float:
-        """Of everything stuck, N/m."""
+        """Stiffness with all sliders stuck, N/m."""
         return float(self.distribution.stiffness)
 
     @property
     def slip(self) -> float:
-        """Force at which everything slips."""
+        """Force at which all sliders slip."""
         return float(self.distribution.slip)
 
     @property

@@ -1,4 +1,4 @@
-"""Values that would make the kinetic energy negative are refused by name, whatever route computes the frequencies."""
+"""Check that the kinetic energy is not negative, and name the parameter that makes it so; common to all routes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["Masses", "masses", "refuse_negative_mass"]
 
 Values = Mapping[str, float | NDArray[np.float64]]
-_SHARES = (np.arange(64) + 0.5) / 64  # of the length: where masses that vary along x are looked at
+_SHARES = (np.arange(64) + 0.5) / 64  # stations, as shares of the length, at which masses that vary along x are checked
 _WHERE = {"left": "the left end", "right": "the right end", "lumped": "the lumped coordinates"}
 
 
@@ -31,7 +31,7 @@ class Masses(NamedTuple):
     names : tuple of (tuple of str)
         Parameters in those inside, and in the others, in the order of the model's symbols.
     definite : bool
-        Whether it is the sum of squares that none of these can make negative but by being negative.
+        Whether it is a sum of squares with these as factors, negative only where one of them is.
     """
 
     form: Form
@@ -45,7 +45,7 @@ def masses(model: Model) -> Masses:
 
     from cra_sym.mechanics.weak import weak_form
 
-    _ = model.numerics("spatial" if model.numerics("conservative") else "damped_spatial")  # refuses idle fields
+    _ = model.numerics("spatial" if model.numerics("conservative") else "damped_spatial")  # refuses unused fields
     weak = weak_form(model.linearised.variation)
     known = {symbol: Dummy(symbol.name, nonnegative=True) for symbol in model.symbols}
     definite, names = True, []
@@ -107,9 +107,9 @@ def _groups(pairs: Sequence[tuple[Place, Place]]) -> list[list[Place]]:
 
 
 def _refusal(place: Place, at: float | None, given: Mapping[str, float]) -> str:
-    told = ", ".join(f"{name} = {value:g}" for name, value in given.items() if value < 0.0)
-    told = told or ", ".join(f"{name} = {value:g}" for name, value in given.items()) or "values"
+    named = ", ".join(f"{name} = {value:g}" for name, value in given.items() if value < 0.0)
+    named = named or ", ".join(f"{name} = {value:g}" for name, value in given.items()) or "values"
     where = _WHERE.get(place.where, "an interior place")
     if place.where == "inside":
         where = "a section" if at is None else f"the section at x = {at:.6g}"
-    return f"{told}: the kinetic energy of {where} is negative; it must be at least 0"
+    return f"{named}: the kinetic energy of {where} is negative; it must be at least 0"

@@ -46,9 +46,11 @@ class Model(Asked):
     domain : (left, right)
         End coordinates.
     left, right : Expr, optional
-        Lagrangian of each end, in ``v(x, t)`` and its derivatives, understood at that end. Nothing means a free end.
+        Lagrangian of each end, in ``v(x, t)`` and its derivatives, understood at that end. Zero (the default) is a free
+        end.
     essential : sequence of Expr, optional
-        What vanishes at an end, such as ``v.subs(x, 0)``. Measure a field from a displacement that is given. At an
+        Expressions that vanish at an end, such as ``v.subs(x, 0)``. Measure a field from a prescribed displacement. At
+        an
         interior place, ``v.subs(x, a)`` or ``v.diff(x).subs(x, a)``, it is a support.
     inside : sequence of (place, Expr), optional
         Lagrangian terms of interior places: point masses, springs, rotary inertias, in ``v(x, t)`` and its derivatives
@@ -68,10 +70,10 @@ class Model(Asked):
         Symbols of the pieces above that stand for expressions, such as ``{A: b*h}``: the parameters of the model are
         then those of the expressions.
     small : (Symbol, Symbol), optional
-        epsilon and varpi of a Lagrangian that is periodic itself: terms, loads and forces with cosines and sines of
-        ``n*varpi*t + phase``, n a whole number; what multiplies the unknowns twice is times epsilon. They are no
-        values. Every analysis is that of the Lagrangian without these terms, which are `excitation`, for
-        ``cra_sym.growth_rate`` and its kin.
+        epsilon and varpi of a Lagrangian that is periodic in time: terms, loads and forces with cosines and sines of
+        ``n*varpi*t + phase``, n a whole number; terms quadratic in the unknowns must be proportional to epsilon.
+        These two symbols are not parameters and take no value. Analyses leave these terms out, except those of
+        parametric excitation (``cra_sym.growth_rate``, ``cra_sym.stability_boundary``), which take `excitation`.
     quadratures : mapping of applied undefined function to Expr, optional
         Fields s(x, t) that are integrals from the left end, such as the foreshortening ``{s: v.diff(x)**2/2}``; see
         :func:`cra_sym.mechanics.hamilton`.
@@ -173,7 +175,7 @@ class Model(Asked):
 
     @cached_property
     def without_hysteresis(self) -> Model:
-        """The model without its elastic-slip elements, to whose modes nonlinear results refer; itself without any."""
+        """The model without its elastic-slip elements, whose modes nonlinear results use; itself if it has none."""
         return self.replace(hysteresis=()) if self._pieces["hysteresis"] else self
 
     def replace(self, **changes: Any) -> Model:
@@ -233,7 +235,7 @@ class Model(Asked):
 
     @cached_property
     def excitation(self) -> LagrangianTerms | None:
-        """What oscillates in the Lagrangian and the virtual work, or None.
+        """The oscillating terms of the Lagrangian and the virtual work, or None.
 
         Examples
         --------
@@ -247,7 +249,7 @@ class Model(Asked):
         return LagrangianTerms(self) if self.steady is not self and self._periodic else None
 
     def freed(self, name: str) -> Model:
-        """Return the model in which a function of time that drives it is a lumped coordinate instead.
+        """Return the model with one of its inputs (prescribed motion or force) as a lumped coordinate.
 
         The work of a force becomes a term of the Lagrangian, so that the equations stay symmetric.
         """
@@ -258,18 +260,18 @@ class Model(Asked):
 
     @property
     def pieces(self) -> Mapping[str, Any]:
-        """What the model was made of, by the arguments of Model; read-only."""
+        """The arguments that the model was made from, by name; read-only."""
         return MappingProxyType(self._pieces)
 
     @cached_property
     def driving(self) -> tuple[AppliedUndef, ...]:
-        """Functions of time that drive the model: prescribed motions and forces, by name."""
+        """Inputs of the model: prescribed motions and forces, by name."""
         terms = weak_form(self.linearised.variation).load_terms
         return tuple(sorted({f for term in terms for f in term.atoms(AppliedUndef)}, key=str))
 
     @cached_property
     def motions(self) -> tuple[AppliedUndef, ...]:
-        """Those of them that act by their acceleration."""
+        """Inputs that act through their acceleration."""
         terms, t = weak_form(self.linearised.variation).load_terms, self.equations.t
         return tuple(f for f in self.driving if any(term.has(f.diff(t, 2)) for term in terms))
 
@@ -280,7 +282,7 @@ class Model(Asked):
 
     @cached_property
     def numerics(self) -> Numerics:
-        """What is derived from the Lagrangian and compiled, each thing when it is first needed."""
+        """Compiled derivations from the Lagrangian, each made when it is first needed."""
         return Numerics(lambda: self.steady)
 
     def __eq__(self, other: object) -> bool:
@@ -326,7 +328,7 @@ class Model(Asked):
 
     @cached_property
     def conservative(self) -> StateForm:
-        """The same without the forces that are odd in time (dampers).
+        """The spatial problem as a first-order system, without the forces that are odd in time (dampers).
 
         Raises
         ------
@@ -351,15 +353,15 @@ class Model(Asked):
         return separate(self.linearised, **options)
 
     def ritz(self, elements: int, nodes: Sequence[Expr] = ()) -> Ritz:
-        """Return the same Lagrangian on Hermite elements: frequencies from above, coefficients may vary by x.
+        """Return a Hermite-element model of the same Lagrangian: upper bounds of frequencies, coefficients of any x.
 
         Parameters
         ----------
         elements : int
-            Number of equal elements, of each span between nodes.
+            Number of equal elements in each span between nodes.
         nodes : sequence of Expr
-            Interior places that are nodes, in ascending order, such as jumps of a coefficient. Those of terms and
-            supports are nodes anyway; name these too where they are symbols and do not ascend as they were stated.
+            Interior places that are nodes, in ascending order, such as jumps of a coefficient. Places of terms
+            and supports are nodes anyway; list them too where they are symbols and were not stated in ascending order.
         """
         return Ritz(ritz(self.linearised, elements=elements, nodes=nodes), self.symbols)
 

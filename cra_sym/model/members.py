@@ -114,8 +114,8 @@ def joined(
 ) -> Model:
     """Return the model of a structure of several members.
 
-    Along x of this model, from 0 to 1, all members run at once: it is the share of each one's own length, and a
-    derivative by it is that by the place times the length.
+    The coordinate x of this model runs from 0 to 1 along all members at once: it is the position over the length of
+    each member, so a derivative by it is that by the position times the length.
 
     Parameters
     ----------

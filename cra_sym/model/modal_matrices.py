@@ -1,4 +1,4 @@
-"""The matrices of a system between modes that are always real: with dampers, gyroscopic and follower forces too."""
+"""Matrices of a system between the real modes of its conservative part: dampers, gyroscopic and follower forces."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["ModalMatrices", "between_modes", "modal_matrices"]
 
 Array = NDArray[np.float64]
-_NOTHING = 3e-14  # of a product of modes that are orthogonal, relative to these modes
+_NOTHING = 3e-14  # largest entry between orthogonal modes that is set to zero, relative to these modes
 _ROUNDING = 1e-12  # of an integral along the span, relative to the largest entry
 
 
@@ -29,7 +29,7 @@ class ModalMatrices(NamedTuple):
     decay : ndarray, shape (..., modes)
         Decay rates of the modal damping, 1/s.
     damping, stiffness : ndarray, shape (..., modes, modes), or None
-        C beside the modal damping, and K beside ``omega**2``, if there are such.
+        C without the modal damping, and K without ``omega**2``; None if they are zero.
     """
 
     omega: Array
@@ -53,11 +53,11 @@ def modal_matrices(system: System, modes: int) -> ModalMatrices:
 def between_modes(system: System, modes: int, form: Form) -> dict[str, Array]:
     """Return bilinear forms between the first modes of the conservative part, by name."""
     found = Projected(system.domain, system.conservative_part.modes(modes), form)
-    return {name: _settled(found[name]) for name in form.names}
+    return {name: _without_rounding(found[name]) for name in form.names}
 
 
-def _settled(matrix: Array) -> Array:
-    """Return a matrix without entries that are rounding, and its symmetric or skew part alone where it is one."""
+def _without_rounding(matrix: Array) -> Array:
+    """Set entries below rounding to zero, and make a matrix that is symmetric or skew to rounding exactly so."""
     size = np.abs(matrix)
     rows, columns = size.max(axis=-1, keepdims=True), size.max(axis=-2, keepdims=True)
     matrix = np.where(size > _NOTHING * np.sqrt(rows * columns), matrix, 0.0)

@@ -1,4 +1,4 @@
-"""What a jump of a coefficient adds to the rate of a bilinear form when a parameter moves it along x."""
+"""Derivative of a bilinear form by a parameter that moves a jump of a coefficient: the contribution of the jump."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Jumps:
     domain: Kernel
 
     def sides(self, columns: Array) -> tuple[Array, Array, Array]:
-        """Return places left and right of every breakpoint, (sets, breakpoints), and how fast it moves.
+        """Return positions just left and right of every breakpoint, (sets, breakpoints), and the breakpoints' rates.
 
         The rates, (parameters, sets, breakpoints), are relative to points at a fixed share of the length.
         """

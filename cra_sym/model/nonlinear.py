@@ -38,7 +38,7 @@ class Factor:
 
 @dataclass(frozen=True)
 class Product:
-    """A term: its factors and known functions of time, by number; a force's first factor is what it works on."""
+    """A term: its factors and known functions of time, by number; the first factor of a force is what it acts on."""
 
     factors: tuple[Factor, ...]
     causes: tuple[int, ...]
@@ -66,7 +66,7 @@ class NonlinearTerms:
     places : Kernel
         Of the parameters: interior places.
     parameters : tuple of str
-        Those that nonlinear terms hold.
+        Names of those in the nonlinear terms.
     """
 
     inside: tuple[Product, ...]

@@ -1,4 +1,4 @@
-"""What is derived from a model's Lagrangian and compiled: each thing once."""
+"""Compiled derivations from a model's Lagrangian, each made once."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class Numerics:
     model : callable
         Returns the model; it is called only if a derivation is needed.
     path : str, optional
-        ``"cra_sym.room.module:function"`` that returns the model, for one of the package's own: what is derived is then
-        read from the user's store, without SymPy, where it was derived before.
+        ``"cra_sym.room.module:function"`` that returns the model, for a model of the package itself: a derivation that
+        was made before is then read from the user's cache, without SymPy.
     """
 
     def __init__(self, model: Callable[[], Model], path: str | None = None) -> None:
@@ -31,7 +31,7 @@ class Numerics:
         self._made: dict[tuple[Any, ...], Any] = {}
 
     def __call__(self, name: str, *arguments: Any) -> Any:
-        """Return what ``cra_sym.model.derivations.<name>(model, *arguments)`` derives."""
+        """Return ``cra_sym.model.derivations.<name>(model, *arguments)``, derived once."""
         key = name, *arguments
         if key not in self._made:
             if self._path is None:

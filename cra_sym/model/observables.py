@@ -1,4 +1,4 @@
-"""Linear functions of the motion that can be measured: displacements, forces and what is made of them, by name."""
+"""Measurable linear functions of the motion, by name: displacements, forces and combinations of them."""
 
 from __future__ import annotations
 
@@ -76,12 +76,12 @@ def named_observables(model: Model) -> dict[str, Observable]:
     if tips:
         tip = next(iter(tips.values())) + frame(model)
         found = {"y": tip, "tip_velocity": tip.diff(t), "tip_acceleration": tip.diff(t, 2)} | found
-    ordered = sorted(found, key=lambda name: name not in tips)  # the tip of the first field leads
+    ordered = sorted(found, key=lambda name: name not in tips)  # the tip of the first field comes first
     return {name: observable(model, found[name]) for name in ordered} | _forces(model)
 
 
 def _forces(model: Model) -> dict[str, Observable]:
-    """Return the forces the structure exerts on what holds its ends: P at the left end, -P at the right one."""
+    """Return the forces that the structure exerts on its supports: P at the left end, -P at the right one."""
     found = {}
     names = [str(displacement) for displacement in model.state_form.displacements]
     for number, field in enumerate(model.equations.fields):
@@ -96,7 +96,7 @@ def _forces(model: Model) -> dict[str, Observable]:
 
 
 def frame(model: Model) -> Expr:
-    """Return how far the prescribed motions carry the right end of the first field when nothing deforms."""
+    """Return the rigid-body displacement of the right end of the first field due to the prescribed motions."""
     total = S.Zero
     for motion in model.motions:
         freed = weak_form(model.freed(motion.func.__name__).linearised.variation)

@@ -1,7 +1,7 @@
 """The fast route of a Lagrangian with one wave number: strings and beams with any springs, masses and supports.
 
-What links displacements of an end, such as a tip mass with an offset, what varies along x, and what has a second wave
-number, such as a tension in a beam, goes another way: `one_wave_route` returns None.
+`one_wave_route` returns None for all other problems: those with coupled displacements at an end (a tip mass with an
+offset), with coefficients that vary along x, or with a second wave number (a beam under tension).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ Channel = tuple[int, int]
 Rates = dict[Channel, Array]
 Change = Literal["stiffness", "compliance", "inertia"]
 
-_TINY = 1e-30  # an imaginary part whose square is nothing
+_TINY = 1e-30  # imaginary part whose square underflows
 _SCALES = 6  # names before those of the groups
 
 
@@ -84,7 +84,7 @@ class OneWave:
 
     @property
     def layout(self) -> Layout:
-        """Where what belongs to the structure stands."""
+        """The positions of the quantities of the structure in its arrays."""
         return self.family.layout
 
     def covers(self, values: Sequence[Value]) -> bool:
@@ -103,7 +103,7 @@ class OneWave:
         """Return the scales and the groups, not broadcast."""
         with np.errstate(all="ignore"):
             found = self.scales.function(*(np.asarray(value, dtype=np.float64) for value in values))
-        parts = (np.asarray(x) for x in found[1:])  # the root of a negative number is none that is covered
+        parts = (np.asarray(x) for x in found[1:])  # the root of a negative number is nan, which is not covered
         return [np.where(x.imag == 0, x.real, np.nan).astype(np.float64) for x in parts]
 
     def _groups(self, numbers: list[Array]) -> list[Array]:
@@ -156,7 +156,7 @@ class OneWave:
 
 
 class OneWaveModes:
-    """Mass-normalised modes, the first displacement of the right end that moves positive; computed when asked for.
+    """Mass-normalised modes, computed on use; the first nonzero displacement of the right end is positive.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ class OneWaveModes:
 
     @cached_property
     def is_unfelt(self) -> NDArray[np.bool]:
-        """Which modes are held by springs alone that are too soft for the shapes to feel, shape (..., modes)."""
+        """Which modes are held by springs alone that are too soft to change the shapes, shape (..., modes)."""
         return np.asarray((self.lam == 0) & (self.omega > 0))
 
     @property
@@ -232,7 +232,7 @@ class OneWaveModes:
         Raises
         ------
         ValueError
-            If a mode is held by stiffnesses alone that are too small beside the line to be felt by the shapes.
+            If a mode is held only by stiffnesses so small relative to the line that they do not change the shapes.
         """
         if self.is_unfelt.any():
             raise ValueError("values: a stiffness below 1e-150 of the line's own has no force in the modes; take 0")
@@ -311,7 +311,7 @@ class OneWaveModes:
         return known[by, cycles]
 
     def group_unit(self, channel: Channel, by: Change) -> Array:
-        """Return what one unit of a stiffness, a compliance or an inertia is in its dimensionless group."""
+        """Return the value of the dimensionless group for a unit stiffness, compliance or inertia."""
         n, place = self._table.n, channel[1]
         if by == "inertia":
             return 1 / (self._inertia * self._length * self._length ** (2 * place))
@@ -321,7 +321,7 @@ class OneWaveModes:
     def product_rates(self, end: int, place: int, channel: Channel, by: Change) -> tuple[Array, Array]:
         """Return the derivatives of momentum times a displacement of an end, and of ln omega, by a group of an end.
 
-        Both follow the mode along the frequency equation; no difference is taken. By a stiffness that is 0, or a
+        Both are derivatives along the frequency equation, not difference quotients. By a stiffness that is 0, or a
         compliance that is infinite, they are nan: a rigid-body mode is about to become a vibration.
 
         Parameters
@@ -383,5 +383,5 @@ def _parameter_changes(
 
 
 def _column(value: Value, axes: int = 1) -> Value:
-    """Return a parameter with last axes of length one, for modes and points; numbers stay numbers."""
+    """Append axes of length one to a parameter, for modes and points; scalars are returned unchanged."""
     return np.asarray(value)[(..., *(None,) * axes)] if np.ndim(value) else value

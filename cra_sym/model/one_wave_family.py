@@ -68,10 +68,11 @@ class Family:
     def frequency_parameters(
         self, *groups: Array, modes: int, compile: bool | None = None, threads: int | None = None
     ) -> Array:
-        """Return lambda of the first modes for checked arrays of one shape; the mode axis is last.
+        """Return lambda of the first modes for validated arrays of one shape; the mode axis is last.
 
-        Both paths take the same steps. The compiled one is taken where it saves more than loading it costs, unless
-        ``compile`` says otherwise; ``threads`` are then as many as there are processors and work for. A structure
+        The NumPy and the compiled version do the same steps. By default (``compile`` is None) the compiled one is used
+        where it saves more time than loading it takes; ``threads`` defaults to what processors and workload allow. A
+        structure
         without groups gives one set of modes, of shape (modes,).
         """
         shape = groups[0].shape if groups else ()
@@ -148,7 +149,7 @@ class Family:
 
 @dataclass(frozen=True, eq=False)
 class DimensionlessModes:
-    """Modes of unit generalised mass; what is asked for has one entry a mode and is computed then.
+    """Modes of unit generalised mass; each quantity has one entry per mode and is computed on first use.
 
     Attributes
     ----------
@@ -170,7 +171,7 @@ class DimensionlessModes:
     def quantities(self, rows: slice, units: Sequence[float | Array] | None = None) -> Array:
         """Return some rows of the family's table, each times its unit: a number, or an array of the batch's shape.
 
-        What the rows are says `cra_sym.solvers.one_wave_shapes.Table`.
+        See `cra_sym.solvers.one_wave_shapes.Table` for the rows.
         """
         shape = rows.stop - rows.start, *self.lam.shape
         size = self.family.layout.size
@@ -225,7 +226,7 @@ class DimensionlessModes:
         modes = self.lam.shape[-1]
         lam, groups = self.lam.reshape(-1, modes)[part], tuple(x[part] for x in self.groups)
         some = DimensionlessModes(self.family, lam, groups, self.compile, self.threads)
-        if not self.compile:  # the table is there or will be needed
+        if not self.compile:  # the table exists or will be needed
             size = self.family.layout.size
             some.__dict__["_table"] = self._table.reshape(size, -1, modes)[:, part].reshape(size, -1)
         return some

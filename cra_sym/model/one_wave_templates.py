@@ -1,4 +1,4 @@
-"""What replaces the marks of the templates for lines with one wave number: sizes and lists of arguments."""
+"""Replacements of the placeholders in the templates for lines with one wave number: sizes and argument lists."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from cra_sym.solvers.one_wave_shapes import Table
 __all__ = ["MODAL", "SPECTRUM", "modal_marks", "spectrum_marks"]
 
 SPECTRUM = ("coefficients", "power_series", "basis", "basis_near", "chain", "derivatives")
-"""The functions that the template of the spectrum leaves open."""
+"""Placeholders for functions in the template of the spectrum."""
 MODAL = (
     "polynomials", "tip_near", "amplitudes_far", "tip_far", "invariant_near", "invariant_far", "prepared",
     "end_state", "generalised_mass", "rows", "rates", "rigid_body", "leading",
 )  # fmt: skip
-"""Those of the template of the modes; a beam's needs ``tip_rows`` too."""
+"""Placeholders for functions in the template of the modes; for a beam there is ``tip_rows`` too."""
 
 _POWER = {1: "lam * lam", 2: "(lam * lam) * (lam * lam)"}
 _ROOT = {1: "np.sqrt(z)", 2: "np.sqrt(np.sqrt(z))"}
@@ -76,7 +76,7 @@ def _listed(names: list[str]) -> str:
 
 
 def spectrum_marks(layout: Layout, functions: Mapping[str, Kernel]) -> dict[str, object]:
-    """Return what replaces the marks of `cra_sym.solvers.spectrum_lanes`."""
+    """Return the replacements of the placeholders in `cra_sym.solvers.spectrum_lanes`."""
     n = layout.n
     basis = list(functions["chain"].arguments[len(layout.parameters) + 1 :])
     coefficients, terms = (len(functions[name].layout) for name in ("coefficients", "power_series"))
@@ -107,7 +107,7 @@ def spectrum_marks(layout: Layout, functions: Mapping[str, Kernel]) -> dict[str,
 
 
 def modal_marks(layout: Table, functions: Mapping[str, Kernel]) -> dict[str, object]:
-    """Return what replaces the marks of `cra_sym.solvers.modal_lanes`."""
+    """Return the replacements of the placeholders in `cra_sym.solvers.modal_lanes`."""
     n = layout.n
     left, waves = ["alpha", "beta"][:n], ["A", "B", "C", "D"][: 2 * n]
     krylov, raw = ([f"{name}{i}" for i in range(2 * n)] for name in ("k", "phi_"))

@@ -1,11 +1,9 @@
-"""Duhamel's integral (12) in closed form: what one mode answers to the motions a base makes, regular at every
-resonance.
+"""Duhamel's integral (12) in closed form: the response of one mode to a base motion, regular at every resonance.
 
 A base motion is a sum of impulses, constant and linear accelerations, and harmonics, and each is a convolution of the
-mode's impulse response with an exponential. These convolutions are divided differences of the exponential function:
-entire in all parameters, so resonance, critical damping and the rigid-body mode are limits, not exceptions. What has
-to be watched is cancellation: where the generic form divides small differences, the power series of the same function
-takes over.
+mode's impulse response with an exponential. These convolutions are divided differences of the exponential function,
+which are entire in all parameters: resonance, critical damping and the rigid-body mode need no special case. Where the
+generic form loses digits by cancellation, the power series of the same function is used instead.
 """
 
 from __future__ import annotations
@@ -34,7 +32,7 @@ _SERIES_TERMS = 20  # of the power series, used while no angle exceeds 1: 1/20! 
 
 
 class UnitResponses(NamedTuple):
-    """Answers of q'' + 2 zeta_i omega_i q' + omega_i^2 q to unit causes, functions of t.
+    """Responses of q'' + 2 zeta_i omega_i q' + omega_i^2 q to unit inputs, functions of t.
 
     Attributes
     ----------
@@ -111,8 +109,7 @@ def unit_responses() -> UnitResponses:
 
 @cache
 def guarded_responses() -> UnitResponses:
-    """Return the unit responses written so that they are exact to rounding for omega_i >= 0, 0 <= zeta_i < 1, varpi
-    >= 0.
+    """Return the unit responses in a form accurate to rounding for omega_i >= 0, 0 <= zeta_i < 1, varpi >= 0.
 
     Where both angles are small, the power series; where the two exponents of the free motion are close to each other,
     the harmonic response's divided difference is taken in another order.
@@ -148,13 +145,12 @@ def _power_series(cause: str) -> sp.Expr:
 
 
 def free_kernel() -> tuple[dict[str, sp.Expr], tuple[sp.Symbol, ...]]:
-    """Return the unit responses without a harmonic, and their arguments (t, omega_i, zeta_i), as the kernel wants
-    them."""
+    """Return the unit responses except the harmonic one, and the arguments (t, omega_i, zeta_i) of their kernel."""
     derived = guarded_responses()._asdict()
     del derived["harmonic"]
     return derived, _symbols()[:3]
 
 
 def forced_kernel() -> tuple[sp.Expr, tuple[sp.Symbol, ...]]:
-    """Return the response to a harmonic, and its arguments (t, omega_i, zeta_i, varpi), as the kernel wants them."""
+    """Return the response to a harmonic, and the arguments (t, omega_i, zeta_i, varpi) of its kernel."""
     return guarded_responses().harmonic, _symbols()

@@ -14,7 +14,7 @@ __all__ = ["parameters"]
 
 
 def parameters(given: Iterable[Expr], result: HamiltonResult) -> tuple[Symbol, ...]:
-    """Return every symbol of the expressions but x and t, by name; refuse an undeclared field and two of a name."""
+    """Return every symbol of the expressions but x and t, by name; refuse undeclared fields and duplicate names."""
     expressions = [sympify(part, strict=True) for part in given]
     own = {result.x, result.t}
     known = {f.func for f in (*result.fields, *result.coordinates)}

@@ -62,7 +62,7 @@ class PencilRoute(StressRoute):
         stiffness, damping, mass = _matrices(self.ends, columns, 3)
         held, springs, rest = self._end_springs(columns, infinite, stiffness)
         pull, constants = _springs(0.5 * (damping + damping.swapaxes(-1, -2)), np.ones(sets))
-        pull, constants = _each(pull, sets), np.maximum(_each(constants, sets), 0.0)
+        pull, constants = _first_of_equal_sets(pull, sets), np.maximum(_first_of_equal_sets(constants, sets), 0.0)
         points, forces = self._inside(columns, nodes)
         return GeneralContinuum(
             self.orders,
@@ -94,16 +94,16 @@ class PencilRoute(StressRoute):
                 continue
             if np.abs(rate - rate.swapaxes(-1, -2)).max() == 0.0:
                 some, k = _springs(rate, np.maximum(columns[position], 0.0))
-                some, k = _each(some, sets), np.maximum(_each(k, sets), 0.0)
+                some, k = _first_of_equal_sets(some, sets), np.maximum(_first_of_equal_sets(k, sets), 0.0)
                 parts.append((some, k))
                 rest = rest - _sum(some, k)
         some, k = _springs(0.5 * (rest + rest.swapaxes(-1, -2)), np.ones(sets))
-        # what the difference of large springs leaves is rounding
-        some, k = _each(some, sets), np.maximum(_each(k, sets), 0.0)
+        # the difference of large stiffnesses leaves rounding errors
+        some, k = _first_of_equal_sets(some, sets), np.maximum(_first_of_equal_sets(k, sets), 0.0)
         parts.append((some, k))
         rest = rest - _sum(some, k)
-        directions = np.concatenate([_each(d, sets) for d, _ in parts], axis=1)
-        return directions, np.concatenate([_each(k, sets) for _, k in parts], axis=1), rest
+        directions = np.concatenate([_first_of_equal_sets(d, sets) for d, _ in parts], axis=1)
+        return directions, np.concatenate([_first_of_equal_sets(k, sets) for _, k in parts], axis=1), rest
 
     def _inside(self, columns: Array, nodes: tuple[int, ...]) -> tuple[tuple[PointTerm, ...], tuple[Array, ...]]:
         points = self.spatial.points
@@ -131,7 +131,7 @@ def _matrices(matrices: Kernel, columns: Array, number: int) -> list[Array]:
     return [np.broadcast_to(matrix, (sets, *matrix.shape[-2:])) for matrix in found]
 
 
-def _each(values: Array, sets: int) -> Array:
+def _first_of_equal_sets(values: Array, sets: int) -> Array:
     return np.broadcast_to(values, (sets, *values.shape[1:]))
 
 
@@ -147,7 +147,7 @@ def pencil_route(model: Model) -> PencilRoute | None:
 
     from cra_sym.mechanics.state_form import end_displacements
     from cra_sym.mechanics.weak import weak_form
-    from cra_sym.model.energies import _one_after_the_other, _solved
+    from cra_sym.model.energies import _apply_inverse, _integrates_in_sequence
     from cra_sym.model.symmetry import vanishes
 
     weak = weak_form(model.linearised.variation)
@@ -169,8 +169,8 @@ def pencil_route(model: Model) -> PencilRoute | None:
             return None
     even = (whole + whole.T) / 2
     leading, coupled = even[:fields, :fields], even[:fields, fields:]
-    strain = _solved(leading, coupled)
-    if not _one_after_the_other(strain, section, highest):
+    strain = _apply_inverse(leading, coupled)
+    if not _integrates_in_sequence(strain, section, highest):
         strain = zeros(*coupled.shape)
     # twice the energy is (h + B s)' W (h + B s) and what remains
     spread = Matrix.hstack(Matrix.eye(fields), strain)
@@ -203,9 +203,9 @@ def pencil_route(model: Model) -> PencilRoute | None:
 
 
 def complex_modes(model: Model) -> Literal["none", "always", "if coupled"]:
-    """Return whether motions are sums of complex modes: where dampers couple the natural modes, or there are none.
+    """Return whether motions need complex modes: dampers couple the natural modes, or there are no natural modes.
 
-    Dampers of the highest derivatives (Kelvin-Voigt) couple them or do not.
+    This holds for dampers of the highest derivatives (Kelvin-Voigt) too, which may or may not couple them.
     """
     from cra_sym.mechanics.weak import weak_form
 

@@ -1,4 +1,4 @@
-"""The pieces a model is made of: what Hamilton's principle takes of them, and how they are changed."""
+"""Arguments of a model: conversion to those of Hamilton's principle, and changes to them."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Works = tuple[tuple[Expr, Expr, Any], ...]
 
 
 def arguments(pieces: Pieces) -> Pieces:
-    """Return the arguments of Model: pieces that are kept as pairs are mappings again."""
+    """Return the arguments of Model, with stored pairs turned back into mappings."""
     return pieces | {name: dict(pieces[name]) for name in ("units", "definitions", "quadratures")}
 
 
 def options_of(pieces: Pieces) -> tuple[Pieces, tuple[tuple[Expr, Expr], ...]]:
-    """Return what Hamilton's principle takes, definitions put in, and the terms at interior places as stated.
+    """Return the arguments of Hamilton's principle with definitions substituted, and the interior terms as stated.
 
-    Point loads of the density are among the terms at interior places. Elastic-slip elements are there as springs.
+    Point loads of the density become terms at interior places; elastic-slip elements become springs.
     """
     apart = ("units", "definitions", "small", "hysteresis")
     options = {name: piece for name, piece in pieces.items() if name not in apart}
@@ -44,7 +44,7 @@ def options_of(pieces: Pieces) -> tuple[Pieces, tuple[tuple[Expr, Expr], ...]]:
 
 
 def stuck(pieces: Pieces) -> Pieces:
-    """Return the pieces to which the energy of the stuck elastic-slip elements belongs, with it."""
+    """Return the pieces of the Lagrangian with the energy of the stuck elastic-slip elements added."""
     found = {name: pieces[name] for name in ("left", "right", "inside")}
     for element, displacement, place in pieces["hysteresis"]:
         energy = -sympify(element.stiffness, strict=True) * displacement**2 / 2
@@ -59,9 +59,9 @@ def stuck(pieces: Pieces) -> Pieces:
 def undamped(work: Sequence[tuple[Expr, Expr, Any]], t: Symbol) -> Works:
     """Return the virtual work without forces that are odd in time."""
 
-    def still(force: Expr) -> Expr:
+    def is_odd(force: Expr) -> Expr:
         terms = sympify(force, strict=True).expand().as_ordered_terms()
         return sum((term for term in terms if not odd_in_time(term, t)), S.Zero)
 
-    kept = ((still(force), displacement, place) for force, displacement, place in work)
+    kept = ((is_odd(force), displacement, place) for force, displacement, place in work)
     return tuple(work for work in kept if work[0] != 0)

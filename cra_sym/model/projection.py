@@ -1,4 +1,4 @@
-"""Loads and bilinear forms of a model seen by its natural modes."""
+"""Loads and bilinear forms of a model projected on its natural modes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Load:
-    """Generalised forces of one unit of a cause.
+    """Generalised forces of a unit input.
 
     Attributes
     ----------
@@ -55,10 +55,10 @@ class Load:
     uniform : bool
         Whether the density is constant along x.
     share : Kernel or None
-        Of the parameters: how much of this load is the inertia of a rigid translation of the first field, if its mass
-        is one uniform density with end masses.
+        Of the parameters: factor of the part of this load that is the inertia of a rigid translation of the first
+        field; only if its mass is one uniform density with end masses.
     rest, rest_ends
-        Then the load is that share and these forces on both ends beside it.
+        Forces on both ends that remain besides that part.
     places : Kernel or None
         Of the parameters: interior places, if there are any.
     """
@@ -128,7 +128,7 @@ class EndParameter(NamedTuple):
 
 
 class Domain(NamedTuple):
-    """Where a batch of modes lives and with which parameters.
+    """Domain and parameters of a batch of modes.
 
     Attributes
     ----------
@@ -158,7 +158,7 @@ def stations(domain: Domain, modes: Modes) -> tuple[Array, Array]:
     return np.asarray(column(domain.left) + share * length), np.tile(0.5 * _WEIGHTS / panels, panels) * length
 
 
-_ASIDE = 1e-10  # lengths; what has two values at a place is taken there on both sides
+_ASIDE = 1e-10  # lengths; a quantity that jumps at a place is evaluated on both sides of it
 
 
 def displaced(domain: Domain, modes: Modes, place: Place, places: Kernel | None) -> Array:
@@ -182,7 +182,7 @@ def _at_place(domain: Domain, modes: Modes, place: Place, places: Kernel) -> Arr
 def displaced_at(domain: Domain, modes: Modes, entry: int, order: int, place: float | Array) -> Array:
     """Return a derivative of a displacement of every mode at a place of the domain, shape (..., modes).
 
-    What has two values there is their mean.
+    At a jump it is the mean of both sides.
     """
     at = np.broadcast_to(column(place), (*modes.omega.shape[:-1], 1))
     left = column(domain.left)
@@ -226,7 +226,7 @@ def _add_ends(
 
 
 class Projected:
-    """Bilinear forms between modes, or of each mode with itself; the integrals are done once for all forms.
+    """Bilinear forms between modes, or of each mode with itself; the integrals are shared by all forms.
 
     Parameters
     ----------
@@ -263,10 +263,10 @@ class Projected:
         return total
 
     def _moved(self, jumps: Jumps, parameter: int, kind: int) -> Array | float:
-        """Return the rate of stiffness (0) or mass (1) that comes from the jumps which a parameter moves.
+        """Return the rate of stiffness (0) or mass (1) due to jumps that move with a parameter.
 
-        Of what jumps there itself, such as a curvature, the two sides are multiplied with each other: the force that
-        belongs to it does not jump.
+        Where the displacement itself jumps, such as a curvature, its values on the two sides are multiplied with each
+        other, since the conjugate force is continuous.
         """
         shape = self._modes.omega.shape[:-1]
         values = [np.broadcast_to(value, shape).ravel() for value in self._domain.values]
@@ -360,7 +360,7 @@ class Projected:
                     whole = whole - column(factor, axes) * product
             left.append(whole)
         (a, *b), (c, *d) = (tuple(column(f, axes) for f in self._density[number]) for number in (k, m))
-        if not b:  # one displacement both bends and moves
+        if not b:  # the same displacement occurs in stiffness and mass
             return [left[1] / c]
         determinant = a * d[0] - b[0] * c
         return [(left[0] * d[0] - left[1] * b[0]) / determinant, (left[1] * a - left[0] * c) / determinant]

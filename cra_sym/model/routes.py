@@ -1,4 +1,4 @@
-"""How a model gets its numbers: one protocol, and the route that takes every linear conservative model."""
+"""Protocol of the methods ("routes") for frequencies and modes, and the one for any linear conservative model."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-_SHARES = (0.0, 0.22, 0.53, 0.81, 1.0 - 1e-4, 1.0)  # ends, and places that are not a node of the first modes
+_SHARES = (0.0, 0.22, 0.53, 0.81, 1.0 - 1e-4, 1.0)  # ends, and positions that are not nodes of the first modes
 ROUNDING = 1e-11
 """Bound of the relative rounding of frequencies from closed forms and from the dynamic stiffness."""
 TOLERANCE = 1e-10
@@ -73,7 +73,7 @@ class Modes(Protocol):
 
 @runtime_checkable
 class RigidShare(Protocol):
-    """Modes that know their momentum in a rigid translation of the first field."""
+    """Modes with a method for their momentum in a rigid translation of the first field."""
 
     def momentum(self) -> Array:
         """Return the integral of mass per length times shape, end masses included, shape (..., modes)."""
@@ -84,18 +84,18 @@ class Estimated(Protocol):
     """A route that estimates its own error."""
 
     def estimated(self, values: Values, shape: tuple[int, ...], modes: int, tolerance: float) -> tuple[Array, Array]:
-        """Return the first natural frequencies and the estimated largest relative error of them, shape ``shape``.
+        """Return the first natural frequencies and an estimate of their largest relative error, shape ``shape``.
 
-        What does not reach the tolerance is refused.
+        An error beyond the tolerance is refused.
         """
 
     def estimated_modes(self, values: Values, shape: tuple[int, ...], omega: Array, tolerance: float) -> Modes:
-        """Return the modes of all the first frequencies as well as the tolerance lets them be known."""
+        """Return the modes of all the first frequencies, to the accuracy that the tolerance allows."""
 
 
 @runtime_checkable
 class Stations(Protocol):
-    """Modes that know where a quadrature must have its points."""
+    """Modes with a quadrature rule of their own."""
 
     def stations(self) -> tuple[Array, Array]:
         """Return points and weights of a quadrature along the domain, shape (..., points)."""
@@ -105,7 +105,7 @@ class Route(Protocol):
     """How frequencies and modes of a model are computed."""
 
     def covers(self, values: Values) -> bool:
-        """Return whether the route serves these values; the general one serves all."""
+        """Return whether the route is valid for these values; the general one is for all."""
 
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:
         """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""
@@ -138,10 +138,10 @@ class GeneralRoute:
         return squares
 
     def estimated(self, values: Values, shape: tuple[int, ...], modes: int, tolerance: float) -> tuple[Array, Array]:
-        """Return the frequencies, and the estimated largest relative error of them, of shape ``shape``.
+        """Return the frequencies and an estimate of their largest relative error, shape ``shape``.
 
-        Where coefficients vary along x, it is the difference of two numbers of steps. With more of them the error of
-        the integration falls, and rounding rises.
+        Where coefficients vary along x, the estimate is the difference between two step sizes. Smaller steps reduce the
+        error of the integration and increase rounding.
         """
         if self.spatial.uniform:
             return self.angular_frequencies(values, shape, modes), np.full(shape, ROUNDING)
@@ -152,7 +152,7 @@ class GeneralRoute:
             for halvings in range(first + 1, _MOST + 1):
                 try:
                     squares = self._squares(columns, modes, halvings)
-                except ValueError:  # what rounding of so many steps makes of a soft direction
+                except ValueError:  # rounding error of so many steps in a soft direction
                     if np.isinf(least).all():
                         raise
                     break
@@ -337,10 +337,10 @@ def overview_places(spatial: SpatialProblem, values: Array, rows: int) -> Array:
 
 
 def mode_sign(displacements: NDArray[Any], coordinates: NDArray[Any] | None = None) -> NDArray[Any]:
-    """Return the sign of every mode, shape (rows, modes, 1).
+    """Return the sign of every mode, shape (rows, modes, 1); of complex modes a phase factor.
 
-    It makes positive the first displacement of the right end that is not zero, or else the first one beside that end,
-    or else the first lumped coordinate; of complex modes it is the phase that does.
+    It makes the first nonzero displacement of the right end positive, or else the first one next to that end, or else
+    the first lumped coordinate.
 
     Parameters
     ----------

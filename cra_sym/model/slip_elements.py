@@ -1,4 +1,4 @@
-"""Elastic-slip elements in numbers: how natural modes move them, and the statics of the modes left out."""
+"""Numerical data of elastic-slip elements: their displacements in the modes, and static correction of omitted modes."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class SlipElements:
-    r"""Jenkins elements on the displacements of a system, seen by its modes without them.
+    r"""Jenkins elements on the displacements of a system, projected on its modes without the elements.
 
     The displacements are :math:`u = B q - R F`, with the modal coordinates q, the forces F of the elements on each
-    displacement, and the static flexibility R of the modes left out; the modes feel the forces :math:`-B^T F`.
+    displacement, and the static flexibility R of the omitted modes; the modal forces are :math:`-B^T F`.
 
     Attributes
     ----------
     stiffness, slip : ndarray, shape (..., elements)
-        An Iwan element is as many as stand for it.
+        One entry for each Jenkins element, several for an Iwan element.
     where : ndarray of int, shape (elements,)
-        The displacement each acts on.
+        Index of the displacement on which each acts.
     displacements : ndarray, shape (..., displacements, modes)
         B, of mass-normalised modes.
     flexibility : ndarray, shape (..., displacements, displacements)
@@ -61,11 +61,10 @@ class SlipElements:
         return np.stack([self.stiffness[..., self.where == k].sum(axis=-1) for k in range(number)], axis=-1)
 
     def absorbed(self) -> SlipElements:
-        """Return elements on B q that do the same: each displacement's own flexibility in series is part of them.
+        """Return equivalent elements on B q that include the diagonal of the flexibility as springs in series.
 
-        The force over the displacement on the way from rest consists of straight lines; in series with a spring it
-        does so too, and these are elements with the same slip forces in sum. Of the flexibility remains what couples
-        different displacements.
+        On first loading the force is piecewise linear in the displacement. In series with a spring it still is, and so
+        it is that of other Jenkins elements with the same total slip force. Only the off-diagonal flexibility remains.
         """
         own = np.diagonal(self.flexibility, axis1=-2, axis2=-1)
         stiffness, slip = (np.array(np.broadcast_to(part, self._shape)) for part in (self.stiffness, self.slip))
@@ -103,14 +102,14 @@ def slip_elements(system: System, modes: int) -> SlipElements:
         stiffness.append(np.broadcast_to(found[0], (*system.shape, found[0].shape[-1])))
         slip.append(np.broadcast_to(found[1], (*system.shape, found[1].shape[-1])))
         where += [displacement] * found[0].shape[-1]
-    rows, flexibility = _seen(system, terms, modes)
+    rows, flexibility = _projected(system, terms, modes)
     return SlipElements(
         np.concatenate(stiffness, axis=-1), np.concatenate(slip, axis=-1), np.array(where), rows, flexibility
     )
 
 
-def _seen(system: System, terms: SlipTerms, modes: int) -> tuple[Array, Array]:
-    """Return the displacements in the modes, and the flexibility of the modes left out."""
+def _projected(system: System, terms: SlipTerms, modes: int) -> tuple[Array, Array]:
+    """Return the displacements in the modes, and the flexibility of the omitted modes."""
     forced, base = _forced(system, terms), system.without_hysteresis
     loads = [forced.numerics("load", name) for name in terms.forces]
     rows = _rows(base, forced, loads, modes, system.shape)
@@ -118,7 +117,7 @@ def _seen(system: System, terms: SlipTerms, modes: int) -> tuple[Array, Array]:
         if (np.abs(rows[..., k, :]).max(axis=-1) == 0.0).any():
             _, displacement, place = system.model.pieces["hysteresis"][terms.displacements.index(k)]
             raise ValueError(f"hysteresis: {displacement} at {place} is held, so nothing can slip there")
-    return rows, _left_out(base, forced, loads, terms.forces, modes, system.shape)
+    return rows, _static_remainder(base, forced, loads, terms.forces, modes, system.shape)
 
 
 def slip_terms_of(system: System) -> SlipTerms:
@@ -129,7 +128,7 @@ def slip_terms_of(system: System) -> SlipTerms:
 
 
 def slip_statics(system: System, modes: int, causes: tuple[str, ...], watched: Load) -> Array:
-    """Return what the modes left out add by their statics to what is watched, and what drives them beside elements.
+    """Return the static contribution of the omitted modes to the displacements of the elements and to the output.
 
     Parameters
     ----------
@@ -138,17 +137,17 @@ def slip_statics(system: System, modes: int, causes: tuple[str, ...], watched: L
     causes : tuple of str
         Prescribed motions, by one unit of their acceleration, and forces.
     watched : Load
-        Of one unit on the displacement that is watched.
+        Unit force on the displacement that is the output.
 
     Returns
     -------
     ndarray, shape (..., displacements + 1, displacements + causes)
-        Displacements of the elements, and then that which is watched, by forces on the former and by the causes.
+        Displacements of the elements, then the output, per unit of force on the former and of each cause.
     """
     terms = slip_terms_of(system)
     forced = _forced(system, terms)
     outputs = [*(forced.numerics("load", name) for name in terms.forces), watched]
-    return _left_out(system.without_hysteresis, forced, outputs, (*terms.forces, *causes), modes, system.shape)
+    return _static_remainder(system.without_hysteresis, forced, outputs, (*terms.forces, *causes), modes, system.shape)
 
 
 def _forced(system: System, terms: SlipTerms) -> System:
@@ -157,22 +156,22 @@ def _forced(system: System, terms: SlipTerms) -> System:
 
 
 def _rows(base: System, forced: System, loads: list[Load], modes: int, shape: tuple[int, ...]) -> Array:
-    """Return how loads act on the modes, shape (..., loads, modes)."""
+    """Return the modal forces of loads, shape (..., loads, modes)."""
     own = base.modes(modes)
     found = [np.broadcast_to(project(forced.domain, own, load), (*shape, modes)) for load in loads]
     return np.stack(found, axis=-2)
 
 
-def _left_out(
+def _static_remainder(
     base: System, forced: System, outputs: list[Load], names: tuple[str, ...], modes: int, shape: tuple[int, ...]
 ) -> Array:
-    """Return displacements by unit loads less those of the first modes at rest, shape (..., outputs, loads)."""
+    """Return static displacements due to unit loads minus those of the first modes, shape (..., outputs, loads)."""
     most = base.most_modes
     number = most if not forced.numerics("sizes")[0] else min(modes + 1, most)
     of = _rows(base, forced, outputs, number, shape)
     by = _rows(base, forced, [forced.numerics("load", name) for name in names], number, shape)
     omega = np.broadcast_to(base.natural_frequencies(number), (*shape, number))
-    if number == most:  # all of them are known
+    if number == most:  # all modes are included
         compliance = np.where(omega > 0, 1.0 / np.where(omega > 0, omega, 1.0) ** 2, 0.0)[..., None, modes:]
         return np.asarray((of[..., modes:] * compliance) @ by[..., modes:].swapaxes(-1, -2))
     squares = omega.reshape(-1, number) ** 2
@@ -209,7 +208,7 @@ def _receptance(forced: System, names: tuple[str, ...], loads: list[Load], z: Ar
 def _station(
     problem: SpatialProblem, load: Load, place: Place, left: Array, length: Array, values: Array
 ) -> tuple[Array, int]:
-    """Return where a displacement is, shape (rows, 1), and its entry in the state of a section there."""
+    """Return the station of a displacement, shape (rows, 1), and its index in the state of a section there."""
     if place.where == "lumped":
         return left[:, None], problem.displacements + place.entry
     if place.where == "point":

@@ -1,4 +1,4 @@
-"""Elastic-slip elements of a model: checks, and what is compiled of them."""
+"""Elastic-slip elements of a model: checks and compilation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Triple = tuple[Element, Expr, Any]
 
 
 def checked_hysteresis(hysteresis: Any) -> tuple[Triple, ...]:
-    """Return the triples (element, displacement, place), or raise an error that names the one that is none."""
+    """Return the triples (element, displacement, place), or raise an error that names an invalid one."""
     found = []
     for number, given in enumerate(listed("hysteresis", () if hysteresis is None else hysteresis)):
         label = f"hysteresis[{number}]"
@@ -54,7 +54,7 @@ def expressions_of(pieces: Mapping[str, Any]) -> tuple[Expr, ...]:
 
 
 def check_displacements(model: Model) -> None:
-    """Refuse an element on what is not a displacement of an unknown, or on one that is held."""
+    """Refuse an element on anything but a displacement of an unknown, or on a displacement that is held."""
     for number, (element, displacement, place) in enumerate(model.pieces["hysteresis"]):
         try:
             forced(model.without_hysteresis, ((element, displacement, place),))
@@ -63,7 +63,7 @@ def check_displacements(model: Model) -> None:
 
 
 def forced(base: Model, triples: tuple[Triple, ...]) -> Model:
-    """Return a model without dampers, with a force, slip_force_1 and on, that works on each displacement."""
+    """Return the model without dampers, with a force on each displacement, named slip_force_1 and so on."""
     t = base.equations.t
     work = [(Function(f"{_FORCE}{k}")(t), u, place) for k, (_, u, place) in enumerate(triples, 1)]
     return base.replace(virtual_work=[*undamped(base.pieces["virtual_work"], t), *work])

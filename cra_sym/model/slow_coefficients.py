@@ -13,7 +13,7 @@ from cra_sym.model.nonlinear import NonlinearTerms, Product
 __all__ = ["slow_coefficients"]
 
 _NAMED = {(4, 0): ("K", Rational(-1, 2)), (2, 2): ("J", Rational(1, 2)), (3, 0): ("C", Rational(-1, 3))}
-_HIGHEST = 4  # degree in the Lagrangian that the first slow flow feels
+_HIGHEST = 4  # highest degree in the Lagrangian that enters the first slow flow
 
 
 def slow_coefficients(terms: NonlinearTerms | None, modes: int) -> tuple[Coefficient, ...]:

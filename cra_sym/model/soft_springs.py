@@ -1,4 +1,4 @@
-"""Springs that are next to nothing beside their line: too soft for its determinant, yet what holds it in place."""
+"""Springs whose dimensionless stiffness is too small for the determinant, yet which alone hold the structure."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ __all__ = ["felt", "free_motions", "put_soft"]
 
 Array = NDArray[np.float64]
 
-_SOFTEST = 1e-150  # the product of two stiffnesses of this size is a number yet
-_LEVELS = ((1e-60, 1e-80), (1e-100, 1e-120))  # limit and target of stiffnesses that are lifted
+_SOFTEST = 1e-150  # the product of two stiffnesses of this size does not underflow
+_LEVELS = ((1e-60, 1e-80), (1e-100, 1e-120))  # limit and target of the stiffnesses that are scaled up
 
 
 def felt(layout: Layout, groups: Sequence[Array]) -> list[Array]:
@@ -39,10 +39,11 @@ def put_soft(
     modes: int,
     levels: Sequence[tuple[float, float]] = _LEVELS,
 ) -> Array:
-    """Return lambda, with that of the motions that only stiffnesses below 1e-150 hold.
+    """Return lambda, including modes that only stiffnesses below 1e-150 resist.
 
-    The line then moves as a rigid body, so lambda^2n is homogeneous in these stiffnesses, with an error as small as
-    they are beside 1 and beside others: all below a limit are multiplied by what lifts the largest of them to a target.
+    In such a mode the line moves as a rigid body, so lambda^2n is homogeneous in these stiffnesses, with an error of
+    the order of these stiffnesses relative to 1 and to the others. All below a limit are therefore scaled by one factor
+    that brings the largest of them to a target.
 
     Parameters
     ----------

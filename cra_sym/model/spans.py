@@ -38,7 +38,7 @@ class Spans:
         nodes = np.unique(np.concatenate([GOLDEN * cells, GOLDEN + (1.0 - GOLDEN) * cells]))
         share = ((edges - edges[:, :1]) / (edges[:, -1:] - edges[:, :1])).mean(axis=0)
         place = np.searchsorted(nodes, share)
-        for k in range(1, number):  # one after the other, from the left and then from the right
+        for k in range(1, number):  # in turn from the left and from the right
             place[k] = max(place[k], place[k - 1] + 1)
         place[-1] = len(nodes) - 1
         for k in range(number - 2, -1, -1):

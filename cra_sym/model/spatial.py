@@ -1,4 +1,4 @@
-"""From a state form and parameter values to the dynamic stiffness the solvers take: infinite stiffness, batches."""
+"""Dynamic stiffness from a state form and parameter values, with batches and infinite stiffnesses."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ Array = NDArray[np.float64]
 HALVINGS = 6
 """How often the two parts of a problem that varies along x are halved: then it has 128 steps."""
 _NEAR_END = 1e-7  # share of the length from an end at which a coefficient is compared with that at the end
-_LONGEST_ROW = 400  # operations from where on a further derivative of a coefficient takes too long
+_LONGEST_ROW = 400  # operation count beyond which a further derivative of a coefficient takes too long
 
 
 @dataclass(frozen=True)
 class Stiffness(DynamicStiffness):
-    """The dynamic stiffness for parameters of any size, refused where doubles do not reach.
+    """The dynamic stiffness; values beyond the range of double precision are refused.
 
     Its coordinate ``share`` runs through the domain span by span, so that every breakpoint is a node of its pieces.
 
@@ -55,7 +55,7 @@ class Stiffness(DynamicStiffness):
         return replace(super().take(rows), spans=spans, at_nodes=at_nodes)  # type: ignore[call-arg]
 
     def _transfer(self, z: np.ndarray, rows: np.ndarray, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the transfer matrices of all pieces; those right of an interior place begin with what acts there."""
+        """Return the transfer matrices of all pieces; the piece right of an interior place includes the terms there."""
         whole, slope = super()._transfer(z, rows, levels)
         for part, piece, jump, rate in self._entered(z, rows, int(levels.max(initial=0))):
             first, first_slope = whole[part, :, piece], slope[part, :, piece]
@@ -100,7 +100,7 @@ class Stiffness(DynamicStiffness):
                 here = super().evaluate(z, rows, keep_tree=keep_tree, levels=levels)
         except np.linalg.LinAlgError:
             check_range(np.array(np.nan))
-        if not np.iscomplexobj(here.matrix):  # a guess of a complex eigenvalue may be far off
+        if not np.iscomplexobj(here.matrix):  # the estimate of a complex eigenvalue may be far off
             check_range(here.matrix, here.derivative)
         return here
 
@@ -151,7 +151,7 @@ class SpatialProblem:
     free : Kernel or None
         The motions the essential conditions allow.
     end_stiffness : dict of int to Kernel
-        What each stiffness of an end, by its position, multiplies in the boundary matrix: it may be infinite.
+        For each stiffness of an end, by its index: its factor in the boundary matrix, needed where it is infinite.
     rows : tuple of tuple of Kernel
         For each displacement, the rows c with ``D^order q = c (q, w, P)``, order 0 and up.
     breaks : Breaks or None
@@ -159,7 +159,7 @@ class SpatialProblem:
     points : PointTerms or None
         What acts at interior places.
     exponents : (Kernel or None, int)
-        How fast the system may vary along x, see `cra_sym.model.breaks.varying`.
+        Bounds of the variation of the system along x, see `cra_sym.model.breaks.varying`.
     """
 
     names: tuple[str, ...]
@@ -177,12 +177,12 @@ class SpatialProblem:
     exponents: tuple[Kernel | None, int] = (None, 0)
 
     def variation(self, columns: Array) -> Variation | None:
-        """Return how fast the system of some parameter sets may vary along x, or None if as polynomials do."""
+        """Return bounds of the variation along x for some parameter sets, None if the coefficients are polynomials."""
         found, decaying = self.exponents
         return None if found is None else Variation(found.function, columns, decaying)
 
     def singular(self, columns: Array) -> NDArray[np.bool_]:
-        """Return in which parameter sets a coefficient of the system becomes infinite at an end: a stiffness vanishes.
+        """Return for which parameter sets a coefficient becomes infinite at an end, because a stiffness vanishes there.
 
         Parameters
         ----------
@@ -288,7 +288,7 @@ class SpatialProblem:
         )
 
     def _rigid_directions(self, position: int, columns: np.ndarray) -> np.ndarray:
-        """Return the end displacements that an infinite stiffness holds still, shape (rows, directions, size)."""
+        """Return the end displacements that an infinite stiffness suppresses, shape (rows, directions, size)."""
         if position not in self.end_stiffness:
             able = ", ".join(self.names[k] for k in self.end_stiffness) or "none here"
             raise ValueError(f"{self.names[position]} = inf: only the stiffness of an end may be infinite ({able})")
@@ -334,7 +334,7 @@ def spatial_problem(form: StateForm, symbols: tuple[Symbol, ...], left: Expr) ->
 
 
 def _end_stiffness(form: StateForm, symbols: tuple[Symbol, ...]) -> dict[int, Kernel]:
-    """Return what each parameter that may be infinite multiplies in the boundary matrix."""
+    """Return the factor in the boundary matrix of each parameter that may be infinite."""
     inside = form.system.free_symbols | form.length.free_symbols | form.free.free_symbols
     slopes = {}
     for position, symbol in enumerate(symbols):

@@ -22,7 +22,7 @@ __all__ = ["StressModes", "StressRoute"]
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 _AIM = 0.2
-"""What is aimed at for squared frequencies, in tolerances of frequencies: a tenth of what is accepted."""
+"""Target error of squared frequencies over the tolerance of frequencies: a tenth of the error accepted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,22 +70,22 @@ class StressRoute:
         return self.estimated_modes(values, shape, omega, TOLERANCE)
 
     def estimated_modes(self, values: Values, shape: tuple[int, ...], omega: Array, tolerance: float) -> StressModes:
-        """Return the modes of all the first frequencies; the relative error of a shape is as the root of theirs."""
+        """Return the modes of all the first frequencies; the error of a shape is of the order of the root of theirs."""
         columns = flat_columns(values, shape)
         found = self.found(columns, omega.shape[-1], tolerance, tolerance**2)
         return StressModes(omega, self.spatial, columns, list(found))
 
     def found(self, columns: Array, modes: int, tolerance: float, target: float) -> Iterator[Found]:
-        """Yield the modes of all sets, some at a time, ``rows`` being their positions among the columns.
+        """Yield the modes in groups of parameter sets; ``rows`` of each holds the indices of its sets.
 
         Parameters
         ----------
         columns : ndarray, shape (parameters, sets)
         modes : int
         tolerance : float
-            Relative error of the frequencies that is refused.
+            Largest relative error of the frequencies that is accepted.
         target : float
-            Relative error of the squared frequencies that is aimed at.
+            Target for the relative error of the squared frequencies.
         """
         for rows, infinite in infinite_patterns(columns):
             some = columns[:, rows].copy()
@@ -191,7 +191,7 @@ class StressRoute:
 
 
 def _springs_and_supports(matrix: Array, held: tuple[int, ...]) -> tuple[Array, Array]:
-    """Return a stiffness matrix of an interior place as springs, with an infinite one for each displacement held."""
+    """Return the stiffness matrix of an interior place as springs, with an infinite one for each held displacement."""
     directions, springs = _springs(matrix, np.ones(len(matrix)))
     sets = len(matrix)
     rows = np.broadcast_to(np.eye(matrix.shape[-1])[list(held)], (sets, len(held), matrix.shape[-1]))
@@ -207,8 +207,8 @@ def _held(free: Kernel | None, columns: Array, size: int) -> tuple[Array, Array]
     if free is None:
         return np.eye(size)[None], np.full((1, size), np.inf)
     motions = np.asarray(free(*columns))
-    motions = _once(motions.reshape(-1, *motions.shape[-2:]))
-    still = (motions == 0.0).all(axis=(0, 2))  # held by themselves: exactly, so that they stay exactly zero
+    motions = _one_if_equal(motions.reshape(-1, *motions.shape[-2:]))
+    still = (motions == 0.0).all(axis=(0, 2))  # imposed exactly
     units = np.broadcast_to(np.eye(size)[still], (len(motions), int(still.sum()), size))
     frame = np.linalg.svd(motions[:, ~still])[0][..., motions.shape[-1] :].swapaxes(-1, -2)
     others = np.zeros((*frame.shape[:2], size))
@@ -219,18 +219,18 @@ def _held(free: Kernel | None, columns: Array, size: int) -> tuple[Array, Array]
 
 def _springs(matrix: Array, factor: Array) -> tuple[Array, Array]:
     """Return a stiffness matrix times a factor as springs on directions."""
-    value, frame = np.linalg.eigh(_once(np.asarray(matrix)))
+    value, frame = np.linalg.eigh(_one_if_equal(np.asarray(matrix)))
     with np.errstate(invalid="ignore"):
         there = np.abs(value) > 1e-14 * np.abs(value).max(axis=-1, keepdims=True)
     springs = np.where(there, value, 0.0)
     kept = there.any(axis=0)
     with np.errstate(invalid="ignore"):
-        stiff = np.where(springs[:, kept] == 0.0, 0.0, springs[:, kept] * _once(factor[:, None]))
+        stiff = np.where(springs[:, kept] == 0.0, 0.0, springs[:, kept] * _one_if_equal(factor[:, None]))
     return frame.swapaxes(-1, -2)[:, kept], stiff
 
 
-def _once(values: Array) -> Array:
-    """Return values with one set instead of many that are alike."""
+def _one_if_equal(values: Array) -> Array:
+    """Return one set instead of all if they are equal."""
     return values[:1] if len(values) > 1 and (values == values[:1]).all() else values
 
 
@@ -251,7 +251,7 @@ class StressModes:
         return self.omega.reshape(-1, self.omega.shape[-1]) ** 2
 
     def _collected(self, part: Callable[[Found], Array]) -> Array:
-        """Return one array of what each group has, its first axis the sets."""
+        """Collect an array from all groups; the first axis is the parameter sets."""
         first = part(self.found[0])
         whole = np.empty((len(self._z), *first.shape[1:]))
         for found in self.found:

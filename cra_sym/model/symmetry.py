@@ -1,4 +1,4 @@
-"""What keeps a problem from having natural frequencies: dampers, gyroscopic terms, forces that follow the motion."""
+"""Terms that exclude natural frequencies: dampers, gyroscopic terms, follower forces."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def odd_in_time(term: Expr, t: Symbol) -> bool:
 
 
 def vanishes(expression: Expr) -> bool:
-    """Tell whether an expression is zero: when it is expanded, or else at three places in 30 digits.
+    """Tell whether an expression is zero: by expansion, or else numerically at three points in 30 digits.
 
     Products of Piecewise do not cancel when they are expanded.
     """
@@ -32,7 +32,7 @@ def vanishes(expression: Expr) -> bool:
 
 
 def asymmetry(form: StateForm) -> str:
-    """Return what keeps the problem from being symmetric, or an empty text."""
+    """Return a description of the terms that make the problem unsymmetric, or an empty text."""
     if form.damped:
         return "the Lagrangian has terms of first order in time"
     half = form.system.rows // 2

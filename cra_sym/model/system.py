@@ -30,13 +30,13 @@ __all__ = ["MOST_MODES", "TOLERANCE", "System"]
 
 Array = NDArray[np.float64]
 MOST_MODES = 1000
-_MOST_KEPT = 8  # numbers of modes for which a system keeps what it computed
+_MOST_KEPT = 8  # numbers of modes for which a system caches its results
 
 
 class System:
     """A :class:`cra_sym.Model` bound to values; make one with :meth:`cra_sym.Model.at`.
 
-    Its natural frequencies and modes are computed when they are first asked for, once for each number of modes.
+    Its natural frequencies and modes are computed on first use, once for each number of modes, and cached.
 
     Parameters
     ----------
@@ -47,8 +47,8 @@ class System:
     zeta : array_like
         Modal damping ratio beside the dampers of the model, the same for every mode, in [0, 1).
     tolerance : float
-        Relative error of natural frequencies that is aimed at where coefficients vary along x, in [1e-13, 0.01]; what
-        does not reach it is refused. See `accuracy`.
+        Largest accepted relative error of natural frequencies where coefficients vary along x, in [1e-13, 0.01]; a
+        frequency that does not reach it is refused. See `accuracy`.
 
     Raises
     ------
@@ -113,7 +113,7 @@ class System:
 
     @property
     def section_quantities(self) -> Mapping[str, Expr]:
-        """What can be measured of a section beside its displacements, by name: expressions in x."""
+        """Measurable quantities of a section besides its displacements, by name: expressions in x."""
         return {}
 
     def replace(self, **changes: Any) -> System:
@@ -129,7 +129,7 @@ class System:
 
     @cached_property
     def without_hysteresis(self) -> System:
-        """The system without its elastic-slip elements, to whose modes nonlinear results refer; itself without any."""
+        """The system without its elastic-slip elements, whose modes nonlinear results use; itself if it has none."""
         model = self.model.without_hysteresis
         if model is self.model:
             return self
@@ -137,7 +137,7 @@ class System:
         return System(model, values, self.zeta, self.tolerance)
 
     def slip_elements(self, modes: int) -> SlipElements:
-        """Return the elastic-slip elements in numbers, seen by modes of the system without them.
+        """Return the numerical data of the elastic-slip elements, projected on modes of the system without them.
 
         Parameters
         ----------
@@ -150,16 +150,16 @@ class System:
         Raises
         ------
         ValueError
-            If the system has none, or what one of them acts on is held.
+            If the system has none, or one of them acts on a held displacement.
         """
-        found: SlipElements = self._once("slip", modes, lambda n: slip_elements(self, n))
+        found: SlipElements = self._cached("slip", modes, lambda n: slip_elements(self, n))
         return found
 
     # ------------------------------------------------------------------------------------------ numbers, once
 
     @property
     def numerics(self) -> Numerics:
-        """What was derived from the Lagrangian, compiled."""
+        """Compiled derivations from the Lagrangian."""
         return self.model.numerics
 
     @cached_property
@@ -190,7 +190,7 @@ class System:
 
     def natural_frequencies(self, modes: int) -> Array:
         """Return the first natural frequencies, rad/s, shape (..., modes); read-only."""
-        return np.asarray(self._once("omega", count("modes", modes, high=MOST_MODES), self._find_frequencies))
+        return np.asarray(self._cached("omega", count("modes", modes, high=MOST_MODES), self._find_frequencies))
 
     def _find_frequencies(self, modes: int) -> Array:
         _ = self.domain  # refuses a length that is not positive
@@ -220,9 +220,9 @@ class System:
         return np.asarray(self.__dict__["_accuracy"])
 
     def check(self, modes: int = 3) -> CrossCheck:
-        """Return how far natural frequencies differ from those of Hermite elements, and what that is owed to.
+        """Compare natural frequencies with those of Hermite elements, and name the likely cause of the difference.
 
-        Ritz's method shares nothing with the route of the frequencies but the Lagrangian, and bounds them from above.
+        Ritz's method is independent of the method of the frequencies but for the Lagrangian, and gives upper bounds.
         Its elements have nodes at all breakpoints.
 
         Parameters
@@ -248,13 +248,13 @@ class System:
 
     @property
     def most_modes(self) -> int:
-        """How many modes there may be: as many as coordinates where there is no field."""
+        """Largest number of modes: that of the coordinates where there is no field, else unlimited."""
         displacements, coordinates = self.numerics("sizes")
         return MOST_MODES if displacements else int(coordinates)
 
     def modes(self, modes: int) -> Modes:
         """Return the first natural modes."""
-        found: Modes = self._once("modes", modes, lambda n: self._find_modes(n))
+        found: Modes = self._cached("modes", modes, lambda n: self._find_modes(n))
         return found
 
     def _find_modes(self, modes: int) -> Modes:
@@ -266,12 +266,12 @@ class System:
 
     @cached_property
     def _route(self) -> Route:
-        """The fastest route that covers the values, such as a mass that is not negative."""
+        """The fastest route that is valid for the values."""
         route: Route = self.numerics("route")
         return route if route.covers(self.parameters) else self.numerics("general_route")
 
     @default_floating_point
-    def _once(self, kind: str, modes: int, find: Any) -> Any:
+    def _cached(self, kind: str, modes: int, find: Any) -> Any:
         kept = self.__dict__.setdefault("_kept", {})
         key = kind, modes
         if key not in kept:

@@ -36,7 +36,7 @@ def check_dimensions(
     virtual_work : iterable of (force, displacement, place)
         The force times the displacement is judged, per length where the place is 'domain'.
     unknowns : iterable of symbol or function
-        Coordinates, fields and motions. A term of these and numbers alone is not judged, nor one with a floating-point
+        Coordinates, fields and motions. A term of these and numbers alone is not checked, nor one with a floating-point
         number: a number may carry any unit.
 
     Raises
@@ -64,13 +64,13 @@ def check_dimensions(
             found = _dimension(term, declared)
             if found not in (None, wanted):
                 raise ValueError(
-                    f"{label}, term {term}: its dimension is {_written(found)}, "
-                    f"that of {'an energy' if wanted == ENERGY else 'an energy per length'} is {_written(wanted)}"
+                    f"{label}, term {term}: its dimension is {_unit_text(found)}, "
+                    f"that of {'an energy' if wanted == ENERGY else 'an energy per length'} is {_unit_text(wanted)}"
                 )
 
 
 def named_units(units: Mapping[Any, str] | None, expressions: Iterable[Any]) -> Mapping[Any, str]:
-    """Return the units, or refuse one of what does not occur in the expressions."""
+    """Return the units, or raise an error if one is given for something that does not occur in the expressions."""
     units = mapping("units", units, "symbols to units")
     given = [sympify(expression, strict=True) for expression in expressions]
     known = {_name(atom) for e in given for atom in (*e.atoms(AppliedUndef), *e.free_symbols)}
@@ -105,7 +105,7 @@ def _dimension(term: Expr, declared: Mapping[str, Dimension]) -> Dimension | Non
 
 
 def _is_table_symbol(atom: Any, name: str) -> bool:
-    """Tell whether the atom is the very symbol of the nomenclature: the same letter alone proves nothing."""
+    """Tell whether the atom is the symbol of the nomenclature itself, not just another one of the same name."""
     try:
         entry = table.symbol(name)
     except KeyError:
@@ -115,6 +115,6 @@ def _is_table_symbol(atom: Any, name: str) -> bool:
     return bool(atom == entry)
 
 
-def _written(dimension: Dimension | None) -> str:
+def _unit_text(dimension: Dimension | None) -> str:
     assert dimension is not None
     return " ".join(f"{unit}^{power}" for unit, power in zip(("m", "kg", "s"), dimension, strict=True) if power) or "1"

@@ -69,7 +69,7 @@ def frozen(array: NDArray[np.float64]) -> Value:
 
 
 def checked_damping(zeta: Any) -> NDArray[np.float64]:
-    """Return damping ratios, or raise an error that says what they must be."""
+    """Return damping ratios, or raise an error if one is out of range."""
     return real_array("zeta", zeta, low=0.0, high=np.nextafter(1.0, 0.0), unit="1", must="real numbers in [0, 1)")
 
 

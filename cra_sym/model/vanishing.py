@@ -1,4 +1,4 @@
-"""Forces on ends at which a stiffness vanishes: they make the strain infinite there, whatever method sums it."""
+"""Refusal of forces on ends at which a stiffness vanishes, where they would make the strain infinite."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ __all__ = ["check_forces"]
 def check_forces(system: System, load: Load, route: object) -> None:
     """Raise a ValueError if a load acts on a displacement of an end where that makes the strain infinite.
 
-    A stiffness like the distance to the power a lets no force act on the displacement of a string from a = 1 on, of a
-    beam from a = 3 on, on its slope from a = 1 on. ``route`` is what gives the system its modes.
+    If the stiffness goes to zero as the distance to the power a, no force may act on the displacement of a string for
+    a >= 1, on the displacement of a beam for a >= 3, or on its slope for a >= 1. ``route`` computes the modes.
     """
     ends = [place for place in load.ends if place.where in ("left", "right")]
     if not ends or not isinstance(route, StressRoute):

@@ -1,10 +1,11 @@
 """The route of a uniform Lagrangian: parts along the span with up to three wave numbers each, joined at their ends.
 
-Strings on foundations, beams under tension or with shear, bending with torsion, several beams: whatever is even under a
-reflection of x, with any springs, masses, lumped coordinates and links of the ends. A coordinate that acts along the
-whole span in another way than to carry it, such as the base of a foundation, keeps the dynamic stiffness: there the
-motion of the span has a part that is not a free wave. So do more than twelve conditions (two for each displacement of a
-section, one for each coordinate and each spring between places): the formulas would be too long.
+This covers strings on foundations, beams under tension or with shear, bending with torsion, several beams: any model
+that is even under a reflection of x, with any springs, masses, lumped coordinates and couplings of the ends. The
+dynamic stiffness is used instead where a coordinate acts along the whole span other than as a rigid translation of it,
+such as the base of a foundation (the motion of the span is then not a sum of free waves), and for more than twelve
+conditions (two for each displacement of a section, one for each coordinate and each spring between them), whose
+formulas would be too long.
 """
 
 from __future__ import annotations
@@ -44,8 +45,8 @@ if TYPE_CHECKING:
 __all__ = ["Waves", "waves_route"]
 
 Array = NDArray[np.float64]
-_BLOCK = 8192  # sets of values at a time
-_COST = 10  # roots of one wave number that one of these costs, to judge whether machine code pays
+_BLOCK = 8192  # parameter sets per block
+_COST = 10  # cost of one root relative to one of a single wave number, to decide whether machine code pays
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,11 +65,11 @@ class Waves:
         Of the parameters: stiffness and mass matrices of the ends and coordinates, the matrix that ties those that are
         held, stiffness and stretch of links.
     carried : Kernel or None
-        Of the parameters: what a unit of each lumped coordinate gives the displacements all along.
+        Of the parameters: the displacement of the whole span per unit of each lumped coordinate.
     held : tuple of int
-        Places that essential conditions hold.
+        Degrees of freedom that essential conditions hold.
     stiffnesses : dict of int to tuple of int
-        Position of each parameter that may be infinite, with the places and links that it then holds.
+        For the index of each parameter that may be infinite, the degrees of freedom and links that it then holds.
     known : tuple of (0, 1 or None)
         Coefficients of the problem that are the same for all parameters.
     coordinates : tuple of str
@@ -106,7 +107,7 @@ class Waves:
         search = _search(parts) if wants_compiler(_COST * squares.size, parts) else None
 
         def fill(rows: slice) -> None:
-            for start in range(rows.start, rows.stop, _BLOCK):  # what belongs to a block stays in the processor's cache
+            for start in range(rows.start, rows.stop, _BLOCK):  # the data of a block fit in the processor's cache
                 block = slice(start, min(start + _BLOCK, rows.stop))
                 self._fill(columns[:, block], squares[block], search)
 

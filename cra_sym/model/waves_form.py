@@ -1,4 +1,4 @@
-"""What a uniform Lagrangian is to the solver of waves: blocks, parities, end matrices, coefficients that are known."""
+"""Input of the wave solver from a uniform Lagrangian: blocks, parities, end matrices, coefficients that are 0 or 1."""
 
 from __future__ import annotations
 
@@ -18,9 +18,11 @@ _MOST_PLACES = 12  # conditions, whose minors double in number with each
 
 
 def parity(system: Matrix, n: int) -> tuple[tuple[int, ...], tuple[bool, ...], tuple[int, ...]] | None:
-    """Return displacements block by block, which are odd, and the sizes of blocks; None if a reflection changes all.
+    """Return the displacements block by block, which of them are odd, and the block sizes.
 
-    Of each block the first displacement is even: a reflection may turn all of it.
+    None if no reflection of x leaves the problem unchanged.
+
+    The first displacement of each block is even, since the sign of a whole block is free.
     """
     places = {i: (i, n + i) for i in range(n)}
     linked = {
@@ -46,7 +48,7 @@ def parity(system: Matrix, n: int) -> tuple[tuple[int, ...], tuple[bool, ...], t
 
 
 def _reflection(system: Matrix, n: int, block: Sequence[int]) -> dict[int, bool] | None:
-    """Return which displacements of a block are odd under a reflection that leaves the problem alone."""
+    """Return which displacements of a block are odd under a reflection that leaves the problem unchanged."""
     for signs in product((False, True), repeat=len(block) - 1):
         odd = dict(zip(block, (False, *signs), strict=True))
         first = [n + i if odd[i] else i for i in block]
@@ -63,20 +65,21 @@ def powers(entry: Expr, parameter: Symbol) -> tuple[Expr, Expr] | None:
 
 
 class Conditions(NamedTuple):
-    """What holds at both ends and of the lumped coordinates; a place is one of (q left, q right, w), in order.
+    """Conditions of both ends and of the lumped coordinates, on the degrees of freedom (q left, q right, w).
 
     Attributes
     ----------
-    stiffness, mass : Matrix, shape (places, places)
-        Of what is free, without the links.
-    ties : Matrix, shape (places, places)
-        Of a displacement that follows others, by these.
+    stiffness, mass : Matrix, shape (dofs, dofs)
+    Of the free degrees of freedom, without the links.
+    ties : Matrix, shape (dofs, dofs)
+    Each dependent displacement as a combination of the free ones.
     free : tuple of int
-        Places that are held by nothing but springs.
+        Degrees of freedom that no essential condition holds.
     springs : dict of Symbol to tuple of int
-        Parameters that hold places, and links (counted on from the places), if they are infinite.
-    links : Matrix, shape (links, 1 + places)
-        Stiffness of springs between places, and what each place stretches them.
+        For each parameter that may be infinite, the degrees of freedom and links that it then holds; links are numbered
+        after the degrees of freedom.
+    links : Matrix, shape (links, 1 + dofs)
+    Stiffness of the springs between degrees of freedom, and their stretch per unit of each.
     carried : Matrix, shape (n, coordinates)
         ``q = v + carried w`` has no coordinate inside, v in the Lagrangian has.
     linked : bool
@@ -96,8 +99,8 @@ class Conditions(NamedTuple):
 def conditions(form: StateForm, order: tuple[int, ...], symbols: Sequence[Symbol]) -> Conditions | None:
     """Return the conditions of ends and coordinates.
 
-    None if they are not linear in z, or if a coordinate does more inside than to carry whole fields: a beam on a
-    foundation that itself moves follows it less at a higher frequency.
+    None if they are not linear in z, or if a coordinate acts inside other than as a rigid translation of whole fields,
+    such as a moving base under the elastic foundation of a beam.
     """
     n, m = len(order), len(form.coordinates)
     carried = _carried(form)
@@ -159,9 +162,9 @@ def _expanded(entry: Expr) -> Expr:
 
 
 def _carried(form: StateForm) -> tuple[Matrix, Matrix] | None:
-    """Return the displacements that each coordinate gives all along, and its own stiffness per length; or None.
+    """Return the uniform displacement per unit of each coordinate, and the coordinates' stiffness per length; or None.
 
-    In displacements with those in them nothing inside depends on the coordinate.
+    In terms of displacements relative to these, the equations inside do not depend on the coordinates.
     """
     n, m = len(form.displacements), len(form.coordinates)
     if not m:
@@ -186,7 +189,7 @@ def _carried(form: StateForm) -> tuple[Matrix, Matrix] | None:
 
 
 def _leaders(motions: Matrix) -> list[int] | None:
-    """Return the place whose displacement is each of the motions that are allowed; None if one has none of its own."""
+    """Return the degree of freedom that represents each admissible motion; None if a motion has none of its own."""
     found = []
     for column in range(motions.cols):
         own = [i for i in range(motions.rows) if motions[i, column] == 1 and sum(e != 0 for e in motions[i, :]) == 1]
@@ -199,9 +202,9 @@ def _leaders(motions: Matrix) -> list[int] | None:
 def _springs(
     whole: Matrix, symbols: Sequence[Symbol], parameter: Symbol
 ) -> tuple[dict[Symbol, tuple[int, ...]], Matrix]:
-    """Return the places and links that each stiffness with a symbol of its own acts on; stiffness and stretch of links.
+    """Return the degrees of freedom and links on which each stiffness acts, and stiffness and stretch of the links.
 
-    Links are counted on from the places.
+    Links are numbered after the degrees of freedom.
     """
     springs: dict[Symbol, tuple[int, ...]] = {}
     links: list[list[Expr]] = []
@@ -227,8 +230,8 @@ def _springs(
 def squares(matrix: Matrix) -> list[tuple[Expr, list[Expr]]]:
     """Return factors d and vectors h, an entry of each 1, such that a matrix is the sum of ``d h h^T``.
 
-    None of them if one of the factors is negative. Factors that are numbers come first: nothing is divided by what may
-    be zero, if that can be.
+    The list is empty if a factor is negative. Pivots that are numbers come first, to avoid division by a symbol that
+    may be zero where possible.
     """
     found = []
     for _ in range(matrix.rows):
@@ -242,7 +245,7 @@ def squares(matrix: Matrix) -> list[tuple[Expr, list[Expr]]]:
 
 
 class WavesForm(NamedTuple):
-    """A Lagrangian as the solver of waves takes it, in symbols.
+    """Symbolic input of the wave solver.
 
     Attributes
     ----------
@@ -264,7 +267,7 @@ class WavesForm(NamedTuple):
 
 
 def waves_form(form: StateForm, symbols: Sequence[Symbol]) -> WavesForm | None:
-    """Return what a conservative problem is to the solver of waves, or None if it is too much for that."""
+    """Return the input of the wave solver for a conservative problem, or None if the solver does not cover it."""
     n = len(form.displacements)
     if not n or 2 * n > _MOST_PLACES or not form.uniform or form.damped:
         return None
@@ -284,7 +287,7 @@ def waves_form(form: StateForm, symbols: Sequence[Symbol]) -> WavesForm | None:
         return None
     matrices = tuple(entry[power] for power in (0, 1) for entry in entries)  # type: ignore[index]
     if not any((*matrices[len(entries) :], *ends.mass)):
-        return None  # nothing has mass: the general route says so
+        return None  # nothing has mass: the general route raises the error
     structure = Structure(odd, sizes, m, ends.links.rows, ends.linked)
     if structure.places > _MOST_PLACES:
         return None
