@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from cra_sym.analysis.backbone_problem import FollowedMode
 from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, ConvergenceWarning, warn_of_slopes
 from cra_sym.analysis.slip_backbone import held_curve, warn_of_missing
 from cra_sym.model.system import System
+from cra_sym.solvers.branching import branches as branches_of
 from cra_sym.solvers.continuation import Curve, Measure, Point, between, correct, first_point, follow, shares
 from cra_sym.solvers.harmonic_balance import peak
 from cra_sym.solvers.monodromy import multipliers
@@ -52,6 +54,8 @@ class Backbone(checks.ByValue):
     damping_ratio, loss : ndarray, shape (...)
         With elastic-slip elements: the ratio of the modal damping that holds the motion, and the energy that it makes
         up for in a cycle, J; zero of free motions without damping.
+    branches : tuple of Backbone
+        The curves that cross, of whole curves, if they were asked for.
 
     Examples
     --------
@@ -72,6 +76,7 @@ class Backbone(checks.ByValue):
     crossings: Array
     damping_ratio: Array
     loss: Array
+    branches: tuple[Backbone, ...] = ()
 
 
 @checks.default_floating_point
@@ -84,6 +89,7 @@ def backbone(
     modes: int = 6,
     harmonics: int | None = None,
     points: int = 400,
+    branches: bool = False,
     place: Any = None,
     field: Any = None,
 ) -> Backbone:
@@ -114,7 +120,11 @@ def backbone(
         do not converge, as stiff elements excite modes that hardly anything damps: ``error_harmonics`` is then what the
         last of them changed.
     points : int
-        Length of the whole curve.
+        Length of the whole curve, and at most of each branch.
+    branches : bool
+        Whether to follow the curves that cross the whole curve too, both ways, where an internal resonance joins two
+        modes or a motion of another form sets in. Like the curve itself, they are sums of cosines of ``multiples``. A
+        branch ends at energies below those of the curve, or where it closes.
     place, field : optional
         Of the peak, instead of the tip.
 
@@ -157,11 +167,13 @@ def backbone(
     mode, points = checks.count("mode", mode, high=modes), checks.count("points", points, low=2, high=_MOST_POINTS)
     if energy is not None and amplitude is not None:
         raise ValueError("energy, amplitude: one of them must be None")
+    if checks.flag("branches", branches) and (energy is not None or amplitude is not None):
+        raise ValueError("branches = True: needs the whole curve, with neither energy nor amplitude given")
     if system.model.pieces["hysteresis"]:
         return _held(system, mode, energy, amplitude, modes, harmonics, place, field)
     problem = FollowedMode.of(system, mode, modes, 9 if harmonics is None else harmonics, place, field)
     if energy is None and amplitude is None:
-        return _whole(problem, points)
+        return _whole(problem, points, branches)
     name, value = ("energy", energy) if amplitude is None else ("amplitude", amplitude)
     unit = "J" if amplitude is None else None
     targets = checks.real_array(name, value, low=1e-60, high=1e60, unit=unit)
@@ -215,18 +227,31 @@ def _started(problem: FollowedMode, measure: Measure, below: float | None) -> tu
     raise ValueError(f"mode = {problem.mode}: harmonic balance does not converge even for a small motion")
 
 
-def _whole(problem: FollowedMode, points: int) -> Backbone:
+def _whole(problem: FollowedMode, points: int, branches: bool) -> Backbone:
     if not problem.equations.energies:
         raise ValueError("system: is linear, so its backbone has no end; ask for an energy or an amplitude")
     curve, start = _started(problem, problem.energy, None)
-    found: list[Point] = []
-    for point in follow(curve, start):
-        found.append(point)
-        if len(found) == points:
-            break
-    else:
+    found = list(itertools.islice(follow(curve, start), points))
+    if len(found) < points:
         _unfinished(found[-1], f"after {len(found)} of {points} points")
-    return _told(problem, [p.vector for p in found], [p.tangent for p in found], (len(found),), _crossings(found))
+    whole = _of_points(problem, found, _crossings(found))
+    if not branches:
+        return whole
+    lowest = problem.energy(start.unknowns)[0]
+    others = branches_of(curve, found, points, lambda point: problem.energy(point.unknowns)[0] < lowest)
+    for other in others:
+        if other.broken:
+            _unfinished((other.points or [other.origin])[-1], "on a branch")
+    told = [
+        _of_points(problem, other.points, np.array([other.origin.frequency, *_crossings(other.points)]))
+        for other in others
+        if other.points
+    ]
+    return replace(whole, branches=tuple(told))
+
+
+def _of_points(problem: FollowedMode, points: list[Point], crossings: Array) -> Backbone:
+    return _told(problem, [p.vector for p in points], [p.tangent for p in points], (len(points),), crossings)
 
 
 def _at_targets(problem: FollowedMode, targets: Array, measure: Measure, name: str) -> Backbone:

@@ -18,8 +18,9 @@ from cra_sym.analysis.steady_levels import shifted
 from cra_sym.analysis.steady_search import answers_at, is_stable
 from cra_sym.model.excitations import Parametric
 from cra_sym.model.system import System
+from cra_sym.solvers.branching import beside
 from cra_sym.solvers.continuation import Point, at_value, follow, passings, started
-from cra_sym.solvers.driven_curve import Driven, beside, turning
+from cra_sym.solvers.driven_curve import Driven, turning
 
 __all__ = ["ResponseCurve", "response_curves"]
 

@@ -1,4 +1,4 @@
-"""Curves of driven motions over one parameter, their turning points, and the other curves through branch points.
+"""Curves of driven motions over one parameter, and their turning points.
 
 The determinant of the equations together with the tangent changes its sign where another curve crosses, and at no fold.
 """
@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from cra_sym.solvers.continuation import Followed, Point, between, correct, point_at
 from cra_sym.solvers.harmonic_balance import Balance
 
-__all__ = ["Driven", "beside", "turning"]
+__all__ = ["Driven", "turning"]
 
 Array = NDArray[np.float64]
 _LARGEST_DRIVEN = 0.1  # step relative to the size of the motion
-_AWAY = (0.02, 0.005, 0.1)  # distances at which the other curve through a branch point is sought
 _TURNS = 12  # of the search for a turning point
 
 
@@ -98,36 +97,4 @@ def turning(curve: Followed, before: Point, after: Point) -> Point | None:
         low, high = (side, high) if (side[1] > 0) == (low[1] > 0) else (low, side)
         if abs(side[1]) * curve.metric(found.unknowns, found.frequency)[-1] < 1e-9:
             break
-    return found
-
-
-def beside(curve: Followed, point: Point, other: Array | None = None) -> list[Point]:
-    """Return points of the other curve through a branch point, one on each side, looking away from it.
-
-    Parameters
-    ----------
-    curve : Followed
-    point : Point
-        Of one curve, at its branch point or next to it.
-    other : ndarray, optional
-        A direction, (size + 1,); default: where the equations change least, beside the tangent.
-    """
-    _, rates, _ = curve.linearised(point.vector)
-    metric = curve.metric(point.unknowns, point.frequency)
-    own = point.tangent * metric / np.linalg.norm(point.tangent * metric)
-    away = np.linalg.svd(np.vstack([rates / metric, own]))[2][-1] if other is None else other * metric
-    away = away - (away @ own) * own
-    away /= np.linalg.norm(away)
-    found = []
-    for side in (1.0, -1.0):
-        for length in _AWAY:
-            guess, plane = point.vector + side * length * away / metric, side * away * metric
-
-            def constraint(z: Array, at: Array = guess, normal: Array = plane) -> tuple[float, Array]:
-                return float(normal @ (z - at)), normal
-
-            answer = correct(curve, guess, constraint, 20)
-            if answer is not None and np.linalg.norm((answer[0] - point.vector) * metric) < 10 * length:
-                found.append(point_at(curve, *answer, plane))
-                break
     return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.integrate import quad, solve_ivp
 from scipy.special import ellipk
 
@@ -58,8 +59,6 @@ def test_hinged_beam_with_midplane_stretching_is_woinowsky_kriegers():
 
 
 def oscillator_stretch(stiffness):
-    import sympy as sp
-
     shortening = sp.Function("s")(x, t)
     right = -stiffness * shortening**2 / (2 * L)
     ends = [v.subs(x, 0), v.subs(x, L)]
@@ -82,7 +81,7 @@ def test_cantilever_with_cubic_tip_spring_at_the_published_points():
 
 
 def test_internal_resonance_is_followed_and_not_jumped():
-    curve = cra.backbone(sprung(), points=220)
+    curve = cra.backbone(sprung(), points=220, branches=True)
     level, hertz = np.log10(curve.energy), curve.angular_frequency / (2 * np.pi)
     arm = np.flatnonzero((hertz > 29.7) & (hertz < 29.9))
     first = arm[level[arm].argmax()]  # the tip of the arm towards the resonance with the fifth harmonic
@@ -95,8 +94,42 @@ def test_internal_resonance_is_followed_and_not_jumped():
     assert abs(beyond / 40.295 - 1) < 2e-3
     assert not curve.stable.all() and curve.stable[: first // 2].all()
     assert len(curve.crossings) and abs(curve.crossings[0] / (2 * np.pi) / hertz[first] - 1) < 1e-5
+    (second,) = curve.branches  # the second mode, a fifth of whose frequency meets the first
+    some = second.energy < 10
+    alone = cra.backbone(sprung(), 2, energy=second.energy[some][::9], harmonics=1)
+    np.testing.assert_allclose(5 * second.angular_frequency[some][::9], alone.angular_frequency, rtol=1e-9)
+    assert second.crossings[0] == curve.crossings[0] and second.energy.min() < 1e-6 and second.energy.max() > 1.0
     once = cra.backbone(sprung(), energy=10.0**-2.0)
     assert abs(once.angular_frequency / (2 * np.pi) - 30.09) < 0.02  # the first crossing, not the main branch
+
+
+def test_localised_motion_leaves_where_lames_equation_says():
+    """Two like Duffing oscillators on a soft link, by q in opposition and r together, of frequency w < 1.
+
+    About q = a cn(Omega t, k) alone, r obeys Lame's equation of degree two, one of whose periodic solutions, cn dn, has
+    the eigenvalue 1 + k^2: that is w^2 = 1 - 3 a^2/2.
+    """
+    r, square = sp.Function("r")(t), 0.7
+    kinetic = (q.diff(t) ** 2 + r.diff(t) ** 2) / 2
+    left = kinetic - q**2 / 2 - square * r**2 / 2 - (q**4 + 6 * q**2 * r**2 + r**4) / 4
+    model = cra.Model(0, fields=(), coordinates=[q, r], x=x, domain=(0, 1), t=t, left=left)
+    curve = cra.backbone(model.at({}), 2, modes=2, points=60, field=q, branches=True)
+    size = np.sqrt(2 * (1 - square) / 3)
+    np.testing.assert_allclose(curve.crossings, [duffing_frequency(1.0, size)], rtol=1e-4)
+    np.testing.assert_array_equal(curve.stable, curve.amplitude < size)
+    (branch,) = curve.branches
+    assert branch.stable.all() and abs(branch.amplitude.min() / size - 1) < 1e-3
+    np.testing.assert_allclose(branch.angular_frequency[::-1], branch.angular_frequency, rtol=1e-8)  # either of them
+    far = branch.coefficients[0].sum(axis=-1)
+
+    def rate(_, y):
+        r, q = y[:2]
+        return np.append(y[2:], [-square * r - 3 * q**2 * r - r**3, -q - 3 * r**2 * q - q**3])
+
+    start, period = np.append(far, [0.0, 0.0]), 2 * np.pi / branch.angular_frequency[0]
+    end = solve_ivp(rate, (0, period), start, method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+    np.testing.assert_allclose(end, start, atol=1e-6)
+    assert abs(far[0]) > 0.5 * abs(far[1])
 
 
 def test_inextensible_arm_against_time_integration_and_its_coefficient():
@@ -154,6 +187,7 @@ def test_stability_far_out_is_that_of_time_integration():
         ({"energy": 0.0}, r"energy = 0.0: must be real numbers in \[1e-60"),
         ({"mode": 7}, "mode = 7: must be an integer from 1 to 6"),
         ({"harmonics": 0}, "harmonics = 0"),
+        ({"energy": 1.0, "branches": True}, "branches = True: needs the whole curve"),
         ({"amplitude": 1e-3, "place": 2.0}, "place = 2 must be in the domain"),
     ],
 )
