@@ -159,6 +159,11 @@ def mode_shapes(
 
 def check_places(system: System, points: Array, name: str = "x") -> None:
     """Raise a ValueError unless all points lie in the domain of every member of the batch."""
+    if not system.numerics("sizes")[0]:
+        raise ValueError(
+            f"{name}: the model has coordinates alone, which have no place; use tip_response for the first of them, "
+            "state_space for any"
+        )
     left, length = system.domain.left, system.domain.length
     low, high = np.max(left), np.min(left + length)
     slack = 1e-12 * np.max(length)

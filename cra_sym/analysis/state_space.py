@@ -8,13 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
 from cra_sym.analysis.modes import only_motion, participation
 from cra_sym.checks import count, default_floating_point, instance, real_array, shown
 from cra_sym.model.observables import Observable
-from cra_sym.model.projection import Projected, displaced_at
+from cra_sym.model.projection import Projected, displaced_at, project
+from cra_sym.model.routes import Modes
 from cra_sym.model.system import MOST_MODES, System
+from cra_sym.model.values import flat_columns
+from cra_sym.model.vanishing import check_forces
 from cra_sym.solvers.linear_system import LinearSystem
+from cra_sym.solvers.lowest_motions import LowestMotions, lowest_motions
 
 if TYPE_CHECKING:
     from sympy import Expr
@@ -40,7 +45,8 @@ def state_space(
     system : System
         One set of values, not a batch.
     modes : int
-        Modes kept, 1 to 1000.
+        Modes kept, 1 to 1000. With gyroscopic forces or forces that follow the motion: the lowest complex modes, as
+        many eigenvalues as that many oscillators have.
     input : str or Expr, or a sequence of them
         'base_acceleration': w'' (m/s2) of the only prescribed motion. 'drive_force': a force F (N) on that motion,
         which is then free; of an arm (m_b + m_e + rho A L) w'' + sum Gamma_i q_i'' = F. A prescribed motion or a
@@ -59,13 +65,17 @@ def state_space(
     -------
     LinearSystem
         A :class:`scipy.signal.StateSpace` with names; `discrete` and `to_control` are its methods. States: q_i and
-        their rates; before them w and before these w', where the base is free or an output needs them.
+        their rates; before them w and before these w', where the base is free or an output needs them. Of complex
+        modes: w and w', and for each pair ``a +- i b`` of eigenvalues q_i_1 and q_i_2 with ``[[a, b], [-b, a]]``, for a
+        real one q_i; modes that meet, as at flutter and in rigid motions, share a block.
 
     Raises
     ------
     TypeError, ValueError
         If ``system`` is not a :class:`System` or is a batch, its model does not have the motion that is asked for,
-        ``modes`` is not an integer from 1 to 1000, or an input or output is none of the above.
+        ``modes`` is not an integer from 1 to 1000, or an input or output is none of the above. Complex modes have no
+        'drive_force' and no forces at the ends: make the motion a coordinate that a force F(t) drives, and name the
+        force of a spring as an expression such as ``k*v.subs(x, 0)``.
 
     Notes
     -----
@@ -101,6 +111,8 @@ def state_space(
     }
     seen = {part.name for one in wanted.values() for part in one.parts if part.kind == "motion" and part.time < 2}
     states = sorted(base if free else base & seen)
+    if system.numerics("complex_modes") == "always" and system.conservative_part is not system:
+        return _complex(system, modes, states, wanted, driven, free=free)
     motion = _equations(system, modes, states, driven, free=free)
     return _measured(system, modes, states, motion, wanted, driven)
 
@@ -172,10 +184,10 @@ def _read(system: System, expression: Any, argument: str) -> Observable:
     return found
 
 
-def _rows(system: System, modes: int, of: Observable) -> tuple[list[Array], dict[tuple[str, int], float]]:
+def _rows(system: System, found: Modes, of: Observable) -> tuple[list[Array], dict[tuple[str, int], float]]:
     """Return what q, q' and q'' add to an observable, and the factors of prescribed motions by (name, derivative)."""
     numbers = [float(number) for number in of.numbers.function(*system.domain.values)]
-    found, rows = system.modes(modes), [np.zeros(modes) for _ in range(3)]
+    rows = [np.zeros(found.omega.shape[-1]) for _ in range(3)]
     motions: dict[tuple[str, int], float] = {}
     for part, factor, place in zip(of.parts, numbers[: len(of.parts)], numbers[len(of.parts) :], strict=True):
         if part.kind == "motion":
@@ -264,7 +276,7 @@ def _push(system: System, modes: int, states: Sequence[str], one: _Input, *, fre
         q = system.project(system.numerics("load", one.name), modes)
     else:
         assert one.displacement is not None
-        (q, _, _), motions = _rows(system, modes, one.displacement)
+        (q, _, _), motions = _rows(system, system.modes(modes), one.displacement)
         if free:
             base[0] = motions.get((states[0], 0), 0.0)
     return np.concatenate([base, q])
@@ -285,7 +297,7 @@ def _measured(
     B = np.vstack([np.zeros_like(by_input), by_input])
     C, D = np.zeros((len(wanted), 2 * size)), np.zeros((len(wanted), len(driven)))
     for k, of in enumerate(wanted.values()):
-        modal, motions = _rows(system, modes, of)
+        modal, motions = _rows(system, system.modes(modes), of)
         rows = [np.array([*(motions.get((name, time), 0.0) for name in states), *modal[time]]) for time in range(3)]
         C[k] = np.concatenate(rows[:2]) + rows[2] @ by_state
         D[k] = rows[2] @ by_input
@@ -294,3 +306,82 @@ def _measured(
     return LinearSystem(
         A, B, C, D, [*names, *(f"{name}_rate" for name in names)], [one.label for one in driven], list(wanted)
     )
+
+
+# Without natural modes -------------------------------------------------------------------------------------------
+
+
+def _complex(
+    system: System,
+    modes: int,
+    states: Sequence[str],
+    wanted: Mapping[str, Observable],
+    driven: Sequence[_Input],
+    *,
+    free: bool,
+) -> LinearSystem:
+    """Return the linear system of the lowest complex modes."""
+    if free:
+        raise ValueError(
+            f"input: {_FREE!r} needs natural modes, which gyroscopic forces and forces that follow the motion leave "
+            f"none; make {driven[0].name} a coordinate that a force F(t) drives, and give input='F'"
+        )
+    _check_complex(system, wanted)
+    ((_, problem),) = system.numerics("pencil").problems(flat_columns(system.parameters, ()))
+    motions = lowest_motions(problem, modes, float(system.zeta), whole=True).in_blocks()
+    push = np.stack([_complex_push(system, motions, one) for one in driven], axis=-1)
+    carried, size = 2 * len(states), len(motions.system)
+    A, B = np.zeros((carried + size,) * 2), np.zeros((carried + size, len(driven)))
+    A[carried:, carried:], B[carried:] = motions.system, push
+    for row, name in enumerate(states):
+        A[row, len(states) + row] = 1.0
+        B[len(states) + row] = [one.kind == "motion" and one.name == name for one in driven]
+    C, D = np.zeros((len(wanted), len(A))), np.zeros((len(wanted), len(driven)))
+    for k, of in enumerate(wanted.values()):
+        by_basis, prescribed = _rows(system, motions.basis, of)
+        by_state = [row @ motions.shapes for row in by_basis]
+        # a sum of modes whose rates are those of the state: its accelerations follow the forces at once
+        C[k, carried:] = by_state[0] + (by_state[1] + by_state[2] @ motions.system) @ motions.system
+        D[k] = by_state[2] @ motions.system @ push
+        C[k, :carried] = [prescribed.get((name, time), 0.0) for time in range(2) for name in states]
+        D[k] += [prescribed.get((one.name, 2), 0.0) * (one.kind == "motion") for one in driven]
+    names = [*states, *(f"{name}_rate" for name in states), *_names(motions)]
+    return LinearSystem(A, B, C, D, names, [one.label for one in driven], list(wanted))
+
+
+def _check_complex(system: System, wanted: Mapping[str, Observable]) -> None:
+    """Raise if complex modes do not tell an output."""
+    orders = system.numerics("pencil").orders
+    top = np.repeat(np.cumsum(orders), orders)
+    for name, of in wanted.items():
+        for part in of.parts:
+            if part.kind == "force":
+                raise ValueError(
+                    f"outputs: {name!r} needs natural modes, which gyroscopic forces and forces that follow the motion "
+                    "leave none; name the force of a spring as an expression such as k*v.subs(x, 0)"
+                )
+            if part.kind == "field" and part.entry + part.order > top[part.entry]:
+                raise ValueError(
+                    f"outputs: {name!r} has a derivative by x beyond those in the energies, which complex modes do not "
+                    f"have; must be at most {top[part.entry] - part.entry}"
+                )
+
+
+def _complex_push(system: System, motions: LowestMotions, one: _Input) -> Array:
+    """Return what one unit of an input does to the state of complex modes."""
+    if one.displacement is not None:
+        (acts, _, _), _ = _rows(system, motions.basis, one.displacement)
+        return motions.push @ acts
+    load = system.numerics("load", one.name)
+    check_forces(system, load, system.numerics("pencil"))
+    return np.asarray(motions.push @ project(system.domain, motions.basis, load))
+
+
+def _names(motions: LowestMotions) -> list[str]:
+    """Return names of the states, by the blocks of the matrix."""
+    joined = motions.system != 0.0
+    _, block = connected_components(joined | joined.T, directed=False)
+    return [
+        f"q_{number + 1}" if (block == number).sum() == 1 else f"q_{number + 1}_{(block[:place] == number).sum() + 1}"
+        for place, number in enumerate(block)
+    ]

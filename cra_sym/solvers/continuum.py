@@ -119,7 +119,8 @@ class Continuum:
             found = self.coefficients(x, rows)
             parts = [found["W"]] if strained else [compliance(found["W"], len(self.orders))]
             parts += [found[name] for name in "BDRM"]
-            return np.stack([np.broadcast_to(entry, x.shape) for part in parts for entry in part.values()])
+            entries = [entry for part in parts for entry in part.values()] or [np.zeros(())]  # lumped coordinates alone
+            return np.stack([np.broadcast_to(entry, x.shape) for entry in entries])
 
         return values
 

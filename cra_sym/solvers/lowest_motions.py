@@ -6,12 +6,13 @@ at critical damping and at flutter, need no case of their own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigvals, schur, solve
+from scipy.linalg import block_diag, eigvals, schur, solve
+from scipy.sparse.csgraph import connected_components
 
 from .pencil import SHIFT, Array, GeneralContinuum, Reduced, reduced
 from .pencil_refine import matched, meshes, sequence
@@ -26,6 +27,11 @@ _OBLIQUE = 3.0
 """How much larger than a state a part of it may be: of orthogonal modes, as without dampers, never."""
 _SAME = 1e-6  # relative difference of moduli that are not told apart: a pair is not split
 _AT_ONCE = 1e3  # rate of decay over the last oscillating eigenvalue asked for
+_TOGETHER = 1e-3  # relative distance of eigenvalues that share a block
+_STILL = (
+    1e-5  # modulus, over the largest, of eigenvalues that may be zero: a rigid motion's are known to half the digits
+)
+_SLANTED = 1e8  # condition of motions that are not told apart
 _LIGHT = 1e-7  # square root of a mass, relative to the largest, below which a coordinate has none
 
 
@@ -49,8 +55,10 @@ class BasisModes:
         return np.asarray(self._motions @ self.problem.columns.ends[self.problem.sets[0]].T)
 
     def displacement(self, end: int, place: int) -> Array:
-        """Return a displacement of an end section, shape (k,)."""
+        """Return a displacement of an end section, or a coordinate where there is no field, shape (k,)."""
         continuum = self.problem.columns.problem
+        if not continuum.displacements:
+            return self.coordinate(place)
         return self._ends[:, end * (continuum.displacements + continuum.lumped) + place]
 
     def force(self, end: int, place: int) -> Array:
@@ -126,6 +134,45 @@ class LowestMotions:
         """Eigenvalues s, rad/s."""
         return np.asarray(eigvals(self.system))
 
+    def in_blocks(self) -> LowestMotions:
+        """Return the same motions with a block of ``system`` for each mode, by ascending modulus of its eigenvalues.
+
+        A pair ``a +- i b`` has ``[[a, b], [-b, a]]``, a real eigenvalue its number. Modes that meet, as at critical
+        damping, at flutter and in rigid motions, share a block; motions that cannot be told apart stay as they are.
+        """
+        s = self.eigenvalues
+        bases = [_invariant(self.system, s, number) for number in _together(s)]
+        turn = np.hstack(bases)
+        if turn.shape != self.system.shape or np.linalg.cond(turn) > _SLANTED:
+            return self
+        into = np.linalg.inv(turn)
+        own = block_diag(*(np.ones((basis.shape[1],) * 2) for basis in bases)) > 0
+        system = np.where(own, into @ self.system @ turn, 0.0)
+        return replace(self, system=system, push=into @ self.push, shapes=self.shapes @ turn, start=into @ self.start)
+
+
+def _together(s: NDArray[np.complex128]) -> list[NDArray[np.intp]]:
+    """Return the numbers of the eigenvalues that lie together, conjugates included, by ascending modulus."""
+    size = np.abs(s)
+    upper = s.real + 1j * np.abs(s.imag)
+    reach = np.maximum(_TOGETHER * np.minimum(size[:, None], size), _STILL * size.max())
+    _, label = connected_components(np.abs(upper[:, None] - upper) <= reach, directed=False)
+    groups = [np.flatnonzero(label == group) for group in range(label.max(initial=-1) + 1)]
+    return sorted(groups, key=lambda group: float(size[group].min()))
+
+
+def _invariant(system: Array, s: NDArray[np.complex128], group: NDArray[np.intp]) -> Array:
+    """Return a basis of the motions of some of the eigenvalues; in that of a pair they are ``[[a, b], [-b, a]]``."""
+
+    def own(real: float, imaginary: float) -> bool:
+        return bool(np.abs(s - complex(real, imaginary)).argmin() in group)
+
+    block, basis, number = schur(system, sort=own)
+    basis = basis[:, :number]
+    if number == 2 and block[0, 1] * block[1, 0] < 0.0:
+        basis = basis * np.array([1.0, np.copysign(np.sqrt(-block[1, 0] / block[0, 1]), block[0, 1])])
+    return np.asarray(basis)
+
 
 def lowest_motions(problem: GeneralContinuum, modes: int, zeta: float, *, whole: bool = False) -> LowestMotions:
     """Return the motions of as many eigenvalues as that many oscillators have, or one more than splits a pair.
@@ -177,7 +224,8 @@ def lowest_motions(problem: GeneralContinuum, modes: int, zeta: float, *, whole:
             # where some meet each is known to half its digits
             worst = float((np.abs(near - s[:number]) / scale).max())
             if worst < _SETTLED or _moments(near, s[:number]) < _SETTLED:
-                found = _motions(one, first, second, float(np.sqrt(np.abs(s[number - 1] * s[number]))))
+                beyond = s[number] if number < len(s) else 4.0 * s[-1]
+                found = _motions(one, first, second, float(np.sqrt(np.abs(s[number - 1] * beyond))))
                 if not whole or found.oblique < _OBLIQUE:
                     return found
                 return _motions(one, first, second, 2.0 * float(np.abs(s[-1])))
@@ -202,7 +250,7 @@ def _all(first: Array, second: Array) -> NDArray[np.complex128]:
 
 def _number(s: NDArray[np.complex128], least: int) -> int:
     """Return how many of the lowest to take so that the next has a larger modulus."""
-    if len(s) <= least:
+    if len(s) < least:
         raise ValueError(f"modes = {least // 2}: the model has only {len(s)} eigenvalues")
     size, number = np.abs(s), least
     while number < len(s) - 1 and size[number] <= size[number - 1] * (1.0 + _SAME) + 1e-6:

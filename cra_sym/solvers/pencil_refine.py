@@ -110,7 +110,7 @@ def sequence(mesh: Mesh) -> Iterator[Mesh]:
 
 def _chunks(problem: GeneralContinuum, mesh: Mesh, number: int) -> Iterator[Index]:
     size = problem.displacements + len(problem.orders) * (len(mesh.elements) - 1) * (mesh.degree + 1)
-    step = max(1, _LANES // (size * max(4 * size, (len(mesh.pieces) - 1) * mesh.points)))
+    step = max(1, _LANES // max(1, size * max(4 * size, (len(mesh.pieces) - 1) * mesh.points)))
     for start in range(0, number, step):
         yield np.arange(start, min(start + step, number))
 

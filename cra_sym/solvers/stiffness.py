@@ -232,11 +232,12 @@ class DynamicStiffness:
         size = 2 * n + m
         left = np.r_[0 : n + m, size : size + n]
         right = np.r_[size : size + n, n : n + m, n + m : size]
-        total = np.zeros((len(z), size + n, size + n), dtype=matrix.dtype)
-        total_slope = np.zeros_like(total)
         edge, edge_slope = self.boundary(z, rows)
+        # where there is no field, the ends alone tell whether the numbers are complex
+        total = np.zeros((len(z), size + n, size + n), dtype=np.result_type(matrix, edge))
+        total_slope = np.zeros_like(total)
         for target, ends, parts in ((total, edge, matrix), (total_slope, edge_slope, slope)):
-            target[:, :size, :size] = _rescale(np.asarray(ends, dtype=matrix.dtype), unit)
+            target[:, :size, :size] = _rescale(np.asarray(ends, dtype=total.dtype), unit)
             target[:, left[:, None], left] += parts[0]
             target[:, right[:, None], right] += parts[1]
         free = np.eye(size) if self.free is None else self.free

@@ -185,6 +185,8 @@ class Columns:
         fields, found = self.elastic[2], np.zeros((self.sets, self.size, self.size))
         table = self.legendre.reshape(len(self.legendre), -1, *self.legendre.shape[-2:])
         size = self.size - self.offset
+        if not fields:
+            return found
         block = np.zeros((self.sets, size // fields, fields, size // fields, fields))
         for (i, j), entry in self._density.items():
             block[:, :, i, :, j] = self._product(entry, table, table)
