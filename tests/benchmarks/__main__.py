@@ -21,6 +21,7 @@ from tests.benchmarks import (
     kernel,
     machine,
     nodes,
+    nonlinear,
     records,
     responses,
     slipping,
@@ -47,6 +48,7 @@ def run(quick: bool) -> dict[str, Any]:
     report["sweep"] = nodes.measured(40_000 if quick else 4_000_000)
     report["along x"] = along_x.measured(3 if quick else 5)
     report["in practice"], report["slip"] = records.measured(quick), slipping.measured()
+    report["nonlinear"] = nonlinear.measured(quick)
     report["targets"] = targets.rows(report)
     return report
 
@@ -118,6 +120,9 @@ def table(report: dict[str, Any], former: dict[str, Any] | None = None) -> str:
     if "slip" in report:  # a report of an earlier day has none
         lines += ["", "## A thousand moves of 2 s with an element that slips, against solve_ivp with events", ""]
         lines += ["| what | |", "| --- | --: |", *(f"| {key} | {value:.3g} |" for key, value in report["slip"].items())]
+    for name, row in report.get("nonlinear", {}).items():
+        lines += ["", f"## {name.capitalize()} against solve_ivp", "", "| what | |", "| --- | --: |"]
+        lines += [f"| {key} | {value:.3g} |" for key, value in row.items()]
     lines += ["", "## Records of motion, and stores", "", *records.note(report["in practice"])]
     lines += ["", "## Sweeps", "", nodes.note(report["sweep"])]
     return "\n".join(lines) + "\n"

@@ -66,6 +66,8 @@ def rows(report: dict[str, Any]) -> list[dict[str, Any]]:
     add("a record of 1e6 samples, 5 modes, times lsim", practice["records"]["times as fast"], 2)
     add("a sweep into a store over Zarr alone", practice["stores"]["times zarr"], 2.0, least=False)
     add("moves with slip, times solve_ivp with events", report["slip"]["times as fast"], 500)
+    for what, case in report["nonlinear"].items():
+        add(f"{what}, times solve_ivp", case["times as fast"], 200 if "backbone" in what else 1000)
     cold = {key: row["wall s"] for key, row in report["cold start"].items()}
     add("import, s more than NumPy's", cold["import cra_sym and numpy"] - cold["import numpy"], 0.3, least=False)
     for key, seconds in cold.items():
