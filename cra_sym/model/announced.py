@@ -7,14 +7,14 @@ from contextlib import contextmanager
 
 from tqdm.auto import tqdm
 
-__all__ = ["Told", "refinement"]
+__all__ = ["Progress", "refinement"]
 
-Told = Callable[[float, str], None]
+Progress = Callable[[float, str], None]
 """Callback that takes the relative error reached and a description of the mesh."""
 
 
 @contextmanager
-def refinement() -> Iterator[Told]:
+def refinement() -> Iterator[Progress]:
     """Yield a callback to be called after each refinement along x."""
     bars: list[tqdm] = []
 

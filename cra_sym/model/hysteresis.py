@@ -61,7 +61,7 @@ class Element:
         raise NotImplementedError
 
     def force(self, displacement: Any) -> Array:
-        """Return the force on first loading from rest to a displacement (the backbone of the loop, Masing's rules)."""
+        """Return the force on first loading to a displacement; after a reversal Masing's rule holds."""
         return self._numbers().force(real_array("displacement", displacement, unit=None))[()]
 
     def loss(self, amplitude: Any) -> Array:

@@ -148,7 +148,7 @@ class GeneralRoute:
         columns = flat_columns(values, shape)
         first = max(self.needed(columns), _FEWEST)
         before, least = self._squares(columns, modes, first), np.full((columns.shape[1], modes), np.inf)
-        with refinement() as told:
+        with refinement() as progress:
             for halvings in range(first + 1, _MOST + 1):
                 try:
                     squares = self._squares(columns, modes, halvings)
@@ -164,7 +164,7 @@ class GeneralRoute:
                 accuracy = np.maximum(error.max(axis=1), ROUNDING)
                 if (error <= tolerance).all():
                     return np.sqrt(squares).reshape(*shape, modes), accuracy.reshape(shape)
-                told(float(error.max()), f"{2 ** (halvings + 1)} steps")
+                progress(float(error.max()), f"{2 ** (halvings + 1)} steps")
         row, mode = np.unravel_index(int(np.argmax(least)), least.shape)
         raise ValueError(
             f"modes = {modes}: the relative error of frequency {mode + 1} stays at {least[row, mode]:.1g}; it comes "

@@ -104,9 +104,9 @@ class StressRoute:
                     points=self._points(some[:, members], nodes),
                     variation=self.spatial.variation(some[:, members]),
                 )
-                with refinement() as told:
+                with refinement() as progress:
                     solutions = solved(
-                        problem, modes, 2.0 * tolerance, target, told, self._counter(columns, rows[members])
+                        problem, modes, 2.0 * tolerance, target, progress, self._counter(columns, rows[members])
                     )
                 for found in solutions:
                     yield Found(rows[members][found.rows], found.fields, found.accuracy)

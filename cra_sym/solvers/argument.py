@@ -1,4 +1,4 @@
-"""How many eigenvalues lie in a circle: the argument principle on the exact characteristic function."""
+"""Number of eigenvalues in a circle, by the argument principle on the exact characteristic function."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["number_inside"]
 _POINTS = 64, 8192
 _MOST_LEVELS = 10
 _CLEAR = 0.05
-"""How far from a whole number the integral may be. Two sums, one of twice the points, must agree."""
+"""Largest accepted distance of the integral from an integer. Two sums, one with twice the points, must agree."""
 
 
 def number_inside(problem: DynamicStiffness, row: int, centre: complex, radius: float) -> int:
@@ -31,8 +31,8 @@ def number_inside(problem: DynamicStiffness, row: int, centre: complex, radius: 
     Raises
     ------
     ArithmeticError
-        If the waves are too short, an eigenvalue lies on the circle, or so near that 8192 points do not tell, or
-        rounding has left the function no digits there.
+        If the waves are too short, an eigenvalue lies on the circle or too near to it for 8192 points, or the function
+        has lost all digits to rounding there.
     """
     least, most = _POINTS
     levels = problem.levels(np.array([centre + radius]), np.array([row]))

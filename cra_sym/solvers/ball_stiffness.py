@@ -1,8 +1,8 @@
 """The exact number of natural frequencies below a point, proved in ball arithmetic, for uniform problems of any kind.
 
-The interval is halved until no piece has a natural frequency of its own with its ends clamped: then the dynamic
-stiffness of the whole, condensed piece by piece, has as many negative eigenvalues, those eliminated on the way
-included, as frequencies lie below (Wittrick and Williams, 1971).
+The interval is halved until no piece with clamped ends has a natural frequency below the point. The number of
+frequencies below it is then that of the negative eigenvalues of the dynamic stiffness, condensed piece by piece and
+including those of the eliminated blocks (Wittrick and Williams, 1971).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Term(NamedTuple):
     ----------
     fields : (int, int)
     gaps : (int, int)
-        How many orders p and q lie below the highest derivative of their field.
+        Orders by which p and q lie below the highest derivative of their field.
     stiffness, mass : arb
         ``value = stiffness - omega^2 mass``.
     """
@@ -90,7 +90,7 @@ class BallStiffness:
         return fixed + negatives((basis.transpose() * total * basis).table())
 
     def _levels(self, z: Any, length: Any) -> int:
-        """Return how often to halve, so that no piece vibrates between clamped ends below z.
+        """Return the number of halvings for which no piece with clamped ends has a natural frequency below z.
 
         Functions that vanish at both ends of a piece of length h, with all derivatives but the highest, obey
         |p| <= (h / pi)^gap |highest derivative| in the norm of square integrals (Poincare's inequality), so the energy

@@ -1,8 +1,8 @@
-"""Enclosures of natural frequencies that an exact count proves: each holds its own, and none is missed.
+"""Enclosures of natural frequencies, proved by an exact count: each contains its frequency, and none is missed.
 
-The arithmetic is that of balls (Arb through python-flint): every operation returns a ball that holds the exact
-result, so a ball away from zero has a proved sign. Nothing here rests upon the floating-point solver: its values are
-only where the search begins.
+Ball arithmetic (Arb through python-flint) is used: every operation returns a ball that contains the exact result, so a
+ball that excludes zero has a proved sign. The proof does not depend on the floating-point solver, whose values are only
+the starting points of the search.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ __all__ = ["Counted", "UndecidedError", "decided", "enclose", "negatives", "prec
 
 FIRST_PRECISION = 192
 _LARGEST_PRECISION = 12_288
-_NEAREST = -53  # the first width tried, relative, as a power of two; the width wanted is half of it
+_NEAREST = -53  # exponent of two of the first relative width tried, twice the target width
 _WIDEST = -8
-_EQUAL = -40  # of the width wanted: frequencies that are closer share an enclosure
+_EQUAL = -40  # times the target width: frequencies that are closer share an enclosure
 
 Result = TypeVar("Result")
 _ALONE = RLock()
 
 
 class UndecidedError(ArithmeticError):
-    """A sign could not be proved at the largest precision: the point is a zero, or as good as one."""
+    """A sign could not be proved at the largest precision: the point is a zero, or too close to one."""
 
 
 @contextmanager
 def precision(flint: Any, bits: int) -> Iterator[None]:
-    """Work with so many bits; threads take turns, since the precision of FLINT belongs to the whole process."""
+    """Set the working precision in bits; one thread at a time, since FLINT's precision is global to the process."""
     with _ALONE, flint.ctx.workprec(bits):
         yield
 
@@ -47,7 +47,7 @@ class Counted(Protocol):
 
 
 def decided(flint: Any, attempt: Callable[[], Result]) -> Result:
-    """Return what an attempt returns at the first working precision at which it raises no :class:`UndecidedError`.
+    """Return the result of an attempt at the lowest working precision that raises no :class:`UndecidedError`.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def negatives(matrix: Sequence[Sequence[Any]]) -> int:
     Raises
     ------
     UndecidedError
-        If a pivot holds zero.
+        If a pivot's ball contains zero.
     """
     rows = [list(row) for row in matrix]
     number = 0
@@ -102,14 +102,15 @@ def enclose(flint: Any, problem: Counted, guesses: Iterable[float]) -> list[tupl
         ``flint`` of python-flint.
     problem : Counted
     guesses : iterable of float
-        Where frequency 1, 2, ... is expected; the better, the faster. They carry no weight in the proof.
+        Estimates of frequencies 1, 2, ...; better ones make it faster, the proof does not depend on them.
 
     Returns
     -------
     list of (arb, arb)
-        Exact lower and upper ends, ascending; (0, 0) for a frequency of 0. Below the lower end lie exactly as many as
-        come before, below the upper end one more: the count makes the set complete. Each is at most 2**-53 wide
-        relative to its frequency. Frequencies that agree to 28 digits share an enclosure, with so many in it.
+        Exact lower and upper ends, ascending; (0, 0) for a frequency of 0. The count shows that exactly as many
+        frequencies lie below the lower end as precede, and one more below the upper end, so that the set is complete.
+        Each is at most 2**-53 wide
+        relative to its frequency. Frequencies that agree to 28 digits share an enclosure.
 
     Raises
     ------
@@ -129,8 +130,8 @@ def _enclosure(flint: Any, problem: Counted, number: int, guess: float) -> tuple
     width = flint.arb(guess) * flint.arb(2) ** (_NEAREST - 1)
     while high - low > width or below < number or above > number + 1:
         if high - low < width * flint.arb(2) ** _EQUAL:
-            break  # a multiple one: it is enclosed with its equals
-        # any point will do, and an exact one costs no width; the half is the guess, which may be the frequency itself
+            break  # a multiple frequency: enclosed together with its equals
+        # any point will do; an exact number adds no width. Not the midpoint: the guess may be the frequency itself
         middle = ((9 * low + 7 * high) / 16).mid()
         counted = problem.count(middle)
         if counted <= number:
@@ -141,7 +142,7 @@ def _enclosure(flint: Any, problem: Counted, number: int, guess: float) -> tuple
 
 
 def _bracket(flint: Any, problem: Counted, number: int, guess: float) -> tuple[Any, Any, int, int]:
-    """Return two points around the guess, with at most ``number`` and with more frequencies below, and how many."""
+    """Return two points around the guess, one with at most ``number`` frequencies below, one with more."""
     centre = flint.arb(guess)
     for exponent in range(_NEAREST, _WIDEST + 1, 3):
         reach = centre * flint.arb(2) ** exponent

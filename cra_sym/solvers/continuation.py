@@ -1,9 +1,9 @@
-"""Arclength continuation of periodic motions of modal equations, through folds, with nothing jumped silently.
+"""Arclength continuation of periodic motions of modal equations, through folds, with a check against branch jumps.
 
 Free motions: the Jacobian of a conservative system is symmetric. Along the curve the number of its negative eigenvalues
-changes by one exactly where the curve turns back in frequency; where it changes otherwise, a step has jumped an
-internal resonance or passed a branch point, and the step is repeated with half its length until one or the other is
-plain. Driven ones: :mod:`cra_sym.solvers.driven_curve`.
+changes by one exactly where the curve turns back in frequency; any other change means that a step has jumped
+an internal resonance or passed a branch point, and the step is halved until it is clear which. Driven motions:
+:mod:`cra_sym.solvers.driven_curve`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Measure = Callable[[Array], tuple[float, Array]]
-"""A positive number of the unknowns, such as the energy, and its gradient."""
+"""A positive function of the unknowns, such as the energy, and its gradient."""
 _LARGEST = 0.05  # step relative to the size of the motion
 _LARGEST_NEAR = 0.25  # the same where the frequency is still that of the linear mode
 _NEAR = 0.005
@@ -51,7 +51,7 @@ class Point:
     ----------
     unknowns : ndarray, shape (size,)
     frequency : float
-        Angular frequency, rad/s, or what else changes along the curve.
+        Angular frequency, rad/s, or another parameter of the curve.
     tangent : ndarray, shape (size + 1,)
         By unknowns and frequency, of length one in the metric of the point.
     mark : int
@@ -59,7 +59,7 @@ class Point:
     step : float
         Length of the step that led here.
     crossing : bool
-        Whether that step, as short as steps get, crosses another curve.
+        Whether that step, of the least length allowed, crosses another curve.
     """
 
     unknowns: Array
@@ -76,23 +76,23 @@ class Point:
 
 
 class Followed(Protocol):
-    """The equations of a curve, its metric, and what tells that a step was too long."""
+    """The equations of a curve, its metric, and the test for steps that are too long."""
 
     @property
     def lowest(self) -> float:
-        """Below the frequencies, or what else changes along the curve."""
+        """Lower limit of the frequency, or of another parameter of the curve."""
 
     def metric(self, unknowns: Array, frequency: float) -> Array:
-        """Return the factors of unknowns and frequency that make a change of all of the motion of size one."""
+        """Return the scale factors of unknowns and frequency: a change as large as the motion has norm one."""
 
     def linearised(self, vector: Array) -> tuple[Array, Array, float]:
         """Return residual, its rates (size, size + 1), and the scale of the residual."""
 
     def mark(self, rates: Array, tangent: Array, metric: Array) -> int:
-        """Return a number that changes where another curve crosses."""
+        """Return an integer that changes where another curve crosses."""
 
     def plain(self, before: int, after: int, turned: bool) -> bool:
-        """Tell whether a change of the mark is that of a step along one curve."""
+        """Tell whether the marks before and after a step are consistent with a step along one curve."""
 
     def longest(self, frequency: float) -> float:
         """Return the longest step."""
@@ -114,7 +114,7 @@ class Curve:
     lowest: float = 0.0
 
     def metric(self, unknowns: Array, frequency: float) -> Array:
-        """Return the factors that make a change of all the energy, and of all the frequency, of size one."""
+        """Return the scale factors: a change as large as the energy, or as the frequency, has norm one."""
         basis, omega = self.balance.basis, self.balance.equations.omega
         energetic = np.sqrt(0.5 * (omega[:, None] ** 2 + (frequency * basis.orders) ** 2)).ravel()
         size = np.linalg.norm(energetic * unknowns)
@@ -136,7 +136,7 @@ class Curve:
         return int((np.linalg.eigvalsh(0.5 * (matrix + matrix.T)) < 0).sum())
 
     def plain(self, before: int, after: int, turned: bool) -> bool:
-        """Tell whether the number changes as it does along one curve."""
+        """Tell whether the change of the number is consistent with a step along one curve."""
         return abs(after - before) == int(turned)
 
     def longest(self, frequency: float) -> float:
@@ -153,18 +153,18 @@ def _tangent(rates: Array, metric: Array, along: Array) -> Array:
     return np.asarray(found / np.linalg.norm(found) / metric)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # an iterate that runs off is told by its residual
+@np.errstate(over="ignore", invalid="ignore")  # a diverging iterate is detected by its residual
 def correct(
     curve: Followed, start: Array, constraint: Callable[[Array], tuple[float, Array]], most: int = 10
 ) -> tuple[Array, Array] | None:
-    """Return the point of the curve near a start that obeys one more equation, with the rates there, or None.
+    """Return the point near a start that satisfies the curve's and one more equation, and the Jacobian; else None.
 
     Parameters
     ----------
     curve : Followed
     start : ndarray, shape (size + 1,)
     constraint : callable
-        Residual of the further equation, of the size of a relative error, and its gradient.
+        Residual of the further equation, as a relative error, and its gradient.
     most : int
         Iterations.
     """
@@ -192,7 +192,7 @@ def correct(
 
 
 def first_point(curve: Curve, unknowns: Array, measure: Measure) -> Point | None:
-    """Return the point near the linear mode with the given motion's measure, looking towards growth."""
+    """Return the point near the linear mode with the measure of the given motion, oriented towards growth."""
     target, _ = measure(unknowns)
 
     def constraint(vector: Array) -> tuple[float, Array]:
@@ -207,7 +207,7 @@ def first_point(curve: Curve, unknowns: Array, measure: Measure) -> Point | None
 
 
 def started(curve: Followed, unknowns: Array, frequency: float, sense: float = 1.0) -> Point | None:
-    """Return the point of a curve at a frequency, looking towards higher ones, or lower ones if ``sense`` is -1."""
+    """Return the point of a curve at a frequency, oriented towards higher ones, or lower ones if ``sense`` is -1."""
     plane = np.zeros(len(unknowns) + 1)
     plane[-1] = 1.0 / curve.metric(unknowns, frequency)[-1]
     found = correct(curve, np.append(unknowns, frequency), lambda z: (float(z[-1] - frequency) * plane[-1], plane), 20)
@@ -215,7 +215,7 @@ def started(curve: Followed, unknowns: Array, frequency: float, sense: float = 1
 
 
 def point_at(curve: Followed, vector: Array, rates: Array, gradient: Array) -> Point:
-    """Return the point of a curve, looking to where a function of this gradient grows."""
+    """Return the point of a curve, oriented towards growth of a function with this gradient."""
     metric = curve.metric(vector[:-1], vector[-1])
     along = gradient / metric
     tangent = _tangent(rates, metric, along / np.linalg.norm(along))
@@ -241,7 +241,7 @@ def follow(curve: Followed, start: Point) -> Iterator[Point]:
 
 
 def _step(curve: Followed, point: Point, length: float) -> Point | None:
-    """Return the next point, or None if the step is too long for what happens along it."""
+    """Return the next point, or None if the step is too long."""
     metric = curve.metric(point.unknowns, point.frequency)
     tangent = point.tangent / np.linalg.norm(point.tangent * metric)
     predicted = point.vector + length * tangent
@@ -270,7 +270,7 @@ def _step(curve: Followed, point: Point, length: float) -> Point | None:
 
 
 def at_value(curve: Followed, before: Point, after: Point, share: float, frequency: float) -> Array | None:
-    """Return the unknowns of the curve at a frequency that it passes at a share of a step."""
+    """Return the unknowns at a frequency that the curve passes at the given share of a step."""
     guess = between(before, after, share)
     found = started(curve, guess[:-1], frequency)
     return None if found is None else found.unknowns

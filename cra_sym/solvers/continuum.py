@@ -1,4 +1,4 @@
-"""A spatial problem by its energies: what Ritz's method on the stresses takes."""
+"""Spatial problem given by its energies: the input of Ritz's method on the stresses."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class PointTerm:
     mass: Array
 
     def take(self, rows: NDArray[np.intp]) -> PointTerm:
-        """Return those of some of the parameter sets."""
+        """Return the terms of some of the parameter sets."""
         return PointTerm(self.node, self.directions[rows], self.springs[rows], self.mass[rows])
 
 
@@ -57,7 +57,7 @@ class Continuum:
         Number of lumped coordinates m.
     coefficients : callable
         ``coefficients(x, rows)`` with x of shape (len(rows), points): 'W', 'B', 'D', 'R' and 'M' by entry, each entry
-        broadcasting to the shape of x. Entries that are not there are zero; of symmetric ones the upper half is there.
+        broadcasting to the shape of x. Missing entries are zero; of symmetric matrices the upper half is given.
     edges : ndarray, shape (rows, spans + 1)
         Left end, breakpoints, right end.
     directions, springs : ndarray, shape (rows, springs, 2 n + m), (rows, springs)
@@ -66,9 +66,9 @@ class Continuum:
     origin : int
         The end from which displacements are integrated, 0 or 1: not one at which a stiffness vanishes.
     points : tuple of PointTerm
-        What acts at breakpoints.
+        Springs and masses at breakpoints.
     variation : Variation, optional
-        How fast the coefficients may vary, unless they are polynomials.
+        Bounds of the variation of the coefficients; None for polynomials.
     """
 
     orders: tuple[int, ...]
@@ -112,7 +112,7 @@ class Continuum:
         return [sum(self.orders[: k + 1]) - 1 for k in range(len(self.orders))]
 
     def sample(self, strained: bool) -> Callable[[Array], Array]:
-        """Return all coefficients as one array: the compliances, or the stiffnesses where the strain is expanded."""
+        """Return all coefficients as one array: compliances, or stiffnesses where the strain is expanded."""
         rows = np.arange(len(self.edges))
 
         def values(x: Array) -> Array:

@@ -1,7 +1,7 @@
-"""Modes that dampers couple, driven by a motion: exponentials of the state matrix, exact for every term of the motion.
+"""Response of modes coupled by dampers to a base motion: matrix exponentials, exact for every term of the motion.
 
-The cause of a term is itself a linear system, s' = S s (a sine and a cosine, or a constant and a ramp). Modes and cause
-together move freely, so that resonance and overdamped modes need no cases.
+Each term of the motion is the output of a linear system s' = S s (a sine and a cosine, or a constant and a ramp). The
+augmented system of modes and s moves freely, so that resonance and overdamped modes need no special case.
 """
 
 from __future__ import annotations
@@ -126,21 +126,21 @@ def _driven(
     times: np.ndarray,
     derivative: int,
 ) -> np.ndarray:
-    """Return the outputs (R, T): the free motion and what each term of the base motion adds."""
+    """Return the outputs (R, T): the free motion plus the response to each term of the base motion."""
     for _ in range(derivative):
         rows, direct = rows @ system, rows @ push
     nothing = _Cause(np.zeros((0, 0)), np.zeros(0), np.zeros(0))
-    moved, _ = _carried(system, push, nothing, state, times)
+    moved, _ = _advance_augmented(system, push, nothing, state, times)
     total = rows @ moved.T
     for term in terms:
-        moved, force = _moved(system, push, term, times)
+        moved, force = _term_response(system, push, term, times)
         total += rows @ moved.T
         if derivative == 2:
             total += direct[:, None] * force
     return np.asarray(total)
 
 
-def _moved(
+def _term_response(
     system: np.ndarray, push: np.ndarray, term: Harmonic | Piecewise, times: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the state (T, 2 N) from rest and the base acceleration (T) of one term."""
@@ -149,7 +149,7 @@ def _moved(
         B, varpi, psi = map(float, term)
         generator = np.array([[0.0, varpi], [-varpi, 0.0]])
         cause = _Cause(generator, np.array([-B * varpi**2, 0.0]), np.array([np.sin(psi), np.cos(psi)]))
-        return _carried(system, push, cause, rest, times)
+        return _advance_augmented(system, push, cause, rest, times)
     ramp, begin = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([1.0, 0.0])
     state, force = np.zeros((len(times), len(push))), np.zeros(len(times))
     for k, knot in enumerate(term.knots):
@@ -157,13 +157,13 @@ def _moved(
         end = term.knots[k + 1] if k + 1 < len(term.knots) else np.inf
         within = (times >= knot) & (times < end)
         if within.any():
-            state[within], force[within] = _carried(system, push, cause, rest, times[within] - knot)
+            state[within], force[within] = _advance_augmented(system, push, cause, rest, times[within] - knot)
         if np.isfinite(end):
-            rest = _carried(system, push, cause, rest, np.array([end - knot]))[0][0]
+            rest = _advance_augmented(system, push, cause, rest, np.array([end - knot]))[0][0]
     return state, force
 
 
-def _carried(
+def _advance_augmented(
     system: np.ndarray, push: np.ndarray, cause: _Cause, state: np.ndarray, times: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return state and base acceleration at the times after a start."""
@@ -171,11 +171,11 @@ def _carried(
     whole = np.zeros((size + len(cause.start),) * 2)
     whole[:size, :size], whole[size:, size:] = system, cause.generator
     whole[:size, size:] = np.outer(push, cause.weight)
-    moved = _free(whole, np.concatenate([state, cause.start]), times)
+    moved = _free_states(whole, np.concatenate([state, cause.start]), times)
     return moved[:, :size], moved[:, size:] @ cause.weight
 
 
-def _free(system: np.ndarray, start: np.ndarray, times: np.ndarray) -> np.ndarray:
+def _free_states(system: np.ndarray, start: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Return the states (T, N) at the times of y' = system y; equidistant times share their exponentials."""
     number = len(times)
     step = (times[-1] - times[0]) / (number - 1) if number > _FEW else 0.0

@@ -1,8 +1,8 @@
 r"""Elastic-slip elements in parallel, distributed over the displacement at which they slip: closed forms.
 
 A distribution is a sum of pieces of stiffness per slip displacement, ``factor phi**exponent`` from ``start`` to
-``stop``, and of single elements. Of one element of stiffness k that slips at phi, under a motion of amplitude a, the
-first harmonic of the force is that of the stiffness k g(phi / a), with
+``stop``, and of single elements. For one element of stiffness k that slips at phi, under a harmonic motion of
+amplitude a, the in-phase first harmonic of the force is that of a stiffness k g(phi / a), with
 
 .. math:: g(s) = (\theta - \cos\theta\sin\theta)/\pi, \quad \cos\theta = 1 - 2s, \quad s < 1,
 
@@ -23,7 +23,7 @@ __all__ = ["Distribution", "Piece"]
 Array = NDArray[np.float64]
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _DECADES = 3.0
-"""Below the largest slip displacement, in which intervals are spaced by one ratio."""
+"""Decades below the largest slip displacement that are divided into intervals of constant ratio."""
 _CENTRED = ((1.0,), (1.0, -0.5), (1.0, -1.0, 0.25), (1.0, -1.5, 0.75, -0.125))  # powers of t - 1/2
 
 
@@ -77,7 +77,7 @@ class Distribution(NamedTuple):
         return cls(tuple(pieces), ())
 
     def _moments(self, until: Array) -> tuple[Array, Array, Array]:
-        """Return the moments 0, 1, 2 of what slips before a displacement."""
+        """Return the moments 0, 1, 2 of the elements that slip before a displacement."""
         total = []
         for order in range(3):
             parts = [piece.moment(order, until) for piece in self.pieces]
@@ -87,16 +87,16 @@ class Distribution(NamedTuple):
 
     @property
     def stiffness(self) -> Array:
-        """Of everything stuck."""
+        """Stiffness with all elements stuck."""
         return self._moments(np.asarray(np.inf))[0]
 
     @property
     def slip(self) -> Array:
-        """Force when everything slips."""
+        """Force when all elements slip."""
         return self._moments(np.asarray(np.inf))[1]
 
     def force(self, displacement: Array) -> Array:
-        """Return the force on the way from rest to a displacement."""
+        """Return the force on first loading from rest to a displacement."""
         size = np.abs(displacement)
         slipped, first, _ = self._moments(size)
         return np.asarray(np.sign(displacement) * (first + size * (self.stiffness - slipped)))
@@ -117,7 +117,7 @@ class Distribution(NamedTuple):
         return np.asarray(np.where(amplitude > 0, total, self.stiffness))
 
     def _of_piece(self, piece: Piece, amplitude: Array) -> Array:
-        """Return the integral of the density times g: by parts, what is left is an incomplete beta function."""
+        """Return the integral of the density times g; integrated by parts it is an incomplete beta function."""
         ends = [np.clip(np.minimum(end, amplitude), piece.start, piece.stop) for end in (piece.start, piece.stop)]
         shares = [np.minimum(end / amplitude, 1.0) for end in ends]
         total = piece.moment(0, piece.stop) - piece.moment(0, ends[1])
@@ -132,14 +132,14 @@ class Distribution(NamedTuple):
     def elements(self, number: int) -> tuple[Array, Array]:
         """Return stiffness and slip force of single elements, shape (..., about number).
 
-        Each piece is cut into intervals of one ratio over the last decades, and two elements with the same first four
-        moments stand for each: stiffness and slip force of the whole are exact, and the relative error of the loss
-        falls with the square of the number.
+        Each piece is divided into intervals of constant ratio over the last decades, and each interval is represented
+        by two elements with the same first four moments. Stiffness and slip force of the whole are exact, and the
+        relative error of the loss falls with the square of the number.
         """
         found = [(np.asarray(k), np.asarray(k * phi)) for k, phi in self.single]
         each = max(1, (number - len(self.single)) // (2 * max(len(self.pieces), 1)))
         for piece in self.pieces:
-            found += [pair for start, stop in _intervals(piece, each) for pair in _two(piece, start, stop)]
+            found += [pair for start, stop in _intervals(piece, each) for pair in _two_elements(piece, start, stop)]
         stiffness, slip = (np.stack(np.broadcast_arrays(*part), axis=-1) for part in zip(*found, strict=True))
         return stiffness, slip
 
@@ -161,7 +161,7 @@ def _intervals(piece: Piece, number: int) -> list[tuple[Array, Array]]:
     return list(itertools.pairwise(edges))
 
 
-def _two(piece: Piece, start: Array, stop: Array) -> list[tuple[Array, Array]]:
+def _two_elements(piece: Piece, start: Array, stop: Array) -> list[tuple[Array, Array]]:
     """Return two elements with the moments 0 to 3 of an interval: a Gauss rule with the density as its weight."""
     middle, half = 0.5 * (start + stop), 0.5 * (stop - start)
     from_zero = start == 0.0

@@ -44,7 +44,7 @@ def driven_states(
     Raises
     ------
     ValueError
-        If the waves are too short to follow, or an infinite stiffness holds what is driven.
+        If the waves are too short, or an infinite stiffness holds the driven coordinate.
     """
     levels = problem.levels(parameter, row)
     if levels.max(initial=0) > _MOST_LEVELS:
@@ -62,7 +62,7 @@ def driven_states(
 
 
 def _moved(matrix: NDArray[np.generic], drive: NDArray[np.generic]) -> NDArray[np.generic]:
-    """Return the coordinates u for drive' u = 1 without other forces; the bordered system serves at antiresonances."""
+    """Return u for drive' u = 1 without other forces, by a bordered system, which is regular at antiresonances."""
     members, size = drive.shape
     largest = np.abs(drive).max(axis=1, keepdims=True)
     bordered = np.zeros((members, size + 1, size + 1), dtype=matrix.dtype)

@@ -1,4 +1,4 @@
-"""Steady vibration on the stress basis: where a stiffness vanishes at an end the dynamic stiffness does not exist."""
+"""Steady vibration on the stress basis, for stiffnesses that vanish at an end (no dynamic stiffness exists then)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["driven_on_basis"]
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 _AIMED, _ACCEPTED = 1e-9, 1e-6  # relative difference of the responses on two meshes
-_MODES = 10  # that the first mesh is made for
+_MODES = 10  # for which the first mesh is made
 _LANES = 1_000_000  # numbers in the largest array of a chunk
 
 
@@ -38,18 +38,19 @@ def driven_on_basis(
     s : ndarray of complex, shape (K,)
         1/s.
     load : callable
-        ``load(basis)`` returns the force on each coordinate of a basis, or what each displaces of what is moved.
+        ``load(basis)`` returns the force on each coordinate of a basis or, for a motion, the driven displacement per
+        unit of each coordinate.
     outputs : callable
         ``outputs(basis)`` returns the rows (outputs, coordinates).
     motion : bool
-        Whether what the load is of moves by one unit, without other forces.
+        Whether the driven displacement is prescribed, with unit amplitude, instead of a force.
     zeta : float
         Modal damping ratio of the structure without dampers.
 
     Raises
     ------
     ValueError
-        If the responses on finer and finer meshes do not settle to 1e-6.
+        If the responses do not converge to 1e-6 under refinement of the mesh.
     """
     ((_, chosen, mesh),) = meshes(problem, _MODES, 1e-10)
     found, error = np.empty((0, len(s)), dtype=complex), np.full(len(s), np.inf)

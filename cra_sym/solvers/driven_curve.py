@@ -31,13 +31,13 @@ class Driven:
     at : callable
         Angular frequency of the period, its rate by the parameter, and the known functions at a value of it.
     size : float
-        Smallest energetic size that a step is measured by: rest is an answer too.
+        Least energy norm by which a step is measured, since rest may be a solution.
     scale : float
-        Change of the parameter that counts as much as one of all of the motion.
+        Change of the parameter that has the same norm as a change as large as the motion.
     moves : bool
         Whether the known functions depend on the parameter.
     lowest : float
-        The parameter is above.
+        Lower limit of the parameter.
     """
 
     balance: Balance
@@ -48,7 +48,7 @@ class Driven:
     lowest: float = 0.0
 
     def metric(self, unknowns: Array, frequency: float) -> Array:
-        """Return the factors that make a change of all the energy, and of one scale of the parameter, of size one."""
+        """Return the scale factors: a change as large as the energy, or of one scale of the parameter, has norm one."""
         basis, omega = self.balance.basis, self.balance.equations.omega
         energetic = np.sqrt(0.5 * (omega[:, None] ** 2 + (self.at(frequency)[0] * basis.orders) ** 2)).ravel()
         return np.append(energetic / np.hypot(np.linalg.norm(energetic * unknowns), self.size), 1.0 / self.scale)

@@ -1,4 +1,4 @@
-"""Modal oscillators driven by a motion: superposition of its terms, each answered in closed form."""
+"""Response of modal oscillators to a base motion: superposition of the closed-form responses to its terms."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def driven_response(
     start : {'inertial', 'base'}
         At rest before t = 0 in the inertial frame or seen from the moving base.
     initial : pair of ndarray, shape (..., modes), optional
-        Modal displacements and velocities at t = 0, beside those of the start.
+        Modal displacements and velocities at t = 0, in addition to those of the start.
     """
     grid, derivative = checked(motion, t, derivative, start)
     modes = osc.omega.shape[:-1]
@@ -54,11 +54,11 @@ def driven_response(
     return total if total.shape == wanted else np.broadcast_to(total, wanted).copy()
 
 
-_LONGEST = 1e15  # s: beyond it not even a slow mode has a phase
+_LONGEST = 1e15  # s; beyond it the phase of even a slow mode is lost to rounding
 
 
 def checked(motion: Any, t: Any, derivative: Any, start: Any) -> tuple[np.ndarray, int]:
-    """Return the times as one axis and the derivative, or raise an error that names what is not allowed."""
+    """Return the times as one axis and the derivative, or raise an error that names the invalid argument."""
     instance("motion", motion, BaseMotion)
     times = np.atleast_1d(one_axis("t", t, "times", low=0.0, high=_LONGEST, unit="s"))
     check_start(start)
@@ -96,8 +96,8 @@ def _steady(osc: solver.Oscillators, motion: BaseMotion, start: Start) -> solver
 def state_at_stop(osc: solver.Oscillators, motion: BaseMotion, stop: Any = None) -> tuple[np.ndarray, np.ndarray]:
     """Return q and q' when the base stops accelerating, or at a later time, shape (..., modes).
 
-    Of a slow mode q' is the difference of integrals that are nearly equal, of which rounding would leave nothing. There
-    it follows from the integral of q'' + 2 zeta omega q' + omega^2 q = -Gamma w'' over time, in which q is -Gamma w.
+    For a slow mode q' is the difference of nearly equal integrals, which cancellation would destroy. It is then
+    computed from the integral of q'' + 2 zeta omega q' + omega^2 q = -Gamma w'' over time, in which q is -Gamma w.
     """
     stop = _column(motion.duration if stop is None else stop)
     rest = np.zeros(1), -osc.gamma * _column(motion.velocity(0.0))
@@ -108,19 +108,23 @@ def state_at_stop(osc: solver.Oscillators, motion: BaseMotion, stop: Any = None)
         q_piece, u_piece = solver.free_motion(osc, stop - piece.knots[..., -1:], end)
         q, u = q + q_piece, u + u_piece
     speed = _column(motion.velocity(np.max(stop)))
-    still = np.abs(speed) <= _STOPPED * _column(_way_of_velocity(motion))
+    still = np.abs(speed) <= _STOPPED * _column(_velocity_variation(motion))
     impulse = np.where(still, 0.0, -osc.gamma * speed)
     omega = osc.omega
-    slow = impulse - 2 * osc.zeta * omega * q + omega**2 * osc.gamma * _column(_area(motion, stop[..., 0]))
+    slow = (
+        impulse
+        - 2 * osc.zeta * omega * q
+        + omega**2 * osc.gamma * _column(_integrated_displacement(motion, stop[..., 0]))
+    )
     return q, np.where(omega.real * stop < _SLOW, slow, u)
 
 
 _SLOW = 3e-5  # rad in the time of the move: beyond the square of it, an eps of q' over omega counts more
-_STOPPED = 1e-9  # of all changes of the velocity: what is left of them is rounding
+_STOPPED = 1e-9  # of the sum of all velocity changes: a remainder below this share is rounding
 
 
-def _way_of_velocity(motion: BaseMotion) -> np.ndarray:
-    """Return the sum of all changes of the velocity, m/s."""
+def _velocity_variation(motion: BaseMotion) -> np.ndarray:
+    """Return the total variation of the velocity, m/s."""
     total = np.zeros(motion.shape)
     for piece in (term for term in motion.terms if isinstance(term, Piecewise)):
         span, a, j = np.diff(piece.knots), piece.acceleration[..., :-1], piece.jerk[..., :-1]
@@ -128,8 +132,8 @@ def _way_of_velocity(motion: BaseMotion) -> np.ndarray:
     return total
 
 
-def _area(motion: BaseMotion, stop: np.ndarray) -> np.ndarray:
-    """Return the integral of the displacement up to a time, m s: that of y^2 w'' / 2 over the time y left, by parts."""
+def _integrated_displacement(motion: BaseMotion, stop: np.ndarray) -> np.ndarray:
+    """Return the integral of the displacement up to a time, m s: by parts that of y^2 w'' / 2, y the time to go."""
     total = np.zeros(motion.shape)
     for piece in (term for term in motion.terms if isinstance(term, Piecewise)):
         left = stop[..., None] - piece.knots

@@ -1,7 +1,7 @@
-"""Every natural frequency of a dynamic stiffness: brackets from the exact count, Newton on one eigenvalue of K.
+"""All natural frequencies of a dynamic stiffness: brackets from the exact count, Newton's method on an eigenvalue of K.
 
-Damped problems have complex eigenvalues and no count: given starting guesses are refined together, so that no two end
-on one root, but completeness is not promised.
+Damped problems have complex eigenvalues and no count: given starting values are refined together, so that no two
+converge to one root, but completeness is not guaranteed.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ __all__ = ["lowest", "refine"]
 
 _NOISE = 512 * np.finfo(float).eps
 _SOFT, _BLURRED = 1e-8, 1e-14
-"""Relative rounding of a root that is left to Ritz values, and of one whose shape takes part in them."""
+"""Relative rounding error above which a root is replaced by a Ritz value, and above which its shape is used for it."""
 _SWEEPS = 200
 
 
@@ -40,9 +40,9 @@ def lowest(problem: DynamicStiffness, modes: int) -> np.ndarray:
 
     Notes
     -----
-    A root found on the stiffness is replaced by the Rayleigh quotient of its shape, which the rounding of the stiffness
-    enters squared; those near that rounding (soft joints, heavy tips) by Ritz values of their shapes together. What
-    remains below 1e-24 of the first elastic bound is a rigid-body zero.
+    Each root is replaced by the Rayleigh quotient of its shape, in which the rounding error of the stiffness appears
+    squared; roots near that error (soft joints, heavy tips) are replaced by Ritz values on their common span. A value
+    below 1e-24 of the first elastic bound is a rigid-body zero.
     """
     rows = len(problem.length)
     every = np.arange(rows)
@@ -91,7 +91,7 @@ def _polish(problem: DynamicStiffness, z: np.ndarray, noise: np.ndarray, bounds:
 
 
 def _rigid_count(static: Evaluation) -> np.ndarray:
-    """Return how many rigid-body motions each row has; refuse a structure that has buckled."""
+    """Return the number of rigid-body motions of each row; refuse a structure that has buckled."""
     if static.matrix.shape[-1] == 0:
         return np.zeros(len(static.matrix), dtype=int)
     value, vector = np.linalg.eigh(static.matrix)
@@ -155,7 +155,7 @@ def _next_point(
 
 
 def _newton(here: Evaluation, mode: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return whether the eigenvalue of K that vanishes at a mode exists, the Newton step on it, the count, rounding."""
+    """Return whether K has the eigenvalue that vanishes at a mode, its Newton step, the count, and rounding."""
     value, vector = np.linalg.eigh(here.matrix)
     count = here.fixed_count + (value < 0.0).sum(axis=1)
     index = mode - 1 - here.fixed_count
@@ -204,12 +204,12 @@ def refine(
     guesses : ndarray of complex, shape (rows, modes)
         Of s.
     squared : bool
-        The parameter is z. Of the two s of a root the one near the guess is returned.
+        Whether the parameter is z; then the one of the two s of a root that is nearer to the guess is returned.
 
     Returns
     -------
     ndarray of complex, shape (rows, modes)
-        Roots of the characteristic function; nan where the iteration did not settle.
+        Roots of the characteristic function; nan where the iteration did not converge.
     """
     s = -(guesses**2) if squared else np.array(guesses, dtype=complex)
     rows, modes = s.shape

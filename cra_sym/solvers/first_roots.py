@@ -1,4 +1,4 @@
-"""Where polynomials on [0, 1] first fall below zero: isolated by Descartes' rule of signs, so that none is missed."""
+"""First root of polynomials on [0, 1], isolated by Descartes' rule of signs so that none is missed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 __all__ = ["first_roots", "hull", "rounding"]
 
 Array = NDArray[np.float64]
-_ROUNDING = 16 * np.finfo(float).eps  # of the sum of the magnitudes of the coefficients: what counts as zero
+_ROUNDING = 16 * np.finfo(float).eps  # values below this share of the sum of the coefficients' magnitudes count as zero
 _HALVINGS = 40
 _ITERATIONS = 80
 
@@ -20,8 +20,8 @@ _ITERATIONS = 80
 def _bernstein(degree: int) -> Array:
     """Return the matrix that takes coefficients of powers to those of Bernstein's polynomials on [0, 1].
 
-    A polynomial lies in the hull of the latter, and has at most as many roots as they have changes of sign; as many, if
-    that is none or one.
+    A polynomial lies in the convex hull of the latter. It has at most as many roots as they have sign changes, and
+    exactly as many for none or one.
     """
     matrix = np.array([[comb(j, k) / comb(degree, k) for k in range(degree + 1)] for j in range(degree + 1)])
     matrix.flags.writeable = False
@@ -44,15 +44,15 @@ def hull(coefficients: Array) -> tuple[Array, Array]:
 
 
 def rounding(coefficients: Array) -> Array:
-    """Return what counts as zero among the values of polynomials, shape (members,)."""
+    """Return the rounding error of the values of polynomials, shape (members,)."""
     return np.asarray(_ROUNDING * np.abs(coefficients).sum(axis=0))
 
 
 def first_roots(coefficients: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return how far on [0, 1] polynomials are followed, and whether they fall below zero there.
+    """Return the position on [0, 1] up to which each polynomial is resolved, and whether it crosses zero there.
 
-    A polynomial with two roots or more in reach is followed to a place before the second; one that starts at zero and
-    falls does so at 0.
+    A polynomial with several roots is resolved up to a position before the second; one that starts at zero and
+    decreases crosses at 0.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def first_roots(coefficients: Array) -> tuple[Array, NDArray[np.bool_]]:
         open_ = open_[(lead > 0) & (changes > 1)]
         if not open_.size:
             break
-        if halving == _HALVINGS:  # roots that rounding does not tell apart
+        if halving == _HALVINGS:  # roots that rounding makes indistinguishable
             falls[open_] = (coefficients[:, open_] * place[open_] ** powers).sum(axis=0) < 0
         else:
             place[open_] /= 2
@@ -92,7 +92,7 @@ def _signs(signs: Array) -> tuple[Array, NDArray[np.intp]]:
     """Return the first sign that is not zero, and how often the sign changes, of each column."""
     there = signs != 0
     last = np.maximum.accumulate(np.where(there, np.arange(len(signs))[:, None], 0), axis=0)
-    filled = np.take_along_axis(signs, last, axis=0)  # zeros take the sign before them
+    filled = np.take_along_axis(signs, last, axis=0)  # zeros take the preceding sign
     lead = np.take_along_axis(signs, there.argmax(axis=0)[None], axis=0)[0]
     return lead, (filled[1:] * filled[:-1] < 0).sum(axis=0)
 

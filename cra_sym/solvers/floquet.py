@@ -1,10 +1,11 @@
 r"""Floquet theory for :math:`\ddot q + 2C\dot q + (\Omega^2 + \sum_r g_r(t) P_r)\,q = 0`, many systems at once.
 
 The excitation is :math:`g_r = s_r / (1 + \lambda_r s_r)` with :math:`s_r` epsilon times a cosine or sine of a multiple
-of :math:`\varpi t`; :math:`\lambda_r` is zero but for statics of other modes. Between kicks of the excitation every
-mode moves exactly (damped oscillation in closed form), so the step follows the excitation, not the highest mode. The
-kicks sit at the nodes of Gauss and Legendre; the middle one also carries the commutator that makes the composition of
-fourth order (Laskar and Robutel, 2001). The result is symmetric in time, and symplectic without damping.
+of :math:`\varpi t`; :math:`\lambda_r` is nonzero only for the static correction of omitted modes. A step is a
+splitting: between kicks of the excitation every mode moves exactly (damped oscillation in closed form), so that the
+step size is set by the excitation, not by the highest mode. The kicks are at the Gauss-Legendre nodes; the middle one
+includes the commutator that makes the composition fourth order (Laskar and Robutel, 2001). The result is symmetric in
+time, and symplectic without damping.
 """
 
 from __future__ import annotations
@@ -31,10 +32,10 @@ __all__ = [
 _NODES, KICKS = (0.5 * np.array(row) for row in np.polynomial.legendre.leggauss(3))
 _NODES = _NODES + 0.5
 DRIFTS = np.diff([0.0, *_NODES, 1.0])
-#: Weight of the nested commutator in one step: what the quadrature misses of the double integral of |s - t|.
+#: Weight of the nested commutator in one step: the quadrature error of the double integral of |s - t|.
 COMMUTATOR = float(1.0 / 3.0 - KICKS @ np.abs(_NODES[:, None] - _NODES) @ KICKS) / 2
 _BLOCK = 512  # systems propagated together, small enough for the cache
-MOST_STEPS = 1e7  # a period: minutes
+MOST_STEPS = 1e7  # steps per period, which take minutes
 
 
 class Oscillation(NamedTuple):
@@ -115,7 +116,7 @@ class Oscillators:
         )
         waves = tuple(oscillations or [Oscillation(1, "cos", 0)] * terms)
         if {kind for _, kind, _ in waves} == {"sin"} and len({order for order, _, _ in waves}) == 1:
-            waves = tuple(Oscillation(order, "cos", power) for order, _, power in waves)  # a quarter of a turn later
+            waves = tuple(Oscillation(order, "cos", power) for order, _, power in waves)  # a quarter of a period later
         varpi, size = flat(frequency, shape, 0), flat(epsilon, shape, 0)
         shared = coupling.size == terms * modes * modes
         matrices = coupling.reshape(terms, modes, modes, 1) if shared else flat(coupling, shape, 3)
@@ -132,13 +133,13 @@ class Oscillators:
 
     @property
     def mirrored(self) -> bool:
-        """Whether couplings are symmetric and the excitation even in time: half of a period then tells the other."""
+        """Whether couplings are symmetric and the excitation even in time: half a period then gives the whole."""
         even = all(kind == "cos" for _, kind, _ in self.oscillations)
         return even and bool(np.array_equal(self.coupling, self.coupling.swapaxes(1, 2)))
 
     @property
     def conservative(self) -> bool:
-        """Whether all systems are mirrored without damping."""
+        """Whether all systems are without damping and symmetric in time."""
         return self.mirrored and not self.decay.any()
 
     def steps(self, tolerance: float) -> np.ndarray:
@@ -306,9 +307,9 @@ def _whole_maps(batch: Oscillators, tolerance: float, loop: Loop | None) -> np.n
 def whole_period(half: np.ndarray, damping: np.ndarray, parity: np.ndarray) -> np.ndarray:
     r"""Return maps of (q, dq/dt) over a period from those over its first half, shape (points, 2N, 2N).
 
-    With the matrix A(t) of the equations even in time and X constant such that :math:`AX = XA^T`, time reversed is X
-    times the adjoint equation, so that the second half of the period is :math:`X\Phi^TX^{-1}`. There is one where a
-    change of the signs of some q turns K(t) and the constant C into their transposes.
+    Let the matrix A(t) of the equations be even in time and X a constant matrix with :math:`AX = XA^T`. Time reversal
+    then gives the adjoint equation transformed by X, so that the map of the second half is :math:`X\Phi^TX^{-1}`. Such
+    an X exists where a change of the signs of some q transposes K(t) and the constant C.
 
     Parameters
     ----------
@@ -339,7 +340,7 @@ def _conservative_exponents(batch: Oscillators, tolerance: float, loop: Loop | N
 
     The excitation is even in time, so the second half of the period is the first one mirrored: with the blocks a, b,
     c, d of the half-period map, :math:`\sinh^2(sT/2)` are the eigenvalues of :math:`b^Tc`, and :math:`\cosh^2(sT/2)`
-    those of :math:`d^Ta`. The smaller of the two is used: a double multiplier 1 or -1 then costs no digits.
+    those of :math:`d^Ta`. The smaller of the two is used, so that a double multiplier 1 or -1 loses no digits.
     """
     maps = _maps(batch, 0.5, tolerance, loop)
     n = maps.shape[-1] // 2

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Template of the compiled twin of the inner loop of `cra_sym.solvers.floquet`: the same steps, in one pass each.
+"""Template of the compiled version of the inner loop of `cra_sym.solvers.floquet`: the same steps, in one pass each.
 
 This text is compiled by `cra_sym.kernels.compiled`. The batch axis is innermost, so that its loops vectorise.
 """

@@ -1,4 +1,4 @@
-"""Histories of a force: constant, harmonic, sampled, as the acceleration of a motion is."""
+"""Force histories: constant, harmonic, sampled, in the form of the acceleration of a motion."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .records import timed_last
 
 __all__ = ["Force"]
 
-_UNITS = "N or N m or N/m"  # of a place, of a turn, along a line
+_UNITS = "N or N m or N/m"  # on a displacement, on a rotation, distributed
 
 
 class Force:
@@ -42,7 +42,7 @@ class Force:
     """
 
     profile: BaseMotion
-    """The motion whose acceleration the force is."""
+    """Motion whose acceleration equals the force."""
 
     def __init__(self, level: Any = 0.0, amplitude: Any = 0.0, angular_frequency: Any = 0.0, phase: Any = 0.0) -> None:
         units = {"level": _UNITS, "amplitude": _UNITS, "angular_frequency": "rad/s", "phase": "rad"}

@@ -1,7 +1,7 @@
 """Harmonic balance of modal equations: alternating frequency and time, with exact Jacobians.
 
-The action over a period is stationary for harmonic test functions, so neither accelerations nor their rates are needed,
-and the samples are as many as make the sums exact.
+The action over a period is stationary for harmonic test functions, so neither accelerations nor their derivatives are
+needed. The number of samples makes the sums exact.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from cra_sym.solvers.modal_polynomials import Derivatives, ModalPolynomials
 __all__ = ["Balance", "Basis", "flattened", "newton", "peak"]
 
 Array = NDArray[np.float64]
-_SHORTEST = 1.0 / 64  # share of a step of Newton's method
+_SHORTEST = 1.0 / 64  # least share of a damped Newton step
 
 
 def flattened(known: Array) -> Array:
-    """Return known functions, shape (points, known functions, samples a point), with one axis of samples."""
+    """Merge the axes of points and samples of known functions (points, known functions, samples)."""
     points, functions, samples = known.shape
     return known.swapaxes(0, 1).reshape(functions, points * samples)
 
@@ -196,10 +196,10 @@ def newton(
     most: int = 40,
     whole: bool = False,
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return answers of harmonic balance at given frequencies, many at once, and which converged.
+    """Return solutions of harmonic balance at given frequencies, many at once, and which converged.
 
-    Newton's method; a step that does not lessen the residual is halved, unless ``whole`` steps are asked for: these
-    may leave the neighbourhood of the start, and find answers that others do not.
+    Newton's method; a step that does not reduce the residual is halved, unless ``whole`` is set. Undamped steps may
+    leave the neighbourhood of the start and find further solutions.
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ def newton(
     frequency : ndarray, shape (points,)
     causes : ndarray, shape (points, known functions, samples), optional
     floor : float
-        Force below which a residual counts as rounding: zero is an answer too.
+        Force below which a residual counts as rounding, since zero may be a solution.
     tolerance : float
         Residual relative to the forces that balance.
     most : int
@@ -263,7 +263,7 @@ def peak(basis: Basis, rows: Array, coefficients: Array) -> tuple[Array, Array]:
     grid = 2 * np.pi * np.arange(number) / number
     values = series @ basis.values(grid).T
     best, where = np.full(len(series), -1.0), np.zeros(len(series))
-    for sign in (1.0, -1.0):  # the highest sample of each side, moved to the extremum by Newton
+    for sign in (1.0, -1.0):  # the largest and the smallest sample, refined by Newton's method
         phase = grid[(sign * values).argmax(axis=1)]
         for _ in range(6):
             slope, bend = ((series * basis.values(phase, k)).sum(axis=1) for k in (1, 2))

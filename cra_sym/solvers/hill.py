@@ -15,7 +15,7 @@ def hill_exponents(
     r"""Return all Floquet exponents of :math:`\ddot q + 2C\dot q + (\Omega^2 + \epsilon\cos\varpi t\,P)\,q = 0`.
 
     With :math:`q = e^{st}\sum_k c_k e^{ik\varpi t}` the zeros s of Hill's determinant are the eigenvalues of a banded
-    matrix. It knows nothing of the integration in :mod:`cra_sym.solvers.floquet`: the two check each other.
+    matrix. It is independent of the integration in :mod:`cra_sym.solvers.floquet`, so that each checks the other.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def hill_exponents(
         P, symmetric or not.
     angular_frequency, epsilon : float
     harmonics : int
-        Highest k; the error falls faster than any power of it once ``harmonics * varpi`` exceeds the frequencies.
+        Highest k; convergence is faster than any power of k once ``harmonics * varpi`` exceeds the frequencies.
 
     Returns
     -------
@@ -47,11 +47,11 @@ def hill_exponents(
 
 
 def _one_strip(values: np.ndarray, frequency: float, wanted: int) -> np.ndarray:
-    """Return one of each family s + i k varpi: those in a strip whose edge lies where no exponent is near."""
+    """Return one member of each family s + i k varpi: those in a strip whose edges are far from all exponents."""
     inner = values[np.abs(values.imag) < frequency]
     turns = np.sort(np.mod(inner.imag / frequency, 1.0))
     gaps = np.diff(np.append(turns, turns[0] + 1.0))
-    cut = np.mod(turns[gaps.argmax()] + gaps.max() / 2, 1.0) - 1.0  # the strip runs from the middle of the widest gap
+    cut = np.mod(turns[gaps.argmax()] + gaps.max() / 2, 1.0) - 1.0  # the strip starts in the middle of the widest gap
     found = inner[(inner.imag >= cut * frequency) & (inner.imag < (cut + 1.0) * frequency)]
     if found.size != wanted:
         raise ValueError(f"harmonics: too few to separate the {wanted} exponents ({found.size} found)")

@@ -1,4 +1,4 @@
-"""A linear system of states with names: a scipy StateSpace that can be discretised exactly and handed on."""
+"""Linear systems with named states: a scipy StateSpace with exact discretisation and export to python-control."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class NamedSystem(StateSpace):  # type: ignore[misc]
     Attributes
     ----------
     state_names, input_names, output_names : tuple of str
-        ``inputs`` and ``outputs`` are their numbers, as SciPy has it.
+        ``inputs`` and ``outputs`` are the numbers of these, as in SciPy.
     """
 
     def __init__(

@@ -1,7 +1,7 @@
 """The lowest complex modes of one parameter set as a real linear system: an invariant subspace of the pencil.
 
-Bases of the subspace and of its partner for the forces come from ordered real Schur forms, so that modes that meet, as
-at critical damping and at flutter, need no case of their own.
+Bases of the right and the left invariant subspace come from ordered real Schur forms, so that coalescing modes, as at
+critical damping and at flutter, need no special case.
 """
 
 from __future__ import annotations
@@ -22,28 +22,26 @@ __all__ = ["BasisModes", "LowestMotions", "lowest_motions", "modal_damping"]
 
 _SETTLED = 1e-9
 """Relative difference of the eigenvalues on two meshes."""
-_MIDDLE, _ASTRAY = 2, 1e-2  # mesh of all motions, and relative difference of eigenvalues that are none
+_MIDDLE, _ASTRAY = 2, 1e-2  # mesh for all motions, and relative difference beyond which an eigenvalue is spurious
 _OBLIQUE = 3.0
-"""How much larger than a state a part of it may be: of orthogonal modes, as without dampers, never."""
-_SAME = 1e-6  # relative difference of moduli that are not told apart: a pair is not split
-_AT_ONCE = 1e3  # rate of decay over the last oscillating eigenvalue asked for
+"""Largest accepted norm of the projection on the motions; it is 1 for orthogonal modes, as without dampers."""
+_SAME = 1e-6  # relative difference of moduli that count as equal: a pair is not split
+_AT_ONCE = 1e3  # decay rate over the last oscillating eigenvalue requested
 _TOGETHER = 1e-3  # relative distance of eigenvalues that share a block
-_STILL = (
-    1e-5  # modulus, over the largest, of eigenvalues that may be zero: a rigid motion's are known to half the digits
-)
-_SLANTED = 1e8  # condition of motions that are not told apart
+_STILL = 1e-5  # modulus over the largest below which an eigenvalue may be a zero, known to half its digits
+_SLANTED = 1e8  # condition number beyond which motions are not separated into blocks
 _LIGHT = 1e-7  # square root of a mass, relative to the largest, below which a coordinate has none
 
 
 @dataclass(frozen=True, eq=False)
 class BasisModes:
-    """The coordinates of a pencil of one set as modes: what each of them displaces."""
+    """The coordinates of the pencil of one parameter set, with the interface of modes."""
 
     problem: Reduced
 
     @property
     def omega(self) -> Array:
-        """Nothing but the shape: one entry a coordinate."""
+        """Placeholder array with one entry per coordinate; only its shape is used."""
         return np.zeros(self.problem.root_mass.shape[1])
 
     @cached_property
@@ -175,10 +173,10 @@ def _invariant(system: Array, s: NDArray[np.complex128], group: NDArray[np.intp]
 
 
 def lowest_motions(problem: GeneralContinuum, modes: int, zeta: float, *, whole: bool = False) -> LowestMotions:
-    """Return the motions of as many eigenvalues as that many oscillators have, or one more than splits a pair.
+    """Return the motions of the 2 ``modes`` lowest eigenvalues, or one more where that would split a pair.
 
-    Where dampers resist the strains (Kelvin-Voigt) eigenvalues crowd, and none of these can be left out: then all
-    motions of a basis are returned in which the first oscillating ones have settled, but for what decays at once.
+    With dampers of the strains (Kelvin-Voigt) eigenvalues accumulate and none of these can be omitted. Then all motions
+    of a basis in which the first oscillating ones have converged are returned, except those that decay almost at once.
 
     Parameters
     ----------
@@ -188,14 +186,14 @@ def lowest_motions(problem: GeneralContinuum, modes: int, zeta: float, *, whole:
     zeta : float
         Modal damping ratio of the structure without dampers.
     whole : bool
-        Return all motions of a basis for so many natural modes without dampers where the eigenvalues do not settle, or
-        their modes make a poor sum: an end that takes up the waves, or nearly so, leaves a motion without eigenvalues,
-        or with modes that all but depend on each other.
+        Return all motions of a basis for that many undamped modes where the eigenvalues do not converge or the modes
+        are ill-conditioned: with an end that absorbs the waves, or nearly so, there are no eigenvalues, or the modes
+        are almost linearly dependent.
 
     Raises
     ------
     ValueError
-        If the eigenvalues do not settle, or there is modal damping of a structure without natural modes.
+        If the eigenvalues do not converge, or modal damping is given for a structure without natural modes.
     """
     ((_, chosen, mesh),) = meshes(problem, 2 * modes, 1e-10)
     before: NDArray[np.complex128] | None = None
@@ -205,7 +203,7 @@ def lowest_motions(problem: GeneralContinuum, modes: int, zeta: float, *, whole:
         first, second = one.pencil()
         first, second = first[0], second[0]
         second[: len(one.stiffness[0]), : len(one.stiffness[0])] += modal_damping(one, zeta)
-        s = _all(first, second)
+        s = _all_eigenvalues(first, second)
         if turn == _MIDDLE:
             middle = one, first, second, 2.0 * float(np.abs(s[-1]))
         if one.columns.resists_strains:
@@ -214,33 +212,33 @@ def lowest_motions(problem: GeneralContinuum, modes: int, zeta: float, *, whole:
                 worst = float((np.abs(matched(swinging[None], before[None])[0] / swinging - 1.0)).max(initial=0.0))
                 if worst < _SETTLED:
                     radius = _AT_ONCE * float(np.abs(swinging[-1])) if len(swinging) else np.inf
-                    return _motions(one, first, second, min(radius, 2.0 * float(np.abs(s[-1]))))
+                    return _invariant_subspaces(one, first, second, min(radius, 2.0 * float(np.abs(s[-1]))))
             before = s
             continue
-        number = _number(s, 2 * modes)
+        number = _cutoff(s, 2 * modes)
         if before is not None:
             near = matched(s[None, :number], before[None])[0]
             scale = np.maximum(np.abs(s[:number]), 1e-3)
-            # where some meet each is known to half its digits
+            # coalescing eigenvalues are accurate to half the digits
             worst = float((np.abs(near - s[:number]) / scale).max())
-            if worst < _SETTLED or _moments(near, s[:number]) < _SETTLED:
+            if worst < _SETTLED or _power_sum_difference(near, s[:number]) < _SETTLED:
                 beyond = s[number] if number < len(s) else 4.0 * s[-1]
-                found = _motions(one, first, second, float(np.sqrt(np.abs(s[number - 1] * beyond))))
+                found = _invariant_subspaces(one, first, second, float(np.sqrt(np.abs(s[number - 1] * beyond))))
                 if not whole or found.oblique < _OBLIQUE:
                     return found
-                return _motions(one, first, second, 2.0 * float(np.abs(s[-1])))
+                return _invariant_subspaces(one, first, second, 2.0 * float(np.abs(s[-1])))
         before = s
         if whole and turn > _MIDDLE and worst > _ASTRAY:
             break
     if whole and middle is not None:
-        return _motions(*middle)
+        return _invariant_subspaces(*middle)
     raise ValueError(
         f"modes = {modes}: the eigenvalues of so many modes settle to {worst:.1g} only; ask for fewer modes. An end "
         "that takes up the waves leaves none"
     )
 
 
-def _all(first: Array, second: Array) -> NDArray[np.complex128]:
+def _all_eigenvalues(first: Array, second: Array) -> NDArray[np.complex128]:
     """Return all eigenvalues by ascending modulus, in units of the rate."""
     mu = np.linalg.eigvals(np.linalg.solve(first + SHIFT * second, second))
     mu = mu[np.abs(mu) > 1e-13 * np.abs(mu).max()]
@@ -248,8 +246,8 @@ def _all(first: Array, second: Array) -> NDArray[np.complex128]:
     return np.asarray(s[np.argsort(np.abs(s), kind="stable")], dtype=complex)
 
 
-def _number(s: NDArray[np.complex128], least: int) -> int:
-    """Return how many of the lowest to take so that the next has a larger modulus."""
+def _cutoff(s: NDArray[np.complex128], least: int) -> int:
+    """Return the number of the lowest eigenvalues to take so that the next one has a larger modulus."""
     if len(s) < least:
         raise ValueError(f"modes = {least // 2}: the model has only {len(s)} eigenvalues")
     size, number = np.abs(s), least
@@ -258,8 +256,8 @@ def _number(s: NDArray[np.complex128], least: int) -> int:
     return number
 
 
-def _moments(near: NDArray[np.complex128], s: NDArray[np.complex128]) -> float:
-    """Return the relative difference of the sums of s and of s^2, which are well known where eigenvalues meet."""
+def _power_sum_difference(near: NDArray[np.complex128], s: NDArray[np.complex128]) -> float:
+    """Return the relative difference of the sums of s and of s^2, which are accurate where eigenvalues coalesce."""
     size = np.abs(s).sum()
     return float(max(abs((near - s).sum()) / size, abs((near**2 - s**2).sum()) / size**2))
 
@@ -282,7 +280,7 @@ def modal_damping(one: Reduced, zeta: float) -> Array | float:
     return np.asarray(found)
 
 
-def _motions(one: Reduced, first: Array, second: Array, radius: float) -> LowestMotions:
+def _invariant_subspaces(one: Reduced, first: Array, second: Array, radius: float) -> LowestMotions:
     rate, k = float(one.rate[0]), one.root_mass.shape[1]
     shifted = first + SHIFT * second
 
@@ -290,7 +288,7 @@ def _motions(one: Reduced, first: Array, second: Array, radius: float) -> Lowest
         mu = complex(real, imaginary)
         return mu != 0.0 and abs(SHIFT - 1.0 / mu) <= radius
 
-    # (A + shift B)^-1 B maps the motions to themselves, its partner (A + shift B)^-T B^T the tests of the forces
+    # (A + shift B)^-1 B has the motions as invariant subspace, (A + shift B)^-T B^T the test functions
     _, right, number = schur(solve(shifted, second), sort=lowest)
     _, left, same = schur(solve(shifted.T, second.T), sort=lowest)
     if number != same:
@@ -302,7 +300,7 @@ def _motions(one: Reduced, first: Array, second: Array, radius: float) -> Lowest
     root = one.root_mass[0]
     light = root < _LIGHT * root.max()
     per_root = np.where(light, 0.0, 1.0 / np.where(light, 1.0, root))
-    units = np.zeros((len(first), k))  # w = (d, e, g) of displacements at rest
+    units = np.zeros((len(first), k))  # w = (d, e, g) of static displacements
     units[:k] = np.diag(per_root**2)
     units[2 * k :] = np.maximum(one.constants[0], 1.0)[:, None] * (first[2 * k :, :k] @ units[:k])
     return LowestMotions(

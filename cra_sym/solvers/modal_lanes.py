@@ -2,15 +2,15 @@
 # mypy: ignore-errors
 """Template of the compiled twin of `cra_sym.solvers.one_wave_shapes`: the same, for blocks of lanes, mode by mode.
 
-This text is specialised by `cra_sym.kernels.compiled` with the functions it leaves open, those of one structure. Sizes
-and lists of arguments replace the marks: capital letters between double underscores.
+This text is specialised by `cra_sym.kernels.compiled` with the functions of one structure. Placeholders for sizes and
+argument lists are capital letters between double underscores.
 """
 
 import numpy as np
 
 _NEAR = __NEAR__
 _LANES = 64
-_STEP = 16  # lanes worked on are a multiple of it, so that no loop needs a remainder
+_STEP = 16  # lanes are padded to a multiple of it, so that no loop needs a remainder
 _FIRST = __FIRST__  # rows up to the amplitudes of waves, the momentum among them
 _MOMENTUM = __MOMENTUM__
 _WAVES = __WAVES_SIZE__

@@ -110,24 +110,24 @@ class ModalPolynomials(ByValue):
 
     @cached_property
     def odd(self) -> bool:
-        """Whether reversed displacements obey the same equations, without known functions of time."""
+        """Whether the equations without known functions of time are unchanged under q -> -q."""
         free = [term for term in self.energies if not term.causes], [term for term in self.forces if not term.causes]
         even = all((term.positions + term.velocities) % 2 == 0 for term in free[0])
         return even and all((term.positions + term.velocities) % 2 for term in free[1])
 
     @cached_property
     def moves_mass(self) -> bool:
-        """Whether the nonlinear terms hold velocities."""
+        """Whether the nonlinear terms contain velocities."""
         return any(term.velocities for term in (*self.energies, *self.forces))
 
     @cached_property
     def by_velocity(self) -> tuple[bool, bool]:
-        """Whether forces, and whether momenta, of the terms beside the linear ones depend on velocities."""
+        """Whether the forces, and whether the momenta, of the nonlinear terms depend on velocities."""
         mixed = any(term.positions and term.velocities for term in self.energies)
         return mixed or any(term.velocities for term in self.forces), any(t.velocities > 1 for t in self.energies)
 
     def free(self) -> ModalPolynomials:
-        """Return the same without damping, forces and known functions of time."""
+        """Return the equations without damping, forces and known functions of time."""
         kept = tuple(term for term in self.energies if not term.causes)
         return ModalPolynomials(self.omega, np.zeros_like(self.damping), kept)
 
@@ -181,7 +181,7 @@ class ModalPolynomials(ByValue):
         return np.asarray(value.reshape(q.shape[:-1]))
 
     def derivatives(self, q: Array, v: Array, causes: Array | None = None) -> Derivatives:
-        """Return forces, momenta and their rates of the terms beside the linear ones.
+        """Return forces, momenta and their rates of the nonlinear terms.
 
         Parameters
         ----------
@@ -229,7 +229,7 @@ class ModalPolynomials(ByValue):
         load : ndarray, shape (samples, modes), optional
             Further forces.
         whole : bool
-            False leaves out those of the undamped linear modes.
+            If False, those of the undamped linear modes are left out.
         """
         found, pull = self.derivatives(q, v, causes), self.omega**2 * q
         force = found.force - v @ self.damping.T + load

@@ -1,5 +1,4 @@
-"""Forced modal oscillators in closed form: uniform grids by exact shifts and one matrix product, any other times
-directly.
+"""Closed-form response of forced modal oscillators; on uniform grids by exact shifts and one matrix product.
 
 Every oscillator obeys q'' + 2 zeta omega q' + omega^2 q = -gamma w''. Its unit responses come as two callables:
 ``free(t, omega, zeta)`` with the keys displacement, impulse, step, ramp, and ``forced(t, omega, zeta, varpi)``, the
@@ -28,7 +27,7 @@ __all__ = [
 ]
 
 Array = np.ndarray
-_LONG = 64  # samples from which the ways for long records gain something
+_LONG = 64  # number of samples from which the methods for long records are faster
 _CHUNK = 1 << 18  # elements of a temporary array
 
 
@@ -73,7 +72,7 @@ class Piecewise(NamedTuple):
 
 
 class _Shift(NamedTuple):
-    """What the passing of a time does to an oscillator, exact for any length of that time."""
+    """Exact propagation of an oscillator over a time of any length."""
 
     p: Array
     h: Array
@@ -128,7 +127,7 @@ def _widened(osc: Oscillators, axis: int) -> Oscillators:
 def steady_response(osc: Oscillators, cause: Steady, t: Array, derivative: int = 0) -> Array:
     """Return the outputs at the times ``t`` (1-D) or a derivative of them, shape (..., R, T).
 
-    A uniform grid is answered by :func:`_grid_response`, other times one by one.
+    A uniform grid is evaluated by :func:`_grid_response`, other times one by one.
     """
     step = _uniform_step(t)
     if step is not None:
@@ -197,15 +196,15 @@ def knot_states(osc: Oscillators, cause: Piecewise) -> tuple[Array, Array]:
 def _uniform_states(osc: Oscillators, cause: Piecewise, step: float, shape: tuple[int, ...]) -> tuple[Array, Array]:
     """Return q and q' at every knot of a uniform record, from rest at the first.
 
-    The record is cut into blocks as long as there are blocks. All of them are followed at once from rest, then from
-    block to block, and what a block began with is added to it by an exact shift.
+    The record is divided into blocks, as many as their length. All blocks are propagated at once from rest, then the
+    states at their starts from block to block, and the response to these is added by exact shifts.
     """
     count = cause.knots.size - 1
     length = int(np.ceil(np.sqrt(count)))
     blocks = -(-count // length)
 
     def cut(values: Array) -> Array:
-        """Bring values a knot (..., K) into the shape (length, ..., 1, blocks)."""
+        """Reshape values by knot (..., K) to (length, ..., 1, blocks)."""
         padded = np.zeros((*values.shape[:-1], blocks * length))
         padded[..., :count] = values[..., :count]
         return np.moveaxis(padded.reshape(*values.shape[:-1], 1, blocks, length), -1, 0).copy()
@@ -237,7 +236,7 @@ def _uniform_states(osc: Oscillators, cause: Piecewise, step: float, shape: tupl
 
 
 def _knots_at(knots: Array, t: Array) -> Array | None:
-    """Return the knot that each time is, or None if one is none of them."""
+    """Return the index of the knot at each time, or None if some time is not a knot."""
     if knots.ndim > 1 or t.size < _LONG or knots.size < 2:
         return None
     step = (knots[-1] - knots[0]) / (knots.size - 1)
@@ -245,7 +244,7 @@ def _knots_at(knots: Array, t: Array) -> Array | None:
     if not (at.min() >= 0 and at.max() < knots.size):
         return None
     found = at.astype(np.intp)
-    # closer than rounding of the times or 1e-9 of a step: the state moves by less than that share of what a step does
+    # within rounding of the times or 1e-9 of a step, the change of the state is that share of its change in a step
     slack = 1e-9 * step + 4 * np.finfo(float).eps * np.abs(knots[-1])
     return found if np.max(np.abs(t - knots[found])) <= slack else None
 
@@ -280,7 +279,7 @@ def _in_parts(function: Callable[[Array], Array], t: Array, width: int) -> Array
 
 
 def _uniform_step(t: Array) -> float | None:
-    """Return the step of an increasing uniform grid, or None if ``t`` is none or too short to gain anything."""
+    """Return the step of an increasing uniform grid, or None if ``t`` is not one or is too short to be worth it."""
     if t.size < 64:
         return None
     step = (t[-1] - t[0]) / (t.size - 1)
@@ -291,9 +290,9 @@ def _uniform_step(t: Array) -> float | None:
 def _grid_response(osc: Oscillators, cause: Steady, start: float, step: float, count: int, derivative: int) -> Array:
     """Return the outputs at ``start + step * arange(count)``, shape (..., R, count).
 
-    The motion is a linear system, so its response at t + tau is a row that depends on tau times a state that depends
-    on t. The state is shifted from block to block, the row through one block, and one matrix product gives all times.
-    Beyond the result this needs about 2 sqrt(count) (2 N + 1 + 2 harmonics) numbers a parameter set.
+    The system is linear, so the output at t + tau is a row that depends on tau times a state that depends on t. The
+    state is shifted from block to block, the row through one block, and one matrix product gives all times. Besides the
+    result this needs memory for about 2 sqrt(count) (2 N + 1 + 2 harmonics) numbers per parameter set.
     """
     length = int(np.ceil(np.sqrt(count)))
     blocks = -(-count // length)
@@ -325,7 +324,7 @@ def _state_table(osc: Oscillators, cause: Steady, times: Array, step: float) -> 
 
 
 def _row_table(osc: Oscillators, cause: Steady, step: float, length: int, derivative: int) -> Array:
-    """Return what each entry of a state contributes to the output ``step * arange(length)`` later.
+    """Return the contribution of each entry of a state to the output ``step * arange(length)`` later.
 
     The shape is (..., R, length, columns). A row y(tau) = r_q q + r_u q' + ... is shifted by substituting the shifted
     state into it.
@@ -357,7 +356,7 @@ def _row_table(osc: Oscillators, cause: Steady, step: float, length: int, deriva
 
 
 def _output_row(osc: Oscillators, derivative: int) -> tuple[Array, Array, Array]:
-    """Return what q, q' and the base acceleration contribute to the wanted derivative of the outputs."""
+    """Return the factors of q, q' and the base acceleration in a derivative of the outputs."""
     c, none = osc.rows, np.zeros_like(osc.rows)
     if derivative == 2:
         return -c * osc.omega**2, -2 * c * osc.zeta * osc.omega, -np.sum(c * osc.gamma, -1)
@@ -375,9 +374,9 @@ def free_motion(osc: Oscillators, tau: Array, state: tuple[Array, Array]) -> tup
 def free_peak(osc: Oscillators, q: Array, u: Array) -> Array:
     """Return the largest absolute value each freely vibrating oscillator reaches from q, q' on, shape (..., N).
 
-    It is the initial value or the first turning point after it. An oscillator of frequency zero keeps its value, or
-    leaves without bound if it has a velocity. Complex values may carry a derivative along in their imaginary parts:
-    the turning time, where the velocity is zero, is stationary and stays real.
+    It is the initial value or the first extremum after it. An oscillator of frequency zero keeps its value, or grows
+    without bound if it has a velocity. The imaginary parts of complex values may hold a complex-step derivative: the
+    time of the extremum, where the velocity is zero, stays real.
     """
     omega = osc.omega.real
     delta, damped = osc.zeta * omega, omega * np.sqrt(1 - osc.zeta**2)

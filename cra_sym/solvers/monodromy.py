@@ -1,8 +1,9 @@
-"""Floquet multipliers of periodic answers: the equations of variation over one period, many answers at once.
+"""Floquet multipliers of periodic solutions: the variational equations over one period, many solutions at once.
 
-A step is exact for the stiffness at its middle, so that steps need only follow how the stiffness changes, however fast
-the modes are. Where velocities mix the modes it turns the linear ones exactly and applies the rest at its middle by a
-Cayley transform. Both keep a system without damping symplectic: multipliers of stable motions lie on the unit circle.
+A step is exact for the stiffness at its midpoint, so that its length is set by the change of the stiffness, not by the
+fastest mode. Where velocities couple the modes, a step propagates the linear modes exactly and applies the remainder at
+its midpoint by a Cayley transform. Both are symplectic without damping: multipliers of stable motions lie on the unit
+circle.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Causes = Callable[[Array, NDArray[np.intp]], Array]
 """Known functions at phases of shape (samples,) for some points, shape (points, known functions, samples)."""
-_BLOCK = 2_000_000  # entries of matrices that are held at a time
+_BLOCK = 2_000_000  # matrix entries in memory at a time
 _LEVELS = 6
 
 
@@ -66,8 +67,8 @@ def even_monodromy(
 ) -> Array:
     """Return the maps over one period of motions of a system without damping that are sums of cosines.
 
-    The equations of variation are even in time: the second half of the period is the first one mirrored. If all
-    multiples are odd, and the system is, their period is half as long.
+    The variational equations are even in time, so that the first half of the period gives the second. If all multiples
+    are odd, and so is the system, the period of these equations is half as long.
     """
     halves = 2 if equations.odd and all(order % 2 for order in basis.cosines) else 1
     n, share = equations.modes, 0.5 / halves
@@ -95,20 +96,20 @@ def _maps(
     known = None if causes is None else flattened(causes(phase, rows))
     rest = beside_linear(equations, q, v, known).reshape(points, steps, 2 * n, 2 * n)
     h = 2 * np.pi * share / (frequency * steps)
-    maps = _turned_and_kicked(equations, rest, h) if _mixes(equations) else _frozen(equations, rest, h)
+    maps = _split_maps(equations, rest, h) if _mixes(equations) else _midpoint_maps(equations, rest, h)
     while maps.shape[1] > 1:
         maps = maps[:, 1::2] @ maps[:, 0::2]
     return maps[:, 0]
 
 
 def _mixes(equations: ModalPolynomials) -> bool:
-    """Whether forces depend on velocities, but for the damping of each mode, or have no energy."""
+    """Whether forces depend on velocities (apart from the damping of each mode) or have no potential."""
     diagonal = np.diag(np.diag(equations.damping))
     return equations.moves_mass or bool(equations.forces) or bool(np.any(equations.damping != diagonal))
 
 
-def _frozen(equations: ModalPolynomials, rest: Array, h: Array) -> Array:
-    """Return the maps over steps of length h (points,), each with the stiffness of its middle: by its own modes."""
+def _midpoint_maps(equations: ModalPolynomials, rest: Array, h: Array) -> Array:
+    """Return the maps over steps of length h (points,), exact for the stiffness at the midpoint of each."""
     n, damping = equations.modes, np.diag(equations.damping)
     square, shape = np.linalg.eigh(np.diag(equations.omega**2) - rest[:, :, n:, :n])
     h = h[:, None, None]
@@ -127,15 +128,15 @@ def _frozen(equations: ModalPolynomials, rest: Array, h: Array) -> Array:
     return maps
 
 
-def _turned_and_kicked(equations: ModalPolynomials, rest: Array, h: Array) -> Array:
-    """Return the maps over steps of length h (points,): the linear modes, and what is beside them at the middle."""
+def _split_maps(equations: ModalPolynomials, rest: Array, h: Array) -> Array:
+    """Return the maps over steps of length h (points,): linear modes exactly, the remainder at the midpoint."""
     one, scaled = np.eye(2 * equations.modes), rest * h[:, None, None, None]
     turn = _rotation(equations.omega, 0.5 * h)[:, None]
     return np.asarray(turn @ np.linalg.solve(one - 0.5 * scaled, one + 0.5 * scaled) @ turn)
 
 
 def beside_linear(equations: ModalPolynomials, q: Array, v: Array, causes: Array | None) -> Array:
-    """Return the matrix of the equations of variation in (q, p) without the undamped linear modes."""
+    """Return the matrix of the variational equations in (q, p) without the undamped linear modes."""
     n, found = equations.modes, equations.derivatives(q, v, causes)
     matrix = np.zeros((len(q), 2 * n, 2 * n))
     drag = found.force_v - equations.damping
@@ -170,7 +171,7 @@ def multipliers(
     tolerance: float = 1e-9,
     even: bool = False,
 ) -> Complex:
-    """Return the Floquet multipliers, by extrapolation of the maps to infinitely many steps.
+    """Return the Floquet multipliers, by Richardson extrapolation of the maps in the number of steps.
 
     Parameters
     ----------
@@ -184,7 +185,7 @@ def multipliers(
     Returns
     -------
     complex ndarray, shape (points, 2 modes)
-        Largest first; infinite where they are beyond the range of numbers.
+        Largest first; infinite where they overflow.
     """
     maps = _extrapolated(equations, basis, coefficients, frequency, causes, tolerance, even)
     if not (equations.damping.any() or equations.forces):
@@ -195,7 +196,7 @@ def multipliers(
     return np.take_along_axis(values, np.argsort(-np.abs(values), axis=1, kind="stable"), axis=1)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # what is beyond the range of numbers is told as such
+@np.errstate(over="ignore", invalid="ignore")  # overflow gives infinite multipliers
 def _extrapolated(
     equations: ModalPolynomials,
     basis: Basis,
@@ -205,7 +206,7 @@ def _extrapolated(
     tolerance: float,
     even: bool,
 ) -> Array:
-    """Return the limit of the maps over one period for ever more steps."""
+    """Return the maps over one period, extrapolated in the number of steps."""
     found = np.empty((len(frequency), 2 * equations.modes, 2 * equations.modes))
     open_ = np.arange(len(frequency))
     turns = float((equations.omega.max() / frequency).max(initial=1.0)) if _mixes(equations) else 0.0
@@ -213,7 +214,7 @@ def _extrapolated(
     table: list[Array] = []
     for level in range(_LEVELS):
         chosen = equations, basis, coefficients[open_], frequency[open_], steps << level
-        some = None if causes is None else _of(causes, open_)
+        some = None if causes is None else _of_members(causes, open_)
         row = [even_monodromy(*chosen) if even else monodromy(*chosen, some)]
         for k, before in enumerate(table):
             row.append(row[k] + (row[k] - before) / (4.0 ** (k + 1) - 1))
@@ -230,7 +231,7 @@ def _extrapolated(
 
 
 def _symplectic(maps: Array) -> Array:
-    """Return the nearby maps that keep volumes in phase, which extrapolated ones of a system with an energy do not.
+    """Return the nearest symplectic maps, since extrapolation of a conservative system's maps is not symplectic.
 
     Newton's method for M' J M = J: its steps are M (1 + J E / 2) with E = M' J M - J.
     """
@@ -241,5 +242,5 @@ def _symplectic(maps: Array) -> Array:
     return maps
 
 
-def _of(causes: Causes, members: NDArray[np.intp]) -> Causes:
+def _of_members(causes: Causes, members: NDArray[np.intp]) -> Causes:
     return lambda phase, rows: causes(phase, members[rows])

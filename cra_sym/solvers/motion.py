@@ -15,7 +15,7 @@ from .records import KINDS, spline_motion, timed_last, uniform_times
 __all__ = ["FASTEST", "BaseMotion", "Harmonic", "Piecewise"]
 
 FASTEST = 1e15
-"""rad/s, beyond which responses are not even finite."""
+"""rad/s; beyond it responses overflow."""
 
 Array = np.ndarray
 
@@ -28,12 +28,12 @@ class BaseMotion:
     Parameters
     ----------
     velocity : float or ndarray
-        Mean velocity v, m/s. A velocity at t = 0 is an impulse to an arm that was at rest.
+        Mean velocity v, m/s. A velocity at t = 0 acts as an impulse on an arm at rest.
     acceleration : float or ndarray
         Mean acceleration a, m/s2.
     amplitude, angular_frequency, phase : float or ndarray
-        Disturbance: B in m, varpi in rad/s (0 to 1e15), psi in rad. The phase varpi t is known to rounding only: a
-        response in which a mode of omega takes part is off by the order of 1e-16 B varpi^2 t / omega.
+        Disturbance: B in m, varpi in rad/s (0 to 1e15), psi in rad. The phase varpi t has a rounding error: that of
+        the response of a mode of frequency omega is of the order of 1e-16 B varpi^2 t / omega.
 
     Raises
     ------
@@ -50,10 +50,10 @@ class BaseMotion:
     """
 
     __array_ufunc__ = None  # an array times a motion is a batch of motions, not an array of objects
-    __pandas_priority__ = 5000  # and a series too
+    __pandas_priority__ = 5000  # and likewise for a pandas Series
     terms: tuple[Term, ...]
     sample_step: float | None = None
-    """Time between the samples of a record, s; None of a motion that is not one."""
+    """Time between the samples of a record, s; None for other motions."""
 
     def __init__(
         self,
@@ -131,8 +131,8 @@ class BaseMotion:
         sampling_rate : float, optional
             Samples per second, Hz, where ``t`` is None: the first sample is at t = 0.
         exact : bool
-            Whether the samples are the corners of the motion, with nothing between them that the record does not tell.
-            Else responses warn where modes lie above half the sampling rate (`UndersamplingWarning`).
+            Whether the interpolated record is the motion exactly. Otherwise responses warn if modes lie above half the
+            sampling rate (`UndersamplingWarning`).
 
         Raises
         ------
@@ -172,7 +172,7 @@ class BaseMotion:
         Parameters
         ----------
         distance : float or ndarray
-            Way, m; negative moves backwards.
+            Distance, m; negative moves backwards.
         v_max, a_max : float or ndarray
             Limits of velocity (may be infinite), m/s, and acceleration, m/s2; positive.
         duration : float or ndarray, optional

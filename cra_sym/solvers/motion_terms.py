@@ -1,4 +1,4 @@
-"""What a motion of the base is a sum of: harmonics, and accelerations that are linear from knot to knot."""
+"""Terms of a base motion: harmonics, and piecewise-linear accelerations."""
 
 from __future__ import annotations
 

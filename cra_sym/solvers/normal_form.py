@@ -2,9 +2,9 @@ r"""Where two modes resonate with a periodic excitation: the boundary of instabi
 
 For :math:`\dot z = (A_0 + \epsilon A_1(t) + \epsilon^2 A_2(t)) z` a solution
 :math:`e^{st}\sum_k z_k e^{ik\varpi t}` obeys Hill's infinite equations. Near a resonance two of their unperturbed
-eigenvalues meet, :math:`\lambda_a` and :math:`\lambda_b + iT\varpi`; all other states are eliminated to second
-order (Bloch 1958), with exact receptances, so that every mode of the matrices responds. What remains are two
-equations, and the boundary is where one of their exponents loses its decay. Damping, gyroscopic and follower forces
+eigenvalues coincide, :math:`\lambda_a` and :math:`\lambda_b + iT\varpi`; all other states are eliminated to second
+order (Bloch 1958), with exact receptances, so that every mode of the matrices takes part. Two equations remain, and
+on the boundary the real part of one of their exponents is zero. Damping, gyroscopic and follower forces
 are part of :math:`A_0`.
 """
 
@@ -21,7 +21,7 @@ __all__ = ["Boundary", "Expansion", "Pair", "boundary", "eigenpairs"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-_TURNS = 8  # the boundary enters its own coefficients: each turn gains an order of epsilon
+_TURNS = 8  # the coefficients depend on the boundary itself: each iteration gains an order of epsilon
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Pair(NamedTuple):
 
 
 class Boundary(NamedTuple):
-    """Both sides of a zone, rad/s, and how strongly the excitation feeds the pair (positive where it can)."""
+    """Both sides of a zone, rad/s, and the strength of the excitation of the pair (positive where it destabilises)."""
 
     lower: Array
     upper: Array
@@ -74,7 +74,7 @@ def eigenpairs(still: Array) -> tuple[Complex, Complex, Complex]:
     others, left = np.linalg.eig(still.swapaxes(1, 2))
     count = int((values.imag > 1e-9 * np.abs(values).max(axis=1, keepdims=True)).sum(axis=1).min())
     order = np.argsort(np.where(values.imag > 0, values.imag, np.inf), axis=1)[:, :count]
-    # the same multiset twice, but for rounding: pair by the closest
+    # the same eigenvalues twice, up to rounding: pair the closest
     values = np.take_along_axis(values, order, axis=1)
     right = np.take_along_axis(right, order[:, None, :], axis=2).swapaxes(1, 2)
     match = np.abs(values[:, :, None] - others[:, None, :]).argmin(axis=2)
@@ -112,7 +112,7 @@ def _marginal(
 ) -> tuple[Array, Complex]:
     """Return the frequency at which ``(s - own[0]) (s - own[1] + detuning) = through`` has s imaginary, and that s.
 
-    With damping of one of the two alone a real ``through > 0`` makes s grow at every detuning: infinite frequencies.
+    If only one of the two is damped, a real ``through > 0`` gives growth at every detuning: infinite frequencies.
     """
     fall, other = -own[0].real, -own[1].real
     total, product = fall + other, fall * other
@@ -165,10 +165,10 @@ def _reduced(
 def _receptance(
     still: Array, pair: Pair, shifts: tuple[int, int], place: int, exponent: Complex, force: Complex
 ) -> Complex:
-    """Return the answer of all states of a harmonic but the two of the pair."""
+    """Return the response of all states of a harmonic except the two of the pair."""
     matrix = exponent[:, None, None] * np.eye(still.shape[-1]) - still
     for k in (0, 1):
-        if shifts[k] == place:  # this state is kept: its share is taken out, its singular term filled
+        if shifts[k] == place:  # this state is retained: its contribution is removed and its singular term regularised
             left, right = pair.left[k], pair.right[k]
             force = force - right * (left * force).sum(axis=1, keepdims=True)
             matrix = matrix + np.abs(pair.values[k])[:, None, None] * right[:, :, None] * left[:, None, :]

@@ -1,4 +1,4 @@
-"""The characteristic function of lines with one wave number as numbers, behind the interface of the complete spectrum.
+"""Numerical characteristic function of lines with one wave number, with the interface of the complete spectrum.
 
 The functions themselves are derived elsewhere, for each structure: two ends, each a tuple of the kinds of its channels
 (see `cra_sym.mechanics.one_wave`). Here are their values on arrays of lanes.
@@ -23,12 +23,12 @@ Counts = NDArray[np.int64]
 Structure = tuple[tuple[str, ...], tuple[str, ...]]
 
 NEAR = {1: 2.0, 2: 5.0}
-"""Below this z power series are used; a test holds it and the derivation's together."""
+"""Below this z power series are used; a test checks that it equals the value in the derivation."""
 _ORDER = {1: (1, 0), 2: (1, 2, 0, 3)}
 
 
 class Function(Protocol):
-    """What `cra_sym.kernels` makes."""
+    """A compiled function of `cra_sym.kernels`."""
 
     @property
     def function(self) -> Callable[..., Any]:
@@ -40,7 +40,7 @@ Functions = Mapping[str, Function]
 
 @dataclass(frozen=True)
 class Layout:
-    """Where what belongs to a structure stands in rows of numbers.
+    """Row numbers of the quantities of a structure in its arrays.
 
     Attributes
     ----------
@@ -82,8 +82,9 @@ class Layout:
 
     @cached_property
     def changes(self) -> tuple[int | tuple[int, int], ...]:
-        """What each link of the chain may do to the count: 1, -1, or -1 where the first parameter exceeds z times the
-        second, else 1.
+        """Change of the count by each link of the chain.
+
+        It is 1, -1, or a pair of parameters: -1 where the first exceeds z times the second, else 1.
         """
         found: list[int | tuple[int, int]] = []
         for channel in _ORDER[self.n]:
@@ -100,18 +101,18 @@ class Layout:
 
     @property
     def most_near(self) -> int:
-        """How many zeros there may be below `NEAR`: the reference has none, and so many links may raise the count."""
+        """Largest number of zeros below `NEAR`: the reference has none, and each link may add one."""
         return sum(change != -1 for change in self.changes)
 
     def is_held(self, groups: Sequence[Array], channel: int) -> NDArray[np.bool] | bool:
-        """Return where a spring or a support resists the displacement of a channel."""
+        """Return for which sets a spring or a support resists the displacement of a channel."""
         if "k" not in self.kinds[channel]:
             return self.kinds[channel] == "h"
         held: NDArray[np.bool] = groups[self.groups.index((channel, "k"))] > 0
         return held
 
     def rigid_body_modes(self, groups: Sequence[Array], lanes: int | tuple[int, ...]) -> Counts:
-        """Return how many rigid-body motions no spring and no support resists, of the shape of the lanes."""
+        """Return the number of rigid-body motions without a spring or support, with the shape of the lanes."""
         n = self.n
         resisted = [np.asarray(self.is_held(groups, i)).astype(np.int64) for i in range(2 * n)]
         rank = resisted[0] + resisted[n]
@@ -134,7 +135,7 @@ def wave_number(z: Any, n: int) -> Any:
 def parameters(layout: Layout, groups: Sequence[Array]) -> Array:
     """Return ``(s, i, c) = (kappa, mu, 1) / (1 + kappa + mu)`` of every channel, shape (parameters, lanes).
 
-    An infinite stiffness gives (1, 0, 0). Only what the structure has is there.
+    An infinite stiffness gives (1, 0, 0). Only parameters of the structure are returned.
     """
     by_group = dict(zip(layout.groups, groups, strict=True))
     rows: list[Array] = []

@@ -14,7 +14,8 @@ __all__ = ["NEAR", "Table", "fill", "integral", "near_shape", "rate_rows", "shap
 
 Array = NDArray[np.float64]
 NEAR = {1: 2.0, 2: 25.0}
-"""Below this z a shape is a power series from the left end; a test holds it and the derivation's together."""
+"""Below this z a shape is a power series from the left end; a test checks that it equals the value in the
+derivation."""
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(16)  # exact to rounding up to `NEAR`
 
 
@@ -55,7 +56,7 @@ class Table(Layout):
 
     @property
     def state(self) -> slice:
-        """q and P of the left end and the amplitudes of the waves: what describes a shape."""
+        """q and P of the left end and the amplitudes of the waves, which determine a shape."""
         return slice(2 * self.n + 1, 6 * self.n + 1)
 
     @property
@@ -104,8 +105,8 @@ def fill(
     ----------
     table : ndarray, shape (rows, size)
     lam : ndarray, shape (size,)
-        All first frequency parameters of each lane, one lane after the other; complex values carry a derivative along
-        in their imaginary parts: everything here is analytic.
+        All first frequency parameters of each lane, one lane after the other; the imaginary parts may hold a
+        complex-step derivative, since all formulas are analytic.
     modes : int
         Of each lane.
     layout : Table

@@ -1,7 +1,7 @@
 # mypy: ignore-errors
-"""What the compiled twins take for a stiffness and a mass of an end, infinite ones included: pairs that add up to 1.
+"""End stiffness and mass of the compiled versions as pairs that add up to 1, so that they may be infinite.
 
-This text stands before those of `cra_sym.solvers.spectrum_lanes` and `cra_sym.solvers.modal_lanes`.
+This text is put before those of `cra_sym.solvers.spectrum_lanes` and `cra_sym.solvers.modal_lanes`.
 """
 
 import numpy as np

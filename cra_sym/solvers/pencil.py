@@ -1,7 +1,7 @@
 """Any linear motion on the stress basis: dampers, gyroscopic forces and forces that follow the motion included.
 
-In motions of unit strain energy, unloaded and without dampers, the problem of motions ``exp(s t)`` is
-``(K + s C + s^2 S^2) d = 0`` with K one plus what further forces add, and S the square root of the mass. With
+In a basis of unit strain energy the problem of motions ``exp(s t)`` is ``(K + s C + s^2 S^2) d = 0``, with K the unit
+matrix plus the stiffness of further forces, and S the square root of the mass. With
 ``e = s S d``, and ``g = c b' d`` for a strong damper c on ``b' d``, it is a linear pencil ``(A + s B) w = 0`` of
 bounded matrices, and the largest ``1 / (s - shift)`` belong to the lowest eigenvalues.
 """
@@ -27,22 +27,22 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Index = NDArray[np.intp]
 SHIFT = 0.7318
-"""Real and positive, in units of the rate, a natural frequency without dampers and loads: no eigenvalue of a problem
-that somebody states lies there."""
+"""Shift, in units of the rate (a natural frequency without dampers and loads); real and positive, far from the
+eigenvalues of practical problems."""
 _SLOW = 1e-2
 """Eigenvalues that are taken without a shift, in the same unit."""
 _STRONG = 1e3
-"""Dampers beyond this, in the same unit, have their force as an unknown."""
+"""Dampers beyond this constant, in the same unit, have their force as a further unknown."""
 _HEAVY, _SPREAD = 4, 1e-3
 """Where the fifth root of a mass is this much smaller than the first (soft springs, heavy ends), the eigenvalues of the
 mass have lost digits, and its singular values take their place."""
 _NEVER = 1e-13
-"""Of 1 / (s - shift) relative to the largest: infinite eigenvalues, which have no motion."""
+"""Values of 1 / (s - shift) below this share of the largest belong to infinite eigenvalues, without a motion."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class GeneralContinuum(Continuum):
-    """A continuum with forces of any kind beside its energies, which are then positive.
+    """A continuum with forces of any kind besides its energies, which must be positive.
 
     Its coefficients have two more parts, of pairs of jets (highest derivatives h of the fields, then s): 'N' and 'C',
     the forces on the first by the second and by its velocity.
@@ -50,13 +50,13 @@ class GeneralContinuum(Continuum):
     Attributes
     ----------
     end_forces : ndarray, shape (2, rows, 2 n + m, 2 n + m)
-        What displacements and velocities of ends and lumped coordinates add to the forces there.
+        Further forces on ends and lumped coordinates per unit of their displacements and velocities.
     point_forces : tuple of ndarray, shape (2, rows, n + m, n + m)
         The same at each of the points.
     dampers : tuple of ndarray, shape (rows, dampers, 2 n + m), (rows, dampers)
-        Directions at the ends and damping constants, beside the end forces.
+        Directions at the ends and damping constants, in addition to the end forces.
     damped : bool
-        Whether there are forces of velocities at all.
+        Whether any forces depend on velocities.
     """
 
     end_forces: Array
@@ -93,7 +93,7 @@ class GeneralContinuum(Continuum):
         return values
 
     def loaded(self) -> GeneralContinuum:
-        """Return the problem with the potential energy of displacements among the forces: it need not be positive."""
+        """Return the problem with the potential energy of displacements as forces, since it need not be positive."""
         fields = len(self.orders)
 
         def coefficients(x: Array, rows: Index) -> dict[str, dict[tuple[int, int], Array]]:
@@ -185,13 +185,13 @@ class Reduced:
         return first, second
 
     def eigenvalues(self) -> Complex:
-        """Return all eigenvalues s, rad/s, by ascending modulus, nan behind the last, shape (sets, number).
+        """Return all eigenvalues s, rad/s, by ascending modulus, padded with nan, shape (sets, number).
 
-        A rigid-body motion that nothing accelerates is one zero.
+        A free rigid-body motion counts as one zero.
         """
         found = self._of_velocities() if self.damped else self._of_squares()
         if self.rigid:
-            _rest(self, found)
+            _set_rigid_zeros(self, found)
         found = np.take_along_axis(found, np.argsort(np.abs(found), axis=1, kind="stable"), axis=1)
         return found * self.rate[:, None]
 
@@ -202,9 +202,9 @@ class Reduced:
         return self.rate / np.maximum(elastic[:, place], 1e-100)
 
     def lossless(self) -> NDArray[np.bool_]:
-        """Return in which sets the eigenvalues come in pairs s and -s: no force does work on a motion and its reverse.
+        """Return for which sets the eigenvalues come in pairs s and -s, since no force dissipates or supplies energy.
 
-        There are no velocities in the forces, or they are gyroscopic and all others have a potential.
+        Either no force depends on velocities, or those that do are gyroscopic and all others have a potential.
         """
         if not self.damped:
             return np.ones(len(self.sets), dtype=bool)
@@ -216,14 +216,14 @@ class Reduced:
         return np.asarray(unused | (gyroscopic & potential & ~self.constants.any(axis=1)))
 
     def _of_squares(self) -> Complex:
-        """Return both s of every s^2: for forces of displacements alone."""
+        """Return both s of every s^2, where forces depend on displacements only."""
         s = self.root_mass
         matrix = self.stiffness.copy()
         diagonal = np.arange(s.shape[1])
         matrix[:, diagonal, diagonal] += SHIFT * s**2
         with np.errstate(divide="ignore", invalid="ignore"):
             mu = np.linalg.eigvals(s[:, :, None] * np.linalg.solve(matrix, s[:, :, None] * np.eye(s.shape[1])))
-            squares = SHIFT - 1.0 / np.where(_small(mu), np.nan, mu)  # s^2
+            squares = SHIFT - 1.0 / np.where(_is_graded(mu), np.nan, mu)  # s^2
             root = np.sqrt(squares.astype(complex))
         return np.concatenate([root, -root], axis=1)
 
@@ -243,17 +243,17 @@ class Reduced:
 def _inverted(first: Array, second: Array, shift: float) -> Complex:
     with np.errstate(divide="ignore", invalid="ignore"):
         mu = np.linalg.eigvals(np.linalg.solve(first + shift * second, second))
-        return np.asarray(shift - 1.0 / np.where(_small(mu), np.nan, mu), dtype=complex)
+        return np.asarray(shift - 1.0 / np.where(_is_graded(mu), np.nan, mu), dtype=complex)
 
 
-def _small(mu: NDArray[np.generic]) -> NDArray[np.bool_]:
+def _is_graded(mu: NDArray[np.generic]) -> NDArray[np.bool_]:
     size = np.abs(mu)
     small: NDArray[np.bool_] = size <= _NEVER * size.max(axis=1, keepdims=True)
     return small
 
 
-def _rest(problem: Reduced, found: Complex) -> None:
-    """Put one zero for every motion without stiffness in place of the eigenvalues it has there (in place)."""
+def _set_rigid_zeros(problem: Reduced, found: Complex) -> None:
+    """Replace, in place, the eigenvalues of each motion without stiffness by one zero."""
     left, size, right = np.linalg.svd(problem.stiffness)
     for row in range(len(found)):
         still = size[row] <= 1e-11 * size[row].max(initial=1.0)

@@ -1,4 +1,4 @@
-"""Complex eigenvalues of stated accuracy: the lowest of a pencil on one mesh must come back on a finer one."""
+"""Complex eigenvalues of stated accuracy: the lowest of a pencil must agree on two successive meshes."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _STEPS = 4, 6  # degrees between the first two meshes, and between later ones
 _MOST_DEGREE, _MOST_UNKNOWNS = 34, 420
 _LANES = 400_000  # numbers in the largest array of a chunk
 _NEAR = 1e-3
-"""Relative distance of two eigenvalues that are compared by their mean and their product: where they meet, each of them
-is known to half the digits only, by nature."""
+"""Relative distance below which two eigenvalues are compared by their mean and their product: coalescing eigenvalues
+are each accurate to half the digits only."""
 _REAL = 1e-7
 """Relative imaginary part below which a pair cannot be told from a double real eigenvalue."""
 
@@ -32,8 +32,8 @@ class Settled:
     Attributes
     ----------
     values : ndarray of complex, shape (rows, modes)
-        By ascending modulus, one of each conjugate pair; the best known where they did not settle, nan where there are
-        no more.
+        By ascending modulus, one of each conjugate pair; the best known values where they did not converge, nan where
+        there are no more.
     error : ndarray, shape (rows, modes)
         Relative difference of two meshes.
     """
@@ -43,7 +43,7 @@ class Settled:
 
 
 def lowest_eigenvalues(problem: GeneralContinuum, modes: int, oscillating: bool, tolerance: float) -> Settled:
-    """Return the lowest eigenvalues of every row, on finer and finer meshes until they settle.
+    """Return the lowest eigenvalues of every row, with meshes refined until they converge.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def lowest_eigenvalues(problem: GeneralContinuum, modes: int, oscillating: bool,
     oscillating : bool
         Leave out real eigenvalues.
     tolerance : float
-        Relative difference of an eigenvalue on two meshes; that of the finer one from the limit is far smaller.
+        Relative difference of an eigenvalue on two meshes; the error on the finer one is far smaller.
     """
     rows = len(problem.edges)
     found = Settled(np.full((rows, modes), np.nan, dtype=complex), np.full((rows, modes), np.inf))
@@ -74,7 +74,7 @@ def lowest_eigenvalues(problem: GeneralContinuum, modes: int, oscillating: bool,
 
 
 def meshes(problem: GeneralContinuum, modes: int, tolerance: float) -> Iterator[tuple[Index, GeneralContinuum, Mesh]]:
-    """Yield rows that are alike, their problem, and a mesh to begin with."""
+    """Yield rows that can share a mesh, their problem, and the initial mesh."""
     waiting = [(rows, problem.take(rows), ends) for rows, ends in alike(problem)]
     while waiting:
         rows, part, ends = waiting.pop()
@@ -95,7 +95,7 @@ def meshes(problem: GeneralContinuum, modes: int, tolerance: float) -> Iterator[
 
 
 def sequence(mesh: Mesh) -> Iterator[Mesh]:
-    """Yield finer and finer meshes: higher degrees, then smaller elements."""
+    """Yield successively finer meshes: higher degrees, then smaller elements."""
     first, later = _STEPS
     mesh = replace(mesh, degree=mesh.degree - 2)
     yield mesh
@@ -116,7 +116,7 @@ def _chunks(problem: GeneralContinuum, mesh: Mesh, number: int) -> Iterator[Inde
 
 
 def _all(problem: GeneralContinuum, mesh: Mesh) -> tuple[Complex, Array]:
-    """Return all eigenvalues of every row, nan behind the last, and the rates."""
+    """Return all eigenvalues of every row, padded with nan, and the rates."""
     parts: list[Reduced] = list(reduced(problem, mesh))
     values = [part.eigenvalues() for part in parts]
     whole = np.full((len(problem.edges), max(v.shape[1] for v in values)), np.nan, dtype=complex)
@@ -128,14 +128,14 @@ def _all(problem: GeneralContinuum, mesh: Mesh) -> tuple[Complex, Array]:
 
 
 def _joined(parts: list[Complex]) -> Complex:
-    """Return parts of a batch as one, nan where a part has fewer columns."""
+    """Join parts of a batch, padded with nan where a part has fewer columns."""
     width = max(part.shape[1] for part in parts)
     pad = (np.pad(part, ((0, 0), (0, width - part.shape[1])), constant_values=np.nan) for part in parts)
     return np.concatenate(list(pad))
 
 
 def _compared(fine: Complex, coarse: Complex, rate: Array, modes: int, oscillating: bool) -> tuple[Complex, Array]:
-    """Return the first eigenvalues of one of each pair, and how far they are from those of the coarser mesh."""
+    """Return the first eigenvalues, one of each pair, and their distance from those of the coarser mesh."""
     size = np.abs(fine)
     with np.errstate(invalid="ignore"):
         wanted = fine.imag > _REAL * size if oscillating else fine.imag >= -_REAL * size
@@ -166,7 +166,7 @@ def _compared(fine: Complex, coarse: Complex, rate: Array, modes: int, oscillati
 def matched(fine: Complex, coarse: Complex) -> Complex:
     """Return the nearest eigenvalue of the coarser mesh for each, none twice.
 
-    Those that are each other's nearest come first: where many crowd, one that has no partner takes none of another.
+    Mutual nearest neighbours are matched first, so that an eigenvalue without a partner does not take that of another.
     """
     free = np.where(np.isnan(coarse), np.inf, coarse)
     near = np.empty_like(fine)

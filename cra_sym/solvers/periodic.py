@@ -4,8 +4,8 @@ r"""Monodromy matrices of any equations of second order with periodic coefficien
           + \Bigl(K + \sum_r g_r K_r\Bigr) q = 0
 
 with :math:`g_r` epsilon times a cosine or sine of a multiple of :math:`\varpi t`. The state is q and the momentum p
-under the derivative by time. Each step is a Taylor series, whose coefficients are sums over those of the cosines; all
-systems take the same number of steps a period, so these are plain numbers.
+under the derivative by time. Each step is a Taylor series, whose coefficients are sums over those of the cosines. All
+systems take the same number of steps per period, so the latter are the same for all.
 """
 
 from __future__ import annotations
@@ -25,12 +25,10 @@ __all__ = ["PeriodicSystem", "Swing", "floquet_exponents", "growth_rate", "monod
 Array = NDArray[np.float64]
 _HIGHEST = 24
 """Order of the series, at most."""
-_WIDEST = 3.0  # step, in units of the fastest motion's time: beyond, the terms of a series lose digits
+_WIDEST = 3.0  # largest step, in units of the fastest motion's time; beyond it the terms of the series lose digits
 _SHARE = 1e-4
-"""Coefficients of cosines below this share of the tolerance are left out: what follows sums to far less than it."""
-_PRODUCTS = (
-    31  # what the products of matrices for one term cost, in halves of one term of a sum over products of series
-)
+"""Coefficients of cosines below this share of the tolerance are left out; their sum is far below the tolerance."""
+_PRODUCTS = 31  # cost of the matrix products of one term, in units of half a term of a product of series
 _BLOCK = 384  # systems propagated together, small enough for the cache
 
 
@@ -56,10 +54,10 @@ def step_coefficients(wave: Oscillation, step: int, steps: int, order: int, leas
 
 
 class _Series:
-    """Taylor coefficients of q, dq/dtau and p over one step, found one after the other.
+    """Taylor coefficients of q, dq/dtau and p over one step, by recursion.
 
-    What oscillates with one cosine adds to forces as K_r q + C_r u, and to momenta as B_r q + M_r u, with u = dq/dt:
-    one sum over products of series each.
+    The terms of one oscillation add K_r q + C_r u to the forces and B_r q + M_r u to the momenta, with u = dq/dt: one
+    product of series each.
     """
 
     def __init__(self, system: PeriodicSystem, steps: int, order: int, least: float) -> None:
@@ -95,7 +93,7 @@ class _Series:
         return end_q, end_p
 
     def _mass(self, waves: list[Array]) -> Array | None:
-        """Return the inverse mass at the start of the step, its diagonal (N, 1, points) if it has no more, or None."""
+        """Return the inverse mass at the start of the step, or its diagonal (N, 1, points), or None."""
         swings = zip(self.system.swings, waves, strict=True)
         terms = [(s.mass, s.size * wave[0]) for s, wave in swings if s.mass is not None]
         if not terms:
@@ -141,7 +139,7 @@ class _Series:
 
 
 class _Stack:
-    """Several matrices, some of them None, applied to a state as one."""
+    """Several matrices, some of them None, applied to a state in one product."""
 
     def __init__(self, matrices: Sequence[Array | None]) -> None:
         there = [matrix for matrix in matrices if matrix is not None]
@@ -204,8 +202,9 @@ def monodromy(system: PeriodicSystem, tolerance: float = 1e-8) -> Array:
 def _majorants(system: PeriodicSystem, blocks: Sequence[NDArray[np.intp]]) -> Array:
     """Return bounds of the Taylor coefficients of all motions, the time in periods, as logarithms.
 
-    They are those of the scalar equations with norms in place of matrices and exponentials in place of cosines, of
-    masses hyperbolic cosines: their inverse is not an entire function. Shape (highest order + 2, blocks).
+    They are the Taylor coefficients of the scalar equations with norms in place of matrices, and with exponentials in
+    place of cosines; for masses hyperbolic cosines, since the inverse of the mass is not an entire function. Shape
+    (highest order + 2, blocks).
     """
     sizes = system.sizes()
     largest = Sizes(
@@ -244,7 +243,7 @@ def _majorants(system: PeriodicSystem, blocks: Sequence[NDArray[np.intp]]) -> Ar
 def _cheapest(series: Array, tolerance: float) -> tuple[int, int]:
     """Return an even number of steps a period and the order of their series that reach the tolerance at least cost.
 
-    A series that ends with the term of order n leaves the coefficient n + 1 times ``h**(n + 1)`` a step.
+    The error of a series truncated after order n is the coefficient n + 1 times ``h**(n + 1)`` per step.
     """
     orders = np.arange(6, _HIGHEST + 1)
     angle = np.exp(series[1])

@@ -1,4 +1,4 @@
-"""Equations of second order with periodic coefficients, many at once: what :mod:`cra_sym.solvers.periodic` solves."""
+"""Batches of second-order equations with periodic coefficients, the input of :mod:`cra_sym.solvers.periodic`."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ __all__ = ["LIGHTEST", "PeriodicSystem", "Sizes", "Swing"]
 
 Array = NDArray[np.float64]
 LIGHTEST = 1e-3
-"""Share of the mass that is left, at least, in estimates."""
+"""Least share of the mass that remains, in estimates."""
 _SAME = 1e-14
-"""Relative size of what is beside the diagonal, of matrices that are diagonal but for rounding."""
+"""Relative size of off-diagonal entries below which a matrix counts as diagonal."""
 
 
 @dataclass(frozen=True)
 class Swing:
-    """One oscillating term; matrices (N, N, points) or (N, N, 1), None where there is nothing.
+    """One oscillating term; matrices (N, N, points) or (N, N, 1), None if zero.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Swing:
 
     @property
     def only_stiffness(self) -> bool:
-        """Whether nothing else oscillates."""
+        """Whether only the stiffness oscillates."""
         return self.damping is None and self.momentum is None and self.mass is None
 
     def take(self, index: NDArray[np.intp]) -> Swing:
@@ -114,7 +114,7 @@ class PeriodicSystem:
         return PeriodicSystem(stiffness, damping, tuple(s.take(index) for s in self.swings), self.period[index])
 
     def check_mass(self) -> None:
-        """Refuse a mass that need not be positive throughout the period."""
+        """Raise an error if the mass may not be positive throughout the period."""
         total = np.zeros_like(self.period)
         for swing in self.swings:
             if swing.mass is not None:
@@ -126,10 +126,10 @@ class PeriodicSystem:
             )
 
     def parity(self) -> NDArray[np.int8] | None:
-        """Return signs of q that make half a period tell the other, None if there are none.
+        """Return signs of q by which the first half of a period gives the second, None if there are none.
 
-        With all cosines even in time they are to turn what stands still, oscillating stiffnesses and masses into their
-        transposes, and every oscillating damping matrix into the transpose of its momentum.
+        With all cosines even in time, these signs must transpose the constant matrices and the oscillating stiffnesses
+        and masses, and transform every oscillating damping matrix to the transpose of its momentum matrix.
         """
         if any(s.oscillation.kind == "sin" for s in self.swings):
             return None
@@ -164,7 +164,7 @@ class PeriodicSystem:
         return None if (same & (product < 0)).any() or (opposite & (product > 0)).any() else signs
 
     def in_axes_of_mass(self) -> tuple[PeriodicSystem, Array | None]:
-        """Return the same in axes that make all oscillating masses diagonal, and these as columns; None if none do."""
+        """Return the system in axes that make all oscillating masses diagonal, and these axes, or None."""
         masses = [s.mass[..., 0] for s in self.swings if s.mass is not None and s.mass.shape[-1] == 1]
         if not masses or len(masses) < sum(s.mass is not None for s in self.swings):
             return self, None
@@ -194,7 +194,7 @@ class PeriodicSystem:
         return PeriodicSystem(turned(self.stiffness), turned(self.damping), swings, self.period), axes
 
     def rate(self) -> Array:
-        """Return a bound of how fast anything moves, 1/s, shape (points,)."""
+        """Return a bound of the rate of all motions, 1/s, shape (points,)."""
         sizes = self.sizes()
         light = 1.0 / np.maximum(1.0 - sizes.mass.sum(axis=0), LIGHTEST)
         still, swung = sizes.still, sizes.damping.sum(axis=0) + sizes.momentum.sum(axis=0)
@@ -203,7 +203,7 @@ class PeriodicSystem:
         return np.asarray(moved + 2 * np.pi * turns / self.period)
 
     def sizes(self) -> Sizes:
-        """Return norms of what stands still and of what oscillates."""
+        """Return norms of the constant and of the oscillating matrices."""
         points = self.period.size
         still = np.array([np.broadcast_to(norm_bound(m), points) for m in (self.stiffness, self.damping)])
 
@@ -215,7 +215,7 @@ class PeriodicSystem:
 
 
 class Sizes(NamedTuple):
-    """Norms of a batch: ``still`` of K and C, shape (2, points); of what oscillates, one row a term."""
+    """Norms of a batch: ``still`` of K and C, shape (2, points); of the oscillating matrices one row per term."""
 
     still: Array
     stiffness: Array

@@ -1,7 +1,7 @@
 """All roots of small systems of polynomials, by elimination: the null space of Macaulay's matrix.
 
 Stetter's eigenvalue method: the monomials at the roots span that null space, and a shift by one degree acts on it as a
-matrix whose eigenvalues are values of a linear form at the roots. Roots at infinity are told apart by the degrees at
+matrix whose eigenvalues are values of a linear form at the roots. Roots at infinity are separated by the degrees at
 which the rank of the rows of the null space stops growing (Dreesen, Batselier and De Moor, 2012).
 """
 
@@ -70,7 +70,7 @@ def polynomial_roots(coefficients: Array, degree: int) -> Complex:
         last = _gap(null, variables, top)
         if last is not None:
             return _roots(null, variables, last, generator)
-    raise AssertionError  # the loop ends by itself
+    raise AssertionError  # the loop always terminates
 
 
 def _macaulay(coefficients: Array, degree: int, top: int) -> Array:
@@ -91,7 +91,7 @@ def _places(variables: int, degree: int, top: int) -> NDArray[np.intp]:
 
 
 def _null_space(matrix: Array) -> Array:
-    q, r, _ = qr(matrix.T, pivoting=True)  # as safe as singular values here, and ten times as fast
+    q, r, _ = qr(matrix.T, pivoting=True)  # as reliable as singular values here, and ten times as fast
     size = np.abs(np.diag(r))
     return np.asarray(q[:, int((size > _RANK * size[0]).sum()) :])
 

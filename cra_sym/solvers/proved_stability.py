@@ -1,17 +1,16 @@
 r"""Proofs of stability and instability: enclosures of monodromy matrices and of their multipliers, many at once.
 
-The Taylor steps of :mod:`cra_sym.solvers.periodic` give a matrix; what they leave out, and what rounding does to them,
-is bounded by a majorant: a scalar series with the norms of the coefficients in their place. Over a step errors grow at
-most by the logarithmic norm; over many, each is led back to the initial state, so that they grow no faster than the
-motion does. In modal units, :math:`(\omega q, \dot q)`, free motion without damping keeps the Euclidean norm.
+The Taylor steps of :mod:`cra_sym.solvers.periodic` give an approximate matrix. Truncation and rounding are bounded by a
+majorant: a scalar series with the norms of the coefficients. Within a step errors grow at most by the logarithmic norm;
+over many steps each error is referred to the initial state, so that it grows no faster than the motion. In modal units,
+:math:`(\omega q, \dot q)`, free motion without damping keeps the Euclidean norm.
 
 Approximate eigenvectors then turn the enclosure into a nearly diagonal one, whose discs by Gershgorin enclose the
-multipliers (Rump 2001). A group of discs outside the unit circle, apart from all others, proves instability; all
+multipliers (Rump 2001). A group of discs outside the unit circle and disjoint from all others proves instability; all
 discs inside it prove stability. Without damping the multipliers come in pairs :math:`\rho, 1/\bar\rho` (Yakubovich and
-Starzhinskii 1975): a disc that holds one multiplier, and whose image in the unit circle meets no other disc, holds its
-own partner, so that the multiplier is simple and of modulus one. If that is so of all, every motion is bounded.
-
-Bounds are computed in doubles and enlarged by a hundredth, far beyond what rounding does to them.
+Starzhinskii 1975). If a disc contains one multiplier and its reflection in the unit circle meets no other disc, it
+contains the partner too, so that the multiplier is simple and of modulus one. If this holds for all discs, every motion
+is bounded. Bounds are computed in doubles and enlarged by one per cent, far more than their rounding error.
 """
 
 from __future__ import annotations
@@ -30,8 +29,8 @@ __all__ = ["STABLE", "UNDECIDED", "UNSTABLE", "enclosed_monodromy", "multiplier_
 Array = NDArray[np.float64]
 STABLE, UNSTABLE, UNDECIDED = 1, -1, 0
 _ORDER = 24
-_ANGLE = 1.5  # of a step, against the largest rate
-_STEPS = 16  # a turn of the fastest cosine, at least
+_ANGLE = 1.5  # largest step times the largest rate
+_STEPS = 16  # least number of steps per period of the fastest cosine
 _ROUNDING = np.finfo(float).eps / 2
 _ENLARGED = 1.01
 _BLOCK = 512
@@ -65,7 +64,7 @@ def proved_stability(system: PeriodicSystem, unit: Array, conservative: bool, sp
     conservative : bool
         Whether all systems are without damping: symmetric stiffness, skew damping matrices.
     spread : float
-        Relative uncertainty of the coefficients, against the sum of a row: the proof is for all systems within.
+        Relative uncertainty of the coefficients, against the sum of a row: the proof holds for all systems within it.
 
     Returns
     -------
@@ -116,7 +115,7 @@ def _bounds(system: PeriodicSystem, unit: Array) -> _Bounds:
 
 
 def _negative(damping: Array) -> Array:
-    """Return a bound of how fast the damping can feed motion, 1/s."""
+    """Return a bound of the growth rate that negative damping can cause, 1/s."""
     symmetric = 0.5 * (damping + damping.swapaxes(0, 1))
     lowest = np.linalg.eigvalsh(np.moveaxis(symmetric, -1, 0))[:, 0]
     return np.asarray(np.maximum(0.0, -lowest) + 1e-14 * _size(symmetric))
@@ -145,7 +144,7 @@ def enclosed_monodromy(system: PeriodicSystem, unit: Array, steps: int, spread: 
         new = local * _size(state)
         error = factor * error + new
         state = scale * np.concatenate([q, p])
-        # as an error of the initial state, which the exact map carries: it grows no faster than the motion
+        # as an error of the initial state, propagated by the exact map: it grows no faster than the motion
         through = through + _inverse_size(state, error) * new
         carried = np.where(through < 1.0, _size(state) * through / (1.0 - through), np.inf)
         error = np.fmin(error, _ENLARGED * carried)
@@ -194,7 +193,7 @@ def multiplier_discs(maps: Array, error: Array) -> tuple[NDArray[np.complex128],
     Returns
     -------
     centres, radii : ndarray, shape (points, n)
-        A group of discs that meets no other holds as many eigenvalues; a radius is inf where nothing is known.
+        A group of discs that meets no other contains as many eigenvalues as discs; a radius is inf without a bound.
     """
     size = maps.shape[-1]
     usable = np.isfinite(maps).all(axis=(1, 2)) & np.isfinite(error)
@@ -219,7 +218,7 @@ def multiplier_discs(maps: Array, error: Array) -> tuple[NDArray[np.complex128],
 def _inverse(matrices: NDArray[Any]) -> NDArray[Any]:
     try:
         return np.linalg.inv(matrices)
-    except np.linalg.LinAlgError:  # one is singular, and its pseudo-inverse will be found to be no inverse
+    except np.linalg.LinAlgError:  # one is singular; the later check rejects its pseudo-inverse
         return np.linalg.pinv(matrices)
 
 

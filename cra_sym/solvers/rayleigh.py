@@ -1,8 +1,8 @@
-"""Rayleigh-Ritz values of computed mode shapes: the digits that the rounding of the stiffness has taken from the roots.
+"""Rayleigh-Ritz values of computed mode shapes, which restore digits that rounding of the stiffness takes from roots.
 
-A stiffness joined from short pieces is the small difference of large terms where the motion hardly strains a piece:
-soft joints, heavy tips, strings that resist bending a little. The forces in the computed shape have no such
-cancellation, and strain energy taken from them is as exact as the shape squared.
+A stiffness joined from short pieces is a small difference of large terms where the motion hardly strains a piece: soft
+joints, heavy tips, strings with a small bending stiffness. The forces in the computed shape have no such cancellation,
+and the relative error of a strain energy computed from them is of the order of the square of that of the shape.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ __all__ = ["quotients", "ritz_values", "stationary_values"]
 
 
 def quotients(problem: DynamicStiffness, z: np.ndarray) -> np.ndarray:
-    """Return strain over kinetic energy of each mode: an error of the shape enters squared.
+    """Return the Rayleigh quotient of each mode, whose error is the square of that of the shape.
 
     Parameters
     ----------
@@ -40,14 +40,14 @@ def quotients(problem: DynamicStiffness, z: np.ndarray) -> np.ndarray:
 
 
 def ritz_values(problem: DynamicStiffness, z: np.ndarray, almost_rigid: np.ndarray) -> np.ndarray:
-    """Return strain over kinetic energy, minimised over the span of soft modes with the given approximate roots.
+    """Return Ritz values on the span of the soft modes with the given approximate roots.
 
     Parameters
     ----------
     problem : DynamicStiffness
     z : ndarray, shape (rows, modes)
     almost_rigid : ndarray of int, shape (rows,)
-        How many of the first modes hardly deform, so that their static shapes serve.
+        Number of the first modes that are almost rigid, for which static shapes are used.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def stationary_values(strain: np.ndarray, kinetic: np.ndarray) -> np.ndarray:
 def _jacobi(matrix: np.ndarray) -> np.ndarray:
     """Return the eigenvalues of a stack of small graded matrices by Jacobi's rotations.
 
-    LAPACK's are exact to rounding of the largest; Jacobi's are so to rounding of each (Demmel and Veselic 1992).
+    LAPACK's are accurate relative to the largest, Jacobi's relative to each of them (Demmel and Veselic 1992).
     """
     a = matrix.copy()
     size = a.shape[-1]
@@ -98,8 +98,9 @@ def _jacobi(matrix: np.ndarray) -> np.ndarray:
 def energies_of_springs(stiffness: np.ndarray, motions: np.ndarray) -> np.ndarray:
     """Return ``motions @ stiffness @ motions.T`` of a stack of small matrices, as a sum over elongations.
 
-    A spring between two places that move together stores nothing: the product would leave the rounding of its terms,
-    the elongation, by elimination with diagonal pivots, does not. What a pivot leaves below rounding is zero.
+    A spring between two points that move together stores no energy. The product would leave rounding errors of its
+    large terms; elongations, from an elimination with diagonal pivots, do not. A remainder below rounding is set to
+    zero.
 
     Parameters
     ----------

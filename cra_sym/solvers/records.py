@@ -1,4 +1,4 @@
-"""Sampled records as files have them: sample times in any common form, and what moves between the samples."""
+"""Sampled records: sample times in any common form, and interpolation between the samples."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["KINDS", "spline_motion", "timed_last", "uniform_times"]
 
 Array = NDArray[np.float64]
 KINDS = ("acceleration", "velocity", "position")
-_CLOCK = 1e8  # s, three years: times that begin later are those of a clock
+_CLOCK = 1e8  # s, three years: times that begin later are clock times
 _UNEVEN = 0.01  # of a step
 _SLOWEST, _FASTEST = 1e-12, 1e12  # samples per second
 
@@ -76,7 +76,7 @@ def _enough(times: Array, name: str) -> Array:
 
 
 def _seconds(t: Any) -> tuple[Array, float]:
-    """Return times in seconds, and how finely their numbers tell them."""
+    """Return times in seconds, and their resolution."""
     if hasattr(getattr(t, "dtype", None), "tz"):  # of pandas
         given = np.asarray(t, dtype=f"M8[{t.dtype.unit}]")
     elif isinstance(t, (list, tuple)) or hasattr(type(t), "dimensionality"):  # of Pint: no array without its unit

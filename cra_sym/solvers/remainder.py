@@ -1,4 +1,4 @@
-"""What the modes beyond the first ones contribute to a receptance: analytic up to the next natural frequency."""
+"""Contribution of the omitted modes to a receptance, analytic up to the next natural frequency."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ pole."""
 
 
 def nodes(limit: Array) -> Array:
-    """Return the places z = omega^2 at which a receptance has to be known, shape (rows, nodes).
+    """Return the nodes z = omega^2 at which a receptance has to be evaluated, shape (rows, nodes).
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def nodes(limit: Array) -> Array:
 
 
 def remainder(values: Array, squares: Array, residues: Array, limit: Array) -> Callable[[NDArray[Any]], Array]:
-    """Return the part of a receptance that the first modes leave, as a function of z for small z.
+    """Return the receptance minus that of the first modes, as a function of z for small z.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def moments(values: Array, squares: Array, residues: Array, limit: Array) -> tup
 
 
 def _coefficients(values: Array, squares: Array, residues: Array, limit: Array) -> tuple[Array, float, float]:
-    """Return Chebyshev coefficients of what is left at the nodes, shape (rows, nodes, ...), and the interval."""
+    """Return Chebyshev coefficients of the remainder, shape (rows, nodes, ...), and the interval."""
     gap = squares[:, None, :] - nodes(limit)[:, :, None]
     left = values - np.einsum("rnm,rm...->rn...", 1.0 / gap, residues)
     angles = np.pi * (np.arange(_NUMBER) + 0.5) / _NUMBER

@@ -37,7 +37,7 @@ def mode_states(problem: DynamicStiffness, z: np.ndarray, share: np.ndarray) -> 
 def mode_vectors(
     problem: DynamicStiffness, z: np.ndarray, *, common_levels: bool = False
 ) -> tuple[Evaluation, np.ndarray, np.ndarray]:
-    """Return an evaluation at the roots that kept its tree, the normalised free coordinates, and each root's row.
+    """Return an evaluation at the roots with its tree, the normalised free coordinates, and the row of each root.
 
     With ``common_levels`` all roots of a row are evaluated on the same pieces.
     """
@@ -59,7 +59,7 @@ def nodes(
     Parameters
     ----------
     here : Evaluation
-        One that kept its tree.
+        With its tree.
     u : ndarray, shape (members, f)
         Free coordinates.
     """
@@ -69,14 +69,14 @@ def nodes(
     size = unit.shape[1]
     for level in np.unique(here.tree.levels):
         member = np.nonzero(here.tree.levels == level)[0]
-        start = _spread(problem, here.tree, nodal[member], member, int(level))
+        start = _back_substitute(problem, here.tree, nodal[member], member, int(level))
         yield int(level), member, start, nodal[member, :size] * unit[member]
 
 
 def states(
     problem: DynamicStiffness, here: Evaluation, u: np.ndarray, z: np.ndarray, row: np.ndarray, share: np.ndarray
 ) -> np.ndarray:
-    """Return the state (q, w, P) at the stations for free coordinates ``u`` of an evaluation that kept its tree.
+    """Return the state (q, w, P) at the stations for free coordinates ``u`` of an evaluation with its tree.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def states(
     """
     state = np.empty((len(z), share.shape[1], 2 * problem.displacements + problem.coordinates), dtype=u.dtype)
     for level, member, start, _ in nodes(problem, here, u):
-        state[member] = _carry(problem, z[member], row[member], start, level, share[member])
+        state[member] = _propagate(problem, z[member], row[member], start, level, share[member])
     return state
 
 
@@ -115,7 +115,7 @@ def _null_vectors(here: Evaluation, place: np.ndarray, rows: int, modes: int) ->
         return np.asarray(vector / np.abs(nodal * unit).max(axis=1, keepdims=True))
     value, vector = np.linalg.eigh(here.matrix)
     order = np.argsort(np.abs(value), axis=1)[np.arange(len(pick)), pick]
-    # K has as many negative eigenvalues as modes lie below: the next one is this mode's, however close its neighbours
+    # K has as many negative eigenvalues as modes lie below, so the next one belongs to this mode, even among close ones
     number = np.clip(np.tile(np.arange(modes), rows) - here.fixed_count, 0, value.shape[1] - 1)
     vanishing = np.abs(np.take_along_axis(value, number[:, None], axis=1)[:, 0]) < 1e-6
     u = np.take_along_axis(vector, np.where(vanishing, number, order)[:, None, None], axis=2)[..., 0]
@@ -130,7 +130,9 @@ def _null_vectors(here: Evaluation, place: np.ndarray, rows: int, modes: int) ->
     return u.reshape(rows * modes, -1)
 
 
-def _spread(problem: DynamicStiffness, tree: Tree, nodal: np.ndarray, member: np.ndarray, level: int) -> np.ndarray:
+def _back_substitute(
+    problem: DynamicStiffness, tree: Tree, nodal: np.ndarray, member: np.ndarray, level: int
+) -> np.ndarray:
     """Back-substitute to all nodes; return the state at the left of every piece, (part, member, piece, state)."""
     n, m = problem.displacements, problem.coordinates
     left, w = nodal[:, :n], nodal[:, n : n + m]
@@ -153,10 +155,10 @@ def _with_lumped(start: np.ndarray, w: np.ndarray, end: np.ndarray) -> np.ndarra
     return np.concatenate([start, lumped, end], axis=-1)
 
 
-def _carry(
+def _propagate(
     problem: DynamicStiffness, z: np.ndarray, row: np.ndarray, start: np.ndarray, level: int, share: np.ndarray
 ) -> np.ndarray:
-    """Carry the state from the node left of each station to the station by the Taylor series of ``exp(Omega)``."""
+    """Propagate the state from the node left of each station to the station by the Taylor series of ``exp(Omega)``."""
     n, m = problem.displacements, problem.coordinates
     part = (share > GOLDEN).astype(int)
     origin = np.where(part, GOLDEN, 0.0)

@@ -1,7 +1,7 @@
-"""Harmonic balance with elastic-slip elements: the modes are eliminated, displacements of the elements are unknown.
+"""Harmonic balance with elastic-slip elements: modes are eliminated, the unknowns are displacements of the elements.
 
-With the modal equations linearised at coordinates q the displacements obey w = w0 - G F(w): F are the harmonics of the
-elements' forces, exact between events, and G is the flexibility of the modes at each harmonic, dense where the
+With the modal equations linearised at coordinates q, the displacements satisfy w = w0 - G F(w). F are the harmonics of
+the forces of the elements, exact between events; G is the flexibility of the modes at each harmonic, dense where the
 equations are parametric or nonlinear.
 """
 
@@ -23,7 +23,7 @@ __all__ = ["Elements", "SlipBalance", "stuck"]
 
 Array = NDArray[np.float64]
 _HALVINGS = 6
-_PARTS, _LED = 7, 20  # how often a step of stiffness is halved, and Newton's iterations in each
+_PARTS, _LED = 7, 20  # largest number of halvings of a stiffness step, and Newton iterations in each
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Elements:
     groups : tuple of (stiffness, slip)
         Of the elements on each displacement, arrays (elements,).
     coupling : ndarray, shape (displacements, displacements)
-        R, zero on the diagonal: what different displacements owe to modes left out.
+        R, zero on the diagonal: flexibility of the omitted modes between different displacements.
     """
 
     rows: Array
@@ -46,7 +46,7 @@ class Elements:
 
     @cached_property
     def stiffness(self) -> Array:
-        """Of all elements on each displacement, stuck."""
+        """Stiffness of the elements on each displacement, all stuck."""
         return np.array([k.sum() for k, _ in self.groups])
 
     @property
@@ -60,15 +60,15 @@ class Elements:
         return float(max((f / k).max() for k, f in self.groups))
 
     def along(self, shape: Array) -> Elements:
-        """Return the same seen by modes that move in one shape."""
+        """Return the elements projected on one modal shape."""
         return replace(self, rows=(self.rows @ shape)[:, None], coupling=np.zeros_like(self.coupling))
 
     def softened(self, share: float) -> Elements:
-        """Return elements with a share of the stiffness that slip with the same forces."""
+        """Return elements with a share of the stiffness and the same slip forces."""
         return replace(self, groups=tuple((share * k, f) for k, f in self.groups))
 
     def cycles(self, displacements: Array) -> list[Cycle]:
-        """Return what the elements do for displacements of shape (points, displacements, functions)."""
+        """Return the cycles of the elements for displacements of shape (points, displacements, functions)."""
         return [cycle(displacements[:, k], *group) for k, group in enumerate(self.groups)]
 
 
@@ -80,7 +80,7 @@ def stuck(equations: ModalPolynomials, elements: Elements, share: float = 1.0) -
 
 
 class _Based(NamedTuple):
-    """Modal equations linearised: w0, G, and the modal coordinates that belong to forces (points, size)."""
+    """Linearised modal equations: w0, G, and the function from forces to modal coordinates (points, size)."""
 
     displacement: Array
     flexibility: Array
@@ -95,10 +95,10 @@ class SlipBalance:
     ----------
     equations : ModalPolynomials
     basis : Basis
-        Constant and all harmonics up to one, or the constant and one harmonic, of which elements know no other.
+        The constant and all harmonics up to a highest one, or the constant and one harmonic.
     elements : Elements
     statics : ndarray, shape (displacements, known functions), optional
-        What of the displacements follows known functions of time without the modes.
+        Contribution of known functions of time to the displacements, without the modes.
     """
 
     equations: ModalPolynomials
@@ -140,12 +140,12 @@ class SlipBalance:
         return unknowns[:, self.modal_size :].reshape(len(unknowns), -1, self.basis.size)
 
     def start(self, coefficients: Array) -> Array:
-        """Return unknowns of modal coefficients (points, modes, functions), their displacements without coupling."""
+        """Return unknowns from modal coefficients (points, modes, functions), with displacements without coupling."""
         w = self.elements.rows @ coefficients
         return np.concatenate([part.reshape(len(coefficients), -1) for part in (coefficients, w)], axis=1)
 
     def embedded(self, unknowns: Array, harmonics: int) -> Array:
-        """Return unknowns with so many harmonics as unknowns of this balance with more."""
+        """Extend unknowns with fewer harmonics to unknowns of this balance."""
         own, rows = len(self.basis.sines), self.equations.modes + len(self.elements.groups)
         old = unknowns.reshape(len(unknowns), rows, 2 * harmonics + 1)
         new = np.zeros((len(unknowns), rows, 2 * own + 1))
@@ -155,7 +155,9 @@ class SlipBalance:
     # ------------------------------------------------------------------------------------------- linearised modes
 
     def _based(self, q: Array, frequency: Array, causes: Array | None) -> _Based:
-        found = self._receptance(frequency, causes) if self.constant else self._dense(q, frequency, causes)
+        found = (
+            self._receptance(frequency, causes) if self.constant else self._dense_linearisation(q, frequency, causes)
+        )
         if self.statics is None or causes is None:
             return found
         own = self.statics @ self.waves(causes)
@@ -170,13 +172,15 @@ class SlipBalance:
         return np.asarray(self.equations.omega == 0.0)
 
     def _receptance(self, frequency: Array, causes: Array | None) -> _Based:
-        """Return modes of constant coefficients at every harmonic."""
+        """Return the linearised equations of modes with constant coefficients, by harmonic."""
         h, n, b = len(self.basis.sines), self.equations.modes, self.elements.rows
         points, m = len(frequency), len(b)
         k = np.array(self.basis.cosines) * frequency[:, None]
         z = (1j * k)[..., None, None] * self.equations.damping + np.diag(self.equations.omega**2)
         z = z - (k**2)[..., None, None] * np.eye(n)
-        z[:, 0] += np.diag(self._rigid()) * frequency[:, None, None] ** 2  # where it stands, if nothing holds it
+        z[:, 0] += (
+            np.diag(self._rigid()) * frequency[:, None, None] ** 2
+        )  # a free rigid-body mode has no static position
         load = self._complex(self._loads(points, causes))
         right = np.concatenate([load[..., None], np.broadcast_to(b.T, (points, h + 1, n, m))], axis=-1)
         answer = np.linalg.solve(z, right.astype(complex))
@@ -224,7 +228,7 @@ class SlipBalance:
         found[:, :, s, :, k[1:]] = -moved.imag[1:]
         return found.reshape(points, m * (2 * count - 1), -1)
 
-    def _dense(self, q: Array, frequency: Array, causes: Array | None) -> _Based:
+    def _dense_linearisation(self, q: Array, frequency: Array, causes: Array | None) -> _Based:
         """Return parametric or nonlinear modes, linearised at coordinates (points, modal size)."""
         b, size = self.elements.rows, self.basis.size
         residual, jacobian, _, _ = self._balance.residual(q, frequency, causes)
@@ -253,7 +257,7 @@ class SlipBalance:
         most: int = 40,
         alike: NDArray[np.intp] | None = None,
     ) -> tuple[Array, NDArray[np.bool_]]:
-        """Return answers from starts, many at once, and which converged.
+        """Return solutions from starting points, many at once, and which converged.
 
         Parameters
         ----------
@@ -262,11 +266,11 @@ class SlipBalance:
             Of the basis.
         causes : ndarray, shape (points, known functions, samples), optional
         tolerance : float
-            What a displacement may change, relative to the motion or to where the first element slips.
+            Change of a displacement at convergence, relative to the motion or to the displacement of first slip.
         most : int
             Iterations.
         alike : ndarray of int, shape (points,), optional
-            Points of one number have one answer: when one of them has it, the others are left.
+            Points with the same number share a solution: once one of them has converged, the others are dropped.
         """
         n = self.modal_size
         q, w = unknowns[:, :n].copy(), unknowns[:, n:].copy()
@@ -310,7 +314,7 @@ class SlipBalance:
         return np.concatenate([q, w], axis=1), done
 
     def stuck_motion(self, frequency: Array, causes: Array | None, share: float) -> Array:
-        """Return unknowns of the motion with springs of a share of the elements' stiffness, linearised at rest."""
+        """Return unknowns of the motion with a share of the stuck stiffness for the elements, linearised at rest."""
         based = self._based(np.zeros((len(frequency), self.modal_size)), frequency, causes)
         springs = np.repeat(share * self.elements.stiffness, self.basis.size)
         matrix = np.eye(springs.size) + based.flexibility * springs
@@ -318,21 +322,21 @@ class SlipBalance:
         return np.concatenate([based.modal(springs * w, np.arange(len(frequency))), w], axis=1)
 
     def stiffened(self, frequency: Array, causes: Array | None) -> tuple[Array, NDArray[np.bool_]]:
-        """Return answers led from elements so soft that all of them stick to the ones there are, and which arrived.
+        """Return solutions by continuation in the stiffness, from elements so soft that all stick, and which succeeded.
 
-        The slip forces stay. Where elements are stiff over the modes, answers move little on the way, and starts with
-        everything stuck or nothing stuck lie far from them.
+        The slip forces are held fixed. Where elements are stiff relative to the modes, solutions change little along
+        the way, whereas starts with all or no elements stuck are far from them.
         """
         free = self.stuck_motion(frequency, causes, 0.0)
         largest = np.abs(free[:, self.modal_size :]).sum(axis=1).max()
         softest = 0.5 * min(1.0, self.elements.limit / max(float(largest), 1e-300))
         found = self.stuck_motion(frequency, causes, softest)
-        return self._led(found, (softest, 1.0), frequency, causes, _PARTS)
+        return self._continued(found, (softest, 1.0), frequency, causes, _PARTS)
 
-    def _led(
+    def _continued(
         self, start: Array, shares: tuple[float, float], frequency: Array, causes: Array | None, parts: int
     ) -> tuple[Array, NDArray[np.bool_]]:
-        """Return answers with the second share of the stiffness from those with the first, by halves if need be."""
+        """Continue solutions from the first share of the stiffness to the second, halving the step if necessary."""
         soft = replace(self, elements=self.elements.softened(shares[1]))
         found, good = soft.newton(start, frequency, causes, most=_LED)
         left = np.flatnonzero(~good)
@@ -340,7 +344,7 @@ class SlipBalance:
         for pair in ((shares[0], middle), (middle, shares[1])):
             if left.size and parts:
                 some = None if causes is None else causes[left]
-                found[left], good[left] = self._led(
+                found[left], good[left] = self._continued(
                     start[left] if pair[1] == middle else found[left], pair, frequency[left], some, parts - 1
                 )
                 left = left[good[left]]
@@ -348,7 +352,7 @@ class SlipBalance:
 
     @staticmethod
     def _halve(which: NDArray[np.intp], share: Array, *moved: tuple[Array, Array]) -> None:
-        """Take back half of the last step of some points."""
+        """Halve the last step of some points."""
         share[which] *= 0.5
         for place, step in moved:
             place[which] -= share[which, None] * step[which]

@@ -1,11 +1,11 @@
-r"""Forces of elastic-slip elements over a period of a motion given by its harmonics: exact between events.
+r"""Forces of elastic-slip elements over a period of a motion given by its harmonics; exact between events.
 
 The slider of an element, at z, moves only so far that the spring's length u - z stays within the slip displacement d:
 at each reversal of u it is clipped to [u - d, u + d], and in between it sticks from the reversal to the phase where
 u - z reaches d. With the indicator of sticking :math:`\chi` the rate of the force is :math:`k\chi u'`, so the harmonics
 of the force are sums of those of the motion times integrals of :math:`\chi\cos n\theta` and :math:`\chi\sin n\theta`.
-While an element sticks its slider follows variations of u at the reversal that it stopped at, which makes the Jacobian
-exact; moved events change nothing to first order, for the force is continuous.
+While an element sticks, the variation of its slider is that of u at the reversal at which it stopped, which makes the
+Jacobian exact. Shifts of the events have no first-order effect, since the force is continuous.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ __all__ = ["Cycle", "cycle"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-_PER_WAVE = 16  # samples to the wave of the highest harmonic
+_PER_WAVE = 16  # samples per period of the highest harmonic
 _ITERATIONS = 80
 _SMALL = 1e-9
 _TURN = 2.0 * np.pi
@@ -28,7 +28,7 @@ _TURN = 2.0 * np.pi
 
 @dataclass(frozen=True, eq=False)
 class Cycle:
-    """What elements on one displacement do in a period, many motions at once.
+    """The elements on one displacement over a period, many motions at once.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Cycle:
         Of the displacement: constant, cosines, sines.
     stiffness, slip : ndarray, shape (elements,)
     reversals : ndarray, shape (rows, reversals)
-        Phases in [0, 2 pi), ascending; the last one may come several times.
+        Phases in [0, 2 pi), ascending; padded by repeating the last one.
     places : ndarray, shape (rows, reversals)
         Displacements there.
     sliders : ndarray, shape (rows, reversals, elements)
@@ -72,7 +72,7 @@ class Cycle:
         return np.asarray(np.roll(self.sliders, -1, axis=1) != self.sliders)
 
     @cached_property
-    def _falls(self) -> Array:
+    def _is_falling(self) -> Array:
         return np.sign(np.roll(self.places, -1, axis=1) - self.places)[:, :, None]
 
     @cached_property
@@ -111,7 +111,7 @@ class Cycle:
         found[:, h + 1 :] = turned[:, 1 : h + 1] / (np.pi * k)
         stuck = (self._products[:, 0] * c).sum(axis=1)
         stuck -= ((self.onsets - self.reversals[:, :, None]) * self.sliders * self.stiffness).sum(axis=(1, 2))
-        slipping = ((self.ends[:, :, None] - self.onsets) * self._falls * self.slip).sum(axis=(1, 2))
+        slipping = ((self.ends[:, :, None] - self.onsets) * self._is_falling * self.slip).sum(axis=(1, 2))
         found[:, 0] = (stuck + slipping) / _TURN
         return found
 
@@ -133,7 +133,7 @@ class Cycle:
 
     @cached_property
     def loss(self) -> Array:
-        """Energy that friction takes in a period, shape (rows,)."""
+        """Energy dissipated by friction in a period, shape (rows,)."""
         way = np.abs(np.roll(self.sliders, -1, axis=1) - self.sliders)
         return np.asarray((way * self.slip).sum(axis=(1, 2)))
 
@@ -158,7 +158,7 @@ def values(phase: Array, harmonics: int, derivative: int = 0) -> Array:
 
 
 def cycle(coefficients: Array, stiffness: Array, slip: Array) -> Cycle:
-    """Return what elements do in a period of a displacement, the sliders at rest at 0 or the nearest that holds.
+    """Return the cycle of elements for a displacement; a slider that never slips is at 0 or as near as possible.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def _sliders(places: Array, limit: Array) -> tuple[Array, Index]:
 
 
 def _reversals(coefficients: Array, limit: float) -> tuple[Array, Array]:
-    """Return phases and displacements of all reversals, shape (rows, reversals); one at 0 for what sticks anyway."""
+    """Return phases and displacements of all reversals, shape (rows, reversals); only one at 0 where nothing slips."""
     h = coefficients.shape[1] // 2
     moving = np.abs(coefficients).sum(axis=1) > limit
     row, low, high = _brackets(coefficients[moving], h)
@@ -228,7 +228,7 @@ def _brackets(coefficients: Array, harmonics: int) -> tuple[Index, Array, Array]
     low, high = at * width, (at + 1) * width
     near = ((rate >= 0) == (ahead >= 0)) & (rate * bend < 0) & (ahead * bend_ahead > 0)
     hidden, cell = np.nonzero(near)
-    if hidden.size:  # two zeros between samples: a cubic through both ends tells
+    if hidden.size:  # two zeros between samples are found from a cubic through both ends
         s = np.linspace(0.0, 1.0, 17)[1:-1, None]
         y, dy, end, dend = (part[hidden, cell] for part in (rate, bend, ahead, bend_ahead))
         cubic = (
@@ -251,7 +251,7 @@ def _zeros(coefficients: Array, low: Array, high: Array, derivative: int, level:
 
 
 def _crossings(coefficients: Array, low: Array, high: Array, start: Array, end: Array, level: Array) -> Array:
-    """Return where a displacement passes a level between two reversals."""
+    """Return the phase at which a displacement crosses a level between two reversals."""
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.clip(np.nan_to_num((level - start) / (end - start)), 0.0, 1.0)
     guess = low + (high - low) * np.arccos(1.0 - 2.0 * share) / np.pi

@@ -1,4 +1,4 @@
-"""Loads on modes with elastic-slip elements, as series over a step; members along the first axis of terms."""
+"""Loads on modes with elastic-slip elements, as power series over a step; members along the first axis of terms."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Cause(NamedTuple):
 
 
 def _term_of(term: Harmonic | Piecewise, kept: NDArray[np.intp]) -> Harmonic | Piecewise:
-    """Return the term of some members; what has one entry holds for all."""
+    """Return the term of some members; arrays with one entry apply to all."""
 
     def rows(values: Array) -> Array:
         return values if len(values) == 1 else np.asarray(values[kept])

@@ -1,8 +1,8 @@
 r"""Damped nonlinear modes with elastic-slip elements: motions held periodic by modal damping of opposite sign.
 
 The extended periodic motion concept (M. Krack, Computers and Structures 154, 2015): with the damping ratio zeta of a
-motion the equations :math:`\ddot q + (C - 2\zeta\omega)\dot q + \Omega^2 q + \ldots + B^T F = 0` have a periodic answer
-for each amplitude, and zeta belongs to the motion as omega does.
+motion, the equations :math:`\ddot q + (C - 2\zeta\omega)\dot q + \Omega^2 q + \ldots + B^T F = 0` have a periodic
+solution for each amplitude, and zeta is a property of the motion, as omega is.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ __all__ = ["Held", "HeldMotions"]
 Array = NDArray[np.float64]
 _TOLERANCE = 1e-11
 _ITERATIONS = 30
-_LARGEST = 0.5  # step over the motion
+_LARGEST = 0.5  # relative step
 
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """Motions that are held periodic.
+    """Motions that are made periodic by modal damping of opposite sign.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Held:
 
 
 class _State(NamedTuple):
-    """Motions on the way: forces, their rates, rates of the peak by modes and forces, by how much it is too large."""
+    """State of the iteration: forces and their rates, rates of the peak by modes and forces, error of the peak."""
 
     coefficients: Array
     displacements: Array
@@ -89,7 +89,7 @@ class HeldMotions:
     rows : ndarray, shape (modes,)
         Of the displacement whose peak is the amplitude.
     statics : ndarray, shape (displacements,)
-        What a force on each displacement of elements adds to it without the modes, with opposite sign.
+        Contribution of a force on each element displacement to that displacement, beyond the modes, with opposite sign.
     """
 
     balance: SlipBalance
@@ -99,7 +99,7 @@ class HeldMotions:
 
     @cached_property
     def active(self) -> NDArray[np.intp]:
-        """Functions that take part: odd harmonics alone where reversed displacements obey the same equations."""
+        """Functions in use: odd harmonics alone where the equations are unchanged under q -> -q."""
         orders = self.balance.basis.orders.astype(int)
         return np.flatnonzero(orders % 2 == 1) if self.balance.equations.odd else np.arange(orders.size)
 
@@ -131,7 +131,7 @@ class HeldMotions:
         return np.asarray(np.diag(self.balance.equations.omega**2) + (rows.T * springs) @ rows)
 
     def _equivalent(self, sizes: Array) -> tuple[Array, Array]:
-        """Return the share of the stiffness that is left, and the loss, of the elements on each displacement."""
+        """Return equivalent stiffness over stuck stiffness, and the loss, of the elements on each displacement."""
         shares, losses = np.ones(sizes.size), np.zeros(sizes.size)
         waves = sizes[None, :, None] * np.array([0.0, 1.0, 0.0])
         for k, found in enumerate(self.balance.elements.cycles(waves)):
@@ -141,7 +141,7 @@ class HeldMotions:
         return shares, losses
 
     def solved(self, start: Held, amplitudes: Array) -> Held:
-        """Return the motions of given amplitudes near a start, by Newton's method."""
+        """Return the motions of given amplitudes near a starting point, by Newton's method."""
         x = start.coefficients.copy()
         w, frequency, ratio = start.displacements.copy(), start.frequency.copy(), start.ratio.copy()
         good, open_ = np.zeros(len(x), bool), np.arange(len(x))
@@ -228,9 +228,10 @@ class HeldMotions:
         return step_x, step_w, step[:, number], step[:, number + 1]
 
     def _condensed(self, state: _State) -> tuple[Array, Array, Array, Array]:
-        """Return the step of linear modes, all eliminated but the first harmonic of the mode that is followed.
+        """Return the step for linear modes, all eliminated but the first harmonic of the mode that is followed.
 
-        That one is singular when the elements do little, so a spring is added to it, and its force is an unknown.
+        Its equation is nearly singular when the elements have little effect, so a spring is added and its force is an
+        unknown.
         """
         elements, active, mode = self.balance.elements, self.active, self.mode
         b, m, half = elements.rows, len(elements.groups), active.size // 2

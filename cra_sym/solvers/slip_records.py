@@ -1,4 +1,4 @@
-"""What is kept of the steps of modes with elastic-slip elements: outputs at times, energies, the largest output."""
+"""Recorders for the time integration of modes with elastic-slip elements: outputs, energies, largest output."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LOOKS = np.linspace(0.0, 1.0, 33)
 
 
 def _derivative(series: Array, order: int, span: Array) -> Array:
-    """Return the series of a derivative by time; what has no span is not asked."""
+    """Return the series of a time derivative; steps of zero span are not evaluated."""
     for _ in range(order):
         series = series[1:] * np.arange(1, len(series)).reshape(-1, *[1] * (series.ndim - 1))
     return np.asarray(series / np.where(span > 0, span, 1.0) ** order)
@@ -52,7 +52,7 @@ class Sampler:
         self._next = np.zeros(rows.shape[2], np.intp)
 
     def __call__(self, step: Step) -> None:
-        """Take in what lies within a step; what lies at its end belongs to the next, but for the last time."""
+        """Record the times within a step; a time at its end belongs to the next step, except the last time."""
         begin = self._next[step.members]
         until = np.searchsorted(self.times, step.end, side="left")
         until = np.where(step.end >= self.times[-1], self.times.size, until)
@@ -71,20 +71,20 @@ class Sampler:
 
 
 class Energies(NamedTuple):
-    """Energies seen from the moving frame, J, and where they went, of shape (P, T); by elements (E, P, T).
+    """Energy balance in the moving frame, J, shape (P, T); by element (E, P, T).
 
     Attributes
     ----------
     kinetic, potential, elements : ndarray, shape (P, T)
-        Stored: in the masses, in the modes, in the springs of the elements and the give beside the modes.
+        Stored in the masses, in the modes, and in the springs of the elements with the flexibility of omitted modes.
     input, dampers : ndarray, shape (P, T)
-        Work of the loads, and what dampers and modal damping took, since t = 0.
+        Work of the loads, and energy dissipated by dampers and modal damping, since t = 0.
     sliders : ndarray, shape (E, P, T)
-        What each slider took.
+        Energy dissipated by each slider.
     force : ndarray, shape (E, P, T)
     displacement : ndarray, shape (D, P, T)
     state : ndarray of int8, shape (E, P, T)
-        0 where it sticks, 1 or -1 where it slips, as it was just before.
+        State just before: 0 sticking, 1 or -1 slipping.
     """
 
     kinetic: Array
@@ -99,13 +99,13 @@ class Energies(NamedTuple):
 
 
 class Ledger:
-    """Energies at times at which steps end.
+    """Recorder of the energies at times at which steps end.
 
     Parameters
     ----------
     modes : SlippingModes
     times : ndarray, shape (T,)
-        The pauses of the march, ascending, from 0 on; what is before the first step is at rest but for the start.
+        Ascending times from 0 on, at which the integration ends a step.
     start : tuple of ndarray, shape (N, P), and (E, P)
         Modal displacements and velocities, and forces, at t = 0.
     """
@@ -170,20 +170,20 @@ class Ledger:
 
 
 class Peak:
-    """The largest magnitude of an output from a time on, and the state at which the elements stuck last.
+    """Recorder of the largest magnitude of an output from a time on, and of the state when all elements last stuck.
 
     Parameters
     ----------
     row : ndarray, shape (N, P)
     since : ndarray, shape (P,)
-        A time at which a step ends, such as that of a knot of a motion.
+        Time at which a step ends, such as a knot of a motion.
 
     Attributes
     ----------
     moving : ndarray, shape (P,)
-        The largest output until the elements stuck last; all of it where one still slips.
+        Largest output until all elements last stuck; over all times where one still slips.
     state : list of ndarray: (N, P), (N, P), (E, P)
-        Modal displacements, velocities and forces when that was.
+        Modal displacements, velocities and forces at that time.
     sticks : ndarray of bool, shape (P,)
         Whether none slips at the end.
     """
@@ -195,7 +195,7 @@ class Peak:
         self.state = [np.zeros(row.shape), np.zeros(row.shape), np.zeros((elements, since.size))]
 
     def __call__(self, step: Step) -> None:
-        """Take in a step."""
+        """Record a step."""
         counted = np.flatnonzero((step.end > step.time) & (step.time >= self.since[step.members]))
         members = step.members[counted]
         if not members.size:
@@ -214,7 +214,7 @@ class Peak:
 
 
 def _largest(series: Array, share: Array) -> Array:
-    """Return the largest magnitude of series (K, P) on [0, share]: that of many looks, refined by Newton's method."""
+    """Return the largest magnitude of series (K, P) on [0, share]: of many samples, refined by Newton's method."""
     powers = _LOOKS[:, None] ** np.arange(len(series))
     scaled = series * share**_POWERS
     seen = np.abs(powers @ scaled)

@@ -1,8 +1,8 @@
-r"""Floquet multipliers of motions with elastic-slip elements, by maps from event to event.
+r"""Floquet multipliers of motions with elastic-slip elements, from the maps between events.
 
-A variation of the motion obeys linear equations between events, with the elements that stick as springs. The slider of
-an element that slips follows: its variation is that of the displacement at the reversal at which it stops. The forces
-are continuous at all events, so nothing else jumps there, and sliders that never slip do not vary.
+Between events the variation of a motion satisfies linear equations, with sticking elements as springs. When a slider
+stops, its variation is that of the displacement at that reversal; sliders that never slip do not vary. The forces are
+continuous at all events, so nothing else jumps.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Complex = NDArray[np.complex128]
 Waves = Callable[[Array], Array]
 """Known functions at phases (samples,), shape (known functions, samples)."""
 _TURN = 2.0 * np.pi
-_ANGLE = 0.4  # of the fastest mode and the highest harmonic in one step of the coarsest integration
+_ANGLE = 0.4  # largest phase of the fastest mode and the highest harmonic in one step of the coarsest integration
 _LEVELS = 5
 _GAUSS = 0.5 - np.sqrt(3.0) / 6.0
 _FEWEST = 1e-12  # phase
@@ -36,7 +36,7 @@ _FEWEST = 1e-12  # phase
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """One periodic motion with what linearises it."""
+    """A periodic motion and its variational equations."""
 
     equations: ModalPolynomials
     basis: Basis
@@ -85,7 +85,7 @@ def slip_multipliers(
         Of the motion.
     elements : Elements
     cycles : list of Cycle
-        What the elements on each displacement do, of one row.
+        Cycle of the elements on each displacement, of one row.
     waves : callable, optional
     tolerance : float
         Relative error of the map where equations are parametric or nonlinear.
@@ -168,7 +168,7 @@ def _map(motion: _Motion, elements: Elements, spans: list[Span], finer: int) -> 
 
 
 def _coupled(elements: Elements, stuck: Array) -> tuple[Array, Array]:
-    """Return the matrices of F = stiff B q - drive s with s the sums of k z over what sticks."""
+    """Return the matrices of F = stiff B q - drive s with s the sums of k z over the sticking elements."""
     k = np.diag(stuck)
     inverse: Array = np.asarray(np.linalg.inv(np.eye(len(k)) + k @ elements.coupling), float)
     return inverse @ k, inverse

@@ -1,9 +1,9 @@
 """Modes with elastic-slip elements in time, exact from event to event.
 
 An element is a spring in series with a slider: it sticks while its force is below the slip force, and slips with that
-force until the sliding velocity vanishes. Between such events the system is linear. A step is the series of its matrix
-exponential, as many terms as rounding asks for over a step of that length; within it forces and velocities are
-polynomials, whose first roots, isolated by Descartes' rule of signs, are the events. There is no fixed step.
+force until the sliding velocity vanishes. Between such events the system is linear. A step is the Taylor series of its
+matrix exponential to rounding. Within it forces and velocities are polynomials, whose first roots, isolated by
+Descartes' rule of signs, are the events. There is no fixed step.
 
 Arrays of one number a batch member have the members along their last axis.
 """
@@ -28,7 +28,7 @@ ORDER = 36
 """Degree of the series of a step."""
 _REACH = 5.0  # length of a step times the highest frequency: the first term left out is 5^37/37! = 5e-18
 _MOST_STEPS = 1_000_000
-_STALLED = 8  # events at one time, after which a member moves on
+_STALLED = 8  # largest number of events at the same time of a member
 _WAYS = np.arange(1.0, ORDER + 1)[:, None, None]
 _Numbers = NDArray[np.intp]
 _Event = tuple[_Numbers, _Numbers, _Numbers]
@@ -49,7 +49,7 @@ class SlippingModes(NamedTuple):
     rows : ndarray, shape (D, N, P)
         Displacements in each mode.
     give : ndarray, shape (D, D, P)
-        Displacements under unit forces that the modes left out would have, as statics.
+        Static flexibility of the omitted modes.
     where : ndarray of int, shape (E,)
         The displacement of each element.
     stiffness, slip : ndarray, shape (E, P)
@@ -76,7 +76,7 @@ class SlippingModes(NamedTuple):
         return np.stack([values[self.where == d].sum(axis=0) for d in range(len(self.rows))])
 
     def given(self, totals: Array) -> Array:
-        """Return the displacements (..., D, P) that forces make the modes left out give."""
+        """Return the static displacements (..., D, P) of the omitted modes under forces."""
         return np.asarray(np.einsum("efp,...fp->...ep", self.give, totals))
 
 
@@ -88,7 +88,7 @@ class Start(NamedTuple):
 
 
 class Events(NamedTuple):
-    """When elements began to slip (state 1 or -1) or to stick (0), in the order of time of each member."""
+    """Times at which elements began to slip (state 1 or -1) or to stick (0), in order of time for each member."""
 
     member: NDArray[np.intp]
     time: Array
@@ -97,19 +97,20 @@ class Events(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A step that was made. Series are in powers of the time since its start over its span, up to `share`.
+    """A completed step. Series are in powers of the time since its start over its span, up to `share`.
 
     Attributes
     ----------
     members : ndarray of int, shape (P,)
     time, span, share, end : ndarray, shape (P,)
-        Beginning, span of the series, what of it was gone, end of the step; the span is 0 of those that have arrived.
+        Start of the step, span of the series, completed share of it, end of the step; the span is 0 for finished
+        members.
     series, loads : ndarray, shape (ORDER + 1, N, P)
         Modal displacements, and modal loads times the square of the span.
     moved : ndarray, shape (ORDER + 1, D, P)
-        Displacements that hold elements.
+        Displacements with elements.
     force : ndarray, shape (E, P)
-        Of the elements at the beginning.
+        Of the elements at the start.
     state : ndarray of int8, shape (E, P)
         Of the elements during the step: 0 where they stick.
     """
@@ -147,7 +148,7 @@ def follow(
     visit: Callable[[Step], object],
     pauses: Array | None = None,
 ) -> Events:
-    """Follow the modes from t = 0 to the end of each member, and show every step to ``visit``.
+    """Integrate the modes from t = 0 to the end of each member, and call ``visit`` with every step.
 
     Parameters
     ----------
@@ -189,7 +190,7 @@ def follow(
 
 @dataclass
 class _March:
-    """The members under way."""
+    """State of the integration of the unfinished members."""
 
     modes: SlippingModes
     causes: Sequence[Cause]
@@ -202,7 +203,7 @@ class _March:
     u: Array
     force: Array
     state: NDArray[np.int8]
-    fresh: NDArray[np.bool_]  # the event was just now
+    fresh: NDArray[np.bool_]  # the event is at the current time
     stalled: NDArray[np.intp]
     tangent: Array  # (D, D, P): rate of the forces on the displacements by that of `rows q`
 
@@ -296,7 +297,7 @@ class _March:
         return series, moved
 
     def _first_events(self, moved: Array) -> tuple[Array, _Event | None]:
-        """Return how far each member goes, as a share, and the event there, one of each member."""
+        """Return the share of the step up to the first event of each member, and the event."""
         where, slip, stiffness, stuck = self.modes.where, self.modes.slip, self.modes.stiffness, self.state == 0
         shape = moved.shape[1:]
         way = np.concatenate([np.zeros((1, *shape)), moved[1:]]).reshape(ORDER + 1, -1)
@@ -319,25 +320,27 @@ class _March:
         place, falls = np.where(stalled, 1e-3, place), falls & ~stalled
         np.minimum.at(share, member, place)
         first = np.flatnonzero(falls & (place == share[member]))
-        _, once = np.unique(member[first], return_index=True)  # the others follow in a step of no length
+        _, once = np.unique(
+            member[first], return_index=True
+        )  # further events at the same time follow in steps of zero length
         chosen = first[once]
         return share, (member[chosen], element[chosen], new[chosen])
 
     def _margins(self, moved: Array, new: _Numbers, element: _Numbers, member: _Numbers) -> Array:
-        """Return what vanishes where elements take up a new state: a velocity where they slip, else room for force."""
+        """Return the event functions of elements: the velocity while they slip, else the margin to the slip force."""
         series = moved[:, self.modes.where[element], member]
         speed = np.zeros_like(series)
         speed[:-1] = series[1:] * _WAYS[:, 0] * self.state[element, member]
         room = -new * self.modes.stiffness[element, member] * series
         room[0] = self.modes.slip[element, member] - new * self.force[element, member]
-        # an element that has just come to rest has no velocity, one that has just left has no margin
+        # an element that has just stopped has no velocity, one that has just started to slip no margin
         just = self.fresh[element, member]
         room[1, just & (room[0] == 0.0)] = 0.0
         speed[0] = np.where(just, np.maximum(speed[0], 0.0), speed[0])
         return np.where(new == 0, speed, room)
 
     def _move(self, step: Step) -> None:
-        """Take the state to the end of the step."""
+        """Advance the state to the end of the step."""
         self.q, u = step.reached()
         self.u = np.where(step.span > 0, u, self.u)
         self.force = step.forces(self.modes)
@@ -347,7 +350,7 @@ class _March:
         self.time = step.end
 
     def _switch(self, member: _Numbers, element: _Numbers, new: _Numbers) -> _Happened:
-        """Let elements slip or stick."""
+        """Change elements to slipping or sticking."""
         self.state = self.state.copy()
         limit = np.where(new != 0, new, self.state[element, member])
         self.force[element, member] = limit * self.modes.slip[element, member]
@@ -374,7 +377,7 @@ def _fastest(modes: SlippingModes, causes: Sequence[Cause]) -> Array:
 
 
 def _tangent(modes: SlippingModes, state: NDArray[np.int8]) -> Array:
-    """Return the rate of the forces on the displacements by that of `rows q`: only what sticks resists."""
+    """Return the tangent stiffness of the forces with respect to `rows q`: only sticking elements contribute."""
     k = modes.total(np.where(state == 0, modes.stiffness, 0.0))
     if len(k) == 1:
         return np.asarray(k / (1.0 + k * modes.give[0]))[None]
@@ -385,7 +388,7 @@ def _tangent(modes: SlippingModes, state: NDArray[np.int8]) -> Array:
 
 
 def stuck_tangent(modes: SlippingModes) -> Array:
-    """Return the rate of the forces on the displacements by that of `rows q` while all elements stick, (D, D, P)."""
+    """Return the tangent stiffness of the forces with respect to `rows q` with all elements stuck, (D, D, P)."""
     return _tangent(modes, np.zeros(modes.slip.shape, np.int8))
 
 
@@ -394,7 +397,7 @@ def _applied(matrix: Array, values: Array) -> Array:
 
 
 def first_forces(modes: SlippingModes, q: Array) -> Array:
-    """Return the forces of the elements at displacements that were reached at once, from sliders at zero, (E, P)."""
+    """Return the forces of the elements at displacements reached in one loading, from sliders at zero, (E, P)."""
     state, force = np.zeros(modes.slip.shape, np.int8), np.zeros(modes.slip.shape)
     for _ in range(len(state) + 1):
         held = modes.total(np.where(state != 0, force, 0.0))

@@ -1,7 +1,8 @@
-"""Complete spectra: the first zeros of an entire function with real zeros only, none missed and none doubled.
+"""Complete spectra: the first zeros of an entire function with real zeros only, none missed and none repeated.
 
-An exact count says how many zeros lie below any point; Ostrowski's square-root step then climbs from a point next to
-a zero to that zero, at cubic order and without ever passing it. The functions are those of lines with one wave number,
+An exact count gives the number of zeros below any point. Ostrowski's square-root step then converges from a point
+below a zero to that zero, with cubic order and without overshoot. The functions are those of lines with one wave
+number,
 in z = lambda^4 for beams and lambda^2 for strings, with zeros about pi apart in lambda.
 """
 
@@ -52,8 +53,8 @@ def spectrum(characteristic: Characteristic, modes: int, offset: float = 1 / 16,
     modes : int
         How many zeros, multiplicity included.
     offset : float
-        Zeros are counted where lambda is ``(k / 2 + offset) pi``, k = 0, 1, ...; best a value that keeps away from
-        where zeros gather.
+        Zeros are counted at lambda = ``(k / 2 + offset) pi``, k = 0, 1, ...; best chosen away from accumulations of
+        zeros.
     power : int
         z is this power of lambda.
 
@@ -95,7 +96,7 @@ def _counted(
 
 
 def _first_point_with(counts: np.ndarray, modes: int) -> np.ndarray:
-    """Return, for each number of zeros and each lane, the index of the first point that has more than so many below."""
+    """Return, for each number and each lane, the index of the first point with more than that many zeros below."""
     lanes = np.arange(counts.shape[1])
     points = np.zeros((modes + 1, counts.shape[1]), dtype=np.int64)
     for row in counts:
@@ -113,7 +114,7 @@ def _start(
     values: np.ndarray,
     power: int,
 ) -> np.ndarray:
-    """Return points next to the wanted zeros: with ``number`` zeros below, or one more."""
+    """Return points close to the wanted zeros, with ``number`` zeros below, or one more."""
     low, high = points[right - 1] ** power, points[right] ** power
     below, above = counts[right - 1, lane], counts[right, lane]
     _separate(characteristic, number, lane, low, high, below, above)
@@ -138,7 +139,7 @@ def _separate(
     below: np.ndarray,
     above: np.ndarray,
 ) -> None:
-    """Shrink, in place, brackets with other zeros on both sides of the wanted one until one side has none."""
+    """Shrink, in place, brackets until on one side of the wanted zero there is no other."""
     crowded = np.flatnonzero((below < number) & (number + 1 < above))
     while crowded.size:
         middle = np.where(low[crowded] > 0, np.sqrt(low[crowded] * high[crowded]), high[crowded] / 16)
@@ -156,7 +157,7 @@ def _from_zero(characteristic: Characteristic, lane: np.ndarray, high: np.ndarra
 
 
 def _second_from_zero(characteristic: Characteristic, lane: np.ndarray) -> np.ndarray:
-    """Return the larger zero of the function's first three terms at z = 0, nan where it is not well apart."""
+    """Return the larger zero of the function's first three terms at z = 0, nan where the two are not well separated."""
     value, slope, curvature = characteristic.evaluate(np.zeros(lane.size), lane)
     discriminant = slope * slope - 2 * value * curvature
     apart = np.where(discriminant > 0.1 * slope * slope, discriminant, np.nan)
@@ -164,7 +165,7 @@ def _second_from_zero(characteristic: Characteristic, lane: np.ndarray) -> np.nd
 
 
 def _by_phase(lane: np.ndarray, right: np.ndarray, points: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return lambda of zeros that are alone in their intervals, from a sinusoid of growing amplitude.
+    """Return lambda of zeros that are alone in their intervals, by a fit of a sinusoid of growing amplitude.
 
     Neighbouring points are a quarter of a period apart, so that two values in a row give amplitude and phase.
     """
@@ -191,11 +192,10 @@ def _step(
     z: np.ndarray | float = 1.0,
     lower: np.ndarray | int = 0,
 ) -> np.ndarray:
-    """Return Ostrowski's step, which is the root of one over the sum of (z - zero)^-2: no zero is nearer.
+    """Return Ostrowski's step, the square root of one over the sum of (z - zero)^-2: no zero is nearer.
 
-    Each of the ``lower`` zeros between 0 and the wanted one adds at least z^-2 to that sum. That much is taken off: the
-    step becomes longer, and yet never passes the wanted zero. Where nearly all would go, rounding would decide: nothing
-    is taken off.
+    Each of the ``lower`` zeros between 0 and the wanted one adds at least z^-2 to that sum. Subtracting these makes the
+    step longer, but never beyond the wanted zero. Where the difference would be rounding, nothing is subtracted.
     """
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         whole, known = slope * slope - value * curvature, lower * (value / z) ** 2
@@ -207,7 +207,7 @@ def _step(
 def _climbed(characteristic: Characteristic, number: np.ndarray, lane: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Climb, in place, to the zeros from points next to them."""
     active = np.arange(z.size)
-    previous = np.zeros(z.size)  # the step before, none at first
+    previous = np.zeros(z.size)  # previous step
     even, lower = number % 2 == 0, number - characteristic.zeros[lane]
     for _ in range(_MOST_STEPS):
         if not active.size:

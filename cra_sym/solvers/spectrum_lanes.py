@@ -1,10 +1,10 @@
 # ruff: noqa: B018, F821, F841
 # mypy: ignore-errors
-"""Template of the compiled twin of `cra_sym.solvers.spectrum`: the same steps, for blocks of lanes at once.
+"""Template of the compiled version of `cra_sym.solvers.spectrum`: the same steps, for blocks of lanes at once.
 
-This text is specialised by `cra_sym.kernels.compiled` with the functions it leaves open: ``coefficients``,
-``power_series``, ``basis``, ``basis_near``, ``chain`` and ``derivatives`` of one family of functions. What else depends
-on the family, sizes and lists of arguments, replaces the marks: capital letters between double underscores.
+This text is specialised by `cra_sym.kernels.compiled` with the functions ``coefficients``,
+``power_series``, ``basis``, ``basis_near``, ``chain`` and ``derivatives`` of one family. Placeholders for sizes and
+argument lists are capital letters between double underscores.
 """
 
 import numpy as np

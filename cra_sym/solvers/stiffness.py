@@ -2,9 +2,9 @@
 
 The spatial problem is a first-order system ``y' = A y`` with ``z = omega^2`` (or any analytic parameter, such as a
 complex Laplace variable), ``y = (q, w, P, r)``: displacements, lumped coordinates (constant in x), the natural forces
-conjugate to q, and the force gathered by each coordinate. A piece so short that its ``exp`` is harmless is joined to
-its neighbour by eliminating the displacements between them, and so on: no large exponential and no choice of basis
-functions is ever needed. If A is constant along x, all pieces are alike and joining is doubling.
+conjugate to q, and the force gathered by each coordinate. Pieces so short that their transfer matrix is well
+conditioned are joined to their neighbours by eliminating the displacements between them, recursively: neither large
+exponentials nor basis functions are needed. If A is constant along x, all pieces are alike and joining is doubling.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _EPS = np.finfo(float).eps
 
 @dataclass(frozen=True)
 class Tree:
-    """What back-substitution needs: the middle ``-X (q0, w, qh)`` at every level, and ``-P0 = W (q0, w, qh)``.
+    """Data for back-substitution: the middle ``-X (q0, w, qh)`` at every level, and ``-P0 = W (q0, w, qh)``.
 
     Arrays lead with (part, row, piece); all pieces of a uniform part are alike and stored once.
     """
@@ -57,7 +57,7 @@ class Evaluation:
     unit : ndarray, shape (rows, f)
         Free coordinates = ``unit`` times the balanced ones.
     poles : ndarray, shape (rows,)
-        Logarithmic derivative of everything that was eliminated on the way: the poles of the determinant of K.
+        Logarithmic derivative of the eliminated blocks, which are the poles of the determinant of K.
     """
 
     matrix: np.ndarray
@@ -73,7 +73,7 @@ class Evaluation:
         return np.asarray(self.fixed_count + negatives(self.matrix))
 
     def solve(self, load: np.ndarray) -> np.ndarray:
-        """Return the free coordinates that a load on them, shape (rows, f), moves."""
+        """Return the free coordinates under a load on them, shape (rows, f)."""
         return np.asarray((_inverse(self.matrix) @ load[..., None])[..., 0])
 
     @property
@@ -98,8 +98,8 @@ class DynamicStiffness:
         where P is the derivative of potential minus kinetic energy density by q', and r' the same by w. A uniform
         system may return one station for all.
     boundary : callable
-        ``boundary(z, rows) -> (B, dB/dz)``, each (len(z), 2 n + m, 2 n + m): what the ends and the lumped terms add to
-        the dynamic stiffness, in the order (q(0), w, q(L)).
+        ``boundary(z, rows) -> (B, dB/dz)``, each (len(z), 2 n + m, 2 n + m): contribution of the ends and the lumped
+        terms to the dynamic stiffness, in the order (q(0), w, q(L)).
     length : ndarray, shape (rows,)
     displacements, coordinates : int
         n and m.
@@ -169,11 +169,10 @@ class DynamicStiffness:
         return self._assemble(z, rows, matrix[:, :, 0], slope[:, :, 0], unit, fixed.sum(axis=(0, 2)), poles, tree)
 
     def levels(self, z: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Return how often to halve, so that every exponent of the longer part is at most one on a piece.
+        """Return the number of halvings for which every exponent of the longer part is at most one on a piece.
 
         A scalar equation with exponents lambda has no clamped-clamped frequency below z on a piece shorter than
-        pi / max |Im lambda| (Polya's disconjugacy), so a piece this short starts the count at zero with a margin of
-        three.
+        pi / max |Im lambda| (Polya's disconjugacy), so the count of such a piece is zero, with a margin of three.
         """
         share = np.linspace(0.0, 1.0, 1 if self.uniform else 17)[None]
         system, _ = self.system(z, rows, share)
@@ -195,7 +194,7 @@ class DynamicStiffness:
         return np.stack([t for t, _ in parts]), np.stack([dt for _, dt in parts])
 
     def exponent(self, z: np.ndarray, rows: np.ndarray, start: np.ndarray, share: np.ndarray) -> Dual:
-        """Return Omega of the transfer ``exp(Omega)`` over each step, from ``start`` on ``share`` of the length.
+        """Return Omega of the transfer matrix ``exp(Omega)`` of steps from ``start`` on, ``share`` of the length long.
 
         Uniform: A h. Otherwise the sixth-order Magnus expansion on three Gauss points (Blanes, Casas, Oteo and Ros,
         Physics Reports 470, 2009), which keeps the Hamiltonian structure, so that the stiffness stays symmetric.
@@ -227,7 +226,7 @@ class DynamicStiffness:
         growth: np.ndarray,
         tree: Tree | None,
     ) -> Evaluation:
-        """Join the two parts at a node that stays, add the ends, keep the free coordinates, balance."""
+        """Join the two parts at a retained node, add the ends, reduce to the free coordinates, and balance."""
         n, m = self.displacements, self.coordinates
         size = 2 * n + m
         left = np.r_[0 : n + m, size : size + n]
@@ -353,7 +352,7 @@ def _symmetric(matrix: np.ndarray) -> np.ndarray:
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
-    """Invert a stack; if a pole is hit to the last bit, move off it by some rounding errors."""
+    """Invert a stack of matrices; an exactly singular one is perturbed by some rounding errors."""
     try:
         return np.linalg.inv(matrix)
     except np.linalg.LinAlgError:

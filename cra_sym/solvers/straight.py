@@ -1,7 +1,7 @@
-"""Formulas written once: run on arrays, or written down as text without branches for one structure of numbers.
+"""Formulas written once: evaluated on arrays, or recorded as branch-free source text for one pattern of coefficients.
 
-`Exact` is a number 0 or 1 that is known beforehand: whatever it makes idle is left out, of the arrays as of the text.
-`Term` is a number in the text: what Python does with it becomes a line.
+`Exact` is a coefficient known to be 0 or 1; operations that it makes trivial are omitted, in arrays and in the text.
+`Term` is a number in the text: each operation on it becomes a line.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 __all__ = ["Exact", "Term", "straight", "wanted_lines"]
 
 _NAMES = re.compile(r"\bt\d+\w*")
-_OF_NUMPY = {"floor", "sqrt"}  # the others are functions of the text around it
+_OF_NUMPY = {"floor", "sqrt"}  # the other names are functions of the surrounding text
 
 
 class Exact:
@@ -79,7 +79,7 @@ def _number(value: Any) -> Any:
 
 
 class Term:
-    """A number in the text, by its name there; the lines so far, with the names of what they compute."""
+    """A number in the text, by its name there, and the lines so far with the names of their results."""
 
     __slots__ = ("lines", "name")
 
@@ -87,7 +87,7 @@ class Term:
         self.name, self.lines = name, lines
 
     def _new(self, text: str) -> Term:
-        """Return what a line computes; one that is there already serves again."""
+        """Return the result of a line; an identical earlier line is used again."""
         name = self.lines.setdefault(text, f"t{len(self.lines)}")
         return Term(name, self.lines)
 
@@ -126,7 +126,7 @@ def _written(value: Any) -> str:
 def _operator(sign: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
     def forward(self: Term, other: Any) -> Any:
         if isinstance(other, Exact):
-            return NotImplemented  # which knows what is idle
+            return NotImplemented  # Exact simplifies trivial operations
         if sign in "*/" and isinstance(other, float) and other == 1.0:
             return self
         return self._new(f"{self.name} {sign} {_written(other)}")
@@ -144,7 +144,7 @@ def _comparison(sign: str) -> Callable[..., Any]:
 
 
 def _joint(sign: str) -> Callable[..., Any]:
-    """Return & or |; one of the conditions may be known beforehand."""
+    """Return the operator & or |; one of the conditions may be Exact."""
 
     def joint(self: Term, other: Any) -> Any:
         if isinstance(other, Term):
@@ -216,9 +216,9 @@ def wanted_lines(lines: dict[str, str], results: Sequence[str]) -> list[tuple[li
 
 
 def _with_few_names(lines: list[tuple[list[str], str]], results: Sequence[str]) -> tuple[str, list[str]]:
-    """Return the lines and results with names that serve again once nobody needs what they stood for.
+    """Return the lines and results with names that are reused once their value is no longer needed.
 
-    Arrays are given back that early.
+    Arrays are thus freed early.
     """
     last = {name: at for at, (_, text) in enumerate(lines) for name in _NAMES.findall(text)}
     last |= dict.fromkeys(results, len(lines))

@@ -2,7 +2,7 @@
 
 Unknown are, element by element, the natural forces of highest order (moment of a beam, tension of a string, moment and
 shear of Timoshenko's beam) as Legendre series, and the displacements of one end. Displacements follow by integration
-from that end, so nothing needs to be continuous, and a jump of a stiffness costs nothing.
+from that end, so the stresses need not be continuous, and a jump of a stiffness does not slow convergence.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 class Columns:
-    """What each unknown displaces and strains, at the Gauss points of a mesh; then the matrices.
+    """Displacements and strains per unit of each unknown at the Gauss points of a mesh, and the matrices from them.
 
     The unknowns are the displacements of the origin, the lumped coordinates, the amplitudes of further stresses and the
     Legendre coefficients: degree by degree, in each degree element by element, in each element field by field.
@@ -32,7 +32,7 @@ class Columns:
     problem : Continuum
     mesh : Mesh
     further : ndarray, shape (sets, functions, fields, Q, G), optional
-        Further functions at the points of the mesh beside the Legendre functions.
+        Further stress functions at the points of the mesh, in addition to the Legendre functions.
     """
 
     def __init__(self, problem: Continuum, mesh: Mesh, further: Array | None = None) -> None:
@@ -55,7 +55,7 @@ class Columns:
         self._check_signs()
 
     def _check_signs(self) -> None:
-        """Refuse a stiffness or a mass that is negative somewhere."""
+        """Raise an error if a stiffness or a mass is negative somewhere."""
         for name, what in (("W", "a stiffness"), ("M", "a mass")):
             for (i, j), entry in self.coefficient[name].items():
                 if i == j and (entry < 0.0).any():
@@ -142,7 +142,7 @@ class Columns:
         return [v for v in values if v is not None], [e for e in ends if e is not None]
 
     def _rate(self, place: int, tops: list[int], values: list[Array | None]) -> Array | None:
-        """Return the derivative of a displacement by x, or None if it waits for another."""
+        """Return the derivative of a displacement by x, or None if it depends on one not yet known."""
         if place not in tops:
             return values[place + 1]
         field = tops.index(place)
@@ -219,7 +219,7 @@ class Columns:
 
     @cached_property
     def potential(self) -> Array | None:
-        """What the displacements themselves add to the stiffness, (sets, size, size), or None if nothing."""
+        """Stiffness from the potential energy of the displacements, (sets, size, size), or None if there is none."""
         cross, direct = self.coefficient["D"], self.coefficient["R"]
         if not cross and not direct:
             return None
@@ -283,7 +283,7 @@ class Columns:
 
     @cached_property
     def held(self) -> tuple[Array, Array]:
-        """What each spring acts on, (sets, springs, size), and the springs, (sets, springs)."""
+        """Direction of each spring in the unknowns, (sets, springs, size), and the stiffnesses, (sets, springs)."""
         rows, springs = [self.problem.directions @ self.ends], [self.problem.springs]
         for point, there in zip(self.problem.points, self.at_points, strict=True):
             rows.append(point.directions @ there)

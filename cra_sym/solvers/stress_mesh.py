@@ -23,7 +23,7 @@ Sampler = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class Variation:
-    """How fast coefficients may vary between the places where they are sampled.
+    """Bounds of the variation of coefficients between their samples.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Variation:
         ``exponents(x, *parameters)``: exponents e of functions such as exp(e) or cos(e).
     columns : ndarray, shape (parameters, sets)
     decaying : int
-        So many, the first, are of functions that no longer change where e is below -745.
+        Number of exponents, the first ones, of functions that are constant where e is below -745.
     """
 
     exponents: Callable[..., Sequence[Any]]
@@ -39,7 +39,7 @@ class Variation:
     decaying: int
 
     def take(self, rows: NDArray[np.intp]) -> Variation:
-        """Return that of some of the parameter sets."""
+        """Return the bounds of some of the parameter sets."""
         return replace(self, columns=self.columns[:, rows])
 
     def _at(self, x: NDArray[np.floating]) -> Array:
@@ -48,7 +48,7 @@ class Variation:
         return np.stack([np.broadcast_to(np.asarray(exponent, dtype=float), x.shape) for exponent in exponents])
 
     def resolved(self, x: Array) -> NDArray[np.bool_]:
-        """Return whether no exponent changes so much that detail hides between samples, (functions, sets, pieces).
+        """Return whether the samples resolve the change of every exponent, (functions, sets, pieces).
 
         Parameters
         ----------
@@ -66,26 +66,26 @@ class Variation:
 
 
 SWING = 48.0
-"""Change of an exponent on a piece up to which 69 samples show every rise and fall."""
+"""Largest change of an exponent on a piece that 69 samples resolve."""
 UNDERFLOW = -745.0
 """Exponent from which exp underflows."""
 
 NODES = 32
-"""Gauss points of the test whether a piece is resolved: a coefficient must be a polynomial of that degree there."""
+"""Gauss points of the test of resolution: on a piece a coefficient must be a polynomial of that degree."""
 TAIL = 1e-11
-"""Relative size of what a resolved coefficient may hold beyond. Gauss's rule integrates twice that degree, so what is
-left out of an integral is far below; sin(1e3 x) has only this many digits anyway."""
+"""Relative size of the higher-degree part of a resolved coefficient. Gauss's rule integrates twice that degree, so the
+error of an integral is far smaller; sin(1e3 x) itself is accurate only to this many digits."""
 SPECK = 2e-16
-"""Share of its own integral that a coefficient may have on a piece which is left unresolved."""
+"""Largest share of the integral of a coefficient on a piece that is left unresolved."""
 SINGULAR = 1e-9
-"""Share of its own integral that a coefficient may not have on a piece that has no width: it is infinite there."""
+"""Share of the integral of a coefficient on a piece of no width from which on it counts as infinite there."""
 ROUNDING = 8 * np.finfo(float).eps
-"""The same relative to the largest value anywhere: a coefficient that passes zero has no more digits."""
+"""The same relative to the largest value: a coefficient near a zero has no more digits."""
 MOST_PIECES = 8000
 
 
 class TooFineError(ValueError):
-    """Coefficients that vary too finely to be resolved; ``sets`` is how many parameter sets were treated together."""
+    """Coefficients that vary too finely to be resolved; ``sets`` is the number of parameter sets treated together."""
 
     def __init__(self, message: str, sets: int) -> None:
         super().__init__(message)
@@ -136,7 +136,7 @@ class Mesh:
     degree : int
         Highest degree of the Legendre functions on an element.
     strained : ndarray of bool, shape (E,)
-        Elements on which the strain itself is expanded, not the stress: those where a stiffness vanishes at an end.
+        Elements on which the strain is expanded instead of the stress, since a stiffness vanishes at one end.
     smoothness : int
         Degree of the polynomials that the coefficients are on every piece.
     """
@@ -162,7 +162,7 @@ class Mesh:
         return oscillations + (self.smoothness + 1) // 2 + 4
 
     def split(self, marked: NDArray[np.bool_]) -> Mesh:
-        """Return the mesh with some elements parted: so that half of their pieces, or of breakpoints, lie on each side.
+        """Return the mesh with some elements split, with half of their pieces, or of breakpoints, on each side.
 
         Pieces are small where the coefficients vary fast.
         """
@@ -180,7 +180,7 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Grid:
-    """A mesh in physical places: shape (sets, ...), or one set if all are alike.
+    """A mesh in physical coordinates: shape (sets, ...), or one set if all are equal.
 
     Attributes
     ----------
@@ -206,7 +206,7 @@ class Grid:
         left, right = bounds[:, :-1][:, mesh.owner], bounds[:, 1:][:, mesh.owner]
         local = ((x - left[..., None]) - (right[..., None] - x)) / (right - left)[..., None]
         shares = (ends - ends[:, :1]) / (ends[:, -1:] - ends[:, :1])
-        if len(local) > 1 and np.ptp(shares, axis=0).max() < 1e-14:  # the same picture for every length
+        if len(local) > 1 and np.ptp(shares, axis=0).max() < 1e-14:  # invariant under scaling of the length
             local = local[:1]
         return cls(x, half, local, ends)
 
@@ -223,29 +223,29 @@ def places(reference: Array, edges: Array) -> Array:
 def resolved(
     sample: Sampler, edges: Array, pieces: Array, what: str, variation: Variation | None = None
 ) -> tuple[Array, Array, int]:
-    """Return pieces on which every coefficient is resolved, the relative size of what is not, shape (sets,), and the
-    highest degree of the coefficients there.
+    """Return pieces that resolve every coefficient, the relative unresolved part (sets,), and the highest degree.
 
     Parameters
     ----------
     sample : callable
     edges : ndarray, shape (sets, spans + 1)
     pieces : ndarray, shape (Q + 1,)
-        To begin with, in the reference coordinate.
+        Initial pieces, in the reference coordinate.
     what : str
         What the coefficients are, for errors.
     variation : Variation, optional
-        Where it is left out, the coefficients have no detail finer than the pieces to begin with show.
+        By default coefficients have no detail that the initial pieces do not resolve.
 
     Raises
     ------
     TooFineError
-        If some piece is not resolved when there are 8000 of them.
+        If some piece is still unresolved with 8000 pieces.
 
     Notes
     -----
-    A piece is resolved if the last Legendre coefficients of 32 vanish, the polynomial meets the coefficient at places
-    between the points, and nothing can hide between these. One that holds a jump is halved until it does not matter.
+    A piece is resolved if the last of 32 Legendre coefficients vanish, the polynomial agrees with the coefficient
+    between the points, and the coefficient cannot vary between these. A piece with a jump is halved until it is
+    negligible.
     """
     gauss = rule(NODES)
     off = np.linspace(-0.987, 0.983, 37)
@@ -268,7 +268,7 @@ def resolved(
             total = (np.abs(known) @ gauss.weights * half).sum(axis=-1, keepdims=True)
         series = np.abs(known @ gauss.spectrum.T)
         error = np.maximum(series[..., -2:].sum(axis=-1), np.abs(known @ table.T - beyond).max(axis=-1))
-        # x itself is rounded: over a piece a coefficient has no more digits than its steepness leaves
+        # x itself is rounded, which limits the accuracy of a steep coefficient
         steep = 2.0 * ROUNDING * np.abs(ends).max(axis=-1) / (2.0 * half) * np.ptp(values, axis=-1)
         allowed = TAIL * size + ROUNDING * peak + steep
         smooth = error <= allowed
@@ -310,5 +310,5 @@ def _refuse(bad: NDArray[np.bool_], at: Array) -> None:
 
 
 def cells(edges: int, most: int) -> Array:
-    """Return the ends of basis elements for that many spans: one for each, or groups of neighbours if they are many."""
+    """Return the ends of basis elements: one element for each span, or for groups of neighbours if there are many."""
     return np.unique(np.round(np.linspace(0.0, edges, min(edges, most) + 1)))

@@ -1,4 +1,4 @@
-"""Modes of a Ritz basis on the stresses along x, and how well they satisfy equilibrium."""
+"""Modes of a Ritz basis on the stresses along x, and their residual in the equations of equilibrium."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 class ModeFields:
     """Displacements and natural forces of modes at the Gauss points of every piece.
 
-    Natural forces other than the unknown ones, and the residual of these, come from equilibrium: each is the integral
-    of inertia and potential forces. What the integration leaves free is fitted to the unknown stresses.
+    The other natural forces, and the residual of the unknown stresses, follow from equilibrium: each is the integral of
+    inertia and potential forces. Constants of integration are fitted to the unknown stresses.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class ModeFields:
         return ModeFields(columns, self.z[sets], self.vectors[sets])
 
     def _of(self, values: Array) -> Array:
-        """Return what the modes have of a quantity of the unknowns at the points, (sets, modes, Q, G)."""
+        """Return a quantity of the modes, given per unit of each unknown at the points, (sets, modes, Q, G)."""
         shape = self.columns.grid.x.shape[1:]
         return (self.vectors @ self.columns._flat(values)).reshape(*self.z.shape, *shape)
 
@@ -55,7 +55,7 @@ class ModeFields:
         """(q(left), w, q(right)), (sets, modes, 2 n + m)."""
         found = self.vectors @ self.columns.ends.swapaxes(-1, -2)
         held = np.isinf(self.problem.springs).any(axis=0)
-        for row in np.moveaxis(self.problem.directions[:, held], 1, 0):  # what is held does not move, not even a little
+        for row in np.moveaxis(self.problem.directions[:, held], 1, 0):  # held displacements are exactly zero
             found = found - (found @ row[..., None]) * (row / (row**2).sum(axis=-1, keepdims=True))[:, None]
         return found
 
@@ -90,7 +90,7 @@ class ModeFields:
         return self.columns.coefficient[name][pair][:, None]
 
     def _force(self, place: int) -> Array:
-        """Return the rate of the natural force of a displacement without the share of the next lower force."""
+        """Return the derivative by x of the natural force of a displacement, without the next lower force."""
         total = np.zeros((*self.z.shape, *self.columns.grid.x.shape[1:]))
         z = self.z[..., None, None]
         for j, s in enumerate(self.displaced):
@@ -108,7 +108,7 @@ class ModeFields:
     # ------------------------------------------------------------------------------------------ equilibrium
 
     @cached_property
-    def _balanced(self) -> tuple[list[Array], list[Array], list[Array]]:
+    def _equilibrium_forces(self) -> tuple[list[Array], list[Array], list[Array]]:
         """Natural forces from equilibrium at the points and at the ends of pieces, and the residual of each field."""
         forces: list[Array] = []
         ends: list[Array] = []
@@ -120,7 +120,7 @@ class ModeFields:
                 rate = self._force(place + k)
                 chain.append(self._integral(rate - chain[-1][0] if chain else rate))
             stress = self.stress[field]
-            free = self._free(order)
+            free = self._self_equilibrated_forces(order)
             shift = self._fit(stress - chain[-1][0], [levels[-1][0] for levels in free], self._softness(field))
             for k, (values, value_ends) in enumerate(chain):
                 for part, levels in zip(np.moveaxis(shift, -1, 0), free, strict=True):
@@ -132,11 +132,10 @@ class ModeFields:
             place += order
         return forces, ends, residuals
 
-    def _free(self, order: int) -> list[list[tuple[Array, Array]]]:
-        """Return forces of a field that need no load: of each, at the points and at the ends of pieces, lowest first.
+    def _self_equilibrated_forces(self, order: int) -> list[list[tuple[Array, Array]]]:
+        """Return the self-equilibrated forces of a field, at the points and at the ends of pieces, lowest order first.
 
-        One constant, and for a field with second derivatives one moment that grows along x; beside them what each
-        interior place may add to the right of it.
+        A constant and, for a field with second derivatives, a moment linear in x; also a jump at each interior place.
         """
         grid = self.columns.grid
         points = sorted({point.node for point in self.problem.points})
@@ -187,20 +186,20 @@ class ModeFields:
     @property
     def forces(self) -> list[Array]:
         """Natural forces P at the points, each (sets, modes, Q, G)."""
-        return self._balanced[0]
+        return self._equilibrium_forces[0]
 
     @property
     def force_ends(self) -> list[Array]:
         """Natural forces P at the ends of the pieces, each (sets, modes, Q + 1)."""
-        return self._balanced[1]
+        return self._equilibrium_forces[1]
 
     @property
     def unbalanced(self) -> list[Array]:
-        """What equilibrium adds to the highest natural force of each field, (sets, modes, Q, G)."""
-        return self._balanced[2]
+        """Highest natural force of each field by equilibrium minus that of the basis, (sets, modes, Q, G)."""
+        return self._equilibrium_forces[2]
 
     def further(self) -> Array:
-        """Return the same as functions of unit strain energy to expand modes in, (sets, modes, fields, Q, G)."""
+        """Return `unbalanced` as further basis functions of unit strain energy, (sets, modes, fields, Q, G)."""
         strained = self.columns.mesh.strained[self.columns.mesh.owner][:, None]
         found = []
         for field, force in enumerate(self.unbalanced):
@@ -211,7 +210,7 @@ class ModeFields:
 
     @cached_property
     def residual(self) -> Array:
-        """Strain energy of the stresses that break equilibrium relative to that of the mode, (sets, modes, elements).
+        """Strain energy of the residual stresses relative to that of the mode, (sets, modes, elements).
 
         The sum over the elements, divided by the relative distance to the next compliance, bounds the relative error
         of z (Temple's inequality). Rigid-body modes have none.

@@ -1,4 +1,4 @@
-"""From a continuum to modes of stated accuracy: a quadrature mesh, then elements and degrees, led by the estimate."""
+"""Modes of a continuum to a stated accuracy: quadrature mesh, then elements and degrees by the error estimate."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ __all__ = ["Found", "alike", "cure", "meshed", "solved"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-Told = Callable[[float, str], None]
+Progress = Callable[[float, str], None]
 Counted = Callable[[Index, Array], "NDArray[np.intp] | None"]
 _ROUNDS, _MOST_UNKNOWNS, _MOST_DEGREE = 24, 1500, 40
-_MOST_ELEMENTS = 12  # to begin with: more spans than that share elements
-_FURTHER = 3  # times that the stresses which equilibrium asks for are added
+_MOST_ELEMENTS = 12  # initial elements; with more spans than that, spans share elements
+_FURTHER = 3  # number of times that residual stresses are added to the basis
 _GONE = 1e-7
-"""Stiffness at an end over that at 1e-7 of the span from there, below which it vanishes."""
+"""Ratio of the stiffness at an end to that at 1e-7 of the span from it, below which it counts as vanishing."""
 _SHARE = 0.1
-"""Compliance of what a basis leaves out, over that of the last mode, that hides no mode by itself."""
+"""Compliance beyond the basis, relative to that of the last mode, below which no mode can be missing."""
 _LANES = 1_000_000  # numbers in the largest array of a chunk
 
 
@@ -53,7 +53,7 @@ def solved(
     modes: int,
     tolerance: float,
     target: float,
-    told: Told | None = None,
+    progress: Progress | None = None,
     counted: Counted | None = None,
 ) -> list[Found]:
     """Return the lowest modes of every row.
@@ -65,26 +65,26 @@ def solved(
     tolerance : float
         Relative error of the squared frequencies that must be reached.
     target : float
-        What is aimed at; a smaller one gives better mode shapes, whose error is as its square root.
-    told : callable, optional
-        Is told the error of the frequencies that each mesh has reached, and which mesh that is, before the next one.
+        Target error; a smaller one gives better mode shapes, whose error goes as its square root.
+    progress : callable, optional
+        Called after each mesh that is to be refined, with the error of the frequencies and a description of the mesh.
     counted : callable, optional
-        ``counted(rows, z)`` returns how many squared frequencies of rows are below z, or None if it cannot. It is asked
-        where the basis does not prove by itself that it misses no mode.
+        ``counted(rows, z)`` returns how many squared frequencies of rows are below z, or None if it cannot. Used
+        where the basis alone does not prove that no mode is missing.
 
     Raises
     ------
     ValueError
-        If the structure has buckled, has fewer modes, or does not reach the tolerance: names the place and the figure.
+        If the structure has buckled, has fewer modes, or the tolerance is not reached: names the place and the error.
     """
     found: list[Found] = []
     for rows, ends in alike(problem):
-        found += _group(problem.take(rows), rows, ends, _Aim(modes, tolerance, target, told, counted))
+        found += _group(problem.take(rows), rows, ends, _Aim(modes, tolerance, target, progress, counted))
     return found
 
 
 def alike(problem: Continuum) -> Iterator[tuple[Index, tuple[bool, bool]]]:
-    """Yield sets whose stiffness vanishes at the same ends."""
+    """Yield groups of sets whose stiffness vanishes at the same ends."""
     kinds = np.stack([_vanishes(problem, end) for end in (0, 1)], axis=1)
     for kind in np.unique(kinds, axis=0):
         yield np.nonzero((kinds == kind).all(axis=1))[0], (bool(kind[0]), bool(kind[1]))
@@ -115,7 +115,7 @@ def _vanishes(problem: Continuum, end: int) -> NDArray[np.bool_]:
         with np.errstate(invalid="ignore"):
             gone = (power > 0.05) & ~(stiff[:, 0] > _GONE * stiff[:, 1])
         vanishes |= gone
-        for k in range(order):  # a force there makes a stress like the distance to the power order - 1 - k
+        for k in range(order):  # a force there causes a stress that goes as the distance to the power order - 1 - k
             held = gone & (power > order - 1 - k + 0.05) & problem.acts_at(end, tops[field] - order + 1 + k)
             if held.any():
                 name, moved = ("left", "right")[end], ("displacement", "slope")[k]
@@ -147,12 +147,12 @@ def _group(problem: Continuum, rows: Index, ends: tuple[bool, bool], aim: _Aim) 
 
 
 def meshed(problem: Continuum, ends: tuple[bool, bool], modes: int) -> tuple[Continuum, Mesh, Array]:
-    """Return the problem integrated from a regular end, a mesh to begin with, and what stays unresolved of each row.
+    """Return the problem integrated from a regular end, an initial mesh, and the unresolved part of each row.
 
     Parameters
     ----------
     problem : Continuum
-        With rows that are alike.
+        With rows that can share a mesh.
     ends : tuple of bool
         Whether a stiffness vanishes at the left and at the right end.
     modes : int
@@ -178,7 +178,7 @@ def meshed(problem: Continuum, ends: tuple[bool, bool], modes: int) -> tuple[Con
 
 
 def _quadrature(problem: Continuum, elements: Array, strained: NDArray[np.bool_]) -> tuple[Array, Array, int]:
-    """Return the pieces of the quadrature: the compliance is resolved, the stiffness where the strain is expanded."""
+    """Return quadrature pieces that resolve the compliance, or the stiffness where the strain is expanded."""
     whole = np.union1d(elements, np.arange(problem.edges.shape[1]))
     parts, unresolved, smoothness = [], np.zeros(len(problem.edges)), 0
     for kind in np.unique(strained):
@@ -197,7 +197,7 @@ def _quadrature(problem: Continuum, elements: Array, strained: NDArray[np.bool_]
 
 
 def _refined(problem: Continuum, rows: Index, mesh: Mesh, unresolved: Array, aim: _Aim) -> list[Found]:
-    """Solve on finer and finer meshes the sets that have not reached the target."""
+    """Refine the mesh for the sets that have not reached the target."""
     found: list[Found] = []
     open_, before, degree_before = np.arange(len(rows)), np.inf, 0
     for turn in range(_ROUNDS):
@@ -215,8 +215,8 @@ def _refined(problem: Continuum, rows: Index, mesh: Mesh, unresolved: Array, aim
         still = [solution.part[~solution.good(aim.target)] for solution in solutions]
         if last or not sum(map(len, still)):
             return found
-        if aim.told is not None:
-            aim.told(0.5 * float(worst), f"{len(mesh.elements) - 1} elements of degree {mesh.degree}")
+        if aim.progress is not None:
+            aim.progress(0.5 * float(worst), f"{len(mesh.elements) - 1} elements of degree {mesh.degree}")
         marks, open_ = np.max([s.marks(aim.target) for s in solutions], axis=0), np.concatenate(still)
         degree = mesh.degree
         falling = worst > aim.target and (turn == 0 or (degree > degree_before and worst < 1e-3 * before))
@@ -231,21 +231,21 @@ def _refined(problem: Continuum, rows: Index, mesh: Mesh, unresolved: Array, aim
 
 @dataclass(frozen=True)
 class _Aim:
-    """How many modes are asked for, the relative errors of z to accept and to aim at, whom to tell, and who counts."""
+    """Number of modes, accepted and target relative errors of z, and the callbacks for progress and count."""
 
     modes: int
     tolerance: float
     target: float
-    told: Told | None
+    progress: Progress | None
     counted: Counted | None = None
 
 
 @dataclass(frozen=True)
 class _Solution:
-    """Modes of a chunk on one mesh, with the estimated relative error of z, in all and by element.
+    """Modes of a chunk on one mesh, with the estimated relative error of z, total and by element.
 
-    ``left_out`` bounds the compliance that the basis leaves out, by element; ``missing`` is that where a mode may be
-    missing, and ``unproved`` tells where none is as far as the basis knows.
+    ``left_out`` bounds the compliance beyond the basis, by element; ``missing`` is that bound where a mode may be
+    missing, and ``unproved`` marks the sets for which the basis does not prove completeness.
     """
 
     part: Index
@@ -263,12 +263,12 @@ class _Solution:
         return np.asarray((self.error.max(axis=1) <= level) & ~self.missing.any(axis=1))
 
     def marks(self, level: float) -> Array:
-        """Return the share of each element in what is not good enough yet, (elements,)."""
+        """Return the contribution of each element to the errors that are still too large, (elements,)."""
         shares: Array = self.share[self.error.max(axis=1) > level].max(axis=(0, 1), initial=0.0)
         return shares if shares.any() else self.missing.max(axis=0)
 
     def checked(self, rows: Index, aim: _Aim, last: bool) -> _Solution:
-        """Return the same after a count of the modes where it is needed: in the widest gap behind the last of them."""
+        """Return the solution after a count of the modes, where needed, in the widest gap above the last of them."""
         good = self.error.max(axis=1) <= (aim.tolerance if last else aim.target)
         which = np.nonzero(good & (self.unproved | (last & self.missing.any(axis=1))))[0]
         if aim.counted is None or not len(which):
@@ -291,7 +291,7 @@ class _Solution:
 
 
 def _solved(problem: Continuum, part: Index, mesh: Mesh, aim: _Aim) -> _Solution:
-    """Return the modes of a chunk; fine detail within an element is met by the stresses that equilibrium asks for."""
+    """Return the modes of a chunk; residual stresses are added to the basis to resolve fine detail in an element."""
     chosen = problem.take(part)
     further: Array | None = None
     most = _FURTHER if len(mesh.pieces) > 4 * len(mesh.elements) else 0
@@ -305,7 +305,7 @@ def _solved(problem: Continuum, part: Index, mesh: Mesh, aim: _Aim) -> _Solution
         except ValueError:
             if best is None:
                 raise
-            return best  # the further stresses depend on the others to rounding
+            return best  # the further stresses are linearly dependent to rounding
         fields = ModeFields(columns, result.z, result.vectors)
         share = 2.0 * fields.residual
         left_out, loading = tail(columns)
@@ -338,7 +338,7 @@ def _chunks(problem: Continuum, mesh: Mesh, every: Index) -> Iterator[Index]:
 
 
 def _settled(solution: _Solution, good: NDArray[np.bool_], rows: Index, unresolved: Array) -> Found:
-    """Return the sets of a solution that are good enough."""
+    """Return the sets of a solution that meet the tolerance."""
     part = solution.part[good]
     error = np.maximum(solution.error, solution.rounding).max(axis=1)[good]
     return Found(rows[part], solution.fields.take(np.nonzero(good)[0]), 0.5 * error + unresolved[part])
@@ -365,5 +365,5 @@ def _refuse(solution: _Solution, good: NDArray[np.bool_]) -> None:
 
 
 def cure(error: float) -> str:
-    """Return what may be done about an error that stays."""
+    """Return the advice for an error that refinement does not reduce."""
     return f"tolerance={1.5 * error:.0e} accepts it" if error < 5e-3 else "use ritz, which estimates no error"

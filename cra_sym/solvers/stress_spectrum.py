@@ -1,9 +1,8 @@
-"""The eigenvalues of a Ritz basis on the stresses, as those of its compliance: the largest come out best.
+"""Eigenvalues of a Ritz basis on the stresses, as those of its compliance operator: the largest are most accurate.
 
 With K = L L' the compliance operator is ``L^-1 M L^-T``; its largest eigenvalues are 1 / omega^2. A spring k on ``b x``
-changes K by ``k b b'``, which is a multiplication by a symmetric matrix of rank one beside L: that of an infinite
-spring is a projection, and no stiffness is too large. A rigid-body motion is kept out like a displacement that an
-infinite spring holds.
+changes K by ``k b b'``, which multiplies ``L^-1`` by a rank-one modification of the unit matrix; for an infinite spring
+this is a projection, so no stiffness is too large. Rigid-body motions are removed by the same projection.
 """
 
 from __future__ import annotations
@@ -21,12 +20,11 @@ __all__ = ["BuckledError", "Spectrum", "bases", "spectrum"]
 
 Array = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
-EXTRA = 5  # eigenvalues beyond those asked for, for the gap that completeness needs
+EXTRA = 5  # eigenvalues beyond those requested, to find a gap for the proof of completeness
 _NOTHING = 1e-29
-"""Compliance relative to the largest below which there is no motion: the square of what rounding leaves of a singular
-value."""
+"""Compliance relative to the largest below which an eigenvalue is rounding: the square of that of a singular value."""
 _SPREAD = 1e-8
-"""Ratio of compliances below which eigenvectors of the matrix have lost half their digits: singular values then."""
+"""Ratio of compliances below which eigenvectors have lost half their digits and singular values are used instead."""
 
 
 class BuckledError(ValueError):
@@ -89,14 +87,14 @@ def spectrum(columns: Columns, modes: int) -> Spectrum:
 
 
 def bases(columns: Columns) -> Iterator[tuple[NDArray[np.intp], Array, Array, Callable[[], Array]]]:
-    """Yield sets with equally many rigid-body motions, and motions in which their stiffness is one.
+    """Yield groups of sets with equally many rigid-body motions, and bases in which their stiffness is one.
 
     Yields
     ------
     sets : ndarray of int
     elastic : ndarray, shape (sets, size, size)
-        Rows of unit strain energy, orthogonal to each other, no potential that may be negative included. Rows of zeros
-        stand for what infinite springs hold.
+        Orthogonal rows of unit strain energy, without potential energy that may be negative. Rows of zeros replace
+        motions that infinite springs hold.
     rigid : ndarray, shape (sets, motions, size)
         Rows without strain energy; orthonormal, and orthogonal to the elastic ones, with respect to the mass.
     root : callable
@@ -136,7 +134,7 @@ def _rigid_motions(columns: Columns, rows: Array, springs: Array) -> list[Array]
 
 
 def _not_held(directions: Array) -> Array:
-    """Return an orthonormal basis of what moves none of the directions, (motions, unknowns)."""
+    """Return an orthonormal basis of the null space of the directions, (motions, unknowns)."""
     length = np.sqrt((directions**2).sum(axis=1))
     directions = directions[length > 0.0] / length[length > 0.0, None]
     if not len(directions):
@@ -155,7 +153,7 @@ class _Problem:
         held = self.still @ self.mass
         self.rows = np.concatenate([rows, held], axis=1)
         self.springs = np.concatenate([springs, np.full(held.shape[:2], np.inf)], axis=1)
-        self.softened = np.ones(len(sets))  # least share of the stiffness that negative springs leave of a motion
+        self.softened = np.ones(len(sets))  # least remaining share of the stiffness of a motion under negative springs
         self.elastic = columns.elastic_stiffness[sets]
         self.potential = None if columns.potential is None else columns.potential[sets]
 
@@ -215,7 +213,7 @@ class _Problem:
         return bool(parts["D"]) or not _semidefinite(parts["R"])
 
     def _base(self) -> tuple[Array, Array]:
-        """Return a positive stiffness with springs up to the size of what is there, and what it has of each spring."""
+        """Return a positive stiffness with springs up to its own size, and the included part of each spring."""
         total = self.elastic.copy()
         if self.potential is not None and not self._loaded:
             total += self.potential
@@ -244,13 +242,13 @@ class _Problem:
             smallest = np.linalg.eigvalsh(scaled)[:, 0]
             lift = np.where(smallest < 1e-12, 1e-12 - 2.0 * np.minimum(smallest, 0.0), 0.0)
             if self.potential is not None and lift.max() > 1e-6:
-                total = self._whole()
+                total = self._spring_projection()
                 raise BuckledError((np.linalg.eigvalsh(total) < -1e-12).sum(axis=1)) from None
             raise ValueError(
                 "values: the stiffnesses lie too far apart for double precision along x; use ritz"
             ) from None
 
-    def _whole(self) -> Array:
+    def _spring_projection(self) -> Array:
         finite = np.where(np.isinf(self.springs), 0.0, self.springs)
         total = self.elastic + (0.0 if self.potential is None else self.potential)
         total = total + np.einsum("sr,sri,srj->sij", finite, self.rows, self.rows)
@@ -266,7 +264,7 @@ class _Problem:
             return None
         size = projected.shape[1]
         factor = np.broadcast_to(np.eye(size), (len(left), size, size)).copy()
-        # what is held is held before a negative spring takes its part
+        # infinite springs come before negative ones
         order = np.argsort(np.where(left < 0.0, 2, np.isinf(left)), axis=1, kind="stable")
         left, projected = (
             np.take_along_axis(left, order, axis=1),
@@ -286,7 +284,7 @@ class _Problem:
         return factor
 
     def _loaded_factor(self, operator: Array) -> tuple[Array, Array]:
-        """Return the operator of the loaded structure, and how much stiffer the unloaded one is at most."""
+        """Return the operator of the loaded structure, and the largest ratio of unloaded to loaded stiffness."""
         assert self.potential is not None
         matrix = operator @ self.potential @ operator.swapaxes(-1, -2)
         matrix = matrix + np.eye(matrix.shape[-1])
@@ -355,7 +353,7 @@ class _Problem:
         return np.concatenate([*inside, ends, *at], axis=1)[self.sets]
 
     def _kinetic(self, unknowns: Array) -> Array:
-        """Return x' M x from the displacements themselves: no eigenvalue is lost in the rounding of larger ones."""
+        """Return x' M x from the displacements, so that rounding of large eigenvalues does not spoil small ones."""
         columns = self.columns
         moved = {}
 
@@ -389,7 +387,9 @@ class _Problem:
             z = 1.0 / compliances[:, :number] if number > 0 else np.zeros((len(self.sets), 0))
         unknowns = np.take_along_axis(unknowns, order[..., None], axis=1)[:, : max(number, 0)]
         spread = compliances[:, :1] / compliances[:, : max(number, 0)]
-        rounding = EPS * (8.0 * loading + EPS * spread)  # a quotient has the square of the error of its vector
+        rounding = EPS * (
+            8.0 * loading + EPS * spread
+        )  # the error of a Rayleigh quotient is the square of that of its vector
         vectors = unknowns * np.sqrt(z)[..., None]
         rigid = self.still.shape[1]
         if rigid:
@@ -408,7 +408,7 @@ def _root(mass: Array) -> Array:
 
 
 def _semidefinite(entries: Entries) -> bool:
-    """Return whether a quadratic form with these entries is nowhere negative, but for rounding."""
+    """Return whether a quadratic form with these entries is positive semidefinite up to rounding."""
     if all(i == j for i, j in entries):
         return all(bool((entry >= 0.0).all()) for entry in entries.values())
     size = 1 + max(max(pair) for pair in entries)

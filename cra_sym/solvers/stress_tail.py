@@ -1,13 +1,13 @@
-"""What a Ritz basis on the stresses leaves out: a bound of its largest compliance, so that no mode is missed.
+"""Bound of the largest compliance beyond a Ritz basis on the stresses, which proves that no mode is missed.
 
 Ritz's method bounds compliances from below. With the largest compliance t of all motions whose strains are orthogonal
 to the basis, the k-th compliance is between the k-th one of the basis and that plus t. Such motions vanish at the ends
-of every element: the integral over an element of length h of what is orthogonal to polynomials of degree p is at most
-h / (2 p) times as large in the mean square, and at most its root at any place.
+of every element. The integral, over an element of length h, of a function orthogonal to polynomials of degree p is in
+the mean square at most h / (2 p) times the function, and pointwise bounded by the root of that.
 
 With the compliance 1 / W as the weight of the orthogonality, what counts is the largest ``(1 - x^2) / W`` for x from
--1 to 1 on the element, so that a stiffness may all but vanish at an end. For the integral F of a load over the element,
-less a straight line, vanishes at both ends, and Gegenbauer's polynomials y with ``(1 - x^2) y'' = -n (n - 1) y`` expand
+-1 to 1 on the element, so that a stiffness may nearly vanish at an end. For the integral F of a load over the element
+minus a straight line vanishes at both ends, and Gegenbauer's polynomials y with ``(1 - x^2) y'' = -n (n - 1) y`` expand
 it: beyond degree p the mean square of the sum over ``1 - x^2`` is less than that of ``F'`` over p (p + 1).
 """
 
@@ -24,16 +24,17 @@ __all__ = ["complete", "tail"]
 
 Array = NDArray[np.float64]
 _SHARES = 0.0, 0.2, 0.5, 0.8
-"""Of the gap between two compliances (of its logarithm) that a potential energy may take; inertia has the rest."""
+"""Share of the (logarithmic) gap between two compliances allotted to the potential energy; inertia has the rest."""
 
 
 def complete(
     compliances: Array, elastic: NDArray[np.intp], left_out: Array, loading: Array, load: Array
 ) -> NDArray[np.bool_]:
-    """Return for each set whether it is proved that no mode is missing among the first elastic ones.
+    """Return for which sets it is proved that no mode is missing among the first elastic ones.
 
-    It is where some gap between compliances, at the last mode or one of the next, is larger than what is left out can
-    hide. With motions v of the basis and w left out, stiffness and mass of ``v + w`` obey, for any positive a and b,
+    It is proved where a gap between compliances, after the last mode or one of the next, is larger than the compliance
+    beyond the basis can bridge. With motions v of the basis and w orthogonal to it, stiffness and mass of ``v + w``
+    satisfy, for any positive a and b,
     ``K >= (1 - b load) K(v) + (1 - loading - loading / b) K(w)`` and ``M <= (1 + a) M(v) + (1 + 1 / a) M(w)``.
 
     Parameters
@@ -41,7 +42,7 @@ def complete(
     compliances : ndarray, shape (sets, more than modes)
         Of the basis, descending.
     elastic : ndarray of int, shape (sets,)
-        How many modes are asked for, rigid-body motions apart.
+        Number of modes requested, without rigid-body motions.
     left_out, loading : ndarray, shape (sets,)
         As `tail` returns.
     load : ndarray, shape (sets,)
@@ -62,10 +63,10 @@ def complete(
 
 
 def tail(columns: Columns) -> tuple[Array, Array]:
-    """Return bounds of what the basis leaves out, of each element, both (sets, elements).
+    """Return bounds of the motions beyond the basis by element, both (sets, elements).
 
-    That of its largest compliance, without any potential energy of displacements, and that of this energy by magnitude
-    over that of the strains. Of elements at whose end a stiffness vanishes there are none, and 0 is returned.
+    The first bounds their largest compliance without the potential energy of displacements, the second the magnitude of
+    this energy over that of the strains. Elements at whose end a stiffness vanishes have no such motions: 0.
     """
     mesh, problem = columns.mesh, columns.problem
     starts = np.searchsorted(mesh.owner, np.arange(len(mesh.elements) - 1))
@@ -97,7 +98,7 @@ def tail(columns: Columns) -> tuple[Array, Array]:
 def _amplitudes(
     columns: Columns, reach: Array, most: Callable[[Array], Array], inner: Array
 ) -> tuple[list[Array], list[Array]]:
-    """Return what unit strain energy displaces at most, in the mean square and at any place, by displacement.
+    """Return bounds of each displacement for unit strain energy, in the mean square and pointwise.
 
     ``inner`` is ``1 - x^2`` on the element at the points.
     """

@@ -1,4 +1,4 @@
-"""What modes whose elastic-slip elements stick for good can still do: free vibration about an offset."""
+"""Free vibration about an offset of modes whose elastic-slip elements stick for all later times."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 def stuck_peak(modes: SlippingModes, state: Sequence[Array], row: Array) -> Array:
-    """Return a bound of an output from a state on, if the elements stick: offset and peaks of all modes, added.
+    """Return a bound of an output from a state on while the elements stick: the sum of the offset and the modal peaks.
 
     Without damping it is the least upper bound over all times where the frequencies are incommensurable.
 
@@ -55,6 +55,6 @@ def stuck_peak(modes: SlippingModes, state: Sequence[Array], row: Array) -> Arra
         quarter = np.sign(values.imag) * (np.pi / 2 - np.angle(swings * values))
         turn = np.mod(quarter, np.pi) / np.abs(values.imag)
         turned = np.abs((swings * np.exp(values * turn)).real)
-    waves = values.imag != 0  # half of each pair counts for the whole
+    waves = values.imag != 0  # one of each conjugate pair
     peaks = np.where(waves, np.maximum(np.abs(swings.real), turned), np.abs(swings))
     return np.asarray(np.abs(along @ offset)[:, 0, 0] + peaks.sum(axis=1))

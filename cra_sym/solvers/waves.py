@@ -1,8 +1,8 @@
 """Complete spectra of uniform problems with up to three waves a section: counts isolate roots, interpolation finds.
 
-Formulas: `waves_kernel`. The determinant F is real at, below and above every cut-off and has the sign of (-1)**N, where
-N is the number of roots below z. N is exact and costs a few evaluations of F at the same z, so no root is missed and
-none doubled. A root alone in its bracket is found by inverse quadratic interpolation, or bisection (Chandrupatla,
+Formulas: `waves_kernel`. The determinant F is real below, at and above every cut-off and has the sign of (-1)**N, where
+N is the number of roots below z. N is exact and costs a few evaluations of F at the same z, so no root is missed or
+repeated. A root alone in its bracket is found by inverse quadratic interpolation, or bisection (Chandrupatla,
 Advances in Engineering Software 28, 1997).
 """
 
@@ -37,10 +37,10 @@ QUICK: dict[str, Callable[..., Any]] = {
     "_rising": lambda k, i, m: rising(m),
     "_turning": lambda k, i, m: turning(m),
 }
-"""What may replace functions of `formulas` where all lanes are looked at together."""
+"""Replacements of functions of `formulas` for arrays of lanes."""
 
 Search = Callable[[Floats, Integers, Floats, Integers], int]
-"""The compiled twin for one structure: entry `lowest_waves` of what `cra_sym.kernels.compiled` makes of `template`."""
+"""Compiled version for one structure: the entry `lowest_waves` of `template` compiled by `cra_sym.kernels.compiled`."""
 
 
 def template(structure: Structure, known: tuple[int | None, ...] | None = None) -> str:
@@ -79,7 +79,7 @@ def lowest_waves(
     Raises
     ------
     ValueError
-        If a structure has buckled, has fewer natural frequencies than asked for, or several of next to nothing.
+        If a structure has buckled, has fewer natural frequencies than requested, or several that are almost zero.
 
     Examples
     --------
@@ -109,7 +109,7 @@ def lowest_waves(
 
 
 def _check_range(function: Determinant, squares: Floats) -> None:
-    """Refuse several frequencies of next to nothing: the determinant has their product."""
+    """Raise an error for several frequencies close to zero: the determinant contains their product and underflows."""
     least = function.branch(1.0)[:, None]
     least = np.where((least > 0.0) & (least < np.inf), least, 1.0)
     if (squares[:, :1] > 1e-90 * least).all():
@@ -192,7 +192,7 @@ def _counted(function: Determinant, modes: int) -> tuple[Floats, Integers, Float
 
 
 def _isolate(function: Determinant, number: Integers, row: Integers, brackets: Floats) -> None:
-    """Shrink brackets, in place, until each holds its root alone, or no number between its ends."""
+    """Shrink brackets, in place, until each contains one root, or no floating-point number between its ends."""
     low, high, below, above, at_low, at_high = brackets
     crowded = np.flatnonzero((below < number) | (above > number + 1))
     for _ in range(_MOST_STEPS):
@@ -211,7 +211,7 @@ def _isolate(function: Determinant, number: Integers, row: Integers, brackets: F
 
 
 def _open_from_zero(function: Determinant, number: Integers, row: Integers, brackets: Floats) -> None:
-    """Replace, in place, lower ends at z = 0 where the value is not known by small z on the same side of the root."""
+    """Replace, in place, lower ends at z = 0, where the value is not known, by small z on the same side of the root."""
     low, high, _, _, at_low, at_high = brackets
     pending = np.flatnonzero((low == 0.0) & ~np.isfinite(at_low))
     share = 1e-3
@@ -242,7 +242,7 @@ def _roots(function: Determinant, number: Integers, row: Integers, brackets: Flo
 
 
 def _middle(low: Floats, high: Floats) -> Floats:
-    """Return the z half-way in the fourth root: in the wave number, or nearly so."""
+    """Return the midpoint in terms of the fourth root of z, which is nearly the wave number."""
     z: Floats = (0.5 * (low**0.25 + high**0.25)) ** 4
     return z
 

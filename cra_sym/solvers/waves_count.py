@@ -40,14 +40,14 @@ def signs(structure: Structure, block: tuple[int, int]) -> list[int]:
 
 
 def block_waves(structure: Structure, block: tuple[int, int], a: Any, b: Any) -> Any:
-    """Return what the waves of a block are, before any of its columns."""
+    """Return the quantities of the waves of a block from which its columns are computed."""
     if len(a) == 1:
         return (b[0] * a[0],)
     return kernel.wave_numbers(a, b) if len(a) == 4 else three.alone(a, b, signs(structure, block))
 
 
 def block_columns(structure: Structure, block: tuple[int, int], a: Any, b: Any, waves: Any, kind: str) -> Any:
-    """Return the columns of a block and their basis, in a regime or whichever it is."""
+    """Return the columns of a block and their basis, in a given regime or in any."""
     if len(a) == 1:
         return kernel.columns_of_one(a[0], b[0], *kernel.wave(waves[0])), 1.0
     if len(a) == 4:
@@ -60,7 +60,7 @@ KINDS = {1: ("any",), 2: ("near", "close", "mixed", "distant"), 3: ("near", "clo
 
 
 def kinds(structure: Structure) -> tuple[str, ...]:
-    """Return the regimes of a problem: of the blocks with several waves if all are in the same, else 'any'."""
+    """Return the regimes of a problem: that of the blocks with several waves if they share one, else 'any'."""
     several = sum(size > 1 for size in structure.sizes) > 1
     return (*KINDS[max(structure.sizes)], *(("any",) if several else ()))
 
@@ -92,14 +92,14 @@ def _mu(waves: Any, slopes: Any) -> list[tuple[Any, Any, Any]]:
     upward = kernel.where(half < 0.0, -1.0, 1.0)  # the sign of big - small
     if lone is None:
         return [(big, real, rate(big) * upward < 0.0), (small, real, rate(small) * upward > 0.0)]
-    beyond = kernel.where(lone < half, 1.0, -1.0)  # the sign of both over the one alone
+    beyond = kernel.where(lone < half, 1.0, -1.0)  # the sign for both waves over that for one
     found = [(lone, True, rate(lone) < 0.0)]
     found += [(big, real, rate(big) * upward * beyond < 0.0), (small, real, rate(small) * upward * beyond > 0.0)]
     return found
 
 
 def _shears(structure: Structure, block: tuple[int, int], b: Any) -> Any:
-    """Return how many motions that are the same all along a block has below z."""
+    """Return the number of uniform motions of a block (constant along x) below z."""
     size, odd = block[1] - block[0], structure.odd[slice(*block)]
     if not any(odd):
         return 0.0
@@ -114,7 +114,7 @@ def _shears(structure: Structure, block: tuple[int, int], b: Any) -> Any:
 
 
 def assembled(structure: Structure, columns: Sequence[Any]) -> tuple[list[Any], list[Any]]:
-    """Return E and O on all columns, row by row."""
+    """Return E and O for all columns, row by row."""
     n = structure.n
     even, odd = ([[ZERO] * (2 * n) for _ in range(n)] for _ in range(2))
     for (start, stop), block in zip(structure.blocks, columns, strict=True):
@@ -134,10 +134,10 @@ def displacements(structure: Structure, even: list[Any], odd: list[Any]) -> tupl
 
 
 def end_rows(structure: Structure, even: list[Any], odd: list[Any], *, reflected: bool = True) -> tuple[Rows, Rows]:
-    """Return displacements of all places and the forces, links' too, on all columns, in turned signs.
+    """Return the displacements of all degrees of freedom and the forces, including links, for all columns.
 
-    Of a displacement that a reflection turns both have the other sign. A force of the left end is -P. Behind the
-    columns of the section there is one for each coordinate and each link.
+    Both have the opposite sign for a displacement that is odd under reflection; a force of the left end is -P. The
+    columns of the section are followed by one for each coordinate and each link.
     """
     n, size = structure.n, structure.places
     q, force = displacements(structure, even, odd)
@@ -152,7 +152,7 @@ def end_rows(structure: Structure, even: list[Any], odd: list[Any], *, reflected
 
 
 def condition(structure: Structure, k: Entries, z: Any, place: int, moved: Rows, forces: Rows) -> tuple[Any, ...]:
-    """Return the condition of a place on all columns."""
+    """Return the condition of a degree of freedom for all columns."""
     acting = dict(zip((*range(2 * structure.n), *range(structure.moving, structure.places)), forces, strict=True))
     own = [moved[e] for e in structure.reach(place)], [acting[d] for d in structure.forces(place)]
     found: tuple[Any, ...] = kernel.condition(k, z, structure.condition(place), *own)
@@ -160,7 +160,7 @@ def condition(structure: Structure, k: Entries, z: Any, place: int, moved: Rows,
 
 
 def value_of(structure: Structure, k: Entries, z: Any, columns: Sequence[Any], basis: Any) -> Any:
-    """Return the determinant of all conditions: by those of the last block, or of one those of the left end alone."""
+    """Return the determinant of all conditions, expanded by the last block, or by the left end for one block."""
     n, width, several = structure.n, structure.places, len(structure.blocks) > 1
     parts, last = assembled(structure, columns), structure.block(n - 1)
     left = [p for p in range(n) if all(max(found, default=0) < n for found in structure.touched(k, p))]
@@ -175,11 +175,12 @@ def value_of(structure: Structure, k: Entries, z: Any, columns: Sequence[Any], b
 
 
 def _chain(structure: Structure, k: Entries, z: Any, parts: tuple[Any, Any]) -> Iterator[tuple[Any, Any]]:
-    """Yield determinants on the way from E = 0, w = 0 and no links to what is, with what each may add to the count.
+    """Yield determinants from E = 0, w = 0 and no links to the actual problem, with the changes of the count.
 
-    The odd displacements come first, which are free at the start: sprung takes 0 or 1 away, or adds it where inertia
-    outweighs the spring. Those that have to do with others are held. Then nothing moves that has to do with others: to
-    release one gives 0 or 1 more, whatever it is tied to. A spring between places takes 0 or 1 away.
+    Each step changes one condition and the count by 0 or 1, in a known direction. Odd displacements, free at the start,
+    get their springs
+    first: this lowers the count, or raises it where inertia exceeds the spring. Those coupled to others are held. Each
+    later release of a displacement raises the count, each link lowers it.
     """
     moved, forces = end_rows(structure, *parts)
     units, way = [*moved, *forces[2 * structure.n :]], structure.chain(k)
@@ -275,8 +276,8 @@ def _functions(structure: Structure, wanted: Sequence[str]) -> dict[str, Callabl
 def formulas(structure: Structure, known: tuple[int | None, ...], wanted: tuple[str, ...] = ()) -> str:
     """Return the text of ``_value_kind`` and ``_count_kind`` for some kinds of regimes, of ``_regime`` and ``_branch``.
 
-    They take coefficients, of which some are known, a lane or lanes, and z or half waves along the length. Wanted by
-    default are the kinds that `Determinant` needs.
+    The arguments are the coefficients that are not known, a lane or lanes, and z or the half waves along the length.
+    The default is the kinds that `Determinant` needs.
     """
     functions = _functions(structure, wanted or kinds(structure))
     waves = {"_wave": kernel.wave_anywhere, "_rising": kernel.rising, "_turning": kernel.turning}
@@ -286,7 +287,7 @@ def formulas(structure: Structure, known: tuple[int | None, ...], wanted: tuple[
 
 
 def direct(structure: Structure, known: tuple[int | None, ...]) -> Functions:
-    """Return what the text of `formulas` defines, without text: slower."""
+    """Return the functions of `formulas` without generating text; slower."""
 
     def of_lanes(function: Callable[[Entries, Any], Sequence[Any]]) -> Callable[..., Any]:
         def found(k: Floats, i: Any, z: Any) -> Any:
@@ -307,7 +308,7 @@ def _product(bases: Sequence[Any]) -> Any:
 
 
 def kept(structure: Structure, known: Sequence[int | None]) -> list[int | None]:
-    """Return what is known of coefficients, but for rows of matrices that would be left out as a whole."""
+    """Return the known coefficients, except in matrix rows that would then be omitted as a whole."""
     kept, n = list(known), structure.n
     for first in structure.matrices:
         for start, stop in structure.blocks:

@@ -1,15 +1,15 @@
 # mypy: ignore-errors
-"""Waves of a section as numbers: columns of one or two of them at the ends, end conditions, determinants, the count.
+"""Numerical waves of a section: columns of one or two waves at the ends, end conditions, determinants, the count.
 
-The functions hold nothing but arithmetic and selections. They take arrays of lanes, real or complex, or terms of a text
-that is compiled (`straight`).
+The functions contain only arithmetic and selections. They take arrays of lanes, real or complex, or terms of a text to
+be compiled (`straight`).
 
 State and convention. A section has the even part E and the odd part O of its state, ``E' = b O`` and ``O' = a E``, with
 x in half lengths from mid-span. Then ``G = b a`` and ``a b`` have the same eigenvalues mu; a wave number k has
 ``mu = -k^2``. E-columns are ``E = C v``, ``O = a S v`` and O-columns ``O = C u``, ``E = b S u`` with
 ``C = cosh(sqrt mu)`` and ``S = sinh(sqrt mu) / sqrt mu``, which are real at any mu; at the left end one part of each
-column has the other sign. Matrices are tuples of their entries row by row. Displacements that nothing inside couples
-form blocks of one, two or three; here are those of one and two, three are in `waves_three`.
+column has the other sign. Matrices are tuples of their entries row by row. Displacements coupled inside form
+blocks of one, two or three; those of three are in `waves_three`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .straight import Exact
 
 
 def where(condition, value, otherwise):
-    """Return one of two, lane by lane; a condition that is known beforehand leaves the other out."""
+    """Return one of two values, lane by lane; an Exact condition selects one of them at once."""
     if isinstance(condition, bool):
         return value if condition else otherwise
     if isinstance(value, tuple):
@@ -57,7 +57,7 @@ def wave_numbers(a, b):
 
 
 def positive_root(value):
-    """Return the square root, of a negative value 0."""
+    """Return the square root, 0 for a negative value."""
     return np.sqrt(where(value > 0.0, value, 0.0))
 
 
@@ -81,7 +81,7 @@ def wave(m):
 
 
 def wave_anywhere(m):
-    """Return what `wave` does, for m of any size and sign."""
+    """Return `wave` for m of any size and sign."""
     size = np.sqrt(where(m < 0.0, -m, m))
     decay = exp(where(m > 0.0, -size, 0.0 * size))
     twice = 0.5 * decay * decay
@@ -90,7 +90,7 @@ def wave_anywhere(m):
 
 
 def rising(m):
-    """Return what `wave` does for positive m."""
+    """Return `wave` for positive m."""
     size = np.sqrt(m)
     decay = exp(-size)
     twice, small = 0.5 * decay * decay, m < 0.25
@@ -101,7 +101,7 @@ def rising(m):
 
 
 def turning(m):
-    """Return what `wave` does for negative m."""
+    """Return `wave` for negative m."""
     size, small = np.sqrt(-m), m > -0.25
     apart = sin(size) / size
     if isinstance(small, np.ndarray) and not small.any():
@@ -140,7 +140,7 @@ def half_sums(half, product, square):
 
 
 def close_series(big, small, big_c, big_s, small_c, small_s):
-    """Return what `near_series` does from the cosh and sinh of sigma and d."""
+    """Return the result of `near_series` from the cosh and sinh of sigma and d."""
     gap = big - small
     s0 = (big * big_s * small_c - small * big_c * small_s) / gap
     s1 = 0.5 * (big_c * small_s - big_s * small_c) / gap
@@ -212,7 +212,7 @@ def condition(k, z, first, motions, forces):
 
 
 def grown(minors, row, size):
-    """Return the minors of one row more, by sets of columns in order, from those of ``size`` rows."""
+    """Return the minors with one more row, by ordered sets of columns, from those of ``size`` rows."""
     width = len(row)
     place = {columns: at for at, columns in enumerate(combinations(range(width), size))}
 
@@ -224,7 +224,7 @@ def grown(minors, row, size):
 
 
 def minors(rows):
-    """Return the minors of rows, by sets of columns in order; of none it is 1."""
+    """Return the minors of rows, by ordered sets of columns; 1 for no rows."""
     found = rows[0] if rows else (Exact(1),)
     for size in range(1, len(rows)):
         found = grown(found, rows[size], size)
@@ -234,7 +234,7 @@ def minors(rows):
 def joined(upper, lower, size, width, sign=1.0, turned=()):
     """Return a determinant times a sign from the minors of its first ``size`` rows and of the others (Laplace).
 
-    The others have the other sign in the columns ``turned``.
+    The other rows have the opposite sign in the columns ``turned``.
     """
     place = {columns: at for at, columns in enumerate(combinations(range(width), width - size))}
     signed = [Exact(0)], [Exact(0)]
@@ -252,10 +252,10 @@ def adaptable(value, number, change):
 
 
 def reference(waves, shear, value):
-    """Return the count with E = 0 at both ends, where motions are sines and cosines; its determinant gives parity.
+    """Return the count with E = 0 at both ends, where motions are sines and cosines; its determinant gives the parity.
 
-    ``waves`` are triples: a mu, whether it is real, and whether its branch omega(k) falls, which takes away.
-    ``shear`` counts motions that are the same all along.
+    ``waves`` are triples: a mu, whether it is real, and whether its branch omega(k) falls, which lowers the count.
+    ``shear`` is the number of motions that are uniform along x.
     """
     number, nearest = shear, None
     for mu, real, falls in waves:
@@ -290,8 +290,8 @@ def elementary(table, z):
 def branch(wave, table):
     """Return the lowest z of a block whose motions have the square wave number ``wave`` (in 1 / half length squared).
 
-    It is the lowest root of a polynomial with real roots only: Laguerre's step is exact for one and two, and three of
-    them come close from below for three.
+    It is the lowest root of a polynomial with real roots only: Laguerre's step is exact for degrees one and two; for
+    degree three, three steps approximate it from below.
     """
     size, z = len(table), 0.0
     row = list(zip((1.0, 0.0, 0.0, 0.0), *table, strict=True))
@@ -309,7 +309,7 @@ def branch(wave, table):
 
 
 def two_waves(a, b, waves, kind="any"):
-    """Return the columns of a block of two and their basis, in one regime or whichever it is."""
+    """Return the columns of a block of two and their basis, in a given regime or in any."""
     half, product, square = waves[:3]
     near, close, _ = regime(half, product, square) if kind == "any" else (kind == "near", kind == "close", False)
     if kind == "near":
@@ -334,7 +334,7 @@ def two_waves(a, b, waves, kind="any"):
 
 
 def waves_of_both_signs(big, small):
-    """Return what `wave` does for two m of which one is positive and the other negative."""
+    """Return `wave` for two m of opposite sign."""
     first = big > 0.0
     positive, negative = where(first, big, small), where(first, small, big)
     if hasattr(positive, "called"):

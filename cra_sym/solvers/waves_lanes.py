@@ -1,11 +1,11 @@
 # ruff: noqa: F821
 # mypy: ignore-errors
-"""Template of the compiled twin of `cra_sym.solvers.waves`: the same steps, for blocks of lanes at once.
+"""Template of the compiled version of `cra_sym.solvers.waves`: the same steps, for blocks of lanes at once.
 
-Behind it stand (see `waves.template`) the largest multiplicity of a zero and functions of a lane: ``_value`` and
-``_count``, in any regime or for waves of both signs, ``_regime`` and ``_branch``. In any regime all are evaluated and
-one is taken, so that loops over lanes have no branch. These texts are long: each stands in one place, in a function
-that is called.
+It is followed (see `waves.template`) by the largest multiplicity of a zero and functions of a lane: ``_value`` and
+``_count``, for any regime or for waves of both signs, ``_regime`` and ``_branch``. For any regime all variants are
+evaluated and one is selected, so that loops over lanes have no branch. These functions are long, so each is defined
+once and called, not inlined.
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
 """Mode shapes of uniform problems with up to three waves a section, in closed form from the columns of the determinant.
 
 The modal mass is exact without quadrature: for motions ``y(x; z)`` with ``y' = A(z) y``, the kinetic energy of a
-section is the derivative of ``q_z P - P_z q`` along x, so its integral is what that has at the ends. The derivative by
-z is that of a complex step, which loses nothing (Squire and Trapp, SIAM Review 40, 1998).
+section is the derivative of ``q_z P - P_z q`` along x, so its integral is the difference of the values at the ends. The
+derivative by z is by a complex step, without cancellation (Squire and Trapp, SIAM Review 40, 1998).
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ three: Any = waves_three
 Complexes = NDArray[np.complex128]
 
 _PLACES = np.array([1.0, 0.83, 0.57, 0.29])
-"""Places, in half lengths from mid-span, which no wave has all nodes at."""
+"""Stations, in half lengths from mid-span, that are not all nodes of any wave."""
 
 _TINY_SHARE = 1e-45
-"""What is less is the square of the complex step."""
+"""Smaller values are the square of the complex step."""
 
 _TINY = 1e-100
 _STEP = 1e-30  # of the lowest frequency of half a wave along the length
@@ -144,7 +144,7 @@ def block_at(reflected: list[int], a: Any, b: Any, waves: Any, x: Any, kind: str
 def block_integrals(reflected: list[int], a: Any, b: Any, waves: Any, kind: str) -> Any:
     """Return half the integrals over the length of E of the E-columns (first) and of O of the O-columns (third part).
 
-    They are what the columns are with ``sinh(sqrt mu) / sqrt mu`` in place of ``cosh(sqrt mu)``.
+    They are the columns with ``sinh(sqrt mu) / sqrt mu`` in place of ``cosh(sqrt mu)``.
     """
     if len(a) == 1:
         _, s = kernel.wave(waves[0])
@@ -216,8 +216,8 @@ def _conditions(structure: Structure, k: Floats, z: Floats, columns: Floats) -> 
 def _null_vectors(matrices: Floats, place: NDArray[np.int64]) -> Floats:
     """Return the null vectors of the first of some matrices; all of them, (places, roots, 2 n, 2 n), set the scale.
 
-    A column that meets the conditions at the ends by itself is rounding there, but not elsewhere. Of several vectors of
-    an equal root it is the one in its place.
+    The scale is that of all stations, since a column that satisfies the end conditions by itself is rounding at the
+    ends. For equal roots it is the null vector with the root's number among them.
     """
     size = np.abs(matrices).max(axis=0)
     columns = size.max(axis=1)

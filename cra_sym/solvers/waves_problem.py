@@ -1,4 +1,4 @@
-"""Uniform problems with up to three waves a section: what they are made of."""
+"""Uniform problems with up to three waves a section: their data."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["Floats", "Integers", "UniformProblem", "dispersion", "ranks"]
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-_DEPENDENT = 1e-14  # a row of unit size that rounding leaves of a dependent one
+_DEPENDENT = 1e-14  # norm below which the remainder of a unit row counts as dependent
 _MOST = 3  # displacements that are coupled inside
 
 
@@ -38,18 +38,18 @@ class UniformProblem:
         In (0, inf).
     odd_by_even, even_by_odd : ndarray, shape (2, rows, n, n)
         A_OE and A_EO: the part without z, and the factor of z.
-    stiffness, mass : ndarray, shape (rows, places)
+    stiffness, mass : ndarray, shape (rows, dofs)
         Of the conditions of the left end, of the right end, of the m lumped coordinates and of links, in the units of P
         over those of q: ``P + (k - z m) q = 0`` at the right end, ``-P + (k - z m) q = 0`` at the left, and
-        ``(k - z m) w = 0``. Stiffness in [0, inf], inf holds what it acts on; masses in [0, inf), of links 0.
+        ``(k - z m) w = 0``. Stiffness in [0, inf], inf holds the displacement; masses in [0, inf), 0 for links.
     odd : tuple of bool
-        Which displacements are odd. (If all of a block are, call them even.)
+        Which displacements are odd; at least one of each block must be even.
     couplings : ndarray, shape (2, rows, 2 n + m, 2 n + m), optional
         Off-diagonal entries of stiffness and mass. An offset mass m at the distance e has m e. Both matrices must be
         positive semidefinite.
     ties : ndarray, shape (rows, 2 n + m, 2 n + m), optional
-        A displacement i that is held is ``sum_j ties[row, i, j] q_j`` of others that are not held; stiffness, mass and
-        couplings of these are those of the motion that is left. What may be tied must be `known`.
+        A dependent displacement i is ``sum_j ties[row, i, j] q_j`` of independent ones, whose stiffness, mass and
+        couplings include its own. Which displacements may be tied must be `known`.
     sizes : tuple of int, optional
         Displacements that the matrices couple, block by block in order, 1 to 3 each. Default: one block of all.
     known : tuple of (0, 1 or None), optional
@@ -59,7 +59,7 @@ class UniformProblem:
     linked : bool
         Whether couplings or ties join the ends; with coordinates or links they always may.
     stretches : ndarray, shape (rows, links, 2 n + m), optional
-        What each link is stretched by a unit of each displacement and coordinate.
+        Stretch of each link per unit of each displacement and coordinate.
     """
 
     length: Floats
@@ -98,13 +98,13 @@ class UniformProblem:
 
     @cached_property
     def structure(self) -> Structure:
-        """What all rows have in common."""
+        """The structure common to all rows."""
         links = 0 if self.stretches is None else self.stretches.shape[1]
         linked = self.linked or self.coordinates > 0 or links > 0
         return Structure(tuple(self.odd), self.sizes or (len(self.odd),), self.coordinates, links, linked)
 
     def without_idle_links(self) -> UniformProblem:
-        """Return the problem without rigid links between what other infinite stiffness holds already."""
+        """Return the problem without rigid links between displacements that are held already."""
         size = self.structure.moving
         rigid = np.isinf(self.stiffness[:, size:])
         if self.stretches is None or not rigid.any():
@@ -129,7 +129,7 @@ class UniformProblem:
     def springs_and_masses(self, rows: Integers | slice = slice(None)) -> tuple[Floats, Floats]:
         """Return the factors of displacements and of -z times these in all conditions, (rows, 2 n + m, 2 n + m) each.
 
-        Links are left out. The condition of a displacement that is held says so.
+        Links are left out. The condition of a held displacement is that it is zero.
         """
         size = self.structure.moving
         stiffness, mass = self.stiffness[rows, :size], self.mass[rows, :size]
@@ -168,11 +168,11 @@ class UniformProblem:
         return k
 
     def all_coefficients(self) -> Floats:
-        """Return all coefficients, those that are known too."""
+        """Return all coefficients, including the known ones."""
         return replace(self, known=(None,) * self.structure.coefficients).coefficients()
 
     def _enter_condition(self, row: dict[int, Floats], place: int) -> None:
-        """Enter the factors of a condition over 1 + k + m, in turned signs."""
+        """Enter the factors of a condition over 1 + k + m, with the signs of `waves_count.end_rows`."""
         structure, turned = self.structure, self.structure.turned
         stiffness, mass = self.stiffness[:, place], self.mass[:, place]
         held, link = np.isinf(stiffness), place - structure.moving
@@ -197,7 +197,7 @@ class UniformProblem:
                 row[j][:] = share * self._force(place, other) * (turned[place] * turned[other])
 
     def _force(self, place: int, other: int) -> Floats | float:
-        """Return how a force enters the condition of a place: by what the place moves of what it acts on."""
+        """Return the factor of a force in the condition of a degree of freedom: its displacement per unit of that."""
         link, moving = other - self.structure.moving, self.structure.moving
         if place >= moving or link < 0:
             tie = 0.0 if self.ties is None or max(place, other) >= moving else self.ties[:, other, place]

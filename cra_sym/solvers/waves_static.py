@@ -1,4 +1,4 @@
-"""What a uniform problem does at rest: motions without energy, negative energy, coordinates that nothing holds."""
+"""Statics of a uniform problem: rigid motions, negative energy, coordinates without stiffness and mass."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from .waves_problem import Floats, Integers, UniformProblem, ranks
 
 __all__ = ["are_semidefinite", "idle_coordinates", "negative_energy", "negative_motions", "rigid_motions"]
 
-_SMALL = 3  # matrices up to this size are judged by their principal minors
+_SMALL = 3  # matrices up to this size are tested by their principal minors
 
 
 def rigid_motions(problem: UniformProblem) -> Integers:
-    """Return how many independent motions without strain energy and without deflected springs each row has.
+    """Return the number of independent motions without strain and spring energy of each row.
 
     Exact: such a motion has P = 0, so ``q' = A_qq q`` with ``A_Pq q = 0``, and is zero where an end has stiffness. Only
-    linear dependence of a few rows of numbers decides.
+    the rank of a few rows has to be determined numerically.
     """
     structure, n, m = problem.structure, problem.structure.n, problem.coordinates
     result = np.zeros(len(problem.length), dtype=np.int64)
@@ -69,7 +69,7 @@ def _static_blocks(problem: UniformProblem, rows: Integers) -> tuple[Floats, Flo
 
 @np.errstate(invalid="ignore", over="ignore", divide="ignore")
 def negative_energy(problem: UniformProblem) -> NDArray[np.bool_]:
-    """Return where static strain energy may be negative, as in compression: only there can a row buckle."""
+    """Return for which rows the static strain energy may be negative, as in compression; only these can buckle."""
     found = negative_motions(problem, 0)
     for start, stop in problem.structure.blocks:
         for matrix, odd in ((problem.odd_by_even[0], False), (problem.even_by_odd[0], True)):  # A_Pq at z = 0
@@ -81,7 +81,7 @@ def negative_energy(problem: UniformProblem) -> NDArray[np.bool_]:
 
 @np.errstate(invalid="ignore", over="ignore", divide="ignore")
 def negative_motions(problem: UniformProblem, part: int) -> NDArray[np.bool_]:
-    """Return where the stiffness (part 0) or the mass (1) of the conditions may be negative in some motion."""
+    """Return for which rows the stiffness (part 0) or the mass (1) of the conditions may be negative in some motion."""
     found = np.zeros(len(problem.length), dtype=bool)
     if problem.couplings is None:
         return found
@@ -94,7 +94,7 @@ def negative_motions(problem: UniformProblem, part: int) -> NDArray[np.bool_]:
 
 
 def idle_coordinates(problem: UniformProblem) -> NDArray[np.bool_]:
-    """Return where coordinates have a motion without any spring, mass or displacement of an end."""
+    """Return for which rows the coordinates have a motion without any spring, mass or displacement of an end."""
     found, first, structure = np.zeros(len(problem.length), dtype=bool), 2 * problem.structure.n, problem.structure
     if problem.coordinates:
         lumped = slice(first, structure.moving)
@@ -109,7 +109,7 @@ def idle_coordinates(problem: UniformProblem) -> NDArray[np.bool_]:
 
 
 def _groups(pattern: NDArray[np.bool_]) -> list[list[int]]:
-    """Return the places that a pattern of entries couples, group by group."""
+    """Return the groups of indices that a pattern of entries couples."""
     label = np.arange(len(pattern))
     for i, j in zip(*np.nonzero(pattern), strict=True):
         label[label == label[i]] = label[j]
@@ -118,7 +118,7 @@ def _groups(pattern: NDArray[np.bool_]) -> list[list[int]]:
 
 
 def are_semidefinite(matrices: Floats) -> NDArray[np.bool_]:
-    """Return where symmetric matrices have no negative eigenvalue, but for rounding: small ones by principal minors."""
+    """Return which symmetric matrices are positive semidefinite up to rounding; small ones by principal minors."""
     n = matrices.shape[1]
     if n > _SMALL:
         scale = np.sqrt(np.abs(np.diagonal(matrices, axis1=1, axis2=2)))

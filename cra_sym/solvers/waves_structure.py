@@ -1,4 +1,4 @@
-"""What the rows of a uniform problem have in common: parities, blocks, and where each coefficient stands."""
+"""Structure common to the rows of a uniform problem: parities, blocks, and the positions of the coefficients."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from .straight import Exact
 __all__ = ["TERMS", "Structure"]
 
 TERMS = 4
-"""Coefficients of polynomials in z."""
+"""Number of coefficients of polynomials in z."""
 
 
 class Chain(NamedTuple):
-    """Places by what becomes of their conditions on the way from E = 0, w = 0 and no links, in this order.
+    """Degrees of freedom by the change of their conditions in the chain from E = 0, w = 0 and no links, in this order.
 
     Attributes
     ----------
     same : list of int
-        Nothing.
+    Unchanged.
     first : list of int
-        Odd displacements, which are free, become what they are.
+        Odd displacements, free at the start, get their final condition.
     bound : list of int
-        Odd displacements that have to do with others are held.
+        Odd displacements coupled to others are held.
     following : list of int
-        What is zero, or follows what is held yet, does no more than before.
+        Displacements that are zero or tied to held ones get their final condition; the count does not change.
     last : list of int
-        Displacements that are held become what they are.
+        Held displacements get their final condition.
     lumped : list of int
-        Coordinates that are not known to stay are released, links put in.
+        Coordinates that are not known to be zero are released, links are added.
     """
 
     same: list[int]
@@ -48,10 +48,11 @@ class Chain(NamedTuple):
 
 @dataclass(frozen=True)
 class Structure:
-    """What the rows of a problem have in common.
+    """Structure common to the rows of a problem.
 
-    A place is a displacement of the left end (0 to n - 1), of the right end (n to 2 n - 1), a lumped coordinate, or the
-    force of a link: a spring between other places. To each belongs one condition.
+    The degrees of freedom (``places``) are, in order, the displacements of the left end (0 to n - 1), those of the
+    right end (n to 2 n - 1), the lumped coordinates, and the forces of links (springs between others). Each has one
+    condition.
 
     Attributes
     ----------
@@ -62,7 +63,7 @@ class Structure:
     coordinates, links : int
         How many lumped coordinates and links there are.
     linked : bool
-        Whether conditions have to do with other places than those of their own end.
+        Whether conditions involve degrees of freedom beyond their own end.
     """
 
     odd: tuple[bool, ...]
@@ -83,7 +84,7 @@ class Structure:
 
     @property
     def places(self) -> int:
-        """All places."""
+        """Number of degrees of freedom, forces of links included."""
         return self.moving + self.links
 
     @cached_property
@@ -94,39 +95,39 @@ class Structure:
 
     @cached_property
     def turned(self) -> NDArray[np.float64]:
-        """-1 of the places whose displacement a reflection turns to the other sign: the odd ones of the left end."""
+        """-1 for the odd displacements of the left end, whose sign changes under reflection, else 1."""
         return np.array([-1.0 if place < self.n and self.odd[place] else 1.0 for place in range(self.places)])
 
     def is_odd(self, place: int) -> bool:
-        """Return whether a place is an odd displacement."""
+        """Return whether a degree of freedom is an odd displacement."""
         return place < 2 * self.n and self.odd[place % self.n]
 
     def reach(self, place: int) -> range:
-        """Return the places whose displacements may stand in a condition."""
+        """Return the degrees of freedom whose displacements may occur in a condition."""
         first = place - place % self.n
         return range(self.moving) if self.linked else range(first, first + self.n)
 
     def forces(self, place: int) -> tuple[int, ...]:
-        """Return the places whose forces may stand in a condition."""
+        """Return the degrees of freedom whose forces may occur in a condition."""
         return (*range(2 * self.n), *range(self.moving, self.places)) if self.linked else tuple(self.reach(place))
 
     @property
     def matrices(self) -> tuple[int, int]:
-        """Where the entries of both matrices begin among the coefficients."""
+        """Start of the entries of both matrices among the coefficients."""
         return 0, 2 * self.n**2
 
     def condition(self, place: int) -> int:
-        """Return where the factors of a condition begin: those of displacements, of -z times these and of forces."""
+        """Return the start of the factors of a condition: of displacements, of -z times these, and of forces."""
         return 4 * self.n**2 + place * (2 * len(self.reach(0)) + len(self.forces(0)))
 
     def own(self, place: int) -> int:
-        """Return where the factor of its own displacement stands, of a link that of its force."""
+        """Return the position of the factor of its own displacement, or of its force for a link."""
         if place >= self.moving:
             return self.condition(place) + 2 * self.moving + self.forces(place).index(place)
         return self.condition(place) + self.reach(place).index(place)
 
     def table(self, displacement: int) -> int:
-        """Return where the polynomials of a block begin whose first displacement this is."""
+        """Return the start of the polynomials of the block whose first displacement this is."""
         return self.condition(self.places) + TERMS * displacement
 
     @property
@@ -136,10 +137,9 @@ class Structure:
 
     @property
     def order(self) -> tuple[int, ...]:
-        """Places in the order in which determinants are expanded: what is lumped, then block by block, right end first.
+        """Order in which determinants are expanded: coordinates and links, then block by block, right end first.
 
-        Coordinates and blocks that are weakly coupled then leave their determinants as factors, which keep near-equal
-        roots apart.
+        The determinants of weakly coupled coordinates and blocks are then factors, which separates nearly equal roots.
         """
         blocks = [
             place for start, stop in self.blocks for end in (self.n, 0) for place in range(end + start, end + stop)
@@ -147,24 +147,24 @@ class Structure:
         return *range(2 * self.n, self.places), *blocks
 
     def sign(self, order: Sequence[int]) -> float:
-        """Return what makes a determinant with its rows in another order positive below all roots."""
+        """Return the sign that makes a determinant with its rows in another order positive below all roots."""
         n = self.n
         rank = [*range(n, 2 * n), *range(n), *range(2 * n, self.places)]
         ranked = [rank[place] for place in order]
         swaps = sum(a > b for at, a in enumerate(ranked) for b in ranked[at + 1 :])
         return -1.0 if (n + swaps) % 2 else 1.0
 
-    # What is known of the conditions beforehand -------------------------------------------------------------------
+    # Known entries of the conditions -------------------------------------------------------------------
 
     def touched(self, entries: Sequence[Any], place: int) -> tuple[set[int], set[int]]:
-        """Return the places whose displacements, and those whose forces, may stand in a condition."""
+        """Return the degrees of freedom whose displacements, and those whose forces, may occur in a condition."""
         reach, first = self.reach(place), self.condition(place)
         size = len(reach)
         moved = {e for j, e in enumerate(reach) if not all(_is(entries[first + k], 0) for k in (j, size + j))}
         return moved, {d for j, d in enumerate(self.forces(place)) if not _is(entries[first + 2 * size + j], 0)}
 
     def chain(self, entries: Sequence[Any]) -> Chain:
-        """Return the order in which conditions E = 0, w = 0 and no link become what they are."""
+        """Return the order in which the conditions E = 0, w = 0 and no links are replaced by the actual ones."""
         same = [place for place in self.order if place < self.moving and self._is_reference(entries, place)]
         rest = [place for place in self.order if place not in same]
         bound = [place for place in rest if self.is_odd(place) and self._is_bound(entries, place)]
@@ -177,10 +177,10 @@ class Structure:
         return Chain(same, first, bound, following, [place for place in last if place not in lumped], lumped)
 
     def _in_turn(self, entries: Sequence[Any], coordinates: list[int]) -> list[int]:
-        """Return coordinates and links in an order in which a rigid link always finds something that may move.
+        """Return coordinates and links in an order in which a rigid link always joins something that may move.
 
-        One link is there before its coordinate is released, so that one without mass has a stiffness. It may be rigid
-        and join what is held: then the count is known again when the coordinate moves.
+        Each coordinate is released after one of its links has been added, so that one without mass has a stiffness. If
+        that link is rigid and joins held ones, the count is known again once the coordinate is released.
         """
         links = {link: self.touched(entries, link)[0] for link in range(self.moving, self.places)}
         found: list[int] = []
@@ -190,7 +190,7 @@ class Structure:
         return found
 
     def block(self, place: int) -> int:
-        """Return the number of the block of a displacement, of what is lumped -1."""
+        """Return the number of the block of a displacement, -1 for coordinates and links."""
         inside = [number for number, (start, stop) in enumerate(self.blocks) if start <= place % self.n < stop]
         return inside[0] if place < 2 * self.n else -1
 
@@ -202,7 +202,7 @@ class Structure:
         return all(_is(entry, int(at == one)) for at, entry in enumerate(row))
 
     def _is_bound(self, entries: Sequence[Any], place: int) -> bool:
-        """Return whether an odd displacement has to do with another one while all even ones are held."""
+        """Return whether an odd displacement is coupled to another one while all even ones are held."""
         moved, forces = self.touched(entries, place)
         for other in self.reach(place):
             theirs, their_forces = self.touched(entries, other)

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Three waves of a section that nothing uncouples, as numbers: the one farthest from the others, and a block of two.
+"""Numerical waves of a block of three: the wave whose mu is farthest from the others, and a block of two.
 
 State and convention are those of `waves_kernel`. With signs s (1 of an even, -1 of an odd displacement) a problem
 without dampers has ``a^T = s a s`` and ``b^T = s b s``, so that one matrix of rank one, the adjugate of ``G - mu``,
@@ -60,15 +60,15 @@ def _chosen(masks, values):
 
 
 def alone(a, b, signs):
-    """Return what splits a block of three: the wave alone and the other two in their own coordinates.
+    """Split a block of three: the single wave, and the other two in their own coordinates.
 
     Returns
     -------
     near : whether all mu are small
-    mu, pair : the mu alone, and what `wave_numbers` says of the others
+    mu, pair : the single mu, and `wave_numbers` of the others
     matrices : a and b of the others, four entries each
     vectors : alpha, beta, v, y, u and r of ``a v = alpha u``, ``b u = beta v`` and the complements, two entries each
-    masks : whether the second or the third coordinate leads
+    masks : whether the second or the third coordinate is the pivot
     basis : the determinant of all vectors, at E and at O
     """
     g = _product(b, a)
@@ -112,7 +112,7 @@ def _rest(m, y):
 def near_columns(a, b, signs, square=1.0):
     """Return the columns of a block of three at small mu in the basis of unit vectors, by power series.
 
-    With ``square`` they are those at another place, x^2, but for a factor x of O of the E-columns and E of the others.
+    With ``square`` = x^2 they are those at x, without a factor x in O of the E-columns and in E of the others.
     """
     c, s, _ = near_functions(a, b, signs, square)
     return (*c, *_product(a, s), *_reflected(c, signs), *_product(s, b))
@@ -140,7 +140,7 @@ def _reflected(m, signs):
 
 
 def joined_columns(single, pair, vectors, masks):
-    """Return the columns of a block of three from those of the wave alone and of the other two."""
+    """Return the columns of a block of three from those of the single wave and of the other two."""
     _, _, *rest = vectors
     v, y, u, r = (rest[i : i + 2] for i in range(0, 8, 2))
     found = []
@@ -153,7 +153,7 @@ def joined_columns(single, pair, vectors, masks):
 
 
 def three_waves(a, b, signs, split, columns_of_two, kind="any"):
-    """Return the columns of a block of three and their basis, in one regime or whichever it is."""
+    """Return the columns of a block of three and their basis, in a given regime or in any."""
     near, mu, pair, matrices, vectors, masks, basis = split
     together = ()
     if kind in ("any", "series"):
