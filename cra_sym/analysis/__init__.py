@@ -1,1 +1,1 @@
-"""What can be asked of any System: one module a question."""
+"""Analyses of any System, one per module."""

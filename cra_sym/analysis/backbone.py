@@ -1,4 +1,4 @@
-"""Backbones: the free periodic motions that a linear mode becomes as it grows, with folds and internal resonances."""
+"""Backbone curves: the free periodic motions that continue a linear mode, through folds and internal resonances."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ __all__ = ["Backbone", "backbone"]
 
 Array = NDArray[np.float64]
 _MOST_POINTS = 1000
-_MORE_MODES, _MORE_HARMONICS = 3, 4  # in which the error is estimated
+_MORE_MODES, _MORE_HARMONICS = 3, 4  # points for which the error is estimated together
 UNSTABLE = 1e-6
-"""A motion is unstable if a Floquet multiplier lies beyond the unit circle by more."""
+"""A motion counts as unstable if the modulus of a Floquet multiplier exceeds 1 by more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,20 +40,20 @@ class Backbone(checks.ByValue):
     energy : ndarray, shape (...)
         At the instant of zero velocity, J.
     amplitude : ndarray, shape (...)
-        Peak at the tip, or of what was chosen.
+        Peak at the tip, or of the chosen displacement.
     stable : ndarray of bool, shape (...)
         Whether no Floquet multiplier has a modulus beyond 1 + 1e-6.
     error_modes, error_harmonics : ndarray, shape (...)
-        Estimated relative error of the frequency for want of modes and of harmonics: what three more modes, and four
-        more harmonics, change.
+        Estimated relative truncation error of the frequency: its change with three more modes, and with four more
+        harmonics.
     coefficients : ndarray, shape (..., modes, functions)
         Modal coordinates as sums of cosines of ``multiples`` of the phase.
     multiples : tuple of int
     crossings : ndarray, shape (branch points,)
         Angular frequencies at which the curve meets another one on the way.
     damping_ratio, loss : ndarray, shape (...)
-        With elastic-slip elements: the ratio of the modal damping that holds the motion, and the energy that it makes
-        up for in a cycle, J; zero of free motions without damping.
+        With elastic-slip elements: the damping ratio of the motion, and the energy dissipated in a cycle, J; zero for
+        free motions without damping.
     branches : tuple of Backbone
         The curves that cross, of whole curves, if they were asked for.
 
@@ -93,15 +93,15 @@ def backbone(
     place: Any = None,
     field: Any = None,
 ) -> Backbone:
-    """Return the free periodic motions that a mode becomes as it grows, without damping.
+    """Return the undamped free periodic motions that continue a linear mode to finite amplitude.
 
-    Harmonic balance, continued by arclength from the linear mode through every fold. No internal resonance is jumped:
-    a change of the number of negative eigenvalues of the Jacobian tells where a step was too long.
+    Harmonic balance, continued by arclength from the linear mode through every fold. No internal
+    resonance is skipped: a change of the number of negative eigenvalues of the Jacobian shows that a step was too long.
 
-    With elastic-slip elements the motion is damped, and dampers and damping ratios count too: it is held periodic by
-    damping of opposite sign, -2 zeta omega times the velocity of every mode (EPMC, Krack 2015). Its amplitude must be
+    With elastic-slip elements the motion is damped, also by dampers and damping ratios. It is made periodic by damping
+    of opposite sign, -2 zeta omega times the velocity of every mode (EPMC, Krack 2015). Its amplitude must be
     given; it is stable if no multiplier of the equations without this damping has a modulus beyond 1 + 1e-6. Its
-    coefficients are of the constant, cosines and sines.
+    coefficients are those of the constant, the cosines and the sines.
 
     Parameters
     ----------
@@ -110,17 +110,17 @@ def backbone(
     mode : int
         Counted from 1.
     energy, amplitude : array_like, optional
-        Where the motion is wanted: the first along the curve with that energy (J, at zero velocity), or with that peak
-        at the tip. Neither: the whole curve with its turns, up to ``points`` points.
+        Points to return: the first along the curve with that energy (J, at zero velocity), or with that peak at the
+        tip. By default the whole curve with its folds, up to ``points`` points.
     modes : int
         How many linear modes take part, 1 to 40; with elastic-slip elements those of the system without them.
     harmonics : int, optional
         Highest multiple of the frequency, 1 to 60. Internal resonances with higher ones do not show. Default: 9; with
-        elastic-slip elements as many as bring frequency and damping ratio within 3e-7, at most 127; fewer where these
-        do not converge, as stiff elements excite modes that hardly anything damps: ``error_harmonics`` is then what the
-        last of them changed.
+        elastic-slip elements as many as change frequency and damping ratio by less than 3e-7, at most 127. There are
+        fewer where more do not converge, since stiff elements excite lightly damped modes: ``error_harmonics`` is then
+        the change by the last of them.
     points : int
-        Length of the whole curve, and at most of each branch.
+        Number of points of the whole curve, and at most of each branch.
     branches : bool
         Whether to follow the curves that cross the whole curve too, both ways, where an internal resonance joins two
         modes or a motion of another form sets in. Like the curve itself, they are sums of cosines of ``multiples``. A
@@ -136,10 +136,10 @@ def backbone(
     Warns
     -----
     ConvergenceWarning
-        If the curve could not be followed as far as asked; what was not reached is nan. With elastic-slip elements
+        If the curve could not be followed far enough; points that were not reached are nan. With elastic-slip elements
         also if ``error_harmonics`` exceeds 1e-3.
     AsymptoticWarning
-        If slopes are beyond what ``quadratures`` of squared slopes hold.
+        If slopes are too large for ``quadratures`` of squared slopes.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def backbone(
 def _held(
     system: System, mode: int, energy: Any, amplitude: Any, modes: int, harmonics: int | None, place: Any, field: Any
 ) -> Backbone:
-    """Return damped motions with elastic-slip elements."""
+    """Return the backbone of damped motions with elastic-slip elements."""
     if amplitude is None:
         raise ValueError(f"energy = {energy}: must be None and amplitude given, as the model has hysteresis")
     if system.shape:
@@ -251,7 +251,7 @@ def _whole(problem: FollowedMode, points: int, branches: bool) -> Backbone:
 
 
 def _of_points(problem: FollowedMode, points: list[Point], crossings: Array) -> Backbone:
-    return _told(problem, [p.vector for p in points], [p.tangent for p in points], (len(points),), crossings)
+    return _backbone_of(problem, [p.vector for p in points], [p.tangent for p in points], (len(points),), crossings)
 
 
 def _at_targets(problem: FollowedMode, targets: Array, measure: Measure, name: str) -> Backbone:
@@ -277,7 +277,7 @@ def _at_targets(problem: FollowedMode, targets: Array, measure: Measure, name: s
     blank = np.full(problem.balance.size + 1, np.nan)
     vectors = [blank if a is None else a for a in answers]
     normals = [blank if a is None else np.append(measure(a[:-1])[1], 0.0) for a in answers]
-    return _told(problem, vectors, normals, targets.shape, _crossings(passed))
+    return _backbone_of(problem, vectors, normals, targets.shape, _crossings(passed))
 
 
 def _crossings(points: list[Point]) -> Array:
@@ -291,7 +291,7 @@ def _unfinished(last: Point, where: str) -> None:
 
 
 def _rate(measure: Measure, point: Point) -> tuple[float, float]:
-    """Return the logarithm of the measure and its rate along the curve."""
+    """Return the logarithm of the measure and its derivative along the curve."""
     value, gradient = measure(point.unknowns)
     return float(np.log(value)), float(gradient @ point.tangent[:-1] / value)
 
@@ -307,10 +307,10 @@ def _refined(curve: Curve, before: Point, after: Point, share: float, measure: M
     return None if found is None else found[0]
 
 
-def _told(
+def _backbone_of(
     problem: FollowedMode, vectors: list[Array], normals: list[Array], shape: tuple[int, ...], crossings: Array
 ) -> Backbone:
-    """Return the result at points of the curve; the normals fix a point when modes or harmonics are added."""
+    """Return the result at points of the curve; the normals keep a point in place when modes or harmonics are added."""
     stacked = np.array(vectors)
     good = np.isfinite(stacked).all(axis=1)
     unknowns, frequency = stacked[:, :-1], stacked[:, -1]
@@ -344,7 +344,7 @@ def _told(
 
 
 def _stable(problem: FollowedMode, coefficients: Array, frequency: Array) -> NDArray[np.bool_]:
-    """Return whether no multiplier leaves the unit circle, but for the pair that belongs to the curve itself."""
+    """Return whether all multipliers are on the unit circle, except the pair at 1 due to the curve itself."""
     if not len(frequency):
         return np.zeros(0, bool)
     values = multipliers(problem.equations, problem.balance.basis, coefficients, frequency, tolerance=1e-7, even=True)
@@ -354,7 +354,7 @@ def _stable(problem: FollowedMode, coefficients: Array, frequency: Array) -> NDA
 
 
 def _changed(problem: FollowedMode, more: tuple[int, int], vectors: Array, normals: Array) -> Array:
-    """Return by what share the frequency changes when modes and harmonics are added: two steps of Newton's method."""
+    """Return the relative change of the frequency when modes and harmonics are added: two steps of Newton's method."""
     try:
         rich = problem.richer(*more)
     except ValueError:  # there are no more modes

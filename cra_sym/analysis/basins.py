@@ -15,7 +15,7 @@ from cra_sym.analysis.steady_states import SteadyState
 __all__ = ["basins"]
 
 Array = NDArray[np.float64]
-_DECAY = 4.0  # a transient has shrunk to exp(-4) of itself when the motion is told from the steady states
+_DECAY = 4.0  # a transient has decayed to exp(-4) when the motion is assigned to a steady state
 _MOST_CYCLES = 20_000
 _CHUNK = 10  # cycles that are integrated at a time
 _TOLERANCE = 1e-6
@@ -31,26 +31,26 @@ def basins(
 ) -> NDArray[np.intp]:
     """Return which of the steady states at one frequency is reached from initial motions in one mode.
 
-    All initial motions are integrated together (DOP853, relative tolerance 1e-6) for whole periods, and told apart by
-    the stable state whose displacements and velocities at that phase are nearest.
+    All initial motions are integrated together (DOP853, relative tolerance 1e-6) for whole periods, and each is
+    assigned to the stable state whose displacements and velocities at that phase are nearest.
 
     Parameters
     ----------
     states : sequence of SteadyState
-        What :func:`cra_sym.steady_states` returns for one angular frequency.
+        Result of :func:`cra_sym.steady_states` for one angular frequency.
     displacement : array_like, shape (D,)
-        Initial displacement of the tip in the mode, or of what was chosen for ``states``, m.
+        Initial displacement of the tip in the mode, or of the displacement chosen for ``states``, m.
     velocity : array_like, shape (V,)
         Its initial velocity, m/s.
     mode : int
         In which linear mode, from 1; the others start at rest.
     cycles : int, optional
-        Periods of the answers to integrate; default: until the slowest mode has decayed to exp(-4).
+        Periods of the steady states to integrate; default: until the slowest mode has decayed to exp(-4).
 
     Returns
     -------
     ndarray of int, shape (V, D)
-        Index into ``states``; -1 where the motion is nearer to no stable state than they are to each other.
+        Index into ``states``; -1 where no stable state is clearly the nearest, compared with their mutual distances.
 
     Raises
     ------
@@ -98,9 +98,9 @@ def basins(
 
 
 def _nearest(points: Array, marks: Array, started: Array) -> NDArray[np.intp]:
-    """Return the mark next to each point, -1 if the point is not clearly nearer to it than marks are to each other.
+    """Return the nearest mark to each point, -1 if it is not clearly nearer than the marks are to each other.
 
-    If there is one mark, a tenth of the largest distance at the start is near.
+    If there is only one mark, nearer than a tenth of the largest initial distance.
     """
     apart = np.linalg.norm(points[:, None] - marks[None], axis=-1)
     nearest = apart.argmin(axis=1)
@@ -132,14 +132,14 @@ class _Flow:
         return float(2 * np.pi * self._period / self._varpi)
 
     def cycles(self) -> int:
-        """Return how many periods of the answers a transient takes."""
+        """Return the number of periods of the steady states in which a transient decays."""
         rates = np.linalg.eigvalsh((self._equations.damping + self._equations.damping.T) / 4)
         if rates.min() <= 0:
             raise ValueError("cycles = None: must be given where a mode has no damping: its transient does not decay")
         return int(np.clip(np.ceil(_DECAY / (rates.min() * self._cycle)), 1, _MOST_CYCLES))
 
     def after(self, start: Array, cycles: int) -> Array:
-        """Return displacements and velocities after so many periods, shape (2, motions, modes); nan if they run off."""
+        """Return displacements and velocities after some periods, shape (2, motions, modes); nan if they diverge."""
         state, end = start.ravel(), 0
         while end < cycles:
             begin, end = end, min(end + _CHUNK, cycles)
@@ -160,7 +160,7 @@ class _Flow:
         return np.stack([u, self._equations.acceleration(q, u, causes)]).ravel()
 
     def mark(self, state: SteadyState) -> Array:
-        """Return where in the plane of displacements and velocities a steady state is at the phase 0."""
+        """Return the point of a steady state at phase 0 in the space of displacements and scaled velocities."""
         basis, coefficients = state._problem.basis, state.coefficients
         at = np.zeros(1)
         rate = self._varpi / self._period

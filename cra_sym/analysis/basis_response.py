@@ -1,4 +1,4 @@
-"""Frequency responses from the basis on the stresses: dampers along x, stiffnesses that vanish at an end."""
+"""Frequency responses in the stress basis, for dampers along x and stiffnesses that vanish at an end."""
 
 from __future__ import annotations
 
@@ -40,21 +40,21 @@ def on_basis(
     s : ndarray of complex, shape (sets, K)
         rad/s.
     drive : str or callable
-        The name of a motion or a force, or ``drive(modes)`` returns what each mode displaces of what is driven.
+        Name of a motion or a force, or a callable: ``drive(modes)`` returns the driven displacement in each mode.
     place : int
-        Which displacement of the section answers.
+        Index of the displacement of the section that is the output.
     x : ndarray or None
         Places; None is the right end.
     motion : bool
-        Whether what is driven moves by one unit.
+        Whether the driven displacement is prescribed, with unit amplitude.
     zeta : ndarray, shape (sets,), optional
         Modal damping ratios.
 
     Raises
     ------
     ValueError
-        If the response does not settle where there is no other method: where a coefficient is infinite at an end, or
-        with modal damping.
+        If the response does not converge and there is no other method: with an infinite coefficient at an end, or with
+        modal damping.
     """
     count = 1 if x is None else len(x)
     found = np.empty((len(s), count, s.shape[1]), dtype=complex)

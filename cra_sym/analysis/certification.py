@@ -49,8 +49,8 @@ def certify(system: System, modes: int = 3) -> Certificate:
     """Prove the first natural frequencies of a system with coefficients that are constant along x; (23) and (30).
 
     The number of frequencies below a point is that of the negative eigenvalues of its dynamic stiffness, and of the
-    parts that are eliminated on the way, each proved in ball arithmetic. Two such numbers a frequency make the
-    enclosure and its completeness.
+    parts that are eliminated on the way, each proved in ball arithmetic. Two such numbers for each frequency prove its
+    enclosure and the completeness of the set.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def _counted(
 
 
 def _free_columns(entries: Sequence[Any], size: int, fixed: Sequence[int]) -> list[list[Any]]:
-    """Return the columns of free motions that leave the fixed coordinates at rest."""
+    """Return the columns of free motions in which the fixed coordinates are zero."""
     number = len(entries) // size
     columns = [[entries[i * number + j] for i in range(size)] for j in range(number)]
     for place in fixed:
@@ -172,7 +172,7 @@ def _free_columns(entries: Sequence[Any], size: int, fixed: Sequence[int]) -> li
 
 
 def _rigid_motions(problem: BallProblem, values: Sequence[float], size: int, fixed: Sequence[int]) -> int:
-    """Return the number of rigid-body motions: polynomials of first degree without strain, by rank in fractions."""
+    """Return the number of rigid-body motions: polynomials of first degree without strain, by an exact rank."""
 
     def evaluated(kernel: Any, *first: Any) -> list[Fraction]:
         return list(kernel(Fraction, Fraction(0), *first, *map(Fraction, values)))

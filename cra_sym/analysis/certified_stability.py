@@ -31,7 +31,7 @@ def certify_stability(
     means that every motion is bounded: all multipliers lie inside the unit circle, or, without any damping, on it and
     apart from each other. 'unstable' means that a multiplier lies outside. On a boundary, and where multipliers meet, a
     point is 'undecided'. The method is in :mod:`cra_sym.solvers.proved_stability`: enclosures of the monodromy matrix
-    by Taylor series with bounds of all that is left out, and of its multipliers by discs.
+    by Taylor series with bounds of the truncation and rounding errors, and of its multipliers by discs.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def certify_stability(
     epsilon : array_like
         Not negative.
     modes : int
-        How many modes move, 1 to 1000.
+        Number of modes, 1 to 1000.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def certify_stability(
 
 
 def _without_momentum(drive: Drive) -> Iterator[tuple[Oscillation, tuple[Any, ...]]]:
-    """Yield what oscillates with stiffness and damping alone: d/dt(g B q) is g B q' and g' B q."""
+    """Yield the drive with stiffness and damping terms only: d/dt(g B q) is written as g B q' + g' B q."""
     oscillation, stiffness, damping, momentum, mass = drive
     if mass is not None:
         raise ValueError(
@@ -94,7 +94,7 @@ def _without_momentum(drive: Drive) -> Iterator[tuple[Oscillation, tuple[Any, ..
 
 
 def _conservative(matrices: Matrices) -> bool:
-    """Return whether nothing damps or drives but what oscillates with a potential or in a gyroscopic term."""
+    """Return whether all forces, oscillating ones included, have a potential or are gyroscopic."""
     still = matrices.damping
     skew = np.array_equal(still, -still.swapaxes(-1, -2))
     for drive in matrices.drives:

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 class _Cause(NamedTuple):
-    """A motion or a force: its history as a motion whose acceleration acts, its load, whether it strikes at t = 0."""
+    """An input: its history as the acceleration of a motion, its load, and whether it is an impulse at t = 0."""
 
     profile: BaseMotion
     load: Load
@@ -55,11 +55,11 @@ def complex_response(
     outputs : callable
         ``outputs(modes)`` returns the rows (outputs, modes) of a basis.
     t, modes, derivative, start, initial
-        As :func:`cra_sym.response`; the sum has as many eigenvalues as ``modes`` oscillators.
+        As :func:`cra_sym.response`; the sum has 2 ``modes`` eigenvalues.
     zeta : ndarray
         Modal damping ratio of the structure without its dampers.
     check : callable
-        ``check(motion, omega)`` is told every motion and the frequencies.
+        ``check(motion, omega)`` is called with every motion and the frequencies.
     """
     causes = _causes(system, histories, start)
     times = np.empty(0)
@@ -94,7 +94,7 @@ def complex_residual(
     tip : callable
         ``tip(modes)`` returns the row (modes,) of a basis.
     stop : float or ndarray
-        When nothing drives any more, s.
+        Time when all inputs have ended, s.
     """
     found = []
     causes = _causes(system, histories, "inertial")
@@ -109,9 +109,9 @@ def complex_residual(
 
 
 class _Member(NamedTuple):
-    """One of a batch: its motions, rows of the outputs, state at t = 0, and what acts on it.
+    """One member of a batch: its motions, rows of the outputs, state at t = 0, and inputs.
 
-    Each of the causes is its profile, the member of the profile's batch, its effect on the state, and its strike.
+    Each input is a tuple: profile, member of the profile's batch, effect on the state, and initial impulse.
     """
 
     motions: LowestMotions
@@ -141,7 +141,7 @@ def _members(
         for number, index in enumerate(np.ndindex(shape)):
             column = columns[:, number : number + 1]
             key = np.append(column, ratios[number]).tobytes()
-            if motions is None or key != kept:  # the motion varies fastest
+            if motions is None or key != kept:  # the motion is the fastest index
                 ((_, problem),) = system.numerics("pencil").problems(column)
                 motions, kept = lowest_motions(problem, modes, float(ratios[number]), whole=whole), key
             one = system.model.at(dict(zip(system.numerics("names"), column[:, 0], strict=True)))
@@ -172,7 +172,7 @@ def _causes(system: System, histories: Mapping[str, BaseMotion | Force], start: 
 
 
 def _momenta(system: System, initial: Mapping[Any, Any] | None) -> tuple[Load | None, Load | None]:
-    """Return the momenta of given displacements and velocities as loads, None where there are none."""
+    """Return the momenta of initial displacements and velocities as loads, None where they are zero."""
     if not initial:
         return None, None
     from cra_sym.model.derivations import momentum
@@ -181,7 +181,7 @@ def _momenta(system: System, initial: Mapping[Any, Any] | None) -> tuple[Load | 
 
 
 def _projected(one: System, motions: LowestMotions, effect: Array, load: Load | None) -> Array:
-    """Return what a load on the coordinates of the basis does to the state."""
+    """Return the rate of the state per unit of a load on the coordinates of the basis."""
     if load is None:
         return np.zeros(len(motions.system))
     moved: Array = effect @ project(one.domain, motions.basis, load)

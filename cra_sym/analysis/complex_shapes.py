@@ -1,4 +1,4 @@
-"""Complex mode shapes: from the exact dynamic stiffness, or from the basis on the stresses where that has no shapes."""
+"""Complex mode shapes, from the exact dynamic stiffness or, where that has none, from the stress basis."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _of_basis(system: System, column: Array, s: Complex, place: int, derivative:
 
 
 def _motions(problem: GeneralContinuum, s: Complex) -> LowestMotions:
-    """Return the motions of enough eigenvalues to have all of these among them."""
+    """Return the motions of enough eigenvalues to include all of these."""
     number = len(s)
     while True:
         motions = lowest_motions(problem, number, 0.0)

@@ -1,4 +1,4 @@
-"""Where stability is lost as a parameter grows: divergence (buckling) or flutter."""
+"""Critical values of a parameter at which stability is lost: divergence (buckling) or flutter."""
 
 from __future__ import annotations
 
@@ -26,16 +26,18 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Kind = Literal["divergence", "flutter"]
 _GROWTH = 1e-7, 1e-11
-"""Real part over modulus from where on a motion grows, without losses and with them; less is rounding, which without
-losses is large where two eigenvalues meet."""
-_SECTIONS = 33, 33  # values within the interval that the first stability loss was found in, and again
-_REACH = 1.2  # of the eigenvalues that are looked at, over the frequency of the last mode without loads and dampers
+"""Ratio of real part to modulus above which a motion counts as growing, without and with dissipation; smaller ones are
+rounding, which without dissipation is large where two eigenvalues coalesce."""
+_SECTIONS = 33, 33  # numbers of values in the first and the second subdivision of the interval of the first loss
+_REACH = (
+    1.2  # largest modulus of the eigenvalues considered, over the frequency of the last mode without loads and dampers
+)
 _MESHES = 8
 
 
 @dataclass(frozen=True)
 class CriticalValue:
-    """Where stability is lost.
+    """First loss of stability.
 
     Attributes
     ----------
@@ -61,14 +63,14 @@ def critical_value(
     Parameters
     ----------
     system : System
-        Its own value of the parameter has no effect. Modal damping (zeta) is left out.
+        The value of the parameter in it is ignored. Modal damping (zeta) is left out.
     parameter : str or Symbol
     between : (float, float)
         Lower and upper value; at the lower one the system must be stable.
     modes : int
-        Eigenvalues up to the frequency of this mode, without loads and dampers, are looked at.
+        Eigenvalues up to the frequency of this mode, without loads and dampers, are considered.
     points : int
-        Values that are tried. If the system is unstable only between two of them, that is not seen.
+        Number of values tried. Instability only between two of them is not detected.
 
     Returns
     -------
@@ -79,16 +81,17 @@ def critical_value(
     ------
     TypeError, ValueError
         If the parameter is unknown, the interval is not one, the system is unstable at its lower end, or stable at all
-        values that are tried; if the critical value does not settle to the tolerance of the system: says to which.
+        values that are tried; if the critical value does not converge to the tolerance of the system; the message gives
+        the error reached.
     ArithmeticError
         If more than one eigenvalue crosses in a bracket that cannot be narrowed.
 
     Notes
     -----
-    Sections by the complex eigenvalues enclose the first loss; there a function that changes its sign linearly is
-    solved for its zero: the determinant of the static stiffness for divergence; for flutter the squared difference of
-    the two squared eigenvalues that meet or, where dampers or other losses are, a real part. Elements are refined until
-    the value settles to the tolerance of the system.
+    The first loss is bracketed by the complex eigenvalues. In the bracket the zero is found of a function with a simple
+    zero: the determinant of the static stiffness for divergence; for flutter the squared difference of the two squared
+    eigenvalues that coalesce or, with dissipation, a real part. Elements are refined until the value converges to the
+    tolerance of the system.
 
     References
     ----------
@@ -144,7 +147,7 @@ class _FinestError(Exception):
 
 
 class _State(NamedTuple):
-    """What is known at one value: eigenvalues, the determinant of the static stiffness, whether nothing is lost."""
+    """Results at one value: eigenvalues, determinant of the static stiffness, whether there is no dissipation."""
 
     s: Complex
     statics: float
@@ -187,7 +190,7 @@ class _Search:
 
     @staticmethod
     def _omega(kind: Kind, s: complex, state: _State) -> float:
-        """Return the angular frequency of the motion that is neutral; of two that meet it is known from their mean."""
+        """Return the angular frequency of the neutral motion; of two that coalesce, from their mean."""
         if kind == "divergence":
             return 0.0
         if state.lossless:
@@ -207,7 +210,7 @@ class _Search:
         return float(values[first]), float(values[first + 1])
 
     def _zero(self, kind: Kind, s: complex, low: float, high: float, level: int) -> float:
-        """Return the zero of what changes sign in a bracket, which is widened if finer elements move it."""
+        """Return the zero of the indicator function in a bracket, which is widened if mesh refinement shifts it."""
 
         def sign(value: float) -> float:
             state = self._at(float(value), level)
@@ -236,7 +239,7 @@ class _Search:
         return complex(s[s.real.argmax()])
 
     def _states(self, values: Array, level: int) -> list[_State]:
-        """Return what is known at the values, on the mesh of that level."""
+        """Return the results at the values, on the mesh of that level."""
         columns = np.repeat(self._column[:, None], len(values), axis=1)
         columns[self._place] = values
         found: dict[int, _State] = {}

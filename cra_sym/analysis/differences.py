@@ -1,4 +1,4 @@
-"""Derivatives of modal quantities by a parameter, as differences of eighth order with a step that the modes allow."""
+"""Derivatives of modal quantities by a parameter: eighth-order differences with a step adapted to the modes."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ __all__ = ["by_differences", "central_weights"]
 
 Array = NDArray[np.float64]
 Quantity = Callable[[System], Array]
-_STEP = 0.02  # of the differences, over the change of the parameter at which two modes would meet
-_POINTS = 8  # on one side of a parameter that cannot be negative, or four on each side
+_STEP = 0.02  # step of the differences, over the change of the parameter at which two modes would coincide
+_POINTS = 8  # points on one side of a parameter that cannot be negative, or four on each side
 
 
 def by_differences(
@@ -30,26 +30,27 @@ def by_differences(
     compliance: bool = False,
     step: float = _STEP,
 ) -> Array:
-    """Return the derivative of a modal quantity by a parameter, of a stiff spring of an end by way of its compliance.
+    """Return the derivative of a modal quantity by a parameter; by a stiff end spring it is taken via its compliance.
 
     Parameters
     ----------
     system : System
     found : Sensitivities
-        Of the modes the quantity is of, and of the next one, which may be close to the last.
+        Of the modes of the quantity and of the next one, which may be close to the last.
     name : str
     quantity : callable
         Takes a system, returns an array of shape (..., modes, ...) that begins with the shape of the batch.
     compliance : bool
         Whether the derivative is by one over the stiffness.
     step : float
-        Of the differences, over the change of the parameter at which two modes would meet: small where the quantity has
-        kinks, such as a peak that comes at once or a period later.
+        Step of the differences, over the change of the parameter at which two modes would coincide: small where the
+        quantity has kinks, such as a peak that moves by a period.
 
     Returns
     -------
     ndarray
-        As the quantity; its relative error is about 1e-11, or that of the quantity over the step where this is more.
+        With the shape of the quantity; the relative error is the larger of 1e-11 and that of the quantity over the
+        step.
     """
     given = np.broadcast_to(system.values[name], system.shape)
     if compliance or name not in found.compliance:
@@ -68,7 +69,7 @@ def by_differences(
 
 
 def _own_stiffness(system: System, name: str) -> Array:
-    """Return the stiffness beside which the structure gives as much as a spring of an end, shape of the batch."""
+    """Return the end stiffness whose compliance equals that of the structure, shape of the batch."""
     rigid = system.conservative_part.replace(**{name: np.inf})
     end, place, factor = system.numerics("stiffnesses")[name]
     force, unit = rigid.modes(1).force(end, place)[..., 0], factor.function(*rigid.domain.values)
@@ -77,7 +78,7 @@ def _own_stiffness(system: System, name: str) -> Array:
 
 
 def _reach(frequency: Array, rate: Array, place: Array) -> Array:
-    """Return how far a parameter may go before modes meet or become rigid-body motions, to first order.
+    """Return the change of a parameter at which modes coincide or become rigid-body motions, to first order.
 
     In the complex plane of the parameter the modes are analytic up to about there.
     """

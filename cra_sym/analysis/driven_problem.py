@@ -1,4 +1,4 @@
-"""A nonlinear system that is driven, in so many modes and harmonics, at points of excitation frequency and size."""
+"""Periodically driven nonlinear system truncated to a number of modes and harmonics."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ __all__ = ["DrivenProblem"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-_WHOLE = 15  # whole steps, which lead somewhere soon or not at all
-_NEAR_CIRCLE = 1e-5  # multipliers so near the unit circle are computed as well as can be
+_WHOLE = 15  # iterations with full steps, which converge soon or not at all
+_NEAR_CIRCLE = 1e-5  # multipliers this close to the unit circle are computed to the best accuracy
 _ROUGH, _FINE = 1e-7, 1e-11
 
 
 @dataclass(frozen=True, eq=False)
 class DrivenProblem:
-    """A driven system in so many modes and harmonics.
+    """A driven system truncated to a number of modes and harmonics.
 
     Points are pairs of angular frequency and size of the excitation, shape (points, 2).
 
     Attributes
     ----------
     arguments : mapping
-        It was made of.
+        Arguments that the problem was made from.
     rows : ndarray, shape (modes,)
-        What is watched.
+        Output displacement in each mode.
     driven : Forced
         With an excitation of size one.
     basis : Basis
@@ -60,7 +60,7 @@ class DrivenProblem:
 
     @cached_property
     def balance(self) -> Balance:
-        """Its equations in harmonics."""
+        """The equations of harmonic balance."""
         return Balance(self.driven.equations, self.basis)
 
     def causes(self, at: Array, phase: Array | None = None) -> Array:
@@ -79,23 +79,23 @@ class DrivenProblem:
         return self.balance.coefficients(unknowns)
 
     def seeds(self, at: Array, order: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array, float]:
-        """Return starts."""
+        """Return starting points."""
         return seeds(self.driven, self.basis, at, order, self.period)
 
     def loss(self, unknowns: Array) -> float:
-        """Return the energy that elastic-slip elements take: there are none."""
+        """Return the energy dissipated by elastic-slip elements: zero, as there are none."""
         return 0.0
 
     def peaks(self, unknowns: Array, at: Array) -> Array:
-        """Return the largest displacement of what is watched in a period of each answer."""
+        """Return the peak of the output in a period of each solution."""
         return peak(self.basis, self.rows, self.balance.coefficients(unknowns))[0]
 
     def settled(self, found: list[list[Array]], at: Array) -> tuple[DrivenProblem, list[list[Array]]]:
-        """Return the problem and the answers: their harmonics are as many as were asked for."""
+        """Return the problem and the solutions unchanged: the number of harmonics is fixed."""
         return self, found
 
     def solved(self, starts: Array, at: Array, floor: float, most: int = 40) -> tuple[Array, NDArray[np.bool_]]:
-        """Return answers from starts, and which converged; whole steps are taken where halved ones lead nowhere."""
+        """Return solutions from starting points, and which converged; full steps are tried where damped ones fail."""
         given = at[:, 0] / self.period, self.causes(at)
         found, good = newton(self.balance, starts, *given, floor=floor, most=most)
         left = np.flatnonzero(~good) if most > 1 else np.zeros(0, int)
@@ -105,7 +105,7 @@ class DrivenProblem:
         return found, good
 
     def multipliers(self, unknowns: Array, at: Array) -> Complex:
-        """Return Floquet multipliers over a period of each answer: to 1e-7, to 1e-11 if the largest is of size one."""
+        """Return Floquet multipliers over a period of each solution, to 1e-7, or to 1e-11 near the unit circle."""
         found = self._multipliers(unknowns, at, _ROUGH)
         near = np.abs(np.abs(found[:, 0]) - 1.0) < _NEAR_CIRCLE
         found[near] = self._multipliers(unknowns[near], at[near], _FINE)
@@ -121,7 +121,7 @@ class DrivenProblem:
         return multipliers(self.driven.equations, self.basis, coefficients, frequency, causes, tolerance=tolerance)
 
     def changed(self, more_modes: int, more_harmonics: int, unknowns: Array, at: Array) -> float:
-        """Return by what share the motion changes when modes or harmonics are added: two steps of Newton's method."""
+        """Return the relative change of the motion when modes or harmonics are added: two steps of Newton's method."""
         options = dict(self.arguments)
         options["modes"] = min(options["modes"] + more_modes, options["system"].most_modes)
         options["harmonics"] += more_harmonics

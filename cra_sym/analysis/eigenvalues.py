@@ -21,7 +21,7 @@ __all__ = ["count_eigenvalues", "damping_ratios", "eigenvalues"]
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 _LEAST = 1e-11  # smallest relative tolerance that two meshes can agree to, because of rounding
-_SHRINK = 0.85  # radius to try next, over one at which rounding spoils the count
+_SHRINK = 0.85  # next radius to try, relative to one at which rounding spoils the count
 
 
 @default_floating_point
@@ -38,7 +38,8 @@ def eigenvalues(system: System, modes: int = 3, *, oscillating: bool = True) -> 
         How many, 1 to 1000.
     oscillating : bool
         Leave out real eigenvalues, of motions that do not oscillate, rigid-body motions at rest among them:
-        Kelvin-Voigt damping has infinitely many real ones, which crowd at minus one over the retardation time. Without
+        Kelvin-Voigt damping has infinitely many real ones, which accumulate at minus one over the retardation time.
+        Without
         forces of first order in time that follow the motion, both s and -s of a real pair are given.
 
     Returns
@@ -51,13 +52,14 @@ def eigenvalues(system: System, modes: int = 3, *, oscillating: bool = True) -> 
     ValueError
         If there are fewer eigenvalues, with the number that the argument principle counts.
     ArithmeticError
-        If they do not settle, and the count does not confirm what Newton's method finds.
+        If they do not converge, and the count does not confirm the result of Newton's method.
 
     Notes
     -----
-    They are those of the Ritz basis on the stresses and settle to a relative ``system.tolerance`` (1e-11 at least) as
-    its degree rises. Where two meet (critical damping, flutter) their mean and product do, and each is known to half
-    the digits, as it is from the parameters. :func:`count_eigenvalues` proves in a region that none is missing. With
+    They are those of the Ritz basis on the stresses, converged to a relative ``system.tolerance`` (1e-11 at least) as
+    its degree rises. Where two coalesce (critical damping, flutter) their mean and product converge, and each is
+    accurate to half the digits only, as its sensitivity to the parameters implies. :func:`count_eigenvalues` proves in
+    a region that none is missing. With
     third derivatives by x or a mass of the highest derivative, Newton's method on the exact problem refines Ritz values
     of Hermite elements. Without dampers and other such forces ``s = i omega``.
 
@@ -123,10 +125,10 @@ def damping_ratios(system: System, modes: int = 3) -> NDArray[np.float64]:
 
 @default_floating_point
 def count_eigenvalues(system: System, radius: Any) -> NDArray[np.int64]:
-    """Return how many eigenvalues have a modulus below a radius, by the argument principle.
+    """Return the number of eigenvalues with a modulus below a radius, by the argument principle.
 
-    The count rests on the exact characteristic function alone, not on the method of :func:`eigenvalues`: if that gives
-    as many within the radius, none is missing and none comes twice.
+    The count uses only the exact characteristic function, not the method of :func:`eigenvalues`: if that gives the same
+    number within the radius, none is missing or repeated.
 
     Parameters
     ----------
@@ -137,18 +139,18 @@ def count_eigenvalues(system: System, radius: Any) -> NDArray[np.int64]:
     Returns
     -------
     ndarray of int, shape (...)
-        Both members of each conjugate pair, real eigenvalues, and multiplicities are counted: a rigid-body motion that
-        nothing holds and nothing damps counts twice.
+        Both members of each conjugate pair, real eigenvalues, and multiplicities are counted: a free undamped
+        rigid-body motion counts twice.
 
     Raises
     ------
     ValueError
-        If the radius is out of range, an eigenvalue lies on the circle, it reaches to waves too short to follow or to
-        where rounding leaves no digits, or a stiffness vanishes at an end.
+        If the radius is out of range, an eigenvalue lies on the circle, the waves are too short or rounding leaves no
+        digits at this radius, or a stiffness vanishes at an end.
 
     Examples
     --------
-    A string whose end takes up every wave has no eigenvalue at all:
+    A string whose end absorbs every wave has no eigenvalue at all:
 
     >>> from sympy import symbols
     >>> import cra_sym as cra
@@ -183,7 +185,7 @@ def count_eigenvalues(system: System, radius: Any) -> NDArray[np.int64]:
 
 
 def _unsettled(system: System, columns: Array, found: Settled, oscillating: bool, tolerance: float) -> Complex:
-    """Return eigenvalues by Newton's method if that settles, or say how many there are."""
+    """Return eigenvalues by Newton's method if it converges, or raise an error with their number."""
     modes, there = found.values.shape[1], int(np.isfinite(found.values).sum())
     if there < modes:
         kind = "oscillating motions; oscillating=False gives real ones too" if oscillating else "eigenvalues"
@@ -204,7 +206,7 @@ def _unsettled(system: System, columns: Array, found: Settled, oscillating: bool
 
 
 def _counted(system: System, columns: Array, reach: float) -> tuple[int | None, float]:
-    """Return how many eigenvalues lie within the largest circle in which rounding lets them be counted."""
+    """Return the number of eigenvalues within the largest circle in which rounding allows a count."""
     one = system.model.at(dict(zip(system.numerics("names"), columns[:, 0], strict=True)))
     for _ in range(8):
         reach *= _SHRINK
@@ -214,7 +216,7 @@ def _counted(system: System, columns: Array, reach: float) -> tuple[int | None, 
 
 
 def _by_newton(system: System, columns: Array, guesses: Complex) -> Complex:
-    """Return guesses refined on the exact problem; within the last of them there must be no other eigenvalue."""
+    """Return guesses refined on the exact problem; there must be no other eigenvalue below the last of them."""
     roots = np.empty(guesses.shape, dtype=complex)
     squared = not system.numerics("damped")
     for rows, _, problem in system.numerics("driven_spatial").problems(columns):

@@ -1,4 +1,4 @@
-"""What an identification is given, checked: measured frequencies, names of unknowns, what is known of them."""
+"""Checks of the arguments of identifications: measured frequencies, names of unknowns, priors."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def checked_data(system: System, name: str, measured: Any, uncertainty: Any, mod
 
 
 def checked_names(system: System, unknown: Any, prior: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the names of all parameters to be estimated, or raise an error that says what they must be."""
+    """Return the names of all parameters to be estimated, or raise an error."""
     given = tuple(system.numerics("stiffnesses")) if unknown is None else names("unknown", unknown, system.values)
     found = tuple(dict.fromkeys([*given, *prior]))
     if not 1 <= len(found) <= _MOST_UNKNOWN:
@@ -50,7 +50,7 @@ def checked_names(system: System, unknown: Any, prior: Mapping[str, Any]) -> tup
 
 
 def checked_priors(system: System, prior: Any) -> dict[str, tuple[float, float]]:
-    """Return value and uncertainty of what is roughly known, or raise an error that names the parameter."""
+    """Return value and uncertainty of each prior, or raise an error that names the parameter."""
     found = {}
     for name, pair in mapping("prior", prior, "names to (value, uncertainty)").items():
         if name not in system.values:

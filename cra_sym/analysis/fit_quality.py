@@ -1,4 +1,4 @@
-"""How well values fit measured data, and what the data know of them."""
+"""Goodness of fit to measured data, and Fisher information."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["SMALLEST_P", "Goodness", "goodness", "information_inverse"]
 Array = NDArray[np.float64]
 SMALLEST_P = 0.01
 """Probability of a larger chi2 below which values do not fit."""
-_LARGEST_RESIDUAL = 3.0  # in sigma, of values that fit where there are no degrees of freedom
+_LARGEST_RESIDUAL = 3.0  # largest residual, in sigma, of values that fit without degrees of freedom
 
 
 class Goodness(NamedTuple):
@@ -25,7 +25,7 @@ class Goodness(NamedTuple):
 
 
 def goodness(residuals: Array, unknowns: int) -> Goodness:
-    """Return how well so many unknowns fit, by the residuals over their standard deviations."""
+    """Return the goodness of fit of a number of unknowns, from the residuals over their standard deviations."""
     from scipy.special import chdtrc
 
     freedom, chi2 = residuals.size - unknowns, float(np.sum(residuals**2))

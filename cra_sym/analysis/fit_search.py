@@ -19,20 +19,20 @@ __all__ = ["Data", "Search"]
 Array = NDArray[np.float64]
 
 _MOST_POINTS = 20_000
-_SAMPLES = 8_192  # where a grid would have more points
-_LINKED = 4.0  # chi2 on the way between two minima, above theirs, up to which they are one: two standard deviations
-_LOWEST = 200  # places of a grid that are starts whatever is beside them
+_SAMPLES = 8_192  # points of a sample, where a grid would have more
+_LINKED = 4.0  # rise of chi2 between two minima up to which they count as one: two standard deviations
+_LOWEST = 200  # lowest grid points that are starts even if they are not local minima
 _STEPS, _MORE_STEPS = 25, 50
-_IDLE = 3  # steps in a row that gain nothing anywhere
-_MARGIN = 1e-9  # of a coordinate, inside its bounds
-_NOTHING = 1e-20  # of chi2: nothing more is to be gained
-_HOLD = 1e3 * _LINKED**0.5  # weight of a component that is to stay what it is
-_SHARES = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)  # of the way between two minima
-_SAME = 1e-6  # of a coordinate: minima that are closer are one
-_APART = 1e-2  # of a coordinate: ends of a descent that are closer are one
+_IDLE = 3  # successive steps without any progress
+_MARGIN = 1e-9  # margin of a coordinate inside its bounds
+_NOTHING = 1e-20  # relative decrease of chi2 at convergence
+_HOLD = 1e3 * _LINKED**0.5  # weight of a component that is held fixed
+_SHARES = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)  # points along the path between two minima
+_SAME = 1e-6  # difference of a coordinate below which minima count as one
+_APART = 1e-2  # difference of a coordinate below which end points of descents count as one
 _FEW = 24
 _MOST_KEPT = 1000
-_LARGEST = 1e150  # of a residual, whose square is a number
+_LARGEST = 1e150  # largest residual, whose square does not overflow
 
 
 @dataclass(frozen=True)
@@ -59,11 +59,11 @@ class Search:
     _table: tuple[Array, Array, tuple[int, ...]] | None = None
 
     def values(self, place: Array) -> dict[str, Any]:
-        """Return the values of the unknowns at a place, or arrays of them at places (..., unknowns)."""
+        """Return the values of the unknowns at a point, or arrays of them at points (..., unknowns)."""
         return {unknown.name: unknown.value(place[..., i])[()] for i, unknown in enumerate(self.unknowns)}
 
     def found(self, place: Array) -> Sensitivities:
-        """Return frequencies and sensitivities at a place, or at places; the last ones are kept."""
+        """Return frequencies and sensitivities at a point, or at points; the last result is cached."""
         key = place.shape, place.tobytes()
         if key not in self._known:
             if len(self._known) > _MOST_KEPT:
@@ -77,7 +77,7 @@ class Search:
         """Return computed minus measured frequencies, and values minus priors, in units of their uncertainty."""
         try:
             frequency = self.found(place).frequency[..., data.modes]
-        except ValueError:  # the structure has buckled, or these values describe none
+        except ValueError:  # the structure has buckled, or the values are not admissible
             frequency = np.full((*place.shape[:-1], data.modes.size), np.nan)
         values = self.values(place)
         prior = [(values[u.name] - u.prior[0]) / u.prior[1] for u in self.unknowns if u.prior is not None]
@@ -103,10 +103,10 @@ class Search:
     # ------------------------------------------------------------------------------------------------------------
 
     def minima(self, data: Data, most: int | None = None) -> list[Array]:
-        """Return the local minima, best first, or those that the lowest ends of the descent lead to.
+        """Return the local minima, best first, or those reached from the lowest end points of the descent.
 
-        Of ends that are linked within the uncertainty, as in a valley of values that the data do not tell apart, only
-        the lowest is followed to its minimum.
+        Of end points that are connected within the uncertainty, as in a valley of values that the data do not
+        distinguish, only the lowest is refined to its minimum.
         """
         ends = self._descended(self._starts(data), data)[:most]
         if most is None:
@@ -116,7 +116,7 @@ class Search:
         return places
 
     def distinct(self, places: Sequence[Array], data: Data) -> list[Array]:
-        """Return those places that no path links to a better one within the uncertainty of the data."""
+        """Return the points that no path within the uncertainty of the data connects to a better one."""
         kept: list[Array] = []
         left = list(places)
         while left:
@@ -141,19 +141,18 @@ class Search:
         return self._rounded(found.x)
 
     def _rounded(self, place: Array) -> Array:
-        """Return a place at which a value within the margin of rigid, or of zero, is set to exactly that."""
+        """Return the point with values within the margin of rigid, or of zero, set to exactly that."""
         stiff = np.array([unknown.kind != "signed" for unknown in self.unknowns])
         return np.where(stiff & (place <= 2 * _MARGIN), 0.0, place)
 
     @property
     def _bounds(self) -> tuple[Array, Array]:
-        """Smallest and largest coordinates, a margin inside those that are allowed."""
+        """Smallest and largest coordinates, a margin inside the allowed range."""
         low, high = np.array([unknown.bounds for unknown in self.unknowns]).T
         return low + _MARGIN, high - _MARGIN
 
     def _starts(self, data: Data) -> Array:
-        """Return the local minima of the misfit on the grid, weighted by the uncertainties and relative, and the lowest
-        of its places."""
+        """Return the local minima of the misfit on the grid, weighted and relative, and its lowest points."""
         places, frequencies, shape = self._grid()
         with np.errstate(all="ignore"):
             off = frequencies[:, data.modes] - data.measured
@@ -168,7 +167,7 @@ class Search:
         return places[sorted(found)]
 
     def _descended(self, places: Array, data: Data) -> Array:
-        """Follow all starts at once; return those that end apart, the lowest of each.
+        """Descend from all starts at once; return the distinct end points, the lowest of each group.
 
         Where some start has no natural frequencies, the starts are returned as they are.
         """
@@ -180,7 +179,7 @@ class Search:
 
     @staticmethod
     def _apart(places: Array, cost: Array) -> Array:
-        """Return the lowest few places that are not the same to the resolution of the search."""
+        """Return the lowest few points that are distinct at the resolution of the search."""
         kept: list[Array] = []
         for place in places[np.argsort(cost)]:
             if all(np.max(np.abs(place - other)) > _APART for other in kept):
@@ -190,7 +189,7 @@ class Search:
     def _followed(
         self, places: Array, data: Data, steps: int, held: tuple[Array, Array] | None = None
     ) -> tuple[Array, Array]:
-        """Return where damped Gauss-Newton steps lead from all places at once, and chi2 there.
+        """Take damped Gauss-Newton steps from all points at once; return the end points and their chi2.
 
         Parameters
         ----------
@@ -198,7 +197,7 @@ class Search:
         data : Data
         steps : int
         held : tuple of ndarrays, shape (P, unknowns), (P,), optional
-            Directions, and the components of the places along them, which stay what they are.
+            Directions, and the components of the points along them, which are held fixed.
         """
         bounds = self._bounds
 
@@ -235,7 +234,7 @@ class Search:
         return places, np.nan_to_num(cost, nan=np.inf)
 
     def _grid(self) -> tuple[Array, Array, tuple[int, ...]]:
-        """Return places (P, unknowns), their frequencies (P, modes) and the shape of the grid, () for a sample."""
+        """Return points (P, unknowns), their frequencies (P, modes) and the shape of the grid, () for a sample."""
         if self._table is None:
             axes = [unknown.grid for unknown in self.unknowns]
             shape = tuple(axis.size for axis in axes)
@@ -264,7 +263,7 @@ class Search:
         return omega / (2 * np.pi)
 
     def _linked(self, places: Array, other: Array, data: Data) -> NDArray[np.bool]:
-        """Tell which minima are joined to another by a path along which the misfit stays within the uncertainty."""
+        """Return which minima a path connects to another with the misfit within the uncertainty."""
         step = other - places
         distance = np.linalg.norm(step, axis=-1)
         limit = np.array([max(self.chi2(place, data), self.chi2(other, data)) for place in places]) + _LINKED
@@ -279,7 +278,7 @@ class Search:
 
 
 def _lowest(cost: Array) -> list[int]:
-    """Return the flat positions of the entries of a grid that no neighbour, diagonal ones too, is below."""
+    """Return the flat indices of the local minima of a grid, with diagonal neighbours."""
     padded = np.pad(cost, 1, constant_values=np.inf)
     inner = tuple(slice(1, -1) for _ in cost.shape)
     least = np.isfinite(cost)

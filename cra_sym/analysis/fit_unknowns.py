@@ -17,16 +17,16 @@ __all__ = ["Unknown", "natural_stiffnesses", "unknowns"]
 Array = NDArray[np.float64]
 Kind = Literal["stiffness", "signed", "nonnegative"]
 
-_SOFTEST, _STIFFEST = 1e-8, 1e8  # of a stiffness in natural units: beyond, it is absent or rigid to rounding
-_RANGE = 1e3  # factor by which other parameters may differ from where the search begins
+_SOFTEST, _STIFFEST = 1e-8, 1e8  # range of a stiffness in natural units, beyond which it is absent or rigid to rounding
+_RANGE = 1e3  # factor by which other parameters may differ from their initial value
 
 
 @dataclass(frozen=True)
 class Unknown:
     """A parameter to be estimated, with the coordinate in which it is searched.
 
-    That is ln(1 + unit/k) for the stiffness k of an end, in which a rigid one is the ordinary value 0, ln(p / unit) for
-    others, and ln(1 + p/unit) for one that is zero where the search begins.
+    That is ln(1 + unit/k) for the stiffness k of an end, so that a rigid one has the finite value 0, ln(p / unit) for
+    other parameters, and ln(1 + p/unit) for one that is zero initially.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Unknown:
         return self.unit * (np.exp(coordinate) if self.kind == "signed" else np.expm1(coordinate))
 
     def rate(self, coordinate: Array) -> Array:
-        """Return the derivative by the coordinate of what has a finite one everywhere: 1/k of a stiffness, p else."""
+        """Return the derivative by the coordinate of 1/k for a stiffness, else of p; it is finite everywhere."""
         return np.exp(coordinate) / self.unit if self.kind == "stiffness" else np.exp(coordinate) * self.unit
 
     def slopes(self, found: Sensitivities) -> Array:
@@ -86,7 +86,7 @@ class Unknown:
         if self.kind == "stiffness":
             with np.errstate(divide="ignore", invalid="ignore"):
                 soft = -found.frequency * found.log[self.name] * (1 + 1 / np.expm1(column))
-            slope = np.where(np.expm1(column) > 1, soft, slope)  # soft: the rate by k is the exact one
+            slope = np.where(np.expm1(column) > 1, soft, slope)  # soft: the rate by k is the accurate one
         return np.where(np.isfinite(slope), slope, 0.0)
 
     def prior_row(self, value: Any) -> Any:
@@ -112,10 +112,10 @@ def unknowns(system: System, names: Sequence[str], prior: dict[str, tuple[float,
 
 
 def natural_stiffnesses(system: System, names: Sequence[str]) -> dict[str, float]:
-    """Return the stiffnesses beside which the structure itself gives as much as the end.
+    """Return the end stiffnesses whose compliance equals that of the structure itself.
 
-    The first give of a rigid support lowers omega^2 by P^2 times its compliance, P its force in the first elastic mode;
-    P^2 / omega^2 is the stiffness that would halve it.
+    A small compliance of a rigid support lowers omega^2 by P^2 times the compliance, with the force P in the first
+    elastic mode, so the natural unit is P^2 / omega^2.
     """
     if not names:
         return {}
@@ -132,7 +132,7 @@ def natural_stiffnesses(system: System, names: Sequence[str]) -> dict[str, float
 
 
 def _natural_unit(system: System, name: str) -> float:
-    """Return the value that would change the square of a frequency as much as it is."""
+    """Return the change of the parameter that would change the square of a frequency by 100 per cent."""
     found = sensitivities(system, _elastic(system), by=(name,))
     change = np.abs(found.rate[name])[found.frequency > 0] / found.frequency[found.frequency > 0]
     if not change.max() > 0:
@@ -141,7 +141,7 @@ def _natural_unit(system: System, name: str) -> float:
 
 
 def _elastic(system: System) -> int:
-    """Return a number of modes of which the last is elastic, with two more if the model has them."""
+    """Return the number of modes up to the first elastic one, plus two if the model has them."""
     for number in (3, 6, 9, 12):
         if system.natural_frequencies(number)[-1] > 0:
             return number

@@ -1,4 +1,4 @@
-"""What a fit to measured natural frequencies says, in words."""
+"""Messages about a fit to measured natural frequencies."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 __all__ = ["TOLD", "ambiguity", "knowledge", "misfit"]
 
 Array = NDArray[np.float64]
-TOLD = float(np.log(2.0))  # a parameter is known if its standard deviation is below a factor of two
+TOLD = float(np.log(2.0))  # a parameter counts as known if its standard deviation is below a factor of two
 
 
 def knowledge(
@@ -21,24 +21,24 @@ def knowledge(
     spread: Array,
     jacobian: Array,
 ) -> str:
-    """Say what is known of each parameter.
+    """Return a message about the accuracy of each parameter.
 
     Parameters
     ----------
     values : mapping of str to float
     stiff : sequence of bool
-        Whether each is a stiffness of an end, of which 1/k is what the data tell.
+        Whether each is a stiffness of an end, of which the data determine 1/k.
     units : mapping of str to str
     deviation : ndarray, shape (n,)
         Standard deviations of their logarithms.
     spread, jacobian : ndarray, shape (n, n), (data, n)
         Covariance, and derivatives of the weighted residuals, by 1/k of a stiffness and by others themselves.
     """
-    told = deviation < TOLD
+    known_well = deviation < TOLD
     known = [f"{name} is known to {d:.2g} of itself" for name, d in zip(values, deviation, strict=True)]
-    if told.all():
+    if known_well.all():
         return "; ".join(known)
-    if told.any() or (np.isfinite(spread).all() and np.isinf(list(values.values())).any()):
+    if known_well.any() or (np.isfinite(spread).all() and np.isinf(list(values.values())).any()):
         bounds = []
         for k, (name, value) in enumerate(values.items()):
             if stiff[k]:
@@ -46,12 +46,12 @@ def knowledge(
                 bounds.append(f"{name} is only known to exceed {least:.3g} {units.get(name, '')} (2 sigma)")
             else:
                 bounds.append(f"{name} = {value:.3g} is not known to a factor of two")
-        return "; ".join(np.where(told, known, bounds).tolist())
+        return "; ".join(np.where(known_well, known, bounds).tolist())
     return _combination(values, stiff, units, jacobian)
 
 
 def _combination(values: Mapping[str, float], stiff: Sequence[bool], units: Mapping[str, str], jacobian: Array) -> str:
-    """Say which combination of the parameters the data fix best."""
+    """Return a message about the combination of parameters that the data determine best."""
     names = list(values)
     size = np.linalg.norm(jacobian, axis=0)
     if not size.any():
@@ -82,7 +82,7 @@ def _combination(values: Mapping[str, float], stiff: Sequence[bool], units: Mapp
 def misfit(
     chi2: float, freedom: int, p_value: float, residuals: Array, modes: Sequence[int], hints: Sequence[str]
 ) -> str:
-    """Say that no values fit, by how much, and what would."""
+    """Return a message that no values fit, with the size of the misfit and hints."""
     worst = int(np.argmax(np.abs(residuals)))
     size = f"chi2 = {chi2:.3g} with {freedom} degrees of freedom (p = {p_value:.2g}), " if freedom > 0 else ""
     text = f"no values of the unknown parameters fit: {size}mode {modes[worst]} is off by {residuals[worst]:.3g} sigma"
@@ -90,6 +90,6 @@ def misfit(
 
 
 def ambiguity(solutions: Sequence[Mapping[str, float]]) -> str:
-    """Say which values fit as well."""
+    """Return a message with all sets of values that fit."""
     found = (", ".join(f"{name} = {value:.5g}" for name, value in values.items()) for values in solutions)
     return f"{len(solutions)} sets of values fit the data: {'; '.join(found)}"

@@ -28,7 +28,7 @@ __all__ = [
     "parametric",
 ]
 
-_ROOTS = 5  # of the spectrum, for which the compiled path saves as much as for a point of a chart
+_ROOTS = 5  # spectra for which the compiled path saves as much time as for a point of a chart
 
 
 @checks.default_floating_point
@@ -43,10 +43,10 @@ def growth_rate(
     tolerance: float = 1e-8,
     backend: str = "auto",
 ) -> np.ndarray:
-    """Return the rate at which vibration grows: max(0, largest real part of the Floquet exponents).
+    """Return the growth rate of vibration: max(0, largest real part of the Floquet exponents).
 
-    The system moves in the first natural modes of its conservative part: dampers, gyroscopic and follower forces act
-    between them, so that with such forces more modes may be needed. Where stiffness alone oscillates, as in (36a) and
+    The motion is expanded in the first natural modes of the conservative part. Dampers, gyroscopic and follower forces
+    couple them, so that with such forces more modes may be needed. Where stiffness alone oscillates, as in (36a) and
     (36b), and damping is modal, the method is that of :mod:`cra_sym.solvers.floquet`, else that of
     :mod:`cra_sym.solvers.periodic`.
 
@@ -59,10 +59,10 @@ def growth_rate(
     epsilon : array_like
         Not negative.
     modes : int
-        How many modes move, 1 to 1000.
+        Number of modes, 1 to 1000.
     residual : bool
-        Whether the static flexibility of the modes left out is kept, for fluctuating stiffnesses of ends: few modes
-        then do for what would take many. Without it the system is its first modes and nothing else.
+        Whether to include the static flexibility of the omitted modes, for fluctuating stiffnesses of ends; far fewer
+        modes are then sufficient. Otherwise the system consists of its first modes only.
     tolerance : float
         Relative error of the monodromy matrix.
     backend : {'auto', 'numpy', 'numba'}
@@ -87,7 +87,7 @@ def growth_rate(
     >>> print(growth_rate(arm, JointStiffness(), [186.0, 187.15, 188.0], 0.1).round(3))
     [0.    0.102 0.   ]
     """
-    found = _taken(system, excitation, angular_frequency, epsilon, modes, residual)
+    found = _solver_arguments(system, excitation, angular_frequency, epsilon, modes, residual)
     if isinstance(found, tuple):
         checks.choice("backend", backend, ("auto", "numpy"))
         return periodic.growth_rate(*found, tolerance=tolerance)[()]
@@ -108,7 +108,8 @@ def floquet_exponents(
 ) -> np.ndarray:
     """Return all Floquet exponents of the excited system, largest real part first.
 
-    The first one's real part is the growth rate before it is cut at zero, so with damping it tells the margin.
+    The real part of the first one is the growth rate without the limit at zero, so a negative one is the stability
+    margin.
     Imaginary parts are given between -1/2 and 1/2 of the excitation frequency.
 
     Parameters
@@ -137,7 +138,7 @@ def floquet_exponents(
     >>> cra.floquet_exponents(soft, cra.JointStiffness(), varpi, epsilon=0.3, modes=1).real.round(4)
     array([ 0.0316, -0.0316])
     """
-    found = _taken(system, excitation, angular_frequency, epsilon, modes, residual)
+    found = _solver_arguments(system, excitation, angular_frequency, epsilon, modes, residual)
     if isinstance(found, tuple):
         checks.choice("backend", backend, ("auto", "numpy"))
         return periodic.floquet_exponents(*found, tolerance=tolerance)
@@ -145,7 +146,7 @@ def floquet_exponents(
 
 
 def parametric(excitation: Any) -> Parametric:
-    """Return the excitation, or say which there are."""
+    """Return the excitation, or raise an error that lists the kinds."""
     if isinstance(excitation, TransverseBase):
         raise ValueError(
             f"excitation = {excitation!r}: in linear theory a transverse base only forces the system and has no "
@@ -166,7 +167,7 @@ def batch_shape(system: Any, excitation: Excitation, **arrays: np.ndarray) -> tu
 
 
 def _loop(backend: str, found: dict[str, Any]) -> floquet.Loop | None:
-    """Return the compiled loop of the Floquet solver if it is asked for, or pays."""
+    """Return the compiled loop of the Floquet solver if requested or worthwhile."""
     checks.choice("backend", backend, ("auto", "numpy", "numba"))
     if backend == "numba" and not has_compiler():
         raise ValueError("backend = 'numba': Numba is not installed; backend must be 'auto' or 'numpy'")
@@ -185,7 +186,7 @@ def _template_parts() -> tuple[str, dict[str, Kernel]]:
 
 
 class Matrices(NamedTuple):
-    """A system between its modes, and what oscillates."""
+    """Constant and oscillating matrices of a system between its modes."""
 
     modal: ModalMatrices
     drives: list[Drive]
@@ -218,7 +219,7 @@ def matrices_of(system: System, excitation: Parametric, modes: int) -> Matrices:
 def checked_point(
     system: System, excitation: Any, angular_frequency: Any, epsilon: Any, modes: Any
 ) -> tuple[Parametric, np.ndarray, np.ndarray, int]:
-    """Return the arguments of a chart, or raise an error that names what is not allowed."""
+    """Return the arguments of a chart, or raise an error that names an invalid one."""
     excitation = parametric(excitation)
     checks.instance("system", system, System)
     given = paired({"system": np.empty(system.shape), "angular_frequency": angular_frequency, "epsilon": epsilon})
@@ -228,10 +229,10 @@ def checked_point(
     return excitation, frequency, epsilon, checks.count("modes", modes, high=MOST_MODES)
 
 
-def _taken(
+def _solver_arguments(
     system: System, excitation: Excitation, angular_frequency: Any, epsilon: Any, modes: int, residual: bool
 ) -> dict[str, Any] | tuple[Any, ...]:
-    """Return what `cra_sym.solvers.floquet` takes, or else, as a tuple, what `cra_sym.solvers.periodic` does."""
+    """Return the arguments of `cra_sym.solvers.floquet`, or else, as a tuple, those of `cra_sym.solvers.periodic`."""
     given, frequency, epsilon, modes = checked_point(system, excitation, angular_frequency, epsilon, modes)
     matrices = matrices_of(system, given, modes)
     if residual and not (isinstance(given, Fluctuation) and given.springs(system) and matrices.only_stiffness):

@@ -1,4 +1,4 @@
-"""Borders of a zone of instability found by Floquet theory alone: the truth that boundaries are compared with."""
+"""Boundaries of a zone of instability by Floquet theory, the reference for asymptotic boundaries."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def floquet_boundary(
     *,
     residual: bool | None = None,
 ) -> tuple[float, float]:
-    """Return the excitation frequencies between which the vibration grows, from Floquet multipliers.
+    """Return the excitation frequencies between which vibration grows, from Floquet multipliers.
 
-    The search starts in the middle of the zone that multiple scales give and goes outwards until nothing grows.
+    The search starts in the middle of the zone by multiple scales and proceeds outwards until there is no growth.
 
     Parameters
     ----------
@@ -36,9 +36,9 @@ def floquet_boundary(
     resonance : (int, int)
         As in :func:`cra_sym.stability_boundary`.
     modes : int, optional
-        How many modes move, by default five more than the highest that takes part.
+        Number of modes, by default five more than the highest one of the resonance.
     residual : bool, optional
-        Whether the others are kept by their statics, by default for fluctuating stiffnesses of ends.
+        Whether to include the static flexibility of the omitted modes, by default for fluctuating stiffnesses of ends.
 
     Returns
     -------

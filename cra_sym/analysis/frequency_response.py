@@ -1,4 +1,4 @@
-"""Frequency response of a system: exact, from the boundary-value problem; no modes are summed."""
+"""Frequency response of a system, exact from the boundary-value problem instead of a modal sum."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ __all__ = ["frequency_response"]
 
 Complex = NDArray[np.complex128]
 _BELOW, _ABOVE, _DIGITS = 18.0, 14.0, 37.0  # reach of the quadrature in ln y, and minus ln of its error
-_SOFT, _MOST_SOFT = 0.03, 4  # a mode this far below the next is soft; at most so many are looked for
-_NEAR = 0.05  # z below which soft modes are summed, over the square of the first frequency that is not soft
+_SOFT, _MOST_SOFT = 0.03, 4  # ratio to the next frequency below which a mode is soft; largest number of soft modes
+_NEAR = 0.05  # z below which soft modes are summed separately, over the square of the first frequency that is not soft
 _MODES = (20, 60, 200)  # numbers of modes that are tried in turn where the problem varies along x
-_LEFT_OUT = 1e-9, 1e-6  # what damping of the other modes may add to the response: aimed at, accepted
-_FINEST = 20  # halvings of the domain up to which waves are followed at imaginary frequencies
+_LEFT_OUT = 1e-9, 1e-6  # relative contribution of the damping of omitted modes to the response: target, accepted
+_FINEST = 20  # largest number of halvings of the domain at imaginary frequencies
 _KINDS = ("force", "motion")
-_FASTEST = 1e60  # rad/s, whose fourth power is a number; what is slower than its inverse is static
+_FASTEST = 1e60  # rad/s, whose fourth power does not overflow; below its inverse the response is static
 
 
 @default_floating_point
@@ -48,7 +48,7 @@ def frequency_response(
 ) -> Complex:
     """Return the complex amplitude of a field for harmonic driving ``exp(i Omega t)``, dampers included.
 
-    No modes are summed: the boundary-value problem is solved at each frequency, for any stiffness from zero to
+    The boundary-value problem is solved at each frequency, without a modal sum, for any stiffness from zero to
     infinity.
 
     Parameters
@@ -60,33 +60,33 @@ def frequency_response(
     x : array_like, optional
         Place or one axis of places in the domain, m; the right end by default.
     drive : Expr or str, optional
-        What drives: a prescribed motion ``w(t)`` by one unit of its acceleration (by default the only one), a force
-        ``F(t)`` of the Lagrangian or the virtual work, distributed or not, by one unit of it; or a displacement of a
-        section at an end or an interior place, such as ``v.subs(x, L/2)``, or a lumped coordinate.
+        Input: a unit acceleration of a prescribed motion ``w(t)`` (by default the only one); a unit of a force ``F(t)``
+        of the Lagrangian or the virtual work, distributed or not; or a displacement of a section at an end or an
+        interior place, such as ``v.subs(x, L/2)``, or a lumped coordinate.
     kind : {'force', 'motion'}, optional
-        A unit force on that displacement (the default), or one unit of motion of it, at an end or a coordinate.
+        A unit force on that displacement (the default), or a unit motion of it, at an end or of a coordinate.
     field : applied undefined function, optional
         Default: the first.
     damping : {'modal', 'structural'}
-        What zeta means. 'modal': viscous, the same ratio in every mode, as in the time domain. No local damper has this
-        property, but the sum over all modes is known, see Notes. 'structural': a loss factor 2 zeta of every
+        Meaning of zeta. 'modal': viscous, the same ratio in every mode, as in the time domain. No local damper has this
+        property, but the sum over all modes has a closed form, see Notes. 'structural': a loss factor 2 zeta of every
         stiffness. Both agree at resonances, to first order in zeta.
 
     Returns
     -------
     complex ndarray, shape (..., x, Omega)
-        m per unit of the drive; s2 for an acceleration. A single x or Omega has no axis. Without damping it grows
-        beyond all bounds at a natural frequency.
+        m per unit of the drive; s2 for an acceleration. A single x or Omega has no axis. Without damping it is
+        unbounded at a natural frequency.
 
     Raises
     ------
     TypeError, ValueError
-        If an argument is out of its range, an infinite stiffness holds what is driven, the waves are too short to
-        follow, a model with dampers is given modal damping too, or modal damping is beyond the formula, see Notes.
+        If an argument is out of its range, an infinite stiffness holds the driven displacement, the waves are too
+        short, a model with dampers has modal damping too, or modal damping is outside the scope of the Notes.
 
     Notes
     -----
-    Mode i answers with a_i f(omega_i), f(z) = 1 / (z^2 + 2 i zeta Omega z - Omega^2) having its poles at
+    Mode i responds with a_i f(omega_i), f(z) = 1 / (z^2 + 2 i zeta Omega z - Omega^2) having its poles at
     alpha = Omega (sqrt(1 - zeta^2) - i zeta) and at -conj(alpha). With V(z), the undamped response at complex
     frequency z, the sum over modes is a sum of residues of 2 z V(z) f(z) in the right half plane, and the residue
     theorem gives
@@ -95,13 +95,13 @@ def frequency_response(
             + (4 i zeta Omega / pi) int_0^inf y^2 V(i y) / ((y^2 + Omega^2)^2 - (2 zeta Omega y)^2) dy.
 
     The integrand has no resonance, and the trapezoidal rule in ln y converges geometrically to rounding. Rigid-body
-    modes, which have no damping, are summed apart.
+    modes, which have no damping, are summed separately.
 
-    Where coefficients or loads vary along x, up to 200 modes are summed, with their damping, and what all others add
-    without damping is exact. Beside dampers along x, where a stiffness vanishes at an end, and where 200 modes are too
-    few, the problem is solved in a Ritz basis on the stresses, on finer and finer meshes until the response settles to
-    1e-9; one that does not settle to 1e-6 is refused, as is modal damping of a structure that a motion of one end
-    drives and that varies along x or can still move as a rigid body.
+    Where coefficients or loads vary along x, up to 200 modes are summed with their damping, and the undamped
+    contribution of all others is added exactly. With dampers along x, with a stiffness that vanishes at an end, and
+    where 200 modes are too few, the problem is solved in a Ritz basis on the stresses, refined until the response
+    converges to 1e-9. A response that does not converge to 1e-6 is refused, as is modal damping of a structure that is
+    driven by the motion of one end and varies along x or can still move as a rigid body.
 
     Examples
     --------
@@ -152,13 +152,13 @@ def _with_modal_damping(undamped: _Undamped, grid: NDArray[np.float64], zeta: ND
     moving = grid[~static]
     step = 2 * np.pi * np.arccos(np.max(zeta)) / _DIGITS
     y = np.exp(np.arange(np.log(moving.min()) - _BELOW, np.log(moving.max()) + _ABOVE, step))
-    y = y[: undamped.followed(y)]  # beyond, the integrand is below the square of a millionth
+    y = y[: undamped.followed(y)]  # beyond, the integrand is below 1e-12
     Omega = np.where(static, 1.0, grid)[..., None, :]
     factor = zeta[..., None]
     integrand = y[:, None] ** 3 / ((y[:, None] ** 2 + Omega**2) ** 2 - (2 * factor * Omega * y[:, None]) ** 2)
     smooth = undamped(-1j * y + 0.0 * zeta, rigid=False).real
     rest = np.where(static, 0.0, 4j * zeta * grid * step / np.pi)[..., None, :] * (smooth @ integrand)
-    # a rigid-body mode has no damping: what the formula does with it is taken back
+    # a rigid-body mode has no damping, so its contribution to the formula is removed
     rigid = undamped.rigid_share(np.where(static, 1.0, alpha)), undamped.rigid_share(np.where(static, 1.0, grid))
     return np.asarray(response + rest + np.where(static[..., None, :], 0.0, rigid[1] - weight[..., None, :] * rigid[0]))
 
@@ -201,7 +201,7 @@ class _Undamped:
         return flat_columns(self._system.parameters, self._system.shape)
 
     def check_modal_damping(self, zeta: NDArray[np.float64]) -> None:
-        """Raise if modal damping of this structure has no formula here."""
+        """Raise an error if the formula for modal damping does not apply to this structure."""
         if not np.any(zeta) or self.motion is not None or self.by_force:
             return
         if self.varies or (self._system.natural_frequencies(min(2, self._system.most_modes)) == 0).all(axis=-1).any():
@@ -212,7 +212,7 @@ class _Undamped:
             )
 
     def followed(self, y: NDArray[np.float64]) -> int:
-        """Return how many of these rising imaginary frequencies have waves that can be followed."""
+        """Return the number of these ascending imaginary frequencies at which the waves are not too short."""
         count = y.size
         for rows, _, problem in self._problem.problems(self._columns):
             row = np.repeat(np.arange(len(rows)), y.size)
@@ -222,7 +222,7 @@ class _Undamped:
         return count
 
     def turned_by_motion(self, found: Complex) -> Complex:
-        """Return the response at rest, where an end that moves also turns the structure about it as a rigid body."""
+        """Return the static response, where a moving end also rotates the structure about it as a rigid body."""
         system = self._system
         if self.problem_damped or self._kind != "motion" or self.motion is not None:
             return found
@@ -254,7 +254,7 @@ class _Undamped:
         return self._driven_by(self._system.modes(modes))
 
     def _driven_by(self, found: Modes) -> NDArray[np.float64]:
-        """Return what each mode displaces of what is driven."""
+        """Return the driven displacement in each mode."""
         sizes = self._system.numerics("sizes")
         if self._driven < sizes[0]:
             return found.displacement(0, self._driven)
@@ -263,7 +263,7 @@ class _Undamped:
         return found.displacement(1, self._driven - sum(sizes))
 
     def __call__(self, frequency: NDArray[Any], *, rigid: bool = True) -> Complex:
-        """Return the response; without ``rigid`` that of all modes but the rigid-body ones."""
+        """Return the response, without that of the rigid-body modes if ``rigid`` is False."""
         shape = self._system.shape
         frequency = np.broadcast_to(frequency, (*shape, frequency.shape[-1])).reshape(-1, frequency.shape[-1])
         if self.problem_damped or not self._soft:
@@ -303,8 +303,8 @@ class _Undamped:
         drive = self._driven_by if self.motion is None else self.motion
         return on_basis(self._system, self._columns, s, drive, self._place, x, motion=moved, zeta=zeta)
 
-    # Next to a rigid-body mode, or one nearly so, the boundary-value problem is nearly singular: there the soft modes
-    # are summed, and what the others add is interpolated from where the problem is well conditioned.
+    # Near the frequency of a (nearly) rigid-body mode the boundary-value problem is nearly singular. The soft modes are
+    # summed there, and the rest is interpolated from frequencies at which the problem is well conditioned.
 
     @cached_property
     def _vanishing(self) -> bool:
@@ -324,8 +324,8 @@ class _Undamped:
         gaps = (omega[..., :-1] < _SOFT * omega[..., 1:]).reshape(-1, _MOST_SOFT).any(axis=0)
         return int(np.flatnonzero(gaps).max(initial=-1)) + 1
 
-    # Where the problem varies along x, many modes are summed: they are known to a stated accuracy, while the dynamic
-    # stiffness of many short pieces loses digits at low frequencies.
+    # Where the problem varies along x, many modes are summed: their accuracy is known, while the dynamic stiffness of
+    # many short pieces loses digits at low frequencies.
 
     def _reached(self, modes: int) -> bool:
         omega = self._system.natural_frequencies(modes + 1)
@@ -333,9 +333,9 @@ class _Undamped:
         return low and (not np.any(self._system.zeta) or self._left_out(modes) < _LEFT_OUT[0])
 
     def _left_out(self, modes: int) -> float:
-        """Return a bound of what damping of the modes beyond adds, over the response at rest of the elastic modes.
+        """Return a bound of the effect of the omitted modes' damping, over the static response of the elastic modes.
 
-        From mode to mode a residue over the squared frequency falls at least as the inverse square of its number.
+        The residue over the squared frequency of a mode decreases at least as the inverse square of its number.
         """
         omega = self._system.natural_frequencies(modes).reshape(-1, modes, 1)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -359,7 +359,7 @@ class _Undamped:
         ratio = np.broadcast_to(zeta, (*shape, 1)).reshape(-1, 1, 1)
         gap = squares[:, :, None] + 2j * ratio * np.sqrt(squares)[:, :, None] * grid - z[:, None, :]
         with np.errstate(divide="ignore", invalid="ignore"):
-            answers = np.where(gap == 0, 0.0, 1.0 / gap)  # at rest: rigid-body modes, by the caller
+            answers = np.where(gap == 0, 0.0, 1.0 / gap)  # static: the caller adds the rigid-body modes
         found = others + np.einsum("rmx,rmk->rxk", self._residues, answers)
         return np.asarray(found.reshape(*shape, *found.shape[1:]))
 
@@ -411,7 +411,7 @@ class _Undamped:
         return np.asarray(np.einsum("rmx,rmk->rxk", self._residues, answers))
 
     def rigid_share(self, frequency: NDArray[Any]) -> Complex:
-        """Return the part of the response at a frequency that is of rigid-body modes, shape (..., X, K)."""
+        """Return the response of the rigid-body modes at a frequency, shape (..., X, K)."""
         shape = self._system.shape
         frequency = np.broadcast_to(frequency, (*shape, frequency.shape[-1])).reshape(-1, frequency.shape[-1])
         count = 1 if self._places is None else self._places.size
@@ -424,7 +424,7 @@ class _Undamped:
 
 
 def _cause_name(system: System, drive: Any) -> str | None:
-    """Return the name of the prescribed motion or force that drives, or None if a displacement does."""
+    """Return the name of the prescribed motion or force that is the input, or None for a displacement."""
     if drive is None:
         return only_motion(system)
     causes = dict(system.numerics("causes"))
@@ -437,7 +437,7 @@ def _cause_name(system: System, drive: Any) -> str | None:
 
 
 def _with_force_inside(system: System, drive: Any, kind: Any) -> tuple[System, Any]:
-    """Return the system and what drives it; a displacement of an interior place with a force of its own there."""
+    """Return system and input; a displacement at an interior place is replaced by a new force there."""
     if drive is None or isinstance(drive, str):
         return system, drive
     found = system.model.numerics("pushed", drive) if hasattr(drive, "free_symbols") else None

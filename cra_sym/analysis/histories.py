@@ -1,4 +1,4 @@
-"""What drives a system: the histories that were given for its prescribed motions and forces."""
+"""Input histories of a system: those given for its prescribed motions and forces."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ History = BaseMotion | Force
 
 
 def histories(system: System, motion: Any) -> dict[str, History]:
-    """Return what was given for each function of time that drives the model, by name."""
+    """Return the history given for each input of the model, by name."""
     causes = dict(system.numerics("causes"))
     terms = system.numerics("nonlinear")
     others = [] if terms is None else [name for name, _ in terms.causes if name not in causes]
@@ -40,7 +40,7 @@ def histories(system: System, motion: Any) -> dict[str, History]:
             )
         if not isinstance(history, BaseMotion | Force):
             raise TypeError(f"motion: {name} = {shown(history)}: must be a Force or a BaseMotion")
-        if name in others:  # in nonlinear terms alone, by any of its derivatives
+        if name in others:  # only in nonlinear terms, through any of its derivatives
             continue
         kind = "force" if isinstance(history, Force) else "motion"
         if causes[name] not in ("force", "motion"):
@@ -58,7 +58,7 @@ def histories(system: System, motion: Any) -> dict[str, History]:
 
 
 def driven(system: System, found: Mapping[str, History], modes: int) -> Iterator[tuple[Array, History]]:
-    """Yield minus the generalised force of one unit of each cause on every mode, and its history."""
+    """Yield, for each input, minus the generalised force of a unit of it on every mode, and its history."""
     for name, history in found.items():
         yield -system.project(system.numerics("load", name), modes), history
     constant = system.numerics("constant")

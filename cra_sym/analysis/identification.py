@@ -1,4 +1,4 @@
-"""Parameters of a system from measured natural frequencies: every set of values that fits, and what the data say."""
+"""Identification of parameters from measured natural frequencies: all sets of values that fit, with uncertainties."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _JOINT = ("k_t", "k_r")
 
 
 class IdentifiabilityWarning(UserWarning):
-    """The measured frequencies do not tell the unknown parameters apart."""
+    """The measured frequencies do not determine the unknown parameters separately."""
 
 
 class MisfitWarning(UserWarning):
@@ -70,37 +70,37 @@ class AmbiguityWarning(UserWarning):
 
 @dataclass(frozen=True, eq=False)
 class Identification(ByValue):
-    """Parameters that fit measured natural frequencies, and what the measurement says about them.
+    """Parameters that fit measured natural frequencies, and their uncertainty.
 
     Attributes
     ----------
     values : mapping of str to float
-        SI; the stiffness of an end is inf where it is best taken as rigid.
+        SI; the stiffness of an end is inf where a rigid one fits best.
     covariance : ndarray, shape (n, n)
-        Of the values to first order, SI; inf where the data do not fix them. Where they do not fit, it is multiplied by
-        chi2 over the degrees of freedom, and inf if there are none: what is wrong is then the model.
+        Of the values to first order, SI; inf where the data do not determine them. If the values do not fit, it is
+        scaled by chi2 over the degrees of freedom, and inf without degrees of freedom, since the model is then wrong.
     compliance_covariance : ndarray, shape (n, n)
-        The same with 1/k in place of each stiffness k of an end: what stays meaningful near a rigid one.
+        The same with 1/k in place of each stiffness k of an end; meaningful for nearly rigid ends too.
     log_standard_deviation : ndarray, shape (n,)
         Standard deviations of the logarithms of the values: about the relative uncertainty where it is small.
     frequencies, residuals : ndarray, shape (m,)
         Fitted frequencies (Hz), and measured minus fitted in units of the uncertainty.
     measured, uncertainty : ndarray, shape (m,)
-        What was fitted, Hz.
+        Data, Hz.
     modes : ndarray of int, shape (m,)
         The modes these belong to, from 1.
     chi2 : float
         Sum of the squared residuals, those of the priors included.
     degrees_of_freedom : int
-        Data and priors less unknowns.
+        Number of data and priors minus that of unknowns.
     p_value : float
         Probability of a larger chi2 if the model is right; nan without degrees of freedom.
     fits : bool
         Whether p_value is at least 0.01; without degrees of freedom, whether every residual is below 3.
     identifiable : bool
-        Whether every value is known to better than a factor of two (one standard deviation), and fits.
+        Whether the values fit and each is known to better than a factor of two (one standard deviation).
     message : str
-        What the data do and do not say.
+        Summary of what the data determine.
     solutions : tuple of Identification
         Every distinct set of values that fits, best first, this one included; this one alone if none fits.
     """
@@ -145,11 +145,11 @@ def identify(
     modes: Sequence[int] | None = None,
     prior: Mapping[str, tuple[float, float]] | None = None,
 ) -> Identification:
-    """Return the values of some parameters that fit measured natural frequencies, with every other set that does.
+    """Return the values of parameters that fit measured natural frequencies, and all other sets of values that fit.
 
     Least squares with exact gradients, weighted by the uncertainties, from every local minimum of a grid; the stiffness
-    of an end is searched in ln(1 + unit/k), in which a rigid one is the ordinary value 0, others within a factor of
-    1000 of their value in ``system`` (or their prior).
+    of an end is searched in ln(1 + unit/k), so that a rigid one has the finite value 0, others within a factor of 1000
+    of their value in ``system`` (or of their prior).
 
     Parameters
     ----------
@@ -173,11 +173,11 @@ def identify(
     Warns
     -----
     MisfitWarning
-        If no values fit; the message tells the mode without which, or the missed mode with which, some do.
+        If no values fit; the message names a mode whose omission, or a missed mode whose inclusion, gives a fit.
     AmbiguityWarning
         If several sets of values fit that differ by more than their uncertainty.
     IdentifiabilityWarning
-        If the data do not tell the parameters apart.
+        If the data do not determine the parameters separately.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def identify_joint(
     modes: Sequence[int] | None = None,
     prior: Mapping[str, tuple[float, float]] | None = None,
 ) -> JointEstimate:
-    """Return the joint's stiffnesses that fit measured natural frequencies, with every other pair that does.
+    """Return the joint stiffnesses that fit measured natural frequencies, and all other pairs that fit.
 
     :func:`identify` with the unknowns ``k_t`` and ``k_r``.
 
@@ -280,7 +280,7 @@ def _identified(
 
 
 def _estimates(kind: type[Identification], search: Search, data: Data) -> list[Identification]:
-    """Return the distinct fits, or the best of what does not fit."""
+    """Return the distinct fits, or the best values if none fits."""
     places = search.minima(data)
     best = _estimate(kind, search, data, places[0])
     if not best.fits or search.residuals(places[0], data).size < len(search.unknowns):
@@ -290,7 +290,7 @@ def _estimates(kind: type[Identification], search: Search, data: Data) -> list[I
 
 
 def _goodness(search: Search, data: Data, place: Array) -> Goodness:
-    """Return how well a place fits."""
+    """Return the goodness of fit at a point."""
     return goodness(search.residuals(place, data), len(search.unknowns))
 
 
@@ -333,7 +333,7 @@ def _jacobian(parameters: Iterable[Unknown], values: Mapping[str, float], found:
 
 
 def _hints(search: Search, data: Data, lowest: bool) -> list[str]:
-    """Say which single frequency is in the way, and which single mode may have been missed."""
+    """Return hints: a frequency whose omission gives a fit, and a mode that may have been missed."""
     spare = data.measured.size + sum(unknown.prior is not None for unknown in search.unknowns) - len(search.unknowns)
     hints = []
     if spare >= 2:

@@ -79,13 +79,13 @@ def section_place(system: System, field: Any = None) -> int:
 @overload
 def mode_shapes(system: System, x: Any, modes: int = 3, derivative: int = 0, *, field: Any = None,
                 damped: Literal[False] = False, oscillating: bool = True) -> Array:  # fmt: skip
-    """Return real shapes."""
+    """Return real mode shapes."""
 
 
 @overload
 def mode_shapes(system: System, x: Any, modes: int = 3, derivative: int = 0, *, field: Any = None,
                 damped: bool, oscillating: bool = True) -> Array | NDArray[np.complex128]:  # fmt: skip
-    """Return complex shapes if they are asked for."""
+    """Return complex mode shapes if ``damped``."""
 
 
 @checks.default_floating_point
@@ -101,8 +101,8 @@ def mode_shapes(
 ) -> Array | NDArray[np.complex128]:
     """Return the mass-normalised mode shapes (25), or their derivatives by x, positive at the right end.
 
-    Where the first field vanishes at its right end in a mode, the first of its derivatives there that does not is
-    positive; where all do (a clamped right end), the field beside that end is.
+    Where the first field of a mode is zero at the right end, its first nonzero derivative there is positive; where all
+    are zero (a clamped right end), the field next to that end is positive.
 
     Parameters
     ----------
@@ -117,8 +117,8 @@ def mode_shapes(
         Default: the first.
     damped : bool
         Complex shapes phi of the motions ``phi exp(s t)`` of :func:`cra_sym.eigenvalues`: with dampers, gyroscopic
-        forces and forces that follow the motion. They are normalised to ``conj(phi)' M phi = 1``, and their phase makes
-        real and positive what is made positive otherwise. Without such forces they are the same.
+        forces and forces that follow the motion. They are normalised to ``conj(phi)' M phi = 1``, with the phase that
+        makes real and positive the quantity that is positive for real modes. Without such forces they are the same.
     oscillating : bool
         Leave out the shapes of real eigenvalues, as in :func:`cra_sym.eigenvalues`.
 
@@ -176,7 +176,7 @@ class ModalParameters:
     """Modal quantities of mass-normalised modes (M_i = 1, so that K_i = omega_i^2), positive at the right end.
 
     The mode axis is last; ``...`` is the batch shape of the system. 'Root' and 'tip' are the left and the right end of
-    the first field v. All are finite at zero and at infinite stiffness; each is computed when it is first asked for.
+    the first field v. All are finite at zero and at infinite stiffness; each is computed on first use.
     Units are given for v in m.
 
     Attributes
@@ -396,7 +396,7 @@ def participation(system: System, modes: int, motion: str | None = None) -> Arra
 
 @checks.default_floating_point
 def stiffness_coupling(system: System, name: str, modes: int) -> Array:
-    """Return a parameter times the rate of the stiffness by it, between the modes, 1/s2; 0 where it is infinite.
+    """Return a parameter times the derivative of the stiffness by it, between the modes, 1/s2; 0 if it is infinite.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What analyses of nonlinear systems share: warnings, the displacement that is watched, sizes of motions."""
+"""Common parts of nonlinear analyses: warnings, the output displacement, sizes of motions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _PLACES = 41
 
 
 class ConvergenceWarning(UserWarning):
-    """An answer was not found; the last good one is returned.
+    """A solution was not found; the last converged one is returned.
 
     Examples
     --------
@@ -105,7 +105,7 @@ def equations_of(system: System, modes: int, zeta: Any = None) -> ModalPolynomia
 
 
 def watched(system: System, modes: int, place: Any = None, field: Any = None) -> Array:
-    """Return the displacement of every mode that is watched: the tip, or the first coordinate where there is no field.
+    """Return the output displacement in every mode: the tip, or the first coordinate where there is no field.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def watched(system: System, modes: int, place: Any = None, field: Any = None) ->
     Raises
     ------
     ValueError
-        If it is none of the model, or the place is not in the domain.
+        If it is not a field or coordinate of the model, or the place is not in the domain.
     """
     checks.count("modes", modes, high=MOST_MODES)
     coordinates = list(system.model.linearised.coordinates)
@@ -138,12 +138,12 @@ def watched(system: System, modes: int, place: Any = None, field: Any = None) ->
 
 
 def samples(degree: int, harmonics: int, causes: int = 0) -> int:
-    """Return how many samples of a period make the sums of harmonic balance exact."""
+    """Return the number of samples per period for which the sums of harmonic balance are exact."""
     return 4 * int(np.ceil(((degree + 1) * harmonics + causes + 1) / 4))
 
 
 def warn_of_slopes(system: System, basis: Basis, coefficients: Array, stacklevel: int = 5) -> None:
-    """Warn if squared slopes, whose integral a quadrature is, are beyond what their expansion holds for.
+    """Warn if squared slopes in a quadrature are too large for their expansion.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Responses of nonlinear systems by integration in time: the referee of steady states.
+"""Responses of nonlinear systems by time integration, an independent check of steady states.
 
-The linear modes turn exactly, in a frame that rotates with each of them; an adaptive Runge-Kutta method of order eight
-integrates what nonlinear terms, damping and loads add.
+The linear modes are integrated exactly, in coordinates that rotate with each of them; an adaptive Runge-Kutta method of
+order eight integrates the nonlinear terms, damping and loads.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ __all__ = ["nonlinear_response"]
 Array = NDArray[np.float64]
 _TOLERANCE = 1e-10
 _BEYOND = 1e6  # nonlinear over linear forces
-_MOST_PARTS = 500  # of a motion, at whose joints the integration starts anew
+_MOST_PARTS = 500  # breaks of a motion at which the integration restarts
 
 
 def nonlinear_response(
@@ -55,7 +55,7 @@ def nonlinear_response(
     modes : int
     derivative : {0, 1, 2}
     state : (q, dq/dt)
-        At t = 0, beside what a base that starts with a velocity gives if ``start`` is 'inertial'.
+        At t = 0, in addition to the effect of an initial base velocity if ``start`` is 'inertial'.
     start : {'inertial', 'base'}
     zeta : array_like, optional
 
@@ -67,7 +67,7 @@ def nonlinear_response(
     Raises
     ------
     ValueError
-        If system or motions are batches, there are too many modes, or the motion runs away.
+        If system or motions are batches, there are too many modes, or the motion diverges.
     """
     times = np.atleast_1d(one_axis("t", t, "times", low=0.0, unit="s"))
     derivative = count("derivative", derivative, low=0, high=2)
@@ -126,7 +126,7 @@ class _Moving:
         return total
 
     def beside(self, time: float, q: Array, u: Array) -> Array:
-        """Return the acceleration less that of the undamped linear modes."""
+        """Return the acceleration minus that of the undamped linear modes."""
         polynomials, load = self.equations.polynomials, self._load(time)
         if polynomials.moves_mass and self.equations.causes:  # momenta may follow known motions
             step = 1e-6 / max(float(polynomials.omega.max()), 1e-12)
@@ -142,7 +142,7 @@ class _Moving:
         return np.asarray(self.beside(time, q, u) - self.equations.polynomials.omega**2 * q)
 
     def states(self, t: Array, start: Array) -> tuple[Array, Array]:
-        """Return q and dq/dt at rising times, shape (modes, times)."""
+        """Return q and dq/dt at ascending times, shape (modes, times)."""
         n, last = start.size // 2, float(t[-1])
         found = np.empty((2 * n, t.size))
         found[:, t <= 0] = start[:, None]

@@ -1,4 +1,4 @@
-"""What drives a nonlinear system periodically: excitations and drives as waves in its modal equations."""
+"""Periodic forcing of nonlinear systems: excitations and drives as harmonic functions in the modal equations."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Wave(NamedTuple):
     order, power : int
     phase, factor : float
     small : bool
-        Whether it is times epsilon besides.
+        Whether it has epsilon as a further factor.
     """
 
     order: int = 1
@@ -41,7 +41,7 @@ class Wave(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Forced:
-    """Modal equations with the waves that drive them.
+    """Modal equations with their harmonic inputs.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Forced:
 
     @property
     def rests(self) -> bool:
-        """Whether no motion is an answer."""
+        """Whether rest is a solution."""
         return not any(not t.positions and not t.velocities and t.tensor.any() for t in self.equations.forces)
 
     def causes(self, varpi: Array, phase: Array, period: int, epsilon: Array | float = 1.0) -> Array:
@@ -73,13 +73,13 @@ class Forced:
         return values
 
     def first(self, modes: int) -> Forced:
-        """Return the same for the first modes alone."""
+        """Return the equations of the first modes alone."""
         return Forced(self.equations.first(modes), self.waves)
 
 
 @dataclass
 class _Collected:
-    """Terms and waves while they are gathered."""
+    """Terms and waves collected so far."""
 
     energies: list[Term] = field(default_factory=list)
     forces: list[Term] = field(default_factory=list)
@@ -111,7 +111,7 @@ def forced(
     epsilon : float, optional
         With the excitation.
     drive : mapping of function of t, or its name, to float, optional
-        Amplitudes of prescribed motions and forces that go with cos(varpi t).
+        Amplitudes of prescribed motions and forces proportional to cos(varpi t).
     zeta : array_like, optional
     small : bool
         Leave epsilon to :meth:`Forced.causes`.
@@ -158,7 +158,7 @@ def _amplitudes(system: System, drive: Any, others: set[str]) -> dict[str, float
 
 
 def _add_loads(found: _Collected, system: System, modes: int, amplitudes: Mapping[str, float]) -> None:
-    """Add what drives linearly, and the loads that are constant in time."""
+    """Add the linear inputs and the constant loads."""
     for name, kind in system.numerics("causes"):
         amplitude = amplitudes.get(name, 0.0)
         if not amplitude:
@@ -182,9 +182,9 @@ def _add_excitation(
         for matrix, positions, velocities in ((drive.stiffness, 1, 0), (drive.damping, 0, 1)):
             if matrix is not None:
                 found.forces.append(Term(-matrix, positions, velocities, wave))
-        if drive.mass is not None:  # d/dt (g M v) is of the Lagrangian g v M v/2
+        if drive.mass is not None:  # d/dt (g M v) comes from the Lagrangian g v M v/2
             found.energies.append(Term(symmetrised(drive.mass / 2, 0), 0, 2, wave))
-        if drive.momentum is not None:  # d/dt (g B q) is of the Lagrangian g v B q, but for a force g B' v
+        if drive.momentum is not None:  # d/dt (g B q) comes from the Lagrangian g v B q, apart from a force g B' v
             found.energies.append(Term(drive.momentum.T, 1, 1, wave))
             found.forces.append(Term(-drive.momentum.T, 0, 1, wave))
     if isinstance(excitation, LagrangianTerms):
@@ -199,7 +199,7 @@ def _wave(oscillation: Oscillation, size: float, small: bool) -> Wave:
 
 
 def _refuse_nonlinear(system: System, excitation: Parametric) -> None:
-    """Refuse a fluctuating parameter that nonlinear terms hold too: only the linear ones would fluctuate."""
+    """Refuse a fluctuating parameter that occurs in nonlinear terms too, since these would not fluctuate."""
     terms = system.numerics("nonlinear")
     if terms is not None and isinstance(excitation, Fluctuation):
         both = [name for name in excitation.weights if name in terms.parameters]

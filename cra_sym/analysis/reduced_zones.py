@@ -1,4 +1,4 @@
-"""Zones of instability of systems with any damping, gyroscopic forces and oscillations, from two reduced equations."""
+"""Zones of instability from two reduced equations, for any damping, gyroscopic forces and oscillating terms."""
 
 from __future__ import annotations
 

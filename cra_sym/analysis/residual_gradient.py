@@ -1,4 +1,4 @@
-"""Gradient of the residual vibration: what a design search follows."""
+"""Gradient of the residual vibration, for optimisation."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 __all__ = ["residual_vibration_gradient"]
 
 Array = NDArray[np.float64]
-_SHORT = 1e-4  # step of a difference of a peak, which has a kink where it comes at once or a period later
-_TURN = 1e-3  # rad of the fastest mode: the same of a difference by the duration
-_TINY = 1e-30  # an imaginary part whose square is nothing
-_SLOWEST = 1e-5  # rad until everything stops
+_SHORT = 1e-4  # step of a difference of a peak, which has a kink where its time jumps by a period
+_TURN = 1e-3  # the same for a difference by the duration, in rad of the fastest mode
+_TINY = 1e-30  # imaginary part whose square underflows
+_SLOWEST = 1e-5  # rad until the inputs end
 
 
 @default_floating_point
@@ -41,14 +41,13 @@ def residual_vibration_gradient(
     *,
     zeta: Any = None,
 ) -> tuple[Any, Array]:
-    r"""Return the residual vibration and its derivatives, as a gradient-based optimiser wants them.
+    r"""Return the residual vibration and its derivatives, for gradient-based optimisation.
 
-    What mode i leaves behind follows from its frequency and from :math:`\Gamma_i \phi_i(L)` for every motion and force.
-    The sensitivities (31)-(32) tell how the frequency follows a parameter; how :math:`\Gamma_i \phi_i(L)` follows a
-    spring or an inertia of an end of a model with one wave number that a motion drives is a closed form along the
-    frequency equation; otherwise it is a difference of eighth order, whose error is about 1e-11 of it. The exact states
-    of the oscillator at the stop carry both along in their imaginary parts. Where modes are complex all derivatives are
-    differences of the sum over them, good to about 1e-6.
+    The residual vibration of mode i depends on its frequency and on :math:`\Gamma_i \phi_i(L)` for every motion and
+    force. The derivative of the frequency is the sensitivity (31)-(32). That of :math:`\Gamma_i \phi_i(L)` by a spring
+    or an inertia of an end has a closed form for a model with one wave number driven by a motion; otherwise it is an
+    eighth-order difference with a relative error of about 1e-11. Both are propagated to the state at the stop by a
+    complex step. Where modes are complex, all derivatives are differences of the sum over them, accurate to about 1e-6.
 
     Parameters
     ----------
@@ -57,18 +56,18 @@ def residual_vibration_gradient(
     by : sequence of str, optional
         By default the stiffnesses of the ends, for an arm k_t and k_r, and, of one motion alone, 'duration'. Otherwise
         parameters of the system; the compliance 1/k of a stiffness k of an end, for an arm 'c_t' and 'c_r', else '1/'
-        and its name; and 'duration', which stretches the motion uniformly in time over the same way, as the argument
-        of :meth:`BaseMotion.s_curve` does.
+        and its name; and 'duration', which stretches the motion uniformly in time over the same distance, as the
+        argument of :meth:`BaseMotion.s_curve` does.
 
     Returns
     -------
     value : float or ndarray, shape (...)
         As from :func:`residual_vibration`, m.
     gradient : ndarray, shape (..., len(by))
-        In m over the SI unit of the parameter. By an infinite stiffness it is 0. Where a mode leaves exactly nothing
-        behind the residual has a kink: the mode counts as 0. By a stiffness that is zero, or a compliance that is
-        infinite, it is nan where a rigid-body mode is about to become a vibration; so it is where a mode turns by less
-        than 1e-5 rad until everything stops, of which rounding leaves nothing.
+        In m over the SI unit of the parameter. By an infinite stiffness it is 0. Where the
+        residual of a mode is exactly zero it has a kink, and the mode counts as 0. By a zero stiffness, or an infinite
+        compliance, it is nan where a rigid-body mode would become elastic; it is also nan where the phase of a mode
+        until the stop is below 1e-5 rad, since rounding then destroys the result.
 
     Raises
     ------
@@ -145,7 +144,7 @@ def _coupled(
 
 
 def _stretched(profile: BaseMotion, factors: Array) -> BaseMotion:
-    """Return the motion over the same way in so many times the time."""
+    """Return the motion over the same distance, stretched in time by the factors."""
     terms: list[Term] = []
     for term in profile.terms:
         assert isinstance(term, Piecewise)

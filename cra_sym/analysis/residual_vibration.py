@@ -1,4 +1,4 @@
-"""What is left after a stop: the peak of the tip when all motions and forces have ended."""
+"""Residual vibration: the peak of the tip after all motions and forces have ended."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ def residual_vibration(
     """Return the peak amplitude of the tip after all motions and forces have stopped, m: the sum over the modes.
 
     Exact for one mode; without damping the least upper bound over all times (frequencies of modes are
-    incommensurable); with damping an upper bound that ignores only that modes do not peak together. Being at rest
-    after the stop is not a condition: what counts is that the base does not accelerate any more. A rigid-body mode
-    contributes its final offset. Of a system with elastic-slip elements it is the largest displacement while they
-    slip, at most for ten periods of the lowest mode; from where they stick for good on it is the offset and the sum
-    over the modes. Where dampers, gyroscopic forces or forces that follow the motion couple the modes, the sum is over
-    complex modes: two real eigenvalues count as one mode, and what grows leaves inf.
+    incommensurable); with damping an upper bound, since the modes do not peak at the same time. The base need not be at
+    rest after the stop, it must only have no acceleration. A rigid-body mode contributes its final offset. For a system
+    with elastic-slip elements it is the largest displacement while they slip, for at most ten periods of the lowest
+    mode, and the offset plus the sum over the modes once all stick. Where dampers, gyroscopic forces or forces that
+    follow the motion couple the modes, the sum is over
+    complex modes: two real eigenvalues count as one mode, and a growing mode gives inf.
 
     Parameters
     ----------
@@ -94,18 +94,18 @@ def residual_vibration(
 
 @dataclass(frozen=True)
 class Stopped:
-    """Modes that are driven until everything stops.
+    """Modes that are driven until all inputs have ended.
 
     Attributes
     ----------
     osc : Oscillators
         Of which omega and zeta count.
     names : tuple of str
-        What drives.
+        Names of the inputs.
     profiles : tuple of BaseMotion
-        Their motions; that of a force is the one whose acceleration it is.
+        Their motions; for a force the motion with this acceleration.
     stop : float or ndarray
-        When the last of them stops, s.
+        Time when the last of them ends, s.
     products : list of ndarray, shape (..., modes)
         Participation in each times the displacement of the tip.
     """
@@ -119,7 +119,7 @@ class Stopped:
     def peaks(self, omega: NDArray[Any], products: Sequence[NDArray[Any]]) -> NDArray[Any]:
         """Return the largest displacement of the tip by each mode after the stop, shape (..., modes).
 
-        Complex frequencies and products carry a derivative along in their imaginary parts.
+        The imaginary parts of complex frequencies and products may hold a complex-step derivative.
         """
         q: Any = 0.0
         u: Any = 0.0
@@ -131,7 +131,7 @@ class Stopped:
 
 
 def couples(system: System, modes: int) -> bool:
-    """Tell whether dampers, gyroscopic or follower forces couple the natural modes; refuse what has no complex ones."""
+    """Tell whether dampers, gyroscopic or follower forces couple the natural modes; complex modes must then exist."""
     instance("system", system, System)
     if system.numerics("complex_modes") == "none" and system.numerics("damping") is not None:
         raise ValueError(
@@ -156,7 +156,7 @@ def _complex_residual(system: System, motion: Any, modes: int, zeta: Any) -> Arr
 
 
 def _ended(system: System, motion: Any) -> tuple[dict[str, History], tuple[BaseMotion, ...], Any]:
-    """Return what drives, the motions it is, and when the last of them stops; refuse what never does."""
+    """Return the inputs, their motions, and the time when the last of them ends; refuse those without an end."""
     instance("system", system, System)
     histories = histories_of(system, motion)
     if not histories:
@@ -176,7 +176,7 @@ def _ended(system: System, motion: Any) -> tuple[dict[str, History], tuple[BaseM
 
 
 def stopped(system: System, motion: Any, modes: int, zeta: Any) -> Stopped:
-    """Return the natural modes driven until everything stops, or refuse what never stops."""
+    """Return the natural modes driven until all inputs have ended; refuse inputs without an end."""
     histories, profiles, stop = _ended(system, motion)
     modes = count("modes", modes, high=MOST_MODES)
     osc = oscillators(system, np.zeros(modes), np.zeros((1, modes)), modes, zeta)
@@ -190,7 +190,7 @@ def stopped(system: System, motion: Any, modes: int, zeta: Any) -> Stopped:
 
 
 def _with_dampers(system: System, omega: Array, zeta: Array) -> Array:
-    """Return damping ratios with those of dampers that leave the natural modes apart."""
+    """Return damping ratios including those of dampers that do not couple the natural modes."""
     matrix = Projected(system.domain, system.modes(omega.shape[-1]), system.numerics("damping"))["damping"]
     rate = np.einsum("...ii->...i", matrix)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -26,10 +26,10 @@ __all__ = ["ResponseCurve", "response_curves"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-_STARTS = 5  # frequencies at which all answers are sought
+_STARTS = 5  # frequencies at which all solutions are searched for
 _MOST_CURVES, _MOST_POINTS = 40, 5000
-_SAME = 1e-5  # relative distance of two answers that are one
-_STEP = 0.25  # of the interval that counts as much as all of the motion
+_SAME = 1e-5  # relative distance below which two solutions are the same
+_STEP = 0.25  # share of the interval with the same norm as a change as large as the motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +39,10 @@ class ResponseCurve:
     Attributes
     ----------
     angular_frequency, amplitude : ndarray, shape (points,)
-        rad/s, and the peak at the tip, or of what was chosen.
+        rad/s, and the peak at the tip, or of the chosen displacement.
     stable : ndarray of bool, shape (points,)
     multipliers : complex ndarray, shape (points, 2 modes)
-        Floquet multipliers over one period of the answer, largest first.
+        Floquet multipliers over one period of the motion, largest first.
     coefficients : ndarray, shape (points, modes, 2 harmonics + 1)
         As of :class:`cra_sym.SteadyState`.
     folds, branch_points : ndarray
@@ -91,11 +91,11 @@ def response_curves(
     place: float | None = None,
     field: Any = None,
 ) -> tuple[ResponseCurve, ...]:
-    """Follow the steady states of a system over the excitation frequency, through folds and onto all branches.
+    """Continue the steady states of a system in the excitation frequency, through folds and onto all branches.
 
-    The answers of :func:`cra_sym.steady_states` at five frequencies of the interval are continued by arclength, both
-    ways, until they leave it or close; where another curve crosses, it is followed too. Of curves that differ by a
-    shift in time, one is returned. A branch point is located to 1e-5 of the interval.
+    The solutions of :func:`cra_sym.steady_states` at five frequencies of the interval are continued by arclength in
+    both directions until the curve leaves the interval or closes; where another curve crosses, it is followed too. Of
+    curves that differ by a shift in time, one is returned. A branch point is located to 1e-5 of the interval.
 
     Parameters
     ----------
@@ -108,9 +108,9 @@ def response_curves(
     harmonics : int
         Highest multiple of ``varpi / period``, 1 to 60.
     period : int
-        2 asks for answers of twice the period of the excitation.
+        2: solutions of twice the period of the excitation.
     points : int
-        Most points of one curve.
+        Largest number of points of one curve.
 
     Returns
     -------
@@ -164,13 +164,13 @@ def response_curves(
         harmonics=harmonics,
     )
     lines = _Curves(problem, (low, high), size, points).all()
-    told = [_told(problem, size, line) for line in lines]
-    if told:
-        warn_of_slopes(system, problem.basis, np.concatenate([curve.coefficients for curve in told]), 4)
+    curves = [_response_curve(problem, size, line) for line in lines]
+    if curves:
+        warn_of_slopes(system, problem.basis, np.concatenate([curve.coefficients for curve in curves]), 4)
     if any(line.broken for line in lines):
         text = f"a curve was not followed to its end, in {points} points or for want of convergence"
         warnings.warn(text, ConvergenceWarning, stacklevel=3)
-    return tuple(sorted(told, key=lambda curve: (curve.angular_frequency.min(), curve.amplitude[0])))
+    return tuple(sorted(curves, key=lambda curve: (curve.angular_frequency.min(), curve.amplitude[0])))
 
 
 def _interval(between: Any) -> tuple[float, float]:
@@ -182,7 +182,7 @@ def _interval(between: Any) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class _Line:
-    """Points of one curve in order, and where it was not followed on."""
+    """Points of one curve in order, and the ends at which continuation failed."""
 
     points: list[Point]
     folds: list[float]
@@ -191,7 +191,7 @@ class _Line:
 
 
 class _Curves:
-    """The curves that have been followed, and the branch points that are left."""
+    """The curves followed so far, and the branch points still to be treated."""
 
     def __init__(self, problem: DrivenProblem, between: tuple[float, float], size: float, most: int) -> None:
         self._problem, self._between, self._size, self._most = problem, between, size, most
@@ -226,7 +226,7 @@ class _Curves:
         return self._lines
 
     def _add(self, unknowns: Array, frequency: float) -> None:
-        """Follow a curve both ways from an answer."""
+        """Follow a curve in both directions from a solution."""
         forward = started(self._curve, unknowns, frequency)
         if forward is None:
             return
@@ -243,7 +243,7 @@ class _Curves:
         )
 
     def _followed(self, start: Point, already: int) -> _Line:
-        """Follow a curve one way."""
+        """Follow a curve in one direction."""
         low, high = self._between
         found, folds = [start], list[float]()
         for after in itertools.islice(follow(self._curve, start), 1, self._most - already):
@@ -277,7 +277,7 @@ class _Curves:
         return bool(near and ahead >= 0 >= behind)
 
     def _known(self, unknowns: Array, frequency: float) -> bool:
-        """Tell whether an answer, or one that it is shifted from, lies on a curve that was followed."""
+        """Tell whether a solution, or a time-shifted one, lies on a curve that was followed."""
         alike = [unknowns, *(copy[0] for copy in shifted(self._problem, unknowns[None]))]
         same = _SAME * float(np.linalg.norm(unknowns) + self._typical)
         for line in self._lines:
@@ -303,13 +303,13 @@ def _reversed(point: Point, step: float) -> Point:
 
 
 def _joined(turned: list[Point], first: _Line) -> list[Point]:
-    """Return the points of the second half, whose first one is reached by a step of the other half."""
+    """Return the points of the second half; the step to its first point is taken from the other half."""
     start = first.points[0]
     step = turned[0].step if len(turned) > 1 else 0.0
     return [Point(start.unknowns, start.frequency, start.tangent, start.mark, step), *first.points[1:]]
 
 
-def _told(problem: DrivenProblem, size: float, line: _Line) -> ResponseCurve:
+def _response_curve(problem: DrivenProblem, size: float, line: _Line) -> ResponseCurve:
     unknowns = np.array([point.unknowns for point in line.points])
     frequency = np.array([point.frequency for point in line.points])
     at = np.stack([frequency, np.full(len(frequency), size)], axis=1)

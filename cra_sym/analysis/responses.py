@@ -37,11 +37,11 @@ __all__ = [
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
-_UNCOUPLED = 1e-8  # of the damping between two modes, over the geometric mean of their own
+_UNCOUPLED = 1e-8  # damping between two modes over the geometric mean of their own, below which they count as uncoupled
 
 
 class UndersamplingWarning(UserWarning):
-    """Modes lie above half the sampling rate of a record, which does not tell what excites them.
+    """Modes lie above half the sampling rate of a record, which has no information on their excitation.
 
     Examples
     --------
@@ -125,11 +125,12 @@ def response(
     """Return a field in time, seen from the moving base, or its time derivatives, equation (34).
 
     The sum over modes of phi_i(x) q_i(t), with Duhamel's integral (12) in closed form: exact at and near every
-    resonance, with and without damping, and for rigid-body modes. Uniform times of 64 and more cost a few nanoseconds
-    each. Of a system with local dampers, gyroscopic forces or forces that follow the motion the sum is that of the
-    lowest complex modes, as many eigenvalues as ``modes`` oscillators have, by exponentials of their state matrix;
-    velocities are those of the modes. Damping of the material (Kelvin-Voigt) that couples the natural modes has
-    eigenvalues that crowd: then all motions of a basis are summed in which that many modes have settled. A nonlinear
+    resonance, with and without damping, and for rigid-body modes. At 64 or more uniform times each costs a few
+    nanoseconds. Of a system with local dampers, gyroscopic forces or forces that follow the motion the sum is that of
+    the lowest complex modes, 2 ``modes`` eigenvalues, by exponentials of their state matrix;
+    velocities are those of the modes. Material damping (Kelvin-Voigt) that couples the natural modes has
+    eigenvalues that accumulate: then all motions of a basis in which that many modes have converged are summed. A
+    nonlinear
     system (not a batch) is integrated in time, its linear modes exactly, to a relative error of about 1e-9. Of a system
     with elastic-slip elements (batches too) the sum is that of its modes without them, followed exactly from event to
     event; see `slip_response`.
@@ -139,9 +140,9 @@ def response(
     system : System
         Batch axes broadcast with those of the motion.
     motion : BaseMotion, or mapping of function of t to BaseMotion or Force, or None
-        What the prescribed motions and the forces of the Lagrangian and of the virtual work are, from t = 0 on. A bare
-        BaseMotion is that of the only prescribed motion. A motion must act by its acceleration alone: measure the
-        fields from the frame that moves. Constant loads act from t = 0.
+        Histories of the prescribed motions and of the forces of the Lagrangian and of the virtual work, from t = 0 on.
+        A bare BaseMotion is that of the only prescribed motion. A motion must act through its acceleration alone:
+        measure the fields from the moving frame. Constant loads act from t = 0.
     t : array_like
         Time or one axis of times, s, not negative; any order.
     x : array_like
@@ -153,10 +154,10 @@ def response(
     zeta : array_like, optional
         Damping ratios in [0, 1), a last axis of ``modes`` values or one for all; default is that of the system.
     start : {'inertial', 'base'}
-        At rest before t = 0 in the inertial frame (a base that starts with a velocity strikes the arm,
-        q_i'(0) = -Gamma_i w'(0+)/M_i), or at rest seen from the moving base.
+        At rest before t = 0 in the inertial frame (an initial base velocity then acts as an impulse,
+        q_i'(0) = -Gamma_i w'(0+)/M_i), or at rest relative to the moving base.
     initial : mapping of field, coordinate or its first time derivative to an expression in x, optional
-        State at t = 0 beside that of the start, such as ``{v: a*x**2, v.diff(t): 0}``.
+        State at t = 0 in addition to that of the start, such as ``{v: a*x**2, v.diff(t): 0}``.
     field : applied undefined function, optional
         Default: the first.
 
@@ -173,7 +174,7 @@ def response(
     Raises
     ------
     TypeError, ValueError
-        Names the argument that is out of its range, the load without a history, the function that is not known.
+        Names the argument that is out of its range, the load without a history, or the unknown function.
 
     Examples
     --------
@@ -278,7 +279,7 @@ def _oscillation(
 def slipping_problem(
     system: System, motion: Any, modes: int, zeta: Any, start: Start = "inertial", initial: Any = None
 ) -> Slipping:
-    """Return the problem in time of a system with elastic-slip elements, its arguments checked as by `response`."""
+    """Return the time-domain problem of a system with elastic-slip elements; arguments are checked as in `response`."""
     check_start(start)
     base = system.without_hysteresis
     state = (_initial_state(base, initial or {}, modes, 0), _initial_state(base, initial or {}, modes, 1))
@@ -287,7 +288,7 @@ def slipping_problem(
 
 
 def has_complex_modes(system: System, modes: int) -> bool:
-    """Return whether the motion is a sum of complex modes: whether dampers couple natural modes, or there are none."""
+    """Return whether complex modes are needed: dampers couple the natural modes, or there are no natural modes."""
     kind = system.numerics("complex_modes")
     if kind != "if coupled":
         return bool(kind == "always")
@@ -307,7 +308,7 @@ def check_sampling(motion: BaseMotion, omega: Array) -> None:
         first = int(beyond[0]) + 1
         frequency = np.max(omega[..., first - 1]) / (2 * np.pi)
         warnings.warn(
-            f"the record is sampled at {1 / motion.sample_step:.4g} Hz and tells nothing above half of that: mode "
+            f"the record is sampled at {1 / motion.sample_step:.4g} Hz and has no information above half of that: mode "
             f"{first} has {frequency:.4g} Hz; take fewer than {first} modes, or sample faster",
             UndersamplingWarning,
             stacklevel=6,

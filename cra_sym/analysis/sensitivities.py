@@ -19,12 +19,12 @@ from cra_sym.model.system import MOST_MODES, System
 __all__ = ["Rates", "Sensitivities", "sensitivities"]
 
 Array = NDArray[np.float64]
-_SAME = 1e-10  # relative distance of frequencies that rounding does not tell apart
-_MIXED = 1e-6  # of a rate: above what rounding of shapes makes of a change that acts alike on repeated modes
+_SAME = 1e-10  # relative distance below which frequencies are equal to rounding
+_MIXED = 1e-6  # relative size of a rate, above rounding, beyond which a parameter splits a repeated frequency
 
 
 class Rates(Mapping[str, Array]):
-    """One kind of derivatives of the natural frequencies, by the name of the parameter; computed when asked for."""
+    """One kind of derivatives of the natural frequencies, by the name of the parameter; computed on use."""
 
     def __init__(self, found: Sensitivities, kind: str, names: Sequence[str]) -> None:
         self._found, self._kind, self._names = found, kind, tuple(names)
@@ -51,25 +51,24 @@ class Rates(Mapping[str, Array]):
 
 
 class Sensitivities:
-    """Derivatives of the natural frequencies f (Hz), every array of shape (..., modes),
-    computed when it is first asked for.
+    """Derivatives of the natural frequencies f (Hz), arrays of shape (..., modes), computed on first use.
 
     Raw derivatives have the unit Hz over that of the parameter and cannot be compared with each other. Logarithmic
     ones, d ln f / d ln p, can: that of a spring is half its share of the strain energy of the mode, that of a mass
     minus half its share of the kinetic energy.
 
-    The frequency of a rigid-body mode, f = 0, grows from zero as a square root: its raw derivative by the stiffness
-    that would hold it is inf, its other raw derivatives are 0 and its logarithmic ones nan. Where there are several
-    such modes, which is which depends on the direction of change: nan, as where a parameter splits a repeated
-    frequency. An infinite stiffness has derivatives 0; those by the compliance 1/k say what the first give of a
-    rigid support costs.
+    The frequency of a rigid-body mode, f = 0, grows from zero as a square root: its raw derivative by a stiffness
+    that would resist it is inf, its other raw derivatives are 0 and its logarithmic ones nan. With several such
+    modes, as where a parameter splits a repeated frequency, the modes depend on the direction of the change and the
+    derivatives are nan. Derivatives by an infinite stiffness are 0; those by its compliance 1/k give the effect of a
+    small compliance of a rigid support.
 
     Attributes
     ----------
     frequency : ndarray
         f, Hz.
     rate, log : mapping of str to ndarray
-        Raw and logarithmic derivatives by every parameter asked for.
+        Raw and logarithmic derivatives by every requested parameter.
     compliance : mapping of str to ndarray
         Raw derivatives by 1/k for every stiffness k of an end: Hz N/m for one in N/m.
     df_dk_t, log_k_t, df_dc_t, ... : ndarray
@@ -115,10 +114,10 @@ class Sensitivities:
     # ------------------------------------------------------------------------------------------------------------
 
     def shapes(self, name: str, x: Any, *, field: Any = None) -> Array:
-        """Return the derivatives of the mass-normalised mode shapes by a parameter at places.
+        """Return the derivatives of the mass-normalised mode shapes by a parameter.
 
-        Places keep their distance from the left end over the length. By an infinite stiffness it is 0; where a
-        frequency is repeated there is none, and it is nan. Differences of eighth order: the error is about 1e-10 of the
+        Points are held fixed relative to the length. By an infinite stiffness the derivative is 0; where a frequency is
+        repeated there is none, and it is nan. Differences of eighth order: the error is about 1e-10 of the
         largest shape over the value of the parameter.
 
         Parameters
@@ -209,14 +208,14 @@ class Sensitivities:
 
     @property
     def _watched(self) -> int:
-        """How many modes are compared, so that one beyond the last that shares its frequency is seen."""
+        """Number of modes compared: more than requested, to detect one beyond the last with the same frequency."""
         return min(self._modes + 2, self._system.most_modes)
 
     @cached_property
     def _repeated(self) -> NDArray[np.bool_] | None:
-        """Which frequencies are the same to rounding, shape (..., modes + 2, modes + 2); None if none are."""
+        """Which frequencies are equal to rounding, shape (..., modes + 2, modes + 2); None if none are."""
         if isinstance(self._system.modes(self._modes), OneWaveModes):
-            return None  # a mode of one wave number in one field is alone at its frequency
+            return None  # modes of one wave number in one field are not repeated
         omega = self._system.natural_frequencies(self._watched)
         near = np.abs(omega[..., :, None] - omega[..., None, :]) <= _SAME * omega[..., None, :]
         near &= (omega > 0)[..., None] & ~np.eye(omega.shape[-1], dtype=bool)
@@ -257,7 +256,7 @@ class Sensitivities:
         return np.where(self._still, np.nan, value) if self._loose else value
 
     def _at_an_end(self, name: str) -> tuple[OneWaveModes, Change, tuple[int, int], Array] | None:
-        """Return what gives the rates by a spring or an inertia of an end in one pass, for one wave number."""
+        """Return modes, kind, (end, place) and factor of an end parameter with rates in closed form, or None."""
         modes = self._system.modes(self._modes)
         kinds: tuple[tuple[str, Change], ...] = (("stiffnesses", "stiffness"), ("inertias", "inertia"))
         if not isinstance(modes, OneWaveModes) or modes.is_unfelt.any():
@@ -282,7 +281,7 @@ class Sensitivities:
         return self._at_rest(value, name)
 
     def _at_rest(self, value: Array, name: str) -> Array:
-        """Return the values with those of rigid-body modes put right."""
+        """Return the values with those of rigid-body modes corrected."""
         if not self._loose:
             return value
         squared = self._squared(name)
@@ -304,9 +303,9 @@ class Sensitivities:
 def sensitivities(system: System, modes: int = 3, by: Sequence[str] | None = None) -> Sensitivities:
     """Return the sensitivities (31)-(32) of the natural frequencies to the parameters of a system.
 
-    First-order perturbation with mass-normalised modes: d omega_i^2 is the change of the stiffness minus omega_i^2
-    times that of the mass, between a mode and itself. Displacements are held fixed over the length, so lengths are
-    parameters like others.
+    First-order perturbation with mass-normalised modes: d omega_i^2 is the modal change of the stiffness minus
+    omega_i^2 times that of the mass. Displacements are held fixed relative to the length, so that lengths are
+    parameters like any other.
 
     Parameters
     ----------

@@ -21,12 +21,12 @@ __all__ = ["HeldCurve", "held_curve", "warn_of_missing"]
 
 Array = NDArray[np.float64]
 _MOST = 127  # harmonics
-_RATIO, _FINEST = 1.5, 1.005  # of neighbouring amplitudes, where a curve is followed
-_FOLLOWED = 3  # harmonics with which a curve is followed where motions with fewer do not lead to it
+_RATIO, _FINEST = 1.5, 1.005  # ratio of successive amplitudes where a curve is followed
+_FOLLOWED = 3  # harmonics with which a curve is followed where starts with fewer do not converge
 _TRIALS = 60  # steps towards the next amplitude
-_JUMP = 0.05  # of frequency and damping ratio by more harmonics: another motion
+_JUMP = 0.05  # change of frequency and damping ratio by more harmonics beyond which it is another motion
 _UNSTABLE = 1e-6
-_COARSE = 1e-3  # change of frequency or damping ratio by the last harmonics of which a user is told
+_COARSE = 1e-3  # change of frequency or damping ratio by the last harmonics that causes a warning
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ def held_curve(
     problem = _problem(system, mode, modes, FIRST if harmonics is None else min(FIRST, harmonics), place, field)
     if not problem.stuck_frequency() > 0:
         raise ValueError(f"mode = {mode}: is a rigid-body mode and does not vibrate")
-    found, change = _found(problem, amplitudes)
+    found, change = _converged_motions(problem, amplitudes)
     stopped = ~found.good | (change > 0)
     more = min(modes + 3, system.without_hysteresis.most_modes)
     wide = _problem(system, mode, more, len(problem.balance.basis.sines), place, field)
@@ -62,19 +62,19 @@ def held_curve(
         more = 2 * len(problem.balance.basis.sines) + 1
         rich, finer, change, stopped = _richer(problem, found, amplitudes, more, change, stopped)
         if harmonics is not None:
-            return _told(problem, found, change, missing)
-        # where the last two changes fall, the next would fall alike
+            return _held_curve_of(problem, found, change, missing)
+        # the last two changes are extrapolated as a geometric series
         with np.errstate(invalid="ignore"):
             left = np.where(stopped, change, change * np.minimum(change / np.maximum(before, 1e-300), 1.0))
             first = np.isinf(before) & ~stopped
         left = np.where(first, change, left)
         problem, found, before = rich, finer, change
         if len(rich.balance.basis.sines) >= _MOST or not (left[~stopped] > ACCURACY).any():
-            return _told(problem, found, left, missing)
+            return _held_curve_of(problem, found, left, missing)
 
 
 def warn_of_missing(found: HeldCurve, amplitudes: Array) -> None:
-    """Warn the caller of the caller's public function of motions that were not found, or in few harmonics only."""
+    """Warn, at the user's call, of motions that were not found or have too few harmonics."""
     missing = np.flatnonzero(np.isnan(found.angular_frequency))
     if missing.size:
         text = f"no motion was found at amplitude = {amplitudes[missing[0]]:g}"
@@ -92,7 +92,7 @@ Flags = NDArray[np.bool_]
 
 
 def _with(problem: HeldMotions, harmonics: int) -> HeldMotions:
-    """Return the same problem with so many harmonics."""
+    """Return the problem with another number of harmonics."""
     degree = problem.balance.equations.degree
     balance = replace(problem.balance, basis=Basis.whole(harmonics, samples(degree, harmonics)))
     return HeldMotions(balance, problem.mode, problem.rows, problem.statics)
@@ -101,9 +101,9 @@ def _with(problem: HeldMotions, harmonics: int) -> HeldMotions:
 def _richer(
     problem: HeldMotions, found: Held, amplitudes: Array, harmonics: int, change: Array, stopped: Flags
 ) -> tuple[HeldMotions, Held, Array, Flags]:
-    """Return the problem with more harmonics, its motions, what these change, and which keep those they have.
+    """Return the problem with more harmonics, its motions, their change, and which motions stay at the former number.
 
-    A motion whose next harmonics do not converge is kept as it is, with what the last ones changed.
+    A motion that does not converge with more harmonics is kept, with the change by the last ones.
     """
     rich = _with(problem, harmonics)
     start = _embedded(found, problem, rich)
@@ -117,14 +117,14 @@ def _richer(
     return rich, start, change, stopped
 
 
-def _found(problem: HeldMotions, amplitudes: Array) -> tuple[Held, Array]:
-    """Return the motions, and what the last harmonics changed where not all of them converge: nan elsewhere.
+def _converged_motions(problem: HeldMotions, amplitudes: Array) -> tuple[Held, Array]:
+    """Return the motions, and the change by the last harmonics where more do not converge, nan elsewhere.
 
-    A mode that slips may meet an odd multiple of its frequency in another mode, which has hardly any damping there.
+    An odd multiple of the frequency may coincide with that of another mode, which has hardly any damping there.
     """
     change = np.full(len(amplitudes), np.nan)
     if problem.balance.equations.energies or problem.balance.equations.forces:
-        return _at(problem, amplitudes), change  # linear starts do not know polynomial terms: the curve is followed
+        return _at(problem, amplitudes), change  # linear starts ignore polynomial terms, so the curve is followed
     found, total = problem.solved(problem.linear(amplitudes), amplitudes), len(problem.balance.basis.sines)
     missing = np.flatnonzero(~found.good)
     if not missing.size:
@@ -166,7 +166,7 @@ def _problem(system: System, mode: int, modes: int, harmonics: int, place: Any, 
 
 
 def _at(problem: HeldMotions, amplitudes: Array) -> Held:
-    """Return the motions: those found at once from linear ones, what is left along the amplitudes from smaller ones."""
+    """Return the motions, from linear starts or, where these fail, by continuation from smaller amplitudes."""
     found = problem.solved(problem.linear(amplitudes), amplitudes)
     if problem.balance.equations.energies or problem.balance.equations.forces:
         found.good[:] = False
@@ -222,7 +222,7 @@ def _embedded(found: Held, old: HeldMotions, new: HeldMotions) -> Held:
 
 
 def _widened(found: Held, old: HeldMotions, new: HeldMotions) -> Held:
-    """Return starts with more modes, which follow the forces of the elements as if at rest."""
+    """Return starts with more modes, which follow the forces of the elements statically."""
     points, n, size = found.coefficients.shape
     force = old.balance.forces(found.displacements.reshape(points, -1))[0].reshape(found.displacements.shape)
     omega, rows = new.balance.equations.omega, new.balance.elements.rows
@@ -234,13 +234,13 @@ def _widened(found: Held, old: HeldMotions, new: HeldMotions) -> Held:
 
 
 def _change(one: Held, other: Held) -> Array:
-    """Return by what share the frequency changes, and the damping ratio by how much; the larger of both."""
+    """Return the larger of the relative change of the frequency and the change of the damping ratio."""
     both = one.good & other.good
     change = np.maximum(np.abs(other.frequency / one.frequency - 1.0), np.abs(other.ratio - one.ratio))
     return np.where(both, change, np.nan)
 
 
-def _told(problem: HeldMotions, found: Held, harmonics: Array, modes: Array) -> HeldCurve:
+def _held_curve_of(problem: HeldMotions, found: Held, harmonics: Array, modes: Array) -> HeldCurve:
     balance, good = problem.balance, found.good
     basis, equations = balance.basis, balance.equations
     force = balance.forces(found.displacements.reshape(good.size, -1))[0]

@@ -27,14 +27,14 @@ from cra_sym.model.system import System
 __all__ = ["identify_slip"]
 
 Array = NDArray[np.float64]
-_REACH = np.log(3.0)  # of the grid of starts, up and down
-_STEP = 1e-4  # of the logarithms, for differences: harmonic balance settles to 1e-7
-_BAD = 1e3  # residual, in sigma, where there is no motion
+_REACH = np.log(3.0)  # factors of the grid of starts
+_STEP = 1e-4  # difference step of the logarithms: harmonic balance converges to 1e-7
+_BAD = 1e3  # residual, in sigma, where no motion is found
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Measured curves of one mode, and the system whose unknown values make them."""
+    """Measured curves of one mode, and the system whose parameters are to be fitted."""
 
     system: System
     unknown: tuple[str, ...]
@@ -46,7 +46,7 @@ class _Fit:
     modes: int
 
     def values(self, logs: Array) -> dict[str, float]:
-        """Return the values: an exponent, which is negative, keeps its sign."""
+        """Return the values; an exponent, which is negative, keeps its sign."""
         return {name: float(x) for name, x in zip(self.unknown, self.start * np.exp(logs), strict=True)}
 
     def curves(self, logs: Array) -> Array:
@@ -54,7 +54,7 @@ class _Fit:
         try:
             system = self.system.replace(**self.values(logs))
             found = held_curve(system, self.mode, self.amplitude, self.modes, None, None, None)
-        except ValueError:  # a value out of its range, such as an exponent of -1
+        except ValueError:  # a value is out of its range, such as an exponent of -1
             return np.full(self.measured.size, np.nan)
         return np.concatenate([found.angular_frequency / (2 * np.pi), found.damping_ratio])
 
@@ -79,16 +79,17 @@ def identify_slip(
     """Return the values of a system with elastic-slip elements that fit frequency and damping over the amplitude.
 
     Least squares of :func:`cra_sym.backbone`, weighted by the uncertainties, in the logarithms of the values, from the
-    best of a grid about those of the system, a factor of 3 up and down: begin within an order of magnitude.
+    best points of a grid around the values of the system, a factor of 3 up and down, which must therefore be within an
+    order of magnitude.
 
     Parameters
     ----------
     system : System
-        One set of values; its zeta is that of everything but the elements.
+        One set of values; zeta is the damping without the elements.
     amplitude : array_like, shape (m,)
         Peak at the tip, m; positive.
     frequency, damping_ratio : array_like, shape (m,)
-        Measured there, such as from a decay: Hz, and 1.
+        Measured at these amplitudes, for example from a decay; Hz, and 1.
     uncertainty : (float or array_like, float or array_like)
         Standard deviations of both.
     unknown : sequence of str
@@ -138,7 +139,7 @@ def identify_slip(
                                           max_nfev=60 * len(fit.unknown)).x) for k in order]  # fmt: skip
     found.sort(key=lambda one: one.chi2)
     best, *others = found
-    told = [one for one in others if one.fits and _differ(best, one)]
+    fitting = [one for one in others if one.fits and _differ(best, one)]
     messages = [best.message]
     if not best.fits:
         text = (
@@ -147,13 +148,13 @@ def identify_slip(
         )
         warnings.warn(text, MisfitWarning, stacklevel=3)
         messages.insert(0, text)
-    elif told:
-        text = fit_words.ambiguity([one.values for one in (best, *told)])
+    elif fitting:
+        text = fit_words.ambiguity([one.values for one in (best, *fitting)])
         warnings.warn(text, AmbiguityWarning, stacklevel=3)
         messages.insert(0, text)
     if not (best.log_standard_deviation < fit_words.TOLD).all():
         warnings.warn(best.message, IdentifiabilityWarning, stacklevel=3)
-    solutions = (best, *told) if best.fits else (best,)
+    solutions = (best, *fitting) if best.fits else (best,)
     return replace(best, message="; ".join(messages), solutions=solutions)
 
 

@@ -1,4 +1,4 @@
-"""What the elastic-slip elements of a system do in time: forces, slip, events, and where the energy goes."""
+"""Elastic-slip elements in the time domain: forces, slip, events, energy balance."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class SlipEvent:
     time : float
         s, to rounding.
     element : int
-        Number of the Jenkins element, of all that the elements of the model stand for, from 0.
+        Index of the Jenkins element, among those of all elements of the model.
     state : int
         0 if it sticks from then on; 1 or -1 if it slips, force and velocity being positive or negative.
 
@@ -57,7 +57,7 @@ class SlipEvent:
 class SlipResponse(ByValue):
     """A motion with elastic-slip elements in time, seen from the frame that moves.
 
-    The elements are those that the elements of the model stand for: one for a Jenkins, several for an Iwan.
+    The elements here are Jenkins elements: one for a Jenkins of the model, several for an Iwan.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class SlipResponse(ByValue):
     tip : ndarray, shape (..., T)
         Displacement of the tip, m.
     displacement : ndarray, shape (..., D, T)
-        Displacements that hold elements, m (rad).
+        Displacements with elements, m (rad).
     force : ndarray, shape (..., E, T)
         Forces of the elements, N (N m).
     state : ndarray of int8, shape (..., E, T)
@@ -74,10 +74,10 @@ class SlipResponse(ByValue):
     kinetic, potential, elastic : ndarray, shape (..., T)
         Stored energies, J: of the masses, of the structure, of the springs of the elements.
     work, dampers : ndarray, shape (..., T)
-        What the loads, inertia forces of the moving frame among them, put in since t = 0 and what dampers and modal
-        damping took, J.
+        Work of the loads, including inertia forces of the moving frame, and energy dissipated by dampers and modal
+        damping since t = 0, J.
     dissipated : ndarray, shape (..., E, T)
-        What each slider took, J.
+        Energy dissipated by each slider, J.
     initial : ndarray, shape (...)
         Energy at t = 0, J.
     events : ndarray of object, shape (...)
@@ -114,7 +114,7 @@ class SlipResponse(ByValue):
 
     @property
     def imbalance(self) -> Array:
-        """Energy stored and taken less that put in, over the largest of these, shape (...): rounding."""
+        """Relative rounding error of the energy balance (stored plus dissipated energy minus work), shape (...)."""
         stored = self.kinetic + self.potential + self.elastic
         taken = self.dampers + self.dissipated.sum(axis=-2)
         there = self.initial[..., None] + self.work
@@ -134,11 +134,11 @@ def slip_response(
     start: Start = "inertial",
     initial: Mapping[Any, Expr] | None = None,
 ) -> SlipResponse:
-    """Return what elastic-slip elements do in time: states, forces, events, energies.
+    """Return the time history of elastic-slip elements: states, forces, events, energies.
 
-    Between two events the modes move linearly, and are followed exactly; events are located to rounding, and none is
-    missed, however short the slip. The modes are those without the elements; what modes left out would give under the
-    forces of the elements counts as statics. Sliders are at zero at t = 0.
+    Between two events the motion is linear and computed exactly; events are located to rounding, and none is missed,
+    however short the slip. The modes are those without the elements; omitted modes respond statically to the forces of
+    the elements. Sliders are at zero at t = 0.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def slip_response(
     Raises
     ------
     TypeError, ValueError
-        If the system has no elastic-slip elements, or nonlinear terms, gyroscopic or follower forces beside them;
+        If the system has no elastic-slip elements, or has other nonlinear terms, gyroscopic or follower forces;
         otherwise as :func:`cra_sym.response`.
 
     Examples
@@ -186,7 +186,7 @@ def slip_response(
     problem = slipping_problem(system, motion, modes, zeta, start, initial)
     begin = (problem.start.displacement, problem.start.velocity)
     force = first_forces(problem.modes, begin[0])
-    grid = np.unique(np.concatenate([[0.0], times]))  # what is at t = 0 goes into the balance
+    grid = np.unique(np.concatenate([[0.0], times]))  # t = 0 is part of the balance
     ledger = Ledger(problem.modes, grid, (*begin, force))
     events = problem.follow(grid[-1], ledger, grid)
     kept = ledger.energies
@@ -194,7 +194,7 @@ def slip_response(
     tip = problem.members(problem.base.modes(modes).displacement(1, section_place(problem.base, None))[..., None, :])[0]
 
     def found(values: Array) -> Array:
-        """Return values (members, times) at the times that were asked for."""
+        """Return values (members, times) at the requested times."""
         return values.reshape(*problem.shape, grid.size)[..., asked]
 
     def by_element(values: Array) -> Array:
@@ -213,15 +213,17 @@ def slip_response(
         dampers=found(kept.dampers),
         dissipated=by_element(kept.sliders),
         initial=(kept.kinetic + kept.potential + kept.elements)[:, 0].reshape(problem.shape),
-        events=_told(events, problem.modes.omega.shape[1]).reshape(problem.shape),
+        events=_events_by_member(events, problem.modes.omega.shape[1]).reshape(problem.shape),
     )
 
 
-def _told(events: Events, members: int) -> NDArray[np.object_]:
+def _events_by_member(events: Events, members: int) -> NDArray[np.object_]:
     """Return the events of each member."""
     order = np.searchsorted(events.member, np.arange(members + 1))
-    told = np.empty(members, object)
+    by_member = np.empty(members, object)
     for k in range(members):
         one = range(order[k], order[k + 1])
-        told[k] = tuple(SlipEvent(float(events.time[j]), int(events.element[j]), int(events.state[j])) for j in one)
-    return told
+        by_member[k] = tuple(
+            SlipEvent(float(events.time[j]), int(events.element[j]), int(events.state[j])) for j in one
+        )
+    return by_member

@@ -1,4 +1,4 @@
-"""Steady states of systems with elastic-slip elements: starts, as many harmonics as are needed, multipliers."""
+"""Steady states of systems with elastic-slip elements: starting points, number of harmonics, multipliers."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ __all__ = ["SlipProblem", "elements_of"]
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 FIRST, MOST = 15, 127
-"""Harmonics that are tried first, and at most, where none are asked for."""
+"""Default number of harmonics: first trial, and largest."""
 LED = 63
-"""Harmonics up to which answers are led from softer elements."""
+"""Harmonics up to which solutions are continued from softer elements."""
 ACCURACY = 3e-7
-"""Relative change of a motion by twice as many harmonics that is aimed at."""
+"""Target for the relative change of a motion by twice as many harmonics."""
 _SMALLEST, _LARGEST, _STEP, _PHASES, _ITERATIONS = 0.01, 100.0, 2.0, 3, 14
 """Amplitudes of starts over that at which the last element slips, their ratio, phases, iterations from each."""
-_SHARES = (1.0, 0.3, 0.0)  # of the elements' stiffness, whose shapes are tried
+_SHARES = (1.0, 0.3, 0.0)  # shares of the elements' stiffness whose mode shapes are tried
 _SAMPLED = 9
 _FAR = 0.4
 _SAME = 1e-6
-_HELD = 1e-9  # force on a rigid-body mode over that of all sliders
+_HELD = 1e-9  # largest force on a rigid-body mode over that of all sliders
 
 
 def elements_of(system: System, modes: int) -> Elements:
-    """Return the elements of a system with the statics of the modes left out in them."""
+    """Return the elements of a system, with the static flexibility of the omitted modes included."""
     found = system.slip_elements(modes).absorbed()
     groups = [
         (found.stiffness[found.where == k], found.slip[found.where == k]) for k in range(len(found.displacements))
@@ -51,7 +51,7 @@ def elements_of(system: System, modes: int) -> Elements:
 
 
 class Watched(NamedTuple):
-    """A displacement by modes, and by the statics of others from forces of elements and known functions of time."""
+    """An output displacement: its modal part, and the static contribution of omitted modes."""
 
     modes: Array
     elements: Array
@@ -59,7 +59,7 @@ class Watched(NamedTuple):
 
 
 def watched_load(system: System, place: Any, field: Any) -> Load:
-    """Return one unit of force on the displacement that is watched, the tip unless another is chosen."""
+    """Return a unit force on the output displacement, by default the tip."""
     base = system.without_hysteresis
     coordinates = list(base.model.linearised.coordinates)
     if field is None and not base.model.linearised.fields:
@@ -76,7 +76,7 @@ def watched_load(system: System, place: Any, field: Any) -> Load:
 
 
 def statics_of(system: System, modes: int, causes: tuple[str, ...], place: Any, field: Any) -> Array:
-    """Return :func:`cra_sym.model.slip_elements.slip_statics` for what is watched, computed once."""
+    """Return :func:`cra_sym.model.slip_elements.slip_statics` for the output, cached."""
 
     def found(number: int) -> Array:
         return slip_statics(system, number, causes, watched_load(system, place, field))
@@ -85,7 +85,7 @@ def statics_of(system: System, modes: int, causes: tuple[str, ...], place: Any, 
 
 
 def driven_by(drive: Any, system: System) -> dict[str, tuple[float, int]]:
-    """Return amplitude, and how often it is differentiated, of what drives linearly, by name."""
+    """Return amplitude and order of the time derivative of each linear input, by name."""
     kinds = dict(system.numerics("causes"))
     given = {key if isinstance(key, str) else key.func.__name__: float(value) for key, value in (drive or {}).items()}
     return {
@@ -97,12 +97,12 @@ def driven_by(drive: Any, system: System) -> dict[str, tuple[float, int]]:
 
 @dataclass(frozen=True, eq=False)
 class SlipProblem:
-    """A driven system with elements in so many modes and harmonics.
+    """A driven system with elements, truncated to a number of modes and harmonics.
 
     Attributes
     ----------
     arguments : mapping
-        It was made of.
+        Arguments that the problem was made from.
     rows : Watched
     driven : Forced
     balance : SlipBalance
@@ -117,7 +117,7 @@ class SlipProblem:
 
     @classmethod
     def of(cls, *, place: Any, field: Any, harmonics: int | None, period: int, **arguments: Any) -> SlipProblem:
-        """Return the problem; ``harmonics`` None is as many as are tried first."""
+        """Return the problem; ``harmonics`` None is the first trial number."""
         system, modes = arguments["system"], arguments["modes"]
         if system.shape:
             raise ValueError(f"system has the batch shape {system.shape}: must be a single one here")
@@ -142,7 +142,7 @@ class SlipProblem:
         return cls(options, rows, driven, balance, period)
 
     def richer(self, harmonics: int, more_modes: int = 0) -> SlipProblem:
-        """Return the same problem with so many harmonics, and more modes."""
+        """Return the problem with another number of harmonics, and more modes."""
         options = dict(self.arguments)
         most = options["system"].without_hysteresis.most_modes
         options |= {"harmonics": harmonics, "modes": min(options["modes"] + more_modes, most)}
@@ -160,7 +160,7 @@ class SlipProblem:
 
     @property
     def unique(self) -> bool:
-        """Whether the answer is unique, as with constant coefficients: the difference of two answers loses energy."""
+        """Whether the solution is unique: with constant coefficients the difference of two solutions loses energy."""
         return self.balance.constant
 
     @property
@@ -176,7 +176,7 @@ class SlipProblem:
         return self.driven.causes(varpi, self.basis.phase, self.period)
 
     def solved(self, starts: Array, varpi: Array, floor: float = 0.0) -> tuple[Array, NDArray[np.bool_]]:
-        """Return answers from starts, and which converged; where no start leads to the only one, it is led there."""
+        """Return solutions from starts, and which converged; if none does, a unique one is found by continuation."""
         alike = np.unique(varpi, return_inverse=True)[1] if self.unique else None
         frequency, causes = varpi / self.period, self._causes(varpi)
         found, good = self.balance.newton(starts, frequency, causes, alike=alike)
@@ -186,14 +186,14 @@ class SlipProblem:
             if left.size:
                 found[left], good[left] = self.balance.stiffened(frequency[left], causes[left])
         rigid = self.balance.equations.omega == 0.0
-        if rigid.any():  # what holds it at rest is not a part of the system
+        if rigid.any():  # a static equilibrium of this part is undetermined
             pull = np.abs(self.coefficients(found)[:, rigid, 0]).max(axis=1) * (varpi / self.period) ** 2
             sliders = sum(float(f.sum()) for _, f in self.balance.elements.groups)
             good = good & (pull <= _HELD * sliders * np.abs(self.balance.elements.rows).max())
         return found, good
 
     def multipliers(self, unknowns: Array, varpi: Array) -> Complex:
-        """Return Floquet multipliers over a period of each answer, shape (points, 2 modes)."""
+        """Return Floquet multipliers over a period of each solution, shape (points, 2 modes)."""
         found = np.zeros((len(unknowns), 2 * self.balance.equations.modes), complex)
         coefficients, displacements = self.coefficients(unknowns), self.balance.displacements(unknowns)
         for k, frequency in enumerate(varpi):
@@ -214,7 +214,7 @@ class SlipProblem:
         return found
 
     def peaks(self, unknowns: Array, varpi: Array) -> Array:
-        """Return the largest displacement of what is watched in a period of each answer."""
+        """Return the peak of the output in a period of each solution."""
         w = self.balance.displacements(unknowns)
         force = self.balance.forces(w.reshape(len(w), -1))[0].reshape(w.shape)
         series = self.rows.modes @ self.coefficients(unknowns) - self.rows.elements @ force
@@ -222,14 +222,14 @@ class SlipProblem:
         return peak(self.basis, np.ones(1), series[:, None])[0]
 
     def loss(self, unknowns: Array) -> float:
-        """Return the energy that sliders take in a period of an answer, J."""
+        """Return the energy dissipated by sliders in a period of a solution, J."""
         cycles = self.balance.elements.cycles(self.balance.displacements(unknowns[None]))
         return float(sum(c.loss[0] for c in cycles))
 
     def changed(self, more_modes: int, more_harmonics: int, unknowns: Array, varpi: float) -> float:
-        """Return by what share the motion changes with more modes, or with twice as many harmonics.
+        """Return the relative change of the motion with more modes, or with twice as many harmonics.
 
-        Of harmonics it is what the last doubling changed, where the next does not converge.
+        Where the next doubling of the harmonics does not converge, it is the change by the last one.
         """
         own, at = self.coefficients(unknowns[None]), np.array([varpi])
         if not own.any():
@@ -240,7 +240,7 @@ class SlipProblem:
         return found if np.isfinite(found) else self._apart(self.richer(max(self.harmonics // 2, 1)), own, at)
 
     def _apart(self, other: SlipProblem, own: Array, varpi: Array) -> float:
-        """Return by what share the answer of another problem, from this one's, differs; inf where there is none."""
+        """Return the relative difference from the solution of another problem started here; inf where there is none."""
         start = np.zeros((1, other.balance.equations.modes, other.basis.size))
         h, n, m = min(self.harmonics, other.harmonics), self.balance.equations.modes, other.harmonics
         start[:, :n, : h + 1] = own[..., : h + 1]
@@ -249,7 +249,7 @@ class SlipProblem:
         return float(np.linalg.norm(other.coefficients(found) - start) / np.linalg.norm(own)) if good[0] else np.inf
 
     def settled(self, found: list[list[Array]], varpi: Array) -> tuple[SlipProblem, list[list[Array]]]:
-        """Return a problem with as many harmonics as its answers need, and these; itself if a number was asked for."""
+        """Return the problem with as many harmonics as its solutions need, and these; itself if the number is given."""
         problem, open_ = self, self.arguments["harmonics"] is None
         where = np.array([k for k, answers in enumerate(found) for _ in answers], int)
         unknowns = np.array([answer for answers in found for answer in answers])
@@ -261,18 +261,20 @@ class SlipProblem:
             start = rich.balance.embedded(unknowns, problem.harmonics)
             after, good = rich.solved(start, varpi[where])
             if self.unique and not good.all():
-                break  # those found tell by how much more harmonics would change them
+                break  # estimated change by more harmonics
             size = np.linalg.norm(start, axis=1)
             change = np.linalg.norm(after - start, axis=1) / np.where(size > 0, size, 1.0)
             unknowns, problem = np.where(good[:, None], after, start), rich
-            left = change * np.minimum(change / np.where(before > 0, before, 1.0), 1.0)  # what the next would change
+            left = change * np.minimum(
+                change / np.where(before > 0, before, 1.0), 1.0
+            )  # estimated change by the next doubling
             open_, before = bool((np.where(np.isfinite(before), left, change) > ACCURACY).any()), change
         return problem, [list(unknowns[where == k]) for k in range(len(found))]
 
     # ----------------------------------------------------------------------------------------------------- starts
 
     def seeds(self, varpi: Array, order: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array, float]:
-        """Return starts: rest, everything stuck, nothing stuck, and single shapes with many amplitudes and phases.
+        """Return starts: rest, all stuck, none stuck, and single shapes with many amplitudes and phases.
 
         Returns
         -------
@@ -307,7 +309,7 @@ class SlipProblem:
         return float(self.balance.elements.limit / rows.max())
 
     def _alone(self, shape: Array, varpi: float) -> Array:
-        """Return answers in one shape with the harmonic nearest to it, from amplitudes and phases all around."""
+        """Return solutions in one shape with its nearest harmonic, from a grid of amplitudes and phases."""
         equations, elements = self.balance.equations.along(shape), self.balance.elements.along(shape)
         stiff, free = np.sqrt(stuck(equations, elements)[0, 0]), float(equations.omega[0])
         frequency = varpi / self.period
@@ -321,7 +323,7 @@ class SlipProblem:
         smallest, largest = max(elements.limit, _SMALLEST * elements.reach), _LARGEST * elements.reach
         number = int(np.ceil(np.log(largest / smallest) / np.log(_STEP)))
         sizes = np.geomspace(0.3 * smallest, largest, number) / max(np.abs(elements.rows).max(), 1e-300)
-        mirrored = self.driven.rests and equations.odd  # reversed displacements are an answer too
+        mirrored = self.driven.rests and equations.odd  # reversed displacements are a solution too
         phases = (1 if mirrored else 2) * np.pi * (np.arange(_PHASES) + 0.3) / _PHASES
         starts = np.zeros((number * _PHASES, 1, basis.size))
         starts[:, 0, 1] = np.multiply.outer(sizes, np.cos(phases)).ravel()

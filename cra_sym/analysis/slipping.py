@@ -1,4 +1,4 @@
-"""Systems with elastic-slip elements in time: their modes without the elements, and what drives these."""
+"""Systems with elastic-slip elements in the time domain: their modes without the elements, and the inputs."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from cra_sym.solvers.stuck_motion import stuck_peak
 __all__ = ["Slipping", "slipping", "slipping_outputs", "slipping_residual"]
 
 Array = NDArray[np.float64]
-_TOGETHER = 1024  # members followed at once
-_PERIODS = 10.0  # of the lowest mode, for which the motion is followed after the stop
+_TOGETHER = 1024  # members integrated together
+_PERIODS = 10.0  # periods of the lowest mode for which the motion is integrated after the stop
 
 
 @dataclass(frozen=True)
 class Slipping:
-    """Modes with elements, member by member of a batch, and what drives them.
+    """Modes with elements and their inputs, by member of a batch.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Slipping:
         return np.asarray(moved.reshape(*self.shape, *moved.shape[1:]))
 
     def follow(self, end: Any, visit: Callable[[Step], object], pauses: Array | None = None) -> Events:
-        """Follow all members, some at a time, to the end of each; every step is shown to ``visit``."""
+        """Integrate all members, in groups, to the end of each; ``visit`` is called with every step."""
         size = self.modes.omega.shape[1]
         last, found = np.broadcast_to(np.maximum(end, 1e-12), (size,)), []  # a motion of zero length is sampled once
         for first in range(0, size, _TOGETHER):
@@ -85,22 +85,22 @@ def slipping(
     initial: tuple[Array, Array],
     check: Callable[[BaseMotion, Array], None],
 ) -> Slipping:
-    """Return the problem in time of a system with elements.
+    """Return the time-domain problem of a system with elements.
 
     Parameters
     ----------
     system : System
     driven : iterable of (ndarray, BaseMotion or Force)
-        Minus the generalised force of one unit of each cause on every mode without the elements, and its history.
+        For each input, minus the generalised force of a unit of it on every mode without the elements, and its history.
     modes : int
-        Modes without the elements; the statics of the others count where the elements are.
+        Number of modes without the elements; static flexibility of the others is included at the elements.
     ratios : ndarray, shape (..., modes or 1)
         Damping ratios of these modes.
     start : {'inertial', 'base'}
     initial : (q, dq/dt)
-        At t = 0, beside what a base that starts with a velocity gives if ``start`` is 'inertial'.
+        At t = 0, in addition to the effect of an initial base velocity if ``start`` is 'inertial'.
     check : callable
-        ``check(motion, omega)`` is told every motion and the frequencies.
+        ``check(motion, omega)`` is called with every motion and the frequencies.
 
     Raises
     ------
@@ -148,8 +148,8 @@ def slipping_outputs(problem: Slipping, rows: Array, t: Any, derivative: int) ->
 def slipping_residual(problem: Slipping, row: Array, stop: Any) -> Array:
     """Return the peak of an output, row (..., modes), after all loads have stopped, shape (...).
 
-    While elements slip it is that of the motion, at most for ten periods of the lowest mode that vibrates; from where
-    they stick for good it is the bound by the sum of the modes.
+    While elements slip it is that of the motion, for at most ten periods of the lowest elastic mode; once all stick it
+    is the bound by the sum of the modes.
     """
     row = _members(row, problem.shape, 1)
     omega, last = problem.modes.omega, np.broadcast_to(stop, problem.shape).ravel()
@@ -170,7 +170,7 @@ def _members(values: Any, shape: tuple[int, ...], axes: int) -> Array:
 
 
 def _term(term: Harmonic | Piecewise, shape: tuple[int, ...]) -> Harmonic | Piecewise:
-    """Return the term with its members along the first axis; what is the same for all has one."""
+    """Return the term with its members along the first axis, of length one for arrays common to all."""
 
     def rows(values: Array, axes: int) -> Array:
         inner = values.shape[values.ndim - axes :]

@@ -1,4 +1,4 @@
-"""Slow flow of a model by multiple scales, and the numbers of its symbols."""
+"""Slow flow of a model by multiple scales, and the values of its symbols."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def slow_flow(model: Model, resonance: Any, order: int = 1, modes: int | None = 
         (varpi about k omega_n); ``('internal', m, n, k)`` (omega_n about k omega_m). Modes are counted from 1.
     order : {1}
         The first order at which the amplitudes change: second in the amplitude where quadratic terms resonate, else
-        third, with what quadratic terms add by way of the second.
+        third, including second-order effects of quadratic terms.
     modes : int, optional
-        How many modes the second-order solution holds; default: those of the resonance.
+        Number of modes in the second-order solution; default: those of the resonance.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def slow_flow(model: Model, resonance: Any, order: int = 1, modes: int | None = 
 
 @checks.default_floating_point
 def slow_flow_values(flow: SlowFlow, system: System) -> dict[Symbol, float]:
-    """Return the numbers of the symbols of a slow flow: frequencies, decay rates and coefficients.
+    """Return the values of the symbols of a slow flow: frequencies, decay rates and coefficients.
 
     Parameters
     ----------

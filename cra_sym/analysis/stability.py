@@ -20,11 +20,11 @@ from cra_sym.si import paired
 __all__ = ["AsymptoticWarning", "ResonanceWarning", "forced_width", "judged_boundary", "stability_boundary"]
 
 _FORCED = derived_kernel("cra_sym.mechanics.boundaries:forced_growth")
-_REACH = 0.5  # share of the half-width by which second order may move the zone
+_REACH = 0.5  # largest second-order shift of the zone over its half-width
 
 
 class ResonanceWarning(UserWarning):
-    """A resonance asked for has no instability; the boundary is nan there.
+    """The requested resonance has no instability; the boundary is nan there.
 
     Examples
     --------
@@ -38,7 +38,7 @@ class ResonanceWarning(UserWarning):
 
 
 class AsymptoticWarning(UserWarning):
-    """A boundary is returned where its expansion in epsilon cannot be trusted.
+    """A boundary is returned outside the range in which its expansion in epsilon is reliable.
 
     Examples
     --------
@@ -74,24 +74,24 @@ def stability_boundary(
     resonance : (int, int)
         ``(n, n)`` principal, ``(m, n)`` sum, ``(m, -n)`` difference; modes are counted from 1.
     order : {1, 2}
-        Order in epsilon. The second one moves the zone; where the boundary is a derived formula, its width stays. It
-        contains the response of all modes of the system, not only of the first ``modes``: of 24, and of those beyond
-        by their statics where stiffnesses of ends fluctuate and damping is modal.
+        Order in epsilon. The second one shifts the zone, without a change of width where the boundary is a derived
+        formula. It includes the response of other modes than the first ``modes``: of 24, and the static response of all
+        others where stiffnesses of ends fluctuate and damping is modal.
     modes : int
-        How many modes may take part, 1 to 1000; other resonances among them are checked for overlap.
+        Number of modes, 1 to 1000; other resonances among them are checked for overlap.
     tongue : {1, 2}
-        2 asks for the zone about half the frequency, (omega_m + omega_n) / 2, whose width is of order epsilon^2.
+        2: the zone near half the frequency, (omega_m + omega_n) / 2, whose width is of order epsilon^2.
 
     Returns
     -------
     lower, upper : ndarray
-        rad/s, shape broadcast from system, excitation and epsilon; nan where there is no instability. Where one of two
-        modes is damped and the other is not, vibration grows at every detuning, slowly at large ones: 0 and inf.
+        rad/s, shape broadcast from system, excitation and epsilon; nan where there is no instability. If only one of
+        the two modes is damped, vibration grows at every detuning, slowly at large ones: 0 and inf.
 
     Warns
     -----
     ResonanceWarning
-        Where there is none, and why.
+        Where there is no instability; the message gives the reason.
     AsymptoticWarning
         Where the zone overlaps that of another resonance, or epsilon is too large for the expansion.
 
@@ -102,10 +102,10 @@ def stability_boundary(
 
     Notes
     -----
-    For one stiffness that goes with cos(varpi t) and modal damping, the boundary is derived by multiple scales,
-    (37)-(49). Elsewhere all states but those of the two modes are eliminated to second order
-    (:mod:`cra_sym.solvers.normal_form`). Modes are then those of the whole system with what does not oscillate,
-    dampers and gyroscopic forces included, by ascending frequency.
+    For one stiffness proportional to cos(varpi t) and modal damping, the boundary is derived by multiple scales,
+    (37)-(49). Otherwise all states but those of the two modes are eliminated to second order
+    (:mod:`cra_sym.solvers.normal_form`). Modes are then those of the system without its oscillating terms, with dampers
+    and gyroscopic forces, by ascending frequency.
 
     Examples
     --------
@@ -162,9 +162,9 @@ def judged_boundary(
 def forced_width(system: System, excitation: TransverseBase, modes: int = 3) -> np.ndarray:
     """Return the measure of the forced resonances of a transverse base, (49a).
 
-    It is ``|Gamma_n phi_n(L)| omega_n w_1 / (2 M_n)``, and not a boundary. A base that shakes across the span at a
-    natural frequency makes the tip's amplitude grow in proportion to time, without damping at this rate for
-    epsilon = 1. It does not depend on how modes are scaled.
+    It is ``|Gamma_n phi_n(L)| omega_n w_1 / (2 M_n)``, and not a boundary. A transverse base motion at a
+    natural frequency makes the undamped tip amplitude grow linearly in time, at this rate for epsilon = 1. The measure
+    does not depend on the normalisation of the modes.
 
     Parameters
     ----------
@@ -220,14 +220,14 @@ def _resonance(resonance: Any, modes: int) -> tuple[int, int]:
         raise ValueError(
             f"resonance = {resonance!r}: {allowed}; the difference of a mode with itself is not a frequency"
         )
-    # which of the two is named first does not matter; omega_m - omega_n is to be positive
+    # the order of the two modes does not matter; omega_m - omega_n is made positive
     return (-second, -first) if second < 0 and first < -second else (first, second)
 
 
 def _explained(
     zone: Zone, alone: bool, excitation: Parametric, first: int, second: int
 ) -> Iterator[tuple[type[UserWarning], str]]:
-    """Say why there is no zone, where there is none."""
+    """Return a message with the reason why there is no zone."""
     name = f"resonance ({first}, {second})"
     rest = zone.centre <= 0
     reasons = [
@@ -260,7 +260,7 @@ def _doubted(
     *,
     rival: bool,
 ) -> Iterator[tuple[type[UserWarning], str]]:
-    """Say where the expansion cannot be trusted; with ``rival``, second order is to be smaller than first."""
+    """Return a message if the expansion is not reliable; with ``rival``, the second order must be below the first."""
     name = f"resonance {resonance}"
     there = ~np.isnan(zone.half_width) & (epsilon > 0)
     with np.errstate(invalid="ignore"):
@@ -290,7 +290,7 @@ def _overlapping(
             other = first_order_zone(system, excitation, epsilon, m, n, modes)
             if _touches(zone, other.centre, other.half_width):
                 found.append(f"({m}, {n})")
-            # the second tongue, of order epsilon^2, lies at half the frequency; worth its sums only where it is near
+            # the second tongue, of order epsilon^2, lies at half the frequency and is computed only if it is near
             if _touches(zone, other.centre / 2, 2 * zone.half_width):
                 second = zone_of(system, excitation, epsilon, m, n, 2, modes)
                 if _touches(zone, second.centre + second.shift, second.half_width):

@@ -1,4 +1,4 @@
-"""A system as a linear one for control design: from a motion or forces to anything that can be measured."""
+"""Linear state-space systems for control design, from motions or forces to measurable outputs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def state_space(
     input: str | Expr | Sequence[str | Expr] = "base_acceleration",
     outputs: Sequence[str | tuple[str, float] | Expr] | Mapping[str, Any] | None = None,
 ) -> LinearSystem:
-    """Return the continuous-time system from what drives to what is measured, in modal coordinates.
+    """Return the continuous-time state space from inputs to outputs, in modal coordinates.
 
     Parameters
     ----------
@@ -49,13 +49,14 @@ def state_space(
         many eigenvalues as that many oscillators have.
     input : str or Expr, or a sequence of them
         'base_acceleration': w'' (m/s2) of the only prescribed motion. 'drive_force': a force F (N) on that motion,
-        which is then free; of an arm (m_b + m_e + rho A L) w'' + sum Gamma_i q_i'' = F. A prescribed motion or a
-        force of the Lagrangian, as w(t) or by its name: its acceleration, itself. Or a displacement that a unit force
+        which is then free; of an arm (m_b + m_e + rho A L) w'' + sum Gamma_i q_i'' = F. The acceleration of a
+        prescribed motion, or a force of the Lagrangian, as w(t) or by its name. Or a displacement that a unit force
         acts on: a coordinate, a field or slope at any place such as ``v.subs(x, L/2)``, or a sum of them.
     outputs : sequence, or mapping of names to them, optional
         Names: of a field (at the right end), a coordinate, a prescribed motion; 'y', 'tip_velocity' and
         'tip_acceleration' of the first field there in the inertial frame, prescribed motions included; 'root_force',
-        'root_moment', 'tip_force' and 'tip_moment', what the structure exerts on what holds its ends, of springs k_t
+        'root_moment', 'tip_force' and 'tip_moment', the forces and moments that the structure exerts on its supports,
+        for springs k_t
         v(0, t) and k_r v_x(0, t) (of another field u 'root_force_u'); of an arm 'strain', that of bending on the face
         turned to -v, h v_xx / 2, at the root. A pair ``('v', 0.3)`` or ``('strain', 0.3)`` takes a field or the strain
         at another place, m. Expressions linear in fields at places, coordinates, motions and their derivatives, of
@@ -72,8 +73,8 @@ def state_space(
     Raises
     ------
     TypeError, ValueError
-        If ``system`` is not a :class:`System` or is a batch, its model does not have the motion that is asked for,
-        ``modes`` is not an integer from 1 to 1000, or an input or output is none of the above. Complex modes have no
+        If ``system`` is not a :class:`System` or is a batch, its model does not have the motion, ``modes`` is not an
+        integer from 1 to 1000, or an input or output is not one of the above. Complex modes have no
         'drive_force' and no forces at the ends: make the motion a coordinate that a force F(t) drives, and name the
         force of a spring as an expression such as ``k*v.subs(x, 0)``.
 
@@ -82,9 +83,10 @@ def state_space(
     Constant loads are left out: states are measured from the equilibrium. An initial base velocity is the state q_i' =
     -Gamma_i w'(0+). ``scipy.signal.lsim`` interpolates its input linearly between the samples; ``discrete`` holds it.
 
-    The modes left out would add the sum of c_i b_i / (omega_i^2 - Omega^2) to the transfer function of a displacement
-    or force, with c_i and b_i what output and input see of mode i: for displacements it falls with the third power of
-    the number of modes or faster; for the force at a rigid root only as its inverse, by the effective masses left out.
+    The omitted modes would add the sum of c_i b_i / (omega_i^2 - Omega^2) to the transfer function of a displacement or
+    force, with the output and input factors c_i and b_i of mode i: for displacements it falls with the third power of
+    the number of modes or faster; for the force at a rigid root only as its inverse, by the effective masses of the
+    omitted modes.
 
     Examples
     --------
@@ -118,7 +120,7 @@ def state_space(
 
 
 def _sequence(name: str, given: Any) -> Sequence[Any]:
-    """Return one thing or several as several."""
+    """Return a single entry or a sequence of entries as a tuple."""
     several = list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
     if not 0 < len(several) <= _MOST:
         raise ValueError(f"{name} = {shown(given)}: must be from 1 to {_MOST}")
@@ -129,7 +131,7 @@ def _sequence(name: str, given: Any) -> Sequence[Any]:
 
 
 def _outputs(system: System, given: Any) -> dict[str, Observable]:
-    """Return what is measured, by name."""
+    """Return the outputs, by name."""
     if given is None:
         known = system.numerics("named_observables")
         tip = next(iter(known))
@@ -185,7 +187,7 @@ def _read(system: System, expression: Any, argument: str) -> Observable:
 
 
 def _rows(system: System, found: Modes, of: Observable) -> tuple[list[Array], dict[tuple[str, int], float]]:
-    """Return what q, q' and q'' add to an observable, and the factors of prescribed motions by (name, derivative)."""
+    """Return the rows of q, q' and q'' in an observable, and its factors of motions by (name, derivative)."""
     numbers = [float(number) for number in of.numbers.function(*system.domain.values)]
     rows = [np.zeros(found.omega.shape[-1]) for _ in range(3)]
     motions: dict[tuple[str, int], float] = {}
@@ -206,7 +208,7 @@ def _rows(system: System, found: Modes, of: Observable) -> tuple[list[Array], di
 
 @dataclass(frozen=True)
 class _Input:
-    """One input: of the acceleration of a motion, of a force on a free motion, of a load, or on a displacement."""
+    """One input: the acceleration of a motion, a force on a free motion, a load, or a force on a displacement."""
 
     kind: str
     name: str
@@ -215,7 +217,7 @@ class _Input:
 
     @classmethod
     def of(cls, system: System, given: Any) -> _Input:
-        """Return what a user names."""
+        """Return the input that the user names."""
         if isinstance(given, str) and given in (_BASE, _FREE):
             return cls("free" if given == _FREE else "motion", only_motion(system), given)
         causes = dict(system.numerics("causes"))
@@ -265,7 +267,7 @@ def _equations(
 
 
 def _push(system: System, modes: int, states: Sequence[str], one: _Input, *, free: bool) -> Array:
-    """Return the generalised force of one unit of an input on (motions that are states, q)."""
+    """Return the generalised force of a unit of an input on (motions that are states, q)."""
     base, q = np.zeros(len(states)), np.zeros(modes)
     if one.kind == "free":
         base[0] = 1.0
@@ -290,7 +292,7 @@ def _measured(
     wanted: Mapping[str, Observable],
     driven: Sequence[_Input],
 ) -> LinearSystem:
-    """Return the linear system of the equations and of what is measured."""
+    """Return the linear system of the equations and the outputs."""
     by_state, by_input = accelerations
     size = len(by_state)
     A = np.vstack([np.hstack([np.zeros((size, size)), np.eye(size)]), by_state])

@@ -1,7 +1,7 @@
-"""What the modes left out contribute by their statics, when the stiffness of an end fluctuates.
+"""Static correction of omitted modes when the stiffness of an end fluctuates.
 
-What the modes beyond the first ones add to the receptance at the springs is analytic up to the next natural frequency,
-so its value and slope at rest follow from the exact receptance where it is well conditioned.
+The contribution of the omitted modes to the receptance at the springs is analytic up to the next natural frequency, so
+its value and slope at zero frequency follow from the exact receptance where that is well conditioned.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 def moments_of_other_modes(system: System, excitation: Fluctuation, modes: int) -> tuple[Array, Array]:
-    """Return the sums over the modes j beyond the first ones of b_sj b_rj / omega_j^2 and / omega_j^4.
+    """Return the sums over the omitted modes j of b_sj b_rj / omega_j^2 and / omega_j^4.
 
     b is as in `Fluctuation.spring_displacements`.
 
@@ -31,7 +31,7 @@ def moments_of_other_modes(system: System, excitation: Fluctuation, modes: int) 
         1 and s2; 0 for an infinite stiffness.
     """
     names = excitation.springs(system)
-    if modes >= system.most_modes:  # no modes are left out
+    if modes >= system.most_modes:  # no modes are omitted
         nothing = np.zeros((*system.shape, len(names), len(names)))
         return nothing, nothing
     problem: SpatialProblem = system.numerics("spatial")
@@ -64,11 +64,11 @@ def moments_of_other_modes(system: System, excitation: Fluctuation, modes: int) 
 
 
 def static_terms(system: System, excitation: Fluctuation, modes: int) -> tuple[Array, Array]:
-    r"""Return the coupling in rank-one terms that include the statics of the modes left out.
+    r"""Return the coupling as rank-one terms that include the static correction of the omitted modes.
 
-    The fluctuating springs act on their displacements, to which the modes left out give a static share. With R its
-    matrix and a the weights the stiffness is :math:`B^T a\,\epsilon c\,(1 + R a\,\epsilon c)^{-1} B` for
-    :math:`c = \cos\varpi t`, and the eigenvectors of :math:`a^{1/2} R a^{1/2}` split it.
+    The fluctuating springs act on displacements to which the omitted modes contribute statically. With the static
+    flexibility R and the weights a the stiffness is :math:`B^T a\,\epsilon c\,(1 + R a\,\epsilon c)^{-1} B` for
+    :math:`c = \cos\varpi t`, and the eigenvectors of :math:`a^{1/2} R a^{1/2}` decouple it.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Further starts of steady states: loads that grow from zero, and motions that are integrated until they settle."""
+"""Further starts of steady states: continuation in the load level, and time integration until motions settle."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from cra_sym.solvers.driven_curve import Driven
 __all__ = ["mirrored", "settling", "shifted", "traced"]
 
 Array = NDArray[np.float64]
-_MOST_POINTS = 250  # of a curve over the level
-_FULL, _HIGHEST = np.arcsinh(1.0), np.arcsinh(10.0)  # the level is the hyperbolic sine of what steps are taken in
-_CYCLES, _DECAY = (60, 200), 12.0  # periods that are integrated; decay of a transient that is enough
-_TOLERANCE, _PUSH = 1e-5, 1e-2  # of the integration; of what an unstable answer is pushed by
+_MOST_POINTS = 250  # points of a curve over the level
+_FULL, _HIGHEST = np.arcsinh(1.0), np.arcsinh(10.0)  # the level is the hyperbolic sine of the continuation parameter
+_CYCLES, _DECAY = (60, 200), 12.0  # periods of integration; sufficient decay of a transient
+_TOLERANCE, _PUSH = 1e-5, 1e-2  # tolerance of the integration; relative perturbation of an unstable solution
 
 
 def traced(problem: DrivenProblem, point: Array, size: float, start: Array | None = None) -> Array:
-    """Return the answers on a curve over the level of all that excites, through its folds.
+    """Return the solutions on a curve over the level of the whole excitation, through its folds.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def traced(problem: DrivenProblem, point: Array, size: float, start: Array | Non
     size : float
         Modal amplitude at which nonlinear forces matter.
     start : ndarray, shape (unknowns,), optional
-        An answer on the curve; default: rest, with nothing that excites.
+        A solution on the curve; default: rest, at zero excitation.
 
     Returns
     -------
@@ -71,12 +71,12 @@ def traced(problem: DrivenProblem, point: Array, size: float, start: Array | Non
 
 
 def shifted(problem: DrivenProblem, unknowns: Array) -> list[Array]:
-    """Return answers shifted by one, two .. periods of the excitation, each of shape (answers, unknowns)."""
+    """Return solutions shifted by one, two .. periods of the excitation, each of shape (solutions, unknowns)."""
     return [_moved(problem, unknowns, float(number), 1.0) for number in range(1, problem.period)]
 
 
 def mirrored(problem: DrivenProblem, unknowns: Array) -> Array:
-    """Return answers mirrored, and shifted by half a period of what pushes; some systems have these answers too."""
+    """Return solutions with opposite sign, and shifted by half a period; symmetric systems have these too."""
     return _moved(problem, unknowns, 0.0 if problem.driven.rests else 0.5, -1.0)
 
 
@@ -89,21 +89,21 @@ def _moved(problem: DrivenProblem, unknowns: Array, shift: float, sign: float) -
 
 
 def settling(problem: DrivenProblem, points: Array, starts: Array, size: float) -> Array:
-    """Return what motions have become that leave unstable answers, as harmonics of their last period.
+    """Return the motions that perturbed unstable solutions settle to, as harmonics of their last period.
 
     Parameters
     ----------
     problem : DrivenProblem
     points : ndarray, shape (motions, 2)
     starts : ndarray, shape (motions, unknowns)
-        Answers; each is pushed a little.
+        Solutions, each of which is perturbed slightly.
     size : float
         Modal amplitude at which nonlinear forces matter.
 
     Returns
     -------
     ndarray, shape (motions, unknowns)
-        nan where a motion runs away.
+        nan where a motion diverges.
     """
     basis, equations, n = problem.basis, problem.driven.equations, problem.driven.equations.modes
     frequency, x = points[:, 0] / problem.period, problem.coefficients(starts)

@@ -1,4 +1,4 @@
-"""The search for all periodic answers: many starts, and what is found is handed to neighbouring points."""
+"""Search for all periodic solutions: many starts, and propagation of solutions to neighbouring points."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ __all__ = ["Answers", "answers_at", "is_stable"]
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Problem = DrivenProblem | SlipProblem
-_SAME = 1e-6  # of the size of two answers that are one
-_ALIKE = 0.05  # relative distance of answers that neighbouring points turn into the same one
-_ROUNDS = 60  # in which answers are handed to neighbouring points
-_TRACED, _FEW = 5, 3  # points at which curves over the level are followed from rest, and if so few from answers too
-_LONELY, _TRIES = 3, 3  # points without a stable answer at which motions are integrated; how often for few points
+_SAME = 1e-6  # relative distance below which two solutions are the same
+_ALIKE = 0.05  # relative distance of solutions at neighbouring points that belong together
+_ROUNDS = 60  # rounds in which solutions are passed to neighbouring points
+_TRACED, _FEW = 5, 3  # points at which curves over the level are followed from rest, and from solutions too if so few
+_LONELY, _TRIES = 3, 3  # points without a stable solution at which motions are integrated; rounds for few points
 UNSTABLE, UNSTABLE_UNDAMPED = 1e-9, 1e-6
-"""Beyond the unit circle a multiplier means instability; without damping pairs on the circle split by rounding."""
+"""Largest distance of a multiplier outside the unit circle of a stable motion; without damping pairs split by
+rounding."""
 
 
 class Answers(NamedTuple):
-    """Answers of a problem: the point of each (answers,), unknowns (answers, size), multipliers (answers, 2 modes)."""
+    """Solutions: the point of each (solutions,), unknowns (solutions, size), multipliers (solutions, 2 modes)."""
 
     problem: Problem
     where: NDArray[np.intp]
@@ -36,7 +37,7 @@ class Answers(NamedTuple):
 
 
 def is_stable(problem: Problem, multipliers: Complex) -> NDArray[np.bool_]:
-    """Return whether no multiplier is beyond the unit circle, shape (answers,)."""
+    """Return whether no multiplier is outside the unit circle, shape (solutions,)."""
     bound = 1.0 + (UNSTABLE if _damped(problem) else UNSTABLE_UNDAMPED)
     return np.asarray(np.abs(multipliers).max(axis=1, initial=0.0) <= bound)
 
@@ -47,7 +48,7 @@ def _damped(problem: Problem) -> bool:
 
 
 def answers_at(problem: Problem, points: Array, shape: tuple[int, int]) -> Answers:
-    """Return the distinct answers at every point.
+    """Return the distinct solutions at every point.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ def answers_at(problem: Problem, points: Array, shape: tuple[int, int]) -> Answe
 
 
 def _search_on(problem: DrivenProblem, points: Array, order: NDArray[np.intp], size: float, search: _Search) -> None:
-    """Search for answers that the first starts and their neighbours do not lead to."""
+    """Search for solutions that are not reached from the first starts and from neighbours."""
     if problem.driven.equations.degree == 1:
         return
     for at in [] if problem.driven.rests else sampled(points, order, _TRACED):
@@ -95,13 +96,13 @@ def _search_on(problem: DrivenProblem, points: Array, order: NDArray[np.intp], s
 
 
 def _among(answer: Array, known: list[Array], size: float) -> bool:
-    """Tell whether an answer is one of those known."""
+    """Tell whether a solution is one of the known ones."""
     same = _SAME * (size + np.linalg.norm(answer))
     return any(np.linalg.norm(answer - other) <= same for other in known)
 
 
 def _alike(answer: Array, known: list[Array]) -> int:
-    """Return how many of the answers known are near to one."""
+    """Return the number of known solutions close to a given one."""
     if not known:
         return 0
     apart = np.array(known) - answer
@@ -117,13 +118,13 @@ def _order(points: Array, shape: tuple[int, int]) -> NDArray[np.intp]:
 
 
 class _Search:
-    """What has been found so far."""
+    """Solutions found so far."""
 
     def __init__(self, problem: Problem, points: Array, order: NDArray[np.intp], size: float) -> None:
         self._problem, self._points, self._size = problem, points, size
         self._floor = 1e-14 * size * problem.fastest**2
         self.found: list[list[Array]] = [[] for _ in points]
-        self._first: list[list[int]] = [[] for _ in points]  # which answer each is a shifted one of
+        self._first: list[list[int]] = [[] for _ in points]  # index of the solution of which each is a time shift
         self._values: list[list[Complex]] = [[] for _ in points]
         self._near: list[list[int]] = [[] for _ in points]
         for lines in (order, order.T):
@@ -132,7 +133,7 @@ class _Search:
                 self._near[other].append(int(one))
 
     def run(self, where: NDArray[np.intp], starts: Array) -> None:
-        """Solve from starts, and hand new answers on until there is none."""
+        """Solve from starts, and pass new solutions on to neighbours until there are none."""
         for turn in range(_ROUNDS):
             if not len(where):
                 return
@@ -144,7 +145,7 @@ class _Search:
             starts = np.array([answer for _, answer in handed])
 
     def _handed(self, new: list[tuple[int, Array]]) -> list[tuple[int, Array]]:
-        """Return new answers for the neighbours that do not know as many of their kind."""
+        """Return new solutions as starts for neighbours that have fewer similar ones."""
         given: dict[int, list[Array]] = {}
         found = []
         for at, answer in new:
@@ -160,11 +161,11 @@ class _Search:
         return found
 
     def run_at(self, at: int, starts: Array) -> None:
-        """Do so from starts at one point."""
+        """Solve from starts at one point, and pass new solutions on."""
         self.run(np.full(len(starts), at), starts)
 
     def _mirrored(self, new: list[tuple[int, Array]]) -> list[tuple[int, Array]]:
-        """Return answers that are those found in a mirror, and were not known."""
+        """Return the solutions of opposite sign that were not known."""
         if not new or not isinstance(self._problem, DrivenProblem):
             return []
         where, starts = np.array([at for at, _ in new]), mirrored(self._problem, np.array([x for _, x in new]))
@@ -172,7 +173,7 @@ class _Search:
         return [(int(at), x) for at, x in zip(where[good], starts[good], strict=True) if self._is_new(int(at), x)]
 
     def _is_new(self, at: int, answer: Array) -> bool:
-        """Keep an answer, and those it is shifted in time, if it is new."""
+        """Store a solution, and its time shifts, if it is new."""
         if _among(answer, self.found[at], self._size):
             return False
         self._first[at].append(len(self.found[at]))
@@ -185,7 +186,7 @@ class _Search:
         return True
 
     def _judge(self) -> None:
-        """Compute the multipliers that are missing; answers that differ by a shift have the same."""
+        """Compute the missing multipliers; solutions that differ by a time shift have the same."""
         open_ = [
             (at, k)
             for at, first in enumerate(self._first)
@@ -195,20 +196,20 @@ class _Search:
         if open_:
             where = np.array([at for at, _ in open_])
             unknowns = np.array([self.found[at][k] for at, k in open_])
-            told = dict(zip(open_, self._problem.multipliers(unknowns, self._points[where]), strict=True))
+            multipliers = dict(zip(open_, self._problem.multipliers(unknowns, self._points[where]), strict=True))
             for at, first in enumerate(self._first):
                 for k in range(len(self._values[at]), len(first)):
-                    self._values[at].append(told[at, k] if first[k] == k else self._values[at][first[k]])
+                    self._values[at].append(multipliers[at, k] if first[k] == k else self._values[at][first[k]])
 
     def without_stable(self) -> list[int]:
-        """Return the points at which no stable answer is known."""
+        """Return the points at which no stable solution is known."""
         self._judge()
         return [
             k for k, values in enumerate(self._values) if not any(is_stable(self._problem, v[None]) for v in values)
         ]
 
     def answers(self) -> Answers:
-        """Return all that was found."""
+        """Return all solutions found."""
         self._judge()
         where = np.array([k for k, known in enumerate(self.found) for _ in known], int)
         unknowns = np.array([x for known in self.found for x in known])

@@ -1,4 +1,4 @@
-"""Starts for steady states: rest, all answers of one mode with one harmonic, free vibration with several phases."""
+"""Starts for steady states: rest, all one-mode, one-harmonic solutions, free vibration with several phases."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from cra_sym.solvers.polynomial_roots import monomials_up_to, polynomial_roots
 __all__ = ["sampled", "seeds"]
 
 Array = NDArray[np.float64]
-_SAMPLED = 9  # frequencies at which each mode alone is solved, unless that is the whole problem
+_SAMPLED = 9  # frequencies at which each mode is solved alone, unless it is the whole problem
 _PHASES = 4
-_FAR = 0.5  # a harmonic this far from a natural frequency, relative to it, is not tried
+_FAR = 0.5  # relative distance from a natural frequency beyond which a harmonic is not tried
 
 
 def seeds(
@@ -40,7 +40,7 @@ def seeds(
         The point each start belongs to.
     starts : ndarray, shape (starts, unknowns)
     size : float
-        Modal amplitude at which nonlinear forces are as large as linear ones, or that of the linear answer.
+        Modal amplitude at which nonlinear forces are as large as linear ones, or that of the linear response.
     """
     n, harmonics = driven.equations.modes, len(basis.cosines) - 1
     only = n == 1 and harmonics == 1
@@ -55,7 +55,7 @@ def seeds(
             continue
         for at in picked:
             for harmonic in _harmonics(alone, points[at, 0] / period, harmonics, only):
-                small = _One(alone, harmonic, period, points[at], size)
+                small = _SingleMode(alone, harmonic, period, points[at], size)
                 for constant, cosine, sine in small.answers(with_free=not only):
                     x = np.zeros((n, basis.size))
                     x[mode, [0, harmonic, harmonics + harmonic]] = constant, cosine, sine
@@ -66,7 +66,7 @@ def seeds(
 
 
 def sampled(points: Array, order: NDArray[np.intp], most: int = _SAMPLED) -> NDArray[np.intp]:
-    """Return the numbers of some points: a few frequencies of the smallest, middle and largest excitation."""
+    """Return the indices of some points: a few frequencies of the smallest, middle and largest excitation."""
     sizes = np.unique(points[:, 1])
     chosen = sizes[np.unique([0, len(sizes) // 2, len(sizes) - 1])]
     rows = [order[points[order, 1] == size] for size in chosen]
@@ -82,13 +82,13 @@ def _harmonics(alone: Forced, frequency: float, harmonics: int, only: bool) -> l
 
 
 def _size(alone: Forced) -> float:
-    """Return the amplitude at which nonlinear and linear forces of one mode are alike; inf for a linear mode."""
+    """Return the amplitude at which nonlinear and linear forces of one mode are equal; inf for a linear mode."""
     equations = alone.equations
     free = equations.free()
     forces = tuple(t for t in equations.forces if not t.causes and t.positions + t.velocities > 1)
     omega = max(float(equations.omega[0]), 1e-300)
     exponents = np.linspace(-40.0, 40.0, 81)
-    for _ in range(4):  # ever finer tables about the first exponent at which they are alike
+    for _ in range(4):  # successively finer tables around the first exponent at which they are equal
         q = 10.0 ** exponents[:, None]
         found = free.derivatives(q, omega * q)
         other = type(free)(free.omega, free.damping, (), forces).derivatives(q, omega * q)
@@ -101,7 +101,7 @@ def _size(alone: Forced) -> float:
     return float(10.0**high)
 
 
-class _One:
+class _SingleMode:
     """One mode with a constant and one harmonic: polynomials in three unknowns."""
 
     def __init__(self, alone: Forced, harmonic: int, period: int, point: Array, size: float) -> None:
@@ -118,7 +118,7 @@ class _One:
         return balance.residual(unknowns, frequency, np.repeat(self._causes, len(unknowns), axis=0))[0]
 
     def answers(self, *, with_free: bool) -> Array:
-        """Return all real answers, and free vibration at the frequency with several phases, shape (answers, 3)."""
+        """Return all real solutions, and free vibration at the frequency with several phases, shape (solutions, 3)."""
         exponents = np.array(monomials_up_to(3, self._degree))
         points = np.random.default_rng(1).uniform(-1.5, 1.5, (2 * len(exponents), 3))
         table = np.prod(points[:, None, :] ** exponents, axis=-1)

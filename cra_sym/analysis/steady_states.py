@@ -1,4 +1,4 @@
-"""Steady states of nonlinear systems under periodic excitation: all periodic answers that are found, with stability."""
+"""Steady states of nonlinear systems under periodic excitation: all periodic solutions found, with their stability."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ __all__ = ["SteadyState", "steady_states"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-_WIDE = 1e4  # ratio of the frequencies of modes and excitation
+_WIDE = 1e4  # largest ratio of the frequencies of modes and excitation
 
 
 @dataclass(frozen=True, eq=False)
 class SteadyState(checks.ByValue):
-    """A periodic answer.
+    """A periodic solution.
 
     Attributes
     ----------
@@ -37,14 +37,14 @@ class SteadyState(checks.ByValue):
     epsilon : float or None
         Of the excitation, if there is one.
     amplitude : float
-        Peak at the tip, or of what was chosen.
+        Peak at the tip, or of the chosen displacement.
     stable : bool
         Whether no Floquet multiplier lies outside the unit circle.
     multipliers : complex ndarray, shape (2 modes,)
-        Over one period of the answer, largest first.
+        Over one period of the solution, largest first.
     coefficients : ndarray, shape (modes, 2 harmonics + 1)
         Modal coordinates as sums of the constant, the cosines and then the sines of k varpi t / period. With
-        elastic-slip elements the amplitude holds the statics of the modes left out besides.
+        elastic-slip elements the amplitude also includes the static contribution of the omitted modes.
 
     Examples
     --------
@@ -73,20 +73,20 @@ class SteadyState(checks.ByValue):
 
     @cached_property
     def error_modes(self) -> float:
-        """Estimated relative error of the motion for want of modes: what three more change."""
+        """Estimated relative error of the motion by truncation of the modes: its change with three more."""
         return self._problem.changed(3, 0, self._unknowns, self._at)
 
     @cached_property
     def error_harmonics(self) -> float:
-        """Estimated relative error of the motion for want of harmonics: what four more change.
+        """Estimated relative error of the motion by truncation of the harmonics: its change with four more.
 
-        With elastic-slip elements, what twice as many change, or if these do not converge what the last doubling did.
+        With elastic-slip elements, with twice as many, or by the last doubling if these do not converge.
         """
         return self._problem.changed(0, 4, self._unknowns, self._at)
 
     @cached_property
     def loss(self) -> float:
-        """Energy that elastic-slip elements take in a period of the answer, J."""
+        """Energy dissipated by elastic-slip elements in a period of the solution, J."""
         return self._problem.loss(self._unknowns)
 
     def __repr__(self) -> str:
@@ -95,7 +95,7 @@ class SteadyState(checks.ByValue):
 
 
 class _Options(TypedDict, total=False):
-    """What the overloads of :func:`steady_states` have in common."""
+    """Arguments common to the overloads of :func:`steady_states`."""
 
     excitation: Parametric | None
     drive: Mapping[Any, float] | None
@@ -138,16 +138,16 @@ def steady_states(
     place: Any = None,
     field: Any = None,
 ) -> list[list[tuple[SteadyState, ...]]] | list[tuple[SteadyState, ...]] | tuple[SteadyState, ...]:
-    """Return the periodic answers of a system that is excited parametrically, driven, or both.
+    """Return the periodic solutions of a system with parametric excitation, harmonic input, or both.
 
-    Elastic-slip elements are exact between their events. Of the answers in which one sticks, which form a continuum,
-    it is the one whose slider is at rest at 0 or, if it does not hold there, as near as it does.
+    Elastic-slip elements are treated exactly between events. Solutions in which an element always sticks form a
+    continuum, of which the one with the slider at 0, or as near to 0 as possible, is returned.
 
-    Harmonic balance from many starts: rest, all answers of each mode alone with its nearest harmonic (by elimination,
-    so that none of these is missed), free vibration with several phases, the curve of answers to loads that grow from
-    zero, and the answers at neighbouring frequencies and sizes, handed on until no new one appears. Where all of them
-    are unstable, motions are integrated until they settle. For one mode and one harmonic the answers are complete;
-    else one that is far from all others may be missed.
+    Harmonic balance is solved from many starts: rest, all solutions of each mode alone with its nearest harmonic (by
+    elimination, so that none of these is missed), free vibration with several phases, the solution curve for loads that
+    grow from zero, and solutions at neighbouring frequencies and sizes, until no new one appears. Where all solutions
+    are unstable, motions are integrated in time until they settle. For one mode and one harmonic the set is complete;
+    otherwise a solution far from all others may be missed.
 
     Parameters
     ----------
@@ -156,19 +156,19 @@ def steady_states(
     angular_frequency : array_like
         Of the excitation, rad/s: a number or one axis.
     excitation : Fluctuation, JointStiffness, AxialBase or ``model.excitation``, optional
-        What of the Lagrangian fluctuates with cos(varpi t).
+        Parametric excitation, proportional to cos(varpi t).
     epsilon : array_like, optional
         Its size: a number, or one axis for a chart.
     drive : mapping of function of t to float, optional
-        Amplitudes of prescribed motions and of forces that go with cos(varpi t).
+        Amplitudes of prescribed motions and of forces proportional to cos(varpi t).
     modes : int
-        How many linear modes take part, 1 to 40; with elastic-slip elements those of the system without them, and the
-        statics of all others at the elements.
+        How many linear modes take part, 1 to 40; with elastic-slip elements those of the system without them, with
+        static correction at the elements.
     harmonics : int, optional
-        Highest multiple of ``varpi / period``; the constant is there too. Default: 7; with elastic-slip elements as
-        many as bring the motion within 3e-7, at most 127, fewer where these do not converge (see `error_harmonics`).
+        Highest multiple of ``varpi / period``; the constant is included. Default: 7; with elastic-slip elements as many
+        as change the motion by less than 3e-7, at most 127, fewer where more do not converge (see `error_harmonics`).
     period : int
-        2 asks for answers of twice the period of the excitation.
+        2: solutions of twice the period of the excitation.
     zeta : array_like, optional
         Damping ratios; default: that of the system.
     place, field : optional
@@ -178,14 +178,15 @@ def steady_states(
     -------
     tuple of SteadyState, or list of tuples
         For a number, or for each entry of the axis; smallest first. With an axis of sizes a list of these, one for
-        each size. Answers that differ by a shift of time, such as the two of a principal parametric resonance, are two.
+        each size. Solutions that differ by a shift of time, such as the two of a principal parametric resonance, are
+        both returned.
 
     Warns
     -----
     ConvergenceWarning
-        If no answer was found at a frequency.
+        If no solution was found at a frequency.
     AsymptoticWarning
-        If slopes of an answer are beyond what ``quadratures`` of squared slopes hold.
+        If slopes of a solution are too large for ``quadratures`` of squared slopes.
 
     Raises
     ------
@@ -194,7 +195,7 @@ def steady_states(
 
     Examples
     --------
-    A mass on a hardening spring near resonance: three answers, of which two are stable.
+    A mass on a hardening spring near resonance: three solutions, of which two are stable.
 
     >>> from sympy import Function
     >>> import cra_sym as cra
@@ -231,29 +232,29 @@ def steady_states(
         )
     grid = np.stack(np.broadcast_arrays(flat, np.atleast_1d(sizes)[:, None]), axis=-1)
     points = flat if slipping else grid.reshape(-1, 2)
-    told = _told(answers_at(problem, points, grid.shape[:2]), points) if points.size else []
-    _say(told, points, problem)
-    rows = [told[k * flat.size : (k + 1) * flat.size] for k in range(np.size(sizes))]
+    per_point = _by_point(answers_at(problem, points, grid.shape[:2]), points) if points.size else []
+    _warn(per_point, points, problem)
+    rows = [per_point[k * flat.size : (k + 1) * flat.size] for k in range(np.size(sizes))]
     found = rows if varpi.ndim else [row[0] for row in rows]
     return found if sizes.ndim else found[0]
 
 
-def _say(told: list[tuple[SteadyState, ...]], points: Array, problem: DrivenProblem | SlipProblem) -> None:
-    """Warn of frequencies without an answer, and of answers that the expansion does not hold for."""
-    none = [k for k, answers in enumerate(told) if not answers]
+def _warn(per_point: list[tuple[SteadyState, ...]], points: Array, problem: DrivenProblem | SlipProblem) -> None:
+    """Warn of frequencies without a solution, and of solutions outside the range of the expansion."""
+    none = [k for k, answers in enumerate(per_point) if not answers]
     if none:
         more = f" and {len(none) - 1} others" if len(none) > 1 else ""
         where = float(np.reshape(points[none[0]], -1)[0])
-        warnings.warn(f"no answer was found at {where:.6g} rad/s{more}", ConvergenceWarning, stacklevel=4)
+        warnings.warn(f"no periodic solution was found at {where:.6g} rad/s{more}", ConvergenceWarning, stacklevel=4)
     if isinstance(problem, DrivenProblem) and problem.arguments["system"].model.pieces["quadratures"]:
-        coefficients = [state.coefficients for answers in told for state in answers]
+        coefficients = [state.coefficients for answers in per_point for state in answers]
         if coefficients:
             warn_of_slopes(problem.arguments["system"], problem.basis, np.array(coefficients))
 
 
-def _told(answers: Answers, points: Array) -> list[tuple[SteadyState, ...]]:
+def _by_point(answers: Answers, points: Array) -> list[tuple[SteadyState, ...]]:
     problem, where, unknowns, values = answers
-    told: list[list[SteadyState]] = [[] for _ in points]
+    per_point: list[list[SteadyState]] = [[] for _ in points]
     if where.size:
         coefficients, largest = problem.coefficients(unknowns), problem.peaks(unknowns, points[where])
         stable = is_stable(problem, values)
@@ -262,7 +263,7 @@ def _told(answers: Answers, points: Array) -> list[tuple[SteadyState, ...]]:
             varpi, epsilon = np.append(at, 1.0)[:2]
             size = None if problem.arguments["excitation"] is None else float(epsilon)
             size = problem.arguments["epsilon"] if isinstance(problem, SlipProblem) else size
-            told[where[k]].append(
+            per_point[where[k]].append(
                 SteadyState(
                     float(varpi),
                     size,
@@ -275,4 +276,4 @@ def _told(answers: Answers, points: Array) -> list[tuple[SteadyState, ...]]:
                     at,
                 )
             )
-    return [tuple(states) for states in told]
+    return [tuple(states) for states in per_point]

@@ -1,4 +1,4 @@
-"""Where a zone of instability lies and how wide it is: the derived kernels of multiple scales, fed with modes."""
+"""Position and width of zones of instability, from the derived kernels of multiple scales."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from cra_sym.model.system import System
 
 __all__ = ["Zone", "first_order_zone", "zone_of"]
 
-#: Modes in the sums of second order; those beyond enter by their statics (springs of ends) or not at all (what acts
-#: along the span, where the terms fall off with the sixth power of the mode's number).
+#: Modes in the sums of second order. Those beyond are included statically for springs of ends, and neglected for
+# #: excitations along the span, where the terms decrease with the sixth power of the mode number.
 _SPECTATORS = 24
-_SMALLEST = 1e-9  # epsilon, in place of 0, at which a zone has a strength but hardly a width
-_UNCOUPLED = 1e-24  # of a squared coupling over frequencies, in these: it is rounding
+_SMALLEST = 1e-9  # epsilon used in place of 0, at which a zone has a strength but negligible width
+_UNCOUPLED = 1e-24  # squared coupling over the frequencies below which it is rounding
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,11 @@ class Zone:
     free_half_width : ndarray
         Without damping.
     shift : ndarray
-        How far the second order moves the zone, rad/s; 0 in a zone to first order.
+        Second-order shift of the zone, rad/s; 0 to first order.
     strength : ndarray
-        Positive where the coupling can feed both modes, zero without coupling, negative where it cannot.
+        Positive where the coupling can destabilise both modes, zero without coupling, negative otherwise.
     sides : pair of ndarray, optional
-        Where they are not told by centre, shift and half-width.
+        Where they do not follow from centre, shift and half-width.
     """
 
     centre: np.ndarray
@@ -70,7 +70,7 @@ def _evaluate(name: str, values: dict[str, Any]) -> Any:
 
 
 def _kind(first: int, second: int) -> tuple[str, dict[str, int]]:
-    """Return the kind of resonance and the modes behind its labels, counted from 0; ``second`` is signed."""
+    """Return the kind of resonance and its modes, counted from 0; ``second`` is signed."""
     if first == second:
         return "principal", {"n": first - 1}
     return ("sum" if second > 0 else "difference"), {"m": first - 1, "n": abs(second) - 1}
@@ -79,7 +79,7 @@ def _kind(first: int, second: int) -> tuple[str, dict[str, int]]:
 def _quantities(
     system: System, modes: int, excitation: Parametric, epsilon: Any, first: int, second: int, tongue: int
 ) -> tuple[dict[str, Any], np.ndarray, np.ndarray]:
-    """Return what the kernels ask for by name, the exact resonance, and the coupling there."""
+    """Return the arguments of the kernels by name, the exact resonance, and the coupling there."""
     _, labels = _kind(first, second)
     omega = system.natural_frequencies(modes)
     centre = (omega[..., first - 1] + np.sign(second) * omega[..., abs(second) - 1]) / tongue
@@ -133,7 +133,7 @@ def _sums(
 def _paths_of_other_modes(
     system: System, excitation: Fluctuation, modes: int, row: int, target: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the sums over the modes j beyond the first ones of P_rj P_jt / omega_j^2 and / omega_j^4."""
+    """Return the sums over the omitted modes j of P_rj P_jt / omega_j^2 and / omega_j^4."""
     b = excitation.spring_displacements(system, modes)
     weights = np.stack(np.broadcast_arrays(*(excitation.weights[name] for name in excitation.springs(system))), axis=-1)
     first, last = (weights * b[..., mode] for mode in (row, target))
@@ -145,7 +145,7 @@ def _paths_of_other_modes(
 
 
 def derived(matrices: Matrices) -> bool:
-    """Tell whether the derived boundaries hold: one stiffness that goes with cos(varpi t), symmetric, modal damping."""
+    """Tell whether the derived boundaries apply: one symmetric stiffness times cos(varpi t), modal damping."""
     if not matrices.only_stiffness or len(matrices.drives) != 1:
         return False
     ((order, kind, _), stiffness, *_) = matrices.drives[0]
@@ -219,6 +219,6 @@ def _zone(kind: str, tongue: int, values: dict[str, Any], centre: np.ndarray, sy
 
 
 def _with_damping(name: str, values: dict[str, Any], system: System) -> tuple[np.ndarray, np.ndarray]:
-    """Return a quantity of the boundary, each system with its damping, and the same without any."""
+    """Return a quantity of the boundary with the damping of each system, and without damping."""
     free, damping = _evaluate(name, values), np.asarray(system.zeta) > 0
     return (np.where(damping, _evaluate(f"damped_{name}", values), free) if damping.any() else free), free
