@@ -40,6 +40,7 @@ FIGURES = {
     "inside_tongues": "cra_sym.figures.nonlinear:figure_inside_tongues",
     "shaken_along": "cra_sym.figures.large_amplitudes:figure_shaken_along",
     "shaken_across": "cra_sym.figures.large_amplitudes:figure_shaken_across",
+    "backbone": "cra_sym.figures.nonlinear:figure_backbone",
     "slip_loop": "cra_sym.figures.slipping:figure_slip_loop",
     "slip_amplitude": "cra_sym.figures.slipping:figure_slip_amplitude",
     "preload": "cra_sym.figures.slipping:figure_preload",

@@ -11,12 +11,13 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from cra_sym.analysis.modes import modal_parameters
+from cra_sym.analysis.response_curves import response_curves
 from cra_sym.analysis.stability import stability_boundary
-from cra_sym.analysis.steady_states import SteadyState, steady_states
+from cra_sym.analysis.steady_states import SteadyState
 from cra_sym.arm.parameters import Arm
 from cra_sym.figures import STYLE
 from cra_sym.figures.drawing import BLUE, ORANGE, panels
-from cra_sym.figures.nonlinear import cubic_joint, show_states
+from cra_sym.figures.nonlinear import cubic_joint, show_curves
 from cra_sym.model.excitations import AxialBase
 from cra_sym.model.system import System
 
@@ -63,12 +64,12 @@ def foreshortened_arm(arm: Arm) -> System:
 
 
 def figure_shaken_along(
-    arm: Arm | None = None, *, amplitude: float = 2e-3, mode: int = 2, modes: int = 2, points: int = 25, ax: Any = None
+    arm: Arm | None = None, *, amplitude: float = 2e-3, mode: int = 2, modes: int = 2, ax: Any = None
 ) -> Figure:
     """Draw the amplitude of the tip inside and beside the tongue of a base that shakes along the arm.
 
     Nothing but the arm's own foreshortening limits it: the more it bends, the stiffer it is and the more inertia moves
-    along. Stable answers are filled. Shaded: where the arm at rest is unstable.
+    along. Stable answers are bold. Shaded: where the arm at rest is unstable.
 
     Parameters
     ----------
@@ -78,8 +79,8 @@ def figure_shaken_along(
         Of the base along the arm, m.
     mode : int
         Whose principal tongue, from 1.
-    modes, points : int
-        Modes that take part; frequencies.
+    modes : int
+        How many take part.
     ax : Axes, optional
     """
     from cra_sym.symbols import u
@@ -87,13 +88,11 @@ def figure_shaken_along(
     arm = Arm.nominal().replace(**_SOFT) if arm is None else arm
     lower, upper = (float(side) for side in stability_boundary(arm, AxialBase(1.0), amplitude, (mode, mode)))
     width = upper - lower
-    frequency = np.linspace(lower - 1.5 * width, upper + width, points)
-    answers = steady_states(
-        foreshortened_arm(arm), frequency, drive={u: amplitude}, modes=max(modes, mode), harmonics=5, period=2
-    )
+    between, system = (lower - 1.5 * width, upper + width), foreshortened_arm(arm)
+    curves = response_curves(system, between, drive={u: amplitude}, modes=max(modes, mode), harmonics=5, period=2)
     with style.context(STYLE):
         ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
-        show_states(ax, answers, BLUE, "foreshortened arm")
+        show_curves(ax, curves, BLUE, "foreshortened arm")
         ax.axvspan(lower, upper, color="0.9", zorder=0)
         _labelled(ax)
         ax.set_title(f"$u$ = {1e3 * amplitude:g} mm along the arm, about $2\\omega_{mode}$")
@@ -109,12 +108,12 @@ def figure_shaken_across(
     mode: int = 2,
     modes: int = 2,
     zeta: float = 1e-2,
-    points: int = 33,
     ax: Any = None,
 ) -> Figure:
     """Draw what the base's disturbance does to a joint that hardens, beside what it does to a linear one.
 
-    The resonance leans to higher frequencies: where three answers exist, the middle one is unstable, and a sweep jumps.
+    The resonance leans to higher frequencies: where three answers exist, the middle one is unstable (thin), and a
+    sweep jumps.
 
     Parameters
     ----------
@@ -124,8 +123,8 @@ def figure_shaken_across(
         Cubic stiffness, N/m3.
     amplitude : float
         Of the base across the arm, m.
-    mode, modes, points : int
-        Near which natural frequency; modes that take part; frequencies.
+    mode, modes : int
+        Near which natural frequency; modes that take part.
     zeta : float
         Modal damping ratio.
     ax : Axes, optional
@@ -134,14 +133,13 @@ def figure_shaken_across(
 
     arm = Arm.nominal().replace(k_t=1e3) if arm is None else arm
     omega = float(modal_parameters(arm, mode).omega[-1])
-    frequency = np.linspace(0.9 * omega, 1.25 * omega, points)
+    between = (0.9 * omega, 1.25 * omega)
     with style.context(STYLE):
         ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
         for size, color, word, marker in ((0.0, ORANGE, "linear joint", "^"), (k_3, BLUE, "hardening joint", "o")):
-            answers = steady_states(
-                cubic_joint(arm, size, zeta), frequency, drive={w: amplitude}, modes=max(modes, mode), harmonics=5
-            )
-            show_states(ax, answers, color, word, marker=marker)
+            system = cubic_joint(arm, size, zeta)
+            curves = response_curves(system, between, drive={w: amplitude}, modes=max(modes, mode), harmonics=5)
+            show_curves(ax, curves, color, word, marker)
         _labelled(ax)
         ax.set_title(f"$w$ = {1e3 * amplitude:g} mm across the arm, near $\\omega_{mode}$")
     figure: Figure = ax.figure

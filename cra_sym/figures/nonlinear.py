@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,8 +11,9 @@ from matplotlib import style
 from matplotlib.figure import Figure
 
 from cra_sym.analysis.backbone import Backbone, backbone
+from cra_sym.analysis.response_curves import ResponseCurve, response_curves
 from cra_sym.analysis.stability import stability_boundary
-from cra_sym.analysis.steady_states import SteadyState, steady_states
+from cra_sym.analysis.steady_states import SteadyState
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
 from cra_sym.figures import STYLE
@@ -28,6 +30,7 @@ __all__ = [
     "figure_backbone",
     "figure_inside_tongues",
     "figure_sweep",
+    "show_curves",
     "show_states",
     "swept",
 ]
@@ -56,31 +59,21 @@ def cubic_joint(arm: Arm, k_3: float, zeta: float | None = None) -> System:
     return model.at({**arm.values, "k_3": k_3}, zeta=arm.zeta if zeta is None else zeta)
 
 
-def show_states(
-    ax: Axes,
-    states: Sequence[Sequence[SteadyState]],
-    color: str,
-    label: str,
-    *,
-    scale: float = 1e3,
-    marker: str = "o",
-) -> None:
+def show_states(ax: Axes, states: Sequence[Sequence[SteadyState]], color: str, label: str) -> None:
     """Draw amplitudes over the excitation frequency: stable answers filled, unstable ones open.
 
     Parameters
     ----------
     ax : Axes
     states : sequence of sequence of SteadyState
-    color, label, marker : str
-    scale : float
-        Amplitudes are drawn times this; 1000 for mm.
+    color, label : str
     """
     for stable, fill in ((True, color), (False, "white")):
         chosen = [s for found in states for s in found if s.stable is stable]
         ax.plot(
             [s.angular_frequency for s in chosen],
-            [scale * s.amplitude for s in chosen],
-            marker,
+            [1e3 * s.amplitude for s in chosen],
+            "o",
             markersize=3.5,
             markerfacecolor=fill,
             markeredgecolor=color,
@@ -90,20 +83,39 @@ def show_states(
         )
 
 
+def show_curves(ax: Axes, curves: Sequence[ResponseCurve], color: str, label: str, marker: str = "o") -> None:
+    """Draw amplitudes over the excitation frequency: stable answers bold with marks, unstable ones thin.
+
+    Parameters
+    ----------
+    ax : Axes
+    curves : sequence of ResponseCurve
+    color, label, marker : str
+    """
+    look: dict[str, Any] = {"color": color, "marker": marker, "markersize": 3.5}
+    ax.plot([], [], "-", label=label, **look)
+    for curve in curves:
+        frequency, size = curve.angular_frequency, 1e3 * curve.amplitude
+        lost = np.convolve(~curve.stable, np.ones(3), "same") > 0  # up to the next stable points
+        kept = np.where(curve.stable, size, np.nan)
+        ax.plot(frequency, np.where(lost, size, np.nan), "-", color=color, linewidth=0.6)
+        if np.isfinite(kept).any():
+            ax.plot(frequency, kept, "-", markevery=0.08, **look)
+
+
 def figure_inside_tongues(
     arm: Arm | None = None,
     *,
     k_3: float = _CUBIC,
     epsilon: float = _EPSILON,
     modes: int = 3,
-    points: int = 17,
     zeta: float = 1e-4,
     axes: Any = None,
 ) -> Figure:
     """Draw the amplitude of the tip inside and beside each principal tongue of an arm with a cubic joint.
 
     A joint that hardens (blue circles) bends the answers to higher frequencies, one that softens (orange triangles) to
-    lower ones; stable answers are filled. Shaded: where the arm at rest is unstable. Beside it, on the side to which
+    lower ones; stable answers are bold. Shaded: where the arm at rest is unstable. Beside it, on the side to which
     the answers bend, both rest and vibration are stable.
 
     Parameters
@@ -116,8 +128,6 @@ def figure_inside_tongues(
         Of the fluctuation of k_t.
     modes : int
         How many tongues.
-    points : int
-        Frequencies of each.
     zeta : float
         Modal damping ratio.
     axes : sequence of Axes, optional
@@ -129,15 +139,20 @@ def figure_inside_tongues(
     for number, ax in enumerate(row, 1):
         lower, upper = (float(side) for side in stability_boundary(arm, excitation, epsilon, (number, number)))
         width = upper - lower
-        frequency = np.linspace(lower - width, upper + width, points)
         for sign, color, word, marker in ((1.0, BLUE, "hardening", "o"), (-1.0, ORANGE, "softening", "^")):
             system = cubic_joint(arm, sign * k_3, zeta)
-            states = steady_states(
-                system, frequency, excitation=excitation, epsilon=epsilon, period=2, harmonics=5, modes=modes
+            curves = response_curves(
+                system,
+                (lower - width, upper + width),
+                excitation=excitation,
+                epsilon=epsilon,
+                period=2,
+                harmonics=5,
+                modes=modes,
             )
             root = system.modes(modes).displacement(0, 0)
-            near = [[s for s in found if _largest(root, s) < reach or sign > 0] for found in states]
-            show_states(ax, near, color, word, marker=marker)
+            near = [curve if sign > 0 else _within(curve, root, reach) for curve in curves]
+            show_curves(ax, near, color, word, marker)
         ax.axvspan(lower, upper, color="0.9", zorder=0)
         ax.set_title(f"about $2\\omega_{number}$")
         ax.set_xlabel("excitation frequency $\\varpi$ / (rad/s)")
@@ -217,30 +232,44 @@ def figure_amplitude_map(
     return figure_of(ax)
 
 
-def _largest(rows: np.ndarray, state: SteadyState) -> float:
-    """Return the peak of a displacement that has these values in the modes."""
-    harmonics = state.coefficients.shape[1] // 2
-    return float(peak(Basis.whole(harmonics, 1), rows, state.coefficients[None])[0][0])
+def _within(curve: ResponseCurve, rows: np.ndarray, reach: float) -> ResponseCurve:
+    """Return a curve where the peak of a displacement that has these values in the modes is below a reach."""
+    largest, _ = peak(Basis.whole(curve.coefficients.shape[2] // 2, 1), rows, curve.coefficients)
+    return replace(curve, amplitude=np.where(largest < reach, curve.amplitude, np.nan))
 
 
 def figure_backbone(
-    system: System | None = None, *, mode: int = 1, modes: int = 6, points: int = 150, ax: Any = None
+    system: System | None = None,
+    *,
+    mode: int = 1,
+    modes: int = 6,
+    points: int = 120,
+    branches: bool = False,
+    k_3: float = _CUBIC,
+    ax: Any = None,
 ) -> Figure:
     """Draw the frequency of free vibration over its energy, with the turns at internal resonances.
 
     Parameters
     ----------
     system : System, optional
-        Default: the nominal arm with k_t = 1000 N/m and a joint that hardens.
-    mode, modes, points : int
-        As in :func:`cra_sym.backbone`.
+        Nonlinear. An arm is given a joint of cubic stiffness, and k_t = 1000 N/m if it is rigid; default: the nominal
+        one.
+    mode, modes, points, branches
+        As in :func:`cra_sym.backbone`; branches are dashed.
+    k_3 : float
+        Of the joint of an arm, N/m3.
     ax : Axes, optional
     """
-    system = cubic_joint(Arm.nominal().replace(k_t=1e3), _CUBIC) if system is None else system
-    curve = backbone(system, mode, modes=modes, points=points)
+    system = Arm.nominal() if system is None else system
+    if isinstance(system, Arm):
+        system = cubic_joint(system if np.all(np.isfinite(system.k_t)) else system.replace(k_t=1e3), k_3)
+    curve = backbone(system, mode, modes=modes, points=points, branches=branches)
     with style.context(STYLE):
         ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
         _show_curve(ax, curve)
+        for other in curve.branches:
+            ax.semilogx(other.energy, other.angular_frequency / (2 * np.pi), "--", color="0.5", linewidth=0.9)
         ax.set_xlabel("energy / J")
         ax.set_ylabel("frequency / Hz")
     return figure_of(ax)

@@ -86,7 +86,8 @@ def figure_slip_amplitude(
     Parameters
     ----------
     system : System, optional
-        With elastic-slip elements; default: the nominal arm on a joint that is soft and slips at 0.1 N.
+        With elastic-slip elements. An arm is put on a joint that is soft and slips at 0.1 N; default: the nominal one,
+        slightly damped.
     mode, modes : int
     amplitude : array_like, optional
         m.
@@ -100,9 +101,10 @@ def figure_slip_amplitude(
         If the system has no elastic-slip elements.
     """
     if curve is None:
-        if system is None:
+        system = Arm.nominal().replace(zeta=_ZETA) if system is None else system
+        if isinstance(system, Arm):
             joint = BoltedJoint(rest=20.0, body_t=20.0, lever=0.05)
-            system = joint.on(Arm.nominal().replace(zeta=_ZETA), 0.1 / joint.friction)
+            system = joint.on(system, 0.1 / joint.friction)
         if not system.model.pieces["hysteresis"]:
             raise ValueError("system: must have elastic-slip elements: Model(.., hysteresis=[(cra.Jenkins(..), ..)])")
         amplitude = np.geomspace(4e-3, 0.3, 25) if amplitude is None else amplitude

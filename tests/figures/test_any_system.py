@@ -18,7 +18,7 @@ COARSE = {
     "residual_vibration": {"points": 9},
     "input_shaping": {"points": 9},
 }
-SHOWN = [name for name in FIGURES if shows_any_system(name) and name != "slip_amplitude"]
+SHOWN = [name for name in FIGURES if shows_any_system(name) and name not in ("slip_amplitude", "backbone")]
 
 
 # those of the others cost seconds and take no other way
@@ -40,9 +40,18 @@ def test_every_figure_of_a_system_draws_every_system(name):
             assert any(ax.get_xlabel() for ax in drawn.axes) and any(ax.get_ylabel() for ax in drawn.axes), figure
 
 
-def test_a_system_that_does_not_slip_has_no_friction_to_draw():
+def test_a_linear_system_has_neither_friction_nor_a_backbone_to_draw():
     with pytest.raises(ValueError, match="system: must have elastic-slip elements"):
         draw("slip_amplitude", system("string", 0.01))
+    with pytest.raises(ValueError, match="system: is linear, so its backbone has no end"):
+        draw("backbone", system("string", 0.01))
+
+
+@pytest.mark.parametrize(("name", "options"), [("slip_amplitude", {"amplitude": [0.01]}), ("backbone", {"points": 9})])
+def test_an_arm_is_given_the_joint_that_such_a_figure_is_about(name, options):
+    arm = cra.Arm.nominal().replace(zeta=0.01)
+    (line, *_) = draw(name, arm, **options, modes=2).axes[0].lines
+    assert abs(line.get_ydata()[0] / cra.natural_frequencies(arm, 1) - 1) < 0.4  # of the rigid joint
 
 
 def curves(ax):
