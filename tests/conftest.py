@@ -33,6 +33,16 @@ def pytest_sessionfinish(session):
         running.save()
 
 
+@pytest.fixture(autouse=True)
+def precision_is_left_alone():
+    """Fail a test that leaves mpmath at another precision: what runs after it would be slow, or not be as exact."""
+    yield
+    mpmath = sys.modules.get("mpmath")
+    if mpmath is not None and mpmath.mp.prec != 53:
+        mpmath.mp.prec = 53
+        pytest.fail("mpmath: the working precision must be 53 bits after a test, as before it")
+
+
 @pytest.fixture(scope="module")
 def browser():
     """The system's Chromium, headless, driven by Playwright; tests that use it are marked ``browser``."""

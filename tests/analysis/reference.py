@@ -34,17 +34,17 @@ def determinant(lam, kappa_t, kappa_r, mu, iota):
 
 def refined(lam, *arm):
     """Return the zero of the determinant within 1e-7 of ``lam``, or None if there is no change of sign."""
-    mp.mp.dps = 50 + int(lam) + (int(-8 * np.log10(lam)) if lam < 1 else 0)
-    a, b = mp.mpf(float(lam)) * (1 - mp.mpf(10) ** -7), mp.mpf(float(lam)) * (1 + mp.mpf(10) ** -7)
-    f_a, f_b = determinant(a, *arm), determinant(b, *arm)
-    if f_a * f_b >= 0:
-        return None
-    for _ in range(12):
-        if f_a == f_b or abs(b - a) < abs(b) * mp.mpf(10) ** -36:
-            break
-        a, b, f_a = b, b - f_b * (b - a) / (f_b - f_a), f_b
-        f_b = determinant(b, *arm)
-    return b
+    with mp.workdps(50 + int(lam) + (int(-8 * np.log10(lam)) if lam < 1 else 0)):
+        a, b = mp.mpf(float(lam)) * (1 - mp.mpf(10) ** -7), mp.mpf(float(lam)) * (1 + mp.mpf(10) ** -7)
+        f_a, f_b = determinant(a, *arm), determinant(b, *arm)
+        if f_a * f_b >= 0:
+            return None
+        for _ in range(12):
+            if f_a == f_b or abs(b - a) < abs(b) * mp.mpf(10) ** -36:
+                break
+            a, b, f_a = b, b - f_b * (b - a) / (f_b - f_a), f_b
+            f_b = determinant(b, *arm)
+        return b
 
 
 def relative_errors(lam, *arms):

@@ -75,8 +75,8 @@ def tip_mass(b):
 
 
 def classical(equation, guesses):
-    mp.mp.dps = 30
-    return [float(mp.findroot(equation, guess)) for guess in guesses]
+    with mp.workdps(30):
+        return [float(mp.findroot(equation, guess)) for guess in guesses]
 
 
 @pytest.mark.parametrize(
