@@ -15,7 +15,7 @@ __all__ = ["mirrored", "settling", "shifted", "traced"]
 Array = NDArray[np.float64]
 _MOST_POINTS = 250  # points of a curve over the level
 _FULL, _HIGHEST = np.arcsinh(1.0), np.arcsinh(10.0)  # the level is the hyperbolic sine of the continuation parameter
-_CYCLES, _DECAY = (60, 200), 12.0  # periods of integration; sufficient decay of a transient
+_CYCLES, _DECAY = (40, 100), 8.0  # periods of integration; sufficient decay of a transient
 _TOLERANCE, _PUSH = 1e-5, 1e-2  # tolerance of the integration; relative perturbation of an unstable solution
 
 

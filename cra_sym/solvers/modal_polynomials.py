@@ -217,6 +217,16 @@ class ModalPolynomials(ByValue):
                 _add(found.force_v, b, _slots(term, q, v, 0, 1, equation=True), scale)
         return found
 
+    def _forces(self, q: Array, v: Array, causes: Array | None) -> Array:
+        """Return the forces of terms without velocities, beside the linear ones, shape (samples, modes)."""
+        force = np.zeros(q.shape)
+        for term in self.energies:
+            if term.positions:
+                _add(force, term.positions, _slots(term, q, v, 1, 0), _scale(term, causes))
+        for term in self.forces:
+            _add(force, 1, _slots(term, q, v, 0, 0, equation=True), _scale(term, causes))
+        return force
+
     def acceleration(
         self, q: Array, v: Array, causes: Array | None = None, load: Array | float = 0.0, *, whole: bool = True
     ) -> Array:
@@ -231,10 +241,12 @@ class ModalPolynomials(ByValue):
         whole : bool
             If False, those of the undamped linear modes are left out.
         """
-        found, pull = self.derivatives(q, v, causes), self.omega**2 * q
-        force = found.force - v @ self.damping.T + load
+        pull = self.omega**2 * q
         if not self.moves_mass:
+            force = self._forces(q, v, causes) - v @ self.damping.T + load
             return np.asarray(force - pull if whole else force)
+        found = self.derivatives(q, v, causes)
+        force = found.force - v @ self.damping.T + load
         force = force - (found.momentum_q @ v[:, :, None])[:, :, 0] + (found.momentum_v @ pull[:, :, None])[:, :, 0]
         inertia = np.eye(self.modes) + found.momentum_v
         beside = np.linalg.solve(inertia, force[:, :, None])[:, :, 0]
@@ -256,21 +268,26 @@ def _add(total: Array, factor: int, part: Array, scale: Array | float) -> None:
 def _slots(term: Term, q: Array, v: Array, kept_q: int, kept_v: int, equation: bool = False) -> Array:
     """Contract all axes but some of coordinates and velocities; equation, coordinates, velocities is their order."""
     a, b = term.positions, term.velocities
-    return _contracted(term.tensor, a - kept_q, b - kept_v, q, v, equation=equation)
+    return _contracted(term.tensor, a - kept_q, b - kept_v, q, v, kept_v, equation)
 
 
-def _contracted(tensor: Array, with_q: int, with_v: int, q: Array, v: Array, equation: bool = False) -> Array:
-    """Contract the last axes with v and axes of coordinates with q; shape (samples, modes, ...)."""
+def _contracted(
+    tensor: Array, with_q: int, with_v: int, q: Array, v: Array, kept_v: int = 0, equation: bool = False
+) -> Array:
+    """Contract axes of velocities with v and of coordinates with q; shape (samples, modes, ...).
+
+    Axes of one kind are alike, so that those are taken which need not be moved.
+    """
     samples, n = q.shape
     found: Array = tensor.reshape(1, *tensor.shape)
     for _ in range(with_v):
         found = _last(found, v, n)
-    if with_q:
+    if with_q and kept_v:
         axis = 2 if equation else 1  # coordinates come first, after the equation
         found = np.moveaxis(found, range(axis, axis + with_q), range(found.ndim - with_q, found.ndim))
-        for _ in range(with_q):
-            found = _last(found, q, n)
-    return np.broadcast_to(found, (samples, *found.shape[1:]))
+    for _ in range(with_q):
+        found = _last(found, q, n)
+    return found if len(found) == samples else np.broadcast_to(found, (samples, *found.shape[1:]))
 
 
 def _last(found: Array, vector: Array, n: int) -> Array:
