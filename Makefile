@@ -56,7 +56,7 @@ newest: .venv/.ready
 define gate
 	$(RUN) -m venv .venv-$(1)
 	$(RUN) -m tests.notebooks.gate --requirements $(1) > .venv-$(1)/requirements.txt
-	.venv-$(1)/bin/python -m pip install --quiet --no-compile --disable-pip-version-check -r .venv-$(1)/requirements.txt
+	.venv-$(1)/bin/python -m pip install --quiet --disable-pip-version-check -r .venv-$(1)/requirements.txt
 	.venv-$(1)/bin/python -m tests.notebooks.gate
 endef
 
@@ -93,11 +93,13 @@ campaign: .venv/.ready
 clean:
 	rm -rf .venv .venv-oldest .venv-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage .coverage.*
 
+# Everything is compiled once: where PYTHONDONTWRITEBYTECODE is set, each process of the tests would do it again.
 .venv/.ready: requirements.txt pyproject.toml
 	@for python in $(CANDIDATES); do \
 	    if "$$python" -c '$(SUPPORTED)' 2>/dev/null; then \
 	        echo "Setting up .venv with $$python (once; takes a few minutes)"; "$$python" -m venv .venv; exit; \
 	    fi; \
 	done; echo "Python 3.11 to 3.14 is needed and was not found: set PYTHON to one, as in make PYTHON=/path/to/python3.12 ..." >&2; exit 1
-	$(RUN) -m pip install -qq --no-compile --disable-pip-version-check -r requirements.txt
+	$(RUN) -m pip install -qq --disable-pip-version-check -r requirements.txt
+	$(RUN) -m compileall -q cra_sym tests
 	@touch .venv/.ready

@@ -25,6 +25,7 @@ _MANIFEST = "manifest.json"
 _MAKER = {"made by": "cra_sym"}  # others list their files in a manifest.json too
 _OLD = ".replaced"
 _PATIENCE = 60.0  # seconds; locks are held for moments
+_WRITERS = 2.0  # seconds; threads of a library may still write into a folder that is given up
 _ABANDONED = 86_400.0  # seconds; where folders cannot be locked, no run takes so long
 _DISK = {getattr(errno, name, 0) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EROFS", "EIO", "ENXIO", "ENODEV", "ESTALE")}
 
@@ -275,7 +276,12 @@ def _discard(stage: Path, target: Path) -> None:
     with suppress(OSError):
         if (stage / _OLD).exists() and not os.path.lexists(target):
             os.rename(stage / _OLD, target)
-        shutil.rmtree(stage, ignore_errors=True)
+        end = time.monotonic() + _WRITERS
+        while True:
+            shutil.rmtree(stage, ignore_errors=True)
+            if not stage.exists() or time.monotonic() > end:
+                break
+            time.sleep(0.005)
 
 
 def _locked(folder: Path, patience: float) -> int | None:

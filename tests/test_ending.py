@@ -14,7 +14,9 @@ from cra_sym.ending import orderly_ending, run_command
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 SLOW = """
-import sys, time
+import signal, sys, time
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whoever runs the tests may ignore it, as nohup does
+
 from cra_sym.ending import run_command
 from cra_sym.files import staged_directory
 

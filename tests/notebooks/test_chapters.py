@@ -81,6 +81,7 @@ DEAR = (
     "07c_inside_the_tongue",
     "07d_the_joint_that_slips",
     "09_code_export",
+    "10_claims",
     "14_large_amplitudes",
 )
 #: What draws no arm.

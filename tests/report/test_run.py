@@ -6,9 +6,10 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from cra_sym.__main__ import main
 from cra_sym.claims import claim
-from cra_sym.figures import FIGURES
+from cra_sym.figures import ANIMATIONS, FIGURES
 from cra_sym.report import run
 from cra_sym.report.site import build
+from cra_sym.report.tables import TABLES
 
 
 @pytest.fixture
@@ -23,7 +24,7 @@ def book(tmp_path):
 
 @pytest.fixture
 def quickly(monkeypatch):
-    """Stand in for drawings, judgements, proofs and Sphinx, which have tests of their own."""
+    """Stand in for drawings, judgements, tables, proofs and Sphinx, which have tests of their own."""
 
     def every_figure(folder, names=FIGURES, kinds=("svg",)):
         folder.mkdir(exist_ok=True)
@@ -36,7 +37,12 @@ def quickly(monkeypatch):
         return "a warning"
 
     monkeypatch.setattr(run, "save_figures", every_figure)
+    monkeypatch.setattr(run, "save_animations", lambda folder: every_figure(folder, ANIMATIONS))
+    monkeypatch.setattr(run, "TABLES", {"frequencies": TABLES["frequencies"]})
     monkeypatch.setattr(run, "claims", lambda: [claim("C20")])
+    for part in ("accuracy_table", "orders"):
+        monkeypatch.setattr(build, part, lambda: "")
+    monkeypatch.setattr(build, "write_reference", lambda folder: None)
     monkeypatch.setattr("cra_sym.claims.claims", lambda: [claim("C20")])
     monkeypatch.setattr(build, "entries", lambda chapters: [])
     monkeypatch.setattr(build, "_run_sphinx", pages)
