@@ -1,4 +1,4 @@
-"""The compiler: SymPy expression to fast, picklable, broadcasting NumPy or Numba function."""
+"""Compiler from SymPy expressions to fast, picklable, broadcasting NumPy or Numba functions."""
 
 from cra_sym.kernels.callables import Kernel, kernel
 from cra_sym.kernels.derived import derived_kernel

@@ -1,4 +1,4 @@
-"""Arithmetic written where a builder of LLVM stands: constants are Python's numbers, all others LLVM's values."""
+"""Arithmetic emitted with an LLVM builder: constants are Python numbers, all other operands LLVM values."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["CONDITION", "DOUBLE", "INTEGER", "Arithmetic", "is_constant", "kind_
 
 DOUBLE, INTEGER, CONDITION = ir.DoubleType(), ir.IntType(64), ir.IntType(1)
 _KINDS = {bool: CONDITION, int: INTEGER, float: DOUBLE}
-_WIDTHS = CONDITION, INTEGER, DOUBLE  # each holds what those before it hold
+_WIDTHS = CONDITION, INTEGER, DOUBLE  # each type includes the preceding ones
 _OPERATIONS: dict[type, tuple[Callable[..., Any], str | None, str | None]] = {  # of constants, doubles, integers
     ast.Add: (operator.add, "fadd", "add"),
     ast.Sub: (operator.sub, "fsub", "sub"),
@@ -31,17 +31,17 @@ _OPERATIONS: dict[type, tuple[Callable[..., Any], str | None, str | None]] = {  
     ast.RShift: (operator.rshift, None, "ashr"),
 }
 _COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
-_BY_CONSTANTS = {  # operators whose right side is one of these constants: LLVM leaves others undefined
+_BY_CONSTANTS = {  # operators whose right side must be one of these constants; LLVM leaves others undefined
     ast.FloorDiv: range(1, 2**63),
     ast.Mod: range(1, 2**63),
     ast.LShift: range(64),
     ast.RShift: range(64),
 }
-_LARGEST_POWER = 64  # that becomes products
+_LARGEST_POWER = 64  # largest exponent that becomes products
 
 
 def is_constant(value: Any) -> bool:
-    """Return whether a number is known while writing."""
+    """Return whether a number is known at compile time."""
     return isinstance(value, (bool, int, float))
 
 
@@ -50,12 +50,12 @@ def kind_of(value: Any) -> Any:
     if is_constant(value):
         return next(kind for of, kind in _KINDS.items() if isinstance(value, of))
     if getattr(value, "type", None) not in _WIDTHS:
-        raise errors.TypingError(f"{value!r} is no number")
+        raise errors.TypingError(f"{value!r} is not a number")
     return value.type
 
 
 def kind_named(name: Any) -> Any:
-    """Return the LLVM type that ``np.float64`` or ``np.int64`` stands for."""
+    """Return the LLVM type of ``np.float64`` or ``np.int64``."""
     if name not in (np.float64, np.int64):
         raise errors.TypingError(f"{name} is neither np.float64 nor np.int64")
     return DOUBLE if name is np.float64 else INTEGER
@@ -102,7 +102,7 @@ class Arithmetic:
         if isinstance(op, ast.Pow):
             return self.power(left, right)
         if type(op) in _BY_CONSTANTS and (type(right) is not int or right not in _BY_CONSTANTS[type(op)]):
-            raise errors.TypingError(f"{type(op).__name__} by what is no constant in {_BY_CONSTANTS[type(op)]}")
+            raise errors.TypingError(f"{type(op).__name__} by anything but a constant in {_BY_CONSTANTS[type(op)]}")
         kind = DOUBLE if isinstance(op, ast.Div) else _widest(left, right)
         if kind == CONDITION and not isinstance(op, (ast.BitAnd, ast.BitOr)):
             kind = INTEGER
@@ -151,13 +151,13 @@ class Arithmetic:
         return self.builder.select(self.truth(test), self.typed(value, kind), self.typed(otherwise, kind))
 
     def cast(self, kind: type, value: Any) -> Any:
-        """Return what ``np.float64(value)`` or ``np.int64(value)`` is."""
+        """Return ``np.float64(value)`` or ``np.int64(value)``."""
         if kind is np.int64 and kind_of(value) == DOUBLE:
             return self.builder.fptosi(self.typed(value), INTEGER)
         return self.typed(value, kind_named(kind))
 
     def viewed(self, value: Any, kind: type) -> Any:
-        """Return what the bits of a number are as a double or an integer."""
+        """Return the bits of a number reinterpreted as a double or an integer."""
         return self.builder.bitcast(self.typed(value), kind_named(kind))
 
     def known_to_numba(self, function: Any, arguments: Sequence[Any]) -> Any:
@@ -169,7 +169,7 @@ class Arithmetic:
             raise errors.TypingError(f"{function} is unknown to Numba") from error
         found = typing.resolve_function_type(kind, (types.float64,) * len(arguments), {})
         if found is None or found.return_type != types.float64:
-            raise errors.TypingError(f"{function} is no function of doubles")
+            raise errors.TypingError(f"{function} is not a function of doubles")
         written = self.context.get_function(kind, found)
         self.context.add_linking_libs(getattr(written, "libs", ()))
         return written(self.builder, [self.typed(value, DOUBLE) for value in arguments])

@@ -1,4 +1,4 @@
-"""The callable that a SymPy expression becomes: source and arguments in, arrays out."""
+"""Callables generated from SymPy expressions, evaluated on arrays."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _BACKENDS = ("numpy", "numba")  # and None
 class Kernel:
     """A function of broadcasting arrays, generated from a SymPy expression.
 
-    It is its source: two kernels with the same source, arguments and backend are equal, and a pickled kernel rebuilds
-    itself from these three without SymPy. Arithmetic is that of IEEE 754 without warnings: 1/0 is inf.
+    It is defined by its source: two kernels with the same source, arguments and backend are equal, and a pickled kernel
+    is rebuilt from these three without SymPy. Arithmetic is that of IEEE 754 without warnings: 1/0 is inf.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Kernel:
     arguments : tuple of str
         Names of the arguments in calling order.
     backend : {None, 'numpy', 'numba'}
-        What evaluates; None chooses by size.
+        Backend of the evaluation; None selects it by size.
     """
 
     def __init__(self, source: str, arguments: tuple[str, ...], backend: str | None = None) -> None:
@@ -66,13 +66,13 @@ class Kernel:
 
     @property
     def function(self) -> Callable[..., Any]:
-        """The generated function itself: no checks, no broadcasting, any objects that have the arithmetic."""
+        """The generated function, without checks or broadcasting, for any objects that support the arithmetic."""
         function: Callable[..., Any] = self._module["evaluate"]
         return function
 
     @property
     def layout(self) -> Any:
-        """What the outputs form: () one number, (2, 2) a matrix, a list or dict of such."""
+        """Structure of the outputs: () one number, (2, 2) a matrix, a list or dict of such."""
         return self._module["LAYOUT"]
 
     def __call__(self, *values: Any) -> Any:
@@ -81,7 +81,8 @@ class Kernel:
         Returns
         -------
         float, ndarray, tuple or dict
-            What the expression was; every array has the common shape of the values, a matrix adds its axes at the end.
+            With the structure of the expression; arrays have the common shape of the values, a matrix has its axes
+            last.
 
         Raises
         ------
@@ -122,15 +123,15 @@ def kernel(expression: Any, arguments: Any, *, backend: str | None = None) -> Ke
     Parameters
     ----------
     expression : Expr, Matrix, sequence or dict of them
-        Evaluated as it stands: common subexpressions are shared, nothing is expanded or simplified.
+        Evaluated without expansion or simplification; common subexpressions are shared.
     arguments : sequence of Symbol
         Every free symbol of the expression, in calling order; further symbols only take part in broadcasting.
     backend : {None, 'numpy', 'numba'}
-        None begins with NumPy. If Numba is there, machine code is made, or loaded from the user's store, as soon as the
-        calls of this process have come to 10 000 lanes, i.e. elements of the common shape; for sources of more than
+        None starts with NumPy. If Numba is installed, machine code is compiled, or loaded from the user's cache, once
+        the calls of this process add up to 10 000 lanes, i.e. elements of the common shape; for sources of more than
         5000 characters that number grows with the square of their length. Calls add up over equal kernels, separately
-        for each pattern of arrays and numbers among the arguments. What machine code does not do faster stays with
-        NumPy, as complex values do: powers other than integer ones and square roots, inverse and special functions,
+        for each pattern of arrays and numbers among the arguments. NumPy is kept where machine code is not faster,
+        and for complex values: powers other than integer ones and square roots, inverse and special functions,
         Mod, and elementary functions in expressions with conditions. 'numba' compiles at once, these too.
 
     Returns
@@ -147,11 +148,12 @@ def kernel(expression: Any, arguments: Any, *, backend: str | None = None) -> Ke
 
     Notes
     -----
-    The two ways take the same steps but do not round alike. NumPy's elementary functions are within 2 units in the last
+    The two backends take the same steps but round differently. NumPy's elementary functions are within 2 units in the
+    last
     place of the exact value for their argument. So are those of machine code, but for tan and tanh, which are within 4.
-    Hence the ways differ by at most 4 units in each elementary function, and by at most 6 in these two. A sum of
-    products may be rounded once instead of twice (fused multiply-add). Both ways give the same infinities and nan,
-    unless the last place decides on overflow; the sign of a zero that comes out of Max, Min, Mod or sign may differ.
+    Hence they differ by at most 4 units in each elementary function, and by at most 6 in these two. A sum of products
+    may be rounded once instead of twice (fused multiply-add). Both give the same infinities and nan, except at the
+    limit of overflow; the sign of a zero that comes out of Max, Min, Mod or sign may differ.
     Machine code for one pattern of arguments gives a lane the same value whatever the number of lanes and threads.
 
     Examples
@@ -191,14 +193,14 @@ def _tuple(result: Any) -> tuple[Any, ...]:
 
 
 def _filled(value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Return an array of its own memory: a constant, or an output that is one of the inputs, shares nothing."""
+    """Return an array with its own memory, also for a constant or an output that is one of the inputs."""
     output = np.empty(shape, np.result_type(value, np.float64))
     output[...] = value
     return output
 
 
 def _in_blocks(function: Callable[..., Any], arrays: Sequence[np.ndarray], shape: tuple[int, ...]) -> list[np.ndarray]:
-    """Evaluate block by block, so that temporaries stay close to the processor."""
+    """Evaluate in blocks, so that temporaries fit in the cache."""
     size = math.prod(shape)
     flat = [a.reshape(-1) if a.ndim else a for a in arrays]
     outputs: list[np.ndarray] = []

@@ -1,4 +1,4 @@
-"""Kernels of the package's own derivations: derived once on a machine, then read from the store without SymPy."""
+"""Kernels of the package's own derivations: derived once, then read from the user's cache without SymPy."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _DERIVING = ("symbols.py", "checks.py", "mechanics", "model", "kernels", "solver
 
 
 class _DerivedKernel(Kernel):
-    """A kernel that knows where it is derived, and finds its source on first use."""
+    """A kernel given by the path of its derivation, which is run on first use."""
 
     def __init__(self, path: str, given: tuple[Any, ...], backend: str | None) -> None:
         super().__init__("", (), backend)
@@ -46,19 +46,19 @@ class _DerivedKernel(Kernel):
 
 
 def derived_kernel(path: str, *arguments: Any, backend: str | None = None) -> Kernel:
-    """Return the kernel of a derivation of this package, to be derived when it is first needed.
+    """Return the kernel of a derivation of this package; the derivation runs on first use.
 
-    Creating it costs nothing. On first use its source comes from the user's store, or else from the derivation, whose
-    result is then stored for other processes. The key is a hash over the package's deriving sources and the versions of
-    SymPy, NumPy, SciPy, Numba and Python: a change in any of them derives anew.
+    On first use its source is read from the user's cache, or else derived and cached for other processes. The key is a
+    hash of the package's sources that derive and the versions of SymPy, NumPy, SciPy, Numba and Python: a change in any
+    of them leads to a new derivation.
 
     Parameters
     ----------
     path : str
         ``"cra_sym.room.module:function"``. The function takes the arguments and returns ``(expression, arguments)``
-        as :func:`cra_sym.kernels.kernel` wants them.
+        as :func:`cra_sym.kernels.kernel` takes them.
     arguments : literals
-        Numbers, texts and tuples of them, which are a part of the key.
+        Numbers, strings and tuples of them, which are part of the key.
     backend : {None, 'numpy', 'numba'}
         As in :func:`cra_sym.kernels.kernel`.
 
@@ -76,7 +76,7 @@ def derived_kernel(path: str, *arguments: Any, backend: str | None = None) -> Ke
 
 
 def _are_literals(value: Any) -> bool:
-    """Return whether the text of a value says all about it."""
+    """Return whether a value is determined by its repr."""
     return all(map(_are_literals, value)) if type(value) is tuple else type(value) in (str, int, float, bool)
 
 
@@ -99,7 +99,7 @@ def _source_of(path: str, given: tuple[Any, ...] = ()) -> tuple[str, tuple[str, 
 
 
 def derived(path: str, *arguments: str) -> Any:
-    """Return what a function of this package derives, from the user's store where it was derived before.
+    """Return the result of a derivation of this package, read from the user's cache if it was derived before.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def derived(path: str, *arguments: str) -> Any:
     key = f"{_called(path, arguments)} {fingerprint()}"
     content = store.load(key) if storable else None
     if content is not None:
-        with suppress(Exception):  # whatever is wrong with what this process did not make: make it anew
+        with suppress(Exception):  # a damaged entry of another process is derived again
             return pickle.loads(content)
     made = _narrated(path, arguments, lambda result: result)
     if storable and _sources_are_what_runs():
@@ -126,7 +126,7 @@ def _derived(path: str, given: tuple[Any, ...]) -> Kernel:
 
 
 def _narrated(path: str, given: tuple[Any, ...], finish: Callable[[Any], Any]) -> Any:
-    """Return what a derivation yields, finished; a terminal says that it is under way."""
+    """Return the finished result of a derivation, with a note on a terminal while it runs."""
     from tqdm import tqdm
 
     module, _, function = path.partition(":")
@@ -142,7 +142,7 @@ def _sources() -> list[Path]:
 
 
 def _sources_are_what_runs() -> bool:
-    """Return whether the files on disk are the code in memory: there are some, and none is younger than the process's.
+    """Return whether the files on disk are the code in memory: they exist, and none is newer than the process.
 
     Otherwise the result of old code could be stored under the hash of new files.
     """
@@ -152,7 +152,7 @@ def _sources_are_what_runs() -> bool:
 
 @cache
 def fingerprint() -> str:
-    """Return the hash of everything a derivation depends on, without importing any of it."""
+    """Return the hash of all sources and versions that a derivation depends on, without importing them."""
     digest = hashlib.sha256()
     for file in _sources():
         content = file.read_bytes()
@@ -164,7 +164,7 @@ def fingerprint() -> str:
 
 
 def _version(package: str) -> Any:
-    from importlib import metadata  # its import costs more than ours
+    from importlib import metadata  # importing it takes longer than importing this package
 
     try:
         return metadata.version(package)

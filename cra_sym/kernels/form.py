@@ -1,12 +1,13 @@
 """The restricted form in which an algorithm is written once: Python text, parsed, typed and checked, for printing.
 
 A text is a Python module of constants, records (classes of annotated fields) and functions. Values are doubles
-(`float`), integers (`int`), conditions (`bool`), rows of them and records. A function holds assignments, ``for`` over
-``range``, ``while``, ``if``, ``break``, ``continue``, ``return``, ``raise`` and calls; comments and docstrings travel.
+(`float`), integers (`int`), conditions (`bool`), rows of them and records. A function contains assignments, ``for``
+over ``range``, ``while``, ``if``, ``break``, ``continue``, ``return``, ``raise`` and calls; comments and docstrings are
+printed too.
 
 Rules that let every language print the same arithmetic
-    Parameters of type ``Row[float, n]`` or of a record are read only; ``Out[...]`` is made by the function and handed
-    back, ``Mut[...]`` is changed in place. No argument that is changed may be given twice in one call.
+    Parameters of type ``Row[float, n]`` or of a record are read only; ``Out[...]`` is created and returned by the
+    function, ``Mut[...]`` is changed in place. No argument that is changed may be given twice in one call.
     Both sides of ``and``, ``or`` and ``a if c else b`` must be harmless to evaluate: some languages evaluate both.
     Integers and doubles do not mix; ``//`` and ``%`` are for integers that are not negative; `int` cuts toward zero.
     Functions are defined before they are called, so there is no recursion; local rows have constant lengths, so there
@@ -27,7 +28,7 @@ __all__ = [
 
 
 class FormError(ValueError):
-    """What a text does that the restricted form does not allow, with its line."""
+    """Violation of the restricted form, with its line."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class Type:
         return self.access != "in"
 
     def same(self, other: Type) -> bool:
-        """Return whether the values are of one kind, whoever may change them."""
+        """Return whether the values have the same type, regardless of access."""
         return self.name == other.name and (self.length is None) == (other.length is None)
 
 
@@ -86,7 +87,7 @@ class Constant:
 class Record:
     """A record: its fields by name, with the comment of each; those that are infinite unless they are given.
 
-    Languages whose records have beginnings follow the latter; in C a new record is zero.
+    Languages with default values of fields use the latter; in C a new record is zero.
     """
 
     name: str
@@ -98,19 +99,19 @@ class Record:
 
 @dataclass
 class Function:
-    """A function with what the check found out.
+    """A function with the results of the check.
 
     Attributes
     ----------
     parameters : dict of str to Type
     result : Type or None
     types : dict of int to Type
-        Of every expression, by the id of its node.
+        Type of every expression, by the id of its node.
     locals : dict of str to Type
     homes : dict of str to int
         For each local the id of the statement before which, or with which, it is declared.
     writes : dict of str to int
-        How often the text assigns to a local.
+        Number of assignments to each local.
     loops : set of str
         Variables of ``for`` loops, which exist inside these only.
     calls, uses, raises : set of str
@@ -157,7 +158,7 @@ class Form:
     constants, records, functions : dict
         By name, in the order of the text.
     comments : dict of int to str
-        Comment of each line; those that stand alone on their line are also in `alone`.
+        Comment of each line; the lines of those on a line of their own are also in `alone`.
     """
 
     doc: str
@@ -168,7 +169,7 @@ class Form:
     alone: frozenset[int]
 
     def failing(self, also: frozenset[str] = frozenset()) -> frozenset[str]:
-        """Return the functions that raise, or call one that does; ``also`` are taken as such."""
+        """Return the functions that raise, or call one that does; ``also`` are included."""
         found: set[str] = set()
         for name, function in self.functions.items():  # callees come first
             if name in also or function.raises or function.calls & found:
@@ -177,7 +178,7 @@ class Form:
 
     @property
     def errors(self) -> list[str]:
-        """Names of what is raised, in the order of the text."""
+        """Names of the errors raised, in the order of the text."""
         raised = (
             error_name(node)
             for function in self.functions.values()
@@ -197,7 +198,7 @@ class Form:
 
 
 def refused(node: ast.AST, reason: str = "") -> FormError:
-    """Return the error that names a line and what is wrong there."""
+    """Return an error with the line and the reason."""
     where = getattr(node, "lineno", "?")
     return FormError(f"line {where}: {ast.unparse(node).splitlines()[0]!r}: {reason or 'not in the restricted form'}")
 

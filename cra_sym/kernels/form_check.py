@@ -1,4 +1,4 @@
-"""What the restricted form allows in a function, and the type of everything in it."""
+"""Check of a function against the restricted form, and inference of all types in it."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def literal(node: ast.expr) -> float | int | None:
 
 
 def type_of(node: ast.expr, records: Mapping[str, Record], lengths: Mapping[str, object]) -> Type:
-    """Return the type that an annotation means; ``lengths`` are the names a row may have as its length."""
+    """Return the type of an annotation; ``lengths`` are the names allowed as the length of a row."""
     match node:
         case ast.Name(id=name) if name in SCALARS or name in records:
             return Type(name)
@@ -65,7 +65,7 @@ def type_of(node: ast.expr, records: Mapping[str, Record], lengths: Mapping[str,
 
 
 class Checker:
-    """Finds the type of everything in a function, or says what is wrong."""
+    """Type inference for a function, with errors that name the line."""
 
     def __init__(
         self,
@@ -214,7 +214,9 @@ class Checker:
             while len({p[: depth + 1] for p in paths}) == 1 and len(paths[0]) > depth:
                 depth += 1
             common = paths[0][:depth]
-            if (common and common[-1] in (0, 1)) or not common:  # a block: before its first statement that has it
+            if (
+                common and common[-1] in (0, 1)
+            ) or not common:  # a block: before its first statement that uses the name
                 common = paths[0][: depth + 1]
             self.function.homes[name] = common[-1]
 

@@ -1,4 +1,4 @@
-"""The restricted form read from text: see :mod:`cra_sym.kernels.form`."""
+"""Parser of the restricted form; see :mod:`cra_sym.kernels.form`."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def parse(text: str) -> Form:
 
 
 def comments_of(text: str) -> tuple[dict[int, str], frozenset[int]]:
-    """Return the comment of each line that has one, and the lines that hold nothing else."""
+    """Return the comment of each line that has one, and the lines that contain only a comment."""
     found: dict[int, str] = {}
     alone = set()
     for token in tokenize.generate_tokens(io.StringIO(text).readline):

@@ -1,4 +1,4 @@
-"""What the compiler needs to know of a kernel."""
+"""Interface of kernels for the compiler."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["Generated"]
 
 
 class Generated(Protocol):
-    """Generated source and what it means; :class:`cra_sym.kernels.Kernel` is one."""
+    """Generated source and its layout; :class:`cra_sym.kernels.Kernel` is one."""
 
     backend: str | None
 
@@ -27,4 +27,4 @@ class Generated(Protocol):
 
     @property
     def layout(self) -> Any:
-        """What the outputs form."""
+        """Structure of the outputs."""

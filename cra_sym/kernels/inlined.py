@@ -1,4 +1,4 @@
-"""Functions that Numba's compiled code may call, without Numba looking into them: `cra_sym.kernels.writer` does."""
+"""Functions for Numba's compiled code that `cra_sym.kernels.writer` translates instead of Numba."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _TYPES = {arithmetic.DOUBLE: types.float64, arithmetic.INTEGER: types.int64, ari
 
 
 def inlined(function: ast.FunctionDef, namespace: Mapping[str, Any]) -> Any:
-    """Return a function for compiled code to call, which is written out at every call.
+    """Return a function for compiled code, which is inlined at every call.
 
     Parameters
     ----------
     function : ast.FunctionDef
-        As `cra_sym.kernels.writer.call` wants it; it takes numbers and contiguous arrays.
+        In the form of `cra_sym.kernels.writer.call`; its arguments are numbers and contiguous arrays.
     namespace : dict
-        What the names in it mean.
+        Values of the names in it.
     """
 
     def value(context: Any, builder: Any, kinds: Sequence[Any], given: Sequence[Any]) -> Any:
@@ -46,7 +46,7 @@ def inlined(function: ast.FunctionDef, namespace: Mapping[str, Any]) -> Any:
 
     @cache
     def found(*given: Any) -> Any:
-        """Write the function where nobody runs it, to see what it returns."""
+        """Write the function to a scratch module, to find the type of its result."""
         context = cpu_target.target_context.subtarget(enable_nrt=True)
         kinds = [_plain(kind) for kind in given]
         library = context.codegen().create_library("trial")

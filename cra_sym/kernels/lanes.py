@@ -1,4 +1,4 @@
-"""A kernel on many lanes: one compiled loop, made once the calls of a kernel add up, and shared out among threads."""
+"""Kernels on many lanes: a loop that is compiled once the kernel has been called enough, and runs in threads."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from cra_sym.kernels.specialise import compiled, has_compiler
 __all__ = ["COMPILE_FROM", "evaluated"]
 
 COMPILE_FROM = 10_000
-"""Lanes of a kernel, added up over the calls of this process, from where on it is compiled, or loaded from the store.
+"""Total number of lanes over the calls of this process from which on a kernel is compiled, or loaded from the cache.
 
-That takes about half a second, Numba's import included, so whoever evaluates less does without. Kernels of more than
+Compilation takes about half a second, including the import of Numba. Kernels of more than
 `_SHORT` characters take longer, and are compiled later.
 """
 _SHORT = 5000  # characters of source; beyond, the time of the compiler grows nearly with their square
-_SPAN = 1 << 16  # lanes that a thread takes at a time
+_SPAN = 1 << 16  # lanes per task of a thread
 _WORTH = 1e-3  # seconds of work for each of the threads, which cost a tenth of it to start
-_INLINE = {"ceil", "floor", "maximum", "minimum", "nan", "sign", "sqrt", "where"}  # functions that a processor has
+_INLINE = {"ceil", "floor", "maximum", "minimum", "nan", "sign", "sqrt", "where"}  # functions with machine instructions
 _BRANCH_FREE = {"cos", "cosh", "exp", "log", "sin", "sinh", "tan", "tanh"}  # of `cra_sym.kernels.elementary`
 
 Array = NDArray[np.float64]
@@ -40,13 +40,13 @@ class _Loop:
     """The loop of a kernel over one pattern of arguments, each an array of lanes or a number."""
 
     outputs: int
-    lanes: int = 0  # evaluated without it
+    lanes: int = 0  # lanes evaluated without it so far
     fill: Callable[..., int] | None = None
     possible: bool = True
     turn: Lock = field(default_factory=Lock)
 
     def wanted(self, kernel: Generated, along: Sequence[bool], size: int) -> Callable[..., int] | None:
-        """Return the compiled function if there is one after a call of this size."""
+        """Return the compiled function, if a call of this size makes it available."""
         with self.turn:
             if self.fill is None and self.possible:
                 self.lanes += size
@@ -56,7 +56,7 @@ class _Loop:
         return self.fill
 
 
-_loops: dict[tuple[str, tuple[bool, ...]], _Loop] = {}  # by digest and pattern: equal kernels share them
+_loops: dict[tuple[str, tuple[bool, ...]], _Loop] = {}  # by digest and pattern, shared by equal kernels
 
 
 def evaluated(
@@ -67,8 +67,8 @@ def evaluated(
 ) -> list[np.ndarray]:
     """Return the outputs of the kernel, each of the given shape: by machine code once it pays, until then by NumPy.
 
-    Lanes that come out as nan are evaluated again by NumPy, whose sine and cosine have no limit. A kernel that
-    compares numbers could hide such a nan: it is compiled with the platform's functions.
+    Lanes with a result nan are evaluated again by NumPy, whose sine and cosine have no limit of the argument. A kernel
+    with comparisons could hide such a nan and is compiled with the platform's functions.
     """
     size = math.prod(shape)
     if kernel.backend == "numpy" or not size or any(a.dtype != np.float64 for a in arrays):
@@ -91,7 +91,7 @@ def evaluated(
 
 
 def _compiled(kernel: Generated, along: Sequence[bool], outputs: int) -> Callable[..., int] | None:
-    """Return the loop in machine code, or None if there is no compiler for it, or no gain unless it is asked for."""
+    """Return the loop in machine code, or None if there is no compiler, or no gain and it is not requested."""
     complex_or_special = "1j" in kernel.source or "\nfrom scipy" in f"\n{kernel.source}"
     if not outputs or complex_or_special or not (kernel.backend == "numba" or _is_quick(kernel)) or not has_compiler():
         return None
@@ -108,7 +108,7 @@ def _compiled(kernel: Generated, along: Sequence[bool], outputs: int) -> Callabl
 
 
 def _is_quick(kernel: Generated) -> bool:
-    """Return whether all that a kernel calls becomes SIMD code: the platform's functions take one number at a time."""
+    """Return whether all functions of a kernel become SIMD code, unlike the platform's functions of one number."""
     head, _, body = kernel.source.partition("\ndef evaluate(")
     lines = [line.removeprefix("from numpy import ") for line in head.splitlines() if line.startswith("from numpy ")]
     names = {name for line in lines for name in line.split(", ")}
@@ -117,12 +117,12 @@ def _is_quick(kernel: Generated) -> bool:
 
 
 def _is_free(kernel: Generated) -> bool:
-    """Return whether a kernel compares no numbers, so that a nan on its way is a nan at its end."""
+    """Return whether a kernel has no comparisons, so that an intermediate nan propagates to the result."""
     return "where(" not in kernel.source
 
 
 def _in_a_row(array: np.ndarray, shape: tuple[int, ...]) -> Array:
-    """Return the lanes of an array, contiguous, aligned and read-only: of one type, compiled once."""
+    """Return the lanes of an array, contiguous, aligned and read-only, so that only one type is compiled."""
     if array.shape != shape:
         array = np.broadcast_to(array, shape)
     if not array.flags.aligned:
@@ -133,7 +133,7 @@ def _in_a_row(array: np.ndarray, shape: tuple[int, ...]) -> Array:
 
 
 def _in_threads(fill: Callable[..., int], results: Sequence[Array], values: Sequence[Array | float]) -> int:
-    """Fill the results and return how many lanes hold a nan; threads help if the first part says that it takes long."""
+    """Fill the results and return the number of lanes with nan; threads are used if the first part is slow."""
     size = results[0].size
     if size <= _SPAN:
         return fill(*results, *values)
@@ -168,7 +168,7 @@ def _threads() -> int:
 
 
 def _leaves(layout: Any) -> int:
-    """Return how many numbers a lane has."""
+    """Return the number of outputs per lane."""
     if isinstance(layout, (dict, list)):
         return sum(map(_leaves, layout.values() if isinstance(layout, dict) else layout))
     return math.prod(layout)

@@ -1,4 +1,4 @@
-"""How the work on a large batch is shared out: in blocks for NumPy, among threads for machine code, and when which."""
+"""Division of the work on large batches: blocks for NumPy, threads for machine code, and the choice between them."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from cra_sym.kernels.specialise import has_compiler, is_compiled
 
 __all__ = ["COMPILE_FROM", "LOAD_FROM", "Parts", "flattened", "in_parts", "wants_compiler"]
 
-# A root costs NumPy about 2 microseconds and compiled code 0.1; to load machine code, Numba included, takes as long as
-# LOAD_FROM roots by NumPy, to make it as long as COMPILE_FROM. The benchmark of cold starts measures both.
+# A root takes about 2 microseconds with NumPy and 0.1 compiled. Loading machine code, with Numba, takes as long as
+# LOAD_FROM roots by NumPy, compiling it as long as COMPILE_FROM. The benchmark of cold starts measures both.
 LOAD_FROM = 400_000
-"""Roots in one call from where on loading machine code costs less than it saves."""
+"""Number of roots in one call from which on loading machine code pays."""
 COMPILE_FROM = 1_200_000
-"""Roots in such calls of this process from where on making machine code costs less than going on without it."""
-_ROOTS_PER_PART = 30_000  # that are worth handing out
-_PARTS_PER_THREAD = 8  # so that a thread on a busy processor keeps nobody waiting
-_BLOCK = 32_768  # points and roots whose temporaries stay in the processor's cache
+"""Number of roots in such calls of this process from which on compiling pays."""
+_ROOTS_PER_PART = 30_000  # least number of roots per thread
+_PARTS_PER_THREAD = 8  # parts per thread, so that a slow thread does not delay the others
+_BLOCK = 32_768  # points and roots whose temporaries fit in the processor's cache
 _FEWEST = 256  # lanes in a block, below which a call of NumPy costs more than its work
 
 Parts = Callable[[], tuple[str, Mapping[str, Kernel]]]
@@ -31,7 +31,7 @@ _done: Counter[Parts] = Counter()  # roots in large calls, by template
 
 
 def flattened(*values: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return arrays of lanes, all contiguous and read-only: of one type, for which machine code is made once."""
+    """Return arrays of lanes, all contiguous and read-only, so that machine code is compiled for one type."""
     lanes = tuple(np.ascontiguousarray(value).reshape(-1).view() for value in values)
     for array in lanes:
         array.flags.writeable = False
@@ -41,9 +41,9 @@ def flattened(*values: np.ndarray) -> tuple[np.ndarray, ...]:
 def wants_compiler(roots: int, parts: Parts) -> bool:
     """Return whether the compiled path of a template pays for a call: the policy of the package.
 
-    Small calls never compile and never load. A call of `LOAD_FROM` roots takes machine code that is there. If there is
-    none, it is made for a call of more than `COMPILE_FROM` roots, or as soon as such calls of this process have come to
-    that number: nobody waits more than twice as long as whoever knew what comes next.
+    Small calls neither compile nor load. A call of `LOAD_FROM` roots uses machine code that exists already. Otherwise
+    it is compiled for a call of more than `COMPILE_FROM` roots, or once such calls of this process add up to that
+    number. The total time is thus at most twice the optimum (competitive ratio 2).
     """
     if roots < LOAD_FROM or not has_compiler():
         return False

@@ -13,7 +13,7 @@ _NAMES = ("cos", "cosh", "exp", "log", "sin", "sinh", "tan", "tanh", "where")
 
 
 def functions_of(text: str, replaced: Mapping[str, Callable[..., Any]] | None = None) -> dict[str, Callable[..., Any]]:
-    """Return the functions that a text defines, as `cra_sym.kernels.compiled` takes it.
+    """Return the functions that a text in the form of `cra_sym.kernels.compiled` defines.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""SymPy expressions as Python source: one text that NumPy evaluates on arrays and Numba compiles for scalars."""
+"""Python source from SymPy expressions, which NumPy evaluates on arrays and Numba compiles for scalars."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _LONGEST_CHAIN = 64  # integer powers up to this become products
 
 
 class _Printer(SciPyPrinter):  # type: ignore[misc]  # SymPy has no types
-    """SciPy's printer with names of our choosing, and conditions as operators and ``where``: they serve scalars too."""
+    """SciPy's printer with given names, and with conditions as operators and ``where``, which work for scalars too."""
 
     def __init__(self, names: Mapping[sp.Symbol, str]) -> None:
         super().__init__({"fully_qualified_modules": False, "allow_unknown_functions": False})
@@ -126,7 +126,7 @@ def check_arguments(arguments: Any) -> tuple[sp.Symbol, ...]:
     if not isinstance(arguments, Iterable) or isinstance(arguments, str) or getattr(arguments, "ndim", 1) != 1:
         raise TypeError(f"arguments = {shown(arguments)}: must be a sequence of SymPy symbols")
     symbols: tuple[sp.Symbol, ...] = ()
-    for symbol in arguments:  # one by one: there may be no end of them
+    for symbol in arguments:  # one by one, since the sequence may be infinite
         if not isinstance(symbol, sp.Symbol):
             raise TypeError(f"arguments: {shown(symbol)} must be a SymPy symbol; substitute one for it")
         symbols += (symbol,)
@@ -139,8 +139,8 @@ def check_arguments(arguments: Any) -> tuple[sp.Symbol, ...]:
 def module_source(expression: Any, arguments: Sequence[sp.Symbol]) -> str:
     """Return the text of a module: imports, the constants ARGUMENTS and LAYOUT, and the function ``evaluate``.
 
-    Common subexpressions are computed once over all outputs; nothing is expanded. A single expression is returned as it
-    is, everything else as one flat tuple whose shape LAYOUT records.
+    Common subexpressions are computed once over all outputs; nothing is expanded. A single expression is returned
+    directly, anything else as a flat tuple with its structure in LAYOUT.
     """
     symbols = check_arguments(arguments)
     layout, outputs = _flatten(expression)
@@ -166,7 +166,7 @@ def shared_steps(outputs: Sequence[sp.Expr]) -> tuple[list[tuple[sp.Symbol, sp.E
     """Share common subexpressions over all outputs and turn integer powers into products; nothing is expanded."""
     names = sp.numbered_symbols("x", cls=sp.Dummy)
     nodes = (node for value in outputs for node in sp.preorder_traversal(value))
-    if next(islice(nodes, _LARGEST, None), None) is not None:  # a nested recurrence: what repeats are its nodes
+    if next(islice(nodes, _LARGEST, None), None) is not None:  # in a nested recurrence the repeated parts are its nodes
         replacements, outputs = tree_cse(outputs, names)
     else:
         replacements, outputs = sp.cse(outputs, symbols=names, list=True)
@@ -197,12 +197,12 @@ def _with_names(
     outputs: Sequence[sp.Expr],
     taken: Set[str],
 ) -> tuple[_Printer, list[str], list[str]]:
-    """Print steps and outputs; if a function turns out to have the name of a symbol, print again with other names."""
+    """Print steps and outputs, with other names of symbols if one is the name of a function."""
     names: dict[sp.Symbol, str] = {}
     for symbol in symbols:
-        _christen(symbol, names, taken)
+        _assign_name(symbol, names, taken)
     for number, (symbol, _) in enumerate(steps):
-        _christen(symbol, names, taken, f"x{number}")
+        _assign_name(symbol, names, taken, f"x{number}")
     printer = _Printer(names)
     values = [_printed(printer, value) for _, value in steps]
     results = [_printed(printer, value) for value in outputs]
@@ -212,8 +212,8 @@ def _with_names(
     return printer, values, results
 
 
-def _christen(symbol: sp.Symbol, names: dict[sp.Symbol, str], taken: Set[str], wish: str | None = None) -> None:
-    """Give ``symbol`` an identifier of its own: Python's and NumPy's names stay what they are."""
+def _assign_name(symbol: sp.Symbol, names: dict[sp.Symbol, str], taken: Set[str], wish: str | None = None) -> None:
+    """Give ``symbol`` a unique identifier that is not a name of Python or NumPy."""
     base = wish or re.sub(r"[^0-9A-Za-z_]", "_", symbol.name)
     base = base if re.match(r"[A-Za-z]", base) else f"s{base}"
     others = taken | set(names.values())
@@ -231,7 +231,7 @@ def _printed(printer: _Printer, expression: sp.Expr) -> str:
 
 
 def _check_names(text: str) -> None:
-    """Refuse a text that uses a name it does not bind: the printer wrote something it has no import for."""
+    """Raise an error for a name without a binding, which the printer used without an import."""
     used, bound = set(), {"abs"}
     for node in ast.walk(ast.parse(text)):
         match node:
@@ -266,7 +266,9 @@ def _without_powers(
         return known[base, exponent]
 
     def rewrite(expression: sp.Expr) -> sp.Expr:
-        if expression.is_Atom or isinstance(expression, (sp.RootOf, sp.RootSum)):  # whose polynomial is no expression
+        if expression.is_Atom or isinstance(
+            expression, (sp.RootOf, sp.RootSum)
+        ):  # whose polynomial is not an expression
             return aliases.get(expression, expression)
         terms = [rewrite(term) for term in expression.args]
         if expression.is_Pow and expression.exp.is_Integer and 1 < abs(expression.exp) <= _LONGEST_CHAIN:

@@ -1,8 +1,8 @@
-"""Numba templates specialised with generated functions: one module of text, compiled once on a machine and then loaded.
+"""Numba templates specialised with generated functions, compiled once and then loaded from the user's cache.
 
-Numba's own file cache overlooks changes of inlined helpers, trusts time stamps and unpickles whatever lies beside the
-source. Here everything that is compiled is one text, its hash is the key, and machine code goes through the private
-store. Nothing else in the package compiles.
+Numba's own file cache misses changes of inlined helpers, relies on time stamps and unpickles any file next to the
+source. Here the compiled text is a single module whose hash is the key, and machine code is kept in the private cache.
+No other module of the package compiles.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from cra_sym.kernels.generated import Generated
 __all__ = ["compiled", "has_compiler", "is_compiled", "written_out"]
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "no_cfunc_wrapper": True}
-_UNKNOWN = (0, 69)  # the first version of Numba that was not tried
+_UNKNOWN = (0, 69)  # the first version of Numba that was not tested
 _ELEMENTARY = Path(__file__).with_name("elementary.py")
 _COMPILER = [
     Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8") for name in ("arithmetic", "inlined", "writer")
 ]
-_TURN = Lock()  # one thread specialises what others want too; Python 3.11 cannot parse in two at once
+_TURN = Lock()  # one thread specialises for all; Python 3.11 cannot parse in two threads at once
 _WHERE = "def where(condition, value, otherwise):\n    return value if condition else otherwise\n"
 
 
 def has_compiler() -> bool:
-    """Return whether Numba is there and not switched off by NUMBA_DISABLE_JIT."""
+    """Return whether Numba is installed and not disabled by NUMBA_DISABLE_JIT."""
     if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
         return False
     if "numba" in sys.modules:
@@ -63,7 +63,7 @@ def compiled(template: str, kernels: Mapping[str, Generated], *, elementary: boo
     template : str
         Module text.
     kernels : dict of str to Kernel
-        The functions the template takes as given.
+        Functions that the template calls.
     elementary : bool
         Whether these functions are the branch-free ones (sin, cos and tan are nan beyond 1e6) or the platform's.
 
@@ -75,7 +75,7 @@ def compiled(template: str, kernels: Mapping[str, Generated], *, elementary: boo
     Raises
     ------
     ImportError
-        If Numba is missing; :func:`has_compiler` tells.
+        If Numba is missing; see :func:`has_compiler`.
     ValueError
         If a kernel uses functions that Numba cannot compile.
 
@@ -103,9 +103,9 @@ def compiled(template: str, kernels: Mapping[str, Generated], *, elementary: boo
 
 
 def is_compiled(template: str, kernels: Mapping[str, Generated]) -> bool:
-    """Return whether machine code of the specialised template was made before, here or by an earlier process.
+    """Return whether machine code of the specialised template exists, from this or an earlier process.
 
-    The answer costs no import of Numba; another processor than the one that compiled may need to do it again.
+    Numba is not imported for this; a different processor may have to compile again.
     """
     digest = _digest(_prelude(kernels, True), template)
     return digest in _MADE or store.load(_mark(digest)) is not None
@@ -133,7 +133,7 @@ def written_out(template: str, kernels: Mapping[str, Generated]) -> tuple[str, d
     return text, {name: value for name, value in names.items() if isinstance(value, (int, float))}
 
 
-_MADE: set[str] = set()  # digests of what this process compiled or loaded
+_MADE: set[str] = set()  # digests of the code that this process compiled or loaded
 
 
 def _digest(head: str, template: str) -> str:
@@ -141,7 +141,7 @@ def _digest(head: str, template: str) -> str:
 
 
 def _remember(digest: str) -> None:
-    """Note that machine code is there, for this process and for others."""
+    """Record that machine code exists, for this process and for others."""
     if digest not in _MADE:
         _MADE.add(digest)
         if store.load(_mark(digest)) is None:
@@ -149,7 +149,7 @@ def _remember(digest: str) -> None:
 
 
 def _mark(digest: str) -> str:
-    """Return the key of an entry that says that machine code is there, without asking Numba for the processor."""
+    """Return the key of the entry that records that machine code exists, independent of the processor."""
     return repr((digest, sys.version, _versions()))
 
 
@@ -168,7 +168,7 @@ def _entries(head: str, template: str) -> SimpleNamespace:
 
     digest = _digest(head, template)
     module = ModuleType(f"cra_sym_compiled_{digest[:32]}")
-    sys.modules[module.__name__] = module  # where stored machine code looks for its constants
+    sys.modules[module.__name__] = module  # module in which stored machine code finds its constants
     namespace = module.__dict__
     exec(head + template, namespace)
     functions = {node.name: node for node in ast.parse(head + template).body if isinstance(node, ast.FunctionDef)}
@@ -189,13 +189,13 @@ def _names(template: str) -> list[str]:
 
 
 def _is_known() -> bool:
-    """Return whether Numba's inner life, on which our way of compiling and storing leans, is as it was tried."""
+    """Return whether Numba is a tested version, since compiling and storing depend on its internals."""
     return tuple(map(int, re.findall(r"\d+", _versions()[0])[:2])) < _UNKNOWN
 
 
 @cache
 def _tried(head: str, template: str) -> SimpleNamespace:
-    """Return the entries for a Numba that is not known: compiled as ever, or if that fails by its own means."""
+    """Return the entries for an untested version of Numba: compiled as usual, or by Numba itself if that fails."""
     made = None
     with suppress(ImportError, AttributeError):
         made = _entries(head, template)
@@ -220,7 +220,7 @@ def _tried(head: str, template: str) -> SimpleNamespace:
 
 @cache
 def _plain(head: str, template: str) -> SimpleNamespace:
-    """Return the entries as Numba compiles them by itself, which takes seconds and is not stored."""
+    """Return the entries compiled by Numba alone, which takes seconds and is not stored."""
     import numba
 
     warn(
@@ -237,7 +237,7 @@ def _plain(head: str, template: str) -> SimpleNamespace:
 
 
 class _StoredCode:
-    """What a Numba dispatcher asks for machine code; the answers come from the private store, checked byte for byte."""
+    """Cache object of a Numba dispatcher, backed by the private cache with a checksum of every entry."""
 
     cache_path = None
 
@@ -255,7 +255,7 @@ class _StoredCode:
                 found = CompileResult._rebuild(target, *pickle.loads(content))
                 _remember(self._digest)
                 return found
-            except Exception:  # whatever is wrong with code this process did not make: make it anew
+            except Exception:  # a damaged entry of another process is compiled again
                 pass
         self._bar = tqdm(total=0, desc=f"compiling {self._name}, once", bar_format="{desc}", leave=False, disable=None)
         return None
@@ -273,10 +273,10 @@ class _StoredCode:
         return repr((self._digest, self._name, str(signature), codegen.magic_tuple(), sys.version, _versions()))
 
     def enable(self) -> None:
-        """Do nothing: the store is always asked."""
+        """Do nothing: the cache is always used."""
 
     def disable(self) -> None:
-        """Do nothing: the store is always asked."""
+        """Do nothing: the cache is always used."""
 
     def flush(self) -> None:
         """Do nothing: a changed text has another key."""

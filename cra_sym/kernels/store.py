@@ -1,8 +1,8 @@
-"""A private store of generated text and machine code: what it cannot vouch for, it does not return.
+"""Private cache of generated text and machine code, which returns verified entries only.
 
 An entry is a file of the current user in a directory of the current user, both closed to everybody else. Its first line
-holds the SHA-256 of key and content. The checked bytes are the bytes handed out: a file is read once, never imported,
-so no ``.pyc`` and no second look at the disk can replace them. Anything unexpected counts as a miss.
+holds the SHA-256 of key and content. A file is read once and never imported, so the bytes
+returned are the bytes verified. Anything unexpected counts as a miss.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from pathlib import Path
 
 __all__ = ["directory", "load", "save"]
 
-_LARGEST = 1 << 26  # bytes; nothing the package writes comes near
+_LARGEST = 1 << 26  # bytes, far above the size of any entry
 
 
 def directory() -> Path:
-    """Return where this user's cache lives by the habit of the platform; the directory need not exist.
+    """Return the platform's cache directory of this user, which need not exist.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def directory() -> Path:
 
 
 def load(key: str) -> bytes | None:
-    """Return the content stored under ``key``, or None if there is none that can be trusted."""
+    """Return the content stored under ``key``, or None if there is no verified one."""
     try:
         path = _private_directory() / _name(key)
         flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
@@ -58,8 +58,8 @@ def load(key: str) -> bytes | None:
 def save(key: str, content: bytes) -> bool:
     """Store ``content`` under ``key``; return whether that was possible.
 
-    What is not written to its end is a miss like any damage, and the next one who saves replaces it: whenever a process
-    is killed, it leaves nothing else behind.
+    An incomplete file counts as a miss and is replaced by the next save, so a killed process leaves nothing else
+    behind.
     """
     path = None
     try:
@@ -68,7 +68,7 @@ def save(key: str, content: bytes) -> bool:
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
         with open(os.open(path, flags, 0o600), "wb") as file:
             file.write(_tag(key, content) + b"\n" + content)
-    except FileExistsError:  # another one saves it just now
+    except FileExistsError:  # another process is saving it now
         return False
     except (OSError, RuntimeError, ValueError):
         if path is not None:

@@ -1,4 +1,4 @@
-"""The one way in which the text of a template becomes the text of a module: marked names are replaced."""
+"""Substitution of placeholders in the text of a template."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ _MARK = re.compile(r"__([A-Z]+(?:_[A-Z]+)*)__")
 
 
 def template(module: str, marks: Mapping[str, object]) -> str:
-    """Return the text of a module of the package with each ``__NAME__`` replaced by what ``NAME`` stands for.
+    """Return the text of a module of the package with each placeholder ``__NAME__`` replaced.
 
     Parameters
     ----------
     module : str
         ``"cra_sym.room.module"``; it is read, never imported.
     marks : mapping of str to object
-        What stands in the place of a mark, as text: a number, a list of arguments, statements of one line.
+        Replacement of each placeholder ``NAME``, as text: a number, a list of arguments, one-line statements.
 
     Raises
     ------
     ValueError
-        If the marks of the text are not those given.
+        If the placeholders of the text are not those given.
     """
     room, _, name = module.rpartition(".")
     text = files(room).joinpath(f"{name}.py").read_text(encoding="utf-8")

@@ -1,8 +1,8 @@
-"""Functions of numbers and arrays written to LLVM where they are called, statement by statement.
+"""Translation of functions of numbers and arrays to LLVM, inlined statement by statement.
 
-Numba finds types by search, at about a millisecond for every operation. In generated functions and in the loops around
-them there are thousands of operations and nothing to find: a value is a double, an integer, a condition or a contiguous
-array, and the arguments tell which. Everything is inlined, so that loops over lanes become SIMD code.
+Numba's type inference takes about a millisecond per operation. Generated functions and the loops around them have
+thousands of operations whose types follow directly from the arguments: a value is a double, an integer, a condition or
+a contiguous array. Everything is inlined, so that loops over lanes become SIMD code.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ __all__ = ["Array", "call"]
 
 @dataclass(frozen=True)
 class Array:
-    """A contiguous array, or the part of one that leading indices select."""
+    """A contiguous array, or the part of one selected by leading indices."""
 
     data: Any
     shape: tuple[Any, ...]
@@ -34,7 +34,7 @@ class Array:
 def call(
     context: Any, builder: Any, function: ast.FunctionDef, arguments: Sequence[Any], namespace: Mapping[str, Any]
 ) -> Any:
-    """Write the body of a function where the builder stands.
+    """Write the body of a function at the position of the builder.
 
     Parameters
     ----------
@@ -42,12 +42,12 @@ def call(
         Numba's target context and LLVM's builder.
     function : ast.FunctionDef
         Made of assignments, ``for`` over ``range``, ``while``, ``if``, ``continue`` and ``return``. Indices count from
-        the start of an array and stay within it, and all parts of an expression are evaluated, whatever its conditions.
-        A name keeps the type it is given first. Arrays that it makes are gone when it returns.
+        the start of an array and must be within it, and all parts of an expression are evaluated, regardless of its
+        conditions. A name keeps its first type. Arrays created in the function are freed when it returns.
     arguments : sequence of number, LLVM value, or Array
     namespace : dict
-        What other names mean: constants, NumPy and its functions of numbers, further functions as ast.FunctionDef, of
-        which those that ``_CALLED`` names are written once and called, all others wherever they are called.
+        Values of other names: constants, NumPy and its functions of numbers, and further functions as ast.FunctionDef;
+        those in ``_CALLED`` are written once and called, all others are inlined.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def _refused(node: ast.AST) -> errors.TypingError:
 
 
 def _in_double(result: Any) -> Any:
-    """Return a result with whole constants, as SymPy writes them, as the doubles they are."""
+    """Return a result with integer constants, as SymPy prints them, converted to doubles."""
     if isinstance(result, tuple):
         return tuple(map(_in_double, result))
     return float(result) if type(result) is int else result
@@ -70,9 +70,8 @@ def _in_double(result: Any) -> Any:
 class _Body(Arithmetic):
     """One call of a function.
 
-    A name stands for a value. In a function that branches, a name it assigns stands for a place in memory of the type
-    assigned first, and LLVM makes registers of these. Arrays and tuples that get a name in a branch or a loop have it
-    only there.
+    A name denotes a value. In a function with branches, an assigned name denotes a memory location of its first type,
+    which LLVM turns into a register. Arrays and tuples named in a branch or a loop are local to it.
     """
 
     def __init__(
@@ -113,7 +112,7 @@ class _Body(Arithmetic):
         self.builder.position_at_end(self.end)
         for memory in self.owned:
             self.context.nrt.free(self.builder, self.builder.load(memory))
-            self.builder.store(memory.type.pointee(None), memory)  # the next call may not make this array
+            self.builder.store(memory.type.pointee(None), memory)  # the next call may not allocate this array
         results = tuple(self.builder.load(place) for place in self.results or ())
         return (results[0] if self.single else results) if results else None
 
@@ -208,7 +207,7 @@ class _Body(Arithmetic):
             self.builder.unreachable()
 
     def count(self, name: str, bounds: Sequence[Any], body: Sequence[ast.stmt]) -> None:
-        """Write a loop over a range; a plain one of known length as its rounds in a row."""
+        """Write a loop over a range; a simple one of known length is unrolled."""
         start, stop, *steps = bounds if len(bounds) > 1 else (0, *bounds)
         step = steps[0] if steps else 1
         if not is_constant(step) or not step or any(kind_of(bound) != INTEGER for bound in bounds):
@@ -252,7 +251,7 @@ class _Body(Arithmetic):
         self.again = outer
 
     def give_back(self, value: Any) -> None:
-        """Put the result where all returns of the function put it, and leave."""
+        """Store the result in the common location of all returns, and branch to the end."""
         single = not isinstance(value, tuple)
         parts = () if value is None else (value,) if single else value
         if self.results is None:
@@ -296,7 +295,7 @@ class _Body(Arithmetic):
             case ast.BoolOp(op=op, values=parts):
                 join = self.builder.and_ if isinstance(op, ast.And) else self.builder.or_
                 conditions = [self.value(part) for part in parts]
-                if any(kind_of(part) != CONDITION for part in conditions):  # Python's result is one of them
+                if any(kind_of(part) != CONDITION for part in conditions):  # Python returns one of the operands
                     raise _refused(node)
                 return reduce(join, map(self.typed, conditions))
             case ast.IfExp(test=test, body=body, orelse=orelse):
@@ -330,9 +329,9 @@ class _Body(Arithmetic):
         return self.known_to_numba(function, arguments)
 
     def called_apart(self, function: ast.FunctionDef, arguments: Sequence[Any]) -> None:
-        """Call a function that is written once for arguments of the same types, beside the one that calls.
+        """Call a function that is written once for arguments of the same types, next to the caller.
 
-        It returns nothing, and none of the arrays it takes overlaps another. Numbers are passed, so are lengths.
+        It returns nothing, and its array arguments do not overlap. Numbers and lengths are passed.
         """
         numbers, types = [], []
         for argument in arguments:
@@ -364,7 +363,7 @@ class _Body(Arithmetic):
         return index if isinstance(index, tuple) else (index,)
 
     def pointer(self, array: Array, indices: Sequence[Any]) -> Any:
-        """Return where a part of an array begins; its elements lie in C order."""
+        """Return a pointer to the start of a part of an array in C order."""
         offset: Any = 0
         for length, index in zip(array.shape, [*indices, *[0] * (len(array.shape) - len(indices))], strict=True):
             if kind_of(index) != INTEGER or (is_constant(index) and index < 0):
@@ -399,7 +398,7 @@ def _is_stored(name: ast.Name) -> bool:
 
 
 def _is_plain(name: str, body: Sequence[ast.stmt]) -> bool:
-    """Return whether statements hold no loop, nothing that leaves them, and leave a name alone."""
+    """Return whether statements have no loop or exit and do not assign a name."""
     others = ast.For, ast.While, ast.Continue, ast.Return
     nodes = [node for statement in body for node in ast.walk(statement)]
     own = any(isinstance(node, ast.Name) and node.id == name and _is_stored(node) for node in nodes)

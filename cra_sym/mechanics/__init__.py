@@ -1,4 +1,4 @@
-"""Symbolic engines: Hamilton's principle, separation, Ritz, multiple scales; they know beams, never the arm."""
+"""Symbolic engines: Hamilton's principle, separation, Ritz, multiple scales; independent of the arm."""
 
 from cra_sym.mechanics.hamilton import BoundaryCondition, HamiltonResult, hamilton
 from cra_sym.mechanics.jets import HamiltonError

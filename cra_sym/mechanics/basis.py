@@ -50,13 +50,14 @@ class Basis:
     left, right : Matrix, shape (1, N)
         Values at the ends; at the right end in the ``values`` symbols.
     values : dict of Symbol to Expr
-        What the symbols stand for, in terms of ``wave_numbers`` times the length.
+        Meaning of the symbols, in terms of ``wave_numbers`` times the length.
     relations : tuple of (Symbol, Expr)
         ``symbol**2 = expression``.
     fields : tuple of Matrix
         Field number f is ``b fields[f] constants``.
     wave_numbers : dict of Symbol to Expr or None
-        Wave numbers times the length; their values as functions of the frequency, None where only ``dispersion`` says.
+        Wave numbers times the length, with their values as functions of the frequency; None if given only by
+        ``dispersion``.
     dispersion : Eq
         Equation the wave numbers satisfy.
     """
@@ -86,7 +87,7 @@ def general_solution(
     kind : {'hyperbolic', 'decaying'}
         For ``phi'''' = beta**4 phi``: cosh and sinh, or exponentials that decay from either end and stay bounded.
     name : callable
-        Makes a symbol that is not in use.
+        Returns a symbol that is not in use.
     """
     determinant = Poly(operator.det(method="berkowitz").expand(), r)
     degree = determinant.degree()

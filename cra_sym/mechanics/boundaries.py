@@ -1,7 +1,7 @@
-"""Stability boundaries as kernels: what multiple scales derive for each kind of resonance, in plain symbols.
+"""Stability boundaries as kernels: results of multiple scales for each kind of resonance, in plain symbols.
 
 ``half_width_sum_1``, ``shift_sum_1``, ``damped_shift_sum_1``, ``sums_sum_1`` and so on, for each kind and tongue, take
-nothing and return ``(expressions, arguments)`` for :func:`cra_sym.kernels.derived_kernel`.
+no arguments and return ``(expressions, arguments)`` for :func:`cra_sym.kernels.derived_kernel`.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def _half_width(kind: str, damped: bool, tongue: int) -> tuple[Expr, tuple[Symbo
 
 
 def _shift(kind: str, damped: bool, tongue: int) -> tuple[Expr, tuple[Symbol, ...]]:
-    """Return how far the second order moves the zone."""
+    """Return the second-order shift of the zone."""
     border = general_resonance(kind, 2, damped=damped, tongue=tongue).border
     assert border is not None
     return _in_order(kind, plain(border.centre))
@@ -69,7 +69,7 @@ def _in_order(kind: str, expression: Expr) -> tuple[Expr, tuple[Symbol, ...]]:
 
 
 def _sums(kind: str, tongue: int = 1) -> tuple[dict[str, dict[str, Expr]], tuple[Symbol, ...]]:
-    """Return each sum over modes: the resonant modes' share, a spectator's, and how the latter falls off with omega_j.
+    """Return each sum over modes: the contributions of resonant and spectator modes, and the tail of the latter.
 
     ``tail`` and ``tail_2`` are the coefficients of path / omega_j^2 and path / omega_j^4 for a fast spectator.
     """
@@ -91,7 +91,7 @@ def _sums(kind: str, tongue: int = 1) -> tuple[dict[str, dict[str, Expr]], tuple
 
 
 def forced_growth() -> tuple[Expr, tuple[Symbol, ...]]:
-    """Return the rate at which a transverse base of unit epsilon makes the tip's amplitude grow at resonance n."""
+    """Return the growth rate of the tip amplitude at resonance n by a transverse base motion of unit epsilon."""
     response = forced_resonance().response
     assert response is not None
     omega, gamma, mass, w_1 = (symbol(name) for name in ("omega_n", "Gamma_n", "M_n", "w_1"))
@@ -101,7 +101,7 @@ def forced_growth() -> tuple[Expr, tuple[Symbol, ...]]:
 
 @cache
 def forced_resonance() -> MultipleScales:
-    """Return multiple scales for a mode M_n (q'' + omega_n^2 q) = -Gamma_n w'' whose base shakes at resonance n.
+    """Return multiple scales for a mode M_n (q'' + omega_n^2 q) = -Gamma_n w'' with base motion at resonance n.
 
     The base moves by w = epsilon w_1 sin(varpi t), so that its acceleration is -epsilon w_1 varpi^2 sin(varpi t); with
     sin = Re(-i exp(i varpi t)) and the excitation at the resonance the force is what follows.

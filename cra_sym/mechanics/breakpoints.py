@@ -1,6 +1,6 @@
-"""Where coefficients are not smooth along x: the expressions whose zeros are jumps, kinks and branch points.
+"""Breakpoints of coefficients along x: the expressions whose zeros are jumps, kinks and branch points.
 
-The middle of a narrow bump and of a steep layer counts as such a place too, where it shows.
+The middle of a narrow peak or of a steep layer counts as a breakpoint too, if it can be located.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class Switch:
 
 
 def switches(expressions: Iterable[Expr], x: Symbol) -> tuple[Switch, ...]:
-    """Return the expressions whose zeros are where the given ones may not be smooth in x, each once.
+    """Return the expressions, without duplicates, at whose zeros the given ones may not be smooth in x.
 
     Raises
     ------
@@ -98,12 +98,12 @@ def switches(expressions: Iterable[Expr], x: Symbol) -> tuple[Switch, ...]:
 
 
 def _signed(switch: Switch) -> Switch:
-    """Return the same zeros with one of the two signs, so that they are found once."""
+    """Return the expression with a normalised sign, so that it is not duplicated."""
     return Switch(-switch.expression, switch.levels) if switch.expression.could_extract_minus_sign() else switch
 
 
 def derivative(expression: Expr, symbol: Symbol) -> Expr:
-    """Return the derivative by a symbol between breakpoints: all symbols are real, and what a jump adds is left out.
+    """Return the derivative by a symbol between breakpoints: symbols are real, delta functions at jumps are left out.
 
     Examples
     --------
@@ -123,15 +123,14 @@ def derivative(expression: Expr, symbol: Symbol) -> Expr:
 
 @dataclass(frozen=True)
 class Exponents:
-    """Expressions in x and the parameters that tell how fast smooth functions may vary.
+    """Expressions in x and the parameters that bound the variation of smooth functions.
 
-    Where an exponent e changes by a few units, exp(e), cos(e) and the like may rise and fall; between places where it
-    changes by little they cannot.
+    Only where an exponent e changes by a few units may exp(e), cos(e) and similar functions have an extremum.
 
     Attributes
     ----------
     decaying : tuple of Expr
-        Those of functions that are constant, to the last digit, where the exponent is very negative.
+        Exponents of functions that are constant to rounding where the exponent is very negative.
     others : tuple of Expr
     """
 

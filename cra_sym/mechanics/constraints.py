@@ -30,7 +30,7 @@ class Elimination:
     offsets: dict[Jet, Expr]
 
     def value(self, displacement: Jet) -> Expr | None:
-        """Return what an eliminated displacement equals, None for one that is free."""
+        """Return the value of an eliminated displacement, None for a free one."""
         if displacement not in self.factors:
             return None
         moved = (factor * self.space.symbol(jet) for jet, factor in self.factors[displacement].items())
@@ -41,14 +41,14 @@ class Elimination:
         return [(pivot, row[displacement]) for pivot, row in self.factors.items() if displacement in row]
 
     def check_homogeneous(self, label: str) -> None:
-        """Refuse a prescribed displacement, where only the motions that the conditions leave free are computed."""
+        """Raise an error for a prescribed displacement, where only homogeneous conditions are allowed."""
         for jet, offset in self.offsets.items():
             if offset != 0:
                 given = f"{self.space.form(jet)} = {self.space.write(self.value(jet) or S.Zero)}"
                 raise HamiltonError(f"{label}: essential, {given}: must be 0; measure the displacement from there")
 
     def check_effective(self, term: Expr, label: str) -> None:
-        """Refuse an end term that the essential conditions make constant: it contradicts them."""
+        """Raise an error for an end term that does no work because of the essential conditions."""
         space, values = self.space, {}
         for jet in space.jets(term):
             value = self.value(jet._replace(time=0))
@@ -76,7 +76,7 @@ def eliminate(space: JetSpace, essential: Sequence[Expr], orders: Sequence[int])
     Raises
     ------
     HamiltonError
-        If one is not such a combination, or follows from or contradicts the others.
+        If one is not such a combination, or is redundant or contradictory.
     """
     factors: dict[Jet, dict[Jet, Expr]] = {}
     offsets: dict[Jet, Expr] = {}
@@ -118,9 +118,9 @@ def _read(space: JetSpace, condition: Expr, orders: Sequence[int]) -> tuple[dict
             raise HamiltonError(f"{label}: it must be linear and free of time derivatives")
         if jet.place is not None and jet.space >= orders[jet.unknown]:
             raise HamiltonError(
-                f"{label}: {space.form(jet)} is no displacement of an end;"
+                f"{label}: {space.form(jet)} is not a displacement of an end;"
                 " a condition on it is natural and follows from the energy"
             )
     if not any(jet.place for jet in row):
-        raise HamiltonError(f"{label}: it holds no displacement of an end")
+        raise HamiltonError(f"{label}: it contains no displacement of an end")
     return row, read.xreplace({space.symbol(jet): S.Zero for jet in row})

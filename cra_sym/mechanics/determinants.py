@@ -1,4 +1,4 @@
-"""Determinants of matrices of polynomials, in SymPy's sparse polynomial rings: milliseconds, not minutes."""
+"""Determinants of matrices of polynomials, computed in SymPy's sparse polynomial rings for speed."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def without_content(element: Any, variables: Iterable[Symbol]) -> tuple[Any, Exp
 
 
 def divided(element: Any, divisor: Expr) -> tuple[Any, Expr]:
-    """Return (quotient, 1) if the divisor divides the polynomial, otherwise both without powers that they share."""
+    """Return (quotient, 1) if the divisor divides the polynomial, otherwise both without common powers."""
     ring = element.ring
     if divisor.free_symbols <= set(ring.symbols):
         whole = ring.from_expr(divisor)
@@ -86,7 +86,7 @@ def collected(element: Any, variables: Iterable[Symbol]) -> Expr:
 
 
 def _exact(entry: Expr) -> Expr:
-    """Replace floats by the rationals they are: polynomial arithmetic is exact."""
+    """Replace floats by their exact rational values, since polynomial arithmetic is exact."""
     return entry.xreplace({number: Rational(number) for number in entry.atoms(Float)})
 
 
@@ -118,7 +118,7 @@ def _monomial(ring: Any, element: Any) -> Any:
 
 
 def _grouped_terms(element: Any, inner: set[Symbol]) -> dict[tuple[int, ...], Any]:
-    """Group terms by their powers of the ``inner`` generators; each group holds the powers of the others."""
+    """Group terms by their powers of the ``inner`` generators; each group is a polynomial in the others."""
     at = [symbol in inner for symbol in element.ring.symbols]
     groups: dict[tuple[int, ...], dict[tuple[int, ...], Any]] = {}
     for monomial, coefficient in element.terms():

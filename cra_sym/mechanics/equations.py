@@ -28,7 +28,7 @@ class BoundaryCondition(Equality):  # type: ignore[misc]  # SymPy has no types
     displacement : Expr
         The end displacement that is varied.
     kind : {'natural', 'essential'}
-        A natural condition follows from the variation being arbitrary, an essential one forbids it.
+        A natural condition follows from an arbitrary variation; an essential one makes the variation zero.
     variables : (str, str)
         Names of position and time, for the notation.
     """
@@ -77,9 +77,9 @@ class BoundaryCondition(Equality):  # type: ignore[misc]  # SymPy has no types
 
 
 class JumpCondition(BoundaryCondition):
-    """How a natural force jumps at an interior place, or the displacement that a support holds there.
+    """Jump of a natural force at an interior place, or the condition of a support there.
 
-    The displacements of a section are continuous; so is every natural force that nothing at the place works against.
+    The displacements of a section are continuous; so are natural forces without a term at that place.
 
     Attributes
     ----------
@@ -145,18 +145,18 @@ class GeneralisedForces:
         return self.end_force(displacement) + self.boundary_factors[displacement]
 
     def reaction(self, displacement: Jet) -> Expr:
-        """Return the work-equivalent share, on this displacement, of the forces at the eliminated displacements."""
+        """Return the work-equivalent force on this displacement of the forces at eliminated displacements."""
         shares = self.variation.elimination.shares(displacement)
         return Add(*(factor * self.end_factor(pivot) for pivot, factor in shares))
 
     def boundary_conditions(self) -> tuple[BoundaryCondition, ...]:
-        """Collect the factor of each end displacement, or the essential condition that forbids its variation."""
+        """Collect the factor of each end displacement, or the essential condition that replaces it."""
         return tuple(map(self._condition, self.boundary_factors))
 
     def jump_conditions(self, write: Callable[[Expr], Expr] | None = None) -> tuple[JumpCondition, ...]:
         """Collect the factor of each displacement of a section at interior places; fields in order.
 
-        ``write`` makes expressions of jet symbols, by default the functions themselves.
+        ``write`` converts jet symbols to expressions, by default in the functions themselves.
         """
         space, found = self.variation.space, []
         write = write or space.write
@@ -207,7 +207,7 @@ class GeneralisedForces:
         return BoundaryCondition(left, right, end, *self.tags(displacement))
 
     def tags(self, displacement: Jet) -> tuple[Expr, Expr, str, tuple[str, str]]:
-        """Return what a condition tells besides its end: variation, displacement, kind and notation."""
+        """Return the attributes of a condition other than its end: variation, displacement, kind and notation."""
         space = self.variation.space
         kind = "natural" if self.variation.elimination.value(displacement) is None else "essential"
         return varied_form(space, displacement), space.form(displacement), kind, space.names

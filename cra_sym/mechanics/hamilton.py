@@ -22,7 +22,7 @@ __all__ = ["BoundaryCondition", "HamiltonError", "HamiltonResult", "hamilton"]
 
 @dataclass(frozen=True)
 class HamiltonResult:
-    """Equations of motion with everything they were derived from.
+    """Equations of motion and the steps of their derivation.
 
     Attributes
     ----------
@@ -33,10 +33,10 @@ class HamiltonResult:
     coordinate_equations : tuple of Eq
         One for each lumped coordinate.
     variation : Variation
-        What was varied, in jet symbols.
+        First variation, in jet symbols.
     jump_conditions : tuple of JumpCondition
-        Of interior places: how much a natural force jumps there, or which displacement is held, each with its
-        ``place`` and ``variation``.
+        Of interior places: the jump of a natural force there, or the held displacement, each with its ``place`` and
+        ``variation``.
     quadratures : tuple of Quadrature
         Fields that are integrals of others; they and their multipliers are the last of ``fields``.
     """
@@ -69,7 +69,7 @@ class HamiltonResult:
         )
 
     def unused_symbol(self, name: str, *others: Expr) -> Symbol:
-        """Return a symbol of this name, changed if what was given (or ``others``) holds one that looks the same."""
+        """Return a symbol of this name, modified if the input (or ``others``) contains one of the same name."""
         forces = (force for force, _, _ in self.virtual_work)
         given = (self.density, self.left, self.right, *self.domain, *self.essential, *forces, *others)
         return uniquely_named_symbol(name, [sympify(expression, strict=True) for expression in given])
@@ -107,7 +107,7 @@ def hamilton(
         Lagrangian density (kinetic minus potential energy per length) in the fields, the coordinates and their
         derivatives of any order; coefficients may depend on x.
     fields, coordinates : sequence of applied undefined functions
-        ``v(x, t)`` and ``w(t)``: what is varied.
+        ``v(x, t)`` and ``w(t)``: the unknowns, which are varied.
     x, t : Symbol
         Position and time.
     domain : (left, right)

@@ -40,7 +40,7 @@ from sympy.core.function import AppliedUndef
 
 __all__ = ["vanishes"]
 
-#: What stands for itself: whatever its value, the identity has to hold.
+#: Nodes that are treated as indeterminates: the identity must hold for any value of them.
 _OPAQUE = (AppliedUndef, Derivative, Subs, Integral, Sum, Indexed, conjugate, Abs)
 
 _PI = Dummy("pi")
@@ -49,13 +49,13 @@ _PI = Dummy("pi")
 def vanishes(expression: Expr) -> bool:
     """Decide whether an expression is zero for all values of its symbols: proved, not sampled.
 
-    The expression is rational in its symbols, in roots, in functions and derivatives that nothing is known of, and in
-    cos, sin, cosh, sinh and exp of polynomials, of roots too, without an imaginary constant. By the addition theorems
-    it becomes a rational function of exponentials, of roots and of the rest, each an indeterminate of its own; what is
-    zero as such a function is zero, wherever it is defined. The converse holds too, since exponentials of arguments
-    that are linearly independent over the rationals are algebraically independent; a relation may be missed only
-    between unknown functions, or between roots of anything but symbols and natural numbers: of such a root no more is
-    known than its power.
+    The expression must be rational in its symbols, in roots, in undefined functions and derivatives, and in cos, sin,
+    cosh, sinh and exp of polynomials (also in roots) without an imaginary constant. The addition theorems turn it into
+    a rational function of exponentials, roots and the rest, each an independent indeterminate; if that function is
+    zero, so is the expression wherever it is defined. The converse holds too, since exponentials of arguments that are
+    linearly independent over the rationals are algebraically independent. Only relations between undefined functions,
+    or between roots other than those of symbols and natural numbers, may be missed: such a root is characterised by
+    its power alone.
 
     Parameters
     ----------
@@ -64,8 +64,8 @@ def vanishes(expression: Expr) -> bool:
     Raises
     ------
     ValueError
-        If the expression holds something else, such as a floating-point number, a symbolic power or symbols that do
-        not commute; or if it divides by zero, however deep inside.
+        If the expression contains anything else, such as a floating-point number, a symbolic power or noncommutative
+        symbols, or a division by zero at any depth.
 
     Examples
     --------
@@ -100,7 +100,7 @@ def _is_zero(expression: Expr, relations: Mapping[Dummy, Expr]) -> bool:
 
 
 def _is_witness(expression: Expr) -> bool:
-    """Tell whether one exact evaluation shows that a rational function is not zero; that settles most of those."""
+    """Tell whether one exact evaluation shows that a rational function is not zero, which decides most cases."""
     symbols = sorted(expression.free_symbols, key=str)
     value = expression.xreplace({s: Rational(prime(k + 3), 101) for k, s in enumerate(symbols)}).expand()
     turned = value.coeff(I)
@@ -162,8 +162,11 @@ def _terms(argument: Expr) -> list[tuple[Rational, Expr, bool]]:
 
 
 def _without_roots(expression: Expr) -> tuple[Expr, dict[Dummy, Expr]]:
-    """Write roots as powers of new symbols, innermost first, and return the polynomials that vanish for them, outermost
-    first. The root of a symbol needs no such polynomial: the symbol is a power of it."""
+    """Write roots as powers of new symbols, and return the polynomials that vanish for these.
+
+    Roots are replaced innermost first; polynomials are listed outermost first. The root of a symbol needs none: the
+    symbol is a power of it.
+    """
     symbols = expression.free_symbols
     simple: dict[Expr, Expr] = {}
     relations: dict[Dummy, Expr] = {}
@@ -174,7 +177,7 @@ def _without_roots(expression: Expr) -> tuple[Expr, dict[Dummy, Expr]]:
         for power in inner:
             for base in _factors(power.base):
                 orders[base] = lcm(orders[base], int(power.exp.q))
-        # nothing is assumed of a root, lest SymPy simplify an outer one by it
+        # no assumptions on a root, by which SymPy might simplify an outer one
         roots = {base: Dummy("root") for base in orders}
         expression = expression.xreplace(
             {p: Mul(*(roots[b] ** (p.exp * n * orders[b]) for b, n in _factors(p.base).items())) for p in inner}
@@ -192,5 +195,5 @@ def _is_root(power: Expr) -> bool:
 
 
 def _factors(base: Expr) -> dict[Expr, int]:
-    """Return the primes of a whole number, whose roots depend on theirs, and any other base as it is."""
+    """Return the prime factors of an integer, since its root is a product of theirs, or any other base unchanged."""
     return {Integer(p): n for p, n in factorint(base).items()} if base.is_Integer and base > 0 else {base: 1}

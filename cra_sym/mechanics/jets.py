@@ -74,7 +74,7 @@ def scalar(name: str, value: Any) -> Expr:
     try:
         expression = sympify(value, strict=True)
         is_scalar = isinstance(expression, Expr) and expression.is_commutative and not expression.has(*_NO_SCALAR)
-    except Exception:  # whatever an object does when it is asked for its number, or has too many levels to be read
+    except Exception:  # conversion may raise anything, or the expression may be nested too deeply
         is_scalar = False
     if not is_scalar:
         raise TypeError(f"{name} = {shown(value)}: must be a scalar SymPy expression")
@@ -82,7 +82,7 @@ def scalar(name: str, value: Any) -> Expr:
 
 
 class Jet(NamedTuple):
-    """Derivative of unknown number ``unknown`` to the orders ``space`` and ``time``; place None is the interval."""
+    """Derivative of orders ``space`` and ``time`` of the unknown of that index; place None is the interval."""
 
     unknown: int
     space: int
@@ -91,7 +91,7 @@ class Jet(NamedTuple):
 
 
 class JetSpace:
-    """Reads expressions in v(x, t) into jet symbols and writes them back.
+    """Conversion of expressions in v(x, t) to jet symbols and back.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ class JetSpace:
     # ---------------------------------------------------------------------------------------------- symbols
 
     def symbol(self, jet: Jet) -> Dummy:
-        """Return the symbol that stands for a jet."""
+        """Return the symbol of a jet."""
         if jet not in self._symbols:
             marks = "x" * jet.space + "t" * jet.time
             made = Dummy(f"{self.unknowns[jet.unknown].func.__name__}_{marks}{jet.place or ''}")
@@ -207,7 +207,7 @@ class JetSpace:
     # ---------------------------------------------------------------------------------------------- writing
 
     def form(self, jet: Jet) -> Expr:
-        """Return the derivative a jet stands for, evaluated if it belongs to an end."""
+        """Return the derivative that a jet represents, evaluated if it belongs to an end."""
         function = self.unknowns[jet.unknown]
         orders = [(v, n) for v, n in ((self.x, jet.space), (self.t, jet.time)) if n]
         derivative = function.diff(*orders) if orders else function
@@ -408,7 +408,7 @@ def _signed(coefficient: Expr, factor: Expr) -> Expr:
 
 
 def _real_rate(expression: Expr, symbol: Symbol) -> Expr:
-    """Return the derivative by a symbol; that of a magnitude as of real numbers, which all symbols are."""
+    """Return the derivative by a symbol; absolute values are differentiated as those of real numbers."""
     if not expression.has(Abs):
         return expression.diff(symbol)
     real = {s: Dummy(s.name, real=True) for s in expression.free_symbols | {symbol} if isinstance(s, Symbol)}

@@ -9,7 +9,7 @@ from sympy import Add, Basic, Eq, Integral, Mul, S, fraction
 
 __all__ = ["arranged"]
 
-#: What fits on a line of an article beside the number of the equation, in widths of a letter.
+#: Line width of an article, without the equation number, in widths of a letter.
 _LINE = 50.0
 _NAMES = re.compile(r"\\(?:operatorname\{(\w+)\}|(cos|sin|cosh|sinh|exp|lim|log|tan))(?![a-zA-Z])")
 _EMPTY = re.compile(r"\\(?:left|right|bigl|bigr|limits|displaystyle|quad|[,;! ])(?![a-zA-Z])|\\(?:begin|end)\{\w+\}")
@@ -45,7 +45,7 @@ def arranged(part: Basic, write: Write) -> str:
 
 
 def _packed(pieces: list[str], room: float) -> Iterator[str]:
-    """Yield lines that hold as many pieces as fit, at least one each."""
+    """Yield lines of as many pieces as fit, at least one each."""
     line = ""
     for piece in pieces:
         if line and _width(line + piece) > room:
@@ -91,7 +91,7 @@ def _pieces(expression: Basic, write: Write, room: float = _LINE) -> list[str]:
 
 
 def _factors(factors: list[Basic], write: Write) -> str:
-    """Return a product that stands in front of parentheses."""
+    """Return a product in front of parentheses."""
     product = Mul(*factors, evaluate=False)
     if product == -1:
         return "-"
@@ -105,7 +105,7 @@ def _enclosed(before: str, inner: list[str], after: str = "") -> list[str]:
 
 
 def _width(latex: str) -> float:
-    """Return about how wide a line of LaTeX is, in widths of a letter."""
+    """Return the approximate width of a line of LaTeX, in widths of a letter."""
     rows = [_row_width(row) for row in re.split(r"\\\\(?:\[\w+\])?", latex)]
     return max(rows)
 

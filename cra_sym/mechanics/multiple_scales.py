@@ -22,12 +22,12 @@ VARPI = Symbol("varpi", positive=True)
 
 @dataclass(frozen=True, repr=False)
 class MultipleScales:
-    """What the method of multiple scales says about one resonance.
+    """Result of the method of multiple scales for one resonance.
 
     Attributes
     ----------
     system, resonance, order
-        What was expanded, about which resonance, to which power of epsilon.
+        The expanded system, the resonance, and the power of epsilon.
     steps : tuple of Step
         The derivation.
     amplitude_equations : tuple of Eq
@@ -37,7 +37,7 @@ class MultipleScales:
     decays : dict
         Decay rate c_i of each mode that takes part, in terms of its damping ratio.
     border : Border or None
-        Where growth sets in; None for a forced resonance.
+        Boundary of growth; None for a forced resonance.
     response : SteadyResponse or None
         Steady response of a forced resonance, or of a principal one with a cubic term.
     """
@@ -100,8 +100,8 @@ def multiple_scales(
 ) -> MultipleScales:
     r"""Expand :math:`\ddot q + 2Z\Omega\dot q + (\Omega^2 + \epsilon\cos(\varpi t)P)\,q = \epsilon f` at a resonance.
 
-    Harmonics are told apart by their integer combinations of natural frequencies, so the frequencies may be symbols
-    without any relation between them. All symbols stand for real numbers, except the complex amplitudes of forces.
+    Harmonics are identified by their integer combinations of natural frequencies, so the frequencies may be unrelated
+    symbols. All symbols are real, except the complex amplitudes of forces.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def multiple_scales(
     order : {1, 2}
         Order in epsilon of the amplitude equations.
     damping : sequence, dict or IndexedBase, optional
-        Damping ratios zeta_i, taken to be as small as the detuning.
+        Damping ratios zeta_i, taken to be of the order of the detuning.
     forcing : sequence, dict or IndexedBase, optional
         Complex amplitudes F_i: the force on mode i is ``epsilon Re(F_i exp(i varpi t))``.
     cubic : sequence, dict or IndexedBase, optional
@@ -124,7 +124,7 @@ def multiple_scales(
     size : Expr, optional
         Number of modes when it is symbolic; N by default.
     tongue : {1, 2}
-        2 expands about half the excitation frequency, where only second order sees an instability.
+        2: expansion about half the excitation frequency, where instability appears at second order only.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The characteristic function of a line with one wave number, as a solver evaluates it: scaled, derived, counted.
+"""Characteristic function of a line with one wave number for the solvers: scaled, with derivatives and count.
 
 A line is a string (n = 1) or a beam (n = 2): one field v with the density ``a v_t^2 / 2 - c (d^n v / dx^n)^2 / 2``. In
 ``xi = x / L`` its motions of angular frequency omega obey ``(d/dxi)^(2n) phi = (-1)^n z phi`` with
@@ -7,12 +7,12 @@ held, on a spring, with a mass, or with both. With its natural force ``P_j = (-1
 
     (kappa - z mu) q - P = 0 at the left end,    (kappa - z mu) q + P = 0 at the right end.
 
-Every stiffness and inertia enters as ``(s, i, c) = (kappa, mu, 1) / (1 + kappa + mu)``, so that zero and infinity are
-ordinary values and nothing overflows: ``S q -+ c P = 0``, ``S = s - z i``.
+Every stiffness and inertia enters as ``(s, i, c) = (kappa, mu, 1) / (1 + kappa + mu)``, so that zero and infinity need
+no special case and nothing overflows: ``S q -+ c P = 0``, ``S = s - z i``.
 
 A structure is a tuple of two ends, each a tuple of the kinds of its n channels: a text of the letters of what the
-Lagrangian has there, ``"k"`` for a spring and ``"m"`` for a mass, or ``"h"`` for a held displacement. Functions that
-take one return what `cra_sym.kernels.kernel` wants: expressions and their arguments.
+Lagrangian has there, ``"k"`` for a spring and ``"m"`` for a mass, or ``"h"`` for a held displacement. Functions of a
+structure return expressions and their arguments, as `cra_sym.kernels.kernel` takes them.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ ORDER = {1: (1, 0), 2: (1, 2, 0, 3)}
 b, z = symbol("lamda"), sp.Symbol("z", nonnegative=True)
 cos_, sin_, cosh_, sinh_ = sp.symbols("cos sin cosh sinh", real=True)
 BASIS = {1: sp.symbols("u w", real=True), 2: sp.symbols("unit p q r s", real=True)}
-"""The functions, entire in z and multiplied by one positive scale, that carry the determinant; see `products`."""
+"""Basis functions of the determinant, entire in z and multiplied by one positive scale; see `products`."""
 _u, _w = BASIS[1]
 _unit, _p, _q, _r, _s = BASIS[2]
 _PRODUCTS = {
@@ -93,7 +93,7 @@ def conditions(structure: Structure) -> tuple[tuple[tuple[sp.Expr, sp.Expr], ...
 
 
 def parameters(structure: Structure) -> tuple[sp.Symbol, ...]:
-    """Return the symbols s, i, c of the channels, as far as the structure has them."""
+    """Return the symbols s, i, c of the channels that the structure has."""
     return conditions(structure)[1]
 
 
@@ -202,7 +202,7 @@ def derivatives(structure: Structure) -> Derivation:
         result[0] += factor[0] * function[0]
         result[1] += factor[0] * function[1] + factor[1] * function[0]
         result[2] += factor[0] * function[2] + 2 * factor[1] * function[1] + factor[2] * function[0]
-    if deficit:  # these are of z D
+    if deficit:  # these belong to z D
         result[2] = result[2] - 2 * result[1] + 2 * result[0]
         result[1] = result[1] - result[0]
     return tuple(result), (*names, z, *BASIS[n])

@@ -1,4 +1,4 @@
-"""Which Lagrangians have one wave number: strings and beams with diagonal end conditions, and their groups."""
+"""Detection of Lagrangians with one wave number (strings and beams with uncoupled end conditions) and their groups."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def one_wave_scales(form: StateForm, left: Expr = S.Zero) -> dict[str, Expr] | N
 
     The family has one field, no lumped coordinate, no damping, the density ``a v_t^2 / 2 - c (d^n v / dx^n)^2 / 2`` for
     n = 1 or 2 with a and c constant along x, and at each end and each displacement a spring, a mass, both or a support.
-    Conditions that link two displacements, such as those of a tip mass with an offset, are not of it.
+    Conditions that couple two displacements, such as those of a tip mass with an offset, are excluded.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ def _amplitudes(structure: Structure) -> dict[int, sp.Symbol]:
 
 
 def _massive(structure: Structure) -> dict[int, sp.Symbol]:
-    """Return the inertia of each channel of the right end that has no spring beside it."""
+    """Return the inertia of each channel of the right end that has no spring."""
     return {i: mu for i, mu in inertias(structure).items() if i >= len(structure[0]) and channels(structure)[i] == "m"}
 
 
@@ -71,7 +71,7 @@ def _exponent(number: int, n: int) -> int:
 
 
 def prepared(structure: Structure) -> Derivation:
-    """Return what the modes of one parameter set have in common: 1 / mu, where needed, and sqrt(s c) of the springs."""
+    """Return the quantities common to all modes of a set: 1 / mu, where needed, and sqrt(s c) of the springs."""
     pairs = _springs(structure)
     found = [*(1 / mu for mu in _massive(structure).values()), *(sp.sqrt(s * c) for s, c in pairs.values())]
     return tuple(found), (*parameters(structure), *inertias(structure).values())
@@ -92,7 +92,7 @@ def _springs(structure: Structure) -> dict[int, tuple[sp.Symbol, sp.Expr]]:
 def end_state(structure: Structure) -> Derivation:
     """Return q, P and the amplitudes of springs at the right end from the raw shape and its derivatives there.
 
-    A condition links q and P. Where a stiff spring or a heavy inertia keeps q small, P knows it better.
+    Each condition relates q and P. With a stiff spring or a heavy inertia q is small and is computed from P.
     """
     n = len(structure[0])
     raw = force_rows(sp.Matrix(RAW[: 2 * n]))
@@ -149,8 +149,8 @@ def invariant_far(n: int) -> Derivation:
 def generalised_mass(structure: Structure) -> Derivation:
     """Return the modal mass over a L from end values alone, for z > 0, given the invariant H.
 
-    ``2n z phi^2`` is the derivative of ``xi H - sum (2 (n - j) - 1) q_j P_j``. At the ends the conditions turn the
-    products into squares, ``P = -+(kappa - z mu) q``: nothing cancels.
+    ``2n z phi^2`` is the derivative of ``xi H - sum (2 (n - j) - 1) q_j P_j``. By the end conditions the
+    products are squares, ``P = -+(kappa - z mu) q``: without cancellation.
     """
     n = len(structure[0])
     invariant = sp.Symbol("invariant", real=True)
@@ -220,8 +220,8 @@ def rates(structure: Structure) -> Derivation:
 def rigid_body(structure: Structure) -> Derivation:
     """Return rigid-body motion, amplitudes, generalised mass and momentum of a mode with z = 0.
 
-    Translation, where no spring or support is in its way, comes first; then the rotation about the displacement that
-    is held, or about the centre of mass.
+    Translation, if no spring or support resists it, comes first; then the rotation about the held displacement, or
+    about the centre of mass.
     """
     n = len(structure[0])
     first, masses = sp.Symbol("first", nonnegative=True), inertias(structure)
@@ -259,7 +259,7 @@ def _is_held(structure: Structure, number: int) -> sp.Basic:
 
 
 def leading(structure: Structure) -> Derivation:
-    """Return what is to be positive: the first displacement of the right end that moves, else the field beside it."""
+    """Return the quantity made positive: the first nonzero displacement of the right end, else the field next to it."""
     n = len(structure[0])
     q, p = (_state_symbols(name, structure) for name in ("q", "p"))
     found = (-1) ** n * p[n - 1]

@@ -1,7 +1,7 @@
-"""Mode shapes of a line with one wave number, in two bases that between them keep every digit at any frequency.
+"""Mode shapes of a line with one wave number, in two bases that together are accurate at any frequency.
 
 The notation is that of `cra_sym.mechanics.one_wave`, ``xi = x / L``. The channels of the left end leave one amplitude
-alpha_j each open, and with them the state there is exact for any stiffness and inertia, zero and infinity included:
+alpha_j each open, in which the state there is accurate for any stiffness and inertia, zero and infinity included:
 
     q_j(0) = c_j alpha_j,   P_j(0) = S_j alpha_j.
 """
@@ -51,7 +51,7 @@ def _n(structure: Structure) -> int:
 
 
 def _whole(structure: Structure) -> dict[sp.Symbol, sp.Expr]:
-    """Return a symbol for each S of a spring with an inertia beside it: expanded, its terms would cancel apart."""
+    """Return a symbol for each S of a spring with an inertia, to avoid cancellation between its expanded terms."""
     pairs = enumerate(conditions(structure)[0])
     return {sp.Symbol(f"S_{i}", real=True): stiff for i, (stiff, _) in pairs if stiff.is_Add}
 
@@ -101,7 +101,7 @@ def _near(structure: Structure, derivative: int) -> sp.Expr:
 
 
 def _right_conditions(structure: Structure, derivatives: list[sp.Expr]) -> list[sp.Expr]:
-    """Return what has to vanish at the right end, given the shape and its derivatives there."""
+    """Return the residuals of the conditions of the right end, given the shape and its derivatives there."""
     n = _n(structure)
     state = force_rows(sp.Matrix(derivatives))
     pairs = _pairs(structure)[n:]
@@ -148,7 +148,7 @@ def amplitudes_far(structure: Structure) -> Derivation:
     """Return the amplitudes of the left end and those of the waves of a mode with z over `NEAR`.
 
     In a beam the growing exponential has to be small at the left end and to meet the conditions of the right end; the
-    rest of these is then met because z is a zero of the determinant.
+    other condition then holds because z is a zero of the determinant.
     """
     n = _n(structure)
     arguments = (*parameters(structure), b, cos_, sin_, decay)
@@ -181,8 +181,8 @@ def _in_b(expression: sp.Expr, n: int) -> sp.Expr:
 def _from_the_right(structure: Structure, waves: dict[sp.Symbol, sp.Expr]) -> sp.Expr:
     """Return D, in the amplitudes, from the conditions of the right end.
 
-    One condition in which its coefficient is a sum of terms of one sign is enough. Where a spring on the displacement
-    and an inertia of the slope leave none, both are taken, weighted by what is left of the coefficients.
+    One condition in which its coefficient is a sum of terms of one sign is sufficient. Where a spring on the
+    displacement and an inertia of the slope leave none, both are used, weighted by the remaining coefficients.
     """
     rows = [sp.expand(_in_b(row, 2) / b**3) for row in _right_conditions(structure, _at_right(2))]
     for row in rows:

@@ -1,4 +1,4 @@
-"""What multiple scales are applied to: a parametrically excited system of modes, and one of its resonances."""
+"""Input of multiple scales: a parametrically excited system of modes, and one of its resonances."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class Resonance:
     Attributes
     ----------
     first, second : int or Symbol
-        Labels of the modes that take part, counted from 1.
+        Labels of the resonant modes, counted from 1.
     sign : int
         1 for the principal and sum types, -1 for the difference type, 0 for a forced resonance.
     tongue : int
-        Number of excitation periods the resonance takes: 1 for the tongues whose width is of first order in epsilon,
+        Number of excitation periods of the resonance: 1 for the tongues whose width is of first order in epsilon,
         2 for those of second order.
     """
 
@@ -72,11 +72,11 @@ class Resonance:
 
     @property
     def modes(self) -> tuple[Label, ...]:
-        """The modes that take part, each once."""
+        """The resonant modes, without duplicates."""
         return (self.first,) if self.first == self.second else (self.first, self.second)
 
     def combine(self, first: Any, second: Any) -> Any:
-        """Return the excitation's share of two modes' quantities: (first + sign x second) / tongue."""
+        """Return the combination of two modes' quantities for the excitation: (first + sign x second) / tongue."""
         return (first + self.sign * second) * Rational(1, self.tongue)
 
 
@@ -88,7 +88,7 @@ class ParametricSystem:
     ----------
     rows : tuple
         Labels of the modes written out. With a symbolic number of modes these are the resonant ones and, if
-        ``spectator`` is set, one that stands for each of the others.
+        ``spectator`` is set, one that represents each of the others.
     spectator : Symbol or None
         That representative.
     size : Expr
@@ -174,7 +174,7 @@ class ParametricSystem:
 
 
 def _checked(name: str, value: Any, size: Expr, symbolic: bool) -> Any:
-    """Refuse what does not fit the number of modes."""
+    """Raise an error for a value that does not match the number of modes."""
     if value is None or isinstance(value, IndexedBase):
         return value
     if name in ("coupling", "coupling_slope"):

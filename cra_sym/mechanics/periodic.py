@@ -1,4 +1,4 @@
-r"""What of a Lagrangian is periodic in time: its cosines and sines, and the matrices that multiply them.
+r"""Terms of a Lagrangian that are periodic in time: cosines and sines, and the matrices that multiply them.
 
 Around a motion at rest the equations are
 
@@ -34,7 +34,7 @@ Key = tuple[int, Literal["cos", "sin"], int]
 def separated(
     label: str, expression: Expr, small: tuple[Symbol, Symbol], t: Symbol
 ) -> tuple[Expr, dict[tuple[int, Key], Expr]]:
-    """Return what of an expression does not oscillate, and the coefficient of every power of epsilon and oscillation.
+    """Return the constant part of an expression, and coefficients by power of epsilon and oscillation.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ class TimeForms:
         'stiffness', 'damping', 'momentum', 'mass': per length in the interval, and at the ends, on the coordinates and
         at interior places (numbered). Each entry has one power of time, 0.
     load, discrete_load : dict of (Jet, order) to Expr
-        Forces; of order 1 those whose derivative by time acts, momenta.
+        Forces (order 0) and momenta (order 1), whose time derivative acts.
     """
 
     inside: dict[str, Bilinear] = field(default_factory=dict)
@@ -182,7 +182,7 @@ def time_forms(
     lagrangians : sequence of (label, term, number of the interior place or None, whether per length)
     applied : sequence of (force, displacement, whether per length)
     linearise : bool
-        Whether terms of higher degree count as nothing; otherwise they are refused.
+        Whether terms of higher degree are neglected; otherwise they are refused.
 
     Raises
     ------

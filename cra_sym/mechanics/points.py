@@ -32,7 +32,7 @@ __all__ = ["Point", "at_place", "in_points", "linear_work", "read_points", "supp
 
 @dataclass(frozen=True)
 class Point:
-    """What acts at an interior place.
+    """Terms at an interior place.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ def read_points(
 
 
 def _check_jumps(term: Expr, x: Symbol, place: Expr, label: str) -> None:
-    """Refuse a factor that jumps right at the place."""
+    """Raise an error for a factor that is discontinuous at the place itself."""
     for node in term.atoms(Heaviside, sign, floor, ceiling, frac):
         argument = node.args[0].subs(x, place)
         if node.has(x) and (argument.is_integer if isinstance(node, (floor, ceiling, frac)) else argument.is_zero):
@@ -154,7 +154,7 @@ def _check_jumps(term: Expr, x: Symbol, place: Expr, label: str) -> None:
 
 
 def linear_work(space: JetSpace, force: Expr, moved: Expr, label: str) -> list[tuple[Expr, Jet]]:
-    """Return (force, displacement) for each displacement that a linear combination of them holds."""
+    """Return (force, displacement) for each displacement in a linear combination of them."""
     works = []
     for jet in space.jets(moved):
         factor = moved.diff(space.symbol(jet))
@@ -200,7 +200,7 @@ def supports(
     Raises
     ------
     HamiltonError
-        If a condition of an interior place is not that one displacement vanishes.
+        If a condition at an interior place is not a single vanishing displacement.
     """
     ends, inside = [], []
     for condition in essential:
@@ -220,7 +220,7 @@ def _displacement(condition: Expr, x: Symbol) -> tuple[Expr, Expr] | None:
 
 
 def at_place(node: Expr, x: Symbol) -> tuple[Expr, Expr] | None:
-    """Return the place of a value such as v(a, t), v_x(a, t) or v_t(a, t), and the function of x it is of; or None."""
+    """Return the place of a value such as v(a, t), v_x(a, t) or v_t(a, t), and its function of x; or None."""
     if isinstance(node, Subs) and len(node.variables) == 1:
         return node.point[0], node.expr.xreplace({node.variables[0]: x})
     if isinstance(node, AppliedUndef) and len(node.args) == 2 and node.args[0] != x:

@@ -25,9 +25,9 @@ class Monomial:
     coefficient : Expr
         In x and the parameters.
     jets : tuple of Jet
-        As often as they occur.
+        Repeated according to their power.
     causes : tuple of Expr
-        Known functions of time, or their derivatives, as often as they occur.
+        Known functions of time, or their derivatives, repeated according to their power.
     """
 
     coefficient: Expr
@@ -96,14 +96,14 @@ def is_linear(variation: Variation) -> bool:
 def linearised(result: HamiltonResult, options: dict[str, Any]) -> HamiltonResult:
     """Return Hamilton's principle with the quadratic part of a polynomial Lagrangian and the linear part of its forces.
 
-    A known motion counts as an unknown: what multiplies a quadratic term with it is of third order. A quadrature enters
-    by the terms that are linear in it.
+    A known motion counts as an unknown: its product with a quadratic term is of third order. A quadrature enters
+    through the terms that are linear in it.
 
     Parameters
     ----------
     result : HamiltonResult
     options : dict
-        What `hamilton` was given.
+        Arguments of `hamilton`.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def linearised(result: HamiltonResult, options: dict[str, Any]) -> HamiltonResul
 
 
 class Load:
-    """What acts on quadratures in terms linear in them: a weight C(x) of their integrands."""
+    """Terms linear in quadratures, collected as a weight C(x) of their integrands."""
 
     def __init__(self, result: HamiltonResult) -> None:
         self._space, self._quadratures = result.variation.space, result.quadratures
@@ -166,7 +166,7 @@ class Load:
         return density.xreplace(zero)
 
     def take(self, monomial: Monomial, place: Expr | None) -> bool:
-        """Take a term that acts on a quadrature at a place (or along x); return whether it does."""
+        """Collect a term if it is linear in a quadrature at a place (or along x); return whether it is."""
         jets = [jet for jet in monomial.jets if jet.unknown in self._numbers]
         if not jets:
             return False
@@ -187,7 +187,7 @@ class Load:
         return True
 
     def density(self) -> Expr:
-        """Return what the terms linear in quadratures are as a density."""
+        """Return the terms linear in quadratures as a density."""
         return Add(*(weight * self._lowest(quadrature) for quadrature, weight in self._weights.items()))
 
     def _lowest(self, quadrature: Quadrature) -> Expr:

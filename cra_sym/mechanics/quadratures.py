@@ -22,7 +22,7 @@ class Quadrature:
     Attributes
     ----------
     function, multiplier : applied undefined function
-        With s a shortening, the multiplier is the tension that the motion makes.
+        If s is a shortening, the multiplier is the tension.
     integrand : Expr
     """
 
@@ -34,12 +34,12 @@ class Quadrature:
 def quadratures_of(
     given: Any, fields: Sequence[AppliedUndef], x: Symbol, t: Symbol, domain: Sequence[Any]
 ) -> tuple[Quadrature, ...]:
-    """Return the quadratures that a mapping states.
+    """Return the quadratures given by a mapping.
 
     Raises
     ------
     TypeError, HamiltonError
-        Names what is not a function of x and t, and the integrand that holds time derivatives, other quadratures, or
+        Names anything that is not a function of x and t, and an integrand with time derivatives, other quadratures, or
         terms of first degree.
     """
     pairs = mapping(

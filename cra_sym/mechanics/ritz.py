@@ -50,9 +50,9 @@ class RitzMatrices:
         End terms and lumped coordinates, by unknown.
     end_load : dict of int to Expr
     restraint : tuple of dict of int to Expr
-        Each unknown in terms of the free ones, from the essential conditions: ``q[i] = sum factor * free[j]``.
+        Each unknown in terms of the free ones, by the essential conditions: ``q[i] = sum factor * free[j]``.
     labels : tuple of Expr
-        What the unknowns at one node and the lumped coordinates are.
+        Meaning of the unknowns at one node and of the lumped coordinates.
     start, length : Expr
         Left end and length of the interval.
     """
@@ -142,7 +142,7 @@ def ritz(
     elements : int
         Number of equal elements, of each span between nodes.
     nodes : sequence of Expr, optional
-        Places inside that are nodes beside those of terms and supports, such as jumps of a coefficient.
+        Further interior nodes besides those of terms and supports, such as jumps of a coefficient.
 
     Notes
     -----
@@ -150,12 +150,12 @@ def ritz(
     with continuous derivatives up to ``p - 1``. Frequencies converge from above, with an error of order
     ``2 (2 p - m)`` in the element length. Coefficients polynomial in x are integrated exactly, others by Gauss's rule
     with eight points an element; place the jumps of a coefficient at nodes. Interior places that are not all numbers
-    are taken to ascend in the order in which they were stated, those of ``nodes`` first.
+    must be stated in ascending order, those of ``nodes`` first.
 
     Raises
     ------
     HamiltonError
-        If the Lagrangian is not quadratic or holds more than two time derivatives, or an essential condition prescribes
+        If the Lagrangian is not quadratic or has more than two time derivatives, or an essential condition prescribes
         a motion that varies in time: take the displacement relative to it instead.
 
     Examples
@@ -177,7 +177,7 @@ def ritz(
 
 
 def ordered(places: Iterable[Expr]) -> list[Expr]:
-    """Return interior places in ascending order if they are numbers, else as they are."""
+    """Return interior places in ascending order if they are numbers, else unchanged."""
     found = list(places)
     return sorted(found, key=float) if all(place.is_number for place in found) else found
 
@@ -227,7 +227,7 @@ class _Mesh:
         return [self.offsets[f] + j for f, size in enumerate(self.sizes) for j in range(max(orders[f], 1), size)]
 
     def _unknowns(self, element: int) -> list[int]:
-        """Return the unknowns of both nodes of an element; those that jump have a second one right of a node."""
+        """Return the unknowns of both nodes of an element; discontinuous ones have a second one right of a node."""
         found = list(range(element * self.width, (element + 2) * self.width))
         node, within = divmod(element, self.each)
         if node and not within:
@@ -237,7 +237,7 @@ class _Mesh:
         return found
 
     def index(self, jet: Jet) -> int:
-        """Return the unknown that a displacement of an end, or a coordinate, is."""
+        """Return the index of the unknown of an end displacement or a coordinate."""
         if jet in self.lumped:
             return (self.elements + 1) * self.width + self.lumped.index(jet)
         if isinstance(jet.place, int):

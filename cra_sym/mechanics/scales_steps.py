@@ -1,4 +1,4 @@
-"""The derivation as a chain of steps in the textbook order; every expression is read off the expansion."""
+"""The derivation as a chain of steps in textbook order; every expression is taken from the expansion."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _q(i: Label, k: int) -> Symbol:
 
 
 def _operator(k: int) -> Symbol:
-    """Return D_k in front of what it acts on."""
+    """Return D_k as a prefix of its operand."""
     return Symbol(f"D_{k}", commutative=False)
 
 

@@ -50,7 +50,7 @@ class SpatialProblem:
         omega, or s if ``damped``.
     damped : bool
     left_out : tuple of Expr
-        Prescribed motions and forces, which do not enter: generalised forces per length and at ends.
+        Generalised forces, per length and at ends, of prescribed motions and forces; they are not part of the problem.
     """
 
     field_equations: tuple[Eq, ...]
@@ -76,14 +76,14 @@ class Modal:
         constants of the basis, amplitudes of the coordinates, jumps of natural forces at interior places. Polynomial in
         the basis ``values``.
     characteristic_polynomial : Expr
-        Its determinant over that of the initial state, so that its zeros are the eigenvalues and nothing else, without
-        factors that depend on no wave number; in the basis ``values``.
+        Its determinant over that of the initial state, so that its zeros are exactly the eigenvalues, without factors
+        independent of the wave numbers; in the basis ``values``.
     scale : Expr
         ``det(characteristic_matrix) = scale * characteristic_polynomial``.
     still : Matrix
         Constant displacement of each field (rows) for a unit amplitude of each coordinate (columns).
     begun : tuple of tuple of Expr
-        Motion of each field that begins with a unit jump at an interior place, for each jump.
+        For each unit jump at an interior place, the motion of each field to the right of it.
     """
 
     spatial_problem: SpatialProblem
@@ -101,15 +101,16 @@ class Modal:
 
     @property
     def characteristic_function(self) -> Expr:
-        """The characteristic polynomial with the functions it stands for: zero at every eigenvalue."""
+        """The characteristic polynomial with the basis functions substituted: zero at every eigenvalue."""
         return self.characteristic_polynomial.xreplace(self.basis.values)
 
     def null_vector(self, row: int = -1) -> tuple[Expr, ...]:
         """Return constants that satisfy every condition but one: the cofactors of a row of the characteristic matrix.
 
-        At an eigenvalue the condition left out holds as well. The default leaves out the last one, of the right end.
-        The vector vanishes only if two solutions satisfy all others, which for a string or a beam with separate
-        conditions at its ends would be a repeated frequency of the problem with the last displacement held.
+        At an eigenvalue the omitted condition holds as well. By default the last one, of the right end, is omitted.
+
+        The vector vanishes only if two solutions satisfy all others; for a string or a beam with uncoupled end
+        conditions this would be a repeated frequency of the problem with the last displacement held.
         """
         matrix, basis = self.characteristic_matrix, self.basis
         variables = [*basis.values, *basis.wave_numbers, self.frequency]
@@ -170,7 +171,7 @@ def separate(
     result : HamiltonResult
     parameters : dict of Symbol to Expr, optional
         Parameters in terms of others, for example dimensionless groups. A stiffness from 0 to infinity is the ratio
-        ``k: EI/L**3 * s/c`` of two finite numbers: denominators are cleared row by row, so both limits are ordinary.
+        ``k: EI/L**3 * s/c`` of two finite numbers: denominators are cleared row by row, so both limits are regular.
     basis : {'hyperbolic', 'decaying'}
         For beams with one wave number: ``cosh, sinh``, or ``exp(-beta x), exp(-beta (L - x))``, which stay bounded at
         any frequency. Others, and those with interior places, always get cosh and sinh; `state_form` is the exact form
@@ -190,10 +191,9 @@ def separate(
 
     Notes
     -----
-    Right of an interior place the motion that begins there with a jump of a natural force is added: what inertia,
-    springs, dampers and supports do is closed form too. Places that are symbols must lie inside and ascend in the order
-    in which they are stated. Parts with coefficients of their own have wave numbers of their own: state them as fields
-    of their own (`cra_sym.joined`).
+    To the right of an interior place the motion due to the jump of a natural force is added, so that inertia, springs,
+    dampers and supports there have closed forms too. Places that are symbols must lie inside and be stated in ascending
+    order. Parts with different coefficients have different wave numbers and must be separate fields (`cra_sym.joined`).
 
     Examples
     --------
@@ -296,9 +296,9 @@ def _spatial_problem(weak: WeakForm, frequency: Symbol) -> SpatialProblem:
 def _characteristic(
     contents: Sequence[Expr], rows: Matrix, start: Matrix, basis: Basis, frequency: Symbol
 ) -> tuple[Expr, Expr]:
-    """Return the determinant over that of the initial state, and the scale by which that of the rows is larger.
+    """Return the determinant over that of the initial state, and the scale factor to the determinant of the rows.
 
-    Where the basis degenerates both determinants vanish; that drops out of the ratio.
+    Where the basis degenerates both determinants vanish, which cancels in the ratio.
     """
     element = determinant(rows, basis.relations)
     if not element:
@@ -317,6 +317,6 @@ def _characteristic(
 
 
 def _part(polynomial: Expr, variables: set[Symbol]) -> Expr:
-    """Return the product of those factors of a polynomial that hold one of the variables."""
+    """Return the product of the factors of a polynomial that contain one of the variables."""
     _, factors = factor_list(polynomial)
     return Mul(*(base**power for base, power in factors if base.free_symbols & variables))

@@ -4,9 +4,9 @@ The modal equations have the Lagrangian
 
 .. math:: L = \sum_n \tfrac12(\dot q_n^2 - \omega_n^2 q_n^2) + \sum T[q, \ldots, \dot q, \ldots]
 
-and, beside it, damping :math:`2c_n\dot q_n`, a parametric stiffness :math:`P_{mn}\cos\varpi t`, and forces
-:math:`f_n\cos\varpi t`. Solutions are expanded in the amplitude; damping, detuning and excitation are as small as the
-nonlinear terms that change the amplitudes first.
+and, in addition, damping :math:`2c_n\dot q_n`, a parametric stiffness :math:`P_{mn}\cos\varpi t`, and forces
+:math:`f_n\cos\varpi t`. Solutions are expanded in the amplitude; damping, detuning and excitation are of the order of
+the leading nonlinear terms in the amplitude equations.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ _HIGHEST = 3  # order in the amplitude
 
 @dataclass(frozen=True)
 class Coefficient:
-    """A symbol that stands for an entry of a coefficient tensor, times a factor.
+    """A symbol for an entry of a coefficient tensor, up to a factor.
 
     Attributes
     ----------
     symbol : Symbol
     positions, velocities : int
-        Which tensor of the Lagrangian, or of the forces.
+        Degrees that identify the tensor of the Lagrangian, or of the forces.
     indices : tuple of int
         Modes, from 1; of a force the equation first.
     factor : Rational
@@ -61,15 +61,15 @@ class SlowFlow:
     Attributes
     ----------
     resonance : Any
-        As it was asked for.
+        As requested.
     detuning : Eq or None
-        What sigma is.
+        Definition of sigma.
     amplitude_equations : tuple of Eq
         dA_n/dt of every mode that takes part.
     backbone : Expr or None
-        Of one mode: what its frequency changes by, per squared real amplitude a = 2 abs(A).
+        For one mode: change of its frequency per squared real amplitude a = 2 abs(A).
     response : Eq or None
-        Of one excited mode: the real amplitude a of steady vibration.
+        For one excited mode: equation of the real amplitude a of steady vibration.
     coefficients : tuple of Coefficient
         The symbols of the tensors that occur.
     steps : tuple of Step
@@ -90,7 +90,7 @@ class SlowFlow:
 
 @dataclass(frozen=True)
 class _Resonance:
-    """Modes that take part, relation of the frequencies (modes.., varpi), and how the excitation acts."""
+    """Resonant modes, relation of the frequencies (modes.., varpi), and the order of the excitation."""
 
     modes: tuple[int, ...]
     relation: Vector | None
@@ -149,7 +149,7 @@ class _Expansion:
         return tuple(sign * int(k == n) for k in range(self.total + 1))
 
     def frequency(self, harmonic: Vector) -> Expr:
-        """Return the frequency of a harmonic, the exact resonance put in: sigma only turns amplitudes slowly."""
+        """Return the frequency of a harmonic at exact resonance; sigma appears as a slow phase of the amplitudes."""
         value = sum((k * w for k, w in zip(harmonic, self.frequencies, strict=True)), S.Zero)
         relation = self.resonance.relation
         if relation is None:
@@ -216,7 +216,7 @@ class _Expansion:
         return found
 
     def turns(self, harmonic: Vector, n: int) -> int | None:
-        """Return how often the relation has to be added to omega_n to give the harmonic, or None."""
+        """Return the multiple of the relation that added to omega_n gives the harmonic, or None."""
         gap = [h - e for h, e in zip(harmonic, self.unit(n), strict=True)]
         if not any(gap):
             return 0
@@ -229,7 +229,7 @@ class _Expansion:
         return None if off or len(ratios) > 1 or ratio.denominator > 1 else int(ratio)
 
     def secular(self, forces: list[Series], order: int) -> dict[int, Expr]:
-        """Return the resonant part of the forces on every mode that takes part."""
+        """Return the resonant part of the forces on every resonant mode."""
         found = {}
         for n in (m - 1 for m in self.resonance.modes):
             total = S.Zero
@@ -288,7 +288,7 @@ def slow_flow(resonance: Any, coefficients: Sequence[Coefficient], modes: int, o
     Raises
     ------
     ValueError
-        If ``order`` is not 1 or the resonance is not one.
+        If ``order`` is not 1 or the resonance is not valid.
     """
     if order != 1:
         raise ValueError(f"order = {order!r}: must be 1, the first order at which the amplitudes change")
@@ -303,10 +303,10 @@ def slow_flow(resonance: Any, coefficients: Sequence[Coefficient], modes: int, o
         both = [one | two for one, two in zip(first, second, strict=True)]
         secular = expansion.secular(expansion.nonlinear(both), 3)
     flows = {n: expand(part + expansion.excited(n)) / (2 * I * expansion.omega[n]) for n, part in secular.items()}
-    return _told(resonance, expansion, flows, power, first, second, secular)
+    return _result(resonance, expansion, flows, power, first, second, secular)
 
 
-def _told(
+def _result(
     resonance: Any,
     expansion: _Expansion,
     flows: Mapping[int, Expr],
@@ -319,24 +319,24 @@ def _told(
     named: dict[Symbol, Expr] = {expansion.amplitude[n]: f for n, f in functions.items()}
     named |= {expansion.conjugate[n]: conjugate(f) for n, f in functions.items()}
 
-    def told(expression: Expr) -> Expr:
+    def in_functions(expression: Expr) -> Expr:
         return expand(expression).xreplace(named)
 
-    equations = tuple(Eq(f.diff(TIME), told(flows[n])) for n, f in functions.items())
+    equations = tuple(Eq(f.diff(TIME), in_functions(flows[n])) for n, f in functions.items())
     relation = expansion.resonance.relation
     detuning = None
     if relation is not None:
         gap = sum((k * w for k, w in zip(relation, expansion.frequencies, strict=True)), S.Zero)
         detuning = Eq(SIGMA, gap)
     backbone, response = _alone(expansion, flows)
-    steps = _steps(expansion, told, functions, first, second, secular, equations, detuning, power)
+    steps = _steps(expansion, in_functions, functions, first, second, secular, equations, detuning, power)
     used = {s for e in equations for s in e.free_symbols}
     occurring = tuple(c for c in expansion.coefficients if c.symbol in used)
     return SlowFlow(resonance, detuning, equations, backbone, response, occurring, steps)
 
 
 def _alone(expansion: _Expansion, flows: Mapping[int, Expr]) -> tuple[Expr | None, Eq | None]:
-    """Return backbone and steady response where one mode takes part."""
+    """Return backbone and steady response of a resonance of one mode."""
     if len(flows) > 1:
         return None, None
     ((n, flow),) = flows.items()
@@ -350,7 +350,7 @@ def _alone(expansion: _Expansion, flows: Mapping[int, Expr]) -> tuple[Expr | Non
     relation = expansion.resonance.relation
     if relation is None or driven == 0:
         return backbone, None
-    # A = a/2 exp(i (sigma t/s + psi)): every term turns alike, and the moduli of both parts are equal
+    # A = a/2 exp(i (sigma t/s + psi)): all terms have the same phase velocity, and the moduli of both parts are equal
     slow = SIGMA / -relation[n]
     left = ((decay + shrinking * a**2) ** 2 + (backbone * a**2 + drift - slow) ** 2) * a**2 / 4
     return backbone, Eq(left, expand(driven * conjugate(driven)))
@@ -358,7 +358,7 @@ def _alone(expansion: _Expansion, flows: Mapping[int, Expr]) -> tuple[Expr | Non
 
 def _steps(
     expansion: _Expansion,
-    told: Any,
+    in_functions: Any,
     functions: Mapping[int, AppliedUndef],
     first: list[Series],
     second: list[Series] | None,
@@ -372,7 +372,7 @@ def _steps(
         return exp(I * value * TIME)
 
     def written(series: Series, order: int) -> Expr:
-        return sum((told(value) * wave(h) for (p, h), value in series.items() if p == order), S.Zero)
+        return sum((in_functions(value) * wave(h) for (p, h), value in series.items() if p == order), S.Zero)
 
     steps = []
     statements = [
@@ -396,7 +396,7 @@ def _steps(
         (
             "secular terms",
             f"The resonant forces of order {power} in the amplitude.",
-            tuple(Eq(Symbol(f"S_{n + 1}"), told(part), evaluate=False) for n, part in secular.items()),
+            tuple(Eq(Symbol(f"S_{n + 1}"), in_functions(part), evaluate=False) for n, part in secular.items()),
         ),
         ("amplitude equations", "The amplitudes change so that no term grows.", equations),
     ]

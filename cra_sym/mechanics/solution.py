@@ -20,8 +20,8 @@ __all__ = ["GeneralSolution"]
 class GeneralSolution:
     """Rows of coefficients of the unknowns: constants of the basis, amplitudes of coordinates, jumps of forces.
 
-    Right of an interior place a motion is added that begins there with a unit jump of one natural force. The jumps that
-    inertia, springs or a support cause are unknowns.
+    To the right of an interior place the motion due to a unit jump of one natural force is added. The jumps caused by
+    inertia, springs or a support are unknowns.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class GeneralSolution:
         )
 
     def _frequency_of_wave_number(self, frequency: Symbol) -> dict[Expr, Expr]:
-        """Return omega**2 in terms of the wave number where one wave number serves all."""
+        """Return omega**2 in terms of the wave number if there is a single one."""
         if len(self.basis.wave_numbers) > 1 or not self.weak.even:
             return {}
         square = frequency**2
@@ -98,7 +98,7 @@ class GeneralSolution:
     # ------------------------------------------------------------------------------------------------ stations
 
     def _values(self, offset: Expr) -> Matrix:
-        """Return the functions of the basis at a distance from the left end, as symbols that it gets."""
+        """Return the functions of the basis at a distance from the left end, as newly defined symbols."""
         space = self.weak.variation.space
         values, relations = dict(self.basis.values), list(self.basis.relations)
         row: list[Expr] = []
@@ -116,7 +116,7 @@ class GeneralSolution:
 
     @cached_property
     def _stations(self) -> tuple[Matrix, list[Matrix], Matrix]:
-        """The functions at the left end, at every place and at the right end; below them those that begin at places."""
+        """The functions at the left end, at every place and at the right end; below them those that start at places."""
         left = self.weak.variation.space.ends["left"]
         nothing = zeros(len(self.points), self.size)
         if not self.points:
@@ -136,7 +136,7 @@ class GeneralSolution:
         return [inverse[:, len(self.section) + k] for k in range(len(self.section))]
 
     def begun(self, jump: tuple[PointForm, Jet]) -> tuple[Expr, ...]:
-        """Return the motion of each field that begins with a unit jump."""
+        """Return the motion of each field due to a unit jump."""
         space = self.weak.variation.space
         point, jet = jump
         shift = space.ends["left"] + space.x - point.place
@@ -156,7 +156,7 @@ class GeneralSolution:
         return self._spread(at * self.basis.derivative**jet.space * self.basis.fields[jet.unknown], moved)
 
     def _spread(self, shapes: Matrix, moved: Matrix) -> Matrix:
-        """Return the row of a quantity that the basis, and below it what begins at each place, has."""
+        """Return the row of a quantity: entries of the basis, then of the motions that start at each place."""
         begun = zeros(1, len(self.jumps))
         if shapes.rows > 1:
             for number, (point, jet) in enumerate(self.jumps):
@@ -177,7 +177,7 @@ class GeneralSolution:
             jet = varied._replace(space=order)
             rows = (self.stiffness(jet, other) * self._row(other, spread) for other in self._partners(jet))
             term = sum(rows, self._zero())
-            if order > varied.space + 1:  # differentiated: what is constant along x has gone
+            if order > varied.space + 1:  # differentiated, so that constants along x vanish
                 term[:, self.size : self.size + len(self.lumped)] = zeros(1, len(self.lumped))
             total, spread = total + term, -spread * self.basis.derivative
         return total
@@ -207,7 +207,7 @@ class GeneralSolution:
         return polynomial(point.form.get((varied, jet), {}).items(), self.parameter, self.weak.even)
 
     def _jump_conditions(self) -> list[Matrix]:
-        """Return the rows that say what each jump is, or that a displacement is held there."""
+        """Return the rows that define each jump, or that hold a displacement there."""
         table = []
         for number, (point, jet) in enumerate(self.jumps):
             moved = self._moved[self.points.index(point)]
@@ -248,7 +248,7 @@ class GeneralSolution:
         return Matrix.vstack(*table[:last], *self._jump_conditions(), *table[last:])
 
     def initial_state(self) -> Matrix:
-        """Return displacements and forces at the left end: singular only where the basis degenerates."""
+        """Return displacements and forces at the left end; the matrix is singular only where the basis degenerates."""
         left = self.basis.left
         rows = [*(self._row(jet, left) for jet in self.section), *(self._force(jet, left) for jet in self.section)]
         return Matrix.vstack(*rows)[:, : self.size]
@@ -260,7 +260,7 @@ def _acts(point: PointForm, jet: Jet) -> bool:
 
 
 def _ascending(points: Iterable[PointForm], left: Expr, right: Expr) -> list[PointForm]:
-    """Return the places in ascending order, as stated where their difference has no known sign; none beyond an end."""
+    """Return the places within the domain in ascending order, as stated where the sign of a difference is not known."""
     inside = [p for p in points if not ((p.place - left).is_negative or (right - p.place).is_negative)]
 
     def order(first: PointForm, second: PointForm) -> int:

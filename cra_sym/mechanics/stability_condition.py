@@ -35,18 +35,18 @@ DETUNING = Symbol("Delta", real=True)
 
 @dataclass(frozen=True)
 class Border:
-    """Where growth sets in.
+    """Boundary of the zone in which amplitudes grow.
 
     Attributes
     ----------
     state : Matrix
-        The two amplitudes in the rotating frame whose growth decides.
+        The two amplitudes in the rotating frame that determine stability.
     matrix : Matrix
         Their equation is d(state)/dt = matrix x state.
     condition : Expr
         Polynomial in the detuning: negative where the amplitudes grow, zero at the border.
     centre, half_width : Expr
-        The border's detunings are centre - half_width and centre + half_width.
+        The detunings of the border are centre - half_width and centre + half_width.
     threshold : Expr
         Smallest epsilon, to first order, at which the amplitudes can grow; zero without damping.
     """
@@ -62,7 +62,7 @@ class Border:
 def rotating_matrices(expansion: Expansion) -> tuple[Matrix, list[Matrix]]:
     """Return the state and, order by order, the constant matrices of the amplitude equations in the rotating frame.
 
-    The frame turns each amplitude by half the detuning times the number of periods of the tongue, which makes the
+    The frame rotates each amplitude at half the detuning times the number of periods of the tongue, which makes the
     equations autonomous.
     """
     r = expansion.resonance
@@ -71,7 +71,7 @@ def rotating_matrices(expansion: Expansion) -> tuple[Matrix, list[Matrix]]:
     matrices = []
     for k, rates in enumerate(expansion.rates, start=1):
         rows = [sum((c for c in rates[a].terms.values()), S.Zero) * EPSILON**k for a in state]
-        # the linear part: a weak cubic term does not decide whether the arm at rest is stable
+        # the linear part: a weak cubic term does not affect the stability of rest
         matrix = Matrix(2, 2, lambda i, j, rows=rows: rows[i].diff(state[j]).subs(dict.fromkeys(state, 0)))
         matrices.append(matrix.subs(SIGMA, DETUNING / EPSILON**r.tongue).expand())
     frame = Matrix([[I * DETUNING * r.tongue / 2, 0], [0, -I * DETUNING * r.tongue / 2]])
@@ -144,7 +144,7 @@ def _roots(first: Expr, shift: Expr) -> tuple[Expr, Expr]:
 
 
 def _threshold(half_width: Expr, tongue: int) -> Expr:
-    """Return the epsilon at which the border's two sides meet."""
+    """Return the epsilon at which the two sides of the border coincide."""
     above = numer(together(half_width**2))
     power = Symbol("power")
     roots = solve(above.expand().subs(EPSILON ** (2 * tongue), power), power)

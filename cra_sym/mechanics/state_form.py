@@ -1,4 +1,4 @@
-"""The exact first-order form of a spatial problem, y' = A y, with what the ends add: input of exact numeric solvers."""
+"""The exact first-order form of a spatial problem, y' = A y, with its end matrices: input of the numerical solvers."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class StateForm:
     forces : tuple of Expr
         P: the natural partner of each, positive at the right end; ``-P`` acts at the left end.
     coordinates : tuple of applied undefined functions
-        w: lumped coordinates, constant along x (m). Their partner r starts from zero at the left end and gathers the
-        force on the coordinate.
+        w: lumped coordinates, constant along x (m). Their partner r is zero at the left end and accumulates the force
+        on the coordinate.
     system : Matrix, shape (2 (n + m), 2 (n + m))
     boundary : Matrix, shape (2 n + m, 2 n + m)
-        What end terms and lumped coordinates add to the dynamic stiffness, in the order (q(left), w, q(right)).
+        Contribution of end terms and lumped coordinates to the dynamic stiffness, in the order (q(left), w, q(right)).
     free : Matrix, shape (2 n + m, f)
         Its columns span the motions the essential conditions allow.
     parameter : Symbol
@@ -41,8 +41,8 @@ class StateForm:
     x : Symbol
     length : Expr
     points : tuple of (place, Matrix, held)
-        At interior places the forces P and r grow by the matrix, (n + m, n + m), times (q, w); the displacements of a
-        section with the numbers held vanish there.
+        At interior places the forces P and r increase by the matrix, (n + m, n + m), times (q, w); the displacements of
+        a section with the indices ``held`` vanish there.
     """
 
     displacements: tuple[Expr, ...]
@@ -175,7 +175,7 @@ def _system(weak: WeakForm, parameter: Symbol) -> Matrix:
 
 
 def _check_parts(leading: Matrix, x: Symbol) -> None:
-    """Refuse a stiffness that is zero on a part of the domain; name the part."""
+    """Raise an error that names the part of the domain on which a stiffness is zero."""
     for stiffness in leading.diagonal() if leading.rows else ():
         for piecewise in stiffness.atoms(Piecewise):
             for value, condition in piecewise.args:
@@ -189,7 +189,7 @@ def _check_parts(leading: Matrix, x: Symbol) -> None:
 
 
 def _inverse(matrix: Matrix) -> Matrix:
-    """Return the inverse; of a diagonal matrix entry by entry, as it stands: 1 + exp(-x) stays bounded."""
+    """Return the inverse; diagonal entries are not simplified, so that 1 + exp(-x) stays bounded."""
     if not matrix.rows:  # lumped coordinates alone
         return matrix
     return diag(*(1 / entry for entry in matrix.diagonal())) if matrix.is_diagonal() else matrix.inv()

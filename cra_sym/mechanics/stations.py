@@ -14,17 +14,17 @@ __all__ = ["stations"]
 
 
 def stations(x: Symbol, table: Sequence[tuple[Any, Any]], kind: Literal["linear", "step"] = "linear") -> Expr:
-    """Return a table of values along x as an expression that a Lagrangian may hold as a coefficient.
+    """Return a table of values along x as an expression, for use as a coefficient in a Lagrangian.
 
     Parameters
     ----------
     x : Symbol
     table : sequence of (place, value)
-        At least two stations. Places ascend, as far as they are numbers; places and values may be expressions in the
+        At least two stations. Places that are numbers must ascend; places and values may be expressions in the
         parameters.
     kind : {'linear', 'step'}
-        Between two stations the value goes linearly from one to the next, or is that of the left one. Outside of the
-        table it is that of the nearest station.
+        Between two stations the value is interpolated linearly, or is that of the left one. Outside the table it is
+        that of the nearest station.
 
     Returns
     -------

@@ -22,7 +22,7 @@ class SteadyResponse:
     Attributes
     ----------
     curve : Eq
-        What amplitude and detuning satisfy together: the frequency response.
+        Relation between amplitude and detuning: the frequency response.
     backbone : Eq
         Detuning about which that curve is symmetric, as a function of the amplitude.
     growth : Expr

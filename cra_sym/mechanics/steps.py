@@ -1,4 +1,4 @@
-"""A derivation as a chain of frozen steps, each of which shows itself as LaTeX in subscript notation."""
+"""A derivation as a chain of frozen steps, displayed as LaTeX in subscript notation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def variation_of(unknown: AppliedUndef) -> AppliedUndef:
 
 
 class _CompactPrinter(LatexPrinter):  # type: ignore[misc]  # SymPy has no types
-    r"""Writes derivatives as subscripts (``v_{xx}``), dots (``\dot{w}``) or primes (``\phi'(0)``), by their function.
+    r"""Printer of derivatives as subscripts (``v_{xx}``), dots (``\dot{w}``) or primes (``\phi'(0)``).
 
     A field ``v(x, t)`` takes subscripts, at an end too (``v_{x}(0,t)``); a function of time alone takes dots; any other
     function of one argument takes primes. Derivatives by anything else are fractions.
@@ -38,13 +38,13 @@ class _CompactPrinter(LatexPrinter):  # type: ignore[misc]  # SymPy has no types
         return isinstance(argument, Symbol) and argument.name in self._variables
 
     def _head(self, function: AppliedUndef) -> tuple[str, str]:
-        """Return the mark of a variation, or nothing, and the name."""
+        """Return the variation sign, if any, and the name."""
         name = function.func.__name__
         delta = r"\delta " if name.startswith(_DELTA) else ""
         return delta, self._print(Symbol(name.removeprefix(_DELTA)))
 
     def _place(self, arguments: Iterable[Basic]) -> str:
-        """Return the arguments where they say something: a value at an end, or a coefficient that varies along x."""
+        """Return the arguments where they are needed: a value at an end, or a coefficient that varies along x."""
         arguments = tuple(arguments)
         if all(map(self._own, arguments)) and self._variables[1] in map(str, arguments):
             return ""
@@ -177,13 +177,13 @@ class Step:
     name : str
         Short title.
     statement : str
-        What was done and why it is allowed, one sentence.
+        What is done and why, in one sentence.
     expression : Basic or tuple of Basic
-        What came out.
+        Result.
     derived_from : tuple of str
-        Names of the steps it rests on; empty for what was given.
+        Names of the steps it is derived from; empty for given expressions.
     check : str
-        How it is checked by another route.
+        Independent check.
     variables : (str, str)
         Names of position and time, for the notation.
     tag : int or str, optional
@@ -212,7 +212,7 @@ class Step:
 
 
 class Steps(tuple[Step, ...]):
-    """The steps of a derivation, in order; in a notebook it shows itself.
+    """The steps of a derivation, in order, with a display in notebooks.
 
     >>> from sympy import symbols
     >>> a, b = symbols("a b")

@@ -1,4 +1,4 @@
-"""The expansion itself: order by order the right-hand sides, their secular terms, and what solvability demands."""
+"""The expansion: right-hand sides order by order, their secular terms, and the solvability conditions."""
 
 from __future__ import annotations
 
@@ -64,20 +64,20 @@ def derivatives(power: int) -> tuple[Expr, Expr, Expr]:
 
 @dataclass(frozen=True)
 class ModeSum:
-    """What the response of all modes at the combination frequencies gives back to one amplitude equation.
+    """Feedback of the response of all modes at the combination frequencies into one amplitude equation.
 
     Attributes
     ----------
     symbol : Symbol
-        Stands for the sum in the amplitude equations and in the boundary.
+        Symbol of the sum in the amplitude equations and in the boundary.
     row : Label
         Mode whose equation it enters.
     onto : Symbol
         Amplitude it multiplies.
     resonant : Expr
-        Share of the modes that take part in the resonance; of all modes when they are written out.
+        Contribution of the resonant modes; of all modes when they are written out.
     spectator : Expr
-        Share of one mode ``index`` that takes no part, when the number of modes is symbolic.
+        Contribution of one non-resonant mode ``index``, when the number of modes is symbolic.
     total : Expr
         The whole sum.
     """
@@ -92,23 +92,23 @@ class ModeSum:
 
 
 class Expansion:
-    """Two or three time scales carried through order by order.
+    """Expansion in two or three time scales, order by order.
 
     Parameters
     ----------
     system, resonance
-        What is expanded, and about which excitation frequency.
+        The system to expand, and the resonance.
     order : {1, 2}
         Highest power of epsilon in the amplitude equations.
 
     Attributes
     ----------
     receptances : dict
-        Short symbols of 1 / (omega_i^2 - nu^2), in which the solution of order 1 is kept.
+        Short symbols of 1 / (omega_i^2 - nu^2), in which the solution of order 1 is expressed.
     fields : list of dict
         The solution at each order, mode by mode.
     right_sides, secular : list of dict
-        What drives each order from the first on, and its part at the mode's own frequency (which must vanish).
+        Right-hand side of each order from the first on, and its part at the mode's own frequency (which must vanish).
     rates : list of dict
         Derivative of each complex amplitude with respect to T_1, T_2.
     sums : tuple of ModeSum
@@ -175,7 +175,7 @@ class Expansion:
     # one order ----------------------------------------------------------------------------------------------------
 
     def _step(self, k: int) -> None:
-        """Form the right-hand side of order k, take its secular part, and solve that for the amplitudes' rates."""
+        """Form the right-hand side of order k and solve its secular part for the rates of the amplitudes."""
         rows = self.system.rows if k == 1 else self.resonance.modes
         unknown = {a: Symbol(f"D{k}_{a}") for i in rows for a in (amplitude(i), conjugate_amplitude(i))}
         self.rates.append({a: Harmonics({(self.zero, S.Zero): d}) for a, d in unknown.items()})
@@ -187,7 +187,7 @@ class Expansion:
                 self.rates[-1][a] = _solved(right[i].part(vector), unknown[a])
 
     def _right_side(self, i: Label, k: int) -> Harmonics:
-        """Return what drives mode i at order k: everything but D0^2 q_ik + omega_i^2 q_ik, with its sign changed."""
+        """Return the right-hand side for mode i at order k: minus all terms but D0^2 q_ik + omega_i^2 q_ik."""
         system, once, twice = self.system, derivatives(1), derivatives(2)
         parts = [self._differentiate(-twice[k - l], self.fields[l][i]) for l in range(k)]
         damping = -2 * self.decay(i) / EPSILON**self.scale  # the decay rate is taken to be of that order
@@ -212,14 +212,14 @@ class Expansion:
         if k == 1:
             return Harmonics.total(shares.values())
         slopes = [self.excitation * self.fields[0][j] * (-SIGMA * system.slope(i, j)) for j in self.resonance.modes]
-        # The detuning's share of P(varpi_0 + epsilon sigma); for the second tongue it is of third order.
+        # The contribution of the detuning in P(varpi_0 + epsilon sigma); for the second tongue it is of third order.
         parts = slopes if self.scale == 1 else []
         for sign in (1, -1):
             parts += self._summed(i, sign, shares)
         return Harmonics.total(parts)
 
     def _summed(self, i: Label, sign: int, shares: Fields) -> list[Harmonics]:
-        """Name the sums over the modes that come back to mode i's own frequency."""
+        """Define symbols for the sums over modes at the frequency of mode i."""
         vector = self.unit(i, sign)
         parts = {j: share.part(vector) for j, share in shares.items()}
         found = []
@@ -246,7 +246,7 @@ class Expansion:
         return ModeSum(symbol, i, onto, resonant, spectator, index, resonant + others)
 
     def _keep_resonant_modes(self) -> None:
-        """Leave out the free vibration of modes that take no part: their amplitudes only decay."""
+        """Omit the free vibration of non-resonant modes, whose amplitudes only decay."""
         for i in self.system.rows:
             if i not in self.resonance.modes:
                 self.fields[0][i] = Harmonics({})

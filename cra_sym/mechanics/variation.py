@@ -1,4 +1,4 @@
-"""First variation of an action: what is given, read into jet symbols, with its end terms and virtual work checked."""
+"""First variation of an action in jet symbols, with checks of end terms and virtual work."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ class Variation:
     density, ends : Expr
         Lagrangian density, and the sum of the Lagrangian terms of both ends.
     applied : tuple of (Expr, Jet, bool)
-        Non-conservative generalised force, the displacement (a jet without time derivative) it works on, and whether it
-        is a force per length.
+        Non-conservative generalised force, the displacement (a jet without time derivative) on which it does work, and
+        whether it is a force per length.
     orders : tuple of int
         Highest x derivative of each field: as many displacements exist at each end.
     elimination : Elimination
         End displacements fixed by the essential conditions.
     points : tuple of Point
-        What acts at interior places.
+        Terms at interior places.
     """
 
     space: JetSpace
@@ -56,7 +56,7 @@ def vary(
     essential: Sequence[Expr],
     inside: Sequence[tuple[Expr, Expr]] = (),
 ) -> Variation:
-    """Read what is given into jet symbols and check that every end term can do work."""
+    """Convert the input to jet symbols and check that every end term can do work."""
     along = space.read(density, "domain", "density")
     essential, held = supports(essential, space.x, tuple(space.ends.values()))
     terms = {end: space.read(ends[end], end, f"{end} end") for end in END_NAMES}
@@ -85,7 +85,7 @@ def vary(
 
 
 def _check_end_term(space: JetSpace, label: str, jets: Sequence[Jet], orders: Sequence[int]) -> None:
-    """Refuse end terms in a derivative the density does not control: it is no displacement of that end."""
+    """Raise an error for end terms in a derivative that is not a displacement of that end."""
     for jet in jets:
         if jet.place is not None and jet.space >= orders[jet.unknown]:
             field = space.unknowns[jet.unknown]

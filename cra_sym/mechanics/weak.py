@@ -1,6 +1,6 @@
 """The linear weak form of a variation: every pair of displacements with its stiffness as a polynomial in s = d/dt.
 
-Exact state form, separation of variables and Ritz matrices all read their coefficients here, so they cannot disagree.
+Exact state form, separation of variables and Ritz matrices all take their coefficients from it and are thus consistent.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class WeakForm:
         Per length in the interval, and at the ends and on the lumped coordinates. Stiffness is the coefficient of
         ``s**0``, damping (and gyroscopic forces) of ``s**1``, mass of ``s**2``.
     inside_load, end_load : dict of Jet to Expr
-        What does not depend on the unknowns: prescribed motions and applied forces.
+        Terms independent of the unknowns: prescribed motions and applied forces.
     points : tuple of PointForm
         The same at interior places.
     """
@@ -63,13 +63,13 @@ class WeakForm:
 
     @property
     def constant(self) -> bool:
-        """Whether no coefficient depends on x; something may act at interior places."""
+        """Whether no coefficient depends on x; there may be terms at interior places."""
         x = self.variation.space.x
         return not any(v.has(x) for entry in self.inside.values() for v in entry.values())
 
     @property
     def discrete(self) -> Bilinear:
-        """What acts at the ends, on the lumped coordinates and at interior places, these with their number as place."""
+        """Terms at the ends, on the lumped coordinates and at interior places, the latter with their index as place."""
         found = dict(self.ends)
         for number, point in enumerate(self.points):
             for (p, q), entry in point.form.items():
@@ -80,7 +80,7 @@ class WeakForm:
 
     @property
     def discrete_load(self) -> dict[Jet, Expr]:
-        """The same of the loads."""
+        """Loads at the ends, on the lumped coordinates and at interior places."""
         found = dict(self.end_load)
         for number, point in enumerate(self.points):
             for jet, value in point.load.items():
@@ -141,7 +141,7 @@ def weak_form(variation: Variation) -> WeakForm:
 
 
 def _apply(space: JetSpace, form: Bilinear, load: dict[Jet, Expr], force: Expr, displacement: Jet, label: str) -> None:
-    """Add a force that is linear in the unknowns to a form, and what does not depend on them to a load."""
+    """Add the terms of a force linear in the unknowns to a form, and the others to a load."""
     for jet, factor in _linear(space, force, label):
         _accumulate(form, displacement, jet, -factor)
     still = force.xreplace({space.symbol(jet): S.Zero for jet in space.jets(force)})
@@ -181,7 +181,7 @@ def _linear(space: JetSpace, force: Expr, label: str, origin: Expr | None = None
 
 
 def _check_order(variation: Variation, jet: Jet, factor: Expr, label: str) -> None:
-    """Refuse an applied force that depends on a derivative of higher order than the energy does."""
+    """Raise an error for a force that depends on a higher derivative than the energy."""
     space = variation.space
     if space.is_field(jet.unknown) and jet.space > variation.orders[jet.unknown] - (jet.place is not None):
         raise HamiltonError(

@@ -160,7 +160,7 @@ theta = sp.Function("theta")(x, t)
         (lambda: model(BEAM - HALF * N * theta.diff(x) ** 2), r"term -N\*.*: theta\(x, t\) is not one of the fields"),
         (lambda: model(right=HALF * m_e * v.diff(x, 2, t) ** 2), "not a displacement of that end"),
         (lambda: model(essential=[v.subs(x, 0)]), "k_t.*essential"),
-        (lambda: model(essential=[v.diff(x, 2).subs(x, 0)], left=None), "no displacement of an end"),
+        (lambda: model(essential=[v.diff(x, 2).subs(x, 0)], left=None), "not a displacement of an end"),
         (lambda: model(domain=(0, 0)), "domain"),
         (lambda: model(domain=(0, x)), "domain"),
         (lambda: model(right=TIP.subs(v.diff(t), v.diff(t).subs(x, L / 2))), "not an end"),
