@@ -61,6 +61,7 @@ def slow_flow(model: Model, resonance: Any, order: int = 1, modes: int | None = 
     """
     if model.pieces["hysteresis"]:
         raise ValueError("model: has elastic-slip elements, of which there is no slow flow; take without_hysteresis")
+    from cra_sym.mechanics import free_vibration
     from cra_sym.mechanics import slow_flow as mechanics
     from cra_sym.model.slow_coefficients import slow_coefficients
 
@@ -69,8 +70,10 @@ def slow_flow(model: Model, resonance: Any, order: int = 1, modes: int | None = 
     own = max(numbers[: {"internal": 2, "": 2}.get(kind, 1)], default=1)
     own = checks.count("resonance", own, high=MOST_NONLINEAR_MODES)
     total = own if modes is None else checks.count("modes", modes, low=own, high=MOST_NONLINEAR_MODES)
-    coefficients = slow_coefficients(model.numerics("nonlinear"), total)
-    return mechanics.slow_flow(resonance, coefficients, total, order)
+    if checks.count("order", order, high=2) == 2:
+        coefficients = slow_coefficients(model.numerics("nonlinear"), total, degree=6)
+        return free_vibration.free_vibration(resonance, coefficients, total)
+    return mechanics.slow_flow(resonance, slow_coefficients(model.numerics("nonlinear"), total), total)
 
 
 @checks.default_floating_point

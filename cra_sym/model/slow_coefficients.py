@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from sympy import Rational, Symbol
 
-from cra_sym.mechanics.slow_flow import Coefficient
+from cra_sym.mechanics.amplitude_expansion import Coefficient
 from cra_sym.model.nonlinear import NonlinearTerms, Product
 
 __all__ = ["slow_coefficients"]
@@ -16,8 +16,8 @@ _NAMED = {(4, 0): ("K", Rational(-1, 2)), (2, 2): ("J", Rational(1, 2)), (3, 0):
 _HIGHEST = 4  # highest degree in the Lagrangian that enters the first slow flow
 
 
-def slow_coefficients(terms: NonlinearTerms | None, modes: int) -> tuple[Coefficient, ...]:
-    """Return the symbols of all entries up to fourth degree (third, of forces) of the first modes.
+def slow_coefficients(terms: NonlinearTerms | None, modes: int, degree: int = 4) -> tuple[Coefficient, ...]:
+    """Return the symbols of all entries up to a degree (one less, of forces) of the first modes.
 
     K of q^4 enters the Lagrangian as -K q^4/2, J of q^2 v^2 as J q^2 v^2/2, C of q^3 as -C q^3/3; other entries are
     those of the tensors.
@@ -27,7 +27,7 @@ def slow_coefficients(terms: NonlinearTerms | None, modes: int) -> tuple[Coeffic
     kinds = sorted({kind for product in (*terms.inside, *terms.discrete) for kind in _kinds(terms, product)})
     found = []
     for force, positions, velocities in kinds:
-        if positions + velocities > _HIGHEST - int(force):
+        if positions + velocities > degree - int(force):
             continue
         name, factor = _NAMED.get((positions, velocities), (f"T{positions}{velocities}", Rational(1)))
         if force:

@@ -50,6 +50,42 @@ def test_quadratic_terms_act_through_the_second_order():
     assert [step.name for step in flow.steps][-2:] == ["secular terms", "amplitude equations"]
 
 
+def beyond(bend, curve):
+    """Return how far a backbone of frequency 1 at rest is from what slow flow says of its first harmonic."""
+    size = np.abs(curve.coefficients[:, 0, curve.multiples.index(1)])
+    guess = sp.lambdify(sp.Symbol("a", positive=True), bend)(size)
+    return np.abs(curve.angular_frequency - 1 - guess * size**2)
+
+
+@pytest.mark.parametrize(
+    "lagrangian",
+    [
+        MIXED - q**5 / 5 - q**6 / 6,
+        q.diff(t) ** 2 * (1 + q + q**2 - q**4 / 2) / 2 - q**2 / 2 - q**4 / 3,
+    ],
+)
+def test_second_order_leaves_the_sixth_power_of_the_amplitude(lagrangian):
+    model = oscillator(lagrangian)
+    system, flow = model.at({}), model.slow_flow(("free", 1), order=2)
+    bend = flow.backbone.subs(cra.slow_flow_values(flow, system))
+    curve = cra.backbone(system, energy=(0.16 / 2.0 ** np.arange(3)) ** 2 / 2, modes=1, harmonics=15)
+    assert (np.abs(order(beyond(bend, curve), 2.0) - 6) < 0.5).all()
+
+
+def test_second_order_of_duffing_and_of_two_modes_by_hand():
+    """omega + 3 alpha a^2/(8 omega) - 15 alpha^2 a^4/(256 omega^3) with alpha = 2 K; and r that q drives by q^2 r."""
+    flow = oscillator(q.diff(t) ** 2 / 2 - q**2 / 2 - q**4 / 4).slow_flow(("free", 1), order=2)
+    omega, big_k, a = sp.Symbol("omega_1", positive=True), sp.Symbol("K_1111", real=True), sp.Symbol("a", positive=True)
+    known = 3 * big_k / (4 * omega) - 15 * big_k**2 * a**2 / (64 * omega**3)
+    assert sp.expand(flow.backbone - known) == 0
+    model = pair(1.0, 2.6, lambda q, r: q**2 * r)
+    flow, system = model.slow_flow(("free", 1), order=2, modes=2), model.at({})
+    bend = flow.backbone.subs(cra.slow_flow_values(flow, system))
+    curve = cra.backbone(system, energy=(0.4 / 2.0 ** np.arange(3)) ** 2 / 2, modes=2, harmonics=10)
+    assert (np.abs(order(beyond(bend, curve), 2.0) - 6) < 0.5).all()
+    assert [step.name for step in flow.steps][-2:] == ["frequency", "amplitude equations"]
+
+
 def steady(flow, system, symbols, sigma, start):
     """Return the positive amplitudes that the response equation has near a start."""
     a = sp.Symbol("a", positive=True)
@@ -150,7 +186,8 @@ def test_internal_resonance_exchanges_energy_as_time_integration_says(factor, co
 @pytest.mark.parametrize(
     ("resonance", "options", "message"),
     [
-        (("free", 1), {"order": 2}, "order = 2: must be 1"),
+        (("free", 1), {"order": 3}, "order = 3: must be an integer from 1 to 2"),
+        (1, {"order": 2}, r"resonance = 1: must be \('free', n\) with order = 2"),
         (("sideways", 1), {}, "resonance = .* must be a mode n"),
         (("internal", 1, 1, 2), {}, "resonance"),
         (("superharmonic", 1, 1), {}, "factor 1 must be at least 2"),

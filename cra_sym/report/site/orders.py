@@ -164,15 +164,16 @@ def _oscillator(energy: sp.Expr) -> cra.Model:
     return cra.Model(0, fields=(), coordinates=[q], x=x, domain=(0, 1), t=t, left=q.diff(t) ** 2 / 2 - potential)
 
 
-def _slow_flow() -> float:
+def _slow_flow(order: int) -> float:
     """An oscillator with quadratic and cubic force, against harmonic balance at amplitudes whose ratio is 2."""
     q = sp.Symbol("q")
     model = _oscillator(q**2 / 2 + q**3 / 3 + q**4 / 2)
-    flow, system = model.slow_flow(("free", 1)), model.at({})
-    bend = float(cast(sp.Expr, flow.backbone).subs(cra.slow_flow_values(flow, system)))
+    flow, system = model.slow_flow(("free", 1), order), model.at({})
+    bend = cast(sp.Expr, flow.backbone).subs(cra.slow_flow_values(flow, system))
     curve = cra.backbone(system, energy=np.array([0.05, 0.025]) ** 2 / 2, modes=1)
     sizes = np.abs(curve.coefficients[:, 0, curve.multiples.index(1)])
-    return _power(sizes, curve.angular_frequency - 1.0 - bend * sizes**2)
+    slow = sp.lambdify(sp.Symbol("a", positive=True), bend)(sizes) * sizes**2
+    return _power(sizes, curve.angular_frequency - 1.0 - slow)
 
 
 def _harmonic_balance() -> float:
@@ -236,7 +237,8 @@ _ROWS: tuple[_Row, ...] = (
     (("Floquet: steps of the monodromy matrix", "step", "the same with a tolerance of 1e-13"), 4.0, _floquet_steps),
     (("multiple scales, order 1: boundary", "epsilon", "bisection on Floquet exponents"), 2.0, lambda: _boundary(1)),
     (("multiple scales, order 2: boundary", "epsilon", "bisection on Floquet exponents"), 3.0, lambda: _boundary(2)),
-    (("multiple scales, nonlinear: backbone", "amplitude", "harmonic balance"), 4.0, _slow_flow),
+    (("slow flow, order 1: backbone", "amplitude", "harmonic balance"), 4.0, lambda: _slow_flow(1)),
+    (("slow flow, order 2: backbone", "amplitude", "harmonic balance"), 6.0, lambda: _slow_flow(2)),
     (("harmonic balance, Duffing: decades", "two harmonics", "elliptic functions"), _DECADES, _harmonic_balance),
     (("modal series: frequency response of the tip", "1/modes", "the boundary value problem"), 5.0, _truncation),
     (("modal series: motion under a manufactured load", "1/modes", "the chosen motion"), 5.0, _manufactured),
