@@ -1,4 +1,4 @@
-"""Exported code: the derived expressions in seven languages, each with build files, reference vectors and a test."""
+"""Exported code: derived expressions in seven languages, with build files, reference vectors and a self-test."""
 
 from cra_sym.codegen.controllers import Controller
 from cra_sym.codegen.exporter import Export, export

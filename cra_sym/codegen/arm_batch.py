@@ -1,4 +1,4 @@
-"""Many arms at once in C: the loops over lanes that machine code is made of, printed, and the functions around them."""
+"""Batches of arms in C: the loops over lanes of the compiled kernels, printed, with the functions that call them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cra_sym.kernels.specialise import written_out
 
 __all__ = ["arm_batch"]
 
-_GROUPS = 1e-9, 1e-3, 0.2, 1.0, 7.0, 60.0, 1e3, 1e6, 1e9  # that the self-test mixes
+_GROUPS = 1e-9, 1e-3, 0.2, 1.0, 7.0, 60.0, 1e3, 1e6, 1e9  # arms in a batch of the self-test
 
 
 def arm_batch(name: str, real: str, tolerance: float) -> tuple[str, str, str]:
@@ -38,7 +38,7 @@ def arm_batch(name: str, real: str, tolerance: float) -> tuple[str, str, str]:
 @cache
 def _lanes() -> str:
     text, numbers = written_out(*arm_family().spectrum_parts())
-    told = {f.name: f.summary for f in spectrum_functions()}
-    printer = LanesPrinter(text, numbers, {"_LANES": "LANES"}, {"points": "POINTS"}, told)
+    summaries = {f.name: f.summary for f in spectrum_functions()}
+    printer = LanesPrinter(text, numbers, {"_LANES": "LANES"}, {"points": "POINTS"}, summaries)
     group = Rows("const double", ("arms",))
     return printer.entry("frequency_parameters", [Rows("double", ("arms", "modes")), None, *[group] * 4])

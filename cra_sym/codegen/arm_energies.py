@@ -1,4 +1,4 @@
-"""What the exports of the arm take of its Lagrangian itself: the line, what stands at its ends, and their energies."""
+"""Quantities for the exports of the arm from its Lagrangian: the line, springs and inertias at its ends, energies."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ x, t, w, v = (symbol(name) for name in ("x", "t", "w", "v"))
 
 
 def energy_functions() -> tuple[Function, ...]:
-    """Return the functions of the arm's parameters behind its groups, sensitivities and loads."""
+    """Return the functions of the arm's parameters for its groups, sensitivities and loads."""
     return _of(arm_model())
 
 
@@ -43,7 +43,7 @@ def _of(model: Model) -> tuple[Function, ...]:
 
 
 def _line(model: Model) -> list[sp.Expr]:
-    """Return stiffness, mass per length, springs and inertias of the line, and the mass that a free base moves."""
+    """Return stiffness, mass per length, springs and inertias of the line, and the mass that moves with the base."""
     found = one_wave_scales(model.conservative)
     assert found is not None, "arm_family refuses other Lagrangians"
     stiffness, inertia, length = (found[name] for name in ("stiffness", "inertia", "length"))

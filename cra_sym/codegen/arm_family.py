@@ -9,7 +9,7 @@ from cra_sym.model.one_wave_family import Family
 __all__ = ["arm_family"]
 
 _STRUCTURE = (("k", "k"), ("m", "m"))
-"""Springs at the left end, inertias at the right one: what the words around the printed functions speak of."""
+"""Structure assumed by the text around the printed functions: springs at the left end, inertias at the right one."""
 
 
 def arm_family() -> Family:
@@ -18,8 +18,8 @@ def arm_family() -> Family:
     Raises
     ------
     ValueError
-        If the Lagrangian has changed so that the exports, which are written for springs at the joint, inertias at the
-        tip and a base that carries all of it, do not say what it says.
+        If the Lagrangian has changed and the exports, which are written for springs at the joint, inertias at the tip
+        and a base that carries everything, no longer describe it.
     """
     arm = Arm.nominal()
     route, load = arm.numerics("route"), arm.numerics("load", "w")

@@ -1,4 +1,4 @@
-"""The arm as a library: one source of frequencies, modes and responses around what its Lagrangian derives to."""
+"""The arm as a library: frequencies, modes and responses around the functions derived from its Lagrangian."""
 
 from __future__ import annotations
 
@@ -47,13 +47,13 @@ at most 10 kB, of which
 for blocks of `NAME_MOST_LANES` = 64 arms and up to `NAME_MOST_MODES_TOGETHER` = 16 modes; each may be set to less when
 compiling (`-DNAME_MOST_MODES=20`). These functions become SIMD code as wide as the compiler may use:
 `make ARCH=-march=native`"""
-_OF_PRECISION = {  # as _constants lists them
+_OF_PRECISION = {  # in the order of _constants
     "float64": (1.7976931348623157e308, 2.2250738585072014e-308, 1e-16, 1e-13, 1e-12, 1e5),
     "float32": (2.9e38, 1.1754944e-38, 5e-8, 1e-5, 1e-5, 1e4),
 }
 LEAST_SHARE = _OF_PRECISION["float32"][4]
-_IN_TIME = 1e-12  # error of the outputs in time, relative to the largest term
-_SINGLE, _SINGLE_MODAL = 1e-5, 5e-4  # errors allowed in single precision: of frequencies, of all else
+_IN_TIME = 1e-12  # error of time-domain outputs, relative to the largest term
+_SINGLE, _SINGLE_MODAL = 1e-5, 5e-4  # errors allowed in single precision: of frequencies, of all other results
 _PRECISION = {
     "float64": "",
     "float32": f"""
@@ -70,16 +70,16 @@ def arm_library(name: str, real: str = "float64") -> Library:
     parts = (_with_widths(source(part)) for part in names)
     text = "\n\n".join([_constants(real), _generated(), *parts])
     summary = "A flexible Cartesian robotic arm: frequencies, modes, responses"
-    told = stated(Arm.nominal().model)
+    statement = stated(Arm.nominal().model)
     checks = tuple(_checks(real))
     batch = arm_batch(name, real, TOLERANCE if real == "float64" else _SINGLE)
     stack = _STACK.replace("NAME", name.upper())
     readme = _README + _PRECISION[real] + _counted(text)
-    return Library(name, summary, text, told, checks, readme, real, batch, stack)
+    return Library(name, summary, text, statement, checks, readme, real, batch, stack)
 
 
 def _counted(text: str) -> str:
-    """Return how many operations the functions in time take."""
+    """Return a table of the operation counts of the time-domain functions."""
     form = parse(text)
     most = int(form.constants["MOST_KEPT"].values[0])
     counts = ", ".join(f"`{name}` {operations(form, name, {'_kept(sampled)': most})}" for name in ("step", "outputs"))
@@ -103,7 +103,7 @@ def _constants(real: str) -> str:
     numbers = zip(kinds.items(), _OF_PRECISION[real], strict=True)
     return (
         f"PI = {math.pi!r}  # half a turn\n"
-        + "".join(f"{key} = {value!r}  # {told}\n" for (key, told), value in numbers)
+        + "".join(f"{key} = {value!r}  # {statement}\n" for (key, statement), value in numbers)
         + f"NEAR = {float(NEAR[2])!r}  # lambda^4 below which the power series of the determinant serves\n"
         f"TERMS = {terms}  # of that series\n"
         f"GAUSS = {len(nodes)}  # points of a rule on (0, 1)\n"
@@ -113,7 +113,7 @@ def _constants(real: str) -> str:
 
 
 def _with_widths(text: str) -> str:
-    """Put in the calls of the half widths, with their arguments in the functions' own order."""
+    """Insert the calls of the half-width functions, with arguments in the order of each function."""
     one, two = "first.omega", "second.omega"
     given = {
         "P_nn": "P", "P_mn": "P", "P_nm": "P", "epsilon": "epsilon", "omega_m": one, "omega_n": two,
@@ -132,7 +132,7 @@ def _generated() -> str:
 
 
 def _checks(real: str) -> Iterator[Check]:
-    """Yield the reference vectors of the package's own kernels, as far as the library goes."""
+    """Yield the reference vectors from the package's own kernels, for the functions of the library."""
     for check in arm_checks(everything=True):
         if not all(map(math.isfinite, check.outputs)):  # the sensitivities of rigid-body modes
             continue
@@ -142,7 +142,7 @@ def _checks(real: str) -> Iterator[Check]:
             continue
         size = max(map(abs, check.outputs))
         if check.quantity.startswith("state_space_force") and check.absolute * LEAST_SHARE > TOLERANCE * size:
-            yield Check(quantity, check.inputs, (), refused=True)  # the base has next to no share of the mass
+            yield Check(quantity, check.inputs, (), refused=True)  # the base has almost no mass
             continue
         loss = _SINGLE if quantity <= _QUANTITIES["omega"] else _SINGLE_MODAL
         yield Check(quantity, check.inputs, check.outputs, loss, loss / TOLERANCE * check.absolute)

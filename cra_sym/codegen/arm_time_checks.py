@@ -1,4 +1,4 @@
-"""Reference vectors of the arm in time: matrix exponentials, fitted shapes, the package's shapers."""
+"""Reference vectors for the time-domain functions of the arm: matrix exponentials, fitted shapes, input shapers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MODES = 4
 
 
 def arm_time_checks() -> Iterator[Line]:
-    """Yield what the text of the arm in time is compared with."""
+    """Yield the reference vectors of the arm's time-domain functions."""
     nominal = Arm.nominal()
     arms = [nominal, nominal.replace(k_t=1e4, k_r=1e3, m_e=0.05, J_e=1e-4, zeta=0.02), *random_arms(6)]
     arms.append(nominal.replace(k_t=0.0, k_r=0.0, zeta=0.1))  # two rigid-body modes
@@ -30,7 +30,7 @@ def arm_time_checks() -> Iterator[Line]:
         given = tuple(float(getattr(arm, name)) for name in FIELDS)
         modal = modal_parameters(arm, _MODES)
         omega, blocks = np.asarray(modal.omega), _blocks(arm, modal)
-        follows = abs(blocks.through[5]) < 1e-3  # the tip of a free arm stays behind: its acceleration is rounding
+        follows = abs(blocks.through[5]) < 1e-3  # the tip of a free arm stays at rest, so its acceleration is rounding
         slowest = float(omega[omega > 0.0][0])
         for time, steps in ((0.02 / omega[-1], 40), (0.9 / omega[-1], 7), (0.3 / slowest, 12)):
             found, size = stepped(blocks, float(time), 0.25, steps)
@@ -59,7 +59,7 @@ def _blocks(arm: Arm, modal: ModalParameters) -> Blocks:
 
 
 def _responses(arm: Arm, given: tuple[float, ...], slowest: float) -> Iterator[Line]:
-    """Yield derivatives by x from the displacement at as many places as there are modes."""
+    """Yield derivatives by x fitted to the displacement at as many points as there are modes."""
     numbers = (0.05, -0.1, 1e-3, 0.8 * slowest, 0.4)
     length, t = float(arm.L), 0.6 / slowest
     places = length * np.linspace(0.2, 1.0, _MODES)

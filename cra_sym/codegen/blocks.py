@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 __all__ = ["Blocks", "blocks_of"]
 
 Array = NDArray[np.float64]
-_AGREEMENT = 1e-9  # of the frequency responses, relative to the largest of an output; below it rounding alone is seen
-_ZERO = 1e-6  # eigenvalues below this part of the largest may be those of a free motion
+_AGREEMENT = 1e-9  # of the frequency responses, relative to the largest of an output; smaller values are rounding
+_ZERO = 1e-6  # eigenvalues below this share of the largest may be those of a free motion
 
 
 @dataclass(frozen=True)
@@ -41,13 +41,13 @@ class Blocks:
 def blocks_of(A: Array, B: Array, C: Array, D: Array) -> Blocks:
     """Return the blocks of x' = A x + B u, y = C x + D u with one input.
 
-    Modes that do not couple become a block each. Otherwise the poles do: a pair of complex ones, two real ones, a
-    double one at zero. What the input does not reach is left out.
+    Each uncoupled mode is a block. Otherwise the blocks are formed of poles: a pair of complex ones, two real ones, or
+    a double one at zero. Uncontrollable parts are left out.
 
     Raises
     ------
     ValueError
-        If poles lie so close to each other that their shares cannot be told apart.
+        If poles are too close to each other to separate their residues.
     """
     through, half = D[:, 0], len(A) // 2
     if _is_modal(A, B):
@@ -74,7 +74,7 @@ def _is_modal(A: Array, B: Array) -> bool:
 
 
 def _from_poles(A: Array, B: Array, C: Array, through: Array, zeros: int) -> Blocks | None:
-    """Return the blocks with so many poles at zero, or None if there are not as many small ones."""
+    """Return the blocks with a given number of poles at zero, or None if there are fewer small ones."""
     from scipy.linalg import eig
 
     scale = np.exp(-0.5 * np.log(np.maximum(np.abs(A).max(axis=0), 1e-300) / np.maximum(np.abs(A).max(axis=1), 1e-300)))
@@ -97,7 +97,7 @@ def _from_poles(A: Array, B: Array, C: Array, through: Array, zeros: int) -> Blo
 
 
 def _pairs(poles: NDArray[np.complex128], zeros: int) -> tuple[list[int], list[int]]:
-    """Return the indices of the poles that make a block, but for those at zero."""
+    """Return the pairs of indices of the poles that form a block, except those at zero."""
     first, second = [], []
     real = [i for i in range(zeros, len(poles)) if poles[i].imag == 0.0]
     for i in range(zeros, len(poles)):
@@ -108,7 +108,7 @@ def _pairs(poles: NDArray[np.complex128], zeros: int) -> tuple[list[int], list[i
 
 
 def _with_free_motion(blocks: Blocks, A: Array, B: Array, C: Array) -> Blocks:
-    """Add the block of a double pole at zero: what the others leave of the response at a low frequency."""
+    """Add the block of a double pole at zero, from the remainder of the response at a low frequency."""
     slowest = np.sqrt(np.min(np.abs(blocks.stiffness), initial=np.inf))
     omega = np.array([0.3 * slowest if np.isfinite(slowest) else 1.0])
     rest = (_response(A, B, C, omega) - blocks.frequency_response(omega) + blocks.through[:, None])[:, 0]

@@ -1,4 +1,4 @@
-"""Real and imaginary part of an expression in real symbols, node by node: what is shared stays shared."""
+"""Real and imaginary part of an expression in real symbols, node by node, so that common parts stay shared."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _found(e: sp.Expr, known: dict[sp.Expr, Parts]) -> Parts:
     if isinstance(e, sp.exp):
         (re, im) = parts[0]
         return sp.exp(re) * sp.cos(im), sp.exp(re) * sp.sin(im)
-    if isinstance(e, expm1):  # e^x cos y - 1 = (e^x - 1) cos y - 2 sin^2(y/2): nothing cancels
+    if isinstance(e, expm1):  # e^x cos y - 1 = (e^x - 1) cos y - 2 sin^2(y/2), without cancellation
         (re, im) = parts[0]
         return expm1(re) * sp.cos(im) - 2 * sp.sin(im / 2) ** 2, sp.exp(re) * sp.sin(im)
     raise ValueError(f"no real and imaginary part of {type(e).__name__} of a complex argument")

@@ -20,7 +20,7 @@ _UNSEEN = "{}: these outputs do not see every mode and the base; add one, such a
 
 @dataclass(frozen=True)
 class Controller:
-    """What :func:`cra_sym.export` makes a linear-quadratic regulator and a stationary Kalman filter of.
+    """Specification of a linear-quadratic regulator and a stationary Kalman filter for :func:`cra_sym.export`.
 
     Parameters
     ----------
@@ -29,11 +29,11 @@ class Controller:
     measured : sequence of str
         Outputs of the system that are measured.
     noise : sequence of float
-        Standard deviation of each, from sample to sample, in its unit.
+        Standard deviation of the (discrete white) noise of each, in its unit.
     disturbance : float
-        Standard deviation of what is added to the input, from sample to sample, in its unit.
+        Standard deviation of the (discrete white) noise added to the input, in its unit.
     weights : mapping of str to float
-        Of the squares of outputs, in what the regulator makes least.
+        Weights of the squares of outputs in the cost function of the regulator.
     effort : float
         Weight of the square of the input.
 
@@ -81,7 +81,7 @@ class Controller:
         Raises
         ------
         ValueError
-            If an output is unknown, or the weighted or the measured ones do not see every block.
+            If an output is unknown, or some block is not observable by the weighted or by the measured outputs.
         """
         for argument, wanted in (("measured", self.measured), ("weights", self.weights)):
             for name in wanted:
@@ -118,7 +118,7 @@ def sampled_matrices(blocks: Blocks, time: float) -> tuple[Array, Array]:
 def controller_checks(
     controller: Controller, blocks: Blocks, gains: tuple[Array, Array], names: list[str], loss: float
 ) -> Iterator[Check]:
-    """Yield the input and the corrected outputs after some steps, by matrices."""
+    """Yield the input and the corrected outputs after some steps, computed with the matrices."""
     A, B = sampled_matrices(blocks, controller.time)
     C, D = np.hstack([blocks.on_position, blocks.on_rate]), blocks.through
     regulator, observer = gains
@@ -144,7 +144,7 @@ def _riccati(name: str, A: Array, B: Array, Q: Array, R: Array, S: Array | None)
 
 
 def _settles(name: str, closed: Array) -> None:
-    if not np.abs(np.linalg.eigvals(closed)).max() < 1.0 - 1e-10:  # a base that nobody sees stays at 1
+    if not np.abs(np.linalg.eigvals(closed)).max() < 1.0 - 1e-10:  # the eigenvalue 1 of an unobserved base remains
         raise ValueError(_UNSEEN.format(name))
 
 

@@ -1,4 +1,4 @@
-"""Export: generated functions put into the templates of a language, with reference vectors, and written as a whole."""
+"""Export: generated functions in the templates of a language, with reference vectors, written atomically."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from cra_sym.model.system import MOST_MODES, System
 
 __all__ = ["Export", "export"]
 
-_THINNED = 8  # of the reference vectors, those that Octave, some hundred times slower than the others, has
+_THINNED = 8  # share of the reference vectors used in Octave, which is some hundred times slower than the others
 
 
 @dataclass(frozen=True)
 class Export:
-    """What an export wrote.
+    """The result of an export.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Export:
     files : tuple of str
         Paths inside the directory.
     digest : str
-        SHA-256 of all files but the README, which carries it.
+        SHA-256 of all files but the README, which contains it.
     """
 
     language: str
@@ -74,38 +74,39 @@ def export(
     Parameters
     ----------
     language : {'c', 'fortran', 'python', 'julia', 'octave', 'rust', 'javascript', 'fmu'}
-        All hold the same: of the arm characteristic function, frequencies, modes, sensitivities, responses, state
-        space and first-order stability; C also solves many arms at once. 'fmu' writes NAME.fmu, of a system: model
-        exchange and co-simulation with sources, and a binary for this platform where a C compiler is. Its values are
+        All have the same contents: for the arm the characteristic function, frequencies, modes, sensitivities,
+        responses, state space and first-order stability; C also solves many arms at once. 'fmu' writes NAME.fmu, of a
+        system: model
+        exchange and co-simulation with sources, and a binary for this platform if there is a C compiler. Its values are
         frozen.
     directory : path
-        Folder to make, with its parents.
+        Folder to create, with its parents.
     model : Model, optional
         It is exported instead of the arm, for any values of its parameters: characteristic function, count, natural
         frequencies, modes, sensitivities, responses to prescribed motions, state space. Its coefficients must be
         constant, with at most three wave numbers and without dampers; its ends may be joined and carry lumped
         coordinates. For others give `system`.
     overwrite : bool
-        Whether a folder that is not empty is replaced by one that holds the new files and, of the old ones, those no
-        earlier export made. The folder changes in one step: a failed export leaves it as it was.
+        Whether to replace a folder that is not empty: the new one has the new files and those old ones that no earlier
+        export wrote. The replacement is atomic: a failed export leaves the folder unchanged.
     system : System, optional
         Its first modes, frozen as numbers, are exported instead: exact steps under a held input, outputs, frequency
         response, input shapers. It may have dampers, vary along x, or be an arm; it is a single set of values.
     name : str, optional
-        In front of every public symbol, and the name of package, module, crate and target. Default: of the arm
+        Prefix of every public symbol, and the name of package, module, crate and target. Default: of the arm
         `cra_arm`, in C and Fortran `cra`, so that its types are called `cra_arm`, `cra_mode`, ..; `model`; `system`.
     modes : int
         Modes of the system that are kept.
     real : {'float64', 'float32'}
-        Type of real numbers in the code. Single precision is there for C, Fortran and Rust; the README says how exact
-        it is.
+        Type of real numbers in the code. Single precision is available for C, Fortran and Rust; the README states its
+        accuracy.
     version : {'3.0', '2.0'}
         Of FMI.
     input, outputs
         Of a system, as :func:`cra_sym.state_space` takes them; one input. Default outputs: y, v, w, root_force,
-        root_moment and tip_acceleration, as far as the system has them.
+        root_moment and tip_acceleration, if the system has them.
     controller : Controller, optional
-        Of a system: a regulator and an observer are exported too, with gains that are computed now.
+        Of a system: a regulator and an observer are exported too, with gains computed at export.
 
     Returns
     -------
@@ -201,7 +202,7 @@ def _check_free(target: Path, overwrite: bool) -> None:
 
 
 def _write(target: Path, texts: Mapping[str, str | bytes], keep: bool) -> None:
-    """Write everything or nothing: the folder is complete before it takes its place."""
+    """Write the folder atomically: it is complete before it replaces the old one."""
     with staged_directory(target, keep=keep) as folder:
         for name, text in texts.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)

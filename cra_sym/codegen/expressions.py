@@ -1,4 +1,4 @@
-"""What is exported of the arm: the derivations behind the package's own kernels, with their arguments in rows."""
+"""Exported expressions of the arm: the derivations of the package's own kernels, with their arguments in rows."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _first(symbols: Any, order: dict[sp.Symbol, int]) -> list[int]:
 
 @cache
 def spectrum_functions() -> tuple[Function, ...]:
-    """Return the functions behind the complete frequencies of the arm."""
+    """Return the functions for the complete frequencies of the arm."""
     arm, pairs = (arm_family().structure,), _pairs()
     k = _row("k", one_wave.derivatives(*arm)[1])
     return (
@@ -63,7 +63,7 @@ def spectrum_functions() -> tuple[Function, ...]:
 
 
 def _basis() -> Any:
-    """Return the scaled basis as a polynomial in cos, sin and exp(-lambda), which each caller computes its own way."""
+    """Return the scaled basis as a polynomial in cos, sin and exp(-lambda), which the caller computes."""
     scaled, (lamda, decay) = one_wave.basis(2)
     c, s, e = _CIRCLE
     polynomials = [x.xreplace({sp.cos(lamda): c, sp.sin(lamda): s, decay: e}) for x in scaled]
@@ -75,7 +75,7 @@ _basis.__name__ = "basis"
 
 @cache
 def modal_functions() -> tuple[Function, ...]:
-    """Return the functions behind mode shapes, modal quantities and responses."""
+    """Return the functions for mode shapes, modal quantities and responses."""
     circle = ("circle", one_wave_shapes.tip_far(2)[1][-3:])  # cos, sin and decay at lambda
     arm, pairs, shapes = (arm_family().structure,), _pairs(), one_wave_shapes
     return (
@@ -95,7 +95,7 @@ def modal_functions() -> tuple[Function, ...]:
 
 
 def _mass() -> Any:
-    """Return the modal mass with the tip's inertias by their own names."""
+    """Return the modal mass in terms of the named inertias of the tip."""
     (mass,), arguments = _named(one_wave_rows.generalised_mass(arm_family().structure))
     return mass, arguments
 
@@ -113,7 +113,7 @@ def _rigid_body() -> Any:
 
 
 def _named(derivation: Any) -> Any:
-    """Return a derivation with the tip's inertias by their own names."""
+    """Return a derivation in terms of the named inertias of the tip."""
     expressions, arguments = derivation
     inertias = one_wave_rows.inertias(arm_family().structure)
     names = dict(zip(inertias.values(), map(symbol, ("mu", "iota")), strict=True))
@@ -152,7 +152,7 @@ def gauss_rule(points: int = 16) -> tuple[list[float], list[float]]:
 
 @cache
 def stability_functions() -> tuple[Function, ...]:
-    """Return half the width of a zone of instability to first order, as multiple scales derive it."""
+    """Return the first-order half-width of a zone of instability, from multiple scales."""
     omega, coupling, damping = (sp.IndexedBase(name, real=True) for name in ("omega", "P", "zeta"))
     m, n = (sp.Symbol(name, integer=True, positive=True) for name in "mn")
     made = []

@@ -31,7 +31,7 @@ _UNIT_OF = {
     "root_moment": "N.m", "tip_force": "N", "tip_moment": "N.m", "base_acceleration": "m/s2", "drive_force": "N",
     "strain": "1",
 }  # fmt: skip
-_OUTPUT, _STATE, _DERIVATIVE = 1000, 10000, 20000  # first numbers, as in the template
+_OUTPUT, _STATE, _DERIVATIVE = 1000, 10000, 20000  # first value references, as in the template
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
 _SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib")}
 _MACHINES = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
@@ -116,7 +116,7 @@ def fmu_archive(library: Library, given: str, outputs: Sequence[str], version: s
 
 
 def _token(library: Library, version: str) -> str:
-    """Return an identifier that is another for another system."""
+    """Return an identifier that is unique to the system."""
     import hashlib
     import uuid
 
@@ -125,7 +125,7 @@ def _token(library: Library, version: str) -> str:
 
 
 def _binary(name: str, sources: dict[str, str], major: str) -> dict[str, bytes]:
-    """Return the shared library for this platform by its place, or nothing where there is no compiler."""
+    """Return the shared library for this platform by its path in the archive, or nothing without a compiler."""
     compiler, machine = shutil.which("cc"), _MACHINES.get(platform.machine().lower())
     if compiler is None or sys.platform not in _SYSTEMS or machine is None:
         return {}

@@ -1,4 +1,4 @@
-"""Any system as exported code: its modes frozen as numbers, to be stepped, driven and measured."""
+"""Exported code of any system with its modes frozen as numbers: stepping, inputs and outputs."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ __all__ = ["OUTPUTS", "frozen_library", "frozen_system", "stated", "stepped"]
 
 Array = NDArray[np.float64]
 OUTPUTS = ("y", "v", "w", "root_force", "root_moment", "tip_acceleration")
-"""Outputs that are taken where none are named, as far as the system has them."""
+"""Default outputs, if the system has them."""
 _MOST_OUTPUTS = 64
 _ERRORS = {"float64": 1e-11, "float32": 2e-3}
 """Error of the outputs in the reference vectors, relative to the largest of them, by the type of real numbers."""
 
 
 def stated(model: Model, width: int = 96) -> tuple[str, ...]:
-    """Return what a model is, in lines: Lagrangian, boundary conditions, and the hash of both."""
+    """Return a description of a model, in lines: Lagrangian, boundary conditions, and the hash of both."""
     pieces, found = model.pieces, model.equations
     parts = {
         "Lagrangian density": [pieces["density"]],
@@ -43,9 +43,9 @@ def stated(model: Model, width: int = 96) -> tuple[str, ...]:
         "Equations of the coordinates": found.coordinate_equations,
     }
     stated_parts = {name: [str(e) for e in values if e is not None and e != 0] for name, values in parts.items()}
-    told = [f"{name}: {'; '.join(texts)}" for name, texts in stated_parts.items() if texts]
-    digest = hashlib.sha256("\n".join(told).encode()).hexdigest()
-    lines = [line for text in told for line in textwrap.wrap(text, width, subsequent_indent="  ")]
+    statements = [f"{name}: {'; '.join(texts)}" for name, texts in stated_parts.items() if texts]
+    digest = hashlib.sha256("\n".join(statements).encode()).hexdigest()
+    lines = [line for text in statements for line in textwrap.wrap(text, width, subsequent_indent="  ")]
     return (*(line.replace("*/", "* /") for line in lines), f"SHA-256 of the above: {digest}")
 
 
@@ -96,9 +96,9 @@ def frozen_library(
     if not len(blocks.stiffness):
         raise ValueError(f"input = {given!r}: it moves nothing")
     values = ", ".join(f"{key} = {float(value)!r}" for key, value in system.values.items())
-    told = [f"At {values}; zeta = {float(system.zeta)!r}; {modes} modes."]
-    told += [f"Input u: {given}. Outputs y: {', '.join(names)}."]
-    lines = (*stated(system.model), *(line for text in told for line in textwrap.wrap(text, 96)))
+    statements = [f"At {values}; zeta = {float(system.zeta)!r}; {modes} modes."]
+    statements += [f"Input u: {given}. Outputs y: {', '.join(names)}."]
+    lines = (*stated(system.model), *(line for text in statements for line in textwrap.wrap(text, 96)))
     text = constants(blocks, names, system.natural_frequencies(modes))
     checks = [*_checks(blocks, system.natural_frequencies(modes), real)]
     parts = [source(part) for part in ("sampling", "frozen", "frozen_check", "frozen_example")]
@@ -159,7 +159,7 @@ def _numbers(values: Array) -> str:
 
 
 def _checks(blocks: Blocks, omegas: Array, real: str) -> Iterator[Check]:
-    """Yield what the outputs are by SciPy's matrix exponential, another way than the code's."""
+    """Yield the outputs by SciPy's matrix exponential, independent of the exported code."""
     loss = _ERRORS[real]
     rates = np.sqrt(np.abs(blocks.stiffness)) + np.abs(blocks.damping)
     fastest, slowest = float(rates.max()) or 1.0, float(np.min(rates[rates > 0.0], initial=1.0))
@@ -192,7 +192,7 @@ def _checks(blocks: Blocks, omegas: Array, real: str) -> Iterator[Check]:
 
 
 def stepped(blocks: Blocks, time: float, push: float, steps: int) -> tuple[Array, float]:
-    """Return the outputs after steps of the input that the self-test gives, and the largest size met in the sum."""
+    """Return the outputs after steps of the input of the self-test, and the largest term of the sum."""
     from scipy.linalg import expm
 
     count = len(blocks.stiffness)

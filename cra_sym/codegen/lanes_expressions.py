@@ -1,4 +1,4 @@
-"""Expressions in loops over lanes as C99: kinds follow from the parts, and constants are folded."""
+"""Expressions in loops over lanes as C99, with types inferred from the operands and constants folded."""
 
 from __future__ import annotations
 
@@ -49,20 +49,20 @@ HELPERS = {
 
 @dataclass(frozen=True)
 class Rows:
-    """An array: what its entries are, and its lengths as text in C."""
+    """An array: the type of its entries, and its lengths as C text."""
 
     kind: str
     lengths: tuple[str, ...]
 
     def parameter(self, name: str) -> str:
-        """Return how it is declared as a parameter."""
+        """Return the declaration as a parameter."""
         if len(self.lengths) == 1 or not self.fixed:
             return f"{self.kind} {name}[restrict]"
         return f"{self.kind} (*restrict {name})[{self.lengths[1]}]"
 
     @property
     def fixed(self) -> bool:
-        """Whether the length of a line is known to the compiler."""
+        """Whether the length of a row is known to the compiler."""
         return self.lengths[-1].isupper() or self.lengths[-1].isdigit()
 
 
@@ -71,7 +71,7 @@ Kind = str | Rows
 
 @dataclass(frozen=True)
 class Value:
-    """An expression as text, how strongly it binds, what it is; the number, if it is one."""
+    """An expression: text, precedence, type, and the number if it is a constant."""
 
     text: str
     strength: int
@@ -80,35 +80,35 @@ class Value:
 
 
 class Surroundings(Protocol):
-    """What a function is printed in."""
+    """Interface of the printer of the surrounding module."""
 
     tree: dict[str, ast.FunctionDef]
-    told: Mapping[str, str]
+    summaries: Mapping[str, str]
     most: Mapping[str, str]
     comments: dict[int, str]
     results: dict[str, Kind | tuple[str, ...] | None]
     helpers: set[str]
 
     def call(self, name: str, kinds: Sequence[Kind | None]) -> Kind | tuple[str, ...] | None:
-        """Print a function unless that is done; return what it returns."""
+        """Print a function if it is new; return the type of its result."""
 
     def lengths_of(self, name: str) -> list[tuple[str, int]]:
-        """Return which lengths of its arguments a function asks for."""
+        """Return the lengths of its arguments that a function needs."""
 
     def constant(self, name: str) -> Value:
         """Return a constant of the text."""
 
 
 class LaneExpressions:
-    """Prints the expressions of one function.
+    """Printer of the expressions of one function.
 
     Attributes
     ----------
     printer : Surroundings
     names : dict of str to str or Rows
-        What has a value so far.
+        Names that have a value so far.
     fixed : dict of str to int
-        Variables of loops that are written out.
+        Variables of unrolled loops.
     left_out : set of str
         Arguments that are not printed.
     """
@@ -200,7 +200,7 @@ class LaneExpressions:
         one, two = self.widened(left, right)
         if isinstance(op, ast.Div):
             one, two = self.typed(one, DOUBLE), self.typed(two, DOUBLE)
-        if isinstance(op, ast.LShift):  # of a negative number that is not defined
+        if isinstance(op, ast.LShift):  # undefined for a negative number
             text = f"(int64_t)((uint64_t){_bracketed(one, _UNARY)} << {two.text})"
             return Value(text, _UNARY, INTEGER)
         sign, strength = _BINARY[type(op)]
@@ -239,7 +239,7 @@ class LaneExpressions:
         return found
 
     def called(self, name: str, node: ast.Call) -> Value:
-        """Return a call; a mark stands where results go that are handed back through arguments."""
+        """Return a call, with a placeholder for results returned through arguments."""
         given = [None if root_in(a, self.left_out) else self.value(a) for a in node.args]
         kinds = [None if v is None else v.kind for v in given]
         result = self.printer.call(name, kinds)
@@ -290,7 +290,7 @@ def local(name: str) -> str:
 
 
 def root_in(node: ast.expr, names: set[str]) -> bool:
-    """Return whether an expression is one of some names, or an entry of what they mean."""
+    """Return whether an expression is one of the names, or an entry of one."""
     while isinstance(node, ast.Subscript):
         node = node.value
     return isinstance(node, ast.Name) and node.id in names

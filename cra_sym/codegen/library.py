@@ -31,8 +31,8 @@ PRINTERS: dict[str, type[Printer]] = {
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 _ASIDE = {"_evaluate", "_example"}
 _OF_TESTS = frozenset("line file numbers inputs given expected failed failures found got near good".split())
-"""Variables of the self-test in Octave, which a function of that name would hide."""
-_LONGEST = 24  # a name of Fortran has 63 characters at most, ours are in front of others
+"""Variables of the self-test in Octave, which must not be names of functions."""
+_LONGEST = 24  # a Fortran name has at most 63 characters, of which the prefix is a part
 _C_HELPERS = {
     name: f"static inline int {name}(int one, int other)\n{{\n    return one {sign} other ? one : other;\n}}"
     for name, sign in (("smaller_of", "<"), ("larger_of", ">"))
@@ -56,7 +56,7 @@ def source(name: str) -> str:
 
 
 def check_name(name: object) -> str:
-    """Return a name that may stand in front of what is public.
+    """Return a valid prefix of public names.
 
     Raises
     ------
@@ -86,7 +86,7 @@ class Check:
     relative, absolute : float
         The error allowed.
     refused : bool
-        Whether the function has to say no.
+        Whether the function must report an error.
     """
 
     quantity: int
@@ -106,7 +106,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Library:
-    """What becomes a folder of a language.
+    """A library to be exported in any language.
 
     Attributes
     ----------
@@ -121,12 +121,12 @@ class Library:
         Lines at the head of every file.
     checks : tuple of Check
     readme : str
-        What only this library's README says, in Markdown.
+        Part of the README specific to this library, in Markdown.
     real : {'float64', 'float32'}
     batch : tuple of three str
         Declarations, definitions and self-test, in C, of functions for many sets at once.
     stack : str
-        What the C code takes of it.
+        Stack size that the C code needs.
     """
 
     name: str
@@ -205,7 +205,7 @@ class Library:
 
 
 def _tidy(text: str) -> str:
-    """Return a text without several empty lines at its end or more than two in a row."""
+    """Return a text with at most two successive empty lines and one newline at the end."""
     return re.sub(r"\n{4,}", "\n\n\n", text).rstrip("\n") + "\n"
 
 

@@ -1,7 +1,7 @@
 """Reference vectors of an exported model: values of the package; its characteristic function by exponentials.
 
-Points are drawn in the range of parameters; what the package refuses there, the exported code has to refuse. Modes are
-compared where all frequencies are apart: others have no shapes of their own.
+Points are drawn in the range of parameters; the exported code must refuse what the package refuses. Modes are compared
+where all frequencies are distinct, since the shapes are not unique otherwise.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ ERRORS = {"float64": 1e-12, "float32": 2e-3}
 """Error allowed, relative to the largest value of a kind, by the type of real numbers."""
 _POINTS, _MODES = 8, 6
 _APART = 1e-3
-_BELOW = 340  # frequencies, of which more than all lie below the last point
+_BELOW = 340  # number of frequencies; more of them lie below the last point
 _TURNS = (0.3, 4.0, 40.0, 1000.0)
 """Wave number times length of the points of the characteristic function."""
 
 
 def sample(written: ModelText) -> list[float]:
-    """Return parameters of a structure that stands."""
+    """Return parameters of a stable structure."""
     for values in _drawn(written):
         system = _system(written, values)
         try:
@@ -66,7 +66,7 @@ def _system(written: ModelText, values: Sequence[float]) -> System:
 
 
 def model_checks(written: ModelText, values: Sequence[float]) -> Iterator[Check]:
-    """Yield the reference vectors of a model, for parameters around some that are good."""
+    """Yield the reference vectors of a model, for parameters around valid ones."""
     loss = ERRORS[written.real]
     for point in _around(written, values):
         system = _system(written, point)
@@ -110,7 +110,7 @@ def _counts(point: Sequence[float], omega: Array, real: str) -> Iterator[Check]:
 def _modal(written: ModelText, system: System, point: Sequence[float], omega: Array, loss: float) -> Iterator[Check]:
     if (np.diff(omega[:5]) <= _APART * omega[1:5]).any():
         return
-    loss *= 10.0 if written.form.structure.n == 3 else 1.0  # the package's own is 1e-12 there
+    loss *= 10.0 if written.form.structure.n == 3 else 1.0  # the package's own error is 1e-12 there
     modes, order = system.modes(4), written.form.order
     quantities = [[modes.displacement(end, at) for at in order] for end in (0, 1)]
     quantities += [[modes.force(end, at) for at in order] for end in (0, 1)]
@@ -196,7 +196,7 @@ def _driven(written: ModelText, system: System, point: Sequence[float], loss: fl
 
 
 def _characteristic(written: ModelText, values: Sequence[float], turns: float, loss: float) -> Check:
-    """Return the function and its derivative from matrix exponentials with as many digits as they lose."""
+    """Return the function and its derivative from matrix exponentials, with extra digits for those lost."""
     import mpmath
 
     found = _Exact(written, values)
@@ -208,13 +208,13 @@ def _characteristic(written: ModelText, values: Sequence[float], turns: float, l
 
 
 def _of_ends(form: WavesForm) -> list[sp.Expr]:
-    """Return the entries of stiffness, mass and ties of what moves, then stiffness and stretch of links."""
+    """Return the entries of stiffness, mass and ties, then stiffness and stretch of links."""
     ends = form.conditions
     return [*ends.stiffness, *ends.mass, *ends.ties, *ends.links]
 
 
 class _Exact:
-    """The determinant of the end conditions in any number of digits."""
+    """The determinant of the end conditions in arbitrary precision."""
 
     def __init__(self, written: ModelText, values: Sequence[float]) -> None:
         self._form, self._structure = written.form, written.form.structure
@@ -242,7 +242,7 @@ class _Exact:
         return np.asarray(np.sqrt(np.linalg.eigvals((b + z * b_slope) @ (a + z * a_slope)).astype(complex)))
 
     def frequency(self, turns: float) -> float:
-        """Return the angular frequency from which on the shortest wave has so many radians along the length."""
+        """Return the angular frequency at which the shortest wave has a given number of radians along the length."""
         if not turns:
             return 0.0
         low, high = 1e-9 * self._first, 1e12 * self._first
@@ -252,11 +252,11 @@ class _Exact:
         return float(f"{high:.6g}")
 
     def digits(self, omega: float) -> int:
-        """Return how many decimal digits the determinant loses, and 90."""
+        """Return the number of decimal digits that the determinant loses, plus 90."""
         return 90 + int(4 * self._structure.n * float(np.real(self._waves(omega)).max()) / math.log(10))
 
     def scaled(self, omega: float) -> tuple[Any, Any]:
-        """Return the determinant and its derivative by omega, over what its waves grow by."""
+        """Return the determinant and its derivative by omega, over the growth of its waves."""
         import mpmath
 
         (a, b, a_slope, b_slope), _ = self._parts()

@@ -1,4 +1,4 @@
-"""Loads of prescribed motions as factors of what moves."""
+"""Loads of prescribed motions as factors of displacements and coordinates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A model as a text in the restricted form: what its Lagrangian derives to, around one source for all models."""
+"""A model as a text in the restricted form: its derived functions in a source common to all models."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cra_sym.codegen.expressions import response_functions
 from cra_sym.codegen.library import source
 from cra_sym.codegen.model_loads import load_factors
 from cra_sym.codegen.printers import FormPrinter
-from cra_sym.codegen.program import christen, function
+from cra_sym.codegen.program import function, new_name
 from cra_sym.codegen.unused import marked, top_names, without_unused
 from cra_sym.codegen.waves_text import WavesText
 from cra_sym.model import Model
@@ -60,7 +60,7 @@ _WRITTEN = {
     "outside_entries",
 }
 _PLACES = (-1.0, -0.56, 0.06, 0.62, 1.0 - 2e-4, 1.0)
-"""Places where the size of a motion is measured, in half lengths from mid-span."""
+"""Stations at which the size of a motion is measured, in half lengths from mid-span."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class ModelText:
         """The field of every parameter."""
         taken = top_names(*(source(name) for name in _SOURCES), self._constants(), self._formulas) | _WRITTEN
         taken |= {f"by_{symbol.name}" for symbol in self.model.symbols} | {f"load_of_{name}" for name in self.drives}
-        return {symbol: christen(symbol.name, taken) for symbol in self.model.symbols}
+        return {symbol: new_name(symbol.name, taken) for symbol in self.model.symbols}
 
     @cached_property
     def drives(self) -> list[str]:
@@ -108,12 +108,12 @@ class ModelText:
 
     @cached_property
     def held(self) -> list[int]:
-        """What moves (displacements of the left end, of the right one, coordinates) and follows others or stands."""
+        """Dependent or held degrees of freedom (displacements of the left end, of the right end, coordinates)."""
         return [place for place in range(self.form.structure.moving) if place not in self.form.conditions.free]
 
     @cached_property
     def parts(self) -> set[str]:
-        """Marks of the lines of the text that this model needs."""
+        """Labels of the optional lines of the text that this model needs."""
         size, mass = self.form.structure.moving, self.form.conditions.mass
         coupled = any(mass[i, j] != 0 for i in range(size) for j in range(size) if i != j)
         found = {
@@ -203,7 +203,7 @@ class ModelText:
         return FormPrinter.text_of(made, name, checked=False)  # type: ignore[arg-type]
 
     def _call(self, name: str, entries: Sequence[sp.Expr], row: str, words: str) -> tuple[str, list[str]]:
-        """Return a function of the parameters, and the statements that fill a row with what it returns."""
+        """Return a function of the parameters, and the statements that fill a row with its results."""
         made = function(name, words, list(entries), self._given(_free(entries)))
         given = [f"parameters.{self.names[argument.symbols[0]]}" for argument in made.arguments]
         call = f"_{name}({', '.join([*given, row])})"
@@ -247,7 +247,7 @@ class ModelText:
         return {target: entry for target, entry in found.items() if entry != 0}
 
     def _prepare(self) -> str:
-        """Return the functions that check the parameters and compute what all else starts from."""
+        """Return the functions that check the parameters and prepare the problem."""
         left, _ = self.model.equations.domain
         places = self._waves.places
         texts, lines = [], ["_check(parameters)"]
@@ -309,7 +309,7 @@ class ModelText:
             yield from (re.sub(r"\b(share|pull)\b", rf"\1_{place}", line) for line in found)
 
     def _condition(self, place: int) -> Iterator[str]:
-        """Yield the factors of a condition: of displacements, of -z times these and of forces, in turned signs."""
+        """Yield the factors of a condition: of displacements, of -z times these and of forces, with reflected signs."""
         structure = self.form.structure
         size, link, reach = structure.moving, place - structure.moving, structure.reach(place)
 
@@ -359,7 +359,7 @@ class ModelText:
         return "\n\n".join([*texts, "\n    ".join(["def _check(parameters: Parameters) -> None:", *lines])]) + "\n"
 
     def _divisors(self) -> list[sp.Expr]:
-        """Return what coefficients are divided by."""
+        """Return the divisors in the coefficients."""
         found: dict[sp.Expr, None] = {}
         left, _ = self.model.equations.domain
         for entry in (*self._entries.values(), *self._ends.values(), self._length, sp.sympify(left, strict=True)):
@@ -370,7 +370,7 @@ class ModelText:
         return list(found)
 
     def _rates(self) -> str:
-        """Return the functions of the parameters by number and of how the coefficients change with each."""
+        """Return the functions that give a parameter by number, and the rates of the coefficients by it."""
         places = self._waves.places
         names = list(self.names.values())
         value = ["def _parameter(parameters: Parameters, number: int) -> float:",
@@ -391,7 +391,7 @@ class ModelText:
             for target, entry in self._ends.items():
                 name, at = target[:-1].split("[")
                 if name not in offsets:
-                    continue  # what coordinates carry has no energy of its own
+                    continue  # motions carried by coordinates have no energy of their own
                 entries[f"end_rate[{offsets[name] + int(at)}]"] = entry.diff(symbol)
             entries = {target: entry for target, entry in entries.items() if entry != 0}
             if not entries:
@@ -414,7 +414,7 @@ class ModelText:
     # Drives -----------------------------------------------------------------------------------------------------------
 
     def _loads(self) -> str:
-        """Return the function of a load, and the one that puts in what it does to a mode."""
+        """Return the function of a load, and the one of its modal force."""
         texts: list[str] = []
         lines: list[str] = []
         for number, name in enumerate(self.drives):

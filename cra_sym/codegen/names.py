@@ -1,4 +1,4 @@
-"""Words that are taken in one of the languages, so that one name serves in all of them."""
+"""Reserved words of the languages, so that a name is valid in all of them."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ all any isreal inverse error real64 floor_real DomainError RangeError Arithmetic
 """
 
 KEYWORDS = frozenset(_KEYWORDS.split()) | {"result", "status"}
-"""What no variable of a text in the restricted form may be called."""
+"""Names that no variable of a text in the restricted form may have."""
 
 RESERVED = frozenset(f"{_KEYWORDS} {_ATTRIBUTES} {_LIBRARY} True False None NaN Inf Infinity Math Self".split())
 """Words no variable may be called."""
 
 FORTRAN = frozenset(_LIBRARY.split()) - {"e"}
-"""The same where upper and lower case do not differ: Fortran has no keywords, but functions that must not be hidden."""
+"""The same without regard to case: Fortran has no keywords, but functions that must not be hidden."""

@@ -11,7 +11,7 @@ __all__ = ["operations"]
 
 
 def operations(form: Form, name: str, most: Mapping[str, int]) -> int:
-    """Return how many floating-point operations a call makes at most.
+    """Return the largest number of floating-point operations of a call.
 
     An operation is a sum, a difference, a product, a quotient, a comparison or a function of the language.
 
@@ -21,7 +21,7 @@ def operations(form: Form, name: str, most: Mapping[str, int]) -> int:
     name : str
         Of the function.
     most : mapping of str to int
-        The most that the end of a loop may be, by its text, where it is not a constant.
+        Largest value of the end of a loop, by its text, where it is not a constant.
 
     Raises
     ------

@@ -17,7 +17,7 @@ _FUNCTIONS = (
 
 
 class CPrinter(Printer):
-    """C99: rows are pointers, what may fail returns a status, and a public function refuses NULL."""
+    """C99: rows are pointers, functions that may fail return a status, and public functions refuse NULL."""
 
     name, title = "c", "C99"
     functions: ClassVar = {n: n for n in _FUNCTIONS} | {
@@ -47,23 +47,23 @@ class CPrinter(Printer):
         return "\n\n".join(filter(None, [status, self.integers(), self.records(), *declarations]))
 
     def integers(self) -> str:
-        """Return the constants of the caller: whole numbers, which lengths need, and numbers that no function uses."""
+        """Return the constants for the caller: integers, which lengths need, and numbers that no function uses."""
         found = []
-        for c in filter(self.told, self.form.constants.values()):
+        for c in filter(self.is_in_header, self.form.constants.values()):
             name = self.variable(c.name)
             if not _counts(c):
                 found.append(self.documented_constant(c, f"#define {name} {self.literal(c)[0]}"))
-            elif c.name.startswith("MOST_"):  # what arrays have room for: may be set where memory is short
+            elif c.name.startswith("MOST_"):  # sizes of arrays, which may be set where memory is limited
                 found += [f"#ifndef {name}", self.documented_constant(c, f"#define {name} {c.values[0]}"), "#endif"]
             else:
                 found.append(self.documented_constant(c, f"enum {{ {name} = {c.values[0]} }};"))
         return "\n".join(found)
 
     def constants(self) -> str:
-        return "\n".join(self.constant(c) for c in self.form.constants.values() if not self.told(c))
+        return "\n".join(self.constant(c) for c in self.form.constants.values() if not self.is_in_header(c))
 
-    def told(self, constant: Constant) -> bool:
-        """Return whether a constant stands in the header."""
+    def is_in_header(self, constant: Constant) -> bool:
+        """Return whether a constant is in the header."""
         functions = self.form.functions.values()
         used = any(isinstance(n, ast.Name) and n.id == constant.name for f in functions for n in ast.walk(f.node))
         return _counts(constant) or (constant.type.length is None and not used)
@@ -82,7 +82,7 @@ class CPrinter(Printer):
 
     @property
     def upper(self) -> str:
-        """The prefix of what is written in capitals."""
+        """The prefix in capitals."""
         return self.prefix.upper()
 
     def error(self, name: str) -> str:

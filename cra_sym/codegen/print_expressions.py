@@ -1,4 +1,4 @@
-"""Expressions of the restricted form as text: the tree is kept, brackets and all, so that all languages round alike."""
+"""Expressions of the restricted form as text, with brackets that keep the tree, so that all languages round alike."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cra_sym.kernels.form import INT, Constant, Form, Function, Type
 
 __all__ = ["ALWAYS", "OPERATORS", "ExpressionPrinter"]
 
-ALWAYS = 10  # the precedence of what never needs brackets
+ALWAYS = 10  # precedence of expressions that never need brackets
 _ADD, _MULTIPLY, _UNARY = 6, 7, 8
 _COMPARE = 4
 _LARGEST_SINGLE = 3e38
@@ -28,7 +28,7 @@ _COMPARISONS: dict[type, str] = {
 
 
 class ExpressionPrinter:
-    """Prints expressions of the function that is at hand.
+    """Printer of the expressions of the current function.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class ExpressionPrinter:
     both, either, negation = "&&", "||", "!"
     origin = 0
     functions: ClassVar[Mapping[str, str]] = {}
-    choice_least = 1  # what binds less is bracketed inside a choice
+    choice_least = 1  # operands of lower precedence are bracketed inside a conditional expression
 
     def choice(self, condition: str, value: str, otherwise: str) -> tuple[str, int]:
         """Return a conditional expression and its precedence; the parts are bracketed as operands of comparisons."""
@@ -52,7 +52,7 @@ class ExpressionPrinter:
 
     @staticmethod
     def callee(call: ast.Call) -> str:
-        """Return the name of what is called."""
+        """Return the name of the function called."""
         assert isinstance(call.func, ast.Name)
         return call.func.id
 
@@ -61,12 +61,12 @@ class ExpressionPrinter:
         return self.current.types[id(node)]
 
     def expression(self, node: ast.expr, least: int = 0) -> str:
-        """Return an expression, in brackets if it binds less than ``least``."""
+        """Return an expression, in brackets if its precedence is below ``least``."""
         text, strength = self.printed(node)
         return f"({text})" if strength < least else text
 
     def printed(self, node: ast.expr) -> tuple[str, int]:
-        """Return an expression and how strongly it binds."""
+        """Return an expression and its precedence."""
         match node:
             case ast.Constant(value=bool() as value):
                 return (self.true if value else self.false), ALWAYS
@@ -106,7 +106,7 @@ class ExpressionPrinter:
         return f"{self.expression(left, strength)} {sign} {self.expression(right, strength + 1)}", strength
 
     def divided(self, left: ast.expr, right: ast.expr, rest: bool) -> tuple[str, int]:
-        """Return the quotient or the rest of integers that are not negative."""
+        """Return the quotient or the remainder of integers that are not negative."""
         sign = "%" if rest else "/"
         return f"{self.expression(left, _MULTIPLY)} {sign} {self.expression(right, _UNARY)}", _MULTIPLY
 
@@ -157,7 +157,7 @@ class ExpressionPrinter:
         return f"{row}[{index}]"
 
     def index(self, node: ast.expr) -> str:
-        """Return an index, counted as the language does."""
+        """Return an index, with the base of the language."""
         if not self.origin:
             return self.expression(node)
         match node:
@@ -168,7 +168,7 @@ class ExpressionPrinter:
         return f"{self.expression(node, _ADD)} + 1"
 
     def last(self, stop: ast.expr, step: int) -> str:
-        """Return the last number of a loop, for languages that name it instead of the one after it."""
+        """Return the last number of a loop, for languages with inclusive loop bounds."""
         match stop:
             case ast.Constant(value=int() as value):
                 return str(value - step)
@@ -183,7 +183,7 @@ class ExpressionPrinter:
         return self.digits(value)
 
     def digits(self, value: float) -> str:
-        """Return the fewest digits that tell a number of this type from all others."""
+        """Return the shortest digits that identify a number of this type."""
         return str(np.float32(value)) if self.real == "float32" else repr(float(value))
 
     def literal(self, constant: Constant) -> list[str]:
@@ -197,7 +197,7 @@ class ExpressionPrinter:
         raise NotImplementedError
 
     def to_int(self, node: ast.expr) -> tuple[str, int]:
-        """Return a double cut toward zero."""
+        """Return a double truncated toward zero."""
         raise NotImplementedError
 
     def function_name(self, function: Function) -> str:

@@ -1,4 +1,4 @@
-"""The restricted form as Fortran 2008: rows count from 0, every procedure is pure, what may fail has a status."""
+"""The restricted form as Fortran 2008: rows count from 0, procedures are pure, those that may fail have a status."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class FortranPrinter(Printer):
         return f"(0:{last})"
 
     def is_subroutine(self, function: Function) -> bool:
-        """Return whether it is called in a statement of its own."""
+        """Return whether the function is a subroutine."""
         return function.result is None or self.alone(function)
 
     def head(self, function: Function) -> Lines:
@@ -155,7 +155,7 @@ class FortranPrinter(Printer):
         if not self.is_subroutine(callee):
             yield from self.plain(f"{target} = {self.function_name(callee)}({', '.join(given)})", indent)
             return
-        if target:  # an argument that is an expression is not another name of the result
+        if target:  # an argument that is an expression cannot be an alias of the result
             given = [f"({text})" if text == target else text for text in given] + [target]
         given += ["status"] if callee.name in self.failing else []
         yield from self.plain(f"call {self.function_name(callee)}({', '.join(given)})", indent)

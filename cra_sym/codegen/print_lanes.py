@@ -1,9 +1,9 @@
-"""The text of loops over lanes as C99: what machine code is made of is printed as the exported code for many sets.
+"""The text of loops over lanes as C99: the source of the compiled kernels, printed as exported code for batches.
 
-The text is what :func:`cra_sym.kernels.writer.call` takes: functions of numbers and arrays without annotations. Types
+The text has the form of :func:`cra_sym.kernels.writer.call`: functions of numbers and arrays without annotations. Types
 follow from the arguments of the first call: a value is a double, a 64-bit integer, a condition or an array of these.
-Loops of known length are written out, since compilers make SIMD instructions of innermost loops alone. Arrays whose
-length is not known have room for the most there may be: nothing is allocated.
+Loops of known length are unrolled, since compilers vectorise innermost loops only. Arrays of unknown length have the
+largest possible size, so that nothing is allocated.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ __all__ = ["LanesPrinter", "Rows"]
 
 
 class LanesPrinter:
-    """Prints an entry of a text with all that it calls.
+    """Printer of an entry of a text with all functions that it calls.
 
     Parameters
     ----------
     text : str
         Of a module.
     values : mapping
-        What the names of its constants mean.
+        Values of its constants, by name.
     known : mapping of str to str
-        Constants that have a name in C already.
+        Constants that already have a name in C.
     most : mapping of str to str
-        The most that a length may be, by the name of the variable that holds it.
-    told : mapping of str to str
-        What functions do that do not say it themselves.
+        Largest value of a length, by the name of its variable.
+    summaries : mapping of str to str
+        Summaries of functions without a docstring.
     """
 
     def __init__(
@@ -54,10 +54,10 @@ class LanesPrinter:
         values: Mapping[str, Any],
         known: Mapping[str, str],
         most: Mapping[str, str],
-        told: Mapping[str, str],
+        summaries: Mapping[str, str],
     ) -> None:
         self.tree = {node.name: node for node in ast.parse(text).body if isinstance(node, ast.FunctionDef)}
-        self.values, self.known, self.most, self.told = values, known, most, told
+        self.values, self.known, self.most, self.summaries = values, known, most, summaries
         self.comments, _ = comments_of(text)
         self.results: dict[str, Kind | tuple[str, ...] | None] = {}
         self.constants: dict[str, str] = {}
@@ -71,7 +71,7 @@ class LanesPrinter:
         return "\n\n".join(["\n".join(self.constants.values()), *helpers, *self.made])
 
     def call(self, name: str, kinds: Sequence[Kind | None]) -> Kind | tuple[str, ...] | None:
-        """Print a function unless that is done; return what it returns."""
+        """Print a function if it is new; return the type of its result."""
         if name not in self.results:
             writer = _Body(self, self.tree[name], kinds)
             text = writer.text()
@@ -80,7 +80,7 @@ class LanesPrinter:
         return self.results[name]
 
     def lengths_of(self, name: str) -> list[tuple[str, int]]:
-        """Return which lengths of its arguments a function asks for: it gets them as arguments of their own."""
+        """Return the lengths of its arguments that a function needs; they are passed as further arguments."""
         found = {
             (node.value.value.id, int(str(node.slice.value)))
             for node in ast.walk(self.tree[name])
@@ -121,10 +121,10 @@ class _Body(LaneExpressions):
                 kind = Rows(kind.kind, tuple(lengths[: len(kind.lengths)]))
             self.names[name] = self.parameters[name] = kind
         self.fixed: dict[str, int] = {}
-        self.pending: set[str] = set()  # names that get their value in a branch and are read after it
-        self.rest: Sequence[ast.stmt] = ()  # of the block at hand
+        self.pending: set[str] = set()  # names assigned in a branch and read after it
+        self.rest: Sequence[ast.stmt] = ()  # names of the current block
         self.result: Kind | tuple[str, ...] | None = None
-        self.temporary: dict[str, int] = {}  # how many rows were made for the results of a function
+        self.temporary: dict[str, int] = {}  # number of rows created for the results of each function
 
     def text(self) -> str:
         """Return the whole function."""
@@ -141,11 +141,11 @@ class _Body(LaneExpressions):
             head += [f"{k} *restrict found_{i}" for i, k in enumerate(self.result)]
         elif self.result is not None:
             kind = self.result
-        doc = ast.get_docstring(self.node) or self.printer.told.get(name, "")
-        told = [f"// {line}".rstrip() for line in doc.splitlines()]
+        doc = ast.get_docstring(self.node) or self.printer.summaries.get(name, "")
+        comments = [f"// {line}".rstrip() for line in doc.splitlines()]
         whole = ", ".join(part.replace(" ", "\0") for part in head)  # no parameter is broken
         signature = folded(f"static inline {kind} {named(name)}({whole})", 110, "")
-        return "\n".join([*told, *signature, "{", *body, "}"])
+        return "\n".join([*comments, *signature, "{", *body, "}"])
 
     # Statements ---------------------------------------------------------------------------------------------------
 
@@ -249,7 +249,7 @@ class _Body(LaneExpressions):
                 yield from self.put(target, self.value(value), indent)
 
     def unpacked(self, targets: Sequence[ast.expr], callee: str, call: ast.Call, indent: str) -> Iterator[str]:
-        """Yield a call with several results, and where they go."""
+        """Yield a call with several results, and the assignments of these."""
         result = self.called(callee, call)
         if isinstance(result.kind, Rows):
             count = self.temporary[callee] = self.temporary.get(callee, 0) + 1
@@ -316,7 +316,7 @@ class _Body(LaneExpressions):
 
 
 def _check_order(targets: Sequence[ast.expr], parts: Sequence[ast.expr]) -> None:
-    """Refuse an assignment of several values in which a later one reads what an earlier one has changed."""
+    """Raise an error for a multiple assignment in which a later value depends on an earlier target."""
     for i, target in enumerate(targets):
         for later in parts[i + 1 :]:
             if any(ast.unparse(node) == ast.unparse(target) for node in ast.walk(later) if isinstance(node, ast.expr)):
@@ -324,13 +324,13 @@ def _check_order(targets: Sequence[ast.expr], parts: Sequence[ast.expr]) -> None
 
 
 def _is_plain(body: Sequence[ast.stmt]) -> bool:
-    """Return whether statements hold no loop and nothing that leaves them."""
+    """Return whether statements have no loop and no exit."""
     others = ast.For, ast.While, ast.Continue, ast.Return
     return not any(isinstance(node, others) for statement in body for node in ast.walk(statement))
 
 
 def _flowing(statement: ast.stmt, later: Sequence[ast.stmt]) -> set[str]:
-    """Return the names to which a compound statement gives a value that later ones read."""
+    """Return the names assigned in a compound statement and read by later ones."""
     if not isinstance(statement, (ast.If, ast.For, ast.While)):
         return set()
     stored = {n.id for n in ast.walk(statement) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
@@ -338,7 +338,7 @@ def _flowing(statement: ast.stmt, later: Sequence[ast.stmt]) -> set[str]:
 
 
 def _uses(node: ast.AST, name: str) -> Iterator[str]:
-    """Yield how a statement uses a name, in the order of evaluation."""
+    """Yield the uses of a name in a statement, in the order of evaluation."""
     match node:
         case ast.Assign(targets=targets, value=value):
             parts: list[ast.AST] = [value, *targets]

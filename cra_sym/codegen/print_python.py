@@ -34,7 +34,7 @@ class PythonPrinter(BracketingPrinter):
         yield from ()
 
     def errors(self) -> str:
-        """Return the classes of what is raised."""
+        """Return the classes of the errors raised."""
         base = {True: "ValueError", False: "ArithmeticError"}
         words = [f'class {e}({base[e.startswith("Invalid")]}):\n    """{snake(e).replace("_", " ").capitalize()}."""'
                  for e in self.form.errors]  # fmt: skip

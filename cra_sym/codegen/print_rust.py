@@ -1,4 +1,4 @@
-"""The restricted form as Rust, without allocation: rows are slices, what may fail returns a Result."""
+"""The restricted form as Rust, without allocation: rows are slices, functions that may fail return a Result."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _last(body: Sequence[ast.stmt]) -> set[int]:
 
 
 def _most_writes(body: Sequence[ast.stmt], name: str) -> int:
-    """Return how often a variable is written to on the way through a body that does it most."""
+    """Return the largest number of assignments to a variable on any path through a body."""
     total = 0
     for statement in body:
         match statement:
@@ -71,7 +71,7 @@ class RustPrinter(Printer):
         return "///"
 
     def errors(self) -> str:
-        """Return the type of what goes wrong."""
+        """Return the error type."""
         names = "\n".join(f"    {name}," for name in self.form.errors)
         return f"/// What goes wrong.\n#[derive(Clone, Copy, Debug, PartialEq, Eq)]\npub enum Error {{\n{names}\n}}"
 

@@ -1,4 +1,4 @@
-"""The restricted form as JavaScript and Octave, and what languages without types have in common."""
+"""The restricted form as JavaScript and Octave, with a base class for languages without types."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ SAME = (
 
 
 _STATEMENT = re.compile(r"return |[^\s\"'].*? [-+*/]?= ")
-"""What stands in front of a value."""
+"""Tokens after which a value may follow."""
 
 
 class ScriptPrinter(Printer):
-    """What languages without types have in common: results are returned, and no variable is declared."""
+    """Base class for languages without types: results are returned, and no variable is declared."""
 
     def results(self, function: Function) -> list[str]:
-        """Return the parameters that a function hands back: those it makes."""
+        """Return the parameters that a function creates and returns."""
         return [name for name, kind in function.parameters.items() if kind.access == "out"]
 
     def given(self, function: Function) -> list[str]:
@@ -50,7 +50,7 @@ class ScriptPrinter(Printer):
         raise NotImplementedError
 
     def start(self, function: Function) -> Lines:
-        """Yield what makes the results."""
+        """Yield the statements that create the results."""
         for name in self.results(function):
             text = self.declared(name, function.parameters[name], self.made(function.parameters[name]), True)
             yield from self.plain(text, self.indent)
@@ -76,12 +76,12 @@ class ScriptPrinter(Printer):
         yield from self.plain(f"{start}{self.function_name(callee)}({given})", indent)
 
     def targets(self, names: Sequence[str]) -> str:
-        """Return what a call assigns to."""
+        """Return the targets of the assignment of a call."""
         return self.together(names)
 
 
 class BracketingPrinter(ScriptPrinter):
-    """Where a line ends the statement: one that is too long goes on within brackets."""
+    """Base class for languages in which a line ends the statement: long ones are continued within brackets."""
 
     def wrapped(self, text: str, indent: str) -> Lines:
         if len(indent + text) <= self.width:
@@ -138,7 +138,7 @@ class JavaScriptPrinter(ScriptPrinter):
         return names[0] if len(names) == 1 else f"[{', '.join(names)}]"
 
     def declared(self, name: str, kind: Type, value: str | None, fixed: bool) -> str:
-        whole = not kind.scalar  # a call may hand back another
+        whole = not kind.scalar  # a call may return another object
         return f"let {name}" if value is None else f"{'const' if fixed and not whole else 'let'} {name} = {value}"
 
     def loop(self, name: str, start: str, stop: ast.expr, step: int) -> str:
@@ -274,7 +274,7 @@ end
         return f"floor({super().divided(left, right, rest)[0]})", 10
 
     def raised(self, error: str, message: str) -> str:
-        plain = message.replace("'", "''")  # a format, which reads what follows % and \\
+        plain = message.replace("'", "''")  # a format string, in which % and \\ are special
         return f"error('{self.prefix}:{snake(error)}', '%s', '{plain}')"
 
     def to_float(self, node: ast.expr) -> tuple[str, int]:

@@ -1,4 +1,4 @@
-"""SymPy's printers for C, Fortran and the restricted form: every number a double, every fraction one exact division."""
+"""SymPy printers for C, Fortran and the restricted form, with all numbers as doubles and fractions as one division."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _EXACT = 2**53  # integers up to this are doubles
 
 
 class ScalarPrinter(CodePrinter):  # type: ignore[misc]
-    """What the printers share: arithmetic of doubles, written so that no language reads it in another way.
+    """Base class of the printers: arithmetic of doubles in a form that is the same in all languages.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class ScalarPrinter(CodePrinter):  # type: ignore[misc]
         super().__init__()
         self.places = places
 
-    guarded = False  # whether a quotient may be one that a later choice discards
+    guarded = False  # whether a quotient may be discarded by a later conditional
 
     def number(self, value: float) -> str:
         """Return a literal that reads back as exactly this double."""
@@ -55,7 +55,7 @@ class ScalarPrinter(CodePrinter):  # type: ignore[misc]
         Raises
         ------
         ValueError
-            If it holds something the language has no word for.
+            If it contains something without an equivalent in the language.
         """
         return str(self._print(expression))
 

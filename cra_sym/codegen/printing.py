@@ -1,8 +1,7 @@
-"""What the printers of the restricted form share: precedence, declarations, comments, blocks.
+"""Common parts of the printers of the restricted form: precedence, declarations, comments, blocks.
 
-A language is a subclass that says how it writes a declaration, a loop, a call and the like; what it writes comes from
-the checked text of :mod:`cra_sym.kernels.form`. The tree of every expression is kept, brackets and all, so that every
-language rounds alike.
+A language is a subclass that prints declarations, loops, calls and so on of the checked text of
+:mod:`cra_sym.kernels.form`. Brackets keep the tree of every expression, so that all languages round alike.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ def snake(name: str) -> str:
 
 
 def folded(text: str, width: int, indent: str) -> list[str]:
-    """Return a statement on as many lines as it needs, broken at blanks that are in no text."""
+    """Return a statement wrapped at blanks outside of strings."""
     whole = re.sub(r"'[^']*'|\"[^\"]*\"", lambda found: found[0].replace(" ", "\0"), text)
     lines = textwrap.wrap(
         whole, width, initial_indent=indent, subsequent_indent=f"{indent}    ", break_long_words=False,
@@ -37,13 +36,13 @@ def folded(text: str, width: int, indent: str) -> list[str]:
 
 
 class Printer(ExpressionPrinter):
-    """Prints a checked text in one language.
+    """Printer of a checked text in one language.
 
     Parameters
     ----------
     form : Form
     prefix : str
-        In front of all that is public, where the language has no name spaces.
+        Prefix of public names, where the language has no namespaces.
     real : {'float64', 'float32'}
     """
 
@@ -59,7 +58,7 @@ class Printer(ExpressionPrinter):
         self.failing = form.failing(self.also_failing())
 
     def also_failing(self) -> frozenset[str]:
-        """Return functions that fail in this language though they raise nothing."""
+        """Return functions that may fail in this language although they raise nothing."""
         return frozenset()
 
     # The whole ----------------------------------------------------------------------------------------------------
@@ -93,7 +92,7 @@ class Printer(ExpressionPrinter):
         yield from self.tail(function)
 
     def checks(self, function: Function) -> int:
-        """Return how many statements at the beginning only refuse bad input."""
+        """Return the number of statements at the beginning that only check the input."""
         for number, statement in enumerate(function.body):
             match statement:
                 case ast.If(body=[ast.Raise()], orelse=[]):
@@ -104,11 +103,11 @@ class Printer(ExpressionPrinter):
         return len(function.body)
 
     def start(self, function: Function) -> Lines:
-        """Yield what makes the results, where the caller does not."""
+        """Yield the statements that create the results, where the caller does not."""
         yield from ()
 
     def documented(self, function: Function) -> Lines:
-        """Yield what a function does, as comments in front of it."""
+        """Yield the docstring of a function as comments before it."""
         for line in textwrap.dedent(function.doc).strip().splitlines():
             yield f"{self.outer}{self.doc_comment} {line}".rstrip()
 
@@ -120,7 +119,7 @@ class Printer(ExpressionPrinter):
         """What starts a line of documentation."""
         return self.comment
 
-    # What a language says -----------------------------------------------------------------------------------------
+    # Overridden by languages -----------------------------------------------------------------------------------------
 
     def constant(self, constant: Constant) -> str:
         """Return a constant."""
@@ -146,10 +145,10 @@ class Printer(ExpressionPrinter):
         """Return a new row of zeros or a new record."""
         raise NotImplementedError
 
-    infinity = ""  # what a field may begin with
+    infinity = ""  # initial values of fields
 
     def begun(self, record: Record, name: str) -> str:
-        """Return what a field of a new record holds."""
+        """Return the initial value of a field of a record."""
         return self.infinity if name in record.infinite else self.made(record.fields[name])
 
     def loop(self, name: str, start: str, stop: ast.expr, step: int) -> str:
@@ -157,15 +156,15 @@ class Printer(ExpressionPrinter):
         raise NotImplementedError
 
     def call_statement(self, target: str, call: ast.Call, callee: Function, indent: str) -> Lines:
-        """Yield a call that stands alone, with what becomes of its result and of a failure."""
+        """Yield a call as a statement, with the use of its result and the handling of a failure."""
         raise NotImplementedError
 
     def returned(self, value: str | None) -> Lines:
-        """Yield what leaves the function."""
+        """Yield the return statement."""
         raise NotImplementedError
 
     def raised(self, error: str, message: str) -> str:
-        """Return what makes the function fail."""
+        """Return the statement that raises an error."""
         raise NotImplementedError
 
     def if_head(self, condition: str) -> str:
@@ -183,13 +182,13 @@ class Printer(ExpressionPrinter):
     end = ";"
 
     def wrapped(self, text: str, indent: str) -> Lines:
-        """Yield a statement on as many lines as it needs."""
+        """Yield a wrapped statement."""
         yield from folded(text, self.width, indent)
 
     # Statements ---------------------------------------------------------------------------------------------------
 
     def block(self, statements: Sequence[ast.stmt], line: int, indent: str) -> Lines:
-        """Yield statements, each with the comments before it and beside it."""
+        """Yield statements, each with the comments before it and on its line."""
         for statement in statements:
             for number in range(line + 1, statement.lineno):
                 if number in self.form.alone:
@@ -219,7 +218,7 @@ class Printer(ExpressionPrinter):
         return "" if statement.lineno in self.form.alone else self.form.comments.get(statement.lineno, "")
 
     def plain(self, text: str, indent: str) -> Lines:
-        """Yield a statement with what ends it."""
+        """Yield a statement with its terminator."""
         if text:
             yield from self.wrapped(text + self.end, indent)
 
@@ -269,7 +268,7 @@ class Printer(ExpressionPrinter):
                 yield from self.call_statement("", call, self.form.functions[self.callee(call)], indent)
 
     def headed(self, text: str, indent: str) -> Lines:
-        """Yield the head of a branch or a loop, which only some languages let go on in the next line."""
+        """Yield the head of a branch or a loop, wrapped if the language allows that."""
         yield indent + text
 
     def loop_over(self, node: ast.For, name: str) -> str:

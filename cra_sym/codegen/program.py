@@ -1,4 +1,4 @@
-"""Expressions as straight-line functions of no particular language: shared subexpressions, safe names, branches."""
+"""Expressions as language-independent straight-line functions: shared subexpressions, safe names, branches."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Argument:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a symbol's value is found: a variable, or an entry (from 0) of a row."""
+    """Location of a symbol's value: a variable, or an entry (from 0) of a row."""
 
     name: str
     entry: int | None = None
@@ -65,7 +65,7 @@ class Function:
     scalar : bool
         Whether the result is a number instead of a row.
     places : dict
-        Where every symbol is found.
+        Location of every symbol.
     """
 
     name: str
@@ -82,7 +82,7 @@ class Function:
 
     @property
     def variables(self) -> list[str]:
-        """Names of all intermediate results, in order, each once."""
+        """Names of all intermediate results, in order, without duplicates."""
         return list(dict.fromkeys(self.places[symbol].name for b in self.branches for symbol, _ in b.steps))
 
 
@@ -117,7 +117,7 @@ def function(name: str, summary: str, expression: Any, arguments: Sequence[tuple
         members = tuple(symbols) if row else (symbols,)
         if not free & set(members):
             continue
-        given = christen(wish, taken)
+        given = new_name(wish, taken)
         signature.append(Argument(given, members, row))
         places |= {s: Place(given, i if row else None) for i, s in enumerate(members)}
     missing = sorted(str(s) for s in free - set(places))
@@ -134,7 +134,7 @@ def scalars(symbols: Iterable[sp.Symbol]) -> list[tuple[str, sp.Symbol]]:
 
 
 def _alternatives(outputs: list[sp.Expr]) -> list[tuple[Any, list[sp.Expr]]]:
-    """Return the conditions all outputs share and what the outputs are under each."""
+    """Return the conditions common to all outputs, and the outputs under each."""
     if not all(isinstance(e, sp.Piecewise) for e in outputs):
         return [(None, outputs)]
     conditions = [tuple(condition for _, condition in e.args) for e in outputs]
@@ -147,7 +147,7 @@ def _alternatives(outputs: list[sp.Expr]) -> list[tuple[Any, list[sp.Expr]]]:
 
 
 def _branch(condition: Any, values: list[sp.Expr]) -> Branch:
-    """Share subexpressions; conditions are written where they are used, since a variable holds a number."""
+    """Share subexpressions; conditions are written inline, since variables are numbers."""
     steps, values = shared_steps(values)
     conditions: dict[sp.Basic, sp.Basic] = {}
     kept = []
@@ -166,8 +166,8 @@ def _free_symbols(branch: Branch) -> set[sp.Symbol]:
     return found - {symbol for symbol, _ in branch.steps}
 
 
-def christen(wish: str, taken: set[str]) -> str:
-    """Return a name valid in every language and unlike those taken, even where case does not count; take it."""
+def new_name(wish: str, taken: set[str]) -> str:
+    """Return a new name that is valid in every language and differs from those taken in more than case; add it."""
     base = re.sub(r"_+", "_", re.sub(r"[^0-9A-Za-z]", "_", _latin(wish))).strip("_") or "value"
     base = base if base[0].isalpha() else f"n_{base}"
     base = base[:40]
@@ -181,7 +181,7 @@ def christen(wish: str, taken: set[str]) -> str:
 
 
 def _latin(text: str) -> str:
-    """Return a text with Greek letters by their names."""
+    """Return a text with Greek letters spelled out."""
     found = []
     for letter in unicodedata.normalize("NFKD", text):
         word = unicodedata.name(letter, "")

@@ -1,4 +1,4 @@
-"""Templates of a language filled in: the texts of a folder, and what every template may use."""
+"""Rendering of the templates of a language, and the filters available in them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 __all__ = ["DIGEST", "licence", "rendered"]
 
-#: Stands for the content hash, until all texts are there.
+#: Placeholder of the content hash until all texts are rendered.
 DIGEST = "@content-hash@"
 
 

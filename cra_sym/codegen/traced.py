@@ -1,7 +1,7 @@
-"""Formulas of the solvers as functions of the restricted form, and with the rates at which they change.
+"""Formulas of the solvers as functions of the restricted form, with their derivatives.
 
-A function that computes with arrays is run with :class:`Term` in their place, which writes down what it does. What is
-used once is put where it is used; the rest gets a name. With :class:`Dual` numbers the rates are written down too.
+A function of arrays is run with :class:`Term` arguments, which record its operations. Results used once are inlined,
+others get a name. With :class:`Dual` numbers the derivatives are recorded too.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from cra_sym.solvers.straight import Exact, Term, wanted_lines
 
 __all__ = ["Dual", "Traced", "parts"]
 
-_LONGEST = 12  # operations in an expression
+_LONGEST = 12  # largest number of operations in an expression
 _CALLED = re.compile(r"(\w+)\(k, i, ([\w\[\]]+)\)")
 _NO_RATE = {"exp", "log"}
-"""Rates of exponentials, which only scale by positive factors, and of a first guess do not matter."""
+"""Functions whose rates do not matter: exponentials, which are only positive scale factors, and a first guess."""
 
 
 def parts(value: Any) -> tuple[Any, Any]:
@@ -27,7 +27,7 @@ def parts(value: Any) -> tuple[Any, Any]:
 
 
 class Dual(Term):
-    """A number with its rate: what is computed from it has the rate that follows from the rules of differentiation."""
+    """A dual number: a number and its rate, with the rules of differentiation."""
 
     __slots__ = ("rate",)
 
@@ -68,7 +68,7 @@ class Dual(Term):
 
     def _with(self, other: Any, operation: str, *, turned: bool = False) -> Any:
         if isinstance(other, Exact) and not turned:
-            return NotImplemented  # which knows what is idle
+            return NotImplemented  # Exact simplifies trivial operations
         (a, first), (b, second) = map(parts, (other, self) if turned else (self, other))
         if operation == "+":
             return _dual(a + b, first + second)
@@ -109,7 +109,7 @@ def _dual(value: Any, rate: Any) -> Any:
 
 
 def _over(value: Any, divisor: Any) -> Any:
-    """Return a quotient that is zero where the divisor is: of a rate that does not matter there."""
+    """Return a quotient of rates that is zero where the divisor is, since it does not matter there."""
     return divisor.quotient(value) if isinstance(divisor, Term) and not isinstance(value, Exact) else value / divisor
 
 
@@ -120,11 +120,11 @@ class Traced:
     ----------
     name, doc : str
     rows : sequence of (name, length)
-        What is given in rows.
+        Arguments that are rows.
     numbers : sequence of str
-        What is given as numbers.
+        Arguments that are numbers.
     guarded : bool
-        Whether quotients may have a divisor 0, where what they stand for does not matter.
+        Whether divisors may be 0, where the quotient does not matter.
     """
 
     def __init__(
@@ -141,11 +141,11 @@ class Traced:
         self._lines: dict[str, str] = {}
 
     def number(self, name: str) -> Term:
-        """Return a number that is given."""
+        """Return a number argument."""
         return Term(name, self._lines)
 
     def entry(self, row: str, place: int) -> Term:
-        """Return an entry of a row that is given."""
+        """Return an entry of a row argument."""
         return Term(f"{row}[{place}]", self._lines)
 
     def text(self, results: Iterable[Any], out: Sequence[tuple[str, str, int]] = ()) -> str:
@@ -168,7 +168,7 @@ def _name(value: Any) -> str:
 
 
 class _Body:
-    """Lines of one operation each as few statements."""
+    """Merger of lines of one operation each into few statements."""
 
     def __init__(self, lines: Sequence[tuple[list[str], str]], results: Sequence[str], *, guarded: bool) -> None:
         self._lines, self._results, self._guarded = lines, results, guarded
@@ -213,7 +213,7 @@ def _parsed(text: str) -> ast.expr:
 
 
 class _Written(ast.NodeTransformer):
-    """One operation in the words of the restricted form, what it is made of put in."""
+    """One operation in the restricted form, with its operands inlined."""
 
     def __init__(self, known: dict[str, ast.expr], *, guarded: bool) -> None:
         self._known, self._guarded = known, guarded

@@ -1,4 +1,4 @@
-"""Texts in the restricted form without lines that a model does not need and parameters that nothing uses."""
+"""Removal of unneeded lines and unused parameters from texts in the restricted form."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _MARKED = re.compile(r"( *)# ((?:(?:DRIVEN|LUMPED|LINKED|COUPLED): )+)(.*)")
 
 
 def marked(text: str, marks: set[str]) -> str:
-    """Return a text with the lines ``# MARK: statement`` as statements if all marks are wanted, without others."""
+    """Return a text with the lines ``# MARK: statement`` as statements if all their marks are given, else removed."""
     lines = []
     for line in text.split("\n"):
         found = _MARKED.fullmatch(line)
@@ -32,7 +32,7 @@ def top_names(*texts: str) -> set[str]:
 def without_unused(text: str) -> str:
     """Return the text without parameters that private functions do not use, in their heads and in calls of them.
 
-    Calls stand on one line with arguments that hold no commas, as all of private functions do.
+    Each call must be on one line, with arguments without commas, as in the texts of this package.
     """
     unused = next(_unused(text), None)
     while unused is not None:
@@ -42,7 +42,7 @@ def without_unused(text: str) -> str:
 
 
 def _unused(text: str) -> Iterator[tuple[str, int]]:
-    """Yield private functions with the places of parameters that they do not use."""
+    """Yield private functions with the positions of their unused parameters."""
     for node in ast.parse(text).body:
         if isinstance(node, ast.FunctionDef) and node.name.startswith("_"):
             used = {n.id for statement in node.body for n in ast.walk(statement) if isinstance(n, ast.Name)}

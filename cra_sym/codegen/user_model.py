@@ -1,4 +1,4 @@
-"""Export of a model of one's own: frequencies, modes, sensitivities, responses, for any values of its parameters."""
+"""Export of a user's model: frequencies, modes, sensitivities, responses, for any values of its parameters."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cra_sym.model.waves_form import WavesForm, waves_form
 
 __all__ = ["model_library", "model_text"]
 
-_MOST = 32  # parameters that a line of the reference vectors has place for
+_MOST = 32  # largest number of parameters in a line of the reference vectors
 _INSTEAD = "give system= with the model at its values, whose modes are exported as numbers"
 
 
@@ -35,12 +35,12 @@ def model_library(model: Model, name: str, real: str = "float64") -> Library:
 
 
 def model_text(model: Model, real: str = "float64") -> ModelText:
-    """Return what writes the text of a model; raise a ValueError if there is none."""
+    """Return the writer of the text of a model; raise a ValueError if it cannot be exported."""
     return ModelText(model, _form(model), real)
 
 
 def _form(model: Model) -> WavesForm:
-    """Return a model as the solver of waves takes it."""
+    """Return a model as input of the wave solver."""
     if model.pieces["hysteresis"]:
         raise ValueError(
             "model: has elastic-slip elements, whose slip has no frequencies; give model.without_hysteresis, or system="

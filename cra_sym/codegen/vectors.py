@@ -1,4 +1,4 @@
-"""Reference vectors: what the package's own kernels answer, for random and extreme arms, one line a check."""
+"""Reference vectors: results of the package's own kernels for random and extreme arms, one line per check."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _STIFFNESSES = (0.0, 1e-9, 1e12, np.inf)
 
 
 class Check(NamedTuple):
-    """One line: a quantity, what goes in, what comes out, and the error allowed besides the relative one."""
+    """One line: a quantity, its inputs, the expected results, and the absolute error allowed."""
 
     quantity: str
     inputs: tuple[float, ...]
@@ -38,7 +38,7 @@ class Check(NamedTuple):
 
 
 def random_arms(count: int, seed: int = SEED) -> list[Arm]:
-    """Return arms with everything drawn at random, stiffnesses and inertias over many decades."""
+    """Return arms with random parameters, stiffnesses and inertias over many decades."""
     rng = np.random.default_rng(seed)
 
     def decades(low: float, high: float) -> float:
@@ -96,7 +96,7 @@ def arm_checks(*, everything: bool) -> Iterator[Check]:
 
 
 def _watched(arms: list[Arm]) -> Any:
-    """Return the arms, with a bar on a terminal: what follows takes them one by one."""
+    """Return an iterator over the arms with a progress bar on a terminal."""
     from tqdm import tqdm
 
     return tqdm(arms, desc="reference vectors", leave=False, disable=None)
@@ -144,7 +144,7 @@ def _modal_checks(arms: list[Arm], together: Arm) -> Iterator[Check]:
 
 
 def _sensitivity_checks(arms: list[Arm], together: Arm) -> Iterator[Check]:
-    """Yield inf and nan too: what a rigid-body mode has instead of derivatives."""
+    """Yield the checks of sensitivities, with inf and nan for rigid-body modes."""
     found = sensitivities(together, 4)
     for name in ("df_dk_t", "df_dk_r", "log_k_t", "log_k_r"):
         for arm, row in zip(arms, getattr(found, name), strict=True):
@@ -183,7 +183,7 @@ def _system_checks(arm: Arm) -> Iterator[Check]:
     rest = whole - np.sum(modal_parameters(arm, 3).participation ** 2)
     for name, kind in (("acceleration", "base_acceleration"), ("force", "drive_force")):
         system = state_space_module.state_space(arm, 3, kind)
-        loss = float(whole / rest) if name == "force" else 1.0  # the base alone moves what the modes leave of the mass
+        loss = float(whole / rest) if name == "force" else 1.0  # mass that moves with the base but not in the modes
         for part in "ABC":
             yield _check(f"state_space_{name}_{part}", _numbers(arm), getattr(system, part), loss)
 

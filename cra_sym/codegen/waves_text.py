@@ -17,9 +17,9 @@ __all__ = ["WavesText"]
 
 kernel: Any = waves_kernel  # formulas of arrays and terms, without types
 _LENGTHS = {1: 1, 2: 9, 3: 32}
-"""Numbers that tell of the waves of a block, by its size."""
+"""Number of quantities of the waves of a block, by its size."""
 _CONDITIONS = (0, 29, 30)
-"""Those of three that are conditions."""
+"""Quantities of a block of three that are conditions."""
 _KINDS = {1: ("any",), 2: ("near", "close", "distant"), 3: ("near", "close", "distant", "series")}
 _WORDS = {
     "any": "",
@@ -31,7 +31,7 @@ _WORDS = {
 
 
 class WavesText:
-    """Writes the functions of one structure.
+    """Writer of the functions of one structure.
 
     Parameters
     ----------
@@ -45,18 +45,18 @@ class WavesText:
 
     @cached_property
     def places(self) -> dict[int, int]:
-        """Where coefficients that are not known stand in the row of coefficients, by their number."""
+        """Positions of the unknown coefficients in the row of coefficients, by their number."""
         varying = [place for place, value in enumerate(self.known) if value is None]
         return {place: at for at, place in enumerate(varying)}
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Regimes, as the largest block has them."""
+        """Regimes of the largest block."""
         return _KINDS[max(self.structure.sizes)]
 
     @cached_property
     def offsets(self) -> list[int]:
-        """Where the columns of each block begin in the row of all columns, and how many there are."""
+        """Start of the columns of each block in the row of all columns, and their number."""
         found = [0]
         for size in self.structure.sizes:
             found.append(found[-1] + 4 * size * size)
@@ -64,7 +64,7 @@ class WavesText:
 
     @cached_property
     def scaled(self) -> list[int | None]:
-        """Where the basis of each block stands behind the columns; None if it is 1."""
+        """Position of the basis of each block after the columns; None if it is 1."""
         place = iter(range(self.offsets[-1], self.offsets[-1] + len(self.structure.sizes)))
         return [next(place) if size > 1 else None for size in self.structure.sizes]
 
@@ -150,7 +150,7 @@ class WavesText:
         return traced, self._coefficients(traced), traced.number("z")
 
     def _waves_of(self, traced: Traced, *, rates: bool = False) -> list[Any]:
-        """Return what the waves of each block are, from the row that holds it."""
+        """Return the quantities of the waves of each block from the row that contains them."""
         found = []
         at = 0
         for size in self.structure.sizes:
@@ -169,7 +169,7 @@ class WavesText:
         return [(block, a, b, own) for block, (a, b), own in given]
 
     def _kind(self, kind: str, block: tuple[int, int]) -> str:
-        """Return the regime of a block: one of a single displacement has none."""
+        """Return the regime of a block, None for a single displacement."""
         return kind if block[1] - block[0] > 1 else "any"
 
     # Functions --------------------------------------------------------------------------------------------------------
@@ -204,7 +204,9 @@ class WavesText:
         traced = Traced("_regime", words, [("w", "WAVE_ENTRIES")], guarded=True)
         sizes = self.structure.sizes
         found = waves_count.regime(self._waves_of(traced)[sizes.index(max(sizes))])
-        return traced.text([kernel.where(found > 2.5, found - 1.0, found)])  # both signs are no regime of their own
+        return traced.text(
+            [kernel.where(found > 2.5, found - 1.0, found)]
+        )  # waves of both signs are not a separate regime
 
     def _branch(self) -> str:
         words = "Return the lowest z of free waves of so many half waves along the length."
@@ -307,7 +309,7 @@ class WavesText:
         return head + "".join(lines)
 
     def _at_end(self, traced: Traced, *, rates: bool = False) -> tuple[list[Any], list[Any]]:
-        """Return the columns and bases of all blocks as they stand in a row."""
+        """Return the columns and bases of all blocks in the order of the row."""
 
         def entry(at: int) -> Any:
             value = traced.entry("c", at)
@@ -360,7 +362,7 @@ class WavesText:
         return traced.text(found, [("matrix", "ENTRIES", self.structure.places**2)])
 
     def sections(self) -> str:
-        """Return the functions of the matrices of a section, and of whether they say that it loses energy."""
+        """Return the functions of the matrices of a section, and of the check of their signs."""
         n = self.structure.n
         words = "Return the matrices O' by E and E' by O, times half the length."
         traced = Traced("_matrices_of", words, [("k", "COEFFICIENTS")], ["z"])
@@ -389,7 +391,7 @@ class WavesText:
         return [[-entry for entry in row] for row in self._of_parity(k, a + slope, b + slope)]
 
     def _of_parity(self, k: Any, even: int, odd: int) -> list[list[Any]]:
-        """Return a matrix between displacements of one parity, from where its entries begin."""
+        """Return a matrix between displacements of one parity, given the start of its entries."""
         n, parity = self.structure.n, self.structure.odd
         return [
             [Exact(0) if parity[i] != parity[j] else k[(odd if parity[i] else even) + n * i + j] for j in range(n)]

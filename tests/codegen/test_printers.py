@@ -8,7 +8,7 @@ from sympy.codegen.cfunctions import expm1, log1p
 
 from cra_sym.codegen.library import Check, Library
 from cra_sym.codegen.printers import FormPrinter
-from cra_sym.codegen.program import christen, function, scalars
+from cra_sym.codegen.program import function, new_name, scalars
 from tests.codegen import kit
 
 x, y = sp.symbols("x y", real=True)
@@ -95,7 +95,7 @@ def test_a_function_without_equivalent_is_refused():
 def test_names_are_valid_everywhere():
     taken: set[str] = set()
     names = [
-        christen(wish, taken) for wish in ("lambda", "end", "E", "e", "A", "a", "x1", "sin", "2x", "_k", "k__t", "λ")
+        new_name(wish, taken) for wish in ("lambda", "end", "E", "e", "A", "a", "x1", "sin", "2x", "_k", "k__t", "λ")
     ]
     assert len({n.lower() for n in names}) == len(names)
     assert not {"lambda", "end", "sin", "x1"} & set(names)
