@@ -268,6 +268,7 @@ def figure_backbone(
     with style.context(STYLE):
         ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
         _show_curve(ax, curve)
+        ax.axis(ax.axis())  # that of the curve itself
         for other in curve.branches:
             ax.semilogx(other.energy, other.angular_frequency / (2 * np.pi), "--", color="0.5", linewidth=0.9)
         ax.set_xlabel("energy / J")
