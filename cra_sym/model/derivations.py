@@ -17,12 +17,12 @@ from cra_sym.mechanics.weak import Bilinear, WeakForm, weak_form
 from cra_sym.model.conservative_part import conservative_part, stiffness_beside
 from cra_sym.model.driven import driven, driven_coordinate, driven_displacement, driven_spatial, pushed
 from cra_sym.model.energies import stress_route
+from cra_sym.model.energy_signs import leading, masses
 from cra_sym.model.exact import BallProblem, exact_kernel
 from cra_sym.model.excited import axial, fluctuating, fluctuation
 from cra_sym.model.forms import form_of, load_of
 from cra_sym.model.held_motions import HeldMotions
 from cra_sym.model.held_motions import held_motions as motions_held
-from cra_sym.model.kinetic import masses
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.moving import jumps
 from cra_sym.model.nonlinear import nonlinear
@@ -52,6 +52,7 @@ __all__ = [
     "geometry",
     "held_motions",
     "inertia",
+    "leading",
     "load",
     "load_coefficients",
     "masses",

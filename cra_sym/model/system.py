@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cra_sym.checks import broadcastable, count, default_floating_point, instance, real_array, shown
 from cra_sym.model.cross_check import CrossCheck, cross_check
-from cra_sym.model.kinetic import refuse_negative_mass
+from cra_sym.model.energy_signs import refuse_negative
 from cra_sym.model.projection import Domain, Load, Projected, project
 from cra_sym.model.routes import ROUNDING, TOLERANCE, Estimated, Modes, Route
 from cra_sym.model.slip_elements import SlipElements, slip_elements, slip_terms_of
@@ -179,7 +179,7 @@ class System:
             first = bad.flat[0] if bad.size else np.inf
             raise ValueError(f"domain: the length {name} = {first:g} must be in (0, inf)")
         found = Domain(finite, left, length)
-        refuse_negative_mass(self.numerics("masses"), found, self.shape, self.values)
+        refuse_negative(self.numerics("masses"), found, self.shape, self.values)
         return found
 
     @cached_property
@@ -193,7 +193,9 @@ class System:
         return np.asarray(self._cached("omega", count("modes", modes, high=MOST_MODES), self._find_frequencies))
 
     def _find_frequencies(self, modes: int) -> Array:
-        _ = self.domain  # refuses a length that is not positive
+        domain, stiffness = self.domain, self.numerics("leading")
+        if stiffness.form.uniform:  # the routes of what varies along x find the place
+            refuse_negative(stiffness, domain, self.shape, self.values)
         route = self._route
         with np.errstate(all="ignore"):
             if isinstance(route, Estimated):

@@ -1,4 +1,4 @@
-"""Check that the kinetic energy is not negative, and name the parameter that makes it so; common to all routes."""
+"""Energies that must be sums of squares: values that would make them negative are refused by name, on every route."""
 
 from __future__ import annotations
 
@@ -12,69 +12,88 @@ from cra_sym.model.projection import Domain, Form, Place
 from cra_sym.solvers.waves_static import are_semidefinite
 
 if TYPE_CHECKING:
+    from cra_sym.mechanics.weak import Bilinear
     from cra_sym.model.lagrangian import Model
 
-__all__ = ["Masses", "masses", "refuse_negative_mass"]
+__all__ = ["EnergyForm", "leading", "masses", "refuse_negative"]
 
 Values = Mapping[str, float | NDArray[np.float64]]
-_SHARES = (np.arange(64) + 0.5) / 64  # stations, as shares of the length, at which masses that vary along x are checked
+_SHARES = (np.arange(64) + 0.5) / 64  # stations, as shares of the length, at which coefficients that vary are checked
 _WHERE = {"left": "the left end", "right": "the right end", "lumped": "the lumped coordinates"}
 
 
-class Masses(NamedTuple):
-    """The kinetic energy of a model.
+class EnergyForm(NamedTuple):
+    """An energy of a model.
 
     Attributes
     ----------
+    kind : str
+        'kinetic' or 'strain'.
     form : Form
-        The masses.
     names : tuple of (tuple of str)
-        Parameters in those inside, and in the others, in the order of the model's symbols.
+        Parameters in the coefficients inside, and in the others, in the order of the model's symbols.
     definite : bool
         Whether it is a sum of squares with these as factors, negative only where one of them is.
     """
 
+    kind: str
     form: Form
     names: tuple[tuple[str, ...], tuple[str, ...]]
     definite: bool
 
 
-def masses(model: Model) -> Masses:
+def masses(model: Model) -> EnergyForm:
     """Return the kinetic energy of a model."""
-    from sympy import Dummy
-
     from cra_sym.mechanics.weak import weak_form
 
     _ = model.numerics("spatial" if model.numerics("conservative") else "damped_spatial")  # refuses unused fields
     weak = weak_form(model.linearised.variation)
+    return _energy(model, "kinetic", model.numerics("inertia"), (weak.inside, weak.discrete), 2)
+
+
+def leading(model: Model) -> EnergyForm:
+    """Return the strain energy of the highest derivatives of the fields of a model."""
+    from cra_sym.mechanics.weak import weak_form
+    from cra_sym.model.forms import form_of
+
+    weak = weak_form(model.linearised.variation)
+    _, highest, _ = weak.fields()
+    inside = {pair: {0: e[0]} for pair, e in weak.inside.items() if 0 in e and set(pair) <= set(highest)}
+    none: Bilinear = {}
+    return _energy(model, "strain", form_of(weak, {"stiffness": (inside, none)}, model.symbols), (inside, none), 0)
+
+
+def _energy(model: Model, kind: str, form: Form, parts: Sequence[Bilinear], power: int) -> EnergyForm:
+    from sympy import Dummy
+
     known = {symbol: Dummy(symbol.name, nonnegative=True) for symbol in model.symbols}
     definite, names = True, []
-    for form in (weak.inside, weak.discrete):
-        found = [(pair, e[2]) for pair, e in form.items() if 2 in e]
-        definite &= all(p == q and mass.xreplace(known).is_nonnegative for (p, q), mass in found)
-        symbols = set().union(*(mass.free_symbols for _, mass in found))
+    for part in parts:
+        found = [(pair, e[power]) for pair, e in part.items() if power in e]
+        definite &= all(p == q and value.xreplace(known).is_nonnegative for (p, q), value in found)
+        symbols = set().union(*(value.free_symbols for _, value in found))
         names.append(tuple(symbol.name for symbol in model.symbols if symbol in symbols))
-    return Masses(model.numerics("inertia"), (names[0], names[1]), bool(definite))
+    return EnergyForm(kind, form, (names[0], names[1]), bool(definite))
 
 
-def refuse_negative_mass(masses: Masses, domain: Domain, shape: tuple[int, ...], values: Values) -> None:
-    """Raise if a motion of the ends, or of a section, has negative kinetic energy.
+def refuse_negative(energy: EnergyForm, domain: Domain, shape: tuple[int, ...], values: Values) -> None:
+    """Raise if a motion of the ends, or of a section, has negative energy.
 
     Parameters
     ----------
-    masses : Masses
+    energy : EnergyForm
     domain : Domain
     shape : tuple of int
-        Of the batch.
+        Shape of the batch.
     values : mapping
-        Of all parameters.
+        Values of all parameters.
 
     Raises
     ------
     ValueError
         Names the parameter that is negative, or all of them if none is.
     """
-    form, names, definite = masses
+    kind, form, names, definite = energy
     if definite and all(np.min(values[name]) >= 0.0 for name in {*names[0], *names[1]}):
         return
     numbers = [np.asarray(value)[..., None] for value in domain.values]
@@ -93,11 +112,12 @@ def refuse_negative_mass(masses: Masses, domain: Domain, shape: tuple[int, ...],
             if not right.all():
                 *row, station = np.unravel_index(int(np.argmin(right)), right.shape)
                 at = np.broadcast_to(x, (*shape, len(shares)))[(*row, station)] if len(shares) > 1 else None
-                raise ValueError(_refusal(group[0], at, {n: np.broadcast_to(values[n], shape)[*row] for n in own}))
+                given = {name: float(np.broadcast_to(values[name], shape)[*row]) for name in own}
+                raise ValueError(_refusal(kind, group[0], at, given))
 
 
 def _groups(pairs: Sequence[tuple[Place, Place]]) -> list[list[Place]]:
-    """Return the places that masses couple, group by group."""
+    """Return the places that off-diagonal coefficients couple, group by group."""
     groups: list[list[Place]] = []
     for pair in pairs:
         joined = [group for group in groups if set(pair) & set(group)]
@@ -106,10 +126,11 @@ def _groups(pairs: Sequence[tuple[Place, Place]]) -> list[list[Place]]:
     return groups
 
 
-def _refusal(place: Place, at: float | None, given: Mapping[str, float]) -> str:
-    named = ", ".join(f"{name} = {value:g}" for name, value in given.items() if value < 0.0)
-    named = named or ", ".join(f"{name} = {value:g}" for name, value in given.items()) or "values"
+def _refusal(kind: str, place: Place, at: float | None, given: Mapping[str, float]) -> str:
+    """Return the message: the parameters that are negative, or all of them, and where the energy is negative."""
+    told = ", ".join(f"{name} = {value:g}" for name, value in given.items() if value < 0.0)
+    told = told or ", ".join(f"{name} = {value:g}" for name, value in given.items()) or "values"
     where = _WHERE.get(place.where, "an interior place")
     if place.where == "inside":
         where = "a section" if at is None else f"the section at x = {at:.6g}"
-    return f"{named}: the kinetic energy of {where} is negative; it must be at least 0"
+    return f"{told}: the {kind} energy of {where} is negative; it must be at least 0"

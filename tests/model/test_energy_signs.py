@@ -1,4 +1,4 @@
-"""Negative kinetic energy is refused by name, on every route; energies that only look negative are not."""
+"""Negative energies are refused by name, on every route; energies that only look negative are not."""
 
 from __future__ import annotations
 
@@ -31,6 +31,9 @@ def system(density, right=TIP, coordinates=(), essential=CLAMPED, **changed):
     ("made", "words"),
     [
         (lambda: system(BEAM, m=-1.0), "m = -1: the kinetic energy of a section is negative; it must be at least 0"),
+        (lambda: system(BEAM, EI=-1.0), "EI = -1: the strain energy of a section is negative; it must be at least 0"),
+        (lambda: system(BEAM, EI=[1.0, -2.0]), "EI = -2: the strain energy of a section"),
+        (lambda: system(STRING, essential=CLAMPED[:1], T=-1.0), "T = -1: the strain energy of a section"),
         (lambda: system(BEAM, m_e=-0.1), "m_e = -0.1: the kinetic energy of the right end is negative"),
         (lambda: system(BEAM, m_e=[0.1, -0.2]), "m_e = -0.2: the kinetic energy of the right end"),
         (lambda: system(STRING, essential=CLAMPED[:1], m_e=-0.1), "m_e = -0.1: the kinetic energy of the right end"),
@@ -46,7 +49,7 @@ def system(density, right=TIP, coordinates=(), essential=CLAMPED, **changed):
         ),
     ],
 )  # fmt: skip
-def test_negative_kinetic_energy_is_refused_by_name(made, words):
+def test_negative_energy_is_refused_by_name(made, words):
     with pytest.raises(ValueError, match=words):
         made().natural_frequencies(2)
 
@@ -55,6 +58,15 @@ def test_analyses_refuse_it_too():
     for call in (cra.eigenvalues, cra.modal_parameters, cra.sensitivities):
         with pytest.raises(ValueError, match=r"m_e = -0.1: the kinetic energy of the right end"):
             call(system(BEAM, m_e=-0.1))
+
+
+def test_compression_is_not_negative_bending():
+    """The load enters below the highest derivative: a column buckles at Euler's load, not before."""
+    euler = np.pi**2 * 1.3 / (4 * 1.2**2)
+    pressed = BEAM - HALF * T * v.diff(x) ** 2
+    assert (system(pressed, right=0, T=-0.999 * euler).natural_frequencies(2) > 0).all()
+    with pytest.raises(ValueError, match="has buckled"):
+        system(pressed, right=0, T=-1.001 * euler).natural_frequencies(2)
 
 
 def test_a_negative_offset_is_not_a_negative_mass():
