@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.analysis.fit_unknowns import Unknown
-from cra_sym.analysis.sensitivities import Sensitivities, sensitivities
+from cra_sym.analysis.fit_rates import frequencies, rated
+from cra_sym.analysis.fit_unknowns import Rated, Unknown
 from cra_sym.model.system import System
 
 __all__ = ["Data", "Search"]
@@ -55,22 +55,20 @@ class Search:
     system: System
     unknowns: tuple[Unknown, ...]
     most_modes: int
-    _known: dict[tuple[tuple[int, ...], bytes], Sensitivities] = field(default_factory=dict)
+    _known: dict[tuple[tuple[int, ...], bytes], Rated] = field(default_factory=dict)
     _table: tuple[Array, Array, tuple[int, ...]] | None = None
 
     def values(self, place: Array) -> dict[str, Any]:
         """Return the values of the unknowns at a point, or arrays of them at points (..., unknowns)."""
         return {unknown.name: unknown.value(place[..., i])[()] for i, unknown in enumerate(self.unknowns)}
 
-    def found(self, place: Array) -> Sensitivities:
+    def found(self, place: Array) -> Rated:
         """Return frequencies and sensitivities at a point, or at points; the last result is cached."""
         key = place.shape, place.tobytes()
         if key not in self._known:
             if len(self._known) > _MOST_KEPT:
                 self._known.clear()
-            names = tuple(unknown.name for unknown in self.unknowns)
-            found = sensitivities(self.system.replace(**self.values(place)), self.most_modes, by=names)
-            self._known[key] = found
+            self._known[key] = rated(self.system, self.unknowns, place, self.most_modes)
         return self._known[key]
 
     def residuals(self, place: Array, data: Data) -> Array:
@@ -153,28 +151,32 @@ class Search:
 
     def _starts(self, data: Data) -> Array:
         """Return the local minima of the misfit on the grid, weighted and relative, and its lowest points."""
-        places, frequencies, shape = self._grid()
+        places, known, shape = self._grid()
         with np.errstate(all="ignore"):
-            off = frequencies[:, data.modes] - data.measured
+            off = known[:, data.modes] - data.measured
             costs = [np.sum((off / scale) ** 2, -1) for scale in (data.sigma, data.measured)]
         found: set[int] = set()
         for cost in costs:
             finite = np.where(np.isfinite(cost), cost, np.inf)
-            if not np.isfinite(finite).any():
+            number = np.isfinite(finite).sum()
+            if not number:
                 raise ValueError("system: it has no natural frequencies for any values of the unknown parameters")
-            found |= set(np.argsort(finite)[:_LOWEST].tolist())
+            found |= set(np.argsort(finite)[: min(_FEW // 3 if self._slow else _LOWEST, number)].tolist())
             found |= set(_lowest(finite.reshape(shape))) if shape else set()
         return places[sorted(found)]
 
-    def _descended(self, places: Array, data: Data) -> Array:
-        """Descend from all starts at once; return the distinct end points, the lowest of each group.
+    @property
+    def _slow(self) -> bool:
+        """Whether an evaluation is expensive: some values give no stable structure, or there are no natural modes."""
+        return self.system.conservative_part is not self.system or not np.isfinite(self._grid()[1]).all()
 
-        Where some start has no natural frequencies, the starts are returned as they are.
-        """
+    def _descended(self, places: Array, data: Data) -> Array:
+        """Follow all starts at once, return those that end apart, the lowest of each; or the lowest few as they are."""
         places = np.clip(places, *self._bounds)
-        residuals = self.residuals(places, data)
-        if not np.isfinite(residuals).all():
-            return places[np.argsort(np.nan_to_num(np.sum(residuals**2, -1), nan=np.inf))][:_FEW]
+        cost = np.sum(self.residuals(places, data) ** 2, -1)
+        finite = np.isfinite(cost)
+        if self._slow or not finite.all():
+            return np.asarray(places[finite][np.argsort(cost[finite])][:_FEW])
         return self._apart(*self._followed(places, data, _STEPS))
 
     @staticmethod
@@ -246,21 +248,8 @@ class Search:
                 low, high = np.array([(axis.min(), axis.max()) for axis in axes]).T
                 places = low + (high - low) * qmc.Sobol(len(axes), seed=0).random(_SAMPLES)
                 shape = ()
-            self._table = places, self._frequencies(places), shape
+            self._table = places, frequencies(self.system, self.unknowns, places, self.most_modes), shape
         return self._table
-
-    def _frequencies(self, places: Array) -> Array:
-        values = {u.name: u.value(column) for u, column in zip(self.unknowns, places.T, strict=True)}
-        try:
-            omega = self.system.replace(**values).natural_frequencies(self.most_modes)
-        except ValueError:  # somewhere the structure has buckled: point by point
-            omega = np.full((len(places), self.most_modes), np.nan)
-            for row, place in enumerate(places):
-                try:
-                    omega[row] = self.system.replace(**self.values(place)).natural_frequencies(self.most_modes)
-                except ValueError:
-                    continue
-        return omega / (2 * np.pi)
 
     def _linked(self, places: Array, other: Array, data: Data) -> NDArray[np.bool]:
         """Return which minima a path connects to another with the misfit within the uncertainty."""

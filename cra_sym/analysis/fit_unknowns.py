@@ -2,23 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.analysis.sensitivities import Sensitivities, sensitivities
+from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.model.system import System
 
-__all__ = ["Unknown", "natural_stiffnesses", "unknowns"]
+__all__ = ["Rated", "Unknown", "natural_stiffnesses", "unknowns"]
 
 Array = NDArray[np.float64]
 Kind = Literal["stiffness", "signed", "nonnegative"]
 
 _SOFTEST, _STIFFEST = 1e-8, 1e8  # range of a stiffness in natural units, beyond which it is absent or rigid to rounding
 _RANGE = 1e3  # factor by which other parameters may differ from their initial value
+
+
+class Rated(Protocol):
+    """What a fit needs of :class:`Sensitivities`: frequencies (..., modes), Hz, and their derivatives by name."""
+
+    @property
+    def frequency(self) -> Array:
+        """Frequencies, Hz."""
+
+    @property
+    def rate(self) -> Mapping[str, Array]:
+        """Derivatives by the values."""
+
+    @property
+    def log(self) -> Mapping[str, Array]:
+        """Logarithmic derivatives."""
+
+    @property
+    def compliance(self) -> Mapping[str, Array]:
+        """Derivatives by 1/k of every stiffness of an end."""
 
 
 @dataclass(frozen=True)
@@ -75,11 +95,11 @@ class Unknown:
         """Return the derivative by the coordinate of 1/k for a stiffness, else of p; it is finite everywhere."""
         return np.exp(coordinate) / self.unit if self.kind == "stiffness" else np.exp(coordinate) * self.unit
 
-    def slopes(self, found: Sensitivities) -> Array:
+    def slopes(self, found: Rated) -> Array:
         """Return the derivatives of the frequencies by 1/k of a stiffness, by p itself otherwise."""
         return found.compliance[self.name] if self.kind == "stiffness" else found.rate[self.name]
 
-    def gradient(self, found: Sensitivities, coordinate: Array) -> Array:
+    def gradient(self, found: Rated, coordinate: Array) -> Array:
         """Return the derivatives of the frequencies by the coordinate, shape (..., modes)."""
         column = np.asarray(coordinate)[..., None]
         slope = self.slopes(found) * self.rate(column)
@@ -119,6 +139,7 @@ def natural_stiffnesses(system: System, names: Sequence[str]) -> dict[str, float
     """
     if not names:
         return {}
+    system = system.conservative_part
     rigid = system.replace(**dict.fromkeys(names, np.inf))
     number = _elastic(rigid)
     modes, omega = rigid.modes(number), rigid.natural_frequencies(number)
@@ -133,6 +154,8 @@ def natural_stiffnesses(system: System, names: Sequence[str]) -> dict[str, float
 
 def _natural_unit(system: System, name: str) -> float:
     """Return the change of the parameter that would change the square of a frequency by 100 per cent."""
+    if system.conservative_part is not system:
+        raise ValueError(f"unknown: {name} = 0 in system: must have a value of its size, from which the search begins")
     found = sensitivities(system, _elastic(system), by=(name,))
     change = np.abs(found.rate[name])[found.frequency > 0] / found.frequency[found.frequency > 0]
     if not change.max() > 0:

@@ -149,7 +149,10 @@ def identify(
 
     Least squares with exact gradients, weighted by the uncertainties, from every local minimum of a grid; the stiffness
     of an end is searched in ln(1 + unit/k), so that a rigid one has the finite value 0, others within a factor of 1000
-    of their value in ``system`` (or of their prior).
+    of their value in ``system`` (or of their prior). Values at which the structure is unstable are excluded.
+
+    With gyroscopic forces or forces that follow the motion there are no natural frequencies: the imaginary parts of the
+    oscillating :func:`eigenvalues` over 2 pi, by ascending modulus, are fitted, with gradients by differences.
 
     Parameters
     ----------
@@ -260,7 +263,9 @@ def _identified(
     data = checked_data(system, name, measured, uncertainty, modes)
     priors = checked_priors(system, prior)
     parameters = unknowns(system, checked_names(system, unknown, priors), priors)
-    search = Search(system, parameters, int(data.modes.max()) + 2)
+    search = Search(
+        system, parameters, max(int(data.modes.max()) + 1, min(int(data.modes.max()) + 2, system.most_modes))
+    )
     estimates = _estimates(kind, search, data)
     best = estimates[0]
     messages = [best.message]
@@ -340,7 +345,7 @@ def _hints(search: Search, data: Data, lowest: bool) -> list[str]:
         p_values = [_best_p(search, data.without(entry)) for entry in range(data.measured.size)]
         if max(p_values) >= SMALLEST_P:
             hints.append(f"without mode {data.modes[int(np.argmax(p_values))] + 1} they fit")
-    if spare >= 1 and lowest:
+    if spare >= 1 and lowest and data.measured.size < search.most_modes:
         number = data.measured.size
         trials = [np.delete(np.arange(number + 1), skipped) for skipped in range(number)]
         p_values = [_best_p(search, replace(data, modes=trial)) for trial in trials]

@@ -17,6 +17,7 @@ from cra_sym.figures.subject import (
     field_label,
     fields,
     leading_parameter,
+    oscillating_frequencies,
     over_what_is_stable,
     parameter_label,
     parameters_of,
@@ -101,7 +102,7 @@ def figure_frequencies(
     modes: int = 3,
     ax: Axes | None = None,
 ) -> Figure:
-    """Draw natural frequencies against any parameter.
+    """Draw natural frequencies against any parameter, or those of the complex modes where there are none.
 
     Parameters
     ----------
@@ -120,10 +121,10 @@ def figure_frequencies(
         x, found = over_what_is_stable(system, name, modes)
     else:
         x = one_axis("values", values, "values", allow_infinite=True)
-        found = natural_frequencies(system.replace(**{name: x}), modes)
+        found = oscillating_frequencies(system.replace(**{name: x}), modes) / (2 * np.pi)
     ax = panels(ax, 1, 1, (6.4, 4.0))[0, 0]
     if name in system.numerics("stiffnesses"):
-        for level in natural_frequencies(system.replace(**{name: np.inf}), modes):
+        for level in oscillating_frequencies(system.replace(**{name: np.inf}), modes) / (2 * np.pi):
             ax.axhline(level, **_RIGID)
     for mode in range(modes):
         ax.plot(x, found[:, mode], label=f"$f_{{{mode + 1}}}$")
@@ -133,7 +134,7 @@ def figure_frequencies(
     ax.set_xscale("log" if x.min() > 0 and x.max() > 10 * x.min() else "linear")
     ax.set_yscale("log" if (found > 0).any() else "linear")
     ax.set_xlabel(parameter_label(system, name))
-    ax.set_ylabel("natural frequency / Hz")
+    ax.set_ylabel(f"{'natural' if system.conservative_part is system else 'oscillating'} frequency / Hz")
     ax.legend(loc="lower left", ncols=modes, bbox_to_anchor=(0.0, 0.98), borderaxespad=0)
     return cast(Figure, ax.figure)
 
@@ -142,6 +143,8 @@ def figure_mode_shapes(
     system: System | None = None, *, modes: int = 3, phase: float | None = None, axes: Any = None
 ) -> Figure:
     """Draw the first mode shapes, with the springs of the ends as they are and rigid.
+
+    Of complex modes, with gyroscopic forces or forces that follow the motion, the real part at that instant.
 
     Parameters
     ----------
@@ -158,7 +161,7 @@ def figure_mode_shapes(
     grid = panels(axes, len(known), modes, (2.87 * modes, 1.0 + 2.4 * len(known)), sharey="row")
     along, unit = field_label(system)
     for row, (name, field) in zip(grid, known.items(), strict=True):
-        _shapes_of_field(row, system, field, modes, 1.0 if phase is None else float(np.cos(phase)), phase is not None)
+        _shapes_of_field(row, system, field, modes, 0.0 if phase is None else phase, phase is not None)
         symbol = r"\phi" if len(known) == 1 else name
         row[0].set_ylabel(f"mass-normalised shape ${symbol}${unit}")
     for mode, ax in enumerate(grid[0]):
@@ -169,7 +172,7 @@ def figure_mode_shapes(
 
 
 def _shapes_of_field(
-    row: Sequence[Axes], system: System, field: Any, modes: int, swing: float, whole_swing: bool
+    row: Sequence[Axes], system: System, field: Any, modes: int, phase: float, whole_swing: bool
 ) -> None:
     left = float(system.domain.left)
     x = np.linspace(left, left + float(system.domain.length), 301)
@@ -179,12 +182,13 @@ def _shapes_of_field(
     }
     if looks["rigid"][0] == system:
         looks = {"": looks["rigid"]}
-    found = {name: mode_shapes(one, x, modes, field=field) for name, (one, _) in looks.items()}
+    is_complex = system.conservative_part is not system
+    found = {name: mode_shapes(one, x, modes, field=field, damped=is_complex) for name, (one, _) in looks.items()}
     for mode, ax in enumerate(row):
         ax.axhline(0.0, color="0.75", linewidth=0.8)
         for name in reversed(looks):
-            hertz = natural_frequencies(looks[name][0], modes)[mode]
-            shape = found[name][mode] * (1.0 if name == "rigid" else swing)
+            hertz = oscillating_frequencies(looks[name][0], modes)[mode] / (2 * np.pi)
+            shape = np.real(found[name][mode] * np.exp(0.0 if name == "rigid" else 1j * phase))
             ax.plot(x, shape, label=f"{name}, {hertz:.2f} Hz".removeprefix(", "), **looks[name][1])
         ax.margins(x=0.02, y=0.12)
         ax.legend(loc="upper center" if mode else "upper left", fontsize=8)

@@ -14,7 +14,7 @@ from cra_sym.analysis.stability import forced_width, judged_boundary
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
 from cra_sym.figures.drawing import figure_of, panels
-from cra_sym.figures.subject import default_excitation, single
+from cra_sym.figures.subject import default_excitation, oscillating_frequencies, single
 from cra_sym.model.excitations import AxialBase, Fluctuation, TransverseBase
 from cra_sym.model.system import System
 
@@ -58,8 +58,9 @@ def _boundary(*given: Any, **more: Any) -> tuple[np.ndarray, np.ndarray]:
 def _growth(
     system: System, excitation: Any, frequency: np.ndarray, epsilon: np.ndarray, modes: int, tolerance: float = 1e-7
 ) -> np.ndarray:
-    """Return the growth rate over a chart, converged in the number of modes where springs of ends fluctuate."""
-    residual = bool(excitation.springs(system))
+    """Return the growth rate over a chart, converged in the number of modes where springs of ends alone act."""
+    # dampers, gyroscopic and follower forces act between the modes: none is left out then
+    residual = bool(excitation.springs(system)) and bool(system.numerics("conservative"))
     return growth_rate(system, excitation, frequency, epsilon[:, None], modes, residual=residual, tolerance=tolerance)
 
 
@@ -77,7 +78,7 @@ def _excitation(system: System, given: Any, of_an_arm: Any) -> Any:
 
 
 def _rigid_body_modes(system: System) -> int:
-    return int((system.natural_frequencies(6) == 0).sum())
+    return int((oscillating_frequencies(system, 6) == 0).sum())
 
 
 def _say(ax: Axes, words: str) -> None:
@@ -88,8 +89,12 @@ def _zone(
     ax: Axes, arm: System, excitation: Any, mode: int, epsilon: np.ndarray, points: int, tolerance: float = 1e-7
 ) -> None:
     """Draw one principal zone against its detuning."""
-    centre = 2 * arm.natural_frequencies(max(mode, 3))[mode - 1]
     second = _boundary(arm, excitation, epsilon, (mode, mode), order=2, modes=max(mode, 3))
+    middle = 0.5 * (second[0] + second[1])
+    if arm.conservative_part is arm:
+        centre = 2 * float(arm.natural_frequencies(max(mode, 3))[mode - 1])
+    else:  # where the zone of as many modes begins
+        centre = float(middle[np.isfinite(middle)][0]) if np.isfinite(middle).any() else 0.0
     width = second[1] - second[0]  # to second order the zone moves and keeps its width
     first, half = (centre - width / 2, centre + width / 2), width[-1] / 2
     if not half > 0:
@@ -322,7 +327,7 @@ def figure_combinations(
     epsilon = (1.0 if isinstance(excitation, AxialBase) else 0.5) if epsilon is None else epsilon
     ax = panels(ax, 1, 1, (9.4, 5.0))[0, 0]
     still = _rigid_body_modes(system)
-    omega = system.natural_frequencies(still + 3)
+    omega = oscillating_frequencies(system, still + 3)
     frequency = np.linspace(0.5 * omega[still], 2.2 * omega[-1], points)
     sizes = np.linspace(0.0, epsilon, points // 3)
     rates = np.sqrt(_growth(system, excitation, frequency, sizes, still + 4))

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.analysis.modes import mode_shapes, natural_frequencies
+from cra_sym.analysis.eigenvalues import eigenvalues
+from cra_sym.analysis.modes import mode_shapes
 from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import instance
@@ -22,6 +23,7 @@ __all__ = [
     "fields",
     "leading_parameter",
     "moving_place",
+    "oscillating_frequencies",
     "over_what_is_stable",
     "parameter_label",
     "parameter_name",
@@ -112,12 +114,20 @@ def leading_parameter(system: System) -> str:
     ends = system.numerics("stiffnesses")
     if ends:
         return str(next(iter(ends)))
-    found = sensitivities(system, _first_elastic(system))
+    found = sensitivities(system.conservative_part, _first_elastic(system))
     return max(found.log, key=lambda name: float(np.nan_to_num(np.abs(found.log[name][-1]))))
 
 
 def _first_elastic(system: System) -> int:
-    return next((modes for modes in range(1, 8) if system.natural_frequencies(modes)[-1] > 0), 7)
+    part = system.conservative_part
+    return next((modes for modes in range(1, 8) if part.natural_frequencies(modes)[-1] > 0), 7)
+
+
+def oscillating_frequencies(system: System, modes: int) -> Array:
+    """Return the first natural frequencies, or those of the complex modes where there are none, rad/s."""
+    if system.conservative_part is system:
+        return system.natural_frequencies(modes)
+    return np.asarray(eigenvalues(system, modes).imag)
 
 
 def around(system: System, name: str, narrowing: int = 0, points: int = 81) -> Array:
@@ -134,7 +144,7 @@ def around(system: System, name: str, narrowing: int = 0, points: int = 81) -> A
     far = (1e3 if stiff else 2.0) ** 0.5**narrowing
     if 0 < abs(value) < np.inf:
         return (np.geomspace if stiff else np.linspace)(value / far, far * value, points)
-    found = sensitivities(system, _first_elastic(system) + 2, [name])
+    found = sensitivities(system.conservative_part, _first_elastic(system) + 2, [name])
     rate = np.abs(found.compliance[name] if np.isinf(value) else found.rate[name])
     good = (rate > 0) & np.isfinite(rate) & (found.frequency > 0)
     if not good.any():
@@ -147,7 +157,7 @@ def around(system: System, name: str, narrowing: int = 0, points: int = 81) -> A
 def over_what_is_stable(
     system: System, name: str, modes: int, narrowing: int = 0, points: int = 81
 ) -> tuple[Array, Array]:
-    """Return values of a parameter and the natural frequencies there, over a range where nothing buckles.
+    """Return values of a parameter and the frequencies there, Hz, over a range where nothing buckles.
 
     Raises
     ------
@@ -157,7 +167,7 @@ def over_what_is_stable(
     for more in range(narrowing, 5):
         values = around(system, name, more, points)
         try:
-            return values, natural_frequencies(system.replace(**{name: values}), modes)
+            return values, oscillating_frequencies(system.replace(**{name: values}), modes) / (2 * np.pi)
         except ValueError:
             if more == 4:
                 raise
@@ -168,7 +178,7 @@ def moving_place(system: System, modes: int = 3) -> float:
     """Return the right end, or, where no mode moves the first field there, the place that the first mode moves most."""
     left = float(system.domain.left)
     x = np.linspace(left, left + float(system.domain.length), 201)
-    shapes = np.abs(mode_shapes(system, x, modes))
+    shapes = np.abs(mode_shapes(system.conservative_part, x, modes))
     shown = shapes[max(_first_elastic(system) - 1, 0) if _first_elastic(system) <= modes else 0]
     held = shapes[:, -1].max() <= _STILL * shapes.max()
     return float(x[np.argmax(shown)] if held else x[-1])
@@ -177,7 +187,7 @@ def moving_place(system: System, modes: int = 3) -> float:
 def span(system: System, periods: float = 5.0) -> float:
     """Return a time of about so many periods of the first elastic mode, s, to one digit."""
     modes = _first_elastic(system)
-    omega = system.natural_frequencies(modes)[-1]
+    omega = system.conservative_part.natural_frequencies(modes)[-1]
     return float(f"{2 * np.pi * periods / omega:.0e}") if omega > 0 else 1.0
 
 
@@ -196,5 +206,5 @@ def default_excitation(system: System) -> Excitation:
     springs = [name for name in able if name in system.numerics("stiffnesses")]
     if not able:
         raise ValueError("excitation: must be given, as no stiffness of the model can fluctuate by itself")
-    found = sensitivities(system, _first_elastic(system), springs or able)
+    found = sensitivities(system.conservative_part, _first_elastic(system), springs or able)
     return Fluctuation({max(found.log, key=lambda name: float(np.nan_to_num(found.log[name][-1]))): 1.0})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from sympy import Add, Derivative, Expr, S, Symbol, expand, sympify
+from sympy import Add, Basic, Derivative, Expr, S, Symbol, expand, sympify
 
 from cra_sym.mechanics.jets import END_NAMES
 from cra_sym.mechanics.weak import Bilinear, weak_form
@@ -14,7 +14,7 @@ from cra_sym.model.projection import Form
 if TYPE_CHECKING:
     from cra_sym.model.lagrangian import Model
 
-__all__ = ["conservative_part", "stiffness_beside"]
+__all__ = ["beside", "conservative_part", "stiffness_beside"]
 
 
 def conservative_part(model: Model) -> Model | None:
@@ -63,6 +63,15 @@ def _is_odd_in_time(term: Expr, t: Symbol) -> bool:
     """Tell whether a term of a Lagrangian changes sign when time runs backwards."""
     odd = {node for node in term.atoms(Derivative) if sum(n for s, n in node.variable_count if s == t) % 2}
     return bool(odd) and expand(term.xreplace({node: -node for node in odd}) + term) == 0
+
+
+def beside(model: Model, part: Model) -> set[Basic]:
+    """Return the symbols of what the conservative part does not have."""
+    own = [(model._options[name], part._options[name]) for name in ("density", *END_NAMES)]
+    own += [(mine[1], left[1]) for mine, left in zip(model._options["inside"], part._options["inside"], strict=True)]
+    rest = [expand((whole or S.Zero) - (left or S.Zero)) for whole, left in own]
+    rest += [expand(force) for force, *_ in model._options["virtual_work"]]
+    return set().union(*(term.free_symbols for term in rest))
 
 
 def stiffness_beside(model: Model) -> Form | None:

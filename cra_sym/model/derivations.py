@@ -14,7 +14,7 @@ from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics.breakpoints import derivative
 from cra_sym.mechanics.jets import END_NAMES, Jet
 from cra_sym.mechanics.weak import Bilinear, WeakForm, weak_form
-from cra_sym.model.conservative_part import conservative_part, stiffness_beside
+from cra_sym.model.conservative_part import beside, conservative_part, stiffness_beside
 from cra_sym.model.driven import driven, driven_coordinate, driven_displacement, driven_spatial, pushed
 from cra_sym.model.energies import stress_route
 from cra_sym.model.energy_signs import leading, masses
@@ -320,8 +320,15 @@ def slope_place(model: Model) -> int | None:
 
 
 def stiffnesses(model: Model) -> dict[str, EndParameter]:
-    """Return the parameters that are, up to a factor, the stiffness of one displacement of an end, by name."""
-    return _end_parameters(model, S.One)
+    """Return the parameters that are, up to a factor, the stiffness of one displacement of an end, by name.
+
+    Of a model without natural modes those of its conservative part that stand nowhere else.
+    """
+    part: Model | None = model.numerics("conservative_part")
+    if part is None:
+        return _end_parameters(model, S.One)
+    elsewhere = {symbol.name for symbol in beside(model, part)}
+    return {name: spring for name, spring in _end_parameters(part, S.One).items() if name not in elsewhere}
 
 
 def inertias(model: Model) -> dict[str, EndParameter]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,9 @@ class Settled:
     error: Array
 
 
-def lowest_eigenvalues(problem: GeneralContinuum, modes: int, oscillating: bool, tolerance: float) -> Settled:
+def lowest_eigenvalues(
+    problem: GeneralContinuum, modes: int, oscillating: bool, tolerance: float, most: int | None = None
+) -> Settled:
     """Return the lowest eigenvalues of every row, with meshes refined until they converge.
 
     Parameters
@@ -53,12 +56,14 @@ def lowest_eigenvalues(problem: GeneralContinuum, modes: int, oscillating: bool,
         Leave out real eigenvalues.
     tolerance : float
         Relative difference of an eigenvalue on two meshes; the error on the finer one is far smaller.
+    most : int, optional
+        Maximum number of meshes, at least two; default: up to the finest.
     """
     rows = len(problem.edges)
     found = Settled(np.full((rows, modes), np.nan, dtype=complex), np.full((rows, modes), np.inf))
     for part, chosen, mesh in meshes(problem, modes, tolerance):
         open_, before = np.arange(len(part)), None
-        for finer in sequence(mesh):
+        for finer in islice(sequence(mesh), most):
             results = [_all(chosen.take(open_[k]), finer) for k in _chunks(chosen, finer, len(open_))]
             values, rate = _joined([values for values, _ in results]), np.concatenate([rate for _, rate in results])
             if before is not None:

@@ -62,6 +62,18 @@ def _natural_frequencies(system: System, *, modes: int = 3) -> Any:
     return cra.natural_frequencies(system, modes=modes)
 
 
+def _eigenvalues(system: System, *, modes: int = 3, oscillating: bool = True) -> Any:
+    return cra.eigenvalues(system, modes, oscillating=oscillating)
+
+
+def _oscillating_frequencies(system: System, *, modes: int = 3) -> Any:
+    return cra.eigenvalues(system, modes).imag / (2 * np.pi)
+
+
+def _damping_ratios(system: System, *, modes: int = 3) -> Any:
+    return cra.damping_ratios(system, modes)
+
+
 def _sensitivity(kind: str, parameter: str, system: System, *, modes: int = 3) -> Any:
     return getattr(cra.sensitivities(system, modes=modes, by=(parameter,)), kind)[parameter]
 
@@ -111,6 +123,15 @@ QUANTITIES: Mapping[str, Quantity] = {
     quantity.name: quantity
     for quantity in (
         Quantity("natural_frequencies", _natural_frequencies, "Hz", "natural frequencies", ("mode",)),
+        Quantity("eigenvalues", _eigenvalues, "rad/s", "complex eigenvalues", ("mode",)),
+        Quantity(
+            "oscillating_frequencies",
+            _oscillating_frequencies,
+            "Hz",
+            "imaginary parts of the complex eigenvalues over 2 pi",
+            ("mode",),
+        ),
+        Quantity("damping_ratios", _damping_ratios, "1", "damping ratios of the complex eigenvalues", ("mode",)),
         Quantity("identified", _identified, "", "values in SI that fit measured frequencies best", ("unknown",)),
         Quantity("misfit", _misfit, "1", "chi2 of the best fit to measured natural frequencies"),
         Quantity("peak_response", _peak_response, "m", "largest elastic tip displacement at the times t"),
