@@ -123,8 +123,9 @@ def backbone(
         Number of points of the whole curve, and at most of each branch.
     branches : bool
         Whether to follow the curves that cross the whole curve too, both ways, where an internal resonance joins two
-        modes or a motion of another form sets in. Like the curve itself, they are sums of cosines of ``multiples``. A
-        branch ends at energies below those of the curve, or where it closes.
+        modes or a motion of another form sets in; where several cross at one point, one of them. Like the curve itself,
+        they are sums of cosines of ``multiples``. A branch ends at energies below those of the curve, or where it
+        closes.
     place, field : optional
         Of the peak, instead of the tip.
 
@@ -234,24 +235,22 @@ def _whole(problem: FollowedMode, points: int, branches: bool) -> Backbone:
     found = list(itertools.islice(follow(curve, start), points))
     if len(found) < points:
         _unfinished(found[-1], f"after {len(found)} of {points} points")
-    whole = _of_points(problem, found, _crossings(found))
+    whole = _backbone_of(problem, *_along(found), _crossings(found))
     if not branches:
         return whole
-    lowest = problem.energy(start.unknowns)[0]
-    others = branches_of(curve, found, points, lambda point: problem.energy(point.unknowns)[0] < lowest)
-    for other in others:
+    lowest, lines = problem.energy(start.unknowns)[0], list[Backbone]()
+    for other in branches_of(curve, found, points, lambda point: problem.energy(point.unknowns)[0] < lowest):
         if other.broken:
             _unfinished((other.points or [other.origin])[-1], "on a branch")
-    told = [
-        _of_points(problem, other.points, np.array([other.origin.frequency, *_crossings(other.points)]))
-        for other in others
-        if other.points
-    ]
-    return replace(whole, branches=tuple(told))
+        if other.points:
+            crossings = np.array([other.origin.frequency, *_crossings(other.points)])
+            lines.append(_backbone_of(problem, *_along(other.points), crossings))
+    return replace(whole, branches=tuple(lines))
 
 
-def _of_points(problem: FollowedMode, points: list[Point], crossings: Array) -> Backbone:
-    return _backbone_of(problem, [p.vector for p in points], [p.tangent for p in points], (len(points),), crossings)
+def _along(points: list[Point]) -> tuple[list[Array], list[Array], tuple[int]]:
+    """Return the points of a curve, the normals that fix them, and the shape of what is said of them."""
+    return [point.vector for point in points], [point.tangent for point in points], (len(points),)
 
 
 def _at_targets(problem: FollowedMode, targets: Array, measure: Measure, name: str) -> Backbone:

@@ -162,6 +162,7 @@ def _rotation(omega: Array, time: Array) -> Array:
     return matrix
 
 
+@np.errstate(over="ignore", invalid="ignore")  # overflow gives infinite multipliers
 def multipliers(
     equations: ModalPolynomials,
     basis: Basis,
@@ -196,7 +197,6 @@ def multipliers(
     return np.take_along_axis(values, np.argsort(-np.abs(values), axis=1, kind="stable"), axis=1)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # overflow gives infinite multipliers
 def _extrapolated(
     equations: ModalPolynomials,
     basis: Basis,

@@ -153,6 +153,12 @@ def test_inextensible_arm_against_time_integration_and_its_coefficient():
     np.testing.assert_allclose(end[:3], start[:3], atol=1e-8 * np.abs(start).max())
 
 
+def test_far_out_the_caller_is_told_of_slopes_and_of_nothing_else():
+    with pytest.warns(cra.AsymptoticWarning, match="an integrand reaches") as told:
+        curve = cra.backbone(inextensible(), 2, modes=3, harmonics=5, points=120)
+    assert [warning.filename for warning in told] == [__file__] and not curve.stable[-1]
+
+
 def test_stability_far_out_is_that_of_time_integration():
     """Where a joint is 1e4 times as stiff as at rest, its force is faster than every linear mode."""
     arm, modes = cra.Arm.nominal().replace(L=0.8, m_e=0.004, J_e=1e-6, k_t=5e3, k_r=4e2), 3
