@@ -84,8 +84,8 @@ DEAR = (
     "10_claims",
     "14_large_amplitudes",
 )
-#: What draws no arm.
-ARMLESS = re.compile(r'\bdraw\("\w+"(, \w+=[^()]*)*\)')
+#: What draws no arm, or another structure.
+ARMLESS = re.compile(r'\bdraw\("\w+"(, benchmark)?(, \w+=[^()]*)*\)')
 
 
 @pytest.fixture
