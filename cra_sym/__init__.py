@@ -1,13 +1,13 @@
 """Symbolic-numeric dynamics and stability of a flexible Cartesian robotic arm.
 
-The public names below load on first use, so importing the package costs next to nothing: no derivation runs, and
+The public names below load on first use, so that importing the package is fast: no derivation runs, and
 neither SymPy nor matplotlib is imported.
 """
 
 from importlib import import_module
 from time import time
 
-_LOADED = time()  # a derivation is stored only if no source is younger
+_LOADED = time()  # a derivation is stored only if no source is newer
 __version__ = "0.1.0"
 
 _HOME = {

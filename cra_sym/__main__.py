@@ -27,7 +27,7 @@ class UsageError(ValueError):
 
 @contextmanager
 def _reading_input() -> Iterator[None]:
-    """Turn the package's complaints about a value into a usage error."""
+    """Convert the package's errors about a value to a usage error."""
     try:
         yield
     except OutputError:
@@ -37,7 +37,7 @@ def _reading_input() -> Iterator[None]:
 
 
 class Command(NamedTuple):
-    """A command: what it does in a line, the options it adds to its parser, and the function that runs it."""
+    """A command: its one-line summary, the options it adds to its parser, and the function that runs it."""
 
     summary: str
     options: Callable[[argparse.ArgumentParser], None]
@@ -111,7 +111,7 @@ def _chosen_arm(options: Options) -> Arm:
 
 
 def _changed_arm(options: Options) -> Arm | None:
-    """Return the arm asked for, or None if no option speaks of it."""
+    """Return the arm of the options, or None if none of its parameters is given."""
     given = {f.name: getattr(options, f.name) for f in dataclasses.fields(_nominal())}
     given = {name: value for name, value in given.items() if value is not None}
     return _nominal().replace(**given) if given else None
@@ -212,7 +212,7 @@ COMMANDS = {
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose complaint is one line."""
+    """A parser with one-line errors."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
         self.exit(2, f"{self.prog}: {' '.join(message.split())}\n")
@@ -221,8 +221,8 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code.
 
-    0 is success, 2 one line on standard error about what was wrong with the input or the place to write to, 1 a
-    notebook that did not run, and 128 plus its number a signal that ended the run.
+    0 is success, 2 an invalid input or output location (with one line on standard error), 1 a notebook that failed, and
+    128 plus the signal number a run ended by a signal.
     """
     import cra_sym
     from cra_sym.ending import run_command

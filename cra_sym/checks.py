@@ -1,4 +1,4 @@
-"""Argument checks shared by every room: each error names the field, the value and what it must be."""
+"""Argument checks for all subpackages: each error names the argument, its value and the allowed ones."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ __all__ = [
 
 
 default_floating_point = np.errstate(all="warn", under="ignore")
-"""Decorator: NumPy's own treatment of overflow and underflow, whatever the caller's thread has set."""
+"""Decorator: NumPy's default treatment of overflow and underflow, regardless of the caller's settings."""
 
 
 def shown(value: Any) -> str:
-    """Return a value as errors show it: in one line, and not a long one."""
+    """Return a short one-line text of a value for error messages."""
     try:
         text = " ".join(repr(value).split())
     except Exception:  # an integer of too many digits, an expression of too many levels
@@ -68,7 +68,7 @@ def real_array(
     allow_infinite : bool
         Whether infinity within the bounds is a value.
     must : str, optional
-        What the error says the value must be; written from the bounds if not given.
+        Text of the requirement in the error; by default from the bounds.
     unit : str, optional
         Unit of SI that a quantity is converted to.
 
@@ -89,7 +89,7 @@ def real_array(
         raise TypeError(f"{name} = {shown(value)}: must be {must}") from error
     try:
         raw = np.asarray(given)
-    except Exception as error:  # whatever an object does when it is asked for its numbers
+    except Exception as error:  # conversion of an arbitrary object may raise anything
         raise TypeError(f"{name} = {shown(value)}: must be {must}") from error
     if raw.dtype.kind not in "iuf":
         raise TypeError(f"{name} = {shown(value)}: must be {must}")

@@ -1,4 +1,4 @@
-"""How a command ends: one line about what was wrong, an exit code, and nothing half made, whoever ends it."""
+"""Termination of commands: one-line errors, exit codes, and clean-up on signals."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ class Ended(SystemExit):
 
 @contextmanager
 def orderly_ending() -> Iterator[None]:
-    """Raise :class:`Ended` where the block stands when Ctrl-C is pressed, the terminal closes or the system asks.
+    """Raise :class:`Ended` in the block on Ctrl-C (SIGINT), a closed terminal (SIGHUP) or SIGTERM.
 
-    A signal that is ignored stays so (``nohup``), and while the first one is obeyed no second one disturbs. Outside the
-    main thread, where Python hears no signals, nothing changes.
+    Ignored signals stay ignored (``nohup``), and further ones are ignored while the first is handled. Outside the main
+    thread, where Python receives no signals, nothing changes.
     """
     heard = {}
     if current_thread() is main_thread():
@@ -56,18 +56,18 @@ def orderly_ending() -> Iterator[None]:
 
 
 def run_command(name: str, job: Callable[[], Any], codes: Mapping[type[Exception], int]) -> int:
-    """Do a job and return the exit code: 0, that of a foreseen error, or 128 plus the number of a signal.
+    """Run a job and return the exit code: 0, that of an expected error, or 128 plus the number of a signal.
 
     Parameters
     ----------
     name : str
-        What the line on standard error begins with.
+        Prefix of the line on standard error.
     job : callable
     codes : mapping of exception class to int
-        Errors to say in a line, besides a place that cannot be read or written, which is 2.
+        Expected errors, printed in one line; a location that cannot be read or written has the code 2.
     """
     codes = {**codes, OutputError: 2, OSError: 2}
-    if isinstance(sys.stdout, TextIOWrapper):  # a terminal without a letter for it is no reason to fail
+    if isinstance(sys.stdout, TextIOWrapper):  # a terminal that cannot encode a character is not an error
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
         with orderly_ending():
@@ -76,7 +76,7 @@ def run_command(name: str, job: Callable[[], Any], codes: Mapping[type[Exception
         return 0
     except Ended as end:
         told, code = f"{name}: {end}\n", end.exit_code
-    except BrokenPipeError:  # who reads has read enough, as "head" does
+    except BrokenPipeError:  # the reader has closed the pipe, as "head" does
         told, code = "", 141
     except tuple(codes) as error:
         told, code = f"{name}: {error}\n", next(codes[kind] for kind in codes if isinstance(error, kind))
@@ -97,7 +97,7 @@ def _flush() -> None:
 
 
 def _give_up_a_closed_output() -> None:
-    """Keep Python from complaining once more, at its very end, of a standard output that is full or was closed."""
+    """Prevent a second error at exit from a standard output that is full or closed."""
     try:
         print(end="", flush=True)
     except OSError:

@@ -1,6 +1,6 @@
-"""Any system under sliders: its mode shapes, its response and its zones of instability follow each of them at once.
+"""Interactive exploration of any system: mode shapes, response and zones of instability follow the sliders.
 
-The state is plain numbers named as the parameters are, so everything but the sliders works without any widget library.
+The state is plain numbers with the names of the parameters, so only the sliders need a widget library.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _ARM = ("k_t", "k_r", "m_e", "J_e", "L", "b", "h", "E", "rho")
 _MOTION = {"v_m": "velocity", "a_m": "acceleration", "B": "amplitude", "varpi": "angular_frequency", "psi": "phase"}
 _START = {"v_m": 0.0, "a_m": 0.1, "B": 1e-3, "varpi": 10.0, "psi": 0.0, "epsilon": 0.3}
 _OF_AN_ARM = {"joint stiffness fluctuates": JOINT, "base shakes along the arm": AXIAL}
-_SWING = 24  # pictures of one swing of the mode shapes
+_SWING = 24  # frames of one cycle of the mode shapes
 _SIZE = (8.6, 2.9)
 
 #: First value, last value and number of steps; stiffnesses run through decades and end in a rigid joint.
@@ -50,7 +50,7 @@ _RANGES: dict[str, tuple[float, float, int]] = {
 
 
 class _View(NamedTuple):
-    """A picture, the names it depends on, and the arguments it is drawn with."""
+    """A picture, the names it depends on, and its arguments."""
 
     reads: frozenset[str]
     figure: LiveFigure
@@ -58,7 +58,7 @@ class _View(NamedTuple):
 
 
 class Explorer:
-    """What :func:`explore` returns: it shows itself in a notebook, with sliders or as a picture.
+    """The result of :func:`explore`, displayed in a notebook with sliders or as a picture.
 
     Attributes
     ----------
@@ -82,12 +82,12 @@ class Explorer:
 
     @property
     def system(self) -> System:
-        """The system as the sliders stand."""
+        """The system at the present values of the sliders."""
         return self._given.replace(**{name: self.values[name] for name in self._names})
 
     @property
     def motion(self) -> BaseMotion | None:
-        """The motion of the base as the sliders stand; None if one prescribed motion is not all that drives."""
+        """The motion of the base at the present values; None unless a prescribed motion is the only input."""
         given = {field: self.values[name] for name, field in self._motion.items()}
         return BaseMotion(**given) if given else None
 
@@ -114,7 +114,10 @@ class Explorer:
         return found
 
     def _zones(self) -> dict[str, Any]:
-        coarse = {"points": 17, "tolerance": 1e-4}  # growth to about 1e-4 of its largest: a picture's worth
+        coarse = {
+            "points": 17,
+            "tolerance": 1e-4,
+        }  # growth rates to about 1e-4 of the largest, sufficient for a picture
         epsilon = self.values["epsilon"] if "epsilon" not in self._names else _START["epsilon"]
         return {"system": self.system, "excitation": self.excitation, "epsilon": epsilon, **coarse}
 
@@ -165,7 +168,7 @@ class Explorer:
 
     @cached_property
     def sliders(self) -> dict[str, Any]:
-        """A slider a value, labelled by the nomenclature.
+        """One slider per value, labelled by the nomenclature.
 
         Raises
         ------
@@ -206,7 +209,7 @@ class Explorer:
             return _RANGES[name]
         try:
             values = around(self._given, name)
-        except ValueError:  # a parameter of value 0 on which no frequency depends
+        except ValueError:  # a parameter of value 0 that affects no frequency
             return 0.0, 1.0, 50
         low, high = float(values.min()), float(values.max())
         return low, high, 50
@@ -245,8 +248,8 @@ class Explorer:
 
     def __repr__(self) -> str:
         units = {name: self._named(name)[1].removesuffix("1") for name in self.values}
-        told = (f"{name} = {value:.4g} {units[name]}".rstrip() for name, value in self.values.items())
-        return f"explorer: {', '.join(told)}"
+        texts = (f"{name} = {value:.4g} {units[name]}".rstrip() for name, value in self.values.items())
+        return f"explorer: {', '.join(texts)}"
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, Any]:
         """Show the sliders where the extra ``explore`` is installed, and a picture of the same state elsewhere."""
@@ -259,7 +262,7 @@ class Explorer:
 
 
 def _choices(system: System, given: Any) -> tuple[dict[str, Any], Any]:
-    """Return what may fluctuate in the picture of the zones, by words, and what does first."""
+    """Return the excitations to choose from in the picture of the zones, by label, and the initial one."""
     if given is not None and (not isinstance(given, Parametric) or given.shape):
         raise TypeError(f"excitation = {shown(given)}: must be a single Fluctuation, JointStiffness or AxialBase")
     if isinstance(system, Arm):
@@ -275,7 +278,7 @@ def _choices(system: System, given: Any) -> tuple[dict[str, Any], Any]:
 
 
 def explore(system: System | None = None, *, excitation: Any = None, **values: Any) -> Explorer:
-    """Return a system under sliders, to be shown as the last expression of a notebook cell.
+    """Return an interactive view of a system, to be displayed as the last expression of a notebook cell.
 
     The sliders need the extra ``explore`` (ipywidgets); without it the notebook shows a picture of the same state.
 
@@ -285,7 +288,7 @@ def explore(system: System | None = None, *, excitation: Any = None, **values: A
         By default the nominal arm with an elastic joint, k_t = 1e4 N/m and k_r = 1e3 N m/rad. There is a slider for
         each parameter, for an arm k_t, k_r, m_e, J_e, L, b, h, E and rho.
     excitation : Fluctuation, JointStiffness or AxialBase, optional
-        What fluctuates in the picture of the zones.
+        Excitation in the picture of the zones.
     values : float
         Start values of the parameters by name; of the base's motion, if that is all that drives, v_m, a_m, B, varpi and
         psi; and epsilon. Names and units of these are those of the nomenclature.

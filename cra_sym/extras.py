@@ -13,7 +13,7 @@ class MissingExtraError(ImportError):
 
 
 def require(module: str, extra: str) -> ModuleType:
-    """Import and return ``module``, or say which extra of the package brings it.
+    """Import and return ``module``, or raise an error that names the extra that installs it.
 
     Raises
     ------

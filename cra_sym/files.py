@@ -1,4 +1,4 @@
-"""Writing without regret: everything is made under a temporary name beside its place, then moved there in one step."""
+"""Atomic writes of files and folders: written under a temporary name next to the target, then renamed."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from secrets import token_hex
 
 try:
     import fcntl
-except ImportError:  # Windows: nothing is locked, and only age tells what is abandoned
+except ImportError:  # Windows: no locks; abandoned folders are recognised by age only
     fcntl = None  # type: ignore[assignment]
 
 __all__ = ["OutputError", "draft", "path_of", "staged_directory", "write_text", "writing"]
 
 _MANIFEST = "manifest.json"
-_MAKER = {"made by": "cra_sym"}  # others list their files in a manifest.json too
+_MAKER = {"made by": "cra_sym"}  # marks our manifest.json among others of that name
 _OLD = ".replaced"
-_PATIENCE = 60.0  # seconds; locks are held for moments
+_PATIENCE = 60.0  # seconds; locks are held briefly
 _WRITERS = 2.0  # seconds; threads of a library may still write into a folder that is given up
-_ABANDONED = 86_400.0  # seconds; where folders cannot be locked, no run takes so long
+_ABANDONED = 86_400.0  # seconds; longer than any run, where folders cannot be locked
 _DISK = {getattr(errno, name, 0) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EROFS", "EIO", "ENXIO", "ENODEV", "ESTALE")}
 
 
 class OutputError(ValueError):
-    """An output place that cannot be used; the message names it and says why."""
+    """An output location that cannot be used; the message names it and the reason."""
 
 
 @contextmanager
 def draft(path: str | Path) -> Iterator[Path]:
-    """Give a temporary place of the same name to write a file to; at the end of the block it becomes ``path``.
+    """Yield a temporary path of the same name to write a file to; at the end of the block it replaces ``path``.
 
-    ``path`` holds either its old content or all of the new; its parents are made.
+    ``path`` has either its old content or all of the new; its parents are created.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def _listed(target: Path) -> set[str]:
 
 
 def _check_replaceable(target: Path, keep: bool) -> None:
-    """Raise unless ``target`` is absent or a directory, of which every file was made earlier or is to be kept."""
+    """Raise an error unless ``target`` is absent, or a directory with only earlier outputs or files to keep."""
     if not os.path.lexists(target):
         return
     if target.is_symlink() or not target.is_dir():
@@ -107,21 +107,19 @@ def _check_replaceable(target: Path, keep: bool) -> None:
 
 @contextmanager
 def staged_directory(target: str | Path, *, keep: bool = False) -> Iterator[Path]:
-    """Give a temporary sibling of ``target`` to write into; at the end of the block it becomes ``target``.
+    """Yield a temporary sibling of ``target`` to write into; at the end of the block it replaces ``target``.
 
-    The sibling carries a ``manifest.json`` that lists its files. An earlier output at ``target`` is replaced as a
-    whole, once everything new is complete; a directory with anything else in it is refused before any work. Whatever
-    ends the block early, ``target`` and the directories around it stay as they were. Processes that write to the same
-    place at once each write the whole of it, and the last one stays. What a killed process left behind is cleared
-    away by the next one that writes there; after a day where folders cannot be locked.
+    A ``manifest.json`` in it lists its files. An earlier output at ``target`` is replaced atomically once the new one
+    is complete; a directory with any other files is refused at the start. If the block ends early, ``target`` and its
+    parents are unchanged. Of several processes that write to the same target, the last one wins. Remains of a killed
+    process are removed by the next one that writes there, or after a day where folders cannot be locked.
 
     Parameters
     ----------
     target : path
-        Directory to make; its parents are made too.
+        Directory to create, with its parents.
     keep : bool
-        Whether files that no earlier output put into ``target`` are carried over instead of refused. Of two files of
-        one name the new one stays.
+        Whether other files in ``target`` are kept instead of refused. A new file replaces an old one of the same name.
 
     Raises
     ------
@@ -143,7 +141,7 @@ def staged_directory(target: str | Path, *, keep: bool = False) -> Iterator[Path
 
 
 def _carry_over(target: Path, folder: Path) -> None:
-    """Link or copy what is in ``target``, was not made by an earlier run and is not made now."""
+    """Link or copy the files of ``target`` that are neither from an earlier run nor written now."""
     earlier = _listed(target)
     for name in _files(target):
         place = folder / name
@@ -154,7 +152,7 @@ def _carry_over(target: Path, folder: Path) -> None:
                 raise IsADirectoryError("a folder of that name is made")
             place.parent.mkdir(parents=True, exist_ok=True)
             try:
-                os.link(target / name, place, follow_symlinks=False)  # the file itself, however large
+                os.link(target / name, place, follow_symlinks=False)  # a hard link, independent of size
             except (OSError, NotImplementedError):
                 shutil.copy2(target / name, place, follow_symlinks=False)
         except (OSError, shutil.Error) as error:
@@ -162,7 +160,7 @@ def _carry_over(target: Path, folder: Path) -> None:
 
 
 def _swap(folder: Path, target: Path) -> None:
-    """Put ``folder`` in the place of ``target``; what was there goes with the stage, or returns from it."""
+    """Replace ``target`` by ``folder``; the old one is removed with the stage, or restored on an error."""
     _copy_mode(target, folder)
     if target.exists():
         os.rename(target, folder.parent / _OLD)
@@ -170,16 +168,16 @@ def _swap(folder: Path, target: Path) -> None:
 
 
 def _copy_mode(old: Path, new: Path) -> None:
-    """Give what takes the place of something the permissions of that."""
+    """Copy the permissions of the old file or folder to its replacement."""
     with suppress(OSError):
         shutil.copymode(old, new)
 
 
-# Stages, and processes that know of each other --------------------------------------------------------------------
+# Stages, and locks between processes --------------------------------------------------------------------
 
 
 def path_of(name: str, path: str | Path) -> Path:
-    """Return an absolute path, of something or of nothing, or raise an error that names the argument."""
+    """Return an absolute path, existing or not, or raise an error that names the argument."""
     try:
         made = Path(os.path.abspath(path))
         os.lstat(made)
@@ -193,9 +191,9 @@ def path_of(name: str, path: str | Path) -> Path:
 
 @contextmanager
 def writing(target: Path, inside: Path | None = None) -> Iterator[None]:
-    """Say of what the system refuses to write that it was meant for ``target``.
+    """Convert write errors of the system to an OutputError for ``target``.
 
-    With ``inside`` only of a place in there, and of a disk that is full or failing.
+    With ``inside`` only those for paths in ``target``, and those of a full or failing disk.
     """
     try:
         yield
@@ -203,7 +201,7 @@ def writing(target: Path, inside: Path | None = None) -> Iterator[None]:
         raise OutputError(str(error).replace(str(inside), str(target)) if inside else str(error)) from None
     except OSError as error:
         place, reason = error.filename, error.strerror or error
-        if isinstance(error, shutil.Error):  # of copying a folder: (from, to, reason) of each file
+        if isinstance(error, shutil.Error):  # from copying a folder: (from, to, reason) of each file
             _, place, reason = error.args[0][0]
         if inside is None or (error.errno in _DISK if place is None else str(place).startswith(str(inside))):
             said = f"output = {str(target)!r}: cannot be written ({reason})"
@@ -213,9 +211,9 @@ def writing(target: Path, inside: Path | None = None) -> Iterator[None]:
 
 @contextmanager
 def _stage(target: Path) -> Iterator[Path]:
-    """Give a place for ``target`` in a folder beside it, which is locked while it is there, and goes at the end.
+    """Yield a path for ``target`` in a locked temporary folder next to it, which is removed at the end.
 
-    With an error the parents that were made for it go too.
+    On an error, parents that were created for it are removed too.
     """
     made = [folder for folder in target.parents if not os.path.exists(folder)]
     stage = target.parent / f".{target.name}.cra_sym-{token_hex(4)}"
@@ -233,7 +231,7 @@ def _stage(target: Path) -> Iterator[Path]:
     finally:
         try:
             _clear(stage, target, [] if complete else made)
-        except BaseException:  # a signal just now: once more, as a run hears no second one
+        except BaseException:  # interrupted by a signal: try again, as a second signal is ignored
             _clear(stage, target, [] if complete else made)
             raise
         finally:
@@ -250,7 +248,7 @@ def _clear(stage: Path, target: Path, made: list[Path]) -> None:
 
 @contextmanager
 def _alone_at(target: Path) -> Iterator[None]:
-    """Be the only process at work on the names beside ``target``, unless somebody never lets go of them."""
+    """Hold the lock on names next to ``target``; after a time-out go on without it."""
     lock = None
     with suppress(BlockingIOError):
         lock = _locked(target.parent, _PATIENCE)
@@ -261,10 +259,10 @@ def _alone_at(target: Path) -> Iterator[None]:
 
 
 def _clear_abandoned(target: Path) -> None:
-    """Remove the stages of ``target`` that no process holds; an output that was about to be replaced returns."""
+    """Remove the stages of ``target`` without a running process; an old output in one is restored."""
     pattern = re.compile(re.escape(f".{target.name}.cra_sym-") + "[0-9a-f]{8}")
     for stage in [path for path in target.parent.iterdir() if pattern.fullmatch(path.name)]:
-        with suppress(BlockingIOError):  # at work
+        with suppress(BlockingIOError):  # in use
             lock = _locked(stage, 0.0)
             if lock is not None or time.time() - stage.stat().st_mtime > _ABANDONED:
                 _discard(stage, target)
@@ -272,7 +270,7 @@ def _clear_abandoned(target: Path) -> None:
 
 
 def _discard(stage: Path, target: Path) -> None:
-    """Remove a stage; an output that was about to be replaced, and was not, returns to its place first."""
+    """Remove a stage; an old output that was not replaced is restored first."""
     with suppress(OSError):
         if (stage / _OLD).exists() and not os.path.lexists(target):
             os.rename(stage / _OLD, target)
@@ -290,13 +288,13 @@ def _locked(folder: Path, patience: float) -> int | None:
     Raises
     ------
     BlockingIOError
-        If another one has held it for so many seconds.
+        If another process still holds it after ``patience`` seconds.
     """
     if fcntl is None:
         return None
     held, end = None, time.monotonic() + patience
     try:
-        held = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)  # a pipe of that name is not waited for
+        held = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)  # do not block on a named pipe
         while True:
             try:
                 fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,6 +1,6 @@
-"""Numbers as they are brought along, as plain numbers in SI: quantities with units, exact numbers, labelled arrays.
+"""Conversion of quantities with units, exact numbers and labelled arrays to plain numbers in SI.
 
-A unit is converted or refused, never dropped. The libraries of units are known by their documented attributes only;
+A unit is converted or refused, never dropped. Libraries of units are recognised by their documented attributes;
 none of them is imported.
 """
 
@@ -25,7 +25,7 @@ _RATE = Dimension(s=-1)  # cycles or radians: a factor of 2 pi apart
 
 
 def plain_numbers(name: str, value: Any, unit: str | None = None) -> Any:
-    """Return what ``numpy.asarray`` makes numbers of: quantities converted to SI, exact numbers as floats.
+    """Return a value that ``numpy.asarray`` accepts as numbers: quantities converted to SI, exact numbers as floats.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def plain_numbers(name: str, value: Any, unit: str | None = None) -> Any:
     if hasattr(kind, "__array__") or hasattr(kind, "__array_interface__"):  # of pandas, SymPy and others
         try:
             array = np.asarray(value)
-        except Exception as error:  # whatever an object does when it is asked for its numbers
+        except Exception as error:  # conversion of an arbitrary object may raise anything
             raise TypeError(f"{name} = {_text(value)}: must be real numbers") from error
         if array.ndim:
             return plain_numbers(name, array, unit)
@@ -86,8 +86,8 @@ def paired(values: Mapping[str, Any], units: Mapping[str, str] | None = None) ->
     Raises
     ------
     ValueError
-        If a dimension has two lengths or two coordinates, arrays without names are given beside labelled ones, the
-        indexes of two series of pandas differ, or a unit is not that of ``units``.
+        If a dimension has two lengths or two coordinates, arrays without names are combined with labelled ones, the
+        indexes of two pandas series differ, or a unit is not that of ``units``.
     """
     check_rows(values)
     labelled = {name: value for name, value in values.items() if _is_labelled(value) and value.dims}
@@ -124,7 +124,7 @@ def _is_labelled(value: Any) -> bool:
 
 
 def check_rows(tables: Mapping[str, Any]) -> None:
-    """Refuse series and tables of pandas that would be paired by position though their rows have other names."""
+    """Raise an error for pandas series and tables with different indexes, which would be paired by position."""
     tables = {name: value for name, value in tables.items() if hasattr(type(value), "iloc")}
     rows = {name: table.axes[0] for name, table in tables.items()}
     first = next(iter(rows), "")
@@ -162,7 +162,7 @@ def _real_number(name: str, value: Any) -> Any:
 
 
 def _timed(value: Any, unit: str | None) -> Any:
-    """Return seconds of NumPy's time differences where a time is wanted."""
+    """Return NumPy time differences in seconds where the unit is a time."""
     if unit == "s" and value.__class__ not in _EXACT and value.dtype.kind == "m":
         return value / np.timedelta64(1, "s")
     return value
@@ -213,7 +213,7 @@ def _from_astropy(name: str, value: Any, unit: str | None) -> Any:
 
 
 def _check_stated(name: str, stated: Any, unit: str | None) -> None:
-    """Refuse a ``units`` attribute that is not the coherent unit of SI."""
+    """Raise an error for a ``units`` attribute that is not the coherent SI unit."""
     if stated is None:
         return
     text = re.sub(r"([A-Za-z])\^?(-?\d)", r"\1^\2", str(stated).strip().replace("**", "^").replace("*", " "))

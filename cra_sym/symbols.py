@@ -1,4 +1,4 @@
-r"""Every symbol once: ASCII name, LaTeX, unit, meaning, assumptions; the nomenclature table is this table.
+r"""Table of all symbols: ASCII name, LaTeX, unit, meaning, assumptions; the nomenclature is this table.
 
 >>> from cra_sym.symbols import symbol, dimension
 >>> symbol("k_t"), symbol("v")
@@ -6,7 +6,7 @@ r"""Every symbol once: ASCII name, LaTeX, unit, meaning, assumptions; the nomenc
 >>> dimension("k_t")
 Dimension(m=0, kg=1, s=-2)
 
-The table is plain text; SymPy is imported when the first symbol is asked for.
+The table is plain text; SymPy is imported when the first symbol is used.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["Dimension", "Nomenclature", "Row", "dimension", "nomenclature", "sym
 
 
 class Row(NamedTuple):
-    """One symbol; a function is a row with ``arguments``, named like the rows it depends upon."""
+    """One symbol; a function is a row with ``arguments``, the names of the rows it depends on."""
 
     name: str
     latex: str
@@ -300,7 +300,7 @@ def _expression_dimension(e: Any, given: Mapping[Any, Dimension]) -> Dimension:
 
 
 class Nomenclature(tuple[Row, ...]):
-    """The rows as a table that shows itself in a notebook."""
+    """The rows as a table with a display in notebooks."""
 
     __slots__ = ()
 
@@ -347,7 +347,7 @@ def _pretty_unit(unit: str, power: str) -> str:
 
 
 def nomenclature(group: str | None = None) -> Nomenclature:
-    """Return all rows, or those of one group, as a table that shows itself in a notebook."""
+    """Return all rows, or those of one group, as a table with a display in notebooks."""
     from cra_sym.checks import choice
 
     if group is not None:

@@ -1,4 +1,4 @@
-"""A bolted lap joint at the root of the arm: what its preload does to stiffnesses and slip force."""
+"""A bolted lap joint at the root of the arm: stiffnesses and slip force as functions of the preload."""
 
 from __future__ import annotations
 
@@ -28,30 +28,30 @@ _UNITS = {
 class BoltedJoint:
     r"""Stiffnesses and slip force of a bolted lap joint over its preload N.
 
-    Rough faces touch at their summits, and at more of them as they are pressed. With summits whose heights are
-    distributed exponentially the normal stiffness of the contact is :math:`N/\sigma` (Greenwood and Williamson), with
-    others a power of N (Pohrt and Popov): :math:`K_n = n (N_0/\sigma) (N/N_0)^m` of n faces. Sideways it
-    is :math:`2(1-\nu)/(2-\nu)` times that (Mindlin). The members' own stiffness is in series:
+    Rough faces touch at their asperities, at more of them under a larger load. For exponentially distributed asperity
+    heights the normal stiffness of the contact is :math:`N/\sigma` (Greenwood and Williamson), for other distributions
+    a power of N (Pohrt and Popov): :math:`K_n = n (N_0/\sigma) (N/N_0)^m` of n faces. The tangential
+    stiffness is :math:`2(1-\nu)/(2-\nu)` times that (Mindlin). The members' own stiffness is in series:
 
     .. math:: 1/k_d = 1/K_\tau + 1/k_{body,t}, \quad 1/k_r = 1/(K_n l^2) + 1/k_{body,r}.
 
-    The faces slide as a whole (macroslip) at Coulomb's force :math:`\mu N n`; what still holds then, bolts in bending
-    and bushings, is k_t. Microslip at smaller forces is left out: see :class:`cra_sym.Iwan`.
+    The faces slide as a whole (macroslip) at Coulomb's force :math:`\mu N n`; the remaining stiffness, of bolts in
+    bending and bushings, is k_t. Microslip at smaller forces is left out: see :class:`cra_sym.Iwan`.
 
     Parameters
     ----------
     rest : float
-        k_t, stiffness beside the friction, N/m, in [0, inf).
+        k_t, stiffness in parallel with the friction contact, N/m, in [0, inf).
     body_t, body_r : float
         Stiffness of the members, N/m and N m/rad; positive, may be inf.
     roughness : float
-        Sigma: the standard deviation of the summits' heights, m; positive.
+        Sigma: the standard deviation of the asperity heights, m; positive.
     lever : float
         Radius of gyration of the contact, m; positive.
     friction : float
         Coefficient of friction; positive.
     faces : int
-        Faces that slide: 1 of a single lap joint, 2 of a double one.
+        Number of sliding faces: 1 for a single lap joint, 2 for a double one.
     poisson : float
         Of the members, in [0, 0.5].
     exponent, reference : float
@@ -64,10 +64,11 @@ class BoltedJoint:
 
     Notes
     -----
-    The defaults are assumed, for the nominal arm: a joint in aluminium of which little holds without friction. A load
-    that falls exponentially with the distance of the faces has a stiffness proportional to it; Pohrt and Popov computed
-    exponents of 0.51 to 0.77. Mindlin's ratio is that of one circular contact; that it holds between rough faces too is
-    what Campana, Persson and Muser found.
+    The defaults are assumed, for the nominal arm: an aluminium joint with little stiffness without friction. A load
+    that decreases exponentially with the separation of the faces has a stiffness proportional to it; Pohrt and Popov
+    computed
+    exponents of 0.51 to 0.77. Mindlin's ratio is that of one circular contact; Campana, Persson and Muser found that it
+    holds between rough faces too.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""The excitation of the paper's arm that has its name: a bolted joint whose preload fluctuates, (35b)."""
+"""The named excitation of the paper's arm: a bolted joint whose preload fluctuates, (35b)."""
 
 from __future__ import annotations
 

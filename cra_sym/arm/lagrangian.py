@@ -1,4 +1,4 @@
-"""The paper's Lagrangian, (3), (4) and (7): the one place that states it. Everything else follows from it."""
+"""The paper's Lagrangian, (3), (4) and (7), from which everything else is derived."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def potential_energy(*, joint: bool = True) -> ArmLagrangian:
 
 
 def paper_lagrangian(*, joint: bool = True) -> ArmLagrangian:
-    """Return the paper's Lagrangian (7), to be put into :class:`cra_sym.Model`, changed or as it is.
+    """Return the paper's Lagrangian (7), for use in :class:`cra_sym.Model`, modified or unmodified.
 
     Parameters
     ----------

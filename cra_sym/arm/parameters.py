@@ -1,4 +1,4 @@
-"""The arm as numbers: a validated, immutable set of parameters and the dimensionless groups that govern it."""
+"""The arm: a validated, immutable set of parameters and its dimensionless groups."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ Number = float | np.ndarray
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a nominal number comes from.
+    """Origin of a nominal value.
 
     Attributes
     ----------
     kind : str
-        ``'published'`` (printed in the paper), ``'calibrated'`` (chosen so that published results come back) or
+        ``'published'`` (printed in the paper), ``'calibrated'`` (chosen to reproduce published results) or
         ``'assumed'`` (lost in the paper's text, chosen here).
     value : float
         The nominal value, SI.
     note : str
-        Why this value.
+        Reason for this value.
     """
 
     kind: str
@@ -151,7 +151,7 @@ class Arm(System):
 
     @classmethod
     def nominal(cls) -> Arm:
-        """Return the nominal arm; ``Arm.provenance`` says where each number comes from."""
+        """Return the nominal arm; ``Arm.provenance`` gives the origin of each value."""
         return cls(**{name: entry.value for name, entry in cls.provenance.items()})
 
     @classmethod
@@ -176,7 +176,7 @@ class Arm(System):
 
     @property
     def model(self) -> Model:
-        """The model of the paper's Lagrangian, its base moving as prescribed."""
+        """The model of the paper's Lagrangian with prescribed base motion."""
         return _model()
 
     @property
@@ -196,7 +196,7 @@ class Arm(System):
 
     @property
     def numerics(self) -> Numerics:
-        """What was derived from the paper's Lagrangian, compiled."""
+        """Compiled derivations from the paper's Lagrangian."""
         return _NUMERICS
 
     @property

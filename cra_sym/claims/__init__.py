@@ -1,4 +1,4 @@
-"""The paper's claims, each with a verdict the package computes: what holds, where, what does not, and what would."""
+"""The paper's claims, each with a computed verdict: whether and where it holds, and what change would make it hold."""
 
 from cra_sym.claims.family import ArmFamily, provenance_family
 from cra_sym.claims.ledger import claim, claims

@@ -1,4 +1,4 @@
-"""What the three published frequencies determine, one number, and what they cannot: a family of arms."""
+"""The one number that the three published frequencies determine, and the family of arms that share it."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ MATERIALS: Mapping[str, tuple[float, float]] = MappingProxyType(
         "acrylic": (3.2e9, 1190.0),
     }
 )
-"""Young's modulus (Pa) and density (kg/m3) from handbooks: examples, none is the paper's."""
+"""Young's modulus (Pa) and density (kg/m3) from handbooks: examples, not the paper's material."""
 
 
 def common_scale(frequencies: Any, rounding: float = 0.0005) -> tuple[float, float, np.ndarray]:
-    """Return the interval of sqrt(EI / rho A) / L^2 that rounded frequencies of a clamped bare arm agree upon.
+    """Return the interval of sqrt(EI / rho A) / L^2 that is consistent with rounded frequencies of a clamped bare arm.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def common_scale(frequencies: Any, rounding: float = 0.0005) -> tuple[float, flo
     Returns
     -------
     low, high : float
-        rad/s; low > high if they agree upon none.
+        rad/s; low > high if there is none.
     by_mode : ndarray, shape (modes, 2)
         The interval of each frequency.
 
@@ -75,7 +75,7 @@ class ArmFamily:
     published : ndarray, shape (modes,)
         Hz.
     mass, stiffness : ndarray, shape (materials, K)
-        Mass (kg) and stiffness against a force at the tip (N/m) of a strip as wide as the nominal one: these do differ.
+        Mass (kg) and stiffness against a force at the tip (N/m) of a strip as wide as the nominal one: these differ.
     """
 
     materials: tuple[str, ...]
@@ -90,7 +90,7 @@ class ArmFamily:
 def provenance_family(
     frequencies: Any = None, length: Any = None, materials: Mapping[str, tuple[float, float]] = MATERIALS
 ) -> ArmFamily:
-    """Return arms that the published frequencies cannot tell apart.
+    """Return arms with the published frequencies.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The ledger: what the paper states, and the verdict the package computes on each statement."""
+"""The ledger: the paper's statements, each with the computed verdict."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _reduced(verdict: Verdict) -> tuple[Any, ...]:
     return _rebuilt, (values | {"evidence": dict(verdict.evidence), "picture": None},)
 
 
-copyreg.pickle(Verdict, _reduced)  # a picture is a function that no name leads to: the ledger finds it
+copyreg.pickle(Verdict, _reduced)  # a picture is a function that cannot be pickled by name; the ledger provides it
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Claims on natural frequencies and on what they follow from: C01 to C04."""
+"""Claims on natural frequencies and their causes: C01 to C04."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def draw_fall_with_k_t(verdict: Verdict, ax: Axes) -> None:
 
 
 def _fig_4(found: np.ndarray, rigid: np.ndarray, visible: float) -> tuple[np.ndarray, np.ndarray]:
-    """Tell where along k_r a reader sees f1 unchanged, and where he sees f2 and f3 risen, on one axis in hertz."""
+    """Return where along k_r f1 looks unchanged, and where f2 and f3 visibly rise, on a common axis in hertz."""
     axis = max(found.max(), rigid.max())
     change = (found - rigid) / axis
     return np.abs(change[:, 0]) <= visible, np.all(change[:, 1:] > visible, axis=-1)
@@ -220,7 +220,7 @@ def flat_and_rising_with_k_r(setting: Setting) -> Finding:
 
 
 def _energy_of_a_tilt() -> str:
-    """Say how much energy the flipped joint holds when the straight arm is turned about it by one radian."""
+    """Return a sentence on the energy of the flipped joint when the straight arm is turned by one radian."""
     from sympy import latex
 
     from cra_sym.arm.lagrangian import paper_lagrangian

@@ -1,4 +1,4 @@
-"""How a verdict is drawn, and what the panels have in common."""
+"""Drawing of verdicts, and common parts of the panels."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ MARKS = {
 
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
 STYLES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
-"""Colours and line styles of the house's cycle, for panels that draw a mode more than once."""
+"""Colours and line styles of the package's cycle, for panels that draw a mode more than once."""
 
 TINTS = ("#9AD3BE", "#F1F1F1", "#FBE7DA")
 """Where a claim holds (darker), where no effect is visible, and where the opposite holds."""
@@ -53,7 +53,7 @@ _LABELS = {
 
 
 def draw_panel(picture: Callable[[Axes], None], title: str, outcome: str, ax: Axes | None = None) -> Figure:
-    """Draw a panel in the house style, by default a figure of its own, under a title that says the outcome."""
+    """Draw a panel in the package's style, by default in a new figure, with the outcome in the title."""
     with style.context(STYLE):
         if ax is None:
             ax = Figure(figsize=(5.2, 3.6), layout="constrained").subplots()
@@ -101,7 +101,7 @@ def region_map(
     ratio : ndarray, shape (len(x), len(y))
         A logarithmic ratio, negative where the claim holds.
     names : pair of str
-        What x and y are.
+        Labels of x and y.
     here : pair of float, optional
         The nominal point.
     visible : float

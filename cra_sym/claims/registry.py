@@ -59,7 +59,7 @@ def claimed(id: str, theme: str, source: str, title: str, words: str) -> Callabl
 
 
 def pictured(id: str) -> Callable[[Draw], Draw]:
-    """Register the decorated function, ``(Verdict, Axes) -> None``, as what draws the evidence."""
+    """Register the decorated function, ``(Verdict, Axes) -> None``, as the drawing of the evidence."""
 
     def register(function: Draw) -> Draw:
         ENTRIES[id].picture = function

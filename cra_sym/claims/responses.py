@@ -1,4 +1,4 @@
-"""Claims on what the disturbance does to the response: C07-C09, C22 and C23."""
+"""Claims on the effect of the disturbance on the response: C07-C09, C22 and C23."""
 
 from __future__ import annotations
 

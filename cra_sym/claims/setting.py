@@ -1,4 +1,4 @@
-"""Every number a verdict depends upon, with its provenance: published in the paper, or assumed because lost there."""
+"""All numbers on which verdicts depend, with their origin: published in the paper, or assumed because lost there."""
 
 from __future__ import annotations
 
@@ -60,18 +60,18 @@ class Setting:
     amplitude, angular_frequency, phase : float
         The disturbance B sin(varpi t + psi): m, rad/s, rad.
     duration : float
-        Responses run from 0 to here, s.
+        Duration of responses, s.
     masses : tuple of float
         Series of end-effectors, kg.
     epsilon : float
         Depth of a parametric excitation.
     peaks : tuple of float, optional
         The four amplitudes printed with Fig. 6, m: velocity with and without disturbance, acceleration with and
-        without. Lost; a reader of the printed paper can put them in.
+        without. Lost; they can be entered from the printed paper.
     modes : int
         Modes in a response.
     visible : float
-        Share from which a change counts as seen in a figure.
+        Relative change from which on it counts as visible in a figure.
     """
 
     arm: Arm = field(default_factory=Arm.nominal)
@@ -111,7 +111,7 @@ class Setting:
 
     @classmethod
     def of(cls, arm: Arm | None = None, **numbers: Any) -> Setting:
-        """Return a setting, nominal but for what is given."""
+        """Return the nominal setting with some values changed."""
         unknown = [name for name in numbers if name not in cls.provenance]
         if unknown:
             raise TypeError(f"{unknown[0]!r} is not a number of a setting: must be one of {', '.join(cls.provenance)}")

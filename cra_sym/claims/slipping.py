@@ -1,7 +1,7 @@
-"""The paper's claims on the joint, asked again of one that slips, over its preload and the size of the motion.
+"""The paper's claims on the joint, evaluated for a joint that slips, over its preload and the size of the motion.
 
-A section of its own: the ledger is of the paper's model, whose joint is two springs. Here the joint is a
-:class:`cra_sym.BoltedJoint`, which softens and slips as its preload is lost, and "as k_t falls" reads "as the preload
+They are separate from the ledger, which is about the paper's model with two springs as the joint. Here the joint is a
+:class:`cra_sym.BoltedJoint`, which softens and slips as its preload is lost, and "as k_t falls" becomes "as the preload
 falls".
 """
 
@@ -34,7 +34,7 @@ __all__ = ["SLIPPING", "slipping_claim", "slipping_claims"]
 
 _PRELOAD = np.geomspace(0.1, 100.0, 16)  # N
 _SIZES = np.array([1.0, 3.0, 10.0])  # of the motion, over the nominal one
-_SOFT = BoltedJoint(rest=20.0, body_t=20.0, lever=0.05)  # whose faces give visibly before they slip
+_SOFT = BoltedJoint(rest=20.0, body_t=20.0, lever=0.05)  # a joint with visible deformation before slip
 _SOFT_PRELOAD = np.array([0.3, 0.6, 1.2, 2.4])  # N
 _AMPLITUDE = np.geomspace(5e-3, 0.1, 6)  # m, at the tip
 _SETTLED = 1e-6  # relative error of frequencies by harmonic balance
@@ -182,9 +182,9 @@ def _grows(setting: Setting, peaks: np.ndarray, what: str, more: float) -> Findi
         peaks=Quantity(peaks, "m", "largest value: acceleration, size, preload"),
         region=Quantity(region, "1", "where it grows at each step of the acceleration: size, preload"),
     )
-    told = f"by over {percent(more)}" if more else "at all; no threshold"
+    growth = f"by over {percent(more)}" if more else "at all; no threshold"
     return Finding(
-        judgement, plain, sentence, evidence, f"the largest value grows from each acceleration to the next {told}"
+        judgement, plain, sentence, evidence, f"the largest value grows from each acceleration to the next {growth}"
     )
 
 
@@ -238,14 +238,14 @@ _JUDGES: Mapping[str, Callable[[Setting], Finding]] = {
     "C16": _zones_widen,
 }
 SLIPPING = tuple(_JUDGES)
-"""The claims that are asked again."""
+"""The claims that are evaluated for slip."""
 
 
 @cache
 def _verdict(id: str, setting: Setting) -> Verdict:
     paper, found = claim(id, setting.arm), _JUDGES[id](setting)
     return Verdict.of(
-        replace(found, sentence=f"{found.sentence} With springs alone it {_told(paper)}."),
+        replace(found, sentence=f"{found.sentence} With springs alone it {_headline_clause(paper)}."),
         id=id,
         theme=paper.theme,
         title=f"{paper.title}, with slip",
@@ -256,21 +256,21 @@ def _verdict(id: str, setting: Setting) -> Verdict:
     )
 
 
-def _told(verdict: Verdict) -> str:
+def _headline_clause(verdict: Verdict) -> str:
     """Return the headline as the end of a sentence."""
     return f"is {verdict.headline}" if verdict.outcome in ("contradicted", "undecidable") else verdict.headline
 
 
 @default_floating_point
 def slipping_claim(id: str, arm: Arm | None = None, **numbers: Any) -> Verdict:
-    """Return the verdict on a claim, asked of a bolted joint that slips, over its preload and the size of the motion.
+    """Return the verdict on a claim for a bolted joint that slips, over its preload and the size of the motion.
 
     Parameters
     ----------
     id : str
         One of `SLIPPING`.
     arm : Arm, optional
-        By default the nominal one. Its springs do not matter.
+        By default the nominal one; its springs are replaced.
     **numbers
         Fields of `Setting` to change.
 
@@ -288,5 +288,5 @@ def slipping_claim(id: str, arm: Arm | None = None, **numbers: Any) -> Verdict:
 
 
 def slipping_claims(arm: Arm | None = None, **numbers: Any) -> tuple[Verdict, ...]:
-    """Return the verdicts on all claims that are asked again; arguments as for :func:`slipping_claim`."""
+    """Return the verdicts on all claims that are evaluated for slip; arguments as for :func:`slipping_claim`."""
     return tuple(slipping_claim(id, arm, **numbers) for id in SLIPPING)

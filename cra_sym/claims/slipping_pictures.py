@@ -1,4 +1,4 @@
-"""How the verdicts on a joint that slips are drawn."""
+"""Drawings of the verdicts on a joint that slips."""
 
 from __future__ import annotations
 
@@ -82,4 +82,4 @@ PICTURES: Mapping[str, Callable[[Verdict, Axes], None]] = {
     "C13": draw_growth,
     "C16": draw_widths,
 }
-"""What draws the evidence of each claim that is asked again."""
+"""Drawing of the evidence of each claim that is evaluated for slip."""

@@ -1,4 +1,4 @@
-"""Claims on what makes the arm parametrically unstable, and near which frequencies: C14, C15 and C19."""
+"""Claims on the causes and frequencies of parametric instability: C14, C15 and C19."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _NO_GROWTH = 1e-9  # 1/s: rates below this are rounding
 
 
 def zone(arm: Arm, excitation: Any, epsilon: Any, resonance: tuple[int, int], **options: Any) -> tuple[Any, Any]:
-    """Return a stability boundary wherever its expansion is formally defined, as the paper draws it."""
+    """Return a stability boundary wherever its expansion is formally defined, as in the paper."""
     lower, upper, doubts = judged_boundary(arm, excitation, epsilon, resonance, **options)
     for kind, text in doubts:
         if kind is not AsymptoticWarning:
@@ -44,7 +44,7 @@ def zone(arm: Arm, excitation: Any, epsilon: Any, resonance: tuple[int, int], **
 
 
 def _terms(kind: str) -> tuple[bool, bool]:
-    """Tell whether an excited arm's equations have coefficients that vary in time, and force an arm at rest."""
+    """Return whether an excited arm's equations have time-dependent coefficients, and whether they force it at rest."""
     from sympy import Function, Symbol
 
     from cra_sym.paper.evaluation import put

@@ -1,4 +1,4 @@
-"""What a claim's function finds, and the verdict a reader gets."""
+"""Findings of the functions of claims, and verdicts for the reader."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["OUTCOMES", "THEMES", "Finding", "Judgement", "Quantity", "Verdict", 
 Outcome = Literal["holds", "mostly holds", "rarely holds", "contradicted", "undecidable"]
 OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
 MOSTLY = 0.5
-"""A claim that holds in more than this share of the cases tried mostly holds, in a lesser one it rarely holds."""
+"""Share of the cases above which a claim mostly holds, and below which it rarely holds."""
 THEMES = ("modes", "responses", "stability")
 
 
@@ -39,7 +39,7 @@ class Quantity(ByValue):
     unit : str
         ``"1"`` for pure numbers and for truth values.
     meaning : str
-        What the numbers are, and along which other quantities its axes run.
+        Meaning of the numbers, and the quantities along its axes.
     """
 
     values: Any
@@ -54,14 +54,14 @@ class Quantity(ByValue):
 
 @dataclass(frozen=True)
 class Judgement:
-    """How a claim fares.
+    """Outcome of a claim.
 
     Attributes
     ----------
     outcome : str
         One of `OUTCOMES`.
     share : float, optional
-        Of the cases tried, those where the claim holds; None if there are none to try.
+        Share of the cases in which the claim holds; None if there are no cases.
     here : bool, optional
         Whether it holds at the point assumed for what the paper's text lost; None if there is no such point.
     """
@@ -73,23 +73,23 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Finding:
-    """What the function of a claim returns. Mathematics stands between dollar signs, in LaTeX.
+    """Result of the function of a claim. Mathematics is LaTeX between dollar signs.
 
     Attributes
     ----------
     judgement : Judgement
     plain : str
-        What a reader should take away, in one plain sentence.
+        The conclusion in one plain sentence.
     sentence : str
         The computed numbers behind it, in words.
     evidence : mapping of Quantity
         ``"region"``, of truth values, is where a claim holds that holds somewhere.
     criterion : str
-        What was judged, with every threshold: it holds if that is so everywhere, is contradicted if nowhere.
+        The criterion with its thresholds: the claim holds if it is met everywhere, is contradicted if nowhere.
     remedy : str, optional
         The smallest change that makes the claim true, computed to do so.
     missing : str, optional
-        What the text lacks to decide.
+        Information that is missing in the text for a decision.
     """
 
     judgement: Judgement
@@ -103,7 +103,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Verdict:
-    """A claim of the paper and what the computation says about it.
+    """A claim of the paper and its computed verdict.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ class Verdict:
     plain, sentence, evidence, criterion, remedy, missing
         As in `Finding`.
     setting : Setting
-        Every number that went in.
+        All input values.
     picture : callable
         Draws the evidence into axes.
     """
@@ -144,7 +144,7 @@ class Verdict:
 
     @classmethod
     def of(cls, found: Finding, **known: Any) -> Verdict:
-        """Return the verdict that a finding makes of a claim: of its id, theme, title, words, source and setting."""
+        """Return the verdict from a finding and the id, theme, title, words, source and setting of its claim."""
         judgement = found.judgement
         return cls(
             **known,
@@ -173,9 +173,9 @@ class Verdict:
         'rarely holds (in 17 % of the cases; at our assumed point: no)'
         """
         partly = self.share is not None and 0 < self.share < 1
-        told = [f"in {_share(self.share)} of the cases"] if partly and self.share is not None else []
-        told += [f"at our assumed point: {'yes' if self.here else 'no'}"] if self.here is not None else []
-        return f"{self.outcome} ({'; '.join(told)})" if told else self.outcome
+        details = [f"in {_share(self.share)} of the cases"] if partly and self.share is not None else []
+        details += [f"at our assumed point: {'yes' if self.here else 'no'}"] if self.here is not None else []
+        return f"{self.outcome} ({'; '.join(details)})" if details else self.outcome
 
     def draw(self, ax: Axes | None = None) -> Figure:
         """Draw the evidence into one pair of axes, by default a new figure in the house style."""
@@ -186,14 +186,14 @@ class Verdict:
         return draw_panel(partial(self.picture, self), f"{self.id}  {self.title}", self.outcome, ax)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return everything as plain Python values, ready for JSON; what is not finite becomes text."""
-        told = ("id", "theme", "title", "claim", "source", "outcome", "share", "here", "headline")
+        """Return all fields as plain Python values for JSON; numbers that are not finite become text."""
+        named = ("id", "theme", "title", "claim", "source", "outcome", "share", "here", "headline")
         texts = ("plain", "sentence", "criterion", "remedy", "missing")
         evidence = {
             name: {"values": _plain(q.values), "unit": q.unit, "meaning": q.meaning}
             for name, q in self.evidence.items()
         }
-        return {**{name: getattr(self, name) for name in (*told, *texts)}, "evidence": evidence}
+        return {**{name: getattr(self, name) for name in (*named, *texts)}, "evidence": evidence}
 
     def _repr_markdown_(self) -> str:
         lines = [f"> {self.claim} ({self.source})", f"**{self.id} {self.headline}.** {self.plain}", self.sentence]
@@ -204,7 +204,7 @@ class Verdict:
 
 
 def _share(share: float) -> str:
-    """Return a share that is neither none nor all in per cent, so that rounding makes it neither.
+    """Return a share strictly between 0 and 1 in per cent, not rounded to 0 or 100.
 
     >>> _share(0.1649), _share(0.9997), _share(1e-5)
     ('16 %', 'over 99 %', 'under 1 %')
@@ -221,7 +221,7 @@ def _plain(values: np.ndarray) -> Any:
 
 
 def judged(*parts: Any, here: Any = None) -> Judgement:
-    """Judge a claim that all ``parts`` must meet, each an array that tells where it does.
+    """Judge a claim whose ``parts`` must all hold; each is an array of where that part holds.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Numbers put into sentences, with mathematics as LaTeX between dollar signs; and such sentences as plain text."""
+"""Formatting of numbers in sentences, with LaTeX between dollar signs, and conversion of sentences to plain text."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TIMES = r"\times"
 
 
 def number(value: Any, digits: int = 3) -> str:
-    """Return a number as a reader writes it: no exponent from 1e-3 to 1e5.
+    """Return a number in common notation, without an exponent from 1e-3 to 1e5.
 
     >>> print(number(0.30000001), number(1234.5), number(2e6), number(float("inf")))
     0.3 1230 $2\\times10^{6}$ infinite
@@ -90,7 +90,7 @@ def span(places: Any, where: Any, unit: str = "", form: Any = number) -> str:
 
 
 def by_outcome(judgement: Judgement, holds: str, partly: str, contradicted: str) -> str:
-    """Return the sentence that a judgement asks for: everywhere, somewhere or nowhere."""
+    """Return the sentence for a judgement: holds everywhere, somewhere or nowhere."""
     return {"holds": holds, "contradicted": contradicted}.get(judgement.outcome, partly)
 
 

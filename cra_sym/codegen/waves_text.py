@@ -204,9 +204,7 @@ class WavesText:
         traced = Traced("_regime", words, [("w", "WAVE_ENTRIES")], guarded=True)
         sizes = self.structure.sizes
         found = waves_count.regime(self._waves_of(traced)[sizes.index(max(sizes))])
-        return traced.text(
-            [kernel.where(found > 2.5, found - 1.0, found)]
-        )  # waves of both signs are not a separate regime
+        return traced.text([kernel.where(found > 2.5, found - 1.0, found)])  # both signs are not a regime
 
     def _branch(self) -> str:
         words = "Return the lowest z of free waves of so many half waves along the length."

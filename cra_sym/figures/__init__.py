@@ -76,7 +76,7 @@ def draw(name: str, system: System | None = None, **options: Any) -> Figure:
     system : System, optional
         A single one. An arm is one.
     **options
-        What else the figure's function takes, such as ``parameter="k_t"`` of 'frequencies' or ``excitation=``.
+        Further arguments of the figure's function, such as ``parameter="k_t"`` of 'frequencies' or ``excitation=``.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def animate(name: str) -> str:
 
 
 def described(name: str) -> tuple[str, str]:
-    """Return what a figure or an animation shows, and what else there is to say, from the docstring of its function."""
+    """Return the summary and the remaining text of a figure or an animation, from the docstring of its function."""
     text = cleandoc(_function(name).__doc__ or "").partition("\n\nParameters\n")[0].replace("``", "")
     first, more = (" ".join(part.split()) for part in (text + "\n\n").split("\n\n", 1))
     shown = re.sub("^(Draw|Show) ", "", first)

@@ -1,6 +1,6 @@
-"""The arm in motion, as SVG that moves by itself: no script, halts under the pointer, still for who wants no motion.
+"""Animations of the arm as SVG without scripts: they pause under the pointer and respect reduced-motion settings.
 
-A film is a strip of frames side by side that is pulled, step by step, past a window.
+An animation is a strip of frames that is moved stepwise past a window.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from cra_sym.solvers.motion import BaseMotion
 __all__ = ["curve", "document", "film", "moved", "moving_arm", "moving_modes"]
 
 _LINES = (("#0072B2", ' stroke-dasharray="7 3"'), ("#D55E00", ""))  # rigid joint, elastic joint
-_LOOSE = {"k_t": 200.0, "k_r": 20.0}  # N/m, N m/rad: loose enough to be seen
+_LOOSE = {"k_t": 200.0, "k_r": 20.0}  # N/m, N m/rad: soft enough to be visible
 _MOVE = {"distance": 0.4, "v_max": 1.0, "a_max": 4.0, "j_max": 40.0}  # m, m/s, m/s2, m/s3
-_FRAMES, _DURATION, _SLOWER = 96, 2.4, 2.5  # frames, seconds they span, how much slower they are shown
+_FRAMES, _DURATION, _SLOWER = 96, 2.4, 2.5  # frames, their duration in seconds, slow-motion factor
 _LENGTH = 240  # of the arm, pixels
 
 _RULES = """\
@@ -154,7 +154,7 @@ def film(frames: Iterable[str], width: int, seconds: float, still: float = 0.0) 
 
 
 def moved(content: str, travel: int, steps: int, seconds: float, still: float = 0.0) -> str:
-    """Return what is pulled by ``travel`` pixels in so many steps and seconds, again and again."""
+    """Return content that is moved by ``travel`` pixels in a number of steps and seconds, repeatedly."""
     timing = f"animation-duration:{seconds:.3g}s;animation-timing-function:steps({steps})"
     return f'<g class="film" style="--travel:{travel}px;--still:-{_SLOWER * still:g}s;{timing}">{content}</g>'
 
@@ -168,7 +168,7 @@ def curve(x: np.ndarray, y: np.ndarray, line: tuple[str, str], width: float) -> 
 
 
 def document(name: str, height: int, parts: list[str]) -> str:
-    """Return an SVG with words for who cannot see it and the rules by which it moves."""
+    """Return an SVG document with a text alternative and the animation rules."""
     title, description = described(name.replace("-", "_"))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" id="{name}" viewBox="0 0 720 {height}" role="img" '

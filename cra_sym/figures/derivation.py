@@ -1,4 +1,4 @@
-"""How the numbered equations rest on one another: a drawing of the registry."""
+"""Drawing of the dependencies between the numbered equations."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LOOKS = {
 
 
 def layers(chosen: Sequence[Equation]) -> dict[int | str, int]:
-    """Return for each equation the length of the longest chain of equations it rests on."""
+    """Return for each equation the length of the longest chain of equations it is derived from."""
     sources = {e.number: [n for n in e.derived_from if n in {e.number for e in chosen}] for e in chosen}
     depth: dict[int | str, int] = {}
 
@@ -76,7 +76,7 @@ def figure_derivation(chosen: Sequence[Equation] | None = None, *, ax: Axes | No
 
 
 def _placed(columns: dict[int, list[Equation]]) -> dict[int | str, tuple[float, float]]:
-    """Place each column, ordered by the mean height of what its equations rest on."""
+    """Place each column, ordered by the mean height of the sources of its equations."""
     place: dict[int | str, tuple[float, float]] = {}
     tallest = max(map(len, columns.values()))
 

@@ -1,4 +1,4 @@
-"""What the drawings share: an empty canvas, colours, and an arm bent as its first mode bends."""
+"""Common parts of the drawings: an empty canvas, colours, and an arm deflected in its first mode."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["BLUE", "GREEN", "INK", "ORANGE", "canvas", "deflection", "figure_of", "panels"]
 
-#: The style's first colours by value: "C0" would take the colour of whoever shows the figure, not of the style.
+#: The first colours of the style by value: "C0" would depend on the style that is active when the figure is shown.
 INK, BLUE, ORANGE, GREEN = "#222222", "#0072B2", "#D55E00", "#009E73"
 
 

@@ -1,4 +1,4 @@
-"""A figure that is drawn again and again into the same axes, fast enough to follow a slider."""
+"""Figures that are redrawn into the same axes, fast enough to follow a slider."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["LiveFigure"]
 
-_FILL = 0.6  # limits stay as they are while what is drawn fills this part of them: only a still axis shows a change
+_FILL = 0.6  # axis limits are kept while the data fill this share of them, so that a change is visible
 
 
 class LiveFigure:

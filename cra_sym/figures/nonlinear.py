@@ -60,7 +60,7 @@ def cubic_joint(arm: Arm, k_3: float, zeta: float | None = None) -> System:
 
 
 def show_states(ax: Axes, states: Sequence[Sequence[SteadyState]], color: str, label: str) -> None:
-    """Draw amplitudes over the excitation frequency: stable answers filled, unstable ones open.
+    """Draw amplitudes over the excitation frequency: stable solutions filled, unstable ones open.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def figure_inside_tongues(
 
 
 def swept(states: Sequence[Sequence[SteadyState]]) -> np.ndarray:
-    """Return the amplitudes that a slow sweep passes: it keeps to the stable answer nearest to the last one.
+    """Return the amplitudes of a slow sweep, which follows the stable solution nearest to the previous one.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def swept(states: Sequence[Sequence[SteadyState]]) -> np.ndarray:
     Returns
     -------
     ndarray, shape (frequencies,)
-        nan where no stable answer is known.
+        nan where no stable solution is known.
     """
     last, found = 0.0, list[float]()
     for here in states:

@@ -1,4 +1,4 @@
-"""A joint that slips: loops of force over displacement, frequency and damping over amplitude, what preload does."""
+"""Slip in the joint: hysteresis loops, frequency and damping over amplitude, effect of the preload."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def figure_slip_amplitude(
     amplitude : array_like, optional
         m.
     curve : Backbone, optional
-        What was computed already.
+        Curve computed already.
     axes : sequence of two Axes, optional
 
     Raises

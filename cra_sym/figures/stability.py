@@ -50,7 +50,7 @@ def _described(excitation: Any) -> str:
 
 
 def _boundary(*given: Any, **more: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return a boundary where a figure shows by itself what a warning would say."""
+    """Suppress warnings about a boundary that are visible in the figure anyway."""
     lower, upper, _ = judged_boundary(*given, **more)
     return lower, upper
 
@@ -93,9 +93,9 @@ def _zone(
     middle = 0.5 * (second[0] + second[1])
     if arm.conservative_part is arm:
         centre = 2 * float(arm.natural_frequencies(max(mode, 3))[mode - 1])
-    else:  # where the zone of as many modes begins
+    else:  # where the zone starts
         centre = float(middle[np.isfinite(middle)][0]) if np.isfinite(middle).any() else 0.0
-    width = second[1] - second[0]  # to second order the zone moves and keeps its width
+    width = second[1] - second[0]  # the second order shifts the zone and keeps its width
     first, half = (centre - width / 2, centre + width / 2), width[-1] / 2
     if not half > 0:
         _say(ax, _RIGID if _is_rigid(arm, excitation) else "no zone up to this ε")
@@ -117,7 +117,7 @@ def _zone(
 
 
 def _shade(ax: Axes, frequency: np.ndarray, epsilon: np.ndarray, rates: np.ndarray, step: float | None = None) -> Any:
-    """Shade what grows in steps; the rest stays white. Return None if nothing does."""
+    """Shade growth rates in steps; the rest stays white. Return None if there is no growth."""
     top = rates.max()
     if not top > 0:
         return None

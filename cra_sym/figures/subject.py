@@ -1,4 +1,4 @@
-"""What a figure has to know of the system it shows: names with units, ranges of parameters, a place that moves."""
+"""Properties of the system shown in a figure: names with units, ranges of parameters, a place that moves."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _STILL = 1e-9  # of the largest displacement: a place that a mode does not move
 
 
 def single(system: System) -> System:
-    """Return a system, or refuse what is none or a batch."""
+    """Return a system, or raise an error for anything else or a batch."""
     instance("system", system, System)
     if system.shape:
         raise ValueError(f"system has shape {system.shape}: must be a single set of values, not a batch")
@@ -76,14 +76,14 @@ def fields(system: System) -> dict[str, Any]:
 
 
 def field_label(system: System) -> tuple[str, str]:
-    """Return how the axis along the domain and a field are called, with their units where they are known."""
+    """Return the labels of the axis along the domain and of a field, with units if known."""
     if isinstance(system, Arm):
         return "position along the arm $x$ / m", " / kg$^{-1/2}$"
     return f"${system.model.equations.x}$", ""
 
 
 def parameter_label(system: System, name: str) -> str:
-    """Return a parameter with its unit, as an axis names it."""
+    """Return the axis label of a parameter, with its unit."""
     return with_unit(*parameter_name(system, name))
 
 
@@ -110,7 +110,7 @@ def rigid_ends(system: System) -> System:
 
 
 def leading_parameter(system: System) -> str:
-    """Return the first stiffness of an end, or else the parameter that the first elastic frequency owes most to."""
+    """Return the first stiffness of an end, or else the parameter that most affects the first elastic frequency."""
     ends = system.numerics("stiffnesses")
     if ends:
         return str(next(iter(ends)))
@@ -133,7 +133,7 @@ def oscillating_frequencies(system: System, modes: int) -> Array:
 def around(system: System, name: str, narrowing: int = 0, points: int = 81) -> Array:
     """Return values of a parameter over which the frequencies change: decades of a stiffness of an end.
 
-    Each ``narrowing`` takes the square root of how far they go.
+    Each ``narrowing`` takes the square root of the range factor.
 
     Raises
     ------
@@ -149,7 +149,9 @@ def around(system: System, name: str, narrowing: int = 0, points: int = 81) -> A
     good = (rate > 0) & np.isfinite(rate) & (found.frequency > 0)
     if not good.any():
         raise ValueError(f"values: must be given, as no frequency depends on {name} = {value:g}")
-    reach = float((found.frequency[good] / rate[good]).min())  # by which a first order would halve or double one
+    reach = float(
+        (found.frequency[good] / rate[good]).min()
+    )  # factor that to first order would halve or double a frequency
     middle = 1 / reach if np.isinf(value) else reach
     return np.geomspace(middle / far, middle * far, points) if stiff else np.linspace(0.0, (far - 1) * reach, points)
 
@@ -162,7 +164,7 @@ def over_what_is_stable(
     Raises
     ------
     ValueError
-        As `around`, or if the structure has buckled however small the range.
+        As `around`, or if the structure has buckled even for the smallest range.
     """
     for more in range(narrowing, 5):
         values = around(system, name, more, points)
@@ -185,14 +187,14 @@ def moving_place(system: System, modes: int = 3) -> float:
 
 
 def span(system: System, periods: float = 5.0) -> float:
-    """Return a time of about so many periods of the first elastic mode, s, to one digit."""
+    """Return the duration of about that many periods of the first elastic mode, s, to one digit."""
     modes = _first_elastic(system)
     omega = system.conservative_part.natural_frequencies(modes)[-1]
     return float(f"{2 * np.pi * periods / omega:.0e}") if omega > 0 else 1.0
 
 
 def default_excitation(system: System) -> Excitation:
-    """Return what fluctuates by default: what does so in the Lagrangian, springs of the ends, or another stiffness.
+    """Return the default excitation: that of the Lagrangian, of the springs of the ends, or of another stiffness.
 
     Raises
     ------

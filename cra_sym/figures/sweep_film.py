@@ -15,7 +15,7 @@ from cra_sym.figures.nonlinear import cubic_joint, swept
 __all__ = ["jumping_arm"]
 
 _UP, _DOWN, _GREY = ("#0072B2", ""), ("#D55E00", ' stroke-dasharray="7 3"'), ("#aaa", "")
-_SECONDS, _SWINGS = 12.0, 3  # of the film; frames a step of the sweep
+_SECONDS, _SWINGS = 12.0, 3  # frames of the animation; frames per step of the sweep
 _LEFT, _WIDE, _LOW, _HIGH = 330, 350, 230, 170  # of the chart, pixels
 
 
@@ -81,7 +81,7 @@ def jumping_arm(
 
 
 def _swinging(x: np.ndarray, shape: np.ndarray, amplitude: np.ndarray) -> str:
-    """Return the film of the arm, some swings at each frequency."""
+    """Return the animation of the arm, some cycles at each frequency."""
     swing = np.cos(2 * np.pi * np.arange(_SWINGS * amplitude.size) / 4)
     size = 80 * np.repeat(amplitude, _SWINGS) / np.nanmax(amplitude)
     frames = (curve(20 + 240 * x / x[-1], 100 - s * shape, _UP, 3) for s in size * swing)

@@ -93,7 +93,7 @@ def figure_frequency_response(
 
 
 def _drive(system: System, place: float) -> Any:
-    """Return what drives by default: the first prescribed motion or force by name, or the field at a place."""
+    """Return the default input: the first prescribed motion or force by name, or the field at a place."""
     causes = dict(system.numerics("causes"))
     ordered = sorted(causes, key=lambda name: causes[name] != "motion")
     if ordered:
@@ -221,7 +221,7 @@ def figure_input_shaping(
 
 
 def _subject(system: System, parameter: str | None) -> tuple[System, str]:
-    """Return a system that one motion moves, and the parameter that is drawn over."""
+    """Return a system with one prescribed motion, and the parameter of the axis."""
     only_motion(single(system))
     if parameter is None:
         return system, leading_parameter(system)
@@ -229,13 +229,13 @@ def _subject(system: System, parameter: str | None) -> tuple[System, str]:
 
 
 def _alone(system: System, move: BaseMotion) -> dict[Any, BaseMotion | Force]:
-    """Return the motion of what moves a system, with every force zero."""
+    """Return the histories of a system: the given motion, and zero forces."""
     cause, none = only_motion(system), Force.sampled([0.0, 1.0], [0.0, 0.0], exact=True)
     return {name: move if name == cause else none for name, _ in system.numerics("causes")}
 
 
 def _first(system: System) -> np.ndarray:
-    """Return the frequency of the first mode that vibrates, Hz."""
+    """Return the frequency of the first elastic mode, Hz."""
     found = natural_frequencies(system, 3)
     elastic = np.where(found > 0, found, np.inf).min(axis=-1)
     return np.asarray(elastic)

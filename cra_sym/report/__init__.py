@@ -1,1 +1,1 @@
-"""The whole work in one folder: executed notebooks, figures, tables and a site to read offline."""
+"""Reproduction of all results in one folder: executed notebooks, figures, tables and a site for offline reading."""

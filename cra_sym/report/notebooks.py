@@ -1,4 +1,4 @@
-"""Run the notebooks, keep what they show and nothing of the machine that ran them.
+"""Execution of notebooks, with outputs that are independent of the machine.
 
 ``python -m cra_sym.report.notebooks notebooks`` re-executes every notebook of a folder (or the files named) in place.
 """
@@ -33,11 +33,11 @@ _KERNEL = {"display_name": "Python 3 (ipykernel)", "language": "python", "name":
 
 
 class NotebookError(RuntimeError):
-    """A notebook that did not run to its end; the message names it and shows the failing cell."""
+    """A notebook that failed; the message names it and shows the failing cell."""
 
 
 def find_notebooks(folder: str | Path | None = None) -> list[Path]:
-    """Return the notebooks in reading order, by default those that lie beside the package.
+    """Return the notebooks in reading order, by default those of the source checkout.
 
     Raises
     ------
@@ -63,13 +63,13 @@ def _normalise(notebook: NotebookNode) -> None:
         for output in cell.get("outputs", []):
             if "metadata" in output:
                 output.metadata = {}
-            output.get("data", {}).pop("application/vnd.jupyter.widget-view+json", None)  # dead without its kernel
+            output.get("data", {}).pop("application/vnd.jupyter.widget-view+json", None)  # useless without its kernel
             if "image/png" in output.get("data", {}):
                 output.data["image/png"] = _indexed(output.data["image/png"])
 
 
 def _indexed(picture: str) -> str:
-    """Return a base64 PNG with a palette: plots have few colours, and a third of the bytes will do."""
+    """Return a base64 PNG with a palette, which takes a third of the size, since plots have few colours."""
     from PIL import Image
 
     full, small = Image.open(BytesIO(b64decode(picture))).convert("RGB"), BytesIO()
@@ -108,7 +108,7 @@ def execute(
     svg : bool
         Whether figures shown by value are also kept as SVG, whatever formats the notebook itself asks for.
     begun : callable, optional
-        Called at the start with a function that ends the run, cell and kernel, from any thread.
+        Called at the start with a function that stops the run, cell and kernel, from any thread.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def execute(
         km=manager,
         timeout=timeout,
         startup_timeout=timeout,  # a busy machine may need more than the minute it gets by default
-        extra_arguments=["--log-level=40"],  # the kernel's errors, not its advice
+        extra_arguments=["--log-level=40"],  # errors of the kernel, not its hints
         record_timing=False,
         coalesce_streams=True,
         resources={"metadata": {"path": str(path.parent)}},
@@ -151,7 +151,7 @@ def execute(
 
         if begun is not None:
             begun(end)
-        await client.async_execute(cleanup_kc=True)  # it ends the kernels of its own managers only, unless told
+        await client.async_execute(cleanup_kc=True)  # it shuts down only kernels of its own managers by default
 
     try:
         asyncio.run(run())
@@ -177,7 +177,7 @@ def cells_to_run(paths: Iterable[Path]) -> int:
 def refresh(paths: Sequence[Path], *, svg: bool = False) -> None:
     """Execute notebooks, as many at once as there are processors, and store their outputs in place.
 
-    A failing one keeps its file, and nothing more is begun. ``svg`` is that of :func:`execute`.
+    A failing notebook keeps its file, and no further one is started. ``svg`` is that of :func:`execute`.
     """
     import nbformat
 
@@ -188,7 +188,7 @@ def refresh(paths: Sequence[Path], *, svg: bool = False) -> None:
     ):
 
         def run(path: Path) -> NotebookNode:
-            _tell(progress, path.stem)
+            _print_chapter(progress, path.stem)
             return execute(path, progress.update, svg=svg, begun=running.append)
 
         jobs = {pool.submit(run, path): path for path in paths}
@@ -198,13 +198,13 @@ def refresh(paths: Sequence[Path], *, svg: bool = False) -> None:
         except BaseException:  # an interrupt too
             pool.shutdown(wait=False, cancel_futures=True)
             for end in running:
-                with suppress(RuntimeError):  # its loop is closed: it has ended
+                with suppress(RuntimeError):  # its event loop is closed, so it has finished
                     end()
             raise
 
 
-def _tell(progress: tqdm[Any], chapter: str) -> None:
-    """Name the chapter begun last: before the bar or, where there is none, in a line."""
+def _print_chapter(progress: tqdm[Any], chapter: str) -> None:
+    """Print the name of the last chapter started, before the progress bar or in a line of its own."""
     progress.set_description(chapter)
     if progress.disable:
         print(chapter, file=sys.stderr, flush=True)

@@ -1,4 +1,4 @@
-"""``make reproduce`` and ``make site``: every notebook, figure and table in one folder, and the site of them."""
+"""``make reproduce`` and ``make site``: all notebooks, figures and tables in one folder, and the site."""
 
 from __future__ import annotations
 
@@ -27,19 +27,20 @@ def reproduce(output: str | Path, notebooks: str | Path | None = None) -> str:
     Parameters
     ----------
     output : path
-        Folder to make. An earlier output there is replaced as a whole at the very end; anything else is refused first.
+        Folder to create. An earlier output there is replaced atomically at the end; anything else is refused at the
+        start.
     notebooks : path, optional
         Folder of the notebooks, by default that of the source checkout. Copies are executed; the folder stays as it is.
 
     Returns
     -------
     str
-        What was made, a few lines to print.
+        Summary of the output, a few lines to print.
 
     Raises
     ------
     cra_sym.extras.MissingExtraError
-        If what runs notebooks or makes the site is not installed.
+        If the libraries that run notebooks or build the site are not installed.
     cra_sym.files.OutputError
         If the folder cannot be written, before any work.
     cra_sym.report.notebooks.NotebookError
@@ -51,12 +52,12 @@ def reproduce(output: str | Path, notebooks: str | Path | None = None) -> str:
     begun = time.monotonic()
     with staged_directory(output) as folder:
         shutil.copytree(sources[0].parent, folder / "notebooks", ignore=shutil.ignore_patterns(".*"))
-        _say(f"Running {len(sources)} chapters, drawing, judging: some six minutes on two processors")
+        _print_progress(f"Running {len(sources)} chapters, drawing, judging: some six minutes on two processors")
         refresh(find_notebooks(folder / "notebooks"), svg=True)
-        _say("Drawing the figures")
+        _print_progress("Drawing the figures")
         save_figures(folder / "figures")
         save_animations(folder / "figures")
-        _say("Judging the claims")
+        _print_progress("Judging the claims")
         save_claims(folder / "claims", claims())
         _write_tables(folder / "tables")
         _write_site(folder / "site", find_notebooks(folder / "notebooks"), (folder / "figures", folder / "claims"))
@@ -76,7 +77,7 @@ def site(output: str | Path, notebooks: str | Path | None = None) -> str:
     with staged_directory(output) as folder:
         pictures = folder.with_name(f"{folder.name}.pictures")
         try:
-            _say("Judging the claims")
+            _print_progress("Judging the claims")
             save_claims(pictures, claims())
             save_animations(pictures)
             save_figures(pictures, filter(shows_any_system, FIGURES), kinds=["svg"])
@@ -95,20 +96,20 @@ def _require(extra: str, *modules: str) -> None:
         require(module, extra)
 
 
-def _say(what: str) -> None:
-    """Tell on standard error how far the work is."""
+def _print_progress(what: str) -> None:
+    """Print the progress on standard error."""
     print(what, file=sys.stderr, flush=True)
 
 
 def _write_site(folder: Path, notebooks: list[Path], pictures: Iterable[Path]) -> None:
     from cra_sym.report.site.build import write_site
 
-    _say("Checking the equations and writing the site")
+    _print_progress("Checking the equations and writing the site")
     warnings = write_site(
         folder, notebooks, claims(), [path for place in pictures for path in sorted(place.glob("*.svg"))]
     )
     if warnings:
-        _say(warnings)
+        _print_progress(warnings)
 
 
 def _write_tables(folder: Path) -> None:
@@ -120,7 +121,7 @@ def _write_tables(folder: Path) -> None:
 
 
 def _listing(folder: Path) -> str:
-    """A line for each entry of a folder: its size, and the kinds and the names of the files that lie in it."""
+    """Return a line for each entry of a folder: its size, and the kinds and names of its files."""
     lines = []
     for entry in sorted(folder.iterdir(), key=lambda path: (path.is_file(), path.name)):
         files = [entry] if entry.is_file() else [path for path in sorted(entry.rglob("*")) if path.is_file()]

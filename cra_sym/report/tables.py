@@ -1,4 +1,4 @@
-"""Small labelled tables, and the ways to write one down."""
+"""Small labelled tables, and their output formats."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def nomenclature() -> Table:
 
 
 def equations() -> Table:
-    """The paper's numbered equations and what each was derived from."""
+    """The paper's numbered equations and their sources."""
     from cra_sym.paper.equations import equations
 
     rows = [(e.number, e.title, e.kind, ", ".join(map(str, e.derived_from))) for e in equations()]
@@ -89,7 +89,7 @@ def frequencies() -> Table:
 
 
 def claims() -> Table:
-    """What the paper says, and what the computation says about it."""
+    """The paper's claims and their verdicts."""
     from cra_sym.claims import claims
     from cra_sym.claims.words import plain_text
 

@@ -36,12 +36,12 @@ def sweep(
         A key of `QUANTITIES`, ``df_dNAME`` or ``log_NAME`` of a parameter NAME, or ``f(system, **options)`` that
         broadcasts over ``system.shape`` and may add axes at the end: of real or complex numbers, or truth values.
     chunks : int, optional
-        Longest piece of each axis. Given, the dataset is lazy (Dask); with ``store`` it sizes the regions, 64 if left.
+        Longest piece of each axis. If given, the dataset is lazy (Dask); with ``store`` it is the size of the regions,
+        by default 64.
     store : path or URL, optional
         A Zarr store (format 2), written region by region while the sweep runs: a local directory, or a URL of an object
-        store such as ``"s3://bucket/study.zarr"``, which fsspec reaches with a library of its own (``s3fs``). A sweep
-        that was stopped goes on where it was: a region is in the store as a whole or not at all, and what is there is
-        not computed again.
+        store such as ``"s3://bucket/study.zarr"``, which fsspec reaches with a library of its own (``s3fs``). A
+        stopped sweep is resumed: regions are written atomically, and existing ones are not computed again.
     client : dask.distributed.Client, optional
         Where the regions of a store are computed; its workers write them, so the store must be in their reach.
     **parameters

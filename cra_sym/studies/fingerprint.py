@@ -1,8 +1,8 @@
-"""What decides the values of a sweep, as text two processes agree upon: numbers, objects, the code of functions.
+"""Fingerprints of everything that determines the values of a sweep, equal in all processes: numbers, objects, code.
 
-Neither where a function stands in its file nor how it is laid out matters, only what it does, and with which functions,
-classes and values of the user's own: those in its closure, those it takes by name from its module, and so on. What is
-installed counts by its name alone, as does what is reached as an attribute of a module.
+The position and the layout of a function in its file do not matter, only its code and the user's own functions, classes
+and values that it uses: those in its closure, those it takes by name from its module, and so on recursively. Installed
+packages, and attributes of modules, are identified by name only.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def _text(value: Any, above: tuple[int, ...], seen: dict[int, int]) -> str:
     if isinstance(value, (np.ndarray, np.generic)) and value.dtype.kind != "O":
         numbers = np.ascontiguousarray(value)
         return f"{numbers.dtype.str}{numbers.shape}{hashlib.sha256(numbers.tobytes()).hexdigest()}"
-    if id(value) in above:  # it holds itself
+    if id(value) in above:  # it contains itself
         return f"<{above.index(id(value))}>"
     within = (*above, id(value))
 
@@ -68,7 +68,7 @@ def _text(value: Any, above: tuple[int, ...], seen: dict[int, int]) -> str:
 
 
 def _tried(part: Any, above: tuple[int, ...], seen: dict[int, int]) -> str:
-    """Return the text of what a function names, or of its kind where it cannot be told."""
+    """Return the text of an object that a function uses, or only its type if that fails."""
     try:
         return part.__name__ if isinstance(part, ModuleType) else _text(part, above, seen)
     except Exception:  # a lock, an open file
@@ -76,7 +76,7 @@ def _tried(part: Any, above: tuple[int, ...], seen: dict[int, int]) -> str:
 
 
 def _is_own(value: Any) -> bool:
-    """Tell whether a function or a class is the user's: neither of this package nor installed."""
+    """Tell whether a function or a class is the user's own, not of this package or an installed one."""
     module = value.__module__ or "builtins"  # of functions SymPy makes
     place = getattr(sys.modules.get(module), "__file__", None) or ""
     return not place.startswith(_INSTALLED) and module.partition(".")[0] not in ("cra_sym", "builtins")
@@ -94,7 +94,7 @@ def _class(value: type) -> list[tuple[str, Any]]:
 
 
 def _function(value: FunctionType) -> list[tuple[str, Any]]:
-    """Return the code of a function of the user's, and what it takes from its closure and its module, by name."""
+    """Return the code of a user's function, and the names it uses from its closure and its module."""
     if not _is_own(value):
         return []
     held = inspect.getclosurevars(value).nonlocals
@@ -108,7 +108,7 @@ def _function(value: FunctionType) -> list[tuple[str, Any]]:
 
 
 def _state(value: Any) -> Any:
-    """Return what an object is rebuilt from when it is pickled."""
+    """Return the state of an object for pickling."""
     own = any("__reduce__" in vars(kind) or "__reduce_ex__" in vars(kind) for kind in type(value).__mro__[:-1])
     if not own:
         state = value.__getstate__()  # of classes that are not importable too

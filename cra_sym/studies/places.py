@@ -1,4 +1,4 @@
-"""Where a store of a sweep is: a folder, or what an object store has under a prefix."""
+"""Locations of sweep stores: a folder, or a prefix in an object store."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from cra_sym.files import OutputError, draft, path_of, writing
 __all__ = ["Bucket", "Folder", "Place", "place_of"]
 
 _OBJECTS = ("memory", "s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "adl", "oss")
-"""Protocols of stores in which an object appears as a whole or not at all."""
+"""Protocols of stores with atomic writes of objects."""
 
 
 class Place(ABC):
-    """A place of a store, whose metadata and whose chunks appear as a whole or not at all."""
+    """Location of a store with atomic writes of metadata and chunks."""
 
     is_shared = True  # between processes
 
     @property
     @abstractmethod
     def name(self) -> str:
-        """What the user called it, as an absolute path or a URL."""
+        """The location as an absolute path or a URL."""
 
     @abstractmethod
     def exists(self) -> bool:
@@ -36,19 +36,19 @@ class Place(ABC):
 
     @abstractmethod
     def opened(self) -> Any:
-        """Return what Zarr opens."""
+        """Return the object for Zarr to open."""
 
     @abstractmethod
     def keys(self, array: str) -> set[str]:
-        """Return the names of what an array has there."""
+        """Return the names of the stored chunks of an array."""
 
     @abstractmethod
     def new(self) -> AbstractContextManager[Any]:
-        """Give what Zarr writes a new store to."""
+        """Yield the object for Zarr to write a new store to."""
 
     @abstractmethod
     def writing(self) -> AbstractContextManager[None]:
-        """Turn what the system refuses into an OutputError that names the place."""
+        """Convert errors of the system to an OutputError that names the location."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Folder(Place):
         """Tell whether anything but an empty folder is there."""
         try:
             return os.path.exists(self.path) and not (self.path.is_dir() and not any(self.path.iterdir()))
-        except OSError:  # what cannot be looked into is not empty
+        except OSError:  # a folder that cannot be read counts as not empty
             return True
 
     def opened(self) -> Path:
@@ -74,7 +74,7 @@ class Folder(Place):
         return self.path
 
     def keys(self, array: str) -> set[str]:
-        """Return the names of what an array has there."""
+        """Return the names of the stored chunks of an array."""
         return {file.name for file in (self.path / array).iterdir()}
 
     def new(self) -> AbstractContextManager[Path]:
@@ -88,7 +88,7 @@ class Folder(Place):
 
 @dataclass(frozen=True)
 class Bucket(Place):
-    """What an object store has under a URL, through fsspec."""
+    """A URL in an object store, through fsspec."""
 
     url: str
 
@@ -112,13 +112,13 @@ class Bucket(Place):
         return require("zarr.storage", "scale").FsspecStore.from_url(self.url)
 
     def keys(self, array: str) -> set[str]:
-        """Return the names of what an array has there."""
+        """Return the names of the stored chunks of an array."""
         files, root = self._files()
         return {key.rpartition("/")[2] for key in files.find(f"{root}/{array}")}
 
     @contextmanager
     def new(self) -> Iterator[Any]:
-        """Give the store; a new one that is stopped before its metadata are whole is refused later, not mended."""
+        """Yield the store; one without complete metadata is refused later, not repaired."""
         with self.writing():
             yield self.opened()
 
@@ -147,7 +147,7 @@ def place_of(store: str | Path) -> Place:
         If it is neither a path nor the URL of an object store.
     """
     if not isinstance(store, str) or "://" not in store:
-        if re.match(r"[A-Za-z][A-Za-z0-9+.-]+:/", str(store)):  # a path made of a URL has lost a stroke
+        if re.match(r"[A-Za-z][A-Za-z0-9+.-]+:/", str(store)):  # a path made from a URL has lost a slash
             raise ValueError(f"store = {str(store)!r}: must be a local path, or the URL of an object store as a text")
         return Folder(path_of("store", store))
     protocol = store.partition("://")[0]

@@ -1,4 +1,4 @@
-"""What can be swept: each quantity with its unit, meaning and the axes it adds."""
+"""Quantities for sweeps, each with its unit, meaning and added axes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["QUANTITIES", "Quantity", "named_quantity"]
 
 @dataclass(frozen=True)
 class Quantity:
-    """Something of a system that can be swept.
+    """A quantity of a system for sweeps.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Quantity:
         """Raise a TypeError that names an option the function does not take, or one that it needs."""
         try:
             entries = list(inspect.signature(self.function).parameters.values())[1:]
-        except ValueError:  # a built-in function that does not say
+        except ValueError:  # a built-in function without a signature
             return
         if any(p.kind is p.VAR_KEYWORD for p in entries):
             return

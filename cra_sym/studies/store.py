@@ -1,4 +1,4 @@
-"""Sweeps written to a Zarr store region by region; a stopped sweep goes on where it was."""
+"""Sweeps written to a Zarr store region by region; a stopped sweep is resumed."""
 
 from __future__ import annotations
 
@@ -22,27 +22,26 @@ Region = tuple[slice, ...]
 
 
 def sweep_into(study: Study, store: str | Path, chunks: int, client: Any = None) -> Any:
-    """Compute what the store lacks and return the dataset, opened lazily.
+    """Compute the missing regions of the store and return the dataset, opened lazily.
 
-    A region is one Zarr chunk, which the store writes as a whole or not at all; so the chunks that are there are the
-    record of what is done, and nothing else is kept.
+    A region is one Zarr chunk, written atomically, so that the existing chunks are the only record of the work done.
 
     Parameters
     ----------
     study : Study
     store : path or URL
-        Made if it does not exist.
+        Created if it does not exist.
     chunks : int
-        Longest piece of each swept axis; a store keeps the pieces it was made with.
+        Longest piece of each swept axis; an existing store keeps its own.
     client : dask.distributed.Client, optional
         Where regions are computed and written; by default here, one after another.
 
     Raises
     ------
     ValueError
-        If the store holds something else than this sweep; it says what differs.
+        If the store is not of this sweep; the message names the differences.
     OutputError
-        If it cannot be written; what is there is whole, and a later sweep goes on from it.
+        If it cannot be written; existing regions are complete, and a later sweep resumes.
     """
     xarray = require("xarray", "scale")
     require("zarr", "scale")
@@ -74,12 +73,12 @@ def _make(study: Study, place: Place, chunks: int) -> None:
                 shape=(*study.shape, *study.added.values()),
                 chunks=_chunk_shape(study, chunks),
                 dtype=study.dtype,
-                fill_value=np.nan if study.dtype.kind == "f" else None,  # what is missing yet
+                fill_value=np.nan if study.dtype.kind == "f" else None,  # fill value of missing regions
                 attributes={"_ARRAY_DIMENSIONS": [*study.dims, *study.added], **study.variable_attributes()},
             )
             zarr.consolidate_metadata(made, zarr_format=2)
     except OutputError:
-        if not place.exists():  # else another process has made it meanwhile
+        if not place.exists():  # else another process has created it meanwhile
             raise
 
 
@@ -109,7 +108,7 @@ def _opened(study: Study, place: Place) -> Any:
 
 
 def _differences(there: dict[str, str], here: dict[str, str]) -> list[str]:
-    """Say what differs between two descriptions."""
+    """Return the differences between two descriptions."""
     found = []
     for name in dict.fromkeys([*there, *here]):
         if name not in here:

@@ -1,4 +1,4 @@
-"""A checked sweep: what is computed over which axes, evaluated piece by piece and labelled."""
+"""A validated sweep: a quantity over axes, evaluated piece by piece and labelled."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ __all__ = ["Study", "Swept", "make_study"]
 
 Index = NDArray[np.intp]
 Noted = dict[str, tuple[Any, bool]]
-"""Labels of the dimensions, and whether they are stated or only counted."""
-_BLOCK = 1 << 17  # systems evaluated at once in memory
+"""Labels of the dimensions, and whether they are given or only counted."""
+_BLOCK = 1 << 17  # systems evaluated together in memory
 _KINDS = "biufc"  # truth values, integers, real and complex numbers
 
 
@@ -70,7 +70,7 @@ class Study:
     added : mapping of str to int
         Axes that the quantity adds, with their lengths.
     dtype : numpy.dtype
-        What the quantity is made of.
+        Type of the values of the quantity.
     """
 
     system: System
@@ -131,13 +131,13 @@ class Study:
         return self._numbers(self.quantity.function(system, **self.options, **numbers, **objects))
 
     def _numbers(self, value: Any) -> NDArray[Any]:
-        """Return what the quantity gave as an array, units converted to SI."""
+        """Return the result of the quantity as an array, units converted to SI."""
         if isinstance(value, (list, tuple)):
             return np.asarray([self._numbers(entry) for entry in value])
         return np.asarray(plain_numbers(f"quantity = {self.quantity.name}", value))
 
     def check_point(self, corner: NDArray[Any]) -> None:
-        """Refuse what the quantity returns for one entry an axis unless its shape is that of the system, and more."""
+        """Raise an error unless the result for one entry per axis begins with the shape of the system."""
         number = len(self.dims)
         if corner.shape[:number] != (1,) * number:
             options = ", ".join(self.options)
@@ -183,7 +183,7 @@ class Study:
         return found
 
     def attributes(self) -> dict[str, Any]:
-        """Return what the dataset says of the parameters that are not swept."""
+        """Return the attributes of the dataset: the parameters that are not swept."""
         prefix = "arm" if isinstance(self.system, Arm) else "system"
         return {**{f"{prefix}_{name}": value for name, value in self._held().items()}, "cra_sym": cra.__version__}
 
@@ -198,7 +198,7 @@ class Study:
         return xarray.Dataset({self.quantity.name: variable}, self.coordinates(), self.attributes())
 
     def described(self) -> dict[str, str]:
-        """Return everything that decides the values, as texts by name."""
+        """Return everything that determines the values, as texts by name."""
         swept = {**self.fields, **self.numbers, **self.objects}
         model = {} if isinstance(self.system, Arm) else {"model": str(self.system.model._pieces)}
         return {
@@ -307,7 +307,7 @@ def _axis(system: System, name: str, value: Any, unit: str, noted: Noted, is_fie
 
 
 def _put(noted: Noted, dimension: str, label: Any, name: str, stated: bool) -> None:
-    """Note the labels of a dimension, or refuse others than those stated for it."""
+    """Record the labels of a dimension, or raise an error if they differ from those given for it."""
     known, before = noted.setdefault(dimension, (label, stated))
     if len(known) != len(label):
         raise ValueError(f"{name}: dimension {dimension!r} has {len(label)} entries, another {len(known)}")

@@ -1,1 +1,1 @@
-"""The site: pages beside the chapters, and the settings and the extension with which Sphinx builds it all."""
+"""The site: additional pages, and the settings and the extension with which Sphinx builds it."""

@@ -1,4 +1,4 @@
-"""How exact the numbers are: what the site states, measured when it is built; the tests hold the same table to it."""
+"""Accuracy of the results: stated values, measured when the site is built; the tests check the same table."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _ARM = {"k_t": 1e4, "k_r": 1e3, "m_e": 0.05, "J_e": 1e-4}
 
 @dataclass(frozen=True)
 class Row:
-    """A quantity, the relative error stated for it, how that is measured, and the test that goes further."""
+    """A quantity, its stated relative error, how that is measured, and the test with more cases."""
 
     quantity: str
     stated: float
@@ -217,7 +217,7 @@ ACCURACY = (
         _identified, "tests/analysis/test_identification.py",
     ),
 )  # fmt: skip
-"""What the page on accuracy states."""
+"""Rows of the page on accuracy."""
 
 
 def accuracy_table() -> str:

@@ -1,4 +1,4 @@
-"""The site: sources written from the package's own objects, and Sphinx, which makes pages of them."""
+"""Build of the site: sources generated from the package's objects, rendered by Sphinx."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ _VERSIONS = ("sympy", "mpmath", "numpy", "scipy", "numba", "matplotlib", "sphinx
 
 
 class SiteError(RuntimeError):
-    """Sphinx did not build the site; the message is what it said."""
+    """Sphinx failed to build the site; the message is its output."""
 
 
 def write_site(folder: Path, notebooks: Sequence[Path], verdicts: Sequence[Verdict], pictures: Sequence[Path]) -> str:
-    """Write the site into ``folder``; return the warnings of Sphinx, none if all is well.
+    """Write the site into ``folder``; return the warnings of Sphinx, empty if there are none.
 
     Parameters
     ----------
     folder : path
-        To be made, or empty. Nothing else is written to, but for a folder beside it that is gone afterwards.
+        New or empty folder. Only a temporary folder next to it is written besides.
     notebooks : sequence of path
-        Chapters in reading order; what they show is what is stored in them.
+        Chapters in reading order, shown with their stored outputs.
     verdicts : sequence of Verdict
     pictures : sequence of path
         SVG files of the animations, of the verdicts by their ids, and of the figures by their names.
@@ -108,7 +108,7 @@ def _environment() -> Environment:
 def _known(
     chapters: Sequence[Chapter], ledger: Sequence[Entry], verdicts: Sequence[Verdict], pictures: Sequence[Path]
 ) -> dict[str, Any]:
-    """Return what the templates of the pages may name."""
+    """Return the names available in the templates of the pages."""
     from cra_sym.arm.parameters import Arm
     from cra_sym.report.tables import TABLES
     from cra_sym.symbols import nomenclature
@@ -137,7 +137,7 @@ def _known(
 
 
 def _animation(path: Path) -> str:
-    """Return an animation, which carries its own words and rules, as a figure with a switch that holds it still."""
+    """Return an animation, with its own text and rules, as a figure with a pause switch."""
     words, more = described(path.stem)
     stop = '<label class="pause"><input type="checkbox"> Hold still</label>'
     picture = path.read_text(encoding="utf-8").strip()
@@ -145,7 +145,7 @@ def _animation(path: Path) -> str:
 
 
 def _section_of_the_readme(title: str) -> str:
-    """Return a section of the README: of the checkout, or of the installed distribution, which carries it."""
+    """Return a section of the README: from the checkout, or from the metadata of the installed distribution."""
     checkout = _HERE.parents[2]
     text = (
         (checkout / "README.md").read_text(encoding="utf-8")

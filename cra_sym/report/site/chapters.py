@@ -1,4 +1,4 @@
-"""Notebooks as chapters of the site: what Sphinx reads, and what a reader downloads."""
+"""Notebooks as chapters of the site: sources for Sphinx, and downloads."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["NUMBERED", "Chapter", "write_chapters"]
 
 NUMBERED = re.compile(r"\\qquad (?:\\mathrm\{)?\((\d{1,2}[a-z]?)\)|\\tag\{(\d{1,2}[a-z]?)\}")
-"""How a displayed formula carries the number of an equation."""
+"""Pattern of the equation number in a displayed formula."""
 _DRAWN = re.compile(r'\bdraw\("(\w+)"[^()]*\)\s*$')
 
 
@@ -70,7 +70,7 @@ def _drawn(cell: Any) -> str:
 
 
 def _prepared(notebook: NotebookNode, name: str) -> NotebookNode:
-    """Add downloads under the title, fold solutions, and say what figures show."""
+    """Add downloads under the title, fold solutions, and describe figures."""
     title, _, rest = notebook.cells[0].source.partition("\n")
     book, script = (f"{{download}}`{what} <../downloads/{name}.{kind}>`" for what, kind in _DOWNLOADS.items())
     notebook.cells[0].source = f"{title}\n\nTo run this chapter: {book}, or {script}.\n{rest}"

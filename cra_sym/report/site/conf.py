@@ -19,10 +19,10 @@ exclude_patterns = ["downloads"]
 nitpicky = False
 smartquotes_action = "D"  # dashes; quotes stay as they are written
 
-# Notebooks are shown as they are stored: whoever wants them executed does it before.
+# Notebooks are shown with their stored outputs and are not executed.
 nb_execution_mode = "off"
 nb_render_markdown_format = "myst"
-nb_mime_priority_overrides = [("*", "text/markdown", 5)]  # before HTML, whose formulas no one sets
+nb_mime_priority_overrides = [("*", "text/markdown", 5)]  # preferred to HTML, in which formulas are not rendered
 nb_merge_streams = True
 nb_number_source_lines = False
 myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "dollarmath", "fieldlist"]

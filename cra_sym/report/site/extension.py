@@ -1,4 +1,4 @@
-"""What the site needs of Sphinx beyond settings: links from numbers, words for pictures, MathJax beside the pages."""
+"""Sphinx extension of the site: links from equation numbers, text for pictures, a local copy of MathJax."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _MATHJAX = ("tex-svg.js", "input/tex/extensions")
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Connect the functions below to the moments of a build."""
+    """Connect the functions below to Sphinx events."""
     app.connect("doctree-read", plain_types)
     app.connect("doctree-resolved", link_numbers)
     app.connect("doctree-resolved", mark_equations)
@@ -93,7 +93,7 @@ def mark_equations(app: Sphinx, doctree: nodes.document, docname: str) -> None:
 
 
 def describe_pictures(app: Sphinx, doctree: nodes.document, docname: str) -> None:
-    """Give every picture without words those of the section it stands in."""
+    """Give every picture without alternative text the text of its section."""
     for picture in doctree.findall(nodes.image):
         if not picture.get("alt"):
             section: Any = picture.parent
@@ -105,13 +105,13 @@ def describe_pictures(app: Sphinx, doctree: nodes.document, docname: str) -> Non
 def level_captions(
     app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: nodes.document | None
 ) -> None:
-    """Give the captions in the sidebar, which are headings, the level that a heading has to have."""
+    """Give the captions in the sidebar, which are headings, a heading level."""
     tree = str(context.get("furo_navigation_tree", ""))
     context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
 
 
 def copy_mathjax(app: Sphinx, error: Exception | None) -> None:
-    """Copy of MathJax what the pages load, from the package that brings it."""
+    """Copy the MathJax files that the pages load from the installed package."""
     if error is not None:
         return
     source = Path(str(import_module("sphinx-mathjax-offline").__file__)).parent / "static" / "mathjax"
@@ -125,7 +125,7 @@ def copy_mathjax(app: Sphinx, error: Exception | None) -> None:
 
 
 def plain_types(app: Sphinx, doctree: nodes.document) -> None:
-    """Leave the words of a type, as of ``ndarray, shape (3,)``, unlinked but for names of classes, given in full."""
+    """Leave the words of a type such as ``ndarray, shape (3,)`` unlinked, except fully qualified class names."""
     known = {kind.__name__: f"{kind.__module__}.{kind.__name__}" for kinds in results().values() for kind in kinds}
     for link in list(doctree.findall(addnodes.pending_xref)):
         if link.get("refdomain") == "py" and not link.get("refexplicit") and _inside(link, (nodes.field,)):

@@ -1,4 +1,4 @@
-"""The equations as a graph: a drawing in SVG whose every node is the title of an equation and leads to it."""
+"""The equations as an SVG graph, in which each node is the title of an equation and links to it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The numbered equations as the site lists them: each with its formula, its sources, its uses and its proof."""
+"""The numbered equations for the site: each with its formula, its sources, its uses and its proof."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["Entry", "entries", "numbers"]
 
 @dataclass(frozen=True)
 class Entry:
-    """An equation, derived and checked, with what the site says about it."""
+    """An equation, derived and checked, with its texts on the site."""
 
     equation: Equation
     formula: str

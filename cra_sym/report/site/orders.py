@@ -1,4 +1,4 @@
-"""Observed orders of accuracy: each numerical method against what is known exactly, at two sizes."""
+"""Observed orders of convergence: each numerical method against exact results, for two sizes."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ _FIXED = (v.subs(x, 0), v.subs(x, L))
 
 @dataclass(frozen=True)
 class Order:
-    """How fast the error of a method falls.
+    """Order of convergence of a method.
 
     Attributes
     ----------
     method, size, reference : str
-        What is measured, over which size, against what.
+        The method, the size that is varied, and the reference.
     theory, observed : float
         Power of the size with which the error falls; for harmonic balance decades for two more harmonics.
 
@@ -55,7 +55,7 @@ class Order:
 
 
 def orders() -> tuple[Order, ...]:
-    """Return the order of every numerical method of the package, measured now.
+    """Measure the order of every numerical method of the package.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def orders() -> tuple[Order, ...]:
 
 
 def _power(sizes: ArrayLike, errors: ArrayLike) -> float:
-    """Return the power of the size by which two errors differ."""
+    """Return the order from two errors."""
     size, error = np.log(np.abs(sizes)), np.log(np.abs(errors))
     return float((error[0] - error[1]) / (size[0] - size[1]))
 
@@ -177,7 +177,7 @@ def _slow_flow(order: int) -> float:
 
 
 def _harmonic_balance() -> float:
-    """Return how many decades two more harmonics gain in the frequency of x'' + x + x^3 = 0 at a given energy."""
+    """Return the decades gained by two more harmonics in the frequency of x'' + x + x^3 = 0 at a given energy."""
     q, energy = sp.Symbol("q"), 10.0
     system = _oscillator(q**2 / 2 + q**4 / 4).at({})
     top, quarter, _ = _cn(energy)

@@ -1,4 +1,4 @@
-"""The reference: every public name, in groups by what it is for."""
+"""The reference: every public name, grouped by purpose."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ _GROUPS = {
 }
 
 
-# Of the machinery: returned by methods that the package calls itself.
+# Internal classes, returned by methods that the package calls itself.
 _INTERNAL = frozenset({"Distribution", "Domain", "Drive", "Numerics", "Projected", "SlipElements", "StateForm"})
 
 
@@ -100,7 +100,7 @@ def _functions() -> Iterator[Any]:
 
 @cache
 def _imports(module: str) -> dict[str, str]:
-    """Return the modules that names of a module are imported from, those for annotations alone too."""
+    """Return the modules from which a module imports its names, including imports for annotations only."""
     tree = ast.walk(ast.parse(getsource(import_module(module))))
     return {
         alias.asname or alias.name: node.module
