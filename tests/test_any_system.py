@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
 import sympy as sp
 
 import cra_sym as cra
+from cra_sym.figures.identification import figure_fit
 from cra_sym.figures.subject import default_excitation, leading_parameter
 from tests.systems import NAMES, system
 
@@ -33,7 +36,16 @@ def density(given):
 
 def measured(given):
     heavier = given.replace(**{density(given): 1.02 * given.values[density(given)]})
-    return cra.natural_frequencies(heavier, 2)
+    return cra.natural_frequencies(heavier, 1)
+
+
+def fitted(given):
+    """Return what is identified: the prior spares the search."""
+    value = given.values[density(given)]
+    return {
+        "measured": measured(given), "uncertainty": 1e-4, "unknown": (density(given),),
+        "prior": {density(given): (value, 0.1 * value)},
+    }  # fmt: skip
 
 
 #: What each function is called with beside the system.
@@ -48,13 +60,13 @@ CALLS = {
     "state_space": lambda s: {"modes": 3, "input": "w", "outputs": ["v", "y", ("v", 0.4), "tip_acceleration"]},
     "frequency_response": lambda s: {"angular_frequency": [0.7, 3.0], "x": [0.5, 1.2], "damping": "structural"},
     "sensitivities": lambda s: {"modes": 3},
-    "identify": lambda s: {"measured": measured(s), "uncertainty": 1e-3, "unknown": (density(s),)},
+    "identify": fitted,
     "certify": lambda s: {"modes": 2},
     "floquet_exponents": lambda s: {
         "excitation": default_excitation(s), "angular_frequency": principal(s), "epsilon": 0.2},
     "growth_rate": lambda s: {
         "excitation": default_excitation(s), "angular_frequency": principal(s), "epsilon": [0.1, 0.6]},
-    "stability_boundary": lambda s: {"excitation": default_excitation(s), "epsilon": [1e-3, 2e-3], "order": 2},
+    "stability_boundary": lambda s: {"excitation": default_excitation(s), "epsilon": [1e-3], "order": 2, "modes": 1},
     "forced_width": lambda s: {"excitation": cra.TransverseBase(1e-3), "modes": 2},
     "eigenvalues": lambda s: {"modes": 2},
     "damping_ratios": lambda s: {"modes": 2},
@@ -139,10 +151,79 @@ def test_a_function_takes_any_system(function, name, tmp_path):
         with pytest.raises(ValueError, match=REFUSED[function, name]):
             call(function, given, tmp_path)
         return
-    found = numbers(call(function, given, tmp_path))
+    result = call(function, given, tmp_path)
+    if function == "identify":
+        residuals = figure_fit(result).axes[1].lines[-1].get_ydata()
+        np.testing.assert_array_equal(residuals, result.residuals)
+    found = numbers(result)
     assert found and all(array.size and np.isfinite(array).all() for array in found)
     # without dampers no ratio, and the slow flow of a free mode has a decay alone
     assert any(np.abs(array).max() > 0 for array in found) == (function not in ("damping_ratios", "slow_flow_values"))
+
+
+def frequencies_over(given, **options):
+    parameter = density(given)
+    values = given.values[parameter] * np.array([1.0, 1.1, 1.3])
+    return cra.sweep(given, "natural_frequencies", **{parameter: values}, modes=2, **options).natural_frequencies
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_any_sweep_goes_past_memory_and_machine(name, tmp_path):
+    pytest.importorskip("zarr")
+    dask = pytest.importorskip("dask")
+    whole = frequencies_over(system(name)).values
+    with dask.config.set(scheduler="synchronous"):
+        lazy = frequencies_over(system(name), chunks=2)
+        assert lazy.chunks is not None
+        np.testing.assert_array_equal(lazy.values, whole)
+        np.testing.assert_array_equal(frequencies_over(system(name), store=tmp_path / "all.zarr").values, whole)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("humps", [1, 3])
+def test_extra_insensitive_shapers_keep_to_their_tolerance(name, humps):
+    """At the frequency of the mode a hump is at its top, or the residual vanishes between two."""
+    given = system(name)
+    moves = {cause: one for cause, one in driven(given).items() if isinstance(one, cra.BaseMotion)}
+    still = {cause: cra.Force(0.0) for cause in driven(given).keys() - moves}
+    number = int(np.flatnonzero(given.natural_frequencies(3) > 0)[0]) + 1
+    shaper = cra.input_shaper(given.natural_frequencies(3)[number - 1], humps=humps, tolerance=0.05)
+    shaped = {cause: move.shaped(*shaper) for cause, move in moves.items()}
+    before, after = (cra.residual_vibration(given, one | still, number) for one in (moves, shaped))
+    assert after == pytest.approx(0.05 * before, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_fit_is_swept(name):
+    given, unknown, options = system(name), density(system(name)), fitted(system(name))
+    found = cra.sweep(given, "identified", l=given.values["l"] * np.array([1.0]), **options).identified
+    assert found.values.ravel() == pytest.approx([1.02 * given.values[unknown]], rel=1e-5)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_stability_with_a_mass_that_oscillates_is_computed_and_not_proved(name):
+    given = system(name)
+    heavier = {"excitation": cra.Fluctuation({density(given): 1.0}), "angular_frequency": principal(given)}
+    with pytest.raises(ValueError, match=r"a mass oscillates; only of oscillating stiffnesses.*use growth_rate"):
+        cra.certify_stability(given, epsilon=0.1, modes=1, **heavier)
+    assert np.isfinite(cra.growth_rate(given, epsilon=0.1, modes=1, **heavier))
+
+
+def test_the_table_names_every_function_and_tests_that_exist():
+    """Each row of the table of the README: functions, what they take, files of tests that call them."""
+    root = Path(__file__).parents[1]
+    part = (root / "README.md").read_text().split("## What any system can do")[1].split("\n## ")[0]
+    rows = [line.strip("|").split(" | ") for line in part.splitlines() if line.startswith("| `")]
+    named = []
+    for first, _, last in rows:
+        functions = re.findall(r"`(\w+)`", first.split(":")[0])
+        named += [function for function in functions if hasattr(cra, function)]
+        files = re.findall(r"\(([\w/.]+)\)", last)
+        assert files, first
+        text = "".join((root / file).read_text() for file in files)
+        assert all(re.search(rf"\b{function}\b", text) for function in functions), first
+    assert CALLS.keys() - {"identify_joint"} <= set(named)
+    assert len(named) == len(set(named))
 
 
 L, b, h, E, rho, m_b, m_e, J_e, k_t, k_r, x, t = sp.symbols("L b h E rho m_b m_e J_e k_t k_r x t")

@@ -175,7 +175,7 @@ def _linear(space: JetSpace, force: Expr, label: str, origin: Expr | None = None
         if factor.has(space.t):
             raise HamiltonError(
                 f"{label}: the coefficient {space.restore(factor)} of {space.form(jet)} depends on {space.t},"
-                " so the motion does not separate"
+                " so the motion does not separate; of a periodic one, epsilon*cos(varpi*t), say small=(epsilon, varpi)"
             )
     return [(jet, expand(factor) if space.jets(factor) else factor) for jet, factor in factors]
 

@@ -115,6 +115,7 @@ def test_a_lagrangian_says_what_is_periodic_in_it():
         ({"right": -k * epsilon * cos(varpi * t) * v**4}, "must be quadratic or linear in the unknowns"),
         ({"right": k * epsilon**2 * cos(varpi * t) * v}, "at most one"),
         ({"domain": (0, L * (1 + epsilon))}, "domain: .* must be free of epsilon and varpi: no length oscillates"),
+        ({"domain": (0, L * varpi)}, r"domain: L\*varpi must be free of epsilon and varpi: no length oscillates"),
         ({"small": (epsilon, t)}, r"small = .*: must be two symbols \(epsilon, varpi\)"),
         ({"small": epsilon}, r"small = .*: must be two symbols \(epsilon, varpi\)"),
     ],
@@ -123,6 +124,12 @@ def test_what_cannot_be_periodic_is_named(options, words):
     given = {"fields": [v], "x": x, "domain": (0, L), "t": t, "essential": CLAMPED, "small": SMALL} | options
     with pytest.raises((ValueError, TypeError), match=words):
         cra.Model(BEAM, **given)
+
+
+def test_cosines_of_time_need_their_symbols():
+    pulsating = model(BEAM, right=-k * epsilon * cos(varpi * t) * v**2, essential=CLAMPED)
+    with pytest.raises(ValueError, match=r"depends on t, .* say small=\(epsilon, varpi\)"):
+        pulsating.at({**UNIT, k: 1.0, epsilon: 0.1, varpi: 3.0}).natural_frequencies(1)
 
 
 def test_small_symbols_are_no_values():
