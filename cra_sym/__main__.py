@@ -132,7 +132,7 @@ def _modes_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _print_modes(options: Options, title: str, columns: dict[str, Any], digits: int = 6) -> None:
-    """Print one row a mode, in the form asked for."""
+    """Print one row per mode, in the requested form."""
     from cra_sym.report.tables import Table
 
     if options.json:

@@ -113,7 +113,7 @@ def backbone(
         Points to return: the first along the curve with that energy (J, at zero velocity), or with that peak at the
         tip. By default the whole curve with its folds, up to ``points`` points.
     modes : int
-        How many linear modes take part, 1 to 40; with elastic-slip elements those of the system without them.
+        Number of linear modes, 1 to 40; with elastic-slip elements those of the system without them.
     harmonics : int, optional
         Highest multiple of the frequency, 1 to 60. Internal resonances with higher ones do not show. Default: 9; with
         elastic-slip elements as many as change frequency and damping ratio by less than 3e-7, at most 127. There are

@@ -1,4 +1,4 @@
-"""The equations of a backbone: one natural mode as it grows, in so many modes and harmonics."""
+"""The equations of a backbone: the continuation of a natural mode, truncated to a number of modes and harmonics."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _START = 1e-5  # nonlinear share of the forces at the first point
 
 @dataclass(frozen=True, eq=False)
 class FollowedMode:
-    """A mode to be followed, in so many modes and harmonics."""
+    """A mode to be followed, with a truncation in modes and harmonics."""
 
     system: System
     mode: int
@@ -77,7 +77,7 @@ class FollowedMode:
         return x.ravel()
 
     def small(self) -> float:
-        """Return a modal amplitude at which nonlinear forces are a small share of the linear ones."""
+        """Return a modal amplitude at which nonlinear forces are a small fraction of the linear ones."""
         square = self.equations.omega[self.mode - 1] ** 2
         low, high = -40.0, 40.0
         for _ in range(60):

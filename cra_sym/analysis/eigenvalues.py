@@ -201,7 +201,7 @@ def _unsettled(system: System, columns: Array, found: Settled, oscillating: bool
         raise ArithmeticError(f"{reason}, and none can be counted; ask for fewer modes")
     raise ValueError(
         f"{reason}; the argument principle counts {number} eigenvalues, both of each pair, with |s| < {reach:.4g} "
-        "rad/s: an end that takes up the waves leaves none, or none that the parameters determine"
+        "rad/s: an end that absorbs the waves leaves none, or none that the parameters determine"
     )
 
 

@@ -1,4 +1,4 @@
-"""Frequencies that are fitted and their rates by the unknowns: natural ones, or those of the complex eigenvalues."""
+"""Frequencies to be fitted and their rates by the unknowns: natural ones, or those of complex eigenvalues."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ __all__ = ["frequencies", "rated"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-_STEP = 1e-4  # of a coordinate: a central difference errs by its square
+_STEP = 1e-4  # step of a coordinate: the error of a central difference is its square
 _GROWS = 1e-6  # real part over the modulus of what is unstable: two that meet are known to half their digits
-_MORE = 2  # real eigenvalues for which there is room among the lowest
-_SETTLED, _MESHES = (1e-9, 1e-7), 3  # differences of two meshes that are aimed at and accepted, and how many there are
+_MORE = 2  # largest number of real eigenvalues among the lowest
+_SETTLED, _MESHES = (1e-9, 1e-7), 3  # differences between two meshes: target, accepted; and the number of meshes
 
 
 @dataclass(frozen=True)
 class _Found:
-    """Frequencies with rates that are known already."""
+    """Frequencies with known rates."""
 
     frequency: Array
     rate: Mapping[str, Array]
@@ -36,7 +36,7 @@ class _Found:
 
 
 def rated(system: System, unknowns: Sequence[Unknown], place: Array, modes: int) -> Rated:
-    """Return frequencies and their rates at a place, or at places (P, unknowns); nan where there is no stable system.
+    """Return frequencies and their rates at a point, or at points (P, unknowns); nan where there is no stable system.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def rated(system: System, unknowns: Sequence[Unknown], place: Array, modes: int)
 
     try:
         return all_at(place)
-    except ValueError:  # some of these values describe no structure, or one that has buckled
+    except ValueError:  # some values are not admissible, or the structure has buckled
         if place.ndim == 1:
             raise
     good = np.asarray(np.isfinite(frequencies(system, unknowns, place, modes)).all(axis=-1))
@@ -78,7 +78,7 @@ def _at(system: System, unknowns: Sequence[Unknown], place: Array) -> System:
 
 
 def _spread(part: Rated, unknowns: Sequence[Unknown], good: NDArray[np.bool_], modes: int) -> _Found:
-    """Return what was found at some places among all, nan elsewhere."""
+    """Return the results at all points, nan where there are none."""
 
     def among(values: Array) -> Array:
         found = np.full((len(good), modes), np.nan)
@@ -108,7 +108,7 @@ def _stable(system: System, modes: int) -> Complex:
 
 
 def _eigenvalues(system: System, modes: int, *, oscillating: bool) -> Complex:
-    """Return the lowest eigenvalues, of few meshes; nan where they do not settle."""
+    """Return the lowest eigenvalues, from few meshes; nan where they do not converge."""
     columns, pencil = flat_columns(system.parameters, system.shape), system.numerics("pencil")
     if pencil is None:
         raise ValueError(
@@ -124,7 +124,7 @@ def _eigenvalues(system: System, modes: int, *, oscillating: bool) -> Complex:
 
 
 class _Oscillating:
-    """Oscillating frequencies, and their rates by differences of the eigenvalues along the coordinates when asked for.
+    """Oscillating frequencies, with rates by differences of the eigenvalues along the coordinates, computed on use.
 
     Raises
     ------

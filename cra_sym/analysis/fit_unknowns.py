@@ -22,7 +22,7 @@ _RANGE = 1e3  # factor by which other parameters may differ from their initial v
 
 
 class Rated(Protocol):
-    """What a fit needs of :class:`Sensitivities`: frequencies (..., modes), Hz, and their derivatives by name."""
+    """The part of :class:`Sensitivities` for fits: frequencies (..., modes), Hz, and their derivatives by name."""
 
     @property
     def frequency(self) -> Array:

@@ -370,7 +370,7 @@ def _check_complex(system: System, wanted: Mapping[str, Observable]) -> None:
 
 
 def _complex_push(system: System, motions: LowestMotions, one: _Input) -> Array:
-    """Return what one unit of an input does to the state of complex modes."""
+    """Return the rate of the state of complex modes per unit of an input."""
     if one.displacement is not None:
         (acts, _, _), _ = _rows(system, motions.basis, one.displacement)
         return motions.push @ acts

@@ -162,7 +162,7 @@ def steady_states(
     drive : mapping of function of t to float, optional
         Amplitudes of prescribed motions and of forces proportional to cos(varpi t).
     modes : int
-        How many linear modes take part, 1 to 40; with elastic-slip elements those of the system without them, with
+        Number of linear modes, 1 to 40; with elastic-slip elements those of the system without them, with
         static correction at the elements.
     harmonics : int, optional
         Highest multiple of ``varpi / period``; the constant is included. Default: 7; with elastic-slip elements as many

@@ -73,7 +73,7 @@ def listed(values: Iterable[Any], form: Any = number, joint: str = "and") -> str
 
 
 def span(places: Any, where: Any, unit: str = "", form: Any = number) -> str:
-    """Return where along ``places`` a condition holds, as intervals in words.
+    """Return the intervals of ``places`` in which a condition holds, in words.
 
     >>> span([1, 2, 3, 4, 5], [True, True, False, True, True], "m")
     '1 to 2 and 4 to 5 m'

@@ -39,7 +39,7 @@ def _widths(setting: Setting, arm: Arm) -> np.ndarray:
 
 
 def _where(k_t: np.ndarray, region: np.ndarray) -> str:
-    """Say in words for which k_t a claim holds, excitation by excitation."""
+    """Return in words for which k_t a claim holds, by excitation."""
     across, joint, along = (span(k_t, row, "N/m") for row in region)
     return (
         f"for the fluctuating joint for $k_t$ of {joint}, for the base shaken along the arm {along}, for the forced "

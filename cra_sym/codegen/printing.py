@@ -116,7 +116,7 @@ class Printer(ExpressionPrinter):
 
     @property
     def doc_comment(self) -> str:
-        """What starts a line of documentation."""
+        """Prefix of a line of documentation."""
         return self.comment
 
     # Overridden by languages -----------------------------------------------------------------------------------------

@@ -409,7 +409,7 @@ class WavesText:
 
 
 def _flat(waves: Any) -> list[Any]:
-    """Return what the waves of a block are as numbers; conditions are 1 or 0."""
+    """Return the quantities of the waves of a block as numbers; conditions are 1 or 0."""
     found: list[Any] = []
     for entry in waves:
         found += _flat(entry) if isinstance(entry, tuple) else [entry]
@@ -420,7 +420,7 @@ def _flat(waves: Any) -> list[Any]:
 
 
 def _nested(entries: Sequence[Any]) -> Any:
-    """Return what `waves_three.alone` does from the numbers in a row."""
+    """Return the result of `waves_three.alone` from the numbers in a row."""
     values = [entry > 0.5 if place in _CONDITIONS else entry for place, entry in enumerate(entries)]
     near, mu, *rest = values
     return near, mu, tuple(rest[:9]), tuple(rest[9:17]), tuple(rest[17:27]), tuple(rest[27:29]), rest[29]

@@ -84,7 +84,7 @@ def show_states(ax: Axes, states: Sequence[Sequence[SteadyState]], color: str, l
 
 
 def show_curves(ax: Axes, curves: Sequence[ResponseCurve], color: str, label: str, marker: str = "o") -> None:
-    """Draw amplitudes over the excitation frequency: stable answers bold with marks, unstable ones thin.
+    """Draw amplitudes over the excitation frequency: stable solutions bold with marks, unstable ones thin.
 
     Parameters
     ----------

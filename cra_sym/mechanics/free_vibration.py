@@ -18,7 +18,7 @@ _WORDS = {1: "first", 2: "second", 3: "third", 4: "fourth", 5: "fifth"}
 
 
 class _Turning(Expansion):
-    """Motions whose phase turns at a frequency that depends on the amplitude."""
+    """Expansion of motions whose frequency depends on the amplitude."""
 
     def __init__(self, resonance: Any, total: int, coefficients: Sequence[Coefficient]) -> None:
         super().__init__(resonance, total, coefficients)
@@ -53,7 +53,7 @@ class _Turning(Expansion):
         return q
 
     def _turned(self, power: int, square: Expr) -> None:
-        """Keep what the frequency changes by, so that no force of the next order is resonant."""
+        """Store the change of the frequency by which no force of the next order is resonant."""
         cross = sum(
             (self.changes[k] * self.changes[power - k] for k in self.changes if power - k in self.changes), S.Zero
         )

@@ -182,7 +182,7 @@ def _integers_within(value: Array) -> Array:
 
 
 def varying(expressions: Sequence[Expr], x: Symbol, symbols: Sequence[Symbol]) -> tuple[Kernel | None, int]:
-    """Return how fast coefficients may vary, compiled as a function of (x, parameters), and how many of these decay.
+    """Return bounds of the variation of coefficients, compiled in (x, parameters), and the number of decaying ones.
 
     None where they are polynomials between breakpoints. See :func:`cra_sym.mechanics.breakpoints.exponents`.
     """

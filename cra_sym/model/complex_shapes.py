@@ -69,7 +69,7 @@ class ComplexShapes:
 
     @cached_property
     def _factor(self) -> Complex:
-        """What normalises the shapes, (rows, modes)."""
+        """Normalisation factors of the shapes, (rows, modes)."""
         finite = np.where(np.isinf(self.columns), 0.0, self.columns)
         there = self._states(overview_places(self.spatial, finite, len(self._parameter)))
         turn = mode_sign(there[..., : self.spatial.displacements])[..., 0]

@@ -25,7 +25,7 @@ _ROUNDING = 1e-15  # of Ritz's method, times the fourth power of the number of e
 
 @dataclass(frozen=True)
 class CrossCheck:
-    """How far two routes to the natural frequencies differ.
+    """Comparison of two methods for the natural frequencies.
 
     Attributes
     ----------
@@ -76,15 +76,18 @@ def _cause(difference: float, mode: int, accuracy: float, falling: float) -> str
     found = f"mode {mode}: Ritz's method lies {abs(difference):.1g} {'above' if difference >= 0.0 else 'below'}; "
     if abs(difference) <= max(2.0 * expected, 1e-9):
         return found + (
-            f"its elements, halved, still change it by {falling:.1g}"
+            f"halving its elements changes it by {falling:.1g}"
             if falling >= accuracy
-            else f"the own route estimates {accuracy:.1g} for itself"
+            else f"the system's own error estimate is {accuracy:.1g}"
         )
     if difference < 0.0:
-        return found + f"it bounds frequencies from above, so the own route is wrong, which estimates {accuracy:.1g}"
+        return (
+            found
+            + f"it is an upper bound, so the system's frequency is wrong, with an error estimate of {accuracy:.1g}"
+        )
     return found + (
-        f"its elements, halved, change it {falling:.1g}, the own route estimates {accuracy:.1g}: one misses "
-        "a mode or detail of a coefficient"
+        f"halving its elements changes it by {falling:.1g}, the system's own error estimate is {accuracy:.1g}: "
+        "one misses a mode or detail of a coefficient"
     )
 
 

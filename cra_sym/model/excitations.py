@@ -93,7 +93,7 @@ class Parametric(Excitation):
     """An excitation that makes the equations of motion periodic."""
 
     def drives(self, system: System, modes: int) -> list[Drive]:
-        """Return what oscillates between the first modes of the system's conservative part."""
+        """Return the oscillating matrices between the first modes of the system's conservative part."""
         raise NotImplementedError
 
     def springs(self, system: System) -> list[str]:
@@ -115,11 +115,11 @@ class LagrangianTerms(Parametric):
 
     @property
     def oscillations(self) -> tuple[Oscillation, ...]:
-        """What oscillates, (order, 'cos' or 'sin', power): varpi**power times cos or sin of order * varpi * t."""
+        """The oscillations (order, 'cos' or 'sin', power): varpi**power times cos or sin of order * varpi * t."""
         return tuple(dict.fromkeys(part.oscillation for part in self._model._periodic))
 
     def drives(self, system: System, modes: int) -> list[Drive]:
-        """Return what oscillates between the first modes of the system's conservative part."""
+        """Return the oscillating matrices between the first modes of the system's conservative part."""
         self._check(system)
         found = []
         for part in self._model._periodic:
@@ -208,7 +208,7 @@ class Fluctuation(Parametric):
         return self._numbers
 
     def drives(self, system: System, modes: int) -> list[Drive]:
-        """Return what fluctuates between the first modes; an infinite stiffness does not."""
+        """Return the fluctuating matrices between the first modes; an infinite stiffness does not fluctuate."""
         totals: dict[str, Array] = {}
         used: dict[str, tuple[str, ...]] = {}
         for name, weight in self._fluctuating(system).items():
@@ -291,7 +291,7 @@ class AxialBase(_ShakenBase, Parametric):
     """
 
     def drives(self, system: System, modes: int) -> list[Drive]:
-        """Return what oscillates: a stiffness that grows with the square of the excitation frequency."""
+        """Return the oscillating matrix: a stiffness proportional to the square of the excitation frequency."""
         form = between_modes(system, modes, system.numerics("axial"))
         return [Drive(Oscillation(1, "cos", 2), np.asarray(self.amplitude)[..., None, None] * form["axial"])]
 

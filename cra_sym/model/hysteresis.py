@@ -168,7 +168,7 @@ class Iwan(Element):
     beta : float, ndarray or Expr
         S over the stiffness of the other elements, in [0, inf).
     number : int
-        How many Jenkins elements stand for it in analyses, see `elements`.
+        Number of Jenkins elements that represent it in analyses, see `elements`.
 
     Raises
     ------

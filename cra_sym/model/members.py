@@ -125,7 +125,8 @@ def joined(
     joints : sequence of (end, end)
         Ends that move together, such as ``(column.end, beam.start)``.
     essential : sequence of Expr
-        What vanishes besides, such as ``*column.start`` of a clamped foot. At interior places it is a support.
+        Further expressions that vanish, such as ``*column.start`` of a clamped foot. At interior places it is a
+        support.
     terms : Expr
         Lagrangian of masses and springs at ends, in evaluated forms such as ``m * v.subs(x, L).diff(t)**2 / 2``.
     virtual_work : sequence of (force, displacement, None)

@@ -148,7 +148,7 @@ class _Projection:
         return ((left * weights) @ right.T).reshape((self._n,) * total)
 
     def _factor(self, factor: Factor) -> list[tuple[Array, int, int]]:
-        """Return what a factor is in modal coordinates: arrays with their numbers of coordinates and velocities."""
+        """Return a factor in modal coordinates: arrays with their numbers of coordinates and velocities."""
         if factor.quadrature < 0:
             values = self._displacement(factor.place)
             return [(values, 1 - factor.time, factor.time)]

@@ -53,6 +53,6 @@ class Jumps:
 
 
 def jumps(breaks: Breaks, left: Expr, length: Expr, symbols: tuple[Symbol, ...]) -> Jumps:
-    """Return how the parameters move the breakpoints of a model."""
+    """Return the breakpoints of a model with their rates by the parameters."""
     rates = [end.diff(symbol) for end in (left, length) for symbol in symbols]
     return Jumps(breaks, kernel((left, length, *rates), symbols, backend="numpy"))

@@ -64,7 +64,7 @@ class Observable:
 
 
 def named_observables(model: Model) -> dict[str, Observable]:
-    """Return what can be measured of any model, by name.
+    """Return the named measurable quantities of a model.
 
     Fields at the right end, coordinates and prescribed motions by their names; 'y', the first field there in the
     inertial frame, and its rates; and the forces that the structure exerts through its ends.
@@ -161,7 +161,7 @@ def _functions(expression: Expr) -> list[Expr]:
 
 
 def _part(model: Model, node: Expr, name: str) -> tuple[Part, Expr]:
-    """Return what a function at a place, or a derivative of one, is, and its place."""
+    """Return the part that a function at a place, or a derivative of one, represents, and its place."""
     equations = model.equations
     x, t = equations.x, equations.t
     local = at_place(node, x)

@@ -102,7 +102,7 @@ class Stations(Protocol):
 
 
 class Route(Protocol):
-    """How frequencies and modes of a model are computed."""
+    """Protocol of a method for the frequencies and modes of a model."""
 
     def covers(self, values: Values) -> bool:
         """Return whether the route is valid for these values; the general one is for all."""
@@ -129,7 +129,7 @@ class GeneralRoute:
         return np.sqrt(self._squares(flat_columns(values, shape), modes, HALVINGS)).reshape(*shape, modes)
 
     def _squares(self, columns: Array, modes: int, halvings: int) -> Array:
-        """Return the squared frequencies, shape (sets, modes), from so many steps along x."""
+        """Return the squared frequencies, shape (sets, modes), for a number of halvings along x."""
         if self.spatial.points is not None:
             raise ValueError("inside: terms at interior places need fields with first or second derivatives by x")
         squares = np.empty((columns.shape[1], modes))
@@ -172,7 +172,7 @@ class GeneralRoute:
         )
 
     def needed(self, columns: Array) -> int:
-        """Return how often the parts must be halved for steps on which every coefficient is a polynomial.
+        """Return the number of halvings of the parts for which every coefficient is a polynomial on each step.
 
         Raises
         ------
@@ -220,7 +220,7 @@ class GeneralRoute:
         return sample
 
     def _steepest(self, column: Array) -> float:
-        """Return where the coefficients of a set change most."""
+        """Return the position at which the coefficients of a set change most."""
         ((some, edges),) = self._between_breaks(column[:, None])
         x = np.linspace(edges[0, 0], edges[0, -1], 4099)[1:-1]
         found = self._sampler(some)(x[None])[:, 0]

@@ -25,7 +25,7 @@ __all__ = ["HALVINGS", "SpatialProblem", "check_range", "shares", "spatial_probl
 
 Array = NDArray[np.float64]
 HALVINGS = 6
-"""How often the two parts of a problem that varies along x are halved: then it has 128 steps."""
+"""Number of halvings of the two parts of a problem that varies along x, which gives 128 steps."""
 _NEAR_END = 1e-7  # share of the length from an end at which a coefficient is compared with that at the end
 _LONGEST_ROW = 400  # operation count beyond which a further derivative of a coefficient takes too long
 

@@ -233,7 +233,7 @@ def _rows_first(values: Sequence[float | Array], rows: int, shape: tuple[int, ..
 
 @cache
 def _parts(structure: Structure, known: tuple[int | None, ...]) -> Parts:
-    """Return what makes the text of the compiled twin and its kernels."""
+    """Return the arguments of the text of the compiled version, and its kernels."""
     text = cache(lambda: template(structure, known))
     return lambda: (text(), {})
 

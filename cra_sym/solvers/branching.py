@@ -15,7 +15,7 @@ __all__ = ["Branch", "beside", "branches"]
 
 Array = NDArray[np.float64]
 _AWAY = (0.02, 0.005, 0.1)  # distances at which the other curve through a branch point is sought
-_SAME = 1e-3  # of two branch points, relative to the size of the motion
+_SAME = 1e-3  # relative distance below which two branch points are the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,10 +25,10 @@ class Branch:
     Attributes
     ----------
     origin : Point
-        The branch point that it was found at.
+        The branch point at which it was found.
     points : list of Point
     broken : bool
-        Whether an end is one of convergence.
+        Whether it ends because the iteration failed to converge.
     """
 
     origin: Point
@@ -37,7 +37,7 @@ class Branch:
 
 
 def beside(curve: Followed, point: Point, other: Array | None = None) -> list[Point]:
-    """Return points of the other curve through a branch point, one on each side, looking away from it.
+    """Return points of the other curve through a branch point, one on each side, oriented away from it.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def beside(curve: Followed, point: Point, other: Array | None = None) -> list[Po
     point : Point
         Of one curve, at its branch point or next to it.
     other : ndarray, optional
-        A direction, (size + 1,); default: where the equations change least, beside the tangent.
+        A direction, (size + 1,); default: the direction other than the tangent in which the equations change least.
     """
     _, rates, _ = curve.linearised(point.vector)
     metric = curve.metric(point.unknowns, point.frequency)
@@ -69,16 +69,16 @@ def beside(curve: Followed, point: Point, other: Array | None = None) -> list[Po
 
 
 def branches(curve: Followed, whole: Sequence[Point], points: int, ended: Callable[[Point], bool]) -> list[Branch]:
-    """Return the other curves through the branch points of a curve, each one once.
+    """Return the other curves through the branch points of a curve, without duplicates.
 
     Parameters
     ----------
     curve : Followed
     whole : sequence of Point
     points : int
-        Most points of each, half of them on each side.
+        Largest number of points of each, half of them on each side.
     ended : callable
-        Whether a point is beyond the end of what is wanted.
+        Whether a point is beyond the requested range.
     """
     found = list[Branch]()
     for origin in (point for point in whole if point.crossing):
@@ -103,6 +103,6 @@ def branches(curve: Followed, whole: Sequence[Point], points: int, ended: Callab
 
 
 def _same(curve: Followed, one: Point, other: Point) -> bool:
-    """Tell whether two branch points are one."""
+    """Tell whether two branch points are the same."""
     apart = (one.vector - other.vector) * curve.metric(one.unknowns, one.frequency)
     return bool(np.linalg.norm(apart) < _SAME)

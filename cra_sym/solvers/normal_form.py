@@ -1,4 +1,4 @@
-r"""Where two modes resonate with a periodic excitation: the boundary of instability to first or second order.
+r"""Boundary of instability, to first or second order, where two modes resonate with a periodic excitation.
 
 For :math:`\dot z = (A_0 + \epsilon A_1(t) + \epsilon^2 A_2(t)) z` a solution
 :math:`e^{st}\sum_k z_k e^{ik\varpi t}` obeys Hill's infinite equations. Near a resonance two of their unperturbed

@@ -34,8 +34,8 @@ _SLOW = 1e-2
 _STRONG = 1e3
 """Dampers beyond this constant, in the same unit, have their force as a further unknown."""
 _HEAVY, _SPREAD = 4, 1e-3
-"""Where the fifth root of a mass is this much smaller than the first (soft springs, heavy ends), the eigenvalues of the
-mass have lost digits, and its singular values take their place."""
+"""Ratio of the fifth root of a mass to the first (soft springs, heavy ends) below which eigenvalues of the mass have
+lost digits and singular values are used instead."""
 _NEVER = 1e-13
 """Values of 1 / (s - shift) below this share of the largest belong to infinite eigenvalues, without a motion."""
 

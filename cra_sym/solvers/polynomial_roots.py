@@ -83,7 +83,7 @@ def _macaulay(coefficients: Array, degree: int, top: int) -> Array:
 
 @cache
 def _places(variables: int, degree: int, top: int) -> NDArray[np.intp]:
-    """Return where the monomials of a polynomial go when it is multiplied with each monomial, (factors, monomials)."""
+    """Return the positions of the monomials of a polynomial times each monomial, (factors, monomials)."""
     place = {exponents: k for k, exponents in enumerate(monomials_up_to(variables, top))}
     own = monomials_up_to(variables, degree)
     factors = monomials_up_to(variables, top - degree)

@@ -142,7 +142,7 @@ def _first_points(right, counts, number, low, high, size):
 
 
 def _start(z, crowded, around, number, right, counts, values, tables, pairs, k, zeros, last, size):
-    """Put every lane next to its zero: what it has at points around the zero is gathered, then used."""
+    """Start every lane close to its zero, from the values gathered at points around the zero."""
     for lane in range(size):
         point = max(right[lane], 1)
         around[0, lane], around[1, lane] = values[max(point - 2, 0), lane], values[point - 1, lane]
@@ -180,7 +180,7 @@ def _between(pairs, lane, number, point, counts, tables):
 
 
 def _first(k, lane):
-    """Return where the first step from z = 0 ends."""
+    """Return the end point of the first step from z = 0."""
     return abs(k[_SERIES, lane]) / np.sqrt(k[_SERIES + 1, lane] ** 2 - 2.0 * k[_SERIES, lane] * k[_SERIES + 2, lane])
 
 

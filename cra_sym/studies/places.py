@@ -78,11 +78,11 @@ class Folder(Place):
         return {file.name for file in (self.path / array).iterdir()}
 
     def new(self) -> AbstractContextManager[Path]:
-        """Give a temporary folder that becomes the store at the end."""
+        """Yield a temporary folder that becomes the store at the end."""
         return draft(self.path)
 
     def writing(self) -> AbstractContextManager[None]:
-        """Turn what the system refuses into an OutputError that names the path."""
+        """Convert errors of the system to an OutputError that names the path."""
         return writing(self.path, self.path)
 
 
@@ -124,7 +124,7 @@ class Bucket(Place):
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """Turn what the store refuses into an OutputError that names the URL."""
+        """Convert errors of the object store to an OutputError that names the URL."""
         try:
             yield
         except OSError as error:
