@@ -21,14 +21,17 @@ from .first_roots import first_roots, hull, rounding
 from .motion_terms import Harmonic, Piecewise
 from .slip_loads import Cause, add_acceleration, next_knot
 
-__all__ = ["ORDER", "Cause", "Events", "SlippingModes", "Start", "Step", "first_forces", "follow", "stuck_tangent"]
+__all__ = ["ORDER", "Cause", "Events", "SlippingModes", "Start", "Step", "fastest", "first_forces", "follow",
+           "stuck_tangent"]  # fmt: skip
 
 Array = NDArray[np.float64]
 ORDER = 36
 """Degree of the series of a step."""
 _REACH = 5.0  # length of a step times the highest frequency: the first term left out is 5^37/37! = 5e-18
 _MOST_STEPS = 1_000_000
-_STALLED = 8  # largest number of events at the same time of a member
+_STALLED = 8  # largest number of events at the same time of a member, per element
+_CLOSE = 1e-12  # margin to the slip force, relative: elements on one displacement below it start to slip together
+_NOTHING = 1e-9  # velocity relative to the sum of its terms below which it is rounding just after an event
 _WAYS = np.arange(1.0, ORDER + 1)[:, None, None]
 _Numbers = NDArray[np.intp]
 _Event = tuple[_Numbers, _Numbers, _Numbers]
@@ -212,7 +215,7 @@ class _March:
         cls, modes: SlippingModes, causes: Sequence[Cause], start: Start, end: Array, pauses: Array | None
     ) -> _March:
         shape = modes.slip.shape
-        omega = _fastest(modes, causes)
+        omega = fastest(modes, causes)
         steps = float((end * omega).max(initial=0.0)) / _REACH
         if not steps <= _MOST_STEPS:
             raise ValueError(
@@ -316,7 +319,7 @@ class _March:
         new = np.repeat(np.array([0, 1, -1]), [len(member) for _, member in cases])
         element, member = (np.concatenate(parts) for parts in zip(*cases, strict=True))
         place, falls = first_roots(self._margins(moved, new, element, member))
-        stalled = (place == 0.0) & (self.stalled[member] > _STALLED)
+        stalled = (place == 0.0) & (self.stalled[member] > _STALLED * len(self.modes.slip))
         place, falls = np.where(stalled, 1e-3, place), falls & ~stalled
         np.minimum.at(share, member, place)
         first = np.flatnonzero(falls & (place == share[member]))
@@ -333,11 +336,14 @@ class _March:
         speed[:-1] = series[1:] * _WAYS[:, 0] * self.state[element, member]
         room = -new * self.modes.stiffness[element, member] * series
         room[0] = self.modes.slip[element, member] - new * self.force[element, member]
-        # an element that has just stopped has no velocity, one that has just started to slip no margin
-        just = self.fresh[element, member]
-        room[1, just & (room[0] == 0.0)] = 0.0
-        speed[0] = np.where(just, np.maximum(speed[0], 0.0), speed[0])
-        return np.where(new == 0, speed, room)
+        found = np.where(new == 0, speed, room)
+        # an element that has just stopped has no velocity, one that has just started to slip no margin, to rounding
+        at_rest = (new != 0) & (room[0] == 0.0)
+        lowest = np.where(at_rest, found[1], found[0])
+        nothing = self.fresh[element, member] & (lowest < 0) & (-lowest <= _NOTHING * np.abs(found).sum(axis=0))
+        found[1, nothing & at_rest] = 0.0
+        found[0, nothing & ~at_rest] = 0.0
+        return found
 
     def _move(self, step: Step) -> None:
         """Advance the state to the end of the step."""
@@ -350,7 +356,18 @@ class _March:
         self.time = step.end
 
     def _switch(self, member: _Numbers, element: _Numbers, new: _Numbers) -> _Happened:
-        """Change elements to slipping or sticking."""
+        """Change elements to slipping or sticking.
+
+        Elements on one displacement that slip in the same direction stop together. Elements that reach their slip
+        forces at the same time, where a hysteresis loop closes, start to slip together.
+        """
+        room = self.modes.slip[:, member] - new * self.force[:, member]
+        alike = np.where(new == 0, True, room <= _CLOSE * self.modes.slip[:, member])
+        alike &= self.modes.where[:, None] == self.modes.where[element]
+        alike &= self.state[:, member] == self.state[element, member]
+        alike[element, np.arange(element.size)] = True
+        element, number = np.nonzero(alike)
+        member, new = member[number], new[number]
         self.state = self.state.copy()
         limit = np.where(new != 0, new, self.state[element, member])
         self.force[element, member] = limit * self.modes.slip[element, member]
@@ -360,7 +377,7 @@ class _March:
         return self.members[member], self.time[member], element, new
 
 
-def _fastest(modes: SlippingModes, causes: Sequence[Cause]) -> Array:
+def fastest(modes: SlippingModes, causes: Sequence[Cause]) -> Array:
     """Return a bound of the frequencies of the stuck modes, their damping included, and of the loads."""
     tangent = stuck_tangent(modes)
     size = np.sqrt((modes.rows**2).sum(axis=1))

@@ -283,3 +283,18 @@ def test_a_root_at_the_start_is_not_taken_for_a_crossing():
 def test_too_many_steps_are_refused():
     with pytest.raises(ValueError, match="must be at most 1000000"):
         follow(modes(stiffness=1e20), [cause(MOTION)], rest(), np.array([1.0]), lambda step: None)
+
+
+def test_many_elements_on_one_displacement_stop_and_slip_together():
+    """None slides against its force where all stop at once, or where the loop of many closes."""
+    slips = np.linspace(0.01, 0.3, 40)[:, None]
+    system = modes()._replace(where=np.zeros(40, int), stiffness=np.full((40, 1), 300.0), slip=slips)
+    wrong, most = [], []
+
+    def seen(step):
+        way = (step.moved[1:] * step.share ** np.arange(1, len(step.moved))[:, None, None]).sum(axis=0)[system.where]
+        wrong.append(np.where(step.state != 0, -step.state * way, 0.0).max())
+        most.append(np.where(step.state == 0, np.abs(step.force + 300.0 * way) - slips, 0.0).max())
+
+    follow(system, [cause(BaseMotion(amplitude=0.05, angular_frequency=23.0))], rest(), np.array([1.0]), seen)
+    assert max(wrong) < 1e-15 and max(most) < 1e-12 and len(wrong) > 200
