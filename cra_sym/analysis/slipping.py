@@ -21,7 +21,7 @@ from cra_sym.solvers.slipping import Events, SlippingModes, Step, follow
 from cra_sym.solvers.slipping import Start as State
 from cra_sym.solvers.stuck_motion import stuck_peak
 
-__all__ = ["Slipping", "slipping", "slipping_outputs", "slipping_residual"]
+__all__ = ["Slipping", "linear_beside", "slipping", "slipping_outputs", "slipping_residual"]
 
 Array = NDArray[np.float64]
 _TOGETHER = 1024  # members integrated together
@@ -107,11 +107,7 @@ def slipping(
     ValueError
         If the system has nonlinear terms beside its elements, or gyroscopic or follower forces.
     """
-    base = system.without_hysteresis
-    if base.numerics("nonlinear") is not None:
-        raise ValueError("system: in time elastic-slip elements must be its only nonlinear terms; use steady_states")
-    if base.conservative_part is not base:
-        raise ValueError("system: beside elastic-slip elements its forces must be conservative, or dampers")
+    base = linear_beside(system)
     found, omega, form = system.slip_elements(modes), base.natural_frequencies(modes), base.numerics("damping")
     loads = [(gamma, h.profile if isinstance(h, Force) else h, isinstance(h, BaseMotion)) for gamma, h in driven]
     motions = {f"motion {k}": np.empty(motion.shape) for k, (_, motion, _) in enumerate(loads)}
@@ -132,6 +128,16 @@ def slipping(
         found.where, _members(found.stiffness, shape, 1), _members(found.slip, shape, 1),
     )  # fmt: skip
     return Slipping(shape, base, slipping_modes, causes, State(_members(q, shape, 1), _members(u, shape, 1)))
+
+
+def linear_beside(system: System) -> System:
+    """Return a system without its elements, if it is linear then and conservative but for dampers."""
+    base = system.without_hysteresis
+    if base.numerics("nonlinear") is not None:
+        raise ValueError("system: in time elastic-slip elements must be its only nonlinear terms; use steady_states")
+    if base.conservative_part is not base:
+        raise ValueError("system: beside elastic-slip elements its forces must be conservative, or dampers")
+    return base
 
 
 def slipping_outputs(problem: Slipping, rows: Array, t: Any, derivative: int) -> Array:

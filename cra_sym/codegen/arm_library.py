@@ -66,7 +66,7 @@ dimensionless groups from 1e-9 to 1e9, 0 and infinity.
 @lru_cache(maxsize=4)
 def arm_library(name: str, real: str = "float64") -> Library:
     """Return the arm as a library."""
-    names = "arm", "arm_modes", "sampling", "arm_time", "arm_check"
+    names = "arm", "arm_modes", "sampling", "shaping", "arm_time", "arm_check"
     parts = (_with_widths(source(part)) for part in names)
     text = "\n\n".join([_constants(real), _generated(), *parts])
     summary = "A flexible Cartesian robotic arm: frequencies, modes, responses"

@@ -14,6 +14,7 @@ from cra_sym.codegen.arm_library import arm_library
 from cra_sym.codegen.controllers import Controller
 from cra_sym.codegen.fmu import VERSIONS, fmu_archive
 from cra_sym.codegen.frozen import frozen_library
+from cra_sym.codegen.frozen_slipping import slipping_library
 from cra_sym.codegen.library import PRINTERS, Library, check_name
 from cra_sym.codegen.rendering import DIGEST, licence
 from cra_sym.codegen.user_model import model_library
@@ -91,15 +92,17 @@ def export(
         export wrote. The replacement is atomic: a failed export leaves the folder unchanged.
     system : System, optional
         Its first modes, frozen as numbers, are exported instead: exact steps under a held input, outputs, frequency
-        response, input shapers. It may have dampers, vary along x, or be an arm; it is a single set of values.
+        response, input shapers. It may have dampers, vary along x, or be an arm; it is a single set of values. With
+        elastic-slip elements the steps locate the events and are exact in between, as `cra_sym.slip_response`; there is
+        no frequency response then, and an FMU has co-simulation alone.
     name : str, optional
         Prefix of every public symbol, and the name of package, module, crate and target. Default: of the arm
         `cra_arm`, in C and Fortran `cra`, so that its types are called `cra_arm`, `cra_mode`, ..; `model`; `system`.
     modes : int
         Modes of the system that are kept.
     real : {'float64', 'float32'}
-        Type of real numbers in the code. Single precision is available for C, Fortran and Rust; the README states its
-        accuracy.
+        Type of real numbers in the code. Single precision is available for C, Fortran and Rust, without elastic-slip
+        elements; the README states its accuracy.
     version : {'3.0', '2.0'}
         Of FMI.
     input, outputs
@@ -175,7 +178,12 @@ def _system_texts(
 ) -> dict[str, str | bytes]:
     instance("system", system, System)
     modes = count("modes", modes, high=MOST_MODES)
-    library, given, names = frozen_library(system, name, modes, real, drive, outputs, controller)
+    if system.model.pieces["hysteresis"]:
+        if controller is not None:
+            raise ValueError("controller: its gains are those of a linear system; give system.without_hysteresis")
+        library, given, names = slipping_library(system, name, modes, real, drive, outputs)
+    else:
+        library, given, names = frozen_library(system, name, modes, real, drive, outputs, controller)
     if language != "fmu":
         return dict(library.texts(language))
     if real != "float64":

@@ -1,4 +1,7 @@
-"""A system as a Functional Mock-up Unit, FMI 3.0 or 2.0: model exchange and co-simulation, sources and a binary."""
+"""A system as a Functional Mock-up Unit, FMI 3.0 or 2.0: model exchange and co-simulation, sources and a binary.
+
+A system with elastic-slip elements has co-simulation alone: its steps locate the events themselves.
+"""
 
 from __future__ import annotations
 
@@ -32,6 +35,7 @@ _UNIT_OF = {
     "strain": "1",
 }  # fmt: skip
 _OUTPUT, _STATE, _DERIVATIVE = 1000, 10000, 20000  # first value references, as in the template
+_FORCE, _DISSIPATED = 3000, 5000
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
 _SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib")}
 _MACHINES = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
@@ -71,15 +75,18 @@ class _Variable:
         }.get(self.kind, "")
 
 
-def _variables(blocks: int, given: str, outputs: Sequence[str], version: str) -> list[_Variable]:
+def _variables(blocks: int, elements: int, given: str, outputs: Sequence[str], version: str) -> list[_Variable]:
     """Return all variables; time is one in FMI 3.0 only, and indices count from 1."""
     found = [_Variable("time", 0, "independent", "time", "time, s", 0)] if version == "3.0" else []
     rows = [(given, 1, "input", "input", "input, held between communication points")]
     rows += [(name, _OUTPUT + i, "output", "output", f"output {name}") for i, name in enumerate(outputs)]
+    for first, of in (_FORCE, "element_force"), (_DISSIPATED, "element_dissipated"):
+        told = "force of an elastic-slip element" if first == _FORCE else "J, what its slider took"
+        rows += [(f"{of}[{i + 1}]", first + i, "output", "output", told) for i in range(elements)]
+    start = len(rows) + 1
     for i in range(2 * blocks):
         of = f"{'position' if i % 2 == 0 else 'rate'}[{i // 2 + 1}]"
         rows.append((of, _STATE + i, "local", "state", "of a modal block"))
-    start = len(outputs) + 2
     found += [_Variable(*row, index) for index, row in enumerate(rows, 1)]
     for i in range(2 * blocks):
         of = f"der({'position' if i % 2 == 0 else 'rate'}[{i // 2 + 1}])"
@@ -91,7 +98,8 @@ def _variables(blocks: int, given: str, outputs: Sequence[str], version: str) ->
 
 def fmu_archive(library: Library, given: str, outputs: Sequence[str], version: str) -> bytes:
     """Return the bytes of the archive; the same input and compiler give the same bytes."""
-    blocks = int(parse(library.text).constants["BLOCKS"].values[0])
+    constants = parse(library.text).constants
+    blocks, elements = (int(constants[name].values[0]) if name in constants else 0 for name in ("BLOCKS", "ELEMENTS"))
     c = library.texts("c")
     sources = {name: c[name] for name in (f"{library.name}.c", f"{library.name}.h")}
     values = {
@@ -101,7 +109,9 @@ def fmu_archive(library: Library, given: str, outputs: Sequence[str], version: s
         "token": _token(library, version),
         "description": escape(f"{library.summary}. {library.provenance[-1]}", {'"': "&quot;"}),
         "units": _UNITS.items(),
-        "variables": _variables(blocks, given, outputs, version),
+        "variables": _variables(blocks, elements, given, outputs, version),
+        "slips": elements > 0,
+        "directional": "false" if elements else "true",
     }
     made = rendered("fmu", values)
     major = version[0]

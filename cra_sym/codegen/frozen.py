@@ -20,7 +20,9 @@ from cra_sym.kernels.form_parse import parse
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.system import System
 
-__all__ = ["OUTPUTS", "frozen_library", "frozen_system", "stated", "stepped"]
+__all__ = [
+    "OUTPUTS", "common_checks", "default_outputs", "frozen_library", "frozen_system", "numbers_of", "stated", "stepped",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 OUTPUTS = ("y", "v", "w", "root_force", "root_moment", "tip_acceleration")
@@ -59,14 +61,17 @@ def frozen_system(
     TypeError, ValueError
         As :func:`cra_sym.state_space`; and if there are more than one input or more than 64 outputs.
     """
-    if outputs is None:
-        outputs = [name for name in OUTPUTS if _has(system, drive, name)]
-    found = state_space(system, modes, drive, outputs or None)
+    found = state_space(system, modes, drive, default_outputs(system, drive) if outputs is None else outputs)
     if found.B.shape[1] != 1:
         raise ValueError(f"input: must be one, there are {found.B.shape[1]}")
     if len(found.output_names) > _MOST_OUTPUTS:
         raise ValueError(f"outputs: must be at most {_MOST_OUTPUTS}, there are {len(found.output_names)}")
     return blocks_of(found.A, found.B, found.C, found.D), found.output_names, found.input_names[0]
+
+
+def default_outputs(system: System, drive: Any) -> list[str] | None:
+    """Return those of the usual outputs that a system has; None if it has none."""
+    return [name for name in OUTPUTS if _has(system, drive, name)] or None
 
 
 def _has(system: System, drive: Any, output: str) -> bool:
@@ -88,10 +93,6 @@ def frozen_library(
     controller: Controller | None = None,
 ) -> tuple[Library, str, tuple[str, ...]]:
     """Return a system as a library, with the names of its input and its outputs."""
-    if system.model.pieces["hysteresis"]:
-        raise ValueError(
-            "system: has elastic-slip elements, whose slip the exported steps leave out; give system.without_hysteresis"
-        )
     blocks, names, given = frozen_system(system, modes, drive, outputs)
     if not len(blocks.stiffness):
         raise ValueError(f"input = {given!r}: it moves nothing")
@@ -100,12 +101,12 @@ def frozen_library(
     statements += [f"Input u: {given}. Outputs y: {', '.join(names)}."]
     lines = (*stated(system.model), *(line for text in statements for line in textwrap.wrap(text, 96)))
     text = constants(blocks, names, system.natural_frequencies(modes))
-    checks = [*_checks(blocks, system.natural_frequencies(modes), real)]
-    parts = [source(part) for part in ("sampling", "frozen", "frozen_check", "frozen_example")]
+    checks = [*_checks(blocks, real), *common_checks(system.natural_frequencies(modes), real)]
+    parts = [source(part) for part in ("sampling", "shaping", "frozen", "frozen_check", "frozen_example")]
     if controller is not None:
         gains = controller.gains(blocks, names)
         text += _gains(controller, names, *gains)
-        parts[2:3] = [source("controller"), parts[2].rstrip("\n") + "\n    " + source("controller_check")]
+        parts[3:4] = [source("controller"), parts[3].rstrip("\n") + "\n    " + source("controller_check")]
         checks += controller_checks(controller, blocks, gains, list(names), _ERRORS[real])
     text += "\n\n".join(parts)
     summary = "A flexible system frozen as numbers, to be stepped in real time"
@@ -119,8 +120,8 @@ def _gains(controller: Controller, names: Sequence[str], regulator: Array, obser
         f"CONTROL_TIME = {float(controller.time)!r}  # s, sampling time of regulator and observer\n"
         f"SENSORS = {len(measured)}  # measured outputs: {', '.join(controller.measured)}\n"
         f"SENSOR_OUTPUTS = ({', '.join(map(str, measured))},)  # their numbers among the outputs\n"
-        f"REGULATOR = ({_numbers(regulator)},)  # gain on all positions, then on all rates\n"
-        f"OBSERVER = ({_numbers(observer)},)  # gain on the measured outputs, state by state\n\n\n"
+        f"REGULATOR = ({numbers_of(regulator)},)  # gain on all positions, then on all rates\n"
+        f"OBSERVER = ({numbers_of(observer)},)  # gain on the measured outputs, state by state\n\n\n"
     )
 
 
@@ -151,14 +152,34 @@ def constants(blocks: Blocks, names: Sequence[str], omega: Array) -> str:
         f"SIGNALS = {len(names)}  # outputs: {', '.join(names)}",
         f"MODES = {len(omega)}  # modes kept",
     ]
-    return "\n".join([*scalars, *(f"{n} = ({_numbers(v)},)  # {comment}" for n, (v, comment) in rows.items()), "", ""])
+    return "\n".join(
+        [*scalars, *(f"{n} = ({numbers_of(v)},)  # {comment}" for n, (v, comment) in rows.items()), "", ""]
+    )
 
 
-def _numbers(values: Array) -> str:
+def numbers_of(values: Array) -> str:
+    """Return the text of the entries of a row of constants."""
     return ", ".join(repr(float(x) + 0.0) for x in np.ravel(values))
 
 
-def _checks(blocks: Blocks, omegas: Array, real: str) -> Iterator[Check]:
+def common_checks(omegas: Array, real: str) -> Iterator[Check]:
+    """Yield input shapers and natural frequencies."""
+    loss = _ERRORS[real]
+    slowest, fastest = float(np.min(omegas[omegas > 0.0], initial=1.0)), float(omegas.max()) or 1.0
+    for omega, zeta in ((fastest, 0.0), (slowest, 0.2)):
+        root = math.sqrt(1 - zeta**2)
+        decay = math.exp(-math.pi * zeta / root)
+        amplitudes = [math.comb(3, k) * decay**k / (1 + decay) ** 3 for k in range(4)]
+        times = [k * math.pi / (omega * root) for k in range(4)]
+        yield Check(2, (omega, zeta), (*amplitudes, *times), loss)
+    for bad in (0.0, -1.0, math.nan, math.inf):
+        yield Check(2, (bad, 0.1), (), refused=True)
+    yield from (Check(3, (n,), (omega,), loss) for n, omega in enumerate(omegas, 1))
+    yield from (Check(3, (n,), (), refused=True) for n in (0, -1, len(omegas) + 1))
+    yield Check(2, (1.0, 1.0), (), refused=True)
+
+
+def _checks(blocks: Blocks, real: str) -> Iterator[Check]:
     """Yield the outputs by SciPy's matrix exponential, independent of the exported code."""
     loss = _ERRORS[real]
     rates = np.sqrt(np.abs(blocks.stiffness)) + np.abs(blocks.damping)
@@ -175,20 +196,10 @@ def _checks(blocks: Blocks, omegas: Array, real: str) -> Iterator[Check]:
             continue
         z = blocks.frequency_response(np.array([omega]))[:, 0]
         yield Check(1, (omega,), tuple(np.column_stack([z.real, z.imag]).ravel()), 0.0, loss * float(np.abs(z).max()))
-    for omega, zeta in ((fastest, 0.0), (slowest, 0.2)):
-        root = math.sqrt(1 - zeta**2)
-        decay = math.exp(-math.pi * zeta / root)
-        amplitudes = [math.comb(3, k) * decay**k / (1 + decay) ** 3 for k in range(4)]
-        times = [k * math.pi / (omega * root) for k in range(4)]
-        yield Check(2, (omega, zeta), (*amplitudes, *times), loss)
     for bad in (0.0, -1.0, math.nan, math.inf):
         yield Check(0, (bad, 1.0, 1), (), refused=True)
-        yield Check(2, (bad, 0.1), (), refused=True)
-    yield from (Check(3, (n,), (omega,), _ERRORS[real]) for n, omega in enumerate(omegas, 1))
-    yield from (Check(3, (n,), (), refused=True) for n in (0, -1, len(omegas) + 1))
     yield Check(1, (-1.0,), (), refused=True)
     yield Check(1, (math.nan,), (), refused=True)
-    yield Check(2, (1.0, 1.0), (), refused=True)
 
 
 def stepped(blocks: Blocks, time: float, push: float, steps: int) -> tuple[Array, float]:
