@@ -76,10 +76,12 @@ def on_basis(
         check_forces(system, system.numerics("load", drive), pencil)
     for row in range(len(s)):
         column = columns[:, row : row + 1]
-        domain = system.model.at(dict(zip(system.numerics("names"), column[:, 0], strict=True))).domain
 
-        def load(basis: Modes, domain=domain) -> Array:  # type: ignore[no-untyped-def]
-            return project(domain, basis, system.numerics("load", drive)) if isinstance(drive, str) else drive(basis)
+        def load(basis: Modes, column: Array = column) -> Array:
+            if not isinstance(drive, str):
+                return drive(basis)
+            one = system.model.at(dict(zip(system.numerics("names"), column[:, 0], strict=True)))
+            return project(one.domain, basis, system.numerics("load", drive))
 
         with nullcontext() if alone[row] else suppress(ValueError):
             ((_, problem),) = pencil.problems(column)

@@ -18,6 +18,7 @@ __all__ = ["Domain", "EndParameter", "Form", "Load", "Place", "Projected", "disp
 
 Array = NDArray[np.float64]
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
+_MOST_KEPT = 1_000_000  # numbers of one displacement of all modes that are stored for the next form
 
 
 class Place(NamedTuple):
@@ -239,6 +240,7 @@ class Projected:
 
     def __init__(self, domain: Domain, modes: Modes, form: Form, *, diagonal: bool = False) -> None:
         self._domain, self._modes, self._form, self._diagonal = domain, modes, form, diagonal
+        self._shapes: dict[Place, Array] = {}
 
     def __getitem__(self, name: str) -> Array:
         """Return the form of that name.
@@ -332,8 +334,10 @@ class Projected:
 
     def _quadrature(self, entry: int, factor: float | Array) -> Array:
         """Return the integral of a coefficient times both displacements of an entry."""
-        x, weights = self._stations
-        first, second = (along(self._modes, place, x) for place in self._form.inside[entry])
+        _, weights = self._stations
+        one, other = self._form.inside[entry]
+        first = self._along(one)
+        second = first if other == one else self._along(other)
         weighted = np.broadcast_to(factor * weights, np.broadcast_shapes(np.shape(factor), np.shape(weights)))
         if self._diagonal:
             return np.asarray((weighted[..., None, :] * first * second).sum(axis=-1))
@@ -342,6 +346,15 @@ class Projected:
         product = (first * weighted[..., None, :]) @ second.swapaxes(-1, -2)
         symmetric = self._form.inside[entry][0] == self._form.inside[entry][1]
         return (product + product.swapaxes(-1, -2)) / 2 if symmetric else product
+
+    def _along(self, place: Place) -> Array:
+        """Return a displacement of every mode at the stations; computed once unless it is large."""
+        found = self._shapes.get(place)
+        if found is None:
+            found = along(self._modes, place, self._stations[0])
+            if found.size <= _MOST_KEPT:
+                self._shapes[place] = found
+        return found
 
     @cached_property
     def _integrals(self) -> list[Array]:

@@ -314,7 +314,8 @@ class StateModes:
         """Return a derivative of a displacement of the section at places, shape (..., modes, stations)."""
         x = np.broadcast_to(x, (*self.omega.shape[:-1], x.shape[-1])).reshape(len(self._z), -1)
         row = self.spatial.derivative_row(place, derivative, self._z, x[:, None], self._finite)
-        return np.asarray((row * self._at(x)).sum(axis=-1).reshape(*self.omega.shape, x.shape[-1]))
+        found = np.einsum("...i,...i->...", row, self._at(x))
+        return np.asarray(found.reshape(*self.omega.shape, x.shape[-1]))
 
     def _at(self, x: Array) -> Array:
         key = x.tobytes()

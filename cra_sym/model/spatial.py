@@ -200,7 +200,11 @@ class SpatialProblem:
         return np.asarray(~((size[:, 0] * _NEAR_END < size[:, 1]) & (size[:, 3] * _NEAR_END < size[:, 2])))
 
     def derivative_row(self, place: int, order: int, z: np.ndarray, x: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Return the row c with ``D^order q[place] = c (q, w, P)``, shape (rows, modes, stations, 2 n + m)."""
+        """Return the row c with ``D^order q[place] = c (q, w, P)``, shape (rows, modes, stations, 2 n + m).
+
+        Where coefficients are constant along x there is one station.
+        """
+        x = x[..., :1] if self.uniform else x
         known = self.rows[place]
         size = 2 * self.displacements + self.coordinates
         arguments = z[:, :, None], *columns[:, :, None, None]
