@@ -1,6 +1,6 @@
 """A system as a Functional Mock-up Unit, FMI 3.0 or 2.0: model exchange and co-simulation, sources and a binary.
 
-A system with elastic-slip elements has co-simulation alone: its steps locate the events themselves.
+A system with elastic-slip elements has co-simulation only, as its steps locate the events.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _UNIT_OF = {
     "strain": "1",
 }  # fmt: skip
 _OUTPUT, _STATE, _DERIVATIVE = 1000, 10000, 20000  # first value references, as in the template
-_FORCE, _DISSIPATED = 3000, 5000
+_FORCE, _DISSIPATED = 3000, 5000  # of elements
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
 _SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib")}
 _MACHINES = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
@@ -81,8 +81,8 @@ def _variables(blocks: int, elements: int, given: str, outputs: Sequence[str], v
     rows = [(given, 1, "input", "input", "input, held between communication points")]
     rows += [(name, _OUTPUT + i, "output", "output", f"output {name}") for i, name in enumerate(outputs)]
     for first, of in (_FORCE, "element_force"), (_DISSIPATED, "element_dissipated"):
-        told = "force of an elastic-slip element" if first == _FORCE else "J, what its slider took"
-        rows += [(f"{of}[{i + 1}]", first + i, "output", "output", told) for i in range(elements)]
+        meaning = "force of an elastic-slip element" if first == _FORCE else "J, energy dissipated by an element"
+        rows += [(f"{of}[{i + 1}]", first + i, "output", "output", meaning) for i in range(elements)]
     start = len(rows) + 1
     for i in range(2 * blocks):
         of = f"{'position' if i % 2 == 0 else 'rate'}[{i // 2 + 1}]"

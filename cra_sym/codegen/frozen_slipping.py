@@ -1,4 +1,4 @@
-"""A system with elastic-slip elements as exported code: its modes frozen as numbers, stepped exactly between events."""
+"""Exported code of a system with elastic-slip elements, its modes frozen as numbers: steps exact between events."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Outputs = Sequence[Any] | Mapping[str, Any]
 _MOST = {"coordinates": 64, "places": 16, "elements": 512}
 _MOST_OUTPUTS = 64
 _STEPS = 24  # of a motion in the reference vectors
-_TELLING = 3  # modes that tell whether an end is held by springs alone
+_TELLING = 3  # number of modes in the check whether an end is held by springs alone
 _REACH = 5.0  # of a piece: its length times the highest frequency; the first term left out is 5^37/37! = 5e-18
 _ERROR = 1e-9
 """Error of the reference vectors, relative to each value; a thousandth of it relative to the largest of them."""
@@ -68,7 +68,7 @@ class SlippingNumbers:
     states: tuple[str, ...]
 
     def followed(self, inputs: Array, time: float) -> tuple[Array, Array, Array]:
-        """Return outputs, forces of the elements and what their sliders took, by the package's own integration.
+        """Return outputs, forces of the elements and energies dissipated by them, by the package's own integration.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class SlippingNumbers:
 
 @dataclass
 class _Last:
-    """Where motions end, and what their sliders took."""
+    """Final states of motions, and energies dissipated by the elements."""
 
     modes: SlippingModes
     q: Array
@@ -157,7 +157,7 @@ def slipping_numbers(system: System, modes: int, drive: Any, outputs: Outputs | 
 
 
 def _on_forces(system: System, modes: int, outputs: Outputs, give: Array) -> Array:
-    """Return what the elements' forces add to outputs: by accelerations, and to forces of the ends that hold them."""
+    """Return the effect of the element forces on outputs: on accelerations, and on forces of the ends with elements."""
     base, columns = system.without_hysteresis, []
     x, (left, right) = base.model.equations.x, base.model.equations.domain
     for displacement, place in _places(system):
@@ -171,11 +171,11 @@ def _on_forces(system: System, modes: int, outputs: Outputs, give: Array) -> Arr
             place, spring = held
             if spring is None:
                 raise ValueError(
-                    f"outputs: {one} is of an end with a mass and an elastic-slip element, which modes do not tell "
-                    "apart; leave it out, the state has the force of the element"
+                    f"outputs: {one} is of an end with a mass and an elastic-slip element, which the modes "
+                    "cannot separate; leave it out, the state has the force of the element"
                 )
             found[k] -= spring * give[place]  # of the modes left out
-            found[k, place] += 1.0  # beside its springs the element holds the end
+            found[k, place] += 1.0  # the element acts on the end beside its springs
     return found
 
 
@@ -214,9 +214,12 @@ def slipping_library(
     base = system.without_hysteresis
     omega = base.natural_frequencies(modes)
     values = ", ".join(f"{key} = {float(value)!r}" for key, value in system.values.items())
-    told = [f"Elastic-slip elements: {_listed(system)}.", f"At {values}; zeta = {float(system.zeta)!r}; {modes} modes."]
-    told += [f"Input u: {numbers.given}. Outputs y: {', '.join(numbers.names)}."]
-    lines = (*stated(base.model), *(line for text in told for line in textwrap.wrap(text, 96)))
+    statements = [
+        f"Elastic-slip elements: {_listed(system)}.",
+        f"At {values}; zeta = {float(system.zeta)!r}; {modes} modes.",
+    ]
+    statements += [f"Input u: {numbers.given}. Outputs y: {', '.join(numbers.names)}."]
+    lines = (*stated(base.model), *(line for text in statements for line in textwrap.wrap(text, 96)))
     parts = ("shaping", "slipping", "slipping_check", "frozen_example")
     text = _constants(numbers, omega) + "\n\n".join(source(part) for part in parts)
     summary = "A flexible system with elastic-slip elements frozen as numbers, to be stepped in real time"
@@ -226,11 +229,11 @@ def slipping_library(
 
 
 def _listed(system: System) -> str:
-    told = []
+    lines = []
     for element, displacement, place in system.model.pieces["hysteresis"]:
         values = ", ".join(f"{key} = {value}" for key, value in element.parameters.items())
-        told.append(f"{type(element).__name__}({values}) on {displacement}" + (f" at {place}" if place else ""))
-    return "; ".join(told)
+        lines.append(f"{type(element).__name__}({values}) on {displacement}" + (f" at {place}" if place else ""))
+    return "; ".join(lines)
 
 
 def _constants(numbers: SlippingNumbers, omega: Array) -> str:
@@ -254,12 +257,12 @@ def _constants(numbers: SlippingNumbers, omega: Array) -> str:
         "LEFT_OUT": (1e-17, "of the highest term of a power series, at most"),
         "MOST_PANELS": (500.0, "pieces of a step without events"),
         "MOST_PIECES": (1000 + 10 * elements, "of a step"),
-        "MOST_AT_ONCE": (8 * elements, "changes of states at one time, after which some time passes"),
-        "ON_THE_WAY": (1e-3, "of a piece that passes then"),
-        "MOST_HALVINGS": (41, "of a piece until it holds one event at most"),
+        "MOST_AT_ONCE": (8 * elements, "largest number of events at the same time"),
+        "ON_THE_WAY": (1e-3, "share of a piece that is skipped then"),
+        "MOST_HALVINGS": (41, "of a piece to isolate an event"),
         "MOST_TURNS": (80, "of Newton's method"),
-        "NEARLY": (1e-12, "of its slip force, that an element is from it where another at its place slips"),
-        "NOTHING": (1e-9, "of the sum of its terms: what a change just now leaves of a velocity"),
+        "NEARLY": (1e-12, "relative margin to the slip force of elements that start to slip together"),
+        "NOTHING": (1e-9, "velocity relative to the sum of its terms, just after an event, that is rounding"),
         "EPS": (2.0**-52, "rounding"),
         "ROUNDING": (2.0**-48, "of the sum of its terms: what counts as zero of a polynomial"),
     }
@@ -277,14 +280,14 @@ def _constants(numbers: SlippingNumbers, omega: Array) -> str:
         "THROUGH": (numbers.through, "the same on u"),
         "FREQUENCIES": (omega, "rad/s, of the modes kept, without the elements"),
     }
-    told = [f"{name} = {value!r}  # {comment}" for name, (value, comment) in scalars.items()]
-    told += [f"PLACE_OF = ({', '.join(map(str, modes.where))},)  # the place of each element"]
-    told += [f"{name} = ({numbers_of(value)},)  # {comment}" for name, (value, comment) in rows.items()]
-    return "\n".join([*told, "", ""])
+    lines = [f"{name} = {value!r}  # {comment}" for name, (value, comment) in scalars.items()]
+    lines += [f"PLACE_OF = ({', '.join(map(str, modes.where))},)  # the place of each element"]
+    lines += [f"{name} = ({numbers_of(value)},)  # {comment}" for name, (value, comment) in rows.items()]
+    return "\n".join([*lines, "", ""])
 
 
 def _stack(numbers: SlippingNumbers) -> str:
-    """Return what the C code takes of the stack: series of coordinates and places, polynomials, a copy of the state."""
+    """Return the stack of the C code: series of coordinates and places, polynomials, a copy of the state."""
     coordinates, places, elements = len(numbers.drive), len(numbers.modes.rows), len(numbers.modes.slip)
     doubles = (ORDER + 1) * (coordinates + 2 * places + 3) + 2 * coordinates + 3 * elements + 2 * places**2 + 128
     return f"about {math.ceil(8 * doubles / 1000)} kB"
@@ -299,10 +302,10 @@ def _readme(numbers: SlippingNumbers, text: str) -> str:
     )
     words = (
         "`step` and `step_between` locate where elements begin to slip or to stick, and are exact in between; the "
-        "state has the force of each element and what its slider took. A step is a power series for each 5 rad of "
-        "the fastest frequency, and one or more for each event; beyond "
-        f"{form.constants['MOST_PIECES'].values[0]} the status tells, and the state stays. Floating-point operations, "
-        f"at most: {counts}."
+        "state has the force of each element and the energy dissipated by it. A step is a power series for each 5 rad "
+        "of the fastest frequency, and one or more for each event; beyond "
+        f"{form.constants['MOST_PIECES'].values[0]} the step returns an error, and the state is unchanged. "
+        f"Floating-point operations, at most: {counts}."
     )
     return (
         f"The input u is `{numbers.given}`; the outputs, in SI units, are\n\n| entry | output |\n| --- | --- |\n"
@@ -311,7 +314,7 @@ def _readme(numbers: SlippingNumbers, text: str) -> str:
 
 
 def _checks(numbers: SlippingNumbers) -> Iterator[Check]:
-    """Yield outputs, forces and energies by the package's own integration of the motion, from event to event."""
+    """Yield outputs, forces and energies by the package's own integration of the motion."""
     modes = numbers.modes
     rates = modes.omega[modes.omega > 0]
     quickest, slowest = float(fastest(modes, [])[0]), float(np.min(rates, initial=1.0))
@@ -332,7 +335,7 @@ def _checks(numbers: SlippingNumbers) -> Iterator[Check]:
 
 
 def _pushes(numbers: SlippingNumbers) -> float:
-    """Return about which input, held, makes an element slip."""
+    """Return an estimate of the constant input at which the first element slips."""
     modes = numbers.modes
     rows, stiff = modes.rows[..., 0], np.diag(modes.omega[:, 0] ** 2)
     springs = modes.total(modes.stiffness)[:, 0]
