@@ -363,7 +363,7 @@ class ModelText:
         found: dict[sp.Expr, None] = {}
         left, _ = self.model.equations.domain
         for entry in (*self._entries.values(), *self._ends.values(), self._length, sp.sympify(left, strict=True)):
-            for power in sp.sympify(entry, strict=True).atoms(sp.Pow):
+            for power in sp.ordered(sp.sympify(entry, strict=True).atoms(sp.Pow)):
                 if power.exp.is_negative or power.exp.could_extract_minus_sign():
                     for factor in sp.Mul.make_args(power.base):
                         found |= {} if factor.is_number else {factor: None}
