@@ -152,8 +152,8 @@ def identify(
     of their value in ``system`` (or of their prior). Values at which the structure is unstable are excluded.
 
     With gyroscopic forces or forces that follow the motion there are no natural frequencies: the imaginary parts of the
-    oscillating :func:`eigenvalues` over 2 pi, by ascending modulus, are fitted, with gradients by differences. There, and
-    where the structure is unstable somewhere on the grid, the search starts from the 24 best points of the grid.
+    oscillating :func:`eigenvalues` over 2 pi, by ascending modulus, are fitted, with gradients by differences. Then,
+    and if the structure is unstable somewhere on the grid, the search starts from the 24 best points of the grid.
 
     Parameters
     ----------
