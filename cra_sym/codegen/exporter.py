@@ -94,7 +94,8 @@ def export(
         Its first modes, frozen as numbers, are exported instead: exact steps under a held input, outputs, frequency
         response, input shapers. It may have dampers, vary along x, or be an arm; it is a single set of values. With
         elastic-slip elements the steps locate the events and are exact in between, as `cra_sym.slip_response`; there is
-        no frequency response then, and an FMU supports co-simulation only.
+        no frequency response then, and an FMU supports co-simulation only. Nonlinear equations are linearised about
+        zero, and the files say so.
     name : str, optional
         Prefix of every public symbol, and the name of package, module, crate and target. Default: of the arm
         `cra_arm`, in C and Fortran `cra`, so that its types are called `cra_arm`, `cra_mode`, ..; `model`; `system`.

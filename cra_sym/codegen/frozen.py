@@ -33,7 +33,7 @@ _ERRORS = {"float64": 1e-11, "float32": 2e-3}
 
 
 def stated(model: Model, width: int = 96) -> tuple[str, ...]:
-    """Return a description of a model, in lines: Lagrangian, boundary conditions, and the hash of both."""
+    """Return a description of a model, in lines: Lagrangian, boundary conditions, the hash of both, linearisation."""
     pieces, found = model.pieces, model.equations
     parts = {
         "Lagrangian density": [pieces["density"]],
@@ -48,7 +48,9 @@ def stated(model: Model, width: int = 96) -> tuple[str, ...]:
     statements = [f"{name}: {'; '.join(texts)}" for name, texts in stated_parts.items() if texts]
     digest = hashlib.sha256("\n".join(statements).encode()).hexdigest()
     lines = [line for text in statements for line in textwrap.wrap(text, width, subsequent_indent="  ")]
-    return (*(line.replace("*/", "* /") for line in lines), f"SHA-256 of the above: {digest}")
+    linear = ("The equations are nonlinear; the code computes with them linearised about zero.",)
+    hashed = f"SHA-256 of the above: {digest}"
+    return (*(line.replace("*/", "* /") for line in lines), hashed, *(linear if model.nonlinear else ()))
 
 
 def frozen_system(

@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.signal import StateSpace
+from sympy import Symbol
 
 import cra_sym as cra
 from cra_sym.codegen.blocks import blocks_of
-from cra_sym.codegen.frozen import frozen_library, frozen_system
+from cra_sym.codegen.frozen import frozen_library, frozen_system, stated
 from cra_sym.symbols import L, k_t, t, v, x
 from tests.codegen import kit
 
@@ -162,6 +163,11 @@ def test_different_models_never_look_alike():
         assert "SPDX-License-Identifier: BSD-3-Clause" in text and "Lagrangian density" in text
         heads.add(re.search(r"SHA-256 of the above: ([0-9a-f]{64})", text)[1])
     assert len(heads) == 2
+
+
+def test_what_is_linearised_says_so():
+    cubic = ARM.model.replace(left=ARM.model.pieces["left"] - Symbol("k_3") * v**4 / 4)
+    assert "linearised about zero" in stated(cubic)[-1] and "linearised" not in "".join(stated(ARM.model))
 
 
 def test_steps_are_the_tip_response():
