@@ -73,7 +73,7 @@ def test_c18_holds_for_the_full_energy_only(judge, monkeypatch):
     assert verdict.outcome == "contradicted" and "k_t v(0)^2/2" in verdict.remedy
     np.testing.assert_allclose(verdict["with_springs"], 1.0, rtol=1e-10)
     assert verdict["beam_only"].min() < 0.4
-    monkeypatch.setattr(energy, "_joint_stiffness", lambda arm: np.zeros((41, 3)))
+    monkeypatch.setattr(energy, "_joint_share", lambda arm: np.zeros((41, 3)))
     assert judge("C18").remedy is None
 
 
