@@ -1,7 +1,7 @@
 """A chart of steady-state amplitudes against solve_ivp to the steady state, and a backbone against shooting with it.
 
-Run it as ``python -m tests.benchmarks.nonlinear``. It prints ratios of times by the wall clock, on a quiet machine; nothing is asserted but
-agreement.
+Run it as ``python -m tests.benchmarks.nonlinear`` on a quiet machine. It prints ratios of times by the wall clock;
+nothing is asserted but agreement.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def shot(polynomials: ModalPolynomials, start: np.ndarray, frequency: float) -> 
 
 
 def curve() -> dict[str, float]:
-    """Follow a backbone and shoot some of its points from their neighbours; return times by the wall clock and their ratio."""
+    """Follow a backbone and shoot some of its points from their neighbours; return times and their ratio."""
     cra.backbone(sprung(), **{**BACKBONE, "points": 2})  # derives, and finds the modes
     start = perf_counter()
     found = cra.backbone(sprung(), **BACKBONE)
