@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.model.projection import Domain, Form, Place
-from cra_sym.solvers.waves_static import are_semidefinite
+from cra_sym.solvers.waves_static import are_semidefinite, coupled
 
 if TYPE_CHECKING:
     from cra_sym.mechanics.weak import Bilinear
@@ -102,28 +102,21 @@ def refuse_negative(energy: EnergyForm, domain: Domain, shape: tuple[int, ...], 
     with np.errstate(all="ignore"):
         parts = (form.inside, form.density.function(x, *numbers)), (form.ends, form.points.function(*numbers))
     for (pairs, coefficients), own in zip(parts, names, strict=True):
-        for group in _groups(pairs):
-            matrix = np.zeros((*shape, len(shares) if pairs is form.inside else 1, len(group), len(group)))
-            for (p, q), value in zip(pairs, coefficients, strict=True):
-                if p in group:
-                    matrix[..., group.index(p), group.index(q)] = value
-            flat = matrix.reshape(-1, len(group), len(group))
-            right = are_semidefinite(np.where(np.isfinite(flat), flat, 0.0)).reshape(matrix.shape[:-2])
+        places = list(dict.fromkeys(place for pair in pairs for place in pair))
+        pattern = np.zeros((len(places), len(places)), dtype=bool)
+        matrix = np.zeros((*shape, len(shares) if pairs is form.inside else 1, *pattern.shape))
+        for (p, q), value in zip(pairs, coefficients, strict=True):
+            entry = places.index(p), places.index(q)
+            pattern[entry], matrix[(..., *entry)] = True, value
+        matrix = np.where(np.isfinite(matrix), matrix, 0.0)
+        for group in coupled(pattern | pattern.T):
+            part = matrix[..., group, :][..., group]
+            right = are_semidefinite(part.reshape(-1, len(group), len(group))).reshape(part.shape[:-2])
             if not right.all():
                 *row, station = np.unravel_index(int(np.argmin(right)), right.shape)
                 at = np.broadcast_to(x, (*shape, len(shares)))[(*row, station)] if len(shares) > 1 else None
                 given = {name: float(np.broadcast_to(values[name], shape)[*row]) for name in own}
-                raise ValueError(_refusal(kind, group[0], at, given))
-
-
-def _groups(pairs: Sequence[tuple[Place, Place]]) -> list[list[Place]]:
-    """Return the places that off-diagonal coefficients couple, group by group."""
-    groups: list[list[Place]] = []
-    for pair in pairs:
-        joined = [group for group in groups if set(pair) & set(group)]
-        groups = [group for group in groups if group not in joined]
-        groups.append(list(dict.fromkeys([place for group in joined for place in group] + list(pair))))
-    return groups
+                raise ValueError(_refusal(kind, places[group[0]], at, given))
 
 
 def _refusal(kind: str, place: Place, at: float | None, given: Mapping[str, float]) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .waves_kernel import minors
 from .waves_problem import Floats, Integers, UniformProblem, ranks
 
-__all__ = ["are_semidefinite", "idle_coordinates", "negative_energy", "negative_motions", "rigid_motions"]
+__all__ = ["are_semidefinite", "coupled", "idle_coordinates", "negative_energy", "negative_motions", "rigid_motions"]
 
 _SMALL = 3  # matrices up to this size are tested by their principal minors
 
@@ -88,8 +88,9 @@ def negative_motions(problem: UniformProblem, part: int) -> NDArray[np.bool_]:
     held = np.isinf(problem.stiffness[:, : problem.structure.moving])
     matrix = np.where(held[:, :, None] | held[:, None, :], 0.0, problem.springs_and_masses()[part])
     pattern = problem.couplings[part].any(axis=0)
-    for group in _groups(pattern | pattern.T):
-        found |= ~are_semidefinite(matrix[:, group][:, :, group])
+    for group in coupled(pattern | pattern.T):
+        if len(group) > 1:
+            found |= ~are_semidefinite(matrix[:, group][:, :, group])
     return found
 
 
@@ -108,13 +109,12 @@ def idle_coordinates(problem: UniformProblem) -> NDArray[np.bool_]:
     return found
 
 
-def _groups(pattern: NDArray[np.bool_]) -> list[list[int]]:
-    """Return the groups of indices that a pattern of entries couples."""
+def coupled(pattern: NDArray[np.bool_]) -> list[list[int]]:
+    """Return the groups of indices that a symmetric pattern of entries couples, single ones included."""
     label = np.arange(len(pattern))
     for i, j in zip(*np.nonzero(pattern), strict=True):
         label[label == label[i]] = label[j]
-    groups = [np.flatnonzero(label == value).tolist() for value in np.unique(label)]
-    return [group for group in groups if len(group) > 1]
+    return [np.flatnonzero(label == value).tolist() for value in np.unique(label)]
 
 
 def are_semidefinite(matrices: Floats) -> NDArray[np.bool_]:
