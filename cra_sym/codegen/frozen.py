@@ -19,9 +19,11 @@ from cra_sym.codegen.operations import operations
 from cra_sym.kernels.form_parse import parse
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.system import System
+from cra_sym.solvers.linear_system import LinearSystem
 
 __all__ = [
-    "OUTPUTS", "common_checks", "default_outputs", "frozen_library", "frozen_system", "numbers_of", "stated", "stepped",
+    "OUTPUTS", "common_checks", "default_outputs", "exported_state_space", "frozen_library", "frozen_system",
+    "numbers_of", "stated", "stepped",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -63,12 +65,24 @@ def frozen_system(
     TypeError, ValueError
         As :func:`cra_sym.state_space`; and if there are more than one input or more than 64 outputs.
     """
-    found = state_space(system, modes, drive, default_outputs(system, drive) if outputs is None else outputs)
+    found = exported_state_space(system, modes, drive, default_outputs(system, drive) if outputs is None else outputs)
+    return blocks_of(found.A, found.B, found.C, found.D), found.output_names, found.input_names[0]
+
+
+def exported_state_space(system: System, modes: int, drive: Any, outputs: Any) -> LinearSystem:
+    """Return the state space of a system.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As :func:`cra_sym.state_space`; and if there are more than one input or more than 64 outputs.
+    """
+    found = state_space(system, modes, drive, outputs)
     if found.B.shape[1] != 1:
         raise ValueError(f"input: must be one, there are {found.B.shape[1]}")
     if len(found.output_names) > _MOST_OUTPUTS:
         raise ValueError(f"outputs: must be at most {_MOST_OUTPUTS}, there are {len(found.output_names)}")
-    return blocks_of(found.A, found.B, found.C, found.D), found.output_names, found.input_names[0]
+    return found
 
 
 def default_outputs(system: System, drive: Any) -> list[str] | None:

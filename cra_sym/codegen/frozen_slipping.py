@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cra_sym.analysis.slipping import linear_beside
 from cra_sym.analysis.state_space import state_space
-from cra_sym.codegen.frozen import common_checks, default_outputs, numbers_of, stated
+from cra_sym.codegen.frozen import common_checks, default_outputs, exported_state_space, numbers_of, stated
 from cra_sym.codegen.library import Check, Library, source
 from cra_sym.codegen.operations import operations
 from cra_sym.kernels.form_parse import parse
@@ -26,7 +26,6 @@ __all__ = ["SlippingNumbers", "slipping_library", "slipping_numbers"]
 Array = NDArray[np.float64]
 Outputs = Sequence[Any] | Mapping[str, Any]
 _MOST = {"coordinates": 64, "places": 16, "elements": 512}
-_MOST_OUTPUTS = 64
 _STEPS = 24  # of a motion in the reference vectors
 _TELLING = 3  # number of modes in the check whether an end is held by springs alone
 _REACH = 5.0  # of a piece: its length times the highest frequency; the first term left out is 5^37/37! = 5e-18
@@ -125,9 +124,7 @@ def slipping_numbers(system: System, modes: int, drive: Any, outputs: Outputs | 
         usual = [one for one in default_outputs(base, drive) or () if (_held(system, one) or (0, 0.0))[1] is not None]
         outputs = usual or state_space(base, 1, drive).output_names
     outputs = outputs if isinstance(outputs, Mapping | list | tuple) else [outputs]
-    found = state_space(base, modes, drive, outputs)
-    if found.B.shape[1] != 1:
-        raise ValueError(f"input: must be one, there are {found.B.shape[1]}")
+    found = exported_state_space(base, modes, drive, outputs)
     if found.input_names[0] == "drive_force":
         raise ValueError(
             "input = 'drive_force': must be another with elastic-slip elements; make the base a coordinate of the model"
@@ -141,8 +138,6 @@ def slipping_numbers(system: System, modes: int, drive: Any, outputs: Outputs | 
                 f"modes, hysteresis: make {sizes[name]} {name}, must be at most {most}; take fewer modes or a smaller "
                 "number of an Iwan"
             )
-    if len(found.output_names) > _MOST_OUTPUTS:
-        raise ValueError(f"outputs: must be at most {_MOST_OUTPUTS}, there are {len(found.output_names)}")
     omega = np.sqrt(np.diagonal(-found.A[half:, :half]))
     several = (np.reshape(part, (*np.shape(part), 1)) for part in (elements.stiffness, elements.slip))
     slipping = SlippingModes(
@@ -186,7 +181,7 @@ def _places(system: System) -> list[tuple[Any, Any]]:
 def _held(system: System, output: Any) -> tuple[int, float | None] | None:
     """Return the place of elements where an output is the force of an end, and the stiffness of its springs.
 
-    The latter is None if there are masses too: a force is then no multiple of the displacement.
+    The latter is None if there are masses too: a force is then not a multiple of the displacement.
     """
     base = system.without_hysteresis
     known = base.numerics("named_observables")
