@@ -370,10 +370,10 @@ def _changed(problem: FollowedMode, more: tuple[int, int], vectors: Array, norma
     z, normal = embedded(vectors), embedded(normals)
     metric = np.stack([curve.metric(row[:-1], row[-1]) for row in z])
     for _ in range(2):
-        residual, jacobian, rate, _ = rich.balance.residual(z[:, :-1], z[:, -1])
-        matrix = np.concatenate([jacobian, rate[:, :, None]], axis=2)
+        balanced = rich.balance.at(z[:, :-1], z[:, -1])
+        matrix = np.concatenate([balanced.jacobian(), balanced.by_frequency[:, :, None]], axis=2)
         size = np.linalg.norm(normal / metric, axis=1)[:, None]
         bordered = np.concatenate([matrix / metric[:, None, :], (normal / metric / size)[:, None, :]], axis=1)
-        right = np.concatenate([residual, np.zeros((len(z), 1))], axis=1)
+        right = np.concatenate([balanced.residual, np.zeros((len(z), 1))], axis=1)
         z = z - np.linalg.solve(bordered, right[:, :, None])[:, :, 0] / metric
     return np.abs(z[:, -1] / vectors[:, -1] - 1.0)

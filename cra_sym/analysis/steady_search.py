@@ -97,16 +97,18 @@ def _search_on(problem: DrivenProblem, points: Array, order: NDArray[np.intp], s
 
 def _among(answer: Array, known: list[Array], size: float) -> bool:
     """Tell whether a solution is one of the known ones."""
-    same = _SAME * (size + np.linalg.norm(answer))
-    return any(np.linalg.norm(answer - other) <= same for other in known)
+    return bool(known) and bool((_apart(answer, known) <= (_SAME * (size + np.sqrt(answer @ answer))) ** 2).any())
 
 
 def _alike(answer: Array, known: list[Array]) -> int:
     """Return the number of known solutions close to a given one."""
-    if not known:
-        return 0
+    return int((_apart(answer, known) <= _ALIKE**2 * (answer @ answer)).sum()) if known else 0
+
+
+def _apart(answer: Array, known: list[Array]) -> Array:
+    """Return the squared distances of known solutions from a given one."""
     apart = np.array(known) - answer
-    return int((np.einsum("ij,ij->i", apart, apart) <= _ALIKE**2 * (answer @ answer)).sum())
+    return np.asarray(np.einsum("ij,ij->i", apart, apart))
 
 
 def _order(points: Array, shape: tuple[int, int]) -> NDArray[np.intp]:

@@ -115,7 +115,7 @@ class _SingleMode:
 
     def _residual(self, balance: Balance, unknowns: Array) -> Array:
         frequency = np.full(len(unknowns), self._frequency)
-        return balance.residual(unknowns, frequency, np.repeat(self._causes, len(unknowns), axis=0))[0]
+        return balance.at(unknowns, frequency, np.repeat(self._causes, len(unknowns), axis=0)).residual
 
     def answers(self, *, with_free: bool) -> Array:
         """Return all real solutions, and free vibration at the frequency with several phases, shape (solutions, 3)."""

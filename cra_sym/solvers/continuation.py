@@ -122,8 +122,9 @@ class Curve:
 
     def linearised(self, vector: Array) -> tuple[Array, Array, float]:
         """Return residual, its rates (size, size + 1), and the scale of the residual."""
-        residual, jacobian, rate, scale = self.balance.residual(vector[None, :-1], vector[-1:])
-        return residual[0], np.concatenate([jacobian[0], rate[0][:, None]], axis=1), float(scale[0])
+        at = self.balance.at(vector[None, :-1], vector[-1:])
+        rates = np.concatenate([at.jacobian()[0], at.by_frequency[0][:, None]], axis=1)
+        return at.residual[0], rates, float(at.scale[0])
 
     def mark(self, rates: Array, tangent: Array, metric: Array) -> int:
         """Return the number of negative eigenvalues of the symmetric Jacobian."""

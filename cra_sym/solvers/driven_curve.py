@@ -58,14 +58,15 @@ class Driven:
         unknowns, value = vector[None, :-1], float(vector[-1])
         frequency, rate, causes = self.at(value)
         own = np.array([frequency])
-        residual, jacobian, slope, scale = self.balance.residual(unknowns, own, causes)
-        slope = rate * slope[0]
+        balanced = self.balance.at(unknowns, own, causes)
+        slope = rate * balanced.by_frequency[0]
         if self.moves:  # central difference: it only leads Newton's method
             h = 1e-3 * self.scale
-            ends = [self.balance.residual(unknowns, own, self.at(value + side * h)[2])[0][0] for side in (-1, 1)]
+            ends = [self.balance.at(unknowns, own, self.at(value + side * h)[2]).residual[0] for side in (-1, 1)]
             slope = slope + (ends[1] - ends[0]) / (2 * h)
         floor = self.size * float(self.balance.equations.omega.max())
-        return residual[0], np.concatenate([jacobian[0], slope[:, None]], axis=1), float(scale[0]) + floor
+        rates = np.concatenate([balanced.jacobian()[0], slope[:, None]], axis=1)
+        return balanced.residual[0], rates, float(balanced.scale[0]) + floor
 
     def mark(self, rates: Array, tangent: Array, metric: Array) -> int:
         """Return the sign of the determinant of the equations and the tangent."""

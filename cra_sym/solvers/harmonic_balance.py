@@ -75,25 +75,35 @@ class Basis:
         return np.where(self.orders > 0, 2.0, 1.0)
 
     @cached_property
+    def sampled(self) -> tuple[Array, Array]:
+        """The functions and their rates at the samples, shape (samples, size)."""
+        return self.values(self.phase), self.values(self.phase, 1)
+
+    @cached_property
+    def tests(self) -> tuple[Array, Array]:
+        """Weighted test functions and their rates: products with samples give the coefficients of a function."""
+        left = self.weights / self.samples
+        return left * self.sampled[0], left * self.sampled[1]
+
+    @cached_property
     def products(self) -> tuple[Array, Array, Array]:
         """Mean products B B, B D and D D at the samples, weighted, shape (samples, size * size)."""
-        value, rate = self.values(self.phase), self.values(self.phase, 1)
-        left = self.weights / self.samples
-        return tuple(
-            np.einsum("sm,sl->sml", left * one, other).reshape(self.samples, -1)
-            for one, other in ((value, value), (value, rate), (rate, rate))
+        (value, rate), (test, test_rate) = self.sampled, self.tests
+        bb, bd, dd = (
+            np.einsum("sm,sl->sml", one, other).reshape(self.samples, -1)
+            for one, other in ((test, value), (test, rate), (test_rate, rate))
         )
+        return bb, bd, dd
 
     @cached_property
     def turned(self) -> Array:
         """Matrix of the derivative by the phase in the basis, weighted as `products`, shape (size, size)."""
-        value, rate = self.values(self.phase), self.values(self.phase, 1)
-        return (self.weights * value).T @ rate / self.samples
+        return np.asarray(self.tests[0].T @ self.sampled[1])
 
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """Residual of harmonic balance and its rates.
+    """The equations of harmonic balance.
 
     Attributes
     ----------
@@ -113,10 +123,8 @@ class Balance:
         """Return unknowns of shape (points, size) as (points, modes, functions)."""
         return unknowns.reshape(-1, self.equations.modes, self.basis.size)
 
-    def residual(
-        self, unknowns: Array, frequency: Array, causes: Array | None = None
-    ) -> tuple[Array, Array, Array, Array]:
-        """Return the residual, its rates by the unknowns and by the frequency, and a scale of its terms.
+    def at(self, unknowns: Array, frequency: Array, causes: Array | None = None) -> Balanced:
+        """Return the residual at points; rates follow on request.
 
         Parameters
         ----------
@@ -124,64 +132,109 @@ class Balance:
         frequency : ndarray, shape (points,)
             Angular frequency of the period.
         causes : ndarray, shape (points, known functions, samples), optional
-
-        Returns
-        -------
-        residual : ndarray, shape (points, size)
-        jacobian : ndarray, shape (points, size, size)
-        rate : ndarray, shape (points, size)
-            By the frequency, known functions held.
-        scale : ndarray, shape (points,)
         """
-        basis, n, m = self.basis, self.equations.modes, self.basis.size
-        points = len(unknowns)
-        x = self.coefficients(unknowns)
-        value, rate = basis.values(basis.phase), basis.values(basis.phase, 1)
-        q = (x @ value.T).swapaxes(1, 2)
-        turn = (x @ rate.T).swapaxes(1, 2) if self.equations.moves_mass else np.zeros_like(q)
-        w = frequency[:, None, None]
-        shape = (points * basis.samples, n)
+        basis, n = self.basis, self.equations.modes
+        x, w = self.coefficients(unknowns), frequency[:, None, None]
+        q = (x @ basis.sampled[0].T).swapaxes(1, 2)
+        turn = (x @ basis.sampled[1].T).swapaxes(1, 2) if self.equations.moves_mass else np.zeros_like(q)
         flat = None if causes is None else flattened(causes)
-        found = self.equations.derivatives(q.reshape(shape), (w * turn).reshape(shape), flat)
-        force, momentum = (part.reshape(points, basis.samples, n).swapaxes(1, 2) for part in found[:2])
-        left, left_rate = (basis.weights / basis.samples * b for b in (value, rate))
-        moves, pushes = self.equations.by_velocity[1], self.equations.by_velocity[0]
+        found = self.equations.derivatives(q.reshape(-1, n), (w * turn).reshape(-1, n), flat)
+        return Balanced(self, x, w, turn, Derivatives(*(part.reshape(*q.shape[:2], *part.shape[1:]) for part in found)))
 
-        stiff = self.equations.omega[:, None] ** 2 - (w * basis.orders) ** 2
-        damped = self.equations.damping @ x @ basis.turned.T
-        pulse = momentum @ left_rate if self.equations.moves_mass else np.zeros_like(x)
-        residual = -stiff * x - w * damped + force @ left + w * pulse
-        blocks = self._blocks(found, w, points)
-        jacobian = blocks.reshape(points, n, n, m, m).transpose(0, 1, 3, 2, 4).copy()
-        if self.equations.damping.any():
-            jacobian -= w[..., None, None] * np.einsum("ij,ml->imjl", self.equations.damping, basis.turned)
+
+@dataclass(frozen=True, eq=False)
+class Balanced:
+    """Harmonic balance at points: the residual and its rates.
+
+    Attributes
+    ----------
+    balance : Balance
+    x : ndarray, shape (points, modes, functions)
+    w : ndarray, shape (points, 1, 1)
+        Angular frequency.
+    turn : ndarray, shape (points, samples, modes)
+        Rates of the coordinates by the phase, where needed.
+    found : Derivatives
+        With axes of points and samples.
+    """
+
+    balance: Balance
+    x: Array
+    w: Array
+    turn: Array
+    found: Derivatives
+
+    @cached_property
+    def _stiff(self) -> Array:
+        return self.balance.equations.omega[:, None] ** 2 - (self.w * self.balance.basis.orders) ** 2
+
+    @cached_property
+    def _damped(self) -> Array:
+        return np.asarray(self.balance.equations.damping @ self.x @ self.balance.basis.turned.T)
+
+    @cached_property
+    def _pulse(self) -> Array:
+        if not self.balance.equations.moves_mass:
+            return np.zeros_like(self.x)
+        return np.asarray(self.found.momentum.swapaxes(1, 2) @ self.balance.basis.tests[1])
+
+    @cached_property
+    def residual(self) -> Array:
+        """Residual, shape (points, size)."""
+        pushed = self.found.force.swapaxes(1, 2) @ self.balance.basis.tests[0]
+        residual = -self._stiff * self.x - self.w * self._damped + pushed + self.w * self._pulse
+        return np.asarray(residual.reshape(len(self.x), -1))
+
+    @property
+    def scale(self) -> Array:
+        """Size of the terms of the residual, shape (points,)."""
+        squares = self.balance.equations.omega[:, None] ** 2 + (self.w * self.balance.basis.orders) ** 2
+        return np.asarray(np.sqrt((squares**2 * self.x**2).sum(axis=(1, 2))))
+
+    @property
+    def by_frequency(self) -> Array:
+        """Rate of the residual by the frequency, known functions held, shape (points, size)."""
+        balance, (left, left_rate) = self.balance, self.balance.basis.tests
+        by_frequency = 2 * self.w * balance.basis.orders**2 * self.x - self._damped + self._pulse
+        pushes, moves = balance.equations.by_velocity
+        for depends, part, test in (
+            (pushes, self.found.force_v, left),
+            (moves, self.found.momentum_v, self.w * left_rate),
+        ):
+            if depends:
+                slope = (part @ self.turn[..., None])[..., 0].swapaxes(1, 2)
+                by_frequency = by_frequency + slope @ test
+        return np.asarray(by_frequency.reshape(len(self.x), -1))
+
+    def jacobian(self, rows: slice | NDArray[np.bool_] = slice(None)) -> Array:
+        """Return the rates of the residual by the unknowns, shape (points, size, size), at some of the points."""
+        basis, equations, w = self.balance.basis, self.balance.equations, self.w[rows]
+        n, m, points = equations.modes, basis.size, len(w)
+        jacobian = self._blocks(rows, w).reshape(points, n, n, m, m).transpose(0, 1, 3, 2, 4).copy()
+        if equations.damping.any():
+            jacobian -= w[..., None, None] * np.einsum("ij,ml->imjl", equations.damping, basis.turned)
         jacobian = jacobian.reshape(points, n * m, n * m)
         diagonal = np.arange(n * m)
-        jacobian[:, diagonal, diagonal] -= stiff.reshape(points, -1)
-        by_frequency = 2 * w * basis.orders**2 * x - damped + pulse
-        moving = turn.reshape(*shape, 1)
-        for depends, part, test in ((pushes, found.force_v, left), (moves, found.momentum_v, w * left_rate)):
-            if depends:
-                slope = (part @ moving).reshape(points, basis.samples, n).swapaxes(1, 2)
-                by_frequency = by_frequency + slope @ test
-        scale = np.sqrt(((self.equations.omega[:, None] ** 2 + (w * basis.orders) ** 2) ** 2 * x**2).sum(axis=(1, 2)))
-        return residual.reshape(points, -1), jacobian, by_frequency.reshape(points, -1), scale
+        jacobian[:, diagonal, diagonal] -= self._stiff[rows].reshape(points, n * m)
+        return np.asarray(jacobian)
 
-    def _blocks(self, found: Derivatives, w: Array, points: int) -> Array:
+    def _blocks(self, rows: slice | NDArray[np.bool_], w: Array) -> Array:
         """Return the rates of the nonlinear terms by the unknowns, shape (points, modes * modes, size * size)."""
-        n, m = self.equations.modes, self.basis.size
-        by_q_q, by_q_v, by_v_q, by_v_v = (
-            part.reshape(points, self.basis.samples, n * n).swapaxes(1, 2) for part in found[2:]
-        )
-        bb, bd, dd = self.basis.products
-        pushes, moves = self.equations.by_velocity
-        blocks = by_q_q @ bb
+        basis, n = self.balance.basis, self.balance.equations.modes
+
+        def part(one: Array) -> Array:
+            return one[rows].reshape(len(w), basis.samples, n * n).swapaxes(1, 2)
+
+        bb, bd, dd = basis.products
+        pushes, moves = self.balance.equations.by_velocity
+        blocks = part(self.found.force_q) @ bb
         if pushes:
+            m = basis.size
             db = bd.reshape(-1, m, m).swapaxes(1, 2).reshape(-1, m * m)
-            db = db * (self.basis.weights[:, None] / self.basis.weights[None, :]).reshape(-1)
-            blocks = blocks + w * (by_q_v @ bd) + w * (by_v_q @ db)
+            db = db * (basis.weights[:, None] / basis.weights[None, :]).reshape(-1)
+            blocks = blocks + w * (part(self.found.force_v) @ bd) + w * (part(self.found.momentum_q) @ db)
         if moves:
-            blocks = blocks + w**2 * (by_v_v @ dd)
+            blocks = blocks + w**2 * (part(self.found.momentum_v) @ dd)
         return np.asarray(blocks)
 
 
@@ -221,16 +274,16 @@ def newton(
     last, step, share = np.full(len(x), np.inf), np.zeros_like(x), np.ones(len(x))
     for _ in range(most):
         some = None if causes is None else causes[open_]
-        residual, jacobian, _, scale = balance.residual(x[open_], frequency[open_], some)
-        size = np.linalg.norm(residual, axis=1)
-        done[open_[size <= tolerance * scale + floor]] = True
+        balanced = balance.at(x[open_], frequency[open_], some)
+        size = np.linalg.norm(balanced.residual, axis=1)
+        done[open_[size <= tolerance * balanced.scale + floor]] = True
         rises = ~(size < last[open_]) & (share[open_] > _SHORTEST) & (not whole)  # then the step was too long
         back = open_[rises & ~done[open_]]
         share[back] *= 0.5
         x[back] += share[back, None] * step[back]
         on = ~rises & np.isfinite(size) & ~done[open_]
         at = open_[on]
-        step[at], last[at], share[at] = _solved(jacobian[on], residual[on]), size[on], 1.0
+        step[at], last[at], share[at] = _solved(balanced.jacobian(on), balanced.residual[on]), size[on], 1.0
         x[at] -= step[at]
         open_ = np.sort(np.concatenate([back, at]))
         if not open_.size:

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Causes = Callable[[Array, NDArray[np.intp]], Array]
 """Known functions at phases of shape (samples,) for some points, shape (points, known functions, samples)."""
-_BLOCK = 2_000_000  # matrix entries in memory at a time
+_BLOCK = 500_000  # matrix entries at a time, so that they stay in the processor's cache
 _LEVELS = 6
 
 
@@ -94,12 +94,12 @@ def _maps(
     q = np.einsum("pnm,sm->psn", coefficients, basis.values(phase)).reshape(-1, n)
     v = np.einsum("pnm,sm,p->psn", coefficients, basis.values(phase, 1), frequency).reshape(-1, n)
     known = None if causes is None else flattened(causes(phase, rows))
-    rest = beside_linear(equations, q, v, known).reshape(points, steps, 2 * n, 2 * n)
-    h = 2 * np.pi * share / (frequency * steps)
-    maps = _split_maps(equations, rest, h) if _mixes(equations) else _midpoint_maps(equations, rest, h)
-    while maps.shape[1] > 1:
-        maps = maps[:, 1::2] @ maps[:, 0::2]
-    return maps[:, 0]
+    h = (2 * np.pi * share / (frequency * steps))[:, None, None, None]
+    if equations.moves_mass:
+        rest = beside_linear(equations, q, v, known).reshape(points, steps, 2 * n, 2 * n)
+        return _product(_split_maps(equations, rest, h))
+    pull = equations.derivatives(q, v, known).force_q.reshape(points, steps, n, n)
+    return _pushed_map(equations, pull, h) if _mixes(equations) else _product(_midpoint_maps(equations, pull, h))
 
 
 def _mixes(equations: ModalPolynomials) -> bool:
@@ -108,31 +108,57 @@ def _mixes(equations: ModalPolynomials) -> bool:
     return equations.moves_mass or bool(equations.forces) or bool(np.any(equations.damping != diagonal))
 
 
-def _midpoint_maps(equations: ModalPolynomials, rest: Array, h: Array) -> Array:
-    """Return the maps over steps of length h (points,), exact for the stiffness at the midpoint of each."""
+def _midpoint_maps(equations: ModalPolynomials, pull: Array, h: Array) -> Array:
+    """Return the maps over steps of length h, exact for the stiffness at the midpoint of each."""
     n, damping = equations.modes, np.diag(equations.damping)
-    square, shape = np.linalg.eigh(np.diag(equations.omega**2) - rest[:, :, n:, :n])
-    h = h[:, None, None]
-    angle = np.sqrt(np.abs(square)) * h
+    square, shape = np.linalg.eigh(np.diag(equations.omega**2) - pull)
+    angle = np.sqrt(np.abs(square)) * h[..., 0]
     cosine = np.where(square > 0, np.cos(angle), np.cosh(angle))
-    sine = h * np.where(square > 0, np.sinc(angle / np.pi), np.sinh(angle) / np.where(angle > 0, angle, 1.0))
-    sine = np.where(angle > 0, sine, h)
-    maps, across = np.empty_like(rest), shape.swapaxes(-1, -2)
+    sine = h[..., 0] * np.where(square > 0, np.sinc(angle / np.pi), np.sinh(angle) / np.where(angle > 0, angle, 1.0))
+    maps, across = np.empty((*pull.shape[:2], 2 * n, 2 * n)), shape.swapaxes(-1, -2)
     maps[:, :, :n, :n] = maps[:, :, n:, n:] = (shape * cosine[:, :, None]) @ across
     maps[:, :, :n, n:] = (shape * sine[:, :, None]) @ across
     maps[:, :, n:, :n] = -(shape * (square * sine)[:, :, None]) @ across
     if damping.any():  # momenta decay over half a step before and after
-        decay = np.exp(-0.5 * damping * h)
+        decay = np.exp(-0.5 * damping * h[..., 0])
         maps[:, :, n:] *= decay[..., None]
         maps[:, :, :, n:] *= decay[:, :, None]
     return maps
 
 
 def _split_maps(equations: ModalPolynomials, rest: Array, h: Array) -> Array:
-    """Return the maps over steps of length h (points,): linear modes exactly, the remainder at the midpoint."""
-    one, scaled = np.eye(2 * equations.modes), rest * h[:, None, None, None]
-    turn = _rotation(equations.omega, 0.5 * h)[:, None]
+    """Return the maps over steps of length h: linear modes exactly, the remainder at the midpoint."""
+    one, scaled, turn = np.eye(2 * equations.modes), rest * h, _rotation(equations.omega, 0.5 * h)
     return np.asarray(turn @ np.linalg.solve(one - 0.5 * scaled, one + 0.5 * scaled) @ turn)
+
+
+def _pushed_map(equations: ModalPolynomials, pull: Array, h: Array) -> Array:
+    """Return the map over all steps as by `_split_maps` for forces of the displacements, and damping.
+
+    The remainder changes momenta alone. The linear modes turn by half a step at the end of a step and at the start of
+    the next: at once by a whole one.
+    """
+    n, omega = equations.modes, equations.omega
+    drag = -0.5 * h * equations.damping
+    implicit = np.linalg.inv(np.eye(n) - drag)
+    push, keep = h * implicit @ pull, implicit @ (np.eye(n) + drag)
+    turn = _rotation(omega, h)
+    a, b, c, d = (np.diagonal(turn[..., i : i + n, j : j + n], 0, -2, -1)[..., None] for i in (0, n) for j in (0, n))
+    maps, place = np.empty((*pull.shape[:2], 2 * n, 2 * n)), np.arange(n)
+    np.multiply(b, push, out=maps[:, :, :n, :n])
+    np.multiply(d, push, out=maps[:, :, n:, :n])
+    maps[:, :, place, place] += a[..., 0]
+    maps[:, :, n + place, place] += c[..., 0]
+    maps[:, :, :n, n:], maps[:, :, n:, n:] = b * keep, d * keep
+    back, half = (_rotation(omega, share * h)[:, 0] for share in (-0.5, 0.5))
+    return np.asarray(back @ _product(maps) @ half)
+
+
+def _product(maps: Array) -> Array:
+    """Return the product of maps (points, steps, size, size) in the order of time; steps is a power of two."""
+    while maps.shape[1] > 1:
+        maps = maps[:, 1::2] @ maps[:, 0::2]
+    return maps[:, 0]
 
 
 def beside_linear(equations: ModalPolynomials, q: Array, v: Array, causes: Array | None) -> Array:
@@ -140,9 +166,6 @@ def beside_linear(equations: ModalPolynomials, q: Array, v: Array, causes: Array
     n, found = equations.modes, equations.derivatives(q, v, causes)
     matrix = np.zeros((len(q), 2 * n, 2 * n))
     drag = found.force_v - equations.damping
-    if not equations.moves_mass:
-        matrix[:, n:, :n], matrix[:, n:, n:] = found.force_q, drag
-        return matrix
     inverse = np.linalg.inv(np.eye(n) + found.momentum_v)
     back = -inverse @ found.momentum_q
     matrix[:, :n, :n], matrix[:, :n, n:] = back, inverse - np.eye(n)
@@ -151,14 +174,14 @@ def beside_linear(equations: ModalPolynomials, q: Array, v: Array, causes: Array
 
 
 def _rotation(omega: Array, time: Array) -> Array:
-    """Return the exact maps of undamped linear modes, shape (points, 2 modes, 2 modes)."""
-    angle = omega * time[:, None]
+    """Return the exact maps of undamped linear modes over times (..., 1, 1), shape (..., 2 modes, 2 modes)."""
+    angle = omega * time[..., 0]
     cosine, n = np.cos(angle), omega.size
-    matrix = np.zeros((len(time), 2 * n, 2 * n))
+    matrix = np.zeros((*time.shape[:-2], 2 * n, 2 * n))
     place = np.arange(n)
-    matrix[:, place, place] = matrix[:, n + place, n + place] = cosine
-    matrix[:, place, n + place] = time[:, None] * np.sinc(angle / np.pi)
-    matrix[:, n + place, place] = -omega * np.sin(angle)
+    matrix[..., place, place] = matrix[..., n + place, n + place] = cosine
+    matrix[..., place, n + place] = time[..., 0] * np.sinc(angle / np.pi)
+    matrix[..., n + place, place] = -omega * np.sin(angle)
     return matrix
 
 

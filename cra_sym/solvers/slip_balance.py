@@ -231,7 +231,8 @@ class SlipBalance:
     def _dense_linearisation(self, q: Array, frequency: Array, causes: Array | None) -> _Based:
         """Return parametric or nonlinear modes, linearised at coordinates (points, modal size)."""
         b, size = self.elements.rows, self.basis.size
-        residual, jacobian, _, _ = self._balance.residual(q, frequency, causes)
+        balanced = self._balance.at(q, frequency, causes)
+        residual, jacobian = balanced.residual, balanced.jacobian()
         still = np.flatnonzero(self._rigid()) * size
         jacobian[:, still, still] -= frequency[:, None] ** 2
         residual[:, still] -= frequency[:, None] ** 2 * q[:, still]

@@ -325,9 +325,9 @@ class HeldMotions:
         points, n, size = x.shape
         w = frequency[:, None, None]
         turned = x @ basis.turned.T
-        found = Balance(equations, basis).residual(x.reshape(points, -1), frequency)
-        residual, by_frequency = found[0].reshape(x.shape), found[2].reshape(x.shape)
-        jacobian = found[1].reshape(points, n, size, n, size)
+        found = Balance(equations, basis).at(x.reshape(points, -1), frequency)
+        residual, by_frequency = found.residual.reshape(x.shape), found.by_frequency.reshape(x.shape)
+        jacobian = found.jacobian().reshape(points, n, size, n, size)
         by_ratio = 2 * w**2 * turned
         residual = residual + ratio[:, None, None] * by_ratio
         added = (2 * ratio * frequency**2)[:, None, None] * basis.turned
