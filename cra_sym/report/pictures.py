@@ -45,12 +45,14 @@ def save_figures(
     return [path for name in bar for path in _save(draw(name, arm), folder, name, kinds)]
 
 
-def save_claims(folder: Path, verdicts: Iterable[Verdict], kinds: Sequence[str] = ("svg",)) -> list[Path]:
-    """Draw each verdict from its evidence and return the files made, named by the claims."""
+def save_claims(
+    folder: Path, verdicts: Iterable[Verdict], kinds: Sequence[str] = ("svg",), ending: str = ""
+) -> list[Path]:
+    """Draw each verdict from its evidence and return the files made, named by the claims and the ending."""
     return [
         path
         for verdict in tqdm(verdicts, unit="claim", disable=None)
-        for path in _save(verdict.draw(), folder, verdict.id, kinds)
+        for path in _save(verdict.draw(), folder, f"{verdict.id}{ending}", kinds)
     ]
 
 

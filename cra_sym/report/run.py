@@ -12,6 +12,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from cra_sym.claims import claims
+from cra_sym.claims.slipping import slipping_claims
 from cra_sym.extras import require
 from cra_sym.files import staged_directory, write_text
 from cra_sym.report.notebooks import find_notebooks, refresh
@@ -58,7 +59,7 @@ def reproduce(output: str | Path, notebooks: str | Path | None = None) -> str:
         save_figures(folder / "figures")
         save_animations(folder / "figures")
         _print_progress("Judging the claims")
-        save_claims(folder / "claims", claims())
+        _save_claims(folder / "claims")
         _write_tables(folder / "tables")
         _write_site(folder / "site", find_notebooks(folder / "notebooks"), (folder / "figures", folder / "claims"))
         listing = _listing(folder)
@@ -78,7 +79,7 @@ def site(output: str | Path, notebooks: str | Path | None = None) -> str:
         pictures = folder.with_name(f"{folder.name}.pictures")
         try:
             _print_progress("Judging the claims")
-            save_claims(pictures, claims())
+            _save_claims(pictures)
             save_animations(pictures)
             save_figures(pictures, filter(shows_any_system, FIGURES), kinds=["svg"])
             _write_site(folder, sources, (pictures,))
@@ -101,13 +102,17 @@ def _print_progress(what: str) -> None:
     print(what, file=sys.stderr, flush=True)
 
 
+def _save_claims(folder: Path) -> None:
+    save_claims(folder, claims())
+    save_claims(folder, slipping_claims(), ending="-slip")
+
+
 def _write_site(folder: Path, notebooks: list[Path], pictures: Iterable[Path]) -> None:
     from cra_sym.report.site.build import write_site
 
     _print_progress("Checking the equations and writing the site")
-    warnings = write_site(
-        folder, notebooks, claims(), [path for place in pictures for path in sorted(place.glob("*.svg"))]
-    )
+    drawn = [path for place in pictures for path in sorted(place.glob("*.svg"))]
+    warnings = write_site(folder, notebooks, claims(), slipping_claims(), drawn)
     if warnings:
         _print_progress(warnings)
 

@@ -32,6 +32,7 @@ _ANGLE = 0.4  # largest phase of the fastest mode and the highest harmonic in on
 _LEVELS = 5
 _GAUSS = 0.5 - np.sqrt(3.0) / 6.0
 _FEWEST = 1e-12  # phase
+_RADIUS, _DEGREE = 0.5, 13  # norm of an exponent, degree of its series: the first term left out is 0.5^14/14! = 7e-16
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,6 +168,27 @@ def _map(motion: _Motion, elements: Elements, spans: list[Span], finer: int) -> 
     return np.asarray(state[np.ix_(keep, keep)])
 
 
+def _exponentials(exponents: Array, modes: int, fastest: float) -> Array:
+    """Return the exponentials of many exponents of short steps, by scaling, Taylor's series and squaring of them all.
+
+    Momenta are measured in the fastest frequency, so that the exponents of (q, p) are of the order of the phase of a
+    step. The sliders' columns are nilpotent and do not limit the convergence.
+    """
+    scale = np.ones(exponents.shape[-1])
+    scale[modes : 2 * modes] = max(fastest, 1e-300)
+    scaled = exponents / scale[:, None] * scale
+    most = np.abs(scaled[:, : 2 * modes, : 2 * modes]).sum(axis=-1).max()
+    halvings = max(0, int(np.ceil(np.log2(max(most, _RADIUS) / _RADIUS))))
+    scaled = scaled / 2**halvings
+    one = np.eye(scale.size)
+    found = one + scaled / _DEGREE
+    for k in range(_DEGREE - 1, 0, -1):
+        found = one + scaled @ found / k
+    for _ in range(halvings):
+        found = found @ found
+    return np.asarray(found * scale[:, None] / scale)
+
+
 def _coupled(elements: Elements, stuck: Array) -> tuple[Array, Array]:
     """Return the matrices of F = stiff B q - drive s with s the sums of k z over the sticking elements."""
     k = np.diag(stuck)
@@ -204,7 +226,7 @@ def _propagators(
     else:  # Magnus, order four
         first, second = at(_GAUSS), at(1.0 - _GAUSS)
         exponent = 0.5 * (first + second) + np.sqrt(3.0) / 12.0 * (second @ first - first @ second)
-    maps = expm(exponent)
+    maps = expm(exponent) if motion.constant else _exponentials(exponent, n, float(motion.equations.omega.max()))
     found, at_step = [], 0
     for count in parts:
         whole = maps[at_step]

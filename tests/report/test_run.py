@@ -6,6 +6,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from cra_sym.__main__ import main
 from cra_sym.claims import claim
+from cra_sym.claims.slipping import slipping_claim
 from cra_sym.figures import ANIMATIONS, FIGURES
 from cra_sym.report import run
 from cra_sym.report.site import build
@@ -40,6 +41,7 @@ def quickly(monkeypatch):
     monkeypatch.setattr(run, "save_animations", lambda folder: every_figure(folder, ANIMATIONS))
     monkeypatch.setattr(run, "TABLES", {"frequencies": TABLES["frequencies"]})
     monkeypatch.setattr(run, "claims", lambda: [claim("C20")])
+    monkeypatch.setattr(run, "slipping_claims", lambda: [slipping_claim("C16")])
     for part in ("accuracy_table", "orders"):
         monkeypatch.setattr(build, part, lambda: "")
     monkeypatch.setattr(build, "write_reference", lambda folder: None)
@@ -62,7 +64,7 @@ def test_one_folder_with_everything(book, tmp_path, quickly, capsys):
     made = nbformat.read(tmp_path / "out put" / "notebooks" / "00_trial.ipynb", as_version=4)
     assert made.cells[1].outputs[0].data["text/plain"] == "42"
     assert (tmp_path / "out put" / "notebooks" / "images" / "a.svg").exists()
-    assert (tmp_path / "out put" / "claims" / "C20.svg").exists()
+    assert all((tmp_path / "out put" / "claims" / f"{name}.svg").exists() for name in ("C20", "C16-slip"))
     assert (tmp_path / "out put" / "figures" / "moving_arm.svg").exists()
     assert (tmp_path / "out put" / "tables" / "frequencies.csv").exists()
     assert "42" in (tmp_path / "out put" / "site" / "index.html").read_text(encoding="utf-8")
@@ -84,10 +86,10 @@ def test_the_site_alone(book, tmp_path, quickly, capsys):
 def test_what_sphinx_says_is_told(tmp_path, monkeypatch):
     """A page that links to nothing warns; sources without a first page cannot be built."""
     monkeypatch.setattr(build, "_write_sources", lambda folder, *_: written(folder, "[lost](nowhere.md)"))
-    assert "nowhere.md" in build.write_site(tmp_path / "site", [], [], [])
+    assert "nowhere.md" in build.write_site(tmp_path / "site", [], [], [], [])
     monkeypatch.setattr(build, "_write_sources", lambda folder, *_: folder.mkdir(parents=True))
     with pytest.raises(build.SiteError, match="the site was not built"):
-        build.write_site(tmp_path / "other", [], [], [])
+        build.write_site(tmp_path / "other", [], [], [], [])
     assert [path.name for path in tmp_path.iterdir()] == ["site"]
 
 

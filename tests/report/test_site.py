@@ -16,6 +16,7 @@ import pytest
 
 import cra_sym as cra
 from cra_sym.claims import claim
+from cra_sym.claims.slipping import slipping_claim
 from cra_sym.extras import MissingExtraError
 from cra_sym.figures import ANIMATIONS
 from cra_sym.paper.equations import Equation
@@ -27,6 +28,7 @@ from cra_sym.report.site.build import write_site
 from cra_sym.report.site.reference import results
 
 JUDGED = ("C03", "C07", "C20", "C22")  # each fares differently
+SLIPPING = ("C16",)
 LARGEST = 1.5e6  # bytes of a page
 CHAPTERS = [path.stem for path in find_notebooks()]
 
@@ -54,14 +56,15 @@ def site(tmp_path_factory):
     """The site of the notebooks as they are stored; the equations' checks have tests of their own."""
     folder = tmp_path_factory.mktemp("a site") / "pages"
     pictures = folder.parent / "pictures"
-    verdicts = list(map(claim, JUDGED))
+    verdicts, slipping = list(map(claim, JUDGED)), list(map(slipping_claim, SLIPPING))
     save_claims(pictures, verdicts)
+    save_claims(pictures, slipping, ending="-slip")
     save_animations(pictures)
     save_figures(pictures, ["frequencies"], kinds=["svg"])
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Equation, "check", lambda self: self.number != 7)
         patch.setattr(build, "accuracy_table", lambda: "| a | b |\n| --- | --- |\n| 1 | 2 |\n")  # has tests of its own
-        assert write_site(folder, find_notebooks(), verdicts, sorted(pictures.iterdir())) == ""
+        assert write_site(folder, find_notebooks(), verdicts, slipping, sorted(pictures.iterdir())) == ""
     assert sorted(path.name for path in folder.parent.iterdir()) == ["pages", "pictures"]
     return folder
 
@@ -151,12 +154,16 @@ def test_every_equation_is_in_the_ledger_with_the_chapter_that_shows_it(site, pa
 def test_claims_come_first_with_what_they_rest_on(pages):
     page = pages["claims.html"]
     assert "claims.html" in pages["index.html"].all("href")
-    for verdict in map(claim, JUDGED):
-        assert verdict.id.lower() in page.all("id") and verdict.source in page.text and verdict.headline in page.text
+    identifiers = [*map(str.lower, JUDGED), *(f"{id.lower()}-slip" for id in SLIPPING)]
+    assert {*identifiers, "claims-with-slip"} <= {*page.all("id")} and "claims --slipping C16" in page.text
+    assert all(any(f"{id}-slip" in link for link in page.all("src")) for id in SLIPPING)
+    for verdict in [*map(claim, JUDGED), *map(slipping_claim, SLIPPING)]:
+        assert verdict.source in page.text and verdict.headline in page.text
         for told in (verdict.plain, verdict.sentence, verdict.criterion, verdict.remedy or "", verdict.missing or ""):
             prose = " ".join(told.split("$")[::2])  # mathematics stands between
             assert {*re.findall("[a-z]{4,}", prose)} <= {*re.findall("[a-z]{4,}", page.text)}
         assert all(name in page.text for name in verdict.evidence)
+    for verdict in map(claim, JUDGED):
         assert f"../claims.html#{verdict.id.lower()}" in pages["chapters/10_claims.html"].all("href")
 
 

@@ -37,7 +37,13 @@ class SiteError(RuntimeError):
     """Sphinx failed to build the site; the message is its output."""
 
 
-def write_site(folder: Path, notebooks: Sequence[Path], verdicts: Sequence[Verdict], pictures: Sequence[Path]) -> str:
+def write_site(
+    folder: Path,
+    notebooks: Sequence[Path],
+    verdicts: Sequence[Verdict],
+    slipping: Sequence[Verdict],
+    pictures: Sequence[Path],
+) -> str:
     """Write the site into ``folder``; return the warnings of Sphinx, empty if there are none.
 
     Parameters
@@ -46,9 +52,11 @@ def write_site(folder: Path, notebooks: Sequence[Path], verdicts: Sequence[Verdi
         New or empty folder. Only a temporary folder next to it is written besides.
     notebooks : sequence of path
         Chapters in reading order, shown with their stored outputs.
-    verdicts : sequence of Verdict
+    verdicts, slipping : sequence of Verdict
+        With the paper's joint, and with a joint that slips.
     pictures : sequence of path
-        SVG files of the animations, of the verdicts by their ids, and of the figures by their names.
+        SVG files of the animations, of the verdicts by their ids, with the ending ``-slip`` for a joint that slips, and
+        of the figures by their names.
 
     Raises
     ------
@@ -57,7 +65,7 @@ def write_site(folder: Path, notebooks: Sequence[Path], verdicts: Sequence[Verdi
     """
     work = folder.with_name(f"{folder.name}.work")
     try:
-        _write_sources(work / "sources", notebooks, verdicts, pictures)
+        _write_sources(work / "sources", notebooks, verdicts, slipping, pictures)
         said = _run_sphinx(work)
         shutil.copytree(work / "pages", folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".buildinfo"))
     finally:
@@ -75,7 +83,11 @@ def _run_sphinx(work: Path) -> str:
 
 
 def _write_sources(
-    folder: Path, notebooks: Sequence[Path], verdicts: Sequence[Verdict], pictures: Sequence[Path]
+    folder: Path,
+    notebooks: Sequence[Path],
+    verdicts: Sequence[Verdict],
+    slipping: Sequence[Verdict],
+    pictures: Sequence[Path],
 ) -> None:
     """Write everything that Sphinx reads."""
     shutil.copytree(_HERE / "pages", folder, ignore=shutil.ignore_patterns("*.jinja", "__pycache__"))
@@ -86,9 +98,9 @@ def _write_sources(
     (folder / "pictures").mkdir()
     for path in pictures:
         shutil.copy(path, folder / "pictures")
-    environment = _environment()
+    environment, known = _environment(), _known(chapters, ledger, verdicts, pictures) | {"slipping": slipping}
     for path in sorted((_HERE / "pages").glob("*.jinja")):
-        text = environment.get_template(path.name).render(_known(chapters, ledger, verdicts, pictures))
+        text = environment.get_template(path.name).render(known)
         write_text(folder / path.stem, text)
     homes = {str(e.equation.number): f"equations#eq-{e.equation.number}" for e in ledger}
     write_text(folder / LINKS, json.dumps(homes | {v.id: f"claims#{v.id.lower()}" for v in verdicts}))
