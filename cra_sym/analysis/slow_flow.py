@@ -29,9 +29,10 @@ def slow_flow(model: Model, resonance: Any, order: int = 1, modes: int | None = 
         ``n`` primary (varpi about omega_n); ``(n, n)``, ``(m, n)``, ``(m, -n)`` parametric (varpi about the sum or
         difference); ``('free', n)``; ``('superharmonic', n, k)`` (k varpi about omega_n); ``('subharmonic', n, k)``
         (varpi about k omega_n); ``('internal', m, n, k)`` (omega_n about k omega_m). Modes are counted from 1.
-    order : {1}
-        The first order at which the amplitudes change: second in the amplitude where quadratic terms resonate, else
-        third, including second-order effects of quadratic terms.
+    order : {1, 2}
+        1, the first order at which the amplitudes change: second in the amplitude where quadratic terms resonate, else
+        third, including second-order effects of quadratic terms. 2, of ``('free', n)`` alone: the next term of the
+        frequency as well, of fifth order in the amplitude.
     modes : int, optional
         Number of modes in the second-order solution; default: those of the resonance.
 
