@@ -34,6 +34,7 @@ _START = {"v_m": 0.0, "a_m": 0.1, "B": 1e-3, "varpi": 10.0, "psi": 0.0, "epsilon
 _OF_AN_ARM = {"joint stiffness fluctuates": JOINT, "base shakes along the arm": AXIAL}
 _SWING = 24  # frames of one cycle of the mode shapes
 _SIZE = (8.6, 2.9)
+_DECADES = 1.5  # to each side of the first value of a parameter of an elastic-slip element
 
 #: First value, last value and number of steps; stiffnesses run through decades and end in a rigid joint.
 _RANGES: dict[str, tuple[float, float, int]] = {
@@ -191,11 +192,22 @@ class Explorer:
             grid = sorted({*np.geomspace(low, high, steps + 1).round(6).tolist(), np.inf, value})
             options = [("rigid" if np.isinf(k) else f"{k:.3g}", k) for k in grid]
             slider = widgets.SelectionSlider(options=options, value=value, **common)
+        elif name in self._by_decades and value > 0:
+            middle = np.log10(value)
+            common |= {"min": middle - _DECADES, "max": middle + _DECADES, "step": 0.05}
+            slider = widgets.FloatLogSlider(value, readout_format=".3g", **common)
         else:
             common |= {"min": min(low, value), "max": max(high, value), "step": (high - low) / steps}
             slider = widgets.FloatSlider(value, readout_format=".3g", **common)
         slider.observe(lambda change: self._set(**{name: change["new"]}), "value")
         return slider
+
+    @cached_property
+    def _by_decades(self) -> set[str]:
+        """The parameters of elastic-slip elements: stiffness, slip force, or a preload that both depend on."""
+        elements = (element for element, _, _ in self._given.model.pieces["hysteresis"])
+        values = (value for element in elements for value in element.parameters.values())
+        return {symbol.name for value in values for symbol in getattr(value, "free_symbols", ())} & {*self._names}
 
     def _named(self, name: str) -> tuple[str, str, str]:
         """Return symbol, unit and meaning of a value."""

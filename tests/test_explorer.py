@@ -198,3 +198,14 @@ def test_labels_are_not_cut_when_ticks_grow():
         for ax in figure.axes:
             box = ax.yaxis.get_tightbbox(figure.canvas.get_renderer())
             assert box.x0 >= 0 and box.y0 >= 0 and box.y1 <= figure.figure.bbox.height
+
+
+def test_a_preload_is_a_slider_by_decades(monkeypatch):
+    pytest.importorskip("ipywidgets", reason="needs the extra explore: ipywidgets")
+    view = cra.explore(cra.BoltedJoint().parametric(cra.Arm.nominal(), 2.0))
+    slider, redrawn = view.sliders["preload"], []
+    monkeypatch.setattr(view, "_draw", redrawn.append)
+    assert slider.base == 10 and 10**slider.min < 0.1 and 10**slider.max > 50 and slider.value == 2.0
+    slider.value = 20.0
+    assert view.system.values["preload"] == 20.0 and redrawn == ["modes", "response", "zones"]
+    assert "preload = 20 N" in repr(view)

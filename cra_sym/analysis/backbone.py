@@ -188,7 +188,9 @@ def _held(
     if amplitude is None:
         raise ValueError(f"energy = {energy}: must be None and amplitude given, as the model has hysteresis")
     if system.shape:
-        raise ValueError(f"system has the batch shape {system.shape}: must be a single one here")
+        raise ValueError(
+            f"system has the batch shape {system.shape}: must be a single one here; see System.parameter_sets"
+        )
     targets = checks.real_array("amplitude", amplitude, low=1e-60, high=1e60)
     found = held_curve(system, mode, targets.ravel(), modes, harmonics, place, field)
     warn_of_missing(found, targets.ravel())

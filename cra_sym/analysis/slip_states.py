@@ -120,7 +120,9 @@ class SlipProblem:
         """Return the problem; ``harmonics`` None is the first trial number."""
         system, modes = arguments["system"], arguments["modes"]
         if system.shape:
-            raise ValueError(f"system has the batch shape {system.shape}: must be a single one here")
+            raise ValueError(
+                f"system has the batch shape {system.shape}: must be a single one here; see System.parameter_sets"
+            )
         own = {**arguments, "system": system.without_hysteresis}
         own["excitation"] = _without_elements(system, arguments.get("excitation"))
         driven = forced(**own)

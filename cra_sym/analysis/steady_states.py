@@ -152,7 +152,7 @@ def steady_states(
     Parameters
     ----------
     system : System
-        Not a batch.
+        Not a batch: for one, ``[steady_states(one, ..) for one in system.parameter_sets]``.
     angular_frequency : array_like
         Of the excitation, rad/s: a number or one axis.
     excitation : Fluctuation, JointStiffness, AxialBase or ``model.excitation``, optional

@@ -130,15 +130,18 @@ class BoltedJoint:
             Each of the shape of the preload; N/m, N m/rad, N/m, N.
         """
         N = real_array("preload", preload, low=0.0, open_low=True, unit="N")
+        return {name: np.broadcast_to(value, N.shape)[()] for name, value in self._laws(N).items()}
+
+    def _laws(self, N: Any) -> dict[str, Any]:
+        """Return k_t, k_r, k_d and slip at a preload, an array or a symbol."""
         normal = self.faces * self.reference / self.roughness * (N / self.reference) ** self.exponent
         sideways = 2 * (1 - self.poisson) / (2 - self.poisson) * normal
-        found = {
-            "k_t": np.full(N.shape, self.rest),
+        return {
+            "k_t": self.rest,
             "k_r": 1.0 / (1.0 / (normal * self.lever**2) + 1.0 / self.body_r),
             "k_d": 1.0 / (1.0 / sideways + 1.0 / self.body_t),
             "slip": self.friction * self.faces * N,
         }
-        return {name: value[()] for name, value in found.items()}
 
     def on(self, arm: Arm, preload: Any) -> System:
         """Return the arm with this joint: a System with a Jenkins element k_d, slip beside k_t and k_r.
@@ -163,6 +166,50 @@ class BoltedJoint:
 
         instance("arm", arm, Arm)
         return _model(arm.model).at({**arm.values, **self.values(preload)}, zeta=arm.zeta)
+
+    def parametric(self, arm: Arm, preload: Any) -> System:
+        """Return the arm with this joint as :meth:`on` does, with the preload as a parameter of its Lagrangian.
+
+        So it is a slider of :func:`cra_sym.explore`, and sensitivities and sweeps are over the preload. The springs of
+        the joint are no parameters then; to let one of them fluctuate, use :meth:`on`.
+
+        Parameters
+        ----------
+        arm : Arm
+            Its own k_t and k_r do not matter.
+        preload : array_like
+            N, positive; an array is a batch.
+
+        Examples
+        --------
+        >>> import cra_sym as cra
+        >>> system = cra.BoltedJoint().parametric(cra.Arm.nominal(), 1.0)
+        >>> cra.natural_frequencies(system.replace(preload=10.0)).round(1)
+        array([ 2.3, 14.6, 40.9])
+        """
+        from cra_sym.arm.parameters import Arm
+
+        instance("arm", arm, Arm)
+        N = real_array("preload", preload, low=0.0, open_low=True, unit="N")
+        values = {name: value for name, value in arm.values.items() if name not in ("k_t", "k_r")}
+        return _parametric(self, arm.model).at({**values, "preload": N}, zeta=arm.zeta)
+
+
+@cache
+def _parametric(joint: BoltedJoint, model: Model) -> Model:
+    from sympy import Float, Symbol
+
+    from cra_sym.model.hysteresis import Jenkins
+
+    N = Symbol("preload", positive=True)
+    laws, springs = joint._laws(N), {s.name: s for s in model.symbols if s.name in ("k_t", "k_r")}
+    (field,) = model.equations.fields
+    return model.replace(
+        hysteresis=[(Jenkins(laws["k_d"], laws["slip"]), field, "left")],
+        definitions=dict(model.pieces["definitions"])
+        | {springs["k_t"]: Float(laws["k_t"]), springs["k_r"]: laws["k_r"]},
+        units=dict(model.pieces["units"]) | {N: "N"},
+    )
 
 
 @cache

@@ -44,6 +44,7 @@ FIGURES = {
     "slip_loop": "cra_sym.figures.slipping:figure_slip_loop",
     "slip_amplitude": "cra_sym.figures.slipping:figure_slip_amplitude",
     "preload": "cra_sym.figures.slipping:figure_preload",
+    "preload_tongues": "cra_sym.figures.slipping:figure_preload_tongues",
     "frequency_response": "cra_sym.figures.vibration:figure_frequency_response",
     "residual_vibration": "cra_sym.figures.vibration:figure_residual_vibration",
     "input_shaping": "cra_sym.figures.vibration:figure_input_shaping",

@@ -11,17 +11,23 @@ from matplotlib.figure import Figure
 from cra_sym.analysis.backbone import Backbone, backbone
 from cra_sym.analysis.modes import natural_frequencies
 from cra_sym.analysis.slip_response import SlipResponse, slip_response
+from cra_sym.analysis.stability import judged_boundary
+from cra_sym.analysis.steady_states import steady_states
 from cra_sym.arm.bolted_joint import BoltedJoint
 from cra_sym.arm.parameters import Arm
+from cra_sym.checks import count
 from cra_sym.figures import STYLE
 from cra_sym.figures.drawing import BLUE, GREEN, INK, ORANGE, panels
+from cra_sym.model.excitations import Fluctuation
 from cra_sym.model.system import System
 from cra_sym.solvers.motion import BaseMotion
 
-__all__ = ["figure_preload", "figure_slip_amplitude", "figure_slip_loop", "figure_tongue_bounds", "show_loop"]
+__all__ = ["figure_preload", "figure_preload_tongues", "figure_slip_amplitude", "figure_slip_loop",
+           "figure_tongue_bounds", "show_loop"]  # fmt: skip
 
 _MOVE = {"distance": 0.3, "v_max": 0.5, "a_max": 2.0}
 _ZETA = 0.002
+_SOFT = BoltedJoint(rest=20.0, body_t=20.0, lever=0.05)  # visible deformation before slip
 
 
 def show_loop(found: SlipResponse, *, ax: Any = None) -> Figure:
@@ -103,8 +109,7 @@ def figure_slip_amplitude(
     if curve is None:
         system = Arm.nominal().replace(zeta=_ZETA) if system is None else system
         if isinstance(system, Arm):
-            joint = BoltedJoint(rest=20.0, body_t=20.0, lever=0.05)
-            system = joint.on(system, 0.1 / joint.friction)
+            system = _SOFT.on(system, 0.1 / _SOFT.friction)
         if not system.model.pieces["hysteresis"]:
             raise ValueError("system: must have elastic-slip elements: Model(.., hysteresis=[(cra.Jenkins(..), ..)])")
         amplitude = np.geomspace(4e-3, 0.3, 25) if amplitude is None else amplitude
@@ -206,4 +211,65 @@ def figure_preload(
         right.set_xlabel("time $t$ / s")
         right.set_ylabel("$v(L, t)$ / mm")
         right.legend(title="preload")
+    return cast(Figure, left.figure)
+
+
+def figure_preload_tongues(
+    arm: Arm | None = None,
+    *,
+    joint: BoltedJoint | None = None,
+    preload: Any = None,
+    excitation: Fluctuation | None = None,
+    epsilon: float = 0.3,
+    amplitudes: int = 4,
+    harmonics: int = 7,
+    axes: Any = None,
+) -> Figure:
+    """Draw what the preload of a bolted joint does to tongues of instability: their width, and the vibration inside.
+
+    Left: widths of the principal tongues of modes 1 to 3 while the faces stick, where damping does not close them.
+    Right: the amplitude at which slip bounds the vibration at twice the first frequency, by harmonic balance.
+
+    Parameters
+    ----------
+    arm : Arm, optional
+        Default: the nominal one, slightly damped.
+    joint : BoltedJoint, optional
+        Default: one that is soft.
+    preload : array_like, optional
+        N, ascending.
+    excitation : Fluctuation, optional
+        Default: both springs of the joint that do not slip.
+    epsilon : float
+        Its size.
+    amplitudes : int
+        Number of preloads of the right panel, at least 2.
+    harmonics : int
+    axes : sequence of two Axes, optional
+    """
+    arm = Arm.nominal().replace(zeta=_ZETA) if arm is None else arm
+    excitation = Fluctuation(k_t=1.0, k_r=1.0) if excitation is None else excitation
+    forces = np.geomspace(0.1, 10.0, 25) if preload is None else np.asarray(preload, float)
+    systems = (_SOFT if joint is None else joint).on(arm, forces)
+    widths = [np.subtract(*judged_boundary(systems, excitation, epsilon, (n, n))[1::-1]) for n in (1, 2, 3)]
+    picked = np.unique(np.linspace(0, forces.size - 1, count("amplitudes", amplitudes, low=2)).round().astype(int))
+    options: dict[str, Any] = {"excitation": excitation, "epsilon": epsilon, "modes": 2, "period": 2}
+    varpi = 4 * np.pi * natural_frequencies(systems, 1)[:, 0]
+    found = [
+        steady_states(one, float(varpi[k]), harmonics=harmonics, **options)
+        for k, one in enumerate(systems.parameter_sets)
+        if k in picked
+    ]
+    bounded = [max((s.amplitude for s in states if s.stable and s.amplitude > 0), default=np.nan) for states in found]
+    with style.context(STYLE):
+        left, right = panels(axes, 1, 2, (8.8, 3.7)).ravel()
+        kinds = ((INK, "-", "mode 1"), (BLUE, "--", "mode 2"), (ORANGE, ":", "mode 3"))
+        for width, (color, line, label) in zip(widths, kinds, strict=True):
+            left.semilogx(forces, width, color=color, linestyle=line, label=label)
+        left.set_ylabel("width of the tongue / (rad/s)")
+        left.legend()
+        right.loglog(forces[picked], 1e3 * np.array(bounded), "-o", color=BLUE, markersize=4)
+        right.set_ylabel("amplitude at the tip / mm")
+        for ax in (left, right):
+            ax.set_xlabel("preload / N")
     return cast(Figure, left.figure)

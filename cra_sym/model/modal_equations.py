@@ -58,7 +58,9 @@ def modal_equations(system: System, modes: int, zeta: float | Array | None = Non
         If the system is a batch, or a tensor would have too many entries.
     """
     if system.shape:
-        raise ValueError(f"system has the batch shape {system.shape}: must be a single one here")
+        raise ValueError(
+            f"system has the batch shape {system.shape}: must be a single one here; see System.parameter_sets"
+        )
     energies, forces, causes, error = system._cached("nonlinear", modes, lambda n: _projected(system, n))
     omega = system.natural_frequencies(modes)
     ratios = np.broadcast_to(system.zeta if zeta is None else zeta, omega.shape)

@@ -127,6 +127,19 @@ class System:
         options = {name: changes.pop(name, getattr(self, name)) for name in ("zeta", "tolerance")}
         return System(self.model, {**self.values, **changes}, **options)
 
+    @property
+    def parameter_sets(self) -> tuple[System, ...]:
+        """The systems of a batch, one for each set of values, the last batch axis fastest; of a single one itself.
+
+        For what takes no batch: ``[steady_states(one, ..) for one in system.parameter_sets]``.
+        """
+        if not self.shape:
+            return (self,)
+        parts = {name: np.broadcast_to(v, self.shape) for name, v in {**self.values, "zeta": self.zeta}.items()}
+        return tuple(
+            self.replace(**{name: float(v[index]) for name, v in parts.items()}) for index in np.ndindex(self.shape)
+        )
+
     @cached_property
     def without_hysteresis(self) -> System:
         """The system without its elastic-slip elements, whose modes nonlinear results use; itself if it has none."""

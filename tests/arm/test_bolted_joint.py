@@ -56,6 +56,19 @@ def test_the_arm_with_the_joint_sticks_as_an_arm_of_both_springs():
     assert joint.on(arm, 3.0) == joint.on(arm.replace(k_t=1.0, k_r=2.0), 3.0)
 
 
+def test_the_preload_as_a_parameter_is_the_joint_at_that_preload():
+    arm, joint = cra.Arm.nominal().replace(zeta=0.01), cra.BoltedJoint(faces=2, exponent=0.7)
+    system, right = joint.parametric(arm, [0.5, 20.0]), joint.on(arm, [0.5, 20.0])
+    assert "preload" in system.values and not {"k_t", "k_r", "k_d", "slip"} & {*system.values}
+    np.testing.assert_allclose(cra.natural_frequencies(system), cra.natural_frequencies(right), rtol=1e-12)
+    move, times = cra.BaseMotion.trapezoid(0.3, 0.5, 2.0), np.linspace(0.0, 0.8, 9)
+    found, wanted = (cra.tip_response(one, move, times, modes=2) for one in (system, right))
+    # the same equations with other rounding, which events pass on
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-10 * np.abs(wanted).max())
+    for one, preload in zip(system.parameter_sets, (0.5, 20.0), strict=True):
+        assert one == joint.parametric(arm, preload)
+
+
 @pytest.mark.parametrize(
     ("name", "value", "words"),
     [
@@ -77,7 +90,10 @@ def test_bad_arguments_are_named():
     joint = cra.BoltedJoint()
     with pytest.raises(ValueError, match=r"preload\[1\] = 0.0: must be real numbers in \(0, inf\)"):
         joint.values([1.0, 0.0])
-    with pytest.raises(TypeError, match="must be an Arm"):
-        joint.on(3.0, 1.0)
+    for method in (joint.on, joint.parametric):
+        with pytest.raises(TypeError, match="must be an Arm"):
+            method(3.0, 1.0)
+    with pytest.raises(ValueError, match="preload = -1.0: must be real numbers in"):
+        joint.parametric(cra.Arm.nominal(), -1.0)
     with pytest.raises(TypeError, match="'torque' is not a parameter"):
         joint.replace(torque=1.0)

@@ -7,7 +7,13 @@ import pytest
 from matplotlib.figure import Figure
 
 import cra_sym as cra
-from cra_sym.figures.slipping import figure_preload, figure_slip_amplitude, figure_slip_loop, figure_tongue_bounds
+from cra_sym.figures.slipping import (
+    figure_preload,
+    figure_preload_tongues,
+    figure_slip_amplitude,
+    figure_slip_loop,
+    figure_tongue_bounds,
+)
 
 
 @pytest.fixture(scope="module")
@@ -45,3 +51,23 @@ def test_frequency_falls_and_damping_has_a_top(arm):
 def test_bounds_of_tongues_are_drawn():
     bounded, threshold = figure_tongue_bounds([0.1, 0.2], [0.01, 0.011], [0.2, np.nan]).axes[0].lines
     assert bounded.get_ydata().tolist() == [10.0, 11.0] and threshold.get_ydata()[0] == 200.0
+
+
+def test_a_contact_that_does_not_give_has_tongues_of_one_width_and_amplitudes_like_the_preload(arm):
+    """All stiffnesses are those of the members, so that the preload scales the slip force and with it the motion."""
+    joint = cra.BoltedJoint(rest=20.0, body_t=20.0, body_r=100.0, roughness=1e-12)
+    drawn = figure_preload_tongues(arm, joint=joint, preload=[1.0, 3.0], amplitudes=2, harmonics=3)
+    left, right = drawn.axes
+    widths = np.array([line.get_ydata() for line in left.lines])
+    np.testing.assert_allclose(widths[:2, 1], widths[:2, 0], rtol=1e-6)  # the contact gives 1e-6 of the members or less
+    system, step = joint.on(arm, 1.0), 1e-4
+    springs = ({name: (1 + side * step) * system.values[name] for name in ("k_t", "k_r")} for side in (1, -1))
+    more, less = (2 * np.pi * cra.natural_frequencies(system.replace(**values), 2) for values in springs)
+    omega = 2 * np.pi * cra.natural_frequencies(system, 2)
+    rate = (more**2 - less**2) / (2 * step)
+    # to first order in epsilon; the difference quotient is good to the square of its step
+    wanted = 4 * np.sqrt((0.3 * rate / (4 * omega)) ** 2 - (arm.zeta * omega) ** 2)
+    np.testing.assert_allclose(widths[:2, 0], wanted, rtol=1e-5)
+    amplitude = right.lines[0].get_ydata()
+    np.testing.assert_allclose(amplitude[1], 3 * amplitude[0], rtol=1e-6)
+    assert amplitude[0] > 0
