@@ -93,7 +93,7 @@ def test_bad_arguments_are_named():
     for method in (joint.on, joint.parametric):
         with pytest.raises(TypeError, match="must be an Arm"):
             method(3.0, 1.0)
-    with pytest.raises(ValueError, match="preload = -1.0: must be real numbers in"):
+    with pytest.raises(ValueError, match=r"preload = -1\.0: must be real numbers in"):
         joint.parametric(cra.Arm.nominal(), -1.0)
     with pytest.raises(TypeError, match="'torque' is not a parameter"):
         joint.replace(torque=1.0)
