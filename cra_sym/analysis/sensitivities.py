@@ -194,14 +194,23 @@ class Sensitivities:
     def _forms(self) -> Projected:
         return self._system.form("rates", self._modes, diagonal=True)
 
+    @cached_property
+    def _of_the_determinant(self) -> Mapping[str, Array]:
+        """Derivatives of omega^2 by parameters, of a system whose frequencies are the roots of a determinant."""
+        return self._system.root_rates(self._modes, self._by)
+
     @property
     def _omega(self) -> Array:
         return self._system.natural_frequencies(self._modes)
 
     def _squared(self, name: str) -> Array:
         """Return the derivative of omega^2 by a parameter, by first-order perturbation."""
-        rate = self._forms[f"{name} stiffness"] - self._omega**2 * self._forms[f"{name} mass"]
-        rate = rate + self._system.numerics("held_motions").rate(self._system, name, self._modes)
+        direct = self._of_the_determinant.get(name)
+        if direct is None:
+            rate = self._forms[f"{name} stiffness"] - self._omega**2 * self._forms[f"{name} mass"]
+            rate = rate + self._system.numerics("held_motions").rate(self._system, name, self._modes)
+        else:
+            rate = direct
         if self._repeated is not None:
             rate = np.where(self._splits(name), np.nan, rate)
         return np.where(np.isinf(column(np.asarray(self._system.values[name]))), 0.0, rate)
@@ -214,8 +223,8 @@ class Sensitivities:
     @cached_property
     def _repeated(self) -> NDArray[np.bool_] | None:
         """Which frequencies are equal to rounding, shape (..., modes + 2, modes + 2); None if none are."""
-        if isinstance(self._system.modes(self._modes), OneWaveModes):
-            return None  # modes of one wave number in one field are not repeated
+        if self._of_the_determinant or isinstance(self._system.modes(self._modes), OneWaveModes):
+            return None  # those are apart; modes of one wave number in one field are not repeated
         omega = self._system.natural_frequencies(self._watched)
         near = np.abs(omega[..., :, None] - omega[..., None, :]) <= _SAME * omega[..., None, :]
         near &= (omega > 0)[..., None] & ~np.eye(omega.shape[-1], dtype=bool)
@@ -257,6 +266,8 @@ class Sensitivities:
 
     def _at_an_end(self, name: str) -> tuple[OneWaveModes, Change, tuple[int, int], Array] | None:
         """Return modes, kind, (end, place) and factor of an end parameter with rates in closed form, or None."""
+        if name in self._of_the_determinant:
+            return None
         modes = self._system.modes(self._modes)
         kinds: tuple[tuple[str, Change], ...] = (("stiffnesses", "stiffness"), ("inertias", "inertia"))
         if not isinstance(modes, OneWaveModes) or modes.is_unfelt.any():

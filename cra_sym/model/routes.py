@@ -25,6 +25,7 @@ __all__ = [
     "Estimated",
     "GeneralRoute",
     "Modes",
+    "Rated",
     "RigidShare",
     "Route",
     "StateModes",
@@ -91,6 +92,19 @@ class Estimated(Protocol):
 
     def estimated_modes(self, values: Values, shape: tuple[int, ...], omega: Array, tolerance: float) -> Modes:
         """Return the modes of all the first frequencies, to the accuracy that the tolerance allows."""
+
+
+@runtime_checkable
+class Rated(Protocol):
+    """A route that gives derivatives of the frequencies without modes."""
+
+    def rates(
+        self, values: Values, shape: tuple[int, ...], omega: Array, positions: Sequence[int]
+    ) -> Sequence[Array] | None:
+        """Return the derivatives of omega^2 by some parameters, shape (*shape, modes) each, or None.
+
+        They are nan for repeated frequencies, and where rounding would spoil them.
+        """
 
 
 @runtime_checkable

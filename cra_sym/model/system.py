@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ from cra_sym.checks import broadcastable, count, default_floating_point, instanc
 from cra_sym.model.cross_check import CrossCheck, cross_check
 from cra_sym.model.energy_signs import refuse_negative
 from cra_sym.model.projection import Domain, Load, Projected, project
-from cra_sym.model.routes import ROUNDING, TOLERANCE, Estimated, Modes, Route
+from cra_sym.model.routes import ROUNDING, TOLERANCE, Estimated, Modes, Rated, Route
 from cra_sym.model.slip_elements import SlipElements, slip_elements, slip_terms_of
 from cra_sym.model.spatial import check_range
 from cra_sym.model.values import Value, checked_damping, checked_values, frozen
@@ -220,6 +220,18 @@ class System:
         self.__dict__["_accuracy"] = np.maximum(self.__dict__.get("_accuracy", 0.0), accuracy)
         omega.flags.writeable = False
         return omega
+
+    def root_rates(self, modes: int, by: Sequence[str]) -> Mapping[str, Array]:
+        """Return the derivatives of omega^2 by parameters, shape (..., modes) each, without modes.
+
+        Only those that the route gives directly to full accuracy: the others follow from the modes.
+        """
+        route, names = self._route, self.numerics("names")
+        if not isinstance(route, Rated):
+            return {}
+        omega, positions = self.natural_frequencies(modes), [names.index(name) for name in by]
+        found = route.rates(self.parameters, self.shape, omega, positions)
+        return {name: rate for name, rate in zip(by, found, strict=True) if not np.isnan(rate).any()} if found else {}
 
     @property
     def accuracy(self) -> Array:

@@ -30,11 +30,21 @@ from cra_sym.solvers.waves import (
     Search,
     Structure,
     UniformProblem,
+    determinant,
     formulas,
     lowest_waves,
     template,
 )
+from cra_sym.solvers.waves_count import Determinant
 from cra_sym.solvers.waves_modes import wave_states
+from cra_sym.solvers.waves_rates import (
+    Slopes,
+    compiled_slopes,
+    evaluated,
+    root_rates,
+    slope_formulas,
+    slope_template,
+)
 from cra_sym.solvers.waves_static import idle_coordinates, negative_motions
 
 if TYPE_CHECKING:
@@ -46,6 +56,9 @@ __all__ = ["Waves", "waves_route"]
 
 Array = NDArray[np.float64]
 _BLOCK = 8192  # parameter sets per block
+_STEP = 1e-30  # of a complex step (Squire and Trapp, SIAM Review 40, 1998)
+_NEAR = 1e-4  # relative distance of two roots below which their rates come from the modes
+_RATES_BLOCK = 1024  # with repetitions for the parameters
 _COST = 10  # cost of one root relative to one of a single wave number, to decide whether machine code pays
 
 
@@ -74,6 +87,8 @@ class Waves:
         Coefficients of the problem that are the same for all parameters.
     coordinates : tuple of str
         Lumped coordinates, for messages.
+    analytic : bool
+        Whether the matrices and conditions are analytic functions of the parameters.
     """
 
     spatial: SpatialProblem
@@ -86,10 +101,15 @@ class Waves:
     stiffnesses: dict[int, tuple[int, ...]]
     known: tuple[int | None, ...]
     coordinates: tuple[str, ...] = ()
+    analytic: bool = False
 
     @cached_property
     def _functions(self) -> Functions:
         return functions_of(formulas(self.structure, self.known), QUICK)
+
+    @cached_property
+    def _slopes(self) -> Slopes:
+        return evaluated(functions_of(slope_formulas(self.structure, self.known), QUICK))
 
     @cached_property
     def _general(self) -> GeneralRoute:
@@ -130,6 +150,51 @@ class Waves:
             squares[simple] = lowest_waves(part, modes, search, self._functions)
         rest = columns[:, ~simple]
         squares[~simple] = self._general.angular_frequencies(list(rest), rest.shape[1:], modes) ** 2
+
+    def rates(
+        self, values: Values, shape: tuple[int, ...], omega: Array, positions: Sequence[int]
+    ) -> Sequence[Array] | None:
+        """Return the derivatives of omega^2 by parameters, from the determinant, see `Rated`."""
+        columns, z = flat_columns(values, shape), omega.reshape(-1, omega.shape[-1]) ** 2
+        if not (self.analytic and (z > 0).all()):
+            return None
+        found, refused = np.empty((len(positions), *z.shape)), []
+        parts = _slope_parts(self.structure, self.known)
+        machine_code = wants_compiler(_COST * z.size, parts)
+        slopes = compiled_slopes(compiled(*parts())) if machine_code else self._slopes
+
+        def fill(rows: slice) -> None:
+            for start in range(rows.start, rows.stop, _RATES_BLOCK):
+                part = slice(start, min(start + _RATES_BLOCK, rows.stop))
+                if not self._enter_rates(columns[:, part], z[part], positions, slopes, found[:, part]):
+                    refused.append(start)
+
+        if machine_code:
+            in_parts(fill, len(z), z.shape[1], threads=None, compiled=True)
+        else:
+            fill(slice(0, len(z)))
+        return None if refused else list(found.reshape(-1, *omega.shape))
+
+    @np.errstate(all="ignore")
+    def _enter_rates(self, columns: Array, z: Array, positions: Sequence[int], slopes: Slopes, found: Array) -> bool:
+        """Fill in the rates for some sets of values; return whether their frequencies are roots of the determinant."""
+        problem, simple = self._covered(columns)
+        if not simple.all():
+            return False
+        rows, modes = z.shape
+        function = determinant(problem, self._functions)
+        by_k = root_rates(function, slopes, z.ravel(), np.repeat(np.arange(rows), modes)).reshape(-1, rows, modes)
+        steps = _steps(columns, positions)
+        moved = self._problem(np.tile(columns, len(positions)) + 1j * steps)[0].coefficients()
+        k_rates = moved.imag.reshape(-1, len(positions), rows)
+        apart = _apart(z, function)
+        for at, position in enumerate(positions):
+            step, total = steps[position, at * rows : (at + 1) * rows], np.zeros_like(z)
+            for by, k_rate in zip(by_k, k_rates[:, at], strict=True):
+                if k_rate.any():
+                    total += by * (k_rate / step)[:, None]
+            found[at] = np.where(apart, total, np.nan)
+        return True
 
     def modes(self, values: Values, shape: tuple[int, ...], omega: Array) -> StateModes:
         """Return the modes of all the first frequencies."""
@@ -197,7 +262,7 @@ class Waves:
         stretches = [entry for at, entry in enumerate(joined) if at % (1 + size)]
         odd_by_even, even_by_odd = (np.moveaxis(matrices[:, k], -1, 1) for k in (0, 1))
         problem = UniformProblem(
-            np.array(np.broadcast_to(length, rows), dtype=np.float64),
+            np.array(np.broadcast_to(length, rows), dtype=np.result_type(np.float64, length)),
             odd_by_even,
             even_by_odd,
             stiffness,
@@ -216,10 +281,28 @@ class Waves:
 
 def _filled(values: Sequence[float | Array], rows: int) -> Array:
     """Return numbers and arrays as rows of an array."""
-    found = np.empty((len(values), rows))
+    found = np.empty((len(values), rows), dtype=np.result_type(np.float64, *values))
     for row, value in zip(found, values, strict=True):
         row[:] = value
     return found
+
+
+def _steps(columns: Array, positions: Sequence[int]) -> Array:
+    """Return imaginary steps whose squares underflow, one parameter in each repetition of the sets of values."""
+    rows = columns.shape[1]
+    steps = np.zeros((len(columns), rows * len(positions)))
+    for at, position in enumerate(positions):
+        size = np.abs(columns[position])
+        steps[position, at * rows : (at + 1) * rows] = _STEP * np.where((size > 0.0) & np.isfinite(size), size, 1.0)
+    return steps
+
+
+def _apart(z: Array, function: Determinant) -> NDArray[np.bool_]:
+    """Return which of the lowest roots, ascending, have no neighbour close by, among those that follow either."""
+    near = np.diff(z, axis=1) < _NEAR * z[:, 1:]
+    after = function.count(z[:, -1] * (1.0 + _NEAR))[0] > z.shape[1]
+    before = np.zeros(len(z), dtype=bool)
+    return np.asarray(~(np.column_stack([near, after]) | np.column_stack([before, near])))
 
 
 def _any(values: Sequence[float | Array]) -> bool:
@@ -235,6 +318,13 @@ def _rows_first(values: Sequence[float | Array], rows: int, shape: tuple[int, ..
 def _parts(structure: Structure, known: tuple[int | None, ...]) -> Parts:
     """Return the arguments of the text of the compiled version, and its kernels."""
     text = cache(lambda: template(structure, known))
+    return lambda: (text(), {})
+
+
+@cache
+def _slope_parts(structure: Structure, known: tuple[int | None, ...]) -> Parts:
+    """Return the arguments of the text of the compiled rates, and its kernels."""
+    text = cache(lambda: slope_template(structure, known))
     return lambda: (text(), {})
 
 
@@ -256,21 +346,26 @@ def waves_route(form: StateForm, spatial: SpatialProblem, symbols: Sequence[Symb
     symbols : sequence of Symbol
         The parameters, in the order in which their values are given.
     """
+    from sympy import Abs, Max, Min, Piecewise, sign, sympify
+
     from cra_sym.model.waves_form import waves_form
 
     found = waves_form(form, symbols)
     if found is None:
         return None
     order, ends, structure = found.order, found.conditions, found.structure
+    given = (*ends.stiffness, *ends.mass, *ends.ties, *ends.links)
+    entries = (*map(sympify, (*found.matrices, *given)), form.length)
     return Waves(
         spatial,
         order,
         structure,
         kernel(found.matrices, tuple(symbols), backend="numpy"),
-        kernel((*ends.stiffness, *ends.mass, *ends.ties, *ends.links), tuple(symbols), backend="numpy"),
+        kernel(given, tuple(symbols), backend="numpy"),
         kernel(tuple(ends.carried), tuple(symbols), backend="numpy") if structure.coordinates else None,
         tuple(place for place in range(structure.moving) if place not in ends.free),
         {symbols.index(symbol): acting for symbol, acting in ends.springs.items()},
         found.known,
         tuple(str(coordinate) for coordinate in form.coordinates),
+        not any(entry.has(Abs, Max, Min, Piecewise, sign) for entry in entries),
     )

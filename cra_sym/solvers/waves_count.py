@@ -14,8 +14,9 @@ from .waves_problem import Floats, Integers
 from .waves_structure import Structure
 
 __all__ = [
-    "KINDS", "Determinant", "Functions", "assembled", "block_columns", "block_waves", "condition", "count_of", "direct",
-    "displacements", "end_rows", "formulas", "kept", "lowest_branch", "regime", "sections", "signs", "value_of",
+    "KINDS", "Determinant", "Functions", "assembled", "block_columns", "block_waves", "condition", "count_of",
+    "determinant_of", "direct", "displacements", "end_rows", "formulas", "kept", "kinds", "lowest_branch", "regime",
+    "sections", "signs", "value_of", "wave_texts",
 ]  # fmt: skip
 
 kernel: Any = waves_kernel  # formulas of arrays and terms, without types
@@ -250,11 +251,7 @@ def _functions(structure: Structure, wanted: Sequence[str]) -> dict[str, Callabl
     """Return the functions of the coefficients of a lane and of z, or of half waves along the length."""
 
     def value(kind: str) -> Callable[[Entries, Any], Sequence[Any]]:
-        def found(k: Entries, z: Any) -> Sequence[Any]:
-            _, _, columns, bases = _prepared(structure, k, z, kind)
-            return [value_of(structure, k, z, columns, _product(bases))]
-
-        return found
+        return lambda k, z: [determinant_of(structure, kind, k, z, scaled=True)]
 
     def count(kind: str) -> Callable[[Entries, Any], Sequence[Any]]:
         return lambda k, z: count_of(structure, k, z, *_prepared(structure, k, z, kind))
@@ -272,6 +269,18 @@ def _functions(structure: Structure, wanted: Sequence[str]) -> dict[str, Callabl
     return found | {"_regime": kind_of, "_branch": lambda k, turns: [lowest_branch(structure, k, turns)]}
 
 
+def determinant_of(structure: Structure, kind: str, k: Entries, z: Any, *, scaled: bool = False) -> Any:
+    """Return the determinant of all conditions in one regime; without a positive or negative factor unless scaled."""
+    _, _, columns, bases = _prepared(structure, k, z, kind)
+    return value_of(structure, k, z, columns, _product(bases) if scaled else 1.0)
+
+
+def wave_texts() -> list[str]:
+    """Return the texts of the functions of a wave that the other texts call."""
+    waves = {"_wave": kernel.wave_anywhere, "_rising": kernel.rising, "_turning": kernel.turning}
+    return [straight(name, lambda _, m, function=function: function(m), ["m"]) for name, function in waves.items()]
+
+
 @cache
 def formulas(structure: Structure, known: tuple[int | None, ...], wanted: tuple[str, ...] = ()) -> str:
     """Return the text of ``_value_kind`` and ``_count_kind`` for some kinds of regimes, of ``_regime`` and ``_branch``.
@@ -280,8 +289,7 @@ def formulas(structure: Structure, known: tuple[int | None, ...], wanted: tuple[
     The default is the kinds that `Determinant` needs.
     """
     functions = _functions(structure, wanted or kinds(structure))
-    waves = {"_wave": kernel.wave_anywhere, "_rising": kernel.rising, "_turning": kernel.turning}
-    texts = [straight(name, lambda _, m, function=function: function(m), ["m"]) for name, function in waves.items()]
+    texts = wave_texts()
     texts += [straight(name, function, ["z"], known) for name, function in functions.items()]
     return "\n\n\n".join(texts) + "\n"
 
@@ -357,7 +365,7 @@ class Determinant:
     def value(self, z: Floats) -> Floats:
         """Return the determinant over ``z**zeros``."""
         result = np.empty(z.size)
-        for kind, part in self._regimes(z):
+        for kind, part in self.regimes(z):
             result[part] = self._functions[f"_value_{kind}"](self.k, part, z[part])
         return self._deflated(result, z)
 
@@ -365,7 +373,7 @@ class Determinant:
     def count(self, z: Floats) -> tuple[Integers, Floats]:
         """Return the exact number of zeros below z (for z > 0 those at 0 included), and the value."""
         number, result = np.empty(z.size, dtype=np.int64), np.empty(z.size)
-        for kind, part in self._regimes(z):
+        for kind, part in self.regimes(z):
             number[part], result[part] = self._functions[f"_count_{kind}"](self.k, part, z[part])
         return number, self._deflated(result, z)
 
@@ -377,7 +385,7 @@ class Determinant:
     def _deflated(self, value: Floats, z: Floats) -> Floats:
         return value / z**self.zeros if self.zeros.any() else value
 
-    def _regimes(self, z: Floats) -> Iterator[tuple[str, Any]]:
+    def regimes(self, z: Floats) -> Iterator[tuple[str, Any]]:
         """Yield each regime and its members."""
         if len(self._kinds) == 1:
             yield self._kinds[0], slice(None)

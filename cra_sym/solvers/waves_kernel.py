@@ -116,6 +116,14 @@ def small_sinh(m):
     )))))  # fmt: skip
 
 
+def small_sinh_with_rate(m):
+    """Return `small_sinh` and its derivative."""
+    value, rate = _SINH[9], 0.0
+    for term in _SINH[8::-1]:
+        value, rate = term + m * value, value + m * rate
+    return value, rate
+
+
 def near_series(half, product, square):
     """Return C = c0 + c1 (G - p), S = s0 + s1 (G - p) by power series, and the exponent that scales a determinant."""
     c0, c1, s0, s1 = _COSH[9] + 0.0 * half, 0.0 * half, _SINH[9] + 0.0 * half, 0.0 * half

@@ -154,9 +154,11 @@ class UniformProblem:
         Matrices times half the length, end conditions, polynomials of the dispersion relation.
         """
         structure, n, half = self.structure, len(self.odd), 0.5 * self.length
-        k = np.zeros((len(self.varying), len(self.length)))
-        row = {place: k[at] for at, place in enumerate(self.varying)}
         matrices = self.odd_by_even, self.even_by_odd
+        given = half, *matrices, self.stiffness, self.mass, self.couplings, self.ties, self.stretches
+        kind = np.result_type(*(value for value in given if value is not None))
+        k = np.zeros((len(self.varying), len(self.length)), dtype=kind)
+        row = {place: k[at] for at, place in enumerate(self.varying)}
         for at in range(4 * n * n):
             if at in row:
                 (which, power), (i, j) = divmod(at // (n * n), 2), divmod(at % (n * n), n)

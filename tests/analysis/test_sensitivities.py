@@ -227,3 +227,50 @@ def test_places_where_springs_of_one_mass_are_fixed_move_on_their_own():
         slope = (8 * (at[1] - at[-1]) - at[2] + at[-2]) / (12 * h)
         # fourth order: h^4 times a fifth derivative of about (4 pi)^5/30 f; rounding 1e-13 f/h
         np.testing.assert_allclose(found.rate[name], slope, rtol=0, atol=1e-7 * at[1].max())
+
+
+@pytest.mark.parametrize("name", ["Timoshenko beam", "tensioned beam", "gantry"])
+def test_rates_along_the_determinant_are_those_of_the_energies(name):
+    """Rates of a root by its determinant, and first-order perturbation with modes: two routes to d omega^2 / dp."""
+    given = system(name, k=[300.0, 800.0, np.inf])
+    omega = given.natural_frequencies(3)
+    forms, held = given.form("rates", 3, diagonal=True), given.numerics("held_motions")
+    rates = given.root_rates(3, tuple(given.values))
+    assert rates.keys() == given.values.keys()
+    for parameter, value in given.values.items():
+        energies = forms[f"{parameter} stiffness"] - omega**2 * forms[f"{parameter} mass"]
+        energies = energies + held.rate(given, parameter, 3)
+        finite = np.broadcast_to(np.isfinite(np.reshape(value, (-1, 1))), omega.shape)  # by inf there is no rate
+        scale = (omega**2 / np.reshape(value, (-1, 1)))[finite]
+        # rounding of modes by quadrature, of roots and of their slopes: each about 1e-13
+        assert np.abs((rates[parameter] - energies)[finite] / scale).max() < 1e-11
+
+
+def test_compiled_rates_along_the_determinant_are_the_same(monkeypatch):
+    pytest.importorskip("numba")
+    given = system("tensioned beam", T=np.linspace(1.0, 60.0, 5))
+    by_numpy = given.root_rates(2, ("T", "EI", "l"))
+    monkeypatch.setattr("cra_sym.model.waves.wants_compiler", lambda roots, parts: True)
+    compiled = given.replace().root_rates(2, ("T", "EI", "l"))
+    for name, rate in by_numpy.items():
+        np.testing.assert_allclose(compiled[name], rate, rtol=1e-12)
+
+
+def test_close_roots_leave_their_rates_to_the_modes():
+    """Two strings that a weak spring joins: the difference of their frequencies is no slope of a determinant."""
+    rho, T, S, k, x, t = sp.symbols("rho T S k x t")
+    u, y = (sp.Function(name)(x, t) for name in ("u", "y"))
+    energy = rho * (u.diff(t) ** 2 + y.diff(t) ** 2) / 2 - T * u.diff(x) ** 2 / 2 - S * y.diff(x) ** 2 / 2
+    joined = cra.Model(energy, fields=[u, y], x=x, domain=(0, 1), t=t, essential=[u.subs(x, 0), y.subs(x, 0)],
+                       right=-k * (u - y) ** 2 / 2)  # fmt: skip
+    for S_value, weak in ((1.0 + 1e-6, 1e-8), (1.0, 0.0)):  # close, and equal
+        given = joined.at({rho: 1.0, T: 1.0, S: S_value, k: weak})
+        assert not given.root_rates(1, ("T",))  # the second root, which is not asked for, is close
+        assert not given.root_rates(2, ("T",))
+    assert joined.at({rho: 1.0, T: 1.0, S: 1.3, k: 0.1}).root_rates(2, ("T",))
+    same = joined.at({rho: 1.0, T: 1.0, S: 1.0, k: 0.1})
+    even, odd = cra.sensitivities(same, 2).log["k"]
+    assert abs(even) < 1e-13  # both move alike; the other one has w cos w + 2 k sin w = 0
+    w = same.natural_frequencies(2)[1]
+    slope = np.cos(w) - w * np.sin(w) + 0.2 * np.cos(w)
+    assert odd == pytest.approx(-2 * np.sin(w) / slope * 0.1 / w, rel=1e-12)

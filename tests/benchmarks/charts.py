@@ -1,16 +1,19 @@
 """Stability charts of other systems, proved charts and Timoshenko arms: ``python -m tests.benchmarks.charts``.
 
 Writes ``charts.json`` beside this file: what a chart of each system costs beside the arm's, in processor time of one
-run; how many points of two charts of the arm are proved, and how many against the growth rates; how many frequencies of
-random Timoshenko arms are proved, and how far outside the enclosures the solver's values lie.
+run; what sensitivities cost beside frequencies; how many points of two charts of the arm are proved, and how many
+against the growth rates; how many frequencies of random Timoshenko arms are proved, and how far outside the enclosures
+the solver's values lie.
 """
 
 from __future__ import annotations
 
 import json
 import platform
+from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
+from statistics import median
 from time import process_time
 from typing import Any
 
@@ -120,10 +123,62 @@ def timoshenko(number: int = 1000, modes: int = 5) -> dict[str, float]:
     }
 
 
+def sensitivities(sets: int = 300, rounds: int = 15) -> dict[str, float]:
+    """Return what the rates of frequencies by all parameters cost, the frequencies included, over the latter alone."""
+    rng = np.random.default_rng(SEED)
+    beam = rhoA * v.diff(t) ** 2 / 2 - EI * v.diff(x, 2) ** 2 / 2
+    ends = {"left": -k * (v**2 + v.diff(x) ** 2) / 2, "right": m * v.diff(t) ** 2 / 2}
+    held = [v.subs(x, 0), v.diff(x).subs(x, 0), psi.subs(x, 0)]
+    twisted = beam + rhoI * psi.diff(t) ** 2 / 2 + d * v.diff(t) * psi.diff(t) - kGA * psi.diff(x) ** 2 / 2
+    models = {
+        "the arm's Lagrangian as a Model": cra.Model(beam, fields=[v], **ends, **PLACE),
+        "tension": cra.Model(beam - T * v.diff(x) ** 2 / 2, fields=[v], **ends, **PLACE),
+        "foundation": cra.Model(beam - c * v**2 / 2, fields=[v], **ends, **PLACE),
+        "string": cra.Model(
+            rhoA * v.diff(t) ** 2 / 2 - T * v.diff(x) ** 2 / 2, fields=[v], left=-k * v**2 / 2, **PLACE
+        ),
+        "Timoshenko": TIMOSHENKO,
+        "bending and torsion": cra.Model(twisted, fields=[v, psi], essential=held, right=ends["right"], **PLACE),
+    }
+    spans = {
+        "EI": (0, 1),
+        "k": (1, 5),
+        "m": (-2, 0),
+        "T": (0, 2),
+        "c": (0, 2),
+        "rhoI": (-2, -1),
+        "kGA": (2, 4),
+        "d": (-3, -2),
+    }
+    values = {"L": 1.0, "rhoA": 1.0} | {name: 10 ** rng.uniform(*span, sets) for name, span in spans.items()}
+    found = {"the arm": cra.Arm.nominal().replace(k_t=values["k"], k_r=values["k"], m_e=values["m"])}
+    for name, model in models.items():
+        found[name] = model.at({symbol.name: values[symbol.name] for symbol in model.symbols})
+
+    def rates(system: cra.System) -> None:
+        result = cra.sensitivities(system, MODES)
+        for name in result.rate:
+            result.rate[name], result.log[name]
+
+    def seconds(function: Callable[..., Any], system: cra.System, *more: Any) -> float:
+        times = []
+        for _ in range(rounds + 1):
+            fresh, start = system.replace(), process_time()
+            function(fresh, *more)
+            times.append(process_time() - start)
+        return median(times[1:])
+
+    return {
+        name: round(seconds(rates, system) / seconds(cra.natural_frequencies, system, MODES), 2)
+        for name, system in found.items()
+    }
+
+
 def main() -> dict[str, Any]:
     """Measure, write and return all three."""
     summary = {
         "charts, times the arm's processor time": costs(),
+        "sensitivities, times the frequencies' processor time": sensitivities(),
         "proved charts": proofs(),
         "proved Timoshenko arms": timoshenko(),
         "seed": SEED,
