@@ -23,7 +23,8 @@ _SAMPLES = 8_192  # points of a sample, where a grid would have more
 _LINKED = 4.0  # rise of chi2 between two minima up to which they count as one: two standard deviations
 _LOWEST = 200  # lowest grid points that are starts even if they are not local minima
 _STEPS, _MORE_STEPS = 25, 50
-_IDLE = 3  # successive steps without any progress
+_IDLE = 7  # successive steps without progress
+_LEAST_DAMPING = 1e-5  # from which seven rejected steps bring it to a full one
 _MARGIN = 1e-9  # margin of a coordinate inside its bounds
 _NOTHING = 1e-20  # relative decrease of chi2 at convergence
 _HOLD = 1e3 * _LINKED**0.5  # weight of a component that is held fixed
@@ -37,7 +38,10 @@ _LARGEST = 1e150  # largest residual, whose square does not overflow
 
 @dataclass(frozen=True)
 class Data:
-    """Measured frequencies (Hz), their standard deviations, and the modes they belong to, counted from 0."""
+    """Measured frequencies (Hz), their standard deviations, and the modes they belong to, counted from 0.
+
+    Each has the shape (m,), or (P, m) for points with data of their own.
+    """
 
     measured: Array
     sigma: Array
@@ -46,6 +50,14 @@ class Data:
     def without(self, entry: int) -> Data:
         """Return the data without one of the frequencies."""
         return Data(np.delete(self.measured, entry), np.delete(self.sigma, entry), np.delete(self.modes, entry))
+
+    def rows(self, rows: NDArray[np.intp]) -> Data:
+        """Return the data of some of the points."""
+        return self if self.modes.ndim == 1 else Data(self.measured[rows], self.sigma[rows], self.modes[rows])
+
+    def of(self, by_mode: Array) -> Array:
+        """Return the entries of an array (..., modes) that belong to the data."""
+        return by_mode[..., self.modes] if self.modes.ndim == 1 else np.take_along_axis(by_mode, self.modes, -1)
 
 
 @dataclass
@@ -74,9 +86,9 @@ class Search:
     def residuals(self, place: Array, data: Data) -> Array:
         """Return computed minus measured frequencies, and values minus priors, in units of their uncertainty."""
         try:
-            frequency = self.found(place).frequency[..., data.modes]
+            frequency = data.of(self.found(place).frequency)
         except ValueError:  # the structure has buckled, or the values are not admissible
-            frequency = np.full((*place.shape[:-1], data.modes.size), np.nan)
+            frequency = np.full((*place.shape[:-1], data.modes.shape[-1]), np.nan)
         values = self.values(place)
         prior = [(values[u.name] - u.prior[0]) / u.prior[1] for u in self.unknowns if u.prior is not None]
         rows = [(frequency - data.measured) / data.sigma, *(np.asarray(one)[..., None] for one in prior)]
@@ -86,7 +98,7 @@ class Search:
     def gradient(self, place: Array, data: Data) -> Array:
         """Return the derivatives of the residuals by the coordinates, shape (..., residuals, unknowns)."""
         found, values = self.found(place), self.values(place)
-        columns = [u.gradient(found, place[..., i])[..., data.modes] / data.sigma for i, u in enumerate(self.unknowns)]
+        columns = [data.of(u.gradient(found, place[..., i])) / data.sigma for i, u in enumerate(self.unknowns)]
         known = [(i, u) for i, u in enumerate(self.unknowns) if u.prior is not None]
         prior = np.zeros((*place.shape[:-1], len(known), len(self.unknowns)))
         for row, (i, u) in enumerate(known):
@@ -100,18 +112,31 @@ class Search:
 
     # ------------------------------------------------------------------------------------------------------------
 
-    def minima(self, data: Data, most: int | None = None) -> list[Array]:
-        """Return the local minima, best first, or those reached from the lowest end points of the descent.
+    def minima(self, data: Data) -> list[Array]:
+        """Return the local minima, best first.
 
         Of end points that are connected within the uncertainty, as in a valley of values that the data do not
         distinguish, only the lowest is refined to its minimum.
         """
-        ends = self._descended(self._starts(data), data)[:most]
-        if most is None:
-            ends = np.array(self.distinct([*self._apart(*self._followed(ends, data, _MORE_STEPS))], data))
+        ends = self._descended(self._starts(data), data)
+        ends = np.array(self.distinct([*self._apart(*self._followed(ends, data, _MORE_STEPS))], data))
         places = [self._polished(end, data) for end in ends]
         places.sort(key=lambda place: self.chi2(place, data))
         return places
+
+    def lowest(self, trials: Sequence[Data]) -> list[Array]:
+        """Return the lowest end point of short descents for each of some data of one size: no guaranteed minimum."""
+        starts = [np.clip(self._starts(data, _FEW // 4), *self._bounds) for data in trials]
+        owner = np.repeat(np.arange(len(trials)), [len(places) for places in starts])
+        fields = (np.array([getattr(data, name) for data in trials])[owner] for name in ("measured", "sigma", "modes"))
+        places, cost = self._followed(np.concatenate(starts), Data(*fields), _STEPS)
+        return [places[owner == k][np.argmin(cost[owner == k])] for k in range(len(trials))]
+
+    def misfit(self, data: Data) -> float:
+        """Return the smallest sum of the squared relative differences on the grid."""
+        with np.errstate(all="ignore"):
+            cost = np.sum((self._grid()[1][:, data.modes] / data.measured - 1) ** 2, -1)
+        return float(np.min(cost, where=np.isfinite(cost), initial=np.inf))
 
     def distinct(self, places: Sequence[Array], data: Data) -> list[Array]:
         """Return the points that no path within the uncertainty of the data connects to a better one."""
@@ -149,7 +174,7 @@ class Search:
         low, high = np.array([unknown.bounds for unknown in self.unknowns]).T
         return low + _MARGIN, high - _MARGIN
 
-    def _starts(self, data: Data) -> Array:
+    def _starts(self, data: Data, lowest: int = 0) -> Array:
         """Return the local minima of the misfit on the grid, weighted and relative, and its lowest points."""
         places, known, shape = self._grid()
         with np.errstate(all="ignore"):
@@ -161,7 +186,7 @@ class Search:
             number = np.isfinite(finite).sum()
             if not number:
                 raise ValueError("system: it has no natural frequencies for any values of the unknown parameters")
-            found |= set(np.argsort(finite)[: min(_FEW // 3 if self._slow else _LOWEST, number)].tolist())
+            found |= set(np.argsort(finite)[: min(lowest or (_FEW // 3 if self._slow else _LOWEST), number)].tolist())
             found |= set(_lowest(finite.reshape(shape))) if shape else set()
         return places[sorted(found)]
 
@@ -171,13 +196,10 @@ class Search:
         return self.system.conservative_part is not self.system or not np.isfinite(self._grid()[1]).all()
 
     def _descended(self, places: Array, data: Data) -> Array:
-        """Follow all starts at once, return those that end apart, the lowest of each; or the lowest few as they are."""
+        """Follow all starts at once; return those that end apart, the lowest of each group."""
         places = np.clip(places, *self._bounds)
-        cost = np.sum(self.residuals(places, data) ** 2, -1)
-        finite = np.isfinite(cost)
-        if self._slow or not finite.all():
-            return np.asarray(places[finite][np.argsort(cost[finite])][:_FEW])
-        return self._apart(*self._followed(places, data, _STEPS))
+        finite = np.isfinite(np.sum(self.residuals(places, data) ** 2, -1))
+        return self._apart(*self._followed(places[finite], data, _STEPS))
 
     @staticmethod
     def _apart(places: Array, cost: Array) -> Array:
@@ -189,9 +211,16 @@ class Search:
         return np.array(kept[:_FEW])
 
     def _followed(
-        self, places: Array, data: Data, steps: int, held: tuple[Array, Array] | None = None
+        self,
+        places: Array,
+        data: Data,
+        steps: int,
+        held: tuple[Array, Array] | None = None,
+        enough: Array | float = _NOTHING,
     ) -> tuple[Array, Array]:
         """Take damped Gauss-Newton steps from all points at once; return the end points and their chi2.
+
+        A point stops where chi2 is low enough, or after some steps without progress; one without a stable system stays.
 
         Parameters
         ----------
@@ -200,40 +229,47 @@ class Search:
         steps : int
         held : tuple of ndarrays, shape (P, unknowns), (P,), optional
             Directions, and the components of the points along them, which are held fixed.
+        enough : float or ndarray, shape (P,), optional
+            Chi2 at which a point stops.
         """
-        bounds = self._bounds
+        bounds, places = self._bounds, places.copy()
+        lines = held if held is None else (_HOLD * held[0], _HOLD * held[1])
 
-        def rows(at: Array) -> Array:
-            own = self.residuals(at, data)
-            if held is None:
-                return own
-            off = np.einsum("pi,pi->p", held[0], at) - held[1]
-            return np.concatenate([own, _HOLD * off[:, None]], axis=-1)
+        def rows(at: Array, on: NDArray[np.intp]) -> tuple[Array, Array]:
+            own = data.rows(on)
+            found = self.residuals(at, own)
+            stable = np.isfinite(found).all(-1).any()
+            slopes = self.gradient(at, own) if stable else np.zeros((*found.shape, at.shape[-1]))
+            if lines is None:
+                return found, slopes
+            off = np.einsum("pi,pi->p", lines[0][on], at) - lines[1][on]
+            return np.concatenate([found, off[:, None]], -1), np.concatenate([slopes, lines[0][on, None, :]], -2)
 
-        residuals = rows(places)
-        damping = np.full(len(places), 1e-2)
+        on = np.arange(len(places))
+        enough, idle, damping = np.broadcast_to(enough, on.shape), np.zeros(on.size), np.full(on.size, 1e-2)
         with np.errstate(all="ignore"):
-            cost, idle = np.sum(residuals**2, -1), 0
+            residuals, jacobian = rows(places, on)
+            cost = np.nan_to_num(np.sum(residuals**2, -1), nan=np.inf)
             for _ in range(steps):
-                if not np.isfinite(cost).all() or not cost.max() > _NOTHING or idle > _IDLE:
+                on = np.flatnonzero(np.isfinite(cost) & (cost > enough) & (idle <= _IDLE))
+                if not on.size:
                     break
-                jacobian = self.gradient(places, data)
-                if held is not None:
-                    jacobian = np.concatenate([jacobian, _HOLD * held[0][:, None, :]], axis=-2)
-                normal = np.swapaxes(jacobian, -1, -2) @ jacobian
+                turned = np.swapaxes(jacobian[on], -1, -2)
+                normal = turned @ jacobian[on]
                 size = np.einsum("...ii->...i", normal)
                 floor = 1e-12 * size.max(axis=-1, keepdims=True) + np.finfo(float).tiny
-                normal += np.eye(places.shape[-1]) * (damping[:, None] * np.maximum(size, floor) + floor)[:, None]
-                push = np.swapaxes(jacobian, -1, -2) @ residuals[..., None]
-                tried = np.clip(places - np.linalg.solve(normal, push)[..., 0], *bounds)
-                there = rows(tried)
-                lower = np.sum(there**2, -1) < cost
-                places = np.where(lower[:, None], tried, places)
-                residuals = np.where(lower[:, None], there, residuals)
-                before, cost = cost, np.sum(residuals**2, -1)
-                idle = 0 if (before - cost > 1e-6 * before).any() else idle + 1
-                damping = np.clip(np.where(lower, damping / 5, damping * 4), 1e-12, 1e12)
-        return places, np.nan_to_num(cost, nan=np.inf)
+                normal += np.eye(places.shape[-1]) * (damping[on, None] * np.maximum(size, floor) + floor)[:, None]
+                tried = np.clip(places[on] - np.linalg.solve(normal, turned @ residuals[on, :, None])[..., 0], *bounds)
+                tried = np.where(np.isfinite(tried), tried, places[on])
+                there, slopes = rows(tried, on)
+                reached = np.sum(there**2, -1)
+                lower = reached < cost[on]
+                idle[on] = np.where(cost[on] - reached > 1e-6 * cost[on], 0, idle[on] + 1)
+                damping[on] = np.clip(np.where(lower, damping[on] / 5, damping[on] * 4), _LEAST_DAMPING, 1e12)
+                better = on[lower]
+                places[better], cost[better] = tried[lower], reached[lower]
+                residuals[better], jacobian[better] = there[lower], slopes[lower]
+        return places, cost
 
     def _grid(self) -> tuple[Array, Array, tuple[int, ...]]:
         """Return points (P, unknowns), their frequencies (P, modes) and the shape of the grid, () for a sample."""
@@ -262,7 +298,9 @@ class Search:
             direction = np.repeat(step[far] / distance[far, None], len(_SHARES), axis=0)
             starts = (places[far, None] + np.array(_SHARES)[:, None] * step[far, None]).reshape(-1, places.shape[-1])
             held = direction, np.einsum("pi,pi->p", direction, starts)
-            highest[far] = self._followed(starts, data, _STEPS, held)[1].reshape(far.size, -1).max(axis=-1)
+            low_enough = np.repeat(limit[far], len(_SHARES))
+            ends = self._followed(starts, data, _STEPS, held, low_enough)[1]
+            highest[far] = ends.reshape(far.size, -1).max(axis=-1)
         return np.asarray(highest <= limit)
 
 

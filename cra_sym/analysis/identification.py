@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from cra_sym.analysis import fit_words
 from cra_sym.analysis.fit_arguments import checked_data, checked_names, checked_priors
-from cra_sym.analysis.fit_quality import SMALLEST_P, Goodness, goodness, information_inverse
+from cra_sym.analysis.fit_hints import hints
+from cra_sym.analysis.fit_quality import Goodness, goodness, information_inverse
 from cra_sym.analysis.fit_search import Data, Search
 from cra_sym.analysis.fit_unknowns import Unknown, unknowns
 from cra_sym.checks import ByValue, default_floating_point, instance
@@ -152,8 +153,7 @@ def identify(
     of their value in ``system`` (or of their prior). Values at which the structure is unstable are excluded.
 
     With gyroscopic forces or forces that follow the motion there are no natural frequencies: the imaginary parts of the
-    oscillating :func:`eigenvalues` over 2 pi, by ascending modulus, are fitted, with gradients by differences. Then,
-    and if the structure is unstable somewhere on the grid, the search starts from the 24 best points of the grid.
+    oscillating :func:`eigenvalues` over 2 pi, by ascending modulus, are fitted, with gradients by differences.
 
     Parameters
     ----------
@@ -177,7 +177,8 @@ def identify(
     Warns
     -----
     MisfitWarning
-        If no values fit; the message names a mode whose omission, or a missed mode whose inclusion, gives a fit.
+        If no values fit. The message names each frequency whose omission gives a fit, as a wrong value of its mode or
+        as none of the lowest modes, and the ``modes`` that fit if one mode was missed, or two.
     AmbiguityWarning
         If several sets of values fit that differ by more than their uncertainty.
     IdentifiabilityWarning
@@ -271,9 +272,8 @@ def _identified(
     best = estimates[0]
     messages = [best.message]
     if not best.fits:
-        hints = _hints(search, data, modes is None)
-        numbers = (data.modes + 1).tolist()
-        text = fit_words.misfit(best.chi2, best.degrees_of_freedom, best.p_value, best.residuals, numbers, hints)
+        numbers, causes = (data.modes + 1).tolist(), hints(search, data, name, modes is None)
+        text = fit_words.misfit(best.chi2, best.degrees_of_freedom, best.p_value, best.residuals, numbers, causes)
         warnings.warn(text, MisfitWarning, stacklevel=4)
         messages = [text, *messages]
     if len(estimates) > 1:
@@ -336,25 +336,3 @@ def _jacobian(parameters: Iterable[Unknown], values: Mapping[str, float], found:
     for row, (i, unknown) in zip(prior, known, strict=True):
         row[i] = unknown.prior_row(values[unknown.name])
     return np.nan_to_num(np.vstack([rows, prior]), nan=0.0, posinf=0.0, neginf=0.0)
-
-
-def _hints(search: Search, data: Data, lowest: bool) -> list[str]:
-    """Return hints: a frequency whose omission gives a fit, and a mode that may have been missed."""
-    spare = data.measured.size + sum(unknown.prior is not None for unknown in search.unknowns) - len(search.unknowns)
-    hints = []
-    if spare >= 2:
-        p_values = [_best_p(search, data.without(entry)) for entry in range(data.measured.size)]
-        if max(p_values) >= SMALLEST_P:
-            hints.append(f"without mode {data.modes[int(np.argmax(p_values))] + 1} they fit")
-    if spare >= 1 and lowest and data.measured.size < search.most_modes:
-        number = data.measured.size
-        trials = [np.delete(np.arange(number + 1), skipped) for skipped in range(number)]
-        p_values = [_best_p(search, replace(data, modes=trial)) for trial in trials]
-        if max(p_values) >= SMALLEST_P:
-            modes = tuple((trials[int(np.argmax(p_values))] + 1).tolist())
-            hints.append(f"taken as modes {', '.join(map(str, modes))} they fit: give modes={modes}")
-    return hints
-
-
-def _best_p(search: Search, data: Data) -> float:
-    return max(_goodness(search, data, place).p_value for place in search.minima(data, most=3))

@@ -179,6 +179,7 @@ def test_a_bound_is_two_standard_deviations_of_the_compliance_away():
 # Every fit, and none ----------------------------------------------------------------------------------------------
 
 JOINT = NOMINAL.replace(k_t=2e3, k_r=40.0)
+FREQUENCIES = cra.natural_frequencies(JOINT, 6)
 
 
 def test_the_search_is_global():
@@ -194,7 +195,7 @@ def test_two_joints_of_the_same_two_frequencies_are_both_returned():
     pairs = [(2.57, 8.28), (15.196, 0.9234)]
     first, second = (cra.natural_frequencies(NOMINAL.replace(k_t=k_t, k_r=k_r), 2) for k_t, k_r in pairs)
     np.testing.assert_allclose(first, second, rtol=5e-5)  # the second pair is known to four digits
-    with pytest.warns(AmbiguityWarning, match=r"2 sets of values fit.*k_t = 15\.19.*k_t = 2\.57"):
+    with pytest.warns(AmbiguityWarning, match=r"2 sets of values fit(?=.*k_t = 15\.19)(?=.*k_t = 2\.57)"):
         fit = cra.identify_joint(NOMINAL, first, 1e-3)
     found = sorted((solution.k_t, solution.k_r) for solution in fit.solutions)
     np.testing.assert_allclose(found, pairs, rtol=1e-3)
@@ -215,6 +216,29 @@ def test_a_missed_mode_is_named(skipped):
         assert not cra.identify_joint(NOMINAL, measured, 0.01).fits
     fit = cra.identify_joint(NOMINAL, measured, 0.01, modes=modes)
     assert fit.fits and fit.k_t == pytest.approx(2e3, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("measured", "said"),
+    [
+        (FREQUENCIES[[0, 2, 4, 5]], "give modes=(1, 3, 5, 6)"),  # the second and the fourth were missed
+        (np.insert(FREQUENCIES[:4], 2, 30.0), "without measured_frequencies[2] = 30 Hz the others fit"),
+    ],
+)
+def test_two_missed_modes_and_a_frequency_of_no_mode_are_named(measured, said):
+    with pytest.warns(MisfitWarning, match=re.escape(said)) as caught, warnings.catch_warnings():
+        warnings.simplefilter("ignore", IdentifiabilityWarning)
+        assert not cra.identify_joint(NOMINAL, measured, 0.01).fits
+    text = str(caught[0].message)
+    assert text.count("give modes") + text.count("without") == 1, "nothing else explains them"
+
+
+def test_either_of_two_frequencies_of_one_mode_may_be_left_out():
+    measured = np.insert(FREQUENCIES[:4], 2, FREQUENCIES[1] + 1e-3)  # a tenth of the deviation apart
+    words = r"without measured_frequencies\[1\] = .* or measured_frequencies\[2\] = .* the others fit"
+    with pytest.warns(MisfitWarning, match=words), warnings.catch_warnings():
+        warnings.simplefilter("ignore", IdentifiabilityWarning)
+        cra.identify_joint(NOMINAL, measured, 0.01)
 
 
 def test_a_wrong_model_does_not_fit_and_its_covariance_says_so():
