@@ -37,7 +37,7 @@ def certify_stability(
     ----------
     system : System
     excitation : Fluctuation, JointStiffness, AxialBase or the model's own `excitation`
-        Of stiffnesses, dampers and gyroscopic terms; not of masses.
+        Of stiffnesses, masses, dampers and gyroscopic terms.
     angular_frequency : array_like
         Excitation frequency varpi, rad/s, positive.
     epsilon : array_like
@@ -53,7 +53,7 @@ def certify_stability(
     Raises
     ------
     TypeError, ValueError
-        As :func:`cra_sym.growth_rate`; if a mass oscillates.
+        As :func:`cra_sym.growth_rate`.
 
     Examples
     --------
@@ -78,17 +78,12 @@ def certify_stability(
 
 
 def _without_momentum(drive: Drive) -> Iterator[tuple[Oscillation, tuple[Any, ...]]]:
-    """Yield the drive with stiffness and damping terms only: d/dt(g B q) is written as g B q' + g' B q."""
+    """Yield the drive without its momentum term: d/dt(g B q) is written as g B q' + g' B q."""
     oscillation, stiffness, damping, momentum, mass = drive
-    if mass is not None:
-        raise ValueError(
-            "excitation: a mass oscillates; only of oscillating stiffnesses, dampers and gyroscopic terms is there a "
-            "proof: use growth_rate"
-        )
     if momentum is None:
-        yield oscillation, (stiffness, damping, None, None)
+        yield oscillation, (stiffness, damping, None, mass)
     else:
-        yield oscillation, (stiffness, momentum if damping is None else momentum + damping, None, None)
+        yield oscillation, (stiffness, momentum if damping is None else momentum + damping, None, mass)
         rate, factor = oscillation.rate()
         yield rate, (factor * momentum, None, None, None)
 
@@ -105,5 +100,5 @@ def _conservative(matrices: Matrices) -> bool:
             momentum = nothing if drive.momentum is None else drive.momentum
             size = np.abs(damping).max(axis=(-2, -1), keepdims=True)
             skew &= bool((np.abs(damping + momentum.swapaxes(-1, -2)) <= ROUNDING * size).all())
-    stiffness = [matrices.stiffness, *(d.stiffness for d in matrices.drives if d.stiffness is not None)]
-    return skew and all(np.array_equal(k, k.swapaxes(-1, -2)) for k in stiffness)
+    given = [part for drive in matrices.drives for part in (drive.stiffness, drive.mass) if part is not None]
+    return skew and all(np.array_equal(k, k.swapaxes(-1, -2)) for k in (matrices.stiffness, *given))

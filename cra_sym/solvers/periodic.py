@@ -20,7 +20,15 @@ from numpy.typing import NDArray
 from cra_sym.solvers.floquet import MOST_STEPS, Oscillation, exponents_of, rate_of, whole_period
 from cra_sym.solvers.periodic_systems import LIGHTEST, PeriodicSystem, Sizes, Swing
 
-__all__ = ["PeriodicSystem", "Swing", "floquet_exponents", "growth_rate", "monodromy", "step_coefficients"]
+__all__ = [
+    "PeriodicSystem",
+    "Swing",
+    "floquet_exponents",
+    "growth_rate",
+    "mass_and_inverse",
+    "monodromy",
+    "step_coefficients",
+]
 
 Array = NDArray[np.float64]
 _HIGHEST = 24
@@ -82,7 +90,10 @@ class _Series:
             step_coefficients(swing.oscillation, step, self.steps, self.order, self.least)
             for swing in self.system.swings
         ]
-        mass = self._mass(waves)
+        found = _mass_and_inverse(self.system, waves)
+        mass = None if found is None else found[1]
+        if found is not None and _is_diagonal(found[0]):
+            mass = np.einsum("iip->ip", found[1])[:, None]
         end_q, end_p, p = q.copy(), p.copy(), p.copy()
         for k in range(self.order):
             rate, resistance = self._rates(k, q, p, waves, mass)
@@ -91,18 +102,6 @@ class _Series:
             end_q += q
             end_p += p
         return end_q, end_p
-
-    def _mass(self, waves: list[Array]) -> Array | None:
-        """Return the inverse mass at the start of the step, or its diagonal (N, 1, points), or None."""
-        swings = zip(self.system.swings, waves, strict=True)
-        terms = [(s.mass, s.size * wave[0]) for s, wave in swings if s.mass is not None]
-        if not terms:
-            return None
-        total = sum(mass * size for mass, size in terms)
-        if all(_is_diagonal(mass) for mass, _ in terms):
-            return np.asarray(1.0 / (1.0 + np.einsum("iip->ip", total)))[:, None]
-        total = np.moveaxis(np.eye(self.shape[0])[..., None] + total, -1, 0)
-        return np.moveaxis(np.linalg.inv(total), 0, -1)
 
     def _rates(self, k: int, q: Array, p: Array, waves: list[Array], mass: Array | None) -> tuple[Array, Array]:
         """Return the coefficients k of dq/dt and of -dp/dt."""
@@ -136,6 +135,25 @@ class _Series:
         found = wave[length - 1 :: -1] @ kept[k + 1 - length : k + 1].reshape(length, -1)
         found = found.reshape(self.shape)
         return np.multiply(found, self.system.swings[swing].size, out=found)
+
+
+def _mass_and_inverse(system: PeriodicSystem, waves: list[Array]) -> tuple[Array, Array] | None:
+    """Return the mass at the start of a step and its inverse, (N, N, points) each; None if it does not oscillate."""
+    swings = zip(system.swings, waves, strict=True)
+    terms = [s.mass * (s.size * wave[0]) for s, wave in swings if s.mass is not None]
+    if not terms:
+        return None
+    mass = np.eye(len(system.stiffness))[..., None] + sum(terms)
+    if _is_diagonal(mass):
+        inverse = np.zeros_like(mass)
+        np.einsum("iip->ip", inverse)[:] = 1.0 / np.einsum("iip->ip", mass)
+        return mass, inverse
+    return mass, np.moveaxis(np.linalg.inv(np.moveaxis(mass, -1, 0)), 0, -1)
+
+
+def mass_and_inverse(system: PeriodicSystem, step: int, steps: int) -> tuple[Array, Array] | None:
+    """Return the mass at the start of a step of a period, as the series use it, and its inverse, or None."""
+    return _mass_and_inverse(system, [step_coefficients(s.oscillation, step, steps, 0) for s in system.swings])
 
 
 class _Stack:

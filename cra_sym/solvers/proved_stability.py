@@ -3,7 +3,12 @@ r"""Proofs of stability and instability: enclosures of monodromy matrices and of
 The Taylor steps of :mod:`cra_sym.solvers.periodic` give an approximate matrix. Truncation and rounding are bounded by a
 majorant: a scalar series with the norms of the coefficients. Within a step errors grow at most by the logarithmic norm;
 over many steps each error is referred to the initial state, so that it grows no faster than the motion. In modal units,
-:math:`(\omega q, \dot q)`, free motion without damping keeps the Euclidean norm.
+:math:`(\omega q, p)`, free motion without damping keeps the Euclidean norm.
+
+An oscillating mass :math:`M = 1 + \sum_r g_r M_r` enters by its inverse. With s the sum of the norms of the
+:math:`g_r M_r`, its Taylor coefficients over a time tau are at most those of the scalar
+:math:`\mu/(1 - \mu\,s\,(e^{n\varpi\tau} - 1))` with :math:`\mu = 1/(1 - s)`, which multiplies the majorant. The
+computed inverse at the start of a step has a residual, which is bounded and taken as an error of the mass.
 
 Approximate eigenvectors then turn the enclosure into a nearly diagonal one, whose discs by Gershgorin enclose the
 multipliers (Rump 2001). A group of discs outside the unit circle and disjoint from all others proves instability; all
@@ -15,14 +20,14 @@ is bounded. Bounds are computed in doubles and enlarged by one per cent, far mor
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.solvers.floquet import MOST_STEPS
-from cra_sym.solvers.periodic import PeriodicSystem, propagated
+from cra_sym.solvers.periodic import PeriodicSystem, mass_and_inverse, propagated
 
 __all__ = ["STABLE", "UNDECIDED", "UNSTABLE", "enclosed_monodromy", "multiplier_discs", "proved_stability"]
 
@@ -33,23 +38,56 @@ _ANGLE = 1.5  # largest step times the largest rate
 _STEPS = 16  # least number of steps per period of the fastest cosine
 _ROUNDING = np.finfo(float).eps / 2
 _ENLARGED = 1.01
+_MASS_RADIUS = 4.0  # steps over which the bound of the inverse mass at most doubles
 _BLOCK = 512
 _RADII = np.geomspace(2.0, 64.0, 24)  # of circles on which the majorant is evaluated, in steps
 
 
 @dataclass(frozen=True)
 class _Bounds:
-    """Norms of a batch in modal units, shape (points,); ``swings`` has one row a term."""
+    """Norms of a batch in modal units, shape (points,); ``swings`` and ``masses`` have one row a term."""
 
     still: Array
     swings: Array
     growth: Array
     turns: NDArray[np.int64]
+    masses: Array
+
+    @property
+    def light(self) -> Array:
+        """Bound of the norm of the inverse mass; inf where it has none."""
+        rest = 1.0 - _ENLARGED * self.masses.sum(axis=0)
+        return np.where(rest > 0.0, 1.0 / np.where(rest > 0.0, rest, 1.0), np.inf)
+
+    @property
+    def condition(self) -> Array:
+        """Bound of the relative change of the coefficients per relative change of the mass."""
+        return np.asarray(self.light * (1.0 + self.masses.sum(axis=0)))
 
     @property
     def rate(self) -> Array:
-        """Bound of the norm of the coefficients, 1/s."""
-        return np.asarray(self.still + self.swings.sum(axis=0))
+        """Bound of the norm of the coefficients, 1/s, also over a step and some more where masses oscillate."""
+        return np.asarray((self.still + self.swings.sum(axis=0)) * np.where(self.oscillates, 2.0 * self.light, 1.0))
+
+    @property
+    def oscillates(self) -> NDArray[np.bool_]:
+        """Whether the mass oscillates."""
+        return np.asarray(self.masses.any(axis=0))
+
+    def least_steps(self) -> Array:
+        """Return the number of steps a period from which on the inverse mass at most doubles over some steps."""
+        share = np.maximum((self.masses.T * (self.turns > 0)).sum(axis=1) * self.light, 1e-300)
+        turns = max(self.turns, default=1)
+        found = 2 * np.pi * turns * _MASS_RADIUS / np.log1p(0.5 / share)
+        return np.where(self.oscillates, found, 0.0)
+
+    def inverse_mass(self, angles: Array, radius: float) -> Array | float:
+        """Return a bound of the Taylor coefficients of the inverse mass: their sum at a radius, in steps."""
+        if not self.oscillates.any():
+            return 1.0
+        share = self.light * (np.expm1(angles * radius) @ self.masses)
+        inside = _ENLARGED * share < 1.0
+        return np.where(inside, self.light / np.where(inside, 1.0 - _ENLARGED * share, 1.0), np.inf)
 
 
 def proved_stability(system: PeriodicSystem, unit: Array, conservative: bool, spread: float) -> NDArray[np.int8]:
@@ -58,7 +96,7 @@ def proved_stability(system: PeriodicSystem, unit: Array, conservative: bool, sp
     Parameters
     ----------
     system : PeriodicSystem
-        Stiffness and damping alone may oscillate.
+        Stiffness, damping and mass may oscillate; momenta may not.
     unit : ndarray, shape (N, points) or (N, 1)
         Factors of q in modal units, rad/s: the natural frequencies where they are positive.
     conservative : bool
@@ -71,7 +109,8 @@ def proved_stability(system: PeriodicSystem, unit: Array, conservative: bool, sp
     ndarray of int8, shape (points,)
     """
     bounds = _bounds(system, unit)
-    steps = np.ceil(np.maximum(system.period * bounds.rate / _ANGLE, _STEPS * max(bounds.turns, default=1)))
+    least = np.maximum(_STEPS * max(bounds.turns, default=1), bounds.least_steps())
+    steps = np.ceil(np.maximum(system.period * bounds.rate / _ANGLE, least))
     verdict = np.zeros(system.period.size, dtype=np.int8)
     possible = np.nonzero(steps <= MOST_STEPS)[0]
     order = possible[np.argsort(steps[possible], kind="stable")]
@@ -97,10 +136,10 @@ def _bounds(system: PeriodicSystem, unit: Array) -> _Bounds:
     still = np.maximum(unit.max(axis=0), _rows(system.stiffness / unit) + _rows(system.damping))
     sides = np.eye(len(unit))[..., None] * unit - system.stiffness.swapaxes(0, 1) / unit[:, None]
     growth = 0.5 * _size(sides) + _negative(system.damping)
-    swings, points = [], system.period.size
+    swings, masses, points = [], [], system.period.size
     for swing in system.swings:
-        if swing.mass is not None or swing.momentum is not None:
-            raise ValueError("swings: a mass or a momentum oscillates; must be stiffness and damping alone")
+        if swing.momentum is not None:
+            raise ValueError("swings: a momentum oscillates; must be stiffness, damping and mass alone")
         size, total = np.abs(swing.size), np.zeros(points)
         if swing.stiffness is not None:
             total = total + size * _rows(swing.stiffness / unit)
@@ -109,9 +148,18 @@ def _bounds(system: PeriodicSystem, unit: Array) -> _Bounds:
             total = total + size * _rows(swing.damping)
             growth = growth + size * _size(swing.damping)
         swings.append(total)
-    rows = np.array(swings).reshape(len(swings), points)
+        masses.append(np.zeros(points) if swing.mass is None else size * _rows(swing.mass))
+    rows, heavy = (np.array(part).reshape(len(swings), points) for part in (swings, masses))
     turns = np.array([swing.oscillation.order for swing in system.swings], dtype=np.int64)
-    return _Bounds(np.broadcast_to(still, points), rows, np.broadcast_to(growth, points), turns)
+    found = _Bounds(np.broadcast_to(still, points), rows, np.broadcast_to(growth, points), turns, heavy)
+    if not heavy.any():
+        return found
+    with np.errstate(all="ignore"):  # in the Euclidean norm the inverse mass differs from 1 by at most this
+        apart = np.sqrt(len(unit)) * (found.light - 1.0)
+        damped = _size(system.damping) + sum(
+            np.abs(s.size) * _size(s.damping) for s in system.swings if s.damping is not None
+        )
+        return replace(found, growth=found.growth + apart * (0.5 * unit.max(axis=0) + damped))
 
 
 def _negative(damping: Array) -> Array:
@@ -135,13 +183,13 @@ def enclosed_monodromy(system: PeriodicSystem, unit: Array, steps: int, spread: 
     factors = np.concatenate([np.broadcast_to(unit, (len(unit), points)), np.ones((len(unit), points))])
     scale = factors[:, None] / factors
     h = system.period / steps
-    local = np.sqrt(size) * _local_error(bounds, h, steps, len(unit), spread)
-    growth = bounds.growth + spread * np.sqrt(size) * bounds.rate
+    local, by_mass = (np.sqrt(size) * part for part in _local_error(bounds, h, steps, len(unit), spread))
+    growth = bounds.growth + spread * np.sqrt(size) * bounds.rate * bounds.condition
     factor = np.exp(_ENLARGED * h * growth)
     error, through = np.zeros((2, points))
     state = scale * np.eye(size)[..., None]
-    for q, p in propagated(system, steps, _ORDER):
-        new = local * _size(state)
+    for step, (q, p) in enumerate(propagated(system, steps, _ORDER)):
+        new = (local + by_mass * _residual(system, step, steps)) * _size(state)
         error = factor * error + new
         state = scale * np.concatenate([q, p])
         # as an error of the initial state, propagated by the exact map: it grows no faster than the motion
@@ -163,22 +211,41 @@ def _inverse_size(state: Array, error: Array) -> Array:
     return np.asarray(np.where((off < 1.0) & (size * error < 1.0), size / (1.0 - size * error), np.inf))
 
 
-def _local_error(bounds: _Bounds, h: Array, steps: int, modes: int, spread: float) -> Array:
-    """Return a bound of the error of one step, relative to the state in the largest norm of the columns."""
+def _residual(system: PeriodicSystem, step: int, steps: int) -> Array | float:
+    """Return a bound of the residual of the inverse mass that a step uses, in the row norm."""
+    found = mass_and_inverse(system, step, steps)
+    if found is None:
+        return 0.0
+    mass, inverse = (np.moveaxis(part, -1, 0) for part in found)
+    product = np.abs(inverse) @ np.abs(mass)
+    off = np.abs(inverse @ mass - np.eye(len(system.stiffness)))
+    return np.asarray(_ENLARGED * (off + (mass.shape[-1] + 4) * _ROUNDING * product).sum(axis=2).max(axis=1))
+
+
+def _local_error(bounds: _Bounds, h: Array, steps: int, modes: int, spread: float) -> tuple[Array, Array]:
+    """Return a bound of the error of one step, relative to the state in the largest norm of the columns.
+
+    The second is that per residual of the inverse mass.
+    """
     angles = 2 * np.pi * bounds.turns / steps
     logs = []
     for radius in (1.0, *_RADII):
         # the integral from 0 to the radius of the norms of the coefficients, cosines as exponentials
         swung = np.where(angles > 0, np.expm1(angles * radius) / np.where(angles > 0, angles, 1.0), radius)
-        logs.append(h * (bounds.still * radius + swung @ bounds.swings if len(angles) else bounds.still * radius))
+        whole = h * (bounds.still * radius + swung @ bounds.swings if len(angles) else bounds.still * radius)
+        logs.append(whole * bounds.inverse_mass(angles, radius))
     with np.errstate(over="ignore"):
         tails = [np.exp(log) * radius**-_ORDER / (radius - 1.0) for log, radius in zip(logs[1:], _RADII, strict=True)]
     # additions and products for one coefficient of the series, those of the cosines and of the step included; the k-th
-    # coefficient has k times their error, and the sum of k times the majorant's coefficients is its slope
+    # coefficient has k times their error, and the sum of k times the majorant's coefficients is its slope. The inverse
+    # mass is a recursion over the coefficients too, of as many operations
     operations = modes + 2 * _ORDER + 13 * int(max(bounds.turns, default=1)) + len(bounds.turns) + 30
+    operations *= 2 if bounds.oscillates.any() else 1
     slope = h * (bounds.still + (np.exp(angles) @ bounds.swings if len(angles) else 0.0))
-    rounding = ((operations * _ROUNDING + spread) * slope + (_ORDER + 1) * _ROUNDING) * np.exp(logs[0])
-    return np.asarray(_ENLARGED * (np.min(tails, axis=0) + rounding))
+    slope = slope * bounds.inverse_mass(angles, 1.0)
+    by_mass = bounds.condition * slope * np.exp(logs[0])
+    rounding = operations * _ROUNDING * slope * np.exp(logs[0]) + (_ORDER + 1) * _ROUNDING * np.exp(logs[0])
+    return np.asarray(_ENLARGED * (np.min(tails, axis=0) + rounding + spread * by_mass)), _ENLARGED * by_mass
 
 
 def multiplier_discs(maps: Array, error: Array) -> tuple[NDArray[np.complex128], Array]:

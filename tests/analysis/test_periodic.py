@@ -6,6 +6,7 @@ import pickle
 import warnings
 from pathlib import Path
 
+import mpmath
 import numpy as np
 import pytest
 import sympy as sp
@@ -634,7 +635,42 @@ def test_points_of_an_oscillating_gyroscopic_term_are_proved(damper):
     assert (grown[proved == "unstable"] > 0).all() and (grown[proved == "stable"] < 1e-7).all()
 
 
-def test_an_oscillating_mass_is_refused_by_name():
-    beam = model(BEAM, right=m * v.diff(t) ** 2 / 2, essential=CLAMPED).at({**UNIT, m: 0.2})
-    with pytest.raises(ValueError, match=r"excitation: a mass oscillates; only .*: use growth_rate"):
-        cra.certify_stability(beam, cra.Fluctuation(m=0.5), 7.0, 0.1)
+@pytest.mark.parametrize("damper", [0.0, 0.05])
+def test_points_of_an_oscillating_mass_are_proved(damper):
+    """None is against the growth rates; beyond a mass that may vanish nothing is proved."""
+    tip = {"right": m * v.diff(t) ** 2 / 2, "virtual_work": [(-d * v.diff(t), v, "domain")]}
+    beam = model(BEAM, essential=CLAMPED, **tip).at({**UNIT, m: 0.2, d: damper})
+    omega, heavier = 2 * np.pi * cra.natural_frequencies(beam, 2), cra.Fluctuation(m=1.0, rhoA=0.5)
+    at = np.linspace(omega[0], 2.2 * omega[-1], 30), np.linspace(0.05, 0.6, 5)[:, None]
+    proved = cra.certify_stability(beam, heavier, *at, 2)
+    grown = cra.floquet_exponents(beam, heavier, *at, 2, tolerance=1e-12)[..., 0].real
+    assert (proved != "undecided").mean() > 0.95 and (proved == "stable").any() and (proved == "unstable").any()
+    assert (grown[proved == "unstable"] > 0).all() and (grown[proved == "stable"] < 1e-7).all()
+    with pytest.raises(ValueError, match=r"epsilon: the mass fluctuates by .* must be less than once"):
+        cra.certify_stability(beam, heavier, 7.0, 5.0, 2)
+
+
+def test_the_bound_of_a_monodromy_matrix_with_an_oscillating_mass_holds():
+    """The exact motion from one state, by mpmath; the bound is that of doubles, not of a crude majorant."""
+    heavy, steps = 0.7, 200
+    stiffness, damping = np.diag([1.0, 5.0]), np.array([[0.0, 0.3], [-0.3, 0.1]])
+    mass = np.array([[0.6, 0.3], [0.3, 0.4]]) / 0.9  # its row sums are one at most
+    wave = floquet.Oscillation(1, "cos", 0)
+    system, _ = periodic.PeriodicSystem.of(stiffness, damping, [(wave, (None, None, None, mass))], 3.0, heavy)
+    unit = np.sqrt(np.diagonal(stiffness))[:, None]
+    maps, error = proved_stability.enclosed_monodromy(system, unit, steps, 0.0)
+    with mpmath.workdps(20):
+        k, c, heavier = (mpmath.matrix(part.tolist()) for part in (stiffness, damping, heavy * mass))
+
+        def rates(time, state):
+            q, (p1, p2), turn = mpmath.matrix(state[:2]), state[2:], mpmath.cos(3 * time)
+            a, b, d = 1 + turn * heavier[0, 0], turn * heavier[0, 1], 1 + turn * heavier[1, 1]
+            u = mpmath.matrix([d * p1 - b * p2, a * p2 - b * p1]) / (a * d - b * b)
+            return [*u, *(-(c * u) - k * q)]
+
+        exact = mpmath.odefun(rates, 0, [1, 0, 1, 0], tol=mpmath.mpf(10) ** -17)(2 * mpmath.pi / 3)
+    scale = np.array([*unit[:, 0], 1.0, 1.0])
+    found = maps[0] @ (scale * np.array([1.0, 0.0, 1.0, 0.0]))
+    start = np.linalg.norm(scale * np.array([1.0, 0.0, 1.0, 0.0]))
+    off = np.linalg.norm(found - scale * np.array([float(value) for value in exact]))
+    assert off <= error[0] * start and error[0] < 1e-9  # two hundred steps with some hundred operations each
