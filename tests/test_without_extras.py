@@ -1,4 +1,4 @@
-"""The package where Numba, Dask, xarray and the other extras do not exist: a process in which importing them fails."""
+"""The package without llvmlite, Dask, xarray and the other extras: a process in which importing them fails."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 
-ABSENT = ("numba", "llvmlite", "dask", "distributed", "xarray", "zarr", "flint")
+ABSENT = ("llvmlite", "dask", "distributed", "xarray", "zarr", "flint")
 
 BLOCK = f"""
 import sys

@@ -65,8 +65,8 @@ def growth_rate(
         modes are then sufficient. Otherwise the system consists of its first modes only.
     tolerance : float
         Relative error of the monodromy matrix.
-    backend : {'auto', 'numpy', 'numba'}
-        'auto' compiles for large charts if Numba is there, by the policy for frequencies.
+    backend : {'auto', 'numpy', 'compiled'}
+        'auto' compiles for large charts if llvmlite is there, by the policy for frequencies.
 
     Returns
     -------
@@ -77,8 +77,8 @@ def growth_rate(
     ------
     TypeError, ValueError
         If an argument is out of its range, as a :class:`TransverseBase`, ``residual`` without fluctuating stiffnesses
-        of ends and 'numba' without Numba are; if shapes do not broadcast together; or if a period takes more than 1e7
-        steps.
+        of ends and 'compiled' without llvmlite are; if shapes do not broadcast together; or if a period takes more than
+        1e7 steps.
 
     Examples
     --------
@@ -168,12 +168,12 @@ def batch_shape(system: Any, excitation: Excitation, **arrays: np.ndarray) -> tu
 
 def _loop(backend: str, found: dict[str, Any]) -> floquet.Loop | None:
     """Return the compiled loop of the Floquet solver if requested or worthwhile."""
-    checks.choice("backend", backend, ("auto", "numpy", "numba"))
-    if backend == "numba" and not has_compiler():
-        raise ValueError("backend = 'numba': Numba is not installed; backend must be 'auto' or 'numpy'")
+    checks.choice("backend", backend, ("auto", "numpy", "compiled"))
+    if backend == "compiled" and not has_compiler():
+        raise ValueError("backend = 'compiled': llvmlite is not installed; backend must be 'auto' or 'numpy'")
     points = np.broadcast(found["angular_frequency"], found["epsilon"], found["omega"][..., 0]).size
     compile = backend == "auto" and wants_compiler(_ROOTS * points, _template_parts)
-    return _template().kick_and_drift if compile or backend == "numba" else None
+    return _template().kick_and_drift if compile or backend == "compiled" else None
 
 
 @cache

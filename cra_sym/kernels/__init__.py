@@ -1,4 +1,4 @@
-"""Compiler from SymPy expressions to fast, picklable, broadcasting NumPy or Numba functions."""
+"""Compiler from SymPy expressions to fast, picklable, broadcasting functions: by NumPy, or machine code."""
 
 from cra_sym.kernels.callables import Kernel, kernel
 from cra_sym.kernels.derived import derived_kernel

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba.core import errors, types
-from numba.core.registry import cpu_target
+
+from cra_sym.kernels.generated import CompileError
 
 __all__ = ["CONDITION", "DOUBLE", "INTEGER", "Arithmetic", "is_constant", "kind_named", "kind_of"]
 
@@ -38,6 +38,14 @@ _BY_CONSTANTS = {  # operators whose right side must be one of these constants; 
     ast.RShift: range(64),
 }
 _LARGEST_POWER = 64  # largest exponent that becomes products
+_FUSED = ("contract",)  # a product and a sum may be rounded once; nothing else departs from IEEE 754
+_INTRINSICS: dict[Any, str] = {abs: "fabs"}  # functions that LLVM knows, by their names there
+for _name in ("ceil", "cos", "exp", "exp2", "floor", "log", "log2", "log10", "sin", "sqrt"):
+    _INTRINSICS[getattr(np, _name)] = _name
+_OF_THE_LIBRARY: dict[Any, str] = {np.arctan2: "atan2"}  # functions of the platform's mathematical library
+for _name in ("acos", "acosh", "asin", "asinh", "atan", "atanh", "cbrt", "cosh", "expm1", "hypot", "log1p", "sinh"):
+    _OF_THE_LIBRARY[getattr(np, _name)] = _name
+_OF_THE_LIBRARY |= {np.tan: "tan", np.tanh: "tanh"}
 
 
 def is_constant(value: Any) -> bool:
@@ -50,14 +58,14 @@ def kind_of(value: Any) -> Any:
     if is_constant(value):
         return next(kind for of, kind in _KINDS.items() if isinstance(value, of))
     if getattr(value, "type", None) not in _WIDTHS:
-        raise errors.TypingError(f"{value!r} is not a number")
+        raise CompileError(f"{value!r} is not a number")
     return value.type
 
 
 def kind_named(name: Any) -> Any:
     """Return the LLVM type of ``np.float64`` or ``np.int64``."""
     if name not in (np.float64, np.int64):
-        raise errors.TypingError(f"{name} is neither np.float64 nor np.int64")
+        raise CompileError(f"{name} is neither np.float64 nor np.int64")
     return DOUBLE if name is np.float64 else INTEGER
 
 
@@ -66,12 +74,11 @@ class Arithmetic:
 
     Parameters
     ----------
-    context, builder
-        Numba's target context and LLVM's builder.
+    builder : llvmlite.ir.IRBuilder
     """
 
-    def __init__(self, context: Any, builder: Any) -> None:
-        self.context, self.builder = context, builder
+    def __init__(self, builder: Any) -> None:
+        self.builder = builder
 
     def typed(self, value: Any, kind: Any = None) -> Any:
         """Return a number as an LLVM value, of its own type or of a wider one."""
@@ -79,7 +86,7 @@ class Arithmetic:
         kind = kind or own
         if _WIDTHS.index(own) > _WIDTHS.index(kind) or (kind == INTEGER and is_constant(value) and abs(value) >= 2**63):
             what = value if is_constant(value) else f"a value of type {own}"
-            raise errors.TypingError(f"{what} where {kind} is expected")
+            raise CompileError(f"{what} where {kind} is expected")
         if is_constant(value):
             return ir.Constant(kind, float(value) if kind == DOUBLE else int(value))
         if own == kind:
@@ -102,16 +109,17 @@ class Arithmetic:
         if isinstance(op, ast.Pow):
             return self.power(left, right)
         if type(op) in _BY_CONSTANTS and (type(right) is not int or right not in _BY_CONSTANTS[type(op)]):
-            raise errors.TypingError(f"{type(op).__name__} by anything but a constant in {_BY_CONSTANTS[type(op)]}")
+            raise CompileError(f"{type(op).__name__} by anything but a constant in {_BY_CONSTANTS[type(op)]}")
         kind = DOUBLE if isinstance(op, ast.Div) else _widest(left, right)
         if kind == CONDITION and not isinstance(op, (ast.BitAnd, ast.BitOr)):
             kind = INTEGER
         name = of_doubles if kind == DOUBLE else of_integers
         if name is None:
-            raise errors.TypingError(f"{type(op).__name__} of {kind}")
+            raise CompileError(f"{type(op).__name__} of {kind}")
         if isinstance(op, (ast.FloorDiv, ast.Mod)):
             return self.divided(op, self.typed(left, kind), right)
-        return getattr(self.builder, name)(self.typed(left, kind), self.typed(right, kind))
+        flags = _FUSED if kind == DOUBLE else ()
+        return getattr(self.builder, name)(self.typed(left, kind), self.typed(right, kind), flags=flags)
 
     def divided(self, op: ast.operator, left: Any, right: int) -> Any:
         """Return // or %, rounded down, by a positive constant."""
@@ -122,7 +130,7 @@ class Arithmetic:
     def power(self, base: Any, exponent: Any) -> Any:
         """Return a power; one with a small whole exponent by repeated squaring."""
         if not isinstance(exponent, int) or not 0 < abs(exponent) <= _LARGEST_POWER:
-            return self.known_to_numba(operator.pow, (base, exponent))
+            return self.intrinsic("pow", base, exponent)
         result, square, rest = None, base, abs(exponent)
         while rest:
             if rest & 1:
@@ -137,7 +145,8 @@ class Arithmetic:
         values = self.typed(left, kind), self.typed(right, kind)
         if kind != DOUBLE:
             return (self.builder.icmp_signed if kind == INTEGER else self.builder.icmp_unsigned)(sign, *values)
-        return (self.builder.fcmp_unordered if sign == "!=" else self.builder.fcmp_ordered)(sign, *values)
+        write = self.builder.fcmp_unordered if sign == "!=" else self.builder.fcmp_ordered
+        return write(sign, *values, flags=_FUSED)
 
     def truth(self, value: Any) -> Any:
         """Return a number as a condition."""
@@ -160,19 +169,63 @@ class Arithmetic:
         """Return the bits of a number reinterpreted as a double or an integer."""
         return self.builder.bitcast(self.typed(value), kind_named(kind))
 
-    def known_to_numba(self, function: Any, arguments: Sequence[Any]) -> Any:
-        """Return a function of doubles as Numba writes it."""
-        typing = cpu_target.typing_context
+    def function(self, function: Any, arguments: Sequence[Any]) -> Any:
+        """Return a function of doubles, given as Python or NumPy has it."""
         try:
-            kind = typing.resolve_value_type(function)
-        except ValueError as error:
-            raise errors.TypingError(f"{function} is unknown to Numba") from error
-        found = typing.resolve_function_type(kind, (types.float64,) * len(arguments), {})
-        if found is None or found.return_type != types.float64:
-            raise errors.TypingError(f"{function} is not a function of doubles")
-        written = self.context.get_function(kind, found)
-        self.context.add_linking_libs(getattr(written, "libs", ()))
-        return written(self.builder, [self.typed(value, DOUBLE) for value in arguments])
+            if function in _INTRINSICS:
+                return self.intrinsic(_INTRINSICS[function], *arguments)
+            if function in _OF_THE_LIBRARY:
+                return self.from_library(_OF_THE_LIBRARY[function], *arguments)
+            if function in _WRITTEN:
+                return _WRITTEN[function](self, *(self.typed(value, DOUBLE) for value in arguments))
+        except TypeError:  # not hashable, or as many arguments as it does not have
+            pass
+        raise CompileError(f"{getattr(function, '__name__', function)} is no function that can be compiled")
+
+    def intrinsic(self, name: str, *arguments: Any) -> Any:
+        """Return an elementary function that LLVM knows."""
+        shape = ir.FunctionType(DOUBLE, [DOUBLE] * len(arguments))
+        called = self.builder.module.declare_intrinsic(f"llvm.{name}", [DOUBLE], shape)
+        return self.builder.call(called, [self.typed(value, DOUBLE) for value in arguments], fastmath=_FUSED)
+
+    def from_library(self, name: str, *arguments: Any) -> Any:
+        """Return an elementary function of the platform's mathematical library."""
+        called = self.builder.module.globals.get(name)
+        if called is None:
+            shape = ir.FunctionType(DOUBLE, [DOUBLE] * len(arguments))
+            called = ir.Function(self.builder.module, shape, name)
+            called.attributes.add("nounwind")
+            called.attributes.add("readonly")
+        return self.builder.call(called, [self.typed(value, DOUBLE) for value in arguments], fastmath=_FUSED)
+
+    def extreme(self, op: ast.cmpop, one: Any, other: Any) -> Any:
+        """Return the larger or the smaller of two numbers, or the one that is nan."""
+        number = self.chosen(self.compared(op, one, other), one, other)
+        return self._unless_nan(one, self._unless_nan(other, number))
+
+    def _unless_nan(self, value: Any, otherwise: Any) -> Any:
+        return self.chosen(self.compared(ast.NotEq(), value, value), value, otherwise)
+
+    def sign(self, value: Any) -> Any:
+        """Return -1, 0, 1 or nan."""
+        flat = self._unless_nan(value, 0.0)
+        below = self.chosen(self.compared(ast.Lt(), value, 0.0), -1.0, flat)
+        return self.chosen(self.compared(ast.Gt(), value, 0.0), 1.0, below)
+
+    def remainder(self, value: Any, divisor: Any) -> Any:
+        """Return the rest of a division, of the sign of the divisor."""
+        rest = self.builder.frem(value, divisor, flags=_FUSED)
+        signs = [self.compared(ast.Lt(), number, 0.0) for number in (rest, divisor)]
+        other = self.builder.and_(self.compared(ast.NotEq(), rest, 0.0), self.builder.xor(*signs))
+        return self.binary(ast.Add(), rest, self.chosen(other, divisor, 0.0))
+
+
+_WRITTEN: dict[Any, Callable[..., Any]] = {
+    np.maximum: lambda own, one, other: own.extreme(ast.GtE(), one, other),
+    np.minimum: lambda own, one, other: own.extreme(ast.LtE(), one, other),
+    np.mod: Arithmetic.remainder,
+    np.sign: Arithmetic.sign,
+}
 
 
 def _widest(*values: Any) -> Any:

@@ -17,7 +17,7 @@ from cra_sym.kernels import lanes
 __all__ = ["Kernel", "kernel"]
 
 _BLOCK = 8192  # elements whose temporaries stay in the processor's second-level cache
-_BACKENDS = ("numpy", "numba")  # and None
+_BACKENDS = ("numpy", "compiled")  # and None
 
 
 class Kernel:
@@ -32,7 +32,7 @@ class Kernel:
         Module text made by :func:`kernel`.
     arguments : tuple of str
         Names of the arguments in calling order.
-    backend : {None, 'numpy', 'numba'}
+    backend : {None, 'numpy', 'compiled'}
         Backend of the evaluation; None selects it by size.
     """
 
@@ -126,13 +126,13 @@ def kernel(expression: Any, arguments: Any, *, backend: str | None = None) -> Ke
         Evaluated without expansion or simplification; common subexpressions are shared.
     arguments : sequence of Symbol
         Every free symbol of the expression, in calling order; further symbols only take part in broadcasting.
-    backend : {None, 'numpy', 'numba'}
-        None starts with NumPy. If Numba is installed, machine code is compiled, or loaded from the user's cache, once
+    backend : {None, 'numpy', 'compiled'}
+        None starts with NumPy. If llvmlite is there, machine code is compiled, or loaded from the user's cache, once
         the calls of this process add up to 10 000 lanes, i.e. elements of the common shape; for sources of more than
         5000 characters that number grows with the square of their length. Calls add up over equal kernels, separately
         for each pattern of arrays and numbers among the arguments. NumPy is kept where machine code is not faster,
         and for complex values: powers other than integer ones and square roots, inverse and special functions,
-        Mod, and elementary functions in expressions with conditions. 'numba' compiles at once, these too.
+        Mod, and elementary functions in expressions with conditions. 'compiled' compiles at once, these too.
 
     Returns
     -------

@@ -49,7 +49,7 @@ def derived_kernel(path: str, *arguments: Any, backend: str | None = None) -> Ke
     """Return the kernel of a derivation of this package; the derivation runs on first use.
 
     On first use its source is read from the user's cache, or else derived and cached for other processes. The key is a
-    hash of the package's sources that derive and the versions of SymPy, NumPy, SciPy, Numba and Python: a change in any
+    hash of the package's sources that derive and the versions of SymPy, NumPy, SciPy and Python: a change in any
     of them leads to a new derivation.
 
     Parameters
@@ -59,7 +59,7 @@ def derived_kernel(path: str, *arguments: Any, backend: str | None = None) -> Ke
         as :func:`cra_sym.kernels.kernel` takes them.
     arguments : literals
         Numbers, strings and tuples of them, which are part of the key.
-    backend : {None, 'numpy', 'numba'}
+    backend : {None, 'numpy', 'compiled'}
         As in :func:`cra_sym.kernels.kernel`.
 
     Raises
@@ -158,7 +158,7 @@ def fingerprint() -> str:
         content = file.read_bytes()
         digest.update(f"{file.relative_to(_PACKAGE).as_posix()} {len(content)}\n".encode() + content)
     digest.update(platform.python_implementation().encode() + platform.python_version().encode())
-    for package in ("sympy", "numpy", "scipy", "numba"):
+    for package in ("sympy", "numpy", "scipy"):
         digest.update(f"{package} {_version(package)}\n".encode())
     return digest.hexdigest()
 

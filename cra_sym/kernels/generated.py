@@ -1,11 +1,15 @@
-"""Interface of kernels for the compiler."""
+"""Interface of kernels for the compiler, and what it raises."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, Protocol
 
-__all__ = ["Generated"]
+__all__ = ["CompileError", "Generated"]
+
+
+class CompileError(ValueError):
+    """What has no machine code: a construct, a function, or the type of an argument."""
 
 
 class Generated(Protocol):

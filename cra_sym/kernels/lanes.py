@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -15,16 +16,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.kernels.generated import Generated
+from cra_sym.kernels.generated import CompileError, Generated
 from cra_sym.kernels.specialise import compiled, has_compiler
 
-__all__ = ["COMPILE_FROM", "evaluated"]
+__all__ = ["COMPILE_FROM", "evaluated", "processors"]
 
 COMPILE_FROM = 10_000
 """Total number of lanes over the calls of this process from which on a kernel is compiled, or loaded from the cache.
 
-Compilation takes about half a second, including the import of Numba. Kernels of more than
-`_SHORT` characters take longer, and are compiled later.
+Compilation takes about a tenth of a second. Kernels of more than `_SHORT` characters take longer, and are compiled
+later.
 """
 _SHORT = 5000  # characters of source; beyond, the time of the compiler grows nearly with their square
 _SPAN = 1 << 16  # lanes per task of a thread
@@ -50,7 +51,10 @@ class _Loop:
         with self.turn:
             if self.fill is None and self.possible:
                 self.lanes += size
-                if kernel.backend == "numba" or self.lanes >= COMPILE_FROM * max(1, len(kernel.source) / _SHORT) ** 2:
+                if (
+                    kernel.backend == "compiled"
+                    or self.lanes >= COMPILE_FROM * max(1, len(kernel.source) / _SHORT) ** 2
+                ):
                     self.fill = _compiled(kernel, along, self.outputs)
                     self.possible = self.fill is not None
         return self.fill
@@ -93,16 +97,19 @@ def evaluated(
 def _compiled(kernel: Generated, along: Sequence[bool], outputs: int) -> Callable[..., int] | None:
     """Return the loop in machine code, or None if there is no compiler, or no gain and it is not requested."""
     complex_or_special = "1j" in kernel.source or "\nfrom scipy" in f"\n{kernel.source}"
-    if not outputs or complex_or_special or not (kernel.backend == "numba" or _is_quick(kernel)) or not has_compiler():
+    if (
+        not outputs
+        or complex_or_special
+        or not (kernel.backend == "compiled" or _is_quick(kernel))
+        or not has_compiler()
+    ):
         return None
-    import numba
-
     template = _template(along, outputs, kernel.layout == ())
     fill: Callable[..., int] = compiled(template, {"evaluate": kernel}, elementary=_is_free(kernel)).fill
     none = np.empty(0)
     try:
         fill(*[none] * outputs, *(_in_a_row(none, (0,)) if lanes else 0.0 for lanes in along))  # compiles
-    except numba.errors.NumbaError:
+    except CompileError:
         return None
     return fill
 
@@ -153,7 +160,7 @@ def _in_threads(fill: Callable[..., int], results: Sequence[Array], values: Sequ
     start = perf_counter()
     lost = part()
     worth = int((perf_counter() - start) * len(left) / _WORTH)
-    others = min(worth, len(left), _threads()) - 1
+    others = min(worth, len(left), processors()) - 1
     if others < 1:
         return lost + rest()
     with ThreadPoolExecutor(others) as pool:
@@ -161,10 +168,9 @@ def _in_threads(fill: Callable[..., int], results: Sequence[Array], values: Sequ
         return lost + rest() + sum(helper.result() for helper in helping)
 
 
-def _threads() -> int:
-    import numba
-
-    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+def processors() -> int:
+    """Return how many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _leaves(layout: Any) -> int:

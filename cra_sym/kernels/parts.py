@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -11,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from cra_sym.kernels.callables import Kernel
+from cra_sym.kernels.lanes import processors
 from cra_sym.kernels.specialise import has_compiler, is_compiled
 
 __all__ = ["COMPILE_FROM", "LOAD_FROM", "Parts", "flattened", "in_parts", "wants_compiler"]
 
-# A root takes about 2 microseconds with NumPy and 0.1 compiled. Loading machine code, with Numba, takes as long as
+# A root takes about 2 microseconds with NumPy and 0.1 compiled. Loading machine code takes as long as
 # LOAD_FROM roots by NumPy, compiling it as long as COMPILE_FROM. The benchmark of cold starts measures both.
 LOAD_FROM = 400_000
 """Number of roots in one call from which on loading machine code pays."""
@@ -53,7 +53,7 @@ def wants_compiler(roots: int, parts: Parts) -> bool:
 
 def in_parts(fill: Callable[[slice], Any], lanes: int, modes: int, *, threads: int | None, compiled: bool) -> None:
     """Call ``fill`` for all lanes, part by part: in threads if compiled, else in blocks that fit the cache."""
-    threads = (threads or _processors()) if compiled else 1
+    threads = (threads or processors()) if compiled else 1
     fair = -(-lanes // (threads if threads == 1 else _PARTS_PER_THREAD * threads))
     share = max(fair, _ROOTS_PER_PART // modes, 1) if compiled else max(_BLOCK // (modes + 4), _FEWEST)
     parts = [slice(start, min(start + share, lanes)) for start in range(0, lanes, share)]
@@ -63,7 +63,3 @@ def in_parts(fill: Callable[[slice], Any], lanes: int, modes: int, *, threads: i
     else:
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(fill, parts))
-
-
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,4 +1,4 @@
-"""Python source from SymPy expressions, which NumPy evaluates on arrays and Numba compiles for scalars."""
+"""Python source from SymPy expressions, which NumPy evaluates on arrays and LLVM compiles for scalars."""
 
 from __future__ import annotations
 

@@ -1,50 +1,45 @@
-"""Numba templates specialised with generated functions, compiled once and then loaded from the user's cache.
+"""Templates specialised with generated functions, compiled once by LLVM and then loaded from the user's cache.
 
-Numba's own file cache misses changes of inlined helpers, relies on time stamps and unpickles any file next to the
-source. Here the compiled text is a single module whose hash is the key, and machine code is kept in the private cache.
-No other module of the package compiles.
+The compiled text is a single module whose hash, with the processor, is the key of its machine code in the private
+cache. No other module of the package compiles.
 """
 
 from __future__ import annotations
 
 import ast
 import hashlib
-import os
-import pickle
-import re
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import cache
+from functools import cache, cached_property
 from importlib.util import find_spec
 from pathlib import Path
 from threading import Lock
-from types import FunctionType, ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
-from warnings import warn
 
+import numpy as np
+
+from cra_sym.checks import shown
 from cra_sym.kernels import store
-from cra_sym.kernels.generated import Generated
+from cra_sym.kernels.generated import CompileError, Generated
 
-__all__ = ["compiled", "has_compiler", "is_compiled", "written_out"]
+__all__ = ["Entry", "compiled", "has_compiler", "is_compiled", "written_out"]
 
-_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "no_cfunc_wrapper": True}
-_UNKNOWN = (0, 69)  # the first version of Numba that was not tested
 _ELEMENTARY = Path(__file__).with_name("elementary.py")
 _COMPILER = [
-    Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8") for name in ("arithmetic", "inlined", "writer")
+    Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8") for name in ("arithmetic", "machine", "writer")
 ]
+_ARRAYS = {np.dtype(np.float64): "d", np.dtype(np.int64): "q"}
 _TURN = Lock()  # one thread specialises for all; Python 3.11 cannot parse in two threads at once
 _WHERE = "def where(condition, value, otherwise):\n    return value if condition else otherwise\n"
 
 
 def has_compiler() -> bool:
-    """Return whether Numba is installed and not disabled by NUMBA_DISABLE_JIT."""
-    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
-        return False
-    if "numba" in sys.modules:
-        return sys.modules["numba"] is not None
-    return find_spec("numba") is not None
+    """Return whether llvmlite is installed."""
+    if "llvmlite" in sys.modules:
+        return sys.modules["llvmlite"] is not None
+    return find_spec("llvmlite") is not None
 
 
 def compiled(template: str, kernels: Mapping[str, Generated], *, elementary: bool = True) -> SimpleNamespace:
@@ -75,9 +70,10 @@ def compiled(template: str, kernels: Mapping[str, Generated], *, elementary: boo
     Raises
     ------
     ImportError
-        If Numba is missing; see :func:`has_compiler`.
-    ValueError
-        If a kernel uses functions that Numba cannot compile.
+        If llvmlite is missing; see :func:`has_compiler`.
+    CompileError
+        If a kernel uses functions that have no machine code; at the first call of an entry, if its text does or an
+        argument is neither a number nor a contiguous array of numbers.
 
     Examples
     --------
@@ -96,16 +92,16 @@ def compiled(template: str, kernels: Mapping[str, Generated], *, elementary: boo
     array([1., 1., 1.])
     """
     if not has_compiler():
-        raise ImportError("compiling needs numba: pip install numba")
+        raise ImportError("compiling needs llvmlite: pip install llvmlite")
     head = _prelude(kernels, elementary)
     with _TURN:
-        return (_entries if _is_known() else _tried)(head, template)
+        return _entries(head, template)
 
 
 def is_compiled(template: str, kernels: Mapping[str, Generated]) -> bool:
     """Return whether machine code of the specialised template exists, from this or an earlier process.
 
-    Numba is not imported for this; a different processor may have to compile again.
+    LLVM is not loaded for this; a different processor may have to compile again.
     """
     digest = _digest(_prelude(kernels, True), template)
     return digest in _MADE or store.load(_mark(digest)) is not None
@@ -118,7 +114,7 @@ def _prelude(kernels: Mapping[str, Generated], elementary: bool) -> str:
         head, _, body = kernel.source.partition("\n\n\ndef evaluate(")
         lines = [line for line in head.splitlines() if line.startswith("from ")]
         if not all(line.startswith("from numpy import ") for line in lines):
-            raise ValueError(f"{name} needs {'; '.join(lines)}: Numba compiles NumPy's functions only")
+            raise CompileError(f"{name} needs {'; '.join(lines)}: NumPy's functions only are compiled")
         imports.update(lines)
         bodies.append(f"def {name}({body}")
     own = _ELEMENTARY.read_text(encoding="utf-8") if elementary else ""
@@ -137,7 +133,7 @@ _MADE: set[str] = set()  # digests of the code that this process compiled or loa
 
 
 def _digest(head: str, template: str) -> str:
-    return hashlib.sha256(repr((head, template, _OPTIONS, _COMPILER)).encode()).hexdigest()
+    return hashlib.sha256(repr((head, template, _COMPILER)).encode()).hexdigest()
 
 
 def _remember(digest: str) -> None:
@@ -154,129 +150,92 @@ def _mark(digest: str) -> str:
 
 
 @cache
-def _versions() -> list[str]:
+def _versions() -> tuple[str, ...]:
     from importlib.metadata import version
 
-    return [version(package) for package in ("numba", "llvmlite", "numpy")]
+    return version("llvmlite"), version("numpy")
 
 
 @cache
 def _entries(head: str, template: str) -> SimpleNamespace:
-    import numba
-
-    from cra_sym.kernels.inlined import inlined
-
-    digest = _digest(head, template)
-    module = ModuleType(f"cra_sym_compiled_{digest[:32]}")
-    sys.modules[module.__name__] = module  # module in which stored machine code finds its constants
-    namespace = module.__dict__
-    exec(head + template, namespace)
-    functions = {node.name: node for node in ast.parse(head + template).body if isinstance(node, ast.FunctionDef)}
-    entries, meanings = _names(template), namespace | functions
-    for name in entries:
-        written, arguments = f"{name}_written", ", ".join(a.arg for a in functions[name].args.args)
-        namespace[written] = inlined(functions[name], meanings)
-        exec(f"def {name}({arguments}):\n    return {written}({arguments})\n", namespace)
-        namespace[name] = numba.njit(**_OPTIONS)(namespace[name])
-        namespace[name]._cache = _StoredCode(digest, name)
-    return SimpleNamespace(**{name: namespace[name] for name in entries})
-
-
-def _names(template: str) -> list[str]:
-    """Return the names of the entries of a template."""
+    module = _Module(head, template)
     names = (node.name for node in ast.parse(template).body if isinstance(node, ast.FunctionDef))
-    return [name for name in names if not name.startswith("_")]
+    return SimpleNamespace(**{name: Entry(module, name) for name in names if not name.startswith("_")})
 
 
-def _is_known() -> bool:
-    """Return whether Numba is a tested version, since compiling and storing depend on its internals."""
-    return tuple(map(int, re.findall(r"\d+", _versions()[0])[:2])) < _UNKNOWN
+class _Module:
+    """The text of a module, which is parsed and run when the first of its entries is compiled."""
+
+    def __init__(self, head: str, template: str) -> None:
+        self.digest, self._text = _digest(head, template), head + template
+
+    @cached_property
+    def functions(self) -> dict[str, ast.FunctionDef]:
+        return {node.name: node for node in ast.parse(self._text).body if isinstance(node, ast.FunctionDef)}
+
+    @cached_property
+    def names(self) -> dict[str, Any]:
+        names: dict[str, Any] = {}
+        exec(self._text, names)
+        return names | self.functions
 
 
-@cache
-def _tried(head: str, template: str) -> SimpleNamespace:
-    """Return the entries for an untested version of Numba: compiled as usual, or by Numba itself if that fails."""
-    made = None
-    with suppress(ImportError, AttributeError):
-        made = _entries(head, template)
+class Entry:
+    """A function that is compiled, or loaded from the store, when it is first called with new types of arguments."""
 
-    def entry(name: str) -> Callable[..., Any]:
-        def call(*arguments: Any) -> Any:
-            nonlocal made
-            tried = made
-            try:
-                return getattr(tried, name)(*arguments)
-            except Exception:  # compiled code raises nothing
-                with _TURN:
-                    made = _plain(head, template)
-                if made is tried:
-                    raise
-            return getattr(made, name)(*arguments)
+    def __init__(self, module: _Module, name: str) -> None:
+        self._module, self._name = module, name
+        self._codes: dict[tuple[str, ...], Callable[..., Any]] = {}
+        self.origins: dict[tuple[str, ...], str] = {}
+        """Whether the machine code for some types was 'compiled' or 'loaded'."""
 
-        return call
+    def __call__(self, *arguments: Any) -> Any:
+        types = tuple(map(_type_of, arguments))
+        code = self._codes.get(types)
+        if code is None:
+            with _TURN:
+                code = self._codes.get(types) or self._made(types)
+        return code(*arguments)
 
-    return SimpleNamespace(**{name: entry(name) for name in _names(template)})
+    def _made(self, types: tuple[str, ...]) -> Callable[..., Any]:
+        from cra_sym.kernels import machine
 
+        key = repr((self._module.digest, self._name, types, machine.processor(), sys.version, _versions()))
+        content, origin = store.load(key), "loaded"
+        code = None
+        if content is not None:
+            with suppress(ValueError):  # of something else: it is compiled again
+                code = machine.Code(content, self._name, types)
+        if code is None:
+            content, origin = self._compiled(types), "compiled"
+            code = machine.Code(content, self._name, types)
+            store.save(key, content)
+        _remember(self._module.digest)
+        self.origins[types] = origin
+        self._codes[types] = code
+        return code
 
-@cache
-def _plain(head: str, template: str) -> SimpleNamespace:
-    """Return the entries compiled by Numba alone, which takes seconds and is not stored."""
-    import numba
-
-    warn(
-        f"Numba {_versions()[0]} is newer than cra_sym knows: it compiles by its own means, anew in each process",
-        RuntimeWarning,
-        stacklevel=3,
-    )
-    module = ModuleType("cra_sym_compiled_by_numba")
-    exec(head + template, module.__dict__)
-    for name, value in list(vars(module).items()):
-        if isinstance(value, FunctionType):
-            setattr(module, name, numba.njit(nogil=True, error_model="numpy", fastmath={"contract"})(value))
-    return SimpleNamespace(**vars(module))
-
-
-class _StoredCode:
-    """Cache object of a Numba dispatcher, backed by the private cache with a checksum of every entry."""
-
-    cache_path = None
-
-    def __init__(self, digest: str, name: str) -> None:
-        self._digest, self._name, self._bar = digest, name, None
-
-    def load_overload(self, signature: Any, target: Any) -> Any:
-        from numba.core.compiler import CompileResult
+    def _compiled(self, types: tuple[str, ...]) -> bytes:
         from tqdm import tqdm
 
-        target.refresh()
-        content = store.load(self._key(signature, target.codegen()))
-        if content is not None:
-            try:
-                found = CompileResult._rebuild(target, *pickle.loads(content))
-                _remember(self._digest)
-                return found
-            except Exception:  # a damaged entry of another process is compiled again
-                pass
-        self._bar = tqdm(total=0, desc=f"compiling {self._name}, once", bar_format="{desc}", leave=False, disable=None)
-        return None
+        from cra_sym.kernels import machine
 
-    def save_overload(self, signature: Any, result: Any) -> None:
-        from numba.core.serialize import dumps
+        with tqdm(total=0, desc=f"compiling {self._name}, once", bar_format="{desc}", leave=False, disable=None):
+            return machine.made(self._module.functions[self._name], types, self._module.names)
 
-        if self._bar is not None:
-            self._bar.close()
-        if not result.lifted and not result.library.has_dynamic_globals:
-            store.save(self._key(signature, result.library.codegen), dumps(result._reduce()))
-        _remember(self._digest)
 
-    def _key(self, signature: Any, codegen: Any) -> str:
-        return repr((self._digest, self._name, str(signature), codegen.magic_tuple(), sys.version, _versions()))
-
-    def enable(self) -> None:
-        """Do nothing: the cache is always used."""
-
-    def disable(self) -> None:
-        """Do nothing: the cache is always used."""
-
-    def flush(self) -> None:
-        """Do nothing: a changed text has another key."""
+def _type_of(value: Any) -> str:
+    """Return the type of an argument, as `cra_sym.kernels.machine.made` has it."""
+    if isinstance(value, np.ndarray):
+        kind, flags = _ARRAYS.get(value.dtype), value.flags
+        if kind and flags.c_contiguous and flags.aligned:
+            return f"{kind}{value.ndim}{'w' if flags.writeable else ''}"
+    elif isinstance(value, (float, np.floating)):
+        return "d"
+    elif isinstance(value, (bool, np.bool_)):
+        return "?"
+    elif isinstance(value, (int, np.integer)) and -(2**63) <= value < 2**63:
+        return "q"
+    raise CompileError(
+        f"{shown(value)}: arguments of compiled functions must be numbers of 64 bits or contiguous arrays of them"
+    )

@@ -1,8 +1,7 @@
 """Translation of functions of numbers and arrays to LLVM, inlined statement by statement.
 
-Numba's type inference takes about a millisecond per operation. Generated functions and the loops around them have
-thousands of operations whose types follow directly from the arguments: a value is a double, an integer, a condition or
-a contiguous array. Everything is inlined, so that loops over lanes become SIMD code.
+The types of all values follow directly from those of the arguments: a value is a double, an integer, a condition or a
+contiguous array. Everything is inlined, so that loops over lanes become SIMD code.
 """
 
 from __future__ import annotations
@@ -15,9 +14,9 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba.core import cgutils, errors
 
 from cra_sym.kernels.arithmetic import CONDITION, INTEGER, Arithmetic, is_constant, kind_named, kind_of
+from cra_sym.kernels.generated import CompileError
 
 __all__ = ["Array", "call"]
 
@@ -27,19 +26,28 @@ class Array:
     """A contiguous array, or the part of one selected by leading indices."""
 
     data: Any
+    kind: Any
     shape: tuple[Any, ...]
     writable: bool = True
 
 
-def call(
-    context: Any, builder: Any, function: ast.FunctionDef, arguments: Sequence[Any], namespace: Mapping[str, Any]
-) -> Any:
+@dataclass(frozen=True)
+class _Place:
+    """A location in memory and the type of the number there."""
+
+    pointer: Any
+    kind: Any
+
+
+_MEMORY = ir.PointerType()
+
+
+def call(builder: Any, function: ast.FunctionDef, arguments: Sequence[Any], namespace: Mapping[str, Any]) -> Any:
     """Write the body of a function at the position of the builder.
 
     Parameters
     ----------
-    context, builder
-        Numba's target context and LLVM's builder.
+    builder : llvmlite.ir.IRBuilder
     function : ast.FunctionDef
         Made of assignments, ``for`` over ``range``, ``while``, ``if``, ``continue`` and ``return``. Indices count from
         the start of an array and must be within it, and all parts of an expression are evaluated, regardless of its
@@ -53,11 +61,11 @@ def call(
     -------
     number, LLVM value, tuple of them, or None
     """
-    return _Body(context, builder, function, arguments, namespace).written()
+    return _Body(builder, function, arguments, namespace).written()
 
 
-def _refused(node: ast.AST) -> errors.TypingError:
-    return errors.TypingError(f"compiled functions hold nothing like: {ast.unparse(node)}")
+def _refused(node: ast.AST) -> CompileError:
+    return CompileError(f"compiled functions hold nothing like: {ast.unparse(node)}")
 
 
 def _in_double(result: Any) -> Any:
@@ -75,24 +83,19 @@ class _Body(Arithmetic):
     """
 
     def __init__(
-        self,
-        context: Any,
-        builder: Any,
-        function: ast.FunctionDef,
-        arguments: Sequence[Any],
-        namespace: Mapping[str, Any],
+        self, builder: Any, function: ast.FunctionDef, arguments: Sequence[Any], namespace: Mapping[str, Any]
     ) -> None:
-        super().__init__(context, builder)
+        super().__init__(builder)
         self.statements, self.namespace = function.body, namespace
         self.values: dict[str, Any] = {}
-        self.places: dict[str, Any] = {}
+        self.places: dict[str, _Place] = {}
         self.again: Any = None  # where `continue` leads
         self.end: Any = None  # where `return` leads, if the function branches
         self.depth = 0  # of statements in statements
         self.returned: Any = None  # if the function does not branch
-        self.results: list[Any] | None = None
+        self.results: list[_Place] | None = None
         self.single = True
-        self.owned: list[Any] = []  # memory of arrays made here
+        self.owned: list[_Place] = []  # memory of arrays made here
         if any(isinstance(node, (ast.For, ast.While, ast.If)) for node in ast.walk(function)):
             self.end = builder.append_basic_block("end")
         stored = self.own = {n.id for n in ast.walk(function) if isinstance(n, ast.Name) and _is_stored(n)}
@@ -111,9 +114,9 @@ class _Body(Arithmetic):
             self.give_back(None)
         self.builder.position_at_end(self.end)
         for memory in self.owned:
-            self.context.nrt.free(self.builder, self.builder.load(memory))
-            self.builder.store(memory.type.pointee(None), memory)  # the next call may not allocate this array
-        results = tuple(self.builder.load(place) for place in self.results or ())
+            self.builder.call(self.of_platform("free", ir.VoidType(), _MEMORY), [self.read(memory)])
+            self.builder.store(ir.Constant(_MEMORY, None), memory.pointer)  # the next call may not allocate this array
+        results = tuple(map(self.read, self.results or ()))
         return (results[0] if self.single else results) if results else None
 
     # Statements ---------------------------------------------------------------------------------------------------
@@ -126,6 +129,8 @@ class _Body(Arithmetic):
                 break
             try:
                 self.write(statement)
+            except CompileError:
+                raise
             except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
                 raise _refused(statement) from error
         self.depth -= 1
@@ -170,10 +175,10 @@ class _Body(Arithmetic):
             case ast.Subscript(value=base, slice=index):
                 array, indices = self.value(base), self.indices(index)
                 if not array.writable:
-                    raise errors.TypingError(f"{ast.unparse(base)} is read-only")
+                    raise CompileError(f"{ast.unparse(base)} is read-only")
                 if len(indices) != len(array.shape):
-                    raise errors.TypingError(f"{ast.unparse(target)} is not one element")
-                self.put(value, self.pointer(array, indices))
+                    raise CompileError(f"{ast.unparse(target)} is not one element")
+                self.put(value, _Place(self.pointer(array, indices), array.kind))
             case _:
                 raise _refused(target)
 
@@ -181,16 +186,26 @@ class _Body(Arithmetic):
         before = self.values.pop(name, None)
         several = isinstance(value, (Array, tuple))
         if self.depth > 1 and (isinstance(before, (Array, tuple)) or (several and name in self.places)):
-            raise errors.TypingError(f"{name} is assigned again, and is an array or a tuple")
+            raise CompileError(f"{name} is assigned again, and is an array or a tuple")
         if self.end is None or several:
             self.values[name] = value
             return
         if name not in self.places:
-            self.places[name] = cgutils.alloca_once(self.builder, kind_of(value), name=name)
+            self.places[name] = self.place(kind_of(value), name)
         self.put(value, self.places[name])
 
-    def put(self, value: Any, place: Any) -> None:
-        self.builder.store(self.typed(value, place.type.pointee), place)
+    def place(self, kind: Any, name: str = "") -> _Place:
+        """Return a location on the stack, which starts as zero; LLVM turns it into a register."""
+        with self.builder.goto_entry_block():
+            pointer = self.builder.alloca(kind, name=name)
+            self.builder.store(ir.Constant(kind, None), pointer)
+        return _Place(pointer, kind)
+
+    def put(self, value: Any, place: _Place) -> None:
+        self.builder.store(self.typed(value, place.kind), place.pointer)
+
+    def read(self, place: _Place) -> Any:
+        return self.builder.load(place.pointer, typ=place.kind)
 
     def branch(self, test: ast.expr, body: Sequence[ast.stmt], orelse: Sequence[ast.stmt]) -> None:
         then, otherwise, after = map(self.builder.append_basic_block, ("then", "else", "after"))
@@ -211,7 +226,7 @@ class _Body(Arithmetic):
         start, stop, *steps = bounds if len(bounds) > 1 else (0, *bounds)
         step = steps[0] if steps else 1
         if not is_constant(step) or not step or any(kind_of(bound) != INTEGER for bound in bounds):
-            raise errors.TypingError("ranges are of integers, in constant steps")
+            raise CompileError("ranges are of integers, in constant steps")
         if is_constant(start) and is_constant(stop) and _is_plain(name, body):
             for number in range(start, stop, step):
                 self.assign_name(name, number)
@@ -255,10 +270,10 @@ class _Body(Arithmetic):
         single = not isinstance(value, tuple)
         parts = () if value is None else (value,) if single else value
         if self.results is None:
-            self.results = [cgutils.alloca_once(self.builder, kind_of(part)) for part in parts]
+            self.results = [self.place(kind_of(part)) for part in parts]
             self.single = single
         if single != self.single or len(parts) != len(self.results):
-            raise errors.TypingError("all ways out return as much")
+            raise CompileError("all ways out return as much")
         for part, place in zip(parts, self.results, strict=True):
             self.put(part, place)
         self.builder.branch(self.end)
@@ -310,23 +325,23 @@ class _Body(Arithmetic):
         if name in self.values:
             return self.values[name]
         if name in self.places:
-            return self.builder.load(self.places[name])
+            return self.read(self.places[name])
         if name in self.own:
-            raise errors.TypingError(f"{name} has no value yet")
+            raise CompileError(f"{name} has no value yet")
         return self.namespace[name] if name in self.namespace else _BUILT_IN[name]
 
     def called(self, function: Any, arguments: Sequence[Any]) -> Any:
         if isinstance(function, ast.FunctionDef):
             if function.name in self.namespace.get("_CALLED", ()):
                 return self.called_apart(function, arguments)
-            return call(self.context, self.builder, function, arguments, self.namespace)
+            return call(self.builder, function, arguments, self.namespace)
         if function in (np.float64, np.int64):
             return self.cast(function, *arguments)
         if function in (np.empty, np.zeros):
             return self.made(function is np.zeros, *arguments)
         if function in _BUILT_IN.values():
             return function(self, *arguments)
-        return self.known_to_numba(function, arguments)
+        return self.function(function, arguments)
 
     def called_apart(self, function: ast.FunctionDef, arguments: Sequence[Any]) -> None:
         """Call a function that is written once for arguments of the same types, next to the caller.
@@ -337,24 +352,25 @@ class _Body(Arithmetic):
         for argument in arguments:
             parts = (argument.data, *argument.shape) if isinstance(argument, Array) else (argument,)
             numbers.append([part if isinstance(part, ir.Value) else self.typed(part) for part in parts])
-            types.append((argument.writable if isinstance(argument, Array) else None, *(n.type for n in numbers[-1])))
+            own = (argument.kind, argument.writable) if isinstance(argument, Array) else None
+            types.append((own, *(number.type for number in numbers[-1])))
         module = self.builder.module
         name = f"{function.name} {types}"
         if name not in module.globals:
             made = ir.Function(module, ir.FunctionType(ir.VoidType(), [k for own in types for k in own[1:]]), name)
             made.linkage = "internal"
             made.attributes.add("noinline")
-            given, own = iter(made.args), []
-            for writable, *kinds in types:
+            given, parameters = iter(made.args), []
+            for own, *kinds in types:
                 first, *rest = (next(given) for _ in kinds)
-                if writable is None:
-                    own.append(first)
+                if own is None:
+                    parameters.append(first)
                     continue
                 first.add_attribute("noalias")
-                own.append(Array(first, tuple(rest), writable))
+                parameters.append(Array(first, own[0], tuple(rest), own[1]))
             builder = ir.IRBuilder(made.append_basic_block())
-            if call(self.context, builder, function, own, self.namespace) is not None:
-                raise errors.TypingError(f"{function.name} is called, and must return nothing")
+            if call(builder, function, parameters, self.namespace) is not None:
+                raise CompileError(f"{function.name} is called, and must return nothing")
             builder.ret_void()
         self.builder.call(module.globals[name], [number for own in numbers for number in own])
 
@@ -367,14 +383,14 @@ class _Body(Arithmetic):
         offset: Any = 0
         for length, index in zip(array.shape, [*indices, *[0] * (len(array.shape) - len(indices))], strict=True):
             if kind_of(index) != INTEGER or (is_constant(index) and index < 0):
-                raise errors.TypingError("indices are integers that count from the start")
+                raise CompileError("indices are integers that count from the start")
             rows = 0 if offset == 0 else self.binary(ast.Mult(), offset, length)
             offset = index if rows == 0 else self.binary(ast.Add(), rows, index)
-        return self.builder.gep(array.data, [self.typed(offset, INTEGER)], inbounds=True)
+        return self.builder.gep(array.data, [self.typed(offset, INTEGER)], inbounds=True, source_etype=array.kind)
 
     def element(self, array: Array, indices: Sequence[Any]) -> Any:
         place, rest = self.pointer(array, indices), array.shape[len(indices) :]
-        return Array(place, rest, array.writable) if rest else self.builder.load(place)
+        return Array(place, array.kind, rest, array.writable) if rest else self.read(_Place(place, array.kind))
 
     def product(self, numbers: Sequence[Any]) -> Any:
         return reduce(lambda one, two: self.binary(ast.Mult(), one, two), numbers)
@@ -382,15 +398,19 @@ class _Body(Arithmetic):
     def made(self, zeros: bool, shape: Any, kind: type = np.float64) -> Array:
         """Return a new array of doubles or integers."""
         if self.end is None or self.again is not None:
-            raise errors.TypingError("arrays are made outside of loops, in functions that hold one")
+            raise CompileError("arrays are made outside of loops, in functions that hold one")
         shape = shape if isinstance(shape, tuple) else (shape,)
         size = self.typed(self.binary(ast.Mult(), self.product(shape), 8), INTEGER)
-        memory = self.context.nrt.allocate(self.builder, size)
-        self.owned.append(cgutils.alloca_once(self.builder, memory.type))
-        self.builder.store(memory, self.owned[-1])
-        if zeros:
-            cgutils.memset(self.builder, memory, size, 0)
-        return Array(self.builder.bitcast(memory, kind_named(kind).as_pointer()), shape)
+        name, sizes = ("calloc", (size, self.typed(1))) if zeros else ("malloc", (size,))
+        memory = self.builder.call(self.of_platform(name, _MEMORY, *[INTEGER] * len(sizes)), sizes)
+        self.owned.append(self.place(_MEMORY))
+        self.builder.store(memory, self.owned[-1].pointer)
+        return Array(memory, kind_named(kind), shape)
+
+    def of_platform(self, name: str, result: Any, *arguments: Any) -> Any:
+        """Return a function of the platform's C library."""
+        module = self.builder.module
+        return module.globals.get(name) or ir.Function(module, ir.FunctionType(result, arguments), name)
 
 
 def _is_stored(name: ast.Name) -> bool:
@@ -413,7 +433,7 @@ def _extreme(op: ast.cmpop) -> Callable[..., Any]:
 
 
 _BUILT_IN: dict[str, Callable[..., Any]] = {
-    "abs": lambda body, value: body.known_to_numba(abs, [value]),
+    "abs": lambda body, value: body.intrinsic("fabs", value),
     "len": lambda body, array: array.shape[0],
     "max": _extreme(ast.Gt()),
     "min": _extreme(ast.Lt()),

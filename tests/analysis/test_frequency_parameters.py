@@ -217,7 +217,7 @@ def test_bad_input(arguments, error, message):
         frequency_parameters(*arguments)
 
 
-@pytest.mark.skipif(not has_compiler(), reason="Numba is an option")
+@pytest.mark.skipif(not has_compiler(), reason="llvmlite is an option")
 @pytest.mark.parametrize("modes", [1, 3, 12])
 def test_compiled_and_numpy_paths_agree(modes):
     arms = random_arms(4, 1500)
@@ -226,7 +226,7 @@ def test_compiled_and_numpy_paths_agree(modes):
     np.testing.assert_allclose(one, two, rtol=2e-15)
 
 
-@pytest.mark.skipif(not has_compiler(), reason="Numba is an option")
+@pytest.mark.skipif(not has_compiler(), reason="llvmlite is an option")
 def test_every_digit_of_the_compiled_path():
     arms = random_arms(6, 40)
     lam = arm_family().frequency_parameters(*arms, modes=4, compile=True)

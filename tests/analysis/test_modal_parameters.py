@@ -273,7 +273,7 @@ def test_bad_input(call, error, message):
         call()
 
 
-@pytest.mark.skipif(not has_compiler(), reason="Numba is an option")
+@pytest.mark.skipif(not has_compiler(), reason="llvmlite is an option")
 def test_compiled_and_numpy_paths_agree(arm):
     groups = [np.broadcast_to(x, arm.shape) for x in (arm.kappa_t, arm.kappa_r, arm.mu, arm.iota)]
     lam = cra.frequency_parameters(*groups, modes=MODES)
@@ -291,7 +291,7 @@ def test_compiled_and_numpy_paths_agree(arm):
 def test_numbers_need_no_sympy_once_derived():
     code = (
         "import sys, cra_sym as cra; arm = cra.Arm.nominal(); cra.modal_parameters(arm).axial; "
-        "cra.mode_shapes(arm, 0.5); print('sympy' in sys.modules, 'numba' in sys.modules)"
+        "cra.mode_shapes(arm, 0.5); print('sympy' in sys.modules, 'llvmlite' in sys.modules)"
     )
     for _ in range(2):  # the first run derives what the store does not hold yet
         run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

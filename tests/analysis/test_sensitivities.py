@@ -247,7 +247,7 @@ def test_rates_along_the_determinant_are_those_of_the_energies(name):
 
 
 def test_compiled_rates_along_the_determinant_are_the_same(monkeypatch):
-    pytest.importorskip("numba")
+    pytest.importorskip("llvmlite")
     given = system("tensioned beam", T=np.linspace(1.0, 60.0, 5))
     by_numpy = given.root_rates(2, ("T", "EI", "l"))
     monkeypatch.setattr("cra_sym.model.waves.wants_compiler", lambda roots, parts: True)

@@ -409,7 +409,7 @@ def test_numbers_come_without_sympy_once_derived():
     assert run.stdout == "False\n"
 
 
-@pytest.mark.skipif(not has_compiler(), reason="Numba is an option")
+@pytest.mark.skipif(not has_compiler(), reason="llvmlite is an option")
 @pytest.mark.parametrize("decay", [0.0, 0.02])
 def test_the_compiled_loop_is_numpys(decay):
     omega, coupling = np.array([1.0, 2.2]), np.array([[[1.0, 0.5], [0.5, -0.7]], [[0.1, 0.0], [0.0, 0.2]]])
@@ -427,7 +427,7 @@ def test_charts_are_compiled_where_it_pays(monkeypatch):
     assert asked == [21 * growth._ROOTS]
     np.testing.assert_array_equal(one, cra.growth_rate(arm, cra.JointStiffness(), *chart, modes=2, backend="numpy"))
     monkeypatch.setattr(growth, "has_compiler", lambda: False)
-    with pytest.raises(ValueError, match="backend = 'numba': Numba is not installed"):
-        cra.growth_rate(arm, cra.JointStiffness(), *chart, backend="numba")
+    with pytest.raises(ValueError, match="backend = 'compiled': llvmlite is not installed"):
+        cra.growth_rate(arm, cra.JointStiffness(), *chart, backend="compiled")
     with pytest.raises(ValueError, match="backend = 'fortran'"):
         cra.floquet_exponents(arm, cra.JointStiffness(), *chart, backend="fortran")

@@ -96,7 +96,7 @@ def overhead(expression: sp.Expr) -> float | None:
     """Return the microseconds of a compiled call of few lanes: the largest of one, ten and a hundred, and a number."""
     if not has_compiler():
         return None
-    made, found = kernel(expression, ARGUMENTS, backend="numba"), []
+    made, found = kernel(expression, ARGUMENTS, backend="compiled"), []
     for shape in ((), (1,), (10,), (100,)):
         values = [np.full(shape, 0.5) if shape else 0.5 for _ in ARGUMENTS]
         found.append(1e6 * median(in_rounds({"": partial(made, *values)}, 1001)[""]))

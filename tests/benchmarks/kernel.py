@@ -127,8 +127,8 @@ def routes(expression: sp.Expr, folder: Path) -> dict[str, Callable[..., object]
     if has_compiler():
         template = lanes._template([True] * 4, 1, True)
         fill = compiled(template, {"evaluate": numpy_kernel}).fill
-        found["Numba, platform's functions"] = compiled(template, {"evaluate": numpy_kernel}, elementary=False).fill
-        found["Numba, kernel"] = fill
+        found["compiled, platform's functions"] = compiled(template, {"evaluate": numpy_kernel}, elementary=False).fill
+        found["compiled, kernel"] = fill
     if shutil.which("gcc"):
         found["C, platform's functions"] = c_route(expression, False, folder)
         found["C, branch-free functions"] = c_route(expression, True, folder)
@@ -165,7 +165,7 @@ def main(size: int = 1 << 16) -> dict[str, object]:
         }
         for title, t in times.items()
     }
-    versions = {p: metadata.version(p) for p in ("numpy", "sympy", "numba") if p != "numba" or has_compiler()}
+    versions = {p: metadata.version(p) for p in ("numpy", "sympy", "llvmlite") if p != "llvmlite" or has_compiler()}
     machine = {"machine": platform.machine(), "cores": os.cpu_count(), "python": platform.python_version()}
     return {"lanes": size, "rounds": ROUNDS, "seed": SEED, "table": table, "versions": versions, **machine}
 

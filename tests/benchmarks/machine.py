@@ -17,7 +17,7 @@ import sympy as sp
 
 from cra_sym.kernels import compiled, has_compiler, kernel, lanes
 
-PACKAGES = ("numpy", "scipy", "sympy", "numba", "llvmlite")
+PACKAGES = ("numpy", "scipy", "sympy", "llvmlite")
 
 
 def processors() -> int:
@@ -40,7 +40,7 @@ def description() -> dict[str, Any]:
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
         "gcc": gcc,
-        **{name: metadata.version(name) for name in PACKAGES if name not in ("numba", "llvmlite") or has_compiler()},
+        **{name: metadata.version(name) for name in PACKAGES if name != "llvmlite" or has_compiler()},
     }
 
 

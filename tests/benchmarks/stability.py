@@ -63,7 +63,7 @@ def measured() -> dict[str, dict[str, float]]:
     for name, options in (("solve_ivp, default", {}), ("solve_ivp, as accurate", ACCURATE)):
         seconds, rates = timed(lambda o=options: [one_growth_rate(arm, excitation, *p, **o) for p in points], repeat=1)
         rows[name] = {"ms a point": 1e3 * seconds / SAMPLE, "error 1/s": float(np.abs(rates - exact).max())}
-    for backend in ("numpy", "numba") if has_compiler() else ("numpy",):
+    for backend in ("numpy", "compiled") if has_compiler() else ("numpy",):
 
         def run(backend=backend):
             return cra.growth_rate(arm, excitation, varpi, epsilon[:, None], MODES, tolerance=1e-7, backend=backend)

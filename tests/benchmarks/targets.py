@@ -49,8 +49,8 @@ def rows(report: dict[str, Any]) -> list[dict[str, Any]]:
     for model, most in ((ARM_AS_MODEL, 1.3), (STRING, 2.0)):
         add(f"{model} over the arm", report["models"][model]["times the arm"], most, least=False)
     kernel = report["kernel"]
-    if "Numba, kernel" in kernel and "C, branch-free functions" in kernel:
-        add("one evaluation over C", kernel["Numba, kernel"]["ratio to C"], 1.6, least=False)
+    if "compiled, kernel" in kernel and "C, branch-free functions" in kernel:
+        add("one evaluation over C", kernel["compiled, kernel"]["ratio to C"], 1.6, least=False)
     for case in report["calls"]["runs"]:
         for number, routes in case["lanes"].items():
             if int(number) >= LEAST_LANES:

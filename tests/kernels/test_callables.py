@@ -150,7 +150,7 @@ def test_refusals_name_the_culprit():
     with pytest.raises(TypeError, match="__import__"):
         kernel("__import__('os')", (x,))
     for backend, error in (("fortran", ValueError), (np.zeros(3), TypeError), (3, TypeError)):
-        with pytest.raises(error, match=r"^backend = .*must be 'numpy' or 'numba'"):
+        with pytest.raises(error, match=r"^backend = .*must be 'numpy' or 'compiled'"):
             kernel(x, (x,), backend=backend)
     f = kernel(x + a, (x, a))
     with pytest.raises(TypeError, match=r"1 values given, 2 expected: \(x, a\)"):

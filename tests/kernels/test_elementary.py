@@ -47,7 +47,7 @@ def test_plain_python_is_accurate(name):
     assert worst_error(name, x, [getattr(elementary, name)(v) for v in x]) < BOUNDS[name]
 
 
-@pytest.mark.skipif(not has_compiler(), reason="Numba is an option")
+@pytest.mark.skipif(not has_compiler(), reason="llvmlite is an option")
 @pytest.mark.parametrize("name", BOUNDS)
 def test_compiled_code_is_accurate(name):
     x = points(name, 2500)

@@ -40,10 +40,10 @@ def test_work_is_shared_out(lanes, threads, compiled, parts, here):
 
 def test_there_are_as_many_threads_as_processors_for_this_process(monkeypatch):
     monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0: {3, 5, 7}}[process], raising=False)
-    assert sharing._processors() == 3
+    assert sharing.processors() == 3
     monkeypatch.delattr(os, "sched_getaffinity")
     monkeypatch.setattr(os, "cpu_count", lambda: None)
-    assert sharing._processors() == 1, "where nobody knows"
+    assert sharing.processors() == 1, "where nobody knows"
 
 
 def test_the_path_is_chosen_by_what_it_costs(monkeypatch):

@@ -208,7 +208,7 @@ def test_ritz_converges_to_the_closed_forms(name):
 
 
 @pytest.mark.parametrize("name", ["payload on a string", "two beams and a spring"])
-@pytest.mark.skipif(not has_compiler(), reason="needs Numba")
+@pytest.mark.skipif(not has_compiler(), reason="needs llvmlite")
 def test_compiled_twins_agree(name):
     system = models()[name].at(values_of(name, 300, 4.0))
     problem, route = problem_of(system), system._route

@@ -1,4 +1,4 @@
-"""The templates that Numba compiles are plain Python: run as such they give what the NumPy path gives."""
+"""The templates that are compiled are plain Python: run as such they give what the NumPy path gives."""
 
 from pathlib import Path
 
@@ -141,7 +141,7 @@ def test_zeros_are_counted_anywhere(some):
     """Not only at the points that the search begins with, and by another arithmetic than the NumPy path's."""
     template, groups = some.compiled_spectrum, lines(some.structure, 13, 120)
     pairs, zeros = np.empty((len(some.layout.parameters), 120)), np.empty(120, dtype=np.int64)
-    # plain numbers: two truths of NumPy add up to one truth, those of Python and of Numba to two
+    # plain numbers: two truths of NumPy add up to one truth, those of Python and of machine code to two
     with np.errstate(all="ignore"):
         template._prepare(pairs, np.zeros((rows(some), 120)), zeros, *(group.tolist() for group in groups), 0, 120)
     characteristic, power = some.characteristic(*groups), 2 * some.layout.n

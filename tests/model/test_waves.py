@@ -123,7 +123,7 @@ def test_what_is_known_of_the_coefficients_is_so(name):
     np.testing.assert_allclose(found, other, rtol=1e-9, atol=1e-9 * other.max())
 
 
-@pytest.mark.skipif(not has_compiler(), reason="needs Numba")
+@pytest.mark.skipif(not has_compiler(), reason="needs llvmlite")
 @pytest.mark.parametrize(
     "name", ["string on a foundation", "bending and torsion on a foundation", "beam tied to a string"]
 )

@@ -17,7 +17,7 @@ from pathlib import Path
 from cra_sym.report.notebooks import NotebookError, execute, find_notebooks
 
 ROOT = Path(__file__).resolve().parents[2]
-LIBRARIES = ("sympy", "numpy", "scipy", "numba", "matplotlib")
+LIBRARIES = ("sympy", "numpy", "scipy", "llvmlite", "matplotlib")
 
 
 def requirements(which: str) -> list[str]:

@@ -12,7 +12,7 @@ from cra_sym.solvers.waves import UniformProblem, lowest_waves, template
 from tests.solvers.test_waves import FREE, HELD, coupled_strings
 from tests.solvers.wave_problems import INF, beams
 
-pytestmark = pytest.mark.skipif(not has_compiler(), reason="needs Numba")
+pytestmark = pytest.mark.skipif(not has_compiler(), reason="needs llvmlite")
 
 ROUNDING = 1e-14  # both are within fifty roundings of the root
 

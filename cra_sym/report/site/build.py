@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["SiteError", "write_site"]
 
 _HERE = Path(__file__).parent
-_VERSIONS = ("sympy", "mpmath", "numpy", "scipy", "numba", "matplotlib", "sphinx", "myst-nb", "furo")
+_VERSIONS = ("sympy", "mpmath", "numpy", "scipy", "llvmlite", "matplotlib", "sphinx", "myst-nb", "furo")
 
 
 class SiteError(RuntimeError):
