@@ -22,15 +22,15 @@ omega_i, zeta_i, Gamma_i, M_i = (symbol(name) for name in ("omega_i", "zeta_i", 
 
 @numbered(33, "motion of the driving base", "assumption")
 def base_motion() -> Eq:
-    """A mean motion, of constant velocity or constant acceleration, and a harmonic disturbance. Several harmonics add
-    up; the phase of each matters, the constant it adds to the displacement does not."""
+    """A mean motion with constant velocity or constant acceleration, plus a harmonic disturbance. Several harmonics may
+    be added. The phase of each matters; the constant that it adds to the displacement does not."""
     return Eq(w, v_m * t + a_m * t**2 / 2 + B * sin(varpi * t + psi))
 
 
 @proves(33)
 def prove_base_motion() -> Proof:
     """Dimensions; without disturbance the motion starts at zero with the mean velocity and the mean acceleration; the
-    disturbance alone is a free vibration of angular frequency varpi, largest B."""
+    disturbance alone is harmonic with angular frequency varpi and amplitude B."""
     mean, alone = base_motion().rhs.subs(B, 0), base_motion().rhs.subs({v_m: 0, a_m: 0})
     yield dimension(base_motion()) == dimension("w")
     yield base_motion().rhs - mean - alone
@@ -42,9 +42,9 @@ def prove_base_motion() -> Proof:
 
 
 def _integral_of_cosine(phase: Expr) -> Expr:
-    """Return the integral of the cosine of a phase linear in tau over (0, t): t sinc(half the change) cos(its middle).
+    """Return the integral over (0, t) of the cosine of a phase linear in tau: t sinc(half the change) cos(mean phase).
 
-    Entire in the rate of the phase: at rate zero it is the secular term t cos(phase).
+    It is an entire function of the rate of the phase; at rate zero it is the secular term t cos(phase).
     """
     change = phase.coeff(tau) * t
     return t * sinc(change / 2) * cos((phase.subs(tau, 0) + change / 2).expand())
@@ -52,13 +52,13 @@ def _integral_of_cosine(phase: Expr) -> Expr:
 
 @derived(34, "response of a mode", (12, 33))
 def modal_response() -> Derivation[Eq]:
-    """(33) in (12), with an arm at rest before the base starts: v(x, 0) = 0 and y'(x, 0) = 0, so that a base that
-    starts with a velocity strikes the arm. Undamped; where varpi meets omega_i, sinc(0) = 1 leaves the secular
+    """(33) substituted in (12), for an arm at rest before the base starts: v(x, 0) = 0 and y'(x, 0) = 0, so a base that
+    starts with a velocity acts on the arm by an impulse. Undamped; at varpi = omega_i, sinc(0) = 1 gives the secular
     term."""
     moved = base_motion().rhs
     strike = (-Gamma_i / M_i * moved.diff(t)).subs(t, 0)
     solution = duhamel().rhs.subs({q_i.diff(t).subs(t, 0): strike, q_i.subs(t, 0): 0})
-    yield "initial values", "The base's speed at the start strikes an arm at rest, (13).", Eq(q_i, solution)
+    yield "initial values", "The initial velocity of the base is an impulse on an arm at rest, (13).", Eq(q_i, solution)
     (integral,) = solution.atoms(Integral)
     shape = integral.function.subs(w.subs(t, tau).diff(tau, 2), moved.diff(t, 2).subs(t, tau))
     yield "acceleration of (33)", "Put under the integral.", Integral(shape, *integral.limits)
@@ -76,8 +76,9 @@ def _integrated(term: Expr) -> Expr:
 
 @proves(34)
 def prove_modal_response() -> Proof:
-    """It solves (11) with the motion (33), starts undisplaced, and starts with the speed that leaves the arm at rest:
-    where varpi is not omega_i, and since both sides are entire in varpi, where it is."""
+    """It satisfies (11) with the motion (33), with zero initial displacement and the initial velocity of an arm at rest
+    in the inertial frame: for varpi different from omega_i, and by continuity (both sides are entire in varpi) also at
+    omega_i."""
     plain = modal_response().rhs.replace(sinc, lambda angle: sin(angle) / angle)
     equation = (dynamic_equation().lhs - dynamic_equation().rhs).subs({zeta_i: 0, q_i: plain, w: base_motion().rhs})
     strike = -Gamma_i / M_i * base_motion().rhs.diff(t)
@@ -107,7 +108,7 @@ def sample_modal_response() -> bool:
 
 
 def _own_context() -> Any:
-    """Return a context of mpmath beside the one that the process shares."""
+    """Return an mpmath context separate from the shared one of the process."""
     return mpmath.mp.clone()
 
 

@@ -29,13 +29,15 @@ ENERGY = Dimension(2, 1, -2)
 
 @numbered(1, "displacement", "definition")
 def displacement() -> Eq:
-    """The manipulator rides on the base: what an observer at rest sees is the base's motion plus the elastic part."""
+    """The manipulator is carried by the base: the absolute displacement is the motion of the base plus the elastic
+    displacement."""
     return Eq(y, w + v)
 
 
 @proves(1)
 def prove_displacement() -> Proof:
-    """Both sides are lengths; an arm that does not deform moves as its base, a base at rest leaves the deformation."""
+    """Both sides are lengths; a rigid arm moves as its base; with the base at rest only the elastic displacement
+    remains."""
     seen = displacement().rhs
     yield dimension(displacement()) == Dimension(m=1)
     yield seen.subs(v, 0) - w
@@ -44,7 +46,7 @@ def prove_displacement() -> Proof:
 
 @numbered(2, "separation of variables", "assumption")
 def separation() -> Eq:
-    """The elastic displacement is a sum of shapes, each scaled by a coordinate of its own."""
+    """The elastic displacement is a sum of mode shapes, each multiplied by its generalised coordinate."""
     return Eq(v, ModalSum(phi_i * q_i))
 
 
@@ -78,8 +80,8 @@ def kinetic() -> Eq:
 
 @proves(3)
 def prove_kinetic() -> Proof:
-    """An energy; an arm that turns rigidly about the root, which moves with the base, has the kinetic energy of its
-    mass, its static moment and its moment of inertia."""
+    """It has the dimension of an energy; an arm that rotates rigidly about a root moving with the base has the kinetic
+    energy given by its mass, first moment of mass and moment of inertia."""
     turned = single_mode(kinetic().rhs, x * q_i).doit()
     mass, static, inertia = forces.rigid_body()
     base, turn = w.diff(t), q_i.diff(t)
@@ -89,15 +91,15 @@ def prove_kinetic() -> Proof:
 
 @numbered(4, "potential energy", "definition")
 def potential() -> tuple[Eq, Eq]:
-    """First what the paper's words name, the bent manipulator alone; then with the two springs of the joint, without
-    which the generalised stiffness (6) would contradict the natural frequency (30)."""
+    """First as the paper describes it, the bending energy of the manipulator alone; then with the two joint springs,
+    without which the generalised stiffness (6) would contradict the natural frequency (30)."""
     return Eq(symbol("U_b"), potential_energy(joint=False).total()), Eq(symbol("U"), potential_energy().total())
 
 
 @proves(4)
 def prove_potential() -> Proof:
-    """Energies; an arc of radius R stores E I L / (2 R^2) however it is displaced and turned at the joint, which stores
-    what springs do."""
+    """They have the dimension of energy; an arc of radius R stores E I L / (2 R^2) for any displacement and rotation at
+    the joint, and the joint stores the energy of two springs."""
     give, turn, radius = symbol("C_1") * L, symbol("C_2"), symbol("h")
     beam, full = (single_mode(e.rhs, give + turn * x + x**2 / (2 * radius)).doit() for e in potential())
     arc, springs = E * I_z * L / (2 * radius**2), (k_t * give**2 + k_r * turn**2) / 2
@@ -126,7 +128,8 @@ _COMBINED = sum(size * shape for size, shape in zip(_SIZES, _SHAPES, strict=True
 
 @cache
 def _inertia() -> tuple[Expr, Expr]:
-    """Return the coefficients in (3) of the speeds of two shapes, and of that of the first with the base's."""
+    """Return the coefficients in (3) of the product of two modal velocities, and of the first with the velocity of the
+    base."""
     base = symbol("C_1")
     motion = {v: _COMBINED * t, w: base * t}
     return _coefficient(kinetic_energy(), motion, *_SIZES), _coefficient(kinetic_energy(), motion, _SIZES[0], base)
@@ -145,10 +148,11 @@ def _coefficient(energy: ArmLagrangian, motion: dict[Expr, Expr], *sizes: Expr) 
 
 @derived(6, "generalised mass, stiffness, participation", (2, 3, 4))
 def generalised() -> Derivation[tuple[Eq, Eq, Eq]]:
-    """Mass and stiffness of a mode, and how strongly the base's acceleration drives it: in (3) and (4), one mode and
-    the base moving, the coefficients of the squares of the mode's speed and displacement and of both speeds."""
+    """Mass and stiffness of a mode, and its participation factor for accelerations of the base: with one mode and the
+    base moving, the coefficients in (3) and (4) of the squares of the modal velocity and coordinate and of the product
+    of both velocities."""
     moving = single_mode(kinetic_energy().total()), single_mode(potential_energy().total())
-    yield "energies of one mode", "One term of (2) in (3) and (4).", moving
+    yield "energies of one mode", "One term of (2) substituted in (3) and (4).", moving
     return (
         Eq(symbol("M_i"), inner_mass(phi_i, phi_i)),
         Eq(symbol("K_i"), inner_stiffness(phi_i, phi_i)),
@@ -158,8 +162,8 @@ def generalised() -> Derivation[tuple[Eq, Eq, Eq]]:
 
 @proves(6)
 def prove_generalised() -> Proof:
-    """Dimensions; the work that the forces of inertia and elasticity of a mode do on the mode itself, and the inertia
-    of the mode on the base, written down by hand."""
+    """Dimensions; the work of the inertia and elastic forces of a mode on the mode itself, and of the inertia forces of
+    the mode on the base, written by hand."""
     M, K, Gamma = (e.rhs for e in generalised())
     yield [dimension(e) for e in generalised()] == [Dimension(kg=1), Dimension(kg=1, s=-2), Dimension(kg=1)]
     yield termwise(M - forces.mass_product(phi_i, phi_i))
@@ -173,7 +177,7 @@ def tidy(value: Expr) -> Expr:
 
 
 def modal_numbers(values: dict[str, float], shape: Any) -> dict[Expr, float]:
-    """Return M_i, K_i and Gamma_i of a mode found by shooting: (6) by quadrature."""
+    """Return M_i, K_i and Gamma_i of a mode computed by shooting: (6) by quadrature."""
     return {e.lhs: evaluate(e.rhs, values, {phi_i: shape}) for e in generalised()}
 
 
@@ -182,12 +186,12 @@ def modal_numbers(values: dict[str, float], shape: Any) -> dict[Expr, float]:
 
 @numbered(7, "Lagrangian", "definition", (3, 4))
 def lagrangian_function() -> Eq:
-    """Kinetic minus potential energy, the springs of the joint included."""
+    """Kinetic minus potential energy, including the springs of the joint."""
     return Eq(symbol("Lcal"), paper_lagrangian().total())
 
 
 @proves(7)
 def prove_lagrangian_function() -> Proof:
-    """An energy: the difference of (3) and (4), whatever the motion."""
+    """It has the dimension of energy and is the difference of (3) and (4) for every motion."""
     yield dimension(lagrangian_function()) == ENERGY
     yield termwise(lagrangian_function().rhs - kinetic().rhs + potential()[1].rhs)

@@ -24,12 +24,11 @@ A section's module writes one small function an equation, and one each for a pro
         '''The independent route, in words.'''
         return isclose(...)
 
-A proof yields what has to vanish, and :func:`cra_sym.mechanics.identities.vanishes` decides: that an equation is proved
-is its answer, not the author's.
+A proof yields expressions that must vanish; :func:`cra_sym.mechanics.identities.vanishes` decides whether they do.
 
-What is derived comes from the Lagrangian in :mod:`cra_sym.arm.lagrangian` and from the engines in
-:mod:`cra_sym.mechanics`; what it is compared with is written down by hand, or found by shooting, in
-:mod:`cra_sym.paper.oracles`. Change a term of the Lagrangian, and the equations follow while their proofs fail.
+Derived equations come from the Lagrangian in :mod:`cra_sym.arm.lagrangian` and the functions of
+:mod:`cra_sym.mechanics`; the references are written by hand, or computed by shooting, in :mod:`cra_sym.paper.oracles`.
+If a term of the Lagrangian is changed, the equations change with it and their proofs fail.
 """
 
 from __future__ import annotations
@@ -53,14 +52,14 @@ Number = int | str
 R = TypeVar("R")
 Kind = Literal["definition", "assumption", "derived"]
 Evidence = Literal["proved", "sampled"]
-#: What a proof yields: expressions that vanish identically, and truths without numbers, such as equal dimensions.
+#: What a proof yields: expressions that must vanish identically, and Boolean statements such as equal dimensions.
 Proof = Iterator[Any]
-#: What was done (a name and a sentence) and what came out.
+#: Name of a step, a sentence that describes it, and its result.
 Stage = tuple[str, str, Any]
-#: What builds a derived equation: it yields the stages on the way and returns the equation.
+#: Builder of a derived equation: it yields the intermediate steps and returns the equation.
 Derivation = Generator[Stage, None, R]
 
-#: Section of the package that builds each equation; a new section adds a line here.
+#: Module that builds each equation; a new module adds a line here.
 _HOMES: dict[str, range] = {
     "cra_sym.paper.energy": range(1, 8),
     "cra_sym.paper.motion": range(8, 11),
@@ -116,7 +115,8 @@ class Equation:
 
     @property
     def shown(self) -> Any:
-        """What is displayed: the expression or, where that fills a page, the same in terms of its sources."""
+        """What is displayed: the expression or, where that is too long for a page, the same in terms of the equations
+        it rests on."""
         return self.expression if self._shown is None else self._shown()
 
     @property
@@ -146,16 +146,17 @@ class Equation:
 
     @property
     def checked_by(self) -> str:
-        """The independent routes :meth:`check` takes, in words."""
+        """Description of the independent routes that :meth:`check` takes."""
         exact = "Proved" if self.kind == "derived" else "Exact"
         routes: dict[str, Mapping[Number, Callable[[], Any]]] = {exact: _PROOFS, "Sampled": _SAMPLES}
         return " ".join(f"{how}: {_text(of[self.number])}" for how, of in routes.items() if self.number in of)
 
     @property
     def evidence(self) -> Evidence:
-        """Whether :meth:`check` proves exact identities, or only samples numbers because nothing exact is at hand.
+        """Whether :meth:`check` proves exact identities, or only compares numerical samples because no exact route
+        exists.
 
-        Of a definition or an assumption it is what has to follow from it that is proved.
+        For a definition or an assumption, necessary consequences are proved.
         """
         return "proved" if self.number in _PROOFS else "sampled"
 
@@ -173,7 +174,7 @@ class Equation:
         return self.prove() is not False and bool(_SAMPLES.get(self.number, lambda: True)())
 
     def prove(self) -> bool | None:
-        """Tell whether the proof holds, without a number drawn or rounded; None if there is no proof."""
+        """Tell whether the proof holds, without random numbers or rounding; None if there is no proof."""
         if self.number not in _PROOFS:
             return None
         return all(map(_decide, _PROOFS[self.number]()))
@@ -227,7 +228,7 @@ def _text(function: Callable[..., Any]) -> str:
 
 
 def _decide(part: Any) -> bool:
-    """Decide one part of a proof."""
+    """Tell whether one item of a proof holds."""
     from cra_sym.mechanics.identities import vanishes
 
     return part if isinstance(part, bool) else vanishes(part)
@@ -257,8 +258,8 @@ def derived(
 ) -> Callable[[Callable[[], Derivation[R]]], Callable[[], R]]:
     """Register the decorated generator, whose docstring is the statement, as the derivation of an equation.
 
-    It yields the stages on the way and returns the equation; the name then stands for a function that returns the
-    equation. ``shown`` builds what is displayed in place of an expression that fills a page.
+    The generator yields the intermediate steps and returns the equation; the decorated name is a function that returns
+    the equation. ``shown`` builds what is displayed in place of an expression that is too long for a page.
     """
 
     def register(function: Callable[[], Derivation[R]]) -> Callable[[], R]:
@@ -275,7 +276,7 @@ def derived(
 
 
 def _carry_out(function: Callable[[], Derivation[R]]) -> tuple[tuple[Stage, ...], R]:
-    """Return the stages of a derivation and what it ends with."""
+    """Return the intermediate steps of a derivation and its result."""
     stages: list[Stage] = []
     work = function()
     while True:
@@ -308,7 +309,7 @@ def proves(number: Number) -> Callable[[Callable[[], Proof]], Callable[[], Proof
 
 
 def samples(number: Number) -> Callable[[Callable[[], bool]], Callable[[], bool]]:
-    """Register the decorated function, whose docstring names the route, as the trial of an equation in numbers."""
+    """Register the decorated function, whose docstring names the route, as the numerical check of an equation."""
     return _registered(_SAMPLES, number)
 
 

@@ -1,4 +1,5 @@
-"""Put shapes, motions and numbers into equations, at the ends of the manipulator and under integrals too."""
+"""Substitution of shapes, motions and numbers into equations, including at the ends of the manipulator and under
+integrals."""
 
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-Shape = Callable[..., Any]  # a mode shape in numbers, called with places and the order of the derivative
+Shape = Callable[..., Any]  # a numerical mode shape, called with positions and the order of the derivative
 x, t, L = symbol("x"), symbol("t"), symbol("L")
 C_1, beta, lamda, r_2 = (symbol(name) for name in ("C_1", "beta", "lamda", "r_2"))
 
@@ -38,7 +39,7 @@ def at(expression: Expr, place: Any) -> Expr:
 
 
 def put(expression: Expr, values: Mapping[Expr, Expr]) -> Expr:
-    """Return ``expression`` with functions replaced, without doing integrals.
+    """Return ``expression`` with functions replaced; integrals are not evaluated.
 
     SymPy writes a derivative at the tip as ``Derivative(v(L, t), L)``; a value that depends on L itself must be
     differentiated before it is evaluated there, which ``subs`` and ``replace`` alone would not do.
@@ -92,10 +93,10 @@ def termwise(expression: Expr) -> Expr:
 
 
 def virtual_factors(work: Expr, virtual: Expr) -> tuple[Expr, ...]:
-    """Return what a virtual displacement is multiplied by in a virtual work, whatever its shape.
+    """Return the factors of an arbitrary virtual displacement in a virtual work.
 
-    Integration by parts along the manipulator, and in time between instants at which the displacement vanishes, frees
-    it of its derivatives. Two works are equal for all virtual displacements when these factors are.
+    Integration by parts along the manipulator, and in time between instants at which the displacement vanishes, removes
+    the derivatives of the displacement. Two works are equal for all virtual displacements if these factors are equal.
 
     Parameters
     ----------
@@ -161,7 +162,7 @@ def _integrand(
 
 
 def evaluate(expression: Expr, values: Mapping[str, float], shapes: Mapping[Expr, Shape] | None = None) -> float:
-    """Return the number an expression has for given parameters and numeric mode shapes.
+    """Return the value of an expression for given parameters and numerical mode shapes.
 
     Parameters
     ----------
@@ -207,13 +208,14 @@ def group_numbers(values: dict[str, float], mode_beta: float) -> dict[Expr, floa
 
 
 def shot_coefficients(mode: ShotMode) -> Matrix:
-    """Return C_1..C_4 of a mode found by shooting, from its values and derivatives at the root."""
+    """Return C_1..C_4 of a mode computed by shooting, from its values and derivatives at the root."""
     a, b, c, d = (mode.start[k] / mode.beta**k for k in range(4))
     return Matrix([(a - c) / 2, (b - d) / 2, (a + c) / 2, (b + d) / 2])
 
 
 def annihilates(matrix: Matrix, seed: int) -> bool:
-    """Tell whether a matrix annihilates the coefficients of modes found by shooting, and at no other wave number."""
+    """Tell whether a matrix annihilates the coefficients of modes computed by shooting, and does not at other wave
+    numbers."""
     values = sample(seed)
     for mode in shoot(values):
         found = np.array(shot_coefficients(mode), dtype=float)[: matrix.cols]
@@ -226,7 +228,7 @@ def annihilates(matrix: Matrix, seed: int) -> bool:
 
 
 def shapes_agree(seeds: tuple[int, ...], shape: Expr, ratio: Expr, **joint: float) -> bool:
-    """Compare a derived shape with modes found by shooting, scaled alike at the tip."""
+    """Compare a derived shape with modes computed by shooting, both normalised at the tip."""
     for seed in seeds:
         values = sample(seed) | joint
         for mode in shoot(values):

@@ -1,7 +1,7 @@
-"""The disturbed base and what it excites: equations (35) and (36).
+"""Excitation by the disturbed base: equations (35) and (36).
 
-What (35) leads to is no parametric system: in linear theory a base that moves across the arm only forces it. Numbers
-with a letter supply two excitations that are parametric: the same disturbance along the arm, and a fluctuating joint.
+(35) does not lead to a parametric system: in linear theory a base that moves across the arm only forces it. Equations
+numbered with a letter give two parametric excitations: the same disturbance along the arm, and a fluctuating joint.
 """
 
 from __future__ import annotations
@@ -28,13 +28,14 @@ epsilon, varpi, P_ij, w_0, w_1, u, u_0 = (symbol(n) for n in "epsilon varpi P_ij
 
 @numbered(35, "disturbed base", "assumption")
 def disturbed_base() -> Eq:
-    """A small harmonic motion of the driving base about a constant mean, across the arm."""
+    """A small harmonic motion of the base about a constant mean, transverse to the arm."""
     return Eq(w, TRANSVERSE)
 
 
 @proves(35)
 def prove_disturbed_base() -> Proof:
-    """A length; it starts at w_0 with the speed epsilon w_1 varpi and swings about w_0 with angular frequency varpi."""
+    """It is a length; it starts at w_0 with the velocity epsilon w_1 varpi and oscillates about w_0 with angular
+    frequency varpi."""
     motion = disturbed_base().rhs
     yield dimension(disturbed_base()) == Dimension(m=1)
     yield motion.subs(t, 0) - w_0
@@ -50,7 +51,7 @@ def axial_base() -> Eq:
 
 @proves("35a")
 def prove_axial_base() -> Proof:
-    """A length; it starts at rest, epsilon u_0 away, and swings about zero with angular frequency varpi."""
+    """It is a length; it starts at rest from epsilon u_0 and oscillates about zero with angular frequency varpi."""
     motion = axial_base().rhs
     yield dimension(axial_base()) == Dimension(m=1)
     yield motion.subs(t, 0) - epsilon * u_0
@@ -60,14 +61,14 @@ def prove_axial_base() -> Proof:
 
 @numbered("35b", "fluctuating joint", "assumption", (4,))
 def fluctuating_joint() -> Eq:
-    """The preload of the bolts fluctuates, and both stiffnesses of the joint with it: the energy of the joint."""
+    """The energy of a joint whose preload, and with it both stiffnesses, fluctuates."""
     return Eq(symbol("U"), -at(excited_lagrangian("joint stiffness").left, 0))
 
 
 @proves("35b")
 def prove_fluctuating_joint() -> Proof:
-    """An energy: that of the springs of (4), which swings about its mean by epsilon of it, with angular frequency
-    varpi."""
+    """It is an energy: that of the springs of (4), which oscillates about its mean with relative amplitude epsilon and
+    angular frequency varpi."""
     beam, full = (e.rhs for e in potential())
     yield dimension(fluctuating_joint()) == dimension("U")
     yield fluctuating_joint().rhs - (full - beam) * (1 + epsilon * cos(varpi * t))
@@ -75,8 +76,8 @@ def prove_fluctuating_joint() -> Proof:
 
 @derived(36, "excited system", (11, 35))
 def excited_system() -> Derivation[Eq]:
-    """(35) in (11). The disturbance stands on the right only: no coefficient of the unknown depends on time, so this
-    is a forced system and not, as the paper says, a parametric one."""
+    """(35) substituted in (11). The disturbance appears on the right-hand side only: no coefficient of the unknown
+    depends on time, so this is a forced system and not, as the paper says, a parametric one."""
     acceleration = Eq(w.diff(t, 2), TRANSVERSE.diff(t, 2))
     yield "acceleration of the base", "(35) differentiated twice.", acceleration
     return dynamic_equation().subs(w, TRANSVERSE).doit()
@@ -84,8 +85,8 @@ def excited_system() -> Derivation[Eq]:
 
 @proves(36)
 def prove_excited_system() -> Proof:
-    """Equation (11) on the left, whose coefficients do not depend on time, and on the right -Gamma_i times the
-    acceleration of (35)."""
+    """The left-hand side of (11), whose coefficients do not depend on time, and on the right-hand side -Gamma_i times
+    the acceleration of (35)."""
     equation, q = excited_system(), symbol("q_i")
     yield not any(equation.lhs.diff(q.diff(t, k) if k else q).has(t) for k in range(3))
     yield equation.lhs - dynamic_equation().lhs
@@ -94,7 +95,7 @@ def prove_excited_system() -> Proof:
 
 @samples(36)
 def sample_excited_system() -> bool:
-    """The work of the inertia forces of a random arm, carried rigidly by the base, on modes found by shooting."""
+    """The work of the inertia forces of a random arm moving rigidly with the base, on modes computed by shooting."""
     values, equation = sample(36), excited_system()
     length, instant = values["L"], {t: 0.37, varpi: 2.1, w_1: 0.6, epsilon: 0.01}
     acceleration = float(disturbed_base().rhs.diff(t, 2).subs(instant))
@@ -108,32 +109,37 @@ def sample_excited_system() -> bool:
 
 @derived("36a", "coupling by the fluctuating joint", ("35b", 7))
 def joint_coupling() -> Derivation[Eq]:
-    """Two modes in the Lagrangian's share of epsilon cos(varpi t), for modes of unit generalised mass. The stiffness
-    of the modes varies in time: genuinely parametric."""
-    yield "joint that fluctuates", "What the Lagrangian has at the joint.", excited_lagrangian("joint stiffness").left
+    """Two modes, of unit generalised mass, in the terms of the Lagrangian with epsilon cos(varpi t). The modal
+    stiffness varies in time: the excitation is parametric."""
+    yield (
+        "joint that fluctuates",
+        "The terms of the Lagrangian at the joint.",
+        excited_lagrangian("joint stiffness").left,
+    )
     yield "two modes", "Put in at the joint.", _two_modes(excited_lagrangian("joint stiffness").left)
     return Eq(P_ij, coupling("joint stiffness"), evaluate=False)
 
 
 @derived("36b", "coupling by the base disturbed along the arm", ("35a", 7))
 def axial_coupling() -> Derivation[Eq]:
-    """A bent manipulator is shorter, and its foreshortening feels the axial inertia. It grows with varpi^2."""
+    """Bending shortens the manipulator, and the axial inertia force does work on this foreshortening. It grows with
+    varpi^2."""
     still, moving = paper_lagrangian().density.subs(w, 0).doit(), excited_lagrangian("axial base").density
     load = Integral((moving - still).subs(u, AXIAL).doit(), (x, 0, L))
-    yield "foreshortening", "What the acceleration along the arm adds to the Lagrangian.", load
+    yield "foreshortening", "The terms that the axial acceleration adds to the Lagrangian.", load
     yield "two modes", "Put in.", _two_modes(load)
     return Eq(P_ij, coupling("axial base"), evaluate=False)
 
 
 def _two_modes(lagrangian: Expr) -> Expr:
-    """Return a part of the Lagrangian with two modes in it."""
+    """Return a part of the Lagrangian with two modes substituted."""
     return single_mode(lagrangian, phi_i * symbol("q_i") + phi_j * symbol("q_j")).doit(integrals=False)
 
 
 @proves("36a")
 def prove_joint_coupling() -> Proof:
     """The energy (35b) of two modes, differentiated by both coordinates and by the fluctuation; the work of the extra
-    spring forces of one on the other, written down by hand."""
+    spring forces of one on the other, written by hand."""
     q_i, q_j, swing = symbol("q_i"), symbol("q_j"), epsilon * cos(varpi * t)
     energy = single_mode(fluctuating_joint().rhs, phi_i * q_i + phi_j * q_j)
     yield energy.diff(q_i).diff(q_j).diff(epsilon) * epsilon / swing - joint_coupling().rhs
@@ -143,7 +149,7 @@ def prove_joint_coupling() -> Proof:
 
 @samples("36a")
 def sample_joint_coupling() -> bool:
-    """The work of the two extra spring forces of a mode found by shooting on another."""
+    """The work of the two additional spring forces of a mode on another; modes computed by shooting."""
     values = sample(361)
     first, second = shoot(values)[:2]
     work = values["k_t"] * first(0.0) * second(0.0) + values["k_r"] * first(0.0, 1) * second(0.0, 1)
@@ -153,8 +159,8 @@ def sample_joint_coupling() -> bool:
 
 @proves("36b")
 def prove_axial_coupling() -> Proof:
-    """The axial momentum of a bent arm: the foreshortening of every point, whose slope is the product of the slopes of
-    the two modes, grows from the joint on and carries the masses of manipulator and end-effector."""
+    """The axial momentum of a bent arm: the foreshortening of every point, whose derivative is the product of the
+    slopes of the two modes, is integrated from the joint, with the masses of manipulator and end-effector."""
     shortening = symbol("eta")
     momentum = forces.mass_product(shortening, S.One)
     found = axial_coupling().rhs / (u_0 * varpi**2)
@@ -168,7 +174,7 @@ def prove_axial_coupling() -> Proof:
 @samples("36b")
 def sample_axial_coupling() -> bool:
     """The axial momentum of a bent arm, with the foreshortening of every point by its own quadrature from
-    the joint on, its second derivative by two modes found by shooting."""
+    the joint on, its second derivative by two modes computed by shooting."""
     values = sample(362)
     first, second = shoot(values)[:2]
     length, line_mass = values["L"], values["rho"] * values["A"]

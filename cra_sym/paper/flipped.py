@@ -1,8 +1,9 @@
 """The arm with the sign of the rotational spring's energy flipped: frequencies that rise as k_r falls.
 
-The paper reports (Fig. 4) that f2 and f3 rise while the joint softens in rotation. The derivation says they fall. Flip
-one sign in the Lagrangian, carry Hamilton's principle through again, and the condition at the root becomes
-EI v_xx(0) = -k_r v_x(0), whose frequencies rise. Its potential energy is not positive: the arm would fold by itself.
+The paper reports (Fig. 4) that f2 and f3 rise as the rotational stiffness of the joint falls. According to the
+derivation they fall. With one sign of the Lagrangian reversed, Hamilton's principle gives the condition EI v_xx(0) =
+-k_r v_x(0) at the root, whose frequencies rise. Its potential energy is not positive definite: the arm would buckle
+without load.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ __all__ = ["characteristic", "flipped", "flipped_frequencies"]
 
 @cache
 def flipped() -> Any:
-    """Return Hamilton's principle carried out with the sign of the rotational spring's energy flipped."""
+    """Return the result of Hamilton's principle with the sign of the energy of the rotational spring reversed."""
     from cra_sym.arm.lagrangian import paper_lagrangian
     from cra_sym.mechanics import hamilton
     from cra_sym.paper.energy import L, k_r, t, v, w, x
@@ -45,10 +46,12 @@ _function = derived_kernel("cra_sym.paper.flipped:characteristic")
 
 
 def flipped_frequencies(arm: Arm, modes: int = 3) -> np.ndarray:
-    """Return the real natural frequencies of the flipped arm in Hz, those that start at the rigid joint's.
+    """Return the real natural frequencies, in Hz, of the arm with the reversed sign that start from those of the rigid
+    joint.
 
-    Its roots lie between those of the arm rigid in rotation and the next ones of the arm without rotational spring,
-    which the true arm's do too, from the other side. One more mode has a negative square and is not an oscillation.
+    Its roots lie between those of the arm with rigid rotation and the next ones of the arm without rotational spring;
+    those of the actual arm lie on the other side. One further mode has a negative squared frequency and does not
+    oscillate.
 
     Parameters
     ----------

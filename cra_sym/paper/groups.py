@@ -11,7 +11,7 @@ __all__ = ["GROUPS", "in_groups"]
 L, E, I_z, rho, A = (symbol(name) for name in ("L", "E", "I_z", "rho", "A"))
 k_t, k_r, m_e, J_e = (symbol(name) for name in ("k_t", "k_r", "m_e", "J_e"))
 
-#: Each parameter of the joint and of the end-effector, with its group and what defines that.
+#: Each parameter of the joint and of the end-effector, with its group and the definition of the group.
 GROUPS: dict[Symbol, tuple[Symbol, Expr]] = {
     k_t: (symbol("kappa_t"), k_t * L**3 / (E * I_z)),
     k_r: (symbol("kappa_r"), k_r * L / (E * I_z)),

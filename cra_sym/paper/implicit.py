@@ -26,8 +26,8 @@ PAIRS = {name: tuple(symbol(f"{letter}_{name}") for letter in ("s", "c")) for na
 
 @derived(31, "sensitivity function", (23,))
 def sensitivity_function() -> Derivation[sp.Eq]:
-    """Along a root λ(κ) the frequency equation Δ(λ, κ) = 0 stays satisfied as a stiffness changes: the total
-    derivative of Δ vanishes."""
+    """The frequency equation Δ(λ, κ) = 0 holds along a root λ(κ) as a stiffness changes: the total derivative of Δ
+    vanishes."""
     kappa = symbol("kappa_t")
     along = sp.Function("Delta")(sp.Function("lamda")(kappa), kappa)
     yield "along a root", "λ is a function of the stiffness, and the frequency equation holds for all.", sp.Eq(along, 0)
@@ -40,8 +40,8 @@ def sensitivity_function() -> Derivation[sp.Eq]:
 
 @proves(31)
 def prove_sensitivity_function() -> Proof:
-    """The chain rule: whatever the function, its change along the path is none; on the unit circle, a curve known in
-    closed form, the slope of the ordinate is minus abscissa over ordinate."""
+    """The chain rule for an arbitrary function, whose total derivative along the curve vanishes; and the unit circle,
+    where the slope is minus abscissa over ordinate."""
     kappa, Delta, slope = symbol("kappa_t"), sp.Function("Delta"), sensitivity_function()
     yield slope.lhs == sp.Function("lamda")(kappa).diff(kappa)
     yield Delta(lamda, kappa).diff(lamda) * slope.rhs + Delta(lamda, kappa).diff(kappa)
@@ -51,10 +51,10 @@ def prove_sensitivity_function() -> Proof:
 
 @cache
 def implicit_derivatives() -> dict[str, sp.Expr]:
-    """Return how lambda follows each group: for a stiffness its derivative by kappa is this times c^2.
+    """Return the rates of lambda by each group; for a stiffness, the derivative by kappa is this times c^2.
 
-    The chain rule over the pair (s, c) = (kappa, 1) / (1 + kappa), d s / d kappa = c^2 = -d c / d kappa, keeps zero and
-    infinite stiffness ordinary.
+    The chain rule over the pair (s, c) = (kappa, 1) / (1 + kappa), d s / d kappa = c^2 = -d c / d kappa, remains
+    regular at zero and infinite stiffness.
     """
     function, _ = frequency_function()
     slope = function.diff(lamda)
@@ -64,7 +64,7 @@ def implicit_derivatives() -> dict[str, sp.Expr]:
 
 
 def _in_hertz(rates: dict[str, sp.Expr]) -> tuple[sp.Eq, sp.Eq]:
-    """Turn d lamda / d kappa for each stiffness into hertz per unit of the stiffness, by (30)."""
+    """Convert d lamda / d kappa of each stiffness to hertz per unit of the stiffness, by (30)."""
     stiffnesses = {name: symbol(f"k_{name}") for name in rates}
     frequency, hertz = sp.Function("f_i")(*stiffnesses.values()), natural_frequency().rhs
     by_k_t, by_k_r = (
@@ -81,21 +81,21 @@ def _by_parts() -> tuple[sp.Eq, sp.Eq]:
 
 @derived(32, "sensitivities of the frequencies", (23, 30, 31), shown=_by_parts)
 def frequency_sensitivities() -> Derivation[tuple[sp.Eq, sp.Eq]]:
-    """(31) for the two stiffnesses, turned into hertz per N/m and hertz per N m/rad by (30); f_i is proportional to the
-    square of λ. Raw sensitivities have different units: only logarithmic ones can be compared. The expression has
-    Δ of (23) written out, which fills a page."""
+    """(31) for the two stiffnesses, converted to Hz per N/m and Hz per N m/rad by (30); f_i is proportional to the
+    square of λ. Raw sensitivities have different units: only logarithmic ones can be compared. The expression contains
+    Δ of (23) in full, which is too long for a page."""
     hertz = natural_frequency()
     yield "hertz over λ", "(30) differentiated.", sp.Eq(sp.Derivative(hertz.lhs, lamda), hertz.rhs.diff(lamda).doit())
     groups = tuple(sp.Eq(sp.Derivative(group, k), value.diff(k)) for k, (group, value) in list(GROUPS.items())[:2])
-    yield "groups over stiffnesses", "The rest of the chain rule.", groups
+    yield "groups over stiffnesses", "The remaining factors of the chain rule.", groups
     return _in_hertz({name: implicit_derivatives()[f"kappa_{name}"] * c**2 for name, (_, c) in PAIRS.items()})
 
 
 @proves(32)
 def prove_frequency_sensitivities() -> Proof:
-    """Another principle, first-order perturbation: ω_i² changes by φ_i(0)² / M_i per k_t and by φ_i'(0)² / M_i per k_r.
-    Any shape that satisfies the conditions at the joint will do: it is a mode of the arm whose end-effector balances
-    its tip. The integral of its square is known from its ends."""
+    """First-order perturbation: ω_i² changes by φ_i(0)² / M_i per k_t and by φ_i'(0)² / M_i per k_r. Any shape that
+    satisfies the conditions at the joint may be used: it is a mode of an arm whose end-effector balances the force and
+    moment at the tip. The integral of its square follows from its end values."""
     xi, mu, iota, rho, A = (symbol(name) for name in ("xi", "mu", "iota", "rho", "A"))
     shape = by_hand.joined(xi)
     phi, slope, curvature, third = shape
@@ -115,8 +115,8 @@ def prove_frequency_sensitivities() -> Proof:
 
 @samples(32)
 def sample_frequency_sensitivities() -> bool:
-    """Another principle, first-order perturbation. ω_i² changes by φ_i(0)² / M_i per k_t and by
-    φ_i'(0)² / M_i per k_r, for modes of a random arm found by shooting."""
+    """First-order perturbation: ω_i² changes by φ_i(0)² / M_i per k_t and by φ_i'(0)² / M_i per k_r, for modes of a
+    random arm computed by shooting."""
     values = sample(32)
     numbers = {symbol(name): value for name, value in values.items()}
     for mode in shoot(values):

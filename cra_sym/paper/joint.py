@@ -1,6 +1,6 @@
 """The elastic joint by the principle of virtual work: equations (14)-(16).
 
-What works at the ends is read from the Lagrangian; the same work written down by hand confirms it.
+The virtual work at the ends is derived from the Lagrangian and compared with the same work written by hand.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ eta, Q, M_z, omega_i = (symbol(name) for name in ("eta", "Q", "M_z", "omega_i"))
 
 @derived(14, "virtual work at the ends", (7,))
 def virtual_work() -> Derivation[tuple[Eq, Eq]]:
-    """At the joint the manipulator's shear force and moment work against the two springs, at the tip against the
-    inertia of the end-effector; for any virtual displacement the sum is zero."""
+    """The shear force and bending moment of the manipulator do work against the two springs at the joint and against
+    the inertia of the end-effector at the tip; for any virtual displacement the sum is zero."""
     _, root, tip = paper_lagrangian()
     yield "what works at the ends", "The Lagrangian's terms at joint and tip.", (at(root, 0), at(tip, L))
     works = _work(root, "left"), _work(tip, "right")
     yield (
         "work of the springs and of the end-effector",
-        "Lagrange's forces times virtual displacement and slope.",
+        "Generalised forces times virtual displacement and virtual slope.",
         works,
     )
     section = Q * eta - M_z * eta.diff(x)
-    yield "work of the section", "Shear force and moment of the manipulator on what it is cut from.", section
+    yield "work of the section", "Shear force and bending moment of the manipulator at the cut sections.", section
     return Eq(works[0] - at(section, 0), 0), Eq(works[1] + at(section, L), 0)
 
 
 def _work(lagrangian: Expr, end: End) -> Expr:
-    """Return the virtual work of the forces that the Lagrangian of an end stands for."""
+    """Return the virtual work of the forces that follow from the Lagrangian of an end."""
     space = JetSpace([v], [], x, t, (S.Zero, L), [w])
     work = lagrange_forces(space, space.read(lagrangian, end, f"{end} end"))
     return sum(
@@ -50,7 +50,8 @@ def _work(lagrangian: Expr, end: End) -> Expr:
 
 @derived(15, "shear force and bending moment", (4,))
 def section_forces() -> Derivation[tuple[Eq, Eq]]:
-    """Small deflections of a Bernoulli-Euler beam: moment is curvature times bending stiffness, shear its slope."""
+    """Small deflections of an Euler-Bernoulli beam: the moment is the curvature times the bending stiffness, the shear
+    force its derivative."""
     strain = potential_energy(joint=False).density
     yield "strain energy", "Per length of the manipulator, (4).", strain
     moment = strain.diff(v.diff(x, 2))
@@ -58,13 +59,13 @@ def section_forces() -> Derivation[tuple[Eq, Eq]]:
 
 
 def _with_section_forces(expression: Expr) -> Expr:
-    """Put (15) into an expression in Q and M_z."""
+    """Substitute (15) in an expression in Q and M_z."""
     return put(expression, {law.lhs: law.rhs for law in section_forces()})
 
 
 @proves(14)
 def prove_virtual_work() -> Proof:
-    """With (15): for any motion and any virtual displacement, the virtual work of the whole arm, written down by hand,
+    """With (15): for any motion and any virtual displacement, the virtual work of the whole arm, written by hand,
     is the work (14) at the two ends plus that of Newton's force on every slice of the manipulator."""
     ends = sum((_with_section_forces(e.lhs - e.rhs) for e in virtual_work()), S.Zero)
     along = Integral(forces.newton()[0] * eta, (x, 0, L))
@@ -77,8 +78,8 @@ def prove_virtual_work() -> Proof:
 
 @proves(15)
 def prove_section_forces() -> Proof:
-    """Dimensions; an arc of radius R carries the moment E I / R and no shear; a tip load F gives the shear -F
-    everywhere, no moment at the tip and the textbook deflection F L^3 / (3 E I)."""
+    """Dimensions; an arc of radius R has the moment E I / R and no shear force; a tip load F gives the constant shear
+    force -F, no moment at the tip and the textbook deflection F L^3 / (3 E I)."""
     radius, load = symbol("h"), symbol("C_1")
     shear, moment = (law.rhs for law in section_forces())
     arc, cantilever = x**2 / (2 * radius), load * x**2 * (3 * L - x) / (6 * E * I_z)
@@ -92,8 +93,8 @@ def prove_section_forces() -> Proof:
 
 @derived(16, "boundary conditions", (14, 15))
 def boundary_conditions() -> Derivation[tuple[Eq, ...]]:
-    """(15) in (14): the virtual displacement and the virtual slope at each end are arbitrary, so each one's factor
-    vanishes on its own. Root force, root moment, tip force, tip moment."""
+    """(15) substituted in (14): the virtual displacement and the virtual slope at each end are arbitrary, so the factor
+    of each vanishes. Root force, root moment, tip force, tip moment."""
     shear, moment = (law.rhs for law in section_forces())
     works = ((virtual_work()[0].lhs, S.Zero), (virtual_work()[1].lhs, L))
     put_in = tuple(Eq(_with_section_forces(work), 0) for work, _ in works)
@@ -104,20 +105,21 @@ def boundary_conditions() -> Derivation[tuple[Eq, ...]]:
         for choice, force, value in zip((S.One, x - place), (shear, moment), values, strict=True)
     ]
     yield (
-        "one displacement, one turn",
-        "A virtual displacement of one picks the force, a virtual turn about the end picks the moment.",
+        "unit virtual displacement and rotation",
+        "A unit virtual displacement gives the force, a unit virtual rotation about the end gives the moment.",
         tuple(Eq(balance.expand(), 0) for balance, _, _ in chosen),
     )
     return tuple(_solved(*balance) for balance in chosen)
 
 
 def end_values(shape: Expr) -> tuple[Expr, ...]:
-    """Return what the four conditions of (16) determine of a shape: v_xxx and v_xx at the root, then at the tip."""
+    """Return the quantities that the four conditions of (16) determine: v_xxx and v_xx at the root, then at the tip."""
     return tuple(at(shape.diff(x, order), place) for place in (S.Zero, L) for order in (3, 2))
 
 
 def _solved(condition: Expr, force: Expr, value: Expr) -> Eq:
-    """Write a condition linear in a force of the section as ``force = rest``; ``value`` is what it depends on."""
+    """Write a condition linear in a section force as ``force = rest``; ``value`` is the derivative that the force
+    contains."""
     condition = condition.expand()
     sign = condition.coeff(value) / force.coeff(value)
     return Eq(force, ((sign * force - condition) / sign).expand())
@@ -125,14 +127,15 @@ def _solved(condition: Expr, force: Expr, value: Expr) -> Eq:
 
 @derived("16a", "boundary conditions of a mode", (2, 16))
 def mode_conditions() -> Derivation[tuple[Eq, ...]]:
-    """(2) in (16), the base at rest: in free vibration each coordinate obeys q'' = -ω² q and cancels."""
+    """(2) substituted in (16) with the base at rest: in free vibration each coordinate satisfies q'' = -ω² q and
+    cancels."""
     one = tuple(Eq(*(single_mode(side.subs(w, 0).doit()) for side in e.args)) for e in boundary_conditions())
     yield "one mode, base at rest", "One term of (2) in (16).", one
     return tuple(in_one_mode(e) for e in boundary_conditions())
 
 
 def in_one_mode(equation: Eq) -> Eq:
-    """Return an equation in v for one freely vibrating mode: an equation in phi_i."""
+    """Return the equation in phi_i that follows from an equation in v for one mode in free vibration."""
     left, right = (single_mode(side.subs(w, 0).doit()) for side in equation.args)
     return Eq(free_vibration(left), free_vibration(right), evaluate=False)
 
@@ -143,7 +146,7 @@ def free_vibration(expression: Expr) -> Expr:
 
 
 def rayleigh_factors() -> tuple[Expr, ...]:
-    """Return what a virtual change of a mode's shape is multiplied by in that of (K_i - omega_i^2 M_i) / 2, by hand.
+    """Return the factors of a virtual change of the mode shape in the variation of (K_i - omega_i^2 M_i) / 2, by hand.
 
     Along the manipulator, displacement and slope at the root, displacement and slope at the tip.
     """
@@ -155,8 +158,8 @@ def rayleigh_factors() -> tuple[Expr, ...]:
 
 @proves("16a")
 def prove_mode_conditions() -> Proof:
-    """Rayleigh: among all shapes, that of a mode makes K_i - ω_i² M_i, written down by hand, stationary, so these are
-    its natural conditions."""
+    """Rayleigh's principle: the shape of a mode makes K_i - ω_i² M_i, written by hand, stationary; these are its
+    natural boundary conditions."""
     _, *factors = rayleigh_factors()
     for e, factor, sign in zip(mode_conditions(), factors, (1, -1, -1, 1), strict=True):
         yield e.lhs - e.rhs - sign * factor
@@ -164,7 +167,7 @@ def prove_mode_conditions() -> Proof:
 
 @samples("16a")
 def sample_mode_conditions() -> bool:
-    """The end values of a mode of a random arm, found by shooting, satisfy all four."""
+    """The end values of a mode of a random arm, computed by shooting, satisfy all four."""
     values = sample(16)
     for mode in shoot(values):
         for e in mode_conditions():

@@ -39,7 +39,7 @@ __all__ = ["cantilever_frequency", "cantilever_shape", "natural_frequency", "rig
 
 
 def _finite(expression: Expr) -> Expr:
-    """Write the pairs (s, c) as (kappa, 1), a common factor of each stiffness aside."""
+    """Write the pairs (s, c) as (kappa, 1), without the common factor of each stiffness."""
     return expression.subs({s_t: kappa_t, c_t: 1, s_r: kappa_r, c_r: 1})
 
 
@@ -55,8 +55,8 @@ def _take_rigid(expression: Expr) -> Expr:
 
 @derived(27, "rigid joint with end-effector", (23, 25, 26))
 def rigid_joint() -> Derivation[tuple[Eq, Eq, Eq]]:
-    """Both stiffnesses to infinity: frequency equation, shape and ratio. Nothing in (23) is lost on the way: divided by
-    κ_t κ_r it has this finite limit."""
+    """Both stiffnesses tend to infinity: frequency equation, shape and ratio. (23) divided by κ_t κ_r has this finite
+    limit."""
     divided = (_finite(frequency_polynomial()) / (kappa_t * kappa_r)).expand()
     yield "divided by the stiffnesses", "(23) over κ_t κ_r.", Eq(divided.subs(VALUES), 0)
     frequency = _rigid_limit(divided)
@@ -76,7 +76,7 @@ def _gather_rigid(shape: Expr) -> Expr:
 
 @derived(28, "rigid joint, no end-effector: mode shape", (27,))
 def cantilever_shape() -> Derivation[tuple[Eq, Eq]]:
-    """The end-effector's inertia to zero in the shape of (27)."""
+    """The shape of (27) as the inertia of the end-effector tends to zero."""
     _, shape, ratio = rigid_joint()
     limits = Limit(Limit(ratio.rhs, mu, 0), iota, 0)
     yield "limits of the ratio", "No mass, then no rotary inertia at the tip.", Eq(r_2, limits, evaluate=False)
@@ -85,7 +85,7 @@ def cantilever_shape() -> Derivation[tuple[Eq, Eq]]:
 
 @derived(29, "rigid joint, no end-effector: frequency equation", (27,))
 def cantilever_frequency() -> Derivation[Eq]:
-    """The end-effector's inertia to zero in the frequency equation of (27): the textbook cantilever."""
+    """The frequency equation of (27) as the inertia of the end-effector tends to zero: the textbook cantilever."""
     function = symbol("Delta")
     limits = Eq(Limit(Limit(function, mu, 0), iota, 0), 0, evaluate=False)
     yield "limits", "No mass, then no rotary inertia at the tip.", (limits, Eq(function, rigid_joint()[0].lhs))
@@ -117,8 +117,9 @@ def _clamped(shape: Expr, ratio: Expr, frequency: Expr, tip: Matrix) -> Proof:
 
 @proves(27)
 def prove_rigid_joint() -> Proof:
-    """By hand, the two shapes that neither move nor turn at the joint: in this ratio they balance the force at the tip,
-    and this is the determinant of force and moment. The other way of being rigid, (s, c) = (1, 0) in (23)."""
+    """Written by hand, the two shapes with zero displacement and slope at the joint: in this ratio they satisfy the
+    force condition at the tip, and the determinant of force and moment is the frequency equation. Also the rigid joint
+    as (s, c) = (1, 0) in (23)."""
     frequency, shape, ratio = rigid_joint()
     yield (shape.lhs, ratio.lhs) == (phi_i, r_2)
     yield from _clamped(shape.rhs.expand(), ratio.rhs, frequency.lhs - frequency.rhs, tip_rows())
@@ -127,7 +128,7 @@ def prove_rigid_joint() -> Proof:
 
 @samples(27)
 def sample_rigid_joint() -> bool:
-    """Modes found by shooting for a very stiff joint."""
+    """Modes computed by shooting for a very stiff joint."""
     frequency, shape, ratio = rigid_joint()
     values = sample(27) | _RIGID
     residuals = [float(frequency.lhs.subs(group_numbers(values, mode.beta))) for mode in shoot(values)]
@@ -146,28 +147,28 @@ def prove_cantilever_shape() -> Proof:
 
 @samples(28)
 def sample_cantilever_shape() -> bool:
-    """Modes found by shooting for a very stiff joint and no end-effector."""
+    """Modes computed by shooting for a very stiff joint and no end-effector."""
     shape, ratio = cantilever_shape()
     return shapes_agree((28,), shape.rhs, ratio.rhs, **_RIGID, m_e=0.0, J_e=0.0)
 
 
 @proves(29)
 def prove_cantilever_frequency() -> Proof:
-    """The determinant of the free end for the two shapes that neither move nor turn at the joint, by hand."""
+    """The determinant of the free end for the two shapes with zero displacement and slope at the joint, by hand."""
     clamped = Matrix([[1, 0], [0, 1], [-1, 0], [0, -1]])
     determinant = (tip_rows().subs(_BARE) * clamped).det() / (2 * lamda**5)
     yield cantilever_frequency().lhs - cantilever_frequency().rhs + determinant
 
 
 def _apart() -> Eq:
-    """Return (30) with the wave number and the speed of waves apart."""
+    """Return (30) with the wave number as a separate factor."""
     speed = Pow((2 * pi * natural_frequency().rhs * L**2 / lamda**2) ** 2, HALF, evaluate=False)
     return Eq(symbol("f_i"), Mul(lamda**2 / (2 * pi * L**2), speed, evaluate=False), evaluate=False)
 
 
 @derived(30, "natural frequency", (17,), shown=_apart)
 def natural_frequency() -> Derivation[Eq]:
-    """The wave number of (17) turned into a frequency in hertz."""
+    """The wave number of (17) converted to a frequency in hertz."""
     wave = mode_form()[1].subs(beta, lamda / L)
     yield "wave number", "(17) with λ = β L.", wave
     (square,) = solve(wave, omega_i**2)
@@ -177,7 +178,7 @@ def natural_frequency() -> Derivation[Eq]:
 
 @proves(30)
 def prove_natural_frequency() -> Proof:
-    """Dimensions; a sine of this wave number balances stiffness and inertia."""
+    """Dimensions; for a sine of this wave number, elastic and inertia forces balance."""
     bending, inertia = (symbol(a) * symbol(b) for a, b in (("E", "I_z"), ("rho", "A")))
     yield dimension(natural_frequency()) == Dimension(s=-1)
     yield natural_frequency().lhs == symbol("f_i")
@@ -186,7 +187,7 @@ def prove_natural_frequency() -> Proof:
 
 @samples(30)
 def sample_natural_frequency() -> bool:
-    """The frequency of modes of a random arm, from the energies of shapes found by shooting (Rayleigh's quotient)."""
+    """The frequencies of a random arm from the energies of shapes computed by shooting (Rayleigh's quotient)."""
     values = sample(30)
     names = {symbol(name): value for name, value in values.items()}
     for mode in shoot(values):

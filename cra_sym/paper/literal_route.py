@@ -19,14 +19,14 @@ epsilon, sigma, varpi, omega_n, M_n, Gamma_n, T_0, T_1 = (
 
 @numbered("42a", "detuning from the natural frequency", "definition")
 def forced_detuning() -> Eq:
-    """The paper's words taken literally: what the forced system (36) calls for."""
+    """The paper taken literally: the detuning that the forced system (36) requires."""
     return plain(forced_resonance().step("detuning").expression)
 
 
 @proves("42a")
 def prove_forced_detuning() -> Proof:
-    """Frequencies; the excitation exp(i varpi T_0) turns against the motion exp(i omega_n T_0) in slow time alone, at
-    the rate sigma."""
+    """Dimensions; the phase of the excitation exp(i varpi T_0) relative to the motion exp(i omega_n T_0) depends on
+    slow time alone, with the rate sigma."""
     yield dimension(forced_detuning()) == Dimension(s=-1)
     yield forced_detuning().lhs == varpi
     angle = ((forced_detuning().rhs - omega_n) * T_0).expand().subs(epsilon * T_0, T_1)
@@ -36,7 +36,7 @@ def prove_forced_detuning() -> Proof:
 
 @derived("48a", "amplitude equation of the literal route", (36, "42a"))
 def forced_amplitude_equation() -> Derivation[Eq]:
-    """What (36) gives: no conjugate amplitude, so linear growth at resonance and no boundary of stability."""
+    """The result of (36): no conjugate amplitude, so linear growth at resonance and no stability boundary."""
     for step in forced_resonance().steps:
         if step.name in ("order 1", "secular terms", "solvability"):
             yield step.name, step.statement, tuple(map(plain, step.expression))
@@ -46,8 +46,8 @@ def forced_amplitude_equation() -> Derivation[Eq]:
 
 @proves("48a")
 def prove_forced_amplitude_equation() -> Proof:
-    """At resonance the amplitude grows in proportion to time; so made into a motion of the mode, it balances the force
-    of (36). Away from it, it turns with the detuning."""
+    """At resonance the amplitude grows in proportion to time, and the motion of the mode with this amplitude balances
+    the force of (36). Away from resonance its phase rotates with the detuning."""
     drift = forced_amplitude_equation().rhs
     motion = 2 * drift.subs(sigma, 0) * t * cos(omega_n * t)
     force = excited_system().rhs.xreplace({symbol("Gamma_i"): Gamma_n}).subs(varpi, omega_n)
@@ -57,11 +57,11 @@ def prove_forced_amplitude_equation() -> Proof:
 
 @derived("49a", "growth of the literal route", ("48a",))
 def forced_measure() -> Derivation[Eq]:
-    """What can be said instead for a base that moves across the arm: how fast the tip's amplitude grows at resonance,
-    for epsilon = 1. It is a velocity, no frequency."""
+    """The corresponding result for a base that moves transversely: the rate of growth of the tip amplitude at
+    resonance, for epsilon = 1. It is a velocity, not a frequency."""
     yield (
         "at resonance",
-        "No detuning: the amplitude grows at a constant rate.",
+        "Without detuning the amplitude grows at a constant rate.",
         forced_amplitude_equation().subs(sigma, 0),
     )
     expression, _ = forced_growth()
@@ -70,8 +70,8 @@ def forced_measure() -> Derivation[Eq]:
 
 @proves("49a")
 def prove_forced_measure() -> Proof:
-    """A velocity that does not change when the mode is scaled; squared it is that of a motion t times a harmonic, which
-    balances the force of (36) at resonance, at the tip."""
+    """It is a velocity and does not depend on the normalisation of the mode; its square is that of the tip for the
+    motion t times a harmonic that balances the force of (36) at resonance."""
     expression, (_, gamma, tip, mass, _) = forced_growth()
     shown = forced_measure().rhs
     yield forced_measure().lhs == Derivative(Symbol("a"), t)

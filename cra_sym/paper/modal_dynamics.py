@@ -39,10 +39,10 @@ M_i, K_i, Gamma_i, omega_i, zeta_i, tau = (
 
 @derived(11, "dynamic equation", (5, 8, "16b"))
 def dynamic_equation() -> Derivation[Eq]:
-    """Hamilton's principle on the modal energies: one equation a mode, driven by the base's acceleration. A damping
-    ratio is carried along; it is zero in the paper."""
+    """Hamilton's principle for the modal energies: one equation for each mode, driven by the acceleration of the base.
+    A modal damping ratio is included; it is zero in the paper."""
     kinetic, potential = (_one_mode(e.rhs) for e in modal_energies())
-    yield "energies of mode i", "Its share of (5), and what it shares with the base.", (kinetic, potential)
+    yield "energies of mode i", "Its terms of (5), and those that couple it with the base.", (kinetic, potential)
     friction = -2 * zeta_i * omega_i * M_i * q_i.diff(t)
     result = hamilton(
         S.Zero, fields=[], coordinates=[q_i], prescribed=[w], x=x, domain=(0, L), t=t, left=kinetic - potential,
@@ -50,7 +50,7 @@ def dynamic_equation() -> Derivation[Eq]:
     )  # fmt: skip
     yield (
         "Hamilton's principle",
-        "Varied by the coordinate, with the work of the damping.",
+        "Variation of the coordinate, with the virtual work of the damping force.",
         result.coordinate_equations[0],
     )
     balance = result.coordinate_equations[0].lhs - result.coordinate_equations[0].rhs
@@ -65,9 +65,9 @@ def _one_mode(energy: Expr) -> Expr:
 
 @proves(11)
 def prove_dynamic_equation() -> Proof:
-    """D'Alembert: without damping it is the virtual work of all forces, written down by hand, along mode i while any
-    two modes move, by (6), (16b) and (16c); with damping, a free vibration that decays by exp(-zeta_i omega_i t)
-    solves it."""
+    """D'Alembert's principle: without damping it is the virtual work of all forces, written by hand, along mode i for a
+    motion in any two modes, by (6), (16b) and (16c); with damping, a free vibration that decays as exp(-zeta_i omega_i
+    t) satisfies it."""
     equation = dynamic_equation().lhs - dynamic_equation().rhs
     two = separation().rhs.members("i", "j")
     mass, stiffness = (e.lhs - e.rhs for e in orthogonality())
@@ -83,8 +83,8 @@ def prove_dynamic_equation() -> Proof:
 
 @samples(11)
 def sample_dynamic_equation() -> bool:
-    """The virtual work of all forces on a random arm, for a virtual displacement along a mode found by shooting while
-    three modes move, by quadrature."""
+    """The virtual work of all forces on a random arm, by quadrature, for a virtual displacement along a mode computed
+    by shooting and a motion in three modes."""
     values = sample(11)
     shapes, length = shoot(values), values["L"]
     q, acceleration, base = np.array([0.3, -0.5, 0.2]), np.array([0.7, 0.4, -0.6]), 0.9
@@ -116,17 +116,17 @@ def _homogeneous(displacement: Expr, velocity: Expr) -> Expr:
 
 @derived(12, "Duhamel's integral", (11,))
 def duhamel() -> Derivation[Eq]:
-    """Undamped: the free motion from the initial values, and one free motion for each impulse -Γ_i w'' / M_i that
-    the base has given since. With ω_i = 0, sin(ω_i t) / ω_i is t."""
+    """Undamped: the free motion from the initial values plus the superposed free motions due to the impulses -Γ_i w'' /
+    M_i dτ of the base (Duhamel's integral). For ω_i = 0, sin(ω_i t) / ω_i is t."""
     impulse = _homogeneous(S.Zero, S.One)
     start, rate = symbol("C_1"), symbol("C_2")
     free = _homogeneous(start, rate).subs({start: q_i.subs(t, 0), rate: q_i.diff(t).subs(t, 0)})
     yield "free motion", "Without drive, from the initial values.", Eq(q_i, free)
-    yield "unit impulse", "The free motion that starts at rest with unit speed.", impulse
+    yield "unit impulse", "The free motion with zero initial displacement and unit initial velocity.", impulse
     drive = (dynamic_equation().rhs / M_i).subs(t, tau) * impulse.subs(t, t - tau) * omega_i
     yield (
         "impulse of the base at tau",
-        "What the base gives in a unit of time, and what is left of it at t.",
+        "The impulse of the base per unit of time, and its effect at t.",
         drive / omega_i,
     )
     constant, varying = drive.as_independent(tau)
@@ -135,7 +135,7 @@ def duhamel() -> Derivation[Eq]:
 
 @proves(12)
 def prove_duhamel() -> Proof:
-    """Put into (11) it leaves nothing, and it starts with the initial values."""
+    """It satisfies (11) and the initial values."""
     solution, equation = duhamel().rhs, dynamic_equation()
     yield duhamel().lhs == q_i
     yield (equation.lhs - equation.rhs).subs(zeta_i, 0).subs(q_i, solution).doit(integrals=False)
@@ -165,19 +165,19 @@ def sample_duhamel() -> bool:
 
 @derived(13, "its initial values", (2, 6, "16c"))
 def initial_values() -> Derivation[tuple[Eq, Eq]]:
-    """An arm at rest in the inertial frame when the base sets off with speed w'(0): seen from the base it moves
-    backwards, v(x, 0) = 0 and v_t(x, 0) = -w'(0). The product with a mode picks out that mode's coordinate."""
+    """An arm at rest in the inertial frame when the base starts with velocity w'(0): relative to the base it moves
+    backwards, v(x, 0) = 0 and v_t(x, 0) = -w'(0). The inner product with a mode gives the coordinate of that mode."""
     speed = w.diff(t).subs(t, 0)
     participation = generalised()[2]
     at_start = tuple(Eq(at_zero, value) for at_zero, value in ((v.subs(t, 0), 0), (v.diff(t).subs(t, 0), -speed)))
-    yield "arm at rest when the base sets off", "Displacement and speed seen from the base.", at_start
+    yield "arm at rest when the base starts", "Displacement and velocity relative to the base.", at_start
     projected = [
         tidy(inner_mass(phi_i, start)).subs(tidy(participation.rhs), Gamma_i).doit(integrals=False)
         for start in (S.Zero, S.One)
     ]
     yield (
         "product with mode i",
-        "By (16c) a sum over modes leaves M_i times its coordinate; a unit displacement leaves this.",
+        "By (16c) the sum over modes reduces to M_i times the coordinate; a uniform unit displacement gives this.",
         Eq(inner_mass(phi_i, S.One), projected[1]),
     )
     start, rate = q_i.subs(t, 0), q_i.diff(t).subs(t, 0)
@@ -186,8 +186,8 @@ def initial_values() -> Derivation[tuple[Eq, Eq]]:
 
 @proves(13)
 def prove_initial_values() -> Proof:
-    """Among all modal velocities these leave the least kinetic energy (5) in the inertial frame: its derivative by each
-    vanishes. Nothing is displaced."""
+    """Of all modal velocities these minimise the kinetic energy (5) in the inertial frame: its derivative by each
+    vanishes. All displacements are zero."""
     (still, rate), start = initial_values(), {w.diff(t): w.diff(t).subs(t, 0)}
     slope = written_out(modal_energies()[0].rhs, "i", "j").diff(q_i.diff(t)).subs(start)
     yield (still.lhs, rate.lhs) == (q_i.subs(t, 0), q_i.diff(t).subs(t, 0))

@@ -46,7 +46,7 @@ kappa_t, kappa_r, mu, iota = (symbol(name) for name in ("kappa_t", "kappa_r", "m
 s_t, c_t, s_r, c_r = (symbol(name) for name in ("s_t", "c_t", "s_r", "c_r"))
 coefficients = C_1, C_2, C_3, C_4 = tuple(symbol(f"C_{k}") for k in (1, 2, 3, 4))
 
-#: Placeholders for cos, sin, cosh, sinh of lamda: polynomials in these are decided exactly.
+#: Placeholders for cos, sin, cosh, sinh of lamda: identities between polynomials in these are decided exactly.
 _c, _s, _ch, _sh = symbols("c s C S")
 VALUES = {_c: cos(lamda), _s: sin(lamda), _ch: cosh(lamda), _sh: sinh(lamda)}
 
@@ -69,7 +69,7 @@ def basis() -> tuple[Expr, ...]:
 
 
 def _exponential(rate: Symbol) -> Expr:
-    """Return what an exponential of x leaves of the field equation of a mode, divided by itself."""
+    """Return the residual of the field equation of a mode for an exponential of x, divided by the exponential."""
     return (put(mode_field_equation().lhs, {phi_i: exp(rate * x)}) / exp(rate * x)).expand()
 
 
@@ -80,7 +80,11 @@ def mode_form() -> Derivation[tuple[Eq, Eq]]:
     r = Symbol("r")
     yield "exponential put in", "exp(r x) in the field equation (10b).", Eq(_exponential(r), 0)
     quartic = Eq(r**4, beta**4)
-    yield "characteristic equation", "With the wave number as short for what does not depend on r.", quartic
+    yield (
+        "characteristic equation",
+        "With the wave number as abbreviation of the factor that does not depend on r.",
+        quartic,
+    )
     yield "its roots", "Two imaginary, two real.", tuple(roots(quartic.lhs - quartic.rhs, r))
     shape = sum(coefficient * function for coefficient, function in zip(coefficients, basis(), strict=True))
     return Eq(phi_i, shape), _wave()
@@ -88,22 +92,22 @@ def mode_form() -> Derivation[tuple[Eq, Eq]]:
 
 @cache
 def _wave() -> Eq:
-    """Return what the field equation makes of the wave number: of shapes whose fourth derivative is beta^4 of them."""
+    """Return the wave number beta, for which the field equation is phi'''' = beta^4 phi."""
     balance = mode_field_equation().lhs.subs(phi_i.diff(x, 4), beta**4 * phi_i) / phi_i
     (square,) = solve(balance.expand(), beta**4, simplify=False, check=False)
     return Eq(beta**4, square)
 
 
 def _frequency() -> Expr:
-    """Return the angular frequency that belongs to a wave number."""
+    """Return the angular frequency of a wave number."""
     (square,) = solve(_wave(), omega_i**2)
     return sqrt(square)
 
 
 @proves(17)
 def prove_mode_form() -> Proof:
-    """It satisfies the field equation, and its four functions are independent; the wave number is that of a beam in
-    textbooks."""
+    """It satisfies the field equation, and its four functions are independent; the wave number is the textbook one of a
+    beam."""
     shape, wave = mode_form()
     yield wave.rhs - rho * A * omega_i**2 / (E * I_z)
     residual = put(mode_field_equation().lhs, {phi_i: shape.rhs})
@@ -114,7 +118,7 @@ def prove_mode_form() -> Proof:
 
 @samples(17)
 def sample_mode_form() -> bool:
-    """Modes of a random arm found by shooting with power series are combinations of its functions."""
+    """Modes of a random arm, computed by shooting with power series, are combinations of its functions."""
     places = np.linspace(0.0, 1.0, 30)
     for mode in shoot(sample(17)):
         table = np.array([[float(f.subs({beta: mode.beta, x: p})) for f in basis()] for p in places])
@@ -146,7 +150,7 @@ def _rows() -> tuple[Matrix, ...]:
 
 
 def _weighted(row: Matrix, stiffness: Symbol, spring: Symbol, compliance: Symbol) -> Matrix:
-    """Write a row linear in a stiffness so that (spring, compliance) = (1, 0) is the rigid joint, (0, 1) no joint."""
+    """Write a row linear in a stiffness in the pair (spring, compliance): (1, 0) is rigid, (0, 1) is free."""
     return row.applyfunc(lambda e: (spring * e.coeff(stiffness, 1) + compliance * e.coeff(stiffness, 0)).expand())
 
 
@@ -170,21 +174,25 @@ def _system(matrix: Matrix, unknowns: Matrix) -> Eq:
 
 
 def _put_in(conditions: tuple[Eq, ...]) -> tuple[Eq, ...]:
-    """Return conditions on a mode with (17) in them."""
+    """Return conditions on a mode with (17) substituted."""
     shape = mode_form()[0].rhs
     return tuple(Eq(*(put(side, {phi_i: shape}).doit() for side in condition.args)) for condition in conditions)
 
 
 def short_symbols() -> Eq:
-    """Return what the short symbols in displayed equations stand for."""
+    """Return the definitions of the abbreviations in displayed equations."""
     return Eq(Matrix([list(VALUES)]), Matrix([list(VALUES.values())]), evaluate=False)
 
 
 @derived(18, "root system", ("16a", 17))
 def root_system() -> Derivation[Eq]:
-    """(17) in the conditions at the joint. Each stiffness is written as the pair (s, c) = (κ, 1) / (1 + κ), so
-    that a rigid joint (1, 0) and no joint (0, 1) are ordinary values."""
-    yield "shape put in", "(17) in force and moment at the joint, at x = 0.", _put_in(mode_conditions()[:2])
+    """(17) substituted in the conditions at the joint. Each stiffness is written as the pair (s, c) = (κ, 1) / (1 + κ),
+    so that a rigid joint (1, 0) and no joint (0, 1) are regular values."""
+    yield (
+        "shape put in",
+        "(17) substituted in the force and moment conditions at the joint, x = 0.",
+        _put_in(mode_conditions()[:2]),
+    )
     rows = tuple(Eq((row * Matrix(coefficients))[0], 0) for row in _rows()[:2])
     yield "dimensionless", "With λ = β L and the groups of the parameters, divided by common factors.", rows
     return _system(root_matrix(), Matrix(coefficients))
@@ -196,32 +204,36 @@ def _tip_system_in_short() -> tuple[Eq, Eq]:
 
 @derived(19, "tip system", ("16a", 17), shown=_tip_system_in_short)
 def tip_system() -> Derivation[Eq]:
-    """(17) in the conditions at the end-effector."""
-    yield "shape put in", "(17) in force and moment at the tip, at x = L.", _put_in(mode_conditions()[2:])
+    """(17) substituted in the conditions at the end-effector."""
+    yield (
+        "shape put in",
+        "(17) substituted in the force and moment conditions at the tip, x = L.",
+        _put_in(mode_conditions()[2:]),
+    )
     return _system(tip_matrix(), Matrix(coefficients))
 
 
 @proves(18)
 def prove_root_system() -> Proof:
-    """Written down by hand."""
+    """Written by hand."""
     yield from minors(root_system().lhs.args[0], by_hand.root_rows())
 
 
 @samples(18)
 def sample_root_system() -> bool:
-    """The coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
+    """Coefficients of modes computed by shooting (random arm) satisfy it; at other wave numbers they do not."""
     return annihilates(root_system().lhs.args[0], 18)
 
 
 @proves(19)
 def prove_tip_system() -> Proof:
-    """Written down by hand."""
+    """Written by hand."""
     yield from minors(tip_system().lhs.args[0], by_hand.tip_rows())
 
 
 @samples(19)
 def sample_tip_system() -> bool:
-    """The coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
+    """Coefficients of modes computed by shooting (random arm) satisfy it; at other wave numbers they do not."""
     return annihilates(tip_system().lhs.args[0], 19)
 
 
@@ -260,25 +272,25 @@ _entries = Matrix(2, 2, [symbol(name) for name in ("d_11", "d_12", "d_21", "d_22
 
 @derived(20, "reduced system", (18, 19))
 def reduced_system() -> Derivation[Eq]:
-    """(18) gives C_3 and C_4, (19) multiplied by the determinant of that step leaves two equations for C_1 and C_2. The
-    determinant vanishes, and the step is empty, for a pinned and for a sliding root only."""
+    """(18) gives C_3 and C_4; (19) multiplied by the determinant of that step gives two equations for C_1 and C_2. The
+    determinant vanishes only for a pinned and for a sliding root."""
     root = root_matrix()
     named_rows = MatrixSymbol("R", 2, 2), MatrixSymbol("T", 2, 2)
     yield (
         "columns of C_3 and C_4",
-        "What (18) and (19) multiply these two by.",
+        "Coefficients of these two in (18) and (19).",
         (
             Eq(named_rows[0], root[:, 2:], evaluate=False),
             Eq(named_rows[1], tip_matrix()[:, 2:], evaluate=False),
         ),
     )
-    yield "determinant of the first step", "Zero for a pinned and for a sliding root only.", _elimination()[1]
+    yield "determinant of the first step", "Zero only for a pinned and for a sliding root.", _elimination()[1]
     third, fourth = coefficients[2:]
     solved = -root[:, 2:].adjugate() * root[:, :2] * Matrix(coefficients[:2])
     scale = Symbol("d")
     yield (
         "C_3 and C_4 from (18)",
-        "Times that determinant d, Cramer's rule.",
+        "By Cramer's rule, multiplied by that determinant d.",
         tuple(Eq(scale * name, value.expand()) for name, value in zip((third, fourth), solved, strict=True)),
     )
     return _system(_entries, Matrix(coefficients[:2]))
@@ -286,13 +298,13 @@ def reduced_system() -> Derivation[Eq]:
 
 @proves(20)
 def prove_reduced_system() -> Proof:
-    """With (21), Cramer's rule for the conditions written down by hand."""
+    """With (21), Cramer's rule for the conditions written by hand."""
     yield from minors(reduced_system().subs(_named_entries()).lhs.args[0], by_hand.eliminated())
 
 
 @samples(20)
 def sample_reduced_system() -> bool:
-    """The coefficients of modes of a random arm found by shooting satisfy it, at another wave number not."""
+    """Coefficients of modes computed by shooting (random arm) satisfy it; at other wave numbers they do not."""
     return annihilates(reduced_system().subs(_named_entries()).lhs.args[0], 20)
 
 
@@ -307,29 +319,29 @@ def _coefficients_in_short() -> tuple[Eq, ...]:
 
 @derived(21, "its coefficients", (18, 19, 20), shown=_coefficients_in_short)
 def reduced_coefficients() -> Derivation[tuple[Eq, ...]]:
-    """What the elimination leaves, with the joint as (s_t, c_t), (s_r, c_r) and the end-effector as μ, ι."""
+    """The entries after the elimination; the joint is (s_t, c_t), (s_r, c_r), the end-effector μ, ι."""
     raw = tuple(Eq(name, value) for name, value in zip(_entries, _elimination()[0], strict=True))
-    yield "C_3 and C_4 put into (19)", "Multiplied by d, with cos² + sin² = 1 and cosh² - sinh² = 1 used up.", raw
+    yield "C_3 and C_4 put into (19)", "Multiplied by d and simplified with cos² + sin² = 1 and cosh² - sinh² = 1.", raw
     grouped = (collect_stiffness(value).subs(VALUES) for value in _elimination()[0])
     return tuple(Eq(name, value) for name, value in zip(_entries, grouped, strict=True))
 
 
 @proves(21)
 def prove_reduced_coefficients() -> Proof:
-    """Cramer's rule for the conditions written down by hand: C_1 or C_2 with the two hyperbolic coefficients."""
+    """Cramer's rule for the conditions written by hand: C_1 or C_2 with the two hyperbolic coefficients."""
     yield from minors(Matrix(2, 2, [e.rhs for e in reduced_coefficients()]), by_hand.eliminated())
 
 
 @derived(22, "determinant", (20,))
 def determinant() -> Derivation[Eq]:
-    """A mode is a solution that is not zero: the determinant of the reduced system vanishes."""
-    yield "matrix of the reduced system", "It takes C_1 and C_2 to zero.", _entries
+    """A mode is a nonzero solution, so the determinant of the reduced system vanishes."""
+    yield "matrix of the reduced system", "Its product with C_1 and C_2 vanishes.", _entries
     return Eq(_entries.det(), 0)
 
 
 @proves(22)
 def prove_determinant() -> Proof:
-    """The determinant of (18) and (19) together, all four coefficients at once, times that of the elimination."""
+    """The determinant of (18) and (19) for all four coefficients, times that of the elimination."""
     matrix, factor = _elimination()
     whole = Matrix.vstack(root_matrix(), _tip()).det(method="berkowitz")
     named = dict(zip(_entries, matrix, strict=True))
@@ -338,13 +350,13 @@ def prove_determinant() -> Proof:
 
 @cache
 def _expanded_determinant() -> Expr:
-    """Return (22) with (21) in it, free of squares of sine and hyperbolic sine."""
+    """Return (22) with (21) substituted, without squares of sine and hyperbolic sine."""
     return _reduced(determinant().lhs.subs(dict(zip(_entries, _elimination()[0], strict=True))))
 
 
 @cache
 def frequency_polynomial() -> Expr:
-    """Return the determinant, divided so as to leave 1 + c C for the bare cantilever."""
+    """Return the determinant, normalised to 1 + c C for the cantilever without end-effector."""
     polynomial = cancel(_expanded_determinant() / _elimination()[1]).expand()
     lowest = min(power for (power,), _ in Poly(polynomial, lamda).terms())
     rigid = {s_t: 1, c_t: 0, s_r: 1, c_r: 0, mu: 0, iota: 0}
@@ -353,7 +365,7 @@ def frequency_polynomial() -> Expr:
 
 
 def _never_zero() -> Expr:
-    """Return what the determinant of the reduced system has that the frequency equation has not."""
+    """Return the factors of the determinant of the reduced system that the frequency equation does not contain."""
     factor = _elimination()[1]
     return cancel(_expanded_determinant() / _reduced(factor * frequency_polynomial())) * factor
 
@@ -369,12 +381,12 @@ def _frequency_equation_in_short() -> tuple[Eq, Eq]:
 
 @derived(23, "frequency equation", (21, 22), shown=_frequency_equation_in_short)
 def frequency_equation() -> Derivation[Eq]:
-    """The determinant expanded; its factors that never vanish are divided out, so that a rigid joint without
-    end-effector leaves 1 + cos λ cosh λ."""
-    yield "common factors", "What (21) in (22) has in front: d of the elimination, and powers of λ.", _never_zero()
+    """The expanded determinant, divided by its factors that never vanish, so that a rigid joint without end-effector
+    gives 1 + cos λ cosh λ."""
+    yield "common factors", "Common factors of (22) with (21): d of the elimination, and powers of λ.", _never_zero()
     yield (
         "expanded",
-        "What is left of (22) when they are divided out, not yet sorted.",
+        "(22) divided by these factors, terms not yet sorted.",
         Eq(frequency_polynomial(), 0),
     )
     return Eq(collect_stiffness(frequency_polynomial()).subs(VALUES), 0)
@@ -403,7 +415,7 @@ def separated(result: HamiltonResult) -> Expr:
 
 @proves(23)
 def prove_frequency_equation() -> Proof:
-    """The four conditions of Hamilton's principle in one determinant, and the four written down by hand."""
+    """The determinant of the four conditions of Hamilton's principle, and of the four written by hand."""
     function = frequency_equation().lhs - frequency_equation().rhs
     yield separated(dynamics(driven=False)) - function
     yield by_hand.determinant() - 2 * lamda**6 * function
@@ -411,7 +423,7 @@ def prove_frequency_equation() -> Proof:
 
 @samples(23)
 def sample_frequency_equation() -> bool:
-    """It changes sign at every frequency parameter of random arms found by shooting and nowhere between."""
+    """It changes sign at every frequency parameter of random arms, computed by shooting, and nowhere between."""
     function = frequency_equation().lhs
     for seed in (23, 24):
         values = sample(seed)

@@ -1,4 +1,4 @@
-"""Hamilton's principle and what it gives in the interval, at the ends and for the base: equations (8)-(10)."""
+"""Hamilton's principle and the equations that follow from it for the interval, the ends and the base: (8)-(10)."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ __all__ = ["dynamics", "mode_field_equation", "natural_conditions"]
 
 F, m_b, k_t, t_1, t_2, Gamma_i, omega_i = (symbol(name) for name in "F m_b k_t t_1 t_2 Gamma_i omega_i".split())
 
-#: The virtual displacements as :func:`cra_sym.mechanics.hamilton` writes them.
+#: The virtual displacements in the notation of :func:`cra_sym.mechanics.hamilton`.
 delta_v, delta_w, delta_L = Function("δv")(x, t), Function("δw")(t), Function("δLcal")(t)
 
 
 @cache
 def dynamics(*, driven: bool = True) -> Any:
-    """Return Hamilton's principle carried out: the base driven by the force F, or its motion w prescribed."""
+    """Return the result of Hamilton's principle: the base driven by the force F, or its motion w prescribed."""
     base: dict[str, Any] = {"coordinates": [w], "virtual_work": [(F, w, None)]} if driven else {"prescribed": [w]}
     density, left, right = paper_lagrangian()
     return hamilton(density, fields=[v], x=x, domain=(0, L), t=t, left=left, right=right, **base)
 
 
 def _step(name: str) -> Expr:
-    """Return what a step of :func:`dynamics` says is zero."""
+    """Return the expression that a step of :func:`dynamics` equates to zero."""
     return dynamics().steps.step(name).expression
 
 
@@ -44,13 +44,13 @@ def _step(name: str) -> Expr:
 
 @numbered(8, "Hamilton's principle", "assumption", (7,))
 def hamiltons_principle() -> Eq:
-    """Of all motions between two instants the true one makes the action stationary: the variation of the Lagrangian
-    and the virtual work of the driving force add to nothing."""
+    """The actual motion between two instants makes the action stationary: the time integral of the variation of the
+    Lagrangian plus the virtual work of the driving force is zero."""
     return Eq(Integral(delta_L + F * delta_w, (t, t_1, t_2)), 0)
 
 
 def _first_variation() -> Expr:
-    """Return the rate at which the Lagrangian (7) changes on the way to v + e delta_v, w + e delta_w."""
+    """Return the derivative by e, at e = 0, of the Lagrangian (7) of v + e delta_v, w + e delta_w."""
     size = symbol("epsilon")
     moved = {v: v + size * delta_v, w: w + size * delta_w}
     return put(paper_lagrangian().total(), moved).diff(size).subs(size, 0).doit(integrals=False)
@@ -58,8 +58,9 @@ def _first_variation() -> Expr:
 
 @proves(8)
 def prove_hamiltons_principle() -> Proof:
-    """Dimensions; for any motion and any virtual displacement that vanishes at both instants, the integral is the work
-    of Newton's forces on slices, joint, end-effector and base: zero for all when those balance."""
+    """Dimensions; for any motion and any virtual displacement that vanishes at both instants, the integral is the
+    virtual work of the forces of Newton's law on slices, joint, end-effector and base, so it is zero for all if and
+    only if these balance."""
     known = {"δLcal": ENERGY, "δw": dimension("w")}
     yield dimension(hamiltons_principle().lhs.function, known) == ENERGY
     rate = hamiltons_principle().lhs.function.subs(delta_L, _first_variation())
@@ -72,8 +73,8 @@ def prove_hamiltons_principle() -> Proof:
 
 @samples(8)
 def sample_hamiltons_principle() -> bool:
-    """The action of a random arm swinging in a mode found by shooting is stationary for a
-    virtual displacement that vanishes at both instants, and is not when the mode swings one per cent too fast."""
+    """The action of a random arm vibrating in a mode computed by shooting is stationary for a virtual displacement that
+    vanishes at both instants, and is not if the frequency is one per cent too high."""
     values, duration, step = sample(8), 2.0, 1e-4
     mode = shoot(values, modes=1)[0]
 
@@ -111,25 +112,29 @@ def _action(values: dict[str, float], motion: Any, duration: float) -> float:
 
 @derived(9, "variation of the Lagrangian", (7, 8))
 def variation() -> Derivation[Eq]:
-    """The elastic displacement and the base's motion are varied; the first-order change of the Lagrangian, with the
-    virtual work of the driving force."""
-    yield "Lagrangian", "Density along the manipulator, and what sits at the two ends.", _step("Lagrangian")
+    """First variation of the Lagrangian for variations of the elastic displacement and of the motion of the base, with
+    the virtual work of the driving force."""
+    yield "Lagrangian", "Density along the manipulator, and terms at the two ends.", _step("Lagrangian")
     return Eq(delta_L + F * delta_w, _step("Variation"))
 
 
 @proves(9)
 def prove_variation() -> Proof:
-    """Another route to the first variation: the Lagrangian of v + e delta_v, w + e delta_w differentiated by e."""
+    """The first variation as the derivative by e of the Lagrangian of v + e delta_v, w + e delta_w."""
     yield variation().lhs - delta_L - F * delta_w
     yield termwise(variation().rhs - F * delta_w - _first_variation())
 
 
-@derived(10, "principle with the variation put in", (8, 9))
+@derived(10, "principle with the variation substituted", (8, 9))
 def integrated_by_parts() -> Derivation[Eq]:
-    """(9) in (8): integration by parts in time and along the manipulator frees the variations of their derivatives and
-    leaves terms at the two ends."""
+    """(9) substituted in (8): integration by parts in time and along the manipulator removes the derivatives of the
+    variations and gives terms at the two ends."""
     in_time = "integration by parts in time"
-    yield in_time, "The variations vanish at both instants, so nothing is left there.", _step(in_time.capitalize())
+    yield (
+        in_time,
+        "The variations vanish at both instants, so there are no terms at these.",
+        _step(in_time.capitalize()),
+    )
     return Eq(_step("Integration by parts in x"), 0)
 
 
@@ -149,19 +154,19 @@ def prove_integrated_by_parts() -> Proof:
 @derived("10a", "field equation and equation of the base", (10,))
 def field_and_base() -> Derivation[tuple[Eq, Eq]]:
     """Variations along the manipulator and of the base are arbitrary; those at the ends give the conditions (16)."""
-    yield "collected terms", "The factor of each variation.", _step("Collected terms")
+    yield "collected terms", "Factor of each variation.", _step("Collected terms")
     return dynamics().field_equations[0], dynamics().coordinate_equations[0]
 
 
 def natural_conditions() -> tuple[Eq, ...]:
-    """Return the four end conditions that Hamilton's principle leaves: root force and moment, tip force and moment."""
+    """Return the four end conditions of Hamilton's principle: root force and moment, tip force and moment."""
     conditions: tuple[Eq, ...] = dynamics().boundary_conditions
     return conditions
 
 
 @proves(16)
 def prove_boundary_conditions() -> Proof:
-    """Hamilton's principle gives the same four conditions, and so do Newton's forces on joint and end-effector."""
+    """Hamilton's principle gives the same four conditions, and so does Newton's law for joint and end-effector."""
     _, *newton, _ = forces.newton()
     for e, theirs, force, sign in zip(boundary_conditions(), natural_conditions(), newton, (-1, 1, 1, -1), strict=True):
         yield e.lhs - e.rhs - theirs.lhs + theirs.rhs
@@ -170,8 +175,8 @@ def prove_boundary_conditions() -> Proof:
 
 @proves("10a")
 def prove_field_and_base() -> Proof:
-    """Newton: a slice accelerates under the slope of the shear force, and the whole arm under the force that drives
-    it."""
+    """Newton's law: a slice accelerates under the derivative of the shear force, and the whole arm under the driving
+    force."""
     field, base = field_and_base()
     on_slice, *_, on_arm = forces.newton()
     yield field.lhs - field.rhs + on_slice
@@ -180,9 +185,9 @@ def prove_field_and_base() -> Proof:
 
 @derived("10b", "field equation of a mode", (2, "10a"))
 def mode_field_equation() -> Derivation[Eq]:
-    """(2) in the field equation, the base at rest: each coordinate swings with q'' = -ω² q and cancels."""
+    """(2) substituted in the field equation, base at rest: each coordinate satisfies q'' = -ω² q and cancels."""
     field = field_and_base()[0].lhs.subs(w, 0).doit()
-    yield "base at rest", "The field equation of an arm that vibrates freely.", Eq(field, 0)
+    yield "base at rest", "The field equation of free vibration.", Eq(field, 0)
     one = single_mode(field).expand()
     yield "one mode", "One term of (2).", Eq(one, 0)
     return Eq(free_vibration(one), 0)
@@ -190,14 +195,14 @@ def mode_field_equation() -> Derivation[Eq]:
 
 @proves("10b")
 def prove_mode_field_equation() -> Proof:
-    """Rayleigh: among all shapes, that of a mode makes K_i - ω_i² M_i, written down by hand, stationary."""
+    """Rayleigh's principle: the shape of a mode makes K_i - ω_i² M_i, written by hand, stationary."""
     along, *_ = rayleigh_factors()
     yield mode_field_equation().lhs - mode_field_equation().rhs - along
 
 
 @samples("10b")
 def sample_mode_field_equation() -> bool:
-    """Modes of a random arm found by shooting satisfy it along the manipulator."""
+    """Modes of a random arm, computed by shooting, satisfy it along the manipulator."""
     values = sample(102)
     numbers = {symbol(name): value for name, value in values.items()}
     for mode in shoot(values):
@@ -209,30 +214,34 @@ def sample_mode_field_equation() -> bool:
     return True
 
 
-@derived("10c", "equation of the base from its own free body", ("10a", 16))
+@derived("10c", "equation of the base from its free body", ("10a", 16))
 def base_free_body() -> Derivation[Eq]:
-    """The field equation integrated along the manipulator turns all inertia beyond the joint into the force of the
-    translational spring: the base feels its own inertia, the spring and the drive."""
+    """The field equation integrated along the manipulator replaces the inertia forces beyond the joint by the force of
+    the translational spring: its own inertia, the spring and the drive act on the base."""
     field, base = field_and_base()
     shear, _ = (law.rhs for law in section_forces())
     inertia = Integral((field.lhs - field.rhs - shear.diff(x)).expand(), (x, 0, L))
     integrated = Eq(inertia, -Integral(shear.diff(x), (x, 0, L)), evaluate=False)
-    yield "field equation integrated", "All inertia of the manipulator is shear force.", integrated
+    yield (
+        "field equation integrated",
+        "The inertia force of the manipulator is the difference of the shear forces at its ends.",
+        integrated,
+    )
     known = {e.lhs: e.rhs for e in boundary_conditions()}
     at_ends = at(shear, 0).subs(known) - at(shear, L).subs(known)
-    yield "shear at the ends", "(16) tells the shear force at the joint and at the tip.", Eq(inertia, at_ends.expand())
+    yield "shear at the ends", "(16) gives the shear force at the joint and at the tip.", Eq(inertia, at_ends.expand())
     return Eq(termwise(base.lhs - base.rhs + F - inertia) + at_ends.expand(), F)
 
 
 @proves("10c")
 def prove_base_free_body() -> Proof:
-    """Written down from the free body of the base."""
+    """Written from the free body of the base."""
     yield base_free_body().lhs - base_free_body().rhs - (m_b * w.diff(t, 2) - k_t * at(v, 0) - F)
 
 
 @samples("10c")
 def sample_base_free_body() -> bool:
-    """Both forms agree on modes of a random arm found by shooting, ω_i² Γ_i = k_t φ_i(0)."""
+    """Both forms agree for modes of a random arm computed by shooting, ω_i² Γ_i = k_t φ_i(0)."""
     values = sample(103)
     gaps = [
         mode.omega**2 * modal_numbers(values, mode)[Gamma_i] / (values["k_t"] * mode(0.0)) - 1 for mode in shoot(values)

@@ -1,4 +1,4 @@
-"""Equations written with the operators D_k on the orders q_nk, put to work on functions of fast and slow time."""
+"""Equations written with the operators D_k and the orders q_nk, applied to functions of fast and slow time."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ __all__ = ["acting", "named"]
 
 
 def named(name: str) -> Symbol:
-    """Return the symbol that stands for an operator, an order or an amplitude in the equations as written."""
+    """Return the symbol of an operator, an order or an amplitude in the equations."""
     return Symbol(name, commutative=False)
 
 
 def acting(expression: Expr, fields: Mapping[Symbol, Expr], times: Mapping[Symbol, Symbol]) -> Expr:
-    """Return what an expression such as ``D_0**2*q_n0 + omega_n**2*q_n0`` is for given functions.
+    """Return an expression such as ``D_0**2*q_n0 + omega_n**2*q_n0`` for given functions.
 
     Parameters
     ----------
     expression : Expr
-        A sum of products: a factor, powers of operators, and last the field they act on.
+        A sum of products of a factor, powers of operators, and the field they act on.
     fields : mapping
         The function each field stands for.
     times : mapping

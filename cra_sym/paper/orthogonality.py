@@ -41,9 +41,9 @@ omega_i, omega_j, M_i, K_i, K_b = (symbol(name) for name in ("omega_i", "omega_j
 
 @derived("16b", "stiffness and mass of two modes", (6, "10b", "16a"))
 def stiffness_identity() -> Derivation[tuple[Eq, Eq]]:
-    """Integrating by parts twice moves two derivatives from mode j to mode i, where the field equation and the four
-    end conditions replace them: the stiffness product is ω_i² times the mass product, springs, tip mass and
-    rotary inertia included; for i = j it is K_i = ω_i² M_i."""
+    """Two integrations by parts transfer two derivatives from mode j to mode i, where the field equation and the four
+    end conditions replace them: the stiffness product is ω_i² times the mass product, including springs, tip mass and
+    rotary inertia; for i = j, K_i = ω_i² M_i."""
     shear, moment = (single_mode(law.rhs, phi_i) for law in section_forces())
     by_parts = moment * phi_j.diff(x) - shear * phi_j
     along = inner_stiffness(phi_i, phi_j, joint=False) - Integral(by_parts.diff(x) + shear.diff(x) * phi_j, (x, 0, L))
@@ -53,14 +53,14 @@ def stiffness_identity() -> Derivation[tuple[Eq, Eq]]:
     by_parts_twice = at(by_parts, L) - at(by_parts, 0) + Integral(shear.diff(x) * phi_j, (x, 0, L))
     yield (
         "integration by parts, twice",
-        "Of the bent manipulator's share.",
+        "Of the bending energy of the manipulator.",
         Eq(bent, by_parts_twice.doit(integrals=False)),
     )
     known = _balance("i")
     interior = Integral(shear.diff(x).xreplace(known) * phi_j, (x, 0, L))
     ends = (at(by_parts, L) - at(by_parts, 0)).xreplace(known)
     put_in = Eq(bent, (interior + ends).doit(integrals=False).expand())
-    yield "equations of mode i put in", "(10b) replaces the fourth derivative, (16a) what stands at the ends.", put_in
+    yield "equations of mode i put in", "(10b) replaces the fourth derivative, (16a) the terms at the ends.", put_in
     springs = inner_stiffness(phi_i, phi_j) - inner_stiffness(phi_i, phi_j, joint=False)
     mass = inner_mass(phi_i, phi_j)
     rest = termwise(interior + ends + springs - omega_i**2 * mass)
@@ -70,7 +70,7 @@ def stiffness_identity() -> Derivation[tuple[Eq, Eq]]:
 
 
 def _balance(index: str) -> dict[Expr, Expr]:
-    """Return what (10b) and (16a) say of the highest derivatives of mode ``index``, along it and at both ends."""
+    """Return the highest derivatives of mode ``index`` by (10b) and (16a), along it and at both ends."""
     equations = (mode_field_equation(), *mode_conditions())
     highest = (phi_i.diff(x, 4), *end_values(phi_i))
     pairs = zip(highest, equations, strict=True)
@@ -78,7 +78,7 @@ def _balance(index: str) -> dict[Expr, Expr]:
 
 
 def _is_mode(factors: tuple[Expr, ...], index: str) -> Proof:
-    """Yield what is left of five factors of a virtual shape when mode ``index`` satisfies (10b) and (16a)."""
+    """Yield the five factors of a virtual shape, reduced by (10b) and (16a) of mode ``index``."""
     known = _balance(index)
     for factor in factors:
         yield factor.xreplace(known)
@@ -86,8 +86,8 @@ def _is_mode(factors: tuple[Expr, ...], index: str) -> Proof:
 
 @proves("16b")
 def prove_stiffness_identity() -> Proof:
-    """The difference of both sides is the virtual work of the forces of mode i, in balance by (10b) and (16a), on any
-    mode j; mode i for mode j and (6) make it the second equation."""
+    """The difference of both sides is the virtual work of the forces of mode i, which balance by (10b) and (16a), on
+    any mode j; the second equation follows for j = i by (6)."""
     pair, single = stiffness_identity()
     yield from _is_mode(virtual_factors(pair.lhs - pair.rhs, phi_j), "i")
     alone = put(pair.lhs - pair.rhs, {phi_j: phi_i})
@@ -95,13 +95,13 @@ def prove_stiffness_identity() -> Proof:
 
 
 def _generalised(index: str = "i") -> dict[Expr, Expr]:
-    """Return the names of mass, stiffness and participation of a mode, with what (6) says they are."""
+    """Return the symbols of mass, stiffness and participation factor of a mode, with their definitions by (6)."""
     return {member(e.lhs, index): member(e.rhs, index) for e in generalised()}
 
 
 @samples("16b")
 def sample_stiffness_identity() -> bool:
-    """Both products of all pairs of modes of a random arm, found by shooting, by quadrature."""
+    """Both products of all pairs of modes of a random arm, computed by shooting, by quadrature."""
     values = sample(161)
     shapes = shoot(values)
     pair, single = stiffness_identity()
@@ -125,13 +125,13 @@ def orthogonality() -> Derivation[tuple[Eq, Eq]]:
     different frequencies both products vanish."""
     identity, _ = stiffness_identity()
     swapped = Eq(*(_swap(side) for side in identity.args))
-    yield "i and j exchanged", "The identity (16b), and the same for mode j.", (identity, swapped)
+    yield "i and j exchanged", "The identity (16b) for mode i and for mode j.", (identity, swapped)
     difference = (identity.lhs - swapped.lhs) - (identity.rhs - swapped.rhs)
     mass = inner_mass(phi_i, phi_j)
     if (difference + (omega_i**2 - omega_j**2) * mass).expand() != 0:
         raise ArithmeticError(f"the products are not symmetric: {difference}")
     subtracted = Eq((omega_i**2 - omega_j**2) * mass, 0, evaluate=False)
-    yield "subtracted", "The stiffness product is symmetric and drops out.", subtracted
+    yield "subtracted", "The stiffness product is symmetric and cancels.", subtracted
     return Eq(mass, 0), Eq(inner_stiffness(phi_i, phi_j), 0)
 
 
@@ -143,8 +143,9 @@ def _swap(expression: Expr) -> Expr:
 
 @proves("16c")
 def prove_orthogonality() -> Proof:
-    """The forces of each mode balance by (10b) and (16a): stiffness minus ω_i² times mass product is no work on mode j,
-    and with ω_j² none on mode i. So ω_i² - ω_j² times the mass product is zero, and with it the stiffness product."""
+    """The forces of each mode balance by (10b) and (16a): the stiffness product minus ω_i² times the mass product, the
+    work of mode i on mode j, vanishes, and so does that with ω_j². Hence ω_i² - ω_j² times the mass product is zero,
+    and the stiffness product as well."""
     mass, stiffness = (e.lhs - e.rhs for e in orthogonality())
     yield from _is_mode(virtual_factors(stiffness - omega_i**2 * mass, phi_j), "i")
     yield from _is_mode(virtual_factors(stiffness - omega_j**2 * mass, phi_i), "j")
@@ -164,19 +165,19 @@ def sample_orthogonality() -> bool:
     return True
 
 
-@derived("16d", "what the manipulator's energy alone would give", (4, 6, "16b"))
+@derived("16d", "stiffness without the joint springs", (4, 6, "16b"))
 def stiffness_of_manipulator_alone() -> Derivation[Eq]:
-    """The paper's (4) without the springs leaves their share out of the generalised stiffness: K_b / M_i is not
-    ω_i² unless the joint is rigid or the mode does not move it."""
+    """(4) without the springs, as in the paper, omits their contribution to the generalised stiffness: K_b / M_i
+    differs from ω_i² unless the joint is rigid or does not move in the mode."""
     springs = inner_stiffness(phi_i, phi_i) - inner_stiffness(phi_i, phi_i, joint=False)
-    yield "share of the springs", "The second energy of (4) less the first, for one mode.", springs
+    yield "share of the springs", "The second energy of (4) minus the first, for one mode.", springs
     return Eq(K_b, stiffness_identity()[1].rhs - springs)
 
 
 @proves("16d")
 def prove_stiffness_of_manipulator_alone() -> Proof:
-    """Twice the first energy of (4) differs from it by the work of the forces of the mode, in balance by (10b) and
-    (16a), on itself."""
+    """Twice the first energy of (4) differs from it by the work of the forces of the mode on the mode itself, which
+    vanishes by (10b) and (16a)."""
     energy = single_mode(potential()[0].rhs) / q_i**2
     alone, size, virtual = stiffness_of_manipulator_alone(), symbol("epsilon"), symbol("eta")
     gap = 2 * energy - alone.rhs.subs(_generalised())
@@ -187,7 +188,7 @@ def prove_stiffness_of_manipulator_alone() -> Proof:
 
 @samples("16d")
 def sample_stiffness_of_manipulator_alone() -> bool:
-    """The strain energy of modes found by shooting; it falls short of ω_i² M_i by the springs' share."""
+    """The strain energy of modes computed by shooting; it is less than ω_i² M_i by the energy of the springs."""
     values, alone = sample(164), stiffness_of_manipulator_alone().rhs
     for mode in shoot(values):
         strain = evaluate(inner_stiffness(phi_i, phi_i, joint=False), values, {phi_i: mode})
@@ -225,12 +226,12 @@ def _modal(energy: Expr, variables: list[Expr], named: dict[Expr, Expr]) -> Expr
 
 @derived(5, "modal energies", (2, 3, 4, 6, "16c"))
 def modal_energies() -> Derivation[tuple[Eq, Eq]]:
-    """(2) put into (3) and (4): orthogonality leaves no product of two modes."""
+    """(2) substituted in (3) and (4): by orthogonality there are no products of different modes."""
     two = separation().rhs.members("i", "j")
     both = tuple(single_mode(energy.rhs, two) for energy in (kinetic(), potential()[1]))
-    yield "two modes", "Any two members of (2) put into (3) and (4).", both
+    yield "two modes", "Any two terms of (2) substituted in (3) and (4).", both
     products = tuple(e.lhs for e in orthogonality())
-    yield "products of two different modes", "They have these factors, which vanish by (16c).", products
+    yield "products of two different modes", "Their factors, which vanish by (16c).", products
     named = {tidy(e.rhs): e.lhs for e in generalised()} | {tidy(e.lhs): e.rhs for e in orthogonality()}
     motion = _modal(single_mode(kinetic().rhs, two), [q_i.diff(t), q_j.diff(t), w.diff(t)], named)
     strain = _modal(single_mode(potential()[1].rhs, two), [q_i, q_j], named)
@@ -239,7 +240,7 @@ def modal_energies() -> Derivation[tuple[Eq, Eq]]:
 
 @proves(5)
 def prove_modal_energies() -> Proof:
-    """Both energies (3) and (4) of any two modes, with (6); what is left is their products of (16c)."""
+    """Both energies (3) and (4) of any two modes, with (6); the remaining terms are the products of (16c)."""
     two = separation().rhs.members("i", "j")
     mass, stiffness = (e.lhs - e.rhs for e in orthogonality())
     products = (mass * q_i.diff(t) * q_j.diff(t), stiffness * q_i * q_j)
@@ -251,7 +252,7 @@ def prove_modal_energies() -> Proof:
 
 @samples(5)
 def sample_modal_energies() -> bool:
-    """The energies of a random arm moving in three modes found by shooting, by quadrature of (3) and (4)."""
+    """The energies of a random arm moving in three modes, computed by shooting, by quadrature of (3) and (4)."""
     values = sample(5)
     shapes, length = shoot(values), values["L"]
     q, q_dot, w_dot = [0.3, -0.5, 0.2], [0.7, 0.4, -0.6], 0.9

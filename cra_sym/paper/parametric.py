@@ -24,9 +24,9 @@ AXIAL, TRANSVERSE = epsilon * u_0 * cos(varpi * t), w_0 + epsilon * w_1 * sin(va
 
 @cache
 def axial_load() -> Expr:
-    """Return the mass beyond x: the axial force it needs per unit of axial acceleration of the base.
+    """Return the mass beyond x: the axial force per unit of axial acceleration of the base.
 
-    What moves across the arm moves along it too: it is the mass that the kinetic energy (3) gives a speed across.
+    The mass that has transverse kinetic energy in (3) also moves axially.
     """
     place, across = Dummy("x"), v.diff(t)
     density, tip = (part.diff(across, across) for part in kinetic_energy()[::2])
@@ -35,7 +35,7 @@ def axial_load() -> Expr:
 
 @cache
 def excited_lagrangian(kind: str) -> ArmLagrangian:
-    """Return the arm's Lagrangian with one of the excitations in it, base otherwise at rest.
+    """Return the Lagrangian of the arm with one of the excitations, the base otherwise at rest.
 
     A base that moves by u along the arm: a point of the deflected arm is at x + u - s, where s, the integral of
     v_x^2 / 2 from the joint on, is the foreshortening. In the kinetic energy the product -u' s' is, up to a total time
@@ -57,7 +57,7 @@ def excited_lagrangian(kind: str) -> ArmLagrangian:
 
 @cache
 def excited_motion(kind: str) -> Any:
-    """Return Hamilton's principle for the excited arm, the base's motion prescribed."""
+    """Return the result of Hamilton's principle for the excited arm with prescribed motion of the base."""
     density, left, right = excited_lagrangian(kind)
     base = {"axial base": [u], "transverse base": [w]}.get(kind, [])
     return hamilton(density, fields=[v], x=x, domain=(0, L), t=t, left=left, right=right, prescribed=base)
@@ -65,7 +65,8 @@ def excited_motion(kind: str) -> Any:
 
 @cache
 def coupling(kind: str) -> Expr:
-    """Return P_ij of a parametric excitation: two modes put into the Lagrangian's share of epsilon cos(varpi t)."""
+    """Return P_ij of a parametric excitation: two modes substituted in the terms of the Lagrangian with epsilon
+    cos(varpi t)."""
     total = put(excited_lagrangian(kind).total(), {u: AXIAL})
     two = single_mode(total, phi_i * q_i + phi_j * q_j)
     names = dict(zip((q_i, q_j), symbols("q_1 q_2"), strict=True))
@@ -79,7 +80,7 @@ def coupling(kind: str) -> Expr:
 
 
 def _together(expression: Expr) -> Expr:
-    """Return the integrals along the arm as one, with constants in front."""
+    """Return the integrals along the arm combined into one, with constants in front."""
     parts = expression.expand()
     whole = [(parts.coeff(integral), integral) for integral in parts.atoms(Integral)]
     if not whole:

@@ -1,7 +1,7 @@
 """Multiple scales at a principal resonance: equations (37)-(49).
 
-The paper's own (43) and (48) are lost. The excitation here is parametric, (36a) or (36b); the paper's words taken
-literally lead to a forced resonance, in :mod:`cra_sym.paper.literal_route`.
+The paper's (43) and (48) are lost. The excitation here is parametric, (36a) or (36b); the paper taken literally leads
+to a forced resonance, see :mod:`cra_sym.paper.literal_route`.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def _step(name: str) -> Any:
 
 @numbered(37, "two-scale expansion", "assumption", ("36a", "36b"))
 def two_scale_expansion() -> Any:
-    """A solution is sought that depends on fast and slow time."""
+    """Expansion of the solution in epsilon, with terms that depend on fast and slow time."""
     return _step("expansion")
 
 
@@ -66,13 +66,13 @@ def order_0() -> Derivation[Any]:
 
 @derived(40, "order 1", (37, 38))
 def order_1() -> Derivation[Any]:
-    """Terms with epsilon: the slow derivative and the excitation drive."""
+    """Terms with epsilon: the derivative by slow time and the excitation are on the right-hand side."""
     yield _expanded()
     return _step("order 1")
 
 
 def _expanded() -> Stage:
-    """Return the equation of motion of a mode with (37) and (38) put in."""
+    """Return the equation of motion of a mode with (37) and (38) substituted."""
     (motion,), (_, twice), system = two_scale_expansion(), derivative_operators(), principal().system
     operator = twice.rhs.subs({Symbol(name): named(name) for name in ("D_0", "D_1")})
     n, j = principal().resonance.first, system.spectator
@@ -83,25 +83,25 @@ def _expanded() -> Stage:
 
 @derived(41, "solution of order 0", (39,))
 def order_0_solution() -> Derivation[Any]:
-    """Each mode swings at its own frequency; its complex amplitude A_n depends on slow time."""
+    """Each mode vibrates at its natural frequency; its complex amplitude A_n depends on slow time."""
     rate = Symbol("r")
     yield "exponential put in", "exp(r T_0) in (39).", Eq(rate**2 + omega_n**2, 0)
-    yield "its roots", "Two, conjugate: with them the amplitudes.", tuple(roots(rate**2 + omega_n**2, rate))
+    yield "its roots", "Two, complex conjugate; so are the amplitudes.", tuple(roots(rate**2 + omega_n**2, rate))
     return _step("free vibration")
 
 
 @numbered(42, "detuning", "definition")
 def detuning() -> Any:
-    """The paper's text measures the detuning from omega_n; the sources it follows, and a parametric excitation, ask for
-    2 omega_n: here the latter (the former is (42a)). Its own symbols are lost."""
+    """The paper measures the detuning from omega_n; the sources that it follows, and a parametric excitation, require 2
+    omega_n, which is used here (the former is (42a)). The symbols of the paper are lost."""
     return _step("detuning")
 
 
 @derived(43, "the excitation in slow time", (42,))
 def excitation_in_exponentials() -> Derivation[Any]:
-    """The paper's equation is lost; from (41) and (42) it can only be this, the excitation at the detuned frequency."""
+    """The paper's equation is lost; from (41) and (42) it can only be the excitation at the detuned frequency."""
     euler = cos(varpi * T_0).rewrite(exp)
-    yield "Euler's formula", "For the frequency of the excitation.", Eq(cos(varpi * T_0), euler, evaluate=False)
+    yield "Euler's formula", "Solved for the frequency of the excitation.", Eq(cos(varpi * T_0), euler, evaluate=False)
     return _step("excitation in exponentials")
 
 
@@ -110,7 +110,7 @@ def secular_terms() -> Derivation[Any]:
     """Factor of exp(i omega_n T_0) on the right of order 1."""
     written, drive = order_0_solution()[0], excitation_in_exponentials()
     right = _own_member(order_1()[0].rhs).subs(drive.lhs, drive.rhs).xreplace({written.lhs: written.rhs})
-    yield "right of order 1", "(41) and (43) in (40); of the sum the member of mode n itself.", right.expand()
+    yield "right of order 1", "(41) and (43) substituted in (40); of the sum, the term of mode n.", right.expand()
     return _step("secular terms")
 
 
@@ -121,7 +121,7 @@ def solvability() -> Derivation[Any]:
     swelling = -I * T_0 * force / (2 * omega_n)
     yield (
         "what a secular term does",
-        "A force of the mode's own frequency makes it swing ever wider.",
+        "A force at the natural frequency of the mode gives a response that grows without bound.",
         (
             Eq(time.diff(T_0, 2) + omega_n**2 * time, force),
             Eq(time, swelling),
@@ -131,7 +131,7 @@ def solvability() -> Derivation[Any]:
 
 
 def residual(rate: Expr | None = None) -> tuple[Expr, Expr]:
-    """Put the expansion into the equation of motion of a single mode; return what is left at orders 0 and 1.
+    """Substitute the expansion in the equation of motion of a single mode; return the residuals at orders 0 and 1.
 
     The slow derivative of the amplitude is that of (48), or ``rate`` if given.
     """
@@ -149,7 +149,7 @@ def residual(rate: Expr | None = None) -> tuple[Expr, Expr]:
         second = rates[f].diff(t).subs({g.diff(t): r for g, r in rates.items()})
         motion = motion.subs(f.diff(t, 2), second)
     motion = motion.subs({g.diff(t): r for g, r in rates.items()})
-    # in slow time the phase is no power of epsilon
+    # in slow time the phase is not a power of epsilon
     plain_motion = motion.expand().subs(epsilon * sigma * t, Symbol("phase", real=True)).expand()
     return tuple((plain_motion.coeff(epsilon, k) * exp(-I * omega_n * t)).expand() for k in (0, 1))
 
@@ -176,7 +176,7 @@ def _fields() -> dict[Symbol, Expr]:
 
 
 def _own_member(expression: Expr) -> Expr:
-    """Return an expression with the member of mode n in place of each sum over modes."""
+    """Return an expression with each sum over modes replaced by its term of mode n."""
     for total in expression.atoms(Sum):
         own = {s: Symbol(s.name.replace("j", "n"), **s.assumptions0) for s in total.function.free_symbols}
         expression = expression.xreplace({total: total.function.xreplace(own)})
@@ -184,13 +184,13 @@ def _own_member(expression: Expr) -> Expr:
 
 
 def _acted(expression: Expr) -> Expr:
-    """Return what an expression with operators is for a single mode: in sums over modes, all others rest."""
+    """Return an expression with operators for a single mode: the amplitudes of all other modes are zero."""
     expression, excitation = _own_member(expression), excitation_in_exponentials()
     return acting(expression, _fields(), _TIMES).subs(excitation.lhs, excitation.rhs)
 
 
 def _left_over(equation: Eq) -> Expr:
-    """Return what is left of an equation of the expansion when the amplitude follows (48)."""
+    """Return the residual of an equation of the expansion for an amplitude that satisfies (48)."""
     a, b = _SLOW.values()
     rates = {f.diff(T_1): (rate / epsilon).subs(epsilon * t, T_1) for f, rate in _rates(a, b).items()}
     return _acted(equation.lhs - equation.rhs).subs(rates)
@@ -198,15 +198,16 @@ def _left_over(equation: Eq) -> Expr:
 
 @proves(37)
 def prove_two_scale_expansion() -> Proof:
-    """Order 0 without epsilon; with (48) it leaves nothing at orders 0 and 1 in the equation of motion of a mode."""
+    """For epsilon = 0 it is order 0; with (48) the residual of the equation of motion of a mode vanishes at orders 0
+    and 1."""
     yield two_scale_expansion()[0].rhs.subs(epsilon, 0) == named("q_n0")
     yield from residual()
 
 
 @proves(38)
 def prove_derivative_operators() -> Proof:
-    """Any exponential of T_0 and T_1, and so any sum of such, differentiated once and twice as one of t and epsilon t;
-    the second leaves only epsilon^2."""
+    """Any exponential of T_0 and T_1, and so any sum of them, differentiated once and twice as a function of t and
+    epsilon t; for the second derivative the difference is of order epsilon^2."""
     fast, slow = Symbol("a"), Symbol("b")
     trial, gaps = exp(fast * T_0 + slow * T_1), []
     for order, operator in enumerate(derivative_operators(), start=1):
@@ -220,20 +221,20 @@ def prove_derivative_operators() -> Proof:
 
 @proves(39)
 def prove_order_0() -> Proof:
-    """Its operators at work on the free vibration (41) leave nothing."""
+    """Its operators applied to the free vibration (41) give zero."""
     yield _left_over(order_0()[0])
 
 
 @proves(40)
 def prove_order_1() -> Proof:
-    """Its operators at work on the free vibration (41) and on the bounded response of first order leave nothing when
-    the amplitude follows (48)."""
+    """Its operators applied to the free vibration (41) and to the bounded first-order response give zero if the
+    amplitude satisfies (48)."""
     yield _left_over(order_1()[0])
 
 
 @proves(41)
 def prove_order_0_solution() -> Proof:
-    """Differentiated twice; and it is real: its own complex conjugate."""
+    """It is differentiated twice, and it is real: equal to its complex conjugate."""
     amplitudes = {named("A_n"): Symbol("a"), named("Abar_n"): Symbol("b")}
     swap = {Symbol("a"): Symbol("b"), Symbol("b"): Symbol("a"), I: -I}
     solution = order_0_solution()[0].rhs.xreplace(amplitudes)
@@ -244,8 +245,8 @@ def prove_order_0_solution() -> Proof:
 
 @proves(42)
 def prove_detuning() -> Proof:
-    """Frequencies; what the excitation makes of the conjugate motion, exp(i (varpi - omega_n) T_0), turns against the
-    motion itself, exp(i omega_n T_0), in slow time alone, at the rate sigma."""
+    """Dimensions; the phase of the product of excitation and conjugate motion, exp(i (varpi - omega_n) T_0), relative
+    to the motion exp(i omega_n T_0) depends on slow time alone, with the rate sigma."""
     yield dimension(detuning()) == Dimension(s=-1)
     yield detuning().lhs == varpi
     angle = ((detuning().rhs - omega_n - omega_n) * T_0).expand().subs(epsilon * T_0, T_1)
@@ -263,7 +264,8 @@ def prove_excitation_in_exponentials() -> Proof:
 
 @proves(44)
 def prove_secular_terms() -> Proof:
-    """Any other slow evolution of the amplitude leaves in the equation of motion just these terms, sign changed."""
+    """For any other slow evolution of the amplitude the residual of the equation of motion is these terms with opposite
+    sign."""
     rate = Symbol("r", real=True)
     left = [term for term in residual(rate)[1].args if not any(e.args[0].has(t) for e in term.atoms(exp))]
     slow = {named("A_n"): Function("a")(t), named("Abar_n"): Function("b")(t)}
@@ -274,8 +276,8 @@ def prove_secular_terms() -> Proof:
 
 @proves(45)
 def prove_solvability() -> Proof:
-    """A force of an oscillator's own frequency makes it swing ever wider, t times a harmonic, and the mean of the right
-    of (40) times exp(-i omega_n T_0) over one period tells how much of it there is: just this."""
+    """A force at the natural frequency of an oscillator gives the response t times a harmonic; the mean over one period
+    of the right-hand side of (40) times exp(-i omega_n T_0) is the amplitude of that force."""
     swelling = t * exp(I * omega_n * t)
     period = 2 * pi / omega_n
     turned = (_acted(order_1()[0].rhs) * exp(-I * omega_n * T_0)).expand()
@@ -294,8 +296,8 @@ def inner_product() -> Eq:
 
 @proves(46)
 def prove_inner_product() -> Proof:
-    """For functions with real and imaginary parts it is what the mass of (6) makes of the four pairs of those, the part
-    of the second function conjugate."""
+    """For functions with real and imaginary parts it is the combination of the mass products (6) of the four pairs of
+    parts, the second function conjugated."""
     f, g = (Function(name)(x) for name in "fg")
     a, b, c, d = (Function(name)(x) for name in ("Re f", "Im f", "Re g", "Im g"))
     product = put(inner_product().rhs, {f: a + I * b, g: c + I * d})
@@ -304,14 +306,14 @@ def prove_inner_product() -> Proof:
 
 
 def _mass(first: Expr, second: Expr) -> Expr:
-    """Return the product of two shapes that the mass (6) of one shape goes with."""
+    """Return the bilinear form of two shapes whose quadratic form is the mass (6)."""
     mass = generalised()[0].rhs
     return (put(mass, {phi_i: first + second}) - put(mass, {phi_i: first - second})) / 4
 
 
 @samples(46)
 def sample_inner_product() -> bool:
-    """Modes of a random arm found by shooting are orthogonal in it."""
+    """Modes of a random arm, computed by shooting, are orthogonal in it."""
     f, g = Function("f"), Function("g")
     values, (one, two, *_rest) = sample(46), shoot(sample(46))
     real = inner_product().rhs.replace(conjugate, lambda e: e)
@@ -321,17 +323,17 @@ def sample_inner_product() -> bool:
 
 @derived(47, "solvability, term by term", (45, 46))
 def distributed() -> Derivation[Eq]:
-    """The inner product with the mode taken of each term: its generalised mass comes in front."""
+    """Inner product of each term with the mode; its generalised mass is a common factor."""
     factor = Symbol("c")
     alone = inner_mass(factor * phi_i, phi_i).doit(integrals=False)
-    yield "one term", "The inner product (46) of any factor c times a mode with that mode: c times its mass (6).", alone
+    yield "one term", "The inner product (46) of c times a mode with that mode is c times its mass (6).", alone
     return Eq((M_n * solvability()[0].lhs).expand(), 0, evaluate=False)
 
 
 @proves(47)
 def prove_distributed() -> Proof:
-    """For a shape that is written out, x^2, the integrals (46) of every term of (45) times the shape with the shape
-    add up to (47), in which M_n is the mass (6) of that shape."""
+    """For the explicit shape x^2, the inner products (46) of every term of (45) times the shape with the shape add up
+    to (47), with M_n the mass (6) of that shape."""
     f, g, factor, shape = Function("f")(x), Function("g")(x), Symbol("c"), x**2
     mass = put(generalised()[0].rhs, {phi_i: shape}).doit()
     product = put(inner_product().rhs, {f: factor * shape, g: shape}).replace(conjugate, lambda e: e).doit()
@@ -345,25 +347,30 @@ def prove_distributed() -> Proof:
 
 @derived(48, "amplitude equation", (47,))
 def amplitude_equation() -> Derivation[Eq]:
-    """The paper's equation is lost. For a parametric excitation the amplitude is driven by its own conjugate; here
-    the derivative is by the time t."""
+    """The paper's equation is lost. For a parametric excitation the rate of the amplitude contains its complex
+    conjugate; here the derivative is by the time t."""
     rate, condition = named("D_1") * named("A_n"), solvability()[0].lhs
     slow = -condition.coeff(rate, 0) if condition.coeff(rate, 0) != 0 else condition
-    yield "slow derivative", "(47) solved for it; the mass of the mode cancels.", Eq(rate, slow / condition.coeff(rate))
+    yield (
+        "slow derivative",
+        "(47) solved for the rate; the mass of the mode cancels.",
+        Eq(rate, slow / condition.coeff(rate)),
+    )
     return plain(principal().amplitude_equations[0]).subs(Symbol("Delta", real=True), epsilon * sigma)
 
 
 @proves(48)
 def prove_amplitude_equation() -> Proof:
-    """Put with the expansion into the equation of motion it leaves nothing at orders 0 and 1; another one would."""
+    """With the expansion, the residual of the equation of motion vanishes at orders 0 and 1; with any other rate it
+    does not."""
     yield from residual()
     yield residual(Symbol("r", real=True)) != (0, 0)
 
 
 @derived(49, "stability boundary", (48,))
 def stability_boundary() -> Derivation[tuple[Eq, Eq]]:
-    """The amplitude of (48) grows between these two frequencies. The paper's boundary, borrowed from axially moving
-    beams, does not follow from its (36); this one follows from (48)."""
+    """The amplitude of (48) grows between these two frequencies. The paper's boundary, taken from axially moving beams,
+    does not follow from its (36); this one follows from (48)."""
     yield from _border(principal())
     lower, upper = _step("boundary")
     return lower, upper
@@ -371,8 +378,8 @@ def stability_boundary() -> Derivation[tuple[Eq, Eq]]:
 
 @proves(49)
 def prove_stability_boundary() -> Proof:
-    """Borders of instability have motions of twice the period of the excitation. With a third harmonic, a sine at one
-    border and a cosine at the other leave nothing at orders 0 and 1 in the equation of motion."""
+    """On the boundary of instability there are motions of twice the period of the excitation: with a third harmonic, a
+    sine on one side and a cosine on the other satisfy the equation of motion at orders 0 and 1."""
     for sign in (1, -1):
         size, shapes = sign * abs(P_nn), (sin, cos)[::sign]
         for border, shape in zip(stability_boundary(), shapes, strict=True):
@@ -385,8 +392,8 @@ angle = Symbol("theta")
 
 
 def _left_by(motion: Expr, size: Expr, frequency: Expr, damping: Expr = S.Zero) -> Proof:
-    """Yield what a motion, a function of half the phase of the excitation, leaves at orders 0 and 1 in the equation of
-    a mode whose coupling P_nn is ``size``."""
+    """Yield the residuals at orders 0 and 1 of the equation of a mode with coupling P_nn = ``size``, for a motion given
+    as a function of half the phase of the excitation."""
     rate = frequency / 2
     force = rate**2 * motion.diff(angle, 2) + 2 * damping * omega_n * rate * motion.diff(angle)
     left = (force + (omega_n**2 + epsilon * size * cos(2 * angle)) * motion).expand()
@@ -410,7 +417,7 @@ def sample_stability_boundary() -> bool:
 
 
 def _border(found: MultipleScales) -> Iterator[Stage]:
-    """Yield the steps from the amplitude equation to where it stops to be stable."""
+    """Yield the steps from the amplitude equation to the boundary of its stability."""
     for step in found.steps:
         if step.name in ("rotating frame", "stability condition"):
             yield step.name, step.statement, plain(found.explicit(step.expression))
@@ -418,7 +425,7 @@ def _border(found: MultipleScales) -> Iterator[Stage]:
 
 @derived("49b", "threshold of damping", (48,))
 def damping_threshold() -> Derivation[Eq]:
-    """With a damping ratio zeta_n the amplitude grows only above this epsilon."""
+    """With a damping ratio zeta_n the amplitude grows only for larger epsilon."""
     damped = principal(damped=True)
     yield from _border(damped)
     assert damped.border is not None
@@ -427,8 +434,8 @@ def damping_threshold() -> Derivation[Eq]:
 
 @proves("49b")
 def prove_damping_threshold() -> Proof:
-    """With this damping a motion of twice the period of the excitation neither grows nor decays in the middle of the
-    zone: with a third harmonic it leaves nothing at orders 0 and 1 in the equation of motion."""
+    """At this epsilon, in the middle of the zone, a motion of twice the period of the excitation neither grows nor
+    decays: with a third harmonic it satisfies the equation of motion at orders 0 and 1."""
     needed = zeta_n * epsilon / damping_threshold().rhs
     yield damping_threshold().lhs == epsilon
     yield not needed.has(zeta_n)

@@ -49,7 +49,7 @@ def coefficient_ratios() -> Derivation[tuple[Eq, ...]]:
 
 @proves(24)
 def prove_coefficient_ratios() -> Proof:
-    """They satisfy the conditions at the joint written down by hand; by hand, a rigid joint mirrors C_1, C_2."""
+    """They satisfy the conditions at the joint written by hand; for a rigid joint they are -C_1, -C_2."""
     third, fourth = coefficient_ratios()
     rigid = {s_t: 1, c_t: 0, s_r: 1, c_r: 0}
     yield (third.lhs, fourth.lhs) == (C_3, C_4)
@@ -60,7 +60,7 @@ def prove_coefficient_ratios() -> Proof:
 
 @samples(24)
 def sample_coefficient_ratios() -> bool:
-    """Modes of a random arm found by shooting have them."""
+    """Modes of a random arm, computed by shooting, have these coefficients."""
     found = {e.lhs: e.rhs for e in coefficient_ratios()}
     values = sample(26)
     for mode in shoot(values):
@@ -74,7 +74,7 @@ def sample_coefficient_ratios() -> bool:
 
 @derived(25, "mode shape", (17, 24))
 def mode_shape() -> Derivation[Eq]:
-    """(24) in (17), with C_2 / C_1 = r_2; the scale C_1 stays free."""
+    """(24) substituted in (17), with C_2 / C_1 = r_2; the factor C_1 remains arbitrary."""
     put_in = mode_form()[0].rhs.subs({e.lhs: e.rhs for e in coefficient_ratios()})
     yield "ratios put in", "(24) in (17).", Eq(phi_i, put_in)
     shape = put_in.subs(C_2, r_2 * C_1)
@@ -94,18 +94,18 @@ def _ratio_by_parts() -> Eq:
 
 @derived(26, "ratio of the circular coefficients", (20, 21), shown=_ratio_by_parts)
 def circular_ratio() -> Derivation[Eq]:
-    """The first row of the reduced system, which the second repeats at a natural frequency."""
+    """From the first row of the reduced system; at a natural frequency the second row is proportional to it."""
     system = reduced_system().lhs
     row = (system.args[0] * system.args[1])[0]
-    yield "first row", "Of the reduced system (20), to be solved for C_2 / C_1; (21) has its entries.", Eq(row, 0)
+    yield "first row", "Of the reduced system (20), to be solved for C_2 / C_1; its entries are (21).", Eq(row, 0)
     first, second = reduced_matrix()[0, :]
     return Eq(r_2, -first / second)
 
 
 @proves(25)
 def prove_mode_shape() -> Proof:
-    """Whatever r_2, the functions of (17) with coefficients that satisfy the conditions at the joint written down by
-    hand, the second r_2 times the first."""
+    """For any r_2, the functions of (17) with coefficients that satisfy the conditions at the joint written by hand,
+    C_2 = r_2 C_1."""
     row = coefficients_of(mode_shape().rhs)
     yield from by_hand.root_rows() * row
     yield row[1] - r_2 * row[0]
@@ -113,27 +113,27 @@ def prove_mode_shape() -> Proof:
 
 
 def coefficients_of(shape: Expr) -> Matrix:
-    """Return what the functions of (17) are multiplied by in a mode shape."""
+    """Return the coefficients of the functions of (17) in a mode shape."""
     expanded = shape.expand()
     return Matrix([expanded.coeff(function) for function in basis()])
 
 
 @samples(25)
 def sample_mode_shape() -> bool:
-    """With (26), the shape of modes of a random arm found by shooting."""
+    """With (26), the shape of modes of a random arm computed by shooting."""
     return shapes_agree((25,), mode_shape().rhs, circular_ratio().rhs)
 
 
 @proves(26)
 def prove_circular_ratio() -> Proof:
-    """With it the force at the tip balances, written down by hand."""
+    """It satisfies the force condition at the tip, written by hand."""
     yield circular_ratio().lhs == r_2
     yield (by_hand.eliminated() * Matrix([1, circular_ratio().rhs]))[0]
 
 
 @samples(26)
 def sample_circular_ratio() -> bool:
-    """The ratio of modes of a random arm found by shooting, and the second row of the reduced system."""
+    """The ratio for modes of a random arm computed by shooting, and the second row of the reduced system."""
     values = sample(28)
     for mode in shoot(values):
         numbers = group_numbers(values, mode.beta)

@@ -1,7 +1,7 @@
-"""The boundary conditions of a mode written down by hand: the exact second route behind the checks of (18)-(29).
+"""The boundary conditions of a mode written by hand: the exact second route of the checks of (18)-(29).
 
 Nothing here comes from a derivation. In units of the length and the bending stiffness the shape is
-``C_1 cos + C_2 sin + C_3 cosh + C_4 sinh`` of lambda times the place.
+``C_1 cos + C_2 sin + C_3 cosh + C_4 sinh`` of lambda times the position.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def determinant() -> Expr:
 
 
 def minors(rows: Matrix, others: Matrix) -> Iterator[Expr | bool]:
-    """Yield what vanishes if each row of a matrix is that row of another but for a factor: every minor of the two."""
+    """Yield the minors that vanish if each row of a matrix is proportional to that of another."""
     for one, two in ((rows[r, :], others[r, :]) for r in range(rows.rows)):
         yield any(one)
         for i, j in combinations(range(rows.cols), 2):

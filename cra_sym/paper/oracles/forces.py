@@ -1,4 +1,4 @@
-"""Forces, virtual work and inertia of the arm written down by hand: the exact second route behind (3)-(16) and (36).
+"""Forces, virtual work and inertia of the arm written by hand: the exact second route of (3)-(16) and (36).
 
 Nothing here comes from the Lagrangian.
 """
@@ -22,18 +22,18 @@ def rigid_body() -> tuple[Expr, ...]:
 
 
 def mass_product(first: Expr, second: Expr) -> Expr:
-    """Return the work that the inertia of manipulator and end-effector, accelerated as one shape, does on another."""
+    """Return the work of the inertia forces of manipulator and end-effector, accelerated in one shape, on another."""
     tip = m_e * first * second + J_e * first.diff(x) * second.diff(x)
     return Integral(rho * A * first * second, (x, 0, L)) + tip.subs(x, L)
 
 
 def spring_product(first: Expr, second: Expr) -> Expr:
-    """Return the work that the joint's two springs, deflected as one shape, do on another."""
+    """Return the work of the two joint springs, deflected in one shape, on another."""
     return (k_t * first * second + k_r * first.diff(x) * second.diff(x)).subs(x, 0)
 
 
 def stiffness_product(first: Expr, second: Expr) -> Expr:
-    """Return the work that manipulator and joint, deflected as one shape, do on another."""
+    """Return the work of manipulator and joint, deflected in one shape, on another."""
     return Integral(E * I_z * first.diff(x, 2) * second.diff(x, 2), (x, 0, L)) + spring_product(first, second)
 
 
@@ -43,10 +43,10 @@ def virtual_work(virtual: Expr) -> Expr:
 
 
 def newton() -> tuple[Expr, ...]:
-    """Return what Newton's law leaves, inertia forces included, of a Bernoulli-Euler beam.
+    """Return the residuals of Newton's law, with inertia forces, of an Euler-Bernoulli beam.
 
     Force on a slice per length, force and moment on the joint, force and moment on the end-effector, and the force on
-    the whole arm, which the base carries and F drives.
+    the whole arm, carried by the base and driven by F.
     """
     moment = E * I_z * v.diff(x, 2)
     shear, acceleration = moment.diff(x), (w + v).diff(t, 2)

@@ -1,7 +1,7 @@
 """Rates of the squared natural frequencies by implicit differentiation, (31) and (32): a second route to sensitivities.
 
-It differentiates the determinant (23), where :mod:`cra_sym.analysis.sensitivities` perturbs the modes. Near lambda = 0
-the derivatives of the determinant cancel.
+It differentiates the determinant (23), while :mod:`cra_sym.analysis.sensitivities` uses perturbation of the modes. Near
+lambda = 0 the derivatives of the determinant cancel.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["implicit_rates", "squared_frequency_rates"]
 
 
 def implicit_rates(arm: Arm, modes: int = 3) -> dict[str, NDArray[np.float64]]:
-    """Return how the squared angular natural frequencies follow joint and end-effector.
+    """Return the rates of the squared angular natural frequencies by the parameters of joint and end-effector.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Modes of the arm by shooting with power series: the numeric second route behind many checks.
+"""Modes of the arm by shooting with power series: the numerical second route of many checks.
 
 Nothing here comes from a derivation: the end conditions are written by hand and the fundamental solutions are Taylor
-series, so an error in the derived trigonometric forms cannot hide.
+series, independent of the derived trigonometric forms.
 """
 
 from __future__ import annotations
@@ -73,7 +73,8 @@ def _shoot(items: tuple[tuple[str, float], ...], modes: int) -> tuple[ShotMode, 
     speed = np.sqrt(bending / line_mass)
 
     def tip(beta: Any) -> np.ndarray:
-        """Rows moment and shear balance at the tip, columns the two solutions that satisfy the root."""
+        """Rows: moment and force conditions at the tip; columns: the two solutions that satisfy the conditions at the
+        root."""
         square = (np.asarray(beta) ** 2 * speed) ** 2
         columns = []
         for start in starts:
