@@ -60,11 +60,6 @@ def on_basis(
     found = np.empty((len(s), count, s.shape[1]), dtype=complex)
     there = np.zeros(len(s), dtype=bool)
     pencil = system.numerics("pencil")
-    if pencil is None and zeta is not None:
-        raise ValueError(
-            "zeta: too few modes reach the accuracy of 1e-6 where the problem varies along x; set damping='structural' "
-            "or lower angular_frequency or zeta"
-        )
     if pencil is None:
         return found, there
     alone = system.numerics("damped_spatial").singular(columns) | (zeta is not None)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from cra_sym.analysis.basis_response import on_basis
 from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
 from cra_sym.checks import choice, default_floating_point, instance, one_axis, shown
-from cra_sym.model.routes import Modes
-from cra_sym.model.spatial import SpatialProblem
+from cra_sym.model.routes import GeneralRoute, Modes
+from cra_sym.model.spatial import HALVINGS, SpatialProblem
 from cra_sym.model.system import System
 from cra_sym.model.values import flat_columns
 from cra_sym.solvers.driven import driven_states
@@ -28,8 +28,6 @@ Complex = NDArray[np.complex128]
 _BELOW, _ABOVE, _DIGITS = 18.0, 14.0, 37.0  # reach of the quadrature in ln y, and minus ln of its error
 _SOFT, _MOST_SOFT = 0.03, 4  # ratio to the next frequency below which a mode is soft; largest number of soft modes
 _NEAR = 0.05  # z below which soft modes are summed separately, over the square of the first frequency that is not soft
-_MODES = (20, 60, 200)  # numbers of modes that are tried in turn where the problem varies along x
-_LEFT_OUT = 1e-9, 1e-6  # relative contribution of the damping of omitted modes to the response: target, accepted
 _FINEST = 20  # largest number of halvings of the domain at imaginary frequencies
 _KINDS = ("force", "motion")
 _FASTEST = 1e60  # rad/s, whose fourth power does not overflow; below its inverse the response is static
@@ -97,11 +95,11 @@ def frequency_response(
     The integrand has no resonance, and the trapezoidal rule in ln y converges geometrically to rounding. Rigid-body
     modes, which have no damping, are summed separately.
 
-    Where coefficients or loads vary along x, up to 200 modes are summed with their damping, and the undamped
-    contribution of all others is added exactly. With dampers along x, with a stiffness that vanishes at an end, and
-    where 200 modes are too few, the problem is solved in a Ritz basis on the stresses, refined until the response
-    converges to 1e-9. A response that does not converge to 1e-6 is refused, as is modal damping of a structure that is
-    driven by the motion of one end and varies along x or can still move as a rigid body.
+    Where coefficients or loads vary along x, the problem is solved in a Ritz basis on the stresses, refined until the
+    response converges to 1e-9; one that does not converge to 1e-6, of waves that are too short, is solved as a
+    boundary-value problem, or refused with modal damping or a stiffness that vanishes at an end. With third derivatives
+    by x or a mass of the highest derivative the boundary-value problem and the integral above serve too. Modal damping
+    is refused where the motion of one end drives a structure that varies along x or can still move as a rigid body.
 
     Examples
     --------
@@ -130,8 +128,8 @@ def frequency_response(
         found = undamped(grid / np.sqrt(loss)) / loss[..., None]
     else:
         undamped.check_modal_damping(zeta)
-        by_modes = undamped.varies and np.any(zeta)
-        found = undamped.by_modes(grid, zeta) if by_modes else _with_modal_damping(undamped, grid, zeta)
+        on_basis = undamped.has_basis and np.any(zeta)
+        found = undamped.damped_on_basis(grid, zeta) if on_basis else _with_modal_damping(undamped, grid, zeta)
     found = np.where((grid == 0)[..., None, :], undamped.turned_by_motion(found), found)
     unbounded = (grid == 0) & undamped.drives_rigid_motion()[..., None]
     found = np.where(unbounded[..., None, :], np.inf, found)
@@ -277,23 +275,29 @@ class _Undamped:
         columns, count = self._columns, (1 if self._places is None else self._places.size)
         found = np.empty((len(parameter), count, parameter.shape[-1]), dtype=complex)
         regular = np.arange(len(parameter))
-        damped_along = self.problem_damped and not self._problem.uniform
-        if damped_along or self._vanishing:
+        if not self._problem.uniform:
             found, there = self._on_basis(parameter)
             regular = np.nonzero(~there)[0]
-        for some, left, problem in self._problem.problems(columns[:, regular]):
+        for some, left, problem in self._problem.problems(columns[:, regular], self._halvings(columns[:, regular])):
             rows = regular[some]
-            row = np.repeat(np.arange(len(some)), parameter.shape[-1])
-            here = parameter[rows].ravel()
-            here = here + 0j if self.problem_damped or np.imag(here).any() else np.real(here)
             if self._places is None:
                 share = np.ones((len(rows), 1))
             else:
                 share = problem.shares(np.atleast_1d(self._places), left)
-            state = driven_states(problem, here, row, share[row], self._row, self._kind)
-            values = state[..., self._place].reshape(len(rows), parameter.shape[-1], count)
-            found[rows] = np.swapaxes(values, 1, 2)
+            here = parameter[rows]
+            here = here + 0j if self.problem_damped or np.imag(here).any() else np.real(here)
+            for part in np.array_split(np.arange(here.shape[1]), 1 if self._problem.uniform else here.shape[1]):
+                row = np.repeat(np.arange(len(some)), len(part))
+                state = driven_states(problem, here[:, part].ravel(), row, share[row], self._row, self._kind)
+                values = state[..., self._place].reshape(len(rows), len(part), count)
+                found[rows[:, None], :, part] = values
         return found
+
+    def _halvings(self, columns: NDArray[np.float64]) -> int:
+        """Return the number of halvings of the domain that resolve the coefficients along x."""
+        if self._problem.uniform or not columns.size:
+            return HALVINGS
+        return max(GeneralRoute(self._problem).needed(columns), HALVINGS)
 
     def _on_basis(self, parameter: NDArray[Any], zeta: Any = None) -> tuple[Complex, NDArray[np.bool_]]:
         """Return the response from the basis on the stresses, shape (rows, X, K), and which rows have one."""
@@ -307,63 +311,23 @@ class _Undamped:
     # summed there, and the rest is interpolated from frequencies at which the problem is well conditioned.
 
     @cached_property
-    def _vanishing(self) -> bool:
-        """Whether a coefficient is infinite at an end, in any member of the batch."""
-        return bool(self._system.numerics("damped_spatial").singular(self._columns).any())
+    def has_basis(self) -> bool:
+        """Whether the problem varies along x and can be solved in the basis on the stresses."""
+        return not self._problem.uniform and self._system.numerics("pencil") is not None
 
     @cached_property
     def _soft(self) -> int:
         """Number of modes far below the next, in any member of the batch; 0 for driving by a motion."""
         if self.problem_damped or (self.motion is None and not self.by_force) or not self._problem.displacements:
             return 0
-        if self._vanishing and (self._system.natural_frequencies(1) > 0).all():
+        if self.has_basis and (self._system.natural_frequencies(1) > 0).all():
             return 0  # the basis is as good at rest
-        if self.varies:
-            return next((n for n in _MODES if self._reached(n)), _MODES[-1])
         omega = self._system.natural_frequencies(_MOST_SOFT + 1)
         gaps = (omega[..., :-1] < _SOFT * omega[..., 1:]).reshape(-1, _MOST_SOFT).any(axis=0)
         return int(np.flatnonzero(gaps).max(initial=-1)) + 1
 
-    # Where the problem varies along x, many modes are summed: their accuracy is known, while the dynamic stiffness of
-    # many short pieces loses digits at low frequencies.
-
-    def _reached(self, modes: int) -> bool:
-        omega = self._system.natural_frequencies(modes + 1)
-        low = bool((self._fastest**2 < _NEAR * omega[..., -1] ** 2).all())
-        return low and (not np.any(self._system.zeta) or self._left_out(modes) < _LEFT_OUT[0])
-
-    def _left_out(self, modes: int) -> float:
-        """Return a bound of the effect of the omitted modes' damping, over the static response of the elastic modes.
-
-        The residue over the squared frequency of a mode decreases at least as the inverse square of its number.
-        """
-        omega = self._system.natural_frequencies(modes).reshape(-1, modes, 1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            static = np.where(omega > 0, np.abs(self._products(modes)) / omega**2, 0.0)
-            share = modes * static[:, -4:].max(axis=(1, 2)) / static.max(axis=(1, 2))
-        zeta = np.broadcast_to(self._system.zeta, self._system.shape).ravel()
-        return float(np.max(2 * zeta * self._fastest / omega[:, -1, 0] * np.nan_to_num(share), initial=0.0))
-
-    def by_modes(self, grid: NDArray[np.float64], zeta: NDArray[np.float64]) -> Complex:
-        """Return the response with modal damping of the modes that are summed, shape (..., X, K)."""
-        shape, modes = self._system.shape, self._soft
-        if self._vanishing:
-            return self._damped_on_basis(grid, zeta)
-        squares = self._system.natural_frequencies(modes + 1).reshape(-1, modes + 1) ** 2
-        squares, limit = squares[:, :-1], squares[:, -1]
-        if (self._fastest**2 >= _NEAR * limit).any() or self._left_out(modes) > _LEFT_OUT[1]:
-            return self._damped_on_basis(grid, zeta)
-        z = np.broadcast_to(grid**2, (len(squares), grid.size))
-        values = np.swapaxes(self._exact(nodes(limit)), 1, 2).real
-        others = np.swapaxes(remainder(values, squares, self._residues, limit)(z), 1, 2)
-        ratio = np.broadcast_to(zeta, (*shape, 1)).reshape(-1, 1, 1)
-        gap = squares[:, :, None] + 2j * ratio * np.sqrt(squares)[:, :, None] * grid - z[:, None, :]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            answers = np.where(gap == 0, 0.0, 1.0 / gap)  # static: the caller adds the rigid-body modes
-        found = others + np.einsum("rmx,rmk->rxk", self._residues, answers)
-        return np.asarray(found.reshape(*shape, *found.shape[1:]))
-
-    def _damped_on_basis(self, grid: NDArray[np.float64], zeta: NDArray[np.float64]) -> Complex:
+    def damped_on_basis(self, grid: NDArray[np.float64], zeta: NDArray[np.float64]) -> Complex:
+        """Return the response with modal damping from the basis on the stresses, shape (..., X, K)."""
         shape = self._system.shape
         z = np.broadcast_to(grid**2, (self._columns.shape[1], grid.size))
         found, _ = self._on_basis(z, np.broadcast_to(zeta, (*shape, 1)).ravel())

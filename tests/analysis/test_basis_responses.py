@@ -109,6 +109,25 @@ def test_eigenvalues_are_counted_on_a_domain_that_ends_before_the_tip():
 TIMES = np.array([0.25, 1.0, 1.9, 2.1, 3.0, 4.5])
 
 
+@pytest.mark.parametrize("damping", ["modal", "structural"])
+def test_a_taper_to_almost_a_point(damping):
+    """At rest the integral of (1 - x)^2 / E I, E I = (1 - x + e)^3; else the first modes, at rest those beyond."""
+    e, Omega, zeta = 1e-6, 3.0, 0.02
+    tapered = cra.Model(
+        KINETIC - (1 - x + e) ** 3 * v.diff(x, 2) ** 2 / 2, fields=[v], x=x, domain=(0, 1), t=t,
+        essential=[ROOT, v.diff(x).subs(x, 0)], virtual_work=[(F, v, "right")],
+    )  # fmt: skip
+    system = tapered.at({}, zeta=zeta)
+    found = cra.frequency_response(system, [0.0, Omega], drive=F, damping=damping)
+    loss = 1.0 + (0.0 if damping == "modal" else 2j * zeta)
+    static = (np.log((1 + e) / e) + 2 * e / (1 + e) - 0.5 * (e / (1 + e)) ** 2 - 1.5) / loss
+    omega, tip = system.natural_frequencies(12), system.modes(12).displacement(1, 0)
+    damped = omega**2 * loss + (2j * zeta * omega * Omega if damping == "modal" else 0.0)
+    summed = (tip**2 * (1 / (damped - Omega**2) - 1 / (loss * omega**2))).sum()
+    assert_allclose(found[0], static, rtol=1e-9)
+    assert_allclose(found[1], static + summed, rtol=1e-3)
+
+
 def string_with_a_damper(damper):
     """Velocity of the end: 1 / (1 + c), times -(1 - c) / (1 + c) whenever the wave has come back."""
     start, back = 1 / (1 + damper), (1 - damper) / (1 + damper)
