@@ -133,7 +133,7 @@ def response(
     nonlinear
     system (not a batch) is integrated in time, its linear modes exactly, to a relative error of about 1e-9. Of a system
     with elastic-slip elements (batches too) the sum is that of its modes without them, followed exactly from event to
-    event; see `slip_response`.
+    event, polynomial terms beside them included; see `slip_response`.
 
     Parameters
     ----------

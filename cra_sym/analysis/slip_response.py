@@ -72,10 +72,10 @@ class SlipResponse(ByValue):
     state : ndarray of int8, shape (..., E, T)
         0 where an element sticks, 1 or -1 where it slips in that direction, just before each time.
     kinetic, potential, elastic : ndarray, shape (..., T)
-        Stored energies, J: of the masses, of the structure, of the springs of the elements.
+        Stored energies, J: of the masses, of the structure with its polynomial terms, of the springs of the elements.
     work, dampers : ndarray, shape (..., T)
-        Work of the loads, including inertia forces of the moving frame, and energy dissipated by dampers and modal
-        damping since t = 0, J.
+        Work of the loads, including inertia forces of the moving frame, and energy dissipated by dampers, polynomial
+        forces without a potential, and modal damping since t = 0, J.
     dissipated : ndarray, shape (..., E, T)
         Energy dissipated by each slider, J.
     initial : ndarray, shape (...)
@@ -136,9 +136,10 @@ def slip_response(
 ) -> SlipResponse:
     """Return the time history of elastic-slip elements: states, forces, events, energies.
 
-    Between two events the motion is linear and computed exactly; events are located to rounding, and none is missed,
-    however short the slip. The modes are those without the elements; omitted modes respond statically to the forces of
-    the elements. Sliders are at zero at t = 0.
+    Between two events the motion is linear and computed exactly; with polynomial terms beside the elements it is a
+    Taylor series of degree 36, its steps so short that the last terms are rounding. Events are located to rounding, and
+    none is missed, however short the slip. The modes are those without the elements; omitted modes respond statically
+    to the forces of the elements. Sliders are at zero at t = 0.
 
     Parameters
     ----------
@@ -156,8 +157,8 @@ def slip_response(
     Raises
     ------
     TypeError, ValueError
-        If the system has no elastic-slip elements, or has other nonlinear terms, gyroscopic or follower forces;
-        otherwise as :func:`cra_sym.response`.
+        If the system has no elastic-slip elements, or has nonlinear inertia, nonlinear terms with known motions or
+        forces, gyroscopic or follower forces; if the motion runs away; otherwise as :func:`cra_sym.response`.
 
     Examples
     --------

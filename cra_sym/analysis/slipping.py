@@ -9,13 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES
 from cra_sym.checks import broadcastable
+from cra_sym.model.modal_equations import modal_equations
 from cra_sym.model.projection import Projected
 from cra_sym.model.system import System
 from cra_sym.solvers.driven_modes import Start, checked
 from cra_sym.solvers.force import Force
 from cra_sym.solvers.motion import BaseMotion, Harmonic, Piecewise
 from cra_sym.solvers.slip_loads import Cause
+from cra_sym.solvers.slip_polynomials import Polynomial
 from cra_sym.solvers.slip_records import Peak, Sampler
 from cra_sym.solvers.slipping import Events, SlippingModes, Step, follow
 from cra_sym.solvers.slipping import Start as State
@@ -105,9 +108,11 @@ def slipping(
     Raises
     ------
     ValueError
-        If the system has nonlinear terms beside its elements, or gyroscopic or follower forces.
+        If the system has nonlinear inertia or parametric nonlinear terms beside its elements, or gyroscopic or follower
+        forces.
     """
-    base = linear_beside(system)
+    base = _conservative_beside(system)
+    polynomials = _polynomials(base, modes)
     found, omega, form = system.slip_elements(modes), base.natural_frequencies(modes), base.numerics("damping")
     loads = [(gamma, h.profile if isinstance(h, Force) else h, isinstance(h, BaseMotion)) for gamma, h in driven]
     motions = {f"motion {k}": np.empty(motion.shape) for k, (_, motion, _) in enumerate(loads)}
@@ -126,18 +131,56 @@ def slipping(
     slipping_modes = SlippingModes(
         _members(omega, shape, 1), drag, _members(found.displacements, shape, 2), _members(found.flexibility, shape, 2),
         found.where, _members(found.stiffness, shape, 1), _members(found.slip, shape, 1),
+        tuple(term._replace(tensor=_members(term.tensor, shape, term.tensor.ndim - len(base.shape)))
+              for term in polynomials),
     )  # fmt: skip
     return Slipping(shape, base, slipping_modes, causes, State(_members(q, shape, 1), _members(u, shape, 1)))
 
 
 def linear_beside(system: System) -> System:
     """Return a system without its elements, if it is linear then and conservative but for dampers."""
+    if system.without_hysteresis.numerics("nonlinear") is not None:
+        raise ValueError(
+            "system: elastic-slip elements must be its only nonlinear terms here; use slip_response or steady_states"
+        )
+    return _conservative_beside(system)
+
+
+def _conservative_beside(system: System) -> System:
     base = system.without_hysteresis
-    if base.numerics("nonlinear") is not None:
-        raise ValueError("system: in time elastic-slip elements must be its only nonlinear terms; use steady_states")
     if base.conservative_part is not base:
         raise ValueError("system: beside elastic-slip elements its forces must be conservative, or dampers")
     return base
+
+
+def _polynomials(base: System, modes: int) -> tuple[Polynomial, ...]:
+    """Return the polynomial forces of a system, with its batch axes before those of the tensors."""
+    if base.numerics("nonlinear") is None:
+        return ()
+    if modes > MOST_NONLINEAR_MODES:
+        raise ValueError(f"modes = {modes}: must be at most {MOST_NONLINEAR_MODES} for a nonlinear system")
+    each = [modal_equations(one, modes).polynomials for one in base.parameter_sets]
+    tensors: dict[tuple[bool, int, int], list[Array | float]] = {}  # zeros where a set lacks a term
+    for number, equations in enumerate(each):
+        for has_potential, terms in ((True, equations.energies), (False, equations.forces)):
+            for tensor, positions, velocities, causes in terms:
+                if causes:
+                    raise ValueError(
+                        "system: in time no motion or force may multiply its displacements; use steady_states"
+                    )
+                if has_potential and velocities:
+                    raise ValueError(
+                        "system: in time its inertia must be linear beside elastic-slip elements; use steady_states"
+                    )
+                kind = (has_potential, positions - has_potential, velocities)
+                force = positions * tensor if has_potential else tensor
+                tensors.setdefault(kind, [0.0] * len(each))[number] = force
+    found = []
+    for (has_potential, positions, velocities), parts in tensors.items():
+        size = (modes,) * (1 + positions + velocities)
+        stacked = np.stack([np.broadcast_to(part, size) for part in parts]).reshape(*base.shape, *size)
+        found.append(Polynomial(stacked, positions, velocities, has_potential))
+    return tuple(found)
 
 
 def slipping_outputs(problem: Slipping, rows: Array, t: Any, derivative: int) -> Array:
@@ -157,6 +200,10 @@ def slipping_residual(problem: Slipping, row: Array, stop: Any) -> Array:
     While elements slip it is that of the motion, for at most ten periods of the lowest elastic mode; once all stick it
     is the bound by the sum of the modes.
     """
+    if problem.modes.polynomials:
+        raise ValueError(
+            "system: polynomial terms beside elastic-slip elements leave no bound of its residual vibration"
+        )
     row = _members(row, problem.shape, 1)
     omega, last = problem.modes.omega, np.broadcast_to(stop, problem.shape).ravel()
     lowest = np.where(omega > 0, omega, np.inf).min(axis=0)

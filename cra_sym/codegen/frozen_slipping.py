@@ -139,10 +139,10 @@ def slipping_numbers(system: System, modes: int, drive: Any, outputs: Outputs | 
                 "number of an Iwan"
             )
     omega = np.sqrt(np.diagonal(-found.A[half:, :half]))
-    several = (np.reshape(part, (*np.shape(part), 1)) for part in (elements.stiffness, elements.slip))
+    stiffness, slip = (np.reshape(part, (*np.shape(part), 1)) for part in (elements.stiffness, elements.slip))
     slipping = SlippingModes(
         omega[:, None], -found.A[half:, half:, None], rows[..., None], elements.flexibility[..., None],
-        elements.where, *several,
+        elements.where, stiffness, slip,
     )  # fmt: skip
     on_forces = _on_forces(system, modes, outputs, elements.flexibility)
     return SlippingNumbers(

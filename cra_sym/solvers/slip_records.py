@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .slip_polynomials import polynomial_forces, polynomial_potential
 from .slipping import ORDER, SlippingModes, Step
 
 __all__ = ["Energies", "Ledger", "Peak", "Sampler"]
@@ -78,7 +79,8 @@ class Energies(NamedTuple):
     kinetic, potential, elements : ndarray, shape (P, T)
         Stored in the masses, in the modes, and in the springs of the elements with the flexibility of omitted modes.
     input, dampers : ndarray, shape (P, T)
-        Work of the loads, and energy dissipated by dampers and modal damping, since t = 0.
+        Work of the loads, and energy dissipated by dampers, modal damping and polynomial forces without a potential,
+        since t = 0.
     sliders : ndarray, shape (E, P, T)
         Energy dissipated by each slider.
     force : ndarray, shape (E, P, T)
@@ -131,12 +133,16 @@ class Ledger:
         here = self.modes.of(step.members)
         moving = span > 0
         rate = step.series[1:] * _POWERS[1:, None]  # times the span
+        lossy, whole = [term for term in here.polynomials if not term.conservative], np.where(moving, span, 1.0)
         for node, weight in zip(_NODES, _WEIGHTS, strict=True):
             speed, load = _at(rate, share * node), _at(step.loads, share * node)
             drag = here.damping * speed if here.damping.ndim == 2 else np.einsum("mnp,np->mp", here.damping, speed)
             scale = np.where(moving, weight * share / np.where(moving, span, 1.0) ** 2, 0.0)
             self._work[step.members] += scale * (load * speed).sum(axis=0)
-            self._drag[step.members] += scale * np.where(moving, span, 1.0) * (drag * speed).sum(axis=0)
+            self._drag[step.members] += scale * whole * (drag * speed).sum(axis=0)
+            if lossy:
+                force = polynomial_forces(lossy, _at(step.series, share * node), speed / whole)
+                self._drag[step.members] -= scale * whole**2 * (force * speed).sum(axis=0)
         slid = (_at(step.moved, share) - step.moved[0])[here.where]
         self._slid[:, step.members] += np.where(slipping, step.state * here.slip * slid, 0.0)
         arrived = np.flatnonzero(moving)
@@ -160,7 +166,7 @@ class Ledger:
         at = (members, column)
         self.q[:, members, column] = q
         kept.kinetic[at] = (u**2).sum(axis=0) / 2
-        kept.potential[at] = ((here.omega * q) ** 2).sum(axis=0) / 2
+        kept.potential[at] = ((here.omega * q) ** 2).sum(axis=0) / 2 + polynomial_potential(here.polynomials, q)
         kept.elements[at] = ((force**2 / here.stiffness).sum(axis=0) + (total * give).sum(axis=0)) / 2
         kept.input[at], kept.dampers[at] = self._work[members], self._drag[members]
         place = (slice(None), *at)

@@ -1,9 +1,9 @@
 """Modes with elastic-slip elements in time, exact from event to event.
 
 An element is a spring in series with a slider: it sticks while its force is below the slip force, and slips with that
-force until the sliding velocity vanishes. Between such events the system is linear. A step is the Taylor series of its
-matrix exponential to rounding. Within it forces and velocities are polynomials, whose first roots, isolated by
-Descartes' rule of signs, are the events. There is no fixed step.
+force until the sliding velocity vanishes. Between such events the system is linear, but for polynomial forces. A step
+is the Taylor series of its motion to rounding. Within it forces and velocities are polynomials, whose first roots,
+isolated by Descartes' rule of signs, are the events. There is no fixed step.
 
 Arrays of one number a batch member have the members along their last axis.
 """
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from .first_roots import first_roots, hull, rounding
 from .motion_terms import Harmonic, Piecewise
 from .slip_loads import Cause, add_acceleration, next_knot
+from .slip_polynomials import ForceSeries, Polynomial, reach
 
 __all__ = ["ORDER", "Cause", "Events", "SlippingModes", "Start", "Step", "fastest", "first_forces", "follow",
            "stuck_tangent"]  # fmt: skip
@@ -32,6 +33,7 @@ _MOST_STEPS = 1_000_000
 _STALLED = 8  # largest number of events at the same time of a member, per element
 _CLOSE = 1e-12  # margin to the slip force, relative: elements on one displacement below it start to slip together
 _NOTHING = 1e-9  # velocity relative to the sum of its terms below which it is rounding just after an event
+_TINIEST = 1e-4  # share of a step of the linear modes below which a motion runs away
 _WAYS = np.arange(1.0, ORDER + 1)[:, None, None]
 _Numbers = NDArray[np.intp]
 _Event = tuple[_Numbers, _Numbers, _Numbers]
@@ -56,6 +58,8 @@ class SlippingModes(NamedTuple):
     where : ndarray of int, shape (E,)
         The displacement of each element.
     stiffness, slip : ndarray, shape (E, P)
+    polynomials : tuple of Polynomial
+        Further forces on the right.
     """
 
     omega: Array
@@ -65,12 +69,14 @@ class SlippingModes(NamedTuple):
     where: NDArray[np.intp]
     stiffness: Array
     slip: Array
+    polynomials: tuple[Polynomial, ...] = ()
 
     def of(self, members: NDArray[np.intp]) -> SlippingModes:
         """Return some members."""
-        omega, damping, rows, give, where, stiffness, slip = self
+        omega, damping, rows, give, where, stiffness, slip, polynomials = self
         parts = (omega[:, members], damping[..., members], rows[..., members], give[..., members])
-        return SlippingModes(*parts, where, stiffness[:, members], slip[:, members])
+        terms = tuple(term.of(members) for term in polynomials)
+        return SlippingModes(*parts, where, stiffness[:, members], slip[:, members], terms)
 
     def total(self, values: Array) -> Array:
         """Return the sums over the elements of each displacement, (E, P) to (D, P)."""
@@ -250,12 +256,24 @@ class _March:
         span = target - self.time
         loads = self._loads(span)
         series, moved = self._series(span, loads)
+        if self.modes.polynomials:
+            span, target = self._shortened(span, target, series, moved, loads)
         share, event = self._first_events(moved)
         end = np.where(share == 1.0, target, np.minimum(self.time + span * share, target))
         step = Step(self.members, self.time, span, share, end, series, loads, moved, self.force, self.state)
         visit(step)
         self._move(step)
         return None if event is None else self._switch(*event)
+
+    def _shortened(self, span: Array, target: Array, *all_series: Array) -> tuple[Array, Array]:
+        """Return span and target of steps whose series have converged; scale the series, (K, .., P), to them."""
+        share = reach(all_series[0])
+        if not ((share == 1.0) | (share * span > _TINIEST * self.longest)).all():
+            raise ValueError(f"t: the motion runs away at t = {self.time[np.argmin(share)]:g} s")
+        powers = (share ** np.arange(ORDER + 3)[:, None])[:, None]
+        for values, shift in zip(all_series, (0, 0, 2), strict=True):  # the last one: loads
+            values *= powers[shift : shift + ORDER + 1]
+        return span * share, np.where(share < 1.0, self.time + span * share, target)
 
     def _loads(self, span: Array) -> Array:
         """Return the series of the modal loads times the square of the span."""
@@ -276,7 +294,7 @@ class _March:
         moved, force = np.zeros(size), np.zeros(size)
         stiff, pull = -(modes.omega**2) * span**2, -modes.rows * span**2
         drag = -modes.damping * span
-        driven = np.asarray(loads.any(axis=(1, 2)))
+        driven, powers = np.asarray(loads.any(axis=(1, 2))), ForceSeries(modes.polynomials, ORDER + 1, span)
         part = np.empty_like(self.q)
         series[0], series[1], force[0] = self.q, self.u * span, modes.total(self.force)  # not yet over k!
         for k in range(ORDER + 1):
@@ -290,6 +308,9 @@ class _March:
                     total += np.multiply(row, value, out=part)
                 if driven[k - 2]:
                     total += loads[k - 2] * _FACTORIALS[k - 2]
+                if modes.polynomials:
+                    more = powers.coefficient(k - 2, series[:k] / _FACTORIALS[:k, None, None])
+                    total += more * span**2 * _FACTORIALS[k - 2]
             moved[k] = (modes.rows * series[k]).sum(axis=1)
             if k > 0:
                 force[k] = _applied(self.tangent, moved[k])
