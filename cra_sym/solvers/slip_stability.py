@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from cra_sym.solvers.harmonic_balance import Basis
 from cra_sym.solvers.modal_polynomials import ModalPolynomials
@@ -169,7 +168,7 @@ def _map(motion: _Motion, elements: Elements, spans: list[Span], finer: int) -> 
 
 
 def _exponentials(exponents: Array, modes: int, fastest: float) -> Array:
-    """Return the exponentials of many exponents of short steps, by scaling, Taylor's series and squaring of them all.
+    """Return the exponentials of many exponents, by scaling, Taylor's series and squaring of them all.
 
     Momenta are measured in the fastest frequency, so that the exponents of (q, p) are of the order of the phase of a
     step. The sliders' columns are nilpotent and do not limit the convergence.
@@ -226,7 +225,7 @@ def _propagators(
     else:  # Magnus, order four
         first, second = at(_GAUSS), at(1.0 - _GAUSS)
         exponent = 0.5 * (first + second) + np.sqrt(3.0) / 12.0 * (second @ first - first @ second)
-    maps = expm(exponent) if motion.constant else _exponentials(exponent, n, float(motion.equations.omega.max()))
+    maps = _exponentials(exponent, n, float(motion.equations.omega.max()))
     found, at_step = [], 0
     for count in parts:
         whole = maps[at_step]

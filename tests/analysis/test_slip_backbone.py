@@ -132,10 +132,13 @@ def test_beam_on_a_slipping_joint_resonates_where_its_damped_mode_says():
         essential=[v.diff(x).subs(x, 0)], virtual_work=[(F, v, "right")],
         hysteresis=[(cra.Jenkins(60.0, 0.5), v, "left")],
     ).at({"L": 1.0})  # fmt: skip
-    frequencies = np.linspace(2.9, 3.35, 46)
-    states = cra.steady_states(beam, frequencies, drive={F: 0.12}, modes=3, harmonics=15)
-    sizes = np.array([answers[0].amplitude for answers in states])
-    top = int(np.argmax(sizes))
+    middle = 3.125
+    for reach, number in ((0.225, 10), (0.04, 5)):
+        frequencies = middle + np.linspace(-reach, reach, number)
+        states = cra.steady_states(beam, frequencies, drive={F: 0.12}, modes=3, harmonics=15)
+        sizes = np.array([answers[0].amplitude for answers in states])
+        top = int(np.argmax(sizes))
+        middle = frequencies[top]
     bend = np.polyfit(frequencies[top - 1 : top + 2], sizes[top - 1 : top + 2], 2)
     resonance = -bend[1] / (2 * bend[0])
     curve = cra.backbone(beam, amplitude=float(np.polyval(bend, resonance)), modes=3)

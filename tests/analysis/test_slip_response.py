@@ -45,19 +45,21 @@ def test_without_slip_it_is_the_stiffer_arm(arm, joint):
 
 def test_without_friction_it_is_the_arm_without_the_element(arm, joint):
     free = joint.replace(f_s=1e-12)
-    right = cra.tip_response(arm, MOVE, TIMES)
-    np.testing.assert_allclose(cra.tip_response(free, MOVE, TIMES), right, rtol=0, atol=1e-10 * np.abs(right).max())
-    assert cra.residual_vibration(free, MOVE) <= cra.residual_vibration(arm, MOVE) * (1 + 1e-9)
+    right = cra.tip_response(arm, MOVE, TIMES, modes=3)
+    np.testing.assert_allclose(
+        cra.tip_response(free, MOVE, TIMES, modes=3), right, rtol=0, atol=1e-10 * np.abs(right).max()
+    )
+    assert cra.residual_vibration(free, MOVE, modes=3) <= cra.residual_vibration(arm, MOVE, modes=3) * (1 + 1e-9)
 
 
 def test_energies_balance_and_slip_dissipates(joint):
-    found = cra.slip_response(joint.replace(f_s=[0.1, 0.3, 0.6], zeta=0.01), MOVE, TIMES[1:])
+    system = joint.replace(f_s=[0.1, 0.3, 0.6], zeta=0.01)
+    found = cra.slip_response(system, MOVE, TIMES[1:], modes=3)
     assert (found.imbalance < 1e-12).all()  # rounding of some hundred steps
     assert (np.diff(found.dissipated) >= 0).all() and (found.dissipated[..., -1] > 0).all()
     assert (np.abs(found.force) <= np.array([0.1, 0.3, 0.6])[:, None, None]).all()
     assert (found.initial == 0).all()
-    np.testing.assert_array_equal(found.tip, cra.slip_response(
-        joint.replace(f_s=[0.1, 0.3, 0.6], zeta=0.01), MOVE, TIMES).tip[:, 1:])  # fmt: skip
+    np.testing.assert_array_equal(found.tip, cra.slip_response(system, MOVE, TIMES, modes=3).tip[:, 1:])
 
 
 def test_states_follow_the_events(joint):
@@ -87,13 +89,13 @@ def test_response_along_the_arm_and_its_derivatives(joint):
 def test_batches_of_arms_and_of_motions(joint):
     several = joint.replace(f_s=np.array([0.2, 0.4])[:, None])
     motions = cra.BaseMotion.trapezoid([0.1, 0.2, 0.3], 0.5, 2.0)
-    found = cra.tip_response(several, motions, TIMES)
+    found = cra.tip_response(several, motions, TIMES, modes=2)
     assert found.shape == (2, 3, TIMES.size)
-    one = cra.tip_response(joint.replace(f_s=0.4), motions[1], TIMES)
+    one = cra.tip_response(joint.replace(f_s=0.4), motions[1], TIMES, modes=2)
     np.testing.assert_allclose(found[1, 1], one, rtol=0, atol=1e-12 * np.abs(one).max())
-    peaks = cra.residual_vibration(several, motions)
+    peaks = cra.residual_vibration(several, motions, modes=2)
     assert peaks.shape == (2, 3)
-    assert cra.residual_vibration(joint.replace(f_s=0.4), motions[1]) == pytest.approx(peaks[1, 1], rel=1e-12)
+    assert cra.residual_vibration(joint.replace(f_s=0.4), motions[1], modes=2) == pytest.approx(peaks[1, 1], rel=1e-12)
 
 
 def test_residual_vibration_is_the_largest_after_the_stop(joint):
@@ -161,17 +163,17 @@ def test_one_mass_against_integration():
         hysteresis=[(cra.Jenkins(3.0, 0.5), q, None), (cra.Jenkins(1.0, 0.4), q, None)],
     )  # fmt: skip
     load = {F: cra.Force(amplitude=2.0, angular_frequency=1.7)}
-    found = cra.slip_response(model.at({C: 0.1}), load, TIMES * 8, modes=1)
+    found = cra.slip_response(model.at({C: 0.1}), load, TIMES * 4, modes=1)
     stiffness, slip = np.array([3.0, 1.0]), np.array([0.5, 0.4])
 
     def rate(t, y):
         inside = (np.abs(y[2:]) < slip) | (y[2:] * y[1] < 0)
         return [y[1], 2 * np.sin(1.7 * t) - 0.1 * y[1] - 4 * y[0] - y[2:].sum(), *np.where(inside, stiffness * y[1], 0)]
 
-    run = solve_ivp(rate, (0, 12), np.zeros(4), "RK45", TIMES * 8, rtol=1e-8, atol=1e-9, max_step=1e-3)
+    run = solve_ivp(rate, (0, 6), np.zeros(4), "RK45", TIMES * 4, rtol=1e-8, atol=1e-9, max_step=1e-3)
     # each event is missed by up to a step: slip of 1e-3 s of velocities of order 1, times the stiffness
     np.testing.assert_allclose(found.displacement[0], run.y[0], rtol=0, atol=3e-3)
-    assert found.imbalance < 1e-12 and len(found.events[()]) > 10
+    assert found.imbalance < 1e-12 and len(found.events[()]) > 5
     pulse = {F: cra.Force.sampled([0.0, 0.5, 1.0], [0.0, 0.3, 0.0])}
     stuck = model.replace(hysteresis=[(cra.Jenkins(3.0, 50.0), q, None), (cra.Jenkins(1.0, 40.0), q, None)])
     stiff = model.replace(left=q.diff(time) ** 2 / 2 - 4 * q**2, hysteresis=())

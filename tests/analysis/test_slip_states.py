@@ -62,15 +62,16 @@ def test_thirty_force_levels_are_those_of_integration_by_events():
 
 def test_resonance_peak_falls_and_rises_with_the_force():
     """Little force: stuck. Much: the spring alone. Between them friction damps, best where the peak is lowest."""
-    peaks = []
+    peaks, stuck_at = [], np.sqrt(K + SPRING) * np.sqrt(1 - 2 * ZETA**2 / 1.5)  # where the stuck amplitude is largest
+    frequencies = np.sort(np.append(np.linspace(0.96, 1.24, 22), stuck_at))
     for level in np.geomspace(0.004, 3.0, 8):
-        states = cra.steady_states(mass(), np.linspace(0.96, 1.24, 43), drive={F: level}, modes=1, harmonics=7)
+        states = cra.steady_states(mass(), frequencies, drive={F: level}, modes=1, harmonics=7)
         assert all(len(answers) == 1 for answers in states)
         peaks.append(max(answers[0].amplitude for answers in states) / level)
     lowest = int(np.argmin(peaks))
     assert 0 < lowest < 7 and (np.diff(peaks[: lowest + 1]) < 1e-9).all() and (np.diff(peaks[lowest:]) > 0).all()
-    stuck = 1 / (2 * ZETA * np.sqrt(K) * np.sqrt(K + SPRING))
-    np.testing.assert_allclose(peaks[0], stuck, rtol=0.02)  # steps of the frequency
+    stuck = 1 / (2 * ZETA * np.sqrt(K) * np.sqrt(K + SPRING - ZETA**2 * K))
+    np.testing.assert_allclose(peaks[0], stuck, rtol=1e-9)
     assert peaks[lowest] < 0.15 * peaks[0] and peaks[-1] > 4 * peaks[lowest]
 
 
