@@ -211,7 +211,7 @@ def test_stability_with_a_mass_that_oscillates_is_proved(name):
 
 
 def test_the_table_names_every_function_and_tests_that_exist():
-    """Each row of the table of the README: functions, what they take, files of tests that call them."""
+    """Each row of the table of the README: functions, what they take, tests by name in files that call them."""
     root = Path(__file__).parents[1]
     part = (root / "README.md").read_text().split("## What any system can do")[1].split("\n## ")[0]
     rows = [line.strip("|").split(" | ") for line in part.splitlines() if line.startswith("| `")]
@@ -219,9 +219,11 @@ def test_the_table_names_every_function_and_tests_that_exist():
     for first, _, last in rows:
         functions = re.findall(r"`(\w+)`", first.split(":")[0])
         named += [function for function in functions if hasattr(cra, function)]
-        files = re.findall(r"\(([\w/.]+)\)", last)
-        assert files, first
-        text = "".join((root / file).read_text() for file in files)
+        tests = re.findall(r"\[(test_\w+)\]\(([\w/.]+)\)", last)
+        assert tests and len(tests) == last.count("]("), first
+        texts = {file: (root / file).read_text() for _, file in tests}
+        assert all(re.search(rf"^def {test}\(", texts[file], re.MULTILINE) for test, file in tests), first
+        text = "".join(texts.values())
         assert all(re.search(rf"\b{function}\b", text) for function in functions), first
     assert CALLS.keys() - {"identify_joint"} <= set(named)
     assert len(named) == len(set(named))
