@@ -91,6 +91,8 @@ def real_array(
         raw = np.asarray(given)
     except Exception as error:  # conversion of an arbitrary object may raise anything
         raise TypeError(f"{name} = {shown(value)}: must be {must}") from error
+    if raw.dtype.kind in "SU" or (raw.dtype.kind == "O" and any(isinstance(entry, str) for entry in raw.flat)):
+        raise TypeError(f"{name} = {shown(value)}: must be {must}, not text; convert it to numbers first")
     if raw.dtype.kind not in "iuf":
         raise TypeError(f"{name} = {shown(value)}: must be {must}")
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):

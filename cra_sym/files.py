@@ -177,9 +177,9 @@ def _copy_mode(old: Path, new: Path) -> None:
 
 
 def path_of(name: str, path: str | Path) -> Path:
-    """Return an absolute path, existing or not, or raise an error that names the argument."""
+    """Return an absolute path, existing or not, ~ expanded, or raise an error that names the argument."""
     try:
-        made = Path(os.path.abspath(path))
+        made = Path(os.path.abspath(os.path.expanduser(path)))
         os.lstat(made)
     except OSError:
         pass

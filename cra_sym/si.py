@@ -49,6 +49,8 @@ def plain_numbers(name: str, value: Any, unit: str | None = None) -> Any:
         return _timed(value, unit)
     if kind is np.ndarray and value.dtype.kind != "O":
         return _timed(value, unit)
+    if hasattr(kind, "quantity") and getattr(value, "unit", None) is not None:
+        return plain_numbers(name, _from_column(name, value), unit)
     if isinstance(value, np.ma.MaskedArray) or hasattr(kind, "unmasked"):
         if np.any(value.mask):
             raise TypeError(f"{name}: element {_first_masked(value)} is masked; must be real numbers")
@@ -62,6 +64,8 @@ def plain_numbers(name: str, value: Any, unit: str | None = None) -> Any:
         return plain_numbers(name, value.data, unit)
     if hasattr(kind, "units") or hasattr(kind, "in_units"):
         raise TypeError(f"{name} = {_text(value)}: its unit cannot be converted; must be plain numbers in SI")
+    if hasattr(kind, "nominal_value") and hasattr(kind, "std_dev"):
+        raise TypeError(f"{name} = {_text(value)}: has an uncertainty; must be real numbers, as its nominal value is")
     if kind in (list, tuple) or kind is np.ndarray:
         return _each(name, value, unit)
     if unit == "s" and hasattr(kind, "total_seconds"):
@@ -71,6 +75,7 @@ def plain_numbers(name: str, value: Any, unit: str | None = None) -> Any:
             array = np.asarray(value)
         except Exception as error:  # conversion of an arbitrary object may raise anything
             raise TypeError(f"{name} = {_text(value)}: must be real numbers") from error
+        _check_stated(name, _stated(value), unit)
         if array.ndim:
             return plain_numbers(name, array, unit)
     if kind is bytearray:
@@ -202,7 +207,10 @@ def _from_pint(name: str, value: Any, unit: str | None) -> Any:
 
 
 def _from_astropy(name: str, value: Any, unit: str | None) -> Any:
-    basic = value.decompose()
+    try:
+        basic = value.decompose()
+    except ValueError as error:  # a unit that is only a text
+        raise ValueError(f"{name} = {_text(value)}: its unit is unknown; must be in {unit or 'SI units'}") from error
     powers = {str(base.name): power for base, power in zip(basic.unit.bases, basic.unit.powers, strict=True)}
     turning = bool(powers.pop("rad", 0))
     found = Dimension(powers.pop("m", 0), powers.pop("kg", 0), powers.pop("s", 0))
@@ -210,6 +218,26 @@ def _from_astropy(name: str, value: Any, unit: str | None) -> Any:
         raise ValueError(f"{name} = {_text(value)}: its unit is not one of SI; must be in {unit or 'SI units'}")
     _check(name, value, unit, found, bool(powers), turning)
     return basic.value
+
+
+def _from_column(name: str, value: Any) -> Any:
+    """Return a column of a table of Astropy as a quantity, after a check of its mask."""
+    mask = np.asarray(getattr(value, "mask", False))
+    if mask.any():
+        raise TypeError(f"{name}: element {int(np.argmax(mask))} is masked; must be real numbers")
+    try:
+        return value.quantity
+    except TypeError as error:  # of texts
+        raise TypeError(f"{name} = {_text(value)}: must be real numbers") from error
+
+
+def _stated(value: Any) -> Any:
+    """Return the unit that an array in a file, or of pandas, states, None if there is none."""
+    get = getattr(getattr(value, "attrs", None), "get", None)
+    stated = getattr(value, "units", None) if get is None else get("units")
+    if isinstance(stated, bytes):
+        return stated.decode(errors="replace")
+    return stated if isinstance(stated, str) else None
 
 
 def _check_stated(name: str, stated: Any, unit: str | None) -> None:

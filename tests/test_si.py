@@ -104,6 +104,34 @@ class MaskedQuantity(np.ndarray):
         return np.asarray(self)
 
 
+class TableColumn(np.ndarray):
+    """The documented attributes of a column of a table of Astropy, which is an array beside its unit."""
+
+    @classmethod
+    def of(cls, values, unit, mask=False):
+        made = np.asarray(values, float).view(cls)
+        made.unit, made.mask = unit, mask
+        return made
+
+    @property
+    def quantity(self):
+        return AstropyQuantity.of(np.asarray(self), 1e-3, kg=1)
+
+
+class StatedArray:
+    """An array in a file, with its unit among its attributes."""
+
+    def __init__(self, values, **attrs):
+        self.values, self.attrs = values, attrs
+
+    def __array__(self, *_, **__):
+        return np.asarray(self.values)
+
+
+class Uncertain(float):
+    nominal_value = std_dev = 1.0
+
+
 class UnknownQuantity:
     units = "furlong"
 
@@ -120,6 +148,9 @@ class UnknownQuantity:
         ("L", np.array([PintQuantity(1, "meter"), 2.0], dtype=object), [1.0, 2.0]),
         ("k_t", AstropyQuantity.of(3.0, 1e3, kg=1, s=-2), 3e3),
         ("k_r", AstropyQuantity.of([3.0], 1e-3, kg=1, m=2, s=-2, rad=-1), [3e-3]),
+        ("m_e", TableColumn.of([1.0, 2.0], "g"), [1e-3, 2e-3]),
+        ("m_e", TableColumn.of([1.0, 2.0], None), [1.0, 2.0]),
+        ("m_e", StatedArray([1.0, 2.0], units=b"kg"), [1.0, 2.0]),
         ("k_t", sp.Integer(1000), 1e3),
         ("k_t", sp.oo, np.inf),
         ("L", sp.sqrt(2), 2**0.5),
@@ -150,6 +181,9 @@ def test_numbers_and_quantities_are_converted(field, value, expected):
         ("k_t", AstropyQuantity.of(3.0, m=1), "k_t = 3.*must be in N/m"),
         ("k_t", AstropyQuantity.of(3.0, A=1), "k_t = 3.*must be in N/m"),
         ("k_t", UnknownQuantity(), "k_t = .*its unit cannot be converted"),
+        ("m_e", TableColumn.of([1.0, 2.0], "g", [False, True]), "m_e: element 1 is masked"),
+        ("k_t", StatedArray([1.0], units="kN/m"), "k_t has units 'kN/m': must be in N/m; convert it first"),
+        ("k_t", [Uncertain(1.0)], "k_t = .*has an uncertainty; must be real numbers, as its nominal value is"),
         ("m_e", np.ma.masked_array([1.0, 2.0], mask=[False, True]), "m_e: element 1 is masked"),
         ("m_e", [1.0, np.ma.masked], "m_e: an element is masked"),
         ("L", [True, 2.0], "L = .*booleans"),

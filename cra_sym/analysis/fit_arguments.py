@@ -10,6 +10,7 @@ import numpy as np
 from cra_sym.analysis.fit_search import Data
 from cra_sym.checks import broadcastable, count, instance, listed, mapping, names, real_array, shown
 from cra_sym.model.system import MOST_MODES, System
+from cra_sym.si import check_rows, dimensions, paired
 
 __all__ = ["checked_data", "checked_names", "checked_priors"]
 
@@ -21,8 +22,13 @@ def checked_data(system: System, name: str, measured: Any, uncertainty: Any, mod
     instance("system", system, System)
     if system.shape:
         raise ValueError(f"system has shape {system.shape}: must be a single set of values, not a batch")
-    frequencies = real_array(name, measured, low=0.0, open_low=True, unit="Hz")
-    sigma = real_array("uncertainty", uncertainty, low=1e-60, high=1e60, unit="Hz")
+    check_rows({name: measured, "uncertainty": uncertainty, "modes": modes})
+    own, other = dimensions(measured), dimensions(uncertainty)
+    if own and other and own != other:
+        raise ValueError(f"uncertainty has the dimensions {other}: must have those of {name}, {own}")
+    given = paired({name: measured, "uncertainty": uncertainty}, {name: "Hz", "uncertainty": "Hz"})
+    frequencies = real_array(name, given[name], low=0.0, open_low=True, unit="Hz")
+    sigma = real_array("uncertainty", given["uncertainty"], low=1e-60, high=1e60, unit="Hz")
     if frequencies.ndim != 1 or frequencies.size == 0:
         raise ValueError(f"{name} has shape {frequencies.shape}: must be one axis of frequencies")
     if np.any(np.diff(frequencies) <= 0):

@@ -15,7 +15,7 @@ from cra_sym.analysis.histories import histories as histories_of
 from cra_sym.analysis.modes import participation, section_place
 from cra_sym.analysis.responses import check_sampling, has_complex_modes, oscillators, slipping_problem
 from cra_sym.analysis.slipping import slipping_residual
-from cra_sym.checks import count, default_floating_point, instance
+from cra_sym.checks import broadcastable, count, default_floating_point, instance
 from cra_sym.model.projection import Projected
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.model.values import checked_damping
@@ -169,6 +169,9 @@ def _ended(system: System, motion: Any) -> tuple[dict[str, History], tuple[BaseM
             raise ValueError("motion never stops accelerating: must be a move with a stop, or a sampled record")
     if system.numerics("constant") is not None:
         raise ValueError("system: a constant load acts too and never ends; use response after the stop")
+    inputs = histories if len(histories) > 1 else ["motion"]
+    shapes = {name: np.empty(profile.shape) for name, profile in zip(inputs, profiles, strict=True)}
+    broadcastable(system=np.empty(system.shape), **shapes)
     stop = profiles[0].duration
     for profile in profiles[1:]:
         stop = np.maximum(stop, profile.duration)

@@ -23,6 +23,7 @@ from cra_sym.analysis.identification import (
 from cra_sym.analysis.slip_backbone import held_curve
 from cra_sym.checks import broadcastable, count, default_floating_point, instance, names, real_array
 from cra_sym.model.system import System
+from cra_sym.si import paired
 
 __all__ = ["identify_slip"]
 
@@ -173,9 +174,13 @@ def _checked(
         raise ValueError(f"system has shape {system.shape}: must be a single set of values, not a batch")
     if not system.model.pieces["hysteresis"]:
         raise ValueError("system: has no elastic-slip elements; give its model hysteresis=[..], or use identify")
-    size = real_array("amplitude", amplitude, low=0.0, open_low=True, unit="m")
-    hertz = real_array("frequency", frequency, low=0.0, open_low=True, unit="Hz")
-    ratio = real_array("damping_ratio", damping_ratio, low=0.0, unit="1")
+    given = paired(
+        {"amplitude": amplitude, "frequency": frequency, "damping_ratio": damping_ratio},
+        {"amplitude": "m", "frequency": "Hz", "damping_ratio": "1"},
+    )
+    size = real_array("amplitude", given["amplitude"], low=0.0, open_low=True, unit="m")
+    hertz = real_array("frequency", given["frequency"], low=0.0, open_low=True, unit="Hz")
+    ratio = real_array("damping_ratio", given["damping_ratio"], low=0.0, unit="1")
     if size.ndim != 1 or size.size == 0:
         raise ValueError(f"amplitude has shape {size.shape}: must be one axis of amplitudes")
     if (np.diff(size) <= 0).any():

@@ -39,7 +39,7 @@ def driven_response(
     """
     grid, derivative = checked(motion, t, derivative, start)
     modes = osc.omega.shape[:-1]
-    shape = broadcastable(arm=np.empty(modes), zeta=osc.zeta[..., 0], motion=np.empty(motion.shape))
+    shape = broadcastable(system=np.empty(modes), zeta=osc.zeta[..., 0], motion=np.empty(motion.shape))
     parts = [solver.piecewise_response(osc, piece, grid, derivative) for piece in _pieces(motion)]
     steady = _steady(osc, motion, start)
     if initial is not None:

@@ -15,6 +15,8 @@ __all__ = ["KINDS", "spline_motion", "timed_last", "uniform_times"]
 Array = NDArray[np.float64]
 KINDS = ("acceleration", "velocity", "position")
 _CLOCK = 1e8  # s, three years: times that begin later are clock times
+_LAST = 1e11  # s, three thousand years: later times are no seconds of any calendar
+_LATE, _DAYS = 1e4, 2e11  # s; first time over the step of a record whose times are days
 _UNEVEN = 0.01  # of a step
 _SLOWEST, _FASTEST = 1e-12, 1e12  # samples per second
 
@@ -83,7 +85,10 @@ def _seconds(t: Any) -> tuple[Array, float]:
         given = t
     else:
         given = np.asarray(getattr(t, "values", t))
-    if len(np.shape(given)) == 1 and len(given) and hasattr(given[0], "timestamp"):  # dates of Python
+    first = given[0] if len(np.shape(given)) == 1 and len(given) else None
+    if isinstance(first, (str, bytes)):
+        raise TypeError(f"t = {shown(t)}: must be numbers or dates, as numpy.asarray(t, 'M8[ns]') makes of text")
+    if hasattr(first, "timestamp"):  # dates of Python
         try:
             return np.array([(one - given[0]).total_seconds() for one in given]), 1e-6
         except (AttributeError, TypeError) as error:
@@ -98,6 +103,8 @@ def _seconds(t: Any) -> tuple[Array, float]:
     if isinstance(given, np.ndarray) and given.dtype.kind == "f":
         eps = np.spacing(given.dtype.type(1))
     resolution = float(eps) * float(np.max(np.abs(times), initial=0.0))
+    if times.ndim and times.size and times.ravel()[0] > _LAST:
+        raise ValueError(f"t[0] = {times.ravel()[0]:g}: must be in seconds; divide by 1e3 if these are milliseconds")
     if times.ndim and times.size and times.ravel()[0] > _CLOCK:
         times = times - times.ravel()[0]
     return times, resolution
@@ -115,6 +122,11 @@ def _gridded(times: Array, resolution: float) -> Array:
         cure = "; where they are rounded, give sampling_rate instead" if span[at] == 0 else ""
         raise ValueError(f"t[{at + 1}] = {times[at + 1]:g} after {times[at]:g}: sample times must increase{cure}")
     step = float(np.sort(span)[(span.size - 1) // 2])
+    if times[0] > max(_LATE, _DAYS * step):
+        raise ValueError(
+            f"t[0] = {times[0]:g} with samples {step:.2g} apart: must be in seconds; multiply days by 86400, or "
+            "count from the first sample"
+        )
     slack = _UNEVEN * step + resolution
     gap = np.flatnonzero(span > 1.5 * step + slack)
     if gap.size:
@@ -131,7 +143,13 @@ def _gridded(times: Array, resolution: float) -> Array:
     if np.any(off > slack):
         # the first step that differs, or where a drift is largest
         uneven = np.flatnonzero(np.abs(span - step) > slack)
-        at = int(uneven[0]) + 1 if uneven.size else int(np.argmax(off))
+        if not uneven.size:
+            at = int(np.argmax(off))
+            raise ValueError(
+                f"t[{at}] = {times[at]:g}: sample times must be uniform, and their step changes slowly: this one is "
+                f"{off[at]:.2g} s from the mean step of {step:g} s; resample the record"
+            )
+        at = int(uneven[0]) + 1
         raise ValueError(
             f"t[{at}] = {times[at]:g}: sample times must be uniform, {step:g} s apart to 1 %; the step before it is "
             f"{span[max(at - 1, 0)]:g} s; resample the record"

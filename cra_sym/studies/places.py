@@ -75,7 +75,8 @@ class Folder(Place):
 
     def keys(self, array: str) -> set[str]:
         """Return the names of the stored chunks of an array."""
-        return {file.name for file in (self.path / array).iterdir()}
+        files = (self.path / array).iterdir()
+        return {file.name for file in files if file.stat().st_size}  # a power failure may leave empty ones
 
     def new(self) -> AbstractContextManager[Path]:
         """Yield a temporary folder that becomes the store at the end."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from cra_sym.checks import shown
 from cra_sym.extras import require
 from cra_sym.files import OutputError
 from cra_sym.studies.places import Place, place_of
@@ -18,6 +19,7 @@ from cra_sym.studies.study import Study
 __all__ = ["sweep_into"]
 
 _DESCRIBED = "cra_sym.studies"
+_SHORT = 60  # characters of a value in an error
 Region = tuple[slice, ...]
 
 
@@ -46,6 +48,8 @@ def sweep_into(study: Study, store: str | Path, chunks: int, client: Any = None)
     xarray = require("xarray", "scale")
     require("zarr", "scale")
     place = place_of(store)
+    if client is not None and not all(hasattr(client, name) for name in ("scatter", "submit")):
+        raise TypeError(f"client = {shown(client)}: must be a dask.distributed.Client")
     if client is not None and not place.is_shared:
         raise ValueError(f"store = {place.name!r}: is in the memory of one process; must be another with a client")
     if not place.exists():
@@ -56,7 +60,11 @@ def sweep_into(study: Study, store: str | Path, chunks: int, client: Any = None)
     with progress, place.writing():
         for _ in _written(study, place, missing, client):
             progress.update()
-    return xarray.open_zarr(place.opened(), consolidated=True)
+    found = xarray.open_zarr(place.opened(), consolidated=True)
+    for name, (_, values, _) in study.coordinates().items():
+        if name not in found.coords or not np.array_equal(found.coords[name].values, np.asarray(values)):
+            raise ValueError(f"store = {place.name!r}: the coordinate {name!r} is missing there; must be a new path")
+    return found
 
 
 def _make(study: Study, place: Place, chunks: int) -> None:
@@ -111,13 +119,17 @@ def _differences(there: dict[str, str], here: dict[str, str]) -> list[str]:
     """Return the differences between two descriptions."""
     found = []
     for name in dict.fromkeys([*there, *here]):
+        labels = f"dimension {name}"
+        if labels in there and labels in here and there[labels] != here[labels]:
+            continue  # the labels tell it
         if name not in here:
             found.append(f"{name} is swept or given there only")
         elif name not in there:
             found.append(f"{name} is swept or given here only")
         elif there[name] != here[name]:
-            short = max(len(there[name]), len(here[name])) <= 60
-            found.append(f"{name} is {there[name]} there, {here[name]} here" if short else f"{name} differs")
+            texts = [one if len(one) <= _SHORT else one.partition(":")[0] for one in (there[name], here[name])]
+            told = texts[0] != texts[1] and max(map(len, texts)) <= _SHORT
+            found.append(f"{name} is {texts[0]} there, {texts[1]} here" if told else f"{name} differs")
     return found
 
 

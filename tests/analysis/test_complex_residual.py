@@ -89,6 +89,10 @@ def test_what_has_no_such_sum_is_named():
         cra.residual_vibration(damped(), MOVE, 2, zeta=[0.01, 0.02])
     with pytest.raises(ValueError, match="motion never stops accelerating"):
         cra.residual_vibration(damped(), cra.BaseMotion(acceleration=1.0), 2)
+    batch, three = cra.Arm.nominal().replace(m_e=[0.1, 0.2]), cra.BaseMotion.trapezoid([0.1, 0.2, 0.3], 0.4, 3.0)
+    for function in (cra.residual_vibration, cra.residual_vibration_gradient):
+        with pytest.raises(ValueError, match=r"broadcast together: system \(2,\), motion \(3,\)"):
+            function(batch, three, modes=2)
 
 
 def oscillator(omega, ratio):

@@ -355,6 +355,23 @@ def test_a_parameter_the_frequencies_do_not_depend_on_is_named():
         cra.identify(NOMINAL, cra.natural_frequencies(NOMINAL, 1), 0.1, unknown=("m_b",))
 
 
+def test_measured_and_uncertainty_are_paired_by_label():
+    pandas, xarray = pytest.importorskip("pandas"), pytest.importorskip("xarray")
+    measured, sigma = FREQUENCIES[:3], [0.01, 0.02, 0.03]
+    expected = cra.identify_joint(NOMINAL, measured, sigma)
+    series = pandas.Series(measured, index=[1, 2, 3])
+    found = cra.identify_joint(NOMINAL, series, pandas.Series(sigma, index=[1, 2, 3]), modes=series.index)
+    assert found == expected
+    label = xarray.DataArray(measured, dims="mode", coords={"mode": [1, 2, 3]})
+    for other, message in (
+        (pandas.Series(sigma, index=[3, 2, 1]), "uncertainty: its index is not that of measured_frequencies"),
+        (label[::-1], "dimension 'mode': its coordinate in measured_frequencies is not that in uncertainty"),
+        (label.rename(mode="m"), r"uncertainty has the dimensions \('m',\): must have those of measured_frequencies"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            cra.identify_joint(NOMINAL, series if "index" in message else label, other)
+
+
 def test_a_fit_is_a_value():
     measured = cra.natural_frequencies(JOINT)
     one, two = (cra.identify_joint(NOMINAL, measured, 0.01) for _ in range(2))

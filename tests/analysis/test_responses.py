@@ -244,7 +244,11 @@ def test_a_pinned_arm_is_left_behind_by_a_move():
         ({"zeta": -0.05}, ValueError, "zeta = -0.05"),
         ({"zeta": [0.1, 0.2]}, ValueError, "zeta"),
         ({"motion": 3.0}, TypeError, "motion = 3.0"),
-        ({"motion": BaseMotion([1.0, 2.0]), "system": NOMINAL.replace(k_t=[1, 2, 3])}, ValueError, "broadcast"),
+        (
+            {"motion": BaseMotion([1.0, 2.0]), "system": NOMINAL.replace(k_t=[1, 2, 3])},
+            ValueError,
+            r"broadcast together: system \(3,\), motion \(2,\)",
+        ),
     ],
 )
 def test_bad_input_is_named(arguments, error, words):

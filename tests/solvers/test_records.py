@@ -114,6 +114,18 @@ def two_rates(times):
     times[17:] = times[16] + 1.2 * (times[17:] - times[16])
 
 
+def drifting(times):
+    times *= 1 + 1e-3 * times
+
+
+def milliseconds(times):
+    times[:] = 1.7e12 + 1e3 * times
+
+
+def days(times):
+    times[:] = 45000 + times / 86400
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -122,6 +134,9 @@ def two_rates(times):
         (swapped, r"t\[18\] = .* after .*: sample times must increase"),
         (doubled, r"t\[17\] = .* after .*: sample times must increase"),
         (two_rates, r"t\[\d+\] = .*must be uniform"),
+        (drifting, r"t\[\d+\] = .*their step changes slowly: this one is .* s from the mean step"),
+        (milliseconds, r"t\[0\] = 1\.7e\+12: must be in seconds; divide by 1e3"),
+        (days, r"t\[0\] = 45000 with samples 1\.1e-08 apart: must be in seconds; multiply days by 86400"),
     ],
 )
 def test_what_is_wrong_with_times_is_named_with_the_sample(change, message):
@@ -137,6 +152,8 @@ def test_what_is_wrong_with_times_is_named_with_the_sample(change, message):
         ((None, SAMPLES), {"sampling_rate": 0.0}, ValueError, r"sampling_rate = 0\.0: must be"),
         ((None, SAMPLES), {"sampling_rate": [1.0, 2.0]}, ValueError, "sampling_rate has shape"),
         ((None, [1.0]), {"sampling_rate": 1.0}, ValueError, "acceleration has 1 samples"),
+        ((["2026-01-01", "2026-01-02"], [0, 1]), {}, TypeError, "must be numbers or dates, as numpy.asarray"),
+        ((EXACT, SAMPLES.astype(str)), {}, TypeError, "not text; convert it to numbers first"),
         ((EXACT, SAMPLES), {"kind": "jerk"}, ValueError, "kind = 'jerk': must be one of acceleration, velocity"),
         ((EXACT, SAMPLES, 1.0), {"kind": "velocity"}, ValueError, "velocity: must be left out"),
         (([0, 1, 2], [0, 1, 2]), {"kind": "position"}, ValueError, "position has 3 samples: must be at least four"),
