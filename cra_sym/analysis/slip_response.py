@@ -139,7 +139,8 @@ def slip_response(
     Between two events the motion is linear and computed exactly; with polynomial terms beside the elements it is a
     Taylor series of degree 36, its steps so short that the last terms are rounding. Events are located to rounding, and
     none is missed, however short the slip. The modes are those without the elements; omitted modes respond statically
-    to the forces of the elements. Sliders are at zero at t = 0.
+    to the forces of the elements, but not to the loads: take more modes where a force acts near an element. Sliders are
+    at zero at t = 0.
 
     Parameters
     ----------

@@ -65,7 +65,7 @@ class Slipping:
         """Integrate all members, in groups, to the end of each; ``visit`` is called with every step."""
         size = self.modes.omega.shape[1]
         last, found = np.broadcast_to(np.maximum(end, 1e-12), (size,)), []  # a motion of zero length is sampled once
-        for first in range(0, size, _TOGETHER):
+        for first in range(0, max(size, 1), _TOGETHER):  # an empty batch too has one group
             part = np.arange(first, min(first + _TOGETHER, size))
             state = State(self.start.displacement[:, part], self.start.velocity[:, part])
             causes = [cause.of(part) for cause in self.causes]

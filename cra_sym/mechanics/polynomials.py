@@ -70,7 +70,8 @@ def _monomial(space: JetSpace, term: Expr, label: str) -> Monomial:
         whole = power.is_Integer and power > 0
         if not whole or (there and base != space.symbol(there[0])):
             raise HamiltonError(
-                f"{label}, term {space.restore(term)}: must be polynomial in the unknowns; expand it in powers of them"
+                f"{label}, term {space.restore(term)}: must be polynomial in the unknowns; expand it in powers "
+                "of them, or take dry friction as an elastic-slip element, hysteresis=[(Jenkins(..), ..)]"
             )
         found: list[Any] = there if there else [base]
         (jets if there else causes).extend(found * int(power))

@@ -12,6 +12,7 @@ from sympy import Function, symbols
 import cra_sym as cra
 from cra_sym.symbols import t as time
 from cra_sym.symbols import v, w, x
+from tests.slip_reference import Structure
 
 K_D, SLIP, C = symbols("k_d f_s c")
 MOVE = cra.BaseMotion.trapezoid(0.3, 0.5, 2.0)
@@ -181,6 +182,27 @@ def test_one_mass_against_integration():
     assert cra.residual_vibration(held, pulse, modes=1) == pytest.approx(
         cra.residual_vibration(linear, pulse, modes=1), rel=1e-12
     )
+
+
+def test_free_decay_ends_stuck_where_the_slider_stopped():
+    """From a displacement beyond slip: by exact pieces between events; at rest the element holds a force."""
+    q, stiffness, slip = Function("q")(time), 2.0, 0.3
+    model = cra.Model(
+        0, fields=(), x=x, domain=(0, 1), t=time, coordinates=[q], left=(q.diff(time) ** 2 - q**2) / 2,
+        hysteresis=[(cra.Jenkins(K_D, SLIP), q, None)],
+    )  # fmt: skip
+    system = model.at({"k_d": [stiffness], "f_s": slip}, zeta=0.1)
+    found = cra.slip_response(system, None, [0.5, 2.0, 5.0, 150.0], modes=1, initial={q: 1.0})
+    referee = Structure.one_mass(1.0, 0.1, stiffness, slip, 0.0, 1.0)
+    for k, end in enumerate((0.5, 2.0, 5.0)):
+        (place, _), slider, _ = referee.run(np.array([1.0, 0.0]), 1.0 - slip / stiffness, 0.0, end)
+        assert found.displacement[0, 0, k] == pytest.approx(place, rel=0, abs=1e-10)
+    rest = stiffness * slider / (1.0 + stiffness)  # q + k_d (q - z) = 0; the last slip is before 5 s
+    assert abs(rest) > 1e-3 and found.events[0][-1].time < 5.0
+    assert found.displacement[0, 0, -1] == pytest.approx(rest, rel=0, abs=2e-6)  # exp(-0.1 * 145) = 5e-7
+    assert found.force[0, 0, -1] == pytest.approx(-rest, rel=0, abs=2e-6) and found.imbalance < 1e-13
+    empty = cra.slip_response(model.at({"k_d": [], "f_s": slip}), None, [1.0], modes=1, initial={q: 1.0})
+    assert empty.tip.shape == (0, 1) and empty.events.shape == (0,)
 
 
 def test_iwan_is_followed_as_its_elements(arm):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.integrate import solve_ivp
 
 import cra_sym as cra
 from cra_sym.symbols import L, t, v, x
@@ -331,6 +332,39 @@ def test_clamped_beam_with_an_element_at_its_tip(level):
     referee = Structure(whole, damping, stiff, tip, spring, slip, level * tip, frequency)
     assert state.stable and state.loss > 0
     np.testing.assert_allclose(state.amplitude, referee.settled(250), rtol=1e-4)  # the error of the elements
+
+
+def test_stiff_elements_are_the_limit_of_regularised_friction_on_a_beam():
+    """Coulomb's force at the tip is that of tanh(velocity/e), e to 0, and that of a stiff Jenkins element."""
+    zeta, frequency, friction, level = 0.1, 4.0, 1.0, 4.0
+    beam = cra.Model(
+        v.diff(t) ** 2 / 2 - v.diff(x, 2) ** 2 / 2, fields=[v], x=x, domain=(0, L), t=t,
+        essential=[v.subs(x, 0), v.diff(x).subs(x, 0)], virtual_work=[(F, v, "right")],
+        hysteresis=[(cra.Jenkins(k, friction), v, "right")],
+    ).at({"L": 1.0, "k": [100.0, 1600.0]}, zeta=zeta)  # fmt: skip
+    options = {"drive": {F: level}, "modes": 3, "harmonics": 31}
+    soft, firm = (cra.steady_states(one, frequency, **options)[0] for one in beam.parameter_sets)
+    whole, stiff = clamped_elements(4)
+    squares, shapes = np.linalg.eig(np.linalg.solve(whole, stiff))
+    kept = np.argsort(squares)[:3]
+    omega, tip = np.sqrt(squares[kept]), shapes[-2, kept]
+    tip = tip / np.sqrt(np.einsum("ij,ik,kj->j", shapes, whole, shapes))[kept]
+
+    def rate(time, y):
+        force = level * np.cos(frequency * time) - friction * np.tanh(tip @ y[3:] / 0.02)
+        return np.concatenate([y[3:], tip * force - 2 * zeta * omega * y[3:] - omega**2 * y[:3]])
+
+    # transients fall below exp(-0.1 * 3.5 * 16 * 1.57) = 2e-4; 0.02 is 1/500 of the velocity
+    times = 2 * np.pi / frequency * np.linspace(16.0, 17.0, 101)
+    run = solve_ivp(rate, (0, times[-1]), np.zeros(6), "LSODA", times, rtol=1e-6, atol=1e-8)
+    gaps = [state.amplitude / np.abs(tip @ run.y[:3]).max() - 1 for state in (soft, firm)]
+    # a stop takes of the order of the period on the element, k_d^-1/2; omitted modes give as an element of 4e3 would
+    assert gaps[0] > 2 * gaps[1] > 0 and gaps[1] < 1e-2 and soft.stable and firm.stable
+    for state, stiffness in (
+        (soft, 100.0),
+        (firm, 1600.0),
+    ):  # between two reversals a period the loss is that of a loop
+        assert state.loss == pytest.approx(4 * friction * (state.amplitude - friction / stiffness), rel=1e-3)
 
 
 # refused -----------------------------------------------------------------------------------------------------------
