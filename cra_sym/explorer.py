@@ -289,7 +289,7 @@ def _choices(system: System, given: Any) -> tuple[dict[str, Any], Any]:
     return choices, given if given is not None else next(iter(choices.values()), None)
 
 
-def explore(system: System | None = None, *, excitation: Any = None, **values: Any) -> Explorer:
+def explore(system: System | None = None, *, excitation: Parametric | None = None, **values: float) -> Explorer:
     """Return an interactive view of a system, to be displayed as the last expression of a notebook cell.
 
     The sliders need the extra ``explore`` (ipywidgets); without it the notebook shows a picture of the same state.

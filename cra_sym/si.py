@@ -7,17 +7,20 @@ none of them is imported.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from numbers import Real
-from typing import Any
+from typing import Any, SupportsFloat, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cra_sym.symbols import Dimension, unit_dimension
 
-__all__ = ["check_rows", "dimensions", "paired", "plain_numbers"]
+__all__ = ["Numbers", "check_rows", "dimensions", "paired", "plain_numbers"]
 
+Numbers: TypeAlias = ArrayLike | SupportsFloat | Sequence[SupportsFloat]
+"""Numbers as arguments: also those of SymPy, fractions and decimal, quantities with units, labelled arrays."""
 _EXACT = {int, float}
 _BASE = {"[length]": "meter", "[mass]": "kilogram", "[time]": "second"}
 _OTHERS = {"[current]": "ampere", "[temperature]": "kelvin", "[substance]": "mole", "[luminosity]": "candela"}

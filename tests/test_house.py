@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import re
 import subprocess
 import sys
@@ -224,6 +225,15 @@ def test_public_name_has_a_home(name):
     home = import_module(f"cra_sym.{cra_sym._HOME[name]}")
     assert getattr(cra_sym, name) is getattr(home, name)
     assert getattr(home, name).__doc__
+
+
+@pytest.mark.parametrize("name", sorted(cra_sym._HOME))
+def test_public_arguments_and_results_have_types(name):
+    thing = getattr(cra_sym, name)
+    found = [thing, *(vars(thing).values() if inspect.isclass(thing) else ())]
+    for one in filter(inspect.isfunction, found):
+        untyped = [argument for argument, kind in one.__annotations__.items() if re.search(r"\bAny\b", str(kind))]
+        assert one.__name__.startswith("_") or not untyped, (one.__qualname__, untyped)
 
 
 def test_stub_tells_the_same_names():

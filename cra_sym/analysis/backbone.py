@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import warnings
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,14 @@ from cra_sym.analysis.backbone_problem import FollowedMode
 from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, ConvergenceWarning, warn_of_slopes
 from cra_sym.analysis.slip_backbone import held_curve, warn_of_missing
 from cra_sym.model.system import System
+from cra_sym.si import Numbers
 from cra_sym.solvers.branching import branches as branches_of
 from cra_sym.solvers.continuation import Curve, Measure, Point, between, correct, first_point, follow, shares
 from cra_sym.solvers.harmonic_balance import peak
 from cra_sym.solvers.monodromy import multipliers
+
+if TYPE_CHECKING:
+    from sympy.core.function import AppliedUndef
 
 __all__ = ["Backbone", "backbone"]
 
@@ -84,14 +88,14 @@ def backbone(
     system: System,
     mode: int = 1,
     *,
-    energy: Any = None,
-    amplitude: Any = None,
+    energy: Numbers | None = None,
+    amplitude: Numbers | None = None,
     modes: int = 6,
     harmonics: int | None = None,
     points: int = 400,
     branches: bool = False,
-    place: Any = None,
-    field: Any = None,
+    place: float | None = None,
+    field: AppliedUndef | None = None,
 ) -> Backbone:
     """Return the undamped free periodic motions that continue a linear mode to finite amplitude.
 

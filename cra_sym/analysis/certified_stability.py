@@ -13,6 +13,7 @@ from cra_sym.checks import default_floating_point
 from cra_sym.model.excitations import Drive, Excitation
 from cra_sym.model.routes import ROUNDING
 from cra_sym.model.system import System
+from cra_sym.si import Numbers
 from cra_sym.solvers.floquet import Oscillation, flat
 from cra_sym.solvers.periodic import PeriodicSystem
 from cra_sym.solvers.proved_stability import STABLE, UNSTABLE, proved_stability
@@ -22,7 +23,7 @@ __all__ = ["certify_stability"]
 
 @default_floating_point
 def certify_stability(
-    system: System, excitation: Excitation, angular_frequency: Any, epsilon: Any, modes: int = 3
+    system: System, excitation: Excitation, angular_frequency: Numbers, epsilon: Numbers, modes: int = 3
 ) -> NDArray[np.str_]:
     """Prove whether vibration grows, for each point of a chart.
 

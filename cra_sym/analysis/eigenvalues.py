@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from cra_sym.checks import count, default_floating_point, instance, real_array
 from cra_sym.model.spatial import check_range
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.model.values import flat_columns
+from cra_sym.si import Numbers
 from cra_sym.solvers.argument import number_inside
 from cra_sym.solvers.eigenvalues import refine
 from cra_sym.solvers.pencil_refine import Settled, lowest_eigenvalues
@@ -124,7 +124,7 @@ def damping_ratios(system: System, modes: int = 3) -> NDArray[np.float64]:
 
 
 @default_floating_point
-def count_eigenvalues(system: System, radius: Any) -> NDArray[np.int64]:
+def count_eigenvalues(system: System, radius: Numbers) -> NDArray[np.int64]:
     """Return the number of eigenvalues with a modulus below a radius, by the argument principle.
 
     The count uses only the exact characteristic function, not the method of :func:`eigenvalues`: if that gives the same

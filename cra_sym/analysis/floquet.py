@@ -15,7 +15,7 @@ from cra_sym.kernels.parts import wants_compiler
 from cra_sym.model.excitations import Drive, Excitation, Fluctuation, Parametric, TransverseBase
 from cra_sym.model.modal_matrices import ModalMatrices, modal_matrices
 from cra_sym.model.system import MOST_MODES, System
-from cra_sym.si import paired
+from cra_sym.si import Numbers, paired
 from cra_sym.solvers import floquet, periodic
 
 __all__ = [
@@ -35,8 +35,8 @@ _ROOTS = 5  # spectra for which the compiled path saves as much time as for a po
 def growth_rate(
     system: System,
     excitation: Excitation,
-    angular_frequency: Any,
-    epsilon: Any,
+    angular_frequency: Numbers,
+    epsilon: Numbers,
     modes: int = 3,
     *,
     residual: bool = False,
@@ -98,8 +98,8 @@ def growth_rate(
 def floquet_exponents(
     system: System,
     excitation: Excitation,
-    angular_frequency: Any,
-    epsilon: Any,
+    angular_frequency: Numbers,
+    epsilon: Numbers,
     modes: int = 3,
     *,
     residual: bool = False,

@@ -15,6 +15,7 @@ from cra_sym.model.routes import GeneralRoute, Modes
 from cra_sym.model.spatial import HALVINGS, SpatialProblem
 from cra_sym.model.system import System
 from cra_sym.model.values import flat_columns
+from cra_sym.si import Numbers
 from cra_sym.solvers.driven import driven_states
 from cra_sym.solvers.remainder import nodes, remainder
 
@@ -36,8 +37,8 @@ _FASTEST = 1e60  # rad/s, whose fourth power does not overflow; below its invers
 @default_floating_point
 def frequency_response(
     system: System,
-    angular_frequency: Any,
-    x: Any = None,
+    angular_frequency: Numbers,
+    x: Numbers | None = None,
     drive: Expr | None = None,
     *,
     kind: Literal["force", "motion"] | None = None,

@@ -18,6 +18,7 @@ from cra_sym.analysis.fit_search import Data, Search
 from cra_sym.analysis.fit_unknowns import Unknown, unknowns
 from cra_sym.checks import ByValue, default_floating_point, instance
 from cra_sym.model.system import System
+from cra_sym.si import Numbers
 
 __all__ = [
     "AmbiguityWarning",
@@ -140,8 +141,8 @@ class JointEstimate(Identification):
 
 def identify(
     system: System,
-    measured: Any,
-    uncertainty: Any,
+    measured: Numbers,
+    uncertainty: Numbers,
     unknown: Sequence[str] | None = None,
     modes: Sequence[int] | None = None,
     prior: Mapping[str, tuple[float, float]] | None = None,
@@ -202,8 +203,8 @@ def identify(
 
 def identify_joint(
     system: System,
-    measured_frequencies: Any,
-    uncertainty: Any,
+    measured_frequencies: Numbers,
+    uncertainty: Numbers,
     modes: Sequence[int] | None = None,
     prior: Mapping[str, tuple[float, float]] | None = None,
 ) -> JointEstimate:
@@ -256,8 +257,8 @@ def _identified(
     kind: type[Identification],
     name: str,
     system: System,
-    measured: Any,
-    uncertainty: Any,
+    measured: Numbers,
+    uncertainty: Numbers,
     unknown: Sequence[str] | None,
     modes: Any,
     prior: Any,

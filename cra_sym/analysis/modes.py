@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,10 @@ from cra_sym.analysis.complex_shapes import complex_shapes
 from cra_sym.model.routes import Modes
 from cra_sym.model.spatial import check_range
 from cra_sym.model.system import MOST_MODES, System
+from cra_sym.si import Numbers
+
+if TYPE_CHECKING:
+    from sympy.core.function import AppliedUndef
 
 __all__ = [
     "ModalParameters",
@@ -77,13 +81,13 @@ def section_place(system: System, field: Any = None) -> int:
 
 
 @overload
-def mode_shapes(system: System, x: Any, modes: int = 3, derivative: int = 0, *, field: Any = None,
+def mode_shapes(system: System, x: Numbers, modes: int = 3, derivative: int = 0, *, field: AppliedUndef | None = None,
                 damped: Literal[False] = False, oscillating: bool = True) -> Array:  # fmt: skip
     """Return real mode shapes."""
 
 
 @overload
-def mode_shapes(system: System, x: Any, modes: int = 3, derivative: int = 0, *, field: Any = None,
+def mode_shapes(system: System, x: Numbers, modes: int = 3, derivative: int = 0, *, field: AppliedUndef | None = None,
                 damped: bool, oscillating: bool = True) -> Array | NDArray[np.complex128]:  # fmt: skip
     """Return complex mode shapes if ``damped``."""
 
@@ -91,11 +95,11 @@ def mode_shapes(system: System, x: Any, modes: int = 3, derivative: int = 0, *, 
 @checks.default_floating_point
 def mode_shapes(
     system: System,
-    x: Any,
+    x: Numbers,
     modes: int = 3,
     derivative: int = 0,
     *,
-    field: Any = None,
+    field: AppliedUndef | None = None,
     damped: bool = False,
     oscillating: bool = True,
 ) -> Array | NDArray[np.complex128]:

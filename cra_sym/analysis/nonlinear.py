@@ -15,6 +15,7 @@ from cra_sym.model.modal_equations import ModalEquations, modal_equations
 from cra_sym.model.nonlinear import NonlinearTerms
 from cra_sym.model.projection import along
 from cra_sym.model.system import MOST_MODES, System
+from cra_sym.si import Numbers
 from cra_sym.solvers.harmonic_balance import Basis
 from cra_sym.solvers.modal_polynomials import ModalPolynomials
 
@@ -48,7 +49,7 @@ class ConvergenceWarning(UserWarning):
 
 
 @checks.default_floating_point
-def nonlinear_modal_equations(system: System, modes: int = 3, zeta: Any = None) -> ModalEquations:
+def nonlinear_modal_equations(system: System, modes: int = 3, zeta: Numbers | None = None) -> ModalEquations:
     r"""Return the equations of motion of the first linear modes with their nonlinear coefficient tensors.
 
     .. math:: L = \tfrac12\dot q^T\dot q - \tfrac12 q^T\Omega^2 q + \sum T[q, \ldots, q, \dot q, \ldots, \dot q]

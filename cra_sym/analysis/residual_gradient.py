@@ -17,6 +17,7 @@ from cra_sym.checks import count, default_floating_point, names
 from cra_sym.model.one_wave import Change, OneWaveModes
 from cra_sym.model.projection import column
 from cra_sym.model.system import MOST_MODES, System
+from cra_sym.si import Numbers
 from cra_sym.solvers.motion import BaseMotion, Piecewise
 from cra_sym.solvers.motion_terms import Term
 
@@ -39,8 +40,8 @@ def residual_vibration_gradient(
     by: Sequence[str] | None = None,
     modes: int = 5,
     *,
-    zeta: Any = None,
-) -> tuple[Any, Array]:
+    zeta: Numbers | None = None,
+) -> tuple[Array | float, Array]:
     r"""Return the residual vibration and its derivatives, for gradient-based optimisation.
 
     The residual vibration of mode i depends on its frequency and on :math:`\Gamma_i \phi_i(L)` for every motion and

@@ -19,6 +19,7 @@ from cra_sym.checks import broadcastable, count, default_floating_point, instanc
 from cra_sym.model.projection import Projected
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.model.values import checked_damping
+from cra_sym.si import Numbers
 from cra_sym.solvers import modal_response as solver
 from cra_sym.solvers.driven_modes import state_at_stop
 from cra_sym.solvers.force import Force
@@ -38,8 +39,8 @@ def residual_vibration(
     motion: BaseMotion | Mapping[AppliedUndef, History],
     modes: int = 5,
     *,
-    zeta: Any = None,
-) -> Any:
+    zeta: Numbers | None = None,
+) -> Array | float:
     """Return the peak amplitude of the tip after all motions and forces have stopped, m: the sum over the modes.
 
     Exact for one mode; without damping the least upper bound over all times (frequencies of modes are

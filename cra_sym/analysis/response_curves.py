@@ -6,7 +6,7 @@ import itertools
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +21,10 @@ from cra_sym.model.system import System
 from cra_sym.solvers.branching import beside
 from cra_sym.solvers.continuation import Point, at_value, follow, passings, started
 from cra_sym.solvers.driven_curve import Driven, turning
+
+if TYPE_CHECKING:
+    from sympy import Expr
+    from sympy.core.function import AppliedUndef
 
 __all__ = ["ResponseCurve", "response_curves"]
 
@@ -82,14 +86,14 @@ def response_curves(
     *,
     excitation: Parametric | None = None,
     epsilon: float | None = None,
-    drive: Mapping[Any, float] | None = None,
+    drive: Mapping[Expr, float] | None = None,
     modes: int = 3,
     harmonics: int = 7,
     period: int = 1,
     zeta: ArrayLike | None = None,
     points: int = 600,
     place: float | None = None,
-    field: Any = None,
+    field: AppliedUndef | None = None,
 ) -> tuple[ResponseCurve, ...]:
     """Continue the steady states of a system in the excitation frequency, through folds and onto all branches.
 

@@ -21,6 +21,7 @@ from cra_sym.model.projection import Projected
 from cra_sym.model.routes import Modes
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.model.values import checked_damping
+from cra_sym.si import Numbers, plain_numbers
 from cra_sym.solvers import modal_response as solver
 from cra_sym.solvers.coupled_modes import CoupledModes, coupled_response
 from cra_sym.solvers.driven_modes import Start, check_start, driven_response
@@ -62,15 +63,15 @@ _forced = derived_kernel("cra_sym.model.oscillator:forced_kernel", backend="nump
 def tip_response(
     system: System,
     motion: BaseMotion | Mapping[AppliedUndef, History] | None,
-    t: Any,
+    t: Numbers,
     modes: int = 5,
     derivative: int = 0,
     *,
-    zeta: Any = None,
+    zeta: Numbers | None = None,
     start: Start = "inertial",
-    initial: Mapping[Any, Expr] | None = None,
+    initial: Mapping[Expr, Expr] | None = None,
     field: AppliedUndef | None = None,
-) -> Any:
+) -> Array:
     """Return the displacement of the tip, the right end of the first field, equation (34); of an arm v(L, t), m.
 
     As :func:`response` at the right end of the domain.
@@ -105,23 +106,23 @@ def tip_response(
         return found.displacement(1, place)[..., None, :]
 
     values = _oscillation(system, motion, tip, t, modes, derivative, zeta, start, initial)[..., 0, :]
-    return values if np.ndim(t) else values[..., 0]
+    return values if np.ndim(plain_numbers("t", t, "s")) else values[..., 0]
 
 
 @default_floating_point
 def response(
     system: System,
     motion: BaseMotion | Mapping[AppliedUndef, History] | None,
-    t: Any,
-    x: Any,
+    t: Numbers,
+    x: Numbers,
     modes: int = 5,
     derivative: int = 0,
     *,
-    zeta: Any = None,
+    zeta: Numbers | None = None,
     start: Start = "inertial",
-    initial: Mapping[Any, Expr] | None = None,
+    initial: Mapping[Expr, Expr] | None = None,
     field: AppliedUndef | None = None,
-) -> Any:
+) -> Array:
     """Return a field in time, seen from the moving base, or its time derivatives, equation (34).
 
     The sum over modes of phi_i(x) q_i(t), with Duhamel's integral (12) in closed form: exact at and near every
@@ -195,7 +196,7 @@ def response(
 
     values = _oscillation(system, motion, along, t, modes, derivative, zeta, start, initial)
     values = values if places.ndim else values[..., 0, :]
-    return values if np.ndim(t) else values[..., 0]
+    return values if np.ndim(plain_numbers("t", t, "s")) else values[..., 0]
 
 
 def oscillators(system: System, gamma: Array, rows: Array, modes: int, zeta: Any) -> solver.Oscillators:

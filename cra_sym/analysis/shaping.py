@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from math import comb
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.checks import broadcastable, count, default_floating_point, real_array
-from cra_sym.si import paired
+from cra_sym.si import Numbers, paired
 
 __all__ = ["input_shaper"]
 
@@ -22,7 +21,7 @@ _BAND = np.linspace(-1.0, 1.0, 201)
 
 @default_floating_point
 def input_shaper(
-    angular_frequency: Any, zeta: Any = 0.0, order: int = 1, *, humps: int = 0, tolerance: Any = None
+    angular_frequency: Numbers, zeta: Numbers = 0.0, order: int = 1, *, humps: int = 0, tolerance: Numbers | None = None
 ) -> tuple[Array, Array]:
     r"""Return amplitudes and times of a shaper for a mode, for :meth:`BaseMotion.shaped`.
 

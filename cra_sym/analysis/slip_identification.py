@@ -23,7 +23,7 @@ from cra_sym.analysis.identification import (
 from cra_sym.analysis.slip_backbone import held_curve
 from cra_sym.checks import broadcastable, count, default_floating_point, instance, names, real_array
 from cra_sym.model.system import System
-from cra_sym.si import paired
+from cra_sym.si import Numbers, paired
 
 __all__ = ["identify_slip"]
 
@@ -68,10 +68,10 @@ class _Fit:
 @default_floating_point
 def identify_slip(
     system: System,
-    amplitude: Any,
-    frequency: Any,
-    damping_ratio: Any,
-    uncertainty: tuple[Any, Any],
+    amplitude: Numbers,
+    frequency: Numbers,
+    damping_ratio: Numbers,
+    uncertainty: tuple[Numbers, Numbers],
     unknown: Sequence[str],
     *,
     mode: int = 1,

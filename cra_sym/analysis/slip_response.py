@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from cra_sym.analysis.modes import section_place
 from cra_sym.analysis.responses import slipping_problem
 from cra_sym.checks import ByValue, count, default_floating_point, instance, one_axis
 from cra_sym.model.system import MOST_MODES, System
+from cra_sym.si import Numbers
 from cra_sym.solvers.driven_modes import Start
 from cra_sym.solvers.slip_records import Ledger
 from cra_sym.solvers.slipping import Events, first_forces
@@ -127,12 +128,12 @@ class SlipResponse(ByValue):
 def slip_response(
     system: System,
     motion: History | Mapping[AppliedUndef, History] | None,
-    t: Any,
+    t: Numbers,
     modes: int = 5,
     *,
-    zeta: Any = None,
+    zeta: Numbers | None = None,
     start: Start = "inertial",
-    initial: Mapping[Any, Expr] | None = None,
+    initial: Mapping[Expr, Expr] | None = None,
 ) -> SlipResponse:
     """Return the time history of elastic-slip elements: states, forces, events, energies.
 

@@ -15,7 +15,7 @@ from cra_sym.analysis.zones import Zone, derived, first_order_zone, zone_of
 from cra_sym.kernels import derived_kernel
 from cra_sym.model.excitations import Excitation, Fluctuation, Parametric, TransverseBase
 from cra_sym.model.system import MOST_MODES, System
-from cra_sym.si import paired
+from cra_sym.si import Numbers, paired
 
 __all__ = ["AsymptoticWarning", "ResonanceWarning", "forced_width", "judged_boundary", "stability_boundary"]
 
@@ -56,7 +56,7 @@ class AsymptoticWarning(UserWarning):
 def stability_boundary(
     system: System,
     excitation: Excitation,
-    epsilon: Any,
+    epsilon: Numbers,
     resonance: tuple[int, int] = (1, 1),
     order: int = 1,
     modes: int = 3,
@@ -125,7 +125,7 @@ def stability_boundary(
 def judged_boundary(
     system: System,
     excitation: Excitation,
-    epsilon: Any,
+    epsilon: Numbers,
     resonance: tuple[int, int] = (1, 1),
     order: int = 1,
     modes: int = 3,

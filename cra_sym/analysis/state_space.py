@@ -36,7 +36,7 @@ def state_space(
     system: System,
     modes: int = 3,
     input: str | Expr | Sequence[str | Expr] = "base_acceleration",
-    outputs: Sequence[str | tuple[str, float] | Expr] | Mapping[str, Any] | None = None,
+    outputs: Sequence[str | tuple[str, float] | Expr] | Mapping[str, str | tuple[str, float] | Expr] | None = None,
 ) -> LinearSystem:
     """Return the continuous-time state space from inputs to outputs, in modal coordinates.
 

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypedDict, Unpack, overload
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,11 @@ from cra_sym.analysis.slip_states import MOST, SlipProblem
 from cra_sym.analysis.steady_search import Answers, answers_at, is_stable
 from cra_sym.model.excitations import Parametric
 from cra_sym.model.system import System
+from cra_sym.si import Numbers
+
+if TYPE_CHECKING:
+    from sympy import Expr
+    from sympy.core.function import AppliedUndef
 
 __all__ = ["SteadyState", "steady_states"]
 
@@ -98,13 +103,13 @@ class _Options(TypedDict, total=False):
     """Arguments common to the overloads of :func:`steady_states`."""
 
     excitation: Parametric | None
-    drive: Mapping[Any, float] | None
+    drive: Mapping[Expr, float] | None
     modes: int
     harmonics: int | None
     period: int
     zeta: ArrayLike | None
     place: float | None
-    field: Any
+    field: AppliedUndef | None
 
 
 @overload
@@ -126,17 +131,17 @@ def steady_states(
 @checks.default_floating_point
 def steady_states(
     system: System,
-    angular_frequency: Any,
+    angular_frequency: Numbers,
     *,
-    excitation: Any = None,
-    epsilon: Any = None,
-    drive: Mapping[Any, Any] | None = None,
+    excitation: Parametric | None = None,
+    epsilon: Numbers | None = None,
+    drive: Mapping[Expr, float] | None = None,
     modes: int = 3,
     harmonics: int | None = None,
     period: int = 1,
-    zeta: Any = None,
-    place: Any = None,
-    field: Any = None,
+    zeta: Numbers | None = None,
+    place: float | None = None,
+    field: AppliedUndef | None = None,
 ) -> list[list[tuple[SteadyState, ...]]] | list[tuple[SteadyState, ...]] | tuple[SteadyState, ...]:
     """Return the periodic solutions of a system with parametric excitation, harmonic input, or both.
 
@@ -217,7 +222,13 @@ def steady_states(
     period = checks.count("period", period, high=8)
     varpi = checks.one_axis("angular_frequency", angular_frequency, "frequencies", low=1e-300, unit="rad/s")
     sizes = np.ones(()) if epsilon is None else checks.one_axis("epsilon", epsilon, "sizes", low=0.0, unit="1")
-    given = {"system": system, "modes": modes, "excitation": excitation, "epsilon": epsilon, "drive": drive}
+    given: dict[str, Any] = {
+        "system": system,
+        "modes": modes,
+        "excitation": excitation,
+        "epsilon": epsilon,
+        "drive": drive,
+    }
     given |= {"zeta": zeta, "place": place, "field": field, "period": period, "harmonics": harmonics}
     if slipping and sizes.ndim:
         raise ValueError(f"epsilon has shape {sizes.shape}: must be one number with elastic-slip elements")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.checks import count, instance, real_array
+from cra_sym.si import Numbers
 
 if TYPE_CHECKING:
     from cra_sym.arm.parameters import Arm
@@ -109,14 +110,14 @@ class BoltedJoint:
             object.__setattr__(self, name, float(value))
         object.__setattr__(self, "faces", count("faces", self.faces))
 
-    def replace(self, **changes: Any) -> BoltedJoint:
+    def replace(self, **changes: float) -> BoltedJoint:
         """Return a validated copy with some parameters changed."""
         unknown = [name for name in changes if name not in {field.name for field in fields(self)}]
         if unknown:
             raise TypeError(f"{unknown[0]!r} is not a parameter of BoltedJoint")
-        return replace(self, **changes)
+        return replace(self, **cast(dict[str, Any], changes))
 
-    def values(self, preload: Any) -> dict[str, NDArray[np.float64]]:
+    def values(self, preload: Numbers) -> dict[str, NDArray[np.float64]]:
         """Return k_t, k_r, the stiffness k_d and the slip of the Jenkins element, by name.
 
         Parameters
@@ -143,7 +144,7 @@ class BoltedJoint:
             "slip": self.friction * self.faces * N,
         }
 
-    def on(self, arm: Arm, preload: Any) -> System:
+    def on(self, arm: Arm, preload: Numbers) -> System:
         """Return the arm with this joint: a System with a Jenkins element k_d, slip beside k_t and k_r.
 
         Parameters
@@ -167,7 +168,7 @@ class BoltedJoint:
         instance("arm", arm, Arm)
         return _model(arm.model).at({**arm.values, **self.values(preload)}, zeta=arm.zeta)
 
-    def parametric(self, arm: Arm, preload: Any) -> System:
+    def parametric(self, arm: Arm, preload: Numbers) -> System:
         """Return the arm with this joint as :meth:`on` does, with the preload as a parameter of its Lagrangian.
 
         So it is a slider of :func:`cra_sym.explore`, and sensitivities and sweeps are over the preload. The springs of

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym import checks
 from cra_sym.arm.parameters import Arm
 from cra_sym.model.system import MOST_MODES
-from cra_sym.si import paired
+from cra_sym.si import Numbers, paired
 
 __all__ = ["frequency_parameters"]
 
 
-def frequency_parameters(kappa_t: Any, kappa_r: Any, mu: Any, iota: Any = 0.0, modes: int = 3) -> NDArray[np.float64]:
+def frequency_parameters(
+    kappa_t: Numbers, kappa_r: Numbers, mu: Numbers, iota: Numbers = 0.0, modes: int = 3
+) -> NDArray[np.float64]:
     """Return the frequency parameters lambda = beta L of the paper's arm, the zeros of its determinant (22).
 
     Parameters

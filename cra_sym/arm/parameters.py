@@ -13,7 +13,7 @@ import numpy as np
 from cra_sym.checks import broadcastable, real_array
 from cra_sym.model.numerics import Numerics
 from cra_sym.model.system import System
-from cra_sym.si import paired
+from cra_sym.si import Numbers, paired
 from cra_sym.symbols import row
 
 if TYPE_CHECKING:
@@ -161,7 +161,7 @@ class Arm(System):
     def _fields(self) -> dict[str, Any]:
         return {name: getattr(self, name) for name in self._names()}
 
-    def replace(self, **changes: Any) -> Arm:
+    def replace(self, **changes: Numbers) -> Arm:
         """Return a validated copy with some fields changed.
 
         Raises

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cra_sym.checks import choice, count, instance
 from cra_sym.codegen.arm_library import arm_library
@@ -21,6 +21,9 @@ from cra_sym.codegen.user_model import model_library
 from cra_sym.files import OutputError, path_of, staged_directory
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.system import MOST_MODES, System
+
+if TYPE_CHECKING:
+    from sympy import Expr
 
 __all__ = ["Export", "export"]
 
@@ -63,8 +66,8 @@ def export(
     modes: int = 3,
     real: str = "float64",
     version: str = "3.0",
-    input: Any = "base_acceleration",
-    outputs: Any = None,
+    input: str | Expr | Sequence[str | Expr] = "base_acceleration",
+    outputs: Sequence[str | tuple[str, float] | Expr] | Mapping[str, str | tuple[str, float] | Expr] | None = None,
     controller: Controller | None = None,
 ) -> Export:
     """Write the arm, any model, or the modes of any system, as tested source code that does not need this package.

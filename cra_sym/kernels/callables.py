@@ -5,14 +5,19 @@ from __future__ import annotations
 import hashlib
 import linecache
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from cra_sym.checks import choice, common_shape, shown
 from cra_sym.kernels import lanes
+
+if TYPE_CHECKING:
+    from sympy import Expr, MatrixBase, Symbol
+
+    Expressions: TypeAlias = "Expr | MatrixBase | float | Sequence[Expressions] | Mapping[Hashable, Expressions]"
 
 __all__ = ["Kernel", "kernel"]
 
@@ -117,7 +122,7 @@ class Kernel:
         return f"<Kernel ({', '.join(self.arguments)}) {self.digest[:12]}>"
 
 
-def kernel(expression: Any, arguments: Any, *, backend: str | None = None) -> Kernel:
+def kernel(expression: Expressions, arguments: Iterable[Symbol], *, backend: str | None = None) -> Kernel:
     """Turn a SymPy expression into a fast, picklable function of broadcasting arrays.
 
     Parameters

@@ -13,7 +13,9 @@ from cra_sym import checks
 __all__ = ["stations"]
 
 
-def stations(x: Symbol, table: Sequence[tuple[Any, Any]], kind: Literal["linear", "step"] = "linear") -> Expr:
+def stations(
+    x: Symbol, table: Sequence[tuple[Expr | float, Expr | float]], kind: Literal["linear", "step"] = "linear"
+) -> Expr:
     """Return a table of values along x as an expression, for use as a coefficient in a Lagrangian.
 
     Parameters

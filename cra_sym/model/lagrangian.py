@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 from sympy import Expr, Symbol, sympify
 from sympy.core.function import AppliedUndef
@@ -29,6 +29,7 @@ from cra_sym.model.symmetry import asymmetry
 from cra_sym.model.system import TOLERANCE, System
 from cra_sym.model.units import check_dimensions, named_units, symbol_units
 from cra_sym.model.work import work_as_energy
+from cra_sym.si import Numbers
 
 __all__ = ["Model"]
 
@@ -110,7 +111,7 @@ class Model(Asked):
         *,
         fields: Sequence[AppliedUndef],
         x: Symbol,
-        domain: tuple[Any, Any],
+        domain: tuple[Expr | float, Expr | float],
         t: Symbol,
         left: Expr | None = None,
         right: Expr | None = None,
@@ -118,12 +119,12 @@ class Model(Asked):
         inside: Sequence[tuple[Expr, Expr]] = (),
         coordinates: Sequence[AppliedUndef] = (),
         prescribed: Sequence[AppliedUndef] = (),
-        virtual_work: Sequence[tuple[Expr, Expr, Any]] | None = None,
-        units: Mapping[Any, str] | None = None,
+        virtual_work: Sequence[tuple[Expr, Expr, Expr | float | str | None]] | None = None,
+        units: Mapping[Expr, str] | None = None,
         definitions: Mapping[Symbol, Expr] | None = None,
         small: tuple[Symbol, Symbol] | None = None,
         quadratures: Mapping[AppliedUndef, Expr] | None = None,
-        hysteresis: Sequence[tuple[Element, Expr, Any]] = (),
+        hysteresis: Sequence[tuple[Element, Expr, Expr | float | str | None]] = (),
     ) -> None:
         self._pieces: dict[str, Any] = {
             "density": density,
@@ -178,7 +179,7 @@ class Model(Asked):
         """The model without its elastic-slip elements, whose modes nonlinear results use; itself if it has none."""
         return self.replace(hysteresis=()) if self._pieces["hysteresis"] else self
 
-    def replace(self, **changes: Any) -> Model:
+    def replace(self, **changes: object) -> Model:
         """Return the same model with some of what it was made of replaced.
 
         Parameters
@@ -205,7 +206,7 @@ class Model(Asked):
             raise TypeError(f"{unknown[0]!r} is not an argument of Model; it has {', '.join(self._pieces)}")
         return Model(**{**arguments(self._pieces), **changes})
 
-    def at(self, values: Mapping[Any, Any], zeta: Any = 0.0, tolerance: float = TOLERANCE) -> System:
+    def at(self, values: Mapping[Symbol | str, Numbers], zeta: Numbers = 0.0, tolerance: float = TOLERANCE) -> System:
         """Return the model bound to values.
 
         Parameters
@@ -348,9 +349,15 @@ class Model(Asked):
     def _undamped_work(self) -> tuple[tuple[Expr, Expr, Any], ...]:
         return undamped(self.steady._options["virtual_work"], self._options["t"])
 
-    def separate(self, **options: Any) -> Modal:
+    def separate(
+        self,
+        *,
+        parameters: Mapping[Symbol, Expr] | None = None,
+        basis: Literal["hyperbolic", "decaying"] = "hyperbolic",
+        frequency: Symbol | None = None,
+    ) -> Modal:
         """Separate the variables: characteristic matrix and function, mode shapes, in closed form."""
-        return separate(self.linearised, **options)
+        return separate(self.linearised, parameters=parameters, basis=basis, frequency=frequency)
 
     def ritz(self, elements: int, nodes: Sequence[Expr] = ()) -> Ritz:
         """Return a Hermite-element model of the same Lagrangian: upper bounds of frequencies, coefficients of any x.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from sympy import Derivative, Dummy, Expr, S, Subs, Symbol, cos, preorder_traversal, sin, sympify
 from sympy.core.function import AppliedUndef
@@ -108,9 +107,12 @@ def joined(
     joints: Sequence[tuple[Sequence[Expr], Sequence[Expr]]] = (),
     essential: Sequence[Expr] = (),
     terms: Expr = S.Zero,
-    virtual_work: Sequence[tuple[Expr, Expr, Any]] = (),
-    units: Mapping[Any, str] | None = None,
-    **options: Any,
+    virtual_work: Sequence[tuple[Expr, Expr, Expr | float | str | None]] = (),
+    units: Mapping[Expr, str] | None = None,
+    coordinates: Sequence[AppliedUndef] = (),
+    prescribed: Sequence[AppliedUndef] = (),
+    definitions: Mapping[Symbol, Expr] | None = None,
+    small: tuple[Symbol, Symbol] | None = None,
 ) -> Model:
     """Return the model of a structure of several members.
 
@@ -131,8 +133,8 @@ def joined(
         Lagrangian of masses and springs at ends, in evaluated forms such as ``m * v.subs(x, L).diff(t)**2 / 2``.
     virtual_work : sequence of (force, displacement, None)
         Non-conservative forces on displacements of ends, in evaluated forms.
-    units, **options
-        As of :class:`Model`: coordinates, prescribed, definitions.
+    units, coordinates, prescribed, definitions, small : optional
+        As of :class:`Model`.
 
     Returns
     -------
@@ -188,7 +190,10 @@ def joined(
         inside=inside,
         virtual_work=[(moved(force), moved(displacement), place) for force, displacement, place in virtual_work],
         units={x: "1", **(units or {})},
-        **options,
+        coordinates=coordinates,
+        prescribed=prescribed,
+        definitions=definitions,
+        small=small,
     )
 
 

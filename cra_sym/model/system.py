@@ -19,9 +19,10 @@ from cra_sym.model.slip_elements import SlipElements, slip_elements, slip_terms_
 from cra_sym.model.spatial import check_range
 from cra_sym.model.values import Value, checked_damping, checked_values, frozen
 from cra_sym.model.vanishing import check_forces
+from cra_sym.si import Numbers
 
 if TYPE_CHECKING:
-    from sympy import Expr
+    from sympy import Expr, Symbol
 
     from cra_sym.model.lagrangian import Model
     from cra_sym.model.numerics import Numerics
@@ -71,7 +72,9 @@ class System:
 
     tolerance: float = TOLERANCE
 
-    def __init__(self, model: Model, values: Mapping[Any, Any], zeta: Any = 0.0, tolerance: float = TOLERANCE) -> None:
+    def __init__(
+        self, model: Model, values: Mapping[Symbol | str, Numbers], zeta: Numbers = 0.0, tolerance: float = TOLERANCE
+    ) -> None:
         from cra_sym.model.lagrangian import Model
 
         instance("model", model, Model)
@@ -116,7 +119,7 @@ class System:
         """Measurable quantities of a section besides its displacements, by name: expressions in x."""
         return {}
 
-    def replace(self, **changes: Any) -> System:
+    def replace(self, **changes: Numbers) -> System:
         """Return a validated copy with some values, ``zeta`` or ``tolerance``, changed.
 
         Raises

@@ -6,6 +6,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from cra_sym.si import Numbers
+
 from ..checks import broadcastable, choice, equal, flag, one_axis, real_array
 from ..si import paired
 from .motion_terms import Harmonic, Piecewise, Term
@@ -230,7 +232,7 @@ class BaseMotion:
         jerk = quotient(peak, t_j)[..., None] * np.array([1, 0, -1, 0, -1, 0, 1, 0])
         return cls._of([Piecewise(np.zeros(shape), knots, level, jerk)], shape)
 
-    def shaped(self, amplitudes: Any, times: Any) -> BaseMotion:
+    def shaped(self, amplitudes: Numbers, times: Numbers) -> BaseMotion:
         """Return the motion convolved with impulses: scaled copies of it, each delayed by its time.
 
         Parameters
@@ -287,7 +289,7 @@ class BaseMotion:
 
     __rmul__ = __mul__
 
-    def kinematics(self, t: Any) -> tuple[Any, Any, Any]:
+    def kinematics(self, t: Numbers) -> tuple[Array, Array, Array]:
         """Return displacement (m), velocity (m/s) and acceleration (m/s2) of the base at times ``t`` >= 0, shape
         (..., t).
 
@@ -304,15 +306,15 @@ class BaseMotion:
         w, v, a = (value if times.ndim else value[..., 0] for value in total)
         return w, v, a
 
-    def displacement(self, t: Any) -> Any:
+    def displacement(self, t: Numbers) -> Array:
         """Return w(t), m."""
         return self.kinematics(t)[0]
 
-    def velocity(self, t: Any) -> Any:
+    def velocity(self, t: Numbers) -> Array:
         """Return w'(t), m/s, to the right of a jump."""
         return self.kinematics(t)[1]
 
-    def acceleration(self, t: Any) -> Any:
+    def acceleration(self, t: Numbers) -> Array:
         """Return w''(t), m/s2, to the right of a jump."""
         return self.kinematics(t)[2]
 

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from cra_sym import checks
 from cra_sym.extras import require
 from cra_sym.model.system import System
+from cra_sym.si import Numbers
 from cra_sym.studies.quantities import QUANTITIES, Quantity
 from cra_sym.studies.study import make_study
+
+if TYPE_CHECKING:
+    from distributed import Client
+    from xarray import Dataset
 
 __all__ = ["QUANTITIES", "Quantity", "sweep"]
 
@@ -19,13 +24,13 @@ _CHUNKS = 64
 
 def sweep(
     system: System,
-    quantity: str | Callable[..., Any] = "natural_frequencies",
+    quantity: str | Callable[..., Numbers] = "natural_frequencies",
     *,
     chunks: int | None = None,
     store: str | Path | None = None,
-    client: Any = None,
-    **parameters: Any,
-) -> Any:
+    client: Client | None = None,
+    **parameters: Numbers,
+) -> Dataset:
     """Evaluate a quantity over the product of parameter axes.
 
     Parameters
@@ -81,7 +86,9 @@ def sweep(
     if store is not None:
         from cra_sym.studies.store import sweep_into
 
-        return sweep_into(study, store, chunks or _CHUNKS, client)
+        stored: Dataset = sweep_into(study, store, chunks or _CHUNKS, client)
+        return stored
     if client is not None:
         raise ValueError("client: must be given together with a store, whose regions it computes")
-    return study.dataset(study.evaluate() if chunks is None else study.lazy(chunks))
+    swept: Dataset = study.dataset(study.evaluate() if chunks is None else study.lazy(chunks))
+    return swept
