@@ -70,10 +70,11 @@ def made(function: ast.FunctionDef, types: Sequence[str], namespace: Mapping[str
     TypeError
         If it takes another number of arguments.
     """
-    text, results = _written(function, types, namespace)
-    module = binding.parse_assembly(text)
-    module.verify()
+    written, results = _written(function, types, namespace)
     machine = _target_machine()
+    written.triple, written.data_layout = machine.triple, str(machine.target_data)
+    module = binding.parse_assembly(str(written))
+    module.verify()
     options = binding.create_pipeline_tuning_options(speed_level=3)
     options.loop_vectorization, options.slp_vectorization = True, False
     builder = binding.create_pass_builder(machine, options)
@@ -82,8 +83,8 @@ def made(function: ast.FunctionDef, types: Sequence[str], namespace: Mapping[str
     return _HEAD + results.encode() + b"\n" + code
 
 
-def _written(function: ast.FunctionDef, types: Sequence[str], namespace: Mapping[str, Any]) -> tuple[str, str]:
-    """Return the text of a module with the function, and the types of its results, in parentheses for a tuple.
+def _written(function: ast.FunctionDef, types: Sequence[str], namespace: Mapping[str, Any]) -> tuple[Any, str]:
+    """Return a module with the function, and the types of its results, in parentheses for a tuple.
 
     The function takes the address of the slots of its results; then for each argument the number, or the address of
     the description of an array.
@@ -92,7 +93,7 @@ def _written(function: ast.FunctionDef, types: Sequence[str], namespace: Mapping
         raise TypeError(f"{function.name}: {len(types)} arguments given, {len(function.args.args)} expected")
     module = ir.Module(function.name)
     shape = ir.FunctionType(ir.VoidType(), [_POINTER, *(_NUMBERS.get(of, _POINTER) for of in types)])
-    entry = ir.Function(module, shape, function.name)
+    entry = ir.Function(module, shape, _symbol(function.name))
     builder = ir.IRBuilder(entry.append_basic_block("entry"))
     slots, *given = entry.args
     arguments = [_argument(builder, of, one) for of, one in zip(types, given, strict=True)]
@@ -104,7 +105,11 @@ def _written(function: ast.FunctionDef, types: Sequence[str], namespace: Mapping
         slot = builder.gep(slots, [ir.Constant(arithmetic.INTEGER, number)], source_etype=arithmetic.INTEGER)
         builder.store(builder.zext(part, ir.IntType(8)) if part.type == arithmetic.CONDITION else part, slot)
     builder.ret_void()
-    return str(module), f"({kinds})" if isinstance(value, tuple) else kinds
+    return module, f"({kinds})" if isinstance(value, tuple) else kinds
+
+
+def _symbol(name: str) -> str:
+    return f"entry.{name}"  # which is no function of the platform
 
 
 def _argument(builder: Any, of: str, given: Any) -> Any:
@@ -158,7 +163,7 @@ class Code:
         self._engine.finalize_object()
         numbers: dict[str, Any] = {"d": ctypes.c_double, "q": ctypes.c_int64, "?": ctypes.c_int64}
         shape = ctypes.CFUNCTYPE(None, ctypes.c_void_p, *(numbers.get(of, ctypes.c_void_p) for of in types))
-        self._function = shape(self._engine.get_function_address(name))
+        self._function = shape(self._engine.get_function_address(_symbol(name)))
 
     def __call__(self, *arguments: Any) -> Any:
         """Return None, a number or a tuple of numbers; the interpreter lock is released meanwhile."""

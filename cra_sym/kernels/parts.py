@@ -15,11 +15,11 @@ from cra_sym.kernels.specialise import has_compiler, is_compiled
 
 __all__ = ["COMPILE_FROM", "LOAD_FROM", "Parts", "flattened", "in_parts", "wants_compiler"]
 
-# A root takes about 2 microseconds with NumPy and 0.1 compiled. Loading machine code takes as long as
-# LOAD_FROM roots by NumPy, compiling it as long as COMPILE_FROM. The benchmark of cold starts measures both.
-LOAD_FROM = 400_000
+# A root takes about 2 microseconds with NumPy and 0.1 compiled. Loading machine code takes as long as LOAD_FROM roots by
+# NumPy, compiling it as long as COMPILE_FROM. The benchmark of cold starts measures both.
+LOAD_FROM = 40_000
 """Number of roots in one call from which on loading machine code pays."""
-COMPILE_FROM = 1_200_000
+COMPILE_FROM = 500_000
 """Number of roots in such calls of this process from which on compiling pays."""
 _ROOTS_PER_PART = 30_000  # least number of roots per thread
 _PARTS_PER_THREAD = 8  # parts per thread, so that a slow thread does not delay the others
