@@ -36,6 +36,8 @@ def processor() -> tuple[str, str, str]:
     if sys.platform == "linux":  # elsewhere every process has loaded it
         with suppress(RuntimeError):
             binding.load_library_permanently("libm.so.6")
+    for name in ("PyCapsule_GetPointer", "PyEval_RestoreThread", "PyEval_SaveThread"):
+        binding.add_symbol(name, ctypes.cast(getattr(ctypes.pythonapi, name), ctypes.c_void_p).value)
     try:
         features = binding.get_host_cpu_features().flatten()
     except RuntimeError:  # unknown on this system
@@ -86,8 +88,8 @@ def made(function: ast.FunctionDef, types: Sequence[str], namespace: Mapping[str
 def _written(function: ast.FunctionDef, types: Sequence[str], namespace: Mapping[str, Any]) -> tuple[Any, str]:
     """Return a module with the function, and the types of its results, in parentheses for a tuple.
 
-    The function takes the address of the slots of its results; then for each argument the number, or the address of
-    the description of an array.
+    The function takes the address of the slots of its results; then for each argument the number, or the capsule with
+    the description of an array. It releases the interpreter lock while it computes.
     """
     if len(types) != len(function.args.args):
         raise TypeError(f"{function.name}: {len(types)} arguments given, {len(function.args.args)} expected")
@@ -97,6 +99,7 @@ def _written(function: ast.FunctionDef, types: Sequence[str], namespace: Mapping
     builder = ir.IRBuilder(entry.append_basic_block("entry"))
     slots, *given = entry.args
     arguments = [_argument(builder, of, one) for of, one in zip(types, given, strict=True)]
+    thread = builder.call(_of_python(module, "PyEval_SaveThread", _POINTER), [])
     value = writer.call(builder, function, arguments, namespace)
     parts = value if isinstance(value, tuple) else () if value is None else (value,)
     kinds = ""
@@ -104,6 +107,7 @@ def _written(function: ast.FunctionDef, types: Sequence[str], namespace: Mapping
         kinds += _RESULTS[part.type]
         slot = builder.gep(slots, [ir.Constant(arithmetic.INTEGER, number)], source_etype=arithmetic.INTEGER)
         builder.store(builder.zext(part, ir.IntType(8)) if part.type == arithmetic.CONDITION else part, slot)
+    builder.call(_of_python(module, "PyEval_RestoreThread", ir.VoidType(), _POINTER), [thread])
     builder.ret_void()
     return module, f"({kinds})" if isinstance(value, tuple) else kinds
 
@@ -116,21 +120,24 @@ def _argument(builder: Any, of: str, given: Any) -> Any:
     if of in _NUMBERS:
         return builder.trunc(given, arithmetic.CONDITION) if of == "?" else given
 
-    def read(pointer: Any, number: int, kind: Any) -> Any:
-        return builder.load(builder.gep(pointer, [ir.Constant(_INDEX, number)], source_etype=kind), typ=kind)
+    capsule = _of_python(builder.module, "PyCapsule_GetPointer", _POINTER, _POINTER, _POINTER)
+    description = builder.call(capsule, [given, ir.Constant(_POINTER, None)])
 
     def part(number: int) -> Any:
         place = [ir.Constant(_INT, 0), ir.Constant(_INT, number)]
-        return builder.load(builder.gep(given, place, source_etype=_INTERFACE), typ=_POINTER)
+        return builder.load(builder.gep(description, place, source_etype=_INTERFACE), typ=_POINTER)
+
+    def length(axis: int) -> Any:
+        return builder.load(builder.gep(shape, [ir.Constant(_INDEX, axis)], source_etype=_INDEX), typ=_INDEX)
 
     shape = part(_SHAPE)
-    lengths = tuple(read(shape, axis, _INDEX) for axis in range(int(of.strip("dqw"))))
+    lengths = tuple(map(length, range(int(of.strip("dqw")))))
     return writer.Array(part(_DATA), _NUMBERS[of[0]], lengths, of.endswith("w"))
 
 
-_address = ctypes.PYFUNCTYPE(ctypes.c_void_p, ctypes.py_object, ctypes.c_char_p)(
-    ("PyCapsule_GetPointer", ctypes.pythonapi)
-)
+def _of_python(module: Any, name: str, result: Any, *arguments: Any) -> Any:
+    """Return a function of Python's C interface."""
+    return module.globals.get(name) or ir.Function(module, ir.FunctionType(result, arguments), name)
 
 
 class Code:
@@ -162,19 +169,18 @@ class Code:
         self._engine.add_object_file(binding.ObjectFileRef.from_data(code))
         self._engine.finalize_object()
         numbers: dict[str, Any] = {"d": ctypes.c_double, "q": ctypes.c_int64, "?": ctypes.c_int64}
-        shape = ctypes.CFUNCTYPE(None, ctypes.c_void_p, *(numbers.get(of, ctypes.c_void_p) for of in types))
+        shape = ctypes.PYFUNCTYPE(None, ctypes.c_void_p, *(numbers.get(of, ctypes.py_object) for of in types))
         self._function = shape(self._engine.get_function_address(_symbol(name)))
 
     def __call__(self, *arguments: Any) -> Any:
         """Return None, a number or a tuple of numbers; the interpreter lock is released meanwhile."""
-        slots, kept = self._slots(), []
-        given: list[Any] = [ctypes.addressof(slots)]
-        for argument in arguments:
-            if isinstance(argument, np.ndarray):
-                kept.append(argument.__array_struct__)  # until the call ends
-                given.append(_address(kept[-1], None))
-            else:
-                given.append(argument.item() if isinstance(argument, np.generic) else argument)
-        self._function(*given)
+        slots = self._slots()
+        self._function(ctypes.addressof(slots), *map(_passed, arguments))
         values = self._results.unpack(slots)
         return values if self._several else values[0] if values else None
+
+
+def _passed(argument: Any) -> Any:
+    if isinstance(argument, np.ndarray):
+        return argument.__array_struct__
+    return argument.item() if isinstance(argument, np.generic) else argument

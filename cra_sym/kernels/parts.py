@@ -15,8 +15,8 @@ from cra_sym.kernels.specialise import has_compiler, is_compiled
 
 __all__ = ["COMPILE_FROM", "LOAD_FROM", "Parts", "flattened", "in_parts", "wants_compiler"]
 
-# A root takes about 2 microseconds with NumPy and 0.1 compiled. Loading machine code takes as long as LOAD_FROM roots by
-# NumPy, compiling it as long as COMPILE_FROM. The benchmark of cold starts measures both.
+# A root takes about 2 microseconds with NumPy and 0.1 compiled. Loading machine code takes about as long as LOAD_FROM
+# roots by NumPy, compiling it as long as COMPILE_FROM. The benchmark of cold starts measures both.
 LOAD_FROM = 40_000
 """Number of roots in one call from which on loading machine code pays."""
 COMPILE_FROM = 500_000

@@ -30,7 +30,10 @@ _ELEMENTARY = Path(__file__).with_name("elementary.py")
 _COMPILER = [
     Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8") for name in ("arithmetic", "machine", "writer")
 ]
-_ARRAYS = {np.dtype(np.float64): "d", np.dtype(np.int64): "q"}
+_ARRAYS = {  # names of the types of arrays that can be written to or not, by numbers of axes
+    np.dtype(kind): [[f"{name}{axes}{end}" for axes in range(65)] for end in ("", "w")]
+    for kind, name in ((np.float64, "d"), (np.int64, "q"))
+}
 _TURN = Lock()  # one thread specialises for all; Python 3.11 cannot parse in two threads at once
 _WHERE = "def where(condition, value, otherwise):\n    return value if condition else otherwise\n"
 
@@ -229,7 +232,7 @@ def _type_of(value: Any) -> str:
     if isinstance(value, np.ndarray):
         kind, flags = _ARRAYS.get(value.dtype), value.flags
         if kind and flags.c_contiguous and flags.aligned:
-            return f"{kind}{value.ndim}{'w' if flags.writeable else ''}"
+            return kind[flags.writeable][value.ndim]
     elif isinstance(value, (float, np.floating)):
         return "d"
     elif isinstance(value, (bool, np.bool_)):

@@ -78,6 +78,32 @@ def test_threads_share_an_entry(newton):
     np.testing.assert_allclose(out - eccentricity * np.sin(out), 1, rtol=0, atol=1e-15)
 
 
+SLOW = """
+def fill(out, rounds):
+    for k in range(out.size):
+        x = 1.0 + k
+        for _ in range(rounds):
+            x = 0.5 * (x + 2.0 / x)
+        out[k] = x
+"""
+
+
+def test_threads_run_while_machine_code_does():
+    """Another thread sees a result that is half made, at one of many calls: the interpreter lock is released."""
+    fill, half_made = compiled(SLOW, {}).fill, False
+    fill(np.empty(1), 1)
+    with ThreadPoolExecutor(1) as pool:
+        for _ in range(200):
+            out = np.zeros(1000)
+            running = pool.submit(fill, out, 2000)
+            while not running.done() and not half_made:
+                half_made = out[0] != 0.0 and out[-1] == 0.0
+            running.result()
+            if half_made:
+                return
+    pytest.fail("no other thread ran")
+
+
 def test_threads_that_ask_at_once_get_the_same_entries():
     template = "def at(x):\n" + "    x = x + 1.0 / (x * x + 2.0)\n" * 300 + "    return x\n"
     interval = sys.getswitchinterval()
