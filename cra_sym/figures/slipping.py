@@ -165,8 +165,9 @@ def figure_preload(
 ) -> Figure:
     """Draw what the preload of a bolted joint does to frequencies, to the vibration after a move and to its course.
 
-    Left: natural frequencies while the faces stick, over those of a rigid joint. Middle: the tip's largest displacement
-    in the last quarter, and what friction took of the work put in. Right: the tip during and after the move.
+    Left: natural frequencies while the faces stick, over those of a rigid joint. Middle: the tip's largest
+    displacement, that in the last quarter, and what friction took of the work put in. Right: the tip during and after
+    the move.
 
     Parameters
     ----------
@@ -189,7 +190,7 @@ def figure_preload(
     move, systems = BaseMotion.trapezoid(**_MOVE), joint.on(arm, forces)
     found = slip_response(systems, move, times, modes=modes)
     some = slip_response(joint.on(arm, np.asarray(shown, float)), move, times, modes=modes)
-    late = 1e3 * np.abs(found.tip[..., times >= 0.75 * duration]).max(axis=-1)
+    peak, late = (1e3 * np.abs(found.tip[..., times >= since]).max(axis=-1) for since in (0.0, 0.75 * duration))
     rigid = natural_frequencies(arm.replace(k_t=np.inf, k_r=np.inf))
     with style.context(STYLE):
         left, middle, right = panels(axes, 1, 3, (12.0, 3.7)).ravel()
@@ -198,10 +199,11 @@ def figure_preload(
             left.semilogx(forces, column, color=color, linestyle=line, label=label)
         left.set_ylabel("frequency over that of a rigid joint")
         left.legend()
+        middle.semilogx(forces, peak, color=GREEN, linestyle="-.", label="peak / mm")
         middle.semilogx(forces, late, color=BLUE, label="late vibration / mm")
         taken = 100 * found.dissipated[..., -1].sum(axis=-1) / found.work.max(axis=-1)
         middle.semilogx(forces, taken, color=ORANGE, linestyle="--", label="lost by friction / %")
-        middle.set_ylabel("late vibration / mm, share of the work / %")
+        middle.set_ylabel("displacement / mm, share of the work / %")
         middle.legend()
         for ax in (left, middle):
             ax.set_xlabel("preload / N")
@@ -221,14 +223,16 @@ def figure_preload_tongues(
     preload: Any = None,
     excitation: Fluctuation | None = None,
     epsilon: float = 0.3,
+    amplitude: float = 0.02,
     amplitudes: int = 4,
     harmonics: int = 7,
     axes: Any = None,
 ) -> Figure:
-    """Draw what the preload of a bolted joint does to tongues of instability: their width, and the vibration inside.
+    """Draw what the preload of a bolted joint does to damping, to the width of tongues, and to the vibration inside.
 
-    Left: widths of the principal tongues of modes 1 to 3 while the faces stick, where damping does not close them.
-    Right: the amplitude at which slip bounds the vibration at twice the first frequency, by harmonic balance.
+    Left: damping ratio of mode 1 at an amplitude of the tip. Middle: widths of the principal tongues of modes 1 to 3
+    while the faces stick, where damping does not close them. Right: the amplitude at which slip bounds the vibration at
+    twice the first frequency. Left and right by harmonic balance.
 
     Parameters
     ----------
@@ -242,34 +246,38 @@ def figure_preload_tongues(
         Default: both springs of the joint that do not slip.
     epsilon : float
         Its size.
+    amplitude : float
+        Of the left panel, m.
     amplitudes : int
-        Number of preloads of the right panel, at least 2.
+        Number of preloads of the right panel, at least 2; of the left one three times as many.
     harmonics : int
-    axes : sequence of two Axes, optional
+    axes : sequence of three Axes, optional
     """
     arm = Arm.nominal().replace(zeta=_ZETA) if arm is None else arm
     excitation = Fluctuation(k_t=1.0, k_r=1.0) if excitation is None else excitation
     forces = np.geomspace(0.1, 10.0, 25) if preload is None else np.asarray(preload, float)
     systems = (_SOFT if joint is None else joint).on(arm, forces)
     widths = [np.subtract(*judged_boundary(systems, excitation, epsilon, (n, n))[1::-1]) for n in (1, 2, 3)]
-    picked = np.unique(np.linspace(0, forces.size - 1, count("amplitudes", amplitudes, low=2)).round().astype(int))
+    few = count("amplitudes", amplitudes, low=2)
+    picked, often = (np.unique(np.linspace(0, forces.size - 1, n).round().astype(int)) for n in (few, 3 * few))
     options: dict[str, Any] = {"excitation": excitation, "epsilon": epsilon, "modes": 2, "period": 2}
     varpi = 4 * np.pi * natural_frequencies(systems, 1)[:, 0]
-    found = [
-        steady_states(one, float(varpi[k]), harmonics=harmonics, **options)
-        for k, one in enumerate(systems.parameter_sets)
-        if k in picked
-    ]
+    each = systems.parameter_sets
+    found = [steady_states(each[k], float(varpi[k]), harmonics=harmonics, **options) for k in picked]
+    held = {"amplitude": amplitude, "modes": 2, "harmonics": harmonics}
+    damping = [float(backbone(each[k], 1, **held).damping_ratio) for k in often]
     bounded = [max((s.amplitude for s in states if s.stable and s.amplitude > 0), default=np.nan) for states in found]
     with style.context(STYLE):
-        left, right = panels(axes, 1, 2, (8.8, 3.7)).ravel()
+        left, middle, right = panels(axes, 1, 3, (12.0, 3.7)).ravel()
+        left.loglog(forces[often], damping, "-o", color=ORANGE, markersize=4)
+        left.set_ylabel(f"damping ratio at {1e3 * amplitude:g} mm")
         kinds = ((INK, "-", "mode 1"), (BLUE, "--", "mode 2"), (ORANGE, ":", "mode 3"))
         for width, (color, line, label) in zip(widths, kinds, strict=True):
-            left.semilogx(forces, width, color=color, linestyle=line, label=label)
-        left.set_ylabel("width of the tongue / (rad/s)")
-        left.legend()
+            middle.semilogx(forces, width, color=color, linestyle=line, label=label)
+        middle.set_ylabel("width of the tongue / (rad/s)")
+        middle.legend()
         right.loglog(forces[picked], 1e3 * np.array(bounded), "-o", color=BLUE, markersize=4)
-        right.set_ylabel("amplitude at the tip / mm")
-        for ax in (left, right):
+        right.set_ylabel("amplitude inside tongue 1 / mm")
+        for ax in (left, middle, right):
             ax.set_xlabel("preload / N")
     return cast(Figure, left.figure)

@@ -1,9 +1,9 @@
 """Modes with elastic-slip elements in time, exact from event to event.
 
-An element is a spring in series with a slider: it sticks while its force is below the slip force, and slips with that
-force until the sliding velocity vanishes. Between such events the system is linear, but for polynomial forces. A step
-is the Taylor series of its motion to rounding. Within it forces and velocities are polynomials, whose first roots,
-isolated by Descartes' rule of signs, are the events. There is no fixed step.
+An element is a spring in series with a slider: it sticks below the slip force, and slips with that force until the
+sliding velocity vanishes. Between such events the system is linear, but for polynomial forces. A step is the Taylor
+series of its motion to rounding. Within it forces and velocities are polynomials, whose first roots, isolated by
+Descartes' rule of signs, are the events. There is no fixed step.
 
 Arrays of one number a batch member have the members along their last axis.
 """
@@ -169,14 +169,10 @@ def follow(
     pauses : ndarray, shape (T,), optional
         Ascending times at which steps end.
 
-    Returns
-    -------
-    Events
-
     Raises
     ------
     ValueError
-        If the motion takes too many steps.
+        If the motion takes too many steps, or runs away.
     """
     march = _March.at_start(modes, causes, start, end, pauses)
     found = []
@@ -269,7 +265,8 @@ class _March:
         """Return span and target of steps whose series have converged; scale the series, (K, .., P), to them."""
         share = reach(all_series[0])
         if not ((share == 1.0) | (share * span > _TINIEST * self.longest)).all():
-            raise ValueError(f"t: the motion runs away at t = {self.time[np.argmin(share)]:g} s")
+            when = f"t = {self.time[share.argmin()]:g} s, in steps below {_TINIEST:g} of those of linear modes"
+            raise ValueError(f"t: the motion runs away at {when}")
         powers = (share ** np.arange(ORDER + 3)[:, None])[:, None]
         for values, shift in zip(all_series, (0, 0, 2), strict=True):  # the last one: loads
             values *= powers[shift : shift + ORDER + 1]

@@ -36,7 +36,8 @@ def test_preload_is_drawn_as_computed(arm):
     assert len(right.lines) == 3
     for line in left.lines:
         assert (np.diff(line.get_ydata()) > 0).all() and line.get_ydata()[-1] < 1
-    late, taken = (line.get_ydata() for line in middle.lines)
+    peak, late, taken = (line.get_ydata() for line in middle.lines)
+    assert (peak >= late).all() and peak[0] > late[0]
     assert late[1] < late[2] and taken[2] == 0.0 and taken[1] > 5
 
 
@@ -57,9 +58,13 @@ def test_a_contact_that_does_not_give_has_tongues_of_one_width_and_amplitudes_li
     """All stiffnesses are those of the members, so that the preload scales the slip force and with it the motion."""
     joint = cra.BoltedJoint(rest=20.0, body_t=20.0, body_r=100.0, roughness=1e-12)
     drawn = figure_preload_tongues(arm, joint=joint, preload=[1.0, 3.0], amplitudes=2, harmonics=3)
-    left, right = drawn.axes
-    widths = np.array([line.get_ydata() for line in left.lines])
-    np.testing.assert_allclose(widths[:2, 1], widths[:2, 0], rtol=1e-6)  # the contact gives 1e-6 of the members or less
+    left, middle, right = drawn.axes
+    scaled = [cra.backbone(joint.on(arm, N), 1, amplitude=0.02 * N, modes=2, harmonics=3) for N in (1.0, 3.0)]
+    # the contact gives 1e-6 of the members, or less
+    np.testing.assert_allclose(scaled[1].damping_ratio, scaled[0].damping_ratio, rtol=1e-5)
+    np.testing.assert_allclose(left.lines[0].get_ydata()[0], scaled[0].damping_ratio, rtol=1e-12)
+    widths = np.array([line.get_ydata() for line in middle.lines])
+    np.testing.assert_allclose(widths[:2, 1], widths[:2, 0], rtol=1e-5)
     system, step = joint.on(arm, 1.0), 1e-4
     springs = ({name: (1 + side * step) * system.values[name] for name in ("k_t", "k_r")} for side in (1, -1))
     more, less = (2 * np.pi * cra.natural_frequencies(system.replace(**values), 2) for values in springs)
