@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Callable
-from functools import cached_property
 from io import BytesIO
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cra_sym.arm.parameters import Arm
+from cra_sym.cached import cached_property
 from cra_sym.checks import instance, one_number, real_array, shown
 from cra_sym.extras import MissingExtraError, require
 from cra_sym.figures.live import LiveFigure

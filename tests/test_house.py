@@ -29,7 +29,7 @@ FLOORS = [
     {"report"},
     {"__main__"},
 ]
-OPEN_TO_ALL = {"checks", "ending", "extras", "files", "si", "symbols"}  # checks, signals, extras, safe writing, units
+OPEN_TO_ALL = {"cached", "checks", "ending", "extras", "files", "si", "symbols"}  # safe writing, units and the like
 RANK = {room: rank for rank, floor in enumerate(FLOORS) for room in floor}
 STRANGERS = ({"mechanics", "kernels", "solvers"}, {"analysis", "arm"})  # rooms that do not know each other
 # A module that names one of a higher room, to load it when a function asks for it: the only ways up.

@@ -1,7 +1,9 @@
 """The package beside other tools: pickles and copies, threads, precision of others, floating-point error handling."""
 
 import copy
+import os
 import pickle
+import signal
 import threading
 import warnings
 from concurrent.futures import ThreadPoolExecutor
@@ -12,6 +14,7 @@ import pytest
 import sympy as sp
 
 import cra_sym as cra
+from cra_sym.cached import cached_property, released_in_children
 from cra_sym.checks import equal
 from cra_sym.symbols import v
 
@@ -170,6 +173,45 @@ def test_the_precision_of_another_thread_changes_no_check(digits):
     finally:
         done.set()
         thread.join()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are not forked here")
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
+def test_a_process_forked_beside_a_computing_thread_computes_too():
+    """The lock of a property of Python 3.11 is held in the child forever; that of the package by nobody."""
+    begun, done, lock = threading.Event(), threading.Event(), released_in_children(threading.Lock())
+
+    class Slow:
+        @cached_property
+        def value(self):
+            if threading.current_thread() is not threading.main_thread():
+                begun.set()
+                done.wait(60.0)
+            return 1
+
+    thread = threading.Thread(target=lambda: Slow().value)
+    thread.start()
+    begun.wait(60.0)
+    child = os.fork()
+    if not child:
+        signal.alarm(60)  # ends a child that waits
+        free = lock.acquire(timeout=50.0)
+        os._exit(0 if free and Slow().value == 1 else 1)
+    done.set()
+    thread.join()
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+
+
+def test_no_property_of_the_package_has_a_lock():
+    from pathlib import Path
+
+    lines = {
+        (path.name, line)
+        for path in Path(cra.__file__).parent.rglob("*.py")
+        for line in path.read_text("utf-8").splitlines()
+        if "functools" in line and "cached_property" in line
+    }
+    assert {name for name, _ in lines} == {"cached.py"}
 
 
 # Error handling of others -----------------------------------------------------------------------------------------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from cra_sym.analysis.nonlinear import samples, watched
 from cra_sym.analysis.periodic_forcing import Forced, forced
 from cra_sym.analysis.steady_seeds import seeds
+from cra_sym.cached import cached_property
 from cra_sym.solvers.harmonic_balance import Balance, Basis, newton, peak
 from cra_sym.solvers.monodromy import multipliers
 

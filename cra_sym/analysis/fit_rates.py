@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.fit_unknowns import Rated, Unknown
 from cra_sym.analysis.sensitivities import sensitivities
+from cra_sym.cached import cached_property
 from cra_sym.model.system import System
 from cra_sym.model.values import flat_columns
 from cra_sym.solvers.pencil_refine import lowest_eigenvalues

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from cra_sym.analysis.basis_response import on_basis
 from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
+from cra_sym.cached import cached_property
 from cra_sym.checks import choice, default_floating_point, instance, one_axis, shown
 from cra_sym.model.routes import GeneralRoute, Modes
 from cra_sym.model.spatial import HALVINGS, SpatialProblem

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from cra_sym import checks
 from cra_sym.analysis.complex_shapes import complex_shapes
+from cra_sym.cached import cached_property
 from cra_sym.model.routes import Modes
 from cra_sym.model.spatial import check_range
 from cra_sym.model.system import MOST_MODES, System

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from cra_sym.analysis.differences import by_differences
 from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
+from cra_sym.cached import cached_property
 from cra_sym.checks import choice, count, default_floating_point, instance, names, one_axis
 from cra_sym.model.one_wave import Change, OneWaveModes
 from cra_sym.model.projection import Projected, column

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +13,7 @@ from cra_sym import checks
 from cra_sym.analysis.modes import section_place
 from cra_sym.analysis.nonlinear import samples, watched
 from cra_sym.analysis.periodic_forcing import Forced, Wave, forced
+from cra_sym.cached import cached_property
 from cra_sym.model.excitations import Fluctuation, LagrangianTerms
 from cra_sym.model.projection import Load, Place
 from cra_sym.model.slip_elements import slip_statics, slip_terms_of

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack, overload
 
 import numpy as np
@@ -16,6 +15,7 @@ from cra_sym.analysis.driven_problem import DrivenProblem
 from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, ConvergenceWarning, warn_of_slopes
 from cra_sym.analysis.slip_states import MOST, SlipProblem
 from cra_sym.analysis.steady_search import Answers, answers_at, is_stable
+from cra_sym.cached import cached_property
 from cra_sym.model.excitations import Parametric
 from cra_sym.model.system import System
 from cra_sym.si import Numbers

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from cra_sym.analysis.modes import natural_frequencies
 from cra_sym.analysis.responses import response
 from cra_sym.arm.parameters import Arm
+from cra_sym.cached import cached_property
 from cra_sym.claims.setting import Setting
 from cra_sym.claims.verdict import Quantity
 from cra_sym.solvers.motion import BaseMotion

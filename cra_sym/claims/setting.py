@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any, ClassVar
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from cra_sym.analysis.modes import natural_frequencies
 from cra_sym.arm.parameters import Arm
+from cra_sym.cached import cached_property
 from cra_sym.checks import count, instance, real_array
 
 __all__ = ["Setting"]

@@ -6,10 +6,10 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import sympy as sp
 
+from cra_sym.cached import cached_property
 from cra_sym.codegen.expressions import response_functions
 from cra_sym.codegen.library import source
 from cra_sym.codegen.model_loads import load_factors

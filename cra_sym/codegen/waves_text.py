@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import cached_property, reduce
+from functools import reduce
 from itertools import combinations
 from operator import mul
 from typing import Any
 
+from cra_sym.cached import cached_property
 from cra_sym.codegen.traced import Dual, Traced, parts
 from cra_sym.solvers import waves_count, waves_kernel, waves_modes, waves_problem
 from cra_sym.solvers.straight import Exact, Term

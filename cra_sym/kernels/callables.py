@@ -6,11 +6,11 @@ import hashlib
 import linecache
 import math
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from cra_sym.cached import cached_property
 from cra_sym.checks import choice, common_shape, shown
 from cra_sym.kernels import lanes
 

@@ -11,7 +11,7 @@ import hashlib
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import cache, cached_property
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from threading import Lock
@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from cra_sym.cached import cached_property, released_in_children
 from cra_sym.checks import shown
 from cra_sym.kernels import store
 from cra_sym.kernels.generated import CompileError, Generated
@@ -34,7 +35,7 @@ _ARRAYS = {  # names of the types of arrays that can be written to or not, by nu
     np.dtype(kind): [[f"{name}{axes}{end}" for axes in range(65)] for end in ("", "w")]
     for kind, name in ((np.float64, "d"), (np.int64, "q"))
 }
-_TURN = Lock()  # one thread specialises for all; Python 3.11 cannot parse in two threads at once
+_TURN = released_in_children(Lock())  # one thread specialises for all; Python 3.11 cannot parse in two threads at once
 _WHERE = "def where(condition, value, otherwise):\n    return value if condition else otherwise\n"
 
 

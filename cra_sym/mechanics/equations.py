@@ -9,6 +9,7 @@ from typing import Any
 
 from sympy import Add, Eq, Equality, Expr, Integral, Limit, S
 
+from cra_sym.cached import cached_property
 from cra_sym.mechanics.jets import END_NAMES, End, Jet, JetSpace
 from cra_sym.mechanics.points import Point
 from cra_sym.mechanics.steps import compact_latex, variation_of
@@ -189,7 +190,7 @@ class GeneralisedForces:
             Jet(n, 0, 0, None): self.by_parts(self.inside, n) + self.by_parts(self.inside_applied, n) for n in numbers
         }
 
-    @functools.cached_property
+    @cached_property
     def boundary_factors(self) -> Forces:
         """Factor of every end displacement that integration by parts leaves, end terms apart; left before right."""
         factors: Forces = {}

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 from sympy import Add, Basic, Eq, Expr, Integral, S, Symbol, sympify
 from sympy.core.function import AppliedUndef
 from sympy.core.symbol import uniquely_named_symbol
 
+from cra_sym.cached import cached_property
 from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces, JumpCondition, varied_form
 from cra_sym.mechanics.jets import HamiltonError, Jet, JetSpace, listed, scalar
 from cra_sym.mechanics.quadratures import Quadrature, quadratures_of, with_constraints

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal
 
 from sympy import (
@@ -22,6 +21,7 @@ from sympy import (
 )
 
 from cra_sym import checks
+from cra_sym.cached import cached_property
 from cra_sym.mechanics.basis import Basis
 from cra_sym.mechanics.determinants import cofactors, collected, determinant, divided, primitive_rows, without_content
 from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces, JumpCondition

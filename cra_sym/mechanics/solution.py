@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import cached_property, cmp_to_key
+from functools import cmp_to_key
 from typing import Literal
 
 from sympy import Add, Expr, Heaviside, Matrix, S, Symbol, sin, sinh, zeros
 
+from cra_sym.cached import cached_property
 from cra_sym.mechanics.basis import Naming, general_solution
 from cra_sym.mechanics.jets import HamiltonError, Jet
 from cra_sym.mechanics.state_form import end_displacements

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.cached import cached_property
 from cra_sym.model.projection import Domain, Form, Projected
 from cra_sym.model.routes import StateModes, mode_sign, overview_places
 from cra_sym.model.spatial import SpatialProblem

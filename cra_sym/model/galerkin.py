@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag, eig, eigh, solve_triangular, svd, svdvals
 from sympy import Expr, Symbol
 
+from cra_sym.cached import cached_property
 from cra_sym.checks import ByValue, broadcastable, count
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics import RitzMatrices

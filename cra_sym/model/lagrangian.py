@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Literal
 
 from sympy import Expr, Symbol, sympify
 from sympy.core.function import AppliedUndef
 
+from cra_sym.cached import cached_property
 from cra_sym.checks import mapping
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics import HamiltonResult, Modal, StateForm, hamilton, ritz, separate, state_form

@@ -5,11 +5,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.cached import cached_property
 from cra_sym.model.nonlinear import Factor, NonlinearTerms, Product
 from cra_sym.model.projection import Place, Projected, along, displaced
 from cra_sym.model.system import System

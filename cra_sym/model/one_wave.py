@@ -7,12 +7,12 @@ offset), with coefficients that vary along x, or with a second wave number (a be
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.cached import cached_property
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.model.close_pairs import resolve_close_pairs
 from cra_sym.model.one_wave_family import DimensionlessModes, family

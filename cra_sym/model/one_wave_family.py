@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.cached import cached_property
 from cra_sym.kernels import Kernel, compiled, derived_kernel, template
 from cra_sym.kernels.parts import flattened, in_parts, wants_compiler
 from cra_sym.model.one_wave_templates import MODAL, SPECTRUM, modal_marks, spectrum_marks

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.cached import cached_property
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.model.moving import Jumps
 from cra_sym.model.routes import Modes, RigidShare, Stations

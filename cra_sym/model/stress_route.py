@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.cached import cached_property
 from cra_sym.kernels import Kernel
 from cra_sym.model.announced import refinement
 from cra_sym.model.routes import TOLERANCE, GeneralRoute, Values, mode_sign, overview_places

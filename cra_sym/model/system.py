@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.cached import cached_property
 from cra_sym.checks import broadcastable, count, default_floating_point, instance, real_array, shown
 from cra_sym.model.cross_check import CrossCheck, cross_check
 from cra_sym.model.energy_signs import refuse_negative

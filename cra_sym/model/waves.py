@@ -12,12 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property, partial
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.cached import cached_property
 from cra_sym.kernels import Kernel, compiled, kernel
 from cra_sym.kernels.parts import Parts, in_parts, wants_compiler
 from cra_sym.kernels.plain import functions_of

@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from threading import RLock
 from typing import Any, Protocol, TypeVar
 
+from ..cached import released_in_children
+
 __all__ = ["Counted", "UndecidedError", "decided", "enclose", "negatives", "precision"]
 
 FIRST_PRECISION = 192
@@ -21,7 +23,7 @@ _WIDEST = -8
 _EQUAL = -40  # times the target width: frequencies that are closer share an enclosure
 
 Result = TypeVar("Result")
-_ALONE = RLock()
+_ALONE = released_in_children(RLock())
 
 
 class UndecidedError(ArithmeticError):

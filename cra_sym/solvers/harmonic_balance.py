@@ -7,11 +7,11 @@ needed. The number of samples makes the sums exact.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.cached import cached_property
 from cra_sym.solvers.modal_polynomials import Derivatives, ModalPolynomials
 
 __all__ = ["Balance", "Basis", "flattened", "newton", "peak"]

@@ -7,12 +7,13 @@ critical damping and at flutter, need no special case.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, eigvals, schur, solve
 from scipy.sparse.csgraph import connected_components
+
+from cra_sym.cached import cached_property
 
 from .pencil import SHIFT, Array, GeneralContinuum, Reduced, reduced
 from .pencil_refine import matched, meshes, sequence

@@ -11,13 +11,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from math import factorial, perm
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cached import cached_property
 from ..checks import ByValue
 
 __all__ = ["Derivatives", "ModalPolynomials", "Term", "symmetrised"]

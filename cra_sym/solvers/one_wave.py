@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.cached import cached_property
 from cra_sym.solvers.spectrum import Lanes
 
 __all__ = ["NEAR", "Functions", "Layout", "OneWaveCharacteristic", "Structure", "parameters", "power"]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.cached import cached_property
 from cra_sym.solvers.one_wave import Functions, Layout, power, stacked
 
 __all__ = ["NEAR", "Table", "fill", "integral", "near_shape", "rate_rows", "shape"]

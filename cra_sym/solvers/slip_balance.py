@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.cached import cached_property
 from cra_sym.solvers.harmonic_balance import Balance, Basis
 from cra_sym.solvers.modal_polynomials import ModalPolynomials
 from cra_sym.solvers.slip_law import Cycle, cycle

@@ -11,10 +11,11 @@ Jacobian exact. Shifts of the events have no first-order effect, since the force
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
+from cra_sym.cached import cached_property
 
 __all__ = ["Cycle", "cycle"]
 

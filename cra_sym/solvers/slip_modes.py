@@ -8,12 +8,12 @@ solution for each amplitude, and zeta is a property of the motion, as omega is.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.cached import cached_property
 from cra_sym.solvers.harmonic_balance import Balance, peak
 from cra_sym.solvers.slip_balance import SlipBalance, stuck
 

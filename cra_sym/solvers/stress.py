@@ -8,10 +8,11 @@ from that end, so the stresses need not be continuous, and a jump of a stiffness
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
+from cra_sym.cached import cached_property
 
 from .continuum import Continuum, Entries, compliance
 from .stress_mesh import Grid, Mesh, rule

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 from numpy.typing import NDArray
+
+from cra_sym.cached import cached_property
 
 from .stress import Columns
 from .stress_mesh import rule

@@ -5,13 +5,14 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
-from functools import cache, cached_property
+from functools import cache
 from importlib import import_module
 from inspect import cleandoc, getsource, isclass, isfunction, unwrap
 from pathlib import Path
 from typing import Any
 
 import cra_sym
+from cra_sym.cached import cached_property
 from cra_sym.files import write_text
 
 __all__ = ["groups", "results", "write_reference"]
