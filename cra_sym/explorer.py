@@ -20,7 +20,16 @@ from cra_sym.figures.live import LiveFigure
 from cra_sym.figures.modes import figure_mode_shapes
 from cra_sym.figures.responses import figure_response
 from cra_sym.figures.stability import AXIAL, JOINT, figure_zones
-from cra_sym.figures.subject import around, default_excitation, fields, parameter_name, single, span, with_unit
+from cra_sym.figures.subject import (
+    around,
+    default_excitation,
+    fields,
+    parameter_name,
+    rigid_body_modes,
+    single,
+    span,
+    with_unit,
+)
 from cra_sym.model.excitations import Parametric
 from cra_sym.model.system import System
 from cra_sym.solvers.motion import BaseMotion
@@ -95,24 +104,30 @@ class Explorer:
     @cached_property
     def views(self) -> dict[str, _View]:
         """The pictures: mode shapes, response, zones."""
-        rows = len(fields(self._given))
-        size = _SIZE[0], _SIZE[1] * rows
-        found = {
-            "modes": _View(
+        system, found = self._given, {}
+        rows, columns = len(fields(system)), min(3, system.most_modes)
+        if rows or system.conservative_part is system:  # of coordinates alone complex modes have no picture
+            found["modes"] = _View(
                 frozenset({*self._names, "swing"}),
-                LiveFigure(figure_mode_shapes, rows, 3, size, sharey="row"),
+                LiveFigure(
+                    figure_mode_shapes, max(rows, 1), columns, (_SIZE[0], _SIZE[1] * max(rows, 1)), sharey="row"
+                ),
                 lambda: {"system": self.system, "phase": self.swing},
-            ),
-            "response": _View(
-                frozenset({*self._names, *self._motion}),
-                LiveFigure(figure_response, 1, 1, _SIZE),
-                lambda: {"system": self.system, "motion": self.motion, "t": self._times},
-            ),
-        }
+            )
+        found["response"] = _View(
+            frozenset({*self._names, *self._motion}),
+            LiveFigure(figure_response, 1, 1, _SIZE),
+            lambda: {"system": self.system, "motion": self.motion, "t": self._times},
+        )
         if self._excitations:
-            zones = LiveFigure(figure_zones, 1, 3, _SIZE, sharey=True)
+            zones = LiveFigure(figure_zones, 1, self._zones_shown, _SIZE, sharey=True)
             found["zones"] = _View(frozenset({*self._names, "epsilon", "excitation"}), zones, self._zones)
         return found
+
+    @property
+    def _zones_shown(self) -> int:
+        """The number of elastic modes whose zones are shown."""
+        return min(3, self._given.most_modes - rigid_body_modes(self._given))
 
     def _zones(self) -> dict[str, Any]:
         coarse = {

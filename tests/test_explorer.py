@@ -8,11 +8,13 @@ from io import BytesIO
 
 import numpy as np
 import pytest
+import sympy as sp
 from PIL import Image
 
 import cra_sym as cra
 from cra_sym.extras import MissingExtraError
-from cra_sym.symbols import nomenclature, row
+from cra_sym.figures import draw
+from cra_sym.symbols import nomenclature, row, t, x
 from tests.systems import system
 
 VALUES = {"k_t", "k_r", "m_e", "J_e", "L", "b", "h", "E", "rho", "v_m", "a_m", "B", "varpi", "psi", "epsilon"}
@@ -209,3 +211,24 @@ def test_a_preload_is_a_slider_by_decades(monkeypatch):
     slider.value = 20.0
     assert view.system.values["preload"] == 20.0 and redrawn == ["modes", "response", "zones"]
     assert "preload = 20 N" in repr(view)
+
+
+@pytest.mark.parametrize("turning", [False, True])
+def test_coordinates_alone_are_explored(turning):
+    """Two masses; where they turn, the complex modes have no picture."""
+    a, b = (sp.Function(name)(t) for name in "ab")
+    m, k, g = sp.symbols("m k g")
+    energy = m * (a.diff(t) ** 2 + b.diff(t) ** 2) / 2 - k * (a**2 + 3 * (a - b) ** 2) / 2
+    if turning:
+        energy = energy + g * (a * b.diff(t) - b * a.diff(t)) / 2
+    masses = cra.Model(0, fields=[], x=x, domain=(0, 1), t=t, coordinates=[a, b], left=energy)
+    given = masses.at({m: 1.0, k: 100.0} | ({g: 0.5} if turning else {}))
+    explorer = cra.explore(given, k=120.0)
+    assert explorer.views.keys() == {"response", "zones"} | (set() if turning else {"modes"})
+    before = explorer.picture()
+    explorer._set(k=80.0)
+    assert explorer.system.values["k"] == 80.0 and explorer.picture() != before
+    if not turning:
+        shown = [ax.lines[-1].get_ydata() for ax in draw("mode_shapes", given).axes]
+        exact = [given.modes(2).coordinate(place) for place in (0, 1)]
+        np.testing.assert_array_equal(np.transpose(shown), exact)

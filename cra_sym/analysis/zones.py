@@ -157,10 +157,11 @@ def zone_of(
     system: System, excitation: Parametric, epsilon: np.ndarray, first: int, second: int, tongue: int, modes: int
 ) -> Zone:
     """Return a zone to second order; modes are counted from 1, and ``second`` is negative for a difference."""
+    more = max(modes, min(_SPECTATORS, system.most_modes))
     if not derived(matrices_of(system, excitation, modes)):
-        return _reduced(system, excitation, epsilon, (first, second), tongue, max(modes, _SPECTATORS), 2)
+        return _reduced(system, excitation, epsilon, (first, second), tongue, more, 2)
     kind, labels = _kind(first, second)
-    modes = max(modes, min(_SPECTATORS, system.most_modes))
+    modes = more
     omega = system.natural_frequencies(modes)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         values, centre, coupling = _quantities(system, modes, excitation, epsilon, first, second, tongue)

@@ -23,6 +23,7 @@ from cra_sym.figures.subject import (
     parameters_of,
     rigid_ends,
     single,
+    unknowns,
 )
 from cra_sym.model.system import System
 from cra_sym.paper.flipped import flipped_frequencies
@@ -116,6 +117,7 @@ def figure_frequencies(
     ax : Axes, optional
     """
     system = single(Arm.nominal().replace(k_t=1e4) if system is None else system)
+    modes = min(modes, system.most_modes)
     name = leading_parameter(system) if parameter is None else choice("parameter", parameter, system.values)
     if values is None:
         x, found = over_what_is_stable(system, name, modes)
@@ -144,7 +146,8 @@ def figure_mode_shapes(
 ) -> Figure:
     """Draw the first mode shapes, with the springs of the ends as they are and rigid.
 
-    Of complex modes, with gyroscopic forces or forces that follow the motion, the real part at that instant.
+    Of complex modes, with gyroscopic forces or forces that follow the motion, the real part at that instant. Of lumped
+    coordinates alone the modal displacement of each.
 
     Parameters
     ----------
@@ -157,7 +160,9 @@ def figure_mode_shapes(
         A row for each field, a column for each mode.
     """
     system = single(Arm.nominal().replace(k_t=1e3, k_r=1e2) if system is None else system)
-    known = fields(system)
+    known, modes = fields(system), min(modes, system.most_modes)
+    if not known:
+        return _of_coordinates(system, modes, phase, axes)
     grid = panels(axes, len(known), modes, (2.87 * modes, 1.0 + 2.4 * len(known)), sharey="row")
     along, unit = field_label(system)
     for row, (name, field) in zip(grid, known.items(), strict=True):
@@ -169,6 +174,31 @@ def figure_mode_shapes(
     for ax in grid[-1]:
         ax.set_xlabel(along)
     return figure_of(grid[0, 0])
+
+
+def _of_coordinates(system: System, modes: int, phase: float | None, axes: Any) -> Figure:
+    """Draw the modal displacements of lumped coordinates, a panel a mode."""
+    if system.conservative_part is not system:
+        raise ValueError(
+            "system: has coordinates alone, with gyroscopic forces or forces that follow the motion; shapes are drawn "
+            "of real modes, or of complex ones along a field"
+        )
+    (row,) = panels(axes, 1, modes, (2.87 * modes, 3.4), sharey="row")
+    names, turn = unknowns(system), 1.0 if phase is None else np.cos(phase)
+    shapes = np.array([system.modes(modes).coordinate(k) for k in range(len(names))])
+    for mode, ax in enumerate(row[:modes]):
+        hertz = system.natural_frequencies(modes)[mode] / (2 * np.pi)
+        ax.axhline(0.0, color="0.75", linewidth=0.8)
+        ax.vlines(range(len(names)), 0.0, turn * shapes[:, mode], color=BLUE)
+        ax.plot(range(len(names)), turn * shapes[:, mode], "o", color=BLUE, label=f"{hertz:.3g} Hz")
+        ax.set_xticks(range(len(names)), [f"${name}$" for name in names])
+        ax.set_xlim(-0.6, len(names) - 0.4)
+        ax.legend(loc="upper right", fontsize=8)
+        ax.set_title(f"mode {mode + 1}")
+    largest = np.abs(shapes).max()
+    row[0].set_ylim(-1.15 * largest if phase is not None or (shapes < 0).any() else None, 1.35 * largest)
+    row[0].set_ylabel("mass-normalised displacement")
+    return figure_of(row[0])
 
 
 def _shapes_of_field(

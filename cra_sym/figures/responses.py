@@ -13,7 +13,7 @@ from cra_sym.analysis.histories import History
 from cra_sym.analysis.responses import response, tip_response
 from cra_sym.arm.parameters import Arm
 from cra_sym.figures.drawing import BLUE, ORANGE, figure_of, panels
-from cra_sym.figures.subject import fields, moving_place, rigid_ends, single, span
+from cra_sym.figures.subject import fields, moving_place, rigid_ends, single, span, unknowns
 from cra_sym.model.system import System
 from cra_sym.solvers.force import Force
 from cra_sym.solvers.motion import BaseMotion
@@ -70,7 +70,8 @@ def figure_response(
 ) -> Figure:
     """Draw the response of the tip to any motion and forces, with the springs of the ends as they are and rigid.
 
-    Where no mode moves the right end, the place that the first mode moves most takes the place of the tip.
+    Where no mode moves the right end, the place that the first mode moves most takes the place of the tip; where there
+    is no field, the first coordinate does.
 
     Parameters
     ----------
@@ -90,7 +91,7 @@ def figure_response(
     t = _times(system) if t is None else np.asarray(t, dtype=float)
     if motion is None and initial is None:
         motion, initial = _default_drive(system)
-    ax = panels(axes, 1, 1, (6.4, 3.6))[0, 0]
+    ax, modes = panels(axes, 1, 1, (6.4, 3.6))[0, 0], min(modes, system.most_modes)
     place, tip, rigid = moving_place(system), float(system.domain.left + system.domain.length), rigid_ends(system)
     looks: list[tuple[System, str, dict[str, Any]]] = [(system, "as given", {"color": ORANGE, "linestyle": "-"})]
     if rigid != system:
@@ -104,7 +105,7 @@ def figure_response(
         peak = _peak(ax, t, found, look["color"])
         ax.plot(t, found, label=f"{name}, peak {_short(peak)}{' mm' * isinstance(system, Arm)}", **look)
     ax.legend(loc="lower right", ncols=2, bbox_to_anchor=(1.0, 0.98), borderaxespad=0)
-    ax.set_title("Response of the tip", pad=8)
+    ax.set_title("Response of the tip" if fields(system) else "Response", pad=8)
     ax.set_xlabel("time $t$ / s")
     ax.set_ylabel(label)
     return figure_of(ax)
@@ -115,7 +116,9 @@ def _short(value: float) -> str:
 
 
 def _displacement_label(system: System, place: float) -> str:
-    field = next(iter(fields(system)))
+    field = unknowns(system)[0]
+    if not fields(system):
+        return f"${field}$ / SI unit"
     return f"${field}$ at ${system.model.equations.x}$ = {place:g} m / SI unit"
 
 
@@ -132,7 +135,8 @@ def _default_drive(system: System) -> tuple[Any, Any]:
     if drive or system.numerics("constant") is not None:
         return drive, None
     equations = system.model.equations
-    return None, {equations.fields[0].diff(equations.t): 1}
+    first = (*equations.fields, *equations.coordinates)[0]
+    return None, {first.diff(equations.t): 1}
 
 
 def figure_6(arm: System | None = None, *, axes: Any = None) -> Figure:

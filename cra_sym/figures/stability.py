@@ -14,7 +14,7 @@ from cra_sym.analysis.stability import forced_width, judged_boundary
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
 from cra_sym.figures.drawing import figure_of, panels
-from cra_sym.figures.subject import default_excitation, oscillating_frequencies, single
+from cra_sym.figures.subject import default_excitation, oscillating_frequencies, rigid_body_modes, single
 from cra_sym.model.excitations import AxialBase, Fluctuation, TransverseBase
 from cra_sym.model.system import System
 
@@ -77,10 +77,6 @@ def _excitation(system: System, given: Any, of_an_arm: Any) -> Any:
     return of_an_arm if isinstance(system, Arm) else default_excitation(system)
 
 
-def _rigid_body_modes(system: System) -> int:
-    return int((oscillating_frequencies(system, 6) == 0).sum())
-
-
 def _say(ax: Axes, words: str) -> None:
     ax.text(0.03, 0.04, words, transform=ax.transAxes, fontsize=7.5, color="0.25", va="bottom")
 
@@ -89,10 +85,11 @@ def _zone(
     ax: Axes, arm: System, excitation: Any, mode: int, epsilon: np.ndarray, points: int, tolerance: float = 1e-7
 ) -> None:
     """Draw one principal zone against its detuning."""
-    second = _boundary(arm, excitation, epsilon, (mode, mode), order=2, modes=max(mode, 3))
+    modes, more = (min(number, arm.most_modes) for number in (max(mode, 3), mode + 2))
+    second = _boundary(arm, excitation, epsilon, (mode, mode), order=2, modes=modes)
     middle = 0.5 * (second[0] + second[1])
     if arm.conservative_part is arm:
-        centre = 2 * float(arm.natural_frequencies(max(mode, 3))[mode - 1])
+        centre = 2 * float(arm.natural_frequencies(modes)[mode - 1])
     else:  # where the zone starts
         centre = float(middle[np.isfinite(middle)][0]) if np.isfinite(middle).any() else 0.0
     width = second[1] - second[0]  # the second order shifts the zone and keeps its width
@@ -103,7 +100,7 @@ def _zone(
         ax.set_ylim(0.0, epsilon[-1])
         return
     detuning = np.linspace(-1.7, 1.7, points) * half
-    rates = _growth(arm, excitation, centre + detuning, epsilon, mode + 2, tolerance)
+    rates = _growth(arm, excitation, centre + detuning, epsilon, more, tolerance)
     _shade(ax, detuning, epsilon, rates)
     for sides, look in ((first, _FIRST), (second, _SECOND)):
         for side in sides:
@@ -134,10 +131,11 @@ def _principal_zones(
     points: int,
     tolerance: float = 1e-7,
 ) -> Figure:
-    """Draw the zones of modes 1 to 3, a row an arm."""
-    grid = panels(axes, len(arms), 3, (8.4, 1.95 * len(arms) + 0.8), sharey=True)
+    """Draw the zones of the first three elastic modes, or as many as there are, a row an arm."""
+    first = 1 + max(rigid_body_modes(arm) for _, arm in arms)
+    shown = min(3, *(arm.most_modes + 1 - first for _, arm in arms))
+    grid = panels(axes, len(arms), shown, (2.8 * shown, 1.95 * len(arms) + 0.8), sharey=True)
     sizes = np.linspace(0.0, epsilon, points)
-    first = 1 + max(_rigid_body_modes(arm) for _, arm in arms)
     for row, (label, arm) in zip(grid, arms, strict=True):
         for mode, ax in enumerate(row, start=first):
             _zone(ax, arm, excitation, mode, sizes, points, tolerance)
@@ -175,6 +173,7 @@ def figure_zones(
     epsilon : float
         Top of the axis.
     axes : three Axes, optional
+        One for each mode shown.
     points : int
         Points of the Floquet chart along each axis.
     tolerance : float
@@ -326,7 +325,7 @@ def figure_combinations(
     excitation = _excitation(system, excitation, AXIAL)
     epsilon = (1.0 if isinstance(excitation, AxialBase) else 0.5) if epsilon is None else epsilon
     ax = panels(ax, 1, 1, (9.4, 5.0))[0, 0]
-    still = _rigid_body_modes(system)
+    still = rigid_body_modes(system)
     omega = oscillating_frequencies(system, still + 3)
     frequency = np.linspace(0.5 * omega[still], 2.2 * omega[-1], points)
     sizes = np.linspace(0.0, epsilon, points // 3)

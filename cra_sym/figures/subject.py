@@ -28,9 +28,11 @@ __all__ = [
     "parameter_label",
     "parameter_name",
     "parameters_of",
+    "rigid_body_modes",
     "rigid_ends",
     "single",
     "span",
+    "unknowns",
     "with_unit",
 ]
 
@@ -73,6 +75,14 @@ def fields(system: System) -> dict[str, Any]:
     from sympy import Symbol, latex
 
     return {latex(Symbol(field.func.__name__)): field for field in system.model.equations.fields}
+
+
+def unknowns(system: System) -> list[str]:
+    """Return the names in LaTeX of the fields, or of the coordinates where there is no field."""
+    from sympy import Symbol, latex
+
+    known = list(fields(system))
+    return known or [latex(Symbol(q.func.__name__)) for q in system.model.equations.coordinates]
 
 
 def field_label(system: System) -> tuple[str, str]:
@@ -120,7 +130,8 @@ def leading_parameter(system: System) -> str:
 
 def _first_elastic(system: System) -> int:
     part = system.conservative_part
-    return next((modes for modes in range(1, 8) if part.natural_frequencies(modes)[-1] > 0), 7)
+    most = min(7, part.most_modes)
+    return next((modes for modes in range(1, most) if part.natural_frequencies(modes)[-1] > 0), most)
 
 
 def oscillating_frequencies(system: System, modes: int) -> Array:
@@ -128,6 +139,11 @@ def oscillating_frequencies(system: System, modes: int) -> Array:
     if system.conservative_part is system:
         return system.natural_frequencies(modes)
     return np.asarray(eigenvalues(system, modes).imag)
+
+
+def rigid_body_modes(system: System) -> int:
+    """Return the number of modes of frequency zero among the first six."""
+    return int((oscillating_frequencies(system, min(6, system.most_modes)) == 0).sum())
 
 
 def around(system: System, name: str, narrowing: int = 0, points: int = 81) -> Array:
@@ -180,6 +196,8 @@ def moving_place(system: System, modes: int = 3) -> float:
     """Return the right end, or, where no mode moves the first field there, the place that the first mode moves most."""
     left = float(system.domain.left)
     x = np.linspace(left, left + float(system.domain.length), 201)
+    if not fields(system):  # coordinates alone
+        return float(x[-1])
     shapes = np.abs(mode_shapes(system.conservative_part, x, modes))
     shown = shapes[max(_first_elastic(system) - 1, 0) if _first_elastic(system) <= modes else 0]
     held = shapes[:, -1].max() <= _STILL * shapes.max()

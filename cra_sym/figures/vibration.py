@@ -70,6 +70,8 @@ def figure_frequency_response(
     """
     given = Arm.nominal().replace(k_t=1e5, k_r=1e3, zeta=0.01) if system is None else system
     system = single(given)
+    if not fields(system):
+        raise ValueError("system: has coordinates alone; must have a field along which places are shown")
     tip, left = moving_place(system), float(system.domain.left)
     shapes = np.abs(mode_shapes(system, [left, tip], 3))
     places = [tip, left] if shapes[:, 0].max() > 1e-9 * shapes[:, 1].max() else [tip]

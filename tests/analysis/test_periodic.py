@@ -674,3 +674,18 @@ def test_the_bound_of_a_monodromy_matrix_with_an_oscillating_mass_holds():
     start = np.linalg.norm(scale * np.array([1.0, 0.0, 1.0, 0.0]))
     off = np.linalg.norm(found - scale * np.array([float(value) for value in exact]))
     assert off <= error[0] * start and error[0] < 1e-9  # two hundred steps with some hundred operations each
+
+
+def test_zones_of_one_damped_mass():
+    """Fewer modes than a second order would include: Mathieu's zone with damping, to second order."""
+    q = sp.Function("q")(t)
+    energy = q.diff(t) ** 2 / 2 - k * q**2 / 2
+    mass = cra.Model(0, fields=[], x=x, domain=(0, 1), t=t, coordinates=[q], left=energy,
+                     virtual_work=[(-d * q.diff(t), q, None)]).at({k: 100.0, d: 0.1})  # fmt: skip
+    lower, upper = cra.stability_boundary(mass, cra.Fluctuation(k=1.0), 0.1, order=2, modes=1)
+    for side, way in ((lower, 1), (upper, -1)):
+        inside, outside = (
+            cra.floquet_exponents(mass, cra.Fluctuation(k=1.0), side + way * step, 0.1, 1)[0].real
+            for step in (0.01, -0.01)
+        )  # the third order is of the size 10 * 0.1**3 / 8
+        assert outside < 0 < inside
