@@ -8,19 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.checks import count, default_floating_point, instance, real_array
-from cra_sym.model.spatial import check_range
+from cra_sym.model.spatial import SpatialProblem, Stiffness, check_range
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.model.values import flat_columns
+from cra_sym.model.vanishing import check_ends
 from cra_sym.si import Numbers
 from cra_sym.solvers.argument import number_inside
 from cra_sym.solvers.eigenvalues import refine
 from cra_sym.solvers.pencil_refine import Settled, lowest_eigenvalues
+from cra_sym.solvers.stress_refine import cure
 
 __all__ = ["count_eigenvalues", "damping_ratios", "eigenvalues"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 _LEAST = 1e-11  # smallest relative tolerance that two meshes can agree to, because of rounding
+_SHORTER = 1e-3, 1e-4  # shares of the length that are left out where a stiffness vanishes at an end
 _SHRINK = 0.85  # next radius to try, relative to one at which rounding spoils the count
 
 
@@ -146,7 +149,12 @@ def count_eigenvalues(system: System, radius: Numbers) -> NDArray[np.int64]:
     ------
     ValueError
         If the radius is out of range, an eigenvalue lies on the circle, the waves are too short or rounding leaves no
-        digits at this radius, or a stiffness vanishes at an end.
+        digits at this radius, or the count is not the same on two domains that end before a vanishing stiffness.
+
+    Notes
+    -----
+    Where a stiffness vanishes at an end, the characteristic function is infinite. The eigenvalues are then counted on
+    domains that end by 1e-3 and by 1e-4 of the length before it.
 
     Examples
     --------
@@ -167,20 +175,30 @@ def count_eigenvalues(system: System, radius: Numbers) -> NDArray[np.int64]:
     shape = np.broadcast_shapes(system.shape, radii.shape)
     columns, radii = flat_columns(system.parameters, shape), np.broadcast_to(radii, shape).ravel()
     found = np.empty(len(radii), dtype=np.int64)
-    squared = not system.numerics("damped")
-    if system.numerics("driven_spatial").singular(columns).any():
-        raise ValueError(
-            "values: a stiffness vanishes at an end, where the characteristic function is infinite; count the "
-            "eigenvalues of a domain that ends a thousandth of its length before"
-        )
-    for rows, _, problem in system.numerics("driven_spatial").problems(columns):
-        for number, row in enumerate(rows):
-            reach = float(radii[row])
-            try:
-                inside = number_inside(problem, number, 0.0, reach**2 if squared else reach)
-            except ArithmeticError as error:
-                raise ValueError(f"radius = {reach:g}: {error}") from None
-            found[row] = 2 * inside if squared else inside
+    spatial: SpatialProblem = system.numerics("driven_spatial")
+    squared, singular = not system.numerics("damped"), spatial.singular(columns)
+
+    def inside(problem: Stiffness, number: int, reach: float) -> int:
+        try:
+            return (1 + squared) * number_inside(problem, number, 0.0, reach**2 if squared else reach)
+        except ArithmeticError as error:
+            raise ValueError(f"radius = {reach:g}: {error}") from None
+
+    regular = np.nonzero(~singular)[0]
+    for rows, _, problem in spatial.problems(columns[:, regular]):
+        for number, row in enumerate(regular[rows]):
+            found[row] = inside(problem, number, float(radii[row]))
+    if singular.any():
+        check_ends(system, columns[:, singular])
+    for row in np.nonzero(singular)[0]:
+        reach = float(radii[row])
+        short = {inside(spatial.shortened(columns[:, row : row + 1], share), 0, reach) for share in _SHORTER}
+        if len(short) > 1:
+            raise ValueError(
+                f"radius = {reach:g}: a stiffness vanishes at an end, and domains that end by {_SHORTER[0]:g} and "
+                f"{_SHORTER[1]:g} of the length before have different numbers of eigenvalues; change the radius"
+            )
+        found[row] = short.pop()
     return found.reshape(shape)
 
 
@@ -198,7 +216,7 @@ def _unsettled(system: System, columns: Array, found: Settled, oscillating: bool
     reason = f"modes = {modes}: the relative error of eigenvalue {first + 1} stays at {error:.1g}"
     number, reach = _counted(system, columns, float(np.abs(found.values[0][bad]).min()))
     if number is None:
-        raise ArithmeticError(f"{reason}, and none can be counted; ask for fewer modes")
+        raise ArithmeticError(f"{reason}, and none can be counted; {cure(error)}")
     raise ValueError(
         f"{reason}; the argument principle counts {number} eigenvalues, both of each pair, with |s| < {reach:.4g} "
         "rad/s: an end that absorbs the waves leaves none, or none that the parameters determine"

@@ -188,16 +188,51 @@ class SpatialProblem:
         ----------
         columns : ndarray, shape (parameters, sets)
         """
+        return np.asarray(self._singular_ends(columns).any(axis=1))
+
+    def _singular_ends(self, columns: Array) -> NDArray[np.bool_]:
+        """Return the same for the left and the right end, shape (sets, 2)."""
         sets = columns.shape[1]
         if self.uniform or not self.displacements:
-            return np.zeros(sets, dtype=bool)
+            return np.zeros((sets, 2), dtype=bool)
         finite = np.where(np.isinf(columns), 0.0, columns)
         length, left = (np.broadcast_to(value, sets)[:, None] for value in self.geometry.function(*finite))
         x = np.concatenate([left, left + _NEAR_END * length, left + (1.0 - _NEAR_END) * length, left + length], axis=1)
         with np.errstate(all="ignore"):
             found = np.abs(np.asarray(self.system(x, 1.0, *finite[..., None])[0]))
         size = np.broadcast_to(found, (*x.shape, *found.shape[-2:])).max(axis=(-2, -1))
-        return np.asarray(~((size[:, 0] * _NEAR_END < size[:, 1]) & (size[:, 3] * _NEAR_END < size[:, 2])))
+        return np.asarray(~(size[:, [0, 3]] * _NEAR_END < size[:, [1, 2]]))
+
+    def shortened(self, column: Array, share: float) -> Stiffness:
+        """Return the problem of one set on a domain that ends a share of its length before a singular end.
+
+        Breakpoints that come closer geometrically resolve what varies there.
+
+        Parameters
+        ----------
+        column : ndarray, shape (parameters, 1)
+        share : float
+        """
+        ((_, infinite),) = infinite_patterns(column)
+        ends = self._singular_ends(column)[0]
+        some = column.copy()
+        some[list(infinite)] = 0.0
+        length, left = (np.broadcast_to(value, 1) for value in self.geometry(*some))
+        edges = np.stack([left, left + length], axis=1)
+        nodes: tuple[int, ...] = ()
+        if self.breaks is not None:
+            ((_, edges, nodes),) = self.breaks.edges(some, left, length)
+        reach = length * share
+        steps = 2.0 ** np.arange(np.ceil(np.log2(share)), 0.0)
+        if ends[0]:
+            width = edges[0, 1] - edges[0, 0]
+            edges = np.concatenate([left[:, None] + [[reach[0], *(width * steps)]], edges[:, 1:]], axis=1)
+            nodes = tuple(node + len(steps) if node >= 0 else node for node in nodes)
+        if ends[1]:
+            width = edges[0, -1] - edges[0, -2]
+            last = edges[:, -1:] - [[*(width * steps[::-1]), reach[0]]]
+            edges = np.concatenate([edges[:, :-1], last], axis=1)
+        return self._problem(some, infinite, edges[:, 0], edges[:, -1] - edges[:, 0], edges, HALVINGS, nodes)
 
     def derivative_row(self, place: int, order: int, z: np.ndarray, x: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Return the row c with ``D^order q[place] = c (q, w, P)``, shape (rows, modes, stations, 2 n + m).

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cra_sym.model.projection import Load
 from cra_sym.model.stress_route import StressRoute
@@ -15,7 +16,22 @@ from cra_sym.solvers.stress_refine import alike
 if TYPE_CHECKING:
     from cra_sym.model.system import System
 
-__all__ = ["check_forces"]
+__all__ = ["check_ends", "check_forces"]
+
+
+def check_ends(system: System, columns: NDArray[np.float64]) -> None:
+    """Raise a ValueError if a spring, mass or damper acts where a vanishing stiffness would make the strain infinite.
+
+    Parameters
+    ----------
+    system : System
+    columns : ndarray, shape (parameters, sets)
+    """
+    pencil = system.numerics("pencil")
+    if pencil is not None:
+        for _, problem in pencil.problems(columns):
+            for _ in alike(problem):
+                pass
 
 
 def check_forces(system: System, load: Load, route: object) -> None:

@@ -18,6 +18,7 @@ __all__ = ["Settled", "lowest_eigenvalues", "matched", "meshes", "sequence"]
 Array = NDArray[np.float64]
 _STEPS = 4, 6  # degrees between the first two meshes, and between later ones
 _MOST_DEGREE, _MOST_UNKNOWNS = 34, 420
+_UNGRADED = 2  # meshes that may show a vanishing stiffness to leave all motions smooth
 _LANES = 400_000  # numbers in the largest array of a chunk
 _NEAR = 1e-3
 """Relative distance below which two eigenvalues are compared by their mean and their product: coalescing eigenvalues
@@ -100,17 +101,34 @@ def meshes(problem: GeneralContinuum, modes: int, tolerance: float) -> Iterator[
 
 
 def sequence(mesh: Mesh) -> Iterator[Mesh]:
-    """Yield successively finer meshes: higher degrees, then smaller elements."""
+    """Yield successively finer meshes: higher degrees, then smaller elements.
+
+    Where a stiffness vanishes at an end, elements shrink geometrically towards it: forces that vanish more slowly leave
+    logarithms there.
+    """
     first, later = _STEPS
     mesh = replace(mesh, degree=mesh.degree - 2)
     yield mesh
-    mesh = replace(mesh, degree=mesh.degree + first)
+    mesh, turn = replace(mesh, degree=mesh.degree + first), 1
     while (len(mesh.elements) - 1) * (mesh.degree + 1) <= _MOST_UNKNOWNS:
         yield mesh
-        if mesh.degree + later <= _MOST_DEGREE and len(mesh.elements) < 20:
+        turn += 1
+        if any(mesh.singular) and turn > _UNGRADED:
+            mesh = _graded(mesh)
+        elif mesh.degree + later <= _MOST_DEGREE and len(mesh.elements) < 20:
             mesh = replace(mesh, degree=mesh.degree + later)
         else:
             mesh = mesh.split(np.ones(len(mesh.elements) - 1, dtype=bool))
+
+
+def _graded(mesh: Mesh) -> Mesh:
+    """Return the mesh with the elements at the ends where a stiffness vanishes halved three times towards them."""
+    for _ in range(3):
+        marked = np.zeros(len(mesh.elements) - 1, dtype=bool)
+        marked[0] |= mesh.singular[0]
+        marked[-1] |= mesh.singular[1]
+        mesh = mesh.split(marked)
+    return mesh
 
 
 def _chunks(problem: GeneralContinuum, mesh: Mesh, number: int) -> Iterator[Index]:

@@ -139,6 +139,8 @@ class Mesh:
         Elements on which the strain is expanded instead of the stress, since a stiffness vanishes at one end.
     smoothness : int
         Degree of the polynomials that the coefficients are on every piece.
+    singular : tuple of bool
+        Whether a stiffness vanishes at the left and at the right end.
     """
 
     pieces: Array
@@ -146,6 +148,7 @@ class Mesh:
     degree: int
     strained: NDArray[np.bool_]
     smoothness: int = NODES - 1
+    singular: tuple[bool, bool] = (False, False)
 
     @property
     def owner(self) -> NDArray[np.intp]:

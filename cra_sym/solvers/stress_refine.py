@@ -174,7 +174,7 @@ def meshed(problem: Continuum, ends: tuple[bool, bool], modes: int) -> tuple[Con
     strained[-1] |= ends[1]
     pieces, unresolved, smoothness = _quadrature(problem, elements, strained)
     degree = 8 + int(np.ceil(1.8 * modes / (len(elements) - 1)))
-    return problem, Mesh(pieces, elements, degree, strained, smoothness), unresolved
+    return problem, Mesh(pieces, elements, degree, strained, smoothness, ends), unresolved
 
 
 def _quadrature(problem: Continuum, elements: Array, strained: NDArray[np.bool_]) -> tuple[Array, Array, int]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
 from scipy.special import j0, jn_zeros, jv, yv
 
 import cra_sym as cra
@@ -95,15 +96,40 @@ def test_complex_shapes_of_a_chain_in_a_fluid_are_the_natural_ones():
     assert_allclose(cra.mode_shapes(system, places, modes=2, damped=True), natural, atol=1e-9)
 
 
-def test_eigenvalues_are_counted_on_a_domain_that_ends_before_the_tip():
-    with pytest.raises(ValueError, match="ends a thousandth of its length before"):
-        cra.count_eigenvalues(PUSHED.at({c: 0.3}), 7.0)
-    short = cra.Model(
-        CHAIN, fields=[v], x=x, domain=(0, sp.Rational(999, 1000)), t=t, essential=[ROOT], virtual_work=[ALONG]
-    ).at({c: 0.3})
+def test_eigenvalues_are_counted_where_a_stiffness_vanishes():
     expected = np.sqrt(jn_zeros(0, 5) ** 2 / 4 - 0.15**2 + 0j)
     number = 2 * int((np.abs(-0.15 + 1j * expected) < 7.0).sum())
-    assert cra.count_eigenvalues(short, 7.0) == number == 8
+    assert cra.count_eigenvalues(PUSHED.at({c: 0.3}), 7.0) == number == 8
+    upwards = cra.Model(KINETIC - x * v.diff(x) ** 2 / 2, fields=[v], x=x, domain=(0, 1), t=t, essential=[v.subs(x, 1)])
+    assert cra.count_eigenvalues(upwards.at({}), 7.0) == 8
+    with pytest.raises(ValueError, match="the displacement there makes the strain infinite"):
+        cra.count_eigenvalues(line(CHAIN, virtual_work=[END]).at({c: 0.3}), 7.0)
+
+
+@pytest.mark.parametrize("drag", [0.3, 3.0])
+def test_a_wedge_in_a_fluid_has_a_logarithm_at_its_tip(drag):
+    """((1 - x)^3 v'')'' = -((1 - x) s^2 + c s) v, by DOP853 over ln(1 - x) from the series at the tip."""
+    wedge = cra.Model(
+        (1 - x) * KINETIC - (1 - x) ** 3 * v.diff(x, 2) ** 2 / 2, fields=[v], x=x, domain=(0, 1), t=t,
+        essential=[ROOT, v.diff(x).subs(x, 0)], virtual_work=[ALONG],
+    )  # fmt: skip
+    near = 1e-10  # the series lacks terms of that order
+
+    def clamped(s):
+        def rates(log, y):
+            u, y = np.exp(log), y.reshape(4, 2)
+            return u * np.stack([y[1], y[2] / u**3, y[3], -(u * s**2 + drag * s) * y[0]]).ravel()
+
+        start = [[1, near], [0, 1], [-drag * s * near**2 / 2, -drag * s * near**3 / 6],
+                 [-drag * s * near, -drag * s * near**2 / 2]]  # fmt: skip
+        start = np.array(start, dtype=complex).ravel()
+        states = solve_ivp(rates, [np.log(near), 0.0], start, method="DOP853", rtol=1e-12, atol=1e-30).y[:, -1]
+        return np.linalg.det(states.reshape(4, 2)[:2])
+
+    for s in cra.eigenvalues(wedge.at({c: drag}), 2):
+        h = 1e-5 * abs(s)
+        step = 2 * h * clamped(s) / (clamped(s + h) - clamped(s - h))
+        assert abs(step) < 3e-9 * abs(s)
 
 
 TIMES = np.array([0.25, 1.0, 1.9, 2.1, 3.0, 4.5])
