@@ -51,7 +51,7 @@ class Point:
     applied: tuple[tuple[Expr, Jet], ...] = ()
 
 
-def in_points(density: Expr, x: Symbol) -> tuple[Expr, list[tuple[Expr, Expr]]]:
+def in_points(density: Expr, x: Symbol, label: str = "density") -> tuple[Expr, list[tuple[Expr, Expr]]]:
     """Return a density without its point loads, and these as (place, term).
 
     Raises
@@ -71,7 +71,7 @@ def in_points(density: Expr, x: Symbol) -> tuple[Expr, list[tuple[Expr, Expr]]]:
     for node in density.atoms(SingularityFunction):
         if node.args[2].is_integer is False:
             base = node.args[0] - node.args[1]
-            raise HamiltonError(f"density: the exponent of {node} must be a whole number; write Heaviside({base}) * ..")
+            raise HamiltonError(f"{label}: the exponent of {node} must be a whole number; write Heaviside({base}) * ..")
     steps = {n: DiracDelta(n.args[0] - n.args[1]) for n in density.atoms(SingularityFunction) if n.args[2] == -1}
     density = density.xreplace(steps)
     found = []
@@ -81,12 +81,15 @@ def in_points(density: Expr, x: Symbol) -> tuple[Expr, list[tuple[Expr, Expr]]]:
             continue
         slope = argument.diff(x)
         if len(delta.args) > 1 or slope.has(x):
-            raise HamiltonError(f"density: {delta} must be DiracDelta of an expression that is linear in {x}")
+            raise HamiltonError(
+                f"{label}: {delta} must be DiracDelta of an expression that is linear in {x}; "
+                f"{delta.func.__name__}(g({x})) is the sum over its zeros a of DiracDelta({x} - a) / |g'(a)|"
+            )
         mark = Dummy()
         marked = density.xreplace({delta: mark})
         factor = marked.diff(mark)
         if expand(factor.diff(mark)) != 0 or factor.has(DiracDelta):
-            raise HamiltonError(f"density: {delta} is multiplied with another DiracDelta")
+            raise HamiltonError(f"{label}: {delta} is multiplied with another DiracDelta")
         place = -argument.subs(x, 0) / slope
         found.append((place, factor.subs(mark, 0) / Abs(slope)))
         density = marked.subs(mark, 0)

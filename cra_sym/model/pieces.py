@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from sympy import Expr, S, Symbol, sympify
@@ -24,7 +24,7 @@ def arguments(pieces: Pieces) -> Pieces:
 def options_of(pieces: Pieces) -> tuple[Pieces, tuple[tuple[Expr, Expr], ...]]:
     """Return the arguments of Hamilton's principle with definitions substituted, and the interior terms as stated.
 
-    Point loads of the density become terms at interior places; elastic-slip elements become springs.
+    Point loads of the density and of virtual work become terms at interior places, elastic-slip elements springs.
     """
     apart = ("units", "definitions", "small", "hysteresis")
     options = {name: piece for name, piece in pieces.items() if name not in apart}
@@ -40,7 +40,22 @@ def options_of(pieces: Pieces) -> tuple[Pieces, tuple[tuple[Expr, Expr], ...]]:
         options = {name: put(piece) for name, piece in options.items()}
     density, points = in_points(options["density"], options["x"])
     stated = options["inside"]
-    return ({**options, "density": density, "inside": (*stated, *points)} if points else options), stated
+    if points:
+        options |= {"density": density, "inside": (*stated, *points)}
+    options["virtual_work"] = tuple(_works_at_places(options["virtual_work"], options["x"]))
+    return options, stated
+
+
+def _works_at_places(works: Works, x: Symbol) -> Iterator[tuple[Expr, Expr, Any]]:
+    """Yield virtual works, those of a DiracDelta along the domain as works at its place."""
+    for work in works:
+        if len(work) != 3 or work[2] != "domain":
+            yield work
+            continue
+        rest, points = in_points(work[0], x, "virtual work")
+        if rest != 0 or not points:
+            yield rest, work[1], "domain"
+        yield from ((part, work[1], place) for place, part in points)
 
 
 def stuck(pieces: Pieces) -> Pieces:

@@ -427,6 +427,19 @@ def test_eigenvalues_with_a_damper_inside():
     np.testing.assert_allclose(found, model.ritz(24).eigenvalues(values, 3), rtol=3e-6)
 
 
+@pytest.mark.parametrize("kind", [sp.DiracDelta, lambda s: sp.SingularityFunction(s, 0, -1)])
+def test_a_delta_in_virtual_work_acts_at_its_place(kind):
+    force, drag = sp.Function("F")(t), -m * v.diff(t)
+    spread = beam(
+        virtual_work=[(drag * kind(2 * x - a) + drag / 3, v, "domain"), (force * kind(x - HALF), v, "domain")]
+    )
+    placed = beam(virtual_work=[(drag / 2, v, a / 2), (drag / 3, v, "domain"), (force, v, HALF)])
+    one, other = (model.at({a: 0.8, m: 2.0}) for model in (spread, placed))
+    np.testing.assert_allclose(cra.eigenvalues(one, 2), cra.eigenvalues(other, 2), rtol=1e-12)
+    moved = [cra.frequency_response(system, 3.0, drive=force) for system in (one, other)]
+    np.testing.assert_allclose(*moved, rtol=1e-12)
+
+
 def test_a_base_that_shakes_along_the_beam_pulls_what_is_inside():
     """A mass at a place, as the limit of one that is spread; the mass per length beyond pulls (36b)."""
     spread = sp.Symbol("spread")
