@@ -77,11 +77,12 @@ lock: .venv/.ready
 mutation: .venv/.ready
 	$(RUN) -m tests.mutation $(ARGS)
 
-# Random joints against their own frequencies, coefficients along x and whole Lagrangians against other methods, which go
+# Random joints and columns against their own frequencies, coefficients along x and whole Lagrangians against other methods, which go
 # on where they were stopped; bad values in every argument; a sweep past the memory of its workers, of which one is
 # killed; every chapter with another arm.
 campaign: .venv/.ready
 	$(RUN) -m tests.campaigns.joints $(ARGS)
+	$(RUN) -m tests.campaigns.columns
 	$(RUN) -m tests.campaigns.along_x
 	$(RUN) -m tests.campaigns.lagrangians
 	$(RUN) -m tests.campaigns.attacks

@@ -9,6 +9,7 @@ import sympy as sp
 
 import cra_sym as cra
 from cra_sym.figures.modes import figure_frequencies
+from tests.campaigns import columns
 
 x, t, length, mass, tension, speed, k = sp.symbols("x t l m T c k")
 v = sp.Function("v")(x, t)
@@ -77,6 +78,11 @@ def test_identify_leaves_out_what_buckles():
     measured = wave * np.sqrt((5.0 * wave**2 - 10.0) / 0.2) / (2 * np.pi)
     fit = cra.identify(column.at({"m": 0.2, "EI": 5.0, "l": 1.2, "P": 4.0}), measured, 1e-3, unknown=("P",))
     assert fit.fits and fit.values["P"] == pytest.approx(10.0, rel=1e-9)
+
+
+def test_a_column_is_found_where_others_buckle():
+    """``python -m tests.campaigns.columns`` tries fifty."""
+    assert columns.tried(columns.column(), trial=1) < columns.CLOSE
 
 
 def test_sweeps_label_what_oscillates(string):
