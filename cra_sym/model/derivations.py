@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Literal
 
-from sympy import Derivative, Expr, S, Symbol, SympifyError, cancel, integrate, sympify
+from sympy import Derivative, Expr, Function, Pow, S, Symbol, SympifyError, cancel, integrate, sympify
 from sympy.core.function import AppliedUndef
 
 from cra_sym.checks import mapping, shown
@@ -373,7 +373,7 @@ def ball_problem(model: Model) -> BallProblem:
     Raises
     ------
     ValueError
-        If a coefficient varies along x.
+        If a coefficient varies along x, or is not a rational function of the parameters.
     """
     form = model.conservative
     if not form.uniform:
@@ -391,6 +391,13 @@ def ball_problem(model: Model) -> BallProblem:
     entries = [parts[kind][0].get(pair, {}).get(power, S.Zero) for pair in fields for kind, power in kinds.items()]
     left, right = model.equations.domain
     z = form.parameter
+    for entry in (*form.system, *form.boundary, *form.free, *entries, right - left):
+        other = sorted(map(str, (a for a in entry.atoms(Function, Pow) if not (a.is_Pow and a.exp.is_Integer))))
+        if other:
+            raise ValueError(
+                f"system: the coefficients contain {other[0]}: certification needs rational functions of the "
+                f"parameters; put a parameter in place of {other[0]}"
+            )
     return BallProblem(
         len(form.displacements),
         len(form.coordinates),

@@ -218,3 +218,12 @@ def test_a_frequency_that_is_a_float_is_enclosed():
     )  # fmt: skip
     proved = cra.certify(string.at({m: 1.0, N: 4.0}), 2)
     assert proved.complete and (proved.lower < [1.0, 2.0]).all() and (proved.upper > [1.0, 2.0]).all()
+
+
+@pytest.mark.parametrize("factor", [sp.cos, sp.sqrt])
+def test_coefficients_that_are_not_rational_are_refused_by_name(factor):
+    rod, k, a = sp.Function("rod")(x, t), sp.Symbol("k"), sp.Symbol("a")
+    energy = rod.diff(t) ** 2 / 2 - rod.diff(x) ** 2 / 2
+    made = cra.Model(energy, fields=[rod], x=x, domain=(0, 1), t=t, right=-k * factor(a) * rod**2 / 2)
+    with pytest.raises(ValueError, match=r"system: the coefficients contain .*; put a parameter in place of"):
+        cra.certify(made.at({k: 1.0, a: 0.3}), 1)
