@@ -128,8 +128,9 @@ def backbone(
     branches : bool
         Whether to follow the curves that cross the whole curve too, both ways, where an internal resonance joins two
         modes or a motion of another form sets in; where several cross at one point, one of them. Like the curve itself,
-        they are sums of cosines of ``multiples``. A branch ends at energies below those of the curve, or where it
-        closes.
+        they are sums of cosines of ``multiples``; motions without this symmetry, or of twice the period, that begin
+        where a multiplier passes 1 or -1, are not followed. A branch ends at energies below those of the curve, or
+        where it closes.
     place, field : optional
         Of the peak, instead of the tip.
 

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.integrate import solve_ivp
 
 from cra_sym import checks
 from cra_sym.analysis.slip_states import SlipProblem
+from cra_sym.analysis.steady_levels import FAR
 from cra_sym.analysis.steady_states import SteadyState
+from cra_sym.solvers.trajectories import trajectories
 
 __all__ = ["basins"]
 
@@ -50,13 +51,14 @@ def basins(
     Returns
     -------
     ndarray of int, shape (V, D)
-        Index into ``states``; -1 where no stable state is clearly the nearest, compared with their mutual distances.
+        Index into ``states``; -1 where no stable state is clearly the nearest, compared with their mutual distances, or
+        the motion diverges: beyond 1000 times the largest start and steady state.
 
     Raises
     ------
     TypeError, ValueError
-        If there is no stable state, the states have several frequencies or epsilons, the system has no damping in a
-        mode and ``cycles`` is not given, or its nonlinear inertia depends on a known motion.
+        If there is no stable state, the states have several frequencies or epsilons, or the system has no damping in a
+        mode and ``cycles`` is not given.
 
     Examples
     --------
@@ -91,8 +93,9 @@ def basins(
     v, q = (grid.ravel() for grid in np.meshgrid(np.atleast_1d(rates), np.atleast_1d(places), indexing="ij"))
     start = np.zeros((2, q.size, flow.modes))
     start[0, :, mode - 1], start[1, :, mode - 1] = q / row, v / row
-    reached = flow.after(start, number)
     marks = np.stack([flow.mark(known[k]) for k in stable])
+    far = FAR * max(float(np.abs(found).max(initial=0.0)) for found in (flow.scaled(start), marks))
+    reached = flow.after(start, number, far)
     found = _nearest(flow.scaled(reached), marks, flow.scaled(start))
     return np.append(np.array(stable), -1)[found].reshape(np.size(rates), np.size(places))
 
@@ -124,8 +127,6 @@ class _Flow:
         self._equations = self._problem.driven.equations
         self._varpi = state.angular_frequency
         self.rows, self.modes = state._problem.rows, self._equations.modes
-        if self._equations.moves_mass and any(term.causes for term in self._equations.energies if term.velocities):
-            raise ValueError("states: the nonlinear inertia must not depend on a known motion here")
 
     @property
     def _cycle(self) -> float:
@@ -138,26 +139,22 @@ class _Flow:
             raise ValueError("cycles = None: must be given where a mode has no damping: its transient does not decay")
         return int(np.clip(np.ceil(_DECAY / (rates.min() * self._cycle)), 1, _MOST_CYCLES))
 
-    def after(self, start: Array, cycles: int) -> Array:
+    def after(self, start: Array, cycles: int, far: float) -> Array:
         """Return displacements and velocities after some periods, shape (2, motions, modes); nan if they diverge."""
-        state, end = start.ravel(), 0
-        while end < cycles:
-            begin, end = end, min(end + _CHUNK, cycles)
-            span = begin * self._cycle, end * self._cycle
-            size = float(np.abs(state).max()) + 1e-12
-            run = solve_ivp(
-                self._rate, span, state, method="DOP853", rtol=_TOLERANCE, atol=1e-9 * size, t_eval=span[1:]
-            )
-            if not run.success:
-                return np.full_like(start, np.nan)
-            state = run.y[:, -1]
-        return np.asarray(state.reshape(start.shape))
+        kept, state = np.arange(start.shape[1]), start
+        for begin in range(0, cycles, _CHUNK):
+            end = np.array([min(_CHUNK, cycles - begin) * self._cycle])
+            floor = 1e-9 * (float(np.abs(state).max(initial=0.0)) + 1e-12)
+            state = trajectories(self._rate, state, end, far=far, rtol=_TOLERANCE, atol=floor)[..., 0]
+            good = np.isfinite(state).all(axis=(0, 2))
+            kept, state = kept[good], state[:, good]
+        reached = np.full_like(start, np.nan)
+        reached[:, kept] = state
+        return reached
 
-    def _rate(self, time: float, y: Array) -> Array:
-        q, u = y.reshape(2, -1, self.modes)
-        phase = np.array([2 * np.pi * time / self._cycle])
-        causes = self._problem.causes(self._point, phase)[0]
-        return np.stack([u, self._equations.acceleration(q, u, causes)]).ravel()
+    def _rate(self, time: float, q: Array, u: Array, rows: NDArray[np.intp]) -> Array:
+        at = np.broadcast_to(self._point, (len(q), 2))
+        return np.stack([u, self._problem.acceleration(2 * np.pi * time / self._cycle, at, q, u)])
 
     def mark(self, state: SteadyState) -> Array:
         """Return the point of a steady state at phase 0 in the space of displacements and scaled velocities."""

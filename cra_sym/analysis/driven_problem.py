@@ -63,9 +63,15 @@ class DrivenProblem:
         """The equations of harmonic balance."""
         return Balance(self.driven.equations, self.basis)
 
-    def causes(self, at: Array, phase: Array | None = None) -> Array:
-        """Return the known functions at points, shape (points, waves, samples)."""
-        return self.driven.causes(at[:, 0], self.basis.phase if phase is None else phase, self.period, at[:, 1])
+    def causes(self, at: Array, phase: Array | None = None, *, rates: bool = False) -> Array:
+        """Return the known functions at points, or their rates, shape (points, waves, samples)."""
+        phase = self.basis.phase if phase is None else phase
+        return self.driven.causes(at[:, 0], phase, self.period, at[:, 1], rates=rates)
+
+    def acceleration(self, phase: float, at: Array, q: Array, u: Array) -> Array:
+        """Return the accelerations of one motion at each point, shape (points, modes), at a phase of the period."""
+        known = (self.causes(at, np.array([phase]), rates=rates)[:, :, 0].T for rates in (False, True))
+        return self.driven.equations.acceleration(q, u, *known)
 
     unique = False
 

@@ -127,15 +127,12 @@ class _Moving:
 
     def beside(self, time: float, q: Array, u: Array) -> Array:
         """Return the acceleration minus that of the undamped linear modes."""
-        polynomials, load = self.equations.polynomials, self._load(time)
+        polynomials, rates = self.equations.polynomials, None
         if polynomials.moves_mass and self.equations.causes:  # momenta may follow known motions
             step = 1e-6 / max(float(polynomials.omega.max()), 1e-12)
-            ends = [
-                polynomials.derivatives(q[None], u[None], self._known(max(time + side * step, 0.0))).momentum[0]
-                for side in (-1.0, 1.0)
-            ]
-            load = load - (ends[1] - ends[0]) / (min(time, step) + step)
-        return np.asarray(polynomials.acceleration(q[None], u[None], self._known(time), load, whole=False)[0])
+            rates = (self._known(time + step) - self._known(max(time - step, 0.0))) / (min(time, step) + step)
+        known = self._known(time), rates, self._load(time)
+        return np.asarray(polynomials.acceleration(q[None], u[None], *known, whole=False)[0])
 
     def acceleration(self, time: float, q: Array, u: Array) -> Array:
         """Return the acceleration."""

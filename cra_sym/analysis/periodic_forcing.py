@@ -38,6 +38,12 @@ class Wave(NamedTuple):
     factor: float = 1.0
     small: bool = False
 
+    @property
+    def rate(self) -> Wave:
+        """Its derivative by time."""
+        turned = self.phase + 0.5 * np.pi
+        return self._replace(power=self.power + 1, phase=turned, factor=self.order * self.factor)
+
 
 @dataclass(frozen=True, eq=False)
 class Forced:
@@ -64,10 +70,13 @@ class Forced:
         """Whether rest is a solution."""
         return not any(not t.positions and not t.velocities and t.tensor.any() for t in self.equations.forces)
 
-    def causes(self, varpi: Array, phase: Array, period: int, epsilon: Array | float = 1.0) -> Array:
-        """Return the waves at phases of a period of ``period`` cycles, shape (points, waves, samples)."""
-        values = np.zeros((len(varpi), len(self.waves), phase.size))
-        for k, wave in enumerate(self.waves):
+    def causes(
+        self, varpi: Array, phase: Array, period: int, epsilon: Array | float = 1.0, *, rates: bool = False
+    ) -> Array:
+        """Return the waves, or their rates, at phases of a period of ``period`` cycles (points, waves, samples)."""
+        waves = [wave.rate if rates else wave for wave in self.waves]
+        values = np.zeros((len(varpi), len(waves), phase.size))
+        for k, wave in enumerate(waves):
             size = wave.factor * varpi**wave.power * (epsilon if wave.small else 1.0)
             values[:, k] = size[:, None] * np.cos(wave.order * period * phase + wave.phase)
         return values

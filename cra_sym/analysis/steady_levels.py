@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 from cra_sym.analysis.driven_problem import DrivenProblem
 from cra_sym.solvers.continuation import at_value, follow, passings, started
 from cra_sym.solvers.driven_curve import Driven
+from cra_sym.solvers.trajectories import trajectories
 
-__all__ = ["mirrored", "settling", "shifted", "traced"]
+__all__ = ["FAR", "mirrored", "settling", "shifted", "traced"]
 
 Array = NDArray[np.float64]
 _MOST_POINTS = 250  # points of a curve over the level
 _FULL, _HIGHEST = np.arcsinh(1.0), np.arcsinh(10.0)  # the level is the hyperbolic sine of the continuation parameter
 _CYCLES, _DECAY = (40, 100), 8.0  # periods of integration; sufficient decay of a transient
+FAR = 1e3
+"""Displacement, over those of the starts and of the steady states, beyond which a motion is taken to diverge."""
 _TOLERANCE, _PUSH = 1e-5, 1e-2  # tolerance of the integration; relative perturbation of an unstable solution
 
 
@@ -111,23 +113,14 @@ def settling(problem: DrivenProblem, points: Array, starts: Array, size: float) 
     push = _PUSH * size * np.random.default_rng(0).normal(size=(2, m, n))
     q = x @ basis.values(at)[0] + push[0]
     u = (x @ basis.values(at, 1)[0] + push[1]) * frequency[:, None]
-    bound = 1e6 * (size + np.abs(starts).max(initial=0.0))
 
-    def rate(phase: float, y: Array) -> Array:
-        q, u = y.reshape(2, m, n)
-        causes = problem.causes(points, np.array([phase]))[:, :, 0].T
-        force = equations.acceleration(np.clip(q, -bound, bound), u, causes)
-        return np.asarray(np.stack([u, force]) / frequency[:, None]).ravel()
+    def rate(phase: float, q: Array, u: Array, rows: NDArray[np.intp]) -> Array:
+        return np.stack([u, problem.acceleration(phase, points[rows], q, u)]) / frequency[rows, None]
 
     decay = float(np.linalg.eigvalsh((equations.damping + equations.damping.T) / 4).min())
     cycles = int(np.clip(np.ceil(_DECAY * frequency.max() / (2 * np.pi * max(decay, 1e-300))), *_CYCLES))
-    end = 2 * np.pi * cycles
-    samples = end - 2 * np.pi + basis.phase
+    samples = 2 * np.pi * (cycles - 1) + basis.phase
     scale = size + float(np.abs(q).max())
-    run = solve_ivp(
-        rate, (0.0, end), np.stack([q, u]).ravel(), method="DOP853", t_eval=samples, rtol=_TOLERANCE, atol=1e-6 * scale
-    )
-    if not run.success:
-        return np.full_like(starts, np.nan)
-    values = run.y.reshape(2, m, n, samples.size)[0]
+    limits = {"far": FAR * scale, "rtol": _TOLERANCE, "atol": 1e-6 * scale}
+    values = trajectories(rate, np.stack([q, u]), samples, **limits)[0]
     return np.asarray((values @ (basis.weights * basis.values(samples)) / samples.size).reshape(m, -1))

@@ -92,7 +92,10 @@ def _search_on(problem: DrivenProblem, points: Array, order: NDArray[np.intp], s
         chosen = [lonely[k] for k in np.unique(np.linspace(0, len(lonely) - 1, _LONELY).round().astype(int))]
         starts = [np.array(search.found[at] or [np.zeros(problem.balance.size)]) for at in chosen]
         where = np.concatenate([np.full(len(s), at) for at, s in zip(chosen, starts, strict=True)])
+        before = [len(search.found[at]) for at in chosen]
         search.run(where, settling(problem, points[where], np.concatenate(starts), size))
+        if before == [len(search.found[at]) for at in chosen]:
+            break
 
 
 def _among(answer: Array, known: list[Array], size: float) -> bool:

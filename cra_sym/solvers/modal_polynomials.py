@@ -217,40 +217,55 @@ class ModalPolynomials(ByValue):
                 _add(found.force_v, b, _slots(term, q, v, 0, 1, equation=True), scale)
         return found
 
-    def _forces(self, q: Array, v: Array, causes: Array | None) -> Array:
-        """Return the forces of terms without velocities, beside the linear ones, shape (samples, modes)."""
-        force = np.zeros(q.shape)
+    def _pushes(self, q: Array, v: Array, causes: Array | None, rates: Array | None) -> tuple[Array, Array]:
+        """Return forces of the nonlinear terms less the rates of their momenta at constant v, and their inertia."""
+        samples, n = q.shape
+        force, inertia = np.zeros((samples, n)), np.zeros((samples, n, n))
         for term in self.energies:
-            if term.positions:
-                _add(force, term.positions, _slots(term, q, v, 1, 0), _scale(term, causes))
+            scale, a, b = _scale(term, causes), term.positions, term.velocities
+            if a and b:
+                mixed = _slots(term, q, v, 1, 1)
+                _add(force, a, (mixed @ v[:, :, None])[:, :, 0], scale)
+                _add(force, -a * b, (v[:, None, :] @ mixed)[:, 0], scale)
+            elif a:
+                _add(force, a, _slots(term, q, v, 1, 0), scale)
+            if b > 1:
+                _add(inertia, perm(b, 2), _slots(term, q, v, 0, 2), scale)
+            if b and term.causes and rates is not None:
+                _add(force, -b, _slots(term, q, v, 0, 1), _scale_rate(term, causes, rates))
         for term in self.forces:
             _add(force, 1, _slots(term, q, v, 0, 0, equation=True), _scale(term, causes))
-        return force
+        return force, inertia
 
     def acceleration(
-        self, q: Array, v: Array, causes: Array | None = None, load: Array | float = 0.0, *, whole: bool = True
+        self,
+        q: Array,
+        v: Array,
+        causes: Array | None = None,
+        rates: Array | None = None,
+        load: Array | float = 0.0,
+        *,
+        whole: bool = True,
     ) -> Array:
         """Return accelerations.
 
         Parameters
         ----------
         q, v : ndarray, shape (samples, modes)
-        causes : ndarray, shape (known functions, samples), optional
+        causes, rates : ndarray, shape (known functions, samples), optional
+            Known functions and their rates, of which momenta may depend; rates of None are zero.
         load : ndarray, shape (samples, modes), optional
             Further forces.
         whole : bool
             If False, those of the undamped linear modes are left out.
         """
         pull = self.omega**2 * q
-        if not self.moves_mass:
-            force = self._forces(q, v, causes) - v @ self.damping.T + load
-            return np.asarray(force - pull if whole else force)
-        found = self.derivatives(q, v, causes)
-        force = found.force - v @ self.damping.T + load
-        force = force - (found.momentum_q @ v[:, :, None])[:, :, 0] + (found.momentum_v @ pull[:, :, None])[:, :, 0]
-        inertia = np.eye(self.modes) + found.momentum_v
-        beside = np.linalg.solve(inertia, force[:, :, None])[:, :, 0]
-        return np.asarray(beside - pull if whole else beside)
+        force, inertia = self._pushes(q, v, causes, rates)
+        force = np.asarray(force - v @ self.damping.T + load)
+        if self.by_velocity[1]:
+            force = force + (inertia @ pull[:, :, None])[:, :, 0]
+            force = np.asarray(np.linalg.solve(np.eye(self.modes) + inertia, force[:, :, None])[:, :, 0])
+        return np.asarray(force - pull if whole else force)
 
 
 def _scale(term: Term, causes: Array | None) -> Array | float:
@@ -258,6 +273,14 @@ def _scale(term: Term, causes: Array | None) -> Array | float:
         return 1.0
     assert causes is not None
     return np.asarray(causes[list(term.causes)].prod(axis=0))
+
+
+def _scale_rate(term: Term, causes: Array | None, rates: Array) -> Array:
+    """Return the rate of the product of the known functions of a term."""
+    assert causes is not None
+    factors, slopes = causes[list(term.causes)], rates[list(term.causes)]
+    parts = [np.delete(factors, k, axis=0).prod(axis=0) * slope for k, slope in enumerate(slopes)]
+    return np.asarray(np.sum(parts, axis=0))
 
 
 def _add(total: Array, factor: int, part: Array, scale: Array | float) -> None:

@@ -47,6 +47,33 @@ def test_inertia_that_moves_with_the_arm_is_followed():
     assert cra.basins(states, [0.0, 0.05], [0.0]).tolist() == [[0, 0]]
 
 
+def test_motions_that_diverge_leave_the_others_alone():
+    """Beyond the barrier of a softening spring, at displacement 1, a motion has no bound."""
+    soft = oscillator(q.diff(t) ** 2 / 2 - q**2 / 2 + q**4 / 4, virtual_work=[(F, q, None)]).at({}, zeta=0.05)
+    states = cra.steady_states(soft, 0.8, drive={F: 0.05}, modes=1)
+    assert [state.stable for state in states] == [True, False, False]
+    assert cra.basins(states, [-1.5, -0.3, 0.3], [0.0, 0.1]).tolist() == [[-1, 0, 0]] * 2
+
+
+def test_momenta_of_a_base_that_moves_are_followed():
+    """A foreshortened mode shaken along: q'' + q (q q')' - q u'' + .2 q' + q = 0, from rest pushed and from afar."""
+    u = sp.Function("u")(t)
+    moved = oscillator((q.diff(t) ** 2 + (u.diff(t) - q * q.diff(t)) ** 2 - q**2) / 2).at({}, zeta=0.1)
+    states = cra.steady_states(moved, 1.9, drive={u: 0.17}, modes=1, period=2, harmonics=5)
+    assert [state.stable for state in states] == [False, True, True] and not states[0].amplitude
+    starts = np.array([-0.3, 0.6])
+    found = cra.basins(states, starts, [0.0], cycles=15)[0]
+
+    def rate(time, y):
+        (q, u), push = y.reshape(2, -1), -0.17 * 1.9**2 * np.cos(1.9 * time)
+        return np.append(u, (q * push - q - 0.2 * u - q * u**2) / (1 + q**2))
+
+    span = (0, 15 * 4 * np.pi / 1.9)
+    reached = solve_ivp(rate, span, np.append(starts, [0.0, 0.0]), method="DOP853", rtol=1e-6, atol=1e-8).y[:2, -1]
+    wanted = [states[k].coefficients[0, :6].sum() for k in found]
+    np.testing.assert_allclose(reached, wanted, rtol=0.1)  # of the two opposite answers
+
+
 @pytest.mark.parametrize(
     ("states", "options", "message"),
     [
