@@ -156,7 +156,7 @@ class Library:
             length = whole.functions["_example"].parameters["found"].length
             printed["shown"] = length if isinstance(length, int) else whole.constants[str(length)].values[0]
         texts = rendered(f"library/{language}", printed) | rendered("library/common", printed)
-        texts = {name.replace("NAME", self.name): _tidy(text) for name, text in texts.items()}
+        texts = {name.replace("NAME", self.name): _tidy(text) for name, text in texts.items() if text.strip()}
         if language == "c" and self.batch[1]:
             texts[f"{self.name}_batch.c"] = _tidy(f"{self._commented('/* ', ' * ', ' */')}\n{self.batch[1]}")
         texts["reference.txt"] = "".join(f"{check.line()}\n" for check in self.checks)
@@ -192,6 +192,7 @@ class Library:
             "batch": self.batch[0],
             "batch_test": self.batch[2],
             "stack": self.stack,
+            "timed": _is_stepped(form),
             "checks": len(self.checks),
             "listed": [(f.name, f.doc.splitlines()[0]) for f in functions if f.public],
         }
@@ -202,6 +203,12 @@ class Library:
         lines = ["SPDX-License-Identifier: BSD-3-Clause", *self.provenance]
         marked = [f"{first if n == 0 else further}{line}".rstrip() for n, line in enumerate(lines)]
         return "\n".join([*marked, last] if last else marked)
+
+
+def _is_stepped(form: Form) -> bool:
+    """Tell whether the library steps one system, prepared for a sampling time."""
+    functions = form.functions
+    return "step" in functions and list(functions["discretise"].parameters) == ["time", "sampled"]
 
 
 def _tidy(text: str) -> str:

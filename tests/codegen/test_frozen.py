@@ -111,6 +111,14 @@ def test_sanitizers_and_valgrind_find_nothing(c):
         kit.run(["valgrind", "--error-exitcode=9", "-q", "./self_test", "reference.txt"], c)
 
 
+def test_the_longest_step_is_measured_and_called_so(c):
+    printed = kit.run(["make", "timing"], c).splitlines()[-1]
+    longest, mean = re.fullmatch(
+        r"longest measured time of step: (.+) us; mean of 1000000: (.+) us, .*", printed
+    ).groups()
+    assert float(longest) >= float(mean) > 0
+
+
 def test_null_gives_a_status(c):
     main = """
     #include "crane.h"
