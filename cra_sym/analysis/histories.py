@@ -59,7 +59,12 @@ def histories(system: System, motion: Any) -> dict[str, History]:
 
 def driven(system: System, found: Mapping[str, History], modes: int) -> Iterator[tuple[Array, History]]:
     """Yield, for each input, minus the generalised force of a unit of it on every mode, and its history."""
+    linear = dict(system.numerics("causes"))
     for name, history in found.items():
+        if name not in linear:
+            raise ValueError(
+                f"motion: {name} acts in nonlinear terms alone, which linear results leave out; use response"
+            )
         yield -system.project(system.numerics("load", name), modes), history
     constant = system.numerics("constant")
     if constant is not None:

@@ -12,7 +12,7 @@ from scipy.integrate import quad
 import cra_sym as cra
 from cra_sym.mechanics import hamilton, separate
 from cra_sym.symbols import L, t, v, x
-from tests.nonlinear_models import BEAM, EI, beam, inextensible, k_3, mass, q, shortening, sprung
+from tests.nonlinear_models import BEAM, EI, beam, inextensible, k_3, mass, oscillator, q, shortening, sprung
 
 P, g, a, k, F = sp.symbols("P g a k F", positive=True)
 ONES = {EI: 1.0, mass: 1.0, L: 1.0}
@@ -238,3 +238,12 @@ def test_modal_equations_of_a_batch_and_of_too_many_modes_are_refused():
         cra.nonlinear_modal_equations(sprung().replace(k_3=[1.0, 2.0]))
     with pytest.raises(ValueError, match=r"modes = 40: .* too many coefficients"):
         cra.nonlinear_modal_equations(beam(BEAM - v**6).at(ONES), 40)
+
+
+def test_a_force_in_nonlinear_terms_alone_is_refused_by_linear_results():
+    F = sp.Function("F")(t)
+    system = oscillator(q.diff(t) ** 2 / 2 - q**2 / 2 + F * q**3 / 3).at({})
+    pulse = cra.Force.sampled([0.0, 0.5, 1.0], [0.0, 1.0, 0.0])
+    assert np.isfinite(cra.tip_response(system, {F: pulse}, [0.0, 2.0], modes=1, initial={q: 1.0})).all()
+    with pytest.raises(ValueError, match="F acts in nonlinear terms alone"):
+        cra.residual_vibration(system, {F: pulse}, modes=1)
