@@ -332,7 +332,8 @@ def _backbone_of(
     errors = []
     for more in ((_MORE_MODES, 0), (0, _MORE_HARMONICS)):
         error = np.full(size, np.nan)
-        error[good] = _changed(problem, more, stacked[good], np.array(normals)[good])
+        if good.any():
+            error[good] = _changed(problem, more, stacked[good], np.array(normals)[good])
         errors.append(error.reshape(shape))
     return Backbone(
         frequency.reshape(shape)[()],

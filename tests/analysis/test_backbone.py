@@ -221,3 +221,5 @@ def test_a_curve_that_ends_says_so():
         found = cra.backbone(system, amplitude=[0.5, 1.5], modes=1, harmonics=15)
     np.testing.assert_allclose(found.angular_frequency[0], duffing_frequency(-1.0, 0.5), rtol=1e-9)
     assert np.isnan(found.angular_frequency[1])
+    with pytest.warns(cra.ConvergenceWarning, match="before amplitude = 1.5"):
+        assert np.isnan(cra.backbone(system, amplitude=1.5, modes=1, harmonics=3).angular_frequency)
