@@ -152,7 +152,9 @@ def load_coefficients(model: Model, name: str) -> tuple[dict[Jet, Expr], dict[Je
     """Return the same load's coefficients by displacement: per length inside, and at ends, coordinates and places."""
     weak = weak_form(model.linearised.variation)
     t = weak.variation.space.t
-    function = next(f for f in model.driving if f.func.__name__ == name)
+    function = next((f for f in model.driving if f.func.__name__ == name), None)
+    if function is None:
+        raise ValueError(f"motion: {name} acts in nonlinear terms alone, which only response takes into account")
     cause = function.diff(t, 2) if _kind(weak, function) == "motion" else function
     inside, discrete = (_coefficients(weak, part, cause) for part in (weak.inside_load, weak.discrete_load))
     return inside, discrete
