@@ -119,14 +119,9 @@ def solvability() -> Derivation[Any]:
     """Order 1 has a bounded solution only if its right-hand side is orthogonal to the free vibration."""
     force, time = exp(I * omega_n * T_0), Function("q_n1")(T_0)
     swelling = -I * T_0 * force / (2 * omega_n)
-    yield (
-        "what a secular term does",
-        "A force at the natural frequency of the mode gives a response that grows without bound.",
-        (
-            Eq(time.diff(T_0, 2) + omega_n**2 * time, force),
-            Eq(time, swelling),
-        ),
-    )
+    driven = Eq(time.diff(T_0, 2) + omega_n**2 * time, force)
+    growth = "A force at the natural frequency of the mode gives a response that grows without bound."
+    yield "what a secular term does", growth, (driven, Eq(time, swelling))
     return _step("solvability")
 
 
@@ -198,8 +193,7 @@ def _left_over(equation: Eq) -> Expr:
 
 @proves(37)
 def prove_two_scale_expansion() -> Proof:
-    """For epsilon = 0 it is order 0; with (48) the residual of the equation of motion of a mode vanishes at orders 0
-    and 1."""
+    """For epsilon = 0 it is order 0; with (48) the equation of motion of a mode holds at orders 0 and 1."""
     yield two_scale_expansion()[0].rhs.subs(epsilon, 0) == named("q_n0")
     yield from residual()
 
@@ -227,8 +221,7 @@ def prove_order_0() -> Proof:
 
 @proves(40)
 def prove_order_1() -> Proof:
-    """Its operators applied to the free vibration (41) and to the bounded first-order response give zero if the
-    amplitude satisfies (48)."""
+    """Its operators applied to (41) and to the bounded first-order response give zero for amplitudes by (48)."""
     yield _left_over(order_1()[0])
 
 
@@ -264,8 +257,7 @@ def prove_excitation_in_exponentials() -> Proof:
 
 @proves(44)
 def prove_secular_terms() -> Proof:
-    """For any other slow evolution of the amplitude the residual of the equation of motion is these terms with opposite
-    sign."""
+    """For any other slow evolution of the amplitude, minus these terms are the residual of the equation of motion."""
     rate = Symbol("r", real=True)
     left = [term for term in residual(rate)[1].args if not any(e.args[0].has(t) for e in term.atoms(exp))]
     slow = {named("A_n"): Function("a")(t), named("Abar_n"): Function("b")(t)}
