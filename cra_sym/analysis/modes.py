@@ -76,7 +76,8 @@ def section_place(system: System, field: Any = None) -> int:
         return 0
     fields = system.model.equations.fields
     if not any(field is one or (isinstance(field, type(one)) and field == one) for one in fields):
-        raise ValueError(f"field = {checks.shown(field)}: must be one of {', '.join(map(str, fields))}")
+        allowed = f"one of {', '.join(map(str, fields))}" if fields else "None, as the model has no fields"
+        raise ValueError(f"field = {checks.shown(field)}: must be {allowed}")
     return list(system.model.state_form.displacements).index(field)
 
 
