@@ -19,6 +19,7 @@ __all__ = ["Data", "Search"]
 Array = NDArray[np.float64]
 
 _MOST_POINTS = 20_000
+_POINTS = (25, 13)  # of a parameter that is no stiffness of an end: the most that the grid can have
 _SAMPLES = 8_192  # points of a sample, where a grid would have more
 _LINKED = 4.0  # rise of chi2 between two minima up to which they count as one: two standard deviations
 _LOWEST = 200  # lowest grid points that are starts even if they are not local minima
@@ -274,8 +275,11 @@ class Search:
     def _grid(self) -> tuple[Array, Array, tuple[int, ...]]:
         """Return points (P, unknowns), their frequencies (P, modes) and the shape of the grid, () for a sample."""
         if self._table is None:
-            axes = [unknown.grid for unknown in self.unknowns]
-            shape = tuple(axis.size for axis in axes)
+            for points in _POINTS:
+                axes = [unknown.grid(points) for unknown in self.unknowns]
+                shape = tuple(axis.size for axis in axes)
+                if np.prod(shape) <= _MOST_POINTS:
+                    break
             if np.prod(shape) <= _MOST_POINTS:
                 places = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
             else:

@@ -68,14 +68,13 @@ class Unknown:
             return 0.0, float(np.log1p(1 / _SOFTEST))
         return (-np.log(_RANGE), np.log(_RANGE)) if self.kind == "signed" else (0.0, np.log1p(_RANGE))
 
-    @property
-    def grid(self) -> Array:
-        """Coordinates among which the search starts."""
+    def grid(self, points: int) -> Array:
+        """Return the coordinates among which the search starts, ``points`` unless it is a stiffness of an end."""
         if self.prior is not None:
             return np.array([self.coordinate(self.prior[0])])
         if self.kind == "stiffness":
             return np.log1p(1 / np.logspace(-4.0, 6.0, 41))
-        return np.linspace(*self.bounds, 13)
+        return np.linspace(*self.bounds, points)
 
     def coordinate(self, value: float) -> float:
         """Return the coordinate of a value."""
