@@ -212,7 +212,8 @@ def figure_preload(
             right.plot(times, 1e3 * tip, color=color, linestyle=line, linewidth=0.9, label=f"{force:g} N")
         right.set_xlabel("time $t$ / s")
         right.set_ylabel("$v(L, t)$ / mm")
-        right.legend(title="preload")
+        right.set_ylim(top=1.4 * right.get_ylim()[1])
+        right.legend(title="preload", ncols=3, loc="upper right")
     return cast(Figure, left.figure)
 
 
@@ -264,7 +265,7 @@ def figure_preload_tongues(
     varpi = 4 * np.pi * natural_frequencies(systems, 1)[:, 0]
     each = systems.parameter_sets
     found = [steady_states(each[k], float(varpi[k]), harmonics=harmonics, **options) for k in picked]
-    held = {"amplitude": amplitude, "modes": 2, "harmonics": harmonics}
+    held: dict[str, Any] = {"amplitude": amplitude, "modes": 2, "harmonics": harmonics}
     damping = [float(backbone(each[k], 1, **held).damping_ratio) for k in often]
     bounded = [max((s.amplitude for s in states if s.stable and s.amplitude > 0), default=np.nan) for states in found]
     with style.context(STYLE):
