@@ -7,7 +7,7 @@ import builtins
 import keyword
 import re
 from collections.abc import Iterable, Mapping, Sequence, Set
-from itertools import islice
+from itertools import islice, pairwise
 from typing import Any
 
 import numpy as np
@@ -30,9 +30,9 @@ _LONGEST_CHAIN = 64  # integer powers up to this become products
 class _Printer(SciPyPrinter):  # type: ignore[misc]  # SymPy has no types
     """SciPy's printer with given names, and with conditions as operators and ``where``, which work for scalars too."""
 
-    def __init__(self, names: Mapping[sp.Symbol, str]) -> None:
+    def __init__(self, names: Mapping[sp.Symbol, str], shared: Mapping[sp.Symbol, sp.Basic]) -> None:
         super().__init__({"fully_qualified_modules": False, "allow_unknown_functions": False})
-        self.names = names
+        self.names, self.shared = names, shared
 
     def _print_Symbol(self, expr: sp.Symbol) -> str:
         return self.names[expr]
@@ -70,11 +70,34 @@ class _Printer(SciPyPrinter):  # type: ignore[misc]  # SymPy has no types
         return f"(1.0/{self._print(sp.cosh(*expr.args))})"
 
     def _print_Piecewise(self, expr: sp.Piecewise) -> str:
+        """Write nested choices: by halves where the branches are the intervals of a table, else one after another."""
+        if self._is_table([condition for _, condition in expr.args]):
+            return self._halved(expr.args)
         *branches, (last, condition) = expr.args
         text = self._print(last) if condition == True else self._where(last, condition, "nan")  # noqa: E712
         for value, condition in reversed(branches):
             text = self._where(value, condition, text)
         return text
+
+    def _is_table(self, conditions: Sequence[Any]) -> bool:
+        """Return whether the conditions are ``x < number`` with one x and ascending numbers, and at last True."""
+        *below, last = (self.shared.get(condition, condition) for condition in conditions)
+        return (
+            last == True  # noqa: E712
+            and all(
+                type(c) in (sp.StrictLessThan, sp.LessThan) and (c.rhs.is_Rational or c.rhs.is_Float) for c in below
+            )
+            and len({c.lhs for c in below}) == 1
+            and all(first.rhs < second.rhs for first, second in pairwise(below))
+        )
+
+    def _halved(self, branches: Sequence[Any]) -> str:
+        if len(branches) == 1:
+            return str(self._print(branches[0][0]))
+        middle = len(branches) // 2
+        self._module_format("numpy.where")
+        condition, first, second = branches[middle - 1][1], branches[:middle], branches[middle:]
+        return f"where({self._print(condition)}, {self._halved(first)}, {self._halved(second)})"
 
     def _where(self, value: sp.Expr, condition: Any, otherwise: str) -> str:
         self._module_format("numpy.where")
@@ -203,7 +226,7 @@ def _with_names(
         _assign_name(symbol, names, taken)
     for number, (symbol, _) in enumerate(steps):
         _assign_name(symbol, names, taken, f"x{number}")
-    printer = _Printer(names)
+    printer = _Printer(names, dict(steps))
     values = [_printed(printer, value) for _, value in steps]
     results = [_printed(printer, value) for value in outputs]
     imported: set[str] = set().union(*printer.module_imports.values())

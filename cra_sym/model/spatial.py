@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.model.breaks import Breaks, breaks, varying
+from cra_sym.model.derivative_rows import DerivativeRows
 from cra_sym.model.spans import Spans
 from cra_sym.model.values import infinite_patterns
 from cra_sym.solvers.stiffness import GOLDEN, DynamicStiffness, Evaluation
@@ -27,7 +28,6 @@ Array = NDArray[np.float64]
 HALVINGS = 6
 """Number of halvings of the two parts of a problem that varies along x, which gives 128 steps."""
 _NEAR_END = 1e-7  # share of the length from an end at which a coefficient is compared with that at the end
-_LONGEST_ROW = 400  # operation count beyond which a further derivative of a coefficient takes too long
 
 
 @dataclass(frozen=True)
@@ -152,8 +152,8 @@ class SpatialProblem:
         The motions the essential conditions allow.
     end_stiffness : dict of int to Kernel
         For each stiffness of an end, by its index: its factor in the boundary matrix, needed where it is infinite.
-    rows : tuple of tuple of Kernel
-        For each displacement, the rows c with ``D^order q = c (q, w, P)``, order 0 and up.
+    rows : tuple of DerivativeRows
+        For each displacement, the rows c with ``D^order q = c (q, w, P)``.
     breaks : Breaks or None
         Where the system is not smooth along x, unless it is uniform.
     points : PointTerms or None
@@ -171,7 +171,7 @@ class SpatialProblem:
     geometry: Kernel
     free: Kernel | None
     end_stiffness: dict[int, Kernel]
-    rows: tuple[tuple[Kernel, ...], ...]
+    rows: tuple[DerivativeRows, ...]
     breaks: Breaks | None = None
     points: PointTerms | None = None
     exponents: tuple[Kernel | None, int] = (None, 0)
@@ -240,7 +240,7 @@ class SpatialProblem:
         Where coefficients are constant along x there is one station.
         """
         x = x[..., :1] if self.uniform else x
-        known = self.rows[place]
+        known = self.rows[place].to(order)
         size = 2 * self.displacements + self.coordinates
         arguments = z[:, :, None], *columns[:, :, None, None]
         row = known[min(order, len(known) - 1)](x, *arguments)[..., 0, :]
@@ -365,7 +365,7 @@ def spatial_problem(form: StateForm, symbols: tuple[Symbol, ...], left: Expr) ->
         kernel((form.length, left), symbols, backend="numpy"),
         kernel(form.free, symbols, backend="numpy") if form.free.cols else None,
         _end_stiffness(form, symbols),
-        tuple(_derivative_rows(form, place, arguments) for place in range(len(form.displacements))),
+        tuple(DerivativeRows(form, place, arguments) for place in range(len(form.displacements))),
         found,
         points,
         (None, 0) if form.uniform else varying(list(form.system.subs(form.parameter, 1)), form.x, symbols),
@@ -381,28 +381,6 @@ def _end_stiffness(form: StateForm, symbols: tuple[Symbol, ...]) -> dict[int, Ke
         if symbol not in inside and not slope.is_zero_matrix and not slope.has(symbol, form.parameter):
             slopes[position] = kernel(slope.subs({form.parameter: 0}), symbols, backend="numpy")
     return slopes
-
-
-def _derivative_rows(form: StateForm, place: int, arguments: Sequence[Symbol]) -> tuple[Kernel, ...]:
-    """Return the rows of `SpatialProblem`; where coefficients vary, as many as have derivatives between breakpoints."""
-    from sympy import zeros
-
-    from cra_sym.mechanics.breakpoints import derivative
-
-    row = zeros(1, form.system.rows)
-    row[place] = 1
-    kernels = []
-    for _ in range(1 if form.uniform else 2 * len(form.displacements) + 3):
-        try:
-            kernels.append(kernel(row, (form.x, *arguments), backend="numpy"))
-        except ValueError:
-            if not kernels or form.uniform:
-                raise
-            break  # the derivative of such a coefficient has no function
-        if not form.uniform and sum(entry.count_ops() for entry in row) > _LONGEST_ROW:
-            break
-        row = row.applyfunc(lambda entry: derivative(entry, form.x)) + row * form.system
-    return tuple(kernels)
 
 
 def shares(x: np.ndarray, left: np.ndarray, length: np.ndarray, name: str = "x") -> np.ndarray:

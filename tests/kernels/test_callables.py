@@ -78,6 +78,18 @@ def test_conditions_and_extremes():
     np.testing.assert_allclose(f([0, 1, 1, 9], [2, 1, -1, -1]), [2, np.sin(1), 1, np.nan])
 
 
+@pytest.mark.parametrize("relation", [sp.StrictLessThan, sp.LessThan])
+def test_a_table_of_many_steps(relation):
+    """More branches than Python can nest parentheses; two tables share their conditions."""
+    places = sp.S(range(1, 151))
+    tables = [sp.Piecewise(*((k**n, relation(x, place)) for k, place in enumerate(places)), (-1, True)) for n in (1, 2)]
+    at = np.array([-3.0, 0.5, 1.0, 76.0, 76.5, 150.0, 151.0, np.nan])
+    k = np.searchsorted(np.arange(1, 151), at, side="right" if relation is sp.StrictLessThan else "left")
+    first, second = kernel([table * a for table in tables], (x, a))(at, 1.0)
+    np.testing.assert_array_equal(first, np.where(k < 150, k, -1))
+    np.testing.assert_array_equal(second, np.where(k < 150, k**2, -1))
+
+
 def test_no_warning_where_ieee_has_a_value():
     assert kernel(1 / x, (x,))(0.0) == np.inf
 

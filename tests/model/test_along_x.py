@@ -197,7 +197,28 @@ def test_layers_of_every_kind(kind):
         np.testing.assert_allclose(w, brentq(condition, w * (1 - 1e-5), w * (1 + 1e-5), xtol=1e-14), rtol=CLOSE)
 
 
-@pytest.mark.parametrize("cells", [7, 40, 150])
+def test_a_table_of_distinct_cells():
+    """A string of 120 masses per length against transfer matrices; frequencies need no derivative of a coefficient."""
+    masses = np.random.default_rng(16).integers(1, 9, 120)
+    table = [(sp.Rational(k, 120), sp.Integer(mass)) for k, mass in enumerate(masses.tolist())]
+    model = string(1, cra.stations(x, table, kind="step"))
+    found = omega(model, 2)
+    assert [len(rows) for rows in model.numerics("spatial").rows] == [0]
+
+    def condition(w):
+        state = np.array([0.0, 1.0])
+        for q in w * np.sqrt(masses):
+            s, c = np.sin(q / 120), np.cos(q / 120)
+            state = np.array([[c, s / q], [-q * s, c]]) @ state
+        return state[0]
+
+    exact = [brentq(condition, w * (1 - 1e-4), w * (1 + 1e-4), xtol=1e-15) for w in found]
+    np.testing.assert_allclose(found, exact, rtol=CLOSE)
+    assert model.mode_shapes({}, 0.3, modes=2, derivative=1).shape == (2,)
+    assert [len(rows) for rows in model.numerics("spatial").rows] == [2]
+
+
+@pytest.mark.parametrize("cells", [7, 150])
 def test_stepped_cells(cells):
     """A string of equal cells, each half light and half heavy: powers of the transfer matrix of a cell."""
     mass = 1 + 3 * sp.floor(2 * cells * x - 2 * sp.floor(cells * x))
