@@ -15,6 +15,7 @@ __all__ = ["FAR", "mirrored", "settling", "shifted", "traced"]
 Array = NDArray[np.float64]
 _MOST_POINTS = 250  # points of a curve over the level
 _FULL, _HIGHEST = np.arcsinh(1.0), np.arcsinh(10.0)  # the level is the hyperbolic sine of the continuation parameter
+_SLOW = 5.0  # natural frequencies over that of the excitation up to which modes move in the integration
 _CYCLES, _DECAY = (40, 100), 8.0  # periods of integration; sufficient decay of a transient
 FAR = 1e3
 """Displacement, over those of the starts and of the steady states, beyond which a motion is taken to diverge."""
@@ -111,11 +112,12 @@ def settling(problem: DrivenProblem, points: Array, starts: Array, size: float) 
     frequency, x = points[:, 0] / problem.period, problem.coefficients(starts)
     at, m = np.zeros(1), len(points)
     push = _PUSH * size * np.random.default_rng(0).normal(size=(2, m, n))
-    q = x @ basis.values(at)[0] + push[0]
-    u = (x @ basis.values(at, 1)[0] + push[1]) * frequency[:, None]
+    slow = equations.omega <= max(_SLOW * points[:, 0].max(initial=0.0), equations.omega[0])
+    q = (x @ basis.values(at)[0] + push[0]) * slow
+    u = (x @ basis.values(at, 1)[0] + push[1]) * frequency[:, None] * slow
 
     def rate(phase: float, q: Array, u: Array, rows: NDArray[np.intp]) -> Array:
-        return np.stack([u, problem.acceleration(phase, points[rows], q, u)]) / frequency[rows, None]
+        return slow * np.stack([u, problem.acceleration(phase, points[rows], q, u)]) / frequency[rows, None]
 
     decay = float(np.linalg.eigvalsh((equations.damping + equations.damping.T) / 4).min())
     cycles = int(np.clip(np.ceil(_DECAY * frequency.max() / (2 * np.pi * max(decay, 1e-300))), *_CYCLES))
