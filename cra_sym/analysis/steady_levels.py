@@ -117,7 +117,8 @@ def settling(problem: DrivenProblem, points: Array, starts: Array, size: float) 
     u = (x @ basis.values(at, 1)[0] + push[1]) * frequency[:, None] * slow
 
     def rate(phase: float, q: Array, u: Array, rows: NDArray[np.intp]) -> Array:
-        return slow * np.stack([u, problem.acceleration(phase, points[rows], q, u)]) / frequency[rows, None]
+        rates = np.stack([u, problem.acceleration(phase, points[rows], q, u)]) / frequency[rows, None]
+        return np.asarray(slow * rates)
 
     decay = float(np.linalg.eigvalsh((equations.damping + equations.damping.T) / 4).min())
     cycles = int(np.clip(np.ceil(_DECAY * frequency.max() / (2 * np.pi * max(decay, 1e-300))), *_CYCLES))
