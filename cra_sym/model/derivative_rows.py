@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from cra_sym.kernels import Kernel, kernel
 
 if TYPE_CHECKING:
-    from sympy import Symbol
+    from sympy import Matrix, Symbol
 
     from cra_sym.mechanics import StateForm
 
@@ -30,43 +30,42 @@ class DerivativeRows:
     """
 
     def __init__(self, form: StateForm, place: int, arguments: Sequence[Symbol]) -> None:
-        self._form, self._place, self._arguments = form, place, arguments
+        from sympy import zeros
+
+        row = zeros(1, form.system.rows)
+        row[place] = 1
         self._found: list[Kernel] = []
-        self._further = self._derived()
+        self._row: Matrix | None = None  # the last one, if it is to be differentiated
+        if form.uniform:  # further rows follow from products with the system
+            self._found.append(kernel(row, (form.x, *arguments), backend="numpy"))
+            return
+        self._row, self._form, self._arguments = row, form, (form.x, *arguments)
 
     def __len__(self) -> int:
-        """Return how many rows have been derived so far."""
+        """Return how many rows have been compiled so far."""
         return len(self._found)
 
     def to(self, order: int) -> Sequence[Kernel]:
         """Return the rows of order 0 to ``order``, or all there are.
 
-        Where coefficients vary along x these have derivatives between breakpoints; where they do not, order 0 alone is
-        kept, since further rows follow from products with the system.
+        Where coefficients vary along x these have derivatives between breakpoints; where they do not, it is one.
         """
-        while len(self._found) <= order:
-            row = next(self._further, None)
-            if row is None:
-                break
-            self._found.append(row)
+        while len(self._found) <= order and self._row is not None:
+            self._compile_next(self._row)
         return self._found
 
-    def _derived(self) -> Iterator[Kernel]:
-        from sympy import zeros
-
+    def _compile_next(self, row: Matrix) -> None:
         from cra_sym.mechanics.breakpoints import derivative
 
-        form = self._form
-        row = zeros(1, form.system.rows)
-        row[self._place] = 1
-        for order in range(1 if form.uniform else 2 * len(form.displacements) + 3):
-            if order:
-                row = row.applyfunc(lambda entry: derivative(entry, form.x)) + row * form.system
-            try:
-                yield kernel(row, (form.x, *self._arguments), backend="numpy")
-            except ValueError:
-                if order == 0:
-                    raise
-                return  # the derivative of such a coefficient has no function
-            if not form.uniform and sum(entry.count_ops() for entry in row) > _LONGEST:
-                return
+        form, before = self._form, len(self._found)
+        if before:
+            row = row.applyfunc(lambda entry: derivative(entry, form.x)) + row * form.system
+        try:
+            self._found.append(kernel(row, self._arguments, backend="numpy"))
+        except ValueError:
+            if not before:
+                raise
+            self._row = None  # the derivative of such a coefficient has no function
+            return
+        last = len(self._found) == 2 * len(form.displacements) + 3
+        self._row = None if last or sum(entry.count_ops() for entry in row) > _LONGEST else row

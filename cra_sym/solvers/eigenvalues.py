@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from .rayleigh import quotients, ritz_values
-from .stiffness import DynamicStiffness, Evaluation, form
+from .stiffness import GOLDEN, DynamicStiffness, Evaluation, form
 
 __all__ = ["lowest", "refine"]
 
@@ -17,6 +17,7 @@ _NOISE = 512 * np.finfo(float).eps
 _SOFT, _BLURRED = 1e-8, 1e-14
 """Relative rounding error above which a root is replaced by a Ritz value, and above which its shape is used for it."""
 _SWEEPS = 200
+_BELOW = 1e-4  # share of the smallest z without stiffness from which on frequencies are not searched
 
 
 def lowest(problem: DynamicStiffness, modes: int) -> np.ndarray:
@@ -36,7 +37,9 @@ def lowest(problem: DynamicStiffness, modes: int) -> np.ndarray:
     Raises
     ------
     ValueError
-        If the structure is statically unstable (has buckled), or has fewer natural frequencies than asked for.
+        If the structure is statically unstable (has buckled), or has fewer natural frequencies than asked for. Where
+        the highest derivatives by x have inertia too, those count that lie below the z at which it first outweighs
+        their stiffness somewhere: at that z, motions of any wave length are eigenfunctions.
 
     Notes
     -----
@@ -118,10 +121,19 @@ def _upper_bounds(
     shared = min(modes, bounds.shape[1])
     guess[:, :shared] = bounds[:, :shared]
     high, above = np.full((rows, modes), np.inf), np.zeros((rows, modes), dtype=int)
-    z = np.maximum(bounds[:, 0], 1e-12 * bounds[:, -1]) * (1.0 + 1e-9)
+    ceiling = _ceiling(problem)
+    z = np.minimum(np.maximum(bounds[:, 0], 1e-12 * bounds[:, -1]) * (1.0 + 1e-9), ceiling)
     pending = np.arange(rows)
     for _ in range(400):
         count = problem.evaluate(z[pending], pending).count
+        few = (z[pending] >= ceiling[pending]) & (count < modes)
+        if few.any():
+            worst = int(np.argmin(np.where(few, count, modes)))
+            raise ValueError(
+                f"modes = {modes}: only {count[worst]} natural frequencies lie below {np.sqrt(z[pending[worst]]):.6g} "
+                "rad/s, about where the inertia of the highest derivatives by x outweighs their stiffness and "
+                f"frequencies are no longer distinct; modes must be at most {count[worst]}"
+            )
         reached = (np.arange(1, modes + 1) <= count[:, None]) & np.isinf(high[pending])
         high[pending], above[pending] = (
             np.where(reached, z[pending, None], high[pending]),
@@ -130,8 +142,34 @@ def _upper_bounds(
         pending = pending[np.isinf(high[pending, -1])]
         if not pending.size:
             return high, above, guess
-        z[pending] *= 4.0
+        z[pending] = np.minimum(4.0 * z[pending], ceiling[pending])
     raise ValueError(f"modes = {modes}: the model has only {int(above.max())} natural frequencies")
+
+
+def _ceiling(problem: DynamicStiffness) -> np.ndarray:
+    """Return up to which z natural frequencies are searched, shape (rows,): inf without inertia of the highest strain.
+
+    Where q' = F P + .., F is the inverse of stiffness minus z times inertia of the highest derivatives, and F^-1 F' at
+    z = 0 has the reciprocals of the z at which that is singular.
+    """
+    n, rows = problem.displacements, len(problem.length)
+    force = slice(n + problem.coordinates, 2 * n + problem.coordinates)
+
+    def flexibility(share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        matrix, slope = problem.system(np.zeros(rows), np.arange(rows), share[None])
+        return matrix[..., :n, force], slope[..., :n, force]
+
+    if not flexibility(np.array([0.3]))[1].any():
+        return np.full(rows, np.inf)
+    # both ends of every piece, beside its nodes: coefficients may jump there
+    pieces = 1 if problem.uniform else 2 ** max(problem.halvings, 8)
+    near = ((np.arange(pieces)[:, None] + [1e-9, 1.0 - 1e-9]) / pieces).ravel()
+    flexible, slope = flexibility(np.concatenate([GOLDEN * near, GOLDEN + (1.0 - GOLDEN) * near]))
+    top = np.nonzero(np.abs(flexible).max(axis=tuple(range(flexible.ndim - 1))))[0]
+    ratio = np.linalg.solve(flexible[..., top[:, None], top], slope[..., top[:, None], top])
+    largest = np.linalg.eigvals(ratio).real.max(axis=(-2, -1))
+    with np.errstate(divide="ignore"):
+        return np.broadcast_to(np.where(largest > 0.0, (1.0 - _BELOW) / largest, np.inf), rows)
 
 
 def _static_bounds(static: Evaluation) -> np.ndarray:

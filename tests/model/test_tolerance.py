@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from scipy.optimize import brentq
+from scipy.special import j0, y0
 
 import cra_sym as cra
 from cra_sym.model.routes import GeneralRoute
@@ -89,6 +90,34 @@ def test_a_rod_whose_lateral_inertia_jumps():
     found = system.natural_frequencies(1)
     np.testing.assert_allclose(found, exact, rtol=1e-10)
     assert 0 < system.accuracy <= 1e-10
+
+
+def test_frequencies_of_a_rod_end_where_its_lateral_inertia_outweighs_the_stiffness():
+    """(s u')' + z u = 0 with s = 1 - z (1 + x) / 100 has Bessel functions of 200 sqrt(s / z); s(1) = 0 at z = 50.
+
+    Roots of the condition of fixed ends below that are counted by its changes of sign.
+    """
+    rod = love_rod(1, (1 + x) / 100).at({})
+
+    def fixed_ends(w):
+        z, rate = w**2, w**2 / 100
+        left, right = (2 * np.sqrt(z * (1 - rate * (1 + place))) / rate for place in (0, 1))
+        return j0(left) * y0(right) - y0(left) * j0(right)
+
+    w = np.linspace(0.1, 7.07, 4000)
+    value = fixed_ends(w)
+    roots = [brentq(fixed_ends, w[k], w[k + 1], xtol=1e-15) for k in np.nonzero(value[1:] * value[:-1] < 0)[0]]
+    with pytest.raises(ValueError, match=rf"modes must be at most {len(roots)}$"):
+        rod.natural_frequencies(21)
+    np.testing.assert_allclose(rod.natural_frequencies(3), roots[:3], rtol=1e-10)
+
+
+def test_frequencies_of_a_uniform_rod_with_lateral_inertia_accumulate():
+    k = np.arange(1, 101) * np.pi
+    uniform = love_rod(1, sp.Rational(1, 100)).at({})
+    np.testing.assert_allclose(uniform.natural_frequencies(100), k / np.sqrt(1 + k**2 / 100), rtol=1e-11)
+    with pytest.raises(ValueError, match="modes must be at most 318"):  # of z = k^2 / (1 + k^2 / 100) below 99.99
+        uniform.natural_frequencies(400)
 
 
 def test_third_derivatives_that_vary_have_an_estimate():
