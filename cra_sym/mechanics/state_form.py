@@ -145,6 +145,7 @@ def _system(weak: WeakForm, parameter: Symbol) -> Matrix:
         names = [str(weak.variation.space.form(jet)) for jet in highest]
         raise HamiltonError(
             f"density: the quadratic form in {', '.join(names)} is singular, so the problem has no state form"
+            + _linear_cure(weak, [jet for row, jet in enumerate(highest) if leading[row, :].is_zero_matrix])
         )
     _check_parts(leading, weak.variation.space.x)
     for row, jet in enumerate(highest):
@@ -172,6 +173,22 @@ def _system(weak: WeakForm, parameter: Symbol) -> Matrix:
             slope[row, :] = top[highest.index(raised), :]
     rate = stiffness(state, state) * motion + stiffness(state, highest) * top - lower
     return Matrix.vstack(slope, zeros(m, width), rate)
+
+
+def _linear_cure(weak: WeakForm, jets: list[Jet]) -> str:
+    """Return the advice for highest derivatives that occur in products with lower ones alone."""
+    space = weak.variation.space
+    for jet in jets:
+        partners = [
+            q.space for pair in weak.inside for p, q in (pair, pair[::-1]) if (p, q.unknown) == (jet, jet.unknown)
+        ]
+        if jet.space > 1 and partners and (jet.space + min(partners)) % 2 == 0:
+            half = (jet.space + min(partners)) // 2
+            names = [space.form(jet._replace(space=order)) for order in (jet.space, min(partners), half)]
+            return (
+                f"; integrate the product of {names[0]} and {names[1]} by parts, to {names[2]}**2 and terms at the ends"
+            )
+    return ""
 
 
 def _check_parts(leading: Matrix, x: Symbol) -> None:

@@ -41,6 +41,7 @@ ROUNDING = 1e-11
 """Bound of the relative rounding of frequencies from closed forms and from the dynamic stiffness."""
 TOLERANCE = 1e-10
 """Relative error of a natural frequency beyond which it is refused, unless a system states its own."""
+_NO_DIGIT = 5e-3  # relative error of a frequency without a digit that counts
 _FEWEST, _MOST = 2, 11  # halvings of the two parts of a problem that varies along x
 Values = Sequence[float | Array]
 """Parameters in the order of the model's symbols; they broadcast to the shape of the batch."""
@@ -171,7 +172,7 @@ class GeneralRoute:
                     if np.isinf(least).all():
                         raise
                     break
-                if (squares == before).all():
+                if (squares == before).all() and squares.any():
                     continue  # short waves need more steps anyway
                 with np.errstate(divide="ignore", invalid="ignore"):
                     error = 0.5 * np.where(squares == before, 0.0, np.abs(squares - before) / squares)
@@ -181,6 +182,13 @@ class GeneralRoute:
                     return np.sqrt(squares).reshape(*shape, modes), accuracy.reshape(shape)
                 progress(float(error.max()), f"{2 ** (halvings + 1)} steps")
         row, mode = np.unravel_index(int(np.argmax(least)), least.shape)
+        if least[row, mode] > _NO_DIGIT:
+            raise ValueError(
+                f"modes = {modes}: frequency {mode + 1} agrees between no two step sizes, since the rounding error of "
+                "the stiffness hides it, as it does for rigid-body motions and soft springs where a density has high "
+                "derivatives; hold such motions by essential conditions or stiffer springs, or use ritz, which "
+                "estimates no error"
+            )
         raise ValueError(
             f"modes = {modes}: the relative error of frequency {mode + 1} stays at {least[row, mode]:.1g}; it comes "
             f"from the coefficients near x = {self._steepest(columns[:, row]):.6g}; {cure(least[row, mode])}"

@@ -160,7 +160,8 @@ def test_natural_forces_are_the_boundary_conditions():
     [
         (BEAM - T * v.diff(x) ** 4 / 4, r"term -T\*Derivative\(v\(x, t\), x\)\*\*4/4.*nonlinear"),
         (BEAM - T * t * v.diff(x) ** 2, "depends on t"),
-        (m * v.diff(t) ** 2 / 2 - B * v * v.diff(x), "singular"),
+        (m * v.diff(t) ** 2 / 2 - B * v * v.diff(x), "singular, so the problem has no state form$"),
+        (m * v.diff(t) ** 2 / 2 - B * v * v.diff(x, 4), r"by parts, to Derivative\(v\(x, t\), \(x, 2\)\)\*\*2"),
     ],
 )
 def test_problems_without_a_state_form(density, words):
