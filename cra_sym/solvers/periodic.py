@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,7 @@ _WIDEST = 3.0  # largest step, in units of the fastest motion's time; beyond it 
 _SHARE = 1e-4
 """Coefficients of cosines below this share of the tolerance are left out; their sum is far below the tolerance."""
 _PRODUCTS = 31  # cost of the matrix products of one term, in units of half a term of a product of series
-_BLOCK = 384  # systems propagated together, small enough for the cache
+_BLOCK = 768  # systems propagated together: fewer cost more calls, more leave the cache
 
 
 def _applied(matrix: Array, states: Array) -> Array:
@@ -65,24 +66,22 @@ class _Series:
     """Taylor coefficients of q, dq/dtau and p over one step, by recursion.
 
     The terms of one oscillation add K_r q + C_r u to the forces and B_r q + M_r u to the momenta, with u = dq/dt: one
-    product of series each.
+    product of series each, of as many rows as these matrices have ranks together.
     """
 
-    def __init__(self, system: PeriodicSystem, steps: int, order: int, least: float) -> None:
+    def __init__(self, system: PeriodicSystem, steps: int, order: int, least: float, factored: bool) -> None:
         self.system, self.h, self.order = system, system.period / steps, order
         self.steps, self.least = steps, least
         size, points = len(system.stiffness), system.period.size
         self.shape = (size, 2 * size, points)
-        swings = system.swings
-        pushes = [s.stiffness is not None or s.damping is not None for s in swings]
-        carries = [s.momentum is not None or s.mass is not None for s in swings]
-        store = (order + 1, *self.shape)
-        self.forces = [np.empty(store) if there else None for there in pushes]
-        self.momenta = [np.empty(store) if there else None for there in carries]
+        pushes = [_factors(s.stiffness, s.damping, factored) for s in system.swings]
+        carries = [_factors(s.momentum, s.mass, factored) for s in system.swings]
+        self.forces = [_Product(*found, order, self.shape) for found in pushes]
+        self.momenta = [_Product(*found, order, self.shape) for found in carries]
         # all products with q are one product, those with u another
         own = system.damping if system.damping.any() else None
-        self.of_q = _Stack([system.stiffness, *(s.stiffness for s in swings), *(s.momentum for s in swings)])
-        self.of_u = _Stack([own, *(s.damping for s in swings), *(s.mass for s in swings)])
+        self.of_q = _Stack([system.stiffness, *(found[1] for found in (*pushes, *carries))])
+        self.of_u = _Stack([own, *(found[2] for found in (*pushes, *carries))])
 
     def advanced(self, step: int, q: Array, p: Array) -> tuple[Array, Array]:
         """Return the state at the end of a step."""
@@ -94,6 +93,8 @@ class _Series:
         mass = None if found is None else found[1]
         if found is not None and _is_diagonal(found[0]):
             mass = np.einsum("iip->ip", found[1])[:, None]
+        for product in (*self.forces, *self.momenta):
+            product.known = -1
         end_q, end_p, p = q.copy(), p.copy(), p.copy()
         for k in range(self.order):
             rate, resistance = self._rates(k, q, p, waves, mass)
@@ -106,35 +107,70 @@ class _Series:
     def _rates(self, k: int, q: Array, p: Array, waves: list[Array], mass: Array | None) -> tuple[Array, Array]:
         """Return the coefficients k of dq/dt and of -dp/dt."""
         number = len(self.system.swings)
+        sizes = [swing.size for swing in self.system.swings]
         of_q = self.of_q(q)
         rate, resistance = p, of_q[0]
         assert resistance is not None
-        for r, kept in enumerate(self.momenta):
-            if kept is not None:
-                of_both = of_q[1 + number + r]
-                kept[k] = 0.0 if of_both is None else of_both
-                rate -= self._weighed(r, waves[r], kept, k)
+        for product, of_both, wave, size in zip(self.momenta, of_q[1 + number :], waves, sizes, strict=True):
+            product.keep(k, of_both)
+            product.added(rate, k, wave, -size)
         if mass is not None:
             rate = np.multiply(rate, mass, out=rate) if mass.shape[1] == 1 else _applied(mass, rate)
         of_u = self.of_u(rate)
         if of_u[0] is not None:
             resistance += of_u[0]
-        for r, kept in enumerate(self.momenta):
-            if kept is not None and (carried := of_u[1 + number + r]) is not None:
-                kept[k] += carried
-        for r, kept in enumerate(self.forces):
-            if kept is not None:
-                parts = [part for part in (of_q[1 + r], of_u[1 + r]) if part is not None]
-                kept[k] = parts[0] if len(parts) == 1 else np.add(*parts)
-                resistance += self._weighed(r, waves[r], kept, k)
+        for product, carried in zip(self.momenta, of_u[1 + number :], strict=True):
+            product.keep(k, carried)
+        for r, product in enumerate(self.forces):
+            product.keep(k, of_q[1 + r])
+            product.keep(k, of_u[1 + r])
+            product.added(resistance, k, waves[r], sizes[r])
         return rate, resistance
 
-    def _weighed(self, swing: int, wave: Array, kept: Array, k: int) -> Array:
-        """Return the coefficient k of the product of an oscillation and a series."""
-        length = min(k + 1, len(wave))
-        found = wave[length - 1 :: -1] @ kept[k + 1 - length : k + 1].reshape(length, -1)
-        found = found.reshape(self.shape)
-        return np.multiply(found, self.system.swings[swing].size, out=found)
+
+class _Product:
+    """Product of an oscillation and the series of a left factor times rows, which are kept."""
+
+    def __init__(self, left: Array | None, of_q: Array | None, of_u: Array | None, order: int, shape: Any) -> None:
+        rows = next((len(matrix) for matrix in (of_q, of_u) if matrix is not None), 0)
+        self.left = left
+        self.rows = np.empty((order + 1 if rows else 0, rows, *shape[1:]))
+        self.known = -1  # the highest coefficient kept in this step
+
+    def keep(self, k: int, row: Array | None) -> None:
+        """Add to the coefficient k of the rows."""
+        if row is not None:
+            if self.known == k:
+                self.rows[k] += row
+            else:
+                self.rows[k] = row
+            self.known = k
+
+    def added(self, out: Array, k: int, wave: Array, size: Array) -> None:
+        """Add the coefficient k of ``size`` times the product to ``out``, as far as the rows are kept."""
+        first = k + 1 - min(k + 1, len(wave))
+        last = self.known
+        if last < first:
+            return
+        part = self.rows[first : last + 1]
+        found = (wave[k - last : k - first + 1][::-1] @ part.reshape(len(part), -1)).reshape(part.shape[1:])
+        found *= size
+        out += found if self.left is None else _applied(self.left, found)
+
+
+def _factors(of_q: Array | None, of_u: Array | None, wanted: bool) -> tuple[Array | None, Array | None, Array | None]:
+    """Return a common left factor of two matrices, (N, rank, 1), and what it multiplies; None if unwanted or N."""
+    there = [matrix for matrix in (of_q, of_u) if matrix is not None]
+    if not wanted or not there or any(m.shape[-1] > 1 or not np.isfinite(m).all() for m in there):
+        return None, of_q, of_u
+    axes, sizes, _ = np.linalg.svd(np.concatenate(there, axis=1)[..., 0], full_matrices=False)
+    left = axes[:, sizes > len(axes) * np.finfo(float).eps * sizes[0]]
+    if left.shape[1] == len(axes):
+        return None, of_q, of_u
+    if not left.size:  # all entries are zero
+        return None, None, None
+    rows = [None if matrix is None else (left.T @ matrix[..., 0])[..., None] for matrix in (of_q, of_u)]
+    return left[..., None], rows[0], rows[1]
 
 
 def _mass_and_inverse(system: PeriodicSystem, waves: list[Array]) -> tuple[Array, Array] | None:
@@ -161,17 +197,20 @@ class _Stack:
 
     def __init__(self, matrices: Sequence[Array | None]) -> None:
         there = [matrix for matrix in matrices if matrix is not None]
-        self.there = [matrix is not None for matrix in matrices]
+        ends = np.cumsum([0, *(0 if matrix is None else len(matrix) for matrix in matrices)]).tolist()
+        self.rows = [
+            None if matrix is None else slice(*pair) for matrix, pair in zip(matrices, pairwise(ends), strict=True)
+        ]
         if there:
             points = max(matrix.shape[-1] for matrix in there)
             self.whole = np.concatenate([np.broadcast_to(m, (*m.shape[:2], points)) for m in there])
 
     def __call__(self, states: Array) -> list[Array | None]:
         """Return the products, None for None."""
-        if not any(self.there):
-            return [None] * len(self.there)
-        parts = iter(_applied(self.whole, states).reshape(-1, *states.shape))
-        return [next(parts) if there else None for there in self.there]
+        if not any(self.rows):
+            return [None] * len(self.rows)
+        found = _applied(self.whole, states)
+        return [None if rows is None else found[rows] for rows in self.rows]
 
 
 def _is_diagonal(matrix: Array) -> bool:
@@ -179,13 +218,14 @@ def _is_diagonal(matrix: Array) -> bool:
 
 
 def propagated(
-    system: PeriodicSystem, steps: int, order: int, *, half: bool = False, least: float = 0.0
+    system: PeriodicSystem, steps: int, order: int, *, half: bool = False, least: float = 0.0, factored: bool = False
 ) -> Iterator[tuple[Array, Array]]:
     """Yield (q, p), shape (N, 2N, points), after every step of a period, or of half of it, from every unit state.
 
-    Coefficients of cosines below ``least`` are left out.
+    Coefficients of cosines below ``least`` are left out. With ``factored``, oscillating matrices of low rank are
+    factored, which takes less time; the rounding of the factors is not that of the given matrices.
     """
-    series = _Series(system, steps, order, least)
+    series = _Series(system, steps, order, least, factored)
     q, p = (
         np.ascontiguousarray(np.broadcast_to(half[..., None], series.shape))
         for half in np.split(np.eye(series.shape[1]), 2)
@@ -208,7 +248,8 @@ def monodromy(system: PeriodicSystem, tolerance: float = 1e-8) -> Array:
     blocks = [rank[start : start + _BLOCK] for start in range(0, points, _BLOCK)]
     for block, series in zip(blocks, _majorants(system, blocks).T, strict=True):
         steps, order = _cheapest(series, tolerance)
-        states = propagated(system.take(block), steps, order, half=parity is not None, least=_SHARE * tolerance)
+        some, least = system.take(block), _SHARE * tolerance
+        states = propagated(some, steps, order, half=parity is not None, least=least, factored=True)
         end = deque(states, maxlen=1)
         out[block] = np.moveaxis(np.concatenate(end[0]), -1, 0)
     if axes is not None:

@@ -676,6 +676,22 @@ def test_the_bound_of_a_monodromy_matrix_with_an_oscillating_mass_holds():
     assert off <= error[0] * start and error[0] < 1e-9  # two hundred steps with some hundred operations each
 
 
+@pytest.mark.parametrize("rank", [0, 1, 2])
+def test_factors_of_low_rank_leave_the_motion_as_it_is(rank):
+    rng = np.random.default_rng(11 + rank)
+    columns, swung = 0.3 * rng.normal(size=(2, 3, rank))
+    mass, other = 0.3 * columns @ columns.T, columns @ swung.T
+    drives = [(floquet.Oscillation(1, "cos", 0), [other @ other.T, other, other.T, mass])]
+    stiffness = np.diag([1.0, 4.0, 9.0])
+    system, _ = periodic.PeriodicSystem.of(stiffness, 0.01 * stiffness, drives, np.array([2.0, 3.0]), 0.2)
+    found = [np.array(list(periodic.propagated(system, 10, 16, factored=by)))[-1] for by in (False, True)]
+    # rounding of some 1e3 operations on states of size one
+    np.testing.assert_allclose(*found, rtol=0, atol=1e-12)
+    if rank:
+        still, _ = periodic.PeriodicSystem.of(stiffness, 0.01 * stiffness, [], np.array([2.0, 3.0]), 0.2)
+        assert np.abs(found[1] - np.array(list(periodic.propagated(still, 10, 16)))[-1]).max() > 1e-3
+
+
 def test_zones_of_one_damped_mass():
     """Fewer modes than a second order would include: Mathieu's zone with damping, to second order."""
     q = sp.Function("q")(t)
