@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from threading import Lock
 from typing import TYPE_CHECKING
 
+from cra_sym.cached import released_in_children
 from cra_sym.kernels import Kernel, kernel
 
 if TYPE_CHECKING:
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["DerivativeRows"]
 
+_TURN = released_in_children(Lock())  # one thread compiles rows for all
 _LONGEST = 400  # operation count beyond which a further derivative of a coefficient takes too long
 
 
@@ -50,8 +53,10 @@ class DerivativeRows:
 
         Where coefficients vary along x these have derivatives between breakpoints; where they do not, it is one.
         """
-        while len(self._found) <= order and self._row is not None:
-            self._compile_next(self._row)
+        if len(self._found) <= order and self._row is not None:
+            with _TURN:
+                while len(self._found) <= order and self._row is not None:
+                    self._compile_next(self._row)
         return self._found
 
     def _compile_next(self, row: Matrix) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -487,3 +490,19 @@ def test_random_coefficients_agree_with_elements_or_are_refused():
     for trial in (1, 7):
         result = coefficients(trial)
         assert good(result), result
+
+
+def test_derivatives_asked_for_in_several_threads_are_derived_once(monkeypatch):
+    from cra_sym.model import derivative_rows
+
+    def slow(*arguments, **options):
+        time.sleep(0.01)  # so that threads meet here
+        return kernel(*arguments, **options)
+
+    kernel = derivative_rows.kernel
+    monkeypatch.setattr(derivative_rows, "kernel", slow)
+    (system, other), orders = (beam(1 + x**2, 1 + x / 2).at({}) for _ in range(2)), (0, 1, 2, 3, 4, 2, 3, 4)
+    with ThreadPoolExecutor(8) as threads:
+        found = list(threads.map(lambda order: cra.mode_shapes(system, [0.3, 0.7], 2, derivative=order), orders))
+    for order, shapes in zip(orders, found, strict=True):
+        assert np.array_equal(shapes, cra.mode_shapes(other, [0.3, 0.7], 2, derivative=order))
