@@ -217,7 +217,7 @@ FREE |= {(17, 0, f"C_{k}*{f}(beta*x)") for k, f in enumerate(("cos", "sin", "cos
 #: (23) written out and differentiated: its proof takes seconds, so the terms are tried with numbers.
 WRITTEN_OUT = {32}
 #: How many of an equation's terms are tried, so that the long ones do not take all the time.
-TRIED = 8
+TRIED = 4
 
 
 def parts(expression):
