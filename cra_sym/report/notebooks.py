@@ -182,6 +182,13 @@ def refresh(paths: Sequence[Path], *, svg: bool = False) -> None:
     import nbformat
 
     running: list[Callable[[], Any]] = []
+    stopped = Event()
+
+    def started(end: Callable[[], Any]) -> None:
+        running.append(end)
+        if stopped.is_set():  # it was taken from the queue before that was emptied
+            end()
+
     with (
         tqdm(total=cells_to_run(paths), unit="cell", disable=None) as progress,
         ThreadPoolExecutor(max_workers=min(len(paths), os.cpu_count() or 1)) as pool,
@@ -189,7 +196,7 @@ def refresh(paths: Sequence[Path], *, svg: bool = False) -> None:
 
         def run(path: Path) -> NotebookNode:
             _print_chapter(progress, path.stem)
-            return execute(path, progress.update, svg=svg, begun=running.append)
+            return execute(path, progress.update, svg=svg, begun=started)
 
         jobs = {pool.submit(run, path): path for path in paths}
         try:
@@ -197,7 +204,8 @@ def refresh(paths: Sequence[Path], *, svg: bool = False) -> None:
                 write_text(jobs[finished], nbformat.writes(finished.result()) + "\n")
         except BaseException:  # an interrupt too
             pool.shutdown(wait=False, cancel_futures=True)
-            for end in running:
+            stopped.set()
+            for end in list(running):
                 with suppress(RuntimeError):  # its event loop is closed, so it has finished
                     end()
             raise
