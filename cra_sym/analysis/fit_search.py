@@ -19,7 +19,7 @@ __all__ = ["Data", "Search"]
 Array = NDArray[np.float64]
 
 _MOST_POINTS = 20_000
-_POINTS = (25, 13)  # of a parameter that is no stiffness of an end: the most that the grid can have
+_POINTS = (25, 13)  # of a parameter that is not a stiffness of an end: the most that the grid can have
 _SAMPLES = 8_192  # points of a sample, where a grid would have more
 _LINKED = 4.0  # rise of chi2 between two minima up to which they count as one: two standard deviations
 _LOWEST = 200  # lowest grid points that are starts even if they are not local minima

@@ -172,7 +172,7 @@ class BoltedJoint:
         """Return the arm with this joint as :meth:`on` does, with the preload as a parameter of its Lagrangian.
 
         So it is a slider of :func:`cra_sym.explore`, and sensitivities and sweeps are over the preload. The springs of
-        the joint are no parameters then; to let one of them fluctuate, use :meth:`on`.
+        the joint are not parameters then; to let one of them fluctuate, use :meth:`on`.
 
         Parameters
         ----------

@@ -180,7 +180,7 @@ class Arithmetic:
                 return _WRITTEN[function](self, *(self.typed(value, DOUBLE) for value in arguments))
         except TypeError:  # not hashable, or as many arguments as it does not have
             pass
-        raise CompileError(f"{getattr(function, '__name__', function)} is no function that can be compiled")
+        raise CompileError(f"{getattr(function, '__name__', function)} is not a function that can be compiled")
 
     def intrinsic(self, name: str, *arguments: Any) -> Any:
         """Return an elementary function that LLVM knows."""

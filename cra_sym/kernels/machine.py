@@ -113,7 +113,7 @@ def _written(function: ast.FunctionDef, types: Sequence[str], namespace: Mapping
 
 
 def _symbol(name: str) -> str:
-    return f"entry.{name}"  # which is no function of the platform
+    return f"entry.{name}"  # which is not a function of the platform
 
 
 def _argument(builder: Any, of: str, given: Any) -> Any:

@@ -92,7 +92,9 @@ def _maps(
     n, points = equations.modes, len(frequency)
     phase = 2 * np.pi * share * (np.arange(steps) + 0.5) / steps
     q = np.einsum("pnm,sm->psn", coefficients, basis.values(phase)).reshape(-1, n)
-    v = np.einsum("pnm,sm,p->psn", coefficients, basis.values(phase, 1), frequency).reshape(-1, n)
+    v = np.zeros_like(q)  # not needed where no nonlinear term contains velocities
+    if equations.moves_mass:
+        v = np.einsum("pnm,sm,p->psn", coefficients, basis.values(phase, 1), frequency).reshape(-1, n)
     known = None if causes is None else flattened(causes(phase, rows))
     h = (2 * np.pi * share / (frequency * steps))[:, None, None, None]
     if equations.moves_mass:
