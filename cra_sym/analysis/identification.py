@@ -124,6 +124,14 @@ class Identification(ByValue):
     message: str
     solutions: tuple[Identification, ...] = ()
 
+    def __repr__(self) -> str:
+        deviations = np.sqrt(np.diag(self.covariance))
+        found = (
+            f"{name} = {value:.6g} +- {s:.2g}" for (name, value), s in zip(self.values.items(), deviations, strict=True)
+        )
+        fits = "fits" if self.fits else "does not fit"
+        return f"<{type(self).__name__}: {', '.join(found)}; {fits}, p = {self.p_value:.2g}; {self.message}>"
+
 
 class JointEstimate(Identification):
     """Stiffnesses of the bolted joint, with names of their own."""

@@ -222,6 +222,9 @@ class ModalParameters:
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self._system, self._number)
 
+    def __repr__(self) -> str:
+        return f"<ModalParameters of {self._number} modes, shape {self._system.shape}>"
+
     @property
     def _modes(self) -> Modes:
         return self._system.modes(self._number)

@@ -49,6 +49,9 @@ class Rates(Mapping[str, Array]):
     def __len__(self) -> int:
         return len(self._names)
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({dict(self)!r})"
+
 
 class Sensitivities:
     """Derivatives of the natural frequencies f (Hz), arrays of shape (..., modes), computed on first use.
@@ -94,6 +97,9 @@ class Sensitivities:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self._system, self._modes, self._by)
+
+    def __repr__(self) -> str:
+        return f"<Sensitivities of frequencies {self.frequency} Hz by {', '.join(self._by)}: rate, log, compliance>"
 
     def __getattr__(self, name: str) -> Array:
         if name.startswith("_"):

@@ -399,3 +399,9 @@ def test_a_fit_is_a_value():
 def test_bad_options_are_named(options, error, words):
     with pytest.raises(error, match=words):
         cra.identify(NOMINAL, [2.4, 15.0], 0.1, **options)
+
+
+def test_an_estimate_reads_as_values_and_uncertainties():
+    arm = cra.Arm.nominal().replace(k_t=1e4, k_r=100.0)
+    text = repr(cra.identify_joint(arm, cra.natural_frequencies(arm), 0.01))
+    assert text.startswith("<JointEstimate: k_t = 10000 +- ") and "k_r = 100 +- " in text and "; fits, p = " in text

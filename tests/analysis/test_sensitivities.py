@@ -274,3 +274,9 @@ def test_close_roots_leave_their_rates_to_the_modes():
     w = same.natural_frequencies(2)[1]
     slope = np.cos(w) - w * np.sin(w) + 0.2 * np.cos(w)
     assert odd == pytest.approx(-2 * np.sin(w) / slope * 0.1 / w, rel=1e-12)
+
+
+def test_rates_read_as_a_mapping():
+    found = cra.sensitivities(cra.Arm.nominal(), by=("L", "m_e"))
+    assert repr(found).endswith("Hz by L, m_e: rate, log, compliance>")
+    assert repr(found.log) == f"Rates({{'L': {found.log['L']!r}, 'm_e': {found.log['m_e']!r}}})"
