@@ -14,7 +14,7 @@ from cra_sym.model.routes import Modes
 from cra_sym.model.system import System
 from cra_sym.model.values import flat_columns
 from cra_sym.model.vanishing import check_forces
-from cra_sym.solvers.coupled_modes import driven_system
+from cra_sym.solvers.coupled_modes import driven_system, with_support
 from cra_sym.solvers.driven_modes import Start, checked
 from cra_sym.solvers.force import Force
 from cra_sym.solvers.free_peaks import free_peaks
@@ -27,10 +27,13 @@ Array = NDArray[np.float64]
 
 
 class _Cause(NamedTuple):
-    """An input: its history as the acceleration of a motion, its load, and whether it is an impulse at t = 0."""
+    """An input: its history as the acceleration of a motion, its loads, and whether it is an impulse at t = 0.
+
+    Loads are those of units of displacement, velocity and acceleration of the motion, None where there is none.
+    """
 
     profile: BaseMotion
-    load: Load
+    loads: tuple[Load | None, Load | None, Load | None]
     strikes: bool
 
 
@@ -70,8 +73,14 @@ def complex_response(
     for one in members:
         y = one.start
         total = driven_system(one.motions.system, 0.0 * y, one.rows, BaseMotion(), (), y, times, derivative)
-        for profile, member, push, strike in one.causes:
-            total += driven_system(one.motions.system, push, one.rows, profile, member, strike, times, derivative)
+        for profile, member, push, strike, support in one.causes:
+            if support is None:
+                matrix, rows = one.motions.system, one.rows
+            else:
+                matrix, push, rows = with_support(one.motions.system, push, one.rows, support)
+                moved = (np.asarray(value)[member] for value in (profile.displacement(0.0), profile.velocity(0.0)))
+                strike = np.append(strike, [float(value) for value in moved])
+            total += driven_system(matrix, push, rows, profile, member, strike, times, derivative)
         found.append(total)
     return np.array(found).reshape(*shape, *found[0].shape)
 
@@ -101,7 +110,7 @@ def complex_residual(
     shape, members = _members(system, causes, tip, modes, zeta, (None, None), check, whole=False)
     for one, end in zip(members, np.broadcast_to(stop, shape).ravel(), strict=True):
         matrix, state, moment = one.motions.system, 0.0 * one.start, np.array([end])
-        for profile, member, push, strike in one.causes:
+        for profile, member, push, strike, _ in one.causes:
             every = np.eye(len(state))
             state = state + driven_system(matrix, push, every, profile, member, strike, moment, 0)[:, 0]
         found.append(free_peaks(matrix, one.rows, state, one.motions.basis.problem.rigid))
@@ -111,13 +120,14 @@ def complex_residual(
 class _Member(NamedTuple):
     """One member of a batch: its motions, rows of the outputs, state at t = 0, and inputs.
 
-    Each input is a tuple: profile, member of the profile's batch, effect on the state, and initial impulse.
+    Each input is a tuple: profile, member of the profile's batch, effect on the state, initial impulse, and the effect
+    of displacement and velocity, None if both are zero.
     """
 
     motions: LowestMotions
     rows: Array
     start: Array
-    causes: list[tuple[BaseMotion, tuple[int, ...], Array, Array]]
+    causes: list[tuple[BaseMotion, tuple[int, ...], Array, Array, Array | None]]
 
 
 def _members(
@@ -151,9 +161,10 @@ def _members(
             acting = []
             for cause in causes:
                 check(cause.profile, omega)
-                push = _projected(one, motions, motions.push, cause.load)
+                *lower, push = (_projected(one, motions, motions.push, load) for load in cause.loads)
+                support = None if cause.loads[:2] == (None, None) else np.stack(lower)
                 speed = float(np.broadcast_to(cause.profile.velocity(0.0), shape)[index]) if cause.strikes else 0.0
-                acting.append((cause.profile, _member(index, cause.profile.shape), push, push * speed))
+                acting.append((cause.profile, _member(index, cause.profile.shape), push, push * speed, support))
             yield _Member(motions, outputs(motions.basis) @ motions.shapes, start, acting)
 
     return shape, members()
@@ -164,11 +175,12 @@ def _causes(system: System, histories: Mapping[str, BaseMotion | Force], start: 
     for name, history in histories.items():
         force = isinstance(history, Force)
         profile = history.profile if isinstance(history, Force) else history
-        load = system.numerics("load", name)
-        check_forces(system, load, system.numerics("pencil"))
-        found.append(_Cause(profile, load, not force and start == "inertial"))
+        loads = {2: system.numerics("load", name)} if force else system.numerics("loads", name)
+        for load in loads.values():
+            check_forces(system, load, system.numerics("pencil"))
+        found.append(_Cause(profile, (loads.get(0), loads.get(1), loads.get(2)), not force and start == "inertial"))
     constant = system.numerics("constant")
-    return found if constant is None else [*found, _Cause(Force(1.0).profile, constant, False)]
+    return found if constant is None else [*found, _Cause(Force(1.0).profile, (None, None, constant), False)]
 
 
 def _momenta(system: System, initial: Mapping[Any, Any] | None) -> tuple[Load | None, Load | None]:

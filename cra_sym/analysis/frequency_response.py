@@ -59,7 +59,8 @@ def frequency_response(
     x : array_like, optional
         Place or one axis of places in the domain, m; the right end by default.
     drive : Expr or str, optional
-        Input: a unit acceleration of a prescribed motion ``w(t)`` (by default the only one); a unit of a force ``F(t)``
+        Input: a unit acceleration of a prescribed motion ``w(t)`` (by default the only one), a unit displacement if
+        displacement or velocity act too, as on the support of a spring; a unit of a force ``F(t)``
         of the Lagrangian or the virtual work, distributed or not; or a displacement of a section at an end or an
         interior place, such as ``v.subs(x, L/2)``, or a lumped coordinate.
     kind : {'force', 'motion'}, optional
@@ -116,7 +117,7 @@ def frequency_response(
     if places is not None:
         check_places(system, places)
     choice("damping", damping, ("modal", "structural"))
-    system, drive = _with_force_inside(system, drive, kind)
+    system, drive, kind = _as_drive(system, drive, kind)
     undamped = _Undamped(system, places, drive, kind, section_place(system, field), float(grid.max(initial=0.0)))
     zeta = np.broadcast_to(system.zeta, system.shape)[..., None]
     if np.any(zeta) and undamped.problem_damped:
@@ -390,26 +391,38 @@ class _Undamped:
 
 def _cause_name(system: System, drive: Any) -> str | None:
     """Return the name of the prescribed motion or force that is the input, or None for a displacement."""
-    if drive is None:
-        return only_motion(system)
     causes = dict(system.numerics("causes"))
+    if drive is None:
+        return next(iter(causes)) if len(causes) == 1 else only_motion(system)
     name = drive if isinstance(drive, str) else getattr(getattr(drive, "func", None), "__name__", shown(drive))
     if name not in causes or (not isinstance(drive, str) and len(drive.args) != 1):
         return None
     if causes[name] not in ("motion", "force"):
-        raise ValueError(f"drive: the load {causes[name]} is neither a multiple of {name} nor of its acceleration")
+        raise ValueError(
+            f"drive: the load {causes[name]} must be a multiple of {name}, its velocity or its acceleration"
+        )
     return name
 
 
-def _with_force_inside(system: System, drive: Any, kind: Any) -> tuple[System, Any]:
-    """Return system and input; a displacement at an interior place is replaced by a new force there."""
+def _as_drive(system: System, drive: Any, kind: Any) -> tuple[System, Any, Any]:
+    """Return system, input and kind: a displacement at an interior place is replaced by a new force there, a motion that
+    acts by its displacement or velocity too by a coordinate that moves by a unit."""
+    name = drive if isinstance(drive, str) else getattr(getattr(drive, "func", None), "__name__", "")
+    causes = dict(system.numerics("causes"))
+    if drive is None and len(causes) == 1:
+        (name,) = causes
+    if causes.get(name) == "support":
+        if kind is not None:
+            raise ValueError(f"kind = {shown(kind)}: must be left out for {name}, which is not a displacement")
+        moved = next(function for function in system.model.driving if function.func.__name__ == name)
+        return system.model.freed(name).at({**system.values}, system.zeta), moved, "motion"
     if drive is None or isinstance(drive, str):
-        return system, drive
+        return system, drive, kind
     found = system.model.numerics("pushed", drive) if hasattr(drive, "free_symbols") else None
     if found is None:
-        return system, drive
+        return system, drive, kind
     if kind not in (None, "force"):
         raise ValueError(f"kind = {shown(kind)}: what drives at an interior place must be a force")
     model, name, place = found
     check_places(system, np.asarray(place.function(*system.domain.values)), "drive: place")
-    return model.at({**system.values}, system.zeta), name
+    return model.at({**system.values}, system.zeta), name, kind

@@ -14,7 +14,7 @@ from cra_sym.model.system import System
 from cra_sym.solvers.force import Force
 from cra_sym.solvers.motion import BaseMotion
 
-__all__ = ["History", "driven", "histories"]
+__all__ = ["History", "check_no_support", "driven", "histories", "supports"]
 
 Array = NDArray[np.float64]
 History = BaseMotion | Force
@@ -26,7 +26,7 @@ def histories(system: System, motion: Any) -> dict[str, History]:
     terms = system.numerics("nonlinear")
     others = [] if terms is None else [name for name, _ in terms.causes if name not in causes]
     if isinstance(motion, BaseMotion):
-        motion = {only_motion(system): motion}
+        motion = {next(iter(causes)) if len(causes) == 1 else only_motion(system): motion}
     if motion is not None and not isinstance(motion, Mapping):
         raise TypeError(f"motion = {shown(motion)}: must be a BaseMotion or a mapping from functions of t to motions")
     given = {
@@ -42,23 +42,46 @@ def histories(system: System, motion: Any) -> dict[str, History]:
             raise TypeError(f"motion: {name} = {shown(history)}: must be a Force or a BaseMotion")
         if name in others:  # only in nonlinear terms, through any of its derivatives
             continue
-        kind = "force" if isinstance(history, Force) else "motion"
-        if causes[name] not in ("force", "motion"):
-            raise ValueError(f"motion: the load {causes[name]} is neither a multiple of {name} nor of its acceleration")
-        if causes[name] != kind:
-            acts, cure = {
-                "motion": ("by its acceleration", "give a BaseMotion"),
-                "force": ("by itself", "give a Force, or measure the fields from the frame that moves"),
-            }[causes[name]]
-            raise ValueError(f"motion: {name} drives the model {acts}; {cure}")
+        if causes[name] not in ("force", "motion", "support"):
+            raise ValueError(
+                f"motion: the load {causes[name]} must be a multiple of {name}, its velocity or its acceleration"
+            )
+        if isinstance(history, Force) and causes[name] != "force":
+            raise ValueError(f"motion: {name} drives the model by its velocity or acceleration; give a BaseMotion")
     missing = [name for name in (*causes, *others) if name not in given]
     if missing:
         raise ValueError(f"motion: no history for {', '.join(missing)}; must be a Force or a BaseMotion")
     return given
 
 
+def supports(system: System, found: Mapping[str, History]) -> dict[str, BaseMotion]:
+    """Return the motions that act by their displacement or velocity, such as that of the support of a spring."""
+    kinds = dict(system.numerics("causes"))
+    return {
+        name: history
+        for name, history in found.items()
+        if isinstance(history, BaseMotion) and kinds.get(name) in ("force", "support")
+    }
+
+
+def check_no_support(system: System, found: Mapping[str, History]) -> None:
+    """Raise an error if a motion acts by its displacement or velocity."""
+    for name in supports(system, found):
+        raise ValueError(
+            f"motion: {name} acts by its displacement or velocity, which only the response of a system without "
+            "elastic-slip elements takes into account; measure the fields from the moving frame"
+        )
+
+
 def driven(system: System, found: Mapping[str, History], modes: int) -> Iterator[tuple[Array, History]]:
-    """Yield, for each input, minus the generalised force of a unit of it on every mode, and its history."""
+    """Yield, for each input, minus the generalised force of a unit of it on every mode, and its history.
+
+    Raises
+    ------
+    ValueError
+        If a motion acts by its displacement or velocity, or an input in nonlinear terms alone.
+    """
+    check_no_support(system, found)
     linear = dict(system.numerics("causes"))
     for name, history in found.items():
         if name not in linear:

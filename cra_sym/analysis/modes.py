@@ -391,7 +391,9 @@ def only_motion(system: System) -> str:
     if len(motions) != 1:
         found = ", ".join(motions) or "none"
         if not motions and causes:
-            found += f" ({', '.join(name for name, _ in causes)} acts in another way)"
+            found += (
+                f", {', '.join(name for name, _ in causes)} act otherwise; measure the fields from the moving frame"
+            )
         raise ValueError(f"the model must have one prescribed motion that acts by its acceleration; it has {found}")
     return str(motions[0])
 

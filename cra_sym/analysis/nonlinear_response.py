@@ -75,13 +75,17 @@ def nonlinear_response(
         raise ValueError(f"modes = {modes}: must be at most {MOST_NONLINEAR_MODES} for a nonlinear system")
     if any(history.shape for history in histories.values()):
         raise ValueError("motion: must not be a batch for a nonlinear system")
-    gammas = {name: -system.project(system.numerics("load", name), modes) for name, _ in system.numerics("causes")}
+    gammas = {
+        (name, order): -system.project(one, modes)
+        for name, _ in system.numerics("causes")
+        for order, one in system.numerics("loads", name).items()
+    }
     constant = system.numerics("constant")
     load = np.zeros(modes) if constant is None else system.project(constant, modes)
     q, u = state
-    for name, gamma in gammas.items():
+    for (name, order), gamma in gammas.items():
         history = histories[name]
-        if isinstance(history, BaseMotion) and start == "inertial":
+        if isinstance(history, BaseMotion) and order == 2 and start == "inertial":
             u = u - gamma * np.asarray(history.velocity(0.0), float)
     moving = _Moving(nonlinear_modal_equations(system, modes, zeta), histories, gammas, load)
     order = np.argsort(times, kind="stable")
@@ -101,28 +105,27 @@ class _Moving:
 
     equations: ModalEquations
     histories: Mapping[str, BaseMotion | Force]
-    gammas: Mapping[str, Array]
+    gammas: Mapping[tuple[str, int], Array]
     constant: Array
 
     def _known(self, time: float) -> Array:
         """Return the known functions of the nonlinear terms at a time, shape (functions, 1)."""
         found = []
         for name, order in self.equations.causes:
-            history = self.histories.get(name)
-            if history is None:
-                found.append(0.0)
-            elif isinstance(history, Force):
-                found.append(float(history(time)))
-            else:
-                found.append(float((history.displacement, history.velocity, history.acceleration)[order](time)))
+            found.append(0.0 if name not in self.histories else self._input(name, order, time))
         return np.array(found).reshape(-1, 1)
+
+    def _input(self, name: str, order: int, time: float) -> float:
+        """Return a force, or the derivative of a motion by time of that order."""
+        history = self.histories[name]
+        if isinstance(history, Force):
+            return float(history(time))
+        return float((history.displacement, history.velocity, history.acceleration)[order](time))
 
     def _load(self, time: float) -> Array:
         total = self.constant
-        for name, gamma in self.gammas.items():
-            history = self.histories[name]
-            value = history(time) if isinstance(history, Force) else history.acceleration(time)
-            total = total - gamma * float(value)
+        for (name, order), gamma in self.gammas.items():
+            total = total - gamma * self._input(name, order, time)
         return total
 
     def beside(self, time: float, q: Array, u: Array) -> Array:

@@ -172,11 +172,11 @@ def _add_loads(found: _Collected, system: System, modes: int, amplitudes: Mappin
         amplitude = amplitudes.get(name, 0.0)
         if not amplitude:
             continue
-        if kind not in ("motion", "force"):
-            raise ValueError(f"drive: the load {kind} is neither a multiple of {name} nor of its acceleration")
-        load = system.project(system.numerics("load", name), modes)
-        wave = _rate(amplitude, 2 if kind == "motion" else 0)
-        found.forces.append(Term(load, 0, 0, (found.number(wave),)))
+        if kind not in ("motion", "force", "support"):
+            raise ValueError(f"drive: the load {kind} must be a multiple of {name}, its velocity or its acceleration")
+        for order, load in system.numerics("loads", name).items():
+            wave = _rate(amplitude, order)
+            found.forces.append(Term(system.project(load, modes), 0, 0, (found.number(wave),)))
     constant = system.numerics("constant")
     if constant is not None:
         found.forces.append(Term(system.project(constant, modes), 0, 0))

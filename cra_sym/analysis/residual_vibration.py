@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.complex_responses import complex_residual
-from cra_sym.analysis.histories import History
+from cra_sym.analysis.histories import History, check_no_support
 from cra_sym.analysis.histories import histories as histories_of
 from cra_sym.analysis.modes import participation, section_place
 from cra_sym.analysis.responses import check_sampling, has_complex_modes, oscillators, slipping_problem
@@ -162,6 +162,7 @@ def _ended(system: System, motion: Any) -> tuple[dict[str, History], tuple[BaseM
     histories = histories_of(system, motion)
     if not histories:
         raise ValueError("motion: must be of what drives the model; nothing does")
+    check_no_support(system, histories)
     profiles = tuple(one.profile if isinstance(one, Force) else one for one in histories.values())
     for (name, one), profile in zip(histories.items(), profiles, strict=True):
         if not np.all(np.isfinite(profile.duration)):

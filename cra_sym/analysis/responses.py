@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.complex_responses import complex_response
-from cra_sym.analysis.histories import History, driven
+from cra_sym.analysis.histories import History, driven, supports
 from cra_sym.analysis.histories import histories as histories_of
 from cra_sym.analysis.modes import check_places, section_place
 from cra_sym.analysis.nonlinear_response import nonlinear_response
@@ -142,8 +142,9 @@ def response(
         Batch axes broadcast with those of the motion.
     motion : BaseMotion, or mapping of function of t to BaseMotion or Force, or None
         Histories of the prescribed motions and of the forces of the Lagrangian and of the virtual work, from t = 0 on.
-        A bare BaseMotion is that of the only prescribed motion. A motion must act through its acceleration alone:
-        measure the fields from the moving frame. Constant loads act from t = 0.
+        A bare BaseMotion is that of the only prescribed motion. A motion may act by its displacement and velocity too,
+        as that of the support of a spring or a damper does; modal damping then opposes the motion of the fields as the
+        Lagrangian measures them. Constant loads act from t = 0.
     t : array_like
         Time or one axis of times, s, not negative; any order.
     x : array_like
@@ -263,11 +264,26 @@ def _oscillation(
             )
         return driven_response(osc, profile, t, derivative, begin, state)
 
+    def supported(name: str, profile: BaseMotion) -> Array:
+        osc = oscillators(system, still, rows, modes, zeta)
+        check_sampling(profile, osc.omega)
+        loads = system.numerics("loads", name)
+        below, shifted, gamma = (-system.project(loads[k], modes) if k in loads else still for k in range(3))
+        damping = np.zeros((modes, modes)) if matrix is None else matrix
+        support = np.stack(np.broadcast_arrays(below, shifted), axis=-2)
+        found = CoupledModes(osc.omega, osc.zeta, damping, gamma, rows, support)
+        return coupled_response(found, profile, t, derivative, start)
+
     total: Array | None = None
     if initial or not histories:
         q, u = (_initial_state(system, initial or {}, modes, order) for order in (0, 1))
         total = answer(still, BaseMotion(), "base", (q, u))
-    for gamma, history in driven(system, histories, modes):
+    moving = supports(system, histories)
+    for name, profile in moving.items():
+        added = supported(name, profile)
+        total = added if total is None else total + added
+    others = {name: history for name, history in histories.items() if name not in moving}
+    for gamma, history in driven(system, others, modes):
         if isinstance(history, Force):
             added = answer(gamma, history.profile, "base")
         else:

@@ -88,6 +88,12 @@ def driven_by(drive: Any, system: System) -> dict[str, tuple[float, int]]:
     """Return amplitude and order of the time derivative of each linear input, by name."""
     kinds = dict(system.numerics("causes"))
     given = {key if isinstance(key, str) else key.func.__name__: float(value) for key, value in (drive or {}).items()}
+    for name in given:
+        if kinds.get(name) == "support":
+            raise ValueError(
+                f"drive: {name} acts by its displacement or velocity, which a system with elastic-slip elements leaves "
+                "out; measure the fields from the moving frame"
+            )
     return {
         name: (value, 2 if kinds[name] == "motion" else 0)
         for name, value in given.items()

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from cra_sym.analysis.modes import only_motion, participation
 from cra_sym.checks import count, default_floating_point, instance, real_array, shown
 from cra_sym.model.observables import Observable
-from cra_sym.model.projection import Projected, displaced_at, project
+from cra_sym.model.projection import Load, Projected, displaced_at, project
 from cra_sym.model.routes import Modes
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.model.values import flat_columns
@@ -106,13 +106,14 @@ def state_space(
     if len({one.name for one in driven}) < len(driven):
         raise ValueError(f"input = {shown(input)}: must name each input once")
     free = any(one.kind == "free" for one in driven)
-    if free and any(one.kind in ("motion", "force") for one in driven):
+    if free and any(one.kind in ("motion", "force", "support") for one in driven):
         raise ValueError(f"input: beside {_FREE!r} must be displacements that forces act on")
     base = {
         one.name if one.kind == "motion" else only_motion(system) for one in driven if one.kind in ("motion", "free")
     }
+    acting = {one.name for one in driven if one.kind == "support"}
     seen = {part.name for one in wanted.values() for part in one.parts if part.kind == "motion" and part.time < 2}
-    states = sorted(base if free else base & seen)
+    states = sorted(base if free else (base & seen) | acting)
     if system.numerics("complex_modes") == "always" and system.conservative_part is not system:
         return _complex(system, modes, states, wanted, driven, free=free)
     motion = _equations(system, modes, states, driven, free=free)
@@ -208,7 +209,8 @@ def _rows(system: System, found: Modes, of: Observable) -> tuple[list[Array], di
 
 @dataclass(frozen=True)
 class _Input:
-    """One input: the acceleration of a motion, a force on a free motion, a load, or a force on a displacement."""
+    """One input: the acceleration of a motion or of a moving support, a force on a free motion, a load, or a force on a
+    displacement."""
 
     kind: str
     name: str
@@ -223,9 +225,9 @@ class _Input:
         causes = dict(system.numerics("causes"))
         name: str = given if isinstance(given, str) else getattr(getattr(given, "func", None), "__name__", "")
         if name in causes and (isinstance(given, str) or len(given.args) == 1):
-            if causes[name] not in ("motion", "force"):
+            if causes[name] not in ("motion", "force", "support"):
                 raise ValueError(
-                    f"input: the load {causes[name]} is neither a multiple of {name} nor of its acceleration"
+                    f"input: the load {causes[name]} must be a multiple of {name}, its velocity or its acceleration"
                 )
             return cls(causes[name], name, name)
         if isinstance(given, str):
@@ -261,6 +263,11 @@ def _equations(
         own = system.numerics("carried", states[0]).function(*system.domain.values)
         mass[0, 0], damping[0, 0], stiffness[0, 0] = (float(value) for value in own)
         mass[0, 1:] = mass[1:, 0] = participation(system, modes, states[0])
+    for one in driven:
+        if one.kind == "support":
+            for order, load in system.numerics("loads", one.name).items():
+                if order < 2:
+                    (stiffness, damping)[order][first:, states.index(one.name)] = -system.project(load, modes)
     push = np.stack([_push(system, modes, states, one, free=free) for one in driven], axis=-1)
     found = np.asarray(np.linalg.solve(mass, np.hstack([-stiffness, -damping, push])), dtype=np.float64)
     return found[:, : 2 * size], found[:, 2 * size :]
@@ -274,6 +281,10 @@ def _push(system: System, modes: int, states: Sequence[str], one: _Input, *, fre
     elif one.kind == "motion":
         base[:] = [name == one.name for name in states]
         q = -participation(system, modes, one.name)
+    elif one.kind == "support":
+        base[:] = [name == one.name for name in states]
+        loads = system.numerics("loads", one.name)
+        q = system.project(loads[2], modes) if 2 in loads else q
     elif one.kind == "force":
         q = system.project(system.numerics("load", one.name), modes)
     else:
@@ -337,7 +348,12 @@ def _complex(
     A[carried:, carried:], B[carried:] = motions.system, push
     for row, name in enumerate(states):
         A[row, len(states) + row] = 1.0
-        B[len(states) + row] = [one.kind == "motion" and one.name == name for one in driven]
+        B[len(states) + row] = [one.kind in ("motion", "support") and one.name == name for one in driven]
+    for one in driven:
+        if one.kind == "support":
+            for order, load in system.numerics("loads", one.name).items():
+                if order < 2:
+                    A[carried:, order * len(states) + states.index(one.name)] = _pushed(system, motions, load)
     C, D = np.zeros((len(wanted), len(A))), np.zeros((len(wanted), len(driven)))
     for k, of in enumerate(wanted.values()):
         by_basis, prescribed = _rows(system, motions.basis, of)
@@ -346,7 +362,7 @@ def _complex(
         C[k, carried:] = by_state[0] + (by_state[1] + by_state[2] @ motions.system) @ motions.system
         D[k] = by_state[2] @ motions.system @ push
         C[k, :carried] = [prescribed.get((name, time), 0.0) for time in range(2) for name in states]
-        D[k] += [prescribed.get((one.name, 2), 0.0) * (one.kind == "motion") for one in driven]
+        D[k] += [prescribed.get((one.name, 2), 0.0) * (one.kind in ("motion", "support")) for one in driven]
     names = [*states, *(f"{name}_rate" for name in states), *_names(motions)]
     return LinearSystem(A, B, C, D, names, [one.label for one in driven], list(wanted))
 
@@ -374,7 +390,14 @@ def _complex_push(system: System, motions: LowestMotions, one: _Input) -> Array:
     if one.displacement is not None:
         (acts, _, _), _ = _rows(system, motions.basis, one.displacement)
         return motions.push @ acts
-    load = system.numerics("load", one.name)
+    if one.kind != "support":
+        return _pushed(system, motions, system.numerics("load", one.name))
+    loads = system.numerics("loads", one.name)
+    return _pushed(system, motions, loads[2]) if 2 in loads else np.zeros(len(motions.system))
+
+
+def _pushed(system: System, motions: LowestMotions, load: Load) -> Array:
+    """Return the rate of the state of complex modes per unit of a load."""
     check_forces(system, load, system.numerics("pencil"))
     return np.asarray(motions.push @ project(system.domain, motions.basis, load))
 

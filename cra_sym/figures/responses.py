@@ -128,7 +128,7 @@ def _times(system: System) -> np.ndarray:
 
 def _default_drive(system: System) -> tuple[Any, Any]:
     causes = dict(system.numerics("causes"))
-    motions = [name for name, kind in causes.items() if kind == "motion"]
+    motions = [name for name, kind in causes.items() if kind in ("motion", "support")]
     disturbed = BaseMotion(acceleration=0.1, amplitude=AMPLITUDE, angular_frequency=RATE)
     drive: dict[str, History] = {name: Force(1.0) for name, kind in causes.items() if kind == "force"}
     drive |= {name: disturbed if name == motions[0] else BaseMotion() for name in motions}

@@ -111,13 +111,15 @@ def _of_modes(system: System, Omega: np.ndarray, place: float, drive: Any, modes
     few = state_space(system, modes, drive, [(field, place)])
     size, points = len(few.A), 1j * Omega[:, None, None]
     found: np.ndarray = few.C @ np.linalg.solve(points * np.eye(size) - few.A, few.B) + few.D
-    return found[:, 0, 0]
+    by_displacement = dict(system.numerics("causes")).get(str(drive)) == "support"
+    return found[:, 0, 0] * (-(Omega**2) if by_displacement else 1.0)
 
 
 def _response_label(system: System, drive: Any) -> str:
     if isinstance(system, Arm) and drive == "w":
         return "elastic displacement per base acceleration / s²"
-    per = "acceleration" if dict(system.numerics("causes")).get(str(drive)) == "motion" else "force"
+    kind = dict(system.numerics("causes")).get(str(drive))
+    per = {"motion": "acceleration", "support": "displacement"}.get(str(kind), "force")
     return f"${next(iter(fields(system)))}$ per unit {per} / SI unit"
 
 

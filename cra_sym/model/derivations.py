@@ -55,6 +55,7 @@ __all__ = [
     "leading",
     "load",
     "load_coefficients",
+    "loads",
     "masses",
     "named_observables",
     "names",
@@ -118,28 +119,29 @@ def general_route(model: Model) -> Route:
 
 # Loads -----------------------------------------------------------------------------------------------------------
 
-Kind = Literal["motion", "force"]
+Kind = Literal["motion", "force", "support"]
 
 
 def causes(model: Model) -> tuple[tuple[str, Kind | str], ...]:
     """Return the functions of time that drive the model, with their kind.
 
-    A 'motion' acts through its acceleration only, a 'force' through its value; for any other function the kind is the
-    offending term.
+    A 'motion' acts through its acceleration only, a 'force' through its value, a 'support' through several of its
+    displacement, velocity and acceleration, or its velocity only; for any other function the kind is the offending
+    term.
     """
     weak = weak_form(model.linearised.variation)
     return tuple((f.func.__name__, _kind(weak, f)) for f in model.driving)
 
 
 def _kind(weak: WeakForm, function: AppliedUndef) -> str:
-    t = weak.variation.space.t
-    terms = [term for term in weak.load_terms if term.has(function)]
-    for kind, cause in (("motion", function.diff(t, 2)), ("force", function)):
-        if not any((term / cause).has(t) for term in terms):
-            return kind
-    accelerated = any(term.has(function.diff(t, 2)) for term in terms)
-    cause = function.diff(t, 2) if accelerated else function
-    return str(next(term for term in terms if (term / cause).has(t)))
+    orders, t = set(), weak.variation.space.t
+    for term in weak.load_terms:
+        if term.has(function):
+            found = [order for order in range(3) if not (term / function.diff(t, order)).has(t)]
+            if not found:
+                return str(term)
+            orders.update(found)
+    return "motion" if orders == {2} else "force" if orders == {0} else "support"
 
 
 def load(model: Model, name: str) -> Load:
@@ -148,14 +150,26 @@ def load(model: Model, name: str) -> Load:
     return load_of(weak, *load_coefficients(model, name), model.symbols)
 
 
-def load_coefficients(model: Model, name: str) -> tuple[dict[Jet, Expr], dict[Jet, Expr]]:
-    """Return the same load's coefficients by displacement: per length inside, and at ends, coordinates and places."""
+def loads(model: Model, name: str) -> dict[int, Load]:
+    """Return the loads of units of an input (0), its velocity (1) and its acceleration (2): those that act."""
+    weak = weak_form(model.linearised.variation)
+    by_order = {order: load_coefficients(model, name, order) for order in range(3)}
+    return {order: load_of(weak, *parts, model.symbols) for order, parts in by_order.items() if any(parts)}
+
+
+def load_coefficients(model: Model, name: str, order: int | None = None) -> tuple[dict[Jet, Expr], dict[Jet, Expr]]:
+    """Return a load's coefficients by displacement: per length inside, and at ends, coordinates and places.
+
+    ``order`` is that of the derivative of the input by time; by default 2 for a 'motion' and 0 for any other.
+    """
     weak = weak_form(model.linearised.variation)
     t = weak.variation.space.t
     function = next((f for f in model.driving if f.func.__name__ == name), None)
     if function is None:
         raise ValueError(f"motion: {name} acts in nonlinear terms alone, which only response takes into account")
-    cause = function.diff(t, 2) if _kind(weak, function) == "motion" else function
+    if order is None:
+        order = 2 if _kind(weak, function) == "motion" else 0
+    cause = function.diff(t, order)
     inside, discrete = (_coefficients(weak, part, cause) for part in (weak.inside_load, weak.discrete_load))
     return inside, discrete
 

@@ -15,21 +15,22 @@ from ..checks import broadcastable
 from .driven_modes import Start, checked
 from .motion import BaseMotion, Harmonic, Piecewise
 
-__all__ = ["CoupledModes", "coupled_response", "driven_system"]
+__all__ = ["CoupledModes", "coupled_response", "driven_system", "with_support"]
 
 _CHUNK = 512  # times whose exponentials are formed at once
 _FEW = 32  # times whose exponentials are formed one by one
 
 
 class CoupledModes(NamedTuple):
-    """Modes (..., N) with q'' + (D + 2 zeta omega) q' + omega^2 q = -gamma w'', and the rows (..., R, N) of the
-    outputs."""
+    """Modes (..., N) with q'' + (D + 2 zeta omega) q' + omega^2 q = -gamma w'' - gamma_1 w' - gamma_0 w, and the rows
+    (..., R, N) of the outputs; ``support`` is (gamma_0, gamma_1), shape (..., 2, N), or None where both are zero."""
 
     omega: np.ndarray
     zeta: np.ndarray
     damping: np.ndarray
     gamma: np.ndarray
     rows: np.ndarray
+    support: np.ndarray | None = None
 
 
 class _Cause(NamedTuple):
@@ -58,11 +59,17 @@ def coupled_response(
         u = u - modes.gamma * np.asarray(motion.velocity(0.0))[..., None]
     state = np.concatenate(np.broadcast_arrays(q, u), axis=-1)
     inner = {"omega": 1, "zeta": 1, "damping": 2, "gamma": 1, "rows": 2}
+    if modes.support is not None:
+        inner["support"] = 2
     result = np.empty((*shape, modes.rows.shape[-2], times.size))
     for index in np.ndindex(shape):
         here = CoupledModes(*(_member(getattr(modes, name), shape, index, axes) for name, axes in inner.items()))
         causes = [_member_term(term, shape, index) for term in motion.terms]
-        result[index] = _outputs(here, causes, _member(state, shape, index, 1), times, derivative)
+        begin = _member(state, shape, index, 1)
+        if modes.support is not None:
+            moved = (motion.displacement(0.0), motion.velocity(0.0))
+            begin = np.concatenate([begin, [_member(np.asarray(value), shape, index, 0) for value in moved]])
+        result[index] = _outputs(here, causes, begin, times, derivative)
     return result
 
 
@@ -86,7 +93,20 @@ def _outputs(
     system = np.block([[np.zeros((size, size)), np.eye(size)], [-np.diag(modes.omega**2), -friction]])
     push = np.concatenate([np.zeros(size), -modes.gamma])
     rows = np.concatenate([modes.rows, np.zeros_like(modes.rows)], axis=1)
+    if modes.support is not None:
+        load = np.concatenate([np.zeros((2, size)), -modes.support], axis=1)
+        system, push, rows = with_support(system, push, rows, load)
     return _driven(system, push, rows, terms, state, times, derivative)
+
+
+def with_support(
+    system: np.ndarray, push: np.ndarray, rows: np.ndarray, load: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return system, push and rows of a state followed by w and w', of which ``load`` (2, r) acts on its rate."""
+    size = len(system)
+    whole = np.zeros((size + 2, size + 2))
+    whole[:size, :size], whole[:size, size:], whole[size, size + 1] = system, load.T, 1.0
+    return whole, np.append(push, [0.0, 1.0]), np.concatenate([rows, np.zeros((len(rows), 2))], axis=1)
 
 
 def driven_system(
