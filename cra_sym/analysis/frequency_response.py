@@ -405,8 +405,10 @@ def _cause_name(system: System, drive: Any) -> str | None:
 
 
 def _as_drive(system: System, drive: Any, kind: Any) -> tuple[System, Any, Any]:
-    """Return system, input and kind: a displacement at an interior place is replaced by a new force there, a motion that
-    acts by its displacement or velocity too by a coordinate that moves by a unit."""
+    """Return system, input and kind: a displacement at an interior place is replaced by a new force there.
+
+    A motion that acts by its displacement or velocity too is replaced by a coordinate that moves by a unit.
+    """
     name = drive if isinstance(drive, str) else getattr(getattr(drive, "func", None), "__name__", "")
     causes = dict(system.numerics("causes"))
     if drive is None and len(causes) == 1:

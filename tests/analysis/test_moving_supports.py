@@ -18,7 +18,7 @@ TIMES = np.linspace(0.0, 2.0, 9)
 
 
 def _beam(inertial, relative, **pieces):
-    """A beam with a spring k at a moving root, held against rotation there, and a spring g from its tip to the ground."""
+    """A beam with a spring k at a moving root that does not rotate, and a spring g from its tip to the ground."""
     return cra.Model(
         m * inertial.diff(t) ** 2 / 2 - B * v.diff(x, 2) ** 2 / 2,
         fields=[v],
@@ -104,7 +104,7 @@ def test_a_nonlinear_spring_follows_its_support():
 
 def test_what_needs_an_end_of_the_load_is_refused():
     ground, _ = _pair(dampers=True)
-    with pytest.raises(ValueError, match="w acts by its displacement or velocity.*measure the fields from the moving"):
+    with pytest.raises(ValueError, match=r"w acts by its displacement or velocity.*measure the fields from the moving"):
         cra.residual_vibration(ground, MOVE)
     with pytest.raises(ValueError, match="by its velocity or acceleration; give a BaseMotion"):
         cra.tip_response(ground, {w: cra.Force(1.0)}, TIMES)
