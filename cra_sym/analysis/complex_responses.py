@@ -78,8 +78,7 @@ def complex_response(
                 matrix, rows = one.motions.system, one.rows
             else:
                 matrix, push, rows = with_support(one.motions.system, push, one.rows, support)
-                moved = (np.asarray(value)[member] for value in (profile.displacement(0.0), profile.velocity(0.0)))
-                strike = np.append(strike, [float(value) for value in moved])
+                strike = np.append(strike, _moved(profile, member, 0.0))
             total += driven_system(matrix, push, rows, profile, member, strike, times, derivative)
         found.append(total)
     return np.array(found).reshape(*shape, *found[0].shape)
@@ -96,6 +95,8 @@ def complex_residual(
 ) -> Array:
     """Return the sum over the lowest complex modes of the largest displacements of the tip after the stop, shape (...).
 
+    Displacements are measured from the equilibrium with a support that has moved.
+
     Parameters
     ----------
     system, histories, modes, zeta, check
@@ -110,9 +111,15 @@ def complex_residual(
     shape, members = _members(system, causes, tip, modes, zeta, (None, None), check, whole=False)
     for one, end in zip(members, np.broadcast_to(stop, shape).ravel(), strict=True):
         matrix, state, moment = one.motions.system, 0.0 * one.start, np.array([end])
-        for profile, member, push, strike, _ in one.causes:
+        for profile, member, push, strike, support in one.causes:
             every = np.eye(len(state))
-            state = state + driven_system(matrix, push, every, profile, member, strike, moment, 0)[:, 0]
+            if support is None:
+                state = state + driven_system(matrix, push, every, profile, member, strike, moment, 0)[:, 0]
+                continue
+            begin = np.append(strike, _moved(profile, member, 0.0))
+            whole = with_support(matrix, push, every, support)
+            state = state + driven_system(*whole, profile, member, begin, moment, 0)[:, 0]
+            state = state + np.linalg.solve(matrix, support[0] * _moved(profile, member, end)[0])
         found.append(free_peaks(matrix, one.rows, state, one.motions.basis.problem.rigid))
     return np.array(found).reshape(shape)
 
@@ -198,6 +205,12 @@ def _projected(one: System, motions: LowestMotions, effect: Array, load: Load | 
         return np.zeros(len(motions.system))
     moved: Array = effect @ project(one.domain, motions.basis, load)
     return moved
+
+
+def _moved(profile: BaseMotion, member: tuple[int, ...], time: float) -> tuple[float, float]:
+    """Return displacement and velocity of one member of a batch of motions."""
+    w, speed, _ = profile.kinematics(time)
+    return float(w[member]), float(speed[member])
 
 
 def _member(index: tuple[int, ...], shape: tuple[int, ...]) -> tuple[int, ...]:

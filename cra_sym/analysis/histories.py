@@ -68,8 +68,8 @@ def check_no_support(system: System, found: Mapping[str, History]) -> None:
     """Raise an error if a motion acts by its displacement or velocity."""
     for name in supports(system, found):
         raise ValueError(
-            f"motion: {name} acts by its displacement or velocity, which only the response of a system without "
-            "elastic-slip elements takes into account; measure the fields from the moving frame"
+            f"motion: {name} acts by its displacement or velocity, which is not taken into account here; use response "
+            "without elastic-slip elements, or measure the fields from the moving frame"
         )
 
 

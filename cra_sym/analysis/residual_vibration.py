@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.complex_responses import complex_residual
-from cra_sym.analysis.histories import History, check_no_support
+from cra_sym.analysis.histories import History, check_no_support, supports
 from cra_sym.analysis.histories import histories as histories_of
 from cra_sym.analysis.modes import participation, section_place
 from cra_sym.analysis.responses import check_sampling, has_complex_modes, oscillators, slipping_problem
@@ -21,7 +21,7 @@ from cra_sym.model.system import MOST_MODES, System
 from cra_sym.model.values import checked_damping
 from cra_sym.si import Numbers
 from cra_sym.solvers import modal_response as solver
-from cra_sym.solvers.driven_modes import state_at_stop
+from cra_sym.solvers.driven_modes import at_rest, state_at_stop
 from cra_sym.solvers.force import Force
 from cra_sym.solvers.motion import BaseMotion
 
@@ -45,11 +45,12 @@ def residual_vibration(
 
     Exact for one mode; without damping the least upper bound over all times (frequencies of modes are
     incommensurable); with damping an upper bound, since the modes do not peak at the same time. The base need not be at
-    rest after the stop, it must only have no acceleration. A rigid-body mode contributes its final offset. For a system
-    with elastic-slip elements it is the largest displacement while they slip, for at most ten periods of the lowest
-    mode, and the offset plus the sum over the modes once all stick. Where dampers, gyroscopic forces or forces that
-    follow the motion couple the modes, the sum is over
-    complex modes: two real eigenvalues count as one mode, and a growing mode gives inf.
+    rest after the stop, it must only have no acceleration; one that acts by its displacement or velocity must be at
+    rest, and displacements are measured from the equilibrium. A rigid-body mode contributes its final offset. For a
+    system with elastic-slip elements it is the largest displacement while they slip, for at most ten periods of the
+    lowest mode, and the offset plus the sum over the modes once all stick. Where dampers, gyroscopic forces or forces
+    that follow the motion couple the modes, the sum is over complex modes: two
+    real eigenvalues count as one mode, and a growing mode gives inf.
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ def residual_vibration(
         problem, rows = slipping_problem(system, motion, modes, zeta), system.without_hysteresis.modes(modes)
         peak = slipping_residual(problem, rows.displacement(1, 0), still.stop)
         return peak if peak.ndim else float(peak)
-    if couples(system, modes):
+    if couples(system, modes) or supports(system, histories_of(system, motion)):
         total = _complex_residual(system, motion, modes, zeta)
     else:
         found = stopped(system, motion, modes, zeta)
@@ -144,6 +145,11 @@ def couples(system: System, modes: int) -> bool:
 
 def _complex_residual(system: System, motion: Any, modes: int, zeta: Any) -> Array:
     histories, _, stop = _ended(system, motion)
+    for name, profile in supports(system, histories).items():
+        if system.numerics("pencil") is None or (system.natural_frequencies(1) == 0.0).any():
+            check_no_support(system, histories)
+        if not all(at_rest(profile, end).all() for end in np.ravel(stop)):
+            raise ValueError(f"motion: {name} acts by its displacement or velocity; must be at rest after the stop")
     modes = count("modes", modes, high=MOST_MODES)
     ratio = np.asarray(system.zeta if zeta is None else checked_damping(zeta))
     if zeta is not None and ratio.ndim:
@@ -162,7 +168,6 @@ def _ended(system: System, motion: Any) -> tuple[dict[str, History], tuple[BaseM
     histories = histories_of(system, motion)
     if not histories:
         raise ValueError("motion: must be of what drives the model; nothing does")
-    check_no_support(system, histories)
     profiles = tuple(one.profile if isinstance(one, Force) else one for one in histories.values())
     for (name, one), profile in zip(histories.items(), profiles, strict=True):
         if not np.all(np.isfinite(profile.duration)):
@@ -183,6 +188,7 @@ def _ended(system: System, motion: Any) -> tuple[dict[str, History], tuple[BaseM
 def stopped(system: System, motion: Any, modes: int, zeta: Any) -> Stopped:
     """Return the natural modes driven until all inputs have ended; refuse inputs without an end."""
     histories, profiles, stop = _ended(system, motion)
+    check_no_support(system, histories)
     modes = count("modes", modes, high=MOST_MODES)
     osc = oscillators(system, np.zeros(modes), np.zeros((1, modes)), modes, zeta)
     if system.numerics("complex_modes") == "if coupled" and not has_complex_modes(system, modes):

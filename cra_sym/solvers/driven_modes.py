@@ -10,7 +10,7 @@ from ..checks import broadcastable, choice, count, instance, one_axis
 from . import modal_response as solver
 from .motion import BaseMotion, Harmonic, Piecewise
 
-__all__ = ["Start", "check_start", "checked", "driven_response", "state_at_stop"]
+__all__ = ["Start", "at_rest", "check_start", "checked", "driven_response", "state_at_stop"]
 
 Start = Literal["inertial", "base"]
 
@@ -107,9 +107,8 @@ def state_at_stop(osc: solver.Oscillators, motion: BaseMotion, stop: Any = None)
         end = q_knots[..., -1], u_knots[..., -1]
         q_piece, u_piece = solver.free_motion(osc, stop - piece.knots[..., -1:], end)
         q, u = q + q_piece, u + u_piece
-    speed = _column(motion.velocity(np.max(stop)))
-    still = np.abs(speed) <= _STOPPED * _column(_velocity_variation(motion))
-    impulse = np.where(still, 0.0, -osc.gamma * speed)
+    end = np.max(stop)
+    impulse = np.where(_column(at_rest(motion, end)), 0.0, -osc.gamma * _column(motion.velocity(end)))
     omega = osc.omega
     slow = (
         impulse
@@ -121,6 +120,11 @@ def state_at_stop(osc: solver.Oscillators, motion: BaseMotion, stop: Any = None)
 
 _SLOW = 3e-5  # rad in the time of the move: beyond the square of it, an eps of q' over omega counts more
 _STOPPED = 1e-9  # of the sum of all velocity changes: a remainder below this share is rounding
+
+
+def at_rest(motion: BaseMotion, t: float) -> np.ndarray:
+    """Return whether the velocity at a time is no more than rounding, shape of the batch."""
+    return np.asarray(np.abs(motion.velocity(t)) <= _STOPPED * _velocity_variation(motion))
 
 
 def _velocity_variation(motion: BaseMotion) -> np.ndarray:

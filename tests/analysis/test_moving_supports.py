@@ -102,9 +102,19 @@ def test_a_nonlinear_spring_follows_its_support():
     np.testing.assert_allclose(found, own.y[0], rtol=1e-6)
 
 
-def test_what_needs_an_end_of_the_load_is_refused():
+def test_residual_vibration_is_measured_from_the_new_equilibrium():
+    ground, base = _pair(dampers=False)
+    move = cra.BaseMotion.s_curve(0.1, v_max=0.5, a_max=1.0, j_max=10.0)
+    tip = cra.tip_response(ground, move, move.duration + np.linspace(0.0, 2.0, 600), modes=1)
+    peak = cra.residual_vibration(ground, move, modes=1)
+    assert abs(np.ptp(tip) / (2.0 * peak) - 1.0) < 1e-3  # 600 samples miss the peak by less than that
+    both = [cra.residual_vibration(system, move, modes=20) for system in (ground, base)]
+    assert abs(both[0] / both[1] - 1.0) < 1e-3  # the omitted modes, as above
+
+
+def test_a_motion_that_does_not_rest_or_is_no_motion_is_refused():
     ground, _ = _pair(dampers=True)
-    with pytest.raises(ValueError, match=r"w acts by its displacement or velocity.*measure the fields from the moving"):
-        cra.residual_vibration(ground, MOVE)
+    with pytest.raises(ValueError, match="must be at rest after the stop"):
+        cra.residual_vibration(ground, cra.BaseMotion(velocity=1.0))
     with pytest.raises(ValueError, match="by its velocity or acceleration; give a BaseMotion"):
         cra.tip_response(ground, {w: cra.Force(1.0)}, TIMES)
