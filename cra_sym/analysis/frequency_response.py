@@ -393,7 +393,7 @@ def _cause_name(system: System, drive: Any) -> str | None:
     """Return the name of the prescribed motion or force that is the input, or None for a displacement."""
     causes = dict(system.numerics("causes"))
     if drive is None:
-        return next(iter(causes)) if len(causes) == 1 else only_motion(system)
+        return only_motion(system, support=True)
     name = drive if isinstance(drive, str) else getattr(getattr(drive, "func", None), "__name__", shown(drive))
     if name not in causes or (not isinstance(drive, str) and len(drive.args) != 1):
         return None
@@ -411,8 +411,8 @@ def _as_drive(system: System, drive: Any, kind: Any) -> tuple[System, Any, Any]:
     """
     name = drive if isinstance(drive, str) else getattr(getattr(drive, "func", None), "__name__", "")
     causes = dict(system.numerics("causes"))
-    if drive is None and len(causes) == 1:
-        (name,) = causes
+    if drive is None and "support" in causes.values():
+        name = only_motion(system, support=True)
     if causes.get(name) == "support":
         if kind is not None:
             raise ValueError(f"kind = {shown(kind)}: must be left out for {name}, which is not a displacement")

@@ -26,7 +26,7 @@ def histories(system: System, motion: Any) -> dict[str, History]:
     terms = system.numerics("nonlinear")
     others = [] if terms is None else [name for name, _ in terms.causes if name not in causes]
     if isinstance(motion, BaseMotion):
-        motion = {next(iter(causes)) if len(causes) == 1 else only_motion(system): motion}
+        motion = {only_motion(system, support=True): motion}
     if motion is not None and not isinstance(motion, Mapping):
         raise TypeError(f"motion = {shown(motion)}: must be a BaseMotion or a mapping from functions of t to motions")
     given = {

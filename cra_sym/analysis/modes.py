@@ -378,8 +378,14 @@ def modal_parameters(system: System, modes: int = 3) -> ModalParameters:
     return ModalParameters(system, modes)
 
 
-def only_motion(system: System) -> str:
+def only_motion(system: System, *, support: bool = False) -> str:
     """Return the name of the only prescribed motion of a model.
+
+    Parameters
+    ----------
+    system : System
+    support : bool
+        Whether it may act by its displacement and velocity too, or by one of these alone.
 
     Raises
     ------
@@ -387,13 +393,14 @@ def only_motion(system: System) -> str:
         If there is none, or more than one.
     """
     causes = system.numerics("causes")
-    motions = [name for name, kind in causes if kind == "motion"]
+    motions = [name for name, kind in causes if kind == "motion" or (support and kind == "support")]
+    if support and len(causes) == 1:
+        motions = [name for name, _ in causes]
     if len(motions) != 1:
         found = ", ".join(motions) or "none"
         if not motions and causes:
-            found += (
-                f", {', '.join(name for name, _ in causes)} act otherwise; measure the fields from the moving frame"
-            )
+            others = ", ".join(name for name, _ in causes)
+            found += f", but is driven by {others}; name what drives it, or measure the fields from the moving frame"
         raise ValueError(f"the model must have one prescribed motion that acts by its acceleration; it has {found}")
     return str(motions[0])
 

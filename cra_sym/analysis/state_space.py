@@ -220,9 +220,10 @@ class _Input:
     @classmethod
     def of(cls, system: System, given: Any) -> _Input:
         """Return the input that the user names."""
-        if isinstance(given, str) and given in (_BASE, _FREE):
-            return cls("free" if given == _FREE else "motion", only_motion(system), given)
         causes = dict(system.numerics("causes"))
+        if isinstance(given, str) and given in (_BASE, _FREE):
+            name = only_motion(system, support=given == _BASE and "support" in causes.values())
+            return cls("free" if given == _FREE else causes[name], name, given)
         name: str = given if isinstance(given, str) else getattr(getattr(given, "func", None), "__name__", "")
         if name in causes and (isinstance(given, str) or len(given.args) == 1):
             if causes[name] not in ("motion", "force", "support"):

@@ -226,7 +226,7 @@ def figure_input_shaping(
 
 def _subject(system: System, parameter: str | None) -> tuple[System, str]:
     """Return a system with one prescribed motion, and the parameter of the axis."""
-    only_motion(single(system))
+    only_motion(single(system), support=True)
     if parameter is None:
         return system, leading_parameter(system)
     return system, choice("parameter", parameter, tuple(system.values))
@@ -234,7 +234,7 @@ def _subject(system: System, parameter: str | None) -> tuple[System, str]:
 
 def _alone(system: System, move: BaseMotion) -> dict[Any, BaseMotion | Force]:
     """Return the histories of a system: the given motion, and zero forces."""
-    cause, none = only_motion(system), Force.sampled([0.0, 1.0], [0.0, 0.0], exact=True)
+    cause, none = only_motion(system, support=True), Force.sampled([0.0, 1.0], [0.0, 0.0], exact=True)
     return {name: move if name == cause else none for name, _ in system.numerics("causes")}
 
 
