@@ -222,8 +222,8 @@ class _Input:
         """Return the input that the user names."""
         causes = dict(system.numerics("causes"))
         if isinstance(given, str) and given in (_BASE, _FREE):
-            name = only_motion(system, support=given == _BASE and "support" in causes.values())
-            return cls("free" if given == _FREE else causes[name], name, given)
+            motion = only_motion(system, support=given == _BASE and "support" in causes.values())
+            return cls("free" if given == _FREE else causes[motion], motion, given)
         name: str = given if isinstance(given, str) else getattr(getattr(given, "func", None), "__name__", "")
         if name in causes and (isinstance(given, str) or len(given.args) == 1):
             if causes[name] not in ("motion", "force", "support"):
