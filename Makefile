@@ -28,7 +28,7 @@ test: .venv/.ready
 # Before each commit, under two minutes on two processors: style, types, and the tests that tests/fast.txt names.
 check: export OPENBLAS_NUM_THREADS = 1
 check: lint
-	$(RUN) -m pytest -n $(JOBS) --dist worksteal -q -m "not network and not browser" @tests/fast.txt $(ARGS)
+	$(RUN) -m pytest -n $(JOBS) --dist worksteal -q -m "not browser" @tests/fast.txt $(ARGS)
 
 # Lines and branches of the package that the tests run, without the notebooks; derivations too: the store is empty.
 coverage: export OPENBLAS_NUM_THREADS = 1
@@ -79,7 +79,7 @@ mutation: .venv/.ready
 
 # Random joints and columns against their own frequencies, coefficients along x and whole Lagrangians against other methods, which go
 # on where they were stopped; bad values in every argument; a sweep past the memory of its workers, of which one is
-# killed; every chapter with another arm.
+# killed; every case of the tests that run a sample.
 campaign: .venv/.ready
 	$(RUN) -m tests.campaigns.joints $(ARGS)
 	$(RUN) -m tests.campaigns.columns
@@ -89,7 +89,7 @@ campaign: .venv/.ready
 	$(RUN) -m tests.campaigns.workers
 	$(RUN) -m tests.campaigns.languages
 	$(RUN) -m tests.campaigns.models
-	$(RUN) -m pytest -q tests/notebooks/test_chapters.py -k follows --all-chapters
+	$(RUN) -m pytest -q tests -m sample --all-cases
 
 clean:
 	rm -rf .venv .venv-oldest .venv-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage .coverage.*

@@ -1,8 +1,10 @@
 """Settings shared by every test; read before NumPy is imported, so the libraries' thread pools see them."""
 
 import os
+import random
 import shutil
 import sys
+from collections import defaultdict
 
 import pytest
 
@@ -21,9 +23,22 @@ _QUIET = (
 
 
 def pytest_addoption(parser):
-    parser.addoption(
-        "--all-chapters", action="store_true", help="run every chapter with another arm, not the quick ones"
-    )
+    parser.addoption("--all-cases", action="store_true", help="run every case of the tests marked as samples")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Of a test marked ``sample(count, seed)`` keep so many cases, drawn by the seed; ``make campaign`` runs all."""
+    cases = defaultdict(list)
+    for item in items:
+        if (mark := item.get_closest_marker("sample")) and not config.getoption("--all-cases"):
+            cases[item.nodeid.partition("[")[0], *mark.args].append(item)
+    left = {
+        item
+        for (_, count, seed), drawn in cases.items()
+        for item in random.Random(seed).sample(drawn, max(0, len(drawn) - count))
+    }
+    config.hook.pytest_deselected(items=[item for item in items if item in left])
+    items[:] = [item for item in items if item not in left]
 
 
 def pytest_sessionfinish(session):

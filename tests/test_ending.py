@@ -15,7 +15,8 @@ from cra_sym.ending import orderly_ending, run_command
 posix = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 SLOW = """
 import signal, sys, time
-signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whoever runs the tests may ignore it, as nohup does
+for number in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM):
+    signal.signal(number, signal.SIG_DFL)  # whoever runs the tests may ignore it, as nohup and & do
 
 from cra_sym.ending import run_command
 from cra_sym.files import staged_directory

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,8 @@ from cra_sym.solvers.harmonic_balance import Basis, peak
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from cra_sym.model.lagrangian import Model
 
 __all__ = [
     "cubic_joint",
@@ -49,14 +52,16 @@ def cubic_joint(arm: Arm, k_3: float, zeta: float | None = None) -> System:
     zeta : float, optional
         Modal damping ratio; default: that of the arm.
     """
+    return _with_cubic(arm.model).at({**arm.values, "k_3": k_3}, zeta=arm.zeta if zeta is None else zeta)
+
+
+@cache
+def _with_cubic(model: Model) -> Model:
     from sympy import Symbol
 
     from cra_sym.arm.lagrangian import paper_lagrangian
 
-    field = arm.model.equations.fields[0]
-    symbol = Symbol("k_3", real=True)
-    model = arm.model.replace(left=paper_lagrangian()[1] - symbol * field**4 / 4)
-    return model.at({**arm.values, "k_3": k_3}, zeta=arm.zeta if zeta is None else zeta)
+    return model.replace(left=paper_lagrangian()[1] - Symbol("k_3", real=True) * model.equations.fields[0] ** 4 / 4)
 
 
 def show_states(ax: Axes, states: Sequence[Sequence[SteadyState]], color: str, label: str) -> None:

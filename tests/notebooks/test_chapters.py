@@ -73,28 +73,11 @@ def following():
     return [path for path in TAUGHT if any("fields" in c.source for c in tagged(nbformat.read(path, 4), "parameters"))]
 
 
-#: Take longest; `python -m pytest tests/notebooks/test_chapters.py -k follows --all-chapters` runs them too.
-DEAR = (
-    "05_sensitivity",
-    "06b_moves",
-    "07b_zones",
-    "07c_inside_the_tongue",
-    "07d_the_joint_that_slips",
-    "09_code_export",
-    "10_claims",
-    "14_large_amplitudes",
-)
-#: What draws no arm, or another structure.
-ARMLESS = re.compile(r'\bdraw\("\w+"(, benchmark)?(, \w+=[^()]*)*\)')
+#: What draws no arm, or another structure, such as the measured strip.
+ARMLESS = re.compile(r'\bdraw\("\w+"(, benchmark)?(, \w+=[^()]*)*\)|\bfigure_fit\(of_all\)')
 
 
-@pytest.fixture
-def affordable(path, request):
-    if path.stem in DEAR and not request.config.getoption("--all-chapters"):
-        pytest.skip("takes long: --all-chapters runs it")
-
-
-@pytest.mark.usefixtures("affordable")
+@pytest.mark.sample(3, 5)
 @pytest.mark.parametrize("path", following(), ids=lambda path: path.stem)
 def test_a_chapter_follows_its_parameters(path, monkeypatch):
     """Another arm, under tension where a chapter has one: no cell fails, every figure that shows an arm is another."""
