@@ -64,8 +64,7 @@ class CPrinter(Printer):
 
     def is_in_header(self, constant: Constant) -> bool:
         """Return whether a constant is in the header."""
-        functions = self.form.functions.values()
-        used = any(isinstance(n, ast.Name) and n.id == constant.name for f in functions for n in ast.walk(f.node))
+        used = any(constant.name in f.names for f in self.form.functions.values())
         return _counts(constant) or (constant.type.length is None and not used)
 
     def constant(self, constant: Constant) -> str:

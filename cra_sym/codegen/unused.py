@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator
 
 __all__ = ["marked", "top_names", "without_unused"]
 
@@ -34,21 +33,23 @@ def without_unused(text: str) -> str:
 
     Each call must be on one line, with arguments without commas, as in the texts of this package.
     """
-    unused = next(_unused(text), None)
-    while unused is not None:
-        text = _without(text, *unused)
-        unused = next(_unused(text), None)
-    return text
+    parts = re.split(r"\n(?=def )", text)
+    unused = {part: _unused(part) for part in parts}
+    while found := next(filter(None, (unused[part] for part in parts)), None):
+        parts = [_without(part, *found) for part in parts]
+        unused |= {part: _unused(part) for part in parts if part not in unused}
+    return "\n".join(parts)
 
 
-def _unused(text: str) -> Iterator[tuple[str, int]]:
-    """Yield private functions with the positions of their unused parameters."""
+def _unused(text: str) -> tuple[str, int] | None:
+    """Return a private function with the position of a parameter that it does not use."""
     for node in ast.parse(text).body:
         if isinstance(node, ast.FunctionDef) and node.name.startswith("_"):
             used = {n.id for statement in node.body for n in ast.walk(statement) if isinstance(n, ast.Name)}
             for at, argument in enumerate(node.args.args):
                 if argument.arg not in used:
-                    yield node.name, at
+                    return node.name, at
+    return None
 
 
 def _without(text: str, name: str, place: int) -> str:

@@ -21,6 +21,8 @@ import ast
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from cra_sym.cached import cached_property
+
 __all__ = [
     "BOOL", "FLOAT", "INT", "SCALARS", "Constant", "Form", "FormError", "Function", "Record", "Type", "error_name",
     "refused",
@@ -136,6 +138,11 @@ class Function:
     def public(self) -> bool:
         """Whether it is part of the interface: its name has no leading underscore."""
         return not self.name.startswith("_")
+
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """All names in it."""
+        return frozenset(node.id for node in ast.walk(self.node) if isinstance(node, ast.Name))
 
     @property
     def body(self) -> list[ast.stmt]:

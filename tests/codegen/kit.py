@@ -7,11 +7,16 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
+import pytest
 
-from cra_sym.codegen import arm_library
+import cra_sym as cra
+from cra_sym.codegen import arm_library, user_model
 from cra_sym.codegen.library import Check, Library
 
 TEXT = '''
@@ -232,13 +237,18 @@ def _evaluate(quantity: int, given: Row[float, 64], found: Mut[Row[float, 256]])
 '''
 
 
+@cache
 def arm_without_vectors(name: str, real: str = "float64") -> Library:
     """Return the arm's library without the package's reference vectors, which take seconds."""
-    kept, arm_library._checks = arm_library._checks, lambda real: ()
-    try:
+    with patch.object(arm_library, "_checks", lambda real: ()):
         return arm_library.arm_library.__wrapped__(name, real)
-    finally:
-        arm_library._checks = kept
+
+
+@cache
+def model_without_vectors(model: cra.Model, name: str = "span") -> Library:
+    """Return a model's library without its reference vectors, which take seconds."""
+    with patch.object(user_model, "model_checks", lambda written, values: ()):
+        return user_model._library.__wrapped__(model, name, "float64")
 
 
 SIZES = {0: 1, 1: 2, 2: 1, 3: 1, 4: 7, 5: 7, 6: 24, 7: 12}
@@ -264,7 +274,7 @@ def points() -> list[tuple[int, tuple[float, ...], bool]]:
     return found
 
 
-def reference(library: Library, folder: Path, points: list[tuple[int, tuple[float, ...], bool]], sizes) -> list[Check]:
+def reference(library: Library, points: list[tuple[int, tuple[float, ...], bool]], sizes) -> list[Check]:
     """Return what plain Python answers, bit by bit."""
     texts = library.texts("python")
     names: dict = {}
@@ -284,19 +294,34 @@ def reference(library: Library, folder: Path, points: list[tuple[int, tuple[floa
     return checks
 
 
+def bits(library: Library) -> list[Check]:
+    """Return a share of a library's checks with what plain Python answers."""
+    points = [(c.quantity, c.given, c.refused) for c in library.checks[::7]]
+    return reference(library, points, dict.fromkeys(range(64), 256))
+
+
 COMMANDS = {
     "python": ("python3", [[sys.executable, "self_test.py"]]),
-    "c": ("cc", [["make", "test"]]),
+    "c": ("cc", [["make", "test", "SIMD="]]),
     "fortran": ("gfortran", [["make", "test"]]),
-    "rust": ("cargo", [["cargo", "test", "--quiet", "--offline"]]),
+    "rust": ("cargo", [["cargo", "test", "--quiet", "--offline", "--test", "reference"]]),
     "javascript": ("node", [["node", "self_test.mjs"]]),
     "octave": ("octave", [["octave", "--norc", "--no-gui", "--quiet", "self_test.m"]]),
 }  # fmt: skip
 
 
+def write(texts: Mapping[str, str], folder: Path) -> Path:
+    """Write files, with their folders."""
+    for name, text in texts.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    return folder
+
+
 def run(command: list[str], folder: Path) -> str:
-    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "PYTHONPATH", "CFLAGS")}
-    environment |= {"CARGO_TARGET_DIR": str(folder / "target"), "CFLAGS": "-O1"}  # it compiles faster, to the same bits
+    """Run a command, which must succeed, and return what it printed; compilers optimise little, to the same bits."""
+    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "PYTHONPATH")}
+    environment |= {"CARGO_TARGET_DIR": str(folder / "target"), "CFLAGS": "-O1", "FFLAGS": "-O1"}
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, env=environment)
     assert done.returncode == 0, f"{command}\n{done.stdout[-3000:]}{done.stderr[-6000:]}"
     return done.stdout + done.stderr
@@ -304,3 +329,18 @@ def run(command: list[str], folder: Path) -> str:
 
 def has(language: str) -> bool:
     return shutil.which(COMMANDS[language][0]) is not None
+
+
+def needs(language: str) -> None:
+    """Skip a test where a language cannot be run."""
+    if not has(language):
+        pytest.skip(f"{language} needs {COMMANDS[language][0]}")
+
+
+def passes(library: Library, language: str, folder: Path) -> str:
+    """Run the self-test of a library in a language, which must pass; return what it printed."""
+    write(library.texts(language), folder)
+    for command in COMMANDS[language][1]:
+        printed = run(command, folder)
+    assert f"{len(library.checks)} checks, 0 failures" in printed or "test result: ok" in printed
+    return printed

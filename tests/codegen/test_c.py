@@ -1,4 +1,7 @@
-"""Exported C: strict compilation, self-test, sanitizers, and random arms against the package's own numbers."""
+"""Exported C: strict compilation, self-test, sanitizers, and random arms against the package's own numbers.
+
+`tests.codegen.test_readme` does what the README says: the whole self-test, under the sanitizers too, and CMake.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,6 @@ import ctypes
 import re
 import shutil
 import subprocess
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +16,8 @@ import pytest
 
 import cra_sym as cra
 from cra_sym.codegen.arm_library import arm_library
-from tests.codegen.kit import COMMANDS, arm_without_vectors, has, reference
-from tests.codegen.kit import run as kit_run
+from tests.codegen import kit
+from tests.codegen.kit import arm_without_vectors
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None or shutil.which("make") is None, reason="needs gcc and make")
 
@@ -24,127 +26,77 @@ MATHEMATICS = (
     "_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail",
 )  # fmt: skip
 FLAGS = "-std=c99 -pedantic -Wall -Wextra -Wconversion -Wdouble-promotion -Wshadow -Werror -ffp-contract=off".split()
-SOURCES = ["cra.c", "cra_batch.c"]
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
+    """The arm, with its library and its self-test, built under the strict flags of its Makefile."""
     target = tmp_path_factory.mktemp("export") / "c"
     cra.export("c", target)
+    kit.run(["make", "self_test", "SIMD="], target)
     return target
 
 
-def run(*command: str, cwd: Path) -> str:
-    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
-    return done.stdout
-
-
-def test_self_test_passes(folder):
-    assert ", 0 failures" in run("make", "test", cwd=folder)
-
-
 def test_self_test_can_fail(folder, tmp_path):
-    run("make", "self_test", cwd=folder)
     *numbers, last = (folder / "reference.txt").read_text().splitlines()[0].split()
     (tmp_path / "wrong.txt").write_text(" ".join([*numbers, repr(float(last) * (1 + 1e-9))]) + "\n")
     done = subprocess.run([folder / "self_test", tmp_path / "wrong.txt"], capture_output=True, text=True)
     assert done.returncode == 1 and f"quantity {numbers[0]}" in done.stderr
 
 
-def test_sanitizers_find_nothing(folder):
-    assert ", 0 failures" in run("make", "sanitize", cwd=folder)
-
-
 def test_valgrind_finds_nothing(folder):
     if shutil.which("valgrind") is None:
         pytest.skip("needs valgrind")
-    run("make", "self_test", cwd=folder)
     lines = (folder / "reference.txt").read_text().splitlines()
-    (folder / "few.txt").write_text("\n".join(lines[::40]) + "\n")
-    run("valgrind", "-q", "--error-exitcode=9", "--track-origins=no", "./self_test", "few.txt", cwd=folder)
+    (folder / "few.txt").write_text("\n".join(lines[::80]) + "\n")
+    kit.run(["valgrind", "-q", "--error-exitcode=9", "--track-origins=no", "./self_test", "few.txt"], folder)
 
 
-@pytest.mark.parametrize("compiler, real", [("gcc", "float64"), ("clang", "float64"), ("gcc", "float32")])
-def test_strict_compilers_say_nothing(compiler, real, tmp_path):
-    if shutil.which(compiler) is None:
-        pytest.skip(f"needs {compiler}")
-    for name, text in arm_without_vectors("crane", real).texts("c").items():
-        (tmp_path / name).write_text(text)
-    command = [compiler, *FLAGS, "-O2", "-fstack-usage", "-c", "crane.c", "crane_batch.c"]
-    run(*(word for word in command if compiler == "gcc" or word != "-fstack-usage"), cwd=tmp_path)
-    if compiler == "gcc":  # what the README says of the stack, less what functions called have
+def test_strict_compilers_say_nothing(tmp_path):
+    kit.write(arm_without_vectors("crane").texts("c"), tmp_path)
+    both = ["-c", "crane.c", "crane_batch.c"]
+    if shutil.which("gcc"):
+        kit.run(["gcc", *FLAGS, "-O2", "-fstack-usage", *both], tmp_path)
+        # what the README says of the stack, less what functions called have
         lines = [line for file in tmp_path.glob("*.su") for line in file.read_text().splitlines()]
         of = [[int(x.split()[1]) for x in lines if x.startswith(name)] for name in ("crane.c:", "crane_batch.c:")]
         assert max(of[0]) < 9.5e3 and sum(of[1]) < 1.6e5
     less = ["-DCRANE_MOST_MODES=20", "-DCRANE_MOST_LANES=8", "-DCRANE_MOST_MODES_TOGETHER=4"]
-    run(compiler, *FLAGS, "-O1", *less, "-c", "crane.c", "crane_batch.c", cwd=tmp_path)
-    fast = [compiler, "-std=c99", "-ffast-math", "-c", "crane.c"]
-    done = subprocess.run(fast, cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode and "do not compile with -ffast-math" in done.stderr
-
-
-def test_cmake_installs_a_target_that_c_plus_plus_finds(tmp_path):
-    if shutil.which("cmake") is None or shutil.which("g++") is None:
-        pytest.skip("needs cmake and g++")
-    library = arm_without_vectors("crane")
-    (tmp_path / "source").mkdir()
-    for name, text in library.texts("c").items():
-        (tmp_path / "source" / name).write_text(text)
-    build = ["cmake", "-S", "source", "-B", "build", f"-DCMAKE_INSTALL_PREFIX={tmp_path / 'installed'}"]
-    run(*build, "-DCMAKE_BUILD_TYPE=Debug", cwd=tmp_path)
-    run("cmake", "--build", "build", "--target", "install", cwd=tmp_path)
-    (tmp_path / "user").mkdir()
-    (tmp_path / "user" / "CMakeLists.txt").write_text(
-        "cmake_minimum_required(VERSION 3.16)\nproject(user LANGUAGES CXX)\nfind_package(crane REQUIRED CONFIG)\n"
-        "add_executable(user user.cpp)\ntarget_link_libraries(user PRIVATE crane::crane)\n"
-    )
-    (tmp_path / "user" / "user.cpp").write_text(
-        "#include <crane.h>\n#include <cstdio>\nint main() { double z[2];\n"
-        "  return crane_frequency_parameters(3, 0, 0.1, 0, 2, z) != CRANE_OK || !std::puts(CRANE_VERSION); }\n"
-    )
-    run("cmake", "-S", "user", "-B", "used", f"-DCMAKE_PREFIX_PATH={tmp_path / 'installed'}", cwd=tmp_path)
-    run("cmake", "--build", "used", cwd=tmp_path)
-    assert run("./used/user", cwd=tmp_path).strip() == cra.__version__
+    for compiler in filter(shutil.which, ("gcc", "clang")):
+        for more in ([], less):
+            kit.run([compiler, *FLAGS, "-fsyntax-only", *more, *both], tmp_path)
+        fast = [compiler, "-std=c99", "-ffast-math", "-fsyntax-only", "crane.c"]
+        done = subprocess.run(fast, cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode and "do not compile with -ffast-math" in done.stderr
 
 
 def test_no_memory_no_input_no_output(folder):
-    run("make", "libcra.a", cwd=folder)
     if shutil.which("nm") is None:
         pytest.skip("needs nm")
-    symbols = [line.split() for line in run("nm", "libcra.a", cwd=folder).splitlines()]
+    symbols = [line.split() for line in kit.run(["nm", "libcra.a"], folder).splitlines()]
     wanted = {s[-1] for s in symbols if s[-2:-1] == ["U"]}
     assert wanted <= {*MATHEMATICS, "cra_groups_of", "cra_frequency_parameters"}
     assert not [s for s in symbols if s[-2:-1] and s[-2] in "BDCbd"]  # no variable
 
 
-@pytest.mark.parametrize("language", ["c", "fortran"])
-def test_bits_are_those_of_plain_python(language, tmp_path):
-    """Of everything that the self-test asks for, with the one mathematical library that the three have here."""
-    if not has(language):
-        pytest.skip(f"{language} needs {COMMANDS[language][0]}")
-    empty = arm_without_vectors("crane")
-    points = [(c.quantity, c.given, c.refused) for c in arm_library("cra").checks[::7]]
-    checks = reference(empty, tmp_path, points, dict.fromkeys(range(64), 256))
-    for name, text in replace(empty, checks=tuple(checks)).texts(language).items():
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text(text)
-    printed = run("make", "test", *(["SIMD="] if language == "c" else []), cwd=tmp_path)
-    assert f"{len(points)} checks, 0 failures" in printed and len(points) > 500
+def test_bits_are_those_of_plain_python(folder):
+    """Of everything that the self-test asks for, with the one mathematical library that both have here."""
+    checks = kit.bits(arm_library("cra"))
+    (folder / "bits.txt").write_text("".join(f"{check.line()}\n" for check in checks))
+    printed = kit.run(["./self_test", "bits.txt"], folder)
+    assert f"{len(checks)} checks, 0 failures" in printed and len(checks) > 500
 
 
 @pytest.mark.parametrize("language", ["c", "fortran", "rust"])
 def test_single_precision_is_as_exact_as_it_says(language, tmp_path):
     """All reference vectors: 1e-5 for frequencies, 5e-4 for everything else."""
-    if not has(language):
-        pytest.skip(f"{language} needs {COMMANDS[language][0]}")
-    made = cra.export(language, tmp_path / "single", real="float32", name="single")
-    for command in COMMANDS[language][1]:
-        printed = kit_run(command, tmp_path / "single")
-    assert ", 0 failures" in printed or "test result: ok" in printed
-    text = "".join((tmp_path / "single" / file).read_text() for file in made.files if "test" not in file)
+    kit.needs(language)
+    library = arm_library("single", "float32")
+    kit.passes(library, language, tmp_path)
+    texts = library.texts(language)
+    text = "".join(text for file, text in texts.items() if file != "README.md" and "test" not in file)
     assert not re.search(r"\bdouble \w|\bf64\b", re.sub(r"//.*|/\*.*|.*real64.*", "", text))
-    assert "right to 1e-05 and all else to 0.0005" in (tmp_path / "single" / "README.md").read_text()
+    assert "right to 1e-05 and all else to 0.0005" in texts["README.md"]
 
 
 class _Arm(ctypes.Structure):
@@ -155,7 +107,7 @@ class _Arm(ctypes.Structure):
 
 @pytest.fixture(scope="module")
 def library(folder):
-    run("cc", *FLAGS, "-O2", "-shared", "-fPIC", "-o", "libcra.so", *SOURCES, "-lm", cwd=folder)
+    kit.run(["cc", "-shared", "-o", "libcra.so", "cra.o", "cra_batch.o", "-lm"], folder)
     return ctypes.CDLL(str(folder / "libcra.so"))
 
 

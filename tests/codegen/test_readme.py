@@ -52,10 +52,23 @@ def steps(readme: str) -> list[Step]:
 def environment(tmp_path_factory) -> dict[str, str]:
     """No display, a clean Python environment, and the package manager of Fortran where Python's brought it."""
     clean = tmp_path_factory.mktemp("venv")
-    subprocess.run([sys.executable, "-m", "venv", clean], check=True, capture_output=True)
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", clean], check=True, capture_output=True)
+    pip = clean / "bin" / "pip"
+    pip.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m pip --python "{clean}" "$@"\n')
+    pip.chmod(0o755)
     paths = [str(clean / "bin"), os.environ["PATH"], str(Path(sys.executable).parent)]
-    kept = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "PYTHONPATH", "CARGO_TARGET_DIR", "CFLAGS")}
-    return kept | {"PATH": os.pathsep.join(paths), "PYTHONWARNINGS": "error", "CARGO_NET_OFFLINE": "true"}
+    kept = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "PYTHONPATH", "CARGO_TARGET_DIR")}
+    quick = {"CFLAGS": "-O1", "FFLAGS": "-O1", "CARGO_NET_OFFLINE": "true"}
+    return kept | quick | {"PATH": os.pathsep.join(paths), "PYTHONWARNINGS": "error"}
+
+
+def exported(language: str, folder: Path, model: cra.Model | None = None) -> Path:
+    """Export to a folder; Octave, some hundred times slower than others, gets a share of the reference vectors."""
+    cra.export(language, folder, model=model)
+    if language == "octave":
+        lines = (folder / "reference.txt").read_text().splitlines(keepends=True)
+        (folder / "reference.txt").write_text("".join(lines[:: 6 if model is None else 3]))
+    return folder
 
 
 def has(command: str, environment: dict[str, str]) -> bool:
@@ -76,7 +89,7 @@ def has_index(path: str) -> bool:
         )
 
 
-def follow(folder: Path, environment: dict[str, str]) -> str:
+def follow(folder: Path, environment: dict[str, str], left_out: tuple[str, ...] = ()) -> str:
     """Do what the README says; return what was printed. Skip, naming the packages, if tools are missing."""
     environment = environment | {"TMPDIR": str(folder.parent)}
     printed, missing = "", set()
@@ -87,6 +100,8 @@ def follow(folder: Path, environment: dict[str, str]) -> str:
         if file:
             (folder / file).parent.mkdir(exist_ok=True)
             (folder / file).write_text(text)
+        elif text.startswith(left_out):
+            pass
         elif not has(text, environment):
             missing.add(PACKAGES[text.split()[0]])
         elif without and text.split()[0] in ("make", "cmake"):
@@ -103,8 +118,7 @@ def follow(folder: Path, environment: dict[str, str]) -> str:
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_the_arm(language, tmp_path, environment):
-    cra.export(language, tmp_path / "arm")
-    printed = follow(tmp_path / "arm", environment)
+    printed = follow(exported(language, tmp_path / "arm"), environment)
     assert re.search(r"\b2\.4\d", printed), "the example's first frequency"
     assert re.search(r"\b0 failures|test result: ok|100% tests passed", printed)
 
@@ -126,10 +140,10 @@ def beam() -> cra.Model:
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_model_of_ones_own(language, beam, tmp_path, environment):
-    cra.export(language, tmp_path / "model", model=beam)
-    printed = follow(tmp_path / "model", environment)
+    folder = exported(language, tmp_path / "model", beam)
+    printed = follow(folder, environment, ("cmake", "pip"))  # they see to it that the arm is built
     assert re.search(r"\b0 failures|test result: ok|100% tests passed", printed)
-    first = (tmp_path / "model" / "reference.txt").read_text().splitlines()[0]
+    first = (folder / "reference.txt").read_text().splitlines()[0]
     expected = float(first.split()[-4])  # the third frequency: Octave shows five digits of the largest
     numbers = [float(word) for word in re.findall(r"-?\d+\.\d+(?:[eE][-+]?\d+)?", printed)]
     assert any(abs(number - expected) <= 1e-4 * abs(expected) for number in numbers), "the example's third number"
