@@ -16,6 +16,7 @@ from cra_sym.arm.parameters import Arm
 from cra_sym.cached import cached_property
 from cra_sym.checks import instance, one_number, real_array, shown
 from cra_sym.extras import MissingExtraError, require
+from cra_sym.figures import styled
 from cra_sym.figures.live import LiveFigure
 from cra_sym.figures.modes import figure_mode_shapes
 from cra_sym.figures.responses import figure_response
@@ -141,12 +142,13 @@ class Explorer:
         """Change values, ``excitation`` or ``swing`` by name, and redraw what depends on them."""
         values = {name: float(value) for name, value in changes.items() if name in self.values}
         self._check(values)
-        self.values |= values
-        self.excitation = changes.get("excitation", self.excitation)
-        self.swing = changes.get("swing", self.swing)
-        for name, view in self.views.items():
-            if view.reads & changes.keys():
-                self._draw(name)
+        with styled():  # JupyterLab may move one slider in another thread than the next
+            self.values |= values
+            self.excitation = changes.get("excitation", self.excitation)
+            self.swing = changes.get("swing", self.swing)
+            for name, view in self.views.items():
+                if view.reads & changes.keys():
+                    self._draw(name)
 
     def _check(self, values: dict[str, Any]) -> None:
         unknown = set(values) - set(self.values)
@@ -202,20 +204,25 @@ class Explorer:
             "style": {"description_width": "8em"},
             "layout": {"width": "24em"},
         }
-        low, high, steps = self._range(name)
-        if name in self._names and name in self._given.numerics("stiffnesses"):
-            grid = sorted({*np.geomspace(low, high, steps + 1).round(6).tolist(), np.inf, value})
-            options = [("rigid" if np.isinf(k) else f"{k:.3g}", k) for k in grid]
-            slider = widgets.SelectionSlider(options=options, value=value, **common)
-        elif name in self._by_decades and value > 0:
-            middle = np.log10(value)
-            common |= {"min": middle - _DECADES, "max": middle + _DECADES, "step": 0.05}
-            slider = widgets.FloatLogSlider(value, readout_format=".3g", **common)
-        else:
-            common |= {"min": min(low, value), "max": max(high, value), "step": (high - low) / steps}
-            slider = widgets.FloatSlider(value, readout_format=".3g", **common)
+        grid = self._grid(name)
+        options = [("rigid" if np.isinf(one) else f"{one:.3g}", one) for one in grid]
+        slider = widgets.SelectionSlider(options=options, value=value, **common)
         slider.observe(lambda change: self._set(**{name: change["new"]}), "value")
         return slider
+
+    def _grid(self, name: str) -> list[float]:
+        """Return where the slider may stand, in ascending order: the present value is among them, exactly."""
+        value, (low, high, steps) = self.values[name], self._range(name)
+        stiffness = name in self._names and name in self._given.numerics("stiffnesses")
+        if stiffness:
+            grid = np.geomspace(low, high, steps + 1)
+        elif name in self._by_decades and value > 0:
+            grid = value * np.geomspace(10**-_DECADES, 10**_DECADES, steps + 1)
+        else:
+            grid = np.linspace(min(low, value), max(high, value), steps + 1)
+        others = grid[~np.isclose(grid, value, rtol=1e-5, atol=0.0)]
+        ends = {value, np.inf} if stiffness else {value}
+        return sorted({float(f"{one:.8g}") for one in others} | ends)
 
     @cached_property
     def _by_decades(self) -> set[str]:

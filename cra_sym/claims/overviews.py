@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from matplotlib import style
 from matplotlib.figure import Figure
 
 from cra_sym.arm.parameters import Arm
@@ -13,7 +12,7 @@ from cra_sym.checks import choice, count, instance
 from cra_sym.claims.family import ArmFamily, provenance_family
 from cra_sym.claims.ledger import claims
 from cra_sym.claims.verdict import THEMES, Verdict
-from cra_sym.figures import STYLE
+from cra_sym.figures import styled
 from cra_sym.figures.subject import single
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ def figure_claims(theme: str, verdicts: Sequence[Verdict] | None = None, columns
     for verdict in verdicts:
         instance("verdict", verdict, Verdict)
     rows = max(-(-len(verdicts) // count("columns", columns, high=100)), 1)
-    with style.context(STYLE):
+    with styled():
         figure = Figure(figsize=(4.1 * columns, 3.15 * rows), dpi=100, layout="constrained")
         panels = list(figure.subplots(rows, columns, squeeze=False).flat)
     for ax, verdict in zip(panels, verdicts, strict=False):
@@ -54,7 +53,7 @@ def figure_family(family: ArmFamily | None = None, arm: Arm | None = None, ax: A
     arm = Arm.nominal() if arm is None else arm
     instance("arm", arm, Arm)
     single(arm)
-    with style.context(STYLE):
+    with styled():
         if ax is None:
             ax = Figure(figsize=(5.6, 3.8), layout="constrained").subplots()
         for name, thickness in zip(family.materials, family.thickness, strict=True):

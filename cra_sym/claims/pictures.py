@@ -6,11 +6,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import style
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from cra_sym.figures import STYLE
+from cra_sym.figures import styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,7 +53,7 @@ _LABELS = {
 
 def draw_panel(picture: Callable[[Axes], None], title: str, outcome: str, ax: Axes | None = None) -> Figure:
     """Draw a panel in the package's style, by default in a new figure, with the outcome in the title."""
-    with style.context(STYLE):
+    with styled():
         if ax is None:
             ax = Figure(figsize=(5.2, 3.6), layout="constrained").subplots()
         picture(ax)

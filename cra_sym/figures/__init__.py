@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.resources import files
 from inspect import cleandoc, signature
+from threading import RLock
 from typing import TYPE_CHECKING, Any
 
+from cra_sym.cached import released_in_children
 from cra_sym.checks import choice, instance, shown
 
 if TYPE_CHECKING:
@@ -16,7 +19,19 @@ if TYPE_CHECKING:
 
     from cra_sym.model.system import System
 
-__all__ = ["ANIMATIONS", "FIGURES", "STYLE", "animate", "described", "draw", "shows_an_arm", "shows_any_system"]
+__all__ = [
+    "ANIMATIONS",
+    "FIGURES",
+    "STYLE",
+    "animate",
+    "described",
+    "draw",
+    "shows_an_arm",
+    "shows_any_system",
+    "styled",
+]
+
+_TURN = released_in_children(RLock())  # Matplotlib's settings are those of the process: one thread draws at a time
 
 FIGURES = {
     "fig01": "cra_sym.figures.robot:figure_1",
@@ -66,6 +81,15 @@ STYLE = str(files(__name__) / "style.mplstyle")
 """The one style: ``with plt.style.context(STYLE): ...``."""
 
 
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw in the one style what is drawn within, one thread at a time."""
+    from matplotlib import style
+
+    with _TURN, style.context(STYLE):
+        yield
+
+
 def draw(name: str, system: System | None = None, **options: Any) -> Figure:
     """Draw one figure of ``FIGURES`` in the house style, of the system given or of the paper's arm.
 
@@ -107,9 +131,7 @@ def draw(name: str, system: System | None = None, **options: Any) -> Figure:
         if not shows_any_system(name):
             parameters_of(system)
         subject = {"system" if shows_any_system(name) else "arm": system}
-    from matplotlib import style
-
-    with style.context(STYLE):
+    with styled():
         figure: Figure = _function(name)(**subject, **options)
         return figure
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib import style
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from cra_sym.analysis.identification import Identification
 from cra_sym.checks import instance
-from cra_sym.figures import STYLE
+from cra_sym.figures import styled
 from cra_sym.figures.drawing import figure_of
 
 __all__ = ["figure_fit"]
@@ -28,7 +27,7 @@ def figure_fit(fit: Identification, *, axes: Any = None) -> Figure:
     axes : pair of Axes, optional
     """
     instance("fit", fit, Identification)
-    with style.context(STYLE):
+    with styled():
         left, right = Figure(figsize=(8.6, 3.9), layout="constrained").subplots(1, 2) if axes is None else axes
         left.errorbar(fit.modes, fit.measured, fit.uncertainty, fmt="o", markersize=4, capsize=3, label="measured")
         left.plot(fit.modes, fit.frequencies, "_", markersize=14, label="fitted")

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import style
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
@@ -15,7 +14,7 @@ from cra_sym.analysis.response_curves import response_curves
 from cra_sym.analysis.stability import stability_boundary
 from cra_sym.analysis.steady_states import SteadyState
 from cra_sym.arm.parameters import Arm
-from cra_sym.figures import STYLE
+from cra_sym.figures import styled
 from cra_sym.figures.drawing import BLUE, ORANGE, panels
 from cra_sym.figures.nonlinear import cubic_joint, show_curves
 from cra_sym.model.excitations import AxialBase
@@ -90,7 +89,7 @@ def figure_shaken_along(
     width = upper - lower
     between, system = (lower - 1.5 * width, upper + width), foreshortened_arm(arm)
     curves = response_curves(system, between, drive={u: amplitude}, modes=max(modes, mode), harmonics=5, period=2)
-    with style.context(STYLE):
+    with styled():
         ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
         show_curves(ax, curves, BLUE, "foreshortened arm")
         ax.axvspan(lower, upper, color="0.9", zorder=0)
@@ -134,7 +133,7 @@ def figure_shaken_across(
     arm = Arm.nominal().replace(k_t=1e3) if arm is None else arm
     omega = float(modal_parameters(arm, mode).omega[-1])
     between = (0.9 * omega, 1.25 * omega)
-    with style.context(STYLE):
+    with styled():
         ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
         for size, color, word, marker in ((0.0, ORANGE, "linear joint", "^"), (k_3, BLUE, "hardening joint", "o")):
             system = cubic_joint(arm, size, zeta)
@@ -171,7 +170,7 @@ def figure_basins(
 
     reached = basins(states, displacement, velocity, mode=mode, cycles=cycles)
     shown = [k for k in range(-1, len(states)) if (reached == k).any()]
-    with style.context(STYLE):
+    with styled():
         ax = panels(None if ax is None else [ax], 1, 1, (5.6, 4.2)).ravel()[0]
         ax.pcolormesh(
             1e3 * np.asarray(displacement),

@@ -7,12 +7,11 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import style
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from cra_sym.figures import STYLE
+from cra_sym.figures import styled
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -51,7 +50,7 @@ class LiveFigure:
         self._draw = draw
         self._frame: Any = None
         self._look: list[tuple[Any, ...]] = []
-        with style.context(STYLE):
+        with styled():
             self.figure = Figure(figsize=size, dpi=dpi, layout="constrained")
             self.canvas = FigureCanvasAgg(self.figure)
             self.axes = self.figure.subplots(rows, columns, squeeze=False, **options).ravel()
@@ -59,7 +58,7 @@ class LiveFigure:
     def redraw(self, *given: Any, **more: Any) -> bytes:
         """Draw with these arguments in place of what was there; return the picture as PNG."""
         limits = [(ax.get_xlim(), ax.get_ylim()) for ax in self.axes]
-        with style.context(STYLE):
+        with styled():
             self._wipe()
             self._draw(*given, axes=self.axes, **more)
             if self._frame is not None:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import style
 from matplotlib.figure import Figure
 
-from cra_sym.figures import STYLE
+from cra_sym.figures import styled
 from cra_sym.figures.drawing import figure_of
 
 if TYPE_CHECKING:
@@ -29,7 +28,7 @@ def figure_slenderness(slenderness: Any, thin: Any, thick: Any, *, axes: Any = N
     axes : pair of Axes, optional
     """
     slenderness, thin, thick = (np.asarray(a, dtype=float) for a in (slenderness, thin, thick))
-    with style.context(STYLE):
+    with styled():
         left, right = Figure(figsize=(8.6, 3.9), layout="constrained").subplots(1, 2) if axes is None else axes
         for mode in range(thick.shape[1]):
             (line,) = left.loglog(slenderness, thick[:, mode], linestyle="-", label=f"$f_{mode + 1}$")
@@ -56,7 +55,7 @@ def figure_damped_joint(damper: Any, ratio: Any, *, ax: Any = None) -> Figure:
     ratio : array_like, shape (n, modes)
     ax : Axes, optional
     """
-    with style.context(STYLE):
+    with styled():
         ax = Figure(figsize=(6.4, 3.9), layout="constrained").subplots() if ax is None else ax
         for mode, values in enumerate(np.asarray(ratio, dtype=float).T):
             ax.loglog(damper, values, label=f"mode {mode + 1}")
@@ -80,7 +79,7 @@ def figure_eigenvalues(eigenvalues: Any, parameter: Any, *, label: str, ax: Axes
     ax : Axes, optional
     """
     eigenvalues, parameter = np.asarray(eigenvalues, dtype=complex), np.asarray(parameter, dtype=float)
-    with style.context(STYLE):
+    with styled():
         ax = Figure(figsize=(6.4, 4.4), layout="constrained").subplots() if ax is None else ax
         ax.axvline(0.0, color="0.75", linewidth=0.8)
         for number, values in enumerate(eigenvalues.T):

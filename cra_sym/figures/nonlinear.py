@@ -8,7 +8,6 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import style
 from matplotlib.figure import Figure
 
 from cra_sym.analysis.backbone import Backbone, backbone
@@ -17,7 +16,7 @@ from cra_sym.analysis.stability import stability_boundary
 from cra_sym.analysis.steady_states import SteadyState
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
-from cra_sym.figures import STYLE
+from cra_sym.figures import styled
 from cra_sym.figures.drawing import BLUE, INK, ORANGE, figure_of, panels
 from cra_sym.model.system import System
 from cra_sym.solvers.harmonic_balance import Basis, peak
@@ -197,7 +196,7 @@ def figure_sweep(states: Sequence[Sequence[SteadyState]], *, ax: Any = None) -> 
         Ascending frequencies.
     ax : Axes, optional
     """
-    with style.context(STYLE):
+    with styled():
         ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
         frequency = [here[0].angular_frequency for here in states]
         show_states(ax, states, "0.6", "all answers")
@@ -225,7 +224,7 @@ def figure_amplitude_map(
         Where rest loses its stability.
     ax : Axes, optional
     """
-    with style.context(STYLE):
+    with styled():
         ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
         mesh = ax.pcolormesh(frequency, epsilon, 1e3 * np.asarray(amplitude), cmap="cividis", shading="nearest")
         ax.figure.colorbar(mesh, ax=ax, label="largest stable amplitude at the tip / mm")
@@ -270,7 +269,7 @@ def figure_backbone(
     if isinstance(system, Arm):
         system = cubic_joint(system if np.all(np.isfinite(system.k_t)) else system.replace(k_t=1e3), k_3)
     curve = backbone(system, mode, modes=modes, points=points, branches=branches)
-    with style.context(STYLE):
+    with styled():
         ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
         _show_curve(ax, curve)
         ax.axis(ax.axis())  # that of the curve itself

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, cast
 
 import numpy as np
-from matplotlib import style
 from matplotlib.figure import Figure
 
 from cra_sym.analysis.backbone import Backbone, backbone
@@ -16,7 +15,7 @@ from cra_sym.analysis.steady_states import steady_states
 from cra_sym.arm.bolted_joint import BoltedJoint
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import count
-from cra_sym.figures import STYLE
+from cra_sym.figures import styled
 from cra_sym.figures.drawing import BLUE, GREEN, INK, ORANGE, panels
 from cra_sym.model.excitations import Fluctuation
 from cra_sym.model.system import System
@@ -39,7 +38,7 @@ def show_loop(found: SlipResponse, *, ax: Any = None) -> Figure:
         Of one system, its times close enough to be joined by lines.
     ax : Axes, optional
     """
-    with style.context(STYLE):
+    with styled():
         ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
         moved, force = 1e3 * found.displacement[0], found.force.sum(axis=0)
         ax.plot(moved, force, "-", color=INK, linewidth=0.8, label="sticks")
@@ -114,7 +113,7 @@ def figure_slip_amplitude(
             raise ValueError("system: must have elastic-slip elements: Model(.., hysteresis=[(cra.Jenkins(..), ..)])")
         amplitude = np.geomspace(4e-3, 0.3, 25) if amplitude is None else amplitude
         curve = backbone(system, mode, amplitude=amplitude, modes=modes)
-    with style.context(STYLE):
+    with styled():
         left, right = panels(axes, 1, 2, (8.8, 3.7)).ravel()
         size = 1e3 * np.asarray(curve.amplitude)
         left.semilogx(size, curve.angular_frequency / (2 * np.pi), "-o", color=BLUE, markersize=3)
@@ -138,7 +137,7 @@ def figure_tongue_bounds(epsilon: Any, bounded: Any, threshold: Any, *, ax: Any 
         Amplitude of the unstable one at twice the sliding frequency, m: smaller vibrations decay, larger ones grow.
     ax : Axes, optional
     """
-    with style.context(STYLE):
+    with styled():
         ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
         curves = (
             (bounded, BLUE, "-", "o", "bounded, at twice the stuck"),
@@ -192,7 +191,7 @@ def figure_preload(
     some = slip_response(joint.on(arm, np.asarray(shown, float)), move, times, modes=modes)
     peak, late = (1e3 * np.abs(found.tip[..., times >= since]).max(axis=-1) for since in (0.0, 0.75 * duration))
     rigid = natural_frequencies(arm.replace(k_t=np.inf, k_r=np.inf))
-    with style.context(STYLE):
+    with styled():
         left, middle, right = panels(axes, 1, 3, (12.0, 3.7)).ravel()
         kinds = ((INK, "-", "mode 1"), (BLUE, "--", "mode 2"), (ORANGE, ":", "mode 3"))
         for column, (color, line, label) in zip((natural_frequencies(systems) / rigid).T, kinds, strict=True):
@@ -268,7 +267,7 @@ def figure_preload_tongues(
     held: dict[str, Any] = {"amplitude": amplitude, "modes": 2, "harmonics": harmonics}
     damping = [float(backbone(each[k], 1, **held).damping_ratio) for k in often]
     bounded = [max((s.amplitude for s in states if s.stable and s.amplitude > 0), default=np.nan) for states in found]
-    with style.context(STYLE):
+    with styled():
         left, middle, right = panels(axes, 1, 3, (12.0, 3.7)).ravel()
         left.loglog(forces[often], damping, "-o", color=ORANGE, markersize=4)
         left.set_ylabel(f"damping ratio at {1e3 * amplitude:g} mm")
