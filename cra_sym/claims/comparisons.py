@@ -61,8 +61,8 @@ def _softened(setting: Setting, mean: dict[str, float], what: str) -> Finding:
         rf"{percent(setting.visible)}, for $\varpi$ of "
         f"{span(fine, smaller, 'rad/s')}; at {number(setting.angular_frequency)} rad/s it is {mm(nominal[0])} mm "
         rf"against {mm(nominal[1])} mm. The spring changes $\omega_1$ from {number(first[1])} to {number(first[0])} "
-        f"rad/s; below, the response is smaller at {percent(smaller[fine < first[0]].mean())} of the frequencies, "
-        f"above at {percent(smaller[fine > first[1]].mean())}, where the beats that fall into "
+        f"rad/s; for disturbances below that the response is smaller at {percent(smaller[fine < first[0]].mean())} of "
+        f"the frequencies, above at {percent(smaller[fine > first[1]].mean())}, where the beats that fall into "
         f"{number(setting.duration)} s decide. For $k_t$ of {number(k_t[0])} to {number(k_t[-1])} N/m the claim holds "
         f"in {percent(region.mean())} of the plane, measured as $v(L) - v(0)$ in {percent(region_relative.mean())}."
     )
@@ -77,7 +77,7 @@ def _softened(setting: Setting, mean: dict[str, float], what: str) -> Finding:
     "C10",
     "responses",
     "Section 5.1, Fig. 7",
-    "smaller on an elastic joint",
+    "smaller response on an elastic joint",
     "the vibration response amplitude of the end-effector with [finite tensional stiffness] is smaller than that of "
     "rigid "
     "restraint",

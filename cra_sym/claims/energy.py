@@ -99,7 +99,7 @@ def draw_energy_of_the_beam_alone(verdict: Verdict, ax: Axes) -> None:
     "C21",
     "modes",
     "Sections 3 and 4, (8) and (14)",
-    "two principles, one joint",
+    "both principles give the same joint",
     "Hamilton's variational principle ... the principle of virtual work is utilized [for the boundary conditions]",
 )
 def two_principles(setting: Setting) -> Finding:
@@ -128,8 +128,8 @@ def two_principles(setting: Setting) -> Finding:
         "Hamilton's principle and virtual work have no boundary condition in common.",
     )
     sentence = (
-        f"With the springs' energy in (4) {sum(agree[0])} of the four conditions of virtual work (14) come out of "
-        f"Hamilton's principle (8); with the beam's energy alone {sum(agree[1])} of them do, and the joint's end is "
+        f"With the springs' energy in (4) Hamilton's principle (8) gives {sum(agree[0])} of the 4 conditions of "
+        f"virtual work (14); with the beam's energy alone it gives {sum(agree[1])}, and the joint's end is "
         f"{'free' if sum(agree[1]) < 4 else 'the same'}."
     )
     criterion = "each condition of (16) is one of Hamilton's principle with the springs in (4); symbolic, no threshold"

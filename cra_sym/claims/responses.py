@@ -102,7 +102,7 @@ def plane_picture(verdict: Verdict, ax: Axes, label: str) -> None:
     "C07",
     "responses",
     "Section 5.1, Fig. 6",
-    "at mean velocity a lower peak",
+    "a lower peak at mean velocity",
     "for the system with average velocity, the vibration response amplitude with motion disturbance is smaller than "
     "the "
     "vibration response amplitude without motion disturbance",
@@ -117,7 +117,7 @@ def lower_peak_at_mean_velocity(setting: Setting) -> Finding:
     "C08",
     "responses",
     "Section 5.1, Fig. 6",
-    "at mean acceleration a higher peak",
+    "a higher peak at mean acceleration",
     "for the flexible CRA system with average acceleration, the vibration response amplitude with motion disturbance "
     "is "
     "larger than the vibration response amplitude without motion disturbance",
@@ -144,7 +144,7 @@ def draw_higher_peak_at_mean_acceleration(verdict: Verdict, ax: Axes) -> None:
     "C09",
     "responses",
     "Section 5.1, Fig. 6",
-    "it matters more when accelerating",
+    "disturbance matters more when accelerating",
     "the motion disturbance enhances the vibration of the end-effector especially for the accelerating operations",
 )
 def matters_more_when_accelerating(setting: Setting) -> Finding:

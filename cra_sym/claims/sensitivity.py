@@ -90,7 +90,7 @@ def draw_more_sensitive_to_k_t(verdict: Verdict, ax: Axes) -> None:
     "C06",
     "modes",
     "Section 4, Fig. 5",
-    "$k_t$ matters more when soft",
+    "the sensitivity to $k_t$ grows as it softens",
     "with the decreasing of [the tensional stiffness], the sensitivity [to it] obviously enhances",
 )
 def sensitivity_to_k_t_grows(setting: Setting) -> Finding:
@@ -135,7 +135,7 @@ def draw_sensitivity_to_k_t_grows(verdict: Verdict, ax: Axes) -> None:
     "C06b",
     "modes",
     "Section 4, Fig. 5",
-    "$k_r$ matters the same when soft",
+    "the sensitivity to $k_r$ hardly changes",
     "the sensitivity to [the torsional stiffness] presents tiny change",
 )
 def sensitivity_to_k_r_stays(setting: Setting) -> Finding:
@@ -201,7 +201,7 @@ def _factor(value: float) -> str:
     "C20",
     "modes",
     "Section 4, Figs. 3 and 4",
-    "two springs, two mechanisms",
+    "the two springs act differently",
     "the effect mechanisms of the tensional restraint stiffness and the torsional restraint stiffness are different",
 )
 def two_mechanisms(setting: Setting) -> Finding:

@@ -93,7 +93,9 @@ def _frequencies_fall(setting: Setting) -> Finding:
         large=Quantity(large, "Hz", "frequency of mode 1 on the soft joint: its preload, amplitude"),
         region=Quantity(falls, "1", "where the frequency of small vibration falls with the preload: preload, mode"),
     )
-    criterion = f"each frequency falls from preload to preload, to {_SETTLED:g} of it; stuck, and with slip in mode 1"
+    criterion = (
+        f"each frequency falls from preload to preload, to {number(_SETTLED)} of it; stuck, and with slip in mode 1"
+    )
     return Finding(judgement, plain, sentence, evidence, criterion)
 
 
@@ -112,9 +114,9 @@ def _sensitivity_grows(setting: Setting) -> Finding:
         "With slip the sensitivity to the preload does not grow as that is lost.",
     )
     sentence = (
-        f"At the amplitudes {listed(1e3 * _AMPLITUDE, number)} mm it grows from {number(_SOFT_PRELOAD[2])} to "
-        f"{number(_SOFT_PRELOAD[0])} N in {percent(grows.mean())} of the steps; without slip, where the contact alone "
-        f"softens, in {percent(stuck.mean())}."
+        f"At the amplitudes {listed(1e3 * _AMPLITUDE, number)} mm it grows in {percent(grows.mean())} of the steps of "
+        f"the preload from {number(_SOFT_PRELOAD[2])} down to {number(_SOFT_PRELOAD[0])} N; without slip, where the "
+        f"contact alone softens, in {percent(stuck.mean())}."
     )
     evidence = _axes(
         rate=Quantity(rate, "Hz/N", "change of the first frequency over that of the preload: preload, amplitude"),
@@ -135,12 +137,13 @@ def _smaller(setting: Setting, soft: np.ndarray, fixed: np.ndarray, what: str) -
         f"{what} is smaller on the joint that slips, at every preload.",
         f"{what} is smaller on the joint that slips only at some preloads: softening detunes and friction damps, until "
         "too little holds.",
-        f"{what} is smaller at no preload.",
+        f"{what} is smaller at none of the preloads tried.",
     )
-    where = "; ".join(
-        f"{number(s, 2)} times the motion: {span(_PRELOAD, r, 'N')}" for s, r in zip(_SIZES, region, strict=True)
+    where = ", ".join(
+        f"{span(_PRELOAD, r, 'N').replace('nowhere', 'none')} for {number(s, 2)} times the motion"
+        for s, r in zip(_SIZES, region, strict=True)
     )
-    sentence = f"It is smaller than on the rigid joint, by over {percent(setting.visible)}, at preloads of: {where}."
+    sentence = f"Preloads at which it is smaller than on the rigid joint by over {percent(setting.visible)}: {where}."
     evidence = _axes(
         log_ratio=Quantity(ratio, "1", "ln of the peak over that on the rigid joint: size, preload"),
         region=Quantity(region, "1", "where it is visibly smaller: size, preload"),
@@ -206,15 +209,16 @@ def _zones_widen(setting: Setting) -> Finding:
     change = np.abs(width[:, 0] / width[:, -1] - 1)
     steady = change[0] < change[1:].min()
     judgement = judged(widens, [steady])
+    against = "neither zone 2 nor zone 3 widens" if steady else "zone 1 does not stay: another zone changes less"
     plain = by_outcome(
         judgement,
         "As the preload is lost zone 1 changes least, and zones 2 and 3 widen.",
         "As the preload is lost zones 2 and 3 widen over a part of its range.",
-        "As the preload is lost zone 1 does not change least of all, or no other zone widens.",
+        f"As the preload is lost {against}.",
     )
     sentence = (
         f"From {number(_PRELOAD[-1])} to {number(_PRELOAD[0])} N the absolute widths at $\\epsilon$ = "
-        f"{number(setting.epsilon)} change by {listed(change, percent)} of themselves in zones 1 to 3; zones 2 and 3 "
+        f"{number(setting.epsilon)} change by {listed(change, percent)} in zones 1 to 3; zones 2 and 3 "
         f"widen in {percent(widens.mean())} of the steps. Slip does not move these borders: rest sticks. What it "
         "does is bound the vibration inside."
     )

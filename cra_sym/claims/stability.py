@@ -207,7 +207,7 @@ def draw_boundary_from_the_amplitude_equation(verdict: Verdict, ax: Axes) -> Non
     "C19",
     "stability",
     "Section 5.2, (42)",
-    "resonance at any $\\omega_n$",
+    "parametric resonance near any $\\omega_n$",
     "If the variation frequency approaches any natural frequency of the system, the parametric resonance may occur",
 )
 def resonance_at_any_frequency(setting: Setting) -> Finding:

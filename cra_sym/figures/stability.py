@@ -339,13 +339,13 @@ def figure_combinations(
             _name(ax, name, omega[m - 1] + omega[n - 1], epsilon)
         for side in _boundary(system, excitation, sizes, (m, m), order=2, tongue=2, modes=still + 3):
             ax.plot(side, sizes, **_FIRST | {"linewidth": 0.9})
-        _name(ax, f"$\\omega_{m}$", omega[m - 1], epsilon, color=_FIRST["color"])
+        _name(ax, f"$\\omega_{m}$", omega[m - 1], epsilon, above=16, color=_FIRST["color"])
     ax.set_xlim(frequency[0], frequency[-1])
     ax.set_ylim(0, epsilon)
     ax.grid(False)
     ax.set_xlabel(r"excitation frequency $\varpi$ / (rad/s)")
     ax.set_ylabel(r"$\epsilon$")
-    ax.set_title(f"Principal and sum resonances: {_described(excitation)}", pad=20)
+    ax.set_title(f"Principal and sum resonances: {_described(excitation)}", pad=32)
     handles = [ax.plot([], [], **look)[0] for look in (_SECOND, _FIRST)]
     figure = ax.figure
     names = ("multiple scales, second order", "second tongue, width of order ε²")
@@ -360,8 +360,8 @@ def figure_combinations(
     return figure
 
 
-def _name(ax: Axes, name: str, place: float, top: float, **look: Any) -> None:
-    ax.annotate(name, (place, top), xytext=(0, 4), textcoords="offset points", ha="center", **look)
+def _name(ax: Axes, name: str, place: float, top: float, above: float = 4, **look: Any) -> None:
+    ax.annotate(name, (place, top), xytext=(0, above), textcoords="offset points", ha="center", **look)
 
 
 def figure_accuracy(arm: System | None = None, epsilon: Any = None, *, axes: Any = None) -> Figure:
