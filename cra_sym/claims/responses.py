@@ -144,7 +144,7 @@ def draw_higher_peak_at_mean_acceleration(verdict: Verdict, ax: Axes) -> None:
     "C09",
     "responses",
     "Section 5.1, Fig. 6",
-    "disturbance matters more when accelerating",
+    "more effect when accelerating",
     "the motion disturbance enhances the vibration of the end-effector especially for the accelerating operations",
 )
 def matters_more_when_accelerating(setting: Setting) -> Finding:

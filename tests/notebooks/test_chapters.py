@@ -55,6 +55,7 @@ def test_a_chapter_has_objectives_pitfalls_and_exercises(path):
     prose = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
     assert len(notebook.cells) <= 41
     assert "**After this chapter you can**" in prose and "## Pitfalls" in prose
+    assert not re.search(r"\\\\[A-Za-z]", prose), "a doubled backslash breaks a formula"
     solutions = tagged(notebook, "solution")
     assert 2 <= len(solutions) <= 4 and len(re.findall(r"^\*\*\d\.\*\*", prose, re.MULTILINE)) == len(solutions)
     for cell in solutions:
