@@ -54,18 +54,28 @@ class Breaks:
         """Return parameter sets grouped by their number of breakpoints and by which of these carry terms.
 
         For each group: the rows; (left end, breakpoints, right end), shape (sets, breakpoints + 2); and for each
-        interior place the index of its breakpoint, -1 if it is outside the domain.
+        interior place the index of its breakpoint.
 
         Parameters
         ----------
         columns : ndarray, shape (parameters, sets)
         left, length : ndarray, shape (sets,)
+
+        Raises
+        ------
+        ValueError
+            If a place is at an end of the domain or outside.
         """
         right = left + length
         roots = [root for _, root in self._candidates(columns, left, length)]
         stated = np.empty((len(left), len(self.places.layout)))
         for k, place in enumerate(self.places.function(*columns)):
             stated[:, k] = place
+        outside = np.argwhere((stated < left[:, None]) | (stated > right[:, None]))
+        if outside.size:
+            row, k = outside[0]
+            domain = f"({left[row]:g}, {right[row]:g})"
+            raise ValueError(f"inside: a place is at x = {stated[row, k]:g}; must be in the domain, {domain}")
         if ((stated == left[:, None]) | (stated == right[:, None])).any():
             raise ValueError("inside: a place is at an end of the domain; state its term with left or right")
         found = np.concatenate([left[:, None], *roots, stated, right[:, None]], axis=1)
@@ -83,7 +93,6 @@ class Breaks:
             edges = found[rows][kept[rows]].reshape(len(rows), number)
             edges[:, -1] = right[rows]
             nodes = np.abs(edges[:, :, None] - stated[rows, None, :]).argmin(axis=1)
-            nodes[(stated[rows] < left[rows, None]) | (stated[rows] > right[rows, None])] = -1
             for kind in np.unique(nodes, axis=0):
                 alike = (nodes == kind).all(axis=1)
                 groups.append((rows[alike], edges[alike], tuple(int(k) for k in kind)))

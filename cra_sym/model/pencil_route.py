@@ -112,8 +112,6 @@ class PencilRoute(StressRoute):
         matrices = _matrices(self.inside, columns, 3 * len(points.held))
         terms, forces = [], []
         for number, (node, held) in enumerate(zip(nodes, points.held, strict=True)):
-            if node < 0:
-                continue
             stiffness, damping, mass = matrices[3 * number : 3 * number + 3]
             some, k = _springs_and_supports(0.5 * (stiffness + stiffness.swapaxes(-1, -2)), held)
             k = np.maximum(k, 0.0)

@@ -227,7 +227,7 @@ class SpatialProblem:
         if ends[0]:
             width = edges[0, 1] - edges[0, 0]
             edges = np.concatenate([left[:, None] + [[reach[0], *(width * steps)]], edges[:, 1:]], axis=1)
-            nodes = tuple(node + len(steps) if node >= 0 else node for node in nodes)
+            nodes = tuple(node + len(steps) for node in nodes)
         if ends[1]:
             width = edges[0, -1] - edges[0, -2]
             last = edges[:, -1:] - [[*(width * steps[::-1]), reach[0]]]
@@ -309,7 +309,7 @@ class SpatialProblem:
         def at_nodes(z: np.ndarray, rows: np.ndarray) -> list[tuple[float, np.ndarray, np.ndarray]]:
             assert self.points is not None and spans is not None
             terms = zip(self.points.at(z, columns[:, rows]), nodes, strict=True)
-            return [(float(spans.knots[node]), *pair) for pair, node in terms if node >= 0]
+            return [(float(spans.knots[node]), *pair) for pair, node in terms]
 
         if self.points is not None and any(self.points.held):
             raise ValueError("essential: supports at interior places are known to natural frequencies and modes alone")

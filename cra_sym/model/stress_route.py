@@ -160,10 +160,9 @@ class StressRoute:
         found = []
         terms = points.at(np.zeros(sets), columns)
         for node, (stiffness, rate), held in zip(nodes, terms, points.held, strict=True):
-            if node >= 0:
-                shape = (sets, *np.shape(stiffness)[-2:])
-                springs = _springs_and_supports(np.broadcast_to(stiffness, shape), held)
-                found.append(PointTerm(node, *springs, -np.broadcast_to(rate, shape)))
+            shape = (sets, *np.shape(stiffness)[-2:])
+            springs = _springs_and_supports(np.broadcast_to(stiffness, shape), held)
+            found.append(PointTerm(node, *springs, -np.broadcast_to(rate, shape)))
         return tuple(found)
 
     # ------------------------------------------------------------------------------------------ the ends

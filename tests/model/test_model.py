@@ -369,3 +369,22 @@ def test_a_displacement_that_is_given_is_refused(given):
     """Frequencies do not depend on it, but a response would, and would be silent about it."""
     with pytest.raises(ValueError, match=r"essential, v\(0, t\) = .*: must be 0; measure the displacement from there"):
         model(left=None, essential=[v.subs(x, 0) - given])
+
+
+@pytest.mark.parametrize("place", [1.5, -0.25])
+@pytest.mark.parametrize(
+    "term", ["inside", "essential", "virtual_work", "density"], ids=["spring", "support", "force", "impulse"]
+)
+def test_a_place_outside_the_domain_is_refused(term, place):
+    a = sp.Symbol("a")
+    added = {
+        "inside": [(a, -k_t * v**2 / 2)],
+        "essential": [v.subs(x, a)],
+        "virtual_work": [(-c * v.diff(t), v, a)],
+        "density": BEAM - k_t * sp.DiracDelta(x - a) * v**2 / 2,
+    }[term]
+    given = {name: value for name, value in {**VALUES, c: 1.0}.items()} | {a: place}
+    changed = model(**{term: added})
+    analysis = changed.eigenvalues if term == "virtual_work" else changed.natural_frequencies
+    with pytest.raises(ValueError, match=rf"inside: a place is at x = {place}; must be in the domain, \(0, 1.1\)"):
+        analysis({name: given[name] for name in changed.symbols}, modes=2)
