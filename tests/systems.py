@@ -1,4 +1,4 @@
-"""Eight systems that are no arm: what every analysis and every figure is tried on."""
+"""Eight systems that are no arm: what every analysis and every figure is tried on; and two without natural modes."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import sympy as sp
 
 import cra_sym as cra
 
-__all__ = ["NAMES", "system"]
+__all__ = ["NAMES", "TURNING", "system"]
 
-x, t, length, rhoA, EI, T, k, m, g, G, kA, I_r, c, a = sp.symbols("x t l rhoA EI T k m g G kA I_r c a")
+x, t, length, rhoA, EI, T, k, m, g, G, I_r, c, a, U = sp.symbols("x t l rhoA EI T k m g G I_r c a U")
 v, u, phi = (sp.Function(name)(x, t) for name in ("v", "u", "phi"))
 w, p, q = (sp.Function(name)(t) for name in ("w", "p", "q"))
 VALUES = {"l": 1.2, "rhoA": 0.3, "EI": 5.0, "k": 800.0, "m": 0.1}
@@ -65,6 +65,28 @@ MODELS = {
     ),
 }
 NAMES = tuple(MODELS)
+MODELS |= {
+    "pipe on a support": lambda: (  # of the mass m that flows with the speed U, discharged at the right end
+        _model(
+            BENT + m * (v.diff(t) + U * v.diff(x)) ** 2 / 2 + m * v.diff(t) * w.diff(t) + p * v,
+            left=-k * v.diff(x) ** 2 / 2,
+            essential=[v.subs(x, 0), v.subs(x, a)],
+            virtual_work=[(-m * U * (v.diff(t) + U * v.diff(x)), v, "right")],
+        ),
+        {"a": 0.5, "U": 2.0},
+    ),
+    "shaft": lambda: (  # that rotates with the speed U and carries a disc
+        _model(
+            BENT + rhoA * u.diff(t) ** 2 / 2 - EI * u.diff(x, 2) ** 2 / 2,
+            fields=(v, u),
+            left=-k * (v**2 + u**2) / 2,
+            right=-k * (v**2 + u**2) / 2,
+            inside=[(a, m * ((v + w).diff(t) ** 2 + u.diff(t) ** 2) / 2 + I_r * U * v.diff(x) * u.diff(x, t) + p * v)],
+        ),
+        {"a": 0.5, "U": 30.0, "I_r": 2e-3},
+    ),
+}
+TURNING = tuple(name for name in MODELS if name not in NAMES)
 
 
 @cache

@@ -8,6 +8,7 @@ from contextlib import nullcontext, suppress
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.analysis.modes import displaced
 from cra_sym.model.projection import project
 from cra_sym.model.routes import Modes
 from cra_sym.model.system import System
@@ -42,7 +43,7 @@ def on_basis(
     drive : str or callable
         Name of a motion or a force, or a callable: ``drive(modes)`` returns the driven displacement in each mode.
     place : int
-        Index of the displacement of the section that is the output.
+        Output, as found by `section_place`.
     x : ndarray or None
         Places; None is the right end.
     motion : bool
@@ -65,7 +66,7 @@ def on_basis(
     alone = system.numerics("damped_spatial").singular(columns) | (zeta is not None)
 
     def outputs(basis: Modes) -> Array:
-        return basis.displacement(1, place)[None] if x is None else basis.shape(place, 0, x).T
+        return displaced(system, basis, place)[None] if x is None else displaced(system, basis, place, x).T
 
     if isinstance(drive, str):
         check_forces(system, system.numerics("load", drive), pencil)

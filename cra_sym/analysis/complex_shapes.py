@@ -26,8 +26,7 @@ def complex_shapes(system: System, modes: int, oscillating: bool, place: int, de
         return np.asarray(system.modes(modes).shape(place, derivative, x), dtype=complex)
     s, spatial = eigenvalues(system, modes, oscillating=oscillating), numerics("damped_spatial")
     columns = flat_columns(system.parameters, system.shape)
-    held = spatial.points is not None and any(spatial.points.held)
-    if not held and not spatial.singular(columns).any():
+    if not spatial.supported and not spatial.singular(columns).any():
         shapes = ComplexShapes(s, spatial, numerics("damped"), columns, system.domain, numerics("inertia"))
         try:
             return shapes.shape(place, derivative, x)

@@ -18,6 +18,7 @@ __all__ = ["by_differences", "central_weights"]
 Array = NDArray[np.float64]
 Quantity = Callable[[System], Array]
 _STEP = 0.02  # step of the differences, over the change of the parameter at which two modes would coincide
+_SAME = 1e-9  # relative distance of squared frequencies below which they are repeated
 _POINTS = 8  # points on one side of a parameter that cannot be negative, or four on each side
 
 
@@ -89,7 +90,8 @@ def _reach(frequency: Array, rate: Array, place: Array) -> Array:
         meeting = gaps / (slopes[..., :, None] + slopes[..., None, :])
         falling = squares / slopes
     own = np.eye(squares.shape[-1], dtype=bool)
-    meeting = np.where(own | ~(gaps > 0) | np.isnan(meeting), np.inf, meeting)
+    together = gaps <= _SAME * squares[..., :, None]  # repeated frequencies, apart by rounding
+    meeting = np.where(own | together | np.isnan(meeting), np.inf, meeting)
     falling = np.where(squares > 0, falling, np.inf)
     reach = np.minimum(meeting.min(axis=(-2, -1)), falling.min(axis=-1))
     return np.where(np.isfinite(reach), reach, np.where(place > 0, place, 1.0))

@@ -18,7 +18,7 @@ from cra_sym.solvers.eigenvalues import refine
 from cra_sym.solvers.pencil_refine import Settled, lowest_eigenvalues
 from cra_sym.solvers.stress_refine import cure
 
-__all__ = ["count_eigenvalues", "damping_ratios", "eigenvalues"]
+__all__ = ["count_eigenvalues", "damping_ratios", "eigenvalues", "oscillating_frequencies"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -124,6 +124,13 @@ def damping_ratios(system: System, modes: int = 3) -> NDArray[np.float64]:
     """
     s = eigenvalues(system, modes)
     return -s.real / np.where(s == 0.0, 1.0, np.abs(s))
+
+
+def oscillating_frequencies(system: System, modes: int) -> Array:
+    """Return the first natural frequencies, or those of the complex modes where there are none, rad/s."""
+    if system.conservative_part is system:
+        return system.natural_frequencies(modes)
+    return np.asarray(eigenvalues(system, modes).imag)
 
 
 @default_floating_point

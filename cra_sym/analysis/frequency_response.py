@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.basis_response import on_basis
-from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
+from cra_sym.analysis.modes import check_places, displaced, only_motion, participation, section_place
 from cra_sym.cached import cached_property
 from cra_sym.checks import choice, default_floating_point, instance, one_axis, shown
 from cra_sym.model.routes import GeneralRoute, Modes
@@ -66,7 +66,7 @@ def frequency_response(
     kind : {'force', 'motion'}, optional
         A unit force on that displacement (the default), or a unit motion of it, at an end or of a coordinate.
     field : applied undefined function, optional
-        Default: the first.
+        A field (default: the first), or a lumped coordinate, which is the same at every x.
     damping : {'modal', 'structural'}
         Meaning of zeta. 'modal': viscous, the same ratio in every mode, as in the time domain. No local damper has this
         property, but the sum over all modes has a closed form, see Notes. 'structural': a loss factor 2 zeta of every
@@ -118,7 +118,8 @@ def frequency_response(
         check_places(system, places)
     choice("damping", damping, ("modal", "structural"))
     system, drive, kind = _as_drive(system, drive, kind)
-    undamped = _Undamped(system, places, drive, kind, section_place(system, field), float(grid.max(initial=0.0)))
+    place = section_place(system, field, lumped=True)
+    undamped = _Undamped(system, places, drive, kind, place, float(grid.max(initial=0.0)))
     zeta = np.broadcast_to(system.zeta, system.shape)[..., None]
     if np.any(zeta) and undamped.problem_damped:
         raise ValueError(
@@ -182,11 +183,12 @@ class _Undamped:
                 raise ValueError(f"kind = {kind!r}: must be left out for {self.motion}, which is not a displacement")
             self._problem: SpatialProblem = system.numerics("driven", self.motion)
             self._driven = self._problem.displacements + system.numerics("driven_coordinate", self.motion)
+            self._entry = place + (place >= self._driven)  # the motion is one of the coordinates of its problem
         else:
             self._problem = system.numerics("driven_spatial")
             from cra_sym.model.derivations import driven_displacement  # the drive is SymPy's already
 
-            self._driven = driven_displacement(system.model, drive)
+            self._driven, self._entry = driven_displacement(system.model, drive), place
         sizes = system.numerics("sizes")
         reactions = 0 if self.motion is not None else self._problem.coordinates - sizes[1]
         self._row = self._driven + (reactions if self._driven >= sum(sizes) else 0)
@@ -291,7 +293,7 @@ class _Undamped:
             for part in np.array_split(np.arange(here.shape[1]), 1 if self._problem.uniform else here.shape[1]):
                 row = np.repeat(np.arange(len(some)), len(part))
                 state = driven_states(problem, here[:, part].ravel(), row, share[row], self._row, self._kind)
-                values = state[..., self._place].reshape(len(rows), len(part), count)
+                values = state[..., self._entry].reshape(len(rows), len(part), count)
                 found[rows[:, None], :, part] = values
         return found
 
@@ -349,8 +351,8 @@ class _Undamped:
         """Return the displacements at the places, shape (..., modes, X)."""
         found = self._system.modes(modes)
         if self._places is None:
-            return found.displacement(1, self._place)[..., None]
-        return found.shape(self._place, 0, np.atleast_1d(self._places))
+            return displaced(self._system, found, self._place)[..., None]
+        return displaced(self._system, found, self._place, np.atleast_1d(self._places))
 
     def _with_soft_modes(self, z: NDArray[Any], *, rigid: bool) -> Complex:
         squares = self._system.natural_frequencies(self._soft + 1).reshape(len(z), -1) ** 2

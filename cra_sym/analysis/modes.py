@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ModalParameters",
+    "displaced",
     "modal_parameters",
     "mode_shapes",
     "natural_frequencies",
@@ -64,8 +65,10 @@ def natural_frequencies(system: System, modes: int = 3) -> Array:
     return system.natural_frequencies(modes) / (2 * np.pi)
 
 
-def section_place(system: System, field: Any = None) -> int:
+def section_place(system: System, field: Any = None, *, lumped: bool = False) -> int:
     """Return the position of a field among the displacements of a section; the first one by default.
+
+    With ``lumped`` it may be a lumped coordinate: these come after the displacements, see `displaced`.
 
     Raises
     ------
@@ -74,11 +77,24 @@ def section_place(system: System, field: Any = None) -> int:
     """
     if field is None:
         return 0
-    fields = system.model.equations.fields
-    if not any(field is one or (isinstance(field, type(one)) and field == one) for one in fields):
-        allowed = f"one of {', '.join(map(str, fields))}" if fields else "None, as the model has no fields"
+    form = system.model.state_form
+    known = [*system.model.equations.fields, *(form.coordinates if lumped else ())]
+    if not any(field is one or (isinstance(field, type(one)) and field == one) for one in known):
+        allowed = f"one of {', '.join(map(str, known))}" if known else "None, as the model has no fields"
         raise ValueError(f"field = {checks.shown(field)}: must be {allowed}")
-    return list(system.model.state_form.displacements).index(field)
+    return [*form.displacements, *form.coordinates].index(field)
+
+
+def displaced(system: System, modes: Modes, place: int, x: Array | None = None) -> Array:
+    """Return what `section_place` found in every mode: at the right end, (..., modes), or at places x, (..., modes, x).
+
+    A lumped coordinate is the same at all places.
+    """
+    own = system.numerics("sizes")[0]
+    if place >= own:
+        value = modes.coordinate(place - own)
+        return value if x is None else np.repeat(value[..., None], np.size(x), axis=-1)
+    return modes.displacement(1, place) if x is None else modes.shape(place, 0, x)
 
 
 @overload
@@ -166,8 +182,8 @@ def check_places(system: System, points: Array, name: str = "x") -> None:
     """Raise a ValueError unless all points lie in the domain of every member of the batch."""
     if not system.numerics("sizes")[0]:
         raise ValueError(
-            f"{name}: the model has coordinates alone, which have no place; use tip_response for the first of them, "
-            "state_space for any"
+            f"{name}: the model has coordinates alone, which have no place; use tip_response, with field= for "
+            "another than the first"
         )
     left, length = system.domain.left, system.domain.length
     low, high = np.max(left), np.min(left + length)

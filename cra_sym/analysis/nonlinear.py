@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym import checks
-from cra_sym.analysis.modes import check_places, section_place
+from cra_sym.analysis.modes import check_places, displaced, section_place
 from cra_sym.analysis.stability import AsymptoticWarning
 from cra_sym.model.modal_equations import ModalEquations, modal_equations
 from cra_sym.model.nonlinear import NonlinearTerms
@@ -124,18 +124,12 @@ def watched(system: System, modes: int, place: Any = None, field: Any = None) ->
         If it is not a field or coordinate of the model, or the place is not in the domain.
     """
     checks.count("modes", modes, high=MOST_MODES)
-    coordinates = list(system.model.linearised.coordinates)
-    found = system.modes(modes)
-    if field is None and not system.model.linearised.fields:
-        field = coordinates[0]
-    if field in coordinates:
-        return found.coordinate(coordinates.index(field))
-    entry = section_place(system, field)
+    found, entry = system.modes(modes), section_place(system, field, lumped=True)
     if place is None:
-        return found.displacement(1, entry)
+        return displaced(system, found, entry)
     at = checks.one_number("place", place, unit="m")
     check_places(system, np.asarray(at), "place")
-    return found.shape(entry, 0, np.atleast_1d(at))[..., 0]
+    return displaced(system, found, entry, np.atleast_1d(at))[..., 0]
 
 
 def samples(degree: int, harmonics: int, causes: int = 0) -> int:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cra_sym.analysis.differences import by_differences, central_weights
 from cra_sym.analysis.histories import History
 from cra_sym.analysis.modes import participation
-from cra_sym.analysis.residual_vibration import Stopped, couples, residual_vibration, stopped
+from cra_sym.analysis.residual_vibration import Stopped, couples, ended, residual_vibration, stopped
 from cra_sym.analysis.sensitivities import Sensitivities, sensitivities
 from cra_sym.checks import count, default_floating_point, names
 from cra_sym.model.one_wave import Change, OneWaveModes
@@ -85,20 +85,21 @@ def residual_vibration_gradient(
     """
     modes = count("modes", modes, high=MOST_MODES)
     coupled = couples(system, modes) or system.numerics("damping") is not None
-    driven = stopped(system.conservative_part, motion, modes, None if coupled else zeta)
-    stretch = ["duration"] if isinstance(motion, BaseMotion) or (len(driven.names) == 1 and _moves(system)) else []
+    histories, *_ = ended(system, motion)
+    stretch = ["duration"] if isinstance(motion, BaseMotion) or (len(histories) == 1 and _moves(system)) else []
     compliances = {f"1/{name}": name for name in system.numerics("stiffnesses")}
     compliances |= {name.replace("k_", "c_", 1): name for name in compliances.values() if name.startswith("k_")}
     known = [*system.values, *compliances, *stretch]
     by = names("by", (*system.numerics("stiffnesses"), *stretch) if by is None else by, known)
     value = residual_vibration(system, motion, modes, zeta=zeta)
-    still: list[Array] = [np.zeros(modes) for _ in driven.names]
     found = sensitivities(system.conservative_part, modes + 1)  # the next mode may be close to the last one
     gradient = np.empty((*np.shape(value), len(by)))
     if coupled:
         for place, name in enumerate(by):
-            gradient[..., place] = _coupled(system, motion, driven, found, compliances, name, modes, zeta)
+            gradient[..., place] = _coupled(system, histories, found, compliances, name, modes, zeta)
         return value, gradient
+    driven = stopped(system, motion, modes, zeta)
+    still: list[Array] = [np.zeros(modes) for _ in driven.names]
     for place, name in enumerate(by):
         with np.errstate(all="ignore"):
             if name == "duration":  # frequency and duration count by their product alone
@@ -119,8 +120,7 @@ def residual_vibration_gradient(
 
 def _coupled(
     system: System,
-    motion: Any,
-    driven: Stopped,
+    histories: Mapping[Any, History],
     found: Sensitivities,
     compliances: Mapping[str, str],
     name: str,
@@ -132,13 +132,14 @@ def _coupled(
         stiffness = compliances.get(name)
 
         def moved(one: System) -> Array:
-            return np.asarray(residual_vibration(one, motion, modes, zeta=zeta))
+            return np.asarray(residual_vibration(one, histories, modes, zeta=zeta))
 
         return by_differences(system, found, stiffness or name, moved, compliance=stiffness is not None, step=_SHORT)
-    (cause,), (profile,) = driven.names, driven.profiles
+    ((cause, profile),) = histories.items()
+    assert isinstance(profile, BaseMotion)
     offsets, weights = central_weights()
-    duration = np.asarray(driven.stop)
-    step = _TURN / driven.osc.omega.max()
+    duration = np.asarray(profile.duration)
+    step = _TURN / (2 * np.pi * found.frequency[..., :modes].max())
     factors = 1.0 + offsets[(..., *(None,) * duration.ndim)] * step / duration
     stretched = residual_vibration(system, {cause: _stretched(profile, factors)}, modes, zeta=zeta)
     return np.asarray(np.tensordot(weights / step, stretched, axes=1))

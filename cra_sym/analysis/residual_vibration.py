@@ -28,7 +28,7 @@ from cra_sym.solvers.motion import BaseMotion
 if TYPE_CHECKING:
     from sympy.core.function import AppliedUndef
 
-__all__ = ["Stopped", "couples", "residual_vibration", "stopped"]
+__all__ = ["Stopped", "couples", "ended", "residual_vibration", "stopped"]
 
 Array = NDArray[np.float64]
 
@@ -144,7 +144,7 @@ def couples(system: System, modes: int) -> bool:
 
 
 def _complex_residual(system: System, motion: Any, modes: int, zeta: Any) -> Array:
-    histories, _, stop = _ended(system, motion)
+    histories, _, stop = ended(system, motion)
     for name, profile in supports(system, histories).items():
         if system.numerics("pencil") is None or (system.natural_frequencies(1) == 0.0).any():
             check_no_support(system, histories)
@@ -162,7 +162,7 @@ def _complex_residual(system: System, motion: Any, modes: int, zeta: Any) -> Arr
     )
 
 
-def _ended(system: System, motion: Any) -> tuple[dict[str, History], tuple[BaseMotion, ...], Any]:
+def ended(system: System, motion: Any) -> tuple[dict[str, History], tuple[BaseMotion, ...], Any]:
     """Return the inputs, their motions, and the time when the last of them ends; refuse those without an end."""
     instance("system", system, System)
     histories = histories_of(system, motion)
@@ -187,7 +187,7 @@ def _ended(system: System, motion: Any) -> tuple[dict[str, History], tuple[BaseM
 
 def stopped(system: System, motion: Any, modes: int, zeta: Any) -> Stopped:
     """Return the natural modes driven until all inputs have ended; refuse inputs without an end."""
-    histories, profiles, stop = _ended(system, motion)
+    histories, profiles, stop = ended(system, motion)
     check_no_support(system, histories)
     modes = count("modes", modes, high=MOST_MODES)
     osc = oscillators(system, np.zeros(modes), np.zeros((1, modes)), modes, zeta)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cra_sym.analysis.complex_responses import complex_response
 from cra_sym.analysis.histories import History, driven, supports
 from cra_sym.analysis.histories import histories as histories_of
-from cra_sym.analysis.modes import check_places, section_place
+from cra_sym.analysis.modes import check_places, displaced, section_place
 from cra_sym.analysis.nonlinear_response import nonlinear_response
 from cra_sym.analysis.slipping import Slipping, slipping, slipping_outputs
 from cra_sym.checks import broadcastable, count, default_floating_point, instance, one_axis, shown
@@ -100,10 +100,10 @@ def tip_response(
     """
     instance("system", system, System)
     modes = count("modes", modes, high=MOST_MODES)
-    place = section_place(system, field)
+    place = section_place(system, field, lumped=True)
 
     def tip(found: Modes) -> Array:
-        return found.displacement(1, place)[..., None, :]
+        return displaced(system, found, place)[..., None, :]
 
     values = _oscillation(system, motion, tip, t, modes, derivative, zeta, start, initial)[..., 0, :]
     return values if np.ndim(plain_numbers("t", t, "s")) else values[..., 0]
@@ -161,7 +161,7 @@ def response(
     initial : mapping of field, coordinate or its first time derivative to an expression in x, optional
         State at t = 0 in addition to that of the start, such as ``{v: a*x**2, v.diff(t): 0}``.
     field : applied undefined function, optional
-        Default: the first.
+        A field (default: the first), or a lumped coordinate, which is the same at every x.
 
     Returns
     -------
@@ -190,10 +190,10 @@ def response(
     places = one_axis("x", x, "places", unit="m")
     check_places(system, places)
     modes = count("modes", modes, high=MOST_MODES)
-    place = section_place(system, field)
+    place = section_place(system, field, lumped=True)
 
     def along(found: Modes) -> Array:
-        return np.swapaxes(found.shape(place, 0, np.atleast_1d(places)), -1, -2)
+        return np.swapaxes(displaced(system, found, place, np.atleast_1d(places)), -1, -2)
 
     values = _oscillation(system, motion, along, t, modes, derivative, zeta, start, initial)
     values = values if places.ndim else values[..., 0, :]

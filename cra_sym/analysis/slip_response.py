@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.histories import History
-from cra_sym.analysis.modes import section_place
+from cra_sym.analysis.modes import displaced, section_place
 from cra_sym.analysis.responses import slipping_problem
 from cra_sym.checks import ByValue, count, default_floating_point, instance, one_axis
 from cra_sym.model.system import MOST_MODES, System
@@ -65,7 +65,7 @@ class SlipResponse(ByValue):
     time : ndarray, shape (T,)
         s.
     tip : ndarray, shape (..., T)
-        Displacement of the tip, m.
+        Displacement of the tip, m, or of the field or coordinate chosen.
     displacement : ndarray, shape (..., D, T)
         Displacements with elements, m (rad).
     force : ndarray, shape (..., E, T)
@@ -134,6 +134,7 @@ def slip_response(
     zeta: Numbers | None = None,
     start: Start = "inertial",
     initial: Mapping[Expr, Expr] | None = None,
+    field: AppliedUndef | None = None,
 ) -> SlipResponse:
     """Return the time history of elastic-slip elements: states, forces, events, energies.
 
@@ -147,8 +148,8 @@ def slip_response(
     ----------
     system : System
         Of a model with ``hysteresis``; batch axes broadcast with those of the motion.
-    motion, modes, zeta, start, initial
-        As in :func:`cra_sym.response`.
+    motion, modes, zeta, start, initial, field
+        As in :func:`cra_sym.response`; ``tip`` of the result is the field at the right end, or the lumped coordinate.
     t : array_like
         One axis of ascending times, s, not negative.
 
@@ -186,6 +187,7 @@ def slip_response(
     if (np.diff(times) <= 0).any():
         raise ValueError(f"t[{int(np.argmax(np.diff(times) <= 0)) + 1}]: must ascend")
     modes = count("modes", modes, high=MOST_MODES)
+    place = section_place(system.without_hysteresis, field, lumped=True)
     problem = slipping_problem(system, motion, modes, zeta, start, initial)
     begin = (problem.start.displacement, problem.start.velocity)
     force = first_forces(problem.modes, begin[0])
@@ -194,7 +196,7 @@ def slip_response(
     events = problem.follow(grid[-1], ledger, grid)
     kept = ledger.energies
     asked = slice(None) if times[0] == 0.0 else slice(1, None)
-    tip = problem.members(problem.base.modes(modes).displacement(1, section_place(problem.base, None))[..., None, :])[0]
+    tip = problem.members(displaced(problem.base, problem.base.modes(modes), place)[..., None, :])[0]
 
     def found(values: Array) -> Array:
         """Return values (members, times) at the requested times."""

@@ -146,7 +146,7 @@ def judged_boundary(
     zone = zone_of(system, excitation, epsilon, first, second, tongue, modes)
     alone = derived(matrices_of(system, excitation, modes))
     doubts = [
-        *_explained(zone, alone, excitation, first, second),
+        *_explained(zone, system, excitation, first, second, alone=alone),
         *_doubted(zone, system, excitation, epsilon, (first, second), modes, rival=tongue == 1),
     ]
     if order == 1:
@@ -224,8 +224,16 @@ def _resonance(resonance: Any, modes: int) -> tuple[int, int]:
     return (-second, -first) if second < 0 and first < -second else (first, second)
 
 
+def _still(system: System, excitation: Parametric) -> str:
+    """Return which fluctuating parameters do not fluctuate at their values, as a text for a message."""
+    weights = excitation.weights if isinstance(excitation, Fluctuation) else {}
+    values = {name: np.asarray(system.values[name]) for name, weight in weights.items() if np.any(weight)}
+    fixed = [f"{name} = {v}" for name, value in values.items() for v in (0.0, np.inf) if np.any(value == v)]
+    return f": nothing fluctuates about {' and '.join(fixed)}" if fixed else ""
+
+
 def _explained(
-    zone: Zone, alone: bool, excitation: Parametric, first: int, second: int
+    zone: Zone, system: System, excitation: Parametric, first: int, second: int, *, alone: bool
 ) -> Iterator[tuple[type[UserWarning], str]]:
     """Return a message with the reason why there is no zone."""
     name = f"resonance ({first}, {second})"
@@ -234,7 +242,7 @@ def _explained(
         (rest, "a rigid-body mode has no frequency to resonate with"),
         (
             ~rest & (zone.strength == 0),
-            f"{excitation!r} does not couple these modes (an infinite stiffness does not fluctuate)",
+            f"{excitation!r} does not couple these modes{_still(system, excitation)}",
         ),
         (
             ~rest & (zone.strength < 0),

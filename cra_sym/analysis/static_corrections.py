@@ -35,6 +35,8 @@ def moments_of_other_modes(system: System, excitation: Fluctuation, modes: int) 
         nothing = np.zeros((*system.shape, len(names), len(names)))
         return nothing, nothing
     problem: SpatialProblem = system.numerics("spatial")
+    if problem.supported:  # the reactions as unknowns; nothing of first order in time fluctuates here
+        problem = system.numerics("driven_spatial")
     ends = [system.numerics("stiffnesses")[name] for name in names]
     places = [place if end == 0 else problem.displacements + problem.coordinates + place for end, place, _ in ends]
     columns = flat_columns(system.parameters, system.shape)

@@ -18,7 +18,7 @@ from cra_sym.model.system import System
 __all__ = ["Zone", "first_order_zone", "zone_of"]
 
 #: Modes in the sums of second order. Those beyond are included statically for springs of ends, and neglected for
-# #: excitations along the span, where the terms decrease with the sixth power of the mode number.
+#: excitations along the span, where the terms decrease with the sixth power of the mode number.
 _SPECTATORS = 24
 _SMALLEST = 1e-9  # epsilon used in place of 0, at which a zone has a strength but negligible width
 _UNCOUPLED = 1e-24  # squared coupling over the frequencies below which it is rounding
@@ -153,11 +153,15 @@ def derived(matrices: Matrices) -> bool:
     return symmetric and order == 1 and kind == "cos"
 
 
+def _with_spectators(system: System, modes: int) -> int:
+    return max(modes, min(_SPECTATORS, system.most_modes))
+
+
 def zone_of(
     system: System, excitation: Parametric, epsilon: np.ndarray, first: int, second: int, tongue: int, modes: int
 ) -> Zone:
     """Return a zone to second order; modes are counted from 1, and ``second`` is negative for a difference."""
-    more = max(modes, min(_SPECTATORS, system.most_modes))
+    more = _with_spectators(system, modes)
     if not derived(matrices_of(system, excitation, modes)):
         return _reduced(system, excitation, epsilon, (first, second), tongue, more, 2)
     kind, labels = _kind(first, second)
@@ -202,7 +206,10 @@ def first_order_zone(
     system: System, excitation: Parametric, epsilon: np.ndarray, first: int, second: int, modes: int, tongue: int = 1
 ) -> Zone:
     """Return a zone to first order; one of derived boundaries has tongue 1."""
-    if not derived(matrices_of(system, excitation, modes)):
+    matrices = matrices_of(system, excitation, modes)
+    if not derived(matrices):
+        if matrices.modal.damping is not None or matrices.modal.stiffness is not None:
+            modes = _with_spectators(system, modes)  # they couple the natural modes, of which the modes here are made
         return _reduced(system, excitation, epsilon, (first, second), tongue, modes, 1)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         values, centre, _ = _quantities(system, modes, excitation, epsilon, first, second, 1)

@@ -133,5 +133,5 @@ def _disagreement(blocks: Blocks, A: Array, B: Array, C: Array) -> float:
     omega = np.geomspace(0.1 * np.min(sizes, initial=1.0), 10 * np.max(sizes, initial=1.0), 61)
     expected = _response(A, B, C, omega)
     found = blocks.frequency_response(omega) - blocks.through[:, None]
-    size = np.abs(expected).max(axis=1, keepdims=True)
+    size = np.maximum(np.abs(expected).max(axis=1), np.abs(blocks.through))[:, None]
     return float(np.max(np.abs(found - expected) / np.where(size > 0.0, size, 1.0)))

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.analysis.eigenvalues import oscillating_frequencies
 from cra_sym.analysis.state_space import state_space
 from cra_sym.codegen.blocks import Blocks, blocks_of
 from cra_sym.codegen.controllers import Controller, controller_checks
@@ -116,8 +117,9 @@ def frozen_library(
     statements = [f"At {values}; zeta = {float(system.zeta)!r}; {modes} modes."]
     statements += [f"Input u: {given}. Outputs y: {', '.join(names)}."]
     lines = (*stated(system.model), *(line for text in statements for line in textwrap.wrap(text, 96)))
-    text = constants(blocks, names, system.natural_frequencies(modes))
-    checks = [*_checks(blocks, real), *common_checks(system.natural_frequencies(modes), real)]
+    omega = oscillating_frequencies(system, modes)
+    text = constants(blocks, names, omega)
+    checks = [*_checks(blocks, real), *common_checks(omega, real)]
     parts = [source(part) for part in ("sampling", "shaping", "frozen", "frozen_check", "frozen_example")]
     if controller is not None:
         gains = controller.gains(blocks, names)

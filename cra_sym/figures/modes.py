@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
+from cra_sym.analysis.eigenvalues import oscillating_frequencies
 from cra_sym.analysis.modes import mode_shapes, natural_frequencies
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import choice, instance, one_axis
@@ -17,7 +18,6 @@ from cra_sym.figures.subject import (
     field_label,
     fields,
     leading_parameter,
-    oscillating_frequencies,
     over_what_is_stable,
     parameter_label,
     parameters_of,

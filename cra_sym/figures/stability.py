@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from cra_sym.analysis.eigenvalues import oscillating_frequencies
 from cra_sym.analysis.floquet import growth_rate
 from cra_sym.analysis.floquet_boundary import floquet_boundary
 from cra_sym.analysis.stability import forced_width, judged_boundary
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
 from cra_sym.figures.drawing import figure_of, panels
-from cra_sym.figures.subject import default_excitation, oscillating_frequencies, rigid_body_modes, single
+from cra_sym.figures.subject import default_excitation, rigid_body_modes, single
 from cra_sym.model.excitations import AxialBase, Fluctuation, TransverseBase
 from cra_sym.model.system import System
 

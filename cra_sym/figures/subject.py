@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.analysis.eigenvalues import eigenvalues
+from cra_sym.analysis.eigenvalues import oscillating_frequencies
 from cra_sym.analysis.modes import mode_shapes
 from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.arm.parameters import Arm
@@ -23,7 +23,6 @@ __all__ = [
     "fields",
     "leading_parameter",
     "moving_place",
-    "oscillating_frequencies",
     "over_what_is_stable",
     "parameter_label",
     "parameter_name",
@@ -132,13 +131,6 @@ def _first_elastic(system: System) -> int:
     part = system.conservative_part
     most = min(7, part.most_modes)
     return next((modes for modes in range(1, most) if part.natural_frequencies(modes)[-1] > 0), most)
-
-
-def oscillating_frequencies(system: System, modes: int) -> Array:
-    """Return the first natural frequencies, or those of the complex modes where there are none, rad/s."""
-    if system.conservative_part is system:
-        return system.natural_frequencies(modes)
-    return np.asarray(eigenvalues(system, modes).imag)
 
 
 def rigid_body_modes(system: System) -> int:

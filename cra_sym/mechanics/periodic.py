@@ -112,6 +112,8 @@ def _wave(label: str, term: Expr, node: Expr, small: tuple[Symbol, Symbol], t: S
     """Return a cosine or sine in powers of exp(i varpi t)."""
     argument = expand(node.args[0])
     order, phase = argument.diff(t) / small[1], argument.subs(t, 0)
+    if (order * small[1] / small[0]).is_Integer:
+        raise HamiltonError(f"small = {small}: must be (epsilon, varpi), and {small[0]} is the frequency in {node}")
     if not order.is_Integer or phase.has(*small) or phase.atoms(AppliedUndef):
         raise HamiltonError(
             f"{label}, term {term}: {node} must be cos or sin of n*{small[1]}*{t} + phase, n a whole number and the "

@@ -180,7 +180,13 @@ def _coefficients(weak: WeakForm, part: dict[Jet, Expr], cause: Expr) -> dict[Je
 
 
 def constant(model: Model) -> Load | None:
-    """Return the loads that are constant in time, or None if there are none."""
+    """Return the loads that are constant in time, or None if there are none.
+
+    Raises
+    ------
+    ValueError
+        Names a load that is an expression of time itself.
+    """
     weak = weak_form(model.linearised.variation)
     still = {f: S.Zero for e in weak.load_terms for f in e.atoms(AppliedUndef)}
 
@@ -189,6 +195,12 @@ def constant(model: Model) -> Load | None:
         return {jet: value for jet, value in values.items() if value != 0}
 
     inside, ends = left(weak.inside_load), left(weak.discrete_load)
+    for value in (*inside.values(), *ends.values()):
+        if value.has(weak.variation.space.t):
+            raise ValueError(
+                f"system: the load {value} must be a function of time such as F(t), whose history is given, or, with "
+                "cosines and sines of varpi*t, be told by small=(epsilon, varpi)"
+            )
     return load_of(weak, inside, ends, model.symbols) if inside or ends else None
 
 
@@ -340,30 +352,29 @@ def stiffnesses(model: Model) -> dict[str, EndParameter]:
 
     Of a model without natural modes those of its conservative part that stand nowhere else.
     """
-    part: Model | None = model.numerics("conservative_part")
-    if part is None:
-        return _end_parameters(model, S.One)
-    elsewhere = {symbol.name for symbol in beside(model, part)}
-    return {name: spring for name, spring in _end_parameters(part, S.One).items() if name not in elsewhere}
+    return _end_parameters(model)
 
 
 def inertias(model: Model) -> dict[str, EndParameter]:
     """Return the parameters that are, up to a factor, the inertia of one displacement of an end, by name."""
-    return _end_parameters(model, -model.conservative.parameter)
+    return _end_parameters(model, inertia=True)
 
 
-def _end_parameters(model: Model, unit: Expr) -> dict[str, EndParameter]:
-    """Return the parameters that add a positive multiple of themselves, times ``unit``, to one entry of an end.
+def _end_parameters(model: Model, *, inertia: bool = False) -> dict[str, EndParameter]:
+    """Return the parameters that add a positive multiple of themselves to the stiffness or the inertia of one entry.
 
     In the order of the displacements, the left end first.
     """
-    form = model.conservative
+    part: Model | None = model.numerics("conservative_part")
+    elsewhere = set() if part is None else {symbol.name for symbol in beside(model, part)}
+    form = (part or model).conservative
+    unit = -form.parameter if inertia else S.One
     n, m = len(form.displacements), len(form.coordinates)
     inside = form.system.free_symbols | form.length.free_symbols | form.free.free_symbols
     found = {}
     for symbol in model.symbols:
         entries = [(k, entry / unit) for k, entry in enumerate(form.boundary.diff(symbol)) if entry != 0]
-        if symbol in inside or len(entries) != 1:
+        if symbol in inside or symbol.name in elsewhere or len(entries) != 1:
             continue
         (row, column), factor = divmod(entries[0][0], 2 * n + m), cancel(entries[0][1])
         if row != column or n <= row < n + m or factor.has(symbol, form.parameter) or factor.is_negative:

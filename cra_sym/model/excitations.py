@@ -194,9 +194,10 @@ class Fluctuation(Parametric):
     """
 
     def __init__(self, weights: Mapping[Any, Any] | None = None, **named: Any) -> None:
-        if weights is not None and not isinstance(weights, Mapping):
+        known = weights if isinstance(weights, Mapping) else {}
+        given: dict[Any, Any] = {getattr(key, "name", key): value for key, value in known.items()}
+        if not isinstance(weights, Mapping | None) or not all(isinstance(name, str) for name in given):
             raise TypeError(f"weights = {shown(weights)}: must be a mapping from symbols or names to numbers")
-        given = {key if isinstance(key, str) else key.name: value for key, value in (weights or {}).items()}
         twice = sorted(given.keys() & named.keys())
         if twice:
             raise ValueError(f"weights: {twice[0]} is given twice")

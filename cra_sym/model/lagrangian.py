@@ -343,7 +343,10 @@ class Model(Asked):
             form = state_form(linearised(hamilton(**undamped), undamped))
         problem = asymmetry(form)
         if problem:
-            raise ValueError(f"natural frequencies need conservative forces, and {problem}; use eigenvalues")
+            raise ValueError(
+                f"natural frequencies need conservative forces, and {problem}; use eigenvalues and "
+                "mode_shapes(damped=True), or system.conservative_part, which leaves such forces out"
+            )
         return form
 
     def _undamped_work(self) -> tuple[tuple[Expr, Expr, Any], ...]:

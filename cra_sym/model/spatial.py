@@ -181,6 +181,11 @@ class SpatialProblem:
         found, decaying = self.exponents
         return None if found is None else Variation(found.function, columns, decaying)
 
+    @property
+    def supported(self) -> bool:
+        """Whether there are supports at interior places."""
+        return self.points is not None and any(self.points.held)
+
     def singular(self, columns: Array) -> NDArray[np.bool_]:
         """Return for which parameter sets a coefficient becomes infinite at an end, because a stiffness vanishes there.
 
@@ -311,7 +316,7 @@ class SpatialProblem:
             terms = zip(self.points.at(z, columns[:, rows]), nodes, strict=True)
             return [(float(spans.knots[node]), *pair) for pair, node in terms]
 
-        if self.points is not None and any(self.points.held):
+        if self.supported:
             raise ValueError("essential: supports at interior places are known to natural frequencies and modes alone")
         jumps = None if self.points is None else at_nodes
         return Stiffness(section, ends, length, n, m, free, self.uniform, halvings, spans, jumps)

@@ -10,7 +10,7 @@ import cra_sym as cra
 
 x, t, EI, rhoA, L, k, c, m, e = sp.symbols("x t EI rhoA L k c m e")
 v, u = (sp.Function(name)(x, t) for name in "vu")
-w, turn, force = (sp.Function(name)(t) for name in ("w", "turn", "force"))
+w, turn, force, payload = (sp.Function(name)(t) for name in ("w", "turn", "force", "payload"))
 BEAM = {EI: 4.6, rhoA: 0.24, L: 1.3}
 
 
@@ -128,6 +128,66 @@ def test_residual_vibration_is_after_all_that_drives_has_ended():
         cra.residual_vibration(model.at(BEAM), move)
     with pytest.raises(ValueError, match="the force force never ends: must be a sampled record"):
         cra.residual_vibration(model.at(BEAM), {w: move, force: cra.Force(1.0)})
+
+
+def carried(**pieces):
+    """A payload on a spring under the tip of a beam on a base that moves, pulled by a force."""
+    return beam(
+        density=energy(v + w), coordinates=[payload], prescribed=[w], left=springs(),
+        right=m * (payload + w).diff(t) ** 2 / 2 - k * (v - payload) ** 2 / 2 + force * payload, **pieces,
+    )  # fmt: skip
+
+
+def test_a_payload_is_an_output_too():
+    """By the boundary-value problem, by modes in the frequency domain, and by modes in time."""
+    system, Omega = carried().at({**BEAM, m: 0.2, k: 40.0}, zeta=0.03), np.array([0.0, 3.0, 40.0])
+    for drive in ("w", "force"):
+        modal = cra.state_space(system, 12, drive, ["payload"])
+        summed = [(modal.C @ np.linalg.solve(1j * one * np.eye(24) - modal.A, modal.B))[0, 0] for one in Omega]
+        found = cra.frequency_response(system, Omega, drive=drive, field=payload)
+        # what the modes beyond give the payload falls with the twelfth power of their number
+        np.testing.assert_allclose(found, summed, rtol=1e-9)
+        at_places = cra.frequency_response(system, Omega, [0.0, 0.4], drive=drive, field=payload)
+        np.testing.assert_allclose(at_places, [found, found], rtol=1e-12)
+    moves = {w: cra.BaseMotion(), force: cra.Force(2.0)}
+    pushed = cra.state_space(system, 4, "force", ["payload"]).discrete(0.1)
+    state, steps = np.zeros(8), []
+    for _ in range(4):
+        steps.append((pushed.C @ state)[0])
+        state = pushed.A @ state + pushed.B[:, 0] * 2.0
+    times = 0.1 * np.arange(4)
+    np.testing.assert_allclose(cra.tip_response(system, moves, times, 4, field=payload), steps, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(cra.response(system, moves, times, [0.1, 1.0], 4, field=payload), [steps, steps], 1e-9)
+    with pytest.raises(ValueError, match=r"field = w\(t\): must be one of v\(x, t\), payload\(t\)"):
+        cra.tip_response(system, moves, times, field=w)
+
+
+def test_the_payload_of_a_joint_that_slips():
+    """The element sticks: the response is that of the model with a stiffer spring; the tip and the payload."""
+    k_d, f_s = sp.symbols("k_d f_s")
+    held = carried(hysteresis=[(cra.Jenkins(k_d, f_s), payload, None)]).at(
+        {**BEAM, m: 0.2, k: 40.0, k_d: 5.0, f_s: 1e3}
+    )
+    moves, times = {w: cra.BaseMotion.trapezoid(0.1, 0.3, 2.0), force: cra.Force(0.0)}, np.linspace(0.0, 0.6, 7)
+    found = cra.slip_response(held, moves, times, 3, field=payload).tip
+    np.testing.assert_allclose(found, cra.response(held, moves, times, 0.7, 3, field=payload), rtol=1e-9, atol=1e-15)
+    assert np.abs(found - cra.slip_response(held, moves, times, 3).tip).max() > 1e-3 * np.abs(found).max()
+
+
+def test_each_of_two_lumped_masses_is_an_output():
+    """A chain without fields, by hand."""
+    chain = beam(
+        density=0, fields=(), coordinates=[payload, turn], domain=(0, 1), prescribed=[w],
+        left=m * ((payload + w).diff(t) ** 2 + (turn + w).diff(t) ** 2) / 2
+        - k * (payload**2 + 3 * (turn - payload) ** 2) / 2,
+    ).at({m: 0.5, k: 4.0})  # fmt: skip
+    stiffness, Omega = np.array([[16.0, -12.0], [-12.0, 12.0]]), 2.0
+    by_hand = np.linalg.solve(stiffness - 0.5 * Omega**2 * np.eye(2), [-0.5, -0.5])
+    found = [cra.frequency_response(chain, Omega, field=one) for one in (payload, turn)]
+    np.testing.assert_allclose(found, by_hand, rtol=1e-12)
+    late = 1e-4  # after a start the masses stand still in the inertial frame
+    for one in (payload, turn):
+        assert cra.tip_response(chain, cra.BaseMotion(velocity=0.1), late, 2, field=one) == pytest.approx(-0.1 * late)
 
 
 def test_the_base_as_a_coordinate_may_have_a_stiffness_that_fluctuates():

@@ -129,8 +129,17 @@ def test_what_cannot_be_periodic_is_named(options, words):
 
 def test_cosines_of_time_need_their_symbols():
     pulsating = model(BEAM, right=-k * epsilon * cos(varpi * t) * v**2, essential=CLAMPED)
+    with pytest.raises(
+        ValueError, match=r"small = \(varpi, epsilon\): must be \(epsilon, varpi\), and varpi is the freq"
+    ):
+        model(BEAM, right=-k * epsilon * cos(2 * varpi * t + 1) * v**2, small=SMALL[::-1])
     with pytest.raises(ValueError, match=r"depends on t, .* say small=\(epsilon, varpi\)"):
         pulsating.at({**UNIT, k: 1.0, epsilon: 0.1, varpi: 3.0}).natural_frequencies(1)
+    pulled = model(BEAM, right=k * L * epsilon * cos(varpi * t) * v, essential=CLAMPED).at(
+        {**UNIT, k: 1.0, epsilon: 0.1, varpi: 3.0}
+    )
+    with pytest.raises(ValueError, match=r"system: the load .*cos\(t\*varpi\) .* told by small=\(epsilon, varpi\)"):
+        cra.tip_response(pulled, None, 0.1)
 
 
 def test_small_symbols_are_no_values():
@@ -149,6 +158,8 @@ def test_what_cannot_fluctuate_is_named():
     for name, words in (("L", "L is a length"), ("q", "q is not a parameter")):
         with pytest.raises(ValueError, match=rf"{words}; must be one of EI, T, rhoA"):
             cra.growth_rate(system, cra.Fluctuation({name: 1.0}), 7.0, 0.1)
+    with pytest.raises(TypeError, match=r"weights = \{1: 1.0\}: must be a mapping from symbols or names"):
+        cra.Fluctuation({1: 1.0})
     with pytest.raises(ValueError, match="h does not enter the Lagrangian linearly; must be one of b, E, rho, m_e"):
         cra.growth_rate(cra.Arm.nominal(), cra.Fluctuation(h=1.0), 7.0, 0.1)
 
