@@ -138,7 +138,7 @@ def _checked(system: System, parameter: Any, between: Any) -> tuple[str, float, 
     if ends.shape != (2,) or not (np.isfinite(ends).all() and ends[0] < ends[1]):
         raise ValueError(f"between = {shown(between)}: must be two real numbers, the lower one first")
     if system.numerics("pencil") is None:
-        raise ValueError("system: a density with third derivatives by x or a mass of the highest has no critical value")
+        raise ValueError("system: a density with inertia of the highest derivatives by x has no critical value")
     return name, float(ends[0]), float(ends[1])
 
 

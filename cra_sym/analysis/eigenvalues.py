@@ -63,8 +63,8 @@ def eigenvalues(system: System, modes: int = 3, *, oscillating: bool = True) -> 
     its degree rises. Where two coalesce (critical damping, flutter) their mean and product converge, and each is
     accurate to half the digits only, as its sensitivity to the parameters implies. :func:`count_eigenvalues` proves in
     a region that none is missing. With
-    third derivatives by x or a mass of the highest derivative, Newton's method on the exact problem refines Ritz values
-    of Hermite elements. Without dampers and other such forces ``s = i omega``.
+    inertia of the highest derivatives by x, Newton's method on the exact problem refines Ritz values of Hermite
+    elements. Without dampers and other such forces ``s = i omega``.
 
     Examples
     --------

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 __all__ = ["CrossCheck", "cross_check"]
 
 Array = NDArray[np.float64]
-_ELEMENTS, _FEWEST = 32, 2  # of all spans together, of one
-_ROUNDING = 1e-15  # of Ritz's method, times the fourth power of the number of elements
+_ELEMENTS, _FEWEST = 32, 2  # of all spans together where no derivative is above the second, of one span
+_ROUNDING = 1e-15  # of Ritz's method, times the number of elements to the power of the condition of the stiffness
 
 
 @dataclass(frozen=True)
@@ -52,11 +52,12 @@ def cross_check(system: System, modes: int) -> CrossCheck:
     """Compare natural frequencies with those of Hermite elements that have nodes at every breakpoint."""
     own = system.natural_frequencies(modes).reshape(-1, modes) / (2.0 * np.pi)
     accuracy = np.broadcast_to(system.accuracy, system.shape).reshape(-1, 1)
-    coarse, fine, elements = _by_ritz(system, modes)
+    order = max(2, *system.model.linearised.variation.orders)
+    coarse, fine, elements = _by_ritz(system, modes, order)
     with np.errstate(divide="ignore", invalid="ignore"):
         difference = np.where(own > 0.0, fine / own - 1.0, np.where(fine > 0.0, np.inf, 0.0))
         falling = np.where(fine > 0.0, coarse / fine - 1.0, 0.0)
-    expected = accuracy + np.abs(falling) + _ROUNDING * (2.0 * elements[:, None]) ** 4
+    expected = accuracy + np.abs(falling) + _ROUNDING * (2.0 * elements[:, None]) ** (2 * order)
     over = np.abs(difference) - expected
     mode = np.where((over > 0.0).any(axis=1), over.argmax(axis=1), np.abs(difference).argmax(axis=1))
     rows = np.arange(len(own))
@@ -91,18 +92,19 @@ def _cause(difference: float, mode: int, accuracy: float, falling: float) -> str
     )
 
 
-def _by_ritz(system: System, modes: int) -> tuple[Array, Array, Array]:
+def _by_ritz(system: System, modes: int, order: int) -> tuple[Array, Array, Array]:
     """Return frequencies in Hz on a mesh and a refined one, (sets, modes), and the number of elements of the first."""
     from cra_sym.mechanics import ritz
     from cra_sym.model.galerkin import Ritz
 
     model, spatial = system.model, system.numerics("spatial")
     columns = flat_columns(system.parameters, system.shape)
+    whole = (2.0 * _ELEMENTS) ** (2.0 / order) / 2.0  # rounding is then the same for every order
     sets = columns.shape[1]
     found = np.empty((2, sets, modes))
     number = np.empty(sets)
     for rows, names, places in _nodes(system, columns):
-        each = max(_FEWEST, int(np.ceil((_ELEMENTS + modes) / (len(names) + 1))))
+        each = max(_FEWEST, int(np.ceil((whole + modes) / (len(names) + 1))))
         values = {name: column[rows] for name, column in zip(spatial.names, columns, strict=True)}
         values |= {symbol.name: at for symbol, at in zip(places[0], places[1], strict=True)}
         for k, elements in enumerate((each, 2 * each)):

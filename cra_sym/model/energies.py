@@ -21,11 +21,11 @@ __all__ = ["stress_route"]
 
 
 def stress_route(model: Model, spatial: SpatialProblem) -> StressRoute | None:
-    """Return the route of a model by its energies, or None if a field has derivatives of other orders than 1 and 2."""
+    """Return the route of a model by its energies, or None for inertia of the highest derivatives."""
     weak = weak_form(model.linearised.variation)
     section, highest, lumped = weak.fields()
     orders = tuple(weak.variation.orders)
-    if not set(orders) <= {1, 2} or any(jet in highest for pair, e in weak.inside.items() for jet in pair if 2 in e):
+    if 0 in orders or any(jet in highest for pair, e in weak.inside.items() for jet in pair if 2 in e):
         return None
     state = [*section, *lumped]
     leading, coupled = _matrix(weak, highest, highest, 0), _matrix(weak, highest, state, 0)

@@ -43,6 +43,7 @@ TOLERANCE = 1e-10
 """Relative error of a natural frequency beyond which it is refused, unless a system states its own."""
 _NO_DIGIT = 5e-3  # relative error of a frequency without a digit that counts
 _FEWEST, _MOST = 2, 11  # halvings of the two parts of a problem that varies along x
+_CAUTION = 4.0  # two results may by chance differ by less than their rounding errors
 Values = Sequence[float | Array]
 """Parameters in the order of the model's symbols; they broadcast to the shape of the batch."""
 
@@ -142,16 +143,23 @@ class GeneralRoute:
 
     def angular_frequencies(self, values: Values, shape: tuple[int, ...], modes: int) -> Array:
         """Return the first natural frequencies, rad/s, ascending and complete, shape (*shape, modes)."""
-        return np.sqrt(self._squares(flat_columns(values, shape), modes, HALVINGS)).reshape(*shape, modes)
+        return np.sqrt(self._squares(flat_columns(values, shape), modes, HALVINGS)[0]).reshape(*shape, modes)
 
-    def _squares(self, columns: Array, modes: int, halvings: int) -> Array:
-        """Return the squared frequencies, shape (sets, modes), for a number of halvings along x."""
+    def _squares(self, columns: Array, modes: int, halvings: int) -> tuple[Array, int]:
+        """Return the squared frequencies, shape (sets, modes), and by how many halvings along x at most.
+
+        ``halvings`` are the fewest; short waves need more.
+        """
         if self.spatial.points is not None:
-            raise ValueError("inside: terms at interior places need fields with first or second derivatives by x")
-        squares = np.empty((columns.shape[1], modes))
+            raise ValueError(
+                "inside: terms at interior places need a density without inertia of the highest derivatives by x"
+            )
+        squares, most = np.empty((columns.shape[1], modes)), halvings
         for rows, _, problem in self.spatial.problems(columns, halvings):
-            squares[rows] = lowest(problem, modes)
-        return squares
+            squares[rows] = found = lowest(problem, modes)
+            if not self.spatial.uniform:
+                most = max(most, int(problem.levels(found[:, -1], np.arange(len(rows))).max()))
+        return squares, most
 
     def estimated(self, values: Values, shape: tuple[int, ...], modes: int, tolerance: float) -> tuple[Array, Array]:
         """Return the frequencies and an estimate of their largest relative error, shape ``shape``.
@@ -162,20 +170,18 @@ class GeneralRoute:
         if self.spatial.uniform:
             return self.angular_frequencies(values, shape, modes), np.full(shape, ROUNDING)
         columns = flat_columns(values, shape)
-        first = max(self.needed(columns), _FEWEST)
-        before, least = self._squares(columns, modes, first), np.full((columns.shape[1], modes), np.inf)
+        before, halvings = self._squares(columns, modes, max(self.needed(columns), _FEWEST))
+        least = np.full((columns.shape[1], modes), np.inf)
         with refinement() as progress:
-            for halvings in range(first + 1, _MOST + 1):
+            while halvings < _MOST:
                 try:
-                    squares = self._squares(columns, modes, halvings)
+                    squares, halvings = self._squares(columns, modes, halvings + 1)
                 except ValueError:  # rounding error of so many steps in a soft direction
                     if np.isinf(least).all():
                         raise
                     break
-                if (squares == before).all() and squares.any():
-                    continue  # short waves need more steps anyway
                 with np.errstate(divide="ignore", invalid="ignore"):
-                    error = 0.5 * np.where(squares == before, 0.0, np.abs(squares - before) / squares)
+                    error = 0.5 * _CAUTION * np.where(squares == before, 0.0, np.abs(squares - before) / squares)
                 before, least = squares, np.minimum(least, error)
                 accuracy = np.maximum(error.max(axis=1), ROUNDING)
                 if (error <= tolerance).all():
@@ -185,9 +191,8 @@ class GeneralRoute:
         if least[row, mode] > _NO_DIGIT:
             raise ValueError(
                 f"modes = {modes}: frequency {mode + 1} agrees between no two step sizes, since the rounding error of "
-                "the stiffness hides it, as it does for rigid-body motions and soft springs where a density has high "
-                "derivatives; hold such motions by essential conditions or stiffer springs, or use ritz, which "
-                "estimates no error"
+                "the stiffness hides it, as it does for rigid-body motions and soft springs; hold such motions by "
+                "essential conditions or stiffer springs, or use ritz, which estimates no error"
             )
         raise ValueError(
             f"modes = {modes}: the relative error of frequency {mode + 1} stays at {least[row, mode]:.1g}; it comes "
@@ -218,7 +223,7 @@ class GeneralRoute:
                 finest = int(np.argmin(np.diff(at)))
                 raise ValueError(
                     f"coefficients vary too finely at x = {at[finest]:.6g} to {at[finest + 1]:.6g} for a density with "
-                    f"third derivatives by x or a mass of the highest: {2 ** (_MOST + 1)} steps along x do not suffice"
+                    f"inertia of the highest derivatives by x: {2 ** (_MOST + 1)} steps along x do not suffice"
                 )
             needed = max(needed, int(np.ceil(np.log2(GOLDEN / width)).max()))
         return needed

@@ -241,9 +241,9 @@ class System:
         """Estimated relative error of the natural frequencies, the largest of those computed so far, shape (...).
 
         Of the first three if none was computed. Where coefficients vary along x it is estimated, from the stresses that
-        break equilibrium or, with third derivatives by x or a mass of the highest derivative, from a second
-        integration of twice as many steps; a frequency whose error would be beyond ``tolerance`` is refused. Where they
-        are constant along x frequencies are exact but for rounding, and this is a bound of that, 1e-11.
+        break equilibrium or, with inertia of the highest derivatives by x, from a second integration of twice as many
+        steps; a frequency whose error would be beyond ``tolerance`` is refused. Where they are constant along x
+        frequencies are exact but for rounding, and this is a bound of that, 1e-11.
         """
         if "_accuracy" not in self.__dict__:
             self.natural_frequencies(3)

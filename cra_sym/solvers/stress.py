@@ -221,7 +221,21 @@ class Columns:
     @cached_property
     def potential(self) -> Array | None:
         """Stiffness from the potential energy of the displacements, (sets, size, size), or None if there is none."""
-        cross, direct = self.coefficient["D"], self.coefficient["R"]
+        if self.support is None or self.load is None:
+            return self.load if self.support is None else self.support
+        return np.asarray(self.support + self.load)
+
+    @cached_property
+    def support(self) -> Array | None:
+        """The part of it that is positive semidefinite: of foundations, tensions; None if there is none."""
+        entries = self._supports
+        return self._quadratic(entries, np.zeros((self.sets, self.size, self.size))) if entries else None
+
+    @cached_property
+    def load(self) -> Array | None:
+        """The other part, which may be negative: tensions below zero, coupling with strains; None if there is none."""
+        cross, supports = self.coefficient["D"], self._supports
+        direct = {pair: entry for pair, entry in self.coefficient["R"].items() if pair not in supports}
         if not cross and not direct:
             return None
         moved = self.displaced[0]
@@ -230,6 +244,15 @@ class Columns:
             product = self._product(entry, self.strain[i], moved[j])
             total += product + product.swapaxes(-1, -2)
         return self._quadratic(direct, total)
+
+    @cached_property
+    def _supports(self) -> Entries:
+        """The potential if it is semidefinite, else its squares of one displacement that are nowhere negative."""
+        direct = self.coefficient["R"]
+        if _semidefinite(direct):
+            return direct
+        coupled = {place for pair in direct for place in pair if pair[0] != pair[1]}
+        return {(i, j): e for (i, j), e in direct.items() if i == j and i not in coupled and (e >= 0.0).all()}
 
     @cached_property
     def potential_size(self) -> Array | None:
@@ -307,3 +330,15 @@ def _on_points(entry: Array, sets: int, shape: tuple[int, ...]) -> Array:
         entry = entry.reshape(-1, 1, 1) if entry.ndim else entry[None, None, None]
         return np.broadcast_to(entry, (len(entry), *shape))
     return entry.reshape(len(entry), *shape)
+
+
+def _semidefinite(entries: Entries) -> bool:
+    """Return whether a quadratic form with these entries is positive semidefinite up to rounding."""
+    if all(i == j for i, j in entries):
+        return all(bool((entry >= 0.0).all()) for entry in entries.values())
+    size = 1 + max(max(pair) for pair in entries)
+    form = np.zeros((*np.broadcast_shapes(*(entry.shape for entry in entries.values())), size, size))
+    for (i, j), entry in entries.items():
+        form[..., i, j] = form[..., j, i] = entry
+    values = np.linalg.eigvalsh(form)
+    return bool((values[..., 0] >= -size * np.finfo(float).eps * np.abs(values).max(axis=-1)).all())

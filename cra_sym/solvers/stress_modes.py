@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import factorial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -135,7 +137,8 @@ class ModeFields:
     def _self_equilibrated_forces(self, order: int) -> list[list[tuple[Array, Array]]]:
         """Return the self-equilibrated forces of a field, at the points and at the ends of pieces, lowest order first.
 
-        A constant and, for a field with second derivatives, a moment linear in x; also a jump at each interior place.
+        With zero below some order and a constant in it, the next ones are linear in x, quadratic and so on: a constant
+        moment, or a constant shear force with a linear moment. They also jump at each interior place.
         """
         grid = self.columns.grid
         points = sorted({point.node for point in self.problem.points})
@@ -143,22 +146,19 @@ class ModeFields:
         scale = 0.5 * (grid.ends[:, -1] - grid.ends[:, 0])
         starts = [(0.5 * (grid.ends[:, 0] + grid.ends[:, -1]), np.full(len(scale), -np.inf))]
         starts += [(kink, kink) for kink in kinks.T]
-        found = []
-        for centre, start in starts:
-            steps, ramps = [], []
-            for x in (grid.x, grid.ends):
-                shape = (-1, *[1] * (x.ndim - 1))
-                there = np.where(x > start.reshape(shape), 1.0, 0.0)
-                steps.append(there)
-                ramps.append(there * (centre.reshape(shape) - x) / scale.reshape(shape))
-            step = steps[0], steps[1]
-            if order == 1:
-                found.append([step])
-                continue
-            lower = steps[0] / scale[:, None, None], steps[1] / scale[:, None]
-            found.append([(np.zeros_like(steps[0]), np.zeros_like(steps[1])), step])
-            found.append([lower, (ramps[0], ramps[1])])
-        return found
+
+        def level(first: int, k: int, centre: Array, start: Array, x: Array) -> Array:
+            origin, begin, size = (part.reshape(-1, *[1] * (x.ndim - 1)) for part in (centre, start, scale))
+            if k < first:
+                return np.zeros_like(x)
+            power = ((origin - x) / size) ** (k - first) / factorial(k - first)
+            return np.where(x > begin, power * size ** (k + 1 - order), 0.0)
+
+        return [
+            [(level(first, k, *at, grid.x), level(first, k, *at, grid.ends)) for k in range(order)]
+            for at in starts
+            for first in reversed(range(order))
+        ]
 
     def _softness(self, field: int) -> Array:
         """Return weights of the integral of a squared stress times its compliance, (sets, 1, Q, G)."""

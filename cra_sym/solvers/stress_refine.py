@@ -118,7 +118,7 @@ def _vanishes(problem: Continuum, end: int) -> NDArray[np.bool_]:
         for k in range(order):  # a force there causes a stress that goes as the distance to the power order - 1 - k
             held = gone & (power > order - 1 - k + 0.05) & problem.acts_at(end, tops[field] - order + 1 + k)
             if held.any():
-                name, moved = ("left", "right")[end], ("displacement", "slope")[k]
+                name, moved = ("left", "right")[end], ("displacement", "slope", f"derivative of order {k}")[min(k, 2)]
                 raise ValueError(
                     f"the stiffness vanishes at the {name} end like the distance to the power {power[held][0]:.3g}: a "
                     f"force on the {moved} there makes the strain infinite; leave out its spring, mass or damper, or "

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .continuum import Entries
 from .stress import Columns
 
 __all__ = ["BuckledError", "Spectrum", "bases", "spectrum"]
@@ -126,9 +125,10 @@ def _rigid_motions(columns: Columns, rows: Array, springs: Array) -> list[Array]
     for k in range(columns.sets):
         mine = held[k, active[k]]
         if columns.potential is not None:
-            size, frame = np.linalg.eigh(columns.potential[k, : columns.rigid, : columns.rigid])
+            # a motion without potential energy of its own that is coupled to strains is not at rest
+            frame, size, _ = np.linalg.svd(columns.potential[k, : columns.rigid])
             largest = max(float(np.abs(columns.potential[k]).max()), np.finfo(float).tiny)
-            mine = np.concatenate([mine, frame.T[np.abs(size) > 1e-12 * largest]])
+            mine = np.concatenate([mine, frame.T[size > 1e-12 * largest]])
         found.append(_not_held(mine))
     return found
 
@@ -155,7 +155,7 @@ class _Problem:
         self.springs = np.concatenate([springs, np.full(held.shape[:2], np.inf)], axis=1)
         self.softened = np.ones(len(sets))  # least remaining share of the stiffness of a motion under negative springs
         self.elastic = columns.elastic_stiffness[sets]
-        self.potential = None if columns.potential is None else columns.potential[sets]
+        self.support, self.load = (None if part is None else part[sets] for part in (columns.support, columns.load))
 
     def _normalised(self, still: Array) -> Array:
         """Return rigid-body motions as vectors of all unknowns, orthonormal with respect to the mass."""
@@ -177,9 +177,9 @@ class _Problem:
     def solved(self, modes: int) -> Spectrum:
         """Return the lowest modes, those of rigid-body motions first."""
         operator = self.unloaded()
-        load = np.full(len(self.sets), 0.0 if self.potential is None else 1.0)
-        if self.potential is not None and self._loaded:
-            operator, loading = self._loaded_factor(operator)
+        load = np.full(len(self.sets), 0.0 if self.columns.potential is None else 1.0)
+        if self.load is not None:
+            operator, loading = self._loaded_factor(operator, self.load)
             load = self._load(operator)
         else:
             loading = np.ones((len(self.sets), 1))
@@ -198,7 +198,7 @@ class _Problem:
         return self._spectrum(unknowns, kinetic, values, loading, number, load)
 
     def unloaded(self) -> Array:
-        """Return L^-1 of the structure with its springs, without potential that may be negative."""
+        """Return L^-1 of the structure with its springs, without its loads."""
         base, taken = self._base()
         inverse, scale = self._inverse_factor(base)
         projected = inverse @ (scale[:, :, None] * self.rows.swapaxes(-1, -2))  # L^-1 b, (sets, size, rows)
@@ -206,17 +206,11 @@ class _Problem:
         operator: Array = inverse * scale[:, None, :]  # L^-1
         return operator if factor is None else factor.swapaxes(-1, -2) @ operator
 
-    @property
-    def _loaded(self) -> bool:
-        """Whether some potential energy may be negative: tensions below zero, coupling with strains."""
-        parts = self.columns.coefficient
-        return bool(parts["D"]) or not _semidefinite(parts["R"])
-
     def _base(self) -> tuple[Array, Array]:
         """Return a positive stiffness with springs up to its own size, and the included part of each spring."""
         total = self.elastic.copy()
-        if self.potential is not None and not self._loaded:
-            total += self.potential
+        if self.support is not None:
+            total += self.support
         taken = np.zeros(self.springs.shape)
         order = np.argsort(np.where(self.springs < 0.0, np.inf, self.springs).min(axis=0, initial=np.inf))
         for k in order:
@@ -239,23 +233,25 @@ class _Problem:
         try:
             return np.linalg.inv(np.linalg.cholesky(scaled)), scale
         except np.linalg.LinAlgError:
-            smallest = np.linalg.eigvalsh(scaled)[:, 0]
-            lift = np.where(smallest < 1e-12, 1e-12 - 2.0 * np.minimum(smallest, 0.0), 0.0)
-            if self.potential is not None and lift.max() > 1e-6:
-                total = self._spring_projection()
-                raise BuckledError((np.linalg.eigvalsh(total) < -1e-12).sum(axis=1)) from None
+            if self.load is not None and (unstable := self._unstable()).any():
+                raise BuckledError(unstable) from None
             raise ValueError(
                 "values: the stiffnesses lie too far apart for double precision along x; use ritz"
             ) from None
 
-    def _spring_projection(self) -> Array:
-        finite = np.where(np.isinf(self.springs), 0.0, self.springs)
-        total = self.elastic + (0.0 if self.potential is None else self.potential)
-        total = total + np.einsum("sr,sri,srj->sij", finite, self.rows, self.rows)
-        diagonal = np.abs(np.einsum("sii->si", total))
-        scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-        scaled: Array = total * scale[:, :, None] * scale[:, None, :]
-        return scaled
+    def _unstable(self) -> NDArray[np.intp]:
+        """Return the number of motions of negative potential energy of each set."""
+        found, potential = np.zeros(len(self.sets), dtype=np.intp), self.columns.potential
+        assert potential is not None
+        for k, (row, springs) in enumerate(zip(self.sets, self.springs, strict=True)):
+            rigid = np.isinf(springs)
+            free = _not_held(self.rows[k, rigid])
+            pulled = self.rows[k, ~rigid] @ free.T
+            total = free @ (self.elastic[k] + potential[row]) @ free.T + (pulled.T * springs[~rigid]) @ pulled
+            size = np.abs(np.diag(total))
+            scale = 1.0 / np.sqrt(np.maximum(size, 1e-14 * size.max()))
+            found[k] = (np.linalg.eigvalsh(scale[:, None] * total * scale) < -1e-12).sum()
+        return found
 
     def _springs(self, projected: Array, taken: Array) -> Array | None:
         """Return S with S' (I + sum (k - taken) n n') S = I, one spring after the other, or None if it is I."""
@@ -283,10 +279,10 @@ class _Problem:
             factor -= pull[:, None, None] * (factor @ row[:, :, None]) * row[:, None, :]
         return factor
 
-    def _loaded_factor(self, operator: Array) -> tuple[Array, Array]:
+    @staticmethod
+    def _loaded_factor(operator: Array, load: Array) -> tuple[Array, Array]:
         """Return the operator of the loaded structure, and the largest ratio of unloaded to loaded stiffness."""
-        assert self.potential is not None
-        matrix = operator @ self.potential @ operator.swapaxes(-1, -2)
+        matrix = operator @ load @ operator.swapaxes(-1, -2)
         matrix = matrix + np.eye(matrix.shape[-1])
         values, frame = np.linalg.eigh(matrix)
         unstable = (values < -64 * EPS).sum(axis=1)
@@ -405,15 +401,3 @@ def _root(mass: Array) -> Array:
     size, frame = np.linalg.eigh(mass)
     root: Array = np.sqrt(np.maximum(size, 0.0))[..., None] * frame.swapaxes(-1, -2)
     return root
-
-
-def _semidefinite(entries: Entries) -> bool:
-    """Return whether a quadratic form with these entries is positive semidefinite up to rounding."""
-    if all(i == j for i, j in entries):
-        return all(bool((entry >= 0.0).all()) for entry in entries.values())
-    size = 1 + max(max(pair) for pair in entries)
-    form = np.zeros((*np.broadcast_shapes(*(entry.shape for entry in entries.values())), size, size))
-    for (i, j), entry in entries.items():
-        form[..., i, j] = form[..., j, i] = entry
-    values = np.linalg.eigvalsh(form)
-    return bool((values[..., 0] >= -size * EPS * np.abs(values).max(axis=-1)).all())

@@ -71,7 +71,8 @@ def tail(columns: Columns) -> tuple[Array, Array]:
     mesh, problem = columns.mesh, columns.problem
     starts = np.searchsorted(mesh.owner, np.arange(len(mesh.elements) - 1))
     edges = columns.grid.ends[:, np.searchsorted(mesh.pieces, mesh.elements)]
-    reach = 0.5 * np.diff(edges, axis=1) / mesh.degree
+    # of three integrals the product is less than that, of n the last factor is that of degree p - n + 1
+    reach = 0.5 * np.diff(edges, axis=1) / (mesh.degree + min(3 - max(problem.orders, default=1), 0))
     weights = columns.weights.reshape(len(columns.weights), *columns.grid.x.shape[1:])
 
     def most(entry: Array) -> Array:
