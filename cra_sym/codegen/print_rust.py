@@ -8,13 +8,15 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from cra_sym.codegen.printing import Lines, Printer
-from cra_sym.kernels.form import Constant, Form, Function, Record, Type
+from cra_sym.kernels.form import Constant, Form, Function, Record, Type, error_name
 
 __all__ = ["RustPrinter"]
 
 _FUNCTIONS = "sqrt exp log sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh floor ceil abs min max atan2"
 
 _IN_CORE = {"abs", "min", "max", "isfinite", "float", "int"}
+
+_OF_PI = {math.pi: "PI", math.pi / 2: "FRAC_PI_2", 2 / math.pi: "FRAC_2_PI"}
 
 _UPDATES = ast.Add | ast.Sub | ast.Mult | ast.Div
 
@@ -173,6 +175,30 @@ class RustPrinter(Printer):
         used = any(isinstance(n, ast.Name) and n.id == name for part in node.body for n in ast.walk(part))
         return name if used else f"_{name}"
 
+    def _in_range(self, one: ast.expr, other: ast.expr, inside: bool) -> str:
+        """Return a check of a value between or outside of two bounds as a range, or nothing if it is none."""
+        match one, other:
+            case (
+                ast.Compare(left=value, ops=[first], comparators=[low]),
+                ast.Compare(left=again, ops=[second], comparators=[high]),
+            ) if ast.unparse(value) == ast.unparse(again):
+                signs = (ast.GtE, ast.Lt, ast.LtE) if inside else (ast.Lt, ast.GtE, ast.Gt)
+                if isinstance(first, signs[0]) and isinstance(second, signs[1:]):
+                    dots = ".." if isinstance(second, signs[1]) else "..="
+                    bounds = f"{self.expression(low, 5)}{dots}{self.expression(high, 5)}"
+                    return f"{'' if inside else '!'}({bounds}).contains(&{self.expression(value, 10)})"
+        return ""
+
+    def printed(self, node: ast.expr) -> tuple[str, int]:
+        if not isinstance(node, ast.BoolOp):
+            return super().printed(node)
+        inside, parts, rest = isinstance(node.op, ast.And), [], list(node.values)
+        while rest:
+            found = self._in_range(rest[0], rest[1], inside) if len(rest) > 1 else ""
+            parts.append(found or self.expression(rest[0], 4))
+            rest = rest[2 if found else 1 :]
+        return (parts[0], 9) if len(parts) == 1 else (f" {self.both if inside else self.either} ".join(parts), 2)
+
     def call_statement(self, target: str, call: ast.Call, callee: Function, indent: str) -> Lines:
         changed = [kind.changed for kind in callee.parameters.values()]
         given = ", ".join(self.argument(a, c) for a, c in zip(call.args, changed, strict=True))
@@ -195,6 +221,14 @@ class RustPrinter(Printer):
 
     def statement(self, node: ast.stmt, indent: str, declares: str | None) -> Lines:
         match node:
+            case ast.Assign(targets=[ast.Name(id=name)], value=ast.Call() as call) if (
+                declares is not None and self.callee(call) in self.form.functions
+            ):
+                start = "let" if self.current.writes[name] == 1 else "let mut"
+                yield from self.call_statement(f"{start} {name}", call, self.form.functions[self.callee(call)], indent)
+            case ast.Raise() if id(node) in _last(self.current.body) and self.current.result is not None:
+                error = self.raised(error_name(node), "").removeprefix("return ")
+                yield f"{indent}{error}"
             case ast.Return(value=ast.expr() as value) if id(node) in _last(self.current.body):
                 text = self.expression(value)
                 yield from self.wrapped(f"Ok({text})" if self.current.name in self.failing else text, indent)
@@ -220,7 +254,8 @@ class RustPrinter(Printer):
         return f"{kind}::{word}({', '.join(self.expression(a) for a in arguments)})", 10
 
     def number(self, value: float) -> str:
-        return f"core::{self.word}::consts::PI" if value == math.pi else super().number(value)
+        name = _OF_PI.get(value)
+        return f"core::{self.word}::consts::{name}" if name else super().number(value)
 
     def to_float(self, node: ast.expr) -> tuple[str, int]:
         if self.real == "float64":

@@ -179,7 +179,9 @@ def _inverse(x: float) -> float:
     def _print_Mul(self, expr: sp.Mul) -> str:
         if not (self.guarded and any(f.is_Pow and f.exp == -1 for f in expr.args)):
             return super()._print_Mul(expr)
-        return "*".join(self.parenthesize(factor, PRECEDENCE["Mul"]) for factor in expr.args)
+        minus = expr.args[0] == -1
+        text = "*".join(self.parenthesize(factor, PRECEDENCE["Mul"]) for factor in expr.args[minus:])
+        return f"-{text}" if minus else text
 
     def _print_Pow(self, expr: sp.Pow) -> str:
         return f"_inverse({self._print(expr.base)})" if self.guarded and expr.exp == -1 else super()._print_Pow(expr)

@@ -155,6 +155,8 @@ class Traced:
         kept = wanted_lines(self._lines, [_name(value) for value in found])
         body = _Body(kept, [_name(value) for value in found], guarded=self._guarded)
         steps, values = body.written()
+        if not out and steps and steps[-1].startswith(f"{values[0]} = "):
+            values[0] = steps.pop().partition(" = ")[2]
         filled = [f"{row}: Out[Row[float, {length}]]" for row, length, _ in out]
         head = f"def {self._name}({', '.join([*self._given, *filled])}) -> {'None' if out else 'float'}:"
         last = (
@@ -224,6 +226,8 @@ class _Written(ast.NodeTransformer):
     def visit_Call(self, node: ast.Call) -> ast.expr:
         arguments = [self.visit(argument) for argument in node.args]
         word = node.func.attr if isinstance(node.func, ast.Attribute) else ast.unparse(node.func)
+        if word == "where" and ast.unparse(arguments[1]) == ast.unparse(arguments[2]):
+            return arguments[1]  # type: ignore[no-any-return]
         if word == "where":
             return ast.IfExp(*arguments)
         return ast.Call(ast.Name({"absolute": "abs"}.get(word, word)), arguments, [])
@@ -244,9 +248,19 @@ class _Written(ast.NodeTransformer):
             return left  # type: ignore[no-any-return]
         if isinstance(node.op, ast.Add) and _is(left, 0.0):
             return right  # type: ignore[no-any-return]
+        if isinstance(node.op, ast.Sub) and _factors(left) == _factors(right):
+            return ast.Constant(0.0)
         if isinstance(node.op, ast.Div) and self._guarded and not isinstance(right, ast.Constant):
             return ast.Call(ast.Name("_quotient"), [left, right], [])
         return ast.BinOp(left, node.op, right)
+
+
+def _factors(node: ast.expr) -> list[str]:
+    """Return both factors of a product, whose rounding does not depend on their order, or one expression."""
+    match node:
+        case ast.BinOp(left=left, op=ast.Mult(), right=right):
+            return sorted([ast.unparse(left), ast.unparse(right)])
+    return [ast.unparse(node)]
 
 
 def _is(node: ast.expr, value: float) -> bool:
