@@ -46,7 +46,8 @@ notebooks: .venv/.ready
 	$(RUN) -m cra_sym.report.notebooks notebooks
 	$(RUN) -m cra_sym.report.pictures notebooks/images
 
-# Every notebook through on the oldest or the newest versions that pyproject.toml allows, in an environment of its own.
+# Every notebook and every test on the oldest or the newest versions that pyproject.toml allows, in an environment of its
+# own.
 oldest: .venv/.ready
 	$(call gate,oldest)
 
@@ -58,6 +59,7 @@ define gate
 	$(RUN) -m tests.notebooks.gate --requirements $(1) > .venv-$(1)/requirements.txt
 	.venv-$(1)/bin/python -m pip install --quiet --disable-pip-version-check -r .venv-$(1)/requirements.txt
 	.venv-$(1)/bin/python -m tests.notebooks.gate
+	OPENBLAS_NUM_THREADS=1 .venv-$(1)/bin/python -m pytest $(SHARED) -m "not network and not browser" tests cra_sym $(ARGS)
 endef
 
 lint: .venv/.ready

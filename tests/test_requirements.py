@@ -16,6 +16,8 @@ from packaging.specifiers import SpecifierSet
 from packaging.tags import compatible_tags, cpython_tags, platform_tags
 from packaging.utils import canonicalize_name, parse_wheel_filename
 
+from tests.notebooks.gate import requirements
+
 ROOT = Path(__file__).resolve().parents[1]
 SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 PROJECT = SETTINGS["project"]
@@ -23,6 +25,17 @@ LINES = [line for line in (ROOT / "requirements.txt").read_text(encoding="utf-8"
 PINS = [line for line in LINES if not line.startswith(("#", "-e"))]
 LOCKED = tomllib.loads((ROOT / ".ci" / "pylock.toml").read_text(encoding="utf-8"))["packages"]
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
+
+
+@pytest.mark.parametrize("which", ["oldest", "newest"])
+def test_the_ends_of_the_ranges_can_be_installed(which):
+    *lines, package = requirements(which)
+    assert package == "-e ."
+    first = [Requirement(line) for line in lines[: len(PROJECT["dependencies"])]]
+    assert [one.name for one in first] == [Requirement(line).name for line in PROJECT["dependencies"]]
+    for given, own in zip(first, map(Requirement, PROJECT["dependencies"]), strict=True):
+        assert given.marker == own.marker
+        assert [clause.operator for clause in given.specifier] == ["==" if which == "oldest" else ">="]
 
 
 def test_the_package_itself_is_listed():

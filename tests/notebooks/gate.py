@@ -8,6 +8,7 @@ Nothing is stored or compared; a cell that raises, such as an assertion that doe
 from __future__ import annotations
 
 import platform
+import re
 import sys
 import tomllib
 from argparse import ArgumentParser
@@ -21,14 +22,15 @@ LIBRARIES = ("sympy", "numpy", "scipy", "llvmlite", "matplotlib")
 
 
 def requirements(which: str) -> list[str]:
-    """Return the dependencies, the oldest or the newest in their ranges; the notebooks' tools as they come."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    """Return the dependencies, the oldest or the newest in their ranges; tools of notebooks and tests as they come."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    project, tools = settings["project"], settings["dependency-groups"]["test"]
     extras = project["optional-dependencies"]
     ranges = project["dependencies"]
     if which == "oldest":
-        ranges = [f"{name.replace('>=', '==')}.*" for name in ranges]
-    wanted = (line for extra in ("notebooks", "certify", "scale", "explore") for line in extras[extra])
-    return [*ranges, *wanted, "-e ."]
+        ranges = [re.sub(r">=([\d.]+)", r"==\1.*", entry, count=1) for entry in ranges]
+    wanted = (line for extra in ("notebooks", "certify", "scale", "explore", "control") for line in extras[extra])
+    return [*ranges, *wanted, *tools, "-e ."]
 
 
 def main(names: list[str]) -> int:
