@@ -1,5 +1,6 @@
 """Settings shared by every test; read before NumPy is imported, so the libraries' thread pools see them."""
 
+import gc
 import os
 import random
 import shutil
@@ -11,6 +12,7 @@ import pytest
 for pool in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(pool, "1")  # the test workers share the cores already; a pool each only gets in the way
 os.environ.setdefault("MPLBACKEND", "agg")
+gc.set_threshold(20_000, 10, 5)  # expressions and figures are many small objects, most of which fall to their counts
 
 _QUIET = (
     "--disable-gpu",
@@ -39,6 +41,11 @@ def pytest_collection_modifyitems(config, items):
     }
     config.hook.pytest_deselected(items=[item for item in items if item in left])
     items[:] = [item for item in items if item not in left]
+
+
+def pytest_collection_finish():
+    """Leave what was collected out of every search for unreachable objects."""
+    gc.freeze()
 
 
 def pytest_sessionfinish(session):

@@ -29,6 +29,7 @@ DEAR = {
 }
 
 
+@pytest.mark.sample(4, 3)
 @pytest.mark.parametrize("name", NAMES)
 def test_every_figure_of_a_system_draws_every_system(name):
     given = system(name, 0.01)

@@ -12,6 +12,17 @@ from cra_sym.figures import FIGURES, described, draw, shows_an_arm
 from cra_sym.report.pictures import save_figures
 from tests.systems import system
 
+#: The chapters show them whole.
+COARSE = {
+    "fig11": {"points": 9},
+    "fig12": {"points": 9},
+    "combinations": {"points": 60},
+    "inside_tongues": {"modes": 2},
+    "preload": {"duration": 1.0},
+    "preload_tongues": {"amplitudes": 2},
+    "residual_vibration": {"points": 41},
+}
+
 
 def function(name):
     module, attribute = FIGURES[name].split(":")
@@ -33,7 +44,7 @@ def test_words_for_those_who_do_not_see_it(name):
 def drawn(request):
     """Every figure, drawn once, with the global settings before and after."""
     before = dict(rcParams)
-    return draw(request.param), before, dict(rcParams)
+    return draw(request.param, **COARSE.get(request.param, {})), before, dict(rcParams)
 
 
 def test_draws_something_and_leaves_no_trace(drawn):
