@@ -87,6 +87,7 @@ def general(about, tongue):
     return multiple_scales(OMEGA, P, about, order=2, coupling_slope=SLOPE, damping=ZETA, size=3, tongue=tongue)
 
 
+@pytest.mark.sample(2, 1)
 @pytest.mark.parametrize(("spec", "tongue"), [((2, 2), 1), ((2, 2), 2), ((1, 3), 1), ((3, -1), 2)])
 def test_symbolic_number_of_modes_is_the_written_out_system(spec, tongue):
     """The sum over a symbolic number of modes, done for three, is the system of three modes."""

@@ -65,6 +65,7 @@ ROUGH = {
 }
 
 
+@pytest.mark.sample(10, 1)
 @pytest.mark.parametrize("name", ROUGH)
 def test_what_is_rough_agrees_with_elements(name):
     """Nodes of the elements stand on every breakpoint; expected is what halving them still changes."""
@@ -153,6 +154,7 @@ RELATED = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(7, 1)
 @pytest.mark.parametrize("name", RELATED)
 def test_what_is_damped_or_pressed_agrees_with_elements(name):
     """Eigenvalues, a response in time and one at a frequency, by 24 elements with a node halfway."""

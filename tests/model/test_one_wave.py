@@ -81,6 +81,7 @@ def solved(structure, groups, modes):
     return np.atleast_2d(family(structure).frequency_parameters(*groups, modes=modes, compile=False))
 
 
+@pytest.mark.sample(21, 1)
 @pytest.mark.parametrize("structure", SOME, ids=str)
 def test_every_digit_of_lines_with_any_ends(structure):
     groups = drawn(structure, 2, 6)
@@ -162,6 +163,7 @@ def test_the_count_steps_by_one_at_every_zero(structure):
             np.testing.assert_array_equal(np.sign(value), (-1.0) ** number)
 
 
+@pytest.mark.sample(21, 2)
 @pytest.mark.parametrize("structure", SOME, ids=str)
 def test_modes_are_orthonormal_and_meet_their_conditions(structure):
     groups = drawn(structure, 5, 8, (-3, 4, 0.0, np.inf), (-3, 3, 0.0))

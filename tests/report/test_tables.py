@@ -5,6 +5,7 @@ import io
 
 import pytest
 
+from cra_sym.claims import claim
 from cra_sym.report.tables import TABLES, Table
 
 TABLE = Table("Trial", ("name", "value / Hz"), [("a|b, c", 1 / 3), ("d", float("inf"))])
@@ -23,7 +24,8 @@ def test_markdown_rounds_and_escapes():
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_every_table_is_complete(name):
+def test_every_table_is_complete(name, monkeypatch):
+    monkeypatch.setattr("cra_sym.claims.claims", lambda: [claim("C20")])
     table = TABLES[name]()
     assert table.rows
     assert {len(row) for row in table.rows} == {len(table.columns)}
