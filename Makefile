@@ -59,7 +59,7 @@ define gate
 	$(RUN) -m tests.notebooks.gate --requirements $(1) > .venv-$(1)/requirements.txt
 	.venv-$(1)/bin/python -m pip install --quiet --disable-pip-version-check -r .venv-$(1)/requirements.txt
 	.venv-$(1)/bin/python -m tests.notebooks.gate
-	OPENBLAS_NUM_THREADS=1 .venv-$(1)/bin/python -m pytest $(SHARED) -m "not network and not browser" tests cra_sym $(ARGS)
+	OPENBLAS_NUM_THREADS=1 .venv-$(1)/bin/python -m pytest $(SHARED) -m "not browser" -W ignore::DeprecationWarning tests cra_sym $(ARGS)
 endef
 
 lint: .venv/.ready
