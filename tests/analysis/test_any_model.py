@@ -211,18 +211,6 @@ def test_a_system_is_frozen_and_bad_values_are_named():
         FREE.at({**BEAM, EI: np.nan})
 
 
-def test_third_derivatives_tell_the_accuracy_they_reach():
-    """They are left to the dynamic stiffness, whose pieces converge slowly here: refused, or accepted as asked for."""
-    density = energy(stiffness=EI * (1 + x)) - k * v.diff(x, 3) ** 2 / 2
-    model = beam(density=density, essential=[v.subs(x, 0), v.diff(x).subs(x, 0)])
-    with pytest.raises(ValueError, match="tolerance=2e-05 accepts it"):
-        model.at({**BEAM, k: 0.1}).natural_frequencies(1)
-    system = model.at({**BEAM, k: 0.1}, tolerance=1e-4)
-    by_ritz = model.ritz(elements=40).natural_frequencies({**BEAM, k: 0.1}, modes=1)
-    found = system.natural_frequencies(1) / (2.0 * np.pi)
-    assert abs(found / by_ritz - 1.0) < system.accuracy < 1e-4
-
-
 def test_a_weight_of_zero_asks_for_no_parameter():
     """A joint that fluctuates in k_t alone is that of a model without k_r; a weight that is not 0 names it."""
     k_t = sp.Symbol("k_t")

@@ -203,6 +203,16 @@ def test_the_argument_principle_counts_as_many(name):
         cra.count_eigenvalues(system, -1.0)
 
 
+@pytest.mark.parametrize(("damper", "kind"), [(0.3, ALONG), (0.0, ALONG), (0.0, model())])
+def test_a_count_beside_an_eigenvalue(damper, kind):
+    """s^2 + c s + w^2 = 0 has a pair of modulus w; the members of a pair on the circle add up to one at any number."""
+    system = kind.at({c: damper} if kind is ALONG else {})
+    nearness = np.array([-1e-3, -1e-8, 1e-8, 1e-5, 1e-2])
+    assert cra.count_eigenvalues(system, BEND[1] * (1 + nearness)).tolist() == [2, 2, 4, 4, 4]
+    with pytest.raises(ValueError, match="an eigenvalue lies on the circle to rounding"):
+        cra.count_eigenvalues(system, BEND[1])
+
+
 INSIDE = {
     "support": (model(essential=[*CLAMPED, v.subs(x, HALF)], virtual_work=END_DAMPER), {c: 2.0}),
     "clamp": (
