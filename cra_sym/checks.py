@@ -23,6 +23,7 @@ __all__ = [
     "listed",
     "mapping",
     "names",
+    "normal",
     "one_axis",
     "one_number",
     "real_array",
@@ -104,6 +105,15 @@ def real_array(
         place = np.unravel_index(int(np.argmin(good)), good.shape)
         at = f"[{', '.join(map(str, place))}]" if place else ""
         raise ValueError(f"{name}{at} = {shown(array[place].item())}: must be {must}")
+    return array
+
+
+def normal(name: str, array: np.ndarray) -> np.ndarray:
+    """Return an array, or raise an error that names the field if a number in it is subnormal: it has lost digits."""
+    small = np.abs(array)
+    bad = array[(small > 0.0) & (small < np.finfo(float).tiny)]
+    if bad.size:
+        raise ValueError(f"{name} = {bad[0]:.3g}: must be 0 or at least 2.3e-308 in size; smaller numbers lose digits")
     return array
 
 

@@ -414,7 +414,7 @@ def test_a_field_without_stiffness_along_the_length_is_refused(density, fields):
 
 
 @pytest.mark.parametrize(
-    "changes", [{"k_t": 1e-160}, {"k_t": 5e-324}, {"k_t": 1e-200, "k_r": 1e-300}, {"k_r": 1e-310}, {"J_e": 1e-300}]
+    "changes", [{"k_t": 1e-160}, {"k_t": 3e-308}, {"k_t": 1e-200, "k_r": 1e-300}, {"k_r": 1e-307}, {"J_e": 1e-300}]
 )
 def test_tiny_values_give_numbers(changes):
     """As stiffnesses that are zero give: what is that small is nothing beside the beam."""
@@ -426,6 +426,14 @@ def test_tiny_values_give_numbers(changes):
     # both come from one solver, to its accuracy; rigid-body modes that share a frequency may mix
     np.testing.assert_allclose(found.frequency[elastic], limit.frequency[elastic], rtol=1e-12)
     np.testing.assert_allclose(np.abs(found.tip_displacement[elastic]), limit.tip_displacement[elastic], rtol=1e-6)
+
+
+def test_numbers_that_have_lost_digits_are_refused():
+    """A joint of 5e-324 N/m had 0 Hz."""
+    for name, value in (("k_t", 5e-324), ("k_r", [1.0, 1e-310])):
+        for changed in (ARM.replace, lambda **c: ARM.model.at({**ARM.values, **c})):
+            with pytest.raises(ValueError, match=rf"{name} = .*must be 0 or at least 2.3e-308"):
+                changed(**{name: value})
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from cra_sym.checks import broadcastable, real_array
+from cra_sym.checks import broadcastable, normal, real_array
 from cra_sym.model.numerics import Numerics
 from cra_sym.model.system import System
 from cra_sym.si import Numbers, paired
@@ -137,7 +137,7 @@ class Arm(System):
     def __post_init__(self) -> None:
         units = {name: row(name).unit for name in self._names()}
         for name, value in paired(self._fields(), units).items():
-            given = real_array(name, value, unit=units[name], **_RANGES[name])
+            given = normal(name, real_array(name, value, unit=units[name], **_RANGES[name]))
             array = np.asarray(given + 0.0)  # -0.0 becomes 0.0
             array.flags.writeable = False
             object.__setattr__(self, name, float(array) if array.ndim == 0 else array)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import broadcastable, real_array, shown
+from cra_sym.checks import broadcastable, normal, real_array, shown
 from cra_sym.si import paired
 
 __all__ = ["checked_damping", "checked_values", "flat_columns", "frozen", "infinite_patterns"]
@@ -54,6 +54,7 @@ def checked_values(
             raise ValueError(str(error)) from None
         if (found[name] == -np.inf).any():
             raise ValueError(f"{name} = -inf: must be {_NUMBERS}")
+        normal(name, found[name])
     missing = [name for name in names if name not in found]
     if missing:
         raise ValueError(f"values: no value for {', '.join(missing)}")
