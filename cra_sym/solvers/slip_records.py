@@ -31,6 +31,11 @@ def _at(series: Array, share: Array) -> Array:
     return np.asarray(np.einsum("k...p,kp->...p", series, share ** _POWERS[: len(series)]))
 
 
+def _at_each(series: Array, shares: Array) -> Array:
+    """Return the values (S, N, P) of series (K, N, P) at several shares (S, P)."""
+    return np.asarray(np.einsum("knp,ksp->snp", series, shares ** _POWERS[: len(series), None]))
+
+
 class Sampler:
     """Outputs at times, from the series of the steps.
 
@@ -134,15 +139,16 @@ class Ledger:
         moving = span > 0
         rate = step.series[1:] * _POWERS[1:, None]  # times the span
         lossy, whole = [term for term in here.polynomials if not term.conservative], np.where(moving, span, 1.0)
-        for node, weight in zip(_NODES, _WEIGHTS, strict=True):
-            speed, load = _at(rate, share * node), _at(step.loads, share * node)
-            drag = here.damping * speed if here.damping.ndim == 2 else np.einsum("mnp,np->mp", here.damping, speed)
-            scale = np.where(moving, weight * share / np.where(moving, span, 1.0) ** 2, 0.0)
-            self._work[step.members] += scale * (load * speed).sum(axis=0)
-            self._drag[step.members] += scale * whole * (drag * speed).sum(axis=0)
-            if lossy:
-                force = polynomial_forces(lossy, _at(step.series, share * node), speed / whole)
-                self._drag[step.members] -= scale * whole**2 * (force * speed).sum(axis=0)
+        nodes = share * _NODES[:, None]
+        speed, load = _at_each(rate, nodes), _at_each(step.loads, nodes)
+        drag = np.einsum("mnp,snp->smp", here.damping, speed) if here.damping.ndim == 3 else here.damping * speed
+        scale = np.where(moving, _WEIGHTS[:, None] * share / whole**2, 0.0)
+        self._work[step.members] += np.einsum("sp,snp,snp->p", scale, load, speed)
+        self._drag[step.members] += np.einsum("sp,snp,snp->p", scale * whole, drag, speed)
+        if lossy:
+            for at, place, factor in zip(speed, nodes, scale * whole**2, strict=True):
+                force = polynomial_forces(lossy, _at(step.series, place), at / whole)
+                self._drag[step.members] -= factor * (force * at).sum(axis=0)
         slid = (_at(step.moved, share) - step.moved[0])[here.where]
         self._slid[:, step.members] += np.where(slipping, step.state * here.slip * slid, 0.0)
         arrived = np.flatnonzero(moving)

