@@ -80,7 +80,7 @@ def real_array(
     ValueError
         If an element is NaN or out of bounds, or a unit cannot be converted.
     """
-    bracket = "(" if open_low else "["
+    bracket = "(" if open_low or (low == -np.inf and not allow_infinite) else "["
     must = must or f"real numbers in {bracket}{low:g}, {high:g}{']' if allow_infinite or np.isfinite(high) else ')'}"
     try:
         given = plain_numbers(name, value, unit)

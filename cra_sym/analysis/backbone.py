@@ -59,7 +59,7 @@ class Backbone(checks.ByValue):
         With elastic-slip elements: the damping ratio of the motion, and the energy dissipated in a cycle, J; zero for
         free motions without damping.
     branches : tuple of Backbone
-        The curves that cross, of whole curves, if they were asked for.
+        Only with ``branches``: the curves that cross the whole curve.
 
     Examples
     --------
@@ -256,7 +256,7 @@ def _whole(problem: FollowedMode, points: int, branches: bool) -> Backbone:
 
 
 def _along(points: list[Point]) -> tuple[list[Array], list[Array], tuple[int]]:
-    """Return the points of a curve, the normals that fix them, and the shape of what is said of them."""
+    """Return the points of a curve, the normals that fix them, and the shape of the results."""
     return [point.vector for point in points], [point.tangent for point in points], (len(points),)
 
 

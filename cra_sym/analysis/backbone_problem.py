@@ -33,12 +33,14 @@ class FollowedMode:
     def of(cls, system: System, mode: int, modes: int, harmonics: int, place: Any, field: Any) -> FollowedMode:
         whole = equations_of(system, modes)
         if system.numerics("constant") is not None:
-            raise ValueError("a backbone starts from rest at zero; the model has a constant load, which moves it away")
+            raise ValueError("system: must have no constant load, since a backbone starts from rest at zero")
         forces = [force for force in whole.forces if not force.causes]
         if any(force.velocities % 2 == 0 for force in forces):
-            raise ValueError("virtual_work: a backbone needs forces with a potential, or dampers, which it leaves out")
+            raise ValueError("virtual_work: must be forces with a potential, or dampers, which a backbone leaves out")
         if any(term.velocities % 2 for term in whole.energies if not term.causes):
-            raise ValueError("a backbone needs a Lagrangian that is even in time; it has gyroscopic terms")
+            raise ValueError(
+                "system: must have no gyroscopic terms, since a backbone needs motions that are reversible in time"
+            )
         equations = whole.free()
         if not equations.omega[mode - 1] > 0:
             raise ValueError(f"mode = {mode}: is a rigid-body mode and does not vibrate")

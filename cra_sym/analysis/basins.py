@@ -79,7 +79,7 @@ def basins(
         checks.instance("states", state, SteadyState)
     stable = [k for k, state in enumerate(known) if state.stable]
     if not stable:
-        raise ValueError("states: must hold a stable one, no other is reached")
+        raise ValueError("states: must include a stable one, since motions do not end on unstable ones")
     if len({(state.angular_frequency, state.epsilon) for state in known}) > 1:
         raise ValueError("states: must be those of one angular frequency and one epsilon")
     flow = _Flow(known[0])

@@ -32,7 +32,7 @@ def on_basis(
     motion: bool = False,
     zeta: Array | None = None,
 ) -> tuple[Complex, NDArray[np.bool_]]:
-    """Return responses ``exp(s t)`` of parameter sets, (sets, places, K), and which sets have one.
+    """Return the amplitudes of responses to ``exp(s t)``, shape (sets, places, K), and for which sets they exist.
 
     Parameters
     ----------

@@ -75,7 +75,7 @@ def critical_value(
     Returns
     -------
     CriticalValue
-        Shapes are that of the batch of the system, the parameter left out.
+        Of the batch shape that the system has without the parameter.
 
     Raises
     ------
@@ -184,8 +184,8 @@ class _Search:
                 return value, kind, self._omega(kind, s, self._at(value, level))
             before = value
         raise ValueError(
-            f"{self._name}: the critical value near {value:.6g} settles to {least:.1g} only; a tolerance of the system "
-            f"of {2 * least:.1g} accepts that"
+            f"{self._name}: the critical value near {value:.6g} converges to {least:.1g} only; a tolerance of the "
+            f"system of {2 * least:.1g} accepts that"
         )
 
     @staticmethod

@@ -42,8 +42,7 @@ def eigenvalues(system: System, modes: int = 3, *, oscillating: bool = True) -> 
     oscillating : bool
         Leave out real eigenvalues, of motions that do not oscillate, rigid-body motions at rest among them:
         Kelvin-Voigt damping has infinitely many real ones, which accumulate at minus one over the retardation time.
-        Without
-        forces of first order in time that follow the motion, both s and -s of a real pair are given.
+        Without forces of first order in time that follow the motion, both s and -s of a real pair are given.
 
     Returns
     -------
@@ -247,6 +246,6 @@ def _by_newton(system: System, columns: Array, guesses: Complex) -> Complex:
     for rows, _, problem in system.numerics("driven_spatial").problems(columns):
         found = refine(problem, guesses[rows], squared=squared)
         if np.isnan(found).any():
-            raise ArithmeticError("eigenvalues: the refinement of a Ritz value did not settle; ask for fewer modes")
+            raise ArithmeticError("eigenvalues: the refinement of a Ritz value did not converge; ask for fewer modes")
         roots[rows] = np.take_along_axis(found, np.argsort(np.abs(found), axis=1, kind="stable"), axis=1)
     return roots

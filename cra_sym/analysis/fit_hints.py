@@ -64,7 +64,7 @@ def _missed(search: Search, data: Data, missed: int) -> list[str]:
 
 
 def _fitting(search: Search, trials: Sequence[Data]) -> list[int]:
-    """Return which of some data of one size fit."""
+    """Return which of several data sets of one size can be fitted."""
     places = search.lowest(trials)
     number = len(search.unknowns)
     return [k for k, data in enumerate(trials) if goodness(search.residuals(places[k], data), number).fits]

@@ -41,7 +41,7 @@ def rated(system: System, unknowns: Sequence[Unknown], place: Array, modes: int)
     Raises
     ------
     ValueError
-        If there is none at the only place.
+        If the system is not stable at the only point.
     """
 
     def all_at(at: Array) -> Rated:

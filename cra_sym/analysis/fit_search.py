@@ -126,7 +126,7 @@ class Search:
         return places
 
     def lowest(self, trials: Sequence[Data]) -> list[Array]:
-        """Return the lowest end point of short descents for each of some data of one size: no guaranteed minimum."""
+        """Return the lowest end point of short descents for each of several data sets; not always a minimum."""
         starts = [np.clip(self._starts(data, _FEW // 4), *self._bounds) for data in trials]
         owner = np.repeat(np.arange(len(trials)), [len(places) for places in starts])
         fields = (np.array([getattr(data, name) for data in trials])[owner] for name in ("measured", "sigma", "modes"))

@@ -76,9 +76,8 @@ def growth_rate(
     Raises
     ------
     TypeError, ValueError
-        If an argument is out of its range, as a :class:`TransverseBase`, ``residual`` without fluctuating stiffnesses
-        of ends and 'compiled' without llvmlite are; if shapes do not broadcast together; or if a period takes more than
-        1e7 steps.
+        If an argument is out of its range: also a :class:`TransverseBase`, ``residual`` if no stiffness of an end
+        fluctuates, and 'compiled' without llvmlite. If shapes do not broadcast, or a period takes more than 1e7 steps.
 
     Examples
     --------
@@ -109,8 +108,7 @@ def floquet_exponents(
     """Return all Floquet exponents of the excited system, largest real part first.
 
     The real part of the first one is the growth rate without the limit at zero, so a negative one is the stability
-    margin.
-    Imaginary parts are given between -1/2 and 1/2 of the excitation frequency.
+    margin. Imaginary parts are given between -1/2 and 1/2 of the excitation frequency.
 
     Parameters
     ----------

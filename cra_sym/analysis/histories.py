@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,14 @@ from cra_sym.model.system import System
 from cra_sym.solvers.force import Force
 from cra_sym.solvers.motion import BaseMotion
 
-__all__ = ["History", "check_no_support", "driven", "histories", "supports"]
+if TYPE_CHECKING:
+    from sympy.core.function import AppliedUndef
+
+__all__ = ["Histories", "History", "check_no_support", "driven", "histories", "supports"]
 
 Array = NDArray[np.float64]
 History = BaseMotion | Force
+Histories: TypeAlias = Union["Mapping[AppliedUndef, History]", Mapping[str, History]]  # by function of t, or by name
 
 
 def histories(system: System, motion: Any) -> dict[str, History]:

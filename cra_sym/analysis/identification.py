@@ -186,8 +186,8 @@ def identify(
     Warns
     -----
     MisfitWarning
-        If no values fit. The message names each frequency whose omission gives a fit, as a wrong value of its mode or
-        as none of the lowest modes, and the ``modes`` that fit if one mode was missed, or two.
+        If no values fit. The message names each frequency without which the others fit: its value is wrong, or it is
+        that of a higher mode. It also names the ``modes`` that would fit if one or two modes were missed.
     AmbiguityWarning
         If several sets of values fit that differ by more than their uncertainty.
     IdentifiabilityWarning

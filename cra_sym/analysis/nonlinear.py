@@ -144,7 +144,7 @@ def warn_of_slopes(system: System, basis: Basis, coefficients: Array, stacklevel
     ----------
     system : System
     basis : Basis
-    coefficients : ndarray, shape (answers, modes, functions)
+    coefficients : ndarray, shape (solutions, modes, functions)
     stacklevel : int
         Of the warning.
     """

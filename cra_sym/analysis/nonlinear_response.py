@@ -163,7 +163,7 @@ class _Moving:
             q, u = self._turned(time - begin, y)
             force = self.beside(time, q, u)
             if np.abs(force).max() > _BEYOND * (fastest**2 * np.abs(q).max() + fastest * np.abs(u).max() + loads):
-                raise ValueError(f"the motion runs away at t = {time:.6g} s: nonlinear forces outgrow all others")
+                raise ValueError(f"the motion diverges at t = {time:.6g} s: nonlinear forces outgrow all others")
             return self._turned_back(time - begin, force)
 
         at = np.append(t, end)
@@ -178,7 +178,7 @@ class _Moving:
             atol=1e-13 * (scale + 1e-6),
         )
         if not run.success or not np.isfinite(run.y).all():
-            raise ValueError(f"the motion runs away at t = {run.t[-1] if run.t.size else begin:g} s: {run.message}")
+            raise ValueError(f"the motion diverges at t = {run.t[-1] if run.t.size else begin:g} s: {run.message}")
         places = np.searchsorted(run.t, t)
         states = np.stack([np.concatenate(self._turned(run.t[k] - begin, run.y[:, k])) for k in range(run.t.size)], 1)
         found[:, inside] = states[:, places]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.differences import by_differences, central_weights
-from cra_sym.analysis.histories import History
+from cra_sym.analysis.histories import Histories
 from cra_sym.analysis.modes import participation
 from cra_sym.analysis.residual_vibration import Stopped, couples, ended, residual_vibration, stopped
 from cra_sym.analysis.sensitivities import Sensitivities, sensitivities
@@ -20,9 +20,6 @@ from cra_sym.model.system import MOST_MODES, System
 from cra_sym.si import Numbers
 from cra_sym.solvers.motion import BaseMotion, Piecewise
 from cra_sym.solvers.motion_terms import Term
-
-if TYPE_CHECKING:
-    from sympy.core.function import AppliedUndef
 
 __all__ = ["residual_vibration_gradient"]
 
@@ -36,7 +33,7 @@ _SLOWEST = 1e-5  # rad until the inputs end
 @default_floating_point
 def residual_vibration_gradient(
     system: System,
-    motion: BaseMotion | Mapping[AppliedUndef, History],
+    motion: BaseMotion | Histories,
     by: Sequence[str] | None = None,
     modes: int = 5,
     *,

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.complex_responses import complex_residual
-from cra_sym.analysis.histories import History, check_no_support, supports
+from cra_sym.analysis.histories import Histories, History, check_no_support, supports
 from cra_sym.analysis.histories import histories as histories_of
 from cra_sym.analysis.modes import participation, section_place
 from cra_sym.analysis.responses import check_sampling, has_complex_modes, oscillators, slipping_problem
@@ -36,21 +36,21 @@ Array = NDArray[np.float64]
 @default_floating_point
 def residual_vibration(
     system: System,
-    motion: BaseMotion | Mapping[AppliedUndef, History],
+    motion: BaseMotion | Histories,
     modes: int = 5,
     *,
     zeta: Numbers | None = None,
 ) -> Array | float:
     """Return the peak amplitude of the tip after all motions and forces have stopped, m: the sum over the modes.
 
-    Exact for one mode; without damping the least upper bound over all times (frequencies of modes are
-    incommensurable); with damping an upper bound, since the modes do not peak at the same time. The base need not be at
-    rest after the stop, it must only have no acceleration; one that acts by its displacement or velocity must be at
-    rest, and displacements are measured from the equilibrium. A rigid-body mode contributes its final offset. For a
-    system with elastic-slip elements it is the largest displacement while they slip, for at most ten periods of the
-    lowest mode, and the offset plus the sum over the modes once all stick. Where dampers, gyroscopic forces or forces
-    that follow the motion couple the modes, the sum is over complex modes: two
-    real eigenvalues count as one mode, and a growing mode gives inf.
+    Exact for one mode; without damping the least upper bound over all times (frequencies of modes are incommensurable);
+    with damping an upper bound, since the modes do not peak at the same time. The base need not be at rest after the
+    stop, it must only have no acceleration; one that acts by its displacement or velocity must be at rest, and
+    displacements are measured from the equilibrium. A rigid-body mode contributes its final offset. For a system with
+    elastic-slip elements it is the largest displacement while they slip, for at most ten periods of the lowest mode,
+    and the offset plus the sum over the modes once all stick. Where dampers, gyroscopic forces or forces that follow
+    the motion couple the modes, the sum is over complex modes: two real eigenvalues count as one mode, and a growing
+    mode gives inf.
 
     Parameters
     ----------
@@ -81,7 +81,9 @@ def residual_vibration(
     instance("system", system, System)
     if system.model.pieces["hysteresis"]:
         if couples(system.without_hysteresis, modes):
-            raise ValueError("system: dampers beside elastic-slip elements leave no sum over modes; use response")
+            raise ValueError(
+                "system: with dampers beside elastic-slip elements there is no sum over modes; use response"
+            )
         still = stopped(system.without_hysteresis, motion, modes, zeta)
         problem, rows = slipping_problem(system, motion, modes, zeta), system.without_hysteresis.modes(modes)
         peak = slipping_residual(problem, rows.displacement(1, 0), still.stop)
@@ -167,7 +169,7 @@ def ended(system: System, motion: Any) -> tuple[dict[str, History], tuple[BaseMo
     instance("system", system, System)
     histories = histories_of(system, motion)
     if not histories:
-        raise ValueError("motion: must be of what drives the model; nothing does")
+        raise ValueError("motion: the model has no input, neither a prescribed motion nor a force")
     profiles = tuple(one.profile if isinstance(one, Force) else one for one in histories.values())
     for (name, one), profile in zip(histories.items(), profiles, strict=True):
         if not np.all(np.isfinite(profile.duration)):

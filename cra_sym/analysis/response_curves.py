@@ -149,7 +149,7 @@ def response_curves(
     """
     checks.instance("system", system, System)
     if system.model.pieces["hysteresis"]:
-        raise ValueError("system: has elastic-slip elements, whose answers are not followed; take steady_states")
+        raise ValueError("system: must be without elastic-slip elements, for which there is steady_states")
     modes = checks.count("modes", modes, high=MOST_NONLINEAR_MODES)
     harmonics, period = checks.count("harmonics", harmonics, high=60), checks.count("period", period, high=8)
     points = checks.count("points", points, low=2, high=_MOST_POINTS)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.complex_responses import complex_response
-from cra_sym.analysis.histories import History, driven, supports
+from cra_sym.analysis.histories import Histories, History, driven, supports
 from cra_sym.analysis.histories import histories as histories_of
 from cra_sym.analysis.modes import check_places, displaced, section_place
 from cra_sym.analysis.nonlinear_response import nonlinear_response
@@ -62,7 +62,7 @@ _forced = derived_kernel("cra_sym.model.oscillator:forced_kernel", backend="nump
 @default_floating_point
 def tip_response(
     system: System,
-    motion: BaseMotion | Mapping[AppliedUndef, History] | None,
+    motion: BaseMotion | Histories | None,
     t: Numbers,
     modes: int = 5,
     derivative: int = 0,
@@ -112,7 +112,7 @@ def tip_response(
 @default_floating_point
 def response(
     system: System,
-    motion: BaseMotion | Mapping[AppliedUndef, History] | None,
+    motion: BaseMotion | Histories | None,
     t: Numbers,
     x: Numbers,
     modes: int = 5,
@@ -127,20 +127,20 @@ def response(
 
     The sum over modes of phi_i(x) q_i(t), with Duhamel's integral (12) in closed form: exact at and near every
     resonance, with and without damping, and for rigid-body modes. At 64 or more uniform times each costs a few
-    nanoseconds. Of a system with local dampers, gyroscopic forces or forces that follow the motion the sum is that of
-    the lowest complex modes, 2 ``modes`` eigenvalues, by exponentials of their state matrix;
-    velocities are those of the modes. Material damping (Kelvin-Voigt) that couples the natural modes has
-    eigenvalues that accumulate: then all motions of a basis in which that many modes have converged are summed. A
-    nonlinear
-    system (not a batch) is integrated in time, its linear modes exactly, to a relative error of about 1e-9. Of a system
-    with elastic-slip elements (batches too) the sum is that of its modes without them, followed exactly from event to
-    event, polynomial terms beside them included; see `slip_response`.
+    nanoseconds.
+
+    With local dampers, gyroscopic forces or forces that follow the motion, the sum is over the lowest complex modes (2
+    ``modes`` eigenvalues), computed from the exponential of their state matrix. Material damping (Kelvin-Voigt) that
+    couples the natural modes has eigenvalues that accumulate; all motions of a basis in which ``modes`` modes have
+    converged are then summed. A nonlinear system (not a batch) is integrated in time to a relative error of about 1e-9,
+    its linear modes exactly. A system with elastic-slip elements, and polynomial terms beside them, is followed exactly
+    from event to event in the modes that it has without the elements; see `slip_response`.
 
     Parameters
     ----------
     system : System
         Batch axes broadcast with those of the motion.
-    motion : BaseMotion, or mapping of function of t to BaseMotion or Force, or None
+    motion : BaseMotion, or mapping of function of t, or its name, to BaseMotion or Force, or None
         Histories of the prescribed motions and of the forces of the Lagrangian and of the virtual work, from t = 0 on.
         A bare BaseMotion is that of the only prescribed motion. A motion may act by its displacement and velocity too,
         as that of the support of a spring or a damper does; modal damping then opposes the motion of the fields as the

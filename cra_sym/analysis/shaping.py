@@ -26,12 +26,10 @@ def input_shaper(
     r"""Return amplitudes and times of a shaper for a mode, for :meth:`BaseMotion.shaped`.
 
     Two impulses half a damped period apart cancel each other's residual vibration: (1, K)/(1 + K) with K = exp(-pi zeta
-    /
-    sqrt(1 - zeta^2)) (ZV). Applied ``order`` times it also zeroes the first ``order - 1`` derivatives of the residual
-    vibration by the mode's frequency, for half a period each: 2 is ZVD, 3 is ZVDD (Singer and
-    Seering, 1990). With ``humps`` the shaper is extra-insensitive (EI): the residual vibration is at most ``tolerance``
-    over the widest band of frequencies possible for that number of impulses (Singhose, Seering and Singer, 1994 and
-    1997); as a function of
+    / sqrt(1 - zeta^2)) (ZV). Applied ``order`` times it also zeroes the first ``order - 1`` derivatives of the residual
+    vibration by the mode's frequency, for half a period each: 2 is ZVD, 3 is ZVDD (Singer and Seering, 1990). With
+    ``humps`` the shaper is extra-insensitive (EI): the residual vibration is at most ``tolerance`` over the widest band
+    of frequencies possible for that number of impulses (Singhose, Seering and Singer, 1994 and 1997); as a function of
     frequency it has that many humps of this height.
 
     Parameters

@@ -150,10 +150,12 @@ def _problem(system: System, mode: int, modes: int, harmonics: int, place: Any, 
     base = system.without_hysteresis
     whole = equations_of(base, modes)
     if base.numerics("constant") is not None:
-        raise ValueError("a backbone starts from rest at zero; the model has a constant load, which moves it away")
+        raise ValueError("system: must have no constant load, since a backbone starts from rest at zero")
     energies = tuple(term for term in whole.energies if not term.causes)
     if any(term.velocities % 2 for term in energies):
-        raise ValueError("a backbone needs a Lagrangian that is even in time; it has gyroscopic terms")
+        raise ValueError(
+            "system: must have no gyroscopic terms, since a backbone needs motions that are reversible in time"
+        )
     forces = tuple(term for term in whole.forces if not term.causes)
     equations = type(whole)(whole.omega, whole.damping, energies, forces)
     basis = Basis.whole(harmonics, samples(equations.degree, harmonics))

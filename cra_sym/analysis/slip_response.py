@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.analysis.histories import History
+from cra_sym.analysis.histories import Histories, History
 from cra_sym.analysis.modes import displaced, section_place
 from cra_sym.analysis.responses import slipping_problem
 from cra_sym.checks import ByValue, count, default_floating_point, instance, one_axis
@@ -21,7 +21,6 @@ from cra_sym.solvers.slipping import Events, first_forces
 
 if TYPE_CHECKING:
     from sympy import Expr
-    from sympy.core.function import AppliedUndef
 
 __all__ = ["SlipEvent", "SlipResponse", "slip_response"]
 
@@ -127,7 +126,7 @@ class SlipResponse(ByValue):
 @default_floating_point
 def slip_response(
     system: System,
-    motion: History | Mapping[AppliedUndef, History] | None,
+    motion: History | Histories | None,
     t: Numbers,
     modes: int = 5,
     *,
@@ -161,7 +160,7 @@ def slip_response(
     ------
     TypeError, ValueError
         If the system has no elastic-slip elements, or has nonlinear inertia, nonlinear terms with known motions or
-        forces, gyroscopic or follower forces; if the motion runs away; otherwise as :func:`cra_sym.response`.
+        forces, gyroscopic or follower forces; if the motion diverges; otherwise as :func:`cra_sym.response`.
 
     Examples
     --------

@@ -61,7 +61,9 @@ def slow_flow(model: Model, resonance: Any, order: int = 1, modes: int | None = 
     -J_1111*omega_1/4 + 3*K_1111/(4*omega_1)
     """
     if model.pieces["hysteresis"]:
-        raise ValueError("model: has elastic-slip elements, of which there is no slow flow; take without_hysteresis")
+        raise ValueError(
+            "model: must be without elastic-slip elements, which have no slow flow; use without_hysteresis"
+        )
     from cra_sym.mechanics import free_vibration
     from cra_sym.mechanics import slow_flow as mechanics
     from cra_sym.model.slow_coefficients import slow_coefficients

@@ -56,11 +56,11 @@ def state_space(
         Names: of a field (at the right end), a coordinate, a prescribed motion; 'y', 'tip_velocity' and
         'tip_acceleration' of the first field there in the inertial frame, prescribed motions included; 'root_force',
         'root_moment', 'tip_force' and 'tip_moment', the forces and moments that the structure exerts on its supports,
-        for springs k_t
-        v(0, t) and k_r v_x(0, t) (of another field u 'root_force_u'); of an arm 'strain', that of bending on the face
-        turned to -v, h v_xx / 2, at the root. A pair ``('v', 0.3)`` or ``('strain', 0.3)`` takes a field or the strain
-        at another place, m. Expressions linear in fields at places, coordinates, motions and their derivatives, of
-        time up to the second, are outputs too, with parameters of the model as factors. Default: the first field.
+        for springs k_t v(0, t) and k_r v_x(0, t) (of another field u 'root_force_u'); of an arm 'strain', that of
+        bending on the face turned to -v, h v_xx / 2, at the root. A pair ``('v', 0.3)`` or ``('strain', 0.3)`` takes a
+        field or the strain at another place, m. Expressions linear in fields at places, coordinates, motions and their
+        derivatives, of time up to the second, are outputs too, with parameters of the model as factors. Default: the
+        first field.
 
     Returns
     -------

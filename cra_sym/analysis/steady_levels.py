@@ -37,7 +37,7 @@ def traced(problem: DrivenProblem, point: Array, size: float, start: Array | Non
 
     Returns
     -------
-    ndarray, shape (answers, unknowns)
+    ndarray, shape (solutions, unknowns)
     """
     frequency = float(point[0]) / problem.period
     causes = problem.causes(point[None])
@@ -92,7 +92,7 @@ def _moved(problem: DrivenProblem, unknowns: Array, shift: float, sign: float) -
 
 
 def settling(problem: DrivenProblem, points: Array, starts: Array, size: float) -> Array:
-    """Return the motions that perturbed unstable solutions settle to, as harmonics of their last period.
+    """Return the motions to which perturbed unstable solutions converge, as harmonics of their last period.
 
     Parameters
     ----------

@@ -13,6 +13,7 @@ from cra_sym.claims.family import ArmFamily, provenance_family
 from cra_sym.claims.ledger import claims
 from cra_sym.claims.verdict import THEMES, Verdict
 from cra_sym.figures import styled
+from cra_sym.figures.drawing import figure_of, panel
 from cra_sym.figures.subject import single
 
 if TYPE_CHECKING:
@@ -54,8 +55,7 @@ def figure_family(family: ArmFamily | None = None, arm: Arm | None = None, ax: A
     instance("arm", arm, Arm)
     single(arm)
     with styled():
-        if ax is None:
-            ax = Figure(figsize=(5.6, 3.8), layout="constrained").subplots()
+        ax = panel(ax, (5.6, 3.8))
         for name, thickness in zip(family.materials, family.thickness, strict=True):
             ax.plot(family.length, 1e3 * thickness, label=name)
         place = float(arm.L), 1e3 * float(arm.h)
@@ -69,6 +69,4 @@ def figure_family(family: ArmFamily | None = None, arm: Arm | None = None, ax: A
         ax.set(xlabel="length $L$ / m", ylabel="thickness $h$ / mm", ylim=(0, None))
         ax.set_xlim(family.length[0], family.length[-1])
         ax.legend()
-    figure = ax.figure
-    assert isinstance(figure, Figure)
-    return figure
+    return figure_of(ax)

@@ -10,6 +10,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from cra_sym.figures import styled
+from cra_sym.figures.drawing import figure_of, panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,14 +55,11 @@ _LABELS = {
 def draw_panel(picture: Callable[[Axes], None], title: str, outcome: str, ax: Axes | None = None) -> Figure:
     """Draw a panel in the package's style, by default in a new figure, with the outcome in the title."""
     with styled():
-        if ax is None:
-            ax = Figure(figsize=(5.2, 3.6), layout="constrained").subplots()
+        ax = panel(ax, (5.2, 3.6))
         picture(ax)
         mark, colour = MARKS[outcome]
         ax.set_title(f"{mark} {title}", color=colour, fontsize=10)
-    figure = ax.figure
-    assert isinstance(figure, Figure)
-    return figure
+    return figure_of(ax)
 
 
 def by_mode(ax: Axes, x: np.ndarray, curves: np.ndarray, **options: Any) -> None:

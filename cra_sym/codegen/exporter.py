@@ -80,9 +80,8 @@ def export(
     language : {'c', 'fortran', 'python', 'julia', 'octave', 'rust', 'javascript', 'fmu'}
         All have the same contents: for the arm the characteristic function, frequencies, modes, sensitivities,
         responses, state space and first-order stability; C also solves many arms at once. 'fmu' writes NAME.fmu, of a
-        system: model
-        exchange and co-simulation with sources, and a binary for this platform if there is a C compiler. Its values are
-        frozen.
+        system: model exchange and co-simulation with sources, and a binary for this platform if there is a C compiler.
+        Its values are frozen.
     directory : path
         Folder to create, with its parents.
     model : Model, optional

@@ -13,6 +13,7 @@ from cra_sym.analysis.modes import mode_shapes, natural_frequencies
 from cra_sym.analysis.responses import response
 from cra_sym.arm.parameters import Arm
 from cra_sym.figures import described
+from cra_sym.figures.subject import arm_or_nominal
 from cra_sym.solvers.motion import BaseMotion
 
 __all__ = ["curve", "document", "film", "moved", "moving_arm", "moving_modes"]
@@ -49,7 +50,7 @@ def moving_arm(arm: Arm | None = None, k_t: float = _LOOSE["k_t"], k_r: float = 
     str
         An SVG document.
     """
-    arm = arm or Arm.nominal().replace(zeta=0.01)
+    arm = arm_or_nominal(arm, zeta=0.01)
     motion, t = BaseMotion.s_curve(**_MOVE), np.linspace(0.0, _DURATION, _FRAMES, endpoint=False)
     x = np.linspace(0.0, float(arm.L), 17)
     give = [response(joined, motion, t, x) for joined in _joints(arm, k_t, k_r)]
@@ -84,7 +85,7 @@ def moving_modes(arm: Arm | None = None, k_t: float = _LOOSE["k_t"], k_r: float 
     str
         An SVG document.
     """
-    arm = arm or Arm.nominal()
+    arm = arm_or_nominal(arm)
     x = np.linspace(0.0, float(arm.L), 21)
     joints = _joints(arm, k_t, k_r)
     shapes = np.array([mode_shapes(joined, x) for joined in joints])  # joint, mode, x

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from cra_sym.checks import instance, listed
+from cra_sym.figures.drawing import figure_of, panel
 from cra_sym.paper.equations import Equation, equations
 
 if TYPE_CHECKING:
@@ -47,13 +49,17 @@ def figure_derivation(chosen: Sequence[Equation] | None = None, *, ax: Axes | No
         By default all of the registry, companions included.
     ax : Axes, optional
     """
-    chosen = equations(companions=True) if chosen is None else chosen
+    chosen = equations(companions=True) if chosen is None else listed("chosen", chosen, "equations")
+    if not chosen:
+        raise ValueError("chosen = (): must hold at least one equation")
+    for equation in chosen:
+        instance("chosen", equation, Equation)
     depth = layers(chosen)
     columns = defaultdict(list)
     for e in chosen:
         columns[depth[e.number]].append(e)
     place = _placed(columns)
-    ax = Figure(figsize=(11.0, 5.2), layout="constrained").subplots() if ax is None else ax
+    ax = panel(ax, (11.0, 5.2))
     for e in chosen:
         for source in e.derived_from:
             if source in place:
@@ -72,7 +78,7 @@ def figure_derivation(chosen: Sequence[Equation] | None = None, *, ax: Axes | No
         for kind, look in _LOOKS.items()
     ]  # fmt: skip
     ax.legend(handles=marks, loc="lower center", ncols=3, bbox_to_anchor=(0.5, -0.06))
-    return cast(Figure, ax.figure)
+    return figure_of(ax)
 
 
 def _placed(columns: dict[int, list[Equation]]) -> dict[int | str, tuple[float, float]]:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from cra_sym.analysis.identification import Identification
 from cra_sym.checks import instance
 from cra_sym.figures import styled
-from cra_sym.figures.drawing import figure_of
+from cra_sym.figures.drawing import Panels, figure_of, panels
 
 __all__ = ["figure_fit"]
 
 
-def figure_fit(fit: Identification, *, axes: Any = None) -> Figure:
+def figure_fit(fit: Identification, *, axes: Panels | None = None) -> Figure:
     """Draw measured and fitted natural frequencies, and the residuals in units of the uncertainty.
 
     The band holds two of three residuals if the model is right; the largest is named if the data do not fit.
@@ -28,7 +26,7 @@ def figure_fit(fit: Identification, *, axes: Any = None) -> Figure:
     """
     instance("fit", fit, Identification)
     with styled():
-        left, right = Figure(figsize=(8.6, 3.9), layout="constrained").subplots(1, 2) if axes is None else axes
+        ((left, right),) = panels(axes, 1, 2, (8.6, 3.9))
         left.errorbar(fit.modes, fit.measured, fit.uncertainty, fmt="o", markersize=4, capsize=3, label="measured")
         left.plot(fit.modes, fit.frequencies, "_", markersize=14, label="fitted")
         left.set_yscale("log")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from cra_sym.figures.drawing import BLUE, INK, ORANGE, canvas, deflection
+from cra_sym.figures.drawing import BLUE, INK, ORANGE, canvas, deflection, figure_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -135,7 +135,7 @@ def figure_2(arm: System | None = None, ax: Axes | None = None) -> Figure:
     ax : Axes, optional
         Where to draw; by default a new figure.
     """
-    figure, ax = canvas(ax, figsize=(8.0, 4.4))
+    ax = canvas(ax, (8.0, 4.4))
     xi = np.linspace(0.0, 1.0, 400)
     x, v = _LENGTH * xi, 2.7 * deflection(arm, xi)
     slope = float(v[1] - v[0]) / float(x[1] - x[0])
@@ -144,4 +144,4 @@ def figure_2(arm: System | None = None, ax: Axes | None = None) -> Figure:
     _manipulator(ax, x, v)
     _lines_and_measures(ax, x, v, slope)
     ax.autoscale_view()
-    return figure
+    return figure_of(ax)

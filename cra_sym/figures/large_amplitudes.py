@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from cra_sym.analysis.modes import modal_parameters
 from cra_sym.analysis.response_curves import response_curves
 from cra_sym.analysis.stability import stability_boundary
 from cra_sym.analysis.steady_states import SteadyState
 from cra_sym.arm.parameters import Arm
+from cra_sym.checks import one_number
 from cra_sym.figures import styled
-from cra_sym.figures.drawing import BLUE, ORANGE, panels
+from cra_sym.figures.drawing import BLUE, ORANGE, figure_of, panel
 from cra_sym.figures.nonlinear import cubic_joint, show_curves
+from cra_sym.figures.subject import arm_or_nominal
 from cra_sym.model.excitations import AxialBase
 from cra_sym.model.system import System
 
@@ -63,12 +66,12 @@ def foreshortened_arm(arm: Arm) -> System:
 
 
 def figure_shaken_along(
-    arm: Arm | None = None, *, amplitude: float = 2e-3, mode: int = 2, modes: int = 2, ax: Any = None
+    arm: Arm | None = None, *, amplitude: float = 2e-3, mode: int = 2, modes: int = 2, ax: Axes | None = None
 ) -> Figure:
     """Draw the amplitude of the tip inside and beside the tongue of a base that shakes along the arm.
 
     Nothing but the arm's own foreshortening limits it: the more it bends, the stiffer it is and the more inertia moves
-    along. Stable answers are bold. Shaded: where the arm at rest is unstable.
+    along. Stable solutions are bold. Shaded: where the arm at rest is unstable.
 
     Parameters
     ----------
@@ -84,19 +87,19 @@ def figure_shaken_along(
     """
     from cra_sym.symbols import u
 
-    arm = Arm.nominal().replace(**_SOFT) if arm is None else arm
+    arm = arm_or_nominal(arm, **_SOFT)
+    one_number("amplitude", amplitude, low=0.0, open_low=True, unit="m")
     lower, upper = (float(side) for side in stability_boundary(arm, AxialBase(1.0), amplitude, (mode, mode)))
     width = upper - lower
     between, system = (lower - 1.5 * width, upper + width), foreshortened_arm(arm)
     curves = response_curves(system, between, drive={u: amplitude}, modes=max(modes, mode), harmonics=5, period=2)
     with styled():
-        ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
+        ax = panel(ax, (6.4, 3.9))
         show_curves(ax, curves, BLUE, "foreshortened arm")
         ax.axvspan(lower, upper, color="0.9", zorder=0)
         _labelled(ax)
         ax.set_title(f"$u$ = {1e3 * amplitude:g} mm along the arm, about $2\\omega_{mode}$")
-    figure: Figure = ax.figure
-    return figure
+    return figure_of(ax)
 
 
 def figure_shaken_across(
@@ -107,11 +110,11 @@ def figure_shaken_across(
     mode: int = 2,
     modes: int = 2,
     zeta: float = 1e-2,
-    ax: Any = None,
+    ax: Axes | None = None,
 ) -> Figure:
     """Draw what the base's disturbance does to a joint that hardens, beside what it does to a linear one.
 
-    The resonance leans to higher frequencies: where three answers exist, the middle one is unstable (thin), and a
+    The resonance leans to higher frequencies: where three solutions exist, the middle one is unstable (thin), and a
     sweep jumps.
 
     Parameters
@@ -130,31 +133,30 @@ def figure_shaken_across(
     """
     from cra_sym.symbols import w
 
-    arm = Arm.nominal().replace(k_t=1e3) if arm is None else arm
+    arm = arm_or_nominal(arm, k_t=1e3)
     omega = float(modal_parameters(arm, mode).omega[-1])
     between = (0.9 * omega, 1.25 * omega)
     with styled():
-        ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
+        ax = panel(ax, (6.4, 3.9))
         for size, color, word, marker in ((0.0, ORANGE, "linear joint", "^"), (k_3, BLUE, "hardening joint", "o")):
             system = cubic_joint(arm, size, zeta)
             curves = response_curves(system, between, drive={w: amplitude}, modes=max(modes, mode), harmonics=5)
             show_curves(ax, curves, color, word, marker)
         _labelled(ax)
         ax.set_title(f"$w$ = {1e3 * amplitude:g} mm across the arm, near $\\omega_{mode}$")
-    figure: Figure = ax.figure
-    return figure
+    return figure_of(ax)
 
 
 def figure_basins(
     states: Sequence[SteadyState],
-    displacement: Any,
-    velocity: Any,
+    displacement: ArrayLike,
+    velocity: ArrayLike,
     *,
     mode: int = 1,
     cycles: int | None = None,
-    ax: Any = None,
+    ax: Axes | None = None,
 ) -> Figure:
-    """Draw from which initial motions each of the stable answers at one frequency is reached.
+    """Draw from which initial motions each of the stable steady states at one frequency is reached.
 
     Parameters
     ----------
@@ -171,7 +173,7 @@ def figure_basins(
     reached = basins(states, displacement, velocity, mode=mode, cycles=cycles)
     shown = [k for k in range(-1, len(states)) if (reached == k).any()]
     with styled():
-        ax = panels(None if ax is None else [ax], 1, 1, (5.6, 4.2)).ravel()[0]
+        ax = panel(ax, (5.6, 4.2))
         ax.pcolormesh(
             1e3 * np.asarray(displacement),
             velocity,
@@ -183,14 +185,13 @@ def figure_basins(
             rasterized=True,
         )
         for place, k in enumerate(shown):
-            word = "none of them" if k < 0 else f"the answer of {1e3 * states[k].amplitude:.2f} mm"
+            word = "none of them" if k < 0 else f"the state of {1e3 * states[k].amplitude:.2f} mm"
             ax.plot([], [], "s", color=_SHADES[place], markeredgecolor="0.4", label=word, linestyle="none")
         ax.set_xlabel(f"initial displacement of the tip in mode {mode} / mm")
         ax.set_ylabel("its initial velocity / (m/s)")
         ax.legend(loc="upper right", title="reaches", framealpha=0.85, frameon=True)
         ax.grid(False)
-    figure: Figure = ax.figure
-    return figure
+    return figure_of(ax)
 
 
 def _labelled(ax: Axes) -> None:

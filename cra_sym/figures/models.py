@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from cra_sym.figures import styled
-from cra_sym.figures.drawing import figure_of
+from cra_sym.figures.drawing import Panels, figure_of, panel, panels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,7 +17,9 @@ if TYPE_CHECKING:
 __all__ = ["figure_damped_joint", "figure_eigenvalues", "figure_slenderness"]
 
 
-def figure_slenderness(slenderness: Any, thin: Any, thick: Any, *, axes: Any = None) -> Figure:
+def figure_slenderness(
+    slenderness: ArrayLike, thin: ArrayLike, thick: ArrayLike, *, axes: Panels | None = None
+) -> Figure:
     """Draw the frequencies of a thin and of a thick beam theory, in Hz and as their ratio.
 
     Parameters
@@ -29,7 +32,7 @@ def figure_slenderness(slenderness: Any, thin: Any, thick: Any, *, axes: Any = N
     """
     slenderness, thin, thick = (np.asarray(a, dtype=float) for a in (slenderness, thin, thick))
     with styled():
-        left, right = Figure(figsize=(8.6, 3.9), layout="constrained").subplots(1, 2) if axes is None else axes
+        ((left, right),) = panels(axes, 1, 2, (8.6, 3.9))
         for mode in range(thick.shape[1]):
             (line,) = left.loglog(slenderness, thick[:, mode], linestyle="-", label=f"$f_{mode + 1}$")
             left.loglog(slenderness, thin[:, mode], linestyle=":", linewidth=1.2, color=line.get_color())
@@ -45,7 +48,7 @@ def figure_slenderness(slenderness: Any, thin: Any, thick: Any, *, axes: Any = N
     return figure_of(right)
 
 
-def figure_damped_joint(damper: Any, ratio: Any, *, ax: Any = None) -> Figure:
+def figure_damped_joint(damper: ArrayLike, ratio: ArrayLike, *, ax: Axes | None = None) -> Figure:
     """Draw modal damping ratios against the coefficient of a viscous damper in the joint.
 
     Parameters
@@ -56,7 +59,7 @@ def figure_damped_joint(damper: Any, ratio: Any, *, ax: Any = None) -> Figure:
     ax : Axes, optional
     """
     with styled():
-        ax = Figure(figsize=(6.4, 3.9), layout="constrained").subplots() if ax is None else ax
+        ax = panel(ax, (6.4, 3.9))
         for mode, values in enumerate(np.asarray(ratio, dtype=float).T):
             ax.loglog(damper, values, label=f"mode {mode + 1}")
         ax.set_xlabel("damper in the joint $c_j$ / (N s/m)")
@@ -66,7 +69,7 @@ def figure_damped_joint(damper: Any, ratio: Any, *, ax: Any = None) -> Figure:
     return figure_of(ax)
 
 
-def figure_eigenvalues(eigenvalues: Any, parameter: Any, *, label: str, ax: Axes | None = None) -> Figure:
+def figure_eigenvalues(eigenvalues: ArrayLike, parameter: ArrayLike, *, label: str, ax: Axes | None = None) -> Figure:
     """Draw how complex eigenvalues move as a parameter grows.
 
     Parameters
@@ -80,13 +83,13 @@ def figure_eigenvalues(eigenvalues: Any, parameter: Any, *, label: str, ax: Axes
     """
     eigenvalues, parameter = np.asarray(eigenvalues, dtype=complex), np.asarray(parameter, dtype=float)
     with styled():
-        ax = Figure(figsize=(6.4, 4.4), layout="constrained").subplots() if ax is None else ax
+        ax = panel(ax, (6.4, 4.4))
         ax.axvline(0.0, color="0.75", linewidth=0.8)
         for number, values in enumerate(eigenvalues.T):
             points = ax.scatter(
                 values.real, values.imag, c=parameter, s=12, marker="os^Dv"[number % 5], cmap="viridis", linewidths=0
             )
-        figure_of(ax).colorbar(points, ax=ax, label=label)
+        ax.figure.colorbar(points, ax=ax, label=label)
         ax.set_xlabel("growth Re $s$ / (1/s)")
         ax.set_ylabel("oscillation Im $s$ / (rad/s)")
         ax.set_title("Right of the line motions grow")

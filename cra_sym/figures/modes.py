@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 from cra_sym.analysis.eigenvalues import oscillating_frequencies
 from cra_sym.analysis.modes import mode_shapes, natural_frequencies
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import choice, instance, one_axis
-from cra_sym.figures.drawing import BLUE, ORANGE, figure_of, panels
+from cra_sym.checks import choice, count, instance, one_number
+from cra_sym.figures.drawing import BLUE, ORANGE, Panels, figure_of, panel, panels
 from cra_sym.figures.subject import (
+    arm_or_nominal,
     field_label,
     fields,
     leading_parameter,
@@ -22,6 +23,7 @@ from cra_sym.figures.subject import (
     parameter_label,
     parameters_of,
     rigid_ends,
+    several,
     single,
     unknowns,
 )
@@ -30,6 +32,8 @@ from cra_sym.paper.flipped import flipped_frequencies
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.typing import ColorType
+    from sympy.core.function import AppliedUndef
 
 __all__ = ["decades", "figure_3", "figure_4", "figure_frequencies", "figure_mode_shapes"]
 
@@ -38,7 +42,7 @@ _QUANTITIES = {"k_t": "translational stiffness", "k_r": "rotational stiffness"}
 _RIGID: dict[str, Any] = {"color": "0.45", "linestyle": (0, (4, 2)), "linewidth": 0.9}
 
 
-def figure_3(arm: System | None = None, k_t: Any = None, *, axes: Any = None) -> Figure:
+def figure_3(arm: System | None = None, k_t: ArrayLike | None = None, *, axes: Panels | None = None) -> Figure:
     """Draw f1, f2, f3 against the joint's translational stiffness, in Hz and as a fraction of the rigid joint's.
 
     Parameters
@@ -49,8 +53,12 @@ def figure_3(arm: System | None = None, k_t: Any = None, *, axes: Any = None) ->
         Stiffnesses in N/m, by default 1 to 1e6 for the nominal EI / L^3.
     axes : pair of Axes, optional
     """
-    arm = arm or Arm.nominal()
-    k_t = decades(arm, "k_t", 0, 6) if k_t is None else np.asarray(k_t, dtype=float)
+    arm = arm_or_nominal(arm)
+    k_t = (
+        decades(arm, "k_t", 0, 6)
+        if k_t is None
+        else several("k_t", k_t, "stiffnesses", low=0.0, open_low=True, unit="N/m")
+    )
     ((left, right),) = panels(axes, 1, 2, (8.6, 3.9))
     found, rigid = natural_frequencies(arm.replace(k_t=k_t)), natural_frequencies(arm.replace(k_t=np.inf))
     _in_hertz(left, k_t, found, rigid, "k_t")
@@ -60,7 +68,7 @@ def figure_3(arm: System | None = None, k_t: Any = None, *, axes: Any = None) ->
     return figure_of(left)
 
 
-def figure_4(arm: Arm | None = None, k_r: Any = None, *, axes: Any = None) -> Figure:
+def figure_4(arm: Arm | None = None, k_r: ArrayLike | None = None, *, axes: Panels | None = None) -> Figure:
     """Draw f1, f2, f3 against the joint's rotational stiffness: as derived, and with the spring's sign flipped.
 
     The left column follows from the Lagrangian. The right one from the same Lagrangian with the sign of the rotational
@@ -75,9 +83,13 @@ def figure_4(arm: Arm | None = None, k_r: Any = None, *, axes: Any = None) -> Fi
         Stiffnesses in N m/rad, by default 1e2 to 1e5 for the nominal EI / L.
     axes : 2 x 2 array of Axes, optional
     """
-    arm = Arm.nominal() if arm is None else arm
+    arm = arm_or_nominal(arm)
     instance("system", arm, Arm)  # the sign is flipped in the paper's Lagrangian
-    k_r = decades(arm, "k_r", 2, 5) if k_r is None else np.asarray(k_r, dtype=float)
+    k_r = (
+        decades(arm, "k_r", 2, 5)
+        if k_r is None
+        else several("k_r", k_r, "stiffnesses", low=0.0, open_low=True, unit="N m/rad")
+    )
     grid = panels(axes, 2, 2, (8.6, 6.6), sharey="row")
     (top_left, top_right), (low_left, low_right) = grid
     rigid = natural_frequencies(arm.replace(k_r=np.inf))
@@ -122,9 +134,9 @@ def figure_frequencies(
     if values is None:
         x, found = over_what_is_stable(system, name, modes)
     else:
-        x = one_axis("values", values, "values", allow_infinite=True)
+        x = several("values", values, "values", allow_infinite=True)
         found = oscillating_frequencies(system.replace(**{name: x}), modes) / (2 * np.pi)
-    ax = panels(ax, 1, 1, (6.4, 4.0))[0, 0]
+    ax = panel(ax, (6.4, 4.0))
     if name in system.numerics("stiffnesses"):
         for level in oscillating_frequencies(system.replace(**{name: np.inf}), modes) / (2 * np.pi):
             ax.axhline(level, **_RIGID)
@@ -137,12 +149,12 @@ def figure_frequencies(
     ax.set_yscale("log" if (found > 0).any() else "linear")
     ax.set_xlabel(parameter_label(system, name))
     ax.set_ylabel(f"{'natural' if system.conservative_part is system else 'oscillating'} frequency / Hz")
-    ax.legend(loc="lower left", ncols=modes, bbox_to_anchor=(0.0, 0.98), borderaxespad=0)
-    return cast(Figure, ax.figure)
+    ax.legend(loc="lower left", ncols=min(modes, 6), bbox_to_anchor=(0.0, 0.98), borderaxespad=0)
+    return figure_of(ax)
 
 
 def figure_mode_shapes(
-    system: System | None = None, *, modes: int = 3, phase: float | None = None, axes: Any = None
+    system: System | None = None, *, modes: int = 3, phase: float | None = None, axes: Panels | None = None
 ) -> Figure:
     """Draw the first mode shapes, with the springs of the ends as they are and rigid.
 
@@ -160,7 +172,8 @@ def figure_mode_shapes(
         A row for each field, a column for each mode.
     """
     system = single(Arm.nominal().replace(k_t=1e3, k_r=1e2) if system is None else system)
-    known, modes = fields(system), min(modes, system.most_modes)
+    known, modes = fields(system), min(count("modes", modes), system.most_modes)
+    phase = None if phase is None else one_number("phase", phase, unit="rad")
     if not known:
         return _of_coordinates(system, modes, phase, axes)
     grid = panels(axes, len(known), modes, (2.87 * modes, 1.0 + 2.4 * len(known)), sharey="row")
@@ -176,7 +189,7 @@ def figure_mode_shapes(
     return figure_of(grid[0, 0])
 
 
-def _of_coordinates(system: System, modes: int, phase: float | None, axes: Any) -> Figure:
+def _of_coordinates(system: System, modes: int, phase: float | None, axes: Panels | None) -> Figure:
     """Draw the modal displacements of lumped coordinates, a panel a mode."""
     if system.conservative_part is not system:
         raise ValueError(
@@ -202,7 +215,7 @@ def _of_coordinates(system: System, modes: int, phase: float | None, axes: Any) 
 
 
 def _shapes_of_field(
-    row: Sequence[Axes], system: System, field: Any, modes: int, phase: float, whole_swing: bool
+    row: Sequence[Axes], system: System, field: AppliedUndef | None, modes: int, phase: float, whole_swing: bool
 ) -> None:
     left = float(system.domain.left)
     x = np.linspace(left, left + float(system.domain.length), 301)
@@ -266,7 +279,7 @@ def _stiffness_axis(ax: Axes, stiffness: np.ndarray, name: str) -> None:
     ax.set_xlabel(f"{_QUANTITIES[name]} ${name}$ / ({_UNITS[name]})")
 
 
-def _label(ax: Axes, x: float, y: float, text: str, colour: Any) -> None:
+def _label(ax: Axes, x: float, y: float, text: str, colour: ColorType) -> None:
     ax.annotate(
         text, (x, y), xytext=(4, 0), textcoords="offset points", color=colour, va="center", annotation_clip=False
     )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from cra_sym.analysis.backbone import Backbone, backbone
 from cra_sym.analysis.response_curves import ResponseCurve, response_curves
@@ -16,8 +17,10 @@ from cra_sym.analysis.stability import stability_boundary
 from cra_sym.analysis.steady_states import SteadyState
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
+from cra_sym.checks import count, one_number
 from cra_sym.figures import styled
-from cra_sym.figures.drawing import BLUE, INK, ORANGE, figure_of, panels
+from cra_sym.figures.drawing import BLUE, INK, ORANGE, Panels, figure_of, panel, panels
+from cra_sym.figures.subject import arm_or_nominal
 from cra_sym.model.system import System
 from cra_sym.solvers.harmonic_balance import Basis, peak
 
@@ -114,13 +117,13 @@ def figure_inside_tongues(
     epsilon: float = _EPSILON,
     modes: int = 3,
     zeta: float = 1e-4,
-    axes: Any = None,
+    axes: Panels | None = None,
 ) -> Figure:
     """Draw the amplitude of the tip inside and beside each principal tongue of an arm with a cubic joint.
 
-    A joint that hardens (blue circles) bends the answers to higher frequencies, one that softens (orange triangles) to
-    lower ones; stable answers are bold. Shaded: where the arm at rest is unstable. Beside it, on the side to which
-    the answers bend, both rest and vibration are stable.
+    A joint that hardens (blue circles) bends the curves to higher frequencies, one that softens (orange triangles) to
+    lower ones; stable solutions are bold. Shaded: where the arm at rest is unstable. Beside it, on the side to which
+    the curves bend, both rest and vibration are stable.
 
     Parameters
     ----------
@@ -136,8 +139,9 @@ def figure_inside_tongues(
         Modal damping ratio.
     axes : sequence of Axes, optional
     """
-    arm = Arm.nominal().replace(k_t=1e3) if arm is None else arm
-    (row,) = panels(axes, 1, modes, (3.6 * modes, 3.7)).reshape(1, -1)
+    arm = arm_or_nominal(arm, k_t=1e3)
+    (row,) = panels(axes, 1, count("modes", modes), (3.6 * modes, 3.7))
+    k_3 = one_number("k_3", k_3, low=0.0, open_low=True, unit="N/m^3")
     excitation = JointStiffness(k_t=1.0)
     reach = 0.95 * np.sqrt(float(np.asarray(arm.k_t)) / k_3)  # beyond it a softening joint pushes away
     for number, ax in enumerate(row, 1):
@@ -187,7 +191,7 @@ def swept(states: Sequence[Sequence[SteadyState]]) -> np.ndarray:
     return np.array(found)
 
 
-def figure_sweep(states: Sequence[Sequence[SteadyState]], *, ax: Any = None) -> Figure:
+def figure_sweep(states: Sequence[Sequence[SteadyState]], *, ax: Axes | None = None) -> Figure:
     """Draw what a slow sweep of the frequency upwards and one downwards meet: they jump at different frequencies.
 
     Parameters
@@ -197,9 +201,9 @@ def figure_sweep(states: Sequence[Sequence[SteadyState]], *, ax: Any = None) -> 
     ax : Axes, optional
     """
     with styled():
-        ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
+        ax = panel(ax, (6.4, 3.9))
         frequency = [here[0].angular_frequency for here in states]
-        show_states(ax, states, "0.6", "all answers")
+        show_states(ax, states, "0.6", "all solutions")
         ax.plot(frequency, 1e3 * swept(states), "-", color=BLUE, label="swept upwards")
         ax.plot(frequency, 1e3 * swept(states[::-1])[::-1], "--", color=ORANGE, label="swept downwards")
         ax.set_xlabel("excitation frequency $\\varpi$ / (rad/s)")
@@ -209,7 +213,12 @@ def figure_sweep(states: Sequence[Sequence[SteadyState]], *, ax: Any = None) -> 
 
 
 def figure_amplitude_map(
-    frequency: Any, epsilon: Any, amplitude: Any, boundary: Any = None, *, ax: Any = None
+    frequency: ArrayLike,
+    epsilon: ArrayLike,
+    amplitude: ArrayLike,
+    boundary: Sequence[ArrayLike] | None = None,
+    *,
+    ax: Axes | None = None,
 ) -> Figure:
     """Draw the largest stable amplitude over the chart of excitation frequency and size.
 
@@ -225,7 +234,7 @@ def figure_amplitude_map(
     ax : Axes, optional
     """
     with styled():
-        ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
+        ax = panel(ax, (6.4, 3.9))
         mesh = ax.pcolormesh(frequency, epsilon, 1e3 * np.asarray(amplitude), cmap="cividis", shading="nearest")
         ax.figure.colorbar(mesh, ax=ax, label="largest stable amplitude at the tip / mm")
         for side in () if boundary is None else boundary:
@@ -250,7 +259,7 @@ def figure_backbone(
     points: int = 120,
     branches: bool = False,
     k_3: float = _CUBIC,
-    ax: Any = None,
+    ax: Axes | None = None,
 ) -> Figure:
     """Draw the frequency of free vibration over its energy, with the turns at internal resonances.
 
@@ -270,7 +279,7 @@ def figure_backbone(
         system = cubic_joint(system if np.all(np.isfinite(system.k_t)) else system.replace(k_t=1e3), k_3)
     curve = backbone(system, mode, modes=modes, points=points, branches=branches)
     with styled():
-        ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
+        ax = panel(ax, (6.4, 3.9))
         _show_curve(ax, curve)
         ax.axis(ax.axis())  # that of the curve itself
         for other in curve.branches:

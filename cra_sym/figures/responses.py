@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from cra_sym.analysis.histories import History
+from cra_sym.analysis.histories import Histories, History
 from cra_sym.analysis.responses import response, tip_response
 from cra_sym.arm.parameters import Arm
-from cra_sym.figures.drawing import BLUE, ORANGE, figure_of, panels
-from cra_sym.figures.subject import fields, moving_place, rigid_ends, single, span, unknowns
+from cra_sym.figures.drawing import BLUE, ORANGE, Panels, figure_of, panels
+from cra_sym.figures.subject import arm_or_nominal, fields, moving_place, rigid_ends, several, single, span, unknowns
 from cra_sym.model.system import System
 from cra_sym.solvers.force import Force
 from cra_sym.solvers.motion import BaseMotion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.typing import ColorType
+    from sympy import Expr
 
 __all__ = ["figure_6", "figure_7", "figure_8", "figure_9", "figure_10", "figure_response"]
 
@@ -34,10 +36,10 @@ _ERROR = "error: with minus without disturbance / mm"
 
 def _tip(
     arm: System, t: np.ndarray, disturbed: bool = True, rate: float = RATE, phase: float = 0.0, **mean: Any
-) -> Any:
+) -> np.ndarray:
     """Return the tip's displacement in mm."""
     motion = BaseMotion(**mean, amplitude=AMPLITUDE * disturbed, angular_frequency=rate, phase=phase)
-    return 1e3 * tip_response(arm, motion, t)
+    return np.asarray(1e3 * tip_response(arm, motion, t))
 
 
 def _name(arm: System) -> str:
@@ -52,7 +54,7 @@ def _finish(grid: np.ndarray, scenario: str) -> Figure:
     return figure
 
 
-def _peak(ax: Axes, t: np.ndarray, v: np.ndarray, color: Any) -> float:
+def _peak(ax: Axes, t: np.ndarray, v: np.ndarray, color: ColorType) -> float:
     """Mark the largest deflection and return it."""
     k = int(np.argmax(np.abs(v)))
     ax.plot(t[k], v[k], "o", color=color, markersize=5, markerfacecolor="white", zorder=3)
@@ -61,12 +63,12 @@ def _peak(ax: Axes, t: np.ndarray, v: np.ndarray, color: Any) -> float:
 
 def figure_response(
     system: System | None = None,
-    motion: BaseMotion | Mapping[Any, History] | None = None,
+    motion: BaseMotion | Histories | None = None,
     t: ArrayLike | None = None,
     *,
     modes: int = 5,
-    initial: Mapping[Any, Any] | None = None,
-    axes: Any = None,
+    initial: Mapping[Expr, Expr] | None = None,
+    axes: Panels | None = None,
 ) -> Figure:
     """Draw the response of the tip to any motion and forces, with the springs of the ends as they are and rigid.
 
@@ -88,7 +90,7 @@ def figure_response(
     axes : Axes, optional
     """
     system = single(Arm.nominal().replace(k_t=SOFT) if system is None else system)
-    t = _times(system) if t is None else np.asarray(t, dtype=float)
+    t = _times(system) if t is None else several("t", t, "times", low=0.0, unit="s")
     if motion is None and initial is None:
         motion, initial = _default_drive(system)
     ax, modes = panels(axes, 1, 1, (6.4, 3.6))[0, 0], min(modes, system.most_modes)
@@ -126,7 +128,7 @@ def _times(system: System) -> np.ndarray:
     return np.linspace(0.0, span(system), _TIME.size)
 
 
-def _default_drive(system: System) -> tuple[Any, Any]:
+def _default_drive(system: System) -> tuple[dict[str, History] | None, dict[Expr, Expr] | None]:
     causes = dict(system.numerics("causes"))
     motions = [name for name, kind in causes.items() if kind in ("motion", "support")]
     disturbed = BaseMotion(acceleration=0.1, amplitude=AMPLITUDE, angular_frequency=RATE)
@@ -139,7 +141,7 @@ def _default_drive(system: System) -> tuple[Any, Any]:
     return None, {first.diff(equations.t): 1}
 
 
-def figure_6(arm: System | None = None, *, axes: Any = None) -> Figure:
+def figure_6(arm: System | None = None, *, axes: Panels | None = None) -> Figure:
     """Draw the tip's response to a mean velocity and to a mean acceleration, without and with the disturbance.
 
     The phase of the disturbance, which the paper does not tell, decides on the first: one row each for 0 and pi.
@@ -150,7 +152,7 @@ def figure_6(arm: System | None = None, *, axes: Any = None) -> Figure:
         By default the nominal one.
     axes : 2 x 2 array of Axes, optional
     """
-    arm = arm or Arm.nominal()
+    arm = arm_or_nominal(arm)
     t = _times(arm)
     grid = panels(axes, 2, 2, (8.6, 6.2), sharex=True, sharey="col")
     cases = (("mean velocity 0.1 m/s", {"velocity": VELOCITY}), ("mean acceleration 0.1 m/s²", {"acceleration": 0.1}))
@@ -171,8 +173,14 @@ def figure_6(arm: System | None = None, *, axes: Any = None) -> Figure:
     return _finish(grid, f"{_name(arm)}, $B$ = 1 mm, $\\varpi$ = 10 rad/s, {_FROM_REST}")
 
 
-def _against_rigid(axes: Any, arm: System | None, quantity: Any, label: str, title: str) -> Figure:
-    arm = arm or Arm.nominal()
+def _against_rigid(
+    axes: Panels | None,
+    arm: System | None,
+    quantity: Callable[[System, np.ndarray, float], np.ndarray],
+    label: str,
+    title: str,
+) -> Figure:
+    arm = arm_or_nominal(arm)
     t = _times(arm)
     grid = panels(axes, 1, 2, (8.6, 3.9), sharex=True, sharey=True)
     rigid, soft = arm.replace(k_t=np.inf), arm.replace(k_t=SOFT) if np.isinf(arm.values["k_t"]) else arm
@@ -189,7 +197,7 @@ def _against_rigid(axes: Any, arm: System | None, quantity: Any, label: str, tit
     return _finish(grid, f"{_name(arm)}, mean acceleration 0.1 m/s², $B$ = 1 mm, $\\psi$ = 0, {_FROM_REST}")
 
 
-def figure_7(arm: System | None = None, *, axes: Any = None) -> Figure:
+def figure_7(arm: System | None = None, *, axes: Panels | None = None) -> Figure:
     """Draw the tip's response with a joint of finite translational stiffness against a rigid one.
 
     Two frequencies of the disturbance, below and above the first natural frequency: on it depends what a softer joint
@@ -202,13 +210,13 @@ def figure_7(arm: System | None = None, *, axes: Any = None) -> Figure:
     axes : pair of Axes, optional
     """
 
-    def tip(joined: System, t: np.ndarray, rate: float) -> Any:
+    def tip(joined: System, t: np.ndarray, rate: float) -> np.ndarray:
         return _tip(joined, t, rate=rate, acceleration=0.1)
 
     return _against_rigid(axes, arm, tip, _TIP, "Fig. 7  A softer joint: smaller peak at 20 rad/s, not at 10")
 
 
-def figure_8(arm: System | None = None, *, axes: Any = None) -> Figure:
+def figure_8(arm: System | None = None, *, axes: Panels | None = None) -> Figure:
     """Draw what the disturbance adds to the responses of Fig. 7.
 
     Parameters
@@ -218,13 +226,14 @@ def figure_8(arm: System | None = None, *, axes: Any = None) -> Figure:
     axes : pair of Axes, optional
     """
 
-    def error(joined: System, t: np.ndarray, rate: float) -> Any:
-        return _tip(joined, t, rate=rate, acceleration=0.1) - _tip(joined, t, disturbed=False, acceleration=0.1)
+    def error(joined: System, t: np.ndarray, rate: float) -> np.ndarray:
+        moved, plain = (_tip(joined, t, disturbed, rate, acceleration=0.1) for disturbed in (True, False))
+        return np.asarray(moved - plain)
 
     return _against_rigid(axes, arm, error, _ERROR, "Fig. 8  It suppresses the disturbance at 20 rad/s, not at 10")
 
 
-def figure_9(arm: System | None = None, *, axes: Any = None) -> Figure:
+def figure_9(arm: System | None = None, *, axes: Panels | None = None) -> Figure:
     """Draw the tip's response to three mean accelerations, with and without the disturbance.
 
     Parameters
@@ -233,7 +242,7 @@ def figure_9(arm: System | None = None, *, axes: Any = None) -> Figure:
         By default the nominal one.
     axes : pair of Axes, optional
     """
-    arm = arm or Arm.nominal()
+    arm = arm_or_nominal(arm)
     t = _times(arm)
     grid = panels(axes, 1, 2, (8.6, 3.9), sharex=True, sharey=True)
     for ax, disturbed, word in zip(grid[0], (True, False), ("with", "without"), strict=True):
@@ -248,7 +257,7 @@ def figure_9(arm: System | None = None, *, axes: Any = None) -> Figure:
     return _finish(grid, f"{_name(arm)}, $B$ = 1 mm, $\\varpi$ = 10 rad/s, $\\psi$ = 0, {_FROM_REST}")
 
 
-def figure_10(arm: System | None = None, *, axes: Any = None) -> Figure:
+def figure_10(arm: System | None = None, *, axes: Panels | None = None) -> Figure:
     """Draw the error caused by the disturbance for three mean accelerations: of the response, and of its peak.
 
     By superposition the first does not depend on the acceleration at all; the second never grows with it.
@@ -259,7 +268,7 @@ def figure_10(arm: System | None = None, *, axes: Any = None) -> Figure:
         By default the nominal one.
     axes : pair of Axes, optional
     """
-    arm = arm or Arm.nominal()
+    arm = arm_or_nominal(arm)
     t = _times(arm)
     grid = panels(axes, 1, 2, (8.6, 3.9))
     left, right = grid[0]

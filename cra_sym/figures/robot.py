@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from cra_sym.figures.drawing import BLUE, INK, ORANGE, canvas, deflection
+from cra_sym.figures.drawing import BLUE, INK, ORANGE, canvas, deflection, figure_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.typing import ColorType
     from numpy.typing import ArrayLike
 
     from cra_sym.model.system import System
@@ -36,14 +37,15 @@ def _at(point: ArrayLike, offset: ArrayLike = (0.0, 0.0)) -> tuple[float, float]
     return float(across), float(up)
 
 
-def _tint(colour: str, factor: float) -> np.ndarray:
+def _tint(colour: str, factor: float) -> ColorType:
+    """Return a darker colour for a factor below one, a lighter one above."""
     from matplotlib.colors import to_rgb
 
-    rgb = np.array(to_rgb(colour))
-    return rgb * factor if factor <= 1 else 1 - (1 - rgb) * (2 - factor)
+    red, green, blue = (c * factor if factor <= 1 else 1 - (1 - c) * (2 - factor) for c in to_rgb(colour))
+    return red, green, blue
 
 
-def _face(ax: Axes, corners: ArrayLike, colour: Any, **options: Any) -> None:
+def _face(ax: Axes, corners: ArrayLike, colour: ColorType, **options: Any) -> None:
     from matplotlib.patches import Polygon
 
     style = {"edgecolor": INK, "linewidth": 0.7, "joinstyle": "round", **options}
@@ -121,7 +123,7 @@ def figure_1(arm: System | None = None, ax: Axes | None = None) -> Figure:
     ax : Axes, optional
         Where to draw; by default a new figure.
     """
-    figure, ax = canvas(ax, figsize=(7.6, 4.6))
+    ax = canvas(ax, (7.6, 4.6))
     xi = np.linspace(0.0, 1.0, 80)
     bend = 1.25 * deflection(arm, xi)
     x = _ROOT + _LENGTH * xi
@@ -139,4 +141,4 @@ def figure_1(arm: System | None = None, ax: Axes | None = None) -> Figure:
     _label(ax, (x[-1] + 0.36, bend[-1] + 0.1, 0.95), (6.1, -3.1), "end-effector $m_e$")
     _label(ax, (0.55, -2.4, 0.2), (3.4, 2.1), "guide")
     ax.autoscale_view()
-    return figure
+    return figure_of(ax)

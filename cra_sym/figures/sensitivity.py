@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 
 from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.arm.parameters import Arm
-from cra_sym.figures.drawing import figure_of
+from cra_sym.figures.drawing import Panels, figure_of, panels
 from cra_sym.figures.modes import decades
+from cra_sym.figures.subject import arm_or_nominal
 from cra_sym.model.system import System
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ _UNITS = {"k_t": "N/m", "k_r": "N m/rad"}
 _NAMES = {"k_t": "translational stiffness $k_t$ / (N/m)", "k_r": "rotational stiffness $k_r$ / (N m/rad)"}
 
 
-def figure_5(arm: System | None = None, *, axes: Any = None) -> Figure:
+def figure_5(arm: System | None = None, *, axes: Panels | None = None) -> Figure:
     """Draw the sensitivities of f1, f2, f3 to k_t and to k_r, each with the other spring as the arm has it.
 
     Upper row: raw, in different units, so that the two panels cannot be compared. Lower row: logarithmic, on one scale.
@@ -35,12 +36,11 @@ def figure_5(arm: System | None = None, *, axes: Any = None) -> Figure:
         By default the nominal one, whose joint is rigid.
     axes : 2 x 2 array of Axes, optional
     """
-    arm = arm or Arm.nominal()
+    arm = arm_or_nominal(arm)
+    grid = panels(axes, 2, 2, (8.6, 6.4), sharex="col")
+    (raw_t, raw_r), (log_t, log_r) = grid
     if axes is None:
-        figure = Figure(figsize=(8.6, 6.4), layout="constrained")
-        axes = figure.subplots(2, 2, sharex="col")
-        axes[1, 1].sharey(axes[1, 0])
-    (raw_t, raw_r), (log_t, log_r) = np.asarray(axes)
+        log_r.sharey(log_t)
     for name, raw, log, low in (("k_t", raw_t, log_t, 0), ("k_r", raw_r, log_r, -1)):
         stiffness = decades(arm, name, low, 6, 281)
         found, marked = (

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from collections.abc import Sequence
+from itertools import cycle
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from cra_sym.analysis.backbone import Backbone, backbone
 from cra_sym.analysis.modes import natural_frequencies
@@ -14,12 +17,16 @@ from cra_sym.analysis.stability import judged_boundary
 from cra_sym.analysis.steady_states import steady_states
 from cra_sym.arm.bolted_joint import BoltedJoint
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import count
+from cra_sym.checks import count, instance, one_number
 from cra_sym.figures import styled
-from cra_sym.figures.drawing import BLUE, GREEN, INK, ORANGE, panels
+from cra_sym.figures.drawing import BLUE, GREEN, INK, ORANGE, Panels, figure_of, panel, panels
+from cra_sym.figures.subject import arm_or_nominal, positive
 from cra_sym.model.excitations import Fluctuation
 from cra_sym.model.system import System
 from cra_sym.solvers.motion import BaseMotion
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 __all__ = ["figure_preload", "figure_preload_tongues", "figure_slip_amplitude", "figure_slip_loop",
            "figure_tongue_bounds", "show_loop"]  # fmt: skip
@@ -29,7 +36,7 @@ _ZETA = 0.002
 _SOFT = BoltedJoint(rest=20.0, body_t=20.0, lever=0.05)  # visible deformation before slip
 
 
-def show_loop(found: SlipResponse, *, ax: Any = None) -> Figure:
+def show_loop(found: SlipResponse, *, ax: Axes | None = None) -> Figure:
     """Draw force over displacement of the first place that slips, and mark where it does.
 
     Parameters
@@ -39,7 +46,7 @@ def show_loop(found: SlipResponse, *, ax: Any = None) -> Figure:
     ax : Axes, optional
     """
     with styled():
-        ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
+        ax = panel(ax, (6.4, 3.9))
         moved, force = 1e3 * found.displacement[0], found.force.sum(axis=0)
         ax.plot(moved, force, "-", color=INK, linewidth=0.8, label="sticks")
         slips = (found.state != 0).any(axis=0)
@@ -47,7 +54,7 @@ def show_loop(found: SlipResponse, *, ax: Any = None) -> Figure:
         ax.set_xlabel("displacement of the joint / mm")
         ax.set_ylabel("force of the faces / N")
         ax.legend()
-    return cast(Figure, ax.figure)
+    return figure_of(ax)
 
 
 def figure_slip_loop(
@@ -56,7 +63,7 @@ def figure_slip_loop(
     joint: BoltedJoint | None = None,
     preload: float = 2.0,
     duration: float = 1.5,
-    ax: Any = None,
+    ax: Axes | None = None,
 ) -> Figure:
     """Draw the force of the faces of a bolted joint over its displacement during a move: each loop is work lost.
 
@@ -71,8 +78,8 @@ def figure_slip_loop(
         s.
     ax : Axes, optional
     """
-    arm = Arm.nominal().replace(zeta=_ZETA) if arm is None else arm
-    system = (BoltedJoint() if joint is None else joint).on(arm, preload)
+    arm = arm_or_nominal(arm, zeta=_ZETA)
+    system = (BoltedJoint() if joint is None else joint).on(arm, one_number("preload", preload, unit="N"))
     found = slip_response(system, BaseMotion.trapezoid(**_MOVE), np.linspace(0.0, duration, 1501), modes=4)
     return show_loop(found, ax=ax)
 
@@ -82,9 +89,9 @@ def figure_slip_amplitude(
     *,
     mode: int = 1,
     modes: int = 2,
-    amplitude: Any = None,
+    amplitude: ArrayLike | None = None,
     curve: Backbone | None = None,
-    axes: Any = None,
+    axes: Panels | None = None,
 ) -> Figure:
     """Draw frequency and damping ratio of a mode with elastic-slip elements over the amplitude of its tip.
 
@@ -113,6 +120,7 @@ def figure_slip_amplitude(
             raise ValueError("system: must have elastic-slip elements: Model(.., hysteresis=[(cra.Jenkins(..), ..)])")
         amplitude = np.geomspace(4e-3, 0.3, 25) if amplitude is None else amplitude
         curve = backbone(system, mode, amplitude=amplitude, modes=modes)
+    instance("curve", curve, Backbone)
     with styled():
         left, right = panels(axes, 1, 2, (8.8, 3.7)).ravel()
         size = 1e3 * np.asarray(curve.amplitude)
@@ -121,10 +129,12 @@ def figure_slip_amplitude(
         for ax, label in ((left, "frequency / Hz"), (right, "damping ratio")):
             ax.set_xlabel("amplitude at the tip / mm")
             ax.set_ylabel(label)
-    return cast(Figure, left.figure)
+    return figure_of(left)
 
 
-def figure_tongue_bounds(epsilon: Any, bounded: Any, threshold: Any, *, ax: Any = None) -> Figure:
+def figure_tongue_bounds(
+    epsilon: ArrayLike, bounded: ArrayLike, threshold: ArrayLike, *, ax: Axes | None = None
+) -> Figure:
     """Draw to which amplitude friction bounds vibration in a tongue, and from which on it holds nothing in another.
 
     Parameters
@@ -138,7 +148,7 @@ def figure_tongue_bounds(epsilon: Any, bounded: Any, threshold: Any, *, ax: Any 
     ax : Axes, optional
     """
     with styled():
-        ax = panels(None if ax is None else [ax], 1, 1, (6.4, 3.9)).ravel()[0]
+        ax = panel(ax, (6.4, 3.9))
         curves = (
             (bounded, BLUE, "-", "o", "bounded, at twice the stuck"),
             (threshold, ORANGE, "--", "^", "threshold, at twice the sliding"),
@@ -149,18 +159,18 @@ def figure_tongue_bounds(epsilon: Any, bounded: Any, threshold: Any, *, ax: Any 
         ax.set_xlabel("size of the excitation $\\epsilon$")
         ax.set_ylabel("amplitude at the tip / mm")
         ax.legend(title="frequency of the joint")
-    return cast(Figure, ax.figure)
+    return figure_of(ax)
 
 
 def figure_preload(
     arm: Arm | None = None,
     *,
     joint: BoltedJoint | None = None,
-    preload: Any = None,
-    shown: Any = (1.0, 3.0, 100.0),
+    preload: ArrayLike | None = None,
+    shown: Sequence[float] = (1.0, 3.0, 100.0),
     duration: float = 4.0,
     modes: int = 4,
-    axes: Any = None,
+    axes: Panels | None = None,
 ) -> Figure:
     """Draw what the preload of a bolted joint does to frequencies, to the vibration after a move and to its course.
 
@@ -175,20 +185,21 @@ def figure_preload(
     joint : BoltedJoint, optional
     preload : array_like, optional
         N, ascending.
-    shown : sequence of three float
+    shown : sequence of float
         Preloads whose move is drawn, N.
     duration : float
         Of what is followed, s.
     modes : int
     axes : sequence of three Axes, optional
     """
-    arm = Arm.nominal().replace(zeta=_ZETA) if arm is None else arm
+    arm = arm_or_nominal(arm, zeta=_ZETA)
     joint = BoltedJoint() if joint is None else joint
-    forces = np.geomspace(0.3, 100.0, 25) if preload is None else np.asarray(preload, float)
+    forces = np.geomspace(0.3, 100.0, 25) if preload is None else positive("preload", preload, "preloads", unit="N")
     times = np.linspace(0.0, duration, 401)
+    chosen = positive("shown", shown, "preloads", 1, unit="N")
     move, systems = BaseMotion.trapezoid(**_MOVE), joint.on(arm, forces)
     found = slip_response(systems, move, times, modes=modes)
-    some = slip_response(joint.on(arm, np.asarray(shown, float)), move, times, modes=modes)
+    some = slip_response(joint.on(arm, chosen), move, times, modes=modes)
     peak, late = (1e3 * np.abs(found.tip[..., times >= since]).max(axis=-1) for since in (0.0, 0.75 * duration))
     rigid = natural_frequencies(arm.replace(k_t=np.inf, k_r=np.inf))
     with styled():
@@ -207,26 +218,26 @@ def figure_preload(
         for ax in (left, middle):
             ax.set_xlabel("preload / N")
         lines = ((ORANGE, ":"), (GREEN, "-"), (INK, "--"))
-        for force, tip, (color, line) in zip(shown, some.tip, lines, strict=True):
+        for force, tip, (color, line) in zip(chosen, some.tip, cycle(lines), strict=False):
             right.plot(times, 1e3 * tip, color=color, linestyle=line, linewidth=0.9, label=f"{force:g} N")
         right.set_xlabel("time $t$ / s")
         right.set_ylabel("$v(L, t)$ / mm")
         right.set_ylim(top=1.4 * right.get_ylim()[1])
         right.legend(title="preload", ncols=3, loc="upper right")
-    return cast(Figure, left.figure)
+    return figure_of(left)
 
 
 def figure_preload_tongues(
     arm: Arm | None = None,
     *,
     joint: BoltedJoint | None = None,
-    preload: Any = None,
+    preload: ArrayLike | None = None,
     excitation: Fluctuation | None = None,
     epsilon: float = 0.3,
     amplitude: float = 0.02,
     amplitudes: int = 4,
     harmonics: int = 7,
-    axes: Any = None,
+    axes: Panels | None = None,
 ) -> Figure:
     """Draw what the preload of a bolted joint does to damping, to the width of tongues, and to the vibration inside.
 
@@ -253,9 +264,9 @@ def figure_preload_tongues(
     harmonics : int
     axes : sequence of three Axes, optional
     """
-    arm = Arm.nominal().replace(zeta=_ZETA) if arm is None else arm
+    arm = arm_or_nominal(arm, zeta=_ZETA)
     excitation = Fluctuation(k_t=1.0, k_r=1.0) if excitation is None else excitation
-    forces = np.geomspace(0.1, 10.0, 25) if preload is None else np.asarray(preload, float)
+    forces = np.geomspace(0.1, 10.0, 25) if preload is None else positive("preload", preload, "preloads", unit="N")
     systems = (_SOFT if joint is None else joint).on(arm, forces)
     widths = [np.subtract(*judged_boundary(systems, excitation, epsilon, (n, n))[1::-1]) for n in (1, 2, 3)]
     few = count("amplitudes", amplitudes, low=2)
@@ -280,4 +291,4 @@ def figure_preload_tongues(
         right.set_ylabel("amplitude inside tongue 1 / mm")
         for ax in (left, middle, right):
             ax.set_xlabel("preload / N")
-    return cast(Figure, left.figure)
+    return figure_of(left)

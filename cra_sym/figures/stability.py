@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
 
 from cra_sym.analysis.eigenvalues import oscillating_frequencies
 from cra_sym.analysis.floquet import growth_rate
@@ -14,13 +15,15 @@ from cra_sym.analysis.floquet_boundary import floquet_boundary
 from cra_sym.analysis.stability import forced_width, judged_boundary
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
-from cra_sym.figures.drawing import figure_of, panels
-from cra_sym.figures.subject import default_excitation, rigid_body_modes, single
-from cra_sym.model.excitations import AxialBase, Fluctuation, TransverseBase
+from cra_sym.checks import count, one_number
+from cra_sym.figures.drawing import Panels, figure_of, panel, panels
+from cra_sym.figures.subject import arm_or_nominal, default_excitation, positive, rigid_body_modes, several, single
+from cra_sym.model.excitations import AxialBase, Excitation, Fluctuation, Parametric, TransverseBase
 from cra_sym.model.system import System
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.contour import QuadContourSet
 
 __all__ = [
     "figure_11",
@@ -42,7 +45,7 @@ _FIRST: dict[str, Any] = {"color": "#0072B2", "linestyle": (0, (4, 2)), "linewid
 _SECOND: dict[str, Any] = {"color": "#111111", "linestyle": "-", "linewidth": 1.2}
 
 
-def _described(excitation: Any) -> str:
+def _described(excitation: Parametric) -> str:
     if isinstance(excitation, AxialBase):
         return f"base shakes along the arm, {1e3 * np.max(excitation.amplitude):g} mm × ε"
     if isinstance(excitation, Fluctuation) and not isinstance(excitation, JointStiffness):
@@ -57,7 +60,12 @@ def _boundary(*given: Any, **more: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _growth(
-    system: System, excitation: Any, frequency: np.ndarray, epsilon: np.ndarray, modes: int, tolerance: float = 1e-7
+    system: System,
+    excitation: Parametric,
+    frequency: np.ndarray,
+    epsilon: np.ndarray,
+    modes: int,
+    tolerance: float = 1e-7,
 ) -> np.ndarray:
     """Return the growth rate over a chart, converged in the number of modes where springs of ends alone act."""
     # dampers, gyroscopic and follower forces act between the modes: none is left out then
@@ -68,11 +76,11 @@ def _growth(
 _RIGID = "no zone: a rigid joint cannot\nfluctuate; give $k_t$, as 1e4 N/m"
 
 
-def _is_rigid(system: System, excitation: Any) -> bool:
+def _is_rigid(system: System, excitation: Parametric) -> bool:
     return isinstance(excitation, JointStiffness) and bool(np.isinf(system.values["k_t"]))
 
 
-def _excitation(system: System, given: Any, of_an_arm: Any) -> Any:
+def _excitation(system: System, given: Parametric | None, of_an_arm: Parametric) -> Parametric:
     if given is not None:
         return given
     return of_an_arm if isinstance(system, Arm) else default_excitation(system)
@@ -83,7 +91,7 @@ def _say(ax: Axes, words: str) -> None:
 
 
 def _zone(
-    ax: Axes, arm: System, excitation: Any, mode: int, epsilon: np.ndarray, points: int, tolerance: float = 1e-7
+    ax: Axes, arm: System, excitation: Parametric, mode: int, epsilon: np.ndarray, points: int, tolerance: float = 1e-7
 ) -> None:
     """Draw one principal zone against its detuning."""
     modes, more = (min(number, arm.most_modes) for number in (max(mode, 3), mode + 2))
@@ -114,7 +122,9 @@ def _zone(
     _say(ax, f"$2\\omega_{mode}$ = {centre:.4g} rad/s\nwidth {2 * half:.3g} rad/s")
 
 
-def _shade(ax: Axes, frequency: np.ndarray, epsilon: np.ndarray, rates: np.ndarray, step: float | None = None) -> Any:
+def _shade(
+    ax: Axes, frequency: np.ndarray, epsilon: np.ndarray, rates: np.ndarray, step: float | None = None
+) -> QuadContourSet | None:
     """Shade growth rates in steps; the rest stays white. Return None if there is no growth."""
     top = rates.max()
     if not top > 0:
@@ -125,14 +135,16 @@ def _shade(ax: Axes, frequency: np.ndarray, epsilon: np.ndarray, rates: np.ndarr
 
 def _principal_zones(
     arms: Sequence[tuple[str, System]],
-    excitation: Any,
+    excitation: Parametric,
     epsilon: float,
     title: str,
-    axes: Any,
+    axes: Panels | None,
     points: int,
     tolerance: float = 1e-7,
 ) -> Figure:
     """Draw the zones of the first three elastic modes, or as many as there are, a row an arm."""
+    count("points", points, low=2)
+    one_number("epsilon", epsilon, low=0.0, open_low=True, unit="1")
     first = 1 + max(rigid_body_modes(arm) for _, arm in arms)
     shown = min(3, *(arm.most_modes + 1 - first for _, arm in arms))
     grid = panels(axes, len(arms), shown, (2.8 * shown, 1.95 * len(arms) + 0.8), sharey=True)
@@ -155,10 +167,10 @@ def _principal_zones(
 
 def figure_zones(
     system: System | None = None,
-    excitation: Any = None,
+    excitation: Parametric | None = None,
     epsilon: float = 0.3,
     *,
-    axes: Any = None,
+    axes: Panels | None = None,
     points: int = 37,
     tolerance: float = 1e-7,
 ) -> Figure:
@@ -187,11 +199,11 @@ def figure_zones(
 
 def figure_11(
     arm: System | None = None,
-    k_t: Any = K_T,
-    excitation: Any = JOINT,
+    k_t: Sequence[float] = K_T,
+    excitation: Parametric = JOINT,
     epsilon: float = 0.3,
     *,
-    axes: Any = None,
+    axes: Panels | None = None,
     points: int = 37,
 ) -> Figure:
     """Draw the principal zones of the first three modes for three translational stiffnesses of the joint.
@@ -209,8 +221,11 @@ def figure_11(
     points : int
         Points of the Floquet chart along each axis.
     """
-    arm = arm or Arm.nominal()
-    arms = [(f"$k_t$ = {_power(k)} N/m", arm.replace(k_t=k)) for k in k_t]
+    arm = arm_or_nominal(arm)
+    arms = [
+        (f"$k_t$ = {_power(k)} N/m", arm.replace(k_t=k))
+        for k in several("k_t", k_t, "stiffnesses", 1, low=0.0, open_low=True, allow_infinite=True, unit="N/m")
+    ]
     return _principal_zones(arms, excitation, epsilon, "Fig. 11  ", axes, points)
 
 
@@ -221,11 +236,11 @@ def figure_11_axial(arm: System | None = None) -> Figure:
 
 def figure_12(
     arm: System | None = None,
-    m_e: Any = M_E,
-    excitation: Any = JOINT,
+    m_e: Sequence[float] = M_E,
+    excitation: Parametric = JOINT,
     epsilon: float = 0.3,
     *,
-    axes: Any = None,
+    axes: Panels | None = None,
     points: int = 37,
 ) -> Figure:
     """Draw the principal zones of the first three modes for three end-effectors.
@@ -239,8 +254,10 @@ def figure_12(
     excitation, epsilon, axes, points
         As in :func:`figure_11`.
     """
-    arm = arm or Arm.nominal().replace(k_t=1e4)
-    arms = [(f"$m_e$ = {1e3 * m:g} g", arm.replace(m_e=m)) for m in m_e]
+    arm = arm_or_nominal(arm, k_t=1e4)
+    arms = [
+        (f"$m_e$ = {1e3 * m:g} g", arm.replace(m_e=m)) for m in several("m_e", m_e, "masses", 1, low=0.0, unit="kg")
+    ]
     return _principal_zones(arms, excitation, epsilon, "Fig. 12  ", axes, points)
 
 
@@ -250,11 +267,13 @@ def figure_12_axial(arm: System | None = None) -> Figure:
 
 
 def _power(value: float) -> str:
+    if np.isinf(value):
+        return r"$\infty$"
     exponent = np.log10(value)
     return f"$10^{{{exponent:.0f}}}$" if abs(exponent - round(exponent)) < 1e-9 else f"{value:g}"
 
 
-def figure_widths(arm: System | None = None, *, axes: Any = None) -> Figure:
+def figure_widths(arm: System | None = None, *, axes: Panels | None = None) -> Figure:
     """Draw how wide the principal zones are against k_t and m_e: first-order widths at epsilon = 1, three excitations.
 
     Parameters
@@ -263,13 +282,13 @@ def figure_widths(arm: System | None = None, *, axes: Any = None) -> Figure:
         By default the nominal one; against m_e it has k_t = 1e4 N/m.
     axes : 2 x 3 array of Axes, optional
     """
-    arm = arm or Arm.nominal()
+    arm = arm_or_nominal(arm)
     grid = panels(axes, 2, 3, (9.6, 5.6), sharex="row")
     k_t, m_e = np.logspace(1, 6, 201), np.linspace(0.0, 0.02, 101)
     titles = ("joint stiffness", "base along the arm", "base across the arm")
-    rows: tuple[tuple[np.ndarray, System, str, Any], ...] = (
+    rows: tuple[tuple[np.ndarray, System, str, Sequence[float]], ...] = (
         (k_t, arm.replace(k_t=k_t), "$k_t$ / (N/m)", K_T),
-        (m_e * 1e3, arm.replace(k_t=1e4, m_e=m_e), "$m_e$ / g", np.array(M_E) * 1e3),
+        (m_e * 1e3, arm.replace(k_t=1e4, m_e=m_e), "$m_e$ / g", tuple(1e3 * m for m in M_E)),
     )
     for row, (values, batch, label, marks) in zip(grid, rows, strict=True):
         for ax, excitation in zip(row, (JOINT, AXIAL, TRANSVERSE), strict=True):
@@ -292,7 +311,7 @@ def figure_widths(arm: System | None = None, *, axes: Any = None) -> Figure:
     return figure
 
 
-def _widths(arm: System, excitation: Any) -> list[np.ndarray]:
+def _widths(arm: System, excitation: Excitation) -> list[np.ndarray]:
     if isinstance(excitation, TransverseBase):
         return list(np.moveaxis(forced_width(arm, excitation), -1, 0))
     # the width is proportional to epsilon: any small value will do
@@ -302,7 +321,7 @@ def _widths(arm: System, excitation: Any) -> list[np.ndarray]:
 
 def figure_combinations(
     system: System | None = None,
-    excitation: Any = None,
+    excitation: Parametric | None = None,
     epsilon: float | None = None,
     *,
     ax: Axes | None = None,
@@ -325,7 +344,9 @@ def figure_combinations(
     system = single(Arm.nominal().replace(k_t=1e3) if system is None else system)
     excitation = _excitation(system, excitation, AXIAL)
     epsilon = (1.0 if isinstance(excitation, AxialBase) else 0.5) if epsilon is None else epsilon
-    ax = panels(ax, 1, 1, (9.4, 5.0))[0, 0]
+    count("points", points, low=6)
+    epsilon = one_number("epsilon", epsilon, low=0.0, open_low=True, unit="1")
+    ax = panel(ax, (9.4, 5.0))
     still = rigid_body_modes(system)
     omega = oscillating_frequencies(system, still + 3)
     frequency = np.linspace(0.5 * omega[still], 2.2 * omega[-1], points)
@@ -348,16 +369,15 @@ def figure_combinations(
     ax.set_ylabel(r"$\epsilon$")
     ax.set_title(f"Principal and sum resonances: {_described(excitation)}", pad=32)
     handles = [ax.plot([], [], **look)[0] for look in (_SECOND, _FIRST)]
-    figure = ax.figure
+    figure = figure_of(ax)
     names = ("multiple scales, second order", "second tongue, width of order ε²")
     note = f"shaded: growth by Floquet theory, {still + 4} modes; thin streaks are tongues of higher order"
     figure.legend(handles, names, loc="outside lower center", ncols=2, title=note, title_fontsize=8)
     if mesh is None:
         _say(ax, "no growth up to this ε")
     else:
-        bar = figure.colorbar(mesh, ax=ax, pad=0.01, aspect=30)
+        bar = ax.figure.colorbar(mesh, ax=ax, pad=0.01, aspect=30)
         bar.set_label(r"$\sqrt{\mathrm{growth\ rate\ /\ (1/s)}}$")
-    assert isinstance(figure, Figure)
     return figure
 
 
@@ -365,7 +385,9 @@ def _name(ax: Axes, name: str, place: float, top: float, above: float = 4, **loo
     ax.annotate(name, (place, top), xytext=(0, above), textcoords="offset points", ha="center", **look)
 
 
-def figure_accuracy(arm: System | None = None, epsilon: Any = None, *, axes: Any = None) -> Figure:
+def figure_accuracy(
+    arm: System | None = None, epsilon: ArrayLike | None = None, *, axes: Panels | None = None
+) -> Figure:
     """Draw the error of the boundaries against epsilon: first order has slope 2, second order slope 3.
 
     Parameters
@@ -375,8 +397,8 @@ def figure_accuracy(arm: System | None = None, epsilon: Any = None, *, axes: Any
     epsilon : array_like, optional
     axes : pair of Axes, optional
     """
-    arm = arm or Arm.nominal().replace(k_t=1e4)
-    epsilon = np.geomspace(0.03, 0.12, 3) if epsilon is None else np.asarray(epsilon, dtype=float)
+    arm = arm_or_nominal(arm, k_t=1e4)
+    epsilon = np.geomspace(0.03, 0.12, 3) if epsilon is None else positive("epsilon", epsilon, "sizes", unit="1")
     grid = panels(axes, 1, 2, (8.6, 3.9), sharey=False)[0]
     cases = ((JOINT, (2, 2)), (JOINT, (1, 2))), ((STRONG, (2, 2)), (STRONG, (1, 2)))
     for ax, pair in zip(grid, cases, strict=True):
@@ -400,7 +422,9 @@ def figure_accuracy(arm: System | None = None, epsilon: Any = None, *, axes: Any
     return figure_of(grid[0])
 
 
-def boundary_errors(arm: System, excitation: Any, epsilon: Any, resonance: tuple[int, int]) -> np.ndarray:
+def boundary_errors(
+    arm: System, excitation: Parametric, epsilon: NDArray[np.float64], resonance: tuple[int, int]
+) -> np.ndarray:
     """Return the largest error of a zone's two sides at orders 1 and 2 against Floquet theory, rad/s.
 
     Returns

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cra_sym.analysis.eigenvalues import oscillating_frequencies
 from cra_sym.analysis.modes import mode_shapes
 from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import instance
-from cra_sym.model.excitations import Excitation, Fluctuation
+from cra_sym.checks import instance, one_axis, shown
+from cra_sym.model.excitations import Fluctuation, Parametric
 from cra_sym.model.system import System
 from cra_sym.symbols import row
 
+if TYPE_CHECKING:
+    from sympy.core.function import AppliedUndef
+
 __all__ = [
+    "arm_or_nominal",
     "around",
     "default_excitation",
     "field_label",
@@ -27,8 +32,10 @@ __all__ = [
     "parameter_label",
     "parameter_name",
     "parameters_of",
+    "positive",
     "rigid_body_modes",
     "rigid_ends",
+    "several",
     "single",
     "span",
     "unknowns",
@@ -45,6 +52,26 @@ def single(system: System) -> System:
     if system.shape:
         raise ValueError(f"system has shape {system.shape}: must be a single set of values, not a batch")
     return system
+
+
+@overload
+def arm_or_nominal(arm: Arm | None, **values: float) -> Arm: ...
+@overload
+def arm_or_nominal(arm: System | None, **values: float) -> System: ...
+def arm_or_nominal(arm: System | None, **values: float) -> System:
+    """Return an arm given, or the nominal one with some values replaced."""
+    return Arm.nominal().replace(**values) if arm is None else single(arm)
+
+
+def several(name: str, values: ArrayLike, of: str, least: int = 2, **limits: Any) -> Array:
+    """Return an axis of numbers, or raise an error that names the field if they are too few."""
+    axis = np.atleast_1d(one_axis(name, values, of, **limits))
+    if axis.size < least:
+        raise ValueError(f"{name} = {shown(values)}: must hold at least {least} value{'s' * (least > 1)}")
+    return axis
+
+
+positive = partial(several, low=0.0, open_low=True)
 
 
 def parameters_of(system: System) -> Arm:
@@ -67,7 +94,7 @@ def parameters_of(system: System) -> Arm:
     return Arm(**{name: system.values[name] for name in names}, zeta=system.zeta)
 
 
-def fields(system: System) -> dict[str, Any]:
+def fields(system: System) -> dict[str, AppliedUndef | None]:
     """Return the fields by their names in LaTeX; an arm's without its derivation."""
     if isinstance(system, Arm):
         return {"v": None}
@@ -203,7 +230,7 @@ def span(system: System, periods: float = 5.0) -> float:
     return float(f"{2 * np.pi * periods / omega:.0e}") if omega > 0 else 1.0
 
 
-def default_excitation(system: System) -> Excitation:
+def default_excitation(system: System) -> Parametric:
     """Return the default excitation: that of the Lagrangian, of the springs of the ends, or of another stiffness.
 
     Raises

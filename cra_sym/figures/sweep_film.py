@@ -11,6 +11,7 @@ from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
 from cra_sym.figures.animation import curve, document, film, moved
 from cra_sym.figures.nonlinear import cubic_joint, swept
+from cra_sym.figures.subject import arm_or_nominal
 
 __all__ = ["jumping_arm"]
 
@@ -30,7 +31,7 @@ def jumping_arm(
 ) -> str:
     """Show an arm whose joint fluctuates while the frequency is swept up through a zone of instability, and down again.
 
-    Left: the arm, whose vibration is that of the stable answer nearest to the last one, in the shape of the mode.
+    Left: the arm, whose vibration is that of the stable solution nearest to the last one, in the shape of the mode.
     Right: where the sweep is (solid: upwards, dashed: downwards) and the zone in which the arm cannot stay at rest.
 
     Parameters
@@ -53,7 +54,7 @@ def jumping_arm(
     str
         An SVG document.
     """
-    arm = Arm.nominal().replace(k_t=1e3) if arm is None else arm
+    arm = arm_or_nominal(arm, k_t=1e3)
     excitation = JointStiffness(k_t=1.0)
     lower, upper = (float(side) for side in stability_boundary(arm, excitation, epsilon, (mode, mode)))
     frequency = np.linspace(lower - (upper - lower) / 2, upper + (upper - lower), points)

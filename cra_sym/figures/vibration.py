@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from cra_sym.analysis.frequency_response import frequency_response
+from cra_sym.analysis.histories import History
 from cra_sym.analysis.modes import mode_shapes, natural_frequencies, only_motion
 from cra_sym.analysis.residual_vibration import residual_vibration
 from cra_sym.analysis.responses import tip_response
 from cra_sym.analysis.shaping import input_shaper
 from cra_sym.analysis.state_space import state_space
 from cra_sym.arm.parameters import Arm
-from cra_sym.checks import choice
-from cra_sym.figures.drawing import GREEN, ORANGE, figure_of, panels
+from cra_sym.checks import choice, count
+from cra_sym.figures.drawing import GREEN, ORANGE, Panels, figure_of, panel, panels
 from cra_sym.figures.modes import decades
 from cra_sym.figures.subject import (
     fields,
@@ -32,6 +33,7 @@ from cra_sym.solvers.force import Force
 from cra_sym.solvers.motion import BaseMotion, Piecewise
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from sympy import Expr
 
 __all__ = ["figure_frequency_response", "figure_input_shaping", "figure_residual_vibration"]
@@ -49,7 +51,7 @@ def _caption(row: np.ndarray, scenario: str) -> Figure:
 
 
 def figure_frequency_response(
-    system: System | None = None, drive: Expr | str | None = None, *, axes: Any = None, points: int = 1500
+    system: System | None = None, drive: Expr | str | None = None, *, axes: Panels | None = None, points: int = 1500
 ) -> Figure:
     """Draw the exact frequency response of both ends, and what keeping a few modes makes of it.
 
@@ -76,6 +78,7 @@ def figure_frequency_response(
     shapes = np.abs(mode_shapes(system, [left, tip], 3))
     places = [tip, left] if shapes[:, 0].max() > 1e-9 * shapes[:, 1].max() else [tip]
     drive = _drive(system, tip) if drive is None else drive
+    count("points", points, low=2)
     (row,) = panels(axes, 1, len(places), (4.3 * len(places), 3.9), sharex=True)
     elastic = [value for value in system.natural_frequencies(6) if value > 0]
     Omega = np.geomspace(float(f"{0.13 * elastic[0]:.0e}"), float(f"{2.25 * elastic[2]:.0e}"), points)
@@ -94,7 +97,7 @@ def figure_frequency_response(
     return _caption(row, _values(system))
 
 
-def _drive(system: System, place: float) -> Any:
+def _drive(system: System, place: float) -> Expr | str:
     """Return the default input: the first prescribed motion or force by name, or the field at a place."""
     causes = dict(system.numerics("causes"))
     ordered = sorted(causes, key=lambda name: causes[name] != "motion")
@@ -105,7 +108,7 @@ def _drive(system: System, place: float) -> Any:
     return field.subs(x, right if np.isclose(place, float(system.domain.left + system.domain.length)) else place)
 
 
-def _of_modes(system: System, Omega: np.ndarray, place: float, drive: Any, modes: int) -> np.ndarray:
+def _of_modes(system: System, Omega: np.ndarray, place: float, drive: Expr | str, modes: int) -> np.ndarray:
     """Return the transfer function of the first modes alone."""
     field = "v" if isinstance(system, Arm) else system.model.equations.fields[0].func.__name__
     few = state_space(system, modes, drive, [(field, place)])
@@ -115,7 +118,7 @@ def _of_modes(system: System, Omega: np.ndarray, place: float, drive: Any, modes
     return found[:, 0, 0] * (-(Omega**2) if by_displacement else 1.0)
 
 
-def _response_label(system: System, drive: Any) -> str:
+def _response_label(system: System, drive: Expr | str) -> str:
     if isinstance(system, Arm) and drive == "w":
         return "elastic displacement per base acceleration / s²"
     kind = dict(system.numerics("causes")).get(str(drive))
@@ -130,7 +133,7 @@ def _values(system: System) -> str:
 
 
 def figure_residual_vibration(
-    system: System | None = None, parameter: str | None = None, *, ax: Any = None, points: int = 161
+    system: System | None = None, parameter: str | None = None, *, ax: Axes | None = None, points: int = 161
 ) -> Figure:
     """Draw the vibration left after a move over the time the move takes and a parameter, of an arm k_t.
 
@@ -145,7 +148,8 @@ def figure_residual_vibration(
         Values of the parameter drawn; of the time there are more.
     """
     system, name = _subject(system or Arm.nominal(), parameter)
-    panel = panels(ax, 1, 1, _SIZE)[0, 0]
+    count("points", points, low=2)
+    ax = panel(ax, _SIZE)
     joint = isinstance(system, Arm) and name == "k_t"
     values = decades(system, name, 1, 5, points) if joint else over_what_is_stable(system, name, 1, 1, points)[0]
     stiffest = system.replace(**{name: np.inf if joint else values[-1]})
@@ -157,29 +161,29 @@ def figure_residual_vibration(
         raise ValueError("system: its right end does not move; 'response' shows the place that moves most")
     top = 10.0 ** np.ceil(np.log10(1e3 * left[np.isfinite(left)].max()))
     norm = LogNorm(1e-4 * top, top)
-    mesh = panel.pcolormesh(duration, values, 1e3 * left, norm=norm, shading="gouraud", rasterized=True)
-    panel.set_yscale("log" if values[0] > 0 and values[-1] > 30 * values[0] else "linear")
-    panel.figure.colorbar(mesh, ax=panel, label="residual tip amplitude / mm", extend="both")
+    mesh = ax.pcolormesh(duration, values, 1e3 * left, norm=norm, shading="gouraud", rasterized=True)
+    ax.set_yscale("log" if values[0] > 0 and values[-1] > 30 * values[0] else "linear")
+    ax.figure.colorbar(mesh, ax=ax, label="residual tip amplitude / mm", extend="both")
     period = 1 / _first(system.replace(**{name: values}))
     (profile,) = BaseMotion.s_curve(**_LIMITS).terms
     assert isinstance(profile, Piecewise)
     braking = float(profile.knots[4]) / fastest  # from the start to the braking, as a fraction of the move
     for number in (1, 2, 3):
-        panel.plot(number * period / braking, values, color="white", linestyle=(0, (1, 2)), linewidth=1.0)
-    panel.set_xlim(duration[0], duration[-1])
-    panel.set_xlabel("time the move takes / s")
+        ax.plot(number * period / braking, values, color="white", linestyle=(0, (1, 2)), linewidth=1.0)
+    ax.set_xlim(duration[0], duration[-1])
+    ax.set_xlabel("time the move takes / s")
     label = parameter_label(system, name)
-    panel.set_ylabel("translational stiffness $k_t$ / (N/m)" if joint else label)
+    ax.set_ylabel("translational stiffness $k_t$ / (N/m)" if joint else label)
     in_tune = "the joint" if joint else "mode 1"
-    panel.set_title(f"Residual vibration: dark valleys are move times in tune with {in_tune}")
-    panel.grid(False)
+    ax.set_title(f"Residual vibration: dark valleys are move times in tune with {in_tune}")
+    ax.grid(False)
     dotted = "dotted: braking 1, 2, 3 periods of mode 1 after the start"
     damping = "" if system.zeta or system.numerics("damping") is not None else "; undamped"
-    return _caption(np.array([panel]), f"{_MOVE}, slowed down; {dotted}{damping}")
+    return _caption(np.array([ax]), f"{_MOVE}, slowed down; {dotted}{damping}")
 
 
 def figure_input_shaping(
-    system: System | None = None, parameter: str | None = None, *, axes: Any = None, points: int = 201
+    system: System | None = None, parameter: str | None = None, *, axes: Panels | None = None, points: int = 201
 ) -> Figure:
     """Draw a move shaped for the computed modes against an S-curve of the same duration, and with a parameter, of an
     arm k_t, wrongly known.
@@ -199,6 +203,7 @@ def figure_input_shaping(
     value = float(system.values[name])
     if not 0 < abs(value) < np.inf:
         raise ValueError(f"parameter: {name} = {value:g} must be finite and not zero, to be wrongly known")
+    count("points", points, low=2)
     (row,) = panels(axes, 1, 2, _SIZE)
     left, right = row
     moves, period = shaped_moves(system), 1 / _first(system)
@@ -232,7 +237,7 @@ def _subject(system: System, parameter: str | None) -> tuple[System, str]:
     return system, choice("parameter", parameter, tuple(system.values))
 
 
-def _alone(system: System, move: BaseMotion) -> dict[Any, BaseMotion | Force]:
+def _alone(system: System, move: BaseMotion) -> dict[str, History]:
     """Return the histories of a system: the given motion, and zero forces."""
     cause, none = only_motion(system, support=True), Force.sampled([0.0, 1.0], [0.0, 0.0], exact=True)
     return {name: move if name == cause else none for name, _ in system.numerics("causes")}

@@ -221,7 +221,7 @@ class Fluctuation(Parametric):
             other = next((n for n in used if n in used[name] or (name in used[n] and n != name)), None)
             if other is not None:
                 raise ValueError(
-                    f"{self!r}: {name} and {other} multiply each other, so epsilon comes squared; must fluctuate alone"
+                    f"{self!r}: {name} and {other} have a product, which gives epsilon squared; must fluctuate alone"
                 )
             value = np.asarray(system.values[name])
             size = (np.asarray(weight) * np.where(np.isinf(value), 0.0, value))[..., None, None]
@@ -300,7 +300,7 @@ class AxialBase(_ShakenBase, Parametric):
 class TransverseBase(_ShakenBase):
     """A base that oscillates across the span, w = epsilon amplitude sin(varpi t), (35).
 
-    The only prescribed motion of the model; it forces vibration and has no boundary.
+    It is the only prescribed motion of the model. It forces vibration and does not make it unstable.
 
     Parameters
     ----------

@@ -77,7 +77,7 @@ def refuse_small(small: tuple[Symbol, Symbol] | None, values: Any) -> None:
     given = values if isinstance(values, Mapping) else {}
     for symbol in small or ():
         if symbol in given or symbol.name in given:
-            raise ValueError(f"values: {symbol} is small, no value: growth_rate and stability_boundary take it")
+            raise ValueError(f"values: {symbol} must be left out; growth_rate and stability_boundary take it")
 
 
 def split_options(options: Options, small: tuple[Symbol, Symbol]) -> tuple[Options, Parts]:
@@ -92,7 +92,9 @@ def split_options(options: Options, small: tuple[Symbol, Symbol]) -> tuple[Optio
     for name in ("domain", "essential"):
         for given in (sympify(given, strict=True) for given in options[name]):
             if given.has(*small):
-                raise HamiltonError(f"{name}: {given} must be free of {small[0]} and {small[1]}: no length oscillates")
+                raise HamiltonError(
+                    f"{name}: {given} must be free of {small[0]} and {small[1]}; only terms and loads may oscillate"
+                )
     parts: Parts = {}
 
     def part(key: tuple[int, Key]) -> Options:
@@ -156,7 +158,9 @@ def periodic_forms(model: Model, parts: Mapping[tuple[int, Key], Options]) -> tu
             )
         loads = forms.load or forms.discrete_load
         if loads and epsilons > 1:
-            raise HamiltonError(f"small: the forces with the {label} are times epsilon**{epsilons}; at most one")
+            raise HamiltonError(
+                f"small: the forces with the {label} are times epsilon**{epsilons}; must be to the power 0 or 1"
+            )
         weak = weak_form(model.linearised.variation)
         matrices = form_of(weak, named, model.symbols) if named else None
         force, momentum = (_load(model, forms, order) for order in (0, 1))

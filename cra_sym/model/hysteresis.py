@@ -160,9 +160,9 @@ class Iwan(Element):
     Parameters
     ----------
     stiffness : float, ndarray or Expr
-        K_T, of everything stuck, N/m; positive and finite.
+        K_T, with all elements stuck, N/m; positive and finite.
     slip : float, ndarray or Expr
-        F_S, the force at which everything slips; positive and finite.
+        F_S, the force at which all elements slip; positive and finite.
     chi : float, ndarray or Expr
         Exponent, in (-1, 0].
     beta : float, ndarray or Expr

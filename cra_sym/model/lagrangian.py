@@ -51,12 +51,11 @@ class Model(Asked):
         end.
     essential : sequence of Expr, optional
         Expressions that vanish at an end, such as ``v.subs(x, 0)``. Measure a field from a prescribed displacement. At
-        an
-        interior place, ``v.subs(x, a)`` or ``v.diff(x).subs(x, a)``, it is a support.
+        an interior place, ``v.subs(x, a)`` or ``v.diff(x).subs(x, a)``, it is a support.
     inside : sequence of (place, Expr), optional
         Lagrangian terms of interior places: point masses, springs, rotary inertias, in ``v(x, t)`` and its derivatives
-        as at an end. ``DiracDelta(x - a)`` times a term in the density means the same. A place that lies beyond the
-        domain for some values is not there.
+        as at an end. ``DiracDelta(x - a)`` times a term in the density means the same. A term whose place
+        lies outside the domain, for some values, has no effect for these.
     coordinates : sequence of applied undefined functions, optional
         Lumped coordinates ``w(t)``.
     prescribed : sequence of applied undefined functions, optional

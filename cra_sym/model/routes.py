@@ -90,7 +90,7 @@ class Estimated(Protocol):
     def estimated(self, values: Values, shape: tuple[int, ...], modes: int, tolerance: float) -> tuple[Array, Array]:
         """Return the first natural frequencies and an estimate of their largest relative error, shape ``shape``.
 
-        An error beyond the tolerance is refused.
+        A ``ValueError`` is raised if it exceeds the tolerance.
         """
 
     def estimated_modes(self, values: Values, shape: tuple[int, ...], omega: Array, tolerance: float) -> Modes:

@@ -317,7 +317,7 @@ class SpatialProblem:
             return [(float(spans.knots[node]), *pair) for pair, node in terms]
 
         if self.supported:
-            raise ValueError("essential: supports at interior places are known to natural frequencies and modes alone")
+            raise ValueError("essential: with supports at interior places there are natural frequencies and modes only")
         jumps = None if self.points is None else at_nodes
         return Stiffness(section, ends, length, n, m, free, self.uniform, halvings, spans, jumps)
 

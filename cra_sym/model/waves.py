@@ -299,7 +299,7 @@ def _steps(columns: Array, positions: Sequence[int]) -> Array:
 
 
 def _apart(z: Array, function: Determinant) -> NDArray[np.bool_]:
-    """Return which of the lowest roots, ascending, have no neighbour close by, among those that follow either."""
+    """Return which of the lowest of ascending roots have no close neighbour, also among the next ones."""
     near = np.diff(z, axis=1) < _NEAR * z[:, 1:]
     after = function.count(z[:, -1] * (1.0 + _NEAR))[0] > z.shape[1]
     before = np.zeros(len(z), dtype=bool)

@@ -111,8 +111,7 @@ def enclose(flint: Any, problem: Counted, guesses: Iterable[float]) -> list[tupl
     list of (arb, arb)
         Exact lower and upper ends, ascending; (0, 0) for a frequency of 0. The count shows that exactly as many
         frequencies lie below the lower end as precede, and one more below the upper end, so that the set is complete.
-        Each is at most 2**-53 wide
-        relative to its frequency. Frequencies that agree to 28 digits share an enclosure.
+        Each is at most 2**-53 wide relative to its frequency. Frequencies that agree to 28 digits share an enclosure.
 
     Raises
     ------

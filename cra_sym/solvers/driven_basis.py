@@ -75,7 +75,7 @@ def driven_on_basis(
     worst = float(error.max(initial=0.0))
     if worst > _ACCEPTED:
         raise ValueError(
-            f"angular_frequency: the response settles to {worst:.1g} only, on {size} coordinates; lower it"
+            f"angular_frequency: the response converges to {worst:.1g} only, on {size} coordinates; lower it"
             + (" or zeta, or set damping='structural'" if zeta else "")
             + ". A force has no finite response where a stiffness vanishes"
         )

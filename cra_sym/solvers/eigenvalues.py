@@ -75,7 +75,7 @@ def lowest(problem: DynamicStiffness, modes: int) -> np.ndarray:
         open_[row, mode] = ~((settled & value) | narrow)
         trusted = value & ((sweep % 3 != 2) | (relative < 1e-3))
         guess[row, mode] = np.where(trusted, target, np.nan)
-    raise ArithmeticError("the search for natural frequencies did not settle")
+    raise ArithmeticError("the search for natural frequencies did not converge")
 
 
 def _polish(problem: DynamicStiffness, z: np.ndarray, noise: np.ndarray, bounds: np.ndarray) -> np.ndarray:

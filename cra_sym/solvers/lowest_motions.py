@@ -234,7 +234,7 @@ def lowest_motions(problem: GeneralContinuum, modes: int, zeta: float, *, whole:
     if whole and middle is not None:
         return _invariant_subspaces(*middle)
     raise ValueError(
-        f"modes = {modes}: the eigenvalues of so many modes settle to {worst:.1g} only; ask for fewer modes. An end "
+        f"modes = {modes}: the eigenvalues of so many modes converge to {worst:.1g} only; ask for fewer modes. An end "
         "that absorbs the waves leaves none"
     )
 

@@ -33,7 +33,7 @@ _MOST_STEPS = 1_000_000
 _STALLED = 8  # largest number of events at the same time of a member, per element
 _CLOSE = 1e-12  # margin to the slip force, relative: elements on one displacement below it start to slip together
 _NOTHING = 1e-9  # velocity relative to the sum of its terms below which it is rounding just after an event
-_TINIEST = 1e-4  # share of a step of the linear modes below which a motion runs away
+_TINIEST = 1e-4  # share of a step of the linear modes below which a motion counts as divergent
 _WAYS = np.arange(1.0, ORDER + 1)[:, None, None]
 _Numbers = NDArray[np.intp]
 _Event = tuple[_Numbers, _Numbers, _Numbers]
@@ -172,7 +172,7 @@ def follow(
     Raises
     ------
     ValueError
-        If the motion takes too many steps, or runs away.
+        If the motion takes too many steps, or diverges.
     """
     march = _March.at_start(modes, causes, start, end, pauses)
     found = []
@@ -266,7 +266,7 @@ class _March:
         share = reach(all_series[0])
         if not ((share == 1.0) | (share * span > _TINIEST * self.longest)).all():
             when = f"t = {self.time[share.argmin()]:g} s, in steps below {_TINIEST:g} of those of linear modes"
-            raise ValueError(f"t: the motion runs away at {when}")
+            raise ValueError(f"t: the motion diverges at {when}")
         powers = (share ** np.arange(ORDER + 3)[:, None])[:, None]
         for values, shift in zip(all_series, (0, 0, 2), strict=True):  # the last one: loads
             values *= powers[shift : shift + ORDER + 1]

@@ -44,7 +44,7 @@ Search = Callable[[Floats, Integers, Floats, Integers], int]
 
 
 def template(structure: Structure, known: tuple[int | None, ...] | None = None) -> str:
-    """Return the text of the compiled twin: the formulas, and the search over blocks of lanes.
+    """Return the text of the compiled version: the formulas, and the search over blocks of lanes.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def lowest_waves(
     problem : UniformProblem
     modes : int
     search : callable, optional
-        The compiled twin; without it NumPy does the same steps.
+        The compiled version; without it NumPy does the same steps.
     functions : mapping of str to callable, optional
         What the text of `formulas` defines for NumPy; with it the steps take a third of the time.
 
@@ -123,10 +123,10 @@ def _check_range(function: Determinant, squares: Floats) -> None:
 
 
 def _searched(search: Search, function: Determinant, result: Floats) -> None:
-    """Fill in a part of the result by the compiled twin."""
+    """Fill in a part of the result by the compiled version."""
     code = search(result, np.zeros(2, dtype=np.int64), function.k, function.zeros)
     if code < 0:
-        raise ArithmeticError("the search for natural frequencies did not settle")
+        raise ArithmeticError("the search for natural frequencies did not converge")
     if code > 0:
         result[...] = _block(function, result.shape[1])
 
@@ -207,7 +207,7 @@ def _isolate(function: Determinant, number: Integers, row: Integers, brackets: F
         high[down], above[down], at_high[down] = middle[~left], counted[~left], value[~left]
         still = (below[crowded] < number[crowded]) | (above[crowded] > number[crowded] + 1)
         crowded = crowded[still & (high[crowded] - low[crowded] > 4 * _EPS * high[crowded])]
-    raise ArithmeticError("the search for natural frequencies did not settle")
+    raise ArithmeticError("the search for natural frequencies did not converge")
 
 
 def _open_from_zero(function: Determinant, number: Integers, row: Integers, brackets: Floats) -> None:
@@ -283,4 +283,4 @@ def _interpolated(
         if on.size < _SHRINK * place.size:
             function, place, sign, share = function.take(on), place[on], sign[on], share[on]
             x1, x2, f1, f2 = x1[on], x2[on], f1[on], f2[on]
-    raise ArithmeticError("the search for natural frequencies did not settle")
+    raise ArithmeticError("the search for natural frequencies did not converge")

@@ -278,7 +278,7 @@ def test_response_in_the_rotating_frame_is_that_of_plain_integration():
 
 def test_a_nonlinear_response_that_runs_away_or_is_a_batch_is_refused():
     system = oscillator(q.diff(t) ** 2 / 2 - q**2 / 2 + q**4, virtual_work=[(F, q, None)]).at({})
-    with pytest.raises(ValueError, match="runs away"):
+    with pytest.raises(ValueError, match="diverges"):
         cra.tip_response(system, {F: cra.Force(3.0)}, 10.0, modes=1)
     with pytest.raises(ValueError, match=r"field = F.*: must be one of q"):
         cra.tip_response(system, {F: cra.Force(0.1)}, 1.0, modes=1, field=F)

@@ -45,7 +45,7 @@ def test_basins_are_named_by_their_answers():
     states = cra.steady_states(joint, 84.0, drive={w: 1e-4}, modes=2, harmonics=5)
     figure = figure_basins(states, np.linspace(-2e-3, 2e-3, 3), [-0.05, 0.0, 0.05], mode=2, cycles=60)
     words = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    assert words == [f"the answer of {1e3 * state.amplitude:.2f} mm" for state in states if state.stable]
+    assert words == [f"the state of {1e3 * state.amplitude:.2f} mm" for state in states if state.stable]
 
 
 def test_the_film_of_the_jump_follows_both_sweeps():
