@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from cra_sym.ending import run_command
 from cra_sym.files import OutputError
 
 if TYPE_CHECKING:
@@ -19,10 +20,13 @@ if TYPE_CHECKING:
 __all__ = ["main"]
 
 Options = argparse.Namespace
+_PROGRAM = "python -m cra_sym"
 
 
 class UsageError(ValueError):
     """A value given on the command line that is not allowed."""
+
+    exit_code = 2
 
 
 @contextmanager
@@ -222,18 +226,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code.
 
     0 is success, 2 an invalid input or output location (with one line on standard error), 1 a notebook that failed, and
-    128 plus the signal number a run ended by a signal.
+    128 plus the signal number a run ended by a signal, also while modules are imported.
     """
-    import cra_sym
-    from cra_sym.ending import run_command
-    from cra_sym.extras import MissingExtraError
-    from cra_sym.report.notebooks import NotebookError
-    from cra_sym.report.site.build import SiteError
-
     arguments = sys.argv[1:] if arguments is None else list(arguments)
-    parser = _Parser(
-        prog="python -m cra_sym", description="Dynamics and stability of a flexible Cartesian robotic arm."
-    )
+    command = next((word for word in arguments if word in COMMANDS), "")
+    return run_command(f"{_PROGRAM} {command}".strip(), lambda: _run(arguments))
+
+
+def _run(arguments: Sequence[str]) -> None:
+    import cra_sym
+
+    parser = _Parser(prog=_PROGRAM, description="Dynamics and stability of a flexible Cartesian robotic arm.")
     parser.add_argument("--version", action="version", version=f"cra_sym {cra_sym.__version__}")
     commands = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND", required=True)
     for name, command in COMMANDS.items():
@@ -244,11 +247,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             command.options(sub)
         sub.set_defaults(run=command.run)
     options = parser.parse_args(arguments)
-    return run_command(
-        f"{parser.prog} {options.command}",
-        lambda: options.run(options),
-        {UsageError: 2, MissingExtraError: 2, NotebookError: 1, SiteError: 1},
-    )
+    options.run(options)
 
 
 if __name__ == "__main__":

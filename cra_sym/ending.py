@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from io import TextIOWrapper
 from threading import current_thread, main_thread
@@ -55,18 +55,18 @@ def orderly_ending() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def run_command(name: str, job: Callable[[], Any], codes: Mapping[type[Exception], int]) -> int:
+def run_command(name: str, job: Callable[[], object]) -> int:
     """Run a job and return the exit code: 0, that of an expected error, or 128 plus the number of a signal.
+
+    An expected error is printed in one line: one whose class has an ``exit_code``, or an ``OSError`` (a location that
+    cannot be read or written), with the code 2.
 
     Parameters
     ----------
     name : str
         Prefix of the line on standard error.
     job : callable
-    codes : mapping of exception class to int
-        Expected errors, printed in one line; a location that cannot be read or written has the code 2.
     """
-    codes = {**codes, OutputError: 2, OSError: 2}
     if isinstance(sys.stdout, TextIOWrapper):  # a terminal that cannot encode a character is not an error
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
@@ -74,12 +74,13 @@ def run_command(name: str, job: Callable[[], Any], codes: Mapping[type[Exception
             job()
             _flush()
         return 0
-    except Ended as end:
-        told, code = f"{name}: {end}\n", end.exit_code
     except BrokenPipeError:  # the reader has closed the pipe, as "head" does
         told, code = "", 141
-    except tuple(codes) as error:
-        told, code = f"{name}: {error}\n", next(codes[kind] for kind in codes if isinstance(error, kind))
+    except (Exception, Ended) as error:
+        known = getattr(error, "exit_code", 2 if isinstance(error, OSError) else None)
+        if known is None:
+            raise
+        told, code = f"{name}: {error}\n", known
     if sys.stderr is not None:
         with suppress(OSError):
             sys.stderr.write(told)

@@ -11,6 +11,8 @@ __all__ = ["MissingExtraError", "require"]
 class MissingExtraError(ImportError):
     """A library of an optional extra is not installed; the message names the extra."""
 
+    exit_code = 2
+
 
 def require(module: str, extra: str) -> ModuleType:
     """Import and return ``module``, or raise an error that names the extra that installs it.

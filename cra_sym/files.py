@@ -33,6 +33,8 @@ _DISK = {getattr(errno, name, 0) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EROF
 class OutputError(ValueError):
     """An output location that cannot be used; the message names it and the reason."""
 
+    exit_code = 2
+
 
 @contextmanager
 def draft(path: str | Path) -> Iterator[Path]:

@@ -27,7 +27,7 @@ def job():
         print("ready", flush=True)
         time.sleep(60)
 
-sys.exit(run_command("slow", job, {}))
+sys.exit(run_command("slow", job))
 """
 
 
@@ -61,13 +61,16 @@ def test_an_ignored_signal_stays_ignored():
 
 
 def test_foreseen_errors_have_their_codes(capsys):
-    def fail():
-        raise KeyError("k")
+    class ForeseenError(Exception):
+        exit_code = 7
 
-    assert run_command("name", fail, {LookupError: 7}) == 7
-    assert capsys.readouterr() == ("", "name: 'k'\n")
+    def fail(error):
+        raise error
+
+    assert run_command("name", lambda: fail(ForeseenError("no"))) == 7
+    assert capsys.readouterr() == ("", "name: no\n")
     with pytest.raises(KeyError):
-        run_command("name", fail, {})
+        run_command("name", lambda: fail(KeyError()))
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs /dev/full")
@@ -79,7 +82,7 @@ def test_a_full_or_closed_output_is_said_in_a_line():
 
 
 def test_letters_that_the_output_does_not_know_are_written_otherwise():
-    job = "from cra_sym.ending import run_command; raise SystemExit(run_command('n', lambda: print('λ'), {}))"
+    job = "from cra_sym.ending import run_command; raise SystemExit(run_command('n', lambda: print('λ')))"
     environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
     done = subprocess.run([sys.executable, "-c", job], env=environment, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "\\u03bb\n", "")

@@ -35,6 +35,8 @@ _KERNEL = {"display_name": "Python 3 (ipykernel)", "language": "python", "name":
 class NotebookError(RuntimeError):
     """A notebook that failed; the message names it and shows the failing cell."""
 
+    exit_code = 1
+
 
 def find_notebooks(folder: str | Path | None = None) -> list[Path]:
     """Return the notebooks in reading order, by default those of the source checkout.
@@ -226,4 +228,4 @@ def _refresh_as_asked() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(run_command(_COMMAND, _refresh_as_asked, {NotebookError: 1}))
+    sys.exit(run_command(_COMMAND, _refresh_as_asked))

@@ -85,4 +85,4 @@ def _redraw_as_asked() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(run_command(_COMMAND, _redraw_as_asked, {}))
+    sys.exit(run_command(_COMMAND, _redraw_as_asked))

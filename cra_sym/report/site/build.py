@@ -36,6 +36,8 @@ _VERSIONS = ("sympy", "mpmath", "numpy", "scipy", "llvmlite", "matplotlib", "sph
 class SiteError(RuntimeError):
     """Sphinx failed to build the site; the message is its output."""
 
+    exit_code = 1
+
 
 def write_site(
     folder: Path,
