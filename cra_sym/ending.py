@@ -8,13 +8,14 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from io import TextIOWrapper
-from threading import current_thread, main_thread
-from typing import Any
+from threading import Timer, current_thread, main_thread
+from types import FrameType
 
 from cra_sym.files import OutputError
 
 __all__ = ["Ended", "orderly_ending", "run_command"]
 
+_SOON = 0.01  # s, after which a destructor or a callback has most likely returned
 _SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
@@ -33,24 +34,47 @@ class Ended(SystemExit):
 def orderly_ending() -> Iterator[None]:
     """Raise :class:`Ended` in the block on Ctrl-C (SIGINT), a closed terminal (SIGHUP) or SIGTERM.
 
-    Ignored signals stay ignored (``nohup``), and further ones are ignored while the first is handled. Outside the main
-    thread, where Python receives no signals, nothing changes.
+    Ignored signals stay ignored (``nohup``), and further ones are ignored while the first is handled. Where Python
+    ignores exceptions, as in a destructor or a callback of the garbage collector, the signal is sent again until it is
+    raised elsewhere. Outside the main thread, where Python receives no signals, nothing changes.
     """
     heard = {}
     if current_thread() is main_thread():
         heard = {number: signal.getsignal(number) for number in _SIGNALS}
         heard = {number: handler for number, handler in heard.items() if handler not in (signal.SIG_IGN, None)}
 
-    def end(number: int, _: Any) -> None:
+    repeats: list[Timer] = []
+
+    def end(number: int, _: FrameType | None) -> None:
+        forget()
         for other in heard:
             signal.signal(other, signal.SIG_IGN)
         raise Ended(number)
 
+    def again(lost: sys.UnraisableHookArgs) -> None:
+        if isinstance(lost.exc_value, Ended):
+            number = lost.exc_value.number
+            signal.signal(number, end)
+            repeats.append(Timer(_SOON, os.kill, (os.getpid(), number)))
+            repeats[-1].start()
+        else:
+            unraisable(lost)
+
+    def forget() -> None:
+        while repeats:
+            repeats.pop().cancel()
+
+    unraisable = sys.unraisablehook
     for number in heard:
         signal.signal(number, end)
     try:
+        if heard:
+            sys.unraisablehook = again
         yield
     finally:
+        forget()
+        if heard:
+            sys.unraisablehook = unraisable
         for number, handler in heard.items():
             signal.signal(number, handler)
 

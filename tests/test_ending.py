@@ -5,12 +5,13 @@ import os
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
-from cra_sym.__main__ import main
+from cra_sym.__main__ import COMMANDS, main
 from cra_sym.codegen import exporter
-from cra_sym.ending import orderly_ending, run_command
+from cra_sym.ending import Ended, orderly_ending, run_command
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 SLOW = """
@@ -41,6 +42,35 @@ def test_a_signal_leaves_nothing_half_made(name, tmp_path):
         _, said = process.communicate(timeout=60)
     assert (process.returncode, said) == (128 + signal.Signals[name], f"slow: ended by {name}\n")
     assert not list(tmp_path.iterdir())
+
+
+@posix
+def test_a_signal_before_a_command_runs_is_told_in_a_line(monkeypatch, capsys):
+    """While modules are imported, and options are looked up."""
+
+    def interrupted(parser):
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setitem(COMMANDS, "frequencies", COMMANDS["frequencies"]._replace(options=interrupted))
+    assert main(["frequencies"]) == 128 + signal.SIGINT
+    assert capsys.readouterr() == ("", "python -m cra_sym frequencies: ended by SIGINT\n")
+
+
+@posix
+def test_a_signal_in_a_destructor_is_raised_after_it():
+    """Where Python ignores exceptions, and again in the next destructor."""
+
+    class Interrupted:
+        def __del__(self):
+            signal.raise_signal(signal.SIGINT)
+            time.sleep(0.001)
+
+    hook = sys.unraisablehook
+    with pytest.raises(Ended, match="SIGINT"), orderly_ending():
+        Interrupted()
+        Interrupted()
+        time.sleep(10.0)
+    assert sys.unraisablehook is hook
 
 
 def test_handlers_return_to_what_they_were():

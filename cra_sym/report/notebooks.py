@@ -149,11 +149,16 @@ def execute(
 
         def end() -> None:
             ended.set()
+            client.shutdown_kernel = "immediate"  # while it starts, an interrupt would show a traceback
             loop.call_soon_threadsafe(task.cancel)  # type: ignore[union-attr]
 
         if begun is not None:
             begun(end)
-        await client.async_execute(cleanup_kc=True)  # it shuts down only kernels of its own managers by default
+        try:
+            await client.async_execute(cleanup_kc=True)  # it shuts down only kernels of its own managers by default
+        finally:
+            if manager.has_kernel:  # the run was ended while its kernel started
+                await manager.shutdown_kernel(now=True)
 
     try:
         asyncio.run(run())
