@@ -68,7 +68,7 @@ def _in_order(kind: str, expression: Expr) -> tuple[Expr, tuple[Symbol, ...]]:
     return expression, tuple(known.get(name, Symbol(name, real=True)) for name in names)
 
 
-def _sums(kind: str, tongue: int = 1) -> tuple[dict[str, dict[str, Expr]], tuple[Symbol, ...]]:
+def _sums(kind: str, tongue: int) -> tuple[dict[str, dict[str, Expr]], tuple[Symbol, ...]]:
     """Return each sum over modes: the contributions of resonant and spectator modes, and the tail of the latter.
 
     ``tail`` and ``tail_2`` are the coefficients of path / omega_j^2 and path / omega_j^4 for a fast spectator.

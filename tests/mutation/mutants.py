@@ -12,6 +12,7 @@ __all__ = ["Mutant", "mutants"]
 _ANNOTATIONS = {"annotation", "returns", "decorator_list"}
 _NEAR = 1e-5
 _SIZES = {"size", "ndim"}
+_COMMUTATIVE = {"allclose", "gcd", "hypot", "isclose", "lcm", "max", "maximum", "min", "minimum", "set"}
 _CONTRARY: dict[type[ast.AST], type] = {
     ast.Add: ast.Sub,
     ast.Mult: ast.Div,
@@ -59,7 +60,7 @@ def mutants(source: str) -> list[Mutant]:
       out. Of floats the edge is one value among 2**64.
     - A statement is dropped: a call whose value nobody uses, an assignment to an item or an attribute or with an
       operator, ``raise``, ``continue``, ``break``. Without any other assignment a name would be missing.
-    - Two neighbouring arguments of a call change places.
+    - Two neighbouring arguments of a call change places, but for functions of which their order does not matter.
 
     Left alone are annotations, decorators, which hold the equations' numbers, functions that are checks themselves,
     what is raised, and floats of 1e-5 or less, which say how near is near enough or stand in for zero.
@@ -104,7 +105,8 @@ def _changes(node: ast.AST, index: bool) -> tuple[str, ...]:
     if isinstance(node, ast.Constant) and type(node.value) is float and not 0 < node.value <= _NEAR:
         return ("*1.1", "*0.9")
     if isinstance(node, ast.Call):
-        pairs = zip(node.args, node.args[1:], strict=False)
+        called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        pairs = [] if called in _COMMUTATIVE else zip(node.args, node.args[1:], strict=False)
         return tuple(f"swap {place}" for place, pair in enumerate(pairs) if _differ(*pair))
     return dropped
 

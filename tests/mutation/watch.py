@@ -5,6 +5,8 @@ Before any round come the checks of all numbered equations that the module has a
 
 from __future__ import annotations
 
+import ast
+from functools import cache
 from pathlib import Path
 
 __all__ = ["EXEMPT", "PACKAGE", "rounds", "watched_modules"]
@@ -262,12 +264,51 @@ def watched_modules() -> tuple[str, ...]:
 
 
 def rounds(module: str) -> list[list[str]]:
-    """Return the rounds of a module; without an entry, the tests of the same name, or else all those of its room."""
+    """Return the rounds of a module; without an entry, one of the tests nearest to it.
+
+    That is the file of its name, or else those that import it, or else those of the modules that import it, and so on;
+    if some are in the same room, these alone.
+    """
+    return _ROUNDS[module] if module in _ROUNDS else [_nearest(module)]
+
+
+def _nearest(module: str) -> list[str]:
+    room, fresh, seen = module.rpartition("/")[0], {module}, set[str]()
+    if own := _of_its_name(module):
+        return own
+    while fresh:
+        found = {test for test, named in _named_by("tests").items() if named & fresh}
+        found = sorted(found.union(*map(_of_its_name, fresh)))
+        if found:
+            return [test for test in found if test.startswith(f"tests/{room}/")] or found
+        seen |= fresh
+        fresh = {user for user, named in _named_by("cra_sym").items() if named & fresh} - seen
+    return [f"tests/{room}" if room and (PACKAGE.parent / "tests" / room).is_dir() else "tests/test_bad_input.py"]
+
+
+def _of_its_name(module: str) -> list[str]:
     room, _, name = module.rpartition("/")
-    candidates = [f"tests/{room}/test_{name}.py"]
-    while room:
-        above, _, name = room.rpartition("/")
-        candidates += [f"tests/{room}", f"tests/{above}/test_{name}.py"]
-        room = above
-    there = [file for file in candidates if (PACKAGE.parent / file).exists()]
-    return _ROUNDS.get(module, [there[:1] or ["tests/test_bad_input.py"]])
+    file = "/".join(part for part in ("tests", room, f"test_{name}.py") if part)
+    return [file] if (PACKAGE.parent / file).exists() else []
+
+
+@cache
+def _named_by(folder: str) -> dict[str, set[str]]:
+    """Return for each test file, or module of the package, the modules that it imports."""
+    found = {}
+    for file in sorted((PACKAGE.parent / folder).rglob("test_*.py" if folder == "tests" else "*.py")):
+        place = file.relative_to(PACKAGE.parent if folder == "tests" else PACKAGE).as_posix()
+        home = ["cra_sym", *place.split("/")[:-1]]
+        named = set()
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom):
+                base = home[: len(home) - node.level + 1] if node.level else []
+                origin = ".".join([*base, *([node.module] if node.module else [])])
+                named |= {origin, *(f"{origin}.{alias.name}" for alias in node.names)}
+            elif isinstance(node, ast.Import):
+                named |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                named.add(node.value.partition(":")[0])
+        short = {name.removeprefix("cra_sym.").replace(".", "/") for name in named if name.startswith("cra_sym.")}
+        found[place if folder == "tests" else place.removesuffix(".py")] = short
+    return found
