@@ -149,7 +149,7 @@ def _stretched(profile: BaseMotion, factors: Array) -> BaseMotion:
         assert isinstance(term, Piecewise)
         f = factors[..., None]
         terms.append(Piecewise(term.velocity / factors, term.knots * f, term.acceleration / f**2, term.jerk / f**3))
-    return BaseMotion._of(terms, factors.shape)
+    return BaseMotion.of_terms(terms, factors.shape)
 
 
 def _moves(system: System) -> bool:

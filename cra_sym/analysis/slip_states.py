@@ -81,7 +81,7 @@ def statics_of(system: System, modes: int, causes: tuple[str, ...], place: Any, 
     def found(number: int) -> Array:
         return slip_statics(system, number, causes, watched_load(system, place, field))
 
-    return np.asarray(system._cached(f"statics of {causes} at {place} {field}", modes, found))
+    return np.asarray(system.cached(f"statics of {causes} at {place} {field}", modes, found))
 
 
 def driven_by(drive: Any, system: System) -> dict[str, tuple[float, int]]:

@@ -31,8 +31,8 @@ def conservative_part(model: Model) -> Model | None:
         pass
     else:
         return None
-    options, t = model._options, model._options["t"]
-    density = _leading(model) if model._undamped_work() else options["density"]
+    options, t = model.options, model.options["t"]
+    density = _leading(model) if model.undamped_work() else options["density"]
 
     def even(expression: Expr | None) -> Expr | None:
         if expression is None:
@@ -67,10 +67,10 @@ def _is_odd_in_time(term: Expr, t: Symbol) -> bool:
 
 def beside(model: Model, part: Model) -> set[Basic]:
     """Return the symbols of what the conservative part does not have."""
-    own = [(model._options[name], part._options[name]) for name in ("density", *END_NAMES)]
-    own += [(mine[1], left[1]) for mine, left in zip(model._options["inside"], part._options["inside"], strict=True)]
+    own = [(model.options[name], part.options[name]) for name in ("density", *END_NAMES)]
+    own += [(mine[1], left[1]) for mine, left in zip(model.options["inside"], part.options["inside"], strict=True)]
     rest = [expand((whole or S.Zero) - (left or S.Zero)) for whole, left in own]
-    rest += [expand(force) for force, *_ in model._options["virtual_work"]]
+    rest += [expand(force) for force, *_ in model.options["virtual_work"]]
     return set().union(*(term.free_symbols for term in rest))
 
 

@@ -17,7 +17,7 @@ from cra_sym.model.symmetry import vanishes
 if TYPE_CHECKING:
     from cra_sym.model.lagrangian import Model
 
-__all__ = ["stress_route"]
+__all__ = ["apply_inverse", "integrates_in_sequence", "stress_route"]
 
 
 def stress_route(model: Model, spatial: SpatialProblem) -> StressRoute | None:
@@ -29,9 +29,9 @@ def stress_route(model: Model, spatial: SpatialProblem) -> StressRoute | None:
         return None
     state = [*section, *lumped]
     leading, coupled = _matrix(weak, highest, highest, 0), _matrix(weak, highest, state, 0)
-    strain = _apply_inverse(leading, coupled)
+    strain = apply_inverse(leading, coupled)
     cross = zeros(*coupled.shape)
-    if not _integrates_in_sequence(strain, section, highest):
+    if not integrates_in_sequence(strain, section, highest):
         strain, cross = cross, coupled
     rest = _matrix(weak, state, state, 0) - (coupled.T * strain if cross.is_zero_matrix else zeros(len(state)))
     named = {"W": leading, "B": strain, "D": cross, "R": rest, "M": _matrix(weak, state, state, 2)}
@@ -60,7 +60,7 @@ def _reacting(model: Model, spatial: SpatialProblem) -> SpatialProblem:
     return spatial if supported is form else spatial_problem(supported, model.symbols, model.equations.domain[0])
 
 
-def _apply_inverse(leading: Matrix, coupled: Matrix) -> Matrix:
+def apply_inverse(leading: Matrix, coupled: Matrix) -> Matrix:
     """Return the inverse of the leading stiffness times the coupling; entry by entry if it is diagonal."""
     if coupled.is_zero_matrix:
         return coupled
@@ -75,7 +75,7 @@ def _matrix(weak: WeakForm, rows: list[Jet], columns: list[Jet], power: int) -> 
     )
 
 
-def _integrates_in_sequence(strain: Matrix, section: list[Jet], highest: list[Jet]) -> bool:
+def integrates_in_sequence(strain: Matrix, section: list[Jet], highest: list[Jet]) -> bool:
     """Return whether the displacements follow from the strains by successive integration."""
     waiting = list(range(len(section)))
     while waiting:

@@ -116,13 +116,13 @@ class LagrangianTerms(Parametric):
     @property
     def oscillations(self) -> tuple[Oscillation, ...]:
         """The oscillations (order, 'cos' or 'sin', power): varpi**power times cos or sin of order * varpi * t."""
-        return tuple(dict.fromkeys(part.oscillation for part in self._model._periodic))
+        return tuple(dict.fromkeys(part.oscillation for part in self._model.oscillating_terms))
 
     def drives(self, system: System, modes: int) -> list[Drive]:
         """Return the oscillating matrices between the first modes of the system's conservative part."""
         self._check(system)
         found = []
-        for part in self._model._periodic:
+        for part in self._model.oscillating_terms:
             if part.matrices is not None:
                 form = between_modes(system, modes, part.matrices)
                 found.append(Drive(part.oscillation, **{name: form[name] for name in part.matrices.names}))
@@ -132,7 +132,7 @@ class LagrangianTerms(Parametric):
         """Return (oscillation, whether proportional to epsilon, force on each mode (..., modes)) of direct forces."""
         self._check(system)
         found = []
-        for part in self._model._periodic:
+        for part in self._model.oscillating_terms:
             if part.force is not None:
                 found.append((part.oscillation, part.small, self._on_modes(system, modes, part.force)))
             if part.momentum is not None:
@@ -158,9 +158,9 @@ class LagrangianTerms(Parametric):
         return type(self), (self._model,)
 
     def __repr__(self) -> str:
-        epsilon, varpi = self._model._pieces["small"]
+        epsilon, varpi = self._model.pieces["small"]
         words = []
-        for part in self._model._periodic:
+        for part in self._model.oscillating_terms:
             order, kind, power = part.oscillation
             factors = [str(epsilon)] * part.small + [f"{varpi}**{power}" if power > 1 else str(varpi)] * (power > 0)
             words.append(

@@ -126,14 +126,11 @@ def split_options(options: Options, small: tuple[Symbol, Symbol]) -> tuple[Optio
     return {**still, "inside": tuple(inside), "virtual_work": tuple(work)}, parts
 
 
-def without_oscillations(
-    model: Model, options: Options, units: Mapping[Any, str]
-) -> tuple[Model, tuple[PeriodicForms, ...]]:
+def without_oscillations(model: Model) -> tuple[Model, tuple[PeriodicForms, ...]]:
     """Return the model without its oscillating terms, with the same parameters, and these terms."""
-    still, parts = split_options(options, model._pieces["small"])
+    still, parts = split_options(model.options, model.pieces["small"])
     steady = type(model)(**still | {"quadratures": dict(still["quadratures"])})
     steady.symbols = model.symbols
-    steady._pieces["units"] = tuple(units.items())
     return steady, periodic_forms(steady, parts)
 
 

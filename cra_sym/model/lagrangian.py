@@ -148,29 +148,30 @@ class Model(Asked):
         }
         if self._pieces["hysteresis"]:
             check_displacements(self)
-        self._options, self._stated_inside = options_of(self._pieces)
-        self.equations: HamiltonResult = hamilton(**self._options)
+        self.options, self._stated_inside = options_of(self._pieces)
+        self.equations: HamiltonResult = hamilton(**self.options)
         """Equations of motion, boundary conditions and the steps that led there."""
-        stated = ((f"{end} end", self._options[end]) for end in ("left", "right"))
+        stated = ((f"{end} end", self.options[end]) for end in ("left", "right"))
         ends = {label: sympify(term, strict=True) for label, term in stated if term is not None}
         self.equations.variation.elimination.check_homogeneous("Model")
-        density, work = self._options["density"], self._options["virtual_work"]
+        density, work = self.options["density"], self.options["virtual_work"]
         ends |= {f"term inside at {x} = {place}": sympify(term, strict=True) for place, term in self._stated_inside}
-        places = [sympify(place, strict=True) for place, _ in self._options["inside"]]
-        given = [density, *self._options["domain"], *self._options["essential"], *ends.values(), *places]
-        given += [term for _, term in self._options["inside"]]
+        places = [sympify(place, strict=True) for place, _ in self.options["inside"]]
+        given = [density, *self.options["domain"], *self.options["essential"], *ends.values(), *places]
+        given += [term for _, term in self.options["inside"]]
         given += [part for force, displacement, _ in work for part in (force, displacement)]
         given += [sympify(place, strict=True) for *_, place in work if not (place is None or isinstance(place, str))]
         given += [q.integrand for q in self.equations.quadratures]
         given += expressions_of(self._pieces)
         self.symbols: tuple[Symbol, ...] = parameters(given, self.equations)
         """The parameters: every symbol but x and t, by name."""
-        declared = named_units(units, [*given, *self._options["fields"], *self._options["coordinates"]])
+        declared = named_units(units, [*given, *self.options["fields"], *self.options["coordinates"]])
         if self._pieces["small"] is not None:
             self.symbols = tuple(symbol for symbol in self.symbols if symbol not in self._pieces["small"])
-            self._steady, self._periodic = without_oscillations(self, self._options, declared)
+            self._steady, self.oscillating_terms = without_oscillations(self)
+            self._steady._pieces["units"] = tuple(declared.items())
             return
-        unknowns = (x, t, *self.equations.fields, *self.equations.coordinates, *self._options["prescribed"])
+        unknowns = (x, t, *self.equations.fields, *self.equations.coordinates, *self.options["prescribed"])
         check_dimensions(sympify(density, strict=True), ends, declared, work, unknowns)
 
     @cached_property
@@ -246,7 +247,7 @@ class Model(Asked):
         >>> beam.excitation
         <epsilon cos(varpi t) in the Lagrangian>
         """
-        return LagrangianTerms(self) if self.steady is not self and self._periodic else None
+        return LagrangianTerms(self) if self.steady is not self and self.oscillating_terms else None
 
     def freed(self, name: str) -> Model:
         """Return the model with one of its inputs (prescribed motion or force) as a lumped coordinate.
@@ -314,7 +315,7 @@ class Model(Asked):
         ValueError
             Names the term that is not polynomial in the unknowns.
         """
-        return linearised(self.steady.equations, self.steady._options)
+        return linearised(self.steady.equations, self.steady.options)
 
     @cached_property
     def nonlinear(self) -> bool:
@@ -338,7 +339,7 @@ class Model(Asked):
         if not self.state_form.damped:
             form = self.state_form
         else:
-            undamped = self.steady._options | {"virtual_work": self._undamped_work()}
+            undamped = self.steady.options | {"virtual_work": self.undamped_work()}
             form = state_form(linearised(hamilton(**undamped), undamped))
         problem = asymmetry(form)
         if problem:
@@ -348,8 +349,8 @@ class Model(Asked):
             )
         return form
 
-    def _undamped_work(self) -> tuple[tuple[Expr, Expr, Any], ...]:
-        return undamped(self.steady._options["virtual_work"], self._options["t"])
+    def undamped_work(self) -> tuple[tuple[Expr, Expr, Any], ...]:
+        return undamped(self.steady.options["virtual_work"], self.options["t"])
 
     def separate(
         self,

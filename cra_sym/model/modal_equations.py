@@ -62,7 +62,7 @@ def modal_equations(system: System, modes: int, zeta: float | Array | None = Non
         raise ValueError(
             f"system has the batch shape {system.shape}: must be a single one here; see System.parameter_sets"
         )
-    energies, forces, causes, error = system._cached("nonlinear", modes, lambda n: _projected(system, n))
+    energies, forces, causes, error = system.cached("nonlinear", modes, lambda n: _projected(system, n))
     omega = system.natural_frequencies(modes)
     ratios = np.broadcast_to(system.zeta if zeta is None else zeta, omega.shape)
     damping = np.diag(2 * ratios * omega)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.kernels import Kernel, kernel
-from cra_sym.model.stress_route import StressRoute, _held, _springs, _springs_and_supports
+from cra_sym.model.stress_route import StressRoute, held_directions, springs_and_supports, springs_of
 from cra_sym.model.values import infinite_patterns
 from cra_sym.solvers.continuum import PointTerm
 from cra_sym.solvers.pencil import GeneralContinuum
@@ -61,7 +61,7 @@ class PencilRoute(StressRoute):
         sets = columns.shape[1]
         stiffness, damping, mass = _matrices(self.ends, columns, 3)
         held, springs, rest = self._end_springs(columns, infinite, stiffness)
-        pull, constants = _springs(0.5 * (damping + damping.swapaxes(-1, -2)), np.ones(sets))
+        pull, constants = springs_of(0.5 * (damping + damping.swapaxes(-1, -2)), np.ones(sets))
         pull, constants = _first_of_equal_sets(pull, sets), np.maximum(_first_of_equal_sets(constants, sets), 0.0)
         points, forces = self._inside(columns, nodes)
         return GeneralContinuum(
@@ -83,21 +83,21 @@ class PencilRoute(StressRoute):
         """Return directions and positive stiffnesses of springs at the ends, conditions included, and what remains."""
         spatial, sets = self.spatial, columns.shape[1]
         size = 2 * spatial.displacements + spatial.coordinates
-        parts = [_held(spatial.free, columns, size)]
+        parts = [held_directions(spatial.free, columns, size)]
         for position in infinite:
-            held = spatial._rigid_directions(position, columns)
-            parts.append(_springs(np.broadcast_to(held, (sets, size, size)), np.full(sets, np.inf)))
+            held = spatial.rigid_directions(position, columns)
+            parts.append(springs_of(np.broadcast_to(held, (sets, size, size)), np.full(sets, np.inf)))
         rest = stiffness
         for position, slope in spatial.end_stiffness.items():
             rate = np.broadcast_to(slope(*columns), (sets, size, size))
             if position in infinite or not (columns[position] > 0.0).any():
                 continue
             if np.abs(rate - rate.swapaxes(-1, -2)).max() == 0.0:
-                some, k = _springs(rate, np.maximum(columns[position], 0.0))
+                some, k = springs_of(rate, np.maximum(columns[position], 0.0))
                 some, k = _first_of_equal_sets(some, sets), np.maximum(_first_of_equal_sets(k, sets), 0.0)
                 parts.append((some, k))
                 rest = rest - _sum(some, k)
-        some, k = _springs(0.5 * (rest + rest.swapaxes(-1, -2)), np.ones(sets))
+        some, k = springs_of(0.5 * (rest + rest.swapaxes(-1, -2)), np.ones(sets))
         # the difference of large stiffnesses leaves rounding errors
         some, k = _first_of_equal_sets(some, sets), np.maximum(_first_of_equal_sets(k, sets), 0.0)
         parts.append((some, k))
@@ -113,7 +113,7 @@ class PencilRoute(StressRoute):
         terms, forces = [], []
         for number, (node, held) in enumerate(zip(nodes, points.held, strict=True)):
             stiffness, damping, mass = matrices[3 * number : 3 * number + 3]
-            some, k = _springs_and_supports(0.5 * (stiffness + stiffness.swapaxes(-1, -2)), held)
+            some, k = springs_and_supports(0.5 * (stiffness + stiffness.swapaxes(-1, -2)), held)
             k = np.maximum(k, 0.0)
             finite = np.isfinite(k)
             rest = stiffness - _sum(np.where(finite[..., None], some, 0.0), np.where(finite, k, 0.0))
@@ -145,7 +145,7 @@ def pencil_route(model: Model) -> PencilRoute | None:
 
     from cra_sym.mechanics.state_form import end_displacements
     from cra_sym.mechanics.weak import weak_form
-    from cra_sym.model.energies import _apply_inverse, _integrates_in_sequence
+    from cra_sym.model.energies import apply_inverse, integrates_in_sequence
     from cra_sym.model.symmetry import vanishes
 
     weak = weak_form(model.linearised.variation)
@@ -167,8 +167,8 @@ def pencil_route(model: Model) -> PencilRoute | None:
             return None
     even = (whole + whole.T) / 2
     leading, coupled = even[:fields, :fields], even[:fields, fields:]
-    strain = _apply_inverse(leading, coupled)
-    if not _integrates_in_sequence(strain, section, highest):
+    strain = apply_inverse(leading, coupled)
+    if not integrates_in_sequence(strain, section, highest):
         strain = zeros(*coupled.shape)
     # twice the energy is (h + B s)' W (h + B s) and what remains
     spread = Matrix.hstack(Matrix.eye(fields), strain)

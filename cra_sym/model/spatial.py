@@ -297,7 +297,7 @@ class SpatialProblem:
         n, m = self.displacements, self.coordinates
         free = np.zeros((2 * n + m, 0)) if self.free is None else self.free(*columns)
         for position in infinite:
-            free = _without(free, self._rigid_directions(position, columns))
+            free = _without(free, self.rigid_directions(position, columns))
         spans, halvings = (None, halvings) if edges is None else Spans.of(edges, halvings)
 
         def section(z: np.ndarray, rows: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -331,7 +331,7 @@ class SpatialProblem:
             "interior must be greater than 0 and finite"
         )
 
-    def _rigid_directions(self, position: int, columns: np.ndarray) -> np.ndarray:
+    def rigid_directions(self, position: int, columns: np.ndarray) -> np.ndarray:
         """Return the end displacements that an infinite stiffness suppresses, shape (rows, directions, size)."""
         if position not in self.end_stiffness:
             able = ", ".join(self.names[k] for k in self.end_stiffness) or "none here"

@@ -17,7 +17,7 @@ from cra_sym.model.values import flat_columns, infinite_patterns
 from cra_sym.solvers.continuum import Continuum, Entries, PointTerm
 from cra_sym.solvers.stress_refine import Found, solved
 
-__all__ = ["StressModes", "StressRoute"]
+__all__ = ["StressModes", "StressRoute", "held_directions", "springs_and_supports", "springs_of"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -161,7 +161,7 @@ class StressRoute:
         terms = points.at(np.zeros(sets), columns)
         for node, (stiffness, rate), held in zip(nodes, terms, points.held, strict=True):
             shape = (sets, *np.shape(stiffness)[-2:])
-            springs = _springs_and_supports(np.broadcast_to(stiffness, shape), held)
+            springs = springs_and_supports(np.broadcast_to(stiffness, shape), held)
             found.append(PointTerm(node, *springs, -np.broadcast_to(rate, shape)))
         return tuple(found)
 
@@ -171,27 +171,27 @@ class StressRoute:
         """Return directions and stiffnesses of the springs at the ends, conditions included, and the masses there."""
         spatial, sets = self.spatial, columns.shape[1]
         size = 2 * spatial.displacements + spatial.coordinates
-        parts = [_held(spatial.free, columns, size)]
+        parts = [held_directions(spatial.free, columns, size)]
         bare = columns.copy()
         for position in spatial.end_stiffness:
             bare[position] = 0.0
         for position in infinite:
-            held = spatial._rigid_directions(position, columns)
-            parts.append(_springs(np.broadcast_to(held, (sets, size, size)), np.full(sets, np.inf)))
+            held = spatial.rigid_directions(position, columns)
+            parts.append(springs_of(np.broadcast_to(held, (sets, size, size)), np.full(sets, np.inf)))
         for position, rate in spatial.end_stiffness.items():
             if position not in infinite and columns[position].any():
-                parts.append(_springs(np.broadcast_to(rate(*columns), (sets, size, size)), columns[position]))
+                parts.append(springs_of(np.broadcast_to(rate(*columns), (sets, size, size)), columns[position]))
         stiffness, mass = (np.broadcast_to(m, (sets, size, size)) for m in spatial.boundary(np.zeros(sets), *bare))
-        parts.append(_springs(stiffness, np.ones(sets)))
+        parts.append(springs_of(stiffness, np.ones(sets)))
         directions = np.concatenate([np.broadcast_to(d, (sets, *d.shape[1:])) for d, _ in parts], axis=1)
         springs = np.concatenate([np.broadcast_to(k, (sets, *k.shape[1:])) for _, k in parts], axis=1)
         _, full = spatial.boundary(np.zeros(sets), *columns)
         return directions, springs, -np.broadcast_to(full, mass.shape)
 
 
-def _springs_and_supports(matrix: Array, held: tuple[int, ...]) -> tuple[Array, Array]:
+def springs_and_supports(matrix: Array, held: tuple[int, ...]) -> tuple[Array, Array]:
     """Return the stiffness matrix of an interior place as springs, with an infinite one for each held displacement."""
-    directions, springs = _springs(matrix, np.ones(len(matrix)))
+    directions, springs = springs_of(matrix, np.ones(len(matrix)))
     sets = len(matrix)
     rows = np.broadcast_to(np.eye(matrix.shape[-1])[list(held)], (sets, len(held), matrix.shape[-1]))
     directions = np.broadcast_to(directions, (sets, *directions.shape[1:]))
@@ -201,7 +201,7 @@ def _springs_and_supports(matrix: Array, held: tuple[int, ...]) -> tuple[Array, 
     )
 
 
-def _held(free: Kernel | None, columns: Array, size: int) -> tuple[Array, Array]:
+def held_directions(free: Kernel | None, columns: Array, size: int) -> tuple[Array, Array]:
     """Return the directions that the essential conditions hold, with infinite stiffness."""
     if free is None:
         return np.eye(size)[None], np.full((1, size), np.inf)
@@ -216,7 +216,7 @@ def _held(free: Kernel | None, columns: Array, size: int) -> tuple[Array, Array]
     return directions, np.full(directions.shape[:2], np.inf)
 
 
-def _springs(matrix: Array, factor: Array) -> tuple[Array, Array]:
+def springs_of(matrix: Array, factor: Array) -> tuple[Array, Array]:
     """Return a stiffness matrix times a factor as springs on directions."""
     value, frame = np.linalg.eigh(_one_if_equal(np.asarray(matrix)))
     with np.errstate(invalid="ignore"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -168,7 +168,7 @@ class System:
         ValueError
             If the system has none, or one of them acts on a held displacement.
         """
-        found: SlipElements = self._cached("slip", modes, lambda n: slip_elements(self, n))
+        found: SlipElements = self.cached("slip", modes, lambda n: slip_elements(self, n))
         return found
 
     # ------------------------------------------------------------------------------------------ numbers, once
@@ -206,7 +206,7 @@ class System:
 
     def natural_frequencies(self, modes: int) -> Array:
         """Return the first natural frequencies, rad/s, shape (..., modes); read-only."""
-        return np.asarray(self._cached("omega", count("modes", modes, high=MOST_MODES), self._find_frequencies))
+        return np.asarray(self.cached("omega", count("modes", modes, high=MOST_MODES), self._find_frequencies))
 
     def _find_frequencies(self, modes: int) -> Array:
         domain, stiffness = self.domain, self.numerics("leading")
@@ -284,7 +284,7 @@ class System:
 
     def modes(self, modes: int) -> Modes:
         """Return the first natural modes."""
-        found: Modes = self._cached("modes", modes, lambda n: self._find_modes(n))
+        found: Modes = self.cached("modes", modes, lambda n: self._find_modes(n))
         return found
 
     def _find_modes(self, modes: int) -> Modes:
@@ -301,7 +301,8 @@ class System:
         return route if route.covers(self.parameters) else self.numerics("general_route")
 
     @default_floating_point
-    def _cached(self, kind: str, modes: int, find: Any) -> Any:
+    def cached(self, kind: str, modes: int, find: Callable[[int], Any]) -> Any:
+        """Return ``find(modes)``, which is kept for the last few ``modes`` of each kind."""
         kept = self.__dict__.setdefault("_kept", {})
         key = kind, modes
         if key not in kept:

@@ -95,11 +95,12 @@ class BaseMotion:
         return self
 
     @classmethod
-    def _of(cls, terms: Any, shape: tuple[int, ...]) -> BaseMotion:
+    def of_terms(cls, terms: Any, shape: tuple[int, ...]) -> BaseMotion:
+        """Return the motion that is the sum of some terms, a batch of that shape."""
         return cls.__new__(cls)._set(terms, shape)
 
     def _like(self, terms: Any, shape: tuple[int, ...]) -> BaseMotion:
-        made = self._of(terms, shape)
+        made = self.of_terms(terms, shape)
         made.sample_step = self.sample_step
         return made
 
@@ -162,7 +163,7 @@ class BaseMotion:
             raise ValueError(f"position has {times.size} samples: must be at least four")
         shape = broadcastable(**{kind: samples[..., 0], "velocity": v})
         own, level, slope = spline_motion(times, samples, kind)
-        motion = cls._of([Piecewise(v + own, times, level, slope)], shape)
+        motion = cls.of_terms([Piecewise(v + own, times, level, slope)], shape)
         motion.sample_step = None if exact else float((times[-1] - times[0]) / (times.size - 1))
         return motion
 
@@ -230,7 +231,7 @@ class BaseMotion:
         knots = np.concatenate([np.zeros((*shape, 1)), np.cumsum(spans, -1)], -1)
         level = peak[..., None] * np.array([0, 1, 1, 0, 0, -1, -1, 0])
         jerk = quotient(peak, t_j)[..., None] * np.array([1, 0, -1, 0, -1, 0, 1, 0])
-        return cls._of([Piecewise(np.zeros(shape), knots, level, jerk)], shape)
+        return cls.of_terms([Piecewise(np.zeros(shape), knots, level, jerk)], shape)
 
     def shaped(self, amplitudes: Numbers, times: Numbers) -> BaseMotion:
         """Return the motion convolved with impulses: scaled copies of it, each delayed by its time.
@@ -269,7 +270,7 @@ class BaseMotion:
         if not isinstance(other, BaseMotion):
             return NotImplemented
         shape = broadcastable(left=np.empty(self.shape), right=np.empty(other.shape))
-        total = self._of(self.terms + other.terms, shape)
+        total = self.of_terms(self.terms + other.terms, shape)
         steps = [motion.sample_step for motion in (self, other) if motion.sample_step is not None]
         total.sample_step = max(steps, default=None)
         return total

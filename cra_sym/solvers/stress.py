@@ -282,7 +282,7 @@ class Columns:
 
     def _product(self, entry: Array, first: Array, second: Array) -> Array:
         """Return the integrals of a coefficient times two functions of every pair of unknowns."""
-        first, second = (self._flat(side) for side in (first, second))
+        first, second = (self.flat(side) for side in (first, second))
         weighted = first * (entry.reshape(len(entry), -1) * self.weights)[:, None]
         product: Array
         if len(second) == 1:
@@ -291,7 +291,8 @@ class Columns:
             product = weighted @ second.swapaxes(-1, -2)
         return product
 
-    def _flat(self, values: Array) -> Array:
+    def flat(self, values: Array) -> Array:
+        """Return values at the stations as one axis, shape (rows, columns, stations)."""
         shape = self.grid.x.shape[1:]
         return np.broadcast_to(values, (*values.shape[:2], *shape)).reshape(*values.shape[:2], -1)
 

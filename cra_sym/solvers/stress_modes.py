@@ -45,7 +45,7 @@ class ModeFields:
     def _of(self, values: Array) -> Array:
         """Return a quantity of the modes, given per unit of each unknown at the points, (sets, modes, Q, G)."""
         shape = self.columns.grid.x.shape[1:]
-        return (self.vectors @ self.columns._flat(values)).reshape(*self.z.shape, *shape)
+        return (self.vectors @ self.columns.flat(values)).reshape(*self.z.shape, *shape)
 
     @cached_property
     def displaced(self) -> list[Array]:

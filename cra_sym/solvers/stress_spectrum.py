@@ -331,7 +331,7 @@ class _Problem:
     def _mass_factor(self) -> Array:
         """Return F with F' F = M, from the points of the quadrature, (sets, points, size)."""
         columns, entries = self.columns, self.columns.coefficient["M"]
-        moved = [columns._flat(side) for side in columns.displaced[0]]
+        moved = [columns.flat(side) for side in columns.displaced[0]]
         places = sorted({k for pair in entries for k in pair})
         points = moved[0].shape[-1]
         density = np.zeros((columns.sets, points, len(places), len(places)))
@@ -355,7 +355,7 @@ class _Problem:
 
         def shape(place: int) -> Array:
             if place not in moved:
-                values = columns._flat(columns.displaced[0][place])
+                values = columns.flat(columns.displaced[0][place])
                 values = values[self.sets] if len(values) > 1 else values
                 moved[place] = unknowns @ values
             return moved[place]

@@ -118,18 +118,18 @@ def small_sinh(m):
 
 def small_sinh_with_rate(m):
     """Return `small_sinh` and its derivative."""
-    value, rate = _SINH[9], 0.0
-    for term in _SINH[8::-1]:
+    value, rate = SINH_TERMS[9], 0.0
+    for term in SINH_TERMS[8::-1]:
         value, rate = term + m * value, value + m * rate
     return value, rate
 
 
 def near_series(half, product, square):
     """Return C = c0 + c1 (G - p), S = s0 + s1 (G - p) by power series, and the exponent that scales a determinant."""
-    c0, c1, s0, s1 = _COSH[9] + 0.0 * half, 0.0 * half, _SINH[9] + 0.0 * half, 0.0 * half
+    c0, c1, s0, s1 = COSH_TERMS[9] + 0.0 * half, 0.0 * half, SINH_TERMS[9] + 0.0 * half, 0.0 * half
     for k in range(8, -1, -1):
-        c0, c1 = _COSH[k] - product * c1, c0 + 2.0 * half * c1
-        s0, s1 = _SINH[k] - product * s1, s0 + 2.0 * half * s1
+        c0, c1 = COSH_TERMS[k] - product * c1, c0 + 2.0 * half * c1
+        s0, s1 = SINH_TERMS[k] - product * s1, s0 + 2.0 * half * s1
     return c0 + half * c1, c1, s0 + half * s1, s1, -2.0 * growth(half, product, square)
 
 
@@ -358,11 +358,11 @@ def determinant(rows):
     return found
 
 
-_COSH = (
+COSH_TERMS = (
     1.0, 1 / 2, 1 / 24, 1 / 720, 1 / 40320, 1 / 3628800, 1 / 479001600, 1 / 87178291200, 1 / 20922789888000,
     1 / 6402373705728000,
 )  # fmt: skip
-_SINH = (
+SINH_TERMS = (
     1.0, 1 / 6, 1 / 120, 1 / 5040, 1 / 362880, 1 / 39916800, 1 / 6227020800, 1 / 1307674368000, 1 / 355687428096000,
     1 / 121645100408832000,
 )  # fmt: skip

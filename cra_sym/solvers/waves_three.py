@@ -11,7 +11,17 @@ from __future__ import annotations
 import numpy as np
 from numpy import exp
 
-from .waves_kernel import _COSH, _SINH, columns_of_one, growth, positive_root, total, wave, wave_numbers, where
+from .waves_kernel import (
+    COSH_TERMS,
+    SINH_TERMS,
+    columns_of_one,
+    growth,
+    positive_root,
+    total,
+    wave,
+    wave_numbers,
+    where,
+)
 
 __all__ = ["alone", "joined_columns", "near_columns", "near_functions", "three_waves"]
 
@@ -125,7 +135,7 @@ def near_functions(a, b, signs, square):
     first, second, third = first * square, second * square * square, third * square * square * square
     g = tuple(entry * square for entry in g)
     twice, found = _product(g, g), []
-    for terms in (_COSH, _SINH):
+    for terms in (COSH_TERMS, SINH_TERMS):
         c0, c1, c2 = terms[-1], 0.0 * first, 0.0 * first
         for term in terms[-2::-1]:
             c0, c1, c2 = term + third * c2, c0 - second * c2, c1 + first * c2

@@ -200,7 +200,7 @@ class Study:
     def described(self) -> dict[str, str]:
         """Return everything that determines the values, as texts by name."""
         swept = {**self.fields, **self.numbers, **self.objects}
-        model = {} if isinstance(self.system, Arm) else {"model": str(self.system.model._pieces)}
+        model = {} if isinstance(self.system, Arm) else {"model": str(dict(self.system.model.pieces))}
         return {
             "version of cra_sym": cra.__version__,
             "quantity": f"{self.quantity.name}: {fingerprint(self.quantity.function)}",
