@@ -38,6 +38,7 @@ UPWARDS = {
     ("cra_sym/model/asked.py", "analysis"),  # a model has its tools at hand
 }
 KNOW_ORACLES = {"paper", "claims"}
+SELF = {"self", "cls"}
 
 
 def name_of(module: Path) -> str:

@@ -123,7 +123,8 @@ class _Flow:
             raise ValueError(
                 "states: must be of a system without elastic-slip elements; cra.response follows one motion"
             )
-        self._problem, self._period, self._point = state._problem, state._problem.period, state._at[None]
+        self._problem, self._period = state._problem, state._problem.period
+        self._point = np.array([[state.angular_frequency, 1.0 if state.epsilon is None else state.epsilon]])
         self._equations = self._problem.driven.equations
         self._varpi = state.angular_frequency
         self.rows, self.modes = state._problem.rows, self._equations.modes

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.differences import by_differences, central_weights
-from cra_sym.analysis.histories import Histories
+from cra_sym.analysis.histories import Histories, History
 from cra_sym.analysis.modes import participation
 from cra_sym.analysis.residual_vibration import Stopped, couples, ended, residual_vibration, stopped
 from cra_sym.analysis.sensitivities import Sensitivities, sensitivities

@@ -25,9 +25,6 @@ from cra_sym.solvers.driven_modes import at_rest, state_at_stop
 from cra_sym.solvers.force import Force
 from cra_sym.solvers.motion import BaseMotion
 
-if TYPE_CHECKING:
-    from sympy.core.function import AppliedUndef
-
 __all__ = ["Stopped", "couples", "ended", "residual_vibration", "stopped"]
 
 Array = NDArray[np.float64]

@@ -21,6 +21,7 @@ from cra_sym.solvers.slipping import Events, first_forces
 
 if TYPE_CHECKING:
     from sympy import Expr
+    from sympy.core.function import AppliedUndef
 
 __all__ = ["SlipEvent", "SlipResponse", "slip_response"]
 
