@@ -349,7 +349,8 @@ class Model(Asked):
             )
         return form
 
-    def undamped_work(self) -> tuple[tuple[Expr, Expr, Any], ...]:
+    def undamped_work(self) -> tuple[tuple[Expr, Expr, Expr | str | None], ...]:
+        """Return the virtual work without forces that are odd in time."""
         return undamped(self.steady.options["virtual_work"], self.options["t"])
 
     def separate(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ __all__ = ["MOST_MODES", "TOLERANCE", "System"]
 
 Array = NDArray[np.float64]
 MOST_MODES = 1000
+_Found = TypeVar("_Found")
 _MOST_KEPT = 8  # numbers of modes for which a system caches its results
 
 
@@ -301,9 +302,9 @@ class System:
         return route if route.covers(self.parameters) else self.numerics("general_route")
 
     @default_floating_point
-    def cached(self, kind: str, modes: int, find: Callable[[int], Any]) -> Any:
+    def cached(self, kind: str, modes: int, find: Callable[[int], _Found]) -> _Found:
         """Return ``find(modes)``, which is kept for the last few ``modes`` of each kind."""
-        kept = self.__dict__.setdefault("_kept", {})
+        kept: dict[tuple[str, int], _Found] = self.__dict__.setdefault("_kept", {})
         key = kind, modes
         if key not in kept:
             found = find(modes)

@@ -77,7 +77,7 @@ def test_momenta_of_a_base_that_moves_are_followed():
 @pytest.mark.parametrize(
     ("states", "options", "message"),
     [
-        (STATES[1:2], {}, "states: must hold a stable one"),
+        (STATES[1:2], {}, "states: must include a stable one"),
         ([3], {}, "states = 3: must be a SteadyState"),
         ((*STATES, *cra.steady_states(DUFFING, 1.4, drive={F: 0.1}, modes=1)), {}, "one angular frequency"),
         ((*STATES, replace(STATES[0], epsilon=0.1)), {}, "one epsilon"),
