@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from functools import cache
@@ -17,28 +16,21 @@ from tests.perturbed import CHANGES
 ROOT = Path(__file__).resolve().parents[1]
 
 
-@pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory):
-    """The numbers of the arm and of the model under a change, each in a fresh process with a fresh store."""
-    folder = tmp_path_factory.mktemp("store")
-
-    @cache
-    def run(name: str) -> dict[str, dict[str, np.ndarray]]:
-        environment = {**os.environ, "XDG_CACHE_HOME": str(folder / name.replace(" ", "-"))}
-        command = [sys.executable, "-m", "tests.perturbed", name]
-        done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr[-4000:]
-        read = json.loads(done.stdout)
-        return {
-            which: {key: np.array(real) + 1j * np.array(imag) for key, (real, imag) in table.items()}
-            for which, table in read.items()
-        }
-
-    return run
+@cache
+def found(name: str) -> dict[str, dict[str, np.ndarray]]:
+    """Return the numbers of the arm and of the model under a change, each found in a fresh process."""
+    command = [sys.executable, "-m", "tests.perturbed", name]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-4000:]
+    read = json.loads(done.stdout)
+    return {
+        which: {key: np.array(real) + 1j * np.array(imag) for key, (real, imag) in table.items()}
+        for which, table in read.items()
+    }
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_every_number_of_the_arm_is_that_of_its_model(found, change):
+def test_every_number_of_the_arm_is_that_of_its_model(change):
     """Both are derived from the same Lagrangian: they differ by nothing, since they take the same route."""
     arm, model = found(change)["arm"], found(change)["model"]
     assert arm.keys() == model.keys()
@@ -55,7 +47,7 @@ BARELY = 1e-9  # relative to the largest entry: above the rounding of every numb
 
 
 @pytest.mark.parametrize("change", [name for name in CHANGES if name != "nothing"])
-def test_what_physics_says_moves(found, change):
+def test_what_physics_says_moves(change):
     """Every number of the arm moves, but for those that cannot depend on the changed term."""
     before, after = found("nothing")["arm"], found(change)["arm"]
     still = STILL.get(change, _cannot_move)
@@ -89,7 +81,7 @@ SIGNS = {  # frequencies rise with stiffness and fall with inertia, by Rayleigh'
 
 
 @pytest.mark.parametrize("change", SIGNS)
-def test_frequencies_move_the_right_way(found, change):
+def test_frequencies_move_the_right_way(change):
     before, after = (found(name)["arm"]["natural_frequencies"].real for name in ("nothing", change))
     assert (SIGNS[change] * (after - before) >= -1e-12 * before).all()
     assert (SIGNS[change] * (after - before) > 1e-6 * before).any()
