@@ -16,6 +16,7 @@ import matplotlib
 from tests.benchmarks import (
     along_x,
     calls,
+    charts,
     cold,
     frequencies,
     kernel,
@@ -45,6 +46,7 @@ def run(quick: bool) -> dict[str, Any]:
     report["growth"] = frequencies.growth(100_000 if quick else 10_000_000)
     report["cold start"] = cold.measured()
     report["responses"], report["stability"] = responses.measured(), stability.measured()
+    report["charts"], report["sensitivities"] = charts.costs(), charts.sensitivities()
     report["sweep"] = nodes.measured(40_000 if quick else 4_000_000)
     report["along x"] = along_x.measured(3 if quick else 5)
     report["in practice"], report["slip"] = records.measured(quick), slipping.measured()

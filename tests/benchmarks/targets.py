@@ -62,6 +62,11 @@ def rows(report: dict[str, Any]) -> list[dict[str, Any]]:
         add(f"overhead of a compiled call, us, {case['name']}", case["overhead us"], 30, least=False)
     for name, case in report["along x"].items():
         add(f"a batch of {name} beams, times the dynamic stiffness", case["times"], 1000)
+    for name, ratio_to_arm in report["charts"].items():
+        if name != "the arm":
+            add(f"a chart: {name}, times the arm's", ratio_to_arm, 1.5, least=False)
+    for name, over in report["sensitivities"].items():
+        add(f"sensitivities over frequencies, 300 sets: {name}", over, 2.0, least=False)
     practice = report["in practice"]
     add("a record of 1e6 samples, 5 modes, times lsim", practice["records"]["times as fast"], 2)
     add("a sweep into a store over Zarr alone", practice["stores"]["times zarr"], 2.0, least=False)
