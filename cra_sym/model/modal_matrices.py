@@ -53,7 +53,19 @@ def modal_matrices(system: System, modes: int) -> ModalMatrices:
 def between_modes(system: System, modes: int, form: Form) -> dict[str, Array]:
     """Return bilinear forms between the first modes of the conservative part, by name."""
     found = Projected(system.domain, system.conservative_part.modes(modes), form)
-    return {name: _without_rounding(found[name]) for name in form.names}
+    matrices = {name: _without_rounding(found[name]) for name in form.names}
+    if {"damping", "momentum"} <= matrices.keys():  # a gyroscopic term: one is minus the other transposed
+        matrices["damping"] = _alike(matrices["damping"], matrices["momentum"].swapaxes(-1, -2))
+    return matrices
+
+
+def _alike(matrix: Array, other: Array) -> Array:
+    """Return the other matrix, or minus it, where they agree to rounding."""
+    whole = _ROUNDING * np.abs(matrix).max(axis=(-2, -1), keepdims=True)
+    for sign in (1.0, -1.0):
+        if (np.abs(matrix - sign * other) <= whole).all():
+            return sign * other
+    return matrix
 
 
 def _without_rounding(matrix: Array) -> Array:
@@ -62,8 +74,5 @@ def _without_rounding(matrix: Array) -> Array:
     rows, columns = size.max(axis=-1, keepdims=True), size.max(axis=-2, keepdims=True)
     matrix = np.where(size > _NOTHING * np.sqrt(rows * columns), matrix, 0.0)
     turned = matrix.swapaxes(-1, -2)
-    whole = _ROUNDING * size.max(axis=(-2, -1), keepdims=True)
-    for sign in (1.0, -1.0):
-        if (np.abs(matrix - sign * turned) <= whole).all():
-            return np.asarray(0.5 * (matrix + sign * turned))
-    return matrix
+    alike = _alike(matrix, turned)
+    return matrix if alike is matrix else 0.5 * (matrix + alike)

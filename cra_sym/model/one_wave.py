@@ -104,7 +104,10 @@ class OneWave:
         with np.errstate(all="ignore"):
             found = self.scales.function(*(np.asarray(value, dtype=np.float64) for value in values))
         parts = (np.asarray(x) for x in found[1:])  # the root of a negative number is nan, which is not covered
-        return [np.where(x.imag == 0, x.real, np.nan).astype(np.float64) for x in parts]
+        return [
+            (np.where(x.imag == 0, x.real, np.nan) if np.iscomplexobj(x) else x).astype(float, copy=False)
+            for x in parts
+        ]
 
     def _groups(self, numbers: list[Array]) -> list[Array]:
         if not self._are_covered(numbers):
