@@ -11,10 +11,10 @@ from cra_sym.codegen.arm_batch import arm_batch
 from cra_sym.codegen.arm_energies import energy_functions
 from cra_sym.codegen.arm_time_checks import arm_time_checks
 from cra_sym.codegen.expressions import gauss_rule, modal_functions, spectrum_functions, stability_functions
-from cra_sym.codegen.frozen import stated
 from cra_sym.codegen.library import Check, Library, source
 from cra_sym.codegen.operations import operations
 from cra_sym.codegen.printers import FormPrinter
+from cra_sym.codegen.statement import stated
 from cra_sym.codegen.vectors import TOLERANCE, arm_checks
 from cra_sym.kernels.form_parse import parse
 

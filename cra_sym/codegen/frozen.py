@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,14 +16,14 @@ from cra_sym.codegen.blocks import Blocks, blocks_of
 from cra_sym.codegen.controllers import Controller, controller_checks
 from cra_sym.codegen.library import Check, Library, source
 from cra_sym.codegen.operations import operations
+from cra_sym.codegen.statement import stated
 from cra_sym.kernels.form_parse import parse
-from cra_sym.model.lagrangian import Model
 from cra_sym.model.system import System
 from cra_sym.solvers.linear_system import LinearSystem
 
 __all__ = [
     "OUTPUTS", "common_checks", "default_outputs", "exported_state_space", "frozen_library", "frozen_system",
-    "numbers_of", "stated", "stepped",
+    "numbers_of", "stepped",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -33,27 +32,6 @@ OUTPUTS = ("y", "v", "w", "root_force", "root_moment", "tip_acceleration")
 _MOST_OUTPUTS = 64
 _ERRORS = {"float64": 1e-11, "float32": 2e-3}
 """Error of the outputs in the reference vectors, relative to the largest of them, by the type of real numbers."""
-
-
-def stated(model: Model, width: int = 96) -> tuple[str, ...]:
-    """Return a description of a model, in lines: Lagrangian, boundary conditions, the hash of both, linearisation."""
-    pieces, found = model.pieces, model.equations
-    parts = {
-        "Lagrangian density": [pieces["density"]],
-        "Lagrangian at the ends": [pieces["left"], pieces["right"]],
-        "Lagrangian inside": pieces["inside"],
-        "Virtual work": pieces["virtual_work"],
-        "Field equations": found.field_equations,
-        "Boundary conditions": found.boundary_conditions,
-        "Equations of the coordinates": found.coordinate_equations,
-    }
-    stated_parts = {name: [str(e) for e in values if e is not None and e != 0] for name, values in parts.items()}
-    statements = [f"{name}: {'; '.join(texts)}" for name, texts in stated_parts.items() if texts]
-    digest = hashlib.sha256("\n".join(statements).encode()).hexdigest()
-    lines = [line for text in statements for line in textwrap.wrap(text, width, subsequent_indent="  ")]
-    linear = ("The equations are nonlinear; the code computes with them linearised about zero.",)
-    hashed = f"SHA-256 of the above: {digest}"
-    return (*(line.replace("*/", "* /") for line in lines), hashed, *(linear if model.nonlinear else ()))
 
 
 def frozen_system(
@@ -157,16 +135,16 @@ def _readme(given: str, names: Sequence[str], text: str) -> str:
 def constants(blocks: Blocks, names: Sequence[str], omega: Array) -> str:
     """Return the numbers of a system as a text in the restricted form."""
     rows = {
-        "STIFFNESS": (blocks.stiffness, "1/s^2, of each block"),
-        "DAMPING": (blocks.damping, "1/s"),
-        "ON_POSITION": (blocks.on_position, "output by output, on q of each block"),
-        "ON_RATE": (blocks.on_rate, "the same on q', s"),
-        "THROUGH": (blocks.through, "the same on u"),
-        "FREQUENCIES": (omega, "rad/s, of the modes kept"),
+        "STIFFNESS": (blocks.stiffness, "1/s^2, stiffness of each block"),
+        "DAMPING": (blocks.damping, "1/s, damping of each block"),
+        "ON_POSITION": (blocks.on_position, "gains of q of each block, output by output"),
+        "ON_RATE": (blocks.on_rate, "gains of q' of each block, likewise, s"),
+        "THROUGH": (blocks.through, "gains of u, output by output"),
+        "FREQUENCIES": (omega, "rad/s, natural angular frequencies of the modes kept"),
     }
     scalars = [
         f"PI = {math.pi!r}  # half a turn",
-        f"BLOCKS = {len(blocks.stiffness)}  # of second order, whose sum the system is",
+        f"BLOCKS = {len(blocks.stiffness)}  # systems of second order, whose sum this is",
         f"SIGNALS = {len(names)}  # outputs: {', '.join(names)}",
         f"MODES = {len(omega)}  # modes kept",
     ]

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from cra_sym.analysis.slipping import linear_beside
 from cra_sym.analysis.state_space import state_space
-from cra_sym.codegen.frozen import common_checks, default_outputs, exported_state_space, numbers_of, stated
+from cra_sym.codegen.frozen import common_checks, default_outputs, exported_state_space, numbers_of
 from cra_sym.codegen.library import Check, Library, source
 from cra_sym.codegen.operations import operations
+from cra_sym.codegen.statement import stated
 from cra_sym.kernels.form_parse import parse
 from cra_sym.model.system import System
 from cra_sym.solvers.motion_terms import Piecewise

@@ -150,8 +150,8 @@ class ModelText:
         place = [self.form.order.index(at) for at in self._field_places()]
         ranks = ((n * n + moving + links) * (n + m), (2 * moving + links) * m, (links + 1) * moving if links else 0)
         integers = {
-            "PARAMETER_COUNT": (len(self.model.symbols), "of the model"),
-            "FIELDS": (len(self.fields), f"of the model: {', '.join(self.fields)}"),
+            "PARAMETER_COUNT": (len(self.model.symbols), "parameters of the model"),
+            "FIELDS": (len(self.fields), f"fields of the model: {', '.join(self.fields)}"),
             "ENDS": (moving**2, "entries of the matrices of what moves"),
             "END_RATES": (3 * moving**2 + links * (1 + moving), "rates of stiffness, mass, ties and links"),
             "MOTIONS": (n + m, "independent motions without strain"),

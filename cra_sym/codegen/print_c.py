@@ -72,8 +72,8 @@ class CPrinter(Printer):
         name = self.variable(constant.name)
         if constant.type.length is None:
             return self.documented_constant(constant, f"static const {kind} {name} = {values[0]};")
-        row = "\n".join(self.wrapped(", ".join(values), "    "))
-        return self.documented_constant(constant, f"static const {kind} {name}[{len(values)}] = {{\n{row}\n}};")
+        comment = f" /* {constant.comment} */" if constant.comment else ""
+        return self.row(f"static const {kind} {name}[{len(values)}] = {{ ", values, " };", comment)
 
     def documented_constant(self, constant: Constant, text: str) -> str:
         """Return a constant with its comment."""

@@ -45,8 +45,7 @@ class PythonPrinter(BracketingPrinter):
         comment = f"  # {constant.comment}" if constant.comment else ""
         if constant.type.length is None:
             return f"{constant.name} = {values[0]}{comment}"
-        row = "\n".join(self.wrapped(", ".join(values) + ",", "    "))
-        return f"{constant.name} = ({comment}\n{row}\n)"
+        return self.row(f"{constant.name} = (", values, ")" if len(values) > 1 else ",)", comment)
 
     def record(self, record: Record) -> Lines:
         yield from ("@dataclass", f"class {record.name}:", f'    """{record.doc or record.name}"""', "")

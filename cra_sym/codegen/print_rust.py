@@ -82,8 +82,7 @@ class RustPrinter(Printer):
         doc = f"/// {constant.comment}\n" if constant.comment else ""
         if constant.type.length is None:
             return f"{doc}pub const {constant.name}: {kind} = {values[0]};"
-        row = "\n".join(self.wrapped(", ".join(values), "    "))
-        return f"{doc}pub const {constant.name}: [{kind}; {len(values)}] = [\n{row},\n];"
+        return doc + self.row(f"pub const {constant.name}: [{kind}; {len(values)}] = [", values, "];")
 
     def record(self, record: Record) -> Lines:
         yield from (f"/// {line}".rstrip() for line in record.doc.splitlines())
@@ -197,7 +196,11 @@ class RustPrinter(Printer):
             found = self._in_range(rest[0], rest[1], inside) if len(rest) > 1 else ""
             parts.append(found or self.expression(rest[0], 4))
             rest = rest[2 if found else 1 :]
-        return (parts[0], 9) if len(parts) == 1 else (f" {self.both if inside else self.either} ".join(parts), 2)
+        return (
+            (parts[0], 8 if parts[0].startswith("!") else 10)
+            if len(parts) == 1
+            else (f" {self.both if inside else self.either} ".join(parts), 2)
+        )
 
     def call_statement(self, target: str, call: ast.Call, callee: Function, indent: str) -> Lines:
         changed = [kind.changed for kind in callee.parameters.values()]

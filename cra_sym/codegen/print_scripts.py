@@ -9,13 +9,18 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from cra_sym.codegen.printing import Lines, Printer, folded, snake
-from cra_sym.kernels.form import Constant, Function, Record, Type
+from cra_sym.kernels.form import Constant, Form, Function, Record, Type
 
 __all__ = ["SAME", "BracketingPrinter", "JavaScriptPrinter", "OctavePrinter", "ScriptPrinter"]
 
 SAME = (
     "sqrt exp expm1 log log1p sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh floor ceil atan2 pow".split()
 )
+
+
+def _mentions(node: ast.AST, name: str) -> bool:
+    """Return whether a name occurs."""
+    return any(isinstance(part, ast.Name) and part.id == name for part in ast.walk(node))
 
 
 _STATEMENT = re.compile(r"return |[^\s\"'].*? [-+*/]?= ")
@@ -25,9 +30,48 @@ _STATEMENT = re.compile(r"return |[^\s\"'].*? [-+*/]?= ")
 class ScriptPrinter(Printer):
     """Base class for languages without types: results are returned, and no variable is declared."""
 
+    def __init__(self, form: Form, prefix: str, real: str = "float64") -> None:
+        super().__init__(form, prefix, real)
+        self.made_later: set[int] = set()
+
     def results(self, function: Function) -> list[str]:
         """Return the parameters that a function creates and returns."""
         return [name for name, kind in function.parameters.items() if kind.access == "out"]
+
+    def block(self, statements: Sequence[ast.stmt], line: int, indent: str) -> Lines:
+        """Yield statements without rows and records that are created only for the call that makes them."""
+        found = (one for at, one in enumerate(statements) if self.is_made_later(one, statements[at + 1 :]))
+        self.made_later |= set(map(id, found))
+        yield from super().block(statements, line, indent)
+
+    def statement(self, node: ast.stmt, indent: str, declares: str | None) -> Lines:
+        if id(node) in self.made_later:
+            self.left_to_call(declares or "")
+        else:
+            yield from super().statement(node, indent, declares)
+
+    def left_to_call(self, name: str) -> None:
+        """Leave the declaration of a variable to the call that makes it."""
+
+    def is_made_later(self, statement: ast.stmt, after: Sequence[ast.stmt]) -> bool:
+        """Return whether a row or a record is created that the next statement with its name makes anew."""
+        match statement:
+            case ast.Assign(targets=[ast.Name(id=name)], value=ast.Call()) if (
+                self.current.homes.get(name) == id(statement)
+                and not self.current.locals[name].scalar
+                and not self.comment_beside(statement)
+            ):
+                found = next((one for one in after if _mentions(one, name)), None)
+            case _:
+                return False
+        match found:
+            case ast.Expr(value=ast.Call() as call) | ast.Assign(value=ast.Call() as call) if (
+                callee := self.form.functions.get(self.callee(call))
+            ):
+                kinds = [kind.access for kind in callee.parameters.values()]
+                given = [kinds[at] for at, argument in enumerate(call.args) if _mentions(argument, name)]
+                return given == ["out"] and any(isinstance(a, ast.Name) and a.id == name for a in call.args)
+        return False
 
     def given(self, function: Function) -> list[str]:
         """Return the parameters a caller gives."""
@@ -105,13 +149,38 @@ class JavaScriptPrinter(ScriptPrinter):
         "abs": "Math.abs", "min": "Math.min", "max": "Math.max", "isfinite": "Number.isFinite",
     }  # fmt: skip
 
+    def __init__(self, form: Form, prefix: str, real: str = "float64") -> None:
+        super().__init__(form, prefix, real)
+        self.undeclared: set[str] = set()
+
+    def left_to_call(self, name: str) -> None:
+        self.undeclared.add(name)
+
+    def declaration_before(self, declares: str | None) -> str:
+        self.undeclared |= {declares} if declares else set()
+        return ""
+
+    def call_statement(self, target: str, call: ast.Call, callee: Function, indent: str) -> Lines:
+        results = set(self.results(callee))
+        made = [a.id for a, name in zip(call.args, callee.parameters, strict=True)
+                if name in results and isinstance(a, ast.Name)]  # fmt: skip
+        new = {name for name in (target, *made) if name in self.undeclared}
+        self.undeclared -= new
+        (line, *more) = super().call_statement(target, call, callee, indent)
+        if new and len(new) == bool(target) + len(results):
+            whole = any(not self.current.locals[name].scalar or self.current.writes[name] > 1 for name in new)
+            yield f"{indent}{'let' if whole else 'const'} {line.lstrip()}"
+        else:
+            yield from [f"{indent}let {', '.join(sorted(new))};"] if new else []
+            yield line
+        yield from more
+
     def constant(self, constant: Constant) -> str:
         values = self.literal(constant)
         comment = f" // {constant.comment}" if constant.comment else ""
         if constant.type.length is None:
             return f"export const {constant.name} = {values[0]};{comment}"
-        row = "\n".join(self.wrapped(", ".join(values) + ",", "  "))
-        return f"export const {constant.name} = [{comment}\n{row}\n];"
+        return self.row(f"export const {constant.name} = [", values, "];", comment)
 
     def record(self, record: Record) -> Lines:
         yield from (f"// {line}".rstrip() for line in record.doc.splitlines())

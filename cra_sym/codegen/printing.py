@@ -125,6 +125,16 @@ class Printer(ExpressionPrinter):
         """Return a constant."""
         raise NotImplementedError
 
+    def row(self, head: str, values: Sequence[str], tail: str, comment: str = "") -> str:
+        """Return a row of values between two texts: on one line if it is short, with the comment after the first."""
+        line = f"{head}{', '.join(values)}{tail}"
+        if len(line) + len(comment) <= self.width:
+            return line + comment
+        inside = textwrap.wrap(
+            f"{', '.join(values)},", self.width, initial_indent=self.indent, subsequent_indent=self.indent
+        )
+        return "\n".join([head.rstrip() + comment, *inside, tail.lstrip()])
+
     def record(self, record: Record) -> Lines:
         """Yield the lines of a record."""
         raise NotImplementedError

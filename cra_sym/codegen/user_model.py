@@ -6,10 +6,10 @@ import textwrap
 from functools import lru_cache
 
 from cra_sym.checks import instance
-from cra_sym.codegen.frozen import stated
 from cra_sym.codegen.library import Library, source
 from cra_sym.codegen.model_checks import model_checks, sample
 from cra_sym.codegen.model_text import ModelText
+from cra_sym.codegen.statement import stated
 from cra_sym.codegen.unused import marked
 from cra_sym.model import Model
 from cra_sym.model.waves_form import WavesForm, waves_form
@@ -81,7 +81,8 @@ def _library(model: Model, name: str, real: str) -> Library:
     text = "\n\n\n".join(
         part.strip("\n") for part in (written.text(), check, _EXAMPLE.replace("# VALUES", shown.strip()))
     )
-    summary = f"A {repr(model).strip('<>')}: frequencies, modes, sensitivities, responses".replace("\\", "")
+    unknowns = [*(f"{name}(x, t)" for name in written.fields), *(f"{name}(t)" for name in written.coordinates)]
+    summary = f"Frequencies, modes, sensitivities and responses of a model of {', '.join(unknowns)}".replace("\\", "")
     checks = tuple(model_checks(written, values))
     return Library(name, summary, text + "\n", stated(model), checks, _readme(written), real)
 

@@ -16,7 +16,8 @@ from sympy import Symbol
 
 import cra_sym as cra
 from cra_sym.codegen.blocks import blocks_of
-from cra_sym.codegen.frozen import frozen_library, frozen_system, stated
+from cra_sym.codegen.frozen import frozen_library, frozen_system
+from cra_sym.codegen.statement import stated
 from cra_sym.symbols import L, k_t, t, v, x
 from tests.codegen import kit
 

@@ -15,8 +15,8 @@ import sympy as sp
 
 import cra_sym as cra
 from cra_sym.codegen import model_checks
-from cra_sym.codegen.frozen import stated
 from cra_sym.codegen.library import Library
+from cra_sym.codegen.statement import stated
 from cra_sym.codegen.user_model import model_library, model_text
 from cra_sym.symbols import L, t, v, x
 from tests import exported_models
