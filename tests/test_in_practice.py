@@ -72,14 +72,10 @@ VALUES = {
 
 
 @pytest.mark.parametrize("name", VALUES)
-@pytest.mark.parametrize(
-    "made_again",
-    [lambda one: pickle.loads(pickle.dumps(one)), copy.copy, copy.deepcopy],
-    ids=["pickle", "copy", "deepcopy"],
-)
-def test_results_are_values(name, made_again):
+def test_results_are_values(name):
     one, other = VALUES[name](), VALUES[name]()
-    assert one == other and made_again(one) == one
+    assert one == other
+    assert pickle.loads(pickle.dumps(one)) == one and copy.copy(one) == one and copy.deepcopy(one) == one
     assert one != "something else" and not one == 1
 
 
@@ -162,7 +158,7 @@ def test_the_precision_of_another_thread_changes_no_check(digits):
     def other():
         with mpmath.workdps(digits):
             held.set()
-            done.wait(60.0)
+            done.wait()
 
     thread = threading.Thread(target=other)
     thread.start()
@@ -186,7 +182,7 @@ def test_a_process_forked_beside_a_computing_thread_computes_too():
         def value(self):
             if threading.current_thread() is not threading.main_thread():
                 begun.set()
-                done.wait(60.0)
+                done.wait()
             return 1
 
     thread = threading.Thread(target=lambda: Slow().value)
@@ -223,7 +219,7 @@ WORK = {
     "sensitivities": lambda: cra.sensitivities(BATCH).log["L"],
     "sensitivities to a rigid joint": lambda: cra.sensitivities(ARM.replace(k_t=np.inf, k_r=0.0)).compliance["k_t"],
     "sensitivities of a rigid-body mode": lambda: cra.sensitivities(ARM.replace(k_t=0.0)).rate["k_t"],
-    "frequency response": lambda: cra.frequency_response(ARM.replace(zeta=0.01), np.geomspace(1e-3, 1e6, 20)),
+    "frequency response": lambda: cra.frequency_response(ARM.replace(zeta=0.01), np.geomspace(1e-3, 1e6, 6)),
     "static response": lambda: cra.frequency_response(ARM.replace(zeta=0.01), [0.0, 1e-70]),
     "structural damping": lambda: cra.frequency_response(ARM.replace(zeta=0.01), [1.0], damping="structural"),
     "response": lambda: cra.response(ARM, cra.BaseMotion(velocity=0.1), TIMES, [0.5, 1.0]),

@@ -17,7 +17,7 @@ arms = st.builds(
 )  # fmt: skip
 elastic = st.builds(
     lambda k_t, k_r, m_e: cra.Arm.nominal().replace(k_t=10.0**k_t, k_r=10.0**k_r, m_e=m_e),
-    st.floats(1, 5), st.floats(0, 4), st.floats(0, 0.2),
+    st.floats(1, 5), st.floats(0, 4), st.floats(0, 0.2, allow_subnormal=False),
 )  # fmt: skip
 SPRING = cra.JointStiffness(k_t=1.0, k_r=0.5)
 
@@ -81,7 +81,7 @@ def test_continuous_through_zero_and_infinity(arm, name, end):
 
 
 @settings(quick, max_examples=5)
-@given(elastic, st.floats(0.5, 2.2), st.floats(0, 0.3), st.floats(0.001, 0.1))
+@given(elastic, st.floats(0.5, 2.2), st.floats(0, 0.3, allow_subnormal=False), st.floats(0.001, 0.1))
 def test_undamped_multipliers_come_in_reciprocal_pairs(arm, ratio, epsilon, zeta):
     """Next to no damping takes the route that knows of no pairs; without excitation only damping changes amplitudes."""
     omega = cra.modal_parameters(arm, 2).omega

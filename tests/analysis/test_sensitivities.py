@@ -54,8 +54,12 @@ def stiffnesses(low, high):
     return st.sampled_from([0.0, np.inf]) | st.floats(low, high).map(lambda power: 10**power)
 
 
-@settings(max_examples=30, deadline=None)
-@given(stiffnesses(0, 7), stiffnesses(-1, 6), st.floats(0, 0.2), st.floats(0, 1e-2))
+def positive(high):
+    return st.floats(0, high, allow_subnormal=False)
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(stiffnesses(0, 7), stiffnesses(-1, 6), positive(0.2), positive(1e-2))
 def test_the_two_routes_agree_for_every_stiffness(k_t, k_r, m_e, J_e):
     arm = Arm.nominal().replace(k_t=k_t, k_r=k_r, m_e=m_e, J_e=J_e)
     found, frequency = cra.sensitivities(arm, 4), cra.natural_frequencies(arm, 4)
@@ -90,8 +94,8 @@ def test_rigid_body_modes_have_the_documented_limits():
         assert np.isnan(raw[:2]).all() and not np.isnan(raw[2])
 
 
-@settings(max_examples=25, deadline=None)
-@given(st.floats(1, 6), st.floats(0, 5), st.floats(0, 0.2))
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(st.floats(1, 6), st.floats(0, 5), positive(0.2))
 def test_signs_and_sums_of_energy(power_t, power_r, m_e):
     """Stiffness raises, inertia lowers; the shares of strain energy of joint and manipulator add up to one."""
     found = cra.sensitivities(Arm.nominal().replace(k_t=10**power_t, k_r=10**power_r, m_e=m_e))
