@@ -13,11 +13,12 @@ from cra_sym.model.system import System
 if TYPE_CHECKING:
     from cra_sym.analysis.sensitivities import Sensitivities
 
-__all__ = ["by_differences", "central_weights"]
+__all__ = ["by_differences", "central_weights", "rates_by_moved_supports"]
 
 Array = NDArray[np.float64]
 Quantity = Callable[[System], Array]
 _STEP = 0.02  # step of the differences, over the change of the parameter at which two modes would coincide
+_SHORT = 1e-4  # of the room of a support: step of a first estimate of the slope
 _SAME = 1e-9  # relative distance of squared frequencies below which they are repeated
 _POINTS = 8  # points on one side of a parameter that cannot be negative, or four on each side
 
@@ -69,6 +70,32 @@ def by_differences(
     return np.asarray(total)
 
 
+def rates_by_moved_supports(system: System, name: str, modes: int) -> Array:
+    """Return the derivatives of omega by a parameter that moves a support inside, rad/s over its unit, (..., modes)."""
+    given, room = np.broadcast_to(system.values[name], system.shape), _room(system, name)
+    more = min(modes + 1, system.most_modes)  # the next mode may be close to the last one
+    beside = system.replace(**{name: given + np.array([-1.0, 1.0])[:, *(None,) * given.ndim] * _SHORT * room})
+    before, after = beside.natural_frequencies(more)
+    slope = (after - before) / (2 * _SHORT * room)[..., None]
+    width = _STEP * np.minimum(_reach(system.natural_frequencies(more), slope, given), room)
+    offsets, weights = central_weights()
+    moved = system.replace(**{name: given + offsets[:, *(None,) * given.ndim] * width}).natural_frequencies(modes)
+    return np.asarray(np.tensordot(weights, moved, axes=1) / width[..., None])
+
+
+def _room(system: System, name: str) -> Array:
+    """Return the change of a parameter at which a support inside meets another place; inf if it moves none."""
+    moving = system.numerics("moving_supports").get(name)
+    if moving is None:
+        return np.full(system.shape, np.inf)
+    found = [np.broadcast_to(value, system.shape) for value in moving.function(*system.domain.values)]
+    share, rate, held = np.moveaxis(np.reshape(found, (3, -1, *system.shape)), 1, -1)
+    gaps, speeds = (np.abs(part[..., :, None] - part[..., None, :]) for part in (share, rate))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        meeting = np.where((speeds > 0) & (held[..., :, None] > 0), gaps / speeds, np.inf)
+    return np.asarray(meeting.min(axis=(-2, -1)))
+
+
 def _own_stiffness(system: System, name: str) -> Array:
     """Return the end stiffness whose compliance equals that of the structure, shape of the batch."""
     rigid = system.conservative_part.replace(**{name: np.inf})
@@ -109,7 +136,7 @@ def _differences(
     reach = _reach(found.frequency, found.compliance[name] if compliance else found.rate[name], place)
     if not compliance and name not in {*system.numerics("stiffnesses"), *system.numerics("inertias")}:
         reach = np.where(place == 0, reach, np.minimum(reach, np.abs(place)))  # such as a density: nothing beyond 0
-    width = step * reach
+    width = step * np.minimum(reach, _room(system, name))
     half = _POINTS // 2
     room = np.floor(place / width).clip(0, half)
     offsets = np.arange(-half, half + 1)[:, *(None,) * place.ndim] + (half - room)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.analysis.differences import by_differences
+from cra_sym.analysis.differences import by_differences, rates_by_moved_supports
 from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
 from cra_sym.cached import cached_property
 from cra_sym.checks import choice, count, default_floating_point, instance, names, one_axis
@@ -212,7 +212,9 @@ class Sensitivities:
     def _squared(self, name: str) -> Array:
         """Return the derivative of omega^2 by a parameter, by first-order perturbation."""
         direct = self._of_the_determinant.get(name)
-        if direct is None:
+        if name in self._system.numerics("moving_supports"):
+            rate = 2 * self._omega * rates_by_moved_supports(self._system, name, self._modes)
+        elif direct is None:
             rate = self._forms[f"{name} stiffness"] - self._omega**2 * self._forms[f"{name} mass"]
             rate = rate + self._system.numerics("held_motions").rate(self._system, name, self._modes)
         else:
@@ -322,7 +324,8 @@ def sensitivities(system: System, modes: int = 3, by: Sequence[str] | None = Non
 
     First-order perturbation with mass-normalised modes: d omega_i^2 is the modal change of the stiffness minus
     omega_i^2 times that of the mass. Displacements are held fixed relative to the length, so that lengths are
-    parameters like any other.
+    parameters like any other. By a parameter that moves a support inside the domain, derivatives are differences of
+    eighth order, with a relative error of about 1e-8.
 
     Parameters
     ----------

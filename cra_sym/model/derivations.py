@@ -21,7 +21,7 @@ from cra_sym.model.energy_signs import leading, masses
 from cra_sym.model.exact import BallProblem, exact_kernel
 from cra_sym.model.excited import axial, fluctuating, fluctuation
 from cra_sym.model.forms import form_of, load_of
-from cra_sym.model.held_motions import HeldMotions
+from cra_sym.model.held_motions import HeldMotions, moving_supports
 from cra_sym.model.held_motions import held_motions as motions_held
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.moving import jumps
@@ -57,6 +57,7 @@ __all__ = [
     "load_coefficients",
     "loads",
     "masses",
+    "moving_supports",
     "named_observables",
     "names",
     "nonlinear",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 from sympy import Expr, Function, Matrix, S, Symbol, cancel, eye, zeros
 
@@ -72,15 +73,18 @@ def reacting(form: StateForm) -> StateForm:
             if own == number:
                 extended[k, n + m + row] = extended[n + m + row, k] = S.One
         points.append((place, extended.as_immutable(), ()))
-    free = form.free.row_insert(n + m, zeros(len(reactions), form.free.cols))
-    own = zeros(free.rows, len(reactions))
-    own[n + m : n + m + len(reactions), :] = eye(len(reactions))
+    free = zeros(
+        form.free.rows + len(reactions), form.free.cols + len(reactions)
+    )  # joins of no columns lose their rows
+    for row, column in product(range(form.free.rows), range(form.free.cols)):
+        free[row if row < n + m else row + len(reactions), column] = form.free[row, column]
+    free[n + m : n + m + len(reactions), form.free.cols :] = eye(len(reactions))
     return replace(
         form,
         coordinates=(*form.coordinates, *added),
         system=_insert_zeros(form.system, (n + m, 2 * (n + m)), len(reactions)).as_immutable(),
         boundary=_insert_zeros(form.boundary, (n + m,), len(reactions)).as_immutable(),
-        free=free.row_join(own).as_immutable(),
+        free=free.as_immutable(),
         points=tuple(points),
     )
 

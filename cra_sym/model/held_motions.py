@@ -21,9 +21,10 @@ from cra_sym.model.waves_form import squares
 
 if TYPE_CHECKING:
     from cra_sym.mechanics import StateForm
+    from cra_sym.model.lagrangian import Model
     from cra_sym.model.system import System
 
-__all__ = ["HeldMotions", "held_motions"]
+__all__ = ["HeldMotions", "held_motions", "moving_supports"]
 
 Array = NDArray[np.float64]
 
@@ -122,3 +123,23 @@ def _order(displacement: Expr) -> int:
 def _changes_direction(row: Matrix, rate: Matrix) -> bool:
     """Return whether the derivative of a row is not just a multiple of the row."""
     return any(cancel(row[i] * rate[j] - row[j] * rate[i]) != S.Zero for i, j in combinations(range(row.cols), 2))
+
+
+def moving_supports(model: Model) -> dict[str, Kernel]:
+    """Return, for each parameter that moves a support inside relative to the ends, the shares of the length there.
+
+    Of both ends and of all interior places, then their rates by the parameter, then whether they are supports (1 or 0).
+    """
+    left, right = model.equations.domain
+    points = model.state_form.points
+    if not any(held for *_, held in points):
+        return {}
+    places = [left, right, *(place for place, _, _ in points)]
+    held = [S.Zero, S.Zero, *(S.One if held else S.Zero for _, _, held in points)]
+    shares = [(place - left) / (right - left) for place in places]
+    found = {}
+    for symbol in model.symbols:
+        rates = [cancel(share.diff(symbol)) for share in shares]
+        if any(rate != 0 and own for rate, own in zip(rates, held, strict=True)):
+            found[symbol.name] = kernel((*shares, *rates, *held), model.symbols, backend="numpy")
+    return found

@@ -284,3 +284,19 @@ def test_rates_read_as_a_mapping():
     found = cra.sensitivities(cra.Arm.nominal(), by=("L", "m_e"))
     assert repr(found).endswith("Hz by L, m_e: rate, log, compliance>")
     assert repr(found.log) == f"Rates({{'L': {found.log['L']!r}, 'm_e': {found.log['m_e']!r}}})"
+
+
+def test_a_support_that_moves_changes_the_spans_beside_it():
+    """It had been taken to stand still. A string over a support is two strings; the nearer to the end, too."""
+    x, t, tension, mass, length, place = sp.symbols("x t T m l a")
+    v = sp.Function("v")(x, t)
+    string = cra.Model(
+        mass * v.diff(t) ** 2 / 2 - tension * v.diff(x) ** 2 / 2, fields=[v], x=x, domain=(0, length), t=t,
+        essential=[v.subs(x, at) for at in (0, place, length)],
+    )  # fmt: skip
+    for near in (0.5, 1e-3):
+        found = cra.sensitivities(string.at({"T": 20.0, "m": 0.3, "l": 1.2, "a": near}), 2)
+        spans = np.array([1.2 - near, near]) if near == 0.5 else 1.2 - near  # of two modes of one span, or of both
+        long = np.array([1.0, 0.0]) if near == 0.5 else 1.0
+        np.testing.assert_allclose(found.rate["a"], found.frequency / spans * (2 * long - 1), rtol=1e-8)
+        np.testing.assert_allclose(found.rate["l"], -found.frequency / spans * long, rtol=1e-8, atol=1e-8)
