@@ -134,18 +134,19 @@ def _generated() -> str:
 def _checks(real: str) -> Iterator[Check]:
     """Yield the reference vectors from the package's own kernels, for the functions of the library."""
     for check in arm_checks(everything=True):
-        if not all(map(math.isfinite, check.outputs)):  # the sensitivities of rigid-body modes
-            continue
         quantity = _QUANTITIES[check.quantity]
+        expected = tuple(
+            x if math.isfinite(x) else 0.0 for x in check.outputs
+        )  # a rigid-body mode has no sensitivities
         if real == "float64":
-            yield Check(quantity, check.inputs, check.outputs, TOLERANCE, check.absolute)
+            yield Check(quantity, check.inputs, expected, TOLERANCE, check.absolute)
             continue
-        size = max(map(abs, check.outputs))
+        size = max(map(abs, expected))
         if check.quantity.startswith("state_space_force") and check.absolute * LEAST_SHARE > TOLERANCE * size:
             yield Check(quantity, check.inputs, (), refused=True)  # the base has almost no mass
             continue
         loss = _SINGLE if quantity <= _QUANTITIES["omega"] else _SINGLE_MODAL
-        yield Check(quantity, check.inputs, check.outputs, loss, loss / TOLERANCE * check.absolute)
+        yield Check(quantity, check.inputs, expected, loss, loss / TOLERANCE * check.absolute)
     for name, inputs, expected, size in arm_time_checks():
         loss = _IN_TIME if real == "float64" else _SINGLE_MODAL
         yield Check(_QUANTITIES[name], inputs, expected, loss, loss * size)

@@ -5,17 +5,17 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cra_sym.checks import choice, count, instance
+from cra_sym.checks import choice, count, equal, flag, instance
 from cra_sym.codegen.arm_library import arm_library
 from cra_sym.codegen.controllers import Controller
 from cra_sym.codegen.fmu import VERSIONS, fmu_archive
 from cra_sym.codegen.frozen import frozen_library
 from cra_sym.codegen.frozen_slipping import slipping_library
-from cra_sym.codegen.library import PRINTERS, Library, check_name
+from cra_sym.codegen.library import PRINTERS, check_name
 from cra_sym.codegen.rendering import DIGEST, licence
 from cra_sym.codegen.user_model import model_library
 from cra_sym.files import OutputError, path_of, staged_directory
@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Export", "export"]
 
-_THINNED = 8  # share of the reference vectors used in Octave, which is some hundred times slower than the others
+_OF_SYSTEMS = {"modes": 3, "input": "base_acceleration", "outputs": None, "controller": None}
+"""Arguments that are of a system alone, with their default values."""
 
 
 @dataclass(frozen=True)
@@ -139,6 +140,7 @@ def export(
     choice("language", language, [*PRINTERS, "fmu"])
     choice("version", version, VERSIONS)
     choice("real", real, ("float64", "float32"))
+    overwrite = flag("overwrite", overwrite)
     if model is not None and system is not None:
         raise TypeError("model and system: give one of them; a system is a model with values")
     if name is not None:
@@ -147,8 +149,14 @@ def export(
         raise ValueError(f"real = {real!r}: {PRINTERS[language].title} has {', '.join(PRINTERS[language].reals)}")
     if controller is not None:
         instance("controller", controller, Controller)
-        if system is None or language == "fmu":
-            raise ValueError("controller: is exported with the code of a system; give system=")
+        if language == "fmu":
+            raise ValueError("controller: is exported as source code; an FMU has none")
+    given = {"modes": modes, "input": input, "outputs": outputs, "controller": controller}
+    for argument, default in _OF_SYSTEMS.items():
+        if system is None and not equal(given[argument], default):
+            raise ValueError(f"{argument}: is that of a system; give system=")
+    if language != "fmu" and version != VERSIONS[0]:
+        raise ValueError(f"version = {version!r}: is that of FMI; give language='fmu'")
     if language == "fmu" and system is None:
         raise ValueError("language = 'fmu': is that of a system; give system=")
     target = Path(os.path.realpath(path_of("directory", directory)))
@@ -157,7 +165,7 @@ def export(
     if system is not None:
         texts = _system_texts(language, system, name or "system", modes, real, version, input, outputs, controller)
     elif model is not None:
-        texts = dict(_thinned(model_library(model, name or "model", real), language).texts(language))
+        texts = dict(model_library(model, name or "model", real).texts(language))
     else:
         texts = dict(_arm_texts(language, name or ("cra" if language in ("c", "fortran") else "cra_arm"), real))
     if language != "fmu":
@@ -228,8 +236,4 @@ def _arm_texts(language: str, name: str, real: str) -> dict[str, str]:
 
     with tqdm(total=0, desc=f"deriving and printing {language}", bar_format="{desc}", leave=False, disable=None):
         library = arm_library(name, real)
-    return _thinned(library, language).texts(language)
-
-
-def _thinned(library: Library, language: str) -> Library:
-    return replace(library, checks=library.checks[::_THINNED]) if language == "octave" else library
+    return library.texts(language)

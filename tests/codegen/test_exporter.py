@@ -14,6 +14,7 @@ import pytest
 import cra_sym as cra
 from cra_sym.codegen import exporter
 from cra_sym.codegen.library import Library
+from tests import exported_models
 from tests.codegen import kit
 
 
@@ -128,6 +129,24 @@ def test_a_name_stands_in_front_of_everything(without_vectors, tmp_path, languag
     text = "".join((tmp_path / "out" / file).read_text() for file in made.files if file != "README.md")
     assert not re.search(r"\bcra_(?!sym)|CRA_|CraArm", text)
     assert re.search(r"\bcrane", text)
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ({"modes": 4}, "modes: is that of a system"), ({"input": "drive_force"}, "input: is that of a system"),
+        ({"outputs": ["v"]}, "outputs: is that of a system"), ({"version": "2.0"}, "version = '2.0': is that of FMI"),
+        ({"language": None}, "language = None"), ({"directory": None}, "directory = None: must be a path"),
+        ({"name": "../x"}, "name = '../x'"), ({"overwrite": "no"}, "overwrite = 'no': must be True or False"),
+        ({"language": "fmu", "model": exported_models.model("tension")}, "'fmu': is that of a system"),
+        ({"model": exported_models.model("tension"), "outputs": ["v"]}, "outputs: is that of a system"),
+    ],
+)  # fmt: skip
+def test_what_would_not_be_followed_is_refused(options, message, tmp_path):
+    """In one line, and nothing is written."""
+    with pytest.raises((TypeError, ValueError), match=message) as caught:
+        cra.export(**({"language": "c", "directory": tmp_path / "out"} | options))
+    assert "\n" not in str(caught.value) and not list(tmp_path.iterdir())
 
 
 def test_what_has_no_single_precision_says_so(tmp_path):

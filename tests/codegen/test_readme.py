@@ -67,7 +67,7 @@ def exported(language: str, folder: Path, model: cra.Model | None = None) -> Pat
     cra.export(language, folder, model=model)
     if language == "octave":
         lines = (folder / "reference.txt").read_text().splitlines(keepends=True)
-        (folder / "reference.txt").write_text("".join(lines[:: 6 if model is None else 3]))
+        (folder / "reference.txt").write_text("".join(lines[:: 48 if model is None else 24]))
     return folder
 
 
