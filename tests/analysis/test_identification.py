@@ -345,6 +345,7 @@ def test_a_prior_of_what_is_known_better_than_the_data_stays():
     assert np.sqrt(fit.covariance[2, 2]) == pytest.approx(1e-9, rel=1e-3)
 
 
+@pytest.mark.sample(12, 1)
 @pytest.mark.parametrize("trial", range(25))
 def test_the_true_joint_is_among_the_solutions(trial):
     assert joints.good(joints.tried(trial))

@@ -109,6 +109,7 @@ def by_dynamic_stiffness(system, modes):
     return GeneralRoute(system.numerics("spatial")).angular_frequencies(system.parameters, system.shape, modes)
 
 
+@pytest.mark.sample(6, 1)
 @pytest.mark.parametrize("name", models())
 def test_closed_forms_are_the_dynamic_stiffness(name):
     system = models()[name].at(values_of(name, 6, 1.0))
@@ -118,6 +119,7 @@ def test_closed_forms_are_the_dynamic_stiffness(name):
     np.testing.assert_allclose(found**2, other**2, rtol=1e-10, atol=1e-12 * other.max() ** 2)
 
 
+@pytest.mark.sample(5, 2)
 @pytest.mark.parametrize("name", models())
 def test_sixteen_decades_in_extended_precision(name):
     problem = problem_of(models()[name].at(values_of(name, 2, 8.0, seed=3)))
@@ -135,6 +137,7 @@ def test_counts_at_random_points(name):
     np.testing.assert_array_equal(np.sign(value), (-1.0) ** count)
 
 
+@pytest.mark.sample(5, 3)
 @pytest.mark.parametrize("name", models())
 def test_no_spring_and_infinite_ones(name):
     """Springs 0, finite or infinite, alone and together, with masses and without."""
