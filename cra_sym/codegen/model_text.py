@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ import sympy as sp
 from cra_sym.cached import cached_property
 from cra_sym.codegen.expressions import response_functions
 from cra_sym.codegen.library import source
+from cra_sym.codegen.model_constants import model_constants
 from cra_sym.codegen.model_loads import load_factors
 from cra_sym.codegen.printers import FormPrinter
 from cra_sym.codegen.program import function, new_name
@@ -22,32 +22,6 @@ from cra_sym.model.waves_form import WavesForm
 
 __all__ = ["ModelText"]
 
-_NUMBERS = {
-    "float64": {
-        "HUGE": (1.7976931348623157e308, "what is larger is infinite"),
-        "EPS": (2.0**-52, "of rounding"),
-        "TINY": (1e-300, "of what is as good as nothing"),
-        "DEPENDENT": (1e-14, "what rounding leaves of a row of unit size"),
-        "SLIGHT": (1e-12, "beside 1"),
-        "TWO_SMALL": (1e-140, "share of the line's own z below which two zeros cannot be told apart"),
-        "THREE_SMALL": (1e-95, "the same of three"),
-        "SAME": (1e-9, "relative distance below which squared frequencies are taken as equal"),
-        "NODE": (1e-7, "of the largest displacement: a node"),
-        "BESIDE": (1e-12, "of the largest displacement beside a node"),
-    },
-    "float32": {
-        "HUGE": (2.9e38, "what is larger is infinite"),
-        "EPS": (2.0**-23, "of rounding"),
-        "TINY": (1e-37, "of what is as good as nothing"),
-        "DEPENDENT": (1e-6, "what rounding leaves of a row of unit size"),
-        "SLIGHT": (1e-4, "beside 1"),
-        "TWO_SMALL": (1e-16, "share of the line's own z below which two zeros cannot be told apart"),
-        "THREE_SMALL": (1e-11, "the same of three"),
-        "SAME": (1e-4, "relative distance below which squared frequencies are taken as equal"),
-        "NODE": (1e-3, "of the largest displacement: a node"),
-        "BESIDE": (1e-5, "of the largest displacement beside a node"),
-    },
-}
 _SOURCES = ("model", "model_modes", "model_participation", "model_drives", "model_check")
 _WRITTEN = {
     "prepare",
@@ -59,8 +33,6 @@ _WRITTEN = {
     "inside_entries",
     "outside_entries",
 }
-_PLACES = (-1.0, -0.56, 0.06, 0.62, 1.0 - 2e-4, 1.0)
-"""Stations at which the size of a motion is measured, in half lengths from mid-span."""
 
 
 @dataclass(frozen=True)
@@ -145,40 +117,11 @@ class ModelText:
         return without_unused(FormPrinter.helped(whole) + whole)
 
     def _constants(self) -> str:
-        structure = self.form.structure
-        n, m, links, moving = structure.n, structure.coordinates, structure.links, structure.moving
-        place = [self.form.order.index(at) for at in self._field_places()]
-        ranks = ((n * n + moving + links) * (n + m), (2 * moving + links) * m, (links + 1) * moving if links else 0)
-        integers = {
-            "PARAMETER_COUNT": (len(self.model.symbols), "parameters of the model"),
-            "FIELDS": (len(self.fields), f"fields of the model: {', '.join(self.fields)}"),
-            "ENDS": (moving**2, "entries of the matrices of what moves"),
-            "END_RATES": (3 * moving**2 + links * (1 + moving), "rates of stiffness, mass, ties and links"),
-            "MOTIONS": (n + m, "independent motions without strain"),
-            "RESTRAINTS": (moving + links, "conditions of ends, coordinates and links"),
-            "RESTING": (max(ranks), "factors of conditions of a motion without energy"),
-            "MOST_EQUAL": (moving if structure.linked else n, "frequencies that may be equal"),
-            "STATIONS": (len(_PLACES), "places where the size of a motion is measured"),
-        }
-        if self.drives:
-            integers["DRIVES"] = (len(self.drives), f"prescribed motions: {', '.join(self.drives)}")
-            integers["LOADS"] = (3 * n + m, "factors of a load")
-        if m:
-            integers["COORDINATES"] = (m, f"lumped: {', '.join(self.coordinates)}")
-            integers["CARRIED"] = (n * m, "displacements by coordinates")
-        if links:
-            integers["LINKS"] = (links, "springs between what moves")
-            integers["STRETCHES"] = (links * moving, "links by what moves")
-        lines = [f"PI = {math.pi!r}  # half a turn"]
-        lines += [f"{name} = {value!r}  # {words}" for name, (value, words) in _NUMBERS[self.real].items()]
-        lines += [f"{name} = {value}  # {words}" for name, (value, words) in integers.items()]
-        lines += [f"PLACES = {_PLACES!r}  # of these, in half lengths from mid-span"]
-        lines += [f"FIELD_PLACES = ({', '.join(map(str, place))},)  # displacement of a section that each field is"]
-        return self._waves.constants() + "\n".join(lines) + "\n"
-
-    def _field_places(self) -> list[int]:
-        found = list(self.model.conservative.displacements)
-        return [found.index(field) for field in self.model.equations.fields]
+        displacements = list(self.model.conservative.displacements)
+        places = [self.form.order.index(displacements.index(field)) for field in self.model.equations.fields]
+        return self._waves.constants() + model_constants(
+            self.form, len(self.model.symbols), self.fields, self.drives, self.coordinates, places, self.real
+        )
 
     def _parameters(self) -> str:
         lines = [

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from functools import reduce
-from itertools import combinations
-from operator import mul
+from collections.abc import Sequence
 from typing import Any
 
 from cra_sym.cached import cached_property
-from cra_sym.codegen.traced import Dual, Traced, parts
+from cra_sym.codegen.traced import Dual, Traced
+from cra_sym.codegen.waves_quantities import LENGTHS, flat, nested, one_basis, principal_minors, with_rates
 from cra_sym.solvers import waves_count, waves_kernel, waves_modes, waves_problem
 from cra_sym.solvers.straight import Exact, Term
 from cra_sym.solvers.waves import Structure
@@ -17,10 +15,6 @@ from cra_sym.solvers.waves import Structure
 __all__ = ["WavesText"]
 
 kernel: Any = waves_kernel  # formulas of arrays and terms, without types
-_LENGTHS = {1: 1, 2: 9, 3: 32}
-"""Number of quantities of the waves of a block, by its size."""
-_CONDITIONS = (0, 29, 30)
-"""Quantities of a block of three that are conditions."""
 _KINDS = {1: ("any",), 2: ("near", "close", "distant"), 3: ("near", "close", "distant", "series")}
 _WORDS = {
     "any": "",
@@ -72,7 +66,7 @@ class WavesText:
     @property
     def wave_numbers(self) -> int:
         """Length of the row of wave numbers."""
-        return sum(_LENGTHS[size] for size in self.structure.sizes)
+        return sum(LENGTHS[size] for size in self.structure.sizes)
 
     @property
     def section(self) -> int:
@@ -156,11 +150,11 @@ class WavesText:
         at = 0
         for size in self.structure.sizes:
             entries: list[Any] = []
-            for place in range(at, at + _LENGTHS[size]):
+            for place in range(at, at + LENGTHS[size]):
                 entry = traced.entry("w", place)
                 entries.append(Dual(entry, traced.entry("w_rate", place)) if rates else entry)
-            at += _LENGTHS[size]
-            found.append(_nested(entries) if size == 3 else tuple(entries))
+            at += LENGTHS[size]
+            found.append(nested(entries) if size == 3 else tuple(entries))
         return found
 
     def _blocks(self, k: Any, z: Any, waves: Sequence[Any]) -> list[tuple[tuple[int, int], Any, Any, Any]]:
@@ -188,14 +182,14 @@ class WavesText:
         z = Dual(traced.number("z"), traced.number("z_rate"))
         found = self._numbers(self._coefficients(traced, rates=True), z)
         out = [(name, "WAVE_ENTRIES", self.wave_numbers) for name in ("w", "w_rate")]
-        return traced.text(_with_rates(found), out)
+        return traced.text(with_rates(found), out)
 
     def _numbers(self, k: Any, z: Any) -> list[Any]:
         found: list[Any] = []
         matrices = waves_count.sections(self.structure, k, z)
         for block, (a, b) in zip(self.structure.blocks, matrices, strict=True):
             waves = waves_count.block_waves(self.structure, block, a, b)
-            found += _flat(waves)
+            found += flat(waves)
         return found
 
     def _regime(self) -> str:
@@ -219,7 +213,7 @@ class WavesText:
         k = self._coefficients(traced)
         force = [[self._static(k, i, j)[1] for j in range(self.structure.n)] for i in range(self.structure.n)]
         bad: Any = False
-        for value, scale in _principal_minors(force):
+        for value, scale in principal_minors(force):
             below = value < (0.0 if scale is None else -1e-14 * scale)
             bad = (below | bad) if isinstance(below, Term) else bad
         return traced.text([kernel.where(bad, 1.0, 0.0)])
@@ -273,7 +267,7 @@ class WavesText:
             found += columns
             bases += [basis] if block[1] - block[0] > 1 else []
         out = [(name, "SECTION", self.section) for name in ("c", "c_rate")]
-        return traced.text(_with_rates([*found, *bases]), out)
+        return traced.text(with_rates([*found, *bases]), out)
 
     def _integrals(self, kind: str) -> str:
         words = (
@@ -325,7 +319,7 @@ class WavesText:
         traced = Traced("_determinant", words, [("k", "COEFFICIENTS"), ("c", "SECTION")], ["z"])
         columns, bases = self._at_end(traced)
         k, z = self._coefficients(traced), traced.number("z")
-        return traced.text([waves_count.value_of(self.structure, k, z, columns, _basis(bases))])
+        return traced.text([waves_count.value_of(self.structure, k, z, columns, one_basis(bases))])
 
     def _determinant_rate(self) -> str:
         words = "Return the derivative of the determinant by z, times the same factor."
@@ -333,7 +327,7 @@ class WavesText:
         traced = Traced("_determinant_rate", words, rows, ["z"])
         columns, bases = self._at_end(traced, rates=True)
         k, z = self._coefficients(traced), Dual(traced.number("z"), Exact(1))
-        value = waves_count.value_of(self.structure, k, z, columns, _basis(bases))
+        value = waves_count.value_of(self.structure, k, z, columns, one_basis(bases))
         return traced.text([value.rate if isinstance(value, Dual) else 0.0])
 
     def _count(self) -> str:
@@ -374,7 +368,7 @@ class WavesText:
         k = self._coefficients(traced_too)
         bad: Any = False
         for matrix in (self._compliance(k), self._inertia(k)):
-            for value, scale in _principal_minors(matrix):
+            for value, scale in principal_minors(matrix):
                 below = value < (0.0 if scale is None else -1e-14 * scale)
                 bad = (below | bad) if isinstance(below, Term) else bad
         return traced.text(found, out) + "\n\n" + traced_too.text([kernel.where(bad, 1.0, 0.0)])
@@ -407,43 +401,6 @@ class WavesText:
             if not isinstance(value, Exact)
         }
         return traced.text(found.values(), [("table", str(len(found)), len(found))]), list(found)
-
-
-def _flat(waves: Any) -> list[Any]:
-    """Return the quantities of the waves of a block as numbers; conditions are 1 or 0."""
-    found: list[Any] = []
-    for entry in waves:
-        found += _flat(entry) if isinstance(entry, tuple) else [entry]
-    if len(found) == _LENGTHS[3]:
-        for place in _CONDITIONS:
-            found[place] = kernel.where(found[place], 1.0, 0.0)
-    return found
-
-
-def _nested(entries: Sequence[Any]) -> Any:
-    """Return the result of `waves_three.alone` from the numbers in a row."""
-    values = [entry > 0.5 if place in _CONDITIONS else entry for place, entry in enumerate(entries)]
-    near, mu, *rest = values
-    return near, mu, tuple(rest[:9]), tuple(rest[9:17]), tuple(rest[17:27]), tuple(rest[27:29]), rest[29]
-
-
-def _with_rates(values: Sequence[Any]) -> list[Any]:
-    """Return the values, then their rates."""
-    return [*(parts(value)[0] for value in values), *(parts(value)[1] for value in values)]
-
-
-def _basis(bases: Sequence[Any]) -> Any:
-    """Return the product of the bases of all blocks, of which one at most is not 1."""
-    return next((basis for basis in bases if not isinstance(basis, float)), 1.0)
-
-
-def _principal_minors(matrix: Sequence[Sequence[Any]]) -> Iterator[tuple[Any, Any]]:
-    """Yield the principal minors of a matrix and, of more than one row, the product of the sizes of its diagonal."""
-    for size in range(1, len(matrix) + 1):
-        for places in combinations(range(len(matrix)), size):
-            entries = [[matrix[i][j] for j in places] for i in places]
-            scale = reduce(mul, [abs(matrix[i][i]) for i in places])
-            yield kernel.determinant(entries), None if size == 1 else scale
 
 
 def _suffix(kind: str) -> str:

@@ -1,0 +1,80 @@
+"""Numbers at the head of an exported model: of its size, and of the precision."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from cra_sym.model.waves_form import WavesForm
+
+__all__ = ["model_constants"]
+
+_NUMBERS = {
+    "float64": {
+        "HUGE": (1.7976931348623157e308, "what is larger is infinite"),
+        "EPS": (2.0**-52, "of rounding"),
+        "TINY": (1e-300, "of what is as good as nothing"),
+        "DEPENDENT": (1e-14, "what rounding leaves of a row of unit size"),
+        "SLIGHT": (1e-12, "beside 1"),
+        "TWO_SMALL": (1e-140, "share of the line's own z below which two zeros cannot be told apart"),
+        "THREE_SMALL": (1e-95, "the same of three"),
+        "SAME": (1e-9, "relative distance below which squared frequencies are taken as equal"),
+        "NODE": (1e-7, "of the largest displacement: a node"),
+        "BESIDE": (1e-12, "of the largest displacement beside a node"),
+    },
+    "float32": {
+        "HUGE": (2.9e38, "what is larger is infinite"),
+        "EPS": (2.0**-23, "of rounding"),
+        "TINY": (1e-37, "of what is as good as nothing"),
+        "DEPENDENT": (1e-6, "what rounding leaves of a row of unit size"),
+        "SLIGHT": (1e-4, "beside 1"),
+        "TWO_SMALL": (1e-16, "share of the line's own z below which two zeros cannot be told apart"),
+        "THREE_SMALL": (1e-11, "the same of three"),
+        "SAME": (1e-4, "relative distance below which squared frequencies are taken as equal"),
+        "NODE": (1e-3, "of the largest displacement: a node"),
+        "BESIDE": (1e-5, "of the largest displacement beside a node"),
+    },
+}
+_PLACES = (-1.0, -0.56, 0.06, 0.62, 1.0 - 2e-4, 1.0)
+"""Stations at which the size of a motion is measured, in half lengths from mid-span."""
+
+
+def model_constants(
+    form: WavesForm,
+    parameters: int,
+    fields: Sequence[str],
+    drives: Sequence[str],
+    coordinates: Sequence[str],
+    field_places: Sequence[int],
+    real: str,
+) -> str:
+    """Return the constants of a model as a text in the restricted form, given names and places of its fields."""
+    structure = form.structure
+    n, m, links, moving = structure.n, structure.coordinates, structure.links, structure.moving
+    ranks = ((n * n + moving + links) * (n + m), (2 * moving + links) * m, (links + 1) * moving if links else 0)
+    integers = {
+        "PARAMETER_COUNT": (parameters, "parameters of the model"),
+        "FIELDS": (len(fields), f"fields of the model: {', '.join(fields)}"),
+        "ENDS": (moving**2, "entries of the matrices of what moves"),
+        "END_RATES": (3 * moving**2 + links * (1 + moving), "rates of stiffness, mass, ties and links"),
+        "MOTIONS": (n + m, "independent motions without strain"),
+        "RESTRAINTS": (moving + links, "conditions of ends, coordinates and links"),
+        "RESTING": (max(ranks), "factors of conditions of a motion without energy"),
+        "MOST_EQUAL": (moving if structure.linked else n, "frequencies that may be equal"),
+        "STATIONS": (len(_PLACES), "places where the size of a motion is measured"),
+    }
+    if drives:
+        integers["DRIVES"] = (len(drives), f"prescribed motions: {', '.join(drives)}")
+        integers["LOADS"] = (3 * n + m, "factors of a load")
+    if m:
+        integers["COORDINATES"] = (m, f"lumped: {', '.join(coordinates)}")
+        integers["CARRIED"] = (n * m, "displacements by coordinates")
+    if links:
+        integers["LINKS"] = (links, "springs between what moves")
+        integers["STRETCHES"] = (links * moving, "links by what moves")
+    lines = [f"PI = {math.pi!r}  # half a turn"]
+    lines += [f"{name} = {value!r}  # {words}" for name, (value, words) in _NUMBERS[real].items()]
+    lines += [f"{name} = {value}  # {words}" for name, (value, words) in integers.items()]
+    lines += [f"PLACES = {_PLACES!r}  # of these, in half lengths from mid-span"]
+    lines += [f"FIELD_PLACES = ({', '.join(map(str, field_places))},)  # displacement of a section that each field is"]
+    return "\n".join(lines) + "\n"
