@@ -265,6 +265,22 @@ def test_a_tensioned_belt_with_fluctuating_tension():
     agree(system, TENSION, inside, 0.1, 4, others, 1e-4)
 
 
+def test_a_support_inside_leaves_the_zones_of_its_span():
+    """It was refused. A string on a pulsating spring, held at a support, has the zones of the span up to there."""
+
+    def string(**options):
+        return model(rhoA * v.diff(t) ** 2 / 2 - T * v.diff(x) ** 2 / 2, left=-k * v**2 / 2, **options)
+
+    values, pulsating = {rhoA: 1.0, T: 1.0, k: 2.0}, cra.Fluctuation(k=1.0)
+    whole = string(essential=[v.subs(x, a), v.subs(x, L)]).at({**values, a: 1.0, L: 1.05})
+    alone = string(essential=[v.subs(x, L)]).at({**values, L: 1.0})
+    for resonance in ((1, 1), (1, 2)):
+        found, exact = (cra.stability_boundary(one, pulsating, 0.1, resonance, order=2) for one in (whole, alone))
+        np.testing.assert_allclose(found, exact, rtol=1e-9)  # 24 modes here are 23 there, and the rest is static
+    residual = [cra.growth_rate(one, pulsating, np.mean(exact), 0.1, 2, residual=True) for one in (whole, alone)]
+    assert residual[0] == pytest.approx(residual[1], rel=1e-8) and residual[0] > 0
+
+
 def test_a_moving_belt_has_no_difference_zones():
     """All its modes have positive energy below the critical speed, so that a difference is stable (Krein).
 
