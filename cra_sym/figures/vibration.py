@@ -8,9 +8,10 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
+from cra_sym.analysis.eigenvalues import oscillating_frequencies
 from cra_sym.analysis.frequency_response import frequency_response
 from cra_sym.analysis.histories import History
-from cra_sym.analysis.modes import mode_shapes, natural_frequencies, only_motion
+from cra_sym.analysis.modes import mode_shapes, only_motion
 from cra_sym.analysis.residual_vibration import residual_vibration
 from cra_sym.analysis.responses import tip_response
 from cra_sym.analysis.shaping import input_shaper
@@ -75,12 +76,12 @@ def figure_frequency_response(
     if not fields(system):
         raise ValueError("system: has coordinates alone; must have a field along which places are shown")
     tip, left = moving_place(system), float(system.domain.left)
-    shapes = np.abs(mode_shapes(system, [left, tip], 3))
+    shapes = np.abs(mode_shapes(system.conservative_part, [left, tip], 3))
     places = [tip, left] if shapes[:, 0].max() > 1e-9 * shapes[:, 1].max() else [tip]
     drive = _drive(system, tip) if drive is None else drive
     count("points", points, low=2)
     (row,) = panels(axes, 1, len(places), (4.3 * len(places), 3.9), sharex=True)
-    elastic = [value for value in system.natural_frequencies(6) if value > 0]
+    elastic = [value for value in oscillating_frequencies(system, 6) if value > 0]
     Omega = np.geomspace(float(f"{0.13 * elastic[0]:.0e}"), float(f"{2.25 * elastic[2]:.0e}"), points)
     exact = np.abs(frequency_response(system, Omega, places, drive))
     titles = ("Tip: few modes are enough", "Joint: modes converge slowly")
@@ -245,7 +246,7 @@ def _alone(system: System, move: BaseMotion) -> dict[str, History]:
 
 def _first(system: System) -> np.ndarray:
     """Return the frequency of the first elastic mode, Hz."""
-    found = natural_frequencies(system, 3)
+    found = oscillating_frequencies(system, 3) / (2 * np.pi)
     elastic = np.where(found > 0, found, np.inf).min(axis=-1)
     return np.asarray(elastic)
 

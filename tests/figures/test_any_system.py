@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 import cra_sym as cra
 from cra_sym.figures import FIGURES, draw, shows_any_system
 from cra_sym.figures.vibration import shaped_moves
-from tests.systems import NAMES, system
+from tests.systems import NAMES, TURNING, system
 
 COARSE = {
     "zones": {"points": 5, "tolerance": 1e-3},
@@ -39,6 +39,16 @@ def test_every_figure_of_a_system_draws_every_system(name):
             FigureCanvasAgg(drawn).draw()
             assert all(ax.lines or ax.collections or ax.texts for ax in drawn.axes), figure
             assert any(ax.get_xlabel() for ax in drawn.axes) and any(ax.get_ylabel() for ax in drawn.axes), figure
+
+
+def test_figures_of_what_has_no_natural_modes():
+    pipe, shaft = (system(name) for name in TURNING)
+    for figure in ("residual_vibration", "input_shaping"):
+        draw(figure, pipe, **COARSE[figure])
+    exact, _, many = curves(draw("frequency_response", shaft, points=12).axes[0])
+    alone = np.abs(cra.frequency_response(shaft, exact[:, 0], drive="w"))
+    np.testing.assert_allclose(exact[:, 1], alone, rtol=1e-9)
+    np.testing.assert_allclose(many[:, 1], exact[:, 1], rtol=0.05)  # of twelve modes
 
 
 def test_a_linear_system_has_neither_friction_nor_a_backbone_to_draw():
