@@ -22,7 +22,7 @@ _HOME = {
     "natural_frequencies": "analysis.modes",
     "frequency_parameters": "arm.frequency_parameters",
     "mode_shapes": "analysis.modes",
-    "modal_parameters": "analysis.modes",
+    "modal_parameters": "analysis.modal_parameters",
     "eigenvalues": "analysis.eigenvalues",
     "damping_ratios": "analysis.eigenvalues",
     "count_eigenvalues": "analysis.eigenvalues",

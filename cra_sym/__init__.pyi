@@ -14,7 +14,7 @@ from .analysis.identification import AmbiguityWarning as AmbiguityWarning
 from .analysis.identification import MisfitWarning as MisfitWarning
 from .analysis.identification import identify as identify
 from .analysis.identification import identify_joint as identify_joint
-from .analysis.modes import modal_parameters as modal_parameters
+from .analysis.modal_parameters import modal_parameters as modal_parameters
 from .analysis.modes import mode_shapes as mode_shapes
 from .analysis.modes import natural_frequencies as natural_frequencies
 from .analysis.nonlinear import ConvergenceWarning as ConvergenceWarning

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from reprlib import repr as brief
-from secrets import token_hex
 
 try:
     import fcntl
@@ -218,7 +217,7 @@ def _stage(target: Path) -> Iterator[Path]:
     On an error, parents that were created for it are removed too.
     """
     made = [folder for folder in target.parents if not os.path.exists(folder)]
-    stage = target.parent / f".{target.name}.cra_sym-{token_hex(4)}"
+    stage = target.parent / f".{target.name}.cra_sym-{os.urandom(4).hex()}"
     lock, complete = None, False
     try:
         with writing(target):

@@ -308,6 +308,12 @@ def test_a_units_attribute_is_that_of_si_or_refused(units, good):
             ARM.replace(k_t=value)
 
 
+def test_a_units_attribute_tells_hertz_from_radians():
+    assert real_array("omega", labelled([1.0], "k", units="rad/s"), unit="rad/s") == 1.0
+    with pytest.raises(ValueError, match="must be in rad/s; a frequency in Hz times 2 pi"):
+        real_array("omega", labelled([1.0], "k", units="Hz"), unit="rad/s")
+
+
 @pytest.mark.parametrize(
     "shape",
     [

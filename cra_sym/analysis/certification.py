@@ -17,7 +17,7 @@ from cra_sym.extras import require
 from cra_sym.model.exact import BallProblem
 from cra_sym.model.projection import EndParameter
 from cra_sym.model.system import MOST_MODES, System
-from cra_sym.solvers.ball_stiffness import BallStiffness, Term
+from cra_sym.solvers.ball_stiffness import BallStiffness, EnergyTerm
 from cra_sym.solvers.certificates import UndecidedError, enclose, precision
 
 __all__ = ["Certificate", "certify"]
@@ -134,11 +134,11 @@ def _counted(
 
         return rows
 
-    def terms() -> list[Term]:
+    def terms() -> list[EnergyTerm]:
         entries = evaluated(problem.energy)
         gaps = [tuple(problem.orders[f] - o for f, o in zip(*jet, strict=True)) for jet in problem.jets]
         return [
-            Term(fields, (gap[0], gap[1]), entries[2 * k], entries[2 * k + 1])
+            EnergyTerm(fields, (gap[0], gap[1]), entries[2 * k], entries[2 * k + 1])
             for k, ((fields, _), gap) in enumerate(zip(problem.jets, gaps, strict=True))
         ]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.eigenvalues import eigenvalues
-from cra_sym.model.complex_shapes import ComplexShapes, TooFineError
+from cra_sym.model.complex_shapes import CoarseIntegrationError, ComplexShapes
 from cra_sym.model.routes import mode_sign, overview_places
 from cra_sym.model.system import System
 from cra_sym.model.values import flat_columns
@@ -30,7 +30,7 @@ def complex_shapes(system: System, modes: int, oscillating: bool, place: int, de
         shapes = ComplexShapes(s, spatial, numerics("damped"), columns, system.domain, numerics("inertia"))
         try:
             return shapes.shape(place, derivative, x)
-        except TooFineError:
+        except CoarseIntegrationError:
             if numerics("pencil") is None:
                 raise
     found = np.empty((columns.shape[1], modes, len(x)), dtype=complex)

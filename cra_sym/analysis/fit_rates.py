@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.analysis.fit_unknowns import Rated, Unknown
+from cra_sym.analysis.fit_unknowns import RatedFrequencies, Unknown
 from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.cached import cached_property
 from cra_sym.model.system import System
@@ -35,7 +35,7 @@ class _Found:
     compliance: Mapping[str, Array]
 
 
-def rated(system: System, unknowns: Sequence[Unknown], place: Array, modes: int) -> Rated:
+def rated(system: System, unknowns: Sequence[Unknown], place: Array, modes: int) -> RatedFrequencies:
     """Return frequencies and their rates at a point, or at points (P, unknowns); nan where there is no stable system.
 
     Raises
@@ -44,7 +44,7 @@ def rated(system: System, unknowns: Sequence[Unknown], place: Array, modes: int)
         If the system is not stable at the only point.
     """
 
-    def all_at(at: Array) -> Rated:
+    def all_at(at: Array) -> RatedFrequencies:
         if system.conservative_part is not system:
             return _Oscillating(system, unknowns, at, modes)
         names = tuple(unknown.name for unknown in unknowns)
@@ -77,7 +77,7 @@ def _at(system: System, unknowns: Sequence[Unknown], place: Array) -> System:
     return system.replace(**{unknown.name: unknown.value(place[..., i])[()] for i, unknown in enumerate(unknowns)})
 
 
-def _spread(part: Rated, unknowns: Sequence[Unknown], good: NDArray[np.bool_], modes: int) -> _Found:
+def _spread(part: RatedFrequencies, unknowns: Sequence[Unknown], good: NDArray[np.bool_], modes: int) -> _Found:
     """Return the results at all points, nan where there are none."""
 
     def among(values: Array) -> Array:

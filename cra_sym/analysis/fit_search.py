@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.fit_rates import frequencies, rated
-from cra_sym.analysis.fit_unknowns import Rated, Unknown
+from cra_sym.analysis.fit_unknowns import RatedFrequencies, Unknown
 from cra_sym.model.system import System
 
 __all__ = ["Data", "Search"]
@@ -68,14 +68,14 @@ class Search:
     system: System
     unknowns: tuple[Unknown, ...]
     most_modes: int
-    _known: dict[tuple[tuple[int, ...], bytes], Rated] = field(default_factory=dict)
+    _known: dict[tuple[tuple[int, ...], bytes], RatedFrequencies] = field(default_factory=dict)
     _table: tuple[Array, Array, tuple[int, ...]] | None = None
 
     def values(self, place: Array) -> dict[str, Any]:
         """Return the values of the unknowns at a point, or arrays of them at points (..., unknowns)."""
         return {unknown.name: unknown.value(place[..., i])[()] for i, unknown in enumerate(self.unknowns)}
 
-    def found(self, place: Array) -> Rated:
+    def found(self, place: Array) -> RatedFrequencies:
         """Return frequencies and sensitivities at a point, or at points; the last result is cached."""
         key = place.shape, place.tobytes()
         if key not in self._known:

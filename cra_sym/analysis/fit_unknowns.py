@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.model.system import System
 
-__all__ = ["Rated", "Unknown", "natural_stiffnesses", "unknowns"]
+__all__ = ["RatedFrequencies", "Unknown", "natural_stiffnesses", "unknowns"]
 
 Array = NDArray[np.float64]
 Kind = Literal["stiffness", "signed", "nonnegative"]
@@ -21,7 +21,7 @@ _SOFTEST, _STIFFEST = 1e-8, 1e8  # range of a stiffness in natural units, beyond
 _RANGE = 1e3  # factor by which other parameters may differ from their initial value
 
 
-class Rated(Protocol):
+class RatedFrequencies(Protocol):
     """The part of :class:`Sensitivities` for fits: frequencies (..., modes), Hz, and their derivatives by name."""
 
     @property
@@ -94,11 +94,11 @@ class Unknown:
         """Return the derivative by the coordinate of 1/k for a stiffness, else of p; it is finite everywhere."""
         return np.exp(coordinate) / self.unit if self.kind == "stiffness" else np.exp(coordinate) * self.unit
 
-    def slopes(self, found: Rated) -> Array:
+    def slopes(self, found: RatedFrequencies) -> Array:
         """Return the derivatives of the frequencies by 1/k of a stiffness, by p itself otherwise."""
         return found.compliance[self.name] if self.kind == "stiffness" else found.rate[self.name]
 
-    def gradient(self, found: Rated, coordinate: Array) -> Array:
+    def gradient(self, found: RatedFrequencies, coordinate: Array) -> Array:
         """Return the derivatives of the frequencies by the coordinate, shape (..., modes)."""
         column = np.asarray(coordinate)[..., None]
         slope = self.slopes(found) * self.rate(column)

@@ -14,7 +14,7 @@ from cra_sym.analysis.slip_states import ACCURACY, FIRST, elements_of, statics_o
 from cra_sym.model.system import System
 from cra_sym.solvers.harmonic_balance import Basis, peak
 from cra_sym.solvers.slip_balance import SlipBalance
-from cra_sym.solvers.slip_modes import Held, HeldMotions
+from cra_sym.solvers.slip_modes import Held, MotionsAtAmplitude
 from cra_sym.solvers.slip_stability import slip_multipliers
 
 __all__ = ["HeldCurve", "held_curve", "warn_of_missing"]
@@ -91,16 +91,16 @@ def warn_of_missing(found: HeldCurve, amplitudes: Array) -> None:
 Flags = NDArray[np.bool_]
 
 
-def _with(problem: HeldMotions, harmonics: int) -> HeldMotions:
+def _with(problem: MotionsAtAmplitude, harmonics: int) -> MotionsAtAmplitude:
     """Return the problem with another number of harmonics."""
     degree = problem.balance.equations.degree
     balance = replace(problem.balance, basis=Basis.whole(harmonics, samples(degree, harmonics)))
-    return HeldMotions(balance, problem.mode, problem.rows, problem.statics)
+    return MotionsAtAmplitude(balance, problem.mode, problem.rows, problem.statics)
 
 
 def _richer(
-    problem: HeldMotions, found: Held, amplitudes: Array, harmonics: int, change: Array, stopped: Flags
-) -> tuple[HeldMotions, Held, Array, Flags]:
+    problem: MotionsAtAmplitude, found: Held, amplitudes: Array, harmonics: int, change: Array, stopped: Flags
+) -> tuple[MotionsAtAmplitude, Held, Array, Flags]:
     """Return the problem with more harmonics, its motions, their change, and which motions stay at the former number.
 
     A motion that does not converge with more harmonics is kept, with the change by the last ones.
@@ -117,7 +117,7 @@ def _richer(
     return rich, start, change, stopped
 
 
-def _converged_motions(problem: HeldMotions, amplitudes: Array) -> tuple[Held, Array]:
+def _converged_motions(problem: MotionsAtAmplitude, amplitudes: Array) -> tuple[Held, Array]:
     """Return the motions, and the change by the last harmonics where more do not converge, nan elsewhere.
 
     An odd multiple of the frequency may coincide with that of another mode, which has hardly any damping there.
@@ -146,7 +146,7 @@ def _converged_motions(problem: HeldMotions, amplitudes: Array) -> tuple[Held, A
     return found, change
 
 
-def _problem(system: System, mode: int, modes: int, harmonics: int, place: Any, field: Any) -> HeldMotions:
+def _problem(system: System, mode: int, modes: int, harmonics: int, place: Any, field: Any) -> MotionsAtAmplitude:
     base = system.without_hysteresis
     whole = equations_of(base, modes)
     if base.numerics("constant") is not None:
@@ -164,10 +164,10 @@ def _problem(system: System, mode: int, modes: int, harmonics: int, place: Any, 
     if not np.abs(rows).max() > 0:
         raise ValueError("amplitude: no mode moves there; choose another place or field")
     statics = statics_of(system, modes, (), place, field)[len(balance.elements.groups)]
-    return HeldMotions(balance, mode - 1, rows, statics)
+    return MotionsAtAmplitude(balance, mode - 1, rows, statics)
 
 
-def _at(problem: HeldMotions, amplitudes: Array) -> Held:
+def _at(problem: MotionsAtAmplitude, amplitudes: Array) -> Held:
     """Return the motions, from linear starts or, where these fail, by continuation from smaller amplitudes."""
     found = problem.solved(problem.linear(amplitudes), amplitudes)
     if problem.balance.equations.energies or problem.balance.equations.forces:
@@ -202,7 +202,7 @@ def _at(problem: HeldMotions, amplitudes: Array) -> Held:
     return found
 
 
-def _first_slip(problem: HeldMotions) -> float:
+def _first_slip(problem: MotionsAtAmplitude) -> float:
     """Return the amplitude of the stuck mode at which an element begins to slip."""
     one = problem.linear(np.array([1e-12 * problem.balance.elements.limit]))
     moved = np.abs(one.displacements[0, :, 1])
@@ -211,7 +211,7 @@ def _first_slip(problem: HeldMotions) -> float:
     return float(1e-12 * problem.balance.elements.limit / max(max(shares), 1e-300))
 
 
-def _embedded(found: Held, old: HeldMotions, new: HeldMotions) -> Held:
+def _embedded(found: Held, old: MotionsAtAmplitude, new: MotionsAtAmplitude) -> Held:
     h, more = len(old.balance.basis.sines), len(new.balance.basis.sines)
 
     def whole(given: Array) -> Array:
@@ -223,7 +223,7 @@ def _embedded(found: Held, old: HeldMotions, new: HeldMotions) -> Held:
     return Held(whole(found.coefficients), whole(found.displacements), *numbers, found.good.copy())
 
 
-def _widened(found: Held, old: HeldMotions, new: HeldMotions) -> Held:
+def _widened(found: Held, old: MotionsAtAmplitude, new: MotionsAtAmplitude) -> Held:
     """Return starts with more modes, which follow the forces of the elements statically."""
     points, n, size = found.coefficients.shape
     force = old.balance.forces(found.displacements.reshape(points, -1))[0].reshape(found.displacements.shape)
@@ -242,7 +242,7 @@ def _change(one: Held, other: Held) -> Array:
     return np.where(both, change, np.nan)
 
 
-def _held_curve_of(problem: HeldMotions, found: Held, harmonics: Array, modes: Array) -> HeldCurve:
+def _held_curve_of(problem: MotionsAtAmplitude, found: Held, harmonics: Array, modes: Array) -> HeldCurve:
     balance, good = problem.balance, found.good
     basis, equations = balance.basis, balance.equations
     force = balance.forces(found.displacements.reshape(good.size, -1))[0]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cra_sym.analysis.modes import modal_parameters
+from cra_sym.analysis.modal_parameters import modal_parameters
 from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.claims.pictures import by_mode, note, stiffness_axis
 from cra_sym.claims.registry import claimed, pictured

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from cra_sym.analysis.frequency_response import frequency_response
-from cra_sym.analysis.modes import modal_parameters, natural_frequencies
+from cra_sym.analysis.modal_parameters import modal_parameters
+from cra_sym.analysis.modes import natural_frequencies
 from cra_sym.arm.frequency_parameters import frequency_parameters
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import mapping, one_axis, real_array, shown

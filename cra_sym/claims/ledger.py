@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from cra_sym.checks import choice, default_floating_point
-from cra_sym.claims.registry import ENTRIES, Entry
+from cra_sym.claims.registry import ENTRIES, RegisteredClaim
 from cra_sym.claims.setting import Setting
 from cra_sym.claims.verdict import THEMES, Verdict
 
@@ -29,7 +29,7 @@ def _load() -> tuple[str, ...]:
     return tuple(sorted(ENTRIES))
 
 
-def _entry(id: str) -> Entry:
+def _entry(id: str) -> RegisteredClaim:
     return ENTRIES[choice("claim", id, _load())]
 
 

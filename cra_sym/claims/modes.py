@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cra_sym.analysis.modes import modal_parameters, natural_frequencies
+from cra_sym.analysis.modal_parameters import modal_parameters
+from cra_sym.analysis.modes import natural_frequencies
 from cra_sym.arm.frequency_parameters import frequency_parameters
 from cra_sym.claims.family import common_scale
 from cra_sym.claims.pictures import PALETTE, STYLES, by_mode, note, stiffness_axis

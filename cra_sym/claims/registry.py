@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cra_sym.claims.setting import Setting
     from cra_sym.claims.verdict import Finding, Verdict
 
-__all__ = ["ENTRIES", "Entry", "claimed", "pictured"]
+__all__ = ["ENTRIES", "RegisteredClaim", "claimed", "pictured"]
 
 
 Find: TypeAlias = "Callable[[Setting], Finding]"
@@ -32,7 +32,7 @@ Draw: TypeAlias = "Callable[[Verdict, Axes], None]"
 
 
 @dataclass
-class Entry:
+class RegisteredClaim:
     """A claim, the function that judges it and the one that draws it."""
 
     id: str
@@ -44,7 +44,7 @@ class Entry:
     picture: Draw | None = None
 
 
-ENTRIES: dict[str, Entry] = {}
+ENTRIES: dict[str, RegisteredClaim] = {}
 """Claims by id, in the order their modules were imported."""
 
 
@@ -52,7 +52,7 @@ def claimed(id: str, theme: str, source: str, title: str, words: str) -> Callabl
     """Register the decorated function, ``Setting -> Finding``, as the judge of a claim."""
 
     def register(function: Find) -> Find:
-        ENTRIES[id] = Entry(id, theme, source, title, words, function)
+        ENTRIES[id] = RegisteredClaim(id, theme, source, title, words, function)
         return function
 
     return register

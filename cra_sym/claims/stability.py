@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cra_sym.analysis.floquet import growth_rate
-from cra_sym.analysis.modes import modal_parameters
+from cra_sym.analysis.modal_parameters import modal_parameters
 from cra_sym.analysis.stability import AsymptoticWarning, judged_boundary
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.claims.motions import tip

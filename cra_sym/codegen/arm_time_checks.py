@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cra_sym.analysis.modes import ModalParameters, modal_parameters, mode_shapes
+from cra_sym.analysis.modal_parameters import ModalParameters, modal_parameters
+from cra_sym.analysis.modes import mode_shapes
 from cra_sym.analysis.responses import response
 from cra_sym.analysis.shaping import input_shaper
 from cra_sym.arm.parameters import Arm

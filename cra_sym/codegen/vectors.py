@@ -10,7 +10,8 @@ import numpy as np
 
 import cra_sym as cra
 from cra_sym.analysis import state_space as state_space_module
-from cra_sym.analysis.modes import modal_parameters, mode_shapes, natural_frequencies
+from cra_sym.analysis.modal_parameters import modal_parameters
+from cra_sym.analysis.modes import mode_shapes, natural_frequencies
 from cra_sym.analysis.responses import tip_response
 from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.analysis.zones import first_order_zone

@@ -10,7 +10,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from cra_sym.analysis.modes import modal_parameters
+from cra_sym.analysis.modal_parameters import modal_parameters
 from cra_sym.analysis.response_curves import response_curves
 from cra_sym.analysis.stability import stability_boundary
 from cra_sym.analysis.steady_states import SteadyState

@@ -10,7 +10,7 @@ from typing import Any
 
 from sympy import Expr, I, Rational, S, Symbol, exp, expand, symbols
 
-__all__ = ["SIGMA", "TIME", "Coefficient", "Expansion", "Resonance", "Series", "Vector"]
+__all__ = ["SIGMA", "TIME", "AmplitudeExpansion", "Coefficient", "Resonance", "Series", "Vector"]
 
 Vector = tuple[int, ...]
 Series = dict[tuple[int, Vector], Expr]
@@ -87,7 +87,7 @@ def _read(resonance: Any, total: int) -> Resonance:
     return Resonance(modes, tuple(relation), "parametric" if len(numbers) == 2 else "weak")
 
 
-class Expansion:
+class AmplitudeExpansion:
     """Powers of the amplitude and harmonics of symbolic frequencies."""
 
     highest = 3

@@ -32,13 +32,13 @@ from sympy import (
 
 from cra_sym.mechanics.jets import HamiltonError
 
-__all__ = ["Basis", "Naming", "general_solution"]
+__all__ = ["Naming", "SolutionBasis", "general_solution"]
 
 Naming = Callable[[str], Symbol]
 
 
 @dataclass(frozen=True)
-class Basis:
+class SolutionBasis:
     """Basis of the solutions of a spatial problem, with x counted from the left end.
 
     Attributes
@@ -75,7 +75,7 @@ class Basis:
 
 def general_solution(
     operator: Matrix, r: Symbol, x: Expr, length: Expr, kind: Literal["hyperbolic", "decaying"], name: Naming
-) -> Basis:
+) -> SolutionBasis:
     """Return the general solution of ``operator(d/dx) phi = 0``.
 
     Parameters
@@ -99,7 +99,7 @@ def general_solution(
     return _exponential(operator, determinant, r, x, length, name)
 
 
-def _single_term(degree: int, power: Expr, x: Expr, length: Expr, kind: str, name: Naming) -> Basis:
+def _single_term(degree: int, power: Expr, x: Expr, length: Expr, kind: str, name: Naming) -> SolutionBasis:
     """Solve ``phi'' = -beta**2 phi`` (degree 2) and ``phi'''' = beta**4 phi`` (degree 4)."""
     lam = name("lambda")
     beta = lam / length
@@ -122,7 +122,7 @@ def _single_term(degree: int, power: Expr, x: Expr, length: Expr, kind: str, nam
         left, right = [*left, 1, 0], [*right, ch, sh]
         values.update({ch: cosh(lam), sh: sinh(lam)})
         relations.append((sh, ch**2 - 1))
-    return Basis(
+    return SolutionBasis(
         tuple(functions),
         diag(*blocks),
         Matrix([left]),
@@ -135,7 +135,7 @@ def _single_term(degree: int, power: Expr, x: Expr, length: Expr, kind: str, nam
     )
 
 
-def _paired(operator: Matrix, determinant: Poly, r: Symbol, x: Expr, length: Expr, name: Naming) -> Basis:
+def _paired(operator: Matrix, determinant: Poly, r: Symbol, x: Expr, length: Expr, name: Naming) -> SolutionBasis:
     """Solve an equation even in d/dx: cosh(r x) and sinh(r x) for each root r**2."""
     half = determinant.degree() // 2
     squares = _square_roots(determinant, r, half)
@@ -162,7 +162,7 @@ def _paired(operator: Matrix, determinant: Poly, r: Symbol, x: Expr, length: Exp
             even, odd = _parity(entry, r)
             even, odd = even.subs(r, rate), odd.subs(r, rate)
             field[2 * index : 2 * index + 2, 2 * index : 2 * index + 2] = Matrix([[even, odd], [odd, even]])
-    return Basis(
+    return SolutionBasis(
         tuple(functions),
         diag(*blocks),
         Matrix([left]),
@@ -175,14 +175,14 @@ def _paired(operator: Matrix, determinant: Poly, r: Symbol, x: Expr, length: Exp
     )
 
 
-def _exponential(operator: Matrix, determinant: Poly, r: Symbol, x: Expr, length: Expr, name: Naming) -> Basis:
+def _exponential(operator: Matrix, determinant: Poly, r: Symbol, x: Expr, length: Expr, name: Naming) -> SolutionBasis:
     """Solve the general case: exp(r x) for each root r."""
     degree = determinant.degree()
     found = _distinct(determinant, degree) if degree <= 2 else None
     null = _null_vector(operator, determinant, r)
     numbers = {name(f"lambda_{index + 1}"): None if found is None else length * found[index] for index in range(degree)}
     ends = {name(f"exp_{index + 1}"): exp(number) for index, number in enumerate(numbers)}
-    return Basis(
+    return SolutionBasis(
         tuple(exp(number * x / length) for number in numbers),
         diag(*(number / length for number in numbers)),
         Matrix([[1] * degree]),

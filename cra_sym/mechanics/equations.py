@@ -11,7 +11,7 @@ from sympy import Add, Eq, Equality, Expr, Integral, Limit, S
 
 from cra_sym.cached import cached_property
 from cra_sym.mechanics.jets import END_NAMES, End, Jet, JetSpace
-from cra_sym.mechanics.points import Point
+from cra_sym.mechanics.points import InteriorPoint
 from cra_sym.mechanics.steps import compact_latex, variation_of
 from cra_sym.mechanics.variation import Forces, Variation, lagrange_forces
 
@@ -170,7 +170,9 @@ class GeneralisedForces:
                     found.append(self._jump(point, forces, Jet(number, order, 0, None), write))
         return tuple(found)
 
-    def _jump(self, point: Point, forces: Forces, displacement: Jet, write: Callable[[Expr], Expr]) -> JumpCondition:
+    def _jump(
+        self, point: InteriorPoint, forces: Forces, displacement: Jet, write: Callable[[Expr], Expr]
+    ) -> JumpCondition:
         space, held = self.variation.space, displacement in point.held
         varied = varied_form(space, displacement).subs(space.x, point.place)
         moved = write(space.symbol(displacement)).subs(space.x, point.place)

@@ -7,7 +7,7 @@ from typing import Any
 
 from sympy import Eq, Expr, Function, I, Rational, S, Symbol, conjugate, cos, expand
 
-from cra_sym.mechanics.amplitude_expansion import TIME, Coefficient, Expansion, Series
+from cra_sym.mechanics.amplitude_expansion import TIME, AmplitudeExpansion, Coefficient, Series
 from cra_sym.mechanics.slow_flow import SlowFlow
 from cra_sym.mechanics.steps import Step
 
@@ -17,7 +17,7 @@ _HIGHEST = 5
 _WORDS = {1: "first", 2: "second", 3: "third", 4: "fourth", 5: "fifth"}
 
 
-class _Turning(Expansion):
+class _Turning(AmplitudeExpansion):
     """Expansion of motions whose frequency depends on the amplitude."""
 
     def __init__(self, resonance: Any, total: int, coefficients: Sequence[Coefficient]) -> None:

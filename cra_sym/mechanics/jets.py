@@ -22,7 +22,6 @@ from sympy import (
     Limit,
     Max,
     Min,
-    Mul,
     Piecewise,
     S,
     Subs,
@@ -31,7 +30,6 @@ from sympy import (
     arg,
     ceiling,
     conjugate,
-    expand,
     floor,
     im,
     preorder_traversal,
@@ -43,8 +41,9 @@ from sympy.core.function import AppliedUndef, Derivative, UndefinedFunction
 from sympy.matrices.expressions import MatrixExpr
 
 from cra_sym.checks import shown
+from cra_sym.mechanics.grouping import grouped
 
-__all__ = ["END_NAMES", "End", "HamiltonError", "Jet", "JetSpace", "grouped", "listed", "scalar"]
+__all__ = ["END_NAMES", "End", "HamiltonError", "Jet", "JetSpace", "listed", "scalar"]
 
 End = Literal["left", "right"]
 END_NAMES: tuple[End, End] = ("left", "right")
@@ -376,35 +375,6 @@ def _maximal(expression: Expr, wanted: Any) -> list[Basic]:
             found[node] = None
             walk.skip()
     return list(found)
-
-
-def grouped(expression: Expr, variables: Iterable[Symbol]) -> Expr:
-    """Write ``a*y + a*z + b*y`` as ``a*(y + z) + b*y`` for the given variables, without expanding coefficients.
-
-    Terms that are not linear in the variables are expanded first.
-    """
-    variables = list(variables)
-    coefficients = {v: expression.diff(v) for v in variables}
-    if any(c.has(*variables) for c in coefficients.values() if variables):
-        pairs = [term.as_independent(*variables, as_Add=False) for term in Add.make_args(expand(expression))]
-    else:
-        pairs = [(c, v) for v, c in coefficients.items()]
-        pairs.append((expression.xreplace(dict.fromkeys(variables, S.Zero)), S.One))
-    groups: dict[Expr, list[Expr]] = {}
-    for coefficient, variable in pairs:
-        if expand(coefficient) == 0:
-            continue
-        if -coefficient in groups:
-            groups[-coefficient].append(-variable)
-        else:
-            groups.setdefault(coefficient, []).append(variable)
-    return Add(*(_signed(coefficient, Add(*members)) for coefficient, members in groups.items()))
-
-
-def _signed(coefficient: Expr, factor: Expr) -> Expr:
-    if coefficient.is_Add and coefficient.could_extract_minus_sign():
-        return Mul(S.NegativeOne, -coefficient, factor)
-    return Mul(coefficient, factor)
 
 
 def _real_rate(expression: Expr, symbol: Symbol) -> Expr:

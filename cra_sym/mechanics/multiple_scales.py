@@ -7,12 +7,12 @@ from typing import Any
 
 from sympy import Eq, Expr, Symbol, latex
 
-from cra_sym.mechanics.parametric import ParametricSystem, Resonance
+from cra_sym.mechanics.parametric import ParametricResonance, ParametricSystem
 from cra_sym.mechanics.scales_steps import derivation
 from cra_sym.mechanics.stability_condition import Border, border
 from cra_sym.mechanics.steady_response import SteadyResponse, steady_response
 from cra_sym.mechanics.steps import Step, Steps
-from cra_sym.mechanics.two_scales import Expansion, ModeSum
+from cra_sym.mechanics.two_scales import ModeSum, TwoScaleExpansion
 
 __all__ = ["MultipleScales", "multiple_scales"]
 
@@ -43,7 +43,7 @@ class MultipleScales:
     """
 
     system: ParametricSystem
-    resonance: Resonance
+    resonance: ParametricResonance
     order: int
     steps: Steps
     amplitude_equations: tuple[Eq, ...]
@@ -144,7 +144,7 @@ def multiple_scales(
     """
     if order not in (1, 2):
         raise ValueError(f"order = {order!r}: must be 1 or 2")
-    about = Resonance.of(resonance, tongue)
+    about = ParametricResonance.of(resonance, tongue)
     if order < about.tongue:
         raise ValueError(f"order = {order}: the second tongue appears at order 2")
     if order == 2 and (cubic is not None or about.sign == 0):
@@ -159,7 +159,7 @@ def multiple_scales(
         coupling_slope=coupling_slope,
         size=size,
     )
-    expansion = Expansion(system, about, order)
+    expansion = TwoScaleExpansion(system, about, order)
     edge = border(expansion) if about.sign else None
     single = about.sign == 0 or (about.kind == "principal" and cubic is not None)
     response = steady_response(expansion) if single else None

@@ -8,13 +8,13 @@ from typing import Any
 
 from sympy import Expr, IndexedBase, Integer, MatrixBase, Rational, S, Symbol, Tuple, sympify
 
-__all__ = ["ParametricSystem", "Resonance"]
+__all__ = ["ParametricResonance", "ParametricSystem"]
 
 Label = Any
 
 
 @dataclass(frozen=True)
-class Resonance:
+class ParametricResonance:
     r"""A resonance ``tongue`` x varpi = omega_first + sign x omega_second; sign 0 is a forced resonance.
 
     Attributes
@@ -34,7 +34,7 @@ class Resonance:
     tongue: int = 1
 
     @classmethod
-    def of(cls, spec: Any, tongue: int = 1) -> Resonance:
+    def of(cls, spec: Any, tongue: int = 1) -> ParametricResonance:
         """Return the resonance of a pair ``(m, n)``, ``(m, -n)``, or of a single ``n`` for a forced one.
 
         Examples
@@ -111,7 +111,7 @@ class ParametricSystem:
     coupling_slope: Any = None
 
     @classmethod
-    def of(cls, resonance: Resonance, frequencies: Any, coupling: Any, **quantities: Any) -> ParametricSystem:
+    def of(cls, resonance: ParametricResonance, frequencies: Any, coupling: Any, **quantities: Any) -> ParametricSystem:
         """Return the checked system, written out for the modes the resonance needs."""
         size = quantities.pop("size", None)
         symbolic = isinstance(frequencies, IndexedBase)

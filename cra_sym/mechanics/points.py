@@ -27,11 +27,11 @@ from sympy.core.function import AppliedUndef, Derivative
 from cra_sym.checks import shown
 from cra_sym.mechanics.jets import HamiltonError, Jet, JetSpace
 
-__all__ = ["Point", "at_place", "in_points", "linear_work", "read_points", "supports"]
+__all__ = ["InteriorPoint", "at_place", "in_points", "linear_work", "read_points", "supports"]
 
 
 @dataclass(frozen=True)
-class Point:
+class InteriorPoint:
     """Terms at an interior place.
 
     Attributes
@@ -102,7 +102,7 @@ def read_points(
     held: Iterable[tuple[Expr, Expr]],
     work: Iterable[tuple[Expr, Expr, Expr]],
     orders: Sequence[int],
-) -> tuple[Point, ...]:
+) -> tuple[InteriorPoint, ...]:
     """Read terms, supports and forces at interior places into jet symbols, one point for each place."""
     found: dict[Expr, tuple[list[Expr], list[Jet], list[tuple[Expr, Jet]]]] = {}
 
@@ -138,7 +138,7 @@ def read_points(
             _check(space, jet, orders, label)
         at(place)[2].extend(linear_work(space, pushed, moved, label))
     return tuple(
-        Point(
+        InteriorPoint(
             place,
             Add(*terms).subs(space.x, place),
             tuple(jets),

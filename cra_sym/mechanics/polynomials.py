@@ -115,7 +115,7 @@ def linearised(result: HamiltonResult, options: dict[str, Any]) -> HamiltonResul
     if not result.quadratures and is_linear(variation):
         return result
     space = variation.space
-    inside = Load(result)
+    inside = LoadCoefficients(result)
 
     def kept(expression: Expr, label: str, place: Expr | None, degree: int = 2) -> Expr:
         terms = [m for m in monomials(space, expression, label) if m.degree <= degree]
@@ -150,7 +150,7 @@ def linearised(result: HamiltonResult, options: dict[str, Any]) -> HamiltonResul
     return hamilton(**(options | changes))
 
 
-class Load:
+class LoadCoefficients:
     """Terms linear in quadratures, collected as a weight C(x) of their integrands."""
 
     def __init__(self, result: HamiltonResult) -> None:

@@ -17,7 +17,7 @@ from cra_sym.mechanics.two_scales import (
     D2,
     EPSILON,
     SIGMA,
-    Expansion,
+    TwoScaleExpansion,
     amplitude,
     conjugate_amplitude,
     derivatives,
@@ -29,7 +29,7 @@ T0, T1, T2, TIME = (Symbol(name, real=True) for name in ("T_0", "T_1", "T_2", "t
 VARPI = Symbol("varpi", positive=True)
 
 
-def derivation(e: Expansion, edge: Border | None, response: SteadyResponse | None) -> Steps:
+def derivation(e: TwoScaleExpansion, edge: Border | None, response: SteadyResponse | None) -> Steps:
     """Return the steps from the expansion to the boundary or, for a forced resonance, to the steady response."""
     steps = [*_problems(e), *_first_order(e)]
     if e.order == 2:
@@ -62,7 +62,7 @@ def _operator(k: int) -> Symbol:
     return Symbol(f"D_{k}", commutative=False)
 
 
-def _written(e: Expansion, part: Harmonics) -> Expr:
+def _written(e: TwoScaleExpansion, part: Harmonics) -> Expr:
     """Write a sum of harmonics, with the unknown rates of the amplitudes as D_k A."""
     named: dict[Symbol, Expr] = {}
     for a in (f(i) for i in e.system.rows for f in (amplitude, conjugate_amplitude)):
@@ -82,7 +82,7 @@ def _apply(operator: Expr, f: Expr) -> Expr:
     return total
 
 
-def _coupling(e: Expansion, i: Label, k: int) -> Expr:
+def _coupling(e: TwoScaleExpansion, i: Label, k: int) -> Expr:
     system = e.system
     if system.coupling is None:
         return S.Zero
@@ -93,7 +93,7 @@ def _coupling(e: Expansion, i: Label, k: int) -> Expr:
     return cos(VARPI * T0) * total
 
 
-def _problem(e: Expansion, i: Label, k: int) -> Eq:
+def _problem(e: TwoScaleExpansion, i: Label, k: int) -> Eq:
     """Write the equation of order k for mode i."""
     system, once, twice = e.system, derivatives(1), derivatives(2)
     left = _apply(D0**2, _q(i, k)) + system.omega(i) ** 2 * _q(i, k)
@@ -118,7 +118,7 @@ def _problem(e: Expansion, i: Label, k: int) -> Eq:
     return Eq(left, right, evaluate=False)
 
 
-def _modes(e: Expansion) -> tuple[Label, ...]:
+def _modes(e: TwoScaleExpansion) -> tuple[Label, ...]:
     """Return the modes written out in the steps: those of the resonance."""
     return e.resonance.modes
 
@@ -126,7 +126,7 @@ def _modes(e: Expansion) -> tuple[Label, ...]:
 # the steps --------------------------------------------------------------------------------------------------------
 
 
-def _problems(e: Expansion) -> list[Step]:
+def _problems(e: TwoScaleExpansion) -> list[Step]:
     powers = range(e.order + 1)
     shown = [Eq(Symbol(f"q_{i}", commutative=False), sum(EPSILON**k * _q(i, k) for k in powers)) for i in _modes(e)]
     d, d2 = Symbol(r"\frac{d}{dt}"), Symbol(r"\frac{d^2}{dt^2}")
@@ -163,7 +163,7 @@ def _problems(e: Expansion) -> list[Step]:
     ]
 
 
-def _first_order(e: Expansion) -> list[Step]:
+def _first_order(e: TwoScaleExpansion) -> list[Step]:
     r, system = e.resonance, e.system
     phase = SIGMA * (T1, T2)[e.scale - 1]
     centre = r.combine(system.omega(r.first), system.omega(r.second))
@@ -208,7 +208,7 @@ def _first_order(e: Expansion) -> list[Step]:
     ]
 
 
-def _second_order(e: Expansion) -> list[Step]:
+def _second_order(e: TwoScaleExpansion) -> list[Step]:
     solution = tuple(Eq(_q(i, 1), _written(e, e.fields[1][i]), evaluate=False) for i in _modes(e))
     secular = tuple(Eq(_written(e, part), 0, evaluate=False) for part in e.secular[1].values())
     sums = tuple(Eq(s.symbol, s.total, evaluate=False) for s in e.sums)
@@ -244,7 +244,7 @@ def _second_order(e: Expansion) -> list[Step]:
     ]
 
 
-def _amplitude_equations(e: Expansion) -> Step:
+def _amplitude_equations(e: TwoScaleExpansion) -> Step:
     of_time = {a: Function(a.name)(TIME) for j in _modes(e) for a in (amplitude(j), conjugate_amplitude(j))}
     shown: list[Any] = []
     for a in map(amplitude, _modes(e)):
@@ -262,7 +262,7 @@ def _amplitude_equations(e: Expansion) -> Step:
     )
 
 
-def _stability(e: Expansion, edge: Border) -> list[Step]:
+def _stability(e: TwoScaleExpansion, edge: Border) -> list[Step]:
     r, system = e.resonance, e.system
     centre = r.combine(system.omega(r.first), system.omega(r.second))
     sides = tuple(Eq(VARPI, centre + edge.centre + s * edge.half_width, evaluate=False) for s in (-1, 1))

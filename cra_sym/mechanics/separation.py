@@ -22,20 +22,21 @@ from sympy import (
 
 from cra_sym import checks
 from cra_sym.cached import cached_property
-from cra_sym.mechanics.basis import Basis
+from cra_sym.mechanics.basis import SolutionBasis
 from cra_sym.mechanics.determinants import cofactors, collected, determinant, divided, primitive_rows, without_content
 from cra_sym.mechanics.equations import BoundaryCondition, GeneralisedForces, JumpCondition
+from cra_sym.mechanics.grouping import grouped
 from cra_sym.mechanics.hamilton import HamiltonResult
-from cra_sym.mechanics.jets import HamiltonError, Jet, grouped, scalar
+from cra_sym.mechanics.jets import HamiltonError, Jet, scalar
 from cra_sym.mechanics.solution import GeneralSolution
 from cra_sym.mechanics.steps import Step, Steps
 from cra_sym.mechanics.weak import WeakForm, weak_form
 
-__all__ = ["Modal", "SpatialProblem", "separate"]
+__all__ = ["Modal", "SeparatedProblem", "separate"]
 
 
 @dataclass(frozen=True)
-class SpatialProblem:
+class SeparatedProblem:
     """Homogeneous problem of the amplitudes in ``v(x, t) = phi(x) e^(i omega t)``, or ``phi(x) e^(s t)`` with damping.
 
     Attributes
@@ -68,8 +69,8 @@ class Modal:
 
     Attributes
     ----------
-    spatial_problem : SpatialProblem
-    basis : Basis
+    spatial_problem : SeparatedProblem
+    basis : SolutionBasis
         General solution; its ``values`` symbols stand for the functions at the right end.
     characteristic_matrix : Matrix
         Rows: conditions of the left end, lumped coordinates, interior places, conditions of the right end. Columns:
@@ -86,8 +87,8 @@ class Modal:
         For each unit jump at an interior place, the motion of each field to the right of it.
     """
 
-    spatial_problem: SpatialProblem
-    basis: Basis
+    spatial_problem: SeparatedProblem
+    basis: SolutionBasis
     characteristic_matrix: Matrix
     characteristic_polynomial: Expr
     scale: Expr
@@ -252,7 +253,7 @@ def _varying(weak: WeakForm) -> Expr:
 # ------------------------------------------------------------------------------------------------ the spatial problem
 
 
-def _spatial_problem(weak: WeakForm, frequency: Symbol) -> SpatialProblem:
+def _spatial_problem(weak: WeakForm, frequency: Symbol) -> SeparatedProblem:
     space, forces = weak.variation.space, GeneralisedForces.of(weak.variation)
     s = frequency if not weak.even else S.ImaginaryUnit * frequency
     heads = {
@@ -287,14 +288,14 @@ def _spatial_problem(weak: WeakForm, frequency: Symbol) -> SpatialProblem:
     left_out = tuple(space.write(load) for load in loads if load != 0)
     amplitudes = tuple(heads.values())
     jumps = forces.jump_conditions(amplitude)
-    return SpatialProblem(tuple(fields), tuple(conditions), jumps, amplitudes, frequency, not weak.even, left_out)
+    return SeparatedProblem(tuple(fields), tuple(conditions), jumps, amplitudes, frequency, not weak.even, left_out)
 
 
 # ------------------------------------------------------------------------------------------------ the determinant
 
 
 def _characteristic(
-    contents: Sequence[Expr], rows: Matrix, start: Matrix, basis: Basis, frequency: Symbol
+    contents: Sequence[Expr], rows: Matrix, start: Matrix, basis: SolutionBasis, frequency: Symbol
 ) -> tuple[Expr, Expr]:
     """Return the determinant over that of the initial state, and the scale factor to the determinant of the rows.
 

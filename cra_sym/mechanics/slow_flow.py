@@ -18,7 +18,7 @@ from typing import Any
 from sympy import Eq, Expr, Function, I, S, Symbol, conjugate, exp, expand, latex
 from sympy.core.function import AppliedUndef
 
-from cra_sym.mechanics.amplitude_expansion import SIGMA, TIME, Coefficient, Expansion, Series, Vector
+from cra_sym.mechanics.amplitude_expansion import SIGMA, TIME, AmplitudeExpansion, Coefficient, Series, Vector
 from cra_sym.mechanics.steps import Step
 
 __all__ = ["SlowFlow", "slow_flow"]
@@ -67,7 +67,7 @@ def slow_flow(resonance: Any, coefficients: Sequence[Coefficient], modes: int) -
     ValueError
         If the resonance is not valid.
     """
-    expansion = Expansion(resonance, modes, coefficients)
+    expansion = AmplitudeExpansion(resonance, modes, coefficients)
     first = expansion.first()
     forces = expansion.nonlinear(first)
     secular, power = expansion.secular(forces, 2), 2
@@ -82,7 +82,7 @@ def slow_flow(resonance: Any, coefficients: Sequence[Coefficient], modes: int) -
 
 def _result(
     resonance: Any,
-    expansion: Expansion,
+    expansion: AmplitudeExpansion,
     flows: Mapping[int, Expr],
     power: int,
     first: list[Series],
@@ -109,7 +109,7 @@ def _result(
     return SlowFlow(resonance, detuning, equations, backbone, response, occurring, steps)
 
 
-def _alone(expansion: Expansion, flows: Mapping[int, Expr]) -> tuple[Expr | None, Eq | None]:
+def _alone(expansion: AmplitudeExpansion, flows: Mapping[int, Expr]) -> tuple[Expr | None, Eq | None]:
     """Return backbone and steady response of a resonance of one mode."""
     if len(flows) > 1:
         return None, None
@@ -131,7 +131,7 @@ def _alone(expansion: Expansion, flows: Mapping[int, Expr]) -> tuple[Expr | None
 
 
 def _steps(
-    expansion: Expansion,
+    expansion: AmplitudeExpansion,
     in_functions: Any,
     functions: Mapping[int, AppliedUndef],
     first: list[Series],

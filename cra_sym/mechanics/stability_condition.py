@@ -25,7 +25,7 @@ from sympy import (
     zeros,
 )
 
-from cra_sym.mechanics.two_scales import EPSILON, SIGMA, Expansion, amplitude, conjugate_amplitude
+from cra_sym.mechanics.two_scales import EPSILON, SIGMA, TwoScaleExpansion, amplitude, conjugate_amplitude
 
 __all__ = ["DETUNING", "Border", "border", "rotating_matrices"]
 
@@ -59,7 +59,7 @@ class Border:
     threshold: Expr
 
 
-def rotating_matrices(expansion: Expansion) -> tuple[Matrix, list[Matrix]]:
+def rotating_matrices(expansion: TwoScaleExpansion) -> tuple[Matrix, list[Matrix]]:
     """Return the state and, order by order, the constant matrices of the amplitude equations in the rotating frame.
 
     The frame rotates each amplitude at half the detuning times the number of periods of the tongue, which makes the
@@ -79,7 +79,7 @@ def rotating_matrices(expansion: Expansion) -> tuple[Matrix, list[Matrix]]:
     return state, matrices
 
 
-def border(expansion: Expansion) -> Border:
+def border(expansion: TwoScaleExpansion) -> Border:
     """Return the border of stability that the amplitude equations imply."""
     state, matrices = rotating_matrices(expansion)
     leading, correction = matrices[0], zeros(2)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from sympy import Eq, Expr, I, S, Symbol, cancel, expand
 
 from cra_sym.mechanics.stability_condition import DETUNING
-from cra_sym.mechanics.two_scales import EPSILON, SIGMA, Expansion, amplitude, conjugate_amplitude
+from cra_sym.mechanics.two_scales import EPSILON, SIGMA, TwoScaleExpansion, amplitude, conjugate_amplitude
 
 __all__ = ["AMPLITUDE", "SteadyResponse", "steady_response"]
 
@@ -34,7 +34,7 @@ class SteadyResponse:
     growth: Expr
 
 
-def steady_response(expansion: Expansion) -> SteadyResponse:
+def steady_response(expansion: TwoScaleExpansion) -> SteadyResponse:
     """Return the steady response that the first-order amplitude equation of a single mode implies."""
     r = expansion.resonance
     a, b = amplitude(r.first), conjugate_amplitude(r.first)

@@ -23,7 +23,7 @@ from sympy import (
 )
 
 from cra_sym.mechanics.harmonics import Harmonics, Vector, frequency_of
-from cra_sym.mechanics.parametric import Label, ParametricSystem, Resonance
+from cra_sym.mechanics.parametric import Label, ParametricResonance, ParametricSystem
 
 __all__ = [
     "D0",
@@ -31,8 +31,8 @@ __all__ = [
     "D2",
     "EPSILON",
     "SIGMA",
-    "Expansion",
     "ModeSum",
+    "TwoScaleExpansion",
     "amplitude",
     "conjugate_amplitude",
     "derivatives",
@@ -91,7 +91,7 @@ class ModeSum:
     total: Expr
 
 
-class Expansion:
+class TwoScaleExpansion:
     """Expansion in two or three time scales, order by order.
 
     Parameters
@@ -115,7 +115,7 @@ class Expansion:
         The sums over all modes that enter at second order.
     """
 
-    def __init__(self, system: ParametricSystem, resonance: Resonance, order: int) -> None:
+    def __init__(self, system: ParametricSystem, resonance: ParametricResonance, order: int) -> None:
         self.system, self.resonance, self.order = system, resonance, order
         self.zero: Vector = tuple(S.Zero for _ in system.rows)
         self.scale = resonance.tongue  # the slow time on which detuning and damping act

@@ -11,7 +11,7 @@ from sympy import Add, Expr, S, SympifyError, expand_mul, sympify
 from cra_sym.checks import shown
 from cra_sym.mechanics.constraints import Elimination, eliminate
 from cra_sym.mechanics.jets import END_NAMES, End, HamiltonError, Jet, JetSpace
-from cra_sym.mechanics.points import Point, linear_work, read_points, supports
+from cra_sym.mechanics.points import InteriorPoint, linear_work, read_points, supports
 
 __all__ = ["Forces", "Variation", "VirtualWork", "lagrange_forces", "vary"]
 
@@ -35,7 +35,7 @@ class Variation:
         Highest x derivative of each field: as many displacements exist at each end.
     elimination : Elimination
         End displacements fixed by the essential conditions.
-    points : tuple of Point
+    points : tuple of InteriorPoint
         Terms at interior places.
     """
 
@@ -45,7 +45,7 @@ class Variation:
     applied: tuple[tuple[Expr, Jet, bool], ...]
     orders: tuple[int, ...]
     elimination: Elimination
-    points: tuple[Point, ...] = ()
+    points: tuple[InteriorPoint, ...] = ()
 
 
 def vary(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from cra_sym.analysis.modes import ModalParameters
+    from cra_sym.analysis.modal_parameters import ModalParameters
     from cra_sym.mechanics.slow_flow import SlowFlow
     from cra_sym.model.system import System
 
@@ -45,7 +45,7 @@ class Asked(ABC):
 
     def modal_parameters(self, values: Mapping[Any, Any], modes: int = 3) -> ModalParameters:
         """Return ``cra_sym.modal_parameters(self.at(values), modes)``."""
-        return cast("ModalParameters", _analysis("modes").modal_parameters(self.at(values), modes))
+        return cast("ModalParameters", _analysis("modal_parameters").modal_parameters(self.at(values), modes))
 
     def eigenvalues(self, values: Mapping[Any, Any], modes: int = 3, *, oscillating: bool = True) -> Complex:
         """Return :func:`cra_sym.analysis.eigenvalues.eigenvalues` of the model at the values."""

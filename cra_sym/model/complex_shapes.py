@@ -13,7 +13,7 @@ from cra_sym.model.routes import StateModes, mode_sign, overview_places
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.solvers.shapes import mode_states
 
-__all__ = ["ComplexShapes", "TooFineError"]
+__all__ = ["CoarseIntegrationError", "ComplexShapes"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -22,7 +22,7 @@ _GOOD, _POOR = 1e-9, 1e-6
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 
 
-class TooFineError(ValueError):
+class CoarseIntegrationError(ValueError):
     """Coefficients vary too finely along x for the integration."""
 
 
@@ -103,7 +103,7 @@ class ComplexShapes:
             if least < _GOOD:
                 return best
         if _POOR < least < np.inf:
-            raise TooFineError(
+            raise CoarseIntegrationError(
                 f"damped: the coefficients vary too finely along x for complex shapes: {2 ** (_STEPS[-1] + 1)} steps "
                 f"give the eigenvalues to {least:.1g} only"
             )

@@ -8,7 +8,7 @@ from sympy import Derivative, Expr
 
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics.jets import HamiltonError, Jet, JetSpace
-from cra_sym.mechanics.polynomials import Load, Monomial, monomials
+from cra_sym.mechanics.polynomials import LoadCoefficients, Monomial, monomials
 from cra_sym.mechanics.weak import WeakForm, weak_form
 from cra_sym.model.breaks import Breaks, breaks
 from cra_sym.model.lagrangian import Model
@@ -111,7 +111,7 @@ class _Reader:
         variation, symbols, x = self._result.variation, self._model.symbols, self._space.x
         inside: list[tuple[Product, Expr]] = []
         discrete: list[tuple[Product, Expr]] = []
-        density = Load(self._result).without_constraints(variation.density)
+        density = LoadCoefficients(self._result).without_constraints(variation.density)
         inside += self._energy(density, "density", None)
         discrete += self._energy(variation.ends, "end terms", None)
         for number, point in enumerate(variation.points):

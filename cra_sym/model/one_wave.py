@@ -18,7 +18,7 @@ from cra_sym.model.close_pairs import resolve_close_pairs
 from cra_sym.model.one_wave_family import DimensionlessModes, family
 from cra_sym.model.soft_springs import felt, free_motions, put_soft
 from cra_sym.solvers.one_wave import Layout, parameters
-from cra_sym.solvers.one_wave_shapes import Table, fill
+from cra_sym.solvers.one_wave_shapes import ShapeTable, fill
 
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
@@ -194,7 +194,7 @@ class OneWaveModes:
         return np.asarray((self.lam == 0) & (self.omega > 0))
 
     @property
-    def _table(self) -> Table:
+    def _table(self) -> ShapeTable:
         return self.dimensionless.family.layout
 
     @cached_property

@@ -15,7 +15,7 @@ from cra_sym.kernels import Kernel, compiled, derived_kernel, template
 from cra_sym.kernels.parts import flattened, in_parts, wants_compiler
 from cra_sym.model.one_wave_templates import MODAL, SPECTRUM, modal_marks, spectrum_marks
 from cra_sym.solvers.one_wave import OneWaveCharacteristic, Structure, parameters, wave_number
-from cra_sym.solvers.one_wave_shapes import Table, fill, integral, rate_rows, shape
+from cra_sym.solvers.one_wave_shapes import ShapeTable, fill, integral, rate_rows, shape
 from cra_sym.solvers.spectrum import spectrum
 
 __all__ = ["DimensionlessModes", "Family", "family"]
@@ -50,7 +50,7 @@ class Family:
     """
 
     def __init__(self, structure: Structure) -> None:
-        self.structure, self.layout = structure, Table(structure)
+        self.structure, self.layout = structure, ShapeTable(structure)
         self.functions: dict[str, Kernel] = {
             name: derived_kernel(f"cra_sym.mechanics.{module}:{name}", given)
             for table, given in ((_OF_STRUCTURE, structure), (_OF_ORDER, self.layout.n))
@@ -172,7 +172,7 @@ class DimensionlessModes:
     def quantities(self, rows: slice, units: Sequence[float | Array] | None = None) -> Array:
         """Return some rows of the family's table, each times its unit: a number, or an array of the batch's shape.
 
-        See `cra_sym.solvers.one_wave_shapes.Table` for the rows.
+        See `cra_sym.solvers.one_wave_shapes.ShapeTable` for the rows.
         """
         shape = rows.stop - rows.start, *self.lam.shape
         size = self.family.layout.size

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from cra_sym.kernels import Kernel
 from cra_sym.solvers import one_wave, one_wave_shapes
 from cra_sym.solvers.one_wave import Layout
-from cra_sym.solvers.one_wave_shapes import Table
+from cra_sym.solvers.one_wave_shapes import ShapeTable
 
 __all__ = ["MODAL", "SPECTRUM", "modal_marks", "spectrum_marks"]
 
@@ -106,7 +106,7 @@ def spectrum_marks(layout: Layout, functions: Mapping[str, Kernel]) -> dict[str,
     }
 
 
-def modal_marks(layout: Table, functions: Mapping[str, Kernel]) -> dict[str, object]:
+def modal_marks(layout: ShapeTable, functions: Mapping[str, Kernel]) -> dict[str, object]:
     """Return the replacements of the placeholders in `cra_sym.solvers.modal_lanes`."""
     n = layout.n
     left, waves = ["alpha", "beta"][:n], ["A", "B", "C", "D"][: 2 * n]

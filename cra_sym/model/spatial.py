@@ -15,7 +15,7 @@ from cra_sym.model.derivative_rows import DerivativeRows
 from cra_sym.model.spans import Spans
 from cra_sym.model.values import infinite_patterns
 from cra_sym.solvers.stiffness import GOLDEN, DynamicStiffness, Evaluation
-from cra_sym.solvers.stress_mesh import Variation
+from cra_sym.solvers.stress_mesh import VariationBounds
 
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
@@ -176,10 +176,10 @@ class SpatialProblem:
     points: PointTerms | None = None
     exponents: tuple[Kernel | None, int] = (None, 0)
 
-    def variation(self, columns: Array) -> Variation | None:
+    def variation(self, columns: Array) -> VariationBounds | None:
         """Return bounds of the variation along x for some parameter sets, None if the coefficients are polynomials."""
         found, decaying = self.exponents
-        return None if found is None else Variation(found.function, columns, decaying)
+        return None if found is None else VariationBounds(found.function, columns, decaying)
 
     @property
     def supported(self) -> bool:

@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 
 from .certificates import UndecidedError, decided, negatives
 
-__all__ = ["BallStiffness", "Term"]
+__all__ = ["BallStiffness", "EnergyTerm"]
 
 _MOST_LEVELS = 40
 
 
-class Term(NamedTuple):
+class EnergyTerm(NamedTuple):
     """A term ``value p q`` of the energy density, p and q derivatives of fields.
 
     Attributes
@@ -64,7 +64,7 @@ class BallStiffness:
     displacements: int
     coordinates: int
     free: Callable[[], Sequence[Sequence[Any]]]
-    terms: Callable[[], Sequence[Term]]
+    terms: Callable[[], Sequence[EnergyTerm]]
     zeros: int
 
     def count(self, point: Any) -> int:

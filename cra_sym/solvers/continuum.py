@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from .stress_mesh import Variation
+from .stress_mesh import VariationBounds
 
 __all__ = ["Continuum", "Entries", "PointTerm", "compliance"]
 
@@ -67,7 +67,7 @@ class Continuum:
         The end from which displacements are integrated, 0 or 1: not one at which a stiffness vanishes.
     points : tuple of PointTerm
         Springs and masses at breakpoints.
-    variation : Variation, optional
+    variation : VariationBounds, optional
         Bounds of the variation of the coefficients; None for polynomials.
     """
 
@@ -80,7 +80,7 @@ class Continuum:
     end_mass: Array
     origin: int = 0
     points: tuple[PointTerm, ...] = ()
-    variation: Variation | None = None
+    variation: VariationBounds | None = None
 
     @property
     def displacements(self) -> int:

@@ -81,13 +81,13 @@ def _profiles(motion: BaseMotion, *, mean: bool) -> list[Piecewise]:
     return [p for p in profiles if mean is (p.knots.shape == (1,) and not (p.knots.any() or p.jerk.any()))]
 
 
-def _pieces(motion: BaseMotion) -> list[solver.Piecewise]:
-    return [solver.Piecewise(p.knots, p.acceleration, p.jerk) for p in _profiles(motion, mean=False)]
+def _pieces(motion: BaseMotion) -> list[solver.PiecewiseInput]:
+    return [solver.PiecewiseInput(p.knots, p.acceleration, p.jerk) for p in _profiles(motion, mean=False)]
 
 
 def _steady(osc: solver.Oscillators, motion: BaseMotion, start: Start) -> solver.Steady | None:
     """Collect initial velocity, constant acceleration and harmonics, or return None if there are none."""
-    harmonics = [solver.Harmonics(*map(_column, term)) for term in motion.terms if isinstance(term, Harmonic)]
+    harmonics = [solver.HarmonicInput(*map(_column, term)) for term in motion.terms if isinstance(term, Harmonic)]
     level = sum((profile.acceleration for profile in _profiles(motion, mean=True)), np.zeros(1))
     impulse = -osc.gamma * _column(motion.velocity(0.0)) * (start == "inertial")
     return solver.Steady(impulse, level, harmonics) if harmonics or level.any() or impulse.any() else None

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 __all__ = [
-    "Harmonics",
+    "HarmonicInput",
     "Oscillators",
-    "Piecewise",
+    "PiecewiseInput",
     "Steady",
     "free_motion",
     "free_peak",
@@ -42,7 +42,7 @@ class Oscillators(NamedTuple):
     forced: Callable[..., Array]
 
 
-class Harmonics(NamedTuple):
+class HarmonicInput(NamedTuple):
     """Disturbance B sin(varpi t + psi) of the base; arrays (..., 1) with an axis for the modes."""
 
     B: Array
@@ -59,11 +59,11 @@ class Steady(NamedTuple):
 
     velocity: Array
     acceleration: Array
-    harmonics: Sequence[Harmonics] = ()
+    harmonics: Sequence[HarmonicInput] = ()
     displacement: Array = np.zeros(1)
 
 
-class Piecewise(NamedTuple):
+class PiecewiseInput(NamedTuple):
     """Base acceleration + jerk (t - knot) from each knot on; ``knots`` (K) or (..., K), the others (..., K)."""
 
     knots: Array
@@ -83,7 +83,7 @@ class _Shift(NamedTuple):
     slope: list[Array]  # its time derivative
 
 
-def _shift(osc: Oscillators, tau: Array | float, harmonics: Sequence[Harmonics] = ()) -> _Shift:
+def _shift(osc: Oscillators, tau: Array | float, harmonics: Sequence[HarmonicInput] = ()) -> _Shift:
     free = osc.free(tau, osc.omega, osc.zeta)
     p, h = free["displacement"], free["impulse"]
     harmonic = [osc.forced(tau, osc.omega, osc.zeta, f.varpi) for f in harmonics]
@@ -134,7 +134,7 @@ def steady_response(osc: Oscillators, cause: Steady, t: Array, derivative: int =
         return _grid_response(osc, cause, float(t[0]), step, t.size, derivative)
     wide = _widened(osc, -1)
     acceleration = cause.acceleration[..., None]
-    harmonics = [Harmonics(*_with_axis(f, -1)) for f in cause.harmonics]
+    harmonics = [HarmonicInput(*_with_axis(f, -1)) for f in cause.harmonics]
     start = (cause.displacement[..., None], cause.velocity[..., None])
 
     def part(times: Array) -> Array:
@@ -146,7 +146,7 @@ def steady_response(osc: Oscillators, cause: Steady, t: Array, derivative: int =
     return _in_parts(part, t, int(width))
 
 
-def piecewise_response(osc: Oscillators, cause: Piecewise, t: Array, derivative: int = 0) -> Array:
+def piecewise_response(osc: Oscillators, cause: PiecewiseInput, t: Array, derivative: int = 0) -> Array:
     """Return the outputs from rest at the times ``t`` (1-D), shape (..., R, T): exact for a piecewise-linear
     acceleration."""
     q_k, u_k = knot_states(osc, cause)
@@ -172,7 +172,7 @@ def piecewise_response(osc: Oscillators, cause: Piecewise, t: Array, derivative:
     return _in_parts(part, t, q_k[..., 0].size)
 
 
-def knot_states(osc: Oscillators, cause: Piecewise) -> tuple[Array, Array]:
+def knot_states(osc: Oscillators, cause: PiecewiseInput) -> tuple[Array, Array]:
     """Return q and q' at every knot, from rest at the first, shape (..., N, K)."""
     span = np.diff(cause.knots)
     if span.ndim == 1 and span.size and np.ptp(span) <= 1e-12 * np.max(np.abs(cause.knots)):
@@ -193,7 +193,9 @@ def knot_states(osc: Oscillators, cause: Piecewise) -> tuple[Array, Array]:
     return states[0], states[1]
 
 
-def _uniform_states(osc: Oscillators, cause: Piecewise, step: float, shape: tuple[int, ...]) -> tuple[Array, Array]:
+def _uniform_states(
+    osc: Oscillators, cause: PiecewiseInput, step: float, shape: tuple[int, ...]
+) -> tuple[Array, Array]:
     """Return q and q' at every knot of a uniform record, from rest at the first.
 
     The record is divided into blocks, as many as their length. All blocks are propagated at once from rest, then the
@@ -330,7 +332,7 @@ def _row_table(osc: Oscillators, cause: Steady, step: float, length: int, deriva
     state into it.
     """
     osc = _widened(osc, -2)
-    harmonics = [Harmonics(*_with_axis(f, -2)) for f in cause.harmonics]
+    harmonics = [HarmonicInput(*_with_axis(f, -2)) for f in cause.harmonics]
     shift = _shift(osc, step, harmonics)
     turns = [np.exp(1j * f.varpi[..., 0] * step) for f in harmonics]
     back = osc.omega**2 * shift.h

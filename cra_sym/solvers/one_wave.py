@@ -27,7 +27,7 @@ NEAR = {1: 2.0, 2: 5.0}
 _ORDER = {1: (1, 0), 2: (1, 2, 0, 3)}
 
 
-class Function(Protocol):
+class WaveFunction(Protocol):
     """A compiled function of `cra_sym.kernels`."""
 
     @property
@@ -35,7 +35,7 @@ class Function(Protocol):
         """The function of numbers or arrays."""
 
 
-Functions = Mapping[str, Function]
+Functions = Mapping[str, WaveFunction]
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from cra_sym.cached import cached_property
 from cra_sym.solvers.one_wave import Functions, Layout, power, stacked
 
-__all__ = ["NEAR", "Table", "fill", "integral", "near_shape", "rate_rows", "shape"]
+__all__ = ["NEAR", "ShapeTable", "fill", "integral", "near_shape", "rate_rows", "shape"]
 
 Array = NDArray[np.float64]
 NEAR = {1: 2.0, 2: 25.0}
@@ -19,7 +19,7 @@ derivation."""
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(16)  # exact to rounding up to `NEAR`
 
 
-class Table(Layout):
+class ShapeTable(Layout):
     """Rows of a table of modes, and of the rates that follow from them.
 
     They are P and q of the right end, the momentum, q and P of the left end, the amplitudes of cos, sin and for a beam
@@ -94,7 +94,7 @@ def fill(
     table: Array,
     lam: Array,
     modes: int,
-    layout: Table,
+    layout: ShapeTable,
     functions: Functions,
     parameters: Array,
     inertias: Sequence[Array],
@@ -109,7 +109,7 @@ def fill(
         complex-step derivative, since all formulas are analytic.
     modes : int
         Of each lane.
-    layout : Table
+    layout : ShapeTable
     functions : mapping of str to Function
         Those of `cra_sym.mechanics.one_wave_shapes` and ``one_wave_rows``.
     parameters : ndarray, shape (parameters, size)
@@ -151,7 +151,7 @@ def fill(
     table += 0.0  # -0.0 becomes 0.0
 
 
-def _near(layout: Table, functions: Functions, parameters: Array, z: Array) -> tuple[Array, Array, Array]:
+def _near(layout: ShapeTable, functions: Functions, parameters: Array, z: Array) -> tuple[Array, Array, Array]:
     """Return the amplitudes of the left end, the raw state of the right end and the invariant."""
     krylov = functions["polynomials"].function(np.ones_like(z), z)
     if layout.n == 1:
@@ -177,7 +177,7 @@ def _amplitudes_near(rows: Array) -> Array:
 
 
 def _far(
-    layout: Table, functions: Functions, parameters: Array, lam: Array, z: Array
+    layout: ShapeTable, functions: Functions, parameters: Array, lam: Array, z: Array
 ) -> tuple[Array, Array, Array, Array]:
     """Return the amplitudes of the left end, the raw state of the right end, the wave amplitudes and the invariant."""
     n = layout.n
@@ -200,7 +200,7 @@ def _rigid(functions: Functions, parameters: Array, inertias: list[Array], first
     return result
 
 
-def rate_rows(table: Array, lam: Array, layout: Table, functions: Functions, inertias: Sequence[Array]) -> Array:
+def rate_rows(table: Array, lam: Array, layout: ShapeTable, functions: Functions, inertias: Sequence[Array]) -> Array:
     """Return the rows of rates from those of a table, shape (rates, size)."""
     root = lam if layout.n == 1 else lam * lam
     inner = layout.waves

@@ -17,7 +17,7 @@ from cra_sym.cached import cached_property
 from cra_sym.solvers.harmonic_balance import Balance, peak
 from cra_sym.solvers.slip_balance import SlipBalance, stuck
 
-__all__ = ["Held", "HeldMotions"]
+__all__ = ["Held", "MotionsAtAmplitude"]
 
 Array = NDArray[np.float64]
 _TOLERANCE = 1e-11
@@ -77,7 +77,7 @@ class _State(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class HeldMotions:
+class MotionsAtAmplitude:
     """The equations of one mode's motions.
 
     Attributes

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Grid", "Mesh", "Rule", "Sampler", "TooFineError", "Variation", "cells", "places", "resolved", "rule"]
+__all__ = ["Grid", "Mesh", "Rule", "Sampler", "TooFineError", "VariationBounds", "cells", "places", "resolved", "rule"]
 
 Array = NDArray[np.float64]
 Sampler = Callable[[Array], Array]
@@ -22,7 +22,7 @@ Sampler = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
-class Variation:
+class VariationBounds:
     """Bounds of the variation of coefficients between their samples.
 
     Attributes
@@ -38,7 +38,7 @@ class Variation:
     columns: Array
     decaying: int
 
-    def take(self, rows: NDArray[np.intp]) -> Variation:
+    def take(self, rows: NDArray[np.intp]) -> VariationBounds:
         """Return the bounds of some of the parameter sets."""
         return replace(self, columns=self.columns[:, rows])
 
@@ -224,7 +224,7 @@ def places(reference: Array, edges: Array) -> Array:
 
 
 def resolved(
-    sample: Sampler, edges: Array, pieces: Array, what: str, variation: Variation | None = None
+    sample: Sampler, edges: Array, pieces: Array, what: str, variation: VariationBounds | None = None
 ) -> tuple[Array, Array, int]:
     """Return pieces that resolve every coefficient, the relative unresolved part (sets,), and the highest degree.
 
@@ -236,7 +236,7 @@ def resolved(
         Initial pieces, in the reference coordinate.
     what : str
         What the coefficients are, for errors.
-    variation : Variation, optional
+    variation : VariationBounds, optional
         By default coefficients have no detail that the initial pieces do not resolve.
 
     Raises

@@ -14,13 +14,13 @@ from typing import Any
 from cra_sym.extras import MissingExtraError, require
 from cra_sym.files import OutputError, draft, path_of, writing
 
-__all__ = ["Bucket", "Folder", "Place", "place_of"]
+__all__ = ["AxisPlace", "Bucket", "Folder", "place_of"]
 
 _OBJECTS = ("memory", "s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "adl", "oss")
 """Protocols of stores with atomic writes of objects."""
 
 
-class Place(ABC):
+class AxisPlace(ABC):
     """Location of a store with atomic writes of metadata and chunks."""
 
     is_shared = True  # between processes
@@ -52,7 +52,7 @@ class Place(ABC):
 
 
 @dataclass(frozen=True)
-class Folder(Place):
+class Folder(AxisPlace):
     """A directory of this machine."""
 
     path: Path
@@ -88,7 +88,7 @@ class Folder(Place):
 
 
 @dataclass(frozen=True)
-class Bucket(Place):
+class Bucket(AxisPlace):
     """A URL in an object store, through fsspec."""
 
     url: str
@@ -137,7 +137,7 @@ class Bucket(Place):
         return found
 
 
-def place_of(store: str | Path) -> Place:
+def place_of(store: str | Path) -> AxisPlace:
     """Return the place of a store, or raise an error that says what it must be.
 
     Raises

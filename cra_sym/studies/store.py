@@ -13,7 +13,7 @@ from tqdm import tqdm
 from cra_sym.checks import shown
 from cra_sym.extras import require
 from cra_sym.files import OutputError
-from cra_sym.studies.places import Place, place_of
+from cra_sym.studies.places import AxisPlace, place_of
 from cra_sym.studies.study import Study
 
 __all__ = ["sweep_into"]
@@ -67,7 +67,7 @@ def sweep_into(study: Study, store: str | Path, chunks: int, client: Any = None)
     return found
 
 
-def _make(study: Study, place: Place, chunks: int) -> None:
+def _make(study: Study, place: AxisPlace, chunks: int) -> None:
     """Write coordinates, attributes and the empty variable; the store is there with its consolidated metadata."""
     xarray, zarr = require("xarray", "scale"), require("zarr", "scale")
     attributes = study.attributes() | {_DESCRIBED: study.described()}
@@ -94,7 +94,7 @@ def _chunk_shape(study: Study, chunks: int) -> tuple[int, ...]:
     return (*(min(chunks, length) for length in study.shape), *(max(1, length) for length in study.added.values()))
 
 
-def _opened(study: Study, place: Place) -> Any:
+def _opened(study: Study, place: AxisPlace) -> Any:
     """Return the variable of a store that holds this sweep."""
     zarr = require("zarr", "scale")
     try:
@@ -133,7 +133,7 @@ def _differences(there: dict[str, str], here: dict[str, str]) -> list[str]:
     return found
 
 
-def _array(place: Place, name: str, mode: str) -> Any:
+def _array(place: AxisPlace, name: str, mode: str) -> Any:
     array = require("zarr", "scale").open_array(place.opened(), path=name, mode=mode, zarr_format=2)
     return array.with_config({"write_empty_chunks": True, "order": "C"})
 
@@ -147,7 +147,7 @@ def _regions(shape: tuple[int, ...], chunks: tuple[int, ...]) -> Iterator[Region
         )
 
 
-def _missing(study: Study, place: Place, stored: Any) -> list[Region]:
+def _missing(study: Study, place: AxisPlace, stored: Any) -> list[Region]:
     """Return the regions whose chunk is not there."""
     found = place.keys(study.quantity.name)
     missing = []
@@ -159,7 +159,7 @@ def _missing(study: Study, place: Place, stored: Any) -> list[Region]:
     return missing
 
 
-def _written(study: Study, place: Place, regions: list[Region], client: Any) -> Iterator[None]:
+def _written(study: Study, place: AxisPlace, regions: list[Region], client: Any) -> Iterator[None]:
     if client is None:
         target = _array(place, study.quantity.name, "r+") if regions else None
         for region in regions:
@@ -175,6 +175,6 @@ def _written(study: Study, place: Place, regions: list[Region], client: Any) -> 
 
 def _write(study: Study, target: Any, region: Region) -> None:
     """Compute one region and write it into an array, or into that of the store at a place."""
-    array = _array(target, study.quantity.name, "r+") if isinstance(target, Place) else target
+    array = _array(target, study.quantity.name, "r+") if isinstance(target, AxisPlace) else target
     values = study.block(*(np.arange(part.start, part.stop) for part in region))
     array[(*region, ...)] = values

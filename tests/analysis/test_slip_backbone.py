@@ -8,7 +8,7 @@ import sympy as sp
 
 import cra_sym as cra
 from cra_sym.analysis.slip_states import elements_of
-from cra_sym.solvers.slip_modes import HeldMotions
+from cra_sym.solvers.slip_modes import MotionsAtAmplitude
 from cra_sym.symbols import L, t, v, x
 from tests.nonlinear_models import oscillator, q
 from tests.slip_reference import Structure, integrated
@@ -119,7 +119,7 @@ def test_both_ways_of_a_step_are_one(monkeypatch):
     system = two_masses(0.002)[0]
     options = {"amplitude": [0.3, 0.8], "modes": 2, "harmonics": 7}
     eliminated = cra.backbone(system, 1, **options)
-    monkeypatch.setattr(HeldMotions, "_linear", False)
+    monkeypatch.setattr(MotionsAtAmplitude, "_linear", False)
     whole = cra.backbone(system, 1, **options)
     for name in ("angular_frequency", "damping_ratio", "loss", "coefficients"):
         np.testing.assert_allclose(getattr(whole, name), getattr(eliminated, name), rtol=1e-8, atol=1e-10)

@@ -75,7 +75,7 @@ def test_the_preload_as_a_parameter_is_the_joint_at_that_preload():
         ("rest", -1.0, r"must be real numbers in \[0, inf\)"),
         ("roughness", 0.0, r"must be real numbers in \(0, inf\)"),
         ("friction", np.inf, r"must be real numbers in \(0, inf\)"),
-        ("exponent", 1.5, r"must be a real number in \(0, 1\]"),
+        ("exponent", 1.01, r"must be a real number in \(0, 1\]"),
         ("poisson", 0.6, r"must be real numbers in \[0, 0.5\]"),
         ("faces", 0, "must be an integer of at least 1"),
         ("lever", [1.0, 2.0], "must be one number"),

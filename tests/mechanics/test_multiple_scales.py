@@ -25,7 +25,7 @@ from sympy import (
 )
 
 from cra_sym.mechanics.multiple_scales import multiple_scales
-from cra_sym.mechanics.parametric import Resonance
+from cra_sym.mechanics.parametric import ParametricResonance
 from cra_sym.mechanics.two_scales import EPSILON
 
 OMEGA, P, ZETA, SLOPE = (IndexedBase(name) for name in ("omega", "P", "zeta", "dP"))
@@ -163,11 +163,11 @@ def test_steps_follow_the_textbook():
 def test_free_vibration_solves_its_problem_and_the_rates_leave_no_secular_term():
     """Put the solution of order 1 back: the driven part is bounded and solves the equation."""
     from cra_sym.mechanics.parametric import ParametricSystem
-    from cra_sym.mechanics.two_scales import Expansion, amplitude, conjugate_amplitude
+    from cra_sym.mechanics.two_scales import TwoScaleExpansion, amplitude, conjugate_amplitude
 
-    about = Resonance.of((1, 2))
+    about = ParametricResonance.of((1, 2))
     system = ParametricSystem.of(about, symbols("w_1:4", positive=True), Matrix(3, 3, symbols("p:3:3")))
-    expansion = Expansion(system, about, 2)
+    expansion = TwoScaleExpansion(system, about, 2)
     frozen = {f(3): 0 for f in (amplitude, conjugate_amplitude)}
     for i in system.rows:
         field = expansion.fields[1][i]

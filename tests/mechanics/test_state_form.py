@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
-from sympy import Function, Matrix, eye, simplify, symbols, zeros
+from sympy import Function, Matrix, Piecewise, eye, simplify, symbols, zeros
 
 from cra_sym.mechanics import HamiltonError, hamilton, state_form
 
@@ -161,6 +161,8 @@ def test_natural_forces_are_the_boundary_conditions():
         (BEAM - T * v.diff(x) ** 4 / 4, r"term -T\*Derivative\(v\(x, t\), x\)\*\*4/4.*nonlinear"),
         (BEAM - T * t * v.diff(x) ** 2, "depends on t"),
         (m * v.diff(t) ** 2 / 2 - B * v * v.diff(x), "singular, so the problem has no state form$"),
+        (BEAM.subs(B, Piecewise((0, x < L / 2), (B, True))), r"the stiffness .* is 0 where x < L/2; every part"),
+        (BEAM.subs(B, Piecewise((B, x < L / 2), (0, True))), r"the stiffness .* is 0 where .*L/2.*; every part"),
         (m * v.diff(t) ** 2 / 2 - B * v * v.diff(x, 4), r"by parts, to Derivative\(v\(x, t\), \(x, 2\)\)\*\*2"),
     ],
 )

@@ -18,7 +18,7 @@ from cra_sym.model.close_pairs import resolve_close_pairs
 from cra_sym.model.one_wave import OneWave, one_wave_route
 from cra_sym.model.one_wave_family import family
 from cra_sym.solvers.one_wave import Layout
-from cra_sym.solvers.one_wave_shapes import Table
+from cra_sym.solvers.one_wave_shapes import ShapeTable
 
 KINDS = ("", "h", "k", "m", "km")
 STRINGS = [((left,), (right,)) for left, right in itertools.product(KINDS, KINDS)]
@@ -169,7 +169,7 @@ def test_the_count_steps_by_one_at_every_zero(structure):
 def test_modes_are_orthonormal_and_meet_their_conditions(structure):
     groups = drawn(structure, 5, 8, (-3, 4, 0.0, np.inf), (-3, 3, 0.0))
     n, lam, line = len(structure[0]), solved(structure, groups, 5), family(structure)
-    modes, table = line.modes(*groups, lam=lam, compile=False), Table(structure)
+    modes, table = line.modes(*groups, lam=lam, compile=False), ShapeTable(structure)
     rows = modes.quantities(slice(0, table.size))
     shape, bent = modes.shape(NODES), modes.shape(NODES, n)
     ends, integral = [modes.shape(np.array([0.0, 1.0]), order) for order in range(2 * n)], modes.integral()
@@ -206,7 +206,7 @@ def test_rates_are_slopes(structure):
     """Central differences of ln z by the logarithm of each group; their own error is 1e-4 squared."""
     groups = drawn(structure, 6, 6, (-1, 2, 0.5), (-1, 1, 0.5))
     n, lam, line = len(structure[0]), solved(structure, groups, 3), family(structure)
-    table = Table(structure)
+    table = ShapeTable(structure)
     modes = line.modes(*groups, lam=lam, compile=False)
     springs, inertias = len(table.springs), len(table.inertias)
     own = [*modes.quantities(table.by_springs)[springs:], *modes.quantities(table.by_inertias)[inertias:]]

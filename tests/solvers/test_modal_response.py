@@ -5,9 +5,9 @@ import pytest
 from scipy.linalg import expm
 
 from cra_sym.solvers.modal_response import (
-    Harmonics,
+    HarmonicInput,
     Oscillators,
-    Piecewise,
+    PiecewiseInput,
     Steady,
     free_peak,
     knot_states,
@@ -35,7 +35,7 @@ def forced(t, omega, zeta, varpi):
 
 
 OSC = Oscillators(OMEGA, np.zeros(1), GAMMA, ROWS, free, forced)
-CAUSE = Steady(np.array([0.1, -0.3]), np.array([0.4]), [Harmonics(*np.array([[2e-2], [5.0], [0.3]]))])
+CAUSE = Steady(np.array([0.1, -0.3]), np.array([0.4]), [HarmonicInput(*np.array([[2e-2], [5.0], [0.3]]))])
 
 
 def exact(t, derivative):
@@ -88,7 +88,7 @@ def test_a_record_of_equal_steps_needs_one_shift():
     level, jerk = np.random.default_rng(1).normal(size=(2, 21))
     for knots, wanted in (np.linspace(0.0, 2.0, 21), 1), (np.geomspace(0.1, 2.0, 21), 20):
         asked.clear()
-        knot_states(OSC._replace(free=counted), Piecewise(knots, level, jerk))
+        knot_states(OSC._replace(free=counted), PiecewiseInput(knots, level, jerk))
         assert sum(asked) == wanted
 
 
@@ -114,16 +114,16 @@ def test_a_piece_is_a_sum_of_delayed_ramps():
         for values, a, j in ((after, level[k], jerk[k]), (beyond, -end, -jerk[k])):
             unit = free(values, OMEGA[:, None], 0.0)
             expected += ROWS @ (-GAMMA[:, None] * (a * unit["step"] + j * unit["ramp"]))
-    assert piecewise_response(OSC, Piecewise(knots, level, jerk), t) == pytest.approx(expected, abs=1e-13)
+    assert piecewise_response(OSC, PiecewiseInput(knots, level, jerk), t) == pytest.approx(expected, abs=1e-13)
 
 
 def test_uniform_and_listed_knots_agree():
     knots = np.linspace(0, 2, 21)
     level, jerk = np.random.default_rng(0).normal(size=(2, 21))
-    uniform = knot_states(OSC, Piecewise(knots, level, jerk))
-    listed = knot_states(OSC, Piecewise(knots[None], level, jerk))
+    uniform = knot_states(OSC, PiecewiseInput(knots, level, jerk))
+    listed = knot_states(OSC, PiecewiseInput(knots[None], level, jerk))
     assert np.allclose(uniform, [values[0] for values in listed], atol=1e-13)
-    records = knot_states(OSC, Piecewise(knots, np.outer([1.0, -2.0], level), np.outer([1.0, -2.0], jerk)))
+    records = knot_states(OSC, PiecewiseInput(knots, np.outer([1.0, -2.0], level), np.outer([1.0, -2.0], jerk)))
     for several, one in zip(records, uniform, strict=True):
         np.testing.assert_allclose(several, [one, -2.0 * one], atol=1e-13)
     t = np.array([-1.0, 0.0, 0.05, 2.0, 3.0])
@@ -136,22 +136,25 @@ def test_batches_are_loops(derivative):
     rng = np.random.default_rng(4)
     omega, rows = rng.uniform(2.0, 9.0, (3, 1, 2)), rng.normal(size=(3, 1, 2, 2))
     osc = OSC._replace(omega=omega, rows=rows, gamma=rng.normal(size=(3, 1, 2)))
-    harmonics = [Harmonics(*rng.uniform(1.0, 2.0, (3, 3, 4, 1))), Harmonics(*np.array([[0.1], [11.0], [0.5]]))]
+    harmonics = [
+        HarmonicInput(*rng.uniform(1.0, 2.0, (3, 3, 4, 1))),
+        HarmonicInput(*np.array([[0.1], [11.0], [0.5]])),
+    ]
     steady = Steady(rng.normal(size=(4, 2)), rng.normal(size=(4, 1)), harmonics, rng.normal(size=(4, 2)))
     knots, level, jerk = np.sort(rng.uniform(0.0, 2.0, (4, 5))), *rng.normal(size=(2, 4, 5))
     times = np.linspace(0.0, 3.0, 70), np.array([0.3, 2.5, 0.0])
     found = [steady_response(osc, steady, t, derivative) for t in times]
-    found += [piecewise_response(osc, Piecewise(knots, level, jerk), t, derivative) for t in times]
+    found += [piecewise_response(osc, PiecewiseInput(knots, level, jerk), t, derivative) for t in times]
     for i, j in np.ndindex(3, 4):
         one = osc._replace(omega=omega[i, 0], rows=rows[i, 0], gamma=osc.gamma[i, 0])
         cause = Steady(
             steady.velocity[j],
             steady.acceleration[j],
-            [Harmonics(*(value[i, j] for value in harmonics[0])), harmonics[1]],
+            [HarmonicInput(*(value[i, j] for value in harmonics[0])), harmonics[1]],
             steady.displacement[j],
         )
         single = [steady_response(one, cause, t, derivative) for t in times]
-        single += [piecewise_response(one, Piecewise(knots[j], level[j], jerk[j]), t, derivative) for t in times]
+        single += [piecewise_response(one, PiecewiseInput(knots[j], level[j], jerk[j]), t, derivative) for t in times]
         for whole, part in zip(found, single, strict=True):
             np.testing.assert_allclose(whole[i, j], part, atol=1e-11)
 

@@ -197,7 +197,7 @@ def test_a_force_is_what_its_fields_say():
     assert force(t)[0] == pytest.approx(1.0 + 1.5 * np.sin(3.0 * t + 0.4))
     assert force(t)[1] == pytest.approx(-2.0 + 1.5 * np.sin(0.4))  # one that does not swing is constant
     assert Force(amplitude=1.5, angular_frequency=3.0)(t) == pytest.approx(1.5 * np.sin(3.0 * t))
-    assert not Force()(t).any()
+    assert not Force()(t).any() and (Force(1.0, 2.0, phase=np.pi / 2)(t) == 3.0).all()
     record = Force.sampled([0.5, 1.0, 1.5], [2.0, -1.0, 3.0])
     assert record([0.2, 0.5, 0.75, 1.25, 1.5]) == pytest.approx([0.0, 2.0, 0.5, 1.0, 0.0])
     assert (force + record)(t) == pytest.approx(force(t) + record(t))

@@ -88,6 +88,10 @@ def test_a_sampling_rate_stands_for_times(rate):
     assert Force.sampled(None, SAMPLES, sampling_rate=rate) == Force.sampled(EXACT, SAMPLES)
 
 
+def test_two_samples_are_a_record():
+    assert BaseMotion.sampled(None, [1.0, 2.0], sampling_rate=4.0).kinematics(0.125)[2] == 1.5
+
+
 def broken(change):
     times = EXACT.copy()
     change(times)

@@ -13,13 +13,13 @@ from sympy import Function, Piecewise, symbols
 import cra_sym as cra
 from cra_sym.symbols import L, t, v, x
 
-__all__ = ["ACCURACY", "Row", "accuracy_table"]
+__all__ = ["ACCURACY", "AccuracyRow", "accuracy_table"]
 
 _ARM = {"k_t": 1e4, "k_r": 1e3, "m_e": 0.05, "J_e": 1e-4}
 
 
 @dataclass(frozen=True)
-class Row:
+class AccuracyRow:
     """A quantity, its stated relative error, how that is measured, and the test with more cases."""
 
     quantity: str
@@ -160,59 +160,59 @@ def _identified() -> float:
 
 
 ACCURACY = (
-    Row(
+    AccuracyRow(
         "natural frequencies, coefficients constant along x", 1e-14,
         "against proved enclosures of eight modes of two arms", _proved, "tests/analysis/test_certification.py",
     ),
-    Row(
+    AccuracyRow(
         "natural frequencies, coefficients vary along x", 1e-10,
         "a string of two densities, in closed form; `system.accuracy` estimates it, `tolerance` sets it",
         _stepped_string, "tests/model/test_along_x.py",
     ),
-    Row(
+    AccuracyRow(
         "complex eigenvalues", 1e-10,
         "a beam with damping along it, of which the characteristic equation is quadratic", _damped_beam,
         "tests/model/test_eigenvalues.py",
     ),
-    Row(
+    AccuracyRow(
         "sensitivities", 1e-11,
         "scaled stiffnesses scale the squares of the frequencies: the logarithmic rates sum to one half",
         _scaled_stiffnesses, "tests/analysis/test_sensitivities.py",
     ),
-    Row(
+    AccuracyRow(
         "responses to motions in formulas, of the modes kept", 1e-8,
         "against integration of the modal equations with the relative tolerance 1e-12", _harmonic_motion,
         "tests/solvers/test_modal_response.py",
     ),
-    Row(
+    AccuracyRow(
         "responses to records", 1e-10, "a motion in a formula against its own samples", _sampled_motion,
         "tests/solvers/test_records.py",
     ),
-    Row(
+    AccuracyRow(
         "frequency response", 1e-11, "against the static deflection of the arm and its joint", _static_deflection,
         "tests/analysis/test_frequency_response.py",
     ),
-    Row(
+    AccuracyRow(
         "growth rates, Floquet exponents", 1e-7, "Mathieu's equation against plain integration over a period", _growth,
         "tests/solvers/test_floquet.py",
     ),
-    Row(
+    AccuracyRow(
         "boundaries by multiple scales, order 1, depth 0.1", 3e-3, "against Mathieu's characteristic values",
         lambda: _tongue(1), "tests/analysis/test_stability.py",
     ),
-    Row(
+    AccuracyRow(
         "boundaries by multiple scales, order 2, depth 0.1", 3e-4, "against Mathieu's characteristic values",
         lambda: _tongue(2), "tests/analysis/test_stability.py",
     ),
-    Row(
+    AccuracyRow(
         "backbones", 1e-8, "Duffing's oscillator against its elliptic integral; each answer has its own estimates",
         _duffing, "tests/analysis/test_backbone.py",
     ),
-    Row(
+    AccuracyRow(
         "input shapers: what is left of the mode", 1e-10, "a shaped move over a plain one", _shaped,
         "tests/analysis/test_shaping.py",
     ),
-    Row(
+    AccuracyRow(
         "identified stiffnesses, exact frequencies given", 1e-7, "the stiffnesses the frequencies were made with",
         _identified, "tests/analysis/test_identification.py",
     ),

@@ -20,7 +20,7 @@ from cra_sym.report.site.accuracy import accuracy_table
 from cra_sym.report.site.chapters import Chapter, write_chapters
 from cra_sym.report.site.extension import LINKS
 from cra_sym.report.site.graph import equation_graph
-from cra_sym.report.site.ledger import Entry, entries, numbers
+from cra_sym.report.site.ledger import LedgerEntry, entries, numbers
 from cra_sym.report.site.orders import orders
 from cra_sym.report.site.reference import write_reference
 
@@ -120,7 +120,7 @@ def _environment() -> Environment:
 
 
 def _known(
-    chapters: Sequence[Chapter], ledger: Sequence[Entry], verdicts: Sequence[Verdict], pictures: Sequence[Path]
+    chapters: Sequence[Chapter], ledger: Sequence[LedgerEntry], verdicts: Sequence[Verdict], pictures: Sequence[Path]
 ) -> dict[str, Any]:
     """Return the names available in the templates of the pages."""
     from cra_sym.arm.parameters import Arm

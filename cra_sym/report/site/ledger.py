@@ -11,11 +11,11 @@ from cra_sym.mechanics.steps import display_latex
 from cra_sym.paper.equations import Equation, equations
 from cra_sym.report.site.chapters import Chapter
 
-__all__ = ["Entry", "entries", "numbers"]
+__all__ = ["LedgerEntry", "entries", "numbers"]
 
 
 @dataclass(frozen=True)
-class Entry:
+class LedgerEntry:
     """An equation, derived and checked, with its texts on the site."""
 
     equation: Equation
@@ -25,11 +25,11 @@ class Entry:
     confirmed: bool
 
 
-def entries(chapters: Sequence[Chapter]) -> list[Entry]:
+def entries(chapters: Sequence[Chapter]) -> list[LedgerEntry]:
     """Derive, check and typeset every equation; the chapter is the first that shows it."""
     found = equations(companions=True)
     return [
-        Entry(
+        LedgerEntry(
             equation=e,
             formula=display_latex(e.shown, tag=e.number),
             used_in=tuple(other.number for other in found if e.number in other.derived_from),
