@@ -37,8 +37,9 @@ class Breaks:
         Of (x, parameters): derivatives by x of these, and of the exponents in them.
     levels : tuple of bool
         Of the affine ones, then of the others: whether all integer values count.
-    rates : tuple of Kernel
-        Of (x, parameters), in the same order: derivatives by x and by every parameter.
+    rates : tuple of (Kernel, tuple of int) or None
+        Of (x, parameters), in the same order: derivatives by x and by the parameters of those indices, the ones that
+        the switch has; None if it has none.
     places : Kernel
         Of the parameters: interior places of terms.
     """
@@ -47,7 +48,7 @@ class Breaks:
     others: Kernel
     turns: Kernel
     levels: tuple[bool, ...]
-    rates: tuple[Kernel, ...]
+    rates: tuple[tuple[Kernel, tuple[int, ...]] | None, ...]
     places: Kernel
 
     def edges(self, columns: Array, left: Array, length: Array) -> list[tuple[Index, Array, tuple[int, ...]]]:
@@ -110,9 +111,12 @@ class Breaks:
             if not inside.any():
                 continue
             at = np.where(inside, root, left[:, None])
-            with np.errstate(all="ignore"):
-                found = self.rates[number].function(at, *columns[..., None])
-                rate = np.stack([np.broadcast_to(-part / found[0], at.shape) for part in found[1:]])
+            rate, rated = np.zeros((len(columns), *at.shape)), self.rates[number]
+            if rated is not None:
+                with np.errstate(all="ignore"):
+                    found = rated[0].function(at, *columns[..., None])
+                    for k, part in zip(rated[1], found[1:], strict=True):
+                        rate[k] = -part / found[0]
             places.append(at)
             rates.append(np.where(inside & np.isfinite(rate), rate, 0.0))
         place, rate = np.concatenate(places, axis=1), np.concatenate(rates, axis=2)
@@ -225,15 +229,21 @@ def breaks(expressions: Sequence[Expr], x: Symbol, symbols: Sequence[Symbol], pl
     inner = exponents(values, x)
     turning = dict.fromkeys((*values, *inner.decaying, *inner.others))
     arguments = (x, *symbols)
+
+    def rated(expression: Expr) -> tuple[Kernel, tuple[int, ...]] | None:
+        free = expression.free_symbols
+        own = tuple(k for k, symbol in enumerate(symbols) if symbol in free)
+        if not own:
+            return None
+        by = (x, *(symbols[k] for k in own))
+        return kernel(tuple(derivative(expression, symbol) for symbol in by), arguments, backend="numpy"), own
+
     every = [*(switch for switch, _ in affine), *others]
     return Breaks(
         kernel(pairs, arguments, backend="numpy"),
         kernel(values, arguments, backend="numpy"),
         kernel(tuple(derivative(part, x) for part in turning), arguments, backend="numpy"),
         tuple(switch.levels for switch in every),
-        tuple(
-            kernel(tuple(derivative(switch.expression, symbol) for symbol in arguments), arguments, backend="numpy")
-            for switch in every
-        ),
+        tuple(rated(switch.expression) for switch in every),
         kernel(tuple(places), tuple(symbols), backend="numpy"),
     )

@@ -291,6 +291,21 @@ def test_what_has_no_closed_form_is_told_the_way():
 # tables ---------------------------------------------------------------------------------------------------------------
 
 
+def test_a_table_of_symbols_costs_no_derivatives_of_its_fixed_places():
+    """Its values are those of the table of numbers; one whose place is a symbol is moved by that alone."""
+    values = [1.0 + 0.5 * np.sin(k) for k in range(9)]
+    symbols, places = sp.symbols("y0:9"), [sp.Rational(k, 9) for k in range(9)]
+    named, fixed, moved = (
+        beam(cra.stations(x, list(zip(at, of, strict=True)), kind="step"))
+        for at, of in ((places, symbols), (places, values), ([*places[:8], a], symbols))
+    )
+    found = named.at(dict(zip(symbols, values, strict=True)))
+    np.testing.assert_allclose(found.natural_frequencies(3), fixed.at({}).natural_frequencies(3), rtol=1e-13)
+    assert all(rate is None for rate in named.numerics("spatial").breaks.rates)
+    kept = [rate for rate in moved.numerics("spatial").breaks.rates if rate is not None]
+    assert [rate[1] for rate in kept] == [(moved.symbols.index(a),)]
+
+
 def test_tables_as_coefficients():
     steps = cra.stations(x, [(0, 1), (HALF, sp.Rational(1, 10))], kind="step")
     masses = cra.stations(x, [(0, 1), (HALF, sp.Rational(46, 100))], kind="step")
