@@ -150,10 +150,10 @@ def response(
     x : array_like
         Place or one axis of places in the domain, m.
     modes : int
-        Modes in the sum, 1 to 1000. What the others contribute is left out: of the motion of a uniform cantilever under a
-        sudden force at its tip five leave out 3e-4 at the tip and 5e-4 at a quarter of the length; where the outer half
-        is a hundred times more flexible these are 5e-4 and 2e-2. Velocities, accelerations and strains converge more
-        slowly; take twice as many modes to see the difference.
+        Modes in the sum, 1 to 1000. What the others contribute is left out: of the motion of a uniform cantilever
+        under a sudden force at its tip five leave out 3e-4 at the tip and 5e-4 at a quarter of the length; where the
+        outer half is a hundred times more flexible, 5e-4 and 2e-2. Velocities, accelerations and strains converge more
+        slowly; twice as many modes show the difference.
     derivative : {0, 1, 2}
         Displacement (m), velocity (m/s) or acceleration (m/s2). A velocity is that to the right of a jump.
     zeta : array_like, optional
