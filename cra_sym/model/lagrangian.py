@@ -361,7 +361,13 @@ class Model(Asked):
         frequency: Symbol | None = None,
     ) -> Modal:
         """Separate the variables: characteristic matrix and function, mode shapes, in closed form."""
+        if parameters is None and basis == "hyperbolic" and frequency is None:
+            return self._separated
         return separate(self.linearised, parameters=parameters, basis=basis, frequency=frequency)
+
+    @cached_property
+    def _separated(self) -> Modal:
+        return separate(self.linearised)
 
     def ritz(self, elements: int, nodes: Sequence[Expr] = ()) -> Ritz:
         """Return a Hermite-element model of the same Lagrangian: upper bounds of frequencies, coefficients of any x.

@@ -487,7 +487,7 @@ def test_random_coefficients_agree_with_elements_or_are_refused():
     """A seeded sample of the campaign over coefficients that SymPy can write."""
     from tests.campaigns.along_x import coefficients, good
 
-    for trial in (1, 7):
+    for trial in (188, 195):
         result = coefficients(trial)
         assert good(result), result
 
