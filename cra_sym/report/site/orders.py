@@ -227,6 +227,17 @@ def _manufactured() -> float:
     return _power((2.0, 1.0), errors)
 
 
+def _iwan() -> float:
+    """The energy lost in a cycle by the Jenkins elements that stand for Iwan's, over amplitudes (root mean square)."""
+    law = cra.Iwan(1.0, 1.0, chi=-0.5, beta=0.0)
+    amplitude, errors = np.geomspace(0.05, 1.0, 401) * law.phi_max, []
+    for number in (40, 80):
+        stiffness, slip = law.elements(number)
+        beyond = np.maximum(amplitude[:, None] - slip / stiffness, 0.0)
+        errors.append(np.sqrt(np.mean(((4.0 * slip * beyond).sum(axis=-1) / law.loss(amplitude) - 1.0) ** 2)))
+    return _power((2.0, 1.0), errors)
+
+
 _DECADES = -float(np.log10(_cn(10.0)[2]))  # the harmonics of cn fall with the nome
 _Row = tuple[tuple[str, str, str], float, Callable[[], float]]
 _ROWS: tuple[_Row, ...] = (
@@ -235,6 +246,7 @@ _ROWS: tuple[_Row, ...] = (
     (("dynamic stiffness: Magnus steps along x", "step", "solutions in closed form"), 6.0, _magnus),
     (("sampled motions: acceleration between samples", "sampling interval", "the function"), 2.0, _records),
     (("Floquet: steps of the monodromy matrix", "step", "the same with a tolerance of 1e-13"), 4.0, _floquet_steps),
+    (("Gauss rules over slip displacements: loss of an Iwan element", "1/elements", "closed form"), 2.0, _iwan),
     (("multiple scales, order 1: boundary", "epsilon", "bisection on Floquet exponents"), 2.0, lambda: _boundary(1)),
     (("multiple scales, order 2: boundary", "epsilon", "bisection on Floquet exponents"), 3.0, lambda: _boundary(2)),
     (("slow flow, order 1: backbone", "amplitude", "harmonic balance"), 4.0, lambda: _slow_flow(1)),
