@@ -90,7 +90,7 @@ def nonlinear_modal_equations(system: System, modes: int = 3, zeta: Numbers | No
     """
     checks.instance("system", system, System)
     if system.model.pieces["hysteresis"]:
-        raise ValueError("system: has elastic-slip elements, which are no polynomials; take system.without_hysteresis")
+        raise ValueError("system: has elastic-slip elements, which are not polynomials; take system.without_hysteresis")
     modes = checks.count("modes", modes, high=MOST_NONLINEAR_MODES)
     ratios = None
     if zeta is not None:
