@@ -306,7 +306,7 @@ def figure_widths(arm: System | None = None, *, axes: Panels | None = None) -> F
         row[2].set_ylabel("growth of the tip / ε / (m/s)")
     grid[0, 0].legend()
     figure = figure_of(grid[0, 0])
-    note = "first order, no damping; the base moves 10 mm along or 1 mm across at ε = 1; the last column is no zone"
+    note = "first order, no damping; the base moves 10 mm along or 1 mm across at ε = 1; the last column is not a zone"
     figure.supxlabel(note, fontsize=8, color="0.35")
     return figure
 

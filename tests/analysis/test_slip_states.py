@@ -376,7 +376,7 @@ def test_what_is_refused():
     system = model.at({"k": K, "alpha": 0.0, "k_d": 0.5})
     with pytest.raises(ValueError, match="k_d is of an elastic-slip element, which must not fluctuate"):
         cra.steady_states(system, 2.0, excitation=cra.Fluctuation(k_d=1.0), epsilon=0.1, modes=1)
-    with pytest.raises(ValueError, match="has elastic-slip elements, which are no polynomials"):
+    with pytest.raises(ValueError, match="has elastic-slip elements, which are not polynomials"):
         cra.nonlinear_modal_equations(system, 1)
     with pytest.raises(ValueError, match="of which there is no slow flow"):
         model.slow_flow((1, 1))
