@@ -50,8 +50,13 @@ def histories(system: System, motion: Any) -> dict[str, History]:
             raise ValueError(
                 f"motion: the load {causes[name]} must be a multiple of {name}, its velocity or its acceleration"
             )
-        if isinstance(history, Force) and causes[name] != "force":
-            raise ValueError(f"motion: {name} drives the model by its velocity or acceleration; give a BaseMotion")
+        if isinstance(history, Force) != (causes[name] == "force"):
+            acts, other = {
+                "motion": ("by its acceleration", "a BaseMotion"),
+                "support": ("by its displacement or velocity", "a BaseMotion"),
+                "force": ("by itself", "a Force, or state the spring of a moving support in the Lagrangian"),
+            }[causes[name]]
+            raise ValueError(f"motion: {name} drives the model {acts}; give {other}")
     missing = [name for name in (*causes, *others) if name not in given]
     if missing:
         raise ValueError(f"motion: no history for {', '.join(missing)}; must be a Force or a BaseMotion")
@@ -64,7 +69,7 @@ def supports(system: System, found: Mapping[str, History]) -> dict[str, BaseMoti
     return {
         name: history
         for name, history in found.items()
-        if isinstance(history, BaseMotion) and kinds.get(name) in ("force", "support")
+        if isinstance(history, BaseMotion) and kinds.get(name) == "support"
     }
 
 

@@ -126,15 +126,15 @@ Kind = Literal["motion", "force", "support"]
 def causes(model: Model) -> tuple[tuple[str, Kind | str], ...]:
     """Return the functions of time that drive the model, with their kind.
 
-    A 'motion' acts through its acceleration only, a 'force' through its value, a 'support' through several of its
-    displacement, velocity and acceleration, or its velocity only; for any other function the kind is the offending
-    term.
+    A 'motion' acts through its acceleration only, a 'force' through its value. A 'support' is a motion that acts
+    through its displacement, which then has an energy of its own, its velocity, or several of these and its
+    acceleration. For any other function the kind is the offending term.
     """
+    return tuple((f.func.__name__, _kind(model, f)) for f in model.driving)
+
+
+def _kind(model: Model, function: AppliedUndef) -> str:
     weak = weak_form(model.linearised.variation)
-    return tuple((f.func.__name__, _kind(weak, f)) for f in model.driving)
-
-
-def _kind(weak: WeakForm, function: AppliedUndef) -> str:
     orders, t = set(), weak.variation.space.t
     for term in weak.load_terms:
         if term.has(function):
@@ -142,7 +142,11 @@ def _kind(weak: WeakForm, function: AppliedUndef) -> str:
             if not found:
                 return str(term)
             orders.update(found)
-    return "motion" if orders == {2} else "force" if orders == {0} else "support"
+    if orders == {2}:
+        return "motion"
+    energies = [model.pieces[name] for name in ("density", "left", "right")] + [e for _, e in model.pieces["inside"]]
+    stored = any(sympify(energy or 0).diff(function, 2) != 0 for energy in energies)
+    return "force" if orders == {0} and not stored else "support"
 
 
 def load(model: Model, name: str) -> Load:
@@ -169,7 +173,7 @@ def load_coefficients(model: Model, name: str, order: int | None = None) -> tupl
     if function is None:
         raise ValueError(f"motion: {name} acts in nonlinear terms alone, which only response takes into account")
     if order is None:
-        order = 2 if _kind(weak, function) == "motion" else 0
+        order = 2 if _kind(model, function) == "motion" else 0
     cause = function.diff(t, order)
     inside, discrete = (_coefficients(weak, part, cause) for part in (weak.inside_load, weak.discrete_load))
     return inside, discrete

@@ -172,12 +172,6 @@ def test_what_is_refused(motion, options, message):
         model.response(VALUES, motion, TIMES, **options)
 
 
-def test_a_motion_that_acts_through_a_spring_is_refused():
-    sprung = arm(left=-HALF * k_t * (v - w) ** 2 - HALF * k_r * v.diff(x) ** 2, prescribed=[w])
-    with pytest.raises(ValueError, match="measure the fields from the frame that moves"):
-        sprung.tip_response(VALUES, {w: cra.BaseMotion(velocity=1.0)}, TIMES)
-
-
 def test_axes_follow_the_arguments():
     model = arm(virtual_work=[(F, v, "right")])
     push = {F: cra.Force(amplitude=1.0, angular_frequency=[3.0, 30.0])}
