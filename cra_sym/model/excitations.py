@@ -201,6 +201,8 @@ class Fluctuation(Parametric):
         twice = sorted(given.keys() & named.keys())
         if twice:
             raise ValueError(f"weights: {twice[0]} is given twice")
+        if not given and not named:
+            raise ValueError("weights: must name at least one parameter that fluctuates")
         super().__init__(**given, **named)
 
     @property

@@ -163,6 +163,8 @@ def test_what_cannot_fluctuate_is_named():
             cra.growth_rate(system, cra.Fluctuation({name: 1.0}), 7.0, 0.1)
     with pytest.raises(TypeError, match=r"weights = \{1: 1.0\}: must be a mapping from symbols or names"):
         cra.Fluctuation({1: 1.0})
+    with pytest.raises(ValueError, match="weights: must name at least one parameter"):
+        cra.Fluctuation()
     with pytest.raises(ValueError, match="h does not enter the Lagrangian linearly; must be one of b, E, rho, m_e"):
         cra.growth_rate(cra.Arm.nominal(), cra.Fluctuation(h=1.0), 7.0, 0.1)
 
