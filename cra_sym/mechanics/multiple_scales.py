@@ -53,7 +53,10 @@ class MultipleScales:
     response: SteadyResponse | None
 
     def __repr__(self) -> str:
-        return f"Multiple scales of order {self.order} at {self.resonance}"
+        at = self.resonance
+        modes = {0: f"{at.first}", 1: f"({at.first}, {at.second})", -1: f"({at.first}, -{at.second})"}[at.sign]
+        tongue = f", tongue {at.tongue}" if at.tongue > 1 else ""
+        return f"Multiple scales of order {self.order} at the {at.kind} resonance {modes}{tongue}"
 
     @property
     def exact_resonance(self) -> Expr:

@@ -39,7 +39,7 @@ class ParametricResonance:
 
         Examples
         --------
-        >>> Resonance.of((2, -1)).kind, Resonance.of((1, 1)).kind, Resonance.of(3).kind
+        >>> ParametricResonance.of((2, -1)).kind, ParametricResonance.of((1, 1)).kind, ParametricResonance.of(3).kind
         ('difference', 'principal', 'forced')
         """
         if tongue not in (1, 2):

@@ -145,7 +145,7 @@ def _kind(model: Model, function: AppliedUndef) -> str:
     if orders == {2}:
         return "motion"
     energies = [model.pieces[name] for name in ("density", "left", "right")] + [e for _, e in model.pieces["inside"]]
-    stored = any(sympify(energy or 0).diff(function, 2) != 0 for energy in energies)
+    stored = any(sympify(energy or 0, strict=True).diff(function, 2) != 0 for energy in energies)
     return "force" if orders == {0} and not stored else "support"
 
 
