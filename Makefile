@@ -41,8 +41,7 @@ coverage: .venv/.ready
 
 # Without JupyterLab's news and its question whether to update: both would ask the network.
 lab: .venv/.ready
-	$(RUN) -m jupyterlab --LabApp.news_url=None --LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate \
-	    notebooks/00_overview.ipynb
+	$(RUN) -m jupyterlab --LabApp.news_url=None --LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate notebooks/00_overview.ipynb
 
 notebooks: .venv/.ready
 	$(RUN) -m cra_sym.report.notebooks notebooks

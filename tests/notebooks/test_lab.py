@@ -21,12 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PATIENCE = 300_000  # ms; a limit for hanging, on any machine
 # Cells outside the window are not rendered by default; here all are looked at.
 SETTINGS = {"@jupyterlab/notebook-extension/tracker": {"windowingMode": "none"}}
-QUIET = (
-    "--no-browser",
-    "--allow-root",
-    "--LabApp.news_url=None",
-    "--LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate",
-)
+QUIET = ("--no-browser", "--allow-root")
 DONE = """(count) => {
     const shown = '.jp-CodeCell .jp-InputPrompt:not(.jp-Placeholder-prompt)';
     const prompts = [...document.querySelectorAll(shown)].map(p => p.textContent.trim());
