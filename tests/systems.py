@@ -1,4 +1,4 @@
-"""Eight systems that are no arm: what every analysis and every figure is tried on; and two without natural modes."""
+"""Eight systems other than an arm: what every analysis and every figure is tried on; and two without natural modes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whatever the arm can do, any system can do: every public function that takes one, with ten that are no arm."""
+"""Whatever the arm can do, any system can do: every public function that takes one, with ten other than an arm."""
 
 from __future__ import annotations
 

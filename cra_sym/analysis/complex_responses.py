@@ -73,13 +73,8 @@ def complex_response(
     for one in members:
         y = one.start
         total = driven_system(one.motions.system, 0.0 * y, one.rows, BaseMotion(), (), y, times, derivative)
-        for profile, member, push, strike, support in one.causes:
-            if support is None:
-                matrix, rows = one.motions.system, one.rows
-            else:
-                matrix, push, rows = with_support(one.motions.system, push, one.rows, support)
-                strike = np.append(strike, _moved(profile, member, 0.0))
-            total += driven_system(matrix, push, rows, profile, member, strike, times, derivative)
+        for acting in one.causes:
+            total += acting.outputs(one.motions.system, one.rows, times, derivative)
         found.append(total)
     return np.array(found).reshape(*shape, *found[0].shape)
 
@@ -111,30 +106,48 @@ def complex_residual(
     shape, members = _members(system, causes, tip, modes, zeta, (None, None), check, whole=False)
     for one, end in zip(members, np.broadcast_to(stop, shape).ravel(), strict=True):
         matrix, state, moment = one.motions.system, 0.0 * one.start, np.array([end])
-        for profile, member, push, strike, support in one.causes:
-            every = np.eye(len(state))
-            if support is None:
-                state = state + driven_system(matrix, push, every, profile, member, strike, moment, 0)[:, 0]
-                continue
-            begin = np.append(strike, _moved(profile, member, 0.0))
-            whole = with_support(matrix, push, every, support)
-            state = state + driven_system(*whole, profile, member, begin, moment, 0)[:, 0]
-            state = state + np.linalg.solve(matrix, support[0] * _moved(profile, member, end)[0])
+        for acting in one.causes:
+            state = state + acting.outputs(matrix, np.eye(len(state)), moment, 0)[:, 0]
+            if acting.support is not None:
+                state = state + np.linalg.solve(matrix, acting.support[0] * acting.moved(end)[0])
         found.append(free_peaks(matrix, one.rows, state, one.motions.basis.problem.rigid))
     return np.array(found).reshape(shape)
 
 
-class _Member(NamedTuple):
-    """One member of a batch: its motions, rows of the outputs, state at t = 0, and inputs.
+class _Acting(NamedTuple):
+    """An input of one member of a batch.
 
-    Each input is a tuple: profile, member of the profile's batch, effect on the state, initial impulse, and the effect
-    of displacement and velocity, None if both are zero.
+    Its profile, the member of the profile's batch, its effect on the state, the initial impulse, and the effect of
+    displacement and velocity, shape (2, states), None if both are zero.
     """
+
+    profile: BaseMotion
+    member: tuple[int, ...]
+    push: Array
+    strike: Array
+    support: Array | None
+
+    def outputs(self, matrix: Array, rows: Array, times: Array, derivative: int) -> Array:
+        """Return the outputs ``rows`` of the states of a system that it drives from rest, (outputs, times)."""
+        push, start = self.push, self.strike
+        if self.support is not None:
+            matrix, push, rows = with_support(matrix, push, rows, self.support)
+            start = np.append(start, self.moved(0.0))
+        return driven_system(matrix, push, rows, self.profile, self.member, start, times, derivative)
+
+    def moved(self, time: float) -> tuple[float, float]:
+        """Return displacement and velocity."""
+        w, speed, _ = self.profile.kinematics(time)
+        return float(w[self.member]), float(speed[self.member])
+
+
+class _Member(NamedTuple):
+    """One member of a batch: its motions, rows of the outputs, state at t = 0, and inputs."""
 
     motions: LowestMotions
     rows: Array
     start: Array
-    causes: list[tuple[BaseMotion, tuple[int, ...], Array, Array, Array | None]]
+    causes: list[_Acting]
 
 
 def _members(
@@ -171,7 +184,8 @@ def _members(
                 *lower, push = (_projected(one, motions, motions.push, load) for load in cause.loads)
                 support = None if cause.loads[:2] == (None, None) else np.stack(lower)
                 speed = float(np.broadcast_to(cause.profile.velocity(0.0), shape)[index]) if cause.strikes else 0.0
-                acting.append((cause.profile, _member(index, cause.profile.shape), push, push * speed, support))
+                own = _member(index, cause.profile.shape)
+                acting.append(_Acting(cause.profile, own, push, push * speed, support))
             yield _Member(motions, outputs(motions.basis) @ motions.shapes, start, acting)
 
     return shape, members()
@@ -205,12 +219,6 @@ def _projected(one: System, motions: LowestMotions, effect: Array, load: Load | 
         return np.zeros(len(motions.system))
     moved: Array = effect @ project(one.domain, motions.basis, load)
     return moved
-
-
-def _moved(profile: BaseMotion, member: tuple[int, ...], time: float) -> tuple[float, float]:
-    """Return displacement and velocity of one member of a batch of motions."""
-    w, speed, _ = profile.kinematics(time)
-    return float(w[member]), float(speed[member])
 
 
 def _member(index: tuple[int, ...], shape: tuple[int, ...]) -> tuple[int, ...]:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.basis_response import on_basis
-from cra_sym.analysis.modes import check_places, displaced, only_motion, participation, section_place
+from cra_sym.analysis.histories import supports
+from cra_sym.analysis.modes import check_kind, check_places, displaced, only_motion, participation, section_place
 from cra_sym.cached import cached_property
 from cra_sym.checks import choice, default_floating_point, instance, one_axis, shown
 from cra_sym.model.routes import GeneralRoute, Modes
@@ -394,16 +395,13 @@ class _Undamped:
 
 def _cause_name(system: System, drive: Any) -> str | None:
     """Return the name of the prescribed motion or force that is the input, or None for a displacement."""
-    causes = dict(system.numerics("causes"))
     if drive is None:
         return only_motion(system, support=True)
+    causes = dict(system.numerics("causes"))
     name = drive if isinstance(drive, str) else getattr(getattr(drive, "func", None), "__name__", shown(drive))
     if name not in causes or (not isinstance(drive, str) and len(drive.args) != 1):
         return None
-    if causes[name] not in ("motion", "force"):
-        raise ValueError(
-            f"drive: the load {causes[name]} must be a multiple of {name}, its velocity or its acceleration"
-        )
+    check_kind("drive", name, causes[name])
     return name
 
 
@@ -412,15 +410,12 @@ def _as_drive(system: System, drive: Any, kind: Any) -> tuple[System, Any, Any]:
 
     A motion that acts by its displacement or velocity too is replaced by a coordinate that moves by a unit.
     """
-    name = drive if isinstance(drive, str) else getattr(getattr(drive, "func", None), "__name__", "")
-    causes = dict(system.numerics("causes"))
-    if drive is None and "support" in causes.values():
-        name = only_motion(system, support=True)
-    if causes.get(name) == "support":
+    cause = _cause_name(system, drive)
+    if cause in supports(system):
         if kind is not None:
-            raise ValueError(f"kind = {shown(kind)}: must be left out for {name}, which is not a displacement")
-        moved = next(function for function in system.model.driving if function.func.__name__ == name)
-        return system.model.freed(name).at({**system.values}, system.zeta), moved, "motion"
+            raise ValueError(f"kind = {shown(kind)}: must be left out for {cause}, which is not a displacement")
+        moved = next(function for function in system.model.driving if function.func.__name__ == cause)
+        return system.model.freed(cause).at({**system.values}, system.zeta), moved, "motion"
     if drive is None or isinstance(drive, str):
         return system, drive, kind
     found = system.model.numerics("pushed", drive) if hasattr(drive, "free_symbols") else None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, Union
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.analysis.modes import only_motion
+from cra_sym.analysis.modes import check_kind, only_motion
 from cra_sym.checks import mapping, shown
 from cra_sym.model.system import System
 from cra_sym.solvers.force import Force
@@ -46,10 +46,7 @@ def histories(system: System, motion: Any) -> dict[str, History]:
             raise TypeError(f"motion: {name} = {shown(history)}: must be a Force or a BaseMotion")
         if name in others:  # only in nonlinear terms, through any of its derivatives
             continue
-        if causes[name] not in ("force", "motion", "support"):
-            raise ValueError(
-                f"motion: the load {causes[name]} must be a multiple of {name}, its velocity or its acceleration"
-            )
+        check_kind("motion", name, causes[name])
         if isinstance(history, Force) != (causes[name] == "force"):
             acts, other = {
                 "motion": ("by its acceleration", "a BaseMotion"),
@@ -63,19 +60,14 @@ def histories(system: System, motion: Any) -> dict[str, History]:
     return given
 
 
-def supports(system: System, found: Mapping[str, History]) -> dict[str, BaseMotion]:
+def supports(system: System) -> list[str]:
     """Return the motions that act by their displacement or velocity, such as that of the support of a spring."""
-    kinds = dict(system.numerics("causes"))
-    return {
-        name: history
-        for name, history in found.items()
-        if isinstance(history, BaseMotion) and kinds.get(name) == "support"
-    }
+    return [name for name, kind in system.numerics("causes") if kind == "support"]
 
 
-def check_no_support(system: System, found: Mapping[str, History]) -> None:
+def check_no_support(system: System) -> None:
     """Raise an error if a motion acts by its displacement or velocity."""
-    for name in supports(system, found):
+    for name in supports(system):
         raise ValueError(
             f"motion: {name} acts by its displacement or velocity, which is not taken into account here; use response "
             "without elastic-slip elements, or measure the fields from the moving frame"
@@ -83,14 +75,14 @@ def check_no_support(system: System, found: Mapping[str, History]) -> None:
 
 
 def driven(system: System, found: Mapping[str, History], modes: int) -> Iterator[tuple[Array, History]]:
-    """Yield, for each input, minus the generalised force of a unit of it on every mode, and its history.
+    """Yield, for each force and each motion that acts by its acceleration, minus the generalised force of a unit of it
+    on every mode, and its history.
 
     Raises
     ------
     ValueError
-        If a motion acts by its displacement or velocity, or an input in nonlinear terms alone.
+        If an input acts in nonlinear terms alone.
     """
-    check_no_support(system, found)
     linear = dict(system.numerics("causes"))
     for name, history in found.items():
         if name not in linear:

@@ -190,6 +190,12 @@ def check_places(system: System, points: Array, name: str = "x") -> None:
         raise ValueError(f"{name} = {bad:g} must be in the domain, [{low:g}, {high:g}]")
 
 
+def check_kind(argument: str, name: str, kind: str) -> None:
+    """Raise an error that names the argument unless an input of that kind (see `causes`) is a linear load."""
+    if kind not in ("force", "motion", "support"):
+        raise ValueError(f"{argument}: the load {kind} must be a multiple of {name}, its velocity or its acceleration")
+
+
 def only_motion(system: System, *, support: bool = False) -> str:
     """Return the name of the only prescribed motion of a model.
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym import checks
+from cra_sym.analysis.modes import check_kind
 from cra_sym.analysis.nonlinear import nonlinear_modal_equations
 from cra_sym.model.excitations import Fluctuation, LagrangianTerms, Parametric
 from cra_sym.model.system import System
@@ -172,8 +173,7 @@ def _add_loads(found: _Collected, system: System, modes: int, amplitudes: Mappin
         amplitude = amplitudes.get(name, 0.0)
         if not amplitude:
             continue
-        if kind not in ("motion", "force", "support"):
-            raise ValueError(f"drive: the load {kind} must be a multiple of {name}, its velocity or its acceleration")
+        check_kind("drive", name, kind)
         for order, load in system.numerics("loads", name).items():
             wave = _rate(amplitude, order)
             found.forces.append(Term(system.project(load, modes), 0, 0, (found.number(wave),)))

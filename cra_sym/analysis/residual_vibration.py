@@ -79,13 +79,13 @@ def residual_vibration(
     if system.model.pieces["hysteresis"]:
         if couples(system.without_hysteresis, modes):
             raise ValueError(
-                "system: with dampers beside elastic-slip elements there is no sum over modes; use response"
+                "system: modes with dampers beside elastic-slip elements cannot be summed one by one; use response"
             )
         still = stopped(system.without_hysteresis, motion, modes, zeta)
         problem, rows = slipping_problem(system, motion, modes, zeta), system.without_hysteresis.modes(modes)
         peak = slipping_residual(problem, rows.displacement(1, 0), still.stop)
         return peak if peak.ndim else float(peak)
-    if couples(system, modes) or supports(system, histories_of(system, motion)):
+    if couples(system, modes) or supports(system):
         total = _complex_residual(system, motion, modes, zeta)
     else:
         found = stopped(system, motion, modes, zeta)
@@ -144,9 +144,11 @@ def couples(system: System, modes: int) -> bool:
 
 def _complex_residual(system: System, motion: Any, modes: int, zeta: Any) -> Array:
     histories, _, stop = ended(system, motion)
-    for name, profile in supports(system, histories).items():
+    for name in supports(system):
         if system.numerics("pencil") is None or (system.natural_frequencies(1) == 0.0).any():
-            check_no_support(system, histories)
+            check_no_support(system)
+        profile = histories[name]
+        assert isinstance(profile, BaseMotion)
         if not all(at_rest(profile, end).all() for end in np.ravel(stop)):
             raise ValueError(f"motion: {name} acts by its displacement or velocity; must be at rest after the stop")
     modes = count("modes", modes, high=MOST_MODES)
@@ -187,7 +189,7 @@ def ended(system: System, motion: Any) -> tuple[dict[str, History], tuple[BaseMo
 def stopped(system: System, motion: Any, modes: int, zeta: Any) -> Stopped:
     """Return the natural modes driven until all inputs have ended; refuse inputs without an end."""
     histories, profiles, stop = ended(system, motion)
-    check_no_support(system, histories)
+    check_no_support(system)
     modes = count("modes", modes, high=MOST_MODES)
     osc = oscillators(system, np.zeros(modes), np.zeros((1, modes)), modes, zeta)
     if system.numerics("complex_modes") == "if coupled" and not has_complex_modes(system, modes):

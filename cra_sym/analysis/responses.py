@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.complex_responses import complex_response
-from cra_sym.analysis.histories import Histories, History, driven, supports
+from cra_sym.analysis.histories import Histories, History, check_no_support, driven, supports
 from cra_sym.analysis.histories import histories as histories_of
 from cra_sym.analysis.modes import check_places, displaced, section_place
 from cra_sym.analysis.nonlinear_response import nonlinear_response
@@ -267,7 +267,9 @@ def _oscillation(
             )
         return driven_response(osc, profile, t, derivative, begin, state)
 
-    def supported(name: str, profile: BaseMotion) -> Array:
+    def supported(name: str) -> Array:
+        profile = histories[name]
+        assert isinstance(profile, BaseMotion)
         osc = oscillators(system, still, rows, modes, zeta)
         check_sampling(profile, osc.omega)
         loads = system.numerics("loads", name)
@@ -281,9 +283,9 @@ def _oscillation(
     if initial or not histories:
         q, u = (_initial_state(system, initial or {}, modes, order) for order in (0, 1))
         total = answer(still, BaseMotion(), "base", (q, u))
-    moving = supports(system, histories)
-    for name, profile in moving.items():
-        added = supported(name, profile)
+    moving = supports(system)
+    for name in moving:
+        added = supported(name)
         total = added if total is None else total + added
     others = {name: history for name, history in histories.items() if name not in moving}
     for gamma, history in driven(system, others, modes):
@@ -303,6 +305,7 @@ def slipping_problem(
     check_start(start)
     base = system.without_hysteresis
     state = (_initial_state(base, initial or {}, modes, 0), _initial_state(base, initial or {}, modes, 1))
+    check_no_support(base)
     loads = driven(base, histories_of(base, motion), modes)
     return slipping(system, loads, modes, _ratios(base, modes, zeta), start, state, check_sampling)
 

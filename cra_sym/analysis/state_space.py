@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from cra_sym.analysis.modes import only_motion, participation
+from cra_sym.analysis.modes import check_kind, only_motion, participation
 from cra_sym.checks import count, default_floating_point, instance, real_array, shown
 from cra_sym.model.observables import Observable
 from cra_sym.model.projection import Load, Projected, displaced_at, project
@@ -226,10 +226,7 @@ class _Input:
             return cls("free" if given == _FREE else causes[motion], motion, given)
         name: str = given if isinstance(given, str) else getattr(getattr(given, "func", None), "__name__", "")
         if name in causes and (isinstance(given, str) or len(given.args) == 1):
-            if causes[name] not in ("motion", "force", "support"):
-                raise ValueError(
-                    f"input: the load {causes[name]} must be a multiple of {name}, its velocity or its acceleration"
-                )
+            check_kind("input", name, causes[name])
             return cls(causes[name], name, name)
         if isinstance(given, str):
             known = system.numerics("named_observables")
@@ -264,14 +261,20 @@ def _equations(
         own = system.numerics("carried", states[0]).function(*system.domain.values)
         mass[0, 0], damping[0, 0], stiffness[0, 0] = (float(value) for value in own)
         mass[0, 1:] = mass[1:, 0] = participation(system, modes, states[0])
+    for order, column, load in _support_loads(system, states, driven):
+        (stiffness, damping)[order][first:, column] = -system.project(load, modes)
+    push = np.stack([_push(system, modes, states, one, free=free) for one in driven], axis=-1)
+    found = np.asarray(np.linalg.solve(mass, np.hstack([-stiffness, -damping, push])), dtype=np.float64)
+    return found[:, : 2 * size], found[:, 2 * size :]
+
+
+def _support_loads(system: System, states: Sequence[str], driven: Sequence[_Input]) -> Iterator[tuple[int, int, Load]]:
+    """Yield the loads by displacement (order 0) and velocity (1) of moving supports, with the state they belong to."""
     for one in driven:
         if one.kind == "support":
             for order, load in system.numerics("loads", one.name).items():
                 if order < 2:
-                    (stiffness, damping)[order][first:, states.index(one.name)] = -system.project(load, modes)
-    push = np.stack([_push(system, modes, states, one, free=free) for one in driven], axis=-1)
-    found = np.asarray(np.linalg.solve(mass, np.hstack([-stiffness, -damping, push])), dtype=np.float64)
-    return found[:, : 2 * size], found[:, 2 * size :]
+                    yield order, states.index(one.name), load
 
 
 def _push(system: System, modes: int, states: Sequence[str], one: _Input, *, free: bool) -> Array:
@@ -350,11 +353,8 @@ def _complex(
     for row, name in enumerate(states):
         A[row, len(states) + row] = 1.0
         B[len(states) + row] = [one.kind in ("motion", "support") and one.name == name for one in driven]
-    for one in driven:
-        if one.kind == "support":
-            for order, load in system.numerics("loads", one.name).items():
-                if order < 2:
-                    A[carried:, order * len(states) + states.index(one.name)] = _pushed(system, motions, load)
+    for order, column, load in _support_loads(system, states, driven):
+        A[carried:, order * len(states) + column] = _pushed(system, motions, load)
     C, D = np.zeros((len(wanted), len(A))), np.zeros((len(wanted), len(driven)))
     for k, of in enumerate(wanted.values()):
         by_basis, prescribed = _rows(system, motions.basis, of)

@@ -135,9 +135,8 @@ def _checks(real: str) -> Iterator[Check]:
     """Yield the reference vectors from the package's own kernels, for the functions of the library."""
     for check in arm_checks(everything=True):
         quantity = _QUANTITIES[check.quantity]
-        expected = tuple(
-            x if math.isfinite(x) else 0.0 for x in check.outputs
-        )  # a rigid-body mode has no sensitivities
+        # a rigid-body mode has no sensitivities
+        expected = tuple(x if math.isfinite(x) else 0.0 for x in check.outputs)
         if real == "float64":
             yield Check(quantity, check.inputs, expected, TOLERANCE, check.absolute)
             continue

@@ -9,31 +9,17 @@ from cra_sym.model.waves_form import WavesForm
 
 __all__ = ["model_constants"]
 
-_NUMBERS = {
-    "float64": {
-        "HUGE": (1.7976931348623157e308, "what is larger is infinite"),
-        "EPS": (2.0**-52, "of rounding"),
-        "TINY": (1e-300, "of what is as good as nothing"),
-        "DEPENDENT": (1e-14, "what rounding leaves of a row of unit size"),
-        "SLIGHT": (1e-12, "beside 1"),
-        "TWO_SMALL": (1e-140, "share of the line's own z below which two zeros cannot be told apart"),
-        "THREE_SMALL": (1e-95, "the same of three"),
-        "SAME": (1e-9, "relative distance below which squared frequencies are taken as equal"),
-        "NODE": (1e-7, "of the largest displacement: a node"),
-        "BESIDE": (1e-12, "of the largest displacement beside a node"),
-    },
-    "float32": {
-        "HUGE": (2.9e38, "what is larger is infinite"),
-        "EPS": (2.0**-23, "of rounding"),
-        "TINY": (1e-37, "of what is as good as nothing"),
-        "DEPENDENT": (1e-6, "what rounding leaves of a row of unit size"),
-        "SLIGHT": (1e-4, "beside 1"),
-        "TWO_SMALL": (1e-16, "share of the line's own z below which two zeros cannot be told apart"),
-        "THREE_SMALL": (1e-11, "the same of three"),
-        "SAME": (1e-4, "relative distance below which squared frequencies are taken as equal"),
-        "NODE": (1e-3, "of the largest displacement: a node"),
-        "BESIDE": (1e-5, "of the largest displacement beside a node"),
-    },
+_NUMBERS = {  # in double precision, in single precision
+    "HUGE": (1.7976931348623157e308, 2.9e38, "what is larger is infinite"),
+    "EPS": (2.0**-52, 2.0**-23, "of rounding"),
+    "TINY": (1e-300, 1e-37, "of what is as good as nothing"),
+    "DEPENDENT": (1e-14, 1e-6, "what rounding leaves of a row of unit size"),
+    "SLIGHT": (1e-12, 1e-4, "beside 1"),
+    "TWO_SMALL": (1e-140, 1e-16, "share of the line's own z below which two zeros cannot be told apart"),
+    "THREE_SMALL": (1e-95, 1e-11, "the same of three"),
+    "SAME": (1e-9, 1e-4, "relative distance below which squared frequencies are taken as equal"),
+    "NODE": (1e-7, 1e-3, "of the largest displacement: a node"),
+    "BESIDE": (1e-12, 1e-5, "of the largest displacement beside a node"),
 }
 _PLACES = (-1.0, -0.56, 0.06, 0.62, 1.0 - 2e-4, 1.0)
 """Stations at which the size of a motion is measured, in half lengths from mid-span."""
@@ -73,7 +59,8 @@ def model_constants(
         integers["LINKS"] = (links, "springs between what moves")
         integers["STRETCHES"] = (links * moving, "links by what moves")
     lines = [f"PI = {math.pi!r}  # half a turn"]
-    lines += [f"{name} = {value!r}  # {words}" for name, (value, words) in _NUMBERS[real].items()]
+    for name, (double, single, words) in _NUMBERS.items():
+        lines.append(f"{name} = {single if real == 'float32' else double!r}  # {words}")
     lines += [f"{name} = {value}  # {words}" for name, (value, words) in integers.items()]
     lines += [f"PLACES = {_PLACES!r}  # of these, in half lengths from mid-span"]
     lines += [f"FIELD_PLACES = ({', '.join(map(str, field_places))},)  # displacement of a section that each field is"]

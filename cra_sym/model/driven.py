@@ -73,9 +73,8 @@ def reacting(form: StateForm) -> StateForm:
             if own == number:
                 extended[k, n + m + row] = extended[n + m + row, k] = S.One
         points.append((place, extended.as_immutable(), ()))
-    free = zeros(
-        form.free.rows + len(reactions), form.free.cols + len(reactions)
-    )  # joins of no columns lose their rows
+    # not by joins: those of no columns lose their rows
+    free = zeros(form.free.rows + len(reactions), form.free.cols + len(reactions))
     for row, column in product(range(form.free.rows), range(form.free.cols)):
         free[row if row < n + m else row + len(reactions), column] = form.free[row, column]
     free[n + m : n + m + len(reactions), form.free.cols :] = eye(len(reactions))

@@ -54,8 +54,8 @@ class Model(Asked):
         an interior place, ``v.subs(x, a)`` or ``v.diff(x).subs(x, a)``, it is a support.
     inside : sequence of (place, Expr), optional
         Lagrangian terms of interior places: point masses, springs, rotary inertias, in ``v(x, t)`` and its derivatives
-        as at an end. ``DiracDelta(x - a)`` times a term in the density means the same. Places must
-        be between the ends.
+        as at an end. ``DiracDelta(x - a)`` times a term in the density means the same. Places
+        must be between the ends.
     coordinates : sequence of applied undefined functions, optional
         Lumped coordinates ``w(t)``.
     prescribed : sequence of applied undefined functions, optional

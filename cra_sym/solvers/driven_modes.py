@@ -123,7 +123,7 @@ _STOPPED = 1e-9  # of the sum of all velocity changes: a remainder below this sh
 
 
 def at_rest(motion: BaseMotion, t: float) -> np.ndarray:
-    """Return whether the velocity at a time is no more than rounding, shape of the batch."""
+    """Return whether the velocity at a time is at most rounding, shape of the batch."""
     return np.asarray(np.abs(motion.velocity(t)) <= _STOPPED * _velocity_variation(motion))
 
 

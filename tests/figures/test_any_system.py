@@ -1,4 +1,4 @@
-"""Figures of systems that are no arm: the curves are those of the public functions, axes say what they show."""
+"""Figures of systems other than an arm: the curves are those of the public functions, axes say what they show."""
 
 from __future__ import annotations
 
