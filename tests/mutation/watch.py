@@ -6,12 +6,15 @@ Before any round come the checks of all numbered equations that the module has a
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterator
 from functools import cache
+from itertools import islice
 from pathlib import Path
 
 __all__ = ["EXEMPT", "PACKAGE", "rounds", "watched_modules"]
 
 PACKAGE = Path(__file__).resolve().parents[2] / "cra_sym"
+MANY = 5  # files of tests: a second round has no more
 
 #: Modules of which no mutant is made, with the reason.
 EXEMPT = {
@@ -264,25 +267,34 @@ def watched_modules() -> tuple[str, ...]:
 
 
 def rounds(module: str) -> list[list[str]]:
-    """Return the rounds of a module; without an entry, one of the tests nearest to it.
+    """Return the rounds of a module; without an entry, the tests nearest to it, and the next nearest unless many.
 
-    That is the file of its name, or else those that import it, or else those of the modules that import it, and so on;
-    if some are in the same room, these alone.
+    Nearest is the file of its name; then those that import it, those of the modules that import it, and so on. Of
+    those equally near the tests in the same room serve alone, if there are any.
     """
-    return _ROUNDS[module] if module in _ROUNDS else [_nearest(module)]
+    if module in _ROUNDS:
+        return _ROUNDS[module]
+    nearest = list(islice(_nearest(module), 2)) or [_of_its_room(module)]
+    return nearest[:1] + [part for part in nearest[1:] if len(part) <= MANY]
 
 
-def _nearest(module: str) -> list[str]:
+def _nearest(module: str) -> Iterator[list[str]]:
     room, fresh, seen = module.rpartition("/")[0], {module}, set[str]()
-    if own := _of_its_name(module):
-        return own
+    told = set(_of_its_name(module))
+    if told:
+        yield sorted(told)
     while fresh:
         found = {test for test, named in _named_by("tests").items() if named & fresh}
-        found = sorted(found.union(*map(_of_its_name, fresh)))
+        found = found.union(*map(_of_its_name, fresh)) - told
         if found:
-            return [test for test in found if test.startswith(f"tests/{room}/")] or found
+            yield [test for test in sorted(found) if test.startswith(f"tests/{room}/")] or sorted(found)
+        told |= found
         seen |= fresh
         fresh = {user for user, named in _named_by("cra_sym").items() if named & fresh} - seen
+
+
+def _of_its_room(module: str) -> list[str]:
+    room = module.rpartition("/")[0]
     return [f"tests/{room}" if room and (PACKAGE.parent / "tests" / room).is_dir() else "tests/test_bad_input.py"]
 
 
