@@ -96,6 +96,24 @@ def test_the_largest_residual_of_the_band_is_the_tolerance(humps, zeta):
         assert left[peaks].max(initial=0.0) <= 0.05 * (1 + 1e-9)
 
 
+@pytest.mark.parametrize("humps", [1, 3])
+@pytest.mark.parametrize("zeta", [0.02, 0.2, 0.6])
+def test_with_damping_the_largest_residual_up_to_the_ends_of_the_humps_is_the_tolerance(humps, zeta):
+    """Without the decay |P| is V T_n(c s), whose middle hump, of height V, is at the frequency of the mode (n even)."""
+    amplitudes, times = cra.input_shaper(5.0, zeta, humps=humps, tolerance=0.05)
+    growth = np.exp(np.pi * zeta / np.sqrt(1 - zeta**2)) ** np.arange(humps + 2)
+    undamped = amplitudes * growth / (amplitudes * growth).sum()
+    V = residual(undamped, np.pi * np.arange(humps + 2), 1.0)
+    half = 2 / np.pi * np.arcsin(1 / np.cosh(np.arccosh(1 / V) / (humps + 1)))
+    left = [residual(amplitudes, times, 5.0 * r, zeta) for r in np.linspace(1 - half, 1 + half, 401)]
+    # with damping the largest is at an end of the band; bisection of V ends at rounding
+    assert max(left) == pytest.approx(0.05, rel=1e-10) and max(left) == max(left[0], left[-1])
+
+
+def test_five_per_cent_are_left_by_default():
+    assert cra.input_shaper(1.0, humps=1)[0][0] == pytest.approx((1 + 0.05) / 4, rel=1e-14)
+
+
 def test_more_humps_and_tolerance_widen_the_band():
     def width(**options):
         amplitudes, times = cra.input_shaper(1.0, **options)

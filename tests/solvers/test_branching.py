@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from cra_sym.solvers.branching import branches
 from cra_sym.solvers.continuation import follow, started
 
 
 class LineAndCircle:
-    """x (x^2 + (p - 2)^2 - 1) = 0 and y = 0: the line is crossed at p = 1 and p = 3."""
+    """x (x^2 + (p - 2)^2 - 1) = 0 and y = 0: the line is crossed at p = 1 and p = 3.
+
+    The unknown is x over ``unit``; the metric is that of x.
+    """
 
     lowest = 0.0
 
+    def __init__(self, unit=1.0):
+        self.unit = unit
+
     def metric(self, unknowns, frequency):
-        return np.ones(3)
+        return np.array([self.unit, 1.0, 1.0])
 
     def linearised(self, vector):
-        x, y, p = vector
+        x, y, p = vector * self.metric(None, None)
         residual = np.array([x * (x**2 + (p - 2) ** 2 - 1), y])
-        return residual, np.array([[3 * x**2 + (p - 2) ** 2 - 1, 0, 2 * x * (p - 2)], [0, 1, 0]]), 1.0
+        slope = (3 * x**2 + (p - 2) ** 2 - 1) * self.unit
+        return residual, np.array([[slope, 0, 2 * x * (p - 2)], [0, 1, 0]]), 1.0
 
     def mark(self, rates, tangent, metric):
         return int(np.sign(np.linalg.det(np.vstack([rates, tangent]))))
@@ -31,8 +39,8 @@ class LineAndCircle:
         return 0.05
 
 
-def followed(points, ended):
-    curve = LineAndCircle()
+def followed(points, ended, unit=1.0):
+    curve = LineAndCircle(unit)
     whole = []
     for point in follow(curve, started(curve, np.zeros(2), 0.5)):
         whole.append(point)
@@ -40,10 +48,11 @@ def followed(points, ended):
             return whole, branches(curve, whole, points, ended)
 
 
-def test_a_loop_through_two_branch_points_is_found_once_and_closes():
-    whole, (loop,) = followed(1000, lambda point: False)
+@pytest.mark.parametrize("unit", [1.0, 1e-6, 1e6])
+def test_a_loop_through_two_branch_points_is_found_once_and_closes(unit):
+    whole, (loop,) = followed(1000, lambda point: False, unit)
     np.testing.assert_allclose([p.frequency for p in whole if p.crossing], [1.0, 3.0], atol=1e-4)
-    x, p = np.array([[point.unknowns[0], point.frequency] for point in loop.points]).T
+    x, p = np.array([[point.unknowns[0] * unit, point.frequency] for point in loop.points]).T
     np.testing.assert_allclose(x**2 + (p - 2) ** 2, 1.0, atol=1e-5)  # next to the line no better
     angle = np.unwrap(np.arctan2(x, p - 2))
     assert abs(abs(angle[-1] - angle[0]) - 2 * np.pi) < 0.1 and not loop.broken
