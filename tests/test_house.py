@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
@@ -39,6 +40,9 @@ UPWARDS = {
 }
 KNOW_ORACLES = {"paper", "claims"}
 SELF = {"self", "cls"}
+# Private in name, yet part of a documented interface: of named tuples, of SymPy's printers, of IPython.
+DOCUMENTED = re.compile(r"_replace|_asdict|_print(_\w+)?|_repr_\w+_")
+TO_THE_PACKAGE = {("cra_sym", "_HOME"), ("cra_sym", "_LOADED")}  # where the public names live; when it was imported
 
 
 def name_of(module: Path) -> str:
@@ -140,6 +144,65 @@ def test_the_import_rule_sees_rooms_that_must_not_know_each_other(tmp_path, monk
         planted.parent.mkdir(parents=True)
         planted.write_text(f"from cra_sym.{other}.modes import modes\n")
         assert trespasses(planted) == [f"cra_sym.{other}.modes.modes"]
+
+
+def private_reads(module: Path) -> list[str]:
+    """Private names that ``module`` imports or reads from objects whose class it does not define.
+
+    Of an argument the annotation tells its class; of any other object the module must have such an attribute itself.
+    """
+    tree = parsed(module)
+    classes = {node.name for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
+    own, bad = own_names(tree), []
+    for node, arguments in with_arguments(tree, {}):
+        if isinstance(node, ast.ImportFrom):
+            bad += [alias.name for alias in node.names if re.match(r"_[^_]", alias.name)]
+        if not isinstance(node, ast.Attribute) or not re.match(r"_[^_]", node.attr) or DOCUMENTED.fullmatch(node.attr):
+            continue
+        holder = ast.unparse(node.value)
+        kind = arguments.get(holder)
+        foreign = kind is not None and not classes & set(re.findall(r"\w+", kind)) and kind not in {"object", "Any"}
+        if holder not in SELF and (foreign or node.attr not in own) and (holder, node.attr) not in TO_THE_PACKAGE:
+            bad.append(ast.unparse(node))
+    return bad
+
+
+def own_names(tree: ast.Module) -> set[str]:
+    """Attributes that the classes of a module define: methods, fields, slots and what is assigned to ``self``."""
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.FunctionDef, ast.AnnAssign)):
+            found.add(node.name if isinstance(node, ast.FunctionDef) else ast.unparse(node.target))
+        elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store) and ast.unparse(node.value) in SELF:
+            found.add(node.attr)
+        elif isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__slots__":
+            found |= set(ast.literal_eval(node.value))
+    return found
+
+
+def with_arguments(node: ast.AST, known: dict[str, str]) -> Iterator[tuple[ast.AST, dict[str, str]]]:
+    """Yield every node below one with the annotations of the arguments of the functions around it."""
+    if isinstance(node, ast.FunctionDef):
+        given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+        known = known | {a.arg: ast.unparse(a.annotation).strip("'") for a in given if a.annotation}
+    yield node, known
+    for child in ast.iter_child_nodes(node):
+        yield from with_arguments(child, known)
+
+
+def test_private_names_stay_in_their_module(module):
+    assert private_reads(module) == []
+
+
+def test_the_rule_of_private_names_sees_a_trespass(tmp_path):
+    planted = tmp_path / "planted.py"
+    planted.write_text(
+        "from cra_sym.solvers.other import _step, known\n"
+        "class Own:\n    _a: int\n    def __init__(self): self._b = 0\n"
+        "    def f(self, other: Own, state: State, free): return other._a, other._b, state._b, free._b, free._c\n"
+        "    def g(self, t): return t._replace(x=1), super()._print_Pow(t), known._private, self.one._of_others\n"
+    )
+    assert sorted(private_reads(planted)) == ["_step", "free._c", "known._private", "self.one._of_others", "state._b"]
 
 
 def test_solvers_know_numbers_only(module):

@@ -119,15 +119,15 @@ class _Flow:
     """The modal equations that a steady state solves, for many motions at once."""
 
     def __init__(self, state: SteadyState) -> None:
-        if isinstance(state._problem, SlipProblem):
+        if isinstance(state.problem, SlipProblem):
             raise ValueError(
                 "states: must be of a system without elastic-slip elements; cra.response follows one motion"
             )
-        self._problem, self._period = state._problem, state._problem.period
+        self._problem, self._period = state.problem, state.problem.period
         self._point = np.array([[state.angular_frequency, 1.0 if state.epsilon is None else state.epsilon]])
         self._equations = self._problem.driven.equations
         self._varpi = state.angular_frequency
-        self.rows, self.modes = state._problem.rows, self._equations.modes
+        self.rows, self.modes = state.problem.rows, self._equations.modes
 
     @property
     def _cycle(self) -> float:
@@ -159,7 +159,7 @@ class _Flow:
 
     def mark(self, state: SteadyState) -> Array:
         """Return the point of a steady state at phase 0 in the space of displacements and scaled velocities."""
-        basis, coefficients = state._problem.basis, state.coefficients
+        basis, coefficients = self._problem.basis, state.coefficients
         at = np.zeros(1)
         rate = self._varpi / self._period
         q, u = coefficients @ basis.values(at)[0], rate * (coefficients @ basis.values(at, 1)[0])

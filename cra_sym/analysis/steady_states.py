@@ -50,6 +50,8 @@ class SteadyState(checks.ByValue):
     coefficients : ndarray, shape (modes, 2 harmonics + 1)
         Modal coordinates as sums of the constant, the cosines and then the sines of k varpi t / period. With
         elastic-slip elements the amplitude also includes the static contribution of the omitted modes.
+    problem : DrivenProblem or SlipProblem
+        The modal equations that it solves, and the harmonics in which they are balanced.
 
     Examples
     --------
@@ -72,14 +74,14 @@ class SteadyState(checks.ByValue):
     stable: bool
     multipliers: Complex
     coefficients: Array
-    _problem: DrivenProblem | SlipProblem
+    problem: DrivenProblem | SlipProblem
     _unknowns: Array
     _at: Any
 
     @cached_property
     def error_modes(self) -> float:
         """Estimated relative error of the motion by truncation of the modes: its change with three more."""
-        return self._problem.changed(3, 0, self._unknowns, self._at)
+        return self.problem.changed(3, 0, self._unknowns, self._at)
 
     @cached_property
     def error_harmonics(self) -> float:
@@ -87,12 +89,12 @@ class SteadyState(checks.ByValue):
 
         With elastic-slip elements, with twice as many, or by the last doubling if these do not converge.
         """
-        return self._problem.changed(0, 4, self._unknowns, self._at)
+        return self.problem.changed(0, 4, self._unknowns, self._at)
 
     @cached_property
     def loss(self) -> float:
         """Energy dissipated by elastic-slip elements in a period of the solution, J."""
-        return self._problem.loss(self._unknowns)
+        return self.problem.loss(self._unknowns)
 
     def __repr__(self) -> str:
         word = "stable" if self.stable else "unstable"
