@@ -66,13 +66,15 @@ _HOMES: dict[str, range] = {
     "cra_sym.paper.modal_dynamics": range(11, 14),
     "cra_sym.paper.joint": range(14, 17),
     "cra_sym.paper.orthogonality": range(16, 17),
-    "cra_sym.paper.modes": range(17, 24),
+    "cra_sym.paper.modes": range(17, 20),
+    "cra_sym.paper.frequency_equation": range(20, 24),
     "cra_sym.paper.shapes": range(24, 27),
     "cra_sym.paper.limits": range(27, 31),
     "cra_sym.paper.implicit": range(31, 33),
     "cra_sym.paper.driven": range(33, 35),
     "cra_sym.paper.excited": range(35, 37),
-    "cra_sym.paper.resonance": range(37, 50),
+    "cra_sym.paper.resonance": range(37, 49),
+    "cra_sym.paper.stability_boundary": range(49, 50),
     "cra_sym.paper.literal_route": range(42, 50),
 }
 

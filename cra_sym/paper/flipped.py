@@ -37,7 +37,7 @@ def flipped() -> Any:
 
 def characteristic() -> tuple[Any, tuple[Any, ...]]:
     """Return the frequency function of the flipped arm and its arguments (lamda, s_t, c_t, s_r, c_r, mu, iota)."""
-    from cra_sym.paper.modes import frequency_function, separated
+    from cra_sym.paper.frequency_equation import frequency_function, separated
 
     return separated(flipped()), frequency_function()[1]
 

@@ -10,9 +10,9 @@ import sympy as sp
 from cra_sym.paper.energy import modal_numbers
 from cra_sym.paper.equations import Derivation, Proof, derived, proves, samples
 from cra_sym.paper.evaluation import group_numbers
+from cra_sym.paper.frequency_equation import frequency_function
 from cra_sym.paper.groups import GROUPS
 from cra_sym.paper.limits import natural_frequency
-from cra_sym.paper.modes import frequency_function
 from cra_sym.paper.oracles import by_hand
 from cra_sym.paper.oracles.shooting import sample, shoot
 from cra_sym.symbols import symbol

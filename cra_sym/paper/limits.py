@@ -9,16 +9,14 @@ from cra_sym.arm.lagrangian import HALF
 from cra_sym.paper.energy import L, modal_numbers, phi_i
 from cra_sym.paper.equations import Derivation, Proof, derived, proves, samples
 from cra_sym.paper.evaluation import group_numbers, shapes_agree
+from cra_sym.paper.frequency_equation import by_power, frequency_function, frequency_polynomial
 from cra_sym.paper.modes import (
     C_1,
     VALUES,
     basis,
     beta,
-    by_power,
     c_r,
     c_t,
-    frequency_function,
-    frequency_polynomial,
     iota,
     kappa_r,
     kappa_t,

@@ -7,23 +7,8 @@ from sympy import Eq, Expr, MatMul, Matrix, cancel
 from cra_sym.paper.energy import phi_i
 from cra_sym.paper.equations import Derivation, Proof, derived, proves, samples
 from cra_sym.paper.evaluation import group_numbers, shapes_agree, shot_coefficients
-from cra_sym.paper.modes import (
-    C_1,
-    C_2,
-    C_3,
-    C_4,
-    basis,
-    c_r,
-    c_t,
-    coefficients,
-    mode_form,
-    r_2,
-    reduced_matrix,
-    reduced_system,
-    root_matrix,
-    s_r,
-    s_t,
-)
+from cra_sym.paper.frequency_equation import reduced_matrix, reduced_system
+from cra_sym.paper.modes import C_1, C_2, C_3, C_4, basis, c_r, c_t, coefficients, mode_form, r_2, root_matrix, s_r, s_t
 from cra_sym.paper.oracles import by_hand
 from cra_sym.paper.oracles.shooting import sample, shoot
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import cra_sym as cra
 from cra_sym import Arm
-from cra_sym.paper.modes import frequency_function
+from cra_sym.paper.frequency_equation import frequency_function
 from cra_sym.paper.oracles.implicit_rates import implicit_rates
 from cra_sym.symbols import L, t, v, x
 from tests.systems import system

@@ -190,6 +190,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "paper/parametric": [["tests/paper/test_parametric.py"], _FORCED],
     "analysis/static_corrections": [_STATICS, _SUMMED + _FEW_MODES, _LOOPED],
     "paper/resonance": [],
+    "paper/stability_boundary": [],
     "paper/shapes": [],
     "analysis/sensitivities": [
         ["tests/analysis/test_sensitivities.py"],

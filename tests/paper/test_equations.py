@@ -33,8 +33,8 @@ import cra_sym as cra
 from cra_sym.mechanics.steps import mathematics
 from cra_sym.paper import equations as registry
 from cra_sym.paper import evaluation
+from cra_sym.paper.frequency_equation import frequency_function
 from cra_sym.paper.modal_sum import ModalSum
-from cra_sym.paper.modes import frequency_function
 from cra_sym.paper.oracles import shooting
 from cra_sym.symbols import symbol
 

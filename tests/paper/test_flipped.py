@@ -6,7 +6,7 @@ from sympy import Rational
 
 import cra_sym as cra
 from cra_sym import symbols as s
-from cra_sym.paper import modes
+from cra_sym.paper import frequency_equation
 from cra_sym.paper.energy import potential, single_mode
 from cra_sym.paper.flipped import characteristic, flipped, flipped_frequencies
 from cra_sym.paper.motion import natural_conditions
@@ -24,7 +24,7 @@ def test_only_the_sign_of_the_rotational_condition_differs():
 
 def test_flipping_the_sign_is_a_negative_stiffness():
     function, _ = characteristic()
-    derived, _ = modes.frequency_function()
+    derived, _ = frequency_equation.frequency_function()
     negative = derived.subs(s.c_r, -s.c_r)
     assert 0 in ((function - negative).expand(), (function + negative).expand())
 

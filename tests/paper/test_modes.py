@@ -8,7 +8,7 @@ from sympy import cos, cosh, lambdify, limit, oo, pi, sin, sinh, sqrt, tan, tanh
 
 from cra_sym import symbols as s
 from cra_sym.mechanics import ritz
-from cra_sym.paper import modes
+from cra_sym.paper import frequency_equation, modes
 from cra_sym.paper.equations import equation
 from cra_sym.paper.motion import dynamics
 
@@ -18,7 +18,7 @@ BARE = {s.mu: 0, s.iota: 0}
 
 
 def frequency(*conditions):
-    function, _ = modes.frequency_function()
+    function, _ = frequency_equation.frequency_function()
     for condition in conditions:
         function = function.subs(condition)
     return function.expand()
@@ -40,7 +40,7 @@ def test_frequency_equation_is_the_known_determinant():
 
 
 def test_the_equation_shown_is_the_function_used():
-    assert (equation(23).expression.lhs - modes.frequency_function()[0]).expand() == 0
+    assert (equation(23).expression.lhs - frequency_equation.frequency_function()[0]).expand() == 0
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_coefficients_where_the_elimination_is_empty():
 
 def test_mode_shape_satisfies_all_four_conditions_for_random_parameters():
     rng = np.random.default_rng(30)
-    function, arguments = modes.frequency_function()
+    function, arguments = frequency_equation.frequency_function()
     for _ in range(5):
         numbers = dict(zip(arguments[1:], rng.uniform(0.1, 1.0, 6), strict=True))
         numeric = lambdify(s.lamda, function.subs(numbers))

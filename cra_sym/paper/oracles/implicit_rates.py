@@ -64,10 +64,10 @@ def weights(kappa: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 def squared_frequency_rates() -> tuple[dict[str, Expr], tuple[Symbol, ...]]:
     """Return the derivatives of omega^2 by the parameters of joint and end-effector, and their arguments."""
+    from cra_sym.paper.frequency_equation import frequency_function
     from cra_sym.paper.groups import GROUPS
     from cra_sym.paper.implicit import PAIRS, implicit_derivatives
     from cra_sym.paper.limits import natural_frequency
-    from cra_sym.paper.modes import frequency_function
     from cra_sym.symbols import symbol
 
     lamda, *groups = frequency_function()[1]
