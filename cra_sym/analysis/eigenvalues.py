@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.checks import count, default_floating_point, instance, real_array
-from cra_sym.model.spatial import SpatialProblem, Stiffness, check_range
+from cra_sym.model.spanned_stiffness import Stiffness, check_range
+from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.model.values import flat_columns
 from cra_sym.model.vanishing import check_ends

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from cra_sym import checks
 from cra_sym.analysis.complex_shapes import complex_shapes
 from cra_sym.model.routes import Modes
-from cra_sym.model.spatial import check_range
+from cra_sym.model.spanned_stiffness import check_range
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.si import Numbers
 

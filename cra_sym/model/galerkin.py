@@ -14,7 +14,7 @@ from cra_sym.cached import cached_property
 from cra_sym.checks import ByValue, broadcastable, count
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics import RitzMatrices
-from cra_sym.model.spatial import check_range
+from cra_sym.model.spanned_stiffness import check_range
 from cra_sym.model.values import checked_values, flat_columns, infinite_patterns
 
 __all__ = ["Ritz"]

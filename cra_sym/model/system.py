@@ -16,7 +16,7 @@ from cra_sym.model.energy_signs import refuse_negative
 from cra_sym.model.projection import Domain, Load, Projected, project
 from cra_sym.model.routes import ROUNDING, TOLERANCE, Estimated, Modes, Rated, Route
 from cra_sym.model.slip_elements import SlipElements, slip_elements, slip_terms_of
-from cra_sym.model.spatial import check_range
+from cra_sym.model.spanned_stiffness import check_range
 from cra_sym.model.values import Value, checked_damping, checked_values, frozen
 from cra_sym.model.vanishing import check_forces
 from cra_sym.si import Numbers
