@@ -7,18 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
 
 from cra_sym.analysis.eigenvalues import oscillating_frequencies
 from cra_sym.analysis.floquet import growth_rate
-from cra_sym.analysis.floquet_boundary import floquet_boundary
-from cra_sym.analysis.stability import forced_width, judged_boundary
+from cra_sym.analysis.stability import judged_boundary
 from cra_sym.arm.excitations import JointStiffness
 from cra_sym.arm.parameters import Arm
 from cra_sym.checks import count, one_number
 from cra_sym.figures.drawing import Panels, figure_of, panel, panels
-from cra_sym.figures.subject import arm_or_nominal, default_excitation, positive, rigid_body_modes, several, single
-from cra_sym.model.excitations import AxialBase, Excitation, Fluctuation, Parametric, TransverseBase
+from cra_sym.figures.subject import arm_or_nominal, default_excitation, rigid_body_modes, several, single
+from cra_sym.model.excitations import AxialBase, Fluctuation, Parametric
 from cra_sym.model.system import System
 
 if TYPE_CHECKING:
@@ -30,19 +28,17 @@ __all__ = [
     "figure_11_axial",
     "figure_12",
     "figure_12_axial",
-    "figure_accuracy",
     "figure_combinations",
-    "figure_widths",
     "figure_zones",
 ]
 
 #: Assumed: the paper's values of k_t are lost; the masses are published but for the first.
 K_T, M_E = (1e5, 1e4, 1e3), (0.0, 0.001, 0.005)
-AXIAL, JOINT, TRANSVERSE = AxialBase(0.01), JointStiffness(), TransverseBase(0.001)
-STRONG = AxialBase(0.05)
+AXIAL, JOINT = AxialBase(0.01), JointStiffness()
+RIGID = "no zone: a rigid joint cannot\nfluctuate; give $k_t$, as 1e4 N/m"
 _GROWTH = "YlOrBr"
-_FIRST: dict[str, Any] = {"color": "#0072B2", "linestyle": (0, (4, 2)), "linewidth": 1.2}
-_SECOND: dict[str, Any] = {"color": "#111111", "linestyle": "-", "linewidth": 1.2}
+FIRST: dict[str, Any] = {"color": "#0072B2", "linestyle": (0, (4, 2)), "linewidth": 1.2}
+SECOND: dict[str, Any] = {"color": "#111111", "linestyle": "-", "linewidth": 1.2}
 
 
 def _described(excitation: Parametric) -> str:
@@ -53,8 +49,8 @@ def _described(excitation: Parametric) -> str:
     return "joint stiffness fluctuates" if isinstance(excitation, JointStiffness) else "as the Lagrangian says"
 
 
-def _boundary(*given: Any, **more: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Suppress warnings about a boundary that are visible in the figure anyway."""
+def quiet_boundary(*given: Any, **more: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return the sides of a zone without the warnings about it, since the figure shows what they would say."""
     lower, upper, _ = judged_boundary(*given, **more)
     return lower, upper
 
@@ -73,10 +69,8 @@ def _growth(
     return growth_rate(system, excitation, frequency, epsilon[:, None], modes, residual=residual, tolerance=tolerance)
 
 
-_RIGID = "no zone: a rigid joint cannot\nfluctuate; give $k_t$, as 1e4 N/m"
-
-
-def _is_rigid(system: System, excitation: Parametric) -> bool:
+def is_rigid(system: System, excitation: Parametric) -> bool:
+    """Tell whether it is the stiffness of a rigid joint that should fluctuate."""
     return isinstance(excitation, JointStiffness) and bool(np.isinf(system.values["k_t"]))
 
 
@@ -86,7 +80,8 @@ def _excitation(system: System, given: Parametric | None, of_an_arm: Parametric)
     return of_an_arm if isinstance(system, Arm) else default_excitation(system)
 
 
-def _say(ax: Axes, words: str) -> None:
+def say(ax: Axes, words: str) -> None:
+    """Write a remark in the lower left corner."""
     ax.text(0.03, 0.04, words, transform=ax.transAxes, fontsize=7.5, color="0.25", va="bottom")
 
 
@@ -95,7 +90,7 @@ def _zone(
 ) -> None:
     """Draw one principal zone against its detuning."""
     modes, more = (min(number, arm.most_modes) for number in (max(mode, 3), mode + 2))
-    second = _boundary(arm, excitation, epsilon, (mode, mode), order=2, modes=modes)
+    second = quiet_boundary(arm, excitation, epsilon, (mode, mode), order=2, modes=modes)
     middle = 0.5 * (second[0] + second[1])
     if arm.conservative_part is arm:
         centre = 2 * float(arm.natural_frequencies(modes)[mode - 1])
@@ -104,14 +99,14 @@ def _zone(
     width = second[1] - second[0]  # the second order shifts the zone and keeps its width
     first, half = (centre - width / 2, centre + width / 2), width[-1] / 2
     if not half > 0:
-        _say(ax, _RIGID if _is_rigid(arm, excitation) else "no zone up to this ε")
+        say(ax, RIGID if is_rigid(arm, excitation) else "no zone up to this ε")
         ax.set_xticks([0])
         ax.set_ylim(0.0, epsilon[-1])
         return
     detuning = np.linspace(-1.7, 1.7, points) * half
     rates = _growth(arm, excitation, centre + detuning, epsilon, more, tolerance)
     _shade(ax, detuning, epsilon, rates)
-    for sides, look in ((first, _FIRST), (second, _SECOND)):
+    for sides, look in ((first, FIRST), (second, SECOND)):
         for side in sides:
             ax.plot(side - centre, epsilon, **look)
     ax.set_xlim(detuning[0], detuning[-1])
@@ -119,7 +114,7 @@ def _zone(
     ax.ticklabel_format(axis="x", style="sci", scilimits=(-2, 3), useMathText=True)
     ax.locator_params(axis="x", nbins=4)
     ax.grid(False)
-    _say(ax, f"$2\\omega_{mode}$ = {centre:.4g} rad/s\nwidth {2 * half:.3g} rad/s")
+    say(ax, f"$2\\omega_{mode}$ = {centre:.4g} rad/s\nwidth {2 * half:.3g} rad/s")
 
 
 def _shade(
@@ -157,7 +152,7 @@ def _principal_zones(
         ax.set_title(f"{title}mode {mode}" if mode == first else f"mode {mode}")
     for mode, ax in enumerate(grid[-1], start=first):
         ax.set_xlabel(rf"$\varpi - 2\omega_{mode}$ / (rad/s)")
-    handles = [grid[0, 0].plot([], [], **look)[0] for look in (_FIRST, _SECOND)]
+    handles = [grid[0, 0].plot([], [], **look)[0] for look in (FIRST, SECOND)]
     figure = figure_of(grid[0, 0])
     names = ("multiple scales, first order", "second order, all modes")
     note = f"shaded: growth by Floquet theory; {_described(excitation)}; widths at ε = {epsilon:g}, scales differ"
@@ -273,52 +268,6 @@ def _power(value: float) -> str:
     return f"$10^{{{exponent:.0f}}}$" if abs(exponent - round(exponent)) < 1e-9 else f"{value:g}"
 
 
-def figure_widths(arm: System | None = None, *, axes: Panels | None = None) -> Figure:
-    """Draw how wide the principal zones are against k_t and m_e: first-order widths at epsilon = 1, three excitations.
-
-    Parameters
-    ----------
-    arm : Arm, optional
-        By default the nominal one; against m_e it has k_t = 1e4 N/m.
-    axes : 2 x 3 array of Axes, optional
-    """
-    arm = arm_or_nominal(arm)
-    grid = panels(axes, 2, 3, (9.6, 5.6), sharex="row")
-    k_t, m_e = np.logspace(1, 6, 201), np.linspace(0.0, 0.02, 101)
-    titles = ("joint stiffness", "base along the arm", "base across the arm")
-    rows: tuple[tuple[np.ndarray, System, str, Sequence[float]], ...] = (
-        (k_t, arm.replace(k_t=k_t), "$k_t$ / (N/m)", K_T),
-        (m_e * 1e3, arm.replace(k_t=1e4, m_e=m_e), "$m_e$ / g", tuple(1e3 * m for m in M_E)),
-    )
-    for row, (values, batch, label, marks) in zip(grid, rows, strict=True):
-        for ax, excitation in zip(row, (JOINT, AXIAL, TRANSVERSE), strict=True):
-            for mode, width in enumerate(_widths(batch, excitation), start=1):
-                ax.plot(values, width, label=f"mode {mode}")
-            for mark in marks:
-                ax.axvline(mark, color="0.8", linewidth=0.8, zorder=0)
-            ax.set_yscale("log")
-            ax.set_xlabel(label)
-    for ax, title in zip(grid[0], titles, strict=True):
-        ax.set_xscale("log")
-        ax.set_title(title)
-    for row in grid:
-        row[0].set_ylabel("width / ε / (rad/s)")
-        row[2].set_ylabel("growth of the tip / ε / (m/s)")
-    grid[0, 0].legend()
-    figure = figure_of(grid[0, 0])
-    note = "first order, no damping; the base moves 10 mm along or 1 mm across at ε = 1; the last column is not a zone"
-    figure.supxlabel(note, fontsize=8, color="0.35")
-    return figure
-
-
-def _widths(arm: System, excitation: Excitation) -> list[np.ndarray]:
-    if isinstance(excitation, TransverseBase):
-        return list(np.moveaxis(forced_width(arm, excitation), -1, 0))
-    # the width is proportional to epsilon: any small value will do
-    sides = [_boundary(arm, excitation, 1e-3, (mode, mode)) for mode in (1, 2, 3)]
-    return [(upper - lower) / 1e-3 for lower, upper in sides]
-
-
 def figure_combinations(
     system: System | None = None,
     excitation: Parametric | None = None,
@@ -355,26 +304,26 @@ def figure_combinations(
     mesh = _shade(ax, frequency, sizes, rates, step=1.0 if rates.max() > 3 else None)
     for m in range(still + 1, still + 4):
         for n in range(m, still + 4):
-            for side in _boundary(system, excitation, sizes, (m, n), order=2, modes=still + 3):
-                ax.plot(side, sizes, **_SECOND | {"linewidth": 0.9})
+            for side in quiet_boundary(system, excitation, sizes, (m, n), order=2, modes=still + 3):
+                ax.plot(side, sizes, **SECOND | {"linewidth": 0.9})
             name = f"$2\\omega_{m}$" if m == n else f"$\\omega_{m}+\\omega_{n}$"
             _name(ax, name, omega[m - 1] + omega[n - 1], epsilon)
-        for side in _boundary(system, excitation, sizes, (m, m), order=2, tongue=2, modes=still + 3):
-            ax.plot(side, sizes, **_FIRST | {"linewidth": 0.9})
-        _name(ax, f"$\\omega_{m}$", omega[m - 1], epsilon, above=16, color=_FIRST["color"])
+        for side in quiet_boundary(system, excitation, sizes, (m, m), order=2, tongue=2, modes=still + 3):
+            ax.plot(side, sizes, **FIRST | {"linewidth": 0.9})
+        _name(ax, f"$\\omega_{m}$", omega[m - 1], epsilon, above=16, color=FIRST["color"])
     ax.set_xlim(frequency[0], frequency[-1])
     ax.set_ylim(0, epsilon)
     ax.grid(False)
     ax.set_xlabel(r"excitation frequency $\varpi$ / (rad/s)")
     ax.set_ylabel(r"$\epsilon$")
     ax.set_title(f"Principal and sum resonances: {_described(excitation)}", pad=32)
-    handles = [ax.plot([], [], **look)[0] for look in (_SECOND, _FIRST)]
+    handles = [ax.plot([], [], **look)[0] for look in (SECOND, FIRST)]
     figure = figure_of(ax)
     names = ("multiple scales, second order", "second tongue, width of order ε²")
     note = f"shaded: growth by Floquet theory, {still + 4} modes; thin streaks are tongues of higher order"
     figure.legend(handles, names, loc="outside lower center", ncols=2, title=note, title_fontsize=8)
     if mesh is None:
-        _say(ax, "no growth up to this ε")
+        say(ax, "no growth up to this ε")
     else:
         bar = ax.figure.colorbar(mesh, ax=ax, pad=0.01, aspect=30)
         bar.set_label(r"$\sqrt{\mathrm{growth\ rate\ /\ (1/s)}}$")
@@ -383,54 +332,3 @@ def figure_combinations(
 
 def _name(ax: Axes, name: str, place: float, top: float, above: float = 4, **look: Any) -> None:
     ax.annotate(name, (place, top), xytext=(0, above), textcoords="offset points", ha="center", **look)
-
-
-def figure_accuracy(
-    arm: System | None = None, epsilon: ArrayLike | None = None, *, axes: Panels | None = None
-) -> Figure:
-    """Draw the error of the boundaries against epsilon: first order has slope 2, second order slope 3.
-
-    Parameters
-    ----------
-    arm : Arm, optional
-        By default the nominal one with k_t = 1e4 N/m.
-    epsilon : array_like, optional
-    axes : pair of Axes, optional
-    """
-    arm = arm_or_nominal(arm, k_t=1e4)
-    epsilon = np.geomspace(0.03, 0.12, 3) if epsilon is None else positive("epsilon", epsilon, "sizes", unit="1")
-    grid = panels(axes, 1, 2, (8.6, 3.9), sharey=False)[0]
-    cases = ((JOINT, (2, 2)), (JOINT, (1, 2))), ((STRONG, (2, 2)), (STRONG, (1, 2)))
-    for ax, pair in zip(grid, cases, strict=True):
-        if _is_rigid(arm, pair[0][0]):
-            _say(ax, _RIGID)
-            continue
-        for (excitation, resonance), marker in zip(pair, "os", strict=True):
-            errors = boundary_errors(arm, excitation, epsilon, resonance)
-            for order, (error, look) in enumerate(zip(errors, (_FIRST, _SECOND), strict=True), start=1):
-                slope = np.polyfit(np.log(epsilon), np.log(error), 1)[0]
-                name = f"({resonance[0]}, {resonance[1]}), order {order}: slope {slope:.2f}"
-                fill = "white" if marker == "s" else look["color"]
-                ax.loglog(epsilon, error, marker=marker, markersize=5, markerfacecolor=fill, label=name, **look)
-        ax.set_xlabel(r"$\epsilon$")
-        ax.set_xticks(epsilon, [f"{size:.2g}" for size in epsilon])
-        ax.minorticks_off()
-        ax.legend(fontsize=8, loc="lower right")
-    grid[0].set_ylabel("largest error of the two sides / (rad/s)")
-    grid[0].set_title("Joint stiffness: error against Floquet")
-    grid[1].set_title("Base along the arm, 50 mm × ε")
-    return figure_of(grid[0])
-
-
-def boundary_errors(
-    arm: System, excitation: Parametric, epsilon: NDArray[np.float64], resonance: tuple[int, int]
-) -> np.ndarray:
-    """Return the largest error of a zone's two sides at orders 1 and 2 against Floquet theory, rad/s.
-
-    Returns
-    -------
-    ndarray, shape (2, len(epsilon))
-    """
-    truth = np.array([floquet_boundary(arm, excitation, size, resonance) for size in epsilon]).T
-    found = [np.array(_boundary(arm, excitation, epsilon, resonance, order=order)) for order in (1, 2)]
-    return np.array([np.abs(sides - truth).max(axis=0) for sides in found])

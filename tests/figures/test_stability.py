@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import cra_sym as cra
+from cra_sym.figures import boundaries
 from cra_sym.figures import stability as figures
 from cra_sym.model.one_wave import OneWave
 
@@ -53,18 +54,18 @@ def test_combinations_are_named():
 
 
 def test_widths():
-    figure = figures.figure_widths()
+    figure = boundaries.figure_widths()
     assert len(figure.axes) == 6
     joint, along, across = ([line.get_ydata() for line in ax.lines[:3]] for ax in figure.axes[:3])
     assert all(np.all(np.diff(width[-50:]) < 0) for width in joint)
     assert np.all(np.diff(along[0]) > 0)
     assert np.allclose(
-        np.array(across)[:, -1], cra.forced_width(cra.Arm.nominal().replace(k_t=1e6), figures.TRANSVERSE)
+        np.array(across)[:, -1], cra.forced_width(cra.Arm.nominal().replace(k_t=1e6), boundaries.TRANSVERSE)
     )
 
 
 def test_accuracy():
-    figure = figures.figure_accuracy(epsilon=[0.06, 0.12])
+    figure = boundaries.figure_accuracy(epsilon=[0.06, 0.12])
     slopes = {line.get_label(): line.get_label().rpartition(" ")[2] for ax in figure.axes for line in ax.lines}
     assert len(slopes) == 8 or len({*slopes}) >= 6
     for label, slope in slopes.items():
@@ -73,6 +74,6 @@ def test_accuracy():
 
 def test_a_rigid_joint_is_told_what_to_do():
     rigid = cra.Arm.nominal()
-    for drawn in (figures.figure_12(rigid, m_e=[0.0], points=5), figures.figure_accuracy(rigid, [0.1, 0.2])):
+    for drawn in (figures.figure_12(rigid, m_e=[0.0], points=5), boundaries.figure_accuracy(rigid, [0.1, 0.2])):
         words = [text.get_text() for ax in drawn.axes for text in ax.texts]
         assert any("a rigid joint cannot" in said and "give $k_t$" in said for said in words)
