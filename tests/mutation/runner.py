@@ -298,6 +298,7 @@ def _first_failing_test(parts: Sequence[Sequence[str]]) -> str:
 
     os.chdir(PACKAGE.parent)
     options = ["-x", "-q", "--assert=plain", "-o", "addopts=--import-mode=importlib"]
+    options += ["-k", "not sanitizers"]  # these reserve more than BYTES of addresses
     options += [
         f"-pno:{plugin}" for plugin in ("cacheprovider", "xdist", "nbval", "faulthandler", "unraisableexception")
     ]
