@@ -109,7 +109,7 @@ REFUSED |= {(of, name): "system: .*elastic-slip" for of in SLIPPING for name in 
 REFUSED |= {("identify_joint", name): "system: k_t must be the stiffness of an end" for name in (*NAMES, *TURNING)}
 # what is said of natural modes: 'eigenvalues' and the like tell of complex ones
 NATURAL = (
-    "natural_frequencies", "mode_shapes", "modal_parameters", "sensitivities", "certify", "forced_width", "backbone",
+    "natural_frequencies", "mode_shapes", "modal_parameters", "certify", "forced_width", "backbone",
     "steady_states", "response_curves", "nonlinear_modal_equations", "slow_flow_values", "sweep",
 )  # fmt: skip
 REFUSED |= {(of, name): "conservative forces, .*system.conservative_part" for of in NATURAL for name in TURNING}

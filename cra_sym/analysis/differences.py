@@ -13,7 +13,15 @@ from cra_sym.model.system import System
 if TYPE_CHECKING:
     from cra_sym.analysis.sensitivities import Sensitivities
 
-__all__ = ["by_differences", "central_weights", "rates_by_moved_supports"]
+__all__ = [
+    "by_differences",
+    "central_weights",
+    "offsets_at",
+    "own_stiffness",
+    "rates_by_moved_supports",
+    "room_of",
+    "weights_at",
+]
 
 Array = NDArray[np.float64]
 Quantity = Callable[[System], Array]
@@ -57,7 +65,7 @@ def by_differences(
     given = np.broadcast_to(system.values[name], system.shape)
     if compliance or name not in found.compliance:
         return _differences(system, found, name, quantity, compliance=compliance, step=step)
-    stiff = given > _own_stiffness(system, name)
+    stiff = given > own_stiffness(system, name)
     if not stiff.any():
         return _differences(system, found, name, quantity, compliance=False, step=step)
     by_compliance = _differences(system, found, name, quantity, compliance=True, step=step)
@@ -72,7 +80,7 @@ def by_differences(
 
 def rates_by_moved_supports(system: System, name: str, modes: int) -> Array:
     """Return the derivatives of omega by a parameter that moves a support inside, rad/s over its unit, (..., modes)."""
-    given, room = np.broadcast_to(system.values[name], system.shape), _room(system, name)
+    given, room = np.broadcast_to(system.values[name], system.shape), room_of(system, name)
     more = min(modes + 1, system.most_modes)  # the next mode may be close to the last one
     beside = system.replace(**{name: given + np.array([-1.0, 1.0])[:, *(None,) * given.ndim] * _SHORT * room})
     before, after = beside.natural_frequencies(more)
@@ -83,7 +91,7 @@ def rates_by_moved_supports(system: System, name: str, modes: int) -> Array:
     return np.asarray(np.tensordot(weights, moved, axes=1) / width[..., None])
 
 
-def _room(system: System, name: str) -> Array:
+def room_of(system: System, name: str) -> Array:
     """Return the change of a parameter at which a support inside meets another place; inf if it moves none."""
     moving = system.numerics("moving_supports").get(name)
     if moving is None:
@@ -96,7 +104,7 @@ def _room(system: System, name: str) -> Array:
     return np.asarray(meeting.min(axis=(-2, -1)))
 
 
-def _own_stiffness(system: System, name: str) -> Array:
+def own_stiffness(system: System, name: str) -> Array:
     """Return the end stiffness whose compliance equals that of the structure, shape of the batch."""
     rigid = system.conservative_part.replace(**{name: np.inf})
     end, place, factor = system.numerics("stiffnesses")[name]
@@ -136,26 +144,31 @@ def _differences(
     reach = _reach(found.frequency, found.compliance[name] if compliance else found.rate[name], place)
     if not compliance and name not in {*system.numerics("stiffnesses"), *system.numerics("inertias")}:
         reach = np.where(place == 0, reach, np.minimum(reach, np.abs(place)))  # such as a density: nothing beyond 0
-    width = step * np.minimum(reach, _room(system, name))
-    half = _POINTS // 2
-    room = np.floor(place / width).clip(0, half)
-    offsets = np.arange(-half, half + 1)[:, *(None,) * place.ndim] + (half - room)
+    width = step * np.minimum(reach, room_of(system, name))
+    offsets = offsets_at(place, width)
     values = place + offsets * width
     with np.errstate(divide="ignore"):
         moved = system.replace(**{name: 1 / values if compliance else values})
     values_there = quantity(moved)
     more = (None,) * (values_there.ndim - offsets.ndim)
-    weights = _weights(offsets) / width
+    weights = weights_at(offsets) / width
     return np.asarray((weights[(..., *more)] * values_there).sum(axis=0))
+
+
+def offsets_at(place: Array, width: Array) -> Array:
+    """Return the offsets of a difference of eighth order, (points, ...): central, or those that keep the sign."""
+    half = _POINTS // 2
+    room = np.where(place < 0, half, np.floor(place / width).clip(0, half))
+    return np.asarray(np.arange(-half, half + 1)[:, *(None,) * place.ndim] + (half - room))
 
 
 def central_weights() -> tuple[Array, Array]:
     """Return the offsets and the weights of the central difference of eighth order."""
     offsets = np.arange(-(_POINTS // 2), _POINTS // 2 + 1.0)
-    return offsets, _weights(offsets)
+    return offsets, weights_at(offsets)
 
 
-def _weights(offsets: Array) -> Array:
+def weights_at(offsets: Array) -> Array:
     """Return the weights of the derivative at 0 of the polynomial through values at offsets (points, ...)."""
     points = len(offsets)
     orders = np.arange(points, dtype=float).reshape(-1, *(1,) * offsets.ndim)

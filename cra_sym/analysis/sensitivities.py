@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.differences import by_differences, rates_by_moved_supports
+from cra_sym.analysis.eigenvalue_rates import eigenvalue_rates, with_next
+from cra_sym.analysis.eigenvalues import oscillating_frequencies
 from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
+from cra_sym.analysis.rates import Rates
 from cra_sym.cached import cached_property
 from cra_sym.checks import choice, count, default_floating_point, instance, names, one_axis
 from cra_sym.model.one_wave import Change, OneWaveModes
@@ -19,38 +22,9 @@ from cra_sym.model.system import MOST_MODES, System
 __all__ = ["Rates", "Sensitivities", "sensitivities"]
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 _SAME = 1e-10  # relative distance below which frequencies are equal to rounding
 _MIXED = 1e-6  # relative size of a rate, above rounding, beyond which a parameter splits a repeated frequency
-
-
-class Rates(Mapping[str, Array]):
-    """One kind of derivatives of the natural frequencies, by the name of the parameter; computed on use."""
-
-    def __init__(self, found: Sensitivities, kind: str, names: Sequence[str]) -> None:
-        self._found, self._kind, self._names = found, kind, tuple(names)
-
-    def __getitem__(self, name: str) -> Array:
-        if name not in self._names:
-            raise KeyError(name)
-        value: Array = getattr(self._found, f"_{self._kind}")(name)
-        return value
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Rates):
-            return NotImplemented
-        return (self._found, self._kind, self._names) == (other._found, other._kind, other._names)
-
-    def __hash__(self) -> int:
-        return hash((self._kind, self._names))
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({dict(self)!r})"
 
 
 class Sensitivities:
@@ -66,6 +40,10 @@ class Sensitivities:
     derivatives are nan. Derivatives by an infinite stiffness are 0; those by its compliance 1/k give the effect of a
     small compliance of a rigid support.
 
+    Of a system without natural modes (gyroscopic terms, forces that follow the motion), f is that of the motions that
+    oscillate, ``Im s / (2 pi)``. Derivatives of eigenvalues s are differences of eighth order with a relative error of
+    about 1e-10; they are nan where s is repeated or coalesces with another, as at the onset of flutter.
+
     Attributes
     ----------
     frequency : ndarray
@@ -76,16 +54,25 @@ class Sensitivities:
         Raw derivatives by 1/k for every stiffness k of an end: Hz N/m for one in N/m.
     df_dk_t, log_k_t, df_dc_t, ... : ndarray
         The same by attribute: of a parameter p ``df_dp`` and ``log_p``; ``df_dc_t`` is by the compliance 1/k_t.
+    eigenvalue : ndarray of complex
+        s, rad/s, of the motions ``exp(s t)`` that oscillate: with dampers too, see :func:`cra_sym.eigenvalues`.
+    eigenvalue_rate : mapping of str to ndarray of complex
+        Their raw derivatives: the real part is that of the growth, the imaginary one that of the angular frequency.
+    damping_ratio_rate : mapping of str to ndarray
+        Raw derivatives of the damping ratio, ``-Re s / |s|``.
     """
 
     frequency: Array
 
     def __init__(self, system: System, modes: int, by: Sequence[str]) -> None:
         self._system, self._modes, self._by = system, modes, tuple(by)
-        self.frequency = system.natural_frequencies(modes) / (2 * np.pi)
+        self.frequency = oscillating_frequencies(system, modes) / (2 * np.pi)
         stiff = [name for name in system.numerics("stiffnesses") if name in by]
-        self.rate, self.log = Rates(self, "raw", by), Rates(self, "logarithmic", by)
-        self.compliance = Rates(self, "by_compliance", stiff)
+        self.rate: Rates[Array] = Rates(self, "raw", by)
+        self.log: Rates[Array] = Rates(self, "logarithmic", by)
+        self.compliance: Rates[Array] = Rates(self, "by_compliance", stiff)
+        self.eigenvalue_rate: Rates[Complex] = Rates(self, "of_eigenvalue", by)
+        self.damping_ratio_rate: Rates[Array] = Rates(self, "of_damping_ratio", by)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Sensitivities):
@@ -116,6 +103,13 @@ class Sensitivities:
     def __dir__(self) -> list[str]:
         names = [f"{prefix}{name}" for name in self.rate for prefix in ("df_d", "log_")]
         return [*super().__dir__(), *names, *(f"df_d{name.replace('k_', 'c_', 1)}" for name in self.compliance)]
+
+    @property
+    def eigenvalue(self) -> Complex:
+        """Eigenvalues, rad/s."""
+        if self._system.numerics("conservative"):
+            return np.asarray(2j * np.pi * self.frequency)
+        return self._eigenvalues[..., : self._modes]
 
     # ------------------------------------------------------------------------------------------------------------
 
@@ -177,15 +171,26 @@ class Sensitivities:
         Raises
         ------
         ValueError
-            If the name was not asked for, or nothing of that name drives the model.
+            If the name was not asked for, nothing of that name drives the model, or it acts by more than its
+            acceleration or its value.
         """
         causes = dict(self._system.numerics("causes"))
         driver = only_motion(self._system) if motion is None else choice("motion", motion, causes)
+        if causes[driver] not in ("motion", "force"):
+            raise ValueError(
+                f"motion = {driver}: acts by its displacement or its velocity too, so the modes have no single "
+                "participation in it; must be a motion that acts by its acceleration alone, or a force"
+            )
         return self._changed(name, lambda system: participation(system, self._modes, driver))
 
     def _changed(self, name: str, quantity: Callable[[System], Array]) -> Array:
         """Return the derivative of a modal quantity of shape (..., modes, ...)."""
         choice("name", name, self._by)
+        if self._is_complex:
+            raise ValueError(
+                "system: has no real mode shapes, which shapes and participation differentiate; use "
+                "sensitivities(system.conservative_part), or differences of mode_shapes(damped=True)"
+            )
         more = Sensitivities(self._system, self._modes + 1, [name])  # the next mode may be close to the last one
         found = by_differences(self._system, more, name, quantity)
         none = np.zeros(self.frequency.shape, dtype=bool)
@@ -249,8 +254,34 @@ class Sensitivities:
         size = np.maximum(np.abs(own[..., :, None]), np.abs(own[..., None, :])) + np.abs(block)
         return np.asarray(np.any((self._repeated & (off > _MIXED * size))[..., : self._modes, :], axis=-1))
 
+    @cached_property
+    def _is_complex(self) -> bool:
+        """Whether there are no natural modes."""
+        return self._system.conservative_part is not self._system
+
+    @default_floating_point
+    def _of_eigenvalue(self, name: str) -> Complex:
+        if self._system.numerics("conservative"):
+            return np.asarray(2j * np.pi * self._raw(name))
+        return self._eigenvalue_rates(name)
+
+    def _eigenvalue_rates(self, name: str, *, compliance: bool = False) -> Complex:
+        found = eigenvalue_rates(self._system, name, self._eigenvalues, compliance=compliance)
+        return found[..., : self._modes]
+
+    @cached_property
+    def _eigenvalues(self) -> Complex:
+        return with_next(self._system, self._modes)
+
+    def _of_damping_ratio(self, name: str) -> Array:
+        s, rate = self.eigenvalue, self._of_eigenvalue(name)
+        size = np.where(s == 0.0, 1.0, np.abs(s))
+        return (s.real * (s.conj() * rate).real / size**2 - rate.real) / size
+
     @default_floating_point
     def _raw(self, name: str) -> Array:
+        if self._is_complex:
+            return self._of_eigenvalue(name).imag / (2 * np.pi)
         direct = self._at_an_end(name)
         if direct is not None:
             modes, kind, channel, factor = direct
@@ -261,6 +292,9 @@ class Sensitivities:
 
     @default_floating_point
     def _logarithmic(self, name: str) -> Array:
+        if self._is_complex:
+            given = np.asarray(self._system.values[name])
+            return np.asarray(column(np.where(np.isinf(given), 0.0, given)) * self._raw(name) / self.frequency)
         direct = self._at_an_end(name)
         if direct is not None:
             modes, kind, channel, _ = direct
@@ -289,6 +323,8 @@ class Sensitivities:
 
     @default_floating_point
     def _by_compliance(self, name: str) -> Array:
+        if self._is_complex:
+            return self._eigenvalue_rates(name, compliance=True).imag / (2 * np.pi)
         end, place, kernel = self._system.numerics("stiffnesses")[name]
         modes = self._system.modes(self._modes)
         factor = column(np.asarray(kernel.function(*self._system.domain.values)))
@@ -325,7 +361,8 @@ def sensitivities(system: System, modes: int = 3, by: Sequence[str] | None = Non
     First-order perturbation with mass-normalised modes: d omega_i^2 is the modal change of the stiffness minus
     omega_i^2 times that of the mass. Displacements are held fixed relative to the length, so that lengths are
     parameters like any other. By a parameter that moves a support inside the domain, derivatives are differences of
-    eighth order, with a relative error of about 1e-8.
+    eighth order, with a relative error of about 1e-8. Without natural modes they are those of the complex eigenvalues,
+    which all systems have as ``eigenvalue_rate``.
 
     Parameters
     ----------
