@@ -108,14 +108,13 @@ REFUSED |= {(of, name): "system: .*elastic-slip" for of in SLIPPING for name in 
 # the case of the arm, its joint: of other systems 'identify'
 REFUSED |= {("identify_joint", name): "system: k_t must be the stiffness of an end" for name in (*NAMES, *TURNING)}
 # what is said of natural modes: 'eigenvalues' and the like tell of complex ones
-NATURAL = (
-    "natural_frequencies", "mode_shapes", "modal_parameters", "certify", "forced_width", "backbone",
-    "steady_states", "response_curves", "nonlinear_modal_equations", "slow_flow_values", "sweep",
-)  # fmt: skip
-REFUSED |= {(of, name): "conservative forces, .*system.conservative_part" for of in NATURAL for name in TURNING}
+NATURAL = ("natural_frequencies", "mode_shapes", "modal_parameters", "certify", "forced_width", "sweep")
+REFUSED |= {(of, name): "no natural modes, .*system.conservative_part" for of in NATURAL for name in TURNING}
 PIPE, SHAFT = TURNING
+REFUSED |= {("slow_flow_values", name): "gyroscopic terms .*use steady_states" for name in TURNING}
+REFUSED |= {("backbone", PIPE): "forces that follow the motion are neither"}
 # without dampers no ratio; the slow flow of a free mode has a decay alone; what leaves the pipe takes energy along
-ZERO = {(of, name) for of in ("damping_ratios", "slow_flow_values") for name in (*NAMES, SHAFT)}
+ZERO = {("damping_ratios", name) for name in (*NAMES, SHAFT)} | {("slow_flow_values", name) for name in NAMES}
 ZERO |= {("growth_rate", PIPE)}
 # and a shaft that is as stiff across as upright couples no mode with itself: zones that the message says are none
 NO_ZONE = {("stability_boundary", PIPE): "below the threshold", ("stability_boundary", SHAFT): "does not couple"}

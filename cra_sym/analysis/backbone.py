@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cra_sym import checks
 from cra_sym.analysis.backbone_problem import FollowedMode
-from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, ConvergenceWarning, warn_of_slopes
+from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, ConvergenceWarning, embedding, warn_of_slopes
 from cra_sym.analysis.slip_backbone import held_curve, warn_of_missing
 from cra_sym.model.system import System
 from cra_sym.si import Numbers
@@ -42,7 +42,8 @@ class Backbone(checks.ByValue):
     angular_frequency : ndarray, shape (...)
         rad/s.
     energy : ndarray, shape (...)
-        At the instant of zero velocity, J.
+        At the instant of zero velocity, J; with gyroscopic terms, where there is none, the energy v dL/dv - L, which is
+        constant.
     amplitude : ndarray, shape (...)
         Peak at the tip, or of the chosen displacement.
     stable : ndarray of bool, shape (...)
@@ -51,7 +52,8 @@ class Backbone(checks.ByValue):
         Estimated relative truncation error of the frequency: its change with three more modes, and with four more
         harmonics.
     coefficients : ndarray, shape (..., modes, functions)
-        Modal coordinates as sums of cosines of ``multiples`` of the phase.
+        Modal coordinates as sums of cosines of ``multiples`` of the phase; with gyroscopic terms also of the sines of
+        those that are not zero, after the cosines.
     multiples : tuple of int
     crossings : ndarray, shape (branch points,)
         Angular frequencies at which the curve meets another one on the way.
@@ -102,6 +104,9 @@ def backbone(
     Harmonic balance, continued by arclength from the linear mode through every fold. No internal
     resonance is skipped: a change of the number of negative eigenvalues of the Jacobian shows that a step was too long.
 
+    Dampers are left out. Without natural modes, as with gyroscopic terms, the curve begins at a motion of the system
+    between the modes of its conservative part, and mode counts these motions.
+
     With elastic-slip elements the motion is damped, also by dampers and damping ratios. It is made periodic by damping
     of opposite sign, -2 zeta omega times the velocity of every mode (EPMC, Krack 2015). Its amplitude must be
     given; it is stable if no multiplier of the equations without this damping has a modulus beyond 1 + 1e-6. Its
@@ -128,9 +133,9 @@ def backbone(
     branches : bool
         Whether to follow the curves that cross the whole curve too, both ways, where an internal resonance joins two
         modes or a motion of another form sets in; where several cross at one point, one of them. Like the curve itself,
-        they are sums of cosines of ``multiples``; motions without this symmetry, or of twice the period, that begin
-        where a multiplier passes 1 or -1, are not followed. A branch ends at energies below those of the curve, or
-        where it closes.
+        they have the harmonics ``multiples``, and no sines without gyroscopic terms; motions without this symmetry, or
+        of twice the period, that begin where a multiplier passes 1 or -1, are not followed. A branch ends at energies
+        below those of the curve, or where it closes.
     place, field : optional
         Of the peak, instead of the tip.
 
@@ -152,7 +157,7 @@ def backbone(
     TypeError, ValueError
         If an argument is out of its range, both energy and amplitude are given, the system is a batch, has no
         vibrating mode of that number, has constant loads, terms that are not polynomial, or forces without a potential
-        that are even in time.
+        that are even in time, such as forces that follow the motion.
 
     Examples
     --------
@@ -219,10 +224,10 @@ def _held(
 
 
 def _started(problem: FollowedMode, measure: Measure, below: float | None) -> tuple[Curve, Point]:
-    curve = Curve(problem.balance, float(problem.equations.omega[problem.mode - 1]))
+    curve = Curve(problem.balance, problem.linear)
     size = problem.small()
     if below is not None:
-        whole = measure(problem.linear_motion(1.0))[0]
+        whole = measure(np.append(problem.linear_motion(1.0), problem.linear))[0]
         if not whole > 0:
             raise ValueError("amplitude: the mode does not move there; choose another place or field")
         power = 2.0 if measure == problem.energy else 1.0
@@ -239,14 +244,14 @@ def _whole(problem: FollowedMode, points: int, branches: bool) -> Backbone:
     if not problem.equations.energies:
         raise ValueError("system: is linear, so its backbone has no end; ask for an energy or an amplitude")
     curve, start = _started(problem, problem.energy, None)
-    found = list(itertools.islice(follow(curve, start), points))
+    found = list(itertools.islice(follow(curve, start, leaps=True), points))
     if len(found) < points:
         _unfinished(found[-1], f"after {len(found)} of {points} points")
     whole = _backbone_of(problem, *_along(found), _crossings(found))
     if not branches:
         return whole
-    lowest, lines = problem.energy(start.unknowns)[0], list[Backbone]()
-    for other in branches_of(curve, found, points, lambda point: problem.energy(point.unknowns)[0] < lowest):
+    lowest, lines = problem.energy(start.vector)[0], list[Backbone]()
+    for other in branches_of(curve, found, points, lambda point: problem.energy(point.vector)[0] < lowest):
         if other.broken:
             _unfinished((other.points or [other.origin])[-1], "on a branch")
         if other.points:
@@ -266,7 +271,7 @@ def _at_targets(problem: FollowedMode, targets: Array, measure: Measure, name: s
     answers: list[Array | None] = [None] * flat.size
     passed: list[Point] = []
     value, slope = _rate(measure, point)
-    for following in follow(curve, point):
+    for following in follow(curve, point, leaps=True):
         passed.append(following)
         new_value, new_slope = _rate(measure, following)
         for k, target in enumerate(flat):
@@ -282,7 +287,7 @@ def _at_targets(problem: FollowedMode, targets: Array, measure: Measure, name: s
         _unfinished(passed[-1], f"before {name} = {flat[missing[0]]:g}")
     blank = np.full(problem.balance.size + 1, np.nan)
     vectors = [blank if a is None else a for a in answers]
-    normals = [blank if a is None else np.append(measure(a[:-1])[1], 0.0) for a in answers]
+    normals = [blank if a is None else measure(a)[1] for a in answers]
     return _backbone_of(problem, vectors, normals, targets.shape, _crossings(passed))
 
 
@@ -298,16 +303,16 @@ def _unfinished(last: Point, where: str) -> None:
 
 def _rate(measure: Measure, point: Point) -> tuple[float, float]:
     """Return the logarithm of the measure and its derivative along the curve."""
-    value, gradient = measure(point.unknowns)
-    return float(np.log(value)), float(gradient @ point.tangent[:-1] / value)
+    value, gradient = measure(point.vector)
+    return float(np.log(value)), float(gradient @ point.tangent / value)
 
 
 def _refined(curve: Curve, before: Point, after: Point, share: float, measure: Measure, target: float) -> Array | None:
     guess = between(before, after, share)
 
     def constraint(vector: Array) -> tuple[float, Array]:
-        value, gradient = measure(vector[:-1])
-        return np.log(value / target), np.append(gradient / value, 0.0)
+        value, gradient = measure(vector)
+        return np.log(value / target), gradient / value
 
     found = correct(curve, guess, constraint, 20)
     return None if found is None else found[0]
@@ -323,7 +328,7 @@ def _backbone_of(
     size, multiples = len(stacked), problem.balance.basis.cosines
     energy, largest = np.full(size, np.nan), np.full(size, np.nan)
     for k in np.flatnonzero(good):
-        energy[k] = problem.energy(unknowns[k])[0]
+        energy[k] = problem.energy(stacked[k])[0]
     coefficients = problem.balance.coefficients(unknowns)
     warn_of_slopes(problem.system, problem.balance.basis, coefficients[good], 6)
     largest[good] = peak(problem.balance.basis, problem.rows, coefficients[good])[0]
@@ -354,7 +359,10 @@ def _stable(problem: FollowedMode, coefficients: Array, frequency: Array) -> NDA
     """Return whether all multipliers are on the unit circle, except the pair at 1 due to the curve itself."""
     if not len(frequency):
         return np.zeros(0, bool)
-    values = multipliers(problem.equations, problem.balance.basis, coefficients, frequency, tolerance=1e-7, even=True)
+    basis = problem.balance.basis
+    even = not basis.sines  # else there is no instant about which motions are even in time
+    tolerance = 1e-7 if even else 1e-11
+    values = multipliers(problem.equations, basis, coefficients, frequency, tolerance=tolerance, even=even)
     order = np.argsort(np.abs(values - 1.0), axis=1)
     others = np.take_along_axis(values, order[:, 2:], axis=1)
     return np.asarray(np.abs(others).max(axis=1, initial=0.0) <= 1.0 + UNSTABLE)
@@ -366,22 +374,23 @@ def _changed(problem: FollowedMode, more: tuple[int, int], vectors: Array, norma
         rich = problem.richer(*more)
     except ValueError:  # there are no more modes
         return np.zeros(len(vectors))
-    n, old, new = problem.equations.modes, problem.balance.basis.cosines, rich.balance.basis.cosines
-    places = [new.index(k) for k in old]
+    n, old, new = problem.equations.modes, problem.balance.basis, rich.balance.basis
+    places = [new.cosines.index(k) for k in old.cosines]
+    places += [len(new.cosines) + new.sines.index(k) for k in old.sines]
+    into = embedding(problem.system, n, rich.equations.modes).T
 
     def embedded(rows: Array) -> Array:
-        x = np.zeros((len(rows), rich.equations.modes, len(new)))
-        x[:, :n, places] = rows[:, :-1].reshape(-1, n, len(old))
+        x = np.zeros((len(rows), rich.equations.modes, new.size))
+        x[:, :, places] = into @ rows[:, :-1].reshape(-1, n, old.size)
         return np.concatenate([x.reshape(len(rows), -1), rows[:, -1:]], axis=1)
 
-    curve = Curve(rich.balance, float(rich.equations.omega[problem.mode - 1]))
+    curve = Curve(rich.balance, rich.linear)
     z, normal = embedded(vectors), embedded(normals)
     metric = np.stack([curve.metric(row[:-1], row[-1]) for row in z])
     for _ in range(2):
-        balanced = rich.balance.at(z[:, :-1], z[:, -1])
-        matrix = np.concatenate([balanced.jacobian(), balanced.by_frequency[:, :, None]], axis=2)
+        residual, matrix = (np.stack(part) for part in zip(*(curve.linearised(row)[:2] for row in z), strict=True))
         size = np.linalg.norm(normal / metric, axis=1)[:, None]
         bordered = np.concatenate([matrix / metric[:, None, :], (normal / metric / size)[:, None, :]], axis=1)
-        right = np.concatenate([balanced.residual, np.zeros((len(z), 1))], axis=1)
+        right = np.concatenate([residual, np.zeros((len(z), 1))], axis=1)
         z = z - np.linalg.solve(bordered, right[:, :, None])[:, :, 0] / metric
     return np.abs(z[:, -1] / vectors[:, -1] - 1.0)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.analysis.nonlinear import samples, watched
+from cra_sym.analysis.nonlinear import embedding, samples, watched
 from cra_sym.analysis.periodic_forcing import Forced, forced
 from cra_sym.analysis.steady_seeds import seeds
 from cra_sym.cached import cached_property
@@ -134,8 +134,8 @@ class DrivenProblem:
         coefficients: Array = self.balance.coefficients(unknowns)[0]
         rich, n, h = DrivenProblem.of(**options), len(coefficients), coefficients.shape[1] // 2
         x = np.zeros((options["modes"], rich.basis.size))
-        x[:n, : h + 1], start = coefficients[:, : h + 1], options["harmonics"] + 1
-        x[:n, start : start + h] = coefficients[:, h + 1 :]
+        into, start = embedding(options["system"], n, options["modes"]).T, options["harmonics"] + 1
+        x[:, : h + 1], x[:, start : start + h] = into @ coefficients[:, : h + 1], into @ coefficients[:, h + 1 :]
         before = x.ravel()[None].copy()
         after, _ = newton(rich.balance, before, at[None, 0] / self.period, rich.causes(at[None]), most=2)
         size = np.linalg.norm(before)

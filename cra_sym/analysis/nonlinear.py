@@ -19,12 +19,21 @@ from cra_sym.si import Numbers
 from cra_sym.solvers.harmonic_balance import Basis
 from cra_sym.solvers.modal_polynomials import ModalPolynomials
 
-__all__ = ["ConvergenceWarning", "equations_of", "nonlinear_modal_equations", "samples", "warn_of_slopes", "watched"]
+__all__ = [
+    "ConvergenceWarning",
+    "embedding",
+    "equations_of",
+    "nonlinear_modal_equations",
+    "samples",
+    "warn_of_slopes",
+    "watched",
+]
 
 Array = NDArray[np.float64]
 MOST_NONLINEAR_MODES = 40
 _STEEP = 0.2  # v_x^2/2 at which terms of the next order, of size v_x^4, are 0.4 of those kept
 _PLACES = 41
+_SAME = 1e-6  # relative distance of frequencies whose modes may be combined differently among more modes
 
 
 class ConvergenceWarning(UserWarning):
@@ -55,7 +64,8 @@ def nonlinear_modal_equations(system: System, modes: int = 3, zeta: Numbers | No
     .. math:: L = \tfrac12\dot q^T\dot q - \tfrac12 q^T\Omega^2 q + \sum T[q, \ldots, q, \dot q, \ldots, \dot q]
 
     The modes are exact, mass-normalised and positive at the tip; the tensors are integrals along the domain by
-    Gauss quadrature.
+    Gauss quadrature. A system without natural modes has the modes of its conservative part, coupled by gyroscopic terms
+    in the damping matrix and by forces that follow the motion.
 
     Parameters
     ----------
@@ -124,12 +134,38 @@ def watched(system: System, modes: int, place: Any = None, field: Any = None) ->
         If it is not a field or coordinate of the model, or the place is not in the domain.
     """
     checks.count("modes", modes, high=MOST_MODES)
-    found, entry = system.modes(modes), section_place(system, field, lumped=True)
+    found, entry = system.conservative_part.modes(modes), section_place(system, field, lumped=True)
     if place is None:
         return displaced(system, found, entry)
     at = checks.one_number("place", place, unit="m")
     check_places(system, np.asarray(at), "place")
     return displaced(system, found, entry, np.atleast_1d(at))[..., 0]
+
+
+def embedding(system: System, modes: int, more: int) -> Array:
+    """Return the first modes in terms of those of a larger set, shape (modes, more).
+
+    They are the same except that modes of equal frequency, as of a beam that is alike in two planes, may be ordered or
+    combined differently.
+    """
+    part, found = system.conservative_part, np.eye(modes, more)
+    omega = part.natural_frequencies(more)
+    together = np.abs(omega[:, None] - omega) <= _SAME * omega[:, None]
+    if not (together.sum(axis=1) > 1)[:modes].any():
+        return found
+    displacements, coordinates = part.numerics("sizes")
+    x = float(part.domain.left) + float(part.domain.length) * np.linspace(0.0, 1.0, _PLACES)
+
+    def values(number: int) -> Array:
+        own = part.modes(number)
+        parts = [own.shape(k, 0, x) for k in range(displacements)]
+        return np.concatenate([*parts, *(own.coordinate(k)[:, None] for k in range(coordinates))], axis=1)
+
+    old, new = values(modes), values(more)
+    for mode in np.flatnonzero((together.sum(axis=1) > 1)[:modes]):
+        found[mode] = 0.0
+        found[mode, together[mode]] = np.linalg.lstsq(new[together[mode]].T, old[mode], rcond=None)[0]
+    return found
 
 
 def samples(degree: int, harmonics: int, causes: int = 0) -> int:
@@ -151,7 +187,7 @@ def warn_of_slopes(system: System, basis: Basis, coefficients: Array, stacklevel
     terms: NonlinearTerms | None = system.numerics("nonlinear")
     if terms is None or not len(coefficients):
         return
-    domain, modes = system.domain, system.modes(coefficients.shape[1])
+    domain, modes = system.domain, system.conservative_part.modes(coefficients.shape[1])
     x = float(domain.left) + float(domain.length) * np.linspace(0.0, 1.0, _PLACES)
     phase = 2 * np.pi * np.arange(4 * int(basis.orders.max(initial=1.0)) + 4) / (4 * basis.orders.max(initial=1.0) + 4)
     q = (coefficients @ basis.values(phase).T).swapaxes(1, 2)

@@ -110,6 +110,11 @@ def slow_flow_values(flow: SlowFlow, system: System) -> dict[Symbol, float]:
 
     checks.instance("flow", flow, SlowFlow)
     checks.instance("system", system, System)
+    if system.conservative_part is not system:
+        raise ValueError(
+            "system: gyroscopic terms or forces that follow the motion couple its modes at the lowest order, which a "
+            "slow flow leaves out; use steady_states, response_curves or backbone"
+        )
     found = sorted({s for e in flow.amplitude_equations for s in e.free_symbols}, key=str)
     numbers = [int(s.name[6:]) for s in found if s.name.startswith("omega_")]
     numbers += [n for c in flow.coefficients for n in c.indices]

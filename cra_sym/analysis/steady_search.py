@@ -44,7 +44,8 @@ def is_stable(problem: Problem, multipliers: Complex) -> NDArray[np.bool_]:
 
 def _damped(problem: Problem) -> bool:
     equations = problem.driven.equations
-    return bool(equations.damping.any()) or any(term.velocities for term in equations.forces)
+    resistance = equations.damping + equations.damping.T  # without gyroscopic terms
+    return bool(resistance.any()) or any(term.velocities for term in equations.forces)
 
 
 def answers_at(problem: Problem, points: Array, shape: tuple[int, int]) -> Answers:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from cra_sym.checks import broadcastable, real_array, shown
 from cra_sym.model.modal_matrices import between_modes
-from cra_sym.model.projection import Load, project
 from cra_sym.model.system import System
 from cra_sym.model.values import Value, frozen
 from cra_sym.si import paired
@@ -134,14 +133,11 @@ class LagrangianTerms(Parametric):
         found = []
         for part in self._model.oscillating_terms:
             if part.force is not None:
-                found.append((part.oscillation, part.small, self._on_modes(system, modes, part.force)))
+                found.append((part.oscillation, part.small, system.project(part.force, modes)))
             if part.momentum is not None:
                 oscillation, factor = part.oscillation.rate()
-                found.append((oscillation, part.small, factor * self._on_modes(system, modes, part.momentum)))
+                found.append((oscillation, part.small, factor * system.project(part.momentum, modes)))
         return found
-
-    def _on_modes(self, system: System, modes: int, load: Load) -> Array:
-        return project(system.domain, system.conservative_part.modes(modes), load)
 
     def _check(self, system: System) -> None:
         if system.model != self._model:

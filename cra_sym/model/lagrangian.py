@@ -344,8 +344,8 @@ class Model(Asked):
         problem = asymmetry(form)
         if problem:
             raise ValueError(
-                f"natural frequencies need conservative forces, and {problem}; use eigenvalues and "
-                "mode_shapes(damped=True), or system.conservative_part, which leaves such forces out"
+                f"system: has no natural modes, since {problem}; use eigenvalues and mode_shapes(damped=True), or "
+                "system.conservative_part, which leaves such forces out"
             )
         return form
 

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.cached import cached_property
+from cra_sym.model.modal_matrices import modal_matrices
 from cra_sym.model.nonlinear import Factor, NonlinearTerms, Product
-from cra_sym.model.projection import Place, Projected, along, displaced
+from cra_sym.model.projection import Place, along, displaced
 from cra_sym.model.system import System
 from cra_sym.solvers.modal_polynomials import ModalPolynomials, Term, symmetrised
 
@@ -30,7 +31,8 @@ class ModalEquations:
     Attributes
     ----------
     polynomials : ModalPolynomials
-        Frequencies, damping and coefficient tensors.
+        Frequencies, damping and coefficient tensors; without natural modes, between the modes of the conservative
+        part, with gyroscopic terms in the damping and forces that follow the motion among the forces.
     causes : tuple of (str, int)
         Known functions of time in the nonlinear terms, with the order of the derivative.
     error : float
@@ -63,12 +65,14 @@ def modal_equations(system: System, modes: int, zeta: float | Array | None = Non
             f"system has the batch shape {system.shape}: must be a single one here; see System.parameter_sets"
         )
     energies, forces, causes, error = system.cached("nonlinear", modes, lambda n: _projected(system, n))
-    omega = system.natural_frequencies(modes)
+    matrices = modal_matrices(system, modes)
+    omega = matrices.omega
     ratios = np.broadcast_to(system.zeta if zeta is None else zeta, omega.shape)
     damping = np.diag(2 * ratios * omega)
-    form = system.numerics("damping")
-    if form is not None:
-        damping = damping + Projected(system.domain, system.modes(modes), form)["damping"]
+    if matrices.damping is not None:
+        damping = damping + matrices.damping
+    if matrices.stiffness is not None:
+        forces = (*forces, Term(-matrices.stiffness, 1, 0))
     return ModalEquations(ModalPolynomials(omega, damping, energies, forces), causes, error)
 
 
@@ -98,7 +102,7 @@ class _Projection:
     """Terms integrated with one set of panels."""
 
     def __init__(self, system: System, modes: int, terms: NonlinearTerms, panels: int) -> None:
-        self._system, self._modes, self._terms, self._n = system, system.modes(modes), terms, modes
+        self._system, self._modes, self._terms, self._n = system, system.conservative_part.modes(modes), terms, modes
         domain = system.domain
         self._values = [float(value) for value in domain.values]
         columns = np.array(self._values)[:, None]

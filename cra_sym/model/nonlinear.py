@@ -122,7 +122,8 @@ class _Reader:
             (inside if everywhere else discrete).extend(self._force(force, jet, None))
         integrands, weights = self._integrands()
         places = tuple(point.place for point in variation.points)
-        coefficients = [*(c for _, c in inside), *weights, *self._model.conservative.system]
+        part = self._model.numerics("conservative_part") or self._model
+        coefficients = [*(c for _, c in inside), *weights, *part.conservative.system]
         return NonlinearTerms(
             tuple(p for p, _ in inside),
             tuple(p for p, _ in discrete),

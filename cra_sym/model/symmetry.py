@@ -34,7 +34,7 @@ def vanishes(expression: Expr) -> bool:
 def asymmetry(form: StateForm) -> str:
     """Return a description of the terms that make the problem unsymmetric, or an empty text."""
     if form.damped:
-        return "the Lagrangian has terms of first order in time"
+        return "the Lagrangian has gyroscopic terms, of first order in time"
     half = form.system.rows // 2
     a, b, c, d = (form.system[i : i + half, j : j + half] for i in (0, half) for j in (0, half))
     points = ((matrix, matrix.T) for _, matrix, _ in form.points)

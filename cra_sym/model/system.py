@@ -314,9 +314,10 @@ class System:
         return kept[key]
 
     def project(self, load: Load, modes: int) -> Array:
-        """Return the generalised force of a load on every mode, shape (..., modes)."""
-        check_forces(self, load, self._route)
-        return project(self.domain, self.modes(modes), load)
+        """Return the generalised force of a load on every mode of the conservative part, shape (..., modes)."""
+        part = self.conservative_part
+        check_forces(part, load, part._route)
+        return project(part.domain, part.modes(modes), load)
 
     def form(self, name: str, modes: int, *, diagonal: bool = False) -> Projected:
         """Return bilinear forms that were derived from the Lagrangian, between the modes."""

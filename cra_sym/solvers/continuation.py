@@ -35,11 +35,12 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Measure = Callable[[Array], tuple[float, Array]]
-"""A positive function of the unknowns, such as the energy, and its gradient."""
+"""A positive function of unknowns and frequency, such as the energy, and its gradient."""
 _LARGEST = 0.05  # step relative to the size of the motion
 _LARGEST_NEAR = 0.25  # the same where the frequency is still that of the linear mode
 _NEAR = 0.005
 _SMALLEST = 2e-5
+_LEAPS = 4 * _SMALLEST, 8 * _SMALLEST, 16 * _SMALLEST
 _TURN = 0.9  # cosine of the largest angle between the tangents at both ends of a step
 
 
@@ -123,7 +124,14 @@ class Curve:
     def linearised(self, vector: Array) -> tuple[Array, Array, float]:
         """Return residual, its rates (size, size + 1), and the scale of the residual."""
         at = self.balance.at(vector[None, :-1], vector[-1:])
-        rates = np.concatenate([at.jacobian()[0], at.by_frequency[0][:, None]], axis=1)
+        jacobian = at.jacobian()[0]
+        if self.balance.basis.sines:
+            # the residual is orthogonal to the rate of the motion, along which the Jacobian is singular: a change of
+            # the phase is excluded by a term in this direction alone
+            rate = (at.x[0] @ self.balance.basis.turned.T).ravel()
+            rate /= np.linalg.norm(rate)
+            jacobian = jacobian - vector[-1] ** 2 * np.outer(rate, rate)
+        rates = np.concatenate([jacobian, at.by_frequency[0][:, None]], axis=1)
         return at.residual[0], rates, float(at.scale[0])
 
     def mark(self, rates: Array, tangent: Array, metric: Array) -> int:
@@ -194,17 +202,18 @@ def correct(
 
 def first_point(curve: Curve, unknowns: Array, measure: Measure) -> Point | None:
     """Return the point near the linear mode with the measure of the given motion, oriented towards growth."""
-    target, _ = measure(unknowns)
+    start = np.append(unknowns, curve.linear)
+    target, _ = measure(start)
 
     def constraint(vector: Array) -> tuple[float, Array]:
-        value, gradient = measure(vector[:-1])
-        return np.log(value / target), np.append(gradient / value, 0.0)
+        value, gradient = measure(vector)
+        return np.log(value / target), gradient / value
 
-    found = correct(curve, np.append(unknowns, curve.linear), constraint, 30)
+    found = correct(curve, start, constraint, 30)
     if found is None:
         return None
     vector, rates = found
-    return point_at(curve, vector, rates, np.append(measure(vector[:-1])[1], 0.0))
+    return point_at(curve, vector, rates, measure(vector)[1])
 
 
 def started(curve: Followed, unknowns: Array, frequency: float, sense: float = 1.0) -> Point | None:
@@ -223,8 +232,11 @@ def point_at(curve: Followed, vector: Array, rates: Array, gradient: Array) -> P
     return Point(vector[:-1], float(vector[-1]), tangent, curve.mark(rates, tangent, metric))
 
 
-def follow(curve: Followed, start: Point) -> Iterator[Point]:
-    """Yield the points of a curve, the first included, until no step converges."""
+def follow(curve: Followed, start: Point, *, leaps: bool = False) -> Iterator[Point]:
+    """Yield the points of a curve, the first included, until no step converges.
+
+    With ``leaps``, another curve that comes so close that the steps between them are too short is leapt over.
+    """
     yield start
     point, length = start, curve.longest(start.frequency)
     while True:
@@ -234,14 +246,16 @@ def follow(curve: Followed, start: Point) -> Iterator[Point]:
             following = _step(curve, point, length)
             if following is None:
                 length *= 0.5
+        for leap in _LEAPS if leaps and following is None else ():
+            following = following or _step(curve, point, leap, leaps=True)
         if following is None:
             return
-        point = following
+        point, length = following, max(length, following.step)
         yield point
         length *= 2.0 if point.step == length else 1.0
 
 
-def _step(curve: Followed, point: Point, length: float) -> Point | None:
+def _step(curve: Followed, point: Point, length: float, *, leaps: bool = False) -> Point | None:
     """Return the next point, or None if the step is too long."""
     metric = curve.metric(point.unknowns, point.frequency)
     tangent = point.tangent / np.linalg.norm(point.tangent * metric)
@@ -265,7 +279,7 @@ def _step(curve: Followed, point: Point, length: float) -> Point | None:
         return None
     mark = curve.mark(rates, new, here)
     plain = curve.plain(point.mark, mark, (new[-1] > 0) != (point.tangent[-1] > 0))
-    if not plain and length >= 2 * _SMALLEST:
+    if not plain and length >= 2 * _SMALLEST and not leaps:
         return None
     return Point(vector[:-1], float(vector[-1]), new, mark, length, not plain)
 

@@ -87,7 +87,7 @@ class ModalPolynomials(ByValue):
     omega : ndarray, shape (modes,)
         Natural frequencies, rad/s.
     damping : ndarray, shape (modes, modes)
-        C, 1/s.
+        C, 1/s; its skew part are gyroscopic terms.
     energies, forces : tuple of Term
         Of the Lagrangian, and without one; at least of degree one.
     """
@@ -127,9 +127,9 @@ class ModalPolynomials(ByValue):
         return mixed or any(term.velocities for term in self.forces), any(t.velocities > 1 for t in self.energies)
 
     def free(self) -> ModalPolynomials:
-        """Return the equations without damping, forces and known functions of time."""
+        """Return the equations without dampers, forces and known functions of time; gyroscopic terms stay."""
         kept = tuple(term for term in self.energies if not term.causes)
-        return ModalPolynomials(self.omega, np.zeros_like(self.damping), kept)
+        return ModalPolynomials(self.omega, 0.5 * (self.damping - self.damping.T), kept)
 
     def first(self, modes: int) -> ModalPolynomials:
         """Return the equations of the first modes alone."""

@@ -131,7 +131,7 @@ def test_gyroscopic_lagrangian_is_sent_to_eigenvalues():
         t=t,
         essential=[v.subs(x, 0), v.subs(x, 1)],
     )
-    with pytest.raises(ValueError, match="first order in time; use eigenvalues"):
+    with pytest.raises(ValueError, match="gyroscopic terms, of first order in time; use eigenvalues"):
         moving.natural_frequencies({U: 0.3})
     found = moving.eigenvalues({U: 0.3}, modes=4)
     np.testing.assert_allclose(found, 1j * np.pi * np.arange(1, 5) * (1 - 0.3**2), rtol=1e-10)
