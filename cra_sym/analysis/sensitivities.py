@@ -66,6 +66,7 @@ class Sensitivities:
 
     def __init__(self, system: System, modes: int, by: Sequence[str]) -> None:
         self._system, self._modes, self._by = system, modes, tuple(by)
+        self._known: dict[tuple[str, bool], Complex] = {}
         self.frequency = oscillating_frequencies(system, modes) / (2 * np.pi)
         stiff = [name for name in system.numerics("stiffnesses") if name in by]
         self.rate: Rates[Array] = Rates(self, "raw", by)
@@ -266,8 +267,12 @@ class Sensitivities:
         return self._eigenvalue_rates(name)
 
     def _eigenvalue_rates(self, name: str, *, compliance: bool = False) -> Complex:
-        found = eigenvalue_rates(self._system, name, self._eigenvalues, compliance=compliance)
-        return found[..., : self._modes]
+        key = name, compliance
+        if key not in self._known:
+            found = eigenvalue_rates(self._system, name, self._eigenvalues, compliance=compliance)
+            found.flags.writeable = False
+            self._known[key] = found[..., : self._modes]
+        return self._known[key]
 
     @cached_property
     def _eigenvalues(self) -> Complex:
@@ -276,7 +281,7 @@ class Sensitivities:
     def _of_damping_ratio(self, name: str) -> Array:
         s, rate = self.eigenvalue, self._of_eigenvalue(name)
         size = np.where(s == 0.0, 1.0, np.abs(s))
-        return (s.real * (s.conj() * rate).real / size**2 - rate.real) / size
+        return np.asarray((s.real * (s.conj() * rate).real / size**2 - rate.real) / size)
 
     @default_floating_point
     def _raw(self, name: str) -> Array:
