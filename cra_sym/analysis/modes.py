@@ -17,6 +17,8 @@ from cra_sym.si import Numbers
 if TYPE_CHECKING:
     from sympy.core.function import AppliedUndef
 
+    from cra_sym.model.lagrangian import Model
+
 __all__ = [
     "displaced",
     "mode_shapes",
@@ -196,12 +198,12 @@ def check_kind(argument: str, name: str, kind: str) -> None:
         raise ValueError(f"{argument}: the load {kind} must be a multiple of {name}, its velocity or its acceleration")
 
 
-def only_motion(system: System, *, support: bool = False) -> str:
+def only_motion(system: System | Model, *, support: bool = False) -> str:
     """Return the name of the only prescribed motion of a model.
 
     Parameters
     ----------
-    system : System
+    system : System or Model
     support : bool
         Whether it may act by its displacement and velocity too, or by one of these alone.
 

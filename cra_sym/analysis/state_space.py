@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from cra_sym.analysis.modes import check_kind, only_motion, participation
-from cra_sym.checks import count, default_floating_point, instance, real_array, shown
+from cra_sym.analysis.modes import participation
+from cra_sym.analysis.signals import FREE, Input, Reader, states_of
+from cra_sym.checks import count, default_floating_point, instance, real_array
 from cra_sym.model.observables import Observable
 from cra_sym.model.projection import Load, Projected, displaced_at, project
 from cra_sym.model.routes import Modes
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 __all__ = ["state_space"]
 
 Array = NDArray[np.float64]
-_BASE, _FREE = "base_acceleration", "drive_force"
-_MOST = 1000  # inputs, outputs
 
 
 @default_floating_point
@@ -101,78 +99,32 @@ def state_space(
     if system.shape:
         raise ValueError(f"system has shape {system.shape}: must be a single set of values, not a batch")
     modes = count("modes", modes, high=MOST_MODES)
-    wanted = _outputs(system, outputs)
-    driven = [_Input.of(system, one) for one in _sequence("input", input)]
-    if len({one.name for one in driven}) < len(driven):
-        raise ValueError(f"input = {shown(input)}: must name each input once")
-    free = any(one.kind == "free" for one in driven)
-    if free and any(one.kind in ("motion", "force", "support") for one in driven):
-        raise ValueError(f"input: beside {_FREE!r} must be displacements that forces act on")
-    base = {
-        one.name if one.kind == "motion" else only_motion(system) for one in driven if one.kind in ("motion", "free")
-    }
-    acting = {one.name for one in driven if one.kind == "support"}
-    seen = {part.name for one in wanted.values() for part in one.parts if part.kind == "motion" and part.time < 2}
-    states = sorted(base if free else (base & seen) | acting)
+    reader = _reader(system)
+    wanted, driven = reader.outputs(outputs), reader.inputs(input)
+    free, states = any(one.kind == "free" for one in driven), states_of(driven, wanted)
     if system.numerics("complex_modes") == "always" and system.conservative_part is not system:
         return _complex(system, modes, states, wanted, driven, free=free)
     motion = _equations(system, modes, states, driven, free=free)
     return _measured(system, modes, states, motion, wanted, driven)
 
 
-def _sequence(name: str, given: Any) -> Sequence[Any]:
-    """Return a single entry or a sequence of entries as a tuple."""
-    several = list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
-    if not 0 < len(several) <= _MOST:
-        raise ValueError(f"{name} = {shown(given)}: must be from 1 to {_MOST}")
-    return several
-
-
 # What is measured ------------------------------------------------------------------------------------------------
 
 
-def _outputs(system: System, given: Any) -> dict[str, Observable]:
-    """Return the outputs, by name."""
-    if given is None:
-        known = system.numerics("named_observables")
-        tip = next(iter(known))
-        return {tip: known[tip]}
-    named = given.items() if isinstance(given, Mapping) else ((None, one) for one in _sequence("outputs", given))
-    found: dict[str, Observable] = {}
-    for name, one in named:
-        own, value = _observable(system, one)
-        name = own if name is None else name
-        if not isinstance(name, str) or not name or name in found:
-            raise ValueError(f"outputs: {shown(name)} must be a name, and each must be there once")
-        found[name] = value
-    return found
+def _reader(system: System) -> Reader[Observable]:
+    def place(name: str, given: Any) -> float:
+        left, length = float(system.domain.left), float(system.domain.length)
+        return float(real_array(name, given, low=left, high=left + length, unit="m"))
 
-
-def _observable(system: System, given: Any) -> tuple[str, Observable]:
     known: Mapping[str, Observable] = system.numerics("named_observables")
-    local = system.section_quantities
-    if isinstance(given, str) and given in known:
-        return given, known[given]
-    if isinstance(given, str) and given in local:
-        return given, _at(system, given, system.domain.left, "outputs")
-    if isinstance(given, tuple) and len(given) == 2 and isinstance(given[0], str):
-        return f"{given[0]}({given[1]})", _at(system, *given, "outputs")
-    if isinstance(given, str):
-        raise ValueError(f"outputs = {shown(given)}: must be one of {', '.join((*known, *local))}, or an expression")
-    return str(given), _read(system, given, "outputs")
-
-
-def _at(system: System, name: str, place: Any, argument: str) -> Observable:
-    """Return a field or a quantity of the section at a place."""
-    from sympy import Float
-
-    left, length = float(system.domain.left), float(system.domain.length)
-    where = real_array(f"{argument}: place", place, low=left, high=left + length, unit="m")
-    x, fields = system.model.equations.x, system.model.equations.fields
-    local = {field.func.__name__: field for field in fields} | dict(system.section_quantities)
-    if name not in local:
-        raise ValueError(f"{argument}: {shown(name)} must be one of {', '.join(local)}, which have a place")
-    return _read(system, local[name].subs(x, Float(float(where), 17)), argument)
+    return Reader(
+        system,
+        known,
+        system.section_quantities,
+        system.domain.left,
+        place,
+        lambda given, argument: _read(system, given, argument),
+    )
 
 
 def _read(system: System, expression: Any, argument: str) -> Observable:
@@ -207,46 +159,8 @@ def _rows(system: System, found: Modes, of: Observable) -> tuple[list[Array], di
 # What drives -----------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Input:
-    """One input: the acceleration of a motion or of a moving support, a force on a free motion, a load, or a force on a
-    displacement."""
-
-    kind: str
-    name: str
-    label: str
-    displacement: Observable | None = None
-
-    @classmethod
-    def of(cls, system: System, given: Any) -> _Input:
-        """Return the input that the user names."""
-        causes = dict(system.numerics("causes"))
-        if isinstance(given, str) and given in (_BASE, _FREE):
-            motion = only_motion(system, support=given == _BASE and "support" in causes.values())
-            return cls("free" if given == _FREE else causes[motion], motion, given)
-        name: str = given if isinstance(given, str) else getattr(getattr(given, "func", None), "__name__", "")
-        if name in causes and (isinstance(given, str) or len(given.args) == 1):
-            check_kind("input", name, causes[name])
-            return cls(causes[name], name, name)
-        if isinstance(given, str):
-            known = system.numerics("named_observables")
-            places = [name for name, one in known.items() if _is_displacement(one)]
-            if given not in places:
-                allowed = ", ".join(dict.fromkeys((_BASE, _FREE, *causes, *places)))
-                raise ValueError(f"input = {shown(given)}: must be one of {allowed}, or an expression")
-            return cls("displacement", given, given, known[given])
-        displacement = _read(system, given, "input")
-        if not _is_displacement(displacement):
-            raise ValueError(f"input: {given} must be a displacement that a force acts on, without derivatives by time")
-        return cls("displacement", str(given), str(given), displacement)
-
-
-def _is_displacement(of: Observable) -> bool:
-    return all(part.kind != "force" and part.time == 0 for part in of.parts)
-
-
 def _equations(
-    system: System, modes: int, states: Sequence[str], driven: Sequence[_Input], *, free: bool
+    system: System, modes: int, states: Sequence[str], driven: Sequence[Input[Observable]], *, free: bool
 ) -> tuple[Array, Array]:
     """Return accelerations by (z, z') and by the inputs, of z = (motions that are states, q)."""
     first, size = len(states), len(states) + modes
@@ -268,7 +182,9 @@ def _equations(
     return found[:, : 2 * size], found[:, 2 * size :]
 
 
-def _support_loads(system: System, states: Sequence[str], driven: Sequence[_Input]) -> Iterator[tuple[int, int, Load]]:
+def _support_loads(
+    system: System, states: Sequence[str], driven: Sequence[Input[Observable]]
+) -> Iterator[tuple[int, int, Load]]:
     """Yield the loads by displacement (order 0) and velocity (1) of moving supports, with the state they belong to."""
     for one in driven:
         if one.kind == "support":
@@ -277,7 +193,7 @@ def _support_loads(system: System, states: Sequence[str], driven: Sequence[_Inpu
                     yield order, states.index(one.name), load
 
 
-def _push(system: System, modes: int, states: Sequence[str], one: _Input, *, free: bool) -> Array:
+def _push(system: System, modes: int, states: Sequence[str], one: Input[Observable], *, free: bool) -> Array:
     """Return the generalised force of a unit of an input on (motions that are states, q)."""
     base, q = np.zeros(len(states)), np.zeros(modes)
     if one.kind == "free":
@@ -305,7 +221,7 @@ def _measured(
     states: Sequence[str],
     accelerations: tuple[Array, Array],
     wanted: Mapping[str, Observable],
-    driven: Sequence[_Input],
+    driven: Sequence[Input[Observable]],
 ) -> LinearSystem:
     """Return the linear system of the equations and the outputs."""
     by_state, by_input = accelerations
@@ -333,14 +249,14 @@ def _complex(
     modes: int,
     states: Sequence[str],
     wanted: Mapping[str, Observable],
-    driven: Sequence[_Input],
+    driven: Sequence[Input[Observable]],
     *,
     free: bool,
 ) -> LinearSystem:
     """Return the linear system of the lowest complex modes."""
     if free:
         raise ValueError(
-            f"input: {_FREE!r} needs natural modes, which gyroscopic forces and forces that follow the motion leave "
+            f"input: {FREE!r} needs natural modes, which gyroscopic forces and forces that follow the motion leave "
             f"none; make {driven[0].name} a coordinate that a force F(t) drives, and give input='F'"
         )
     _check_complex(system, wanted)
@@ -386,7 +302,7 @@ def _check_complex(system: System, wanted: Mapping[str, Observable]) -> None:
                 )
 
 
-def _complex_push(system: System, motions: LowestMotions, one: _Input) -> Array:
+def _complex_push(system: System, motions: LowestMotions, one: Input[Observable]) -> Array:
     """Return the rate of the state of complex modes per unit of an input."""
     if one.displacement is not None:
         (acts, _, _), _ = _rows(system, motions.basis, one.displacement)

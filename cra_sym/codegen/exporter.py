@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cra_sym.checks import choice, count, equal, flag, instance
+from cra_sym.checks import choice, count, flag, instance
 from cra_sym.codegen.arm_library import arm_library
 from cra_sym.codegen.controllers import Controller
 from cra_sym.codegen.fmu import VERSIONS, fmu_archive
@@ -17,7 +17,7 @@ from cra_sym.codegen.frozen import frozen_library
 from cra_sym.codegen.frozen_slipping import slipping_library
 from cra_sym.codegen.library import PRINTERS, check_name
 from cra_sym.codegen.rendering import DIGEST, licence
-from cra_sym.codegen.user_model import model_library
+from cra_sym.codegen.user_model import KEPT, model_library
 from cra_sym.files import OutputError, path_of, staged_directory
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.system import MOST_MODES, System
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Export", "export"]
 
-_OF_SYSTEMS = {"modes": 3, "input": "base_acceleration", "outputs": None, "controller": None}
-"""Arguments that are of a system alone, with their default values."""
+_OF_TIME = ("modes", "input", "outputs", "controller")
+"""Arguments that are of a system or a model."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +64,10 @@ def export(
     *,
     system: System | None = None,
     name: str | None = None,
-    modes: int = 3,
+    modes: int | None = None,
     real: str = "float64",
     version: str = "3.0",
-    input: str | Expr | Sequence[str | Expr] = "base_acceleration",
+    input: str | Expr | Sequence[str | Expr] | None = None,
     outputs: Sequence[str | tuple[str, float] | Expr] | Mapping[str, str | tuple[str, float] | Expr] | None = None,
     controller: Controller | None = None,
 ) -> Export:
@@ -87,9 +87,9 @@ def export(
         Folder to create, with its parents.
     model : Model, optional
         It is exported instead of the arm, for any values of its parameters: characteristic function, count, natural
-        frequencies, modes, sensitivities, responses to prescribed motions, state space. Its coefficients must be
-        constant, with at most three wave numbers and without dampers; its ends may be joined and carry lumped
-        coordinates. For others give `system`.
+        frequencies, modes, sensitivities, responses to prescribed motions, state space, exact steps under held inputs
+        and outputs. Its coefficients must be constant, with at most three wave numbers and without dampers; its ends
+        may be joined and carry lumped coordinates. For others give `system`.
     overwrite : bool
         Whether to replace a folder that is not empty: the new one has the new files and those old ones that no earlier
         export wrote. The replacement is atomic: a failed export leaves the folder unchanged.
@@ -102,16 +102,18 @@ def export(
     name : str, optional
         Prefix of every public symbol, and the name of package, module, crate and target. Default: of the arm
         `cra_arm`, in C and Fortran `cra`, so that its types are called `cra_arm`, `cra_mode`, ..; `model`; `system`.
-    modes : int
-        Modes of the system that are kept.
+    modes : int, optional
+        Modes of the system that are kept, by default 3; of a model the largest number that it is stepped with, by
+        default 16.
     real : {'float64', 'float32'}
         Type of real numbers in the code. Single precision is available for C, Fortran and Rust, without elastic-slip
         elements; the README states its accuracy.
     version : {'3.0', '2.0'}
         Of FMI.
     input, outputs
-        Of a system, as :func:`cra_sym.state_space` takes them; one input. Default outputs: y, v, w, root_force,
-        root_moment and tip_acceleration, if the system has them.
+        Of a system or a model, as :func:`cra_sym.state_space` takes them; one input of a system, up to 64 of a model.
+        Default input: 'base_acceleration', of a model its only prescribed motion or force; without one it is not
+        stepped. Default outputs: y, v, w, root_force, root_moment and tip_acceleration, if the system has them.
     controller : Controller, optional
         Of a system: a regulator and an observer are exported too, with gains computed at export.
 
@@ -151,10 +153,9 @@ def export(
         instance("controller", controller, Controller)
         if language == "fmu":
             raise ValueError("controller: is exported as source code; an FMU has none")
-    given = {"modes": modes, "input": input, "outputs": outputs, "controller": controller}
-    for argument, default in _OF_SYSTEMS.items():
-        if system is None and not equal(given[argument], default):
-            raise ValueError(f"{argument}: is that of a system; give system=")
+    for argument, given in zip(_OF_TIME, (modes, input, outputs, controller), strict=True):
+        if system is None and given is not None and (model is None or argument == "controller"):
+            raise ValueError(f"{argument}: is that of a system or a model; give system= or model=")
     if language != "fmu" and version != VERSIONS[0]:
         raise ValueError(f"version = {version!r}: is that of FMI; give language='fmu'")
     if language == "fmu" and system is None:
@@ -163,9 +164,12 @@ def export(
     _check_free(target, overwrite)
     texts: dict[str, str | bytes]
     if system is not None:
-        texts = _system_texts(language, system, name or "system", modes, real, version, input, outputs, controller)
+        drive = "base_acceleration" if input is None else input
+        kept = 3 if modes is None else modes
+        texts = _system_texts(language, system, name or "system", kept, real, version, drive, outputs, controller)
     elif model is not None:
-        texts = dict(model_library(model, name or "model", real).texts(language))
+        kept = KEPT if modes is None else modes
+        texts = dict(model_library(model, name or "model", real, kept, input, outputs).texts(language))
     else:
         texts = dict(_arm_texts(language, name or ("cra" if language in ("c", "fortran") else "cra_arm"), real))
     if language != "fmu":

@@ -15,6 +15,7 @@ from cra_sym.analysis.state_space import state_space
 from cra_sym.codegen.blocks import Blocks, blocks_of
 from cra_sym.codegen.controllers import Controller, controller_checks
 from cra_sym.codegen.library import Check, Library, source
+from cra_sym.codegen.model_time import OUTPUTS
 from cra_sym.codegen.operations import operations
 from cra_sym.codegen.statement import stated
 from cra_sym.kernels.form_parse import parse
@@ -22,13 +23,11 @@ from cra_sym.model.system import System
 from cra_sym.solvers.linear_system import LinearSystem
 
 __all__ = [
-    "OUTPUTS", "common_checks", "default_outputs", "exported_state_space", "frozen_library", "frozen_system",
+    "common_checks", "default_outputs", "exported_state_space", "frozen_library", "frozen_system",
     "numbers_of", "stepped",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
-OUTPUTS = ("y", "v", "w", "root_force", "root_moment", "tip_acceleration")
-"""Default outputs, if the system has them."""
 _MOST_OUTPUTS = 64
 _ERRORS = {"float64": 1e-11, "float32": 2e-3}
 """Error of the outputs in the reference vectors, relative to the largest of them, by the type of real numbers."""

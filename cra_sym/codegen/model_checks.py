@@ -24,15 +24,17 @@ from cra_sym.codegen.model_text import ModelText
 from cra_sym.codegen.vectors import SEED
 from cra_sym.model.system import System
 from cra_sym.model.waves_form import WavesForm
+from cra_sym.solvers.force import Force
 from cra_sym.solvers.motion import BaseMotion
 
-__all__ = ["ERRORS", "largest", "model_checks", "sample"]
+__all__ = ["ERRORS", "in_time_checks", "largest", "model_checks", "sample", "tested"]
 
 Array = NDArray[np.float64]
 ERRORS = {"float64": 1e-12, "float32": 2e-3}
 """Error allowed, relative to the largest value of a kind, by the type of real numbers."""
 _POINTS, _MODES = 8, 6
 _APART = 1e-3
+_ALONE = {"float64": 1e-3, "float32": 0.1}  # of all mass, that the base moves alone
 _BELOW = 340  # number of frequencies; more of them lie below the last point
 _TURNS = (0.3, 4.0, 40.0, 1000.0)
 """Wave number times length of the points of the characteristic function."""
@@ -136,6 +138,7 @@ def _modal(written: ModelText, system: System, point: Sequence[float], omega: Ar
             yield Check(4, (*point, derivative, x, field), tuple(shapes), loss, loss * size)
     yield from _sensitivities(written, system, point, omega, loss)
     yield from _driven(written, system, point, loss)
+    yield from in_time_checks(written, system, point, loss)
 
 
 def largest(written: ModelText, system: System) -> Array:
@@ -181,7 +184,10 @@ def _driven(written: ModelText, system: System, point: Sequence[float], loss: fl
             "phase": 0.4,
         }
         damped = system.replace(zeta=zeta)
-        moved = response(damped, {name: BaseMotion(**motion)}, time, x, 4)
+        still = {
+            other: Force() if kind == "force" else BaseMotion() for other, kind in written.model.numerics("causes")
+        }
+        moved = response(damped, still | {name: BaseMotion(**motion)}, time, x, 4)
         size = float(np.abs(taken * largest(written, system)[written.form.order.index(0)]).sum()) * (0.5 * time + 0.1)
         given = (*point, drive, x, 0.0, zeta, time, *motion.values())
         yield Check(7, given, (float(moved),), loss, loss * size)
@@ -190,6 +196,40 @@ def _driven(written: ModelText, system: System, point: Sequence[float], loss: fl
         yield Check(
             8, (*point, drive, x, 0.0, zeta), tuple(map(float, numbers)), loss, loss * float(np.abs(taken).max())
         )
+
+
+def tested(written: ModelText) -> int:
+    """Return the number of modes of the reference vectors in time."""
+    return min(3, written.signals.modes) if written.signals else 0
+
+
+def in_time_checks(written: ModelText, system: System, point: Sequence[float], loss: float) -> Iterator[Check]:
+    """Yield outputs after steps under held inputs by the matrices of the package and SciPy's exponential."""
+    if written.signals is None:
+        return
+    zeta, modes, (drive, outputs) = 0.02, tested(written), written.signals.given
+    linear = state_space(system.replace(zeta=zeta), modes, drive, outputs)
+    omega = system.natural_frequencies(modes)
+    if written.signals.free:  # the less mass the base moves alone, the more digits both lose
+        name = written.signals.states[0]
+        whole = float(system.numerics("carried", name).function(*system.domain.values)[0])
+        alone = 1.0 - float(np.square(participation(system, modes, name)).sum()) / whole
+        if alone < _ALONE[written.real]:
+            return
+        loss /= alone
+    fastest = float(np.abs(np.linalg.eigvals(linear.A)).max())
+    slowest = float(np.min(omega[omega > 1e-6 * fastest], initial=fastest))
+    for time, steps in ((0.05 / fastest, 5), (0.7 / fastest, 9), (0.3 / slowest, 4)):
+        held = linear.discrete(time)
+        x, size = np.zeros(len(held.A)), np.zeros(len(held.C))
+        for n in range(steps + 1):
+            u = 0.25 * np.where((n - (n == steps)) % 3 == np.arange(held.B.shape[1]) % 3, 1.0, -0.5)
+            y = held.C @ x + held.D @ u
+            size = np.maximum(size, np.abs(held.C) @ np.abs(x) + np.abs(held.D) @ np.abs(u))
+            x = held.A @ x + held.B @ u
+        yield Check(9, (*point, steps, 0.25, 0.0, zeta, time), tuple(y), loss, loss * float(size.max()))
+    yield Check(9, (*point, 1.0, 0.25, 0.0, 1.0, time), (), refused=True)
+    yield Check(9, (*point, 1.0, 0.25, 0.0, zeta, math.nan), (), refused=True)
 
 
 # The characteristic function -----------------------------------------------------------------------------------------

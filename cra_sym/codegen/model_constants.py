@@ -29,12 +29,16 @@ def model_constants(
     form: WavesForm,
     parameters: int,
     fields: Sequence[str],
-    drives: Sequence[str],
+    loads: tuple[Sequence[str], Sequence[str]],
     coordinates: Sequence[str],
     field_places: Sequence[int],
     real: str,
 ) -> str:
-    """Return the constants of a model as a text in the restricted form, given names and places of its fields."""
+    """Return the constants of a model as a text in the restricted form, given names and places of its fields.
+
+    ``loads`` are its prescribed motions and its forces.
+    """
+    drives, forces = loads
     structure = form.structure
     n, m, links, moving = structure.n, structure.coordinates, structure.links, structure.moving
     ranks = ((n * n + moving + links) * (n + m), (2 * moving + links) * m, (links + 1) * moving if links else 0)
@@ -51,6 +55,10 @@ def model_constants(
     }
     if drives:
         integers["DRIVES"] = (len(drives), f"prescribed motions: {', '.join(drives)}")
+    if forces:
+        integers["ACTING_FORCES"] = (len(forces), f"forces: {', '.join(forces)}")
+        integers["FIRST_FORCE"] = (len(drives), "place of the first of these among all loads")
+    if drives or forces:
         integers["LOADS"] = (3 * n + m, "factors of a load")
     if m:
         integers["COORDINATES"] = (m, f"lumped: {', '.join(coordinates)}")

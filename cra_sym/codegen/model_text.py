@@ -13,6 +13,7 @@ from cra_sym.codegen.expressions import response_functions
 from cra_sym.codegen.library import source
 from cra_sym.codegen.model_constants import model_constants
 from cra_sym.codegen.model_loads import load_factors
+from cra_sym.codegen.model_time import Signals, TimeText
 from cra_sym.codegen.printers import FormPrinter
 from cra_sym.codegen.program import function, new_name
 from cra_sym.codegen.unused import marked, top_names, without_unused
@@ -22,7 +23,10 @@ from cra_sym.model.waves_form import WavesForm
 
 __all__ = ["ModelText"]
 
-_SOURCES = ("model", "model_modes", "model_participation", "model_drives", "model_check")
+_SOURCES = (
+    "model", "model_modes", "model_participation", "model_drives", "model_check", "in_time", "in_time_held",
+    "in_time_free", "sampling", "shaping",
+)  # fmt: skip
 _WRITTEN = {
     "prepare",
     "dispersion",
@@ -32,6 +36,9 @@ _WRITTEN = {
     "load_of",
     "inside_entries",
     "outside_entries",
+    "factors_of",
+    "put_motions",
+    "put_gains",
 }
 
 
@@ -44,23 +51,42 @@ class ModelText:
     model : Model
     form : WavesForm
     real : {'float64', 'float32'}
+    signals : Signals or None
+        Inputs and outputs in time, if there are any.
     """
 
     model: Model
     form: WavesForm
     real: str = "float64"
+    signals: Signals | None = None
 
     @cached_property
     def names(self) -> dict[sp.Symbol, str]:
         """The field of every parameter."""
         taken = top_names(*(source(name) for name in _SOURCES), self._constants(), self._formulas) | _WRITTEN
-        taken |= {f"by_{symbol.name}" for symbol in self.model.symbols} | {f"load_of_{name}" for name in self.drives}
+        taken |= {f"by_{symbol.name}" for symbol in self.model.symbols} | {f"load_of_{name}" for name in self.loads}
+        taken |= top_names(self.in_time.constants()) if self.in_time else set()
         return {symbol: new_name(symbol.name, taken) for symbol in self.model.symbols}
 
     @cached_property
     def drives(self) -> list[str]:
         """Prescribed motions that act by their acceleration."""
         return [name for name, kind in self.model.numerics("causes") if kind == "motion"]
+
+    @cached_property
+    def forces(self) -> list[str]:
+        """Forces of the model that drive it in time."""
+        return [one.name for one in self.signals.inputs if one.kind == "force"] if self.signals else []
+
+    @property
+    def loads(self) -> list[str]:
+        """Prescribed motions, then these forces."""
+        return [*self.drives, *self.forces]
+
+    @cached_property
+    def in_time(self) -> TimeText | None:
+        """Writer of the part about time."""
+        return TimeText(self, self.signals) if self.signals else None
 
     @cached_property
     def fields(self) -> list[str]:
@@ -90,6 +116,9 @@ class ModelText:
         coupled = any(mass[i, j] != 0 for i in range(size) for j in range(size) if i != j)
         found = {
             "DRIVEN": self.drives,
+            "FORCED": self.forces,
+            "LOADED": self.loads,
+            "TIMED": self.signals,
             "LUMPED": self.coordinates,
             "LINKED": self.form.structure.links,
             "COUPLED": coupled,
@@ -105,13 +134,15 @@ class ModelText:
     def text(self) -> str:
         """Return the text."""
         modes = source("model_modes")
-        for word in ("displacements", "coordinates", "drives"):
+        for word in ("displacements", "coordinates", "drives", "forces"):
             modes = modes.replace(f"{word.upper()}_LISTED", ", ".join(getattr(self, word)))
-        modes = modes.replace("# LOADS", self._loads() if self.drives else "")
+        modes = modes.replace("# LOADINGS", self._loads() if self.loads else "")
         parts = [self._constants(), self._parameters(), source("model"), self._rates(), modes]
         if self.drives:
             parts += ["".join(f"{self._function(f, f'_{f.name}')}\n\n" for f in response_functions())]
             parts += [source("model_drives")]
+        if self.in_time:
+            parts += [self.in_time.text]
         whole = marked("\n\n\n".join(part.strip("\n") for part in parts) + "\n", self.parts)
         whole = whole.replace("# FORMULAS", self._formulas).replace("# PREPARE", self._prepare())
         return without_unused(FormPrinter.helped(whole) + whole)
@@ -120,7 +151,13 @@ class ModelText:
         displacements = list(self.model.conservative.displacements)
         places = [self.form.order.index(displacements.index(field)) for field in self.model.equations.fields]
         return self._waves.constants() + model_constants(
-            self.form, len(self.model.symbols), self.fields, self.drives, self.coordinates, places, self.real
+            self.form,
+            len(self.model.symbols),
+            self.fields,
+            (self.drives, self.forces),
+            self.coordinates,
+            places,
+            self.real,
         )
 
     def _parameters(self) -> str:
@@ -138,14 +175,14 @@ class ModelText:
     @cached_property
     def _formulas(self) -> str:
         waves = self._waves
-        return "\n\n".join([waves.functions(loads=bool(self.drives)), waves.static(), waves.sections()]).strip("\n")
+        return "\n\n".join([waves.functions(loads=bool(self.loads)), waves.static(), waves.sections()]).strip("\n")
 
     # Parameters to coefficients ---------------------------------------------------------------------------------------
 
     def _function(self, made: object, name: str) -> str:
         return FormPrinter.text_of(made, name, checked=False)  # type: ignore[arg-type]
 
-    def _call(self, name: str, entries: Sequence[sp.Expr], row: str, words: str) -> tuple[str, list[str]]:
+    def call(self, name: str, entries: Sequence[sp.Expr], row: str, words: str) -> tuple[str, list[str]]:
         """Return a function of the parameters, and the statements that fill a row with its results."""
         made = function(name, words, list(entries), self._given(_free(entries)))
         given = [f"parameters.{self.names[argument.symbols[0]]}" for argument in made.arguments]
@@ -207,7 +244,7 @@ class ModelText:
              "Return the length, the left end, and stiffness, inertia, ties and links of what moves."),
         )  # fmt: skip
         for name, entries, words in groups:
-            text, call = self._call(f"{name}_entries", list(entries.values()), name, words)
+            text, call = self.call(f"{name}_entries", list(entries.values()), name, words)
             texts.append(text)
             lines += call
             lines += [f"problem.{target} = {name}[{at}]" for at, target in enumerate(entries)]
@@ -340,7 +377,7 @@ class ModelText:
             if not entries:
                 continue
             row = f"by_{self.names[symbol]}"
-            text, call = self._call(row, list(entries.values()), f"rate_{number}",
+            text, call = self.call(row, list(entries.values()), f"rate_{number}",
                                     f"Return how coefficients change with {self.names[symbol]}.")  # fmt: skip
             texts.append(text)
             lines.append(f"{'el' if lines else ''}if number == {number}:")
@@ -360,10 +397,10 @@ class ModelText:
         """Return the function of a load, and the one of its modal force."""
         texts: list[str] = []
         lines: list[str] = []
-        for number, name in enumerate(self.drives):
+        for number, name in enumerate(self.loads):
             factors = load_factors(self.model, self.form, self._length, name)
             entries = {at: value for at, value in enumerate(factors) if value != 0}
-            text, call = self._call(f"load_of_{name}", list(entries.values()), f"load_{number}",
+            text, call = self.call(f"load_of_{name}", list(entries.values()), f"load_{number}",
                                     f"Return the load of a unit acceleration of {name}.")  # fmt: skip
             texts.append(text)
             lines.append(f"{'el' if number else ''}if drive == {number}:")

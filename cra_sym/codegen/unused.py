@@ -7,7 +7,8 @@ import re
 
 __all__ = ["marked", "top_names", "without_unused"]
 
-_MARKED = re.compile(r"( *)# ((?:(?:DRIVEN|LUMPED|LINKED|COUPLED): )+)(.*)")
+_MARKS = "DRIVEN|FORCED|LOADED|TIMED|LUMPED|LINKED|COUPLED|FREE|HELD|ACCELERATED"
+_MARKED = re.compile(rf"( *)# ((?:(?:{_MARKS}): )+)(.*)")
 
 
 def marked(text: str, marks: set[str]) -> str:

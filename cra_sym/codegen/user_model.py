@@ -4,39 +4,65 @@ from __future__ import annotations
 
 import textwrap
 from functools import lru_cache
+from typing import Any
 
 from cra_sym.checks import instance
 from cra_sym.codegen.library import Library, source
-from cra_sym.codegen.model_checks import model_checks, sample
+from cra_sym.codegen.model_checks import model_checks, sample, tested
 from cra_sym.codegen.model_text import ModelText
+from cra_sym.codegen.model_time import Signals, signals
+from cra_sym.codegen.operations import operations
 from cra_sym.codegen.statement import stated
 from cra_sym.codegen.unused import marked
+from cra_sym.kernels.form_parse import parse
 from cra_sym.model import Model
 from cra_sym.model.waves_form import WavesForm, waves_form
 
-__all__ = ["model_library", "model_text"]
+__all__ = ["KEPT", "model_library", "model_text"]
 
+KEPT = 16  # modes in time
 _MOST = 32  # largest number of parameters in a line of the reference vectors
 _INSTEAD = "give system= with the model at its values, whose modes are exported as numbers"
 
 
-def model_library(model: Model, name: str, real: str = "float64") -> Library:
+def model_library(
+    model: Model, name: str, real: str = "float64", modes: int = KEPT, drive: Any = None, outputs: Any = None
+) -> Library:
     """Return a model as a library.
+
+    Parameters
+    ----------
+    model : Model
+    name, real : str
+    modes : int
+        Largest number in time.
+    drive, outputs
+        In time, as :func:`cra_sym.state_space` takes them. Default: the only prescribed motion or force, and the usual
+        outputs; without one there are no functions of time.
 
     Raises
     ------
     TypeError
         If it is not a Model.
     ValueError
-        If it cannot be exported for any values of its parameters: the message says why.
+        If it cannot be exported for any values of its parameters, or an input or output in time is none: the message
+        says why.
     """
     instance("model", model, Model)
-    return _library(model, name, real)
+    if drive is None and outputs is None:
+        return _usual(model, name, real, modes)
+    return _library(model_text(model, real, signals(model, drive, outputs, modes)), name)
 
 
-def model_text(model: Model, real: str = "float64") -> ModelText:
+@lru_cache(maxsize=8)
+def _usual(model: Model, name: str, real: str, modes: int) -> Library:
+    form = _form(model)
+    return _library(ModelText(model, form, real, signals(model, None, None, modes)), name)
+
+
+def model_text(model: Model, real: str = "float64", in_time: Signals | None = None) -> ModelText:
     """Return the writer of the text of a model; raise a ValueError if it cannot be exported."""
-    return ModelText(model, _form(model), real)
+    return ModelText(model, _form(model), real, in_time)
 
 
 def _form(model: Model) -> WavesForm:
@@ -65,15 +91,15 @@ def _form(model: Model) -> WavesForm:
     return found
 
 
-@lru_cache(maxsize=8)
-def _library(model: Model, name: str, real: str) -> Library:
-    written = model_text(model, real)
+def _library(written: ModelText, name: str) -> Library:
+    model = written.model
     fields = list(written.names.values())
     lines = ["def _given_parameters(given: Row[float, 64], parameters: Out[Parameters]) -> None:"]
     lines += [f"    parameters.{field} = given[{at}]" for at, field in enumerate(fields)]
     driven = source("model_check_drives") if written.drives else ""
+    timed = source("in_time_check").replace("TESTED", str(tested(written))) if written.in_time else ""
     check = marked(source("model_check").replace("# GIVEN", "\n".join(lines)), written.parts)
-    check = check.replace("# DRIVEN", driven.strip())
+    check = check.replace("# DRIVEN", "\n".join([driven.strip(), " " * 8 + timed.strip()]).strip())
     values = sample(written)
     shown = "\n".join(
         f"    parameters.{field} = {float(value)!r}" for field, value in zip(fields, values, strict=True)
@@ -84,7 +110,7 @@ def _library(model: Model, name: str, real: str) -> Library:
     unknowns = [*(f"{name}(x, t)" for name in written.fields), *(f"{name}(t)" for name in written.coordinates)]
     summary = f"Frequencies, modes, sensitivities and responses of a model of {', '.join(unknowns)}".replace("\\", "")
     checks = tuple(model_checks(written, values))
-    return Library(name, summary, text + "\n", stated(model), checks, _readme(written), real)
+    return Library(name, summary, text + "\n", stated(model), checks, _readme(written, text), written.real)
 
 
 _EXAMPLE = '''\
@@ -96,7 +122,7 @@ def _example(found: Out[Row[float, 3]]) -> None:
 '''
 
 
-def _readme(written: ModelText) -> str:
+def _readme(written: ModelText, text: str) -> str:
     units = written.model.units or {}
     rows = "".join(
         f"| `{name}` | {units.get(symbol.name, '')} | {symbol} |\n" for symbol, name in written.names.items()
@@ -108,4 +134,21 @@ def _readme(written: ModelText) -> str:
         "function is finite and right below, at and above cut-off frequencies. Fields, by number: "
         f"{', '.join(written.fields)}; displacements of a section: {', '.join(written.displacements)}.{lumped}{drives}"
     )
-    return f"{textwrap.fill(words, 112)}\n\n| parameter | unit | symbol |\n| --- | --- | --- |\n{rows}"
+    table = f"{textwrap.fill(words, 112)}\n\n| parameter | unit | symbol |\n| --- | --- | --- |\n{rows}"
+    return table + (_readme_in_time(written.signals, text) if written.signals else "")
+
+
+def _readme_in_time(in_time: Signals, text: str) -> str:
+    form = parse(text)
+    most = {"_size_of(plant)": len(in_time.states) + in_time.modes, "kept": len(in_time.states) + in_time.modes}
+    counts = ", ".join(f"`{name}` {operations(form, name, most)}" for name in ("step", "outputs", "derivative"))
+    words = (
+        f"In time it has up to {in_time.modes} modes: `plant_of` prepares the system of given parameters, `discretise` "
+        "exact steps under inputs u that are held, `step` takes one, `outputs` returns y."
+    )
+    rows = "".join(f"| u[{i}] | `{one.label}` |\n" for i, one in enumerate(in_time.inputs))
+    rows += "".join(f"| y[{i}] | `{name}` |\n" for i, name in enumerate(in_time.outputs))
+    return (
+        f"\n{textwrap.fill(words, 112)}\n\n| in time | |\n| --- | --- |\n{rows}\n"
+        f"Floating-point operations of a call with {in_time.modes} modes, at most: {counts}.\n"
+    )

@@ -322,6 +322,11 @@ def _add(form: Bilinear, pair: tuple[Jet, Jet], power: int, value: Expr) -> None
 
 def carried(model: Model, name: str) -> Kernel:
     """Return the kernel of the rigid-body (mass, damping, stiffness) that a prescribed motion sees."""
+    return kernel(carried_by(model, name), model.symbols, backend="numpy")
+
+
+def carried_by(model: Model, name: str) -> tuple[Expr, ...]:
+    """Return the rigid-body mass, damping and stiffness that a prescribed motion sees."""
     freed = model.freed(name)
     weak = weak_form(freed.linearised.variation)
     space = weak.variation.space
@@ -332,11 +337,10 @@ def carried(model: Model, name: str) -> Kernel:
             raise ValueError(f"{name}: a force on it depends on {space.form(pair[1])} by more than its acceleration")
     left, right = (space.ends[end] for end in END_NAMES)
     inside, discrete = weak.inside.get((jet, jet), {}), weak.discrete.get((jet, jet), {})
-    found = (
+    return tuple(
         integrate(inside.get(order, S.Zero), (space.x, left, right)) + discrete.get(order, S.Zero)
         for order in (2, 1, 0)
     )
-    return kernel(tuple(found), model.symbols, backend="numpy")
 
 
 def sizes(model: Model) -> tuple[int, int]:

@@ -18,7 +18,7 @@ from cra_sym.mechanics.weak import weak_form
 if TYPE_CHECKING:
     from cra_sym.model.lagrangian import Model
 
-__all__ = ["Observable", "Part", "named_observables", "observable"]
+__all__ = ["Observable", "Part", "Sum", "named_observables", "named_sums", "observable", "sum_of"]
 
 _HIGHEST = 2  # derivative by time
 
@@ -48,6 +48,20 @@ class Part(NamedTuple):
     name: str = ""
 
 
+class Sum(NamedTuple):
+    """A sum of parts, each with its factor and its place in the parameters of the model.
+
+    Attributes
+    ----------
+    parts : tuple of Part
+    factors, places : tuple of Expr
+    """
+
+    parts: tuple[Part, ...]
+    factors: tuple[Expr, ...]
+    places: tuple[Expr, ...]
+
+
 @dataclass(frozen=True)
 class Observable:
     """A sum of parts.
@@ -64,6 +78,11 @@ class Observable:
 
 
 def named_observables(model: Model) -> dict[str, Observable]:
+    """Return the named measurable quantities of a model, as `named_sums`."""
+    return {name: _compiled(model, found) for name, found in named_sums(model).items()}
+
+
+def named_sums(model: Model) -> dict[str, Sum]:
     """Return the named measurable quantities of a model.
 
     Fields at the right end, coordinates and prescribed motions by their names; 'y', the first field there in the
@@ -77,10 +96,14 @@ def named_observables(model: Model) -> dict[str, Observable]:
         tip = next(iter(tips.values())) + frame(model)
         found = {"y": tip, "tip_velocity": tip.diff(t), "tip_acceleration": tip.diff(t, 2)} | found
     ordered = sorted(found, key=lambda name: name not in tips)  # the tip of the first field comes first
-    return {name: observable(model, found[name]) for name in ordered} | _forces(model)
+    return {name: sum_of(model, found[name]) for name in ordered} | _forces(model)
 
 
-def _forces(model: Model) -> dict[str, Observable]:
+def _compiled(model: Model, found: Sum) -> Observable:
+    return Observable(found.parts, kernel((*found.factors, *found.places), model.symbols, backend="numpy"))
+
+
+def _forces(model: Model) -> dict[str, Sum]:
     """Return the forces that the structure exerts on its supports: P at the left end, -P at the right one."""
     found = {}
     names = [str(displacement) for displacement in model.state_form.displacements]
@@ -90,8 +113,7 @@ def _forces(model: Model) -> dict[str, Observable]:
             if str(displacement) in names:
                 entry = names.index(str(displacement))
                 for end, where, sign in ((0, "root", S.One), (1, "tip", S.NegativeOne)):
-                    numbers = kernel((sign, S.Zero), model.symbols, backend="numpy")
-                    found[f"{where}_{kind}{suffix}"] = Observable((Part("force", entry, end=end),), numbers)
+                    found[f"{where}_{kind}{suffix}"] = Sum((Part("force", entry, end=end),), (sign,), (S.Zero,))
     return found
 
 
@@ -112,6 +134,11 @@ def frame(model: Model) -> Expr:
 
 
 def observable(model: Model, expression: Any, name: str = "outputs") -> Observable:
+    """Return a linear function of the motion, given as an expression; as `sum_of`."""
+    return _compiled(model, sum_of(model, expression, name))
+
+
+def sum_of(model: Model, expression: Any, name: str = "outputs") -> Sum:
     """Return a linear function of the motion, given as an expression.
 
     Parameters
@@ -145,8 +172,7 @@ def observable(model: Model, expression: Any, name: str = "outputs") -> Observab
     if unknown:
         known = ", ".join(symbol.name for symbol in model.symbols)
         raise ValueError(f"{name}: {min(map(str, unknown))} in {expression} is not a parameter; must be one of {known}")
-    numbers = kernel((*factors, *(place for _, place in found)), model.symbols, backend="numpy")
-    return Observable(tuple(part for part, _ in found), numbers)
+    return Sum(tuple(part for part, _ in found), tuple(factors), tuple(place for _, place in found))
 
 
 def _functions(expression: Expr) -> list[Expr]:

@@ -248,7 +248,7 @@ def arm_without_vectors(name: str, real: str = "float64") -> Library:
 def model_without_vectors(model: cra.Model, name: str = "span", real: str = "float64") -> Library:
     """Return a model's library without its reference vectors, which take seconds."""
     with patch.object(user_model, "model_checks", lambda written, values: ()):
-        return user_model._library.__wrapped__(model, name, real)
+        return user_model._usual.__wrapped__(model, name, real, user_model.KEPT)
 
 
 SIZES = {0: 1, 1: 2, 2: 1, 3: 1, 4: 7, 5: 7, 6: 24, 7: 12}

@@ -139,7 +139,7 @@ def test_a_name_stands_in_front_of_everything(without_vectors, tmp_path, languag
         ({"language": None}, "language = None"), ({"directory": None}, "directory = None: must be a path"),
         ({"name": "../x"}, "name = '../x'"), ({"overwrite": "no"}, "overwrite = 'no': must be True or False"),
         ({"language": "fmu", "model": exported_models.model("tension")}, "'fmu': is that of a system"),
-        ({"model": exported_models.model("tension"), "outputs": ["v"]}, "outputs: is that of a system"),
+        ({"model": exported_models.model("tension"), "outputs": ["z"]}, "outputs = 'z': must be one of"),
     ],
 )  # fmt: skip
 def test_what_would_not_be_followed_is_refused(options, message, tmp_path):

@@ -76,7 +76,7 @@ def test_a_wrong_number_fails_the_self_test(tmp_path):
     """A line of each quantity, spoiled by a part in 1e9."""
     made = library(LONG[0])
     lines = {check.quantity: check for check in made.checks if not check.refused and np.any(check.expected)}
-    assert sorted(lines) == list(range(9))
+    assert sorted(lines) == list(range(10))
     names = exported(LONG[0])
     test = made.texts("python")["self_test.py"]
     exec(test[test.index("def _given") : test.index("def agree")], names)
