@@ -138,7 +138,7 @@ def _checked(system: System, parameter: Any, between: Any) -> tuple[str, float, 
     if ends.shape != (2,) or not (np.isfinite(ends).all() and ends[0] < ends[1]):
         raise ValueError(f"between = {shown(between)}: must be two real numbers, the lower one first")
     if system.numerics("pencil") is None:
-        raise ValueError("system: a density with inertia of the highest derivatives by x has no critical value")
+        raise ValueError("system: a field without a derivative by x leaves no critical value; eliminate the field")
     return name, float(ends[0]), float(ends[1])
 
 
@@ -244,7 +244,7 @@ class _Search:
         columns[self._place] = values
         found: dict[int, _State] = {}
         for rows, problem in self._pencil.problems(columns):
-            for part, chosen, mesh in meshes(problem, self._modes, self._tolerance):
+            for part, chosen, mesh, _ in meshes(problem, self._modes, self._tolerance):
                 finer = next(islice(sequence(mesh), level, None), None)
                 if finer is None:
                     raise _FinestError

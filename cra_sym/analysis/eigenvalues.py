@@ -8,15 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.checks import count, default_floating_point, instance, real_array
+from cra_sym.model.routes import ROUNDING, GeneralRoute
 from cra_sym.model.spanned_stiffness import Stiffness, check_range
-from cra_sym.model.spatial import SpatialProblem
+from cra_sym.model.spatial import HALVINGS, SpatialProblem
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.model.values import flat_columns
 from cra_sym.model.vanishing import check_ends
 from cra_sym.si import Numbers
 from cra_sym.solvers.argument import number_inside
 from cra_sym.solvers.eigenvalues import refine
-from cra_sym.solvers.pencil_refine import Settled, lowest_eigenvalues
+from cra_sym.solvers.pencil import GeneralContinuum
+from cra_sym.solvers.pencil_refine import Settled, local_spectrum, lowest_eigenvalues
 from cra_sym.solvers.stress_refine import cure
 
 __all__ = ["count_eigenvalues", "damping_ratios", "eigenvalues", "oscillating_frequencies"]
@@ -25,6 +27,9 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 _LEAST = 1e-11  # smallest relative tolerance that two meshes can agree to, because of rounding
 _SHORTER = 1e-3, 1e-4  # shares of the length that are left out where a stiffness vanishes at an end
+_ASTRAY = 10.0  # distance from the value refined, over its estimated error, beyond which a root is another one
+_MOST_HALVINGS = 11
+_BY_CONTINUUM = 0.2  # relative distance from s at which eigenvalues accumulate that explains an error
 _SHRINK = 0.85  # next radius to try, relative to one at which rounding spoils the count
 
 
@@ -53,18 +58,18 @@ def eigenvalues(system: System, modes: int = 3, *, oscillating: bool = True) -> 
     Raises
     ------
     ValueError
-        If there are fewer eigenvalues, with the number that the argument principle counts.
+        If there are fewer eigenvalues, with the number that the argument principle counts, or they accumulate there.
     ArithmeticError
-        If they do not converge, and the count does not confirm the result of Newton's method.
+        If they do not converge, and Newton's method on the exact problem does not either.
 
     Notes
     -----
     They are those of the Ritz basis on the stresses, converged to a relative ``system.tolerance`` (1e-11 at least) as
     its degree rises. Where two coalesce (critical damping, flutter) their mean and product converge, and each is
     accurate to half the digits only, as its sensitivity to the parameters implies. :func:`count_eigenvalues` proves in
-    a region that none is missing. With
-    inertia of the highest derivatives by x, Newton's method on the exact problem refines Ritz values of Hermite
-    elements. Without dampers and other such forces ``s = i omega``.
+    a region that none is missing. With a field that has no derivative by x, Newton's method on the exact problem
+    refines Ritz values of Hermite elements, and two step sizes must agree. ``system.accuracy`` tells the largest
+    estimated relative error. Without dampers and other such forces ``s = i omega``.
 
     Examples
     --------
@@ -87,21 +92,25 @@ def eigenvalues(system: System, modes: int = 3, *, oscillating: bool = True) -> 
     if system.numerics("conservative"):
         return np.asarray(1j * system.natural_frequencies(modes))
     columns = flat_columns(system.parameters, system.shape)
-    roots = np.empty((columns.shape[1], modes), dtype=complex)
+    roots, reached = np.empty((columns.shape[1], modes), dtype=complex), np.empty(columns.shape[1])
     pencil, tolerance = system.numerics("pencil"), max(system.tolerance, _LEAST)
     if pencil is None:
         guesses = system.model.ritz(2 * modes + 10).eigenvalues(system.values, modes, oscillating=oscillating)
-        roots[:] = _by_newton(system, columns, np.broadcast_to(guesses.reshape(-1, modes), roots.shape))
-        return roots.reshape(*system.shape, modes)
+        found = _by_newton(system, columns, np.broadcast_to(guesses.reshape(-1, modes), roots.shape), tolerance)
+        system.note_accuracy(found.error.max(axis=1).reshape(system.shape))
+        return found.values.reshape(*system.shape, modes)
     for rows, problem in pencil.problems(columns):
         with np.errstate(over="ignore", under="ignore"):
             found = lowest_eigenvalues(problem, modes, oscillating, tolerance)
         good = (found.error <= tolerance).all(axis=1)
-        roots[rows[good]] = found.values[good]
+        roots[rows[good]], reached[rows[good]] = found.values[good], found.error[good].max(axis=1)
         for row in np.nonzero(~good)[0]:
             one = Settled(found.values[row : row + 1], found.error[row : row + 1])
-            roots[rows[row]] = _unsettled(system, columns[:, rows[row : row + 1]], one, oscillating, tolerance)
+            alone = problem.take(np.array([row]))
+            last = _unsettled(system, columns[:, rows[row : row + 1]], alone, one, oscillating, tolerance)
+            roots[rows[row]], reached[rows[row]] = last.values[0], last.error.max()
     check_range(roots)
+    system.note_accuracy(reached.reshape(system.shape))
     return roots.reshape(*system.shape, modes)
 
 
@@ -209,18 +218,31 @@ def count_eigenvalues(system: System, radius: Numbers) -> NDArray[np.int64]:
     return found.reshape(shape)
 
 
-def _unsettled(system: System, columns: Array, found: Settled, oscillating: bool, tolerance: float) -> Complex:
+def _unsettled(
+    system: System, columns: Array, problem: GeneralContinuum, found: Settled, oscillating: bool, tolerance: float
+) -> Settled:
     """Return eigenvalues by Newton's method if it converges, or raise an error with their number."""
     modes, there = found.values.shape[1], int(np.isfinite(found.values).sum())
     if there < modes:
         kind = "oscillating motions; oscillating=False gives real ones too" if oscillating else "eigenvalues"
         raise ValueError(f"modes = {modes}: there are only {there} {kind}")
-    try:
-        return np.asarray(_by_newton(system, columns, found.values)[0])
-    except (ArithmeticError, ValueError):
-        bad = ~(found.error[0] <= tolerance)
+    bad = ~(found.error[0] <= tolerance)
     first, error = int(bad.argmax()), float(found.error[0, bad.argmax()])
     reason = f"modes = {modes}: the relative error of eigenvalue {first + 1} stays at {error:.1g}"
+    confined = local_spectrum(problem)
+    gap = np.abs(found.values[0, first] - confined).min(initial=np.inf)
+    accumulate = gap < _BY_CONTINUUM * np.abs(found.values[0, first])
+    if not accumulate or system.numerics("driven_spatial").uniform:
+        with suppress(ArithmeticError, ValueError):
+            exact = _by_newton(system, columns, found.values, tolerance)
+            if (np.abs(exact.values - found.values) <= _ASTRAY * found.error * np.abs(exact.values)).all():
+                return exact
+    if accumulate:
+        sizes = np.abs(confined[np.isfinite(confined)])
+        raise ValueError(
+            f"{reason}; eigenvalues accumulate at |s| = {sizes.min():.6g} to {sizes.max():.6g} rad/s, where inertia, "
+            f"dampers and stiffness of the highest derivatives by x cancel; only {first} precede them"
+        )
     number, reach = _counted(system, columns, float(np.abs(found.values[0][bad]).min()))
     if number is None:
         raise ArithmeticError(f"{reason}, and none can be counted; {cure(error)}")
@@ -240,13 +262,32 @@ def _counted(system: System, columns: Array, reach: float) -> tuple[int | None, 
     return None, reach
 
 
-def _by_newton(system: System, columns: Array, guesses: Complex) -> Complex:
-    """Return guesses refined on the exact problem; there must be no other eigenvalue below the last of them."""
-    roots = np.empty(guesses.shape, dtype=complex)
+def _by_newton(system: System, columns: Array, guesses: Complex, tolerance: float) -> Settled:
+    """Return guesses refined on the exact problem; there must be no other eigenvalue below the last of them.
+
+    Where coefficients vary along x, two step sizes must agree.
+    """
+    spatial: SpatialProblem = system.numerics("driven_spatial")
     squared = not system.numerics("damped")
-    for rows, _, problem in system.numerics("driven_spatial").problems(columns):
-        found = refine(problem, guesses[rows], squared=squared)
-        if np.isnan(found).any():
+    halvings = HALVINGS if spatial.uniform else max(GeneralRoute(spatial).needed(columns), HALVINGS)
+    values, error = guesses, np.full(guesses.shape, np.inf)
+    for steps in range(halvings, _MOST_HALVINGS + 1):
+        finer = np.empty(guesses.shape, dtype=complex)
+        for rows, _, problem in spatial.problems(columns, steps):
+            found = refine(problem, values[rows], squared=squared)
+            finer[rows] = np.take_along_axis(found, np.argsort(np.abs(found), axis=1, kind="stable"), axis=1)
+        if np.isnan(finer).any():
             raise ArithmeticError("eigenvalues: the refinement of a Ritz value did not converge; ask for fewer modes")
-        roots[rows] = np.take_along_axis(found, np.argsort(np.abs(found), axis=1, kind="stable"), axis=1)
-    return roots
+        if steps > halvings:
+            change = np.abs(finer - values)
+            error = np.maximum(change / np.where(change > 0.0, np.abs(finer), 1.0), ROUNDING)
+        elif spatial.uniform:
+            error[:] = ROUNDING
+        values = finer
+        if (error <= tolerance).all():
+            return Settled(values, error)
+    worst = int(error.max(axis=0).argmax())
+    raise ValueError(
+        f"modes = {guesses.shape[1]}: the relative error of eigenvalue {worst + 1} stays at {error.max():.1g}; "
+        f"{cure(float(error.max()))}"
+    )

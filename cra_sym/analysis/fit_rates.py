@@ -112,8 +112,8 @@ def _eigenvalues(system: System, modes: int, *, oscillating: bool) -> Complex:
     columns, pencil = flat_columns(system.parameters, system.shape), system.numerics("pencil")
     if pencil is None:
         raise ValueError(
-            "system: inertia of the highest derivatives by x leaves gyroscopic systems without an identification; "
-            "leave it out"
+            "system: a field that has no derivative by x leaves gyroscopic systems without an identification; "
+            "eliminate the field"
         )
     found = np.full((columns.shape[1], modes), np.nan, dtype=complex)
     for rows, problem in pencil.problems(columns):

@@ -101,9 +101,8 @@ def frequency_response(
     Where coefficients or loads vary along x, the problem is solved in a Ritz basis on the stresses, refined until the
     response changes by less than 1e-9, which leaves an error of up to about 1e-8; one that does not converge to 1e-6,
     of waves that are too short, is solved as a boundary-value problem, or refused with modal damping or a stiffness
-    that vanishes at an end. With inertia of the highest derivatives by x the boundary-value problem and the integral
-    above serve too. Modal damping is refused where the motion of one end drives a structure that varies along x or can
-    still move as a rigid body.
+    that vanishes at an end. Modal damping is refused where the motion of one end drives a structure that varies along
+    x or can still move as a rigid body.
 
     Examples
     --------

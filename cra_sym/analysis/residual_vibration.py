@@ -136,8 +136,8 @@ def couples(system: System, modes: int) -> bool:
     instance("system", system, System)
     if system.numerics("complex_modes") == "none" and system.numerics("damping") is not None:
         raise ValueError(
-            "system: its dampers couple modes, and with inertia of the highest derivatives by x there are no complex "
-            "ones; use modal damping (zeta), or response after the stop"
+            "system: its dampers couple modes, and with a field that has no derivative by x there are no complex ones; "
+            "eliminate the field, use modal damping (zeta), or response after the stop"
         )
     return has_complex_modes(system, count("modes", modes, high=MOST_MODES))
 

@@ -151,8 +151,8 @@ def _system(weak: WeakForm, parameter: Symbol) -> Matrix:
     for row, jet in enumerate(highest):
         if jet.space == 0 and leading[row, row].has(parameter):
             raise HamiltonError(
-                f"density: {weak.variation.space.form(jet)} has kinetic energy but no derivative by "
-                f"{weak.variation.space.x}, so infinitely many motions share one frequency"
+                f"density: {weak.variation.space.form(jet)} has inertia or damping but no derivative by "
+                f"{weak.variation.space.x}, so infinitely many motions share one eigenvalue"
                 "; give it a stiffness along the length"
             )
     # columns of y = (q, w, P, r); the highest derivatives follow from the definition of the top forces

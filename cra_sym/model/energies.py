@@ -36,13 +36,13 @@ def stress_route(model: Model, spatial: SpatialProblem) -> StressRoute | None:
     rest = _matrix(weak, state, state, 0) - (coupled.T * strain if cross.is_zero_matrix else zeros(len(state)))
     named = {"W": leading, "B": strain, "D": cross, "R": rest, "M": _matrix(weak, state, state, 2)}
     entries: dict[tuple[str, int, int], Expr] = {}
+    x = weak.variation.space.x
     for name, matrix in named.items():
         for i in range(matrix.rows):
             for j in range(matrix.cols):
                 value = matrix[i, j]
-                if (j >= i or name in "BD") and value != 0 and not (name in "BR" and vanishes(value)):
+                if (j >= i or name in "BD") and value != 0 and not (name in "BR" and vanishes(value, x)):
                     entries[name, i, j] = value
-    x = weak.variation.space.x
     values = tuple(entries.values())
     return StressRoute(
         spatial,

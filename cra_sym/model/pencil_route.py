@@ -73,6 +73,7 @@ class PencilRoute(StressRoute):
             springs,
             0.5 * (mass + mass.swapaxes(-1, -2)),
             points=points,
+            variation=self.spatial.variation(columns),
             end_forces=np.stack([rest, damping - _sum(pull, constants)]),
             point_forces=forces,
             dampers=(pull, constants),
@@ -140,7 +141,7 @@ def _sum(directions: Array, constants: Array) -> Array:
 
 
 def pencil_route(model: Model) -> PencilRoute | None:
-    """Return the route of a model, or None if a field has no derivative by x or inertia of its highest."""
+    """Return the route of a model, or None if a field has no derivative by x or the inertia is not symmetric."""
     from sympy import Matrix, zeros
 
     from cra_sym.mechanics.state_form import end_displacements
@@ -151,19 +152,21 @@ def pencil_route(model: Model) -> PencilRoute | None:
     weak = weak_form(model.linearised.variation)
     section, highest, lumped = weak.fields()
     orders = tuple(weak.variation.orders)
-    if 0 in orders or any(jet in highest for pair, e in weak.inside.items() for jet in pair if 2 in e):
+    if 0 in orders:
         return None
+    x = weak.variation.space.x
     state, jets, fields = [*section, *lumped], [*highest, *section, *lumped], len(highest)
 
     def part(form: dict[Any, Any], rows: list[Jet], columns: list[Jet], power: int) -> Matrix:
         return Matrix(len(rows), len(columns), [form.get((p, q), {}).get(power, 0) for p in rows for q in columns])
 
-    whole, drag, mass = (part(weak.inside, jets, jets, power) for power in (0, 1, 2))
+    whole, drag = (part(weak.inside, jets, jets, power) for power in (0, 1))
+    mass = part(weak.inside, [*state, *highest], [*state, *highest], 2)
     ends, places = end_displacements(weak), weak.points
     end = [part(weak.ends, ends, ends, power) for power in (0, 1, 2)]
     points = [part(point.form, state, state, power) for point in places for power in (0, 1, 2)]
     for matrix in (mass, end[2], *points[2::3]):
-        if not all(vanishes(entry) for entry in matrix - matrix.T):
+        if not all(vanishes(entry, x) for entry in matrix - matrix.T):
             return None
     even = (whole + whole.T) / 2
     leading, coupled = even[:fields, :fields], even[:fields, fields:]
@@ -172,21 +175,20 @@ def pencil_route(model: Model) -> PencilRoute | None:
         strain = zeros(*coupled.shape)
     # twice the energy is (h + B s)' W (h + B s) and what remains
     spread = Matrix.hstack(Matrix.eye(fields), strain)
-    rest = (whole - spread.T * leading * spread).applyfunc(lambda e: 0 if vanishes(e) else e)
+    rest = (whole - spread.T * leading * spread).applyfunc(lambda e: 0 if vanishes(e, x) else e)
     potential = zeros(len(state), len(state))
     for k in range(len(state)):
         potential[k, k], rest[fields + k, fields + k] = rest[fields + k, fields + k], 0
     named = {
-        "W": leading, "B": strain, "R": potential, "M": mass[fields:, fields:], "N": rest, "C": drag
+        "W": leading, "B": strain, "R": potential, "M": mass, "N": rest, "C": drag
     }  # fmt: skip
     entries: dict[tuple[str, int, int], Expr] = {}
     for name, matrix in named.items():
         for i in range(matrix.rows):
             for j in range(matrix.cols):
                 value = matrix[i, j]
-                if (j >= i or name in "BNC") and value != 0 and not (name in "BR" and vanishes(value)):
+                if (j >= i or name in "BNC") and value != 0 and not (name in "BR" and vanishes(value, x)):
                     entries[name, i, j] = value
-    x = weak.variation.space.x
     spatial = model.numerics("damped_spatial")
     return PencilRoute(
         spatial,

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from sympy import Add, Derivative, Expr, Rational, Symbol
+from itertools import pairwise
+
+from mpmath import mp
+from sympy import Add, Derivative, Expr, Poly, Rational, S, Symbol, lambdify
 
 from cra_sym.mechanics import StateForm
+from cra_sym.mechanics.breakpoints import switches
 
 __all__ = ["asymmetry", "odd_in_time", "vanishes"]
 
@@ -15,20 +19,43 @@ def odd_in_time(term: Expr, t: Symbol) -> bool:
     return bool(sum(orders) % 2 == 1)
 
 
-def vanishes(expression: Expr) -> bool:
-    """Tell whether an expression is zero: by expansion, or else numerically at three points in 30 digits.
+def vanishes(expression: Expr, x: Symbol) -> bool:
+    """Tell whether an expression is zero: by expansion, or else numerically in 30 digits, on every part along x.
 
-    Products of Piecewise do not cancel when they are expanded.
+    Products of Piecewise do not cancel when they are expanded. A sum all of whose terms are zero at some place, as a
+    pulse is beside it, says nothing.
     """
-    if expression == 0 or expression.expand() == 0:
+    expanded = expression.expand()
+    terms = Add.make_args(expanded)
+    if expanded == 0:
         return True
-    symbols = sorted(expression.free_symbols, key=str)
+    if len(terms) == 1:
+        return False
+    symbols = sorted(expanded.free_symbols, key=str)
+    values, seen = lambdify(symbols, terms, "mpmath"), False
     for turn in range(1, 4):
         at = {symbol: Rational(7 * turn + 3 * k, 29 + 5 * k) for k, symbol in enumerate(symbols)}
-        terms = [abs(complex(term.subs(at).evalf(30))) for term in Add.make_args(expression)]
-        if abs(complex(expression.subs(at).evalf(30))) > 1e-20 * sum(terms):
-            return False
-    return True
+        for place in _on_every_part(expanded, x, at):
+            with mp.workdps(30):
+                found = values(*(mp.mpf(v.p) / v.q for v in ({**at, x: place}[symbol] for symbol in symbols)))
+                size = sum(abs(value) for value in found)
+                if abs(sum(found)) > 1e-20 * size:
+                    return False
+            seen |= size > 0
+    return bool(seen)
+
+
+def _on_every_part(expression: Expr, x: Symbol, at: dict[Symbol, Rational]) -> list[Rational]:
+    """Return places on every part of x between the breakpoints of an expression, for values of its symbols."""
+    ends: set[Rational] = set()
+    for switch in switches([expression], x):
+        if switch.expression.is_polynomial(x):
+            here = Poly(switch.expression.xreplace({s: v for s, v in at.items() if s != x}), x)
+            ends |= {Rational(root) for root in here.nroots(maxsteps=200) if root.is_real}
+    if not ends:
+        return [at.get(x, S.Zero)]
+    cuts = sorted(ends)
+    return [cuts[0] - 1, *((left + right) / 2 for left, right in pairwise(cuts)), cuts[-1] + 1]
 
 
 def asymmetry(form: StateForm) -> str:
@@ -39,6 +66,6 @@ def asymmetry(form: StateForm) -> str:
     a, b, c, d = (form.system[i : i + half, j : j + half] for i in (0, half) for j in (0, half))
     points = ((matrix, matrix.T) for _, matrix, _ in form.points)
     pairs = ((b, b.T), (c, c.T), (d, -a.T), (form.boundary, form.boundary.T), *points)
-    if all(vanishes(entry) for left, right in pairs for entry in left - right):
+    if all(vanishes(entry, form.x) for left, right in pairs for entry in left - right):
         return ""
     return "the virtual work has forces that follow the motion"

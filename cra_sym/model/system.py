@@ -221,9 +221,13 @@ class System:
                 omega = route.angular_frequencies(self.parameters, self.shape, modes)
                 accuracy = np.full(self.shape, ROUNDING)
         check_range(omega)
-        self.__dict__["_accuracy"] = np.maximum(self.__dict__.get("_accuracy", 0.0), accuracy)
+        self.note_accuracy(accuracy)
         omega.flags.writeable = False
         return omega
+
+    def note_accuracy(self, error: Array) -> None:
+        """Include the estimated relative error of a result, shape (...), in `accuracy`."""
+        self.__dict__["_accuracy"] = np.maximum(self.__dict__.get("_accuracy", 0.0), error)
 
     def root_rates(self, modes: int, by: Sequence[str]) -> Mapping[str, Array]:
         """Return the derivatives of omega^2 by parameters, shape (..., modes) each, without modes.
@@ -239,12 +243,13 @@ class System:
 
     @property
     def accuracy(self) -> Array:
-        """Estimated relative error of the natural frequencies, the largest of those computed so far, shape (...).
+        """Estimated relative error of natural frequencies and eigenvalues, the largest so far computed, shape (...).
 
-        Of the first three if none was computed. Where coefficients vary along x it is estimated, from the stresses that
-        break equilibrium or, with inertia of the highest derivatives by x, from a second integration of twice as many
-        steps; a frequency whose error would be beyond ``tolerance`` is refused. Where they are constant along x
-        frequencies are exact but for rounding, and this is a bound of that, 1e-11.
+        Of the first three frequencies if none was computed. Where coefficients vary along x it is estimated, from the
+        stresses that break equilibrium or, with inertia of the highest derivatives by x, from a second integration of
+        twice as many steps; that of complex eigenvalues is the difference of two meshes, and of coalescing ones that of
+        their mean and product. A frequency whose error would be beyond ``tolerance`` is refused. Where coefficients are
+        constant along x frequencies are exact but for rounding, and this is a bound of that, 1e-11.
         """
         if "_accuracy" not in self.__dict__:
             self.natural_frequencies(3)

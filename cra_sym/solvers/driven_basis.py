@@ -52,7 +52,7 @@ def driven_on_basis(
     ValueError
         If the responses do not converge to 1e-6 under refinement of the mesh.
     """
-    ((_, chosen, mesh),) = meshes(problem, _MODES, 1e-10)
+    ((_, chosen, mesh, _),) = meshes(problem, _MODES, 1e-10)
     found, error = np.empty((0, len(s)), dtype=complex), np.full(len(s), np.inf)
     open_, before, size = np.arange(len(s)), None, 0
     for finer in sequence(mesh):

@@ -196,7 +196,7 @@ def lowest_motions(problem: GeneralContinuum, modes: int, zeta: float, *, whole:
     ValueError
         If the eigenvalues do not converge, or modal damping is given for a structure without natural modes.
     """
-    ((_, chosen, mesh),) = meshes(problem, 2 * modes, 1e-10)
+    ((_, chosen, mesh, _),) = meshes(problem, 2 * modes, 1e-10)
     before: NDArray[np.complex128] | None = None
     worst, middle = np.inf, None
     for turn, finer in enumerate(sequence(mesh)):

@@ -46,7 +46,7 @@ class GeneralContinuum(Continuum):
     """A continuum with forces of any kind besides its energies, which must be positive.
 
     Its coefficients have two more parts, of pairs of jets (highest derivatives h of the fields, then s): 'N' and 'C',
-    the forces on the first by the second and by its velocity.
+    the forces on the first by the second and by its velocity. The mass 'M' is that of (s, h): h may have inertia.
 
     Attributes
     ----------
@@ -118,6 +118,12 @@ class Forces(Columns):
         moved, tops = self.displaced[0], self.problem.tops()
         highest = [self._rate(place, tops, [*moved]) for place in tops]
         return [h for h in highest if h is not None] + moved
+
+    @property
+    def moving(self) -> list[Array]:
+        """Displacements, then highest derivatives of the fields, of each unknown at the points."""
+        fields = len(self.problem.orders)
+        return self.jets[fields:] + self.jets[:fields]
 
     @property
     def resists_strains(self) -> bool:

@@ -13,16 +13,19 @@ from .pencil import Complex, GeneralContinuum, Index, Reduced, reduced
 from .stress_mesh import Mesh, TooFineError
 from .stress_refine import alike, meshed
 
-__all__ = ["Settled", "lowest_eigenvalues", "matched", "meshes", "sequence"]
+__all__ = ["Settled", "local_spectrum", "lowest_eigenvalues", "matched", "meshes", "sequence"]
 
 Array = NDArray[np.float64]
 _STEPS = 4, 6  # degrees between the first two meshes, and between later ones
 _MOST_DEGREE, _MOST_UNKNOWNS = 34, 420
 _UNGRADED = 2  # meshes that may show a vanishing stiffness to leave all motions smooth
+_PLACES = 64  # in each span, at which motions confined to a place are looked for
 _LANES = 400_000  # numbers in the largest array of a chunk
 _NEAR = 1e-3
 """Relative distance below which two eigenvalues are compared by their mean and their product: coalescing eigenvalues
 are each accurate to half the digits only."""
+_ROUNDING = 8 * float(np.finfo(float).eps)
+"""Of 1 / s over the largest one."""
 _REAL = 1e-7
 """Relative imaginary part below which a pair cannot be told from a double real eigenvalue."""
 
@@ -37,7 +40,8 @@ class Settled:
         By ascending modulus, one of each conjugate pair; the best known values where they did not converge, nan where
         there are no more.
     error : ndarray, shape (rows, modes)
-        Relative difference of two meshes.
+        Relative difference of two meshes, of which the error on the finer one is a small part, and an allowance for
+        rounding and for what the quadrature leaves out of the coefficients.
     """
 
     values: Complex
@@ -62,7 +66,7 @@ def lowest_eigenvalues(
     """
     rows = len(problem.edges)
     found = Settled(np.full((rows, modes), np.nan, dtype=complex), np.full((rows, modes), np.inf))
-    for part, chosen, mesh in meshes(problem, modes, tolerance):
+    for part, chosen, mesh, unresolved in meshes(problem, modes, tolerance):
         open_, before = np.arange(len(part)), None
         for finer in islice(sequence(mesh), most):
             results = [_all(chosen.take(open_[k]), finer) for k in _chunks(chosen, finer, len(open_))]
@@ -70,6 +74,7 @@ def lowest_eigenvalues(
             if before is not None:
                 picked, error = _compared(values, before, rate, modes, oscillating)
                 place = part[open_]
+                error = error + unresolved[open_, None]
                 found.values[place], found.error[place] = picked, error
                 still = (error > tolerance).any(axis=1)
                 open_, values = open_[still], values[still]
@@ -79,8 +84,42 @@ def lowest_eigenvalues(
     return found
 
 
-def meshes(problem: GeneralContinuum, modes: int, tolerance: float) -> Iterator[tuple[Index, GeneralContinuum, Mesh]]:
-    """Yield rows that can share a mesh, their problem, and the initial mesh."""
+def local_spectrum(problem: GeneralContinuum) -> Complex:
+    """Return the s at which a motion could be confined to one place along x, (places, number).
+
+    There stiffness, dampers and inertia of the highest derivatives cancel. Eigenvalues accumulate at such s.
+
+    Parameters
+    ----------
+    problem : GeneralContinuum
+        Of one parameter set.
+    """
+    ends, share = problem.edges, (np.arange(_PLACES) + 0.5) / _PLACES
+    x = (ends[:, :-1, None] + np.diff(ends, axis=1)[..., None] * share).reshape(1, -1)
+    found, fields = problem.coefficients(x, np.zeros(1, dtype=np.intp)), len(problem.orders)
+    offset = problem.displacements + problem.lumped
+    stiffness, damping, mass = (np.zeros((x.size, fields, fields)) for _ in range(3))
+    for i in range(fields):
+        for j in range(fields):
+            pair, above = (min(i, j), max(i, j)), (offset + min(i, j), offset + max(i, j))
+            for matrix, entry in (
+                (stiffness, found["W"].get(pair)), (damping, found["C"].get((i, j))), (mass, found["M"].get(above))
+            ):  # fmt: skip
+                if entry is not None:
+                    matrix[:, i, j] = np.broadcast_to(entry, x.shape)[0]
+    # 1 / s of (W + s C + s^2 M) e = 0
+    zero, one = np.zeros_like(mass), np.broadcast_to(np.eye(fields), mass.shape)
+    inverse = np.linalg.eigvals(
+        np.block([[-np.linalg.solve(stiffness, damping), -np.linalg.solve(stiffness, mass)], [one, zero]])
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(1.0 / np.where(np.abs(inverse) > 1e-12 * np.abs(inverse).max(initial=0.0), inverse, 0.0))
+
+
+def meshes(
+    problem: GeneralContinuum, modes: int, tolerance: float
+) -> Iterator[tuple[Index, GeneralContinuum, Mesh, Array]]:
+    """Yield rows that can share a mesh, their problem, the initial mesh, and the unresolved part of each row."""
     waiting = [(rows, problem.take(rows), ends) for rows, ends in alike(problem)]
     while waiting:
         rows, part, ends = waiting.pop()
@@ -97,7 +136,7 @@ def meshes(problem: GeneralContinuum, modes: int, tolerance: float) -> Iterator[
                 f"values: the coefficients along x are resolved to {unresolved.max():.1g} of their integral only; "
                 "state jumps by Piecewise or Heaviside"
             )
-        yield rows, chosen, mesh  # type: ignore[misc]
+        yield rows, chosen, mesh, unresolved  # type: ignore[misc]
 
 
 def sequence(mesh: Mesh) -> Iterator[Mesh]:
@@ -181,7 +220,7 @@ def _compared(fine: Complex, coarse: Complex, rate: Array, modes: int, oscillati
         )
         close = np.take_along_axis(gap, other[..., None], axis=2)[..., 0] <= _NEAR * scale
         error = np.where(close, np.minimum(error, pair), error)
-    error = np.where(np.isnan(error), np.inf, error)
+    error = np.where(np.isnan(error), np.inf, error) + _ROUNDING * (1.0 + size[:, :width] / rate[:, None])
     picked = np.where(there, np.take_along_axis(fine, order, axis=1), np.nan)
     return picked, np.where(there, np.take_along_axis(error, np.minimum(order, width - 1), axis=1), np.inf)
 

@@ -273,12 +273,35 @@ class Columns:
             total += there.swapaxes(-1, -2) @ point.mass @ there
         return total
 
+    @property
+    def moving(self) -> list[Array]:
+        """What the pairs of a quadratic form are numbered by: the displacements of each unknown at the points."""
+        return self.displaced[0]
+
     def _quadratic(self, entries: Entries, total: Array) -> Array:
-        moved = self.displaced[0]
+        moved = self.moving
         for (i, j), entry in entries.items():
             product = self._product(entry, moved[i], moved[j])
             total += product if i == j else product + product.swapaxes(-1, -2)
         return total
+
+    def mass_factor(self) -> Array:
+        """Return F with F' F = M, from the points of the quadrature, (sets, points, size)."""
+        entries, moved = self.coefficient["M"], [self.flat(side) for side in self.moving]
+        places = sorted({k for pair in entries for k in pair})
+        points = moved[0].shape[-1]
+        density = np.zeros((self.sets, points, len(places), len(places)))
+        for (i, j), entry in entries.items():
+            a, b = places.index(i), places.index(j)
+            density[..., a, b] = density[..., b, a] = entry.reshape(len(entry), -1) * self.weights
+        size, frame = np.linalg.eigh(density)
+        root = np.sqrt(np.maximum(size, 0.0))[..., None, :] * frame  # density = root root'
+        parts = []
+        for k in range(len(places)):
+            parts.append(sum(root[:, :, a, k][:, None] * moved[place] for a, place in enumerate(places)))
+        inside = [np.broadcast_to(part, (self.sets, self.size, points)).swapaxes(-1, -2) for part in parts]
+        at = [_root(point.mass) @ there for point, there in zip(self.problem.points, self.at_points, strict=True)]
+        return np.concatenate([*inside, _root(self.problem.end_mass) @ self.ends, *at], axis=1)
 
     def _product(self, entry: Array, first: Array, second: Array) -> Array:
         """Return the integrals of a coefficient times two functions of every pair of unknowns."""
@@ -331,6 +354,13 @@ def _on_points(entry: Array, sets: int, shape: tuple[int, ...]) -> Array:
         entry = entry.reshape(-1, 1, 1) if entry.ndim else entry[None, None, None]
         return np.broadcast_to(entry, (len(entry), *shape))
     return entry.reshape(len(entry), *shape)
+
+
+def _root(mass: Array) -> Array:
+    """Return F with F' F = a mass matrix, (sets, size, size)."""
+    size, frame = np.linalg.eigh(mass)
+    root: Array = np.sqrt(np.maximum(size, 0.0))[..., None] * frame.swapaxes(-1, -2)
+    return root
 
 
 def _semidefinite(entries: Entries) -> bool:

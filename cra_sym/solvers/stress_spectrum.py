@@ -330,23 +330,7 @@ class _Problem:
 
     def _mass_factor(self) -> Array:
         """Return F with F' F = M, from the points of the quadrature, (sets, points, size)."""
-        columns, entries = self.columns, self.columns.coefficient["M"]
-        moved = [columns.flat(side) for side in columns.displaced[0]]
-        places = sorted({k for pair in entries for k in pair})
-        points = moved[0].shape[-1]
-        density = np.zeros((columns.sets, points, len(places), len(places)))
-        for (i, j), entry in entries.items():
-            a, b = places.index(i), places.index(j)
-            density[..., a, b] = density[..., b, a] = entry.reshape(len(entry), -1) * columns.weights
-        size, frame = np.linalg.eigh(density)
-        root = np.sqrt(np.maximum(size, 0.0))[..., None, :] * frame  # density = root root'
-        parts = []
-        for k in range(len(places)):
-            parts.append(sum(root[:, :, a, k][:, None] * moved[place] for a, place in enumerate(places)))
-        ends = _root(columns.problem.end_mass) @ columns.ends
-        inside = [np.broadcast_to(part, (columns.sets, columns.size, points)).swapaxes(-1, -2) for part in parts]
-        at = [_root(point.mass) @ there for point, there in zip(columns.problem.points, columns.at_points, strict=True)]
-        return np.concatenate([*inside, ends, *at], axis=1)[self.sets]
+        return self.columns.mass_factor()[self.sets]
 
     def _kinetic(self, unknowns: Array) -> Array:
         """Return x' M x from the displacements, so that rounding of large eigenvalues does not spoil small ones."""
@@ -355,7 +339,7 @@ class _Problem:
 
         def shape(place: int) -> Array:
             if place not in moved:
-                values = columns.flat(columns.displaced[0][place])
+                values = columns.flat(columns.moving[place])
                 values = values[self.sets] if len(values) > 1 else values
                 moved[place] = unknowns @ values
             return moved[place]
@@ -394,10 +378,3 @@ class _Problem:
             z, rounding = np.pad(z, pad)[:, :keep], np.pad(rounding, pad)[:, :keep]
             vectors = np.concatenate([self.still, vectors], axis=1)[:, :keep]
         return Spectrum(z, vectors, rounding, compliances, load)
-
-
-def _root(mass: Array) -> Array:
-    """Return F with F' F = a mass matrix, (sets, size, size)."""
-    size, frame = np.linalg.eigh(mass)
-    root: Array = np.sqrt(np.maximum(size, 0.0))[..., None] * frame.swapaxes(-1, -2)
-    return root
