@@ -13,6 +13,7 @@ from cra_sym.checks import choice, count, flag, instance
 from cra_sym.codegen.arm_library import arm_library
 from cra_sym.codegen.controllers import Controller
 from cra_sym.codegen.fmu import VERSIONS, fmu_archive
+from cra_sym.codegen.fmu_parameters import Unit, parametric_unit
 from cra_sym.codegen.frozen import frozen_library
 from cra_sym.codegen.frozen_slipping import slipping_library
 from cra_sym.codegen.library import PRINTERS, check_name
@@ -82,7 +83,8 @@ def export(
         All have the same contents: for the arm the characteristic function, frequencies, modes, sensitivities,
         responses, state space and first-order stability; C also solves many arms at once. 'fmu' writes NAME.fmu, of a
         system: model exchange and co-simulation with sources, and a binary for this platform if there is a C compiler.
-        Its values are frozen.
+        The values of a system that could be exported as a model are start values of parameters, which initialization
+        mode may change; those of others are frozen, and the description of the unit says why.
     directory : path
         Folder to create, with its parents.
     model : Model, optional
@@ -193,17 +195,24 @@ def _system_texts(
 ) -> dict[str, str | bytes]:
     instance("system", system, System)
     modes = count("modes", modes, high=MOST_MODES)
-    if system.model.pieces["hysteresis"]:
-        if controller is not None:
-            raise ValueError("controller: its gains are those of a linear system; give system.without_hysteresis")
+    slips = bool(system.model.pieces["hysteresis"])
+    if slips and controller is not None:
+        raise ValueError("controller: its gains are those of a linear system; give system.without_hysteresis")
+    if language == "fmu" and real != "float64":
+        raise ValueError(f"real = {real!r}: an FMU has float64")
+    frozen = "Its values are frozen, as it has elastic-slip elements."
+    if language == "fmu" and not slips:
+        try:
+            return {f"{name}.fmu": fmu_archive(parametric_unit(system, name, modes, drive, outputs), version, "")}
+        except ValueError as reason:  # another than that of the input is raised again below
+            frozen = f"Its values are frozen: {str(reason).partition(';')[0]}."
+    if slips:
         library, given, names = slipping_library(system, name, modes, real, drive, outputs)
     else:
         library, given, names = frozen_library(system, name, modes, real, drive, outputs, controller)
     if language != "fmu":
         return dict(library.texts(language))
-    if real != "float64":
-        raise ValueError(f"real = {real!r}: an FMU has float64")
-    return {f"{name}.fmu": fmu_archive(library, given, names, version)}
+    return {f"{name}.fmu": fmu_archive(Unit(library, (given,), names), version, frozen)}
 
 
 def _digest(texts: Mapping[str, str | bytes]) -> str:

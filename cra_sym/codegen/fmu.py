@@ -18,9 +18,11 @@ from pathlib import Path
 from xml.sax.saxutils import escape
 
 import cra_sym
+from cra_sym.codegen.fmu_parameters import Parameter, Unit, reasons
 from cra_sym.codegen.library import Library
 from cra_sym.codegen.rendering import licence, rendered
 from cra_sym.kernels.form_parse import parse
+from cra_sym.symbols import unit_dimension
 
 __all__ = ["VERSIONS", "fmu_archive"]
 
@@ -34,7 +36,7 @@ _UNIT_OF = {
     "root_moment": "N.m", "tip_force": "N", "tip_moment": "N.m", "base_acceleration": "m/s2", "drive_force": "N",
     "strain": "1",
 }  # fmt: skip
-_OUTPUT, _STATE, _DERIVATIVE = 1000, 10000, 20000  # first value references, as in the template
+_OUTPUT, _PARAMETER, _STATE, _DERIVATIVE = 1000, 2000, 10000, 20000  # first value references, as in the template
 _FORCE, _DISSIPATED = 3000, 5000  # of elements
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
 _SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib")}
@@ -50,16 +52,23 @@ class _Variable:
     description: str
     index: int
     state: int = 0
+    given: Parameter | None = None
 
     @property
     def unit(self) -> str:
-        unit = _UNIT_OF.get(self.name)
-        return f' unit="{unit}"' if unit else ""
+        unit = self.given.unit if self.given else _UNIT_OF.get(self.name)
+        return f' unit="{escape(unit)}"' if unit else ""
+
+    @property
+    def variability(self) -> str:
+        return "fixed" if self.given else "continuous"
 
     @property
     def more3(self) -> str:
+        start = self.given.start if self.given else "0"
         return {
             "input": ' start="0"', "state": ' initial="exact" start="0"', "derivative": f' derivative="{self.state}"',
+            "parameter": f' initial="exact" start="{start}"',
         }.get(self.kind, "")  # fmt: skip
 
     @property
@@ -70,16 +79,22 @@ class _Variable:
     def initial2(self) -> str:
         return {
             "state": ' initial="exact"',
+            "parameter": ' initial="exact"',
             "derivative": ' initial="calculated"',
             "output": ' initial="calculated"',
         }.get(self.kind, "")
 
 
-def _variables(blocks: int, elements: int, given: str, outputs: Sequence[str], version: str) -> list[_Variable]:
+def _variables(blocks: int, elements: int, unit: Unit, version: str) -> list[_Variable]:
     """Return all variables; time is one in FMI 3.0 only, and indices count from 1."""
     found = [_Variable("time", 0, "independent", "time", "time, s", 0)] if version == "3.0" else []
-    rows = [(given, 1, "input", "input", "input, held between communication points")]
-    rows += [(name, _OUTPUT + i, "output", "output", f"output {name}") for i, name in enumerate(outputs)]
+    rows = [
+        (name, 1 + i, "input", "input", "input, held between communication points")
+        for i, name in enumerate(map(_quoted, unit.inputs))
+    ]
+    rows += [
+        (name, _OUTPUT + i, "output", "output", f"output {name}") for i, name in enumerate(map(_quoted, unit.outputs))
+    ]
     for first, of in (_FORCE, "element_force"), (_DISSIPATED, "element_dissipated"):
         meaning = "force of an elastic-slip element" if first == _FORCE else "J, energy dissipated by an element"
         rows += [(f"{of}[{i + 1}]", first + i, "output", "output", meaning) for i in range(elements)]
@@ -93,13 +108,35 @@ def _variables(blocks: int, elements: int, given: str, outputs: Sequence[str], v
         state = _STATE + i if version == "3.0" else start + i
         words = "local", "derivative", "time derivative of a state"
         found.append(_Variable(of, _DERIVATIVE + i, *words, len(rows) + 1 + i, state))
+    for i, one in enumerate(unit.parameters):
+        place = len(found) + (version == "2.0")
+        about = _quoted(one.description)
+        found.append(_Variable(_quoted(one.name), _PARAMETER + i, "parameter", "parameter", about, place, given=one))
     return found
 
 
-def fmu_archive(library: Library, given: str, outputs: Sequence[str], version: str) -> bytes:
-    """Return the bytes of the archive; the same input and compiler give the same bytes."""
+def _quoted(text: str) -> str:
+    return escape(text, {'"': "&quot;"})
+
+
+def _units(parameters: Sequence[Parameter]) -> dict[str, str]:
+    """Return the units by name, with their exponents of base units."""
+    found = dict(_UNITS)
+    for unit in sorted({one.unit for one in parameters} - {*found, ""}):
+        powers = unit_dimension(unit)._asdict().items()
+        found[escape(unit)] = "".join(f' {base}="{power}"' for base, power in sorted(powers) if power)
+    return found
+
+
+def fmu_archive(unit: Unit, version: str, frozen: str) -> bytes:
+    """Return the bytes of the archive; the same input and compiler give the same bytes.
+
+    ``frozen`` says why there are no parameters, if there are none.
+    """
+    library = unit.library
     constants = parse(library.text).constants
-    blocks, elements = (int(constants[name].values[0]) if name in constants else 0 for name in ("BLOCKS", "ELEMENTS"))
+    elements = int(constants["ELEMENTS"].values[0]) if "ELEMENTS" in constants else 0
+    blocks = 0 if elements else int(constants["DOFS" if unit.parameters else "BLOCKS"].values[0])
     c = library.texts("c")
     sources = {name: c[name] for name in (f"{library.name}.c", f"{library.name}.h")}
     values = {
@@ -107,9 +144,12 @@ def fmu_archive(library: Library, given: str, outputs: Sequence[str], version: s
         "upper": library.name.upper(),
         "version": cra_sym.__version__,
         "token": _token(library, version),
-        "description": escape(f"{library.summary}. {library.provenance[-1]}", {'"': "&quot;"}),
-        "units": _UNITS.items(),
-        "variables": _variables(blocks, elements, given, outputs, version),
+        "description": _quoted(f"{library.summary}. {frozen or library.provenance[-1]}"),
+        "units": _units(unit.parameters).items(),
+        "variables": _variables(blocks, elements, unit, version),
+        "inputs": len(unit.inputs),
+        "parameters": unit.parameters,
+        "reasons": reasons(library),
         "slips": elements > 0,
         "directional": "false" if elements else "true",
     }
