@@ -76,8 +76,9 @@ def growth_rate(
     Raises
     ------
     TypeError, ValueError
-        If an argument is out of its range: also a :class:`TransverseBase`, ``residual`` if no stiffness of an end
-        fluctuates, and 'compiled' without llvmlite. If shapes do not broadcast, or a period takes more than 1e7 steps.
+        If an argument is out of its range: also a :class:`TransverseBase`, stiffnesses that are to fluctuate but are
+        all infinite, ``residual`` if no stiffness of an end fluctuates, and 'compiled' without llvmlite. If shapes do
+        not broadcast, or a period takes more than 1e7 steps.
 
     Examples
     --------
@@ -224,7 +225,19 @@ def checked_point(
     frequency = checks.real_array("angular_frequency", given["angular_frequency"], low=1e-300, unit="rad/s")
     epsilon = checks.real_array("epsilon", given["epsilon"], low=0.0, unit="1")
     batch_shape(system, excitation, angular_frequency=frequency, epsilon=epsilon)
+    _refuse_rigid(system, excitation)
     return excitation, frequency, epsilon, checks.count("modes", modes, high=MOST_MODES)
+
+
+def _refuse_rigid(system: System, excitation: Parametric) -> None:
+    """Raise an error if all parameters that are to fluctuate are infinite everywhere, since then none does."""
+    weights = excitation.weights if isinstance(excitation, Fluctuation) else {}
+    names = [name for name, weight in weights.items() if np.any(weight) and name in system.values]
+    if names and all(np.isinf(system.values[name]).all() for name in names):
+        raise ValueError(
+            f"excitation = {excitation!r}: {' and '.join(f'{name} = inf' for name in names)} cannot fluctuate; must be "
+            "finite"
+        )
 
 
 def _solver_arguments(

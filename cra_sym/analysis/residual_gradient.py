@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.analysis.differences import by_differences, central_weights
-from cra_sym.analysis.histories import Histories, History
-from cra_sym.analysis.modes import participation
+from cra_sym.analysis.histories import Histories, History, supports
+from cra_sym.analysis.modes import displaced, participation, section_place
 from cra_sym.analysis.residual_vibration import Stopped, couples, ended, residual_vibration, stopped
 from cra_sym.analysis.sensitivities import Sensitivities, sensitivities
 from cra_sym.checks import count, default_floating_point, names
@@ -20,6 +20,9 @@ from cra_sym.model.system import MOST_MODES, System
 from cra_sym.si import Numbers
 from cra_sym.solvers.motion import BaseMotion, Piecewise
 from cra_sym.solvers.motion_terms import Term
+
+if TYPE_CHECKING:
+    from sympy.core.function import AppliedUndef
 
 __all__ = ["residual_vibration_gradient"]
 
@@ -38,6 +41,7 @@ def residual_vibration_gradient(
     modes: int = 5,
     *,
     zeta: Numbers | None = None,
+    field: AppliedUndef | None = None,
 ) -> tuple[Array | float, Array]:
     r"""Return the residual vibration and its derivatives, for gradient-based optimisation.
 
@@ -45,11 +49,12 @@ def residual_vibration_gradient(
     force. The derivative of the frequency is the sensitivity (31)-(32). That of :math:`\Gamma_i \phi_i(L)` by a spring
     or an inertia of an end has a closed form for a model with one wave number driven by a motion; otherwise it is an
     eighth-order difference with a relative error of about 1e-11. Both are propagated to the state at the stop by a
-    complex step. Where modes are complex, all derivatives are differences of the sum over them, accurate to about 1e-6.
+    complex step. Where modes are complex, or a motion acts by its displacement or velocity too, all derivatives are
+    differences of the sum over the modes, accurate to about 1e-6.
 
     Parameters
     ----------
-    system, motion, modes, zeta
+    system, motion, modes, zeta, field
         As in :func:`residual_vibration`.
     by : sequence of str, optional
         By default the stiffnesses of the ends, for an arm k_t and k_r, and, of one motion alone, 'duration'. Otherwise
@@ -81,21 +86,22 @@ def residual_vibration_gradient(
     1.696 mm, 52.49 mm/s
     """
     modes = count("modes", modes, high=MOST_MODES)
-    coupled = couples(system, modes) or system.numerics("damping") is not None
+    coupled = couples(system, modes) or system.numerics("damping") is not None or bool(supports(system))
     histories, *_ = ended(system, motion)
     stretch = ["duration"] if isinstance(motion, BaseMotion) or (len(histories) == 1 and _moves(system)) else []
     compliances = {f"1/{name}": name for name in system.numerics("stiffnesses")}
     compliances |= {name.replace("k_", "c_", 1): name for name in compliances.values() if name.startswith("k_")}
     known = [*system.values, *compliances, *stretch]
     by = names("by", (*system.numerics("stiffnesses"), *stretch) if by is None else by, known)
-    value = residual_vibration(system, motion, modes, zeta=zeta)
+    value = residual_vibration(system, motion, modes, zeta=zeta, field=field)
     found = sensitivities(system.conservative_part, modes + 1)  # the next mode may be close to the last one
     gradient = np.empty((*np.shape(value), len(by)))
     if coupled:
         for place, name in enumerate(by):
-            gradient[..., place] = _coupled(system, histories, found, compliances, name, modes, zeta)
+            gradient[..., place] = _coupled(system, histories, found, compliances, name, modes, zeta, field)
         return value, gradient
-    driven = stopped(system, motion, modes, zeta)
+    tip = section_place(system, field, lumped=True)
+    driven = stopped(system, motion, modes, zeta, tip)
     still: list[Array] = [np.zeros(modes) for _ in driven.names]
     for place, name in enumerate(by):
         with np.errstate(all="ignore"):
@@ -104,7 +110,7 @@ def residual_vibration_gradient(
             else:
                 stiffness = compliances.get(name)
                 pairs = [
-                    _rates(system, cause, found, stiffness or name, modes, compliance=stiffness is not None)
+                    _rates(system, cause, found, stiffness or name, modes, tip, compliance=stiffness is not None)
                     for cause in driven.names
                 ]
                 rate = _along(driven, [change for change, _ in pairs], pairs[0][1])
@@ -123,13 +129,14 @@ def _coupled(
     name: str,
     modes: int,
     zeta: Any,
+    field: Any,
 ) -> Array:
-    """Return the derivative of a sum over complex modes by differences."""
+    """Return the derivative of a sum over modes by differences."""
     if name != "duration":
         stiffness = compliances.get(name)
 
         def moved(one: System) -> Array:
-            return np.asarray(residual_vibration(one, histories, modes, zeta=zeta))
+            return np.asarray(residual_vibration(one, histories, modes, zeta=zeta, field=field))
 
         return by_differences(system, found, stiffness or name, moved, compliance=stiffness is not None, step=_SHORT)
     ((cause, profile),) = histories.items()
@@ -138,7 +145,7 @@ def _coupled(
     duration = np.asarray(profile.duration)
     step = _TURN / (2 * np.pi * found.frequency[..., :modes].max())
     factors = 1.0 + offsets[(..., *(None,) * duration.ndim)] * step / duration
-    stretched = residual_vibration(system, {cause: _stretched(profile, factors)}, modes, zeta=zeta)
+    stretched = residual_vibration(system, {cause: _stretched(profile, factors)}, modes, zeta=zeta, field=field)
     return np.asarray(np.tensordot(weights / step, stretched, axes=1))
 
 
@@ -167,7 +174,7 @@ def _along(driven: Stopped, changes: Sequence[Array], logarithmic: Array) -> Arr
 
 
 def _rates(
-    system: System, cause: str, found: Sensitivities, name: str, modes: int, *, compliance: bool
+    system: System, cause: str, found: Sensitivities, name: str, modes: int, tip: int, *, compliance: bool
 ) -> tuple[Array, Array]:
     """Return the derivatives of Gamma_i phi_i(L) and of ln omega_i by a parameter or by one over it."""
     rate = found.compliance[name] if compliance else found.rate[name]
@@ -176,13 +183,13 @@ def _rates(
     with np.errstate(divide="ignore", invalid="ignore"):
         logarithmic = np.where(still, np.where(by_frequency == 0, 0.0, np.nan), by_frequency / frequency)
     given = np.broadcast_to(system.values[name], system.shape)
-    change = _along_the_mode(system, cause, name, modes, compliance=compliance)
+    change = None if tip else _along_the_mode(system, cause, name, modes, compliance=compliance)
     if change is None:
         change = by_differences(
             system,
             found,
             name,
-            lambda moved: participation(moved, modes, cause) * moved.modes(modes).displacement(1, 0),
+            lambda moved: participation(moved, modes, cause) * displaced(moved, moved.modes(modes), tip),
             compliance=compliance,
         )
     held = np.isinf(given)[..., None] & (not compliance)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cra_sym.analysis.complex_responses import complex_residual
 from cra_sym.analysis.histories import Histories, History, check_no_support, supports
 from cra_sym.analysis.histories import histories as histories_of
-from cra_sym.analysis.modes import participation, section_place
+from cra_sym.analysis.modes import displaced, participation, section_place
 from cra_sym.analysis.responses import check_sampling, has_complex_modes, oscillators, slipping_problem
 from cra_sym.analysis.slipping import slipping_residual
 from cra_sym.checks import broadcastable, count, default_floating_point, instance
@@ -24,6 +24,9 @@ from cra_sym.solvers import modal_response as solver
 from cra_sym.solvers.driven_modes import at_rest, state_at_stop
 from cra_sym.solvers.force import Force
 from cra_sym.solvers.motion import BaseMotion
+
+if TYPE_CHECKING:
+    from sympy.core.function import AppliedUndef
 
 __all__ = ["Stopped", "couples", "ended", "residual_vibration", "stopped"]
 
@@ -37,6 +40,7 @@ def residual_vibration(
     modes: int = 5,
     *,
     zeta: Numbers | None = None,
+    field: AppliedUndef | None = None,
 ) -> Array | float:
     """Return the peak amplitude of the tip after all motions and forces have stopped, m: the sum over the modes.
 
@@ -53,6 +57,8 @@ def residual_vibration(
     ----------
     system, motion, modes, zeta
         As in :func:`cra_sym.response`; the system is at rest before t = 0. Every motion and every force must end.
+    field : applied undefined function, optional
+        A field at the right end (default: the first), or a lumped coordinate.
 
     Returns
     -------
@@ -76,6 +82,7 @@ def residual_vibration(
     21.1 mm
     """
     instance("system", system, System)
+    place = section_place(system, field, lumped=True)
     if system.model.pieces["hysteresis"]:
         if couples(system.without_hysteresis, modes):
             raise ValueError(
@@ -83,12 +90,12 @@ def residual_vibration(
             )
         still = stopped(system.without_hysteresis, motion, modes, zeta)
         problem, rows = slipping_problem(system, motion, modes, zeta), system.without_hysteresis.modes(modes)
-        peak = slipping_residual(problem, rows.displacement(1, 0), still.stop)
+        peak = slipping_residual(problem, displaced(system, rows, place), still.stop)
         return peak if peak.ndim else float(peak)
     if couples(system, modes) or supports(system):
-        total = _complex_residual(system, motion, modes, zeta)
+        total = _complex_residual(system, motion, modes, zeta, place)
     else:
-        found = stopped(system, motion, modes, zeta)
+        found = stopped(system, motion, modes, zeta, place)
         total = np.sum(found.peaks(found.osc.omega, found.products), -1)
     return total if total.ndim else float(total)
 
@@ -142,14 +149,14 @@ def couples(system: System, modes: int) -> bool:
     return has_complex_modes(system, count("modes", modes, high=MOST_MODES))
 
 
-def _complex_residual(system: System, motion: Any, modes: int, zeta: Any) -> Array:
+def _complex_residual(system: System, motion: Any, modes: int, zeta: Any, place: int) -> Array:
     histories, _, stop = ended(system, motion)
     for name in supports(system):
         if system.numerics("pencil") is None or (system.natural_frequencies(1) == 0.0).any():
             check_no_support(system)
         profile = histories[name]
         assert isinstance(profile, BaseMotion)
-        if not all(at_rest(profile, end).all() for end in np.ravel(stop)):
+        if not all((at_rest(profile, float(end)) | (stop != end)).all() for end in np.unique(stop)):
             raise ValueError(f"motion: {name} acts by its displacement or velocity; must be at rest after the stop")
     modes = count("modes", modes, high=MOST_MODES)
     ratio = np.asarray(system.zeta if zeta is None else checked_damping(zeta))
@@ -157,9 +164,8 @@ def _complex_residual(system: System, motion: Any, modes: int, zeta: Any) -> Arr
         if ratio.shape[-1] != 1:
             raise ValueError(f"zeta has shape {ratio.shape}: its last axis must have one value where modes are complex")
         ratio = ratio[..., 0]
-    place = section_place(system, None)
     return complex_residual(
-        system, histories, lambda found: found.displacement(1, place), stop, modes, ratio, check_sampling
+        system, histories, lambda found: displaced(system, found, place), stop, modes, ratio, check_sampling
     )
 
 
@@ -186,7 +192,7 @@ def ended(system: System, motion: Any) -> tuple[dict[str, History], tuple[BaseMo
     return histories, profiles, stop
 
 
-def stopped(system: System, motion: Any, modes: int, zeta: Any) -> Stopped:
+def stopped(system: System, motion: Any, modes: int, zeta: Any, place: int = 0) -> Stopped:
     """Return the natural modes driven until all inputs have ended; refuse inputs without an end."""
     histories, profiles, stop = ended(system, motion)
     check_no_support(system)
@@ -196,7 +202,7 @@ def stopped(system: System, motion: Any, modes: int, zeta: Any) -> Stopped:
         osc = osc._replace(zeta=_with_dampers(system, osc.omega, osc.zeta))
     for profile in profiles:
         check_sampling(profile, osc.omega)
-    tip = system.modes(modes).displacement(1, 0)
+    tip = displaced(system, system.modes(modes), place)
     products = [participation(system, modes, name) * tip for name in histories]
     return Stopped(osc, tuple(histories), profiles, stop, products)
 

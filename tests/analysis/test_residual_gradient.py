@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import cra_sym as cra
+from cra_sym.symbols import L, t, v, x
 from tests.systems import system
+
+rhoA, EI, k = sp.symbols("rhoA EI k")
 
 LIMITS = {"distance": 0.2, "v_max": 1.0, "a_max": 2.0, "j_max": 40.0}
 MOVE = cra.BaseMotion.s_curve(**LIMITS, duration=1.234)
@@ -126,3 +130,48 @@ def test_the_gradient_by_any_parameter_with_forces():
         assert found == pytest.approx(np.dot(around, [1, -8, 8, -1]) / (12 * step), rel=1e-6), name
     with pytest.raises(ValueError, match=r"by = 'duration': must be among EI, a"):
         cra.residual_vibration_gradient(given, BOTH, ("duration",), 3)
+
+
+def test_a_moving_support_and_other_displacements():
+    """The slope of the sum over modes; the base of the spring moves, and what counts is an angle or a coordinate."""
+    w = sp.Function("w")(t)
+    beam = cra.Model(
+        rhoA * v.diff(t) ** 2 / 2 - EI * v.diff(x, 2) ** 2 / 2, fields=[v], x=x, domain=(0, L), t=t, prescribed=[w],
+        left=-k * (v - w) ** 2 / 2 - k * v.diff(x) ** 2 / 2,
+    ).at({"rhoA": 0.3, "EI": 5.0, "L": 1.2, "k": 800.0})  # fmt: skip
+    timoshenko = system("Timoshenko beam")
+    angle = timoshenko.model.equations.fields[1]
+    for given, options in ((beam, {}), (timoshenko, {"field": angle})):
+        names = [name for name in ("k", "EI", "rhoA") if name in given.values]
+        value, gradient = cra.residual_vibration_gradient(given, MOVE, names, 2, **options)
+        assert value == cra.residual_vibration(given, MOVE, 2, **options)
+        for name, found in zip(names, gradient, strict=True):
+            steps = given.values[name] * (1 + 1e-5 * np.array([-1.0, 1.0]))
+            before, after = cra.residual_vibration(given.replace(**{name: steps}), MOVE, 2, **options)
+            assert found == pytest.approx((after - before) / np.ptp(steps), rel=1e-5), name
+    _, (longer,) = cra.residual_vibration_gradient(beam, MOVE, ("duration",), 2)
+    moves = cra.BaseMotion.s_curve(**LIMITS, duration=np.array([1.2339, 1.2341]))
+    before, after = cra.residual_vibration(beam, moves, 2)  # of a batch, each after its own stop
+    assert longer == pytest.approx((after - before) / 2e-4, rel=1e-4)
+
+
+@pytest.mark.parametrize(("name", "of"), [("gantry", "q"), ("shaft", "u"), ("Timoshenko beam", "phi")])
+def test_another_displacement_is_that_of_the_response(name, of):
+    given = system(name)
+    pulse = cra.Force.sampled([0, 0.1, 0.2], [0, 2.0, 0], exact=True)
+    inputs = {"w": MOVE} | ({} if name == "Timoshenko beam" else {"p": pulse})
+    form = given.model.state_form
+    (field,) = [one for one in (*form.displacements, *form.coordinates) if one.func.__name__ == of]
+    after = np.linspace(1.234, 3.0, 6001)
+    peak = np.abs(cra.tip_response(given, inputs, after, modes=1, field=field)).max()
+    assert cra.residual_vibration(given, inputs, 1, field=field) == pytest.approx(peak, rel=1e-5)
+    with pytest.raises(ValueError, match=r"field = .*: must be one of"):
+        cra.residual_vibration(given, inputs, 1, field=sp.Function("none")(t))
+
+
+def test_what_is_infinite_cannot_fluctuate():
+    with pytest.raises(ValueError, match="k_t = inf cannot fluctuate"):
+        cra.growth_rate(cra.Arm.nominal(), cra.JointStiffness(), 30.0, 0.1)
+    # among others it is the limit of large values
+    several = cra.Arm.nominal().replace(k_t=np.array([1e4, np.inf]))
+    assert cra.growth_rate(several, cra.JointStiffness(), 187.15, 0.1)[1] == 0.0
