@@ -167,11 +167,3 @@ def test_another_displacement_is_that_of_the_response(name, of):
     assert cra.residual_vibration(given, inputs, 1, field=field) == pytest.approx(peak, rel=1e-5)
     with pytest.raises(ValueError, match=r"field = .*: must be one of"):
         cra.residual_vibration(given, inputs, 1, field=sp.Function("none")(t))
-
-
-def test_what_is_infinite_cannot_fluctuate():
-    with pytest.raises(ValueError, match="k_t = inf cannot fluctuate"):
-        cra.growth_rate(cra.Arm.nominal(), cra.JointStiffness(), 30.0, 0.1)
-    # among others it is the limit of large values
-    several = cra.Arm.nominal().replace(k_t=np.array([1e4, np.inf]))
-    assert cra.growth_rate(several, cra.JointStiffness(), 187.15, 0.1)[1] == 0.0

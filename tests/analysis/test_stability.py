@@ -278,7 +278,11 @@ def test_difference_resonance_of_a_symmetric_coupling_is_none(resonance):
 def test_rigid_joint_has_nothing_to_fluctuate():
     with pytest.warns(cra.ResonanceWarning, match="does not couple"):
         assert np.isnan(cra.stability_boundary(cra.Arm.nominal(), JOINT, 0.1, (1, 1))).all()
-    assert cra.growth_rate(cra.Arm.nominal(), JOINT, 30.0, 0.3) < 1e-6
+    with pytest.raises(ValueError, match="k_t = inf cannot fluctuate"):
+        cra.growth_rate(cra.Arm.nominal(), JOINT, 30.0, 0.3)
+    # of a batch it is the limit of large values
+    several = cra.Arm.nominal().replace(k_t=np.array([1e4, np.inf]))
+    assert cra.growth_rate(several, JOINT, 187.15, 0.1)[1] == 0.0
 
 
 def test_rigid_body_mode_does_not_resonate():
