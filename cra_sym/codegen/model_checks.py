@@ -248,7 +248,7 @@ def _characteristic(written: ModelText, values: Sequence[float], turns: float, l
 
 
 def _of_ends(form: WavesForm) -> list[sp.Expr]:
-    """Return the entries of stiffness, mass and ties, then stiffness and stretch of links."""
+    """Return the entries of stiffness, mass and ties, then those of links."""
     ends = form.conditions
     return [*ends.stiffness, *ends.mass, *ends.ties, *ends.links]
 
@@ -339,7 +339,7 @@ class _Exact:
             for at in range(size * size):
                 target[at // size, at % size] = ends[kind * size * size + at]
         matrix = mpmath.matrix(width, width)
-        links = [ends[3 * size * size + link * (1 + size) :][: 1 + size] for link in range(width - size)]
+        links = [ends[3 * size * size + link * (2 + size) :][: 2 + size] for link in range(width - size)]
         for place in range(size):
             free = place in self._form.conditions.free
             row = moved[place, :] - (ties * moved[:size, :])[place, :]
@@ -348,15 +348,15 @@ class _Exact:
                 row = ((stiffness - z * mass) * moved[:size, :])[place, :] + forces[place, :]
                 for other in range(2 * n):
                     row += ties[other, place] * forces[other, :]
-                for link, (_, *stretch) in enumerate(links):
+                for link, (_, _, *stretch) in enumerate(links):
                     row += stretch[place] * forces[size + link, :]
                 share = 1 / (1 + stiffness[place, place] + mass[place, place])
             matrix[place, :] = share * row
-        for link, (stiff, *stretch) in enumerate(links):
+        for link, (stiff, heavy, *stretch) in enumerate(links):
             row = forces[size + link, :]
             for place in range(size):
-                row -= stiff * stretch[place] * moved[place, :]
-            matrix[size + link, :] = row / (1 + stiff)
+                row -= (stiff - z * heavy) * stretch[place] * moved[place, :]
+            matrix[size + link, :] = row / (1 + stiff + heavy)
         try:
             return mpmath.det(matrix)
         except TypeError:  # of a column that is exactly 0

@@ -46,7 +46,7 @@ def model_constants(
         "PARAMETER_COUNT": (parameters, "parameters of the model"),
         "FIELDS": (len(fields), f"fields of the model: {', '.join(fields)}"),
         "ENDS": (moving**2, "entries of the matrices of what moves"),
-        "END_RATES": (3 * moving**2 + links * (1 + moving), "rates of stiffness, mass, ties and links"),
+        "END_RATES": (3 * moving**2 + links * (2 + moving), "rates of stiffness, mass, ties and links"),
         "MOTIONS": (n + m, "independent motions without strain"),
         "RESTRAINTS": (moving + links, "conditions of ends, coordinates and links"),
         "RESTING": (max(ranks), "factors of conditions of a motion without energy"),
@@ -64,8 +64,8 @@ def model_constants(
         integers["COORDINATES"] = (m, f"lumped: {', '.join(coordinates)}")
         integers["CARRIED"] = (n * m, "displacements by coordinates")
     if links:
-        integers["LINKS"] = (links, "springs between what moves")
-        integers["STRETCHES"] = (links * moving, "links by what moves")
+        integers["LINKS"] = (links, "springs and masses on combinations of what moves")
+        integers["STRETCHES"] = (links * moving, "displacements of links by what moves")
     lines = [f"PI = {math.pi!r}  # half a turn"]
     for name, (double, single, words) in _NUMBERS.items():
         lines.append(f"{name} = {single if real == 'float32' else double!r}  # {words}")

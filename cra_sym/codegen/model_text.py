@@ -221,8 +221,8 @@ class ModelText:
             for at in range(size**2)
         }
         for link in range(structure.links):
-            found[f"link_stiffness[{link}]"] = ends.links[link, 0]
-            found |= {f"stretch[{link * size + at}]": ends.links[link, 1 + at] for at in range(size)}
+            found |= {f"link_{kind}[{link}]": ends.links[link, at] for at, kind in enumerate(("stiffness", "mass"))}
+            found |= {f"stretch[{link * size + at}]": ends.links[link, 2 + at] for at in range(size)}
         found |= {f"carried[{at}]": ends.carried[at] for at in range(structure.n * m)}
         return {target: entry for target, entry in found.items() if entry != 0}
 
@@ -277,16 +277,18 @@ class ModelText:
                 if at in places:
                     found.append(f"problem.k[{places[at]}] = {value}")
             link, own = place - structure.moving, place * (structure.moving + 1)
-            stiff = f"link_stiffness[{link}]"
-            wanted = [stiff] if link >= 0 else [f"{kind}[{own}]" for kind in ("stiffness", "mass")]
+            kinds = ("stiffness", "mass")
+            stiff, heavy = wanted = [f"link_{kind}[{link}]" if link >= 0 else f"{kind}[{own}]" for kind in kinds]
             parts = "".join(f" + problem.{entry}" for entry in wanted if entry in self._ends)
             if not parts:  # of one that is 1
                 found = [line.replace(" * share", "").replace("share", "1.0") for line in found]
             elif any("share" in line for line in found):
                 yield f"share_{place} = 1.0 / (1.0{parts})"
-                if link >= 0:
+                if link >= 0 and stiff in self._ends:
                     yield f"pull_{place} = 1.0 if problem.{stiff} > HUGE else problem.{stiff} * share_{place}"
-            yield from (re.sub(r"\b(share|pull)\b", rf"\1_{place}", line) for line in found)
+                if link >= 0 and heavy in self._ends:
+                    yield f"inertia_{place} = problem.{heavy} * share_{place}"
+            yield from (re.sub(r"\b(share|pull|inertia)\b", rf"\1_{place}", line) for line in found)
 
     def _condition(self, place: int) -> Iterator[str]:
         """Yield the factors of a condition: of displacements, of -z times these and of forces, with reflected signs."""
@@ -308,7 +310,10 @@ class ModelText:
             else:
                 yield f"{signed(other, 'stiffness', at)} * share"
         for other in reach:
-            yield f"{signed(other, 'mass', place * size + other)} * share"
+            if link >= 0:
+                yield f"{signed(other, 'stretch', link * size + other, True)} * inertia"
+            else:
+                yield f"{signed(other, 'mass', place * size + other)} * share"
         for other in structure.forces(place):
             if other == place:
                 yield "share"
@@ -362,7 +367,8 @@ class ModelText:
             "mass": ends,
             "ties": 2 * ends,
             "link_stiffness": 3 * ends,
-            "stretch": 3 * ends + links,
+            "link_mass": 3 * ends + links,
+            "stretch": 3 * ends + 2 * links,
         }
         texts: list[str] = []
         lines: list[str] = []

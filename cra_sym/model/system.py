@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from cra_sym.cached import cached_property
 from cra_sym.checks import broadcastable, count, default_floating_point, instance, real_array, shown
 from cra_sym.model.cross_check import CrossCheck, cross_check
+from cra_sym.model.end_masses import end_mass_rounding
 from cra_sym.model.energy_signs import refuse_negative
 from cra_sym.model.projection import Domain, Load, Projected, project
 from cra_sym.model.routes import ROUNDING, TOLERANCE, Estimated, Modes, Rated, Route
@@ -220,7 +221,8 @@ class System:
             else:
                 omega = route.angular_frequencies(self.parameters, self.shape, modes)
                 accuracy = np.full(self.shape, ROUNDING)
-        check_range(omega)
+            check_range(omega)
+            accuracy = np.maximum(accuracy, end_mass_rounding(self, route, omega))
         self.note_accuracy(accuracy)
         omega.flags.writeable = False
         return omega

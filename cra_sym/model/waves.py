@@ -77,7 +77,7 @@ class Waves:
         Of the parameters: entries of A_OE and A_EO without z, then their factors of z.
     conditions : Kernel
         Of the parameters: stiffness and mass matrices of the ends and coordinates, the matrix that ties those that are
-        held, stiffness and stretch of links.
+        held, links (see `cra_sym.model.waves_form.Conditions`).
     carried : Kernel or None
         Of the parameters: the displacement of the whole span per unit of each lumped coordinate.
     held : tuple of int
@@ -250,8 +250,8 @@ class Waves:
         size, links = structure.moving, structure.links
         parts = [given[size**2 * part :][: size**2] for part in range(3)]
         joined = given[3 * size**2 :]
-        stiffness = _filled([*parts[0][:: size + 1], *joined[:: 1 + size]], rows).T
-        mass = _filled([*parts[1][:: size + 1], *[0.0] * links], rows).T
+        stiffness = _filled([*parts[0][:: size + 1], *joined[:: 2 + size]], rows).T
+        mass = _filled([*parts[1][:: size + 1], *joined[1 :: 2 + size]], rows).T
         stiffness[:, self.held] = np.inf
         for position, places in self.stiffnesses.items():
             infinite = np.isinf(columns[position])
@@ -260,7 +260,7 @@ class Waves:
                     stiffness[infinite, place] = np.inf
         aside = [[0.0 if at % (size + 1) == 0 else entry for at, entry in enumerate(part)] for part in parts[:2]]
         couplings, ties = [*aside[0], *aside[1]], parts[2]
-        stretches = [entry for at, entry in enumerate(joined) if at % (1 + size)]
+        stretches = [entry for at, entry in enumerate(joined) if at % (2 + size) > 1]
         odd_by_even, even_by_odd = (np.moveaxis(matrices[:, k], -1, 1) for k in (0, 1))
         problem = UniformProblem(
             np.array(np.broadcast_to(length, rows), dtype=np.result_type(np.float64, length)),

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from itertools import product
 from typing import NamedTuple
 
-from sympy import Dummy, Expr, Matrix, S, Symbol, cancel, eye, solve, zeros
+from sympy import Dummy, Expr, Matrix, S, Symbol, cancel, eye, fraction, lcm, solve, zeros
 
 from cra_sym.mechanics import StateForm
 from cra_sym.solvers.waves import Structure, kept
@@ -70,16 +71,18 @@ class Conditions(NamedTuple):
     Attributes
     ----------
     stiffness, mass : Matrix, shape (dofs, dofs)
-    Of the free degrees of freedom, without the links.
+        Of the free degrees of freedom, without the links.
     ties : Matrix, shape (dofs, dofs)
-    Each dependent displacement as a combination of the free ones.
+        Each dependent displacement as a combination of the free ones.
     free : tuple of int
         Degrees of freedom that no essential condition holds.
     springs : dict of Symbol to tuple of int
         For each parameter that may be infinite, the degrees of freedom and links that it then holds; links are numbered
         after the degrees of freedom.
-    links : Matrix, shape (links, 1 + dofs)
-    Stiffness of the springs between degrees of freedom, and their stretch per unit of each.
+    links : Matrix, shape (links, 2 + dofs)
+        Springs and masses on a combination of degrees of freedom: stiffness, mass, and the combination (the stretch of
+        the spring, the displacement of the mass). A mass on a lever arm is one; expanded into a matrix, it would cancel
+        the digits of smaller masses. Springs come first, masses last.
     carried : Matrix, shape (n, coordinates)
         ``q = v + carried w`` has no coordinate inside, v in the Lagrangian has.
     linked : bool
@@ -122,9 +125,13 @@ def conditions(form: StateForm, order: tuple[int, ...], symbols: Sequence[Symbol
     whole = (motions.T * boundary * motions).applyfunc(_expanded)
     inside = form.system.free_symbols | form.length.free_symbols | motions.free_symbols
     springs, links = _springs(whole, [symbol for symbol in symbols if symbol not in inside], form.parameter)
+    masses = _lever_masses(whole, form.parameter)
+    if 2 * n + m + links.rows + masses.rows <= _MOST_PLACES:
+        links = Matrix.vstack(links, masses)
     for link in range(links.rows):
-        stretch = links[link, 1:]
-        whole = (whole - links[link, 0] * stretch.T * stretch).applyfunc(cancel)
+        stretch = links[link, 2:]
+        whole -= (links[link, 0] - form.parameter * links[link, 1]) * stretch.T * stretch
+    whole = whole.applyfunc(cancel) if links.rows else whole
     pairs = [powers(entry, form.parameter) for entry in whole.applyfunc(_expanded)]
     if None in pairs:
         return None
@@ -133,16 +140,16 @@ def conditions(form: StateForm, order: tuple[int, ...], symbols: Sequence[Symbol
         zeros(size, size),
         zeros(size, size),
         zeros(size, size),
-        zeros(links.rows, 1 + size),
+        zeros(links.rows, 2 + size),
     )
     for i, row in enumerate(free):
         for j, column in enumerate(free):
             stiffness[row, column], slope = pairs[i * len(free) + j]  # type: ignore[misc]
             mass[row, column] = -slope
-        stretches[:, 1 + row] = links[:, 1 + i]
+        stretches[:, 2 + row] = links[:, 2 + i]
         for place in range(size):
             ties[place, row] = motions[place, i] if place not in free else 0
-    stretches[:, 0] = links[:, 0]
+    stretches[:, :2] = links[:, :2]
     joined = any(
         part[i, j] != 0 and i // n != j // n
         for part in (stiffness, mass, ties)
@@ -202,7 +209,7 @@ def _leaders(motions: Matrix) -> list[int] | None:
 def _springs(
     whole: Matrix, symbols: Sequence[Symbol], parameter: Symbol
 ) -> tuple[dict[Symbol, tuple[int, ...]], Matrix]:
-    """Return the degrees of freedom and links on which each stiffness acts, and stiffness and stretch of the links.
+    """Return the degrees of freedom and links on which each stiffness acts, and the links as `Conditions` has them.
 
     Links are numbered after the degrees of freedom.
     """
@@ -217,21 +224,33 @@ def _springs(
             if len(moved) == 1:
                 acting.append(moved[0])
                 continue
-            number = next((number for number, (_, *known) in enumerate(links) if known == stretch), len(links))
+            number = next((number for number, (_, _, *known) in enumerate(links) if known == stretch), len(links))
             if number == len(links):
-                links.append([S.Zero, *stretch])
+                links.append([S.Zero, S.Zero, *stretch])
             links[number][0] += symbol * factor
             acting.append(whole.rows + number)
         if acting:
             springs[symbol] = tuple(acting)
-    return springs, Matrix(len(links), 1 + whole.rows, [entry for link in links for entry in link])
+    return springs, Matrix(len(links), 2 + whole.rows, [entry for link in links for entry in link])
+
+
+def _lever_masses(whole: Matrix, parameter: Symbol) -> Matrix:
+    """Return the masses on a combination of degrees of freedom, as links."""
+    mass = -whole.diff(parameter)
+    links: list[list[Expr]] = []
+    for symbol in (*sorted(mass.free_symbols - {parameter}, key=str), S.One):
+        slope = mass.subs(dict.fromkeys(mass.free_symbols, 0)) if symbol is S.One else mass.diff(symbol)
+        for factor, motion in [] if slope.has(parameter, symbol) and symbol is not S.One else squares(slope):
+            if sum(entry != 0 for entry in motion) > 1:
+                links.append([S.Zero, symbol * factor, *motion])
+            mass = (mass - symbol * factor * Matrix(motion) * Matrix(motion).T).applyfunc(cancel)
+    return Matrix(len(links), 2 + whole.rows, [entry for link in links for entry in link])
 
 
 def squares(matrix: Matrix) -> list[tuple[Expr, list[Expr]]]:
-    """Return factors d and vectors h, an entry of each 1, such that a matrix is the sum of ``d h h^T``.
+    """Return factors d and vectors h without divisors such that a matrix is the sum of ``d h h^T``.
 
-    The list is empty if a factor is negative. Pivots that are numbers come first, to avoid division by a symbol that
-    may be zero where possible.
+    The list is empty if a factor is negative. Pivots that are numbers come first, which keeps the vectors short.
     """
     found = []
     for _ in range(matrix.rows):
@@ -240,7 +259,8 @@ def squares(matrix: Matrix) -> list[tuple[Expr, list[Expr]]]:
         if factor != 0:
             stretch = (matrix[:, place] / factor).applyfunc(cancel)
             matrix = (matrix - factor * stretch * stretch.T).applyfunc(cancel)
-            found.append((factor, list(stretch)))
+            divisor = reduce(lcm, (fraction(entry)[1] for entry in stretch if entry.free_symbols), S.One)
+            found.append((cancel(factor / divisor**2), [cancel(divisor * entry) for entry in stretch]))
     return found if matrix.is_zero_matrix and not any(factor.is_negative for factor, _ in found) else []
 
 
@@ -316,14 +336,15 @@ def known_coefficients(structure: Structure, matrices: Sequence[Expr], ends: Con
             known[first + size + j] = None if free and ends.mass[place, other] != 0 else 0
         for j, other in enumerate(structure.forces(place)):
             link = other - structure.moving
-            factor = ends.links[link, 1 + place] if link >= 0 else ends.ties[other, place] + int(other == place)
+            factor = ends.links[link, 2 + place] if link >= 0 else ends.ties[other, place] + int(other == place)
             one = 1 if loose and factor * structure.turned[place] * structure.turned[other] == 1 else None
             known[first + 2 * size + j] = one if free and factor != 0 else 0
     for link in range(structure.links):
         first, size = structure.condition(structure.moving + link), structure.moving
         for other in range(size):
-            known[first + other] = None if ends.links[link, 1 + other] != 0 else 0
-            known[first + size + other] = 0
+            for part in (0, 1):
+                varies = ends.links[link, part] != 0 and ends.links[link, 2 + other] != 0
+                known[first + part * size + other] = None if varies else 0
         for j, other in enumerate(structure.forces(0)):
             known[first + 2 * size + j] = None if other == structure.moving + link else 0
     return known

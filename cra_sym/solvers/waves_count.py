@@ -181,7 +181,7 @@ def _chain(structure: Structure, k: Entries, z: Any, parts: tuple[Any, Any]) -> 
     Each step changes one condition and the count by 0 or 1, in a known direction. Odd displacements, free at the start,
     get their springs
     first: this lowers the count, or raises it where inertia exceeds the spring. Those coupled to others are held. Each
-    later release of a displacement raises the count, each link lowers it.
+    later release of a displacement raises the count, each spring lowers it, each mass raises it.
     """
     moved, forces = end_rows(structure, *parts)
     units, way = [*moved, *forces[2 * structure.n :]], structure.chain(k)
@@ -206,7 +206,8 @@ def _chain(structure: Structure, k: Entries, z: Any, parts: tuple[Any, Any]) -> 
         yield changed(place, units[place]), -1.0
     rows |= {place: final[place] for place in way.following}
     for place in (*way.last, *way.lumped):
-        yield changed(place, final[place]), -1.0 if place >= structure.moving else 1.0
+        rise: Any = -1.0 if place >= structure.moving else 1.0
+        yield changed(place, final[place]), kernel.where(z < 0.0, -1.0, 1.0) if structure.is_mass(k, place) else rise
 
 
 def count_of(

@@ -253,8 +253,11 @@ def _mass(problem: UniformProblem, row: NDArray[np.int64], ends: Complexes, step
             np.concatenate([*(end[at] for end in moved), vector.T[2 * n : structure.moving]])
             for at, vector in enumerate((first, second))
         )
-        kinetic: Floats = total + np.einsum("ir,rij,jr->r", one, masses, other)
-        return kinetic
+        total += np.einsum("ir,rij,jr->r", one, masses, other)
+        if problem.stretches is not None:  # not expanded into the matrix, which would cancel digits
+            links = (np.einsum("rli,ir->rl", problem.stretches, motion) for motion in (one, other))
+            total += np.prod([problem.mass[:, structure.moving :], *links], axis=0).sum(axis=1)
+        return total
 
     return mass
 

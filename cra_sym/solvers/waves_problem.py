@@ -42,12 +42,12 @@ class UniformProblem:
     stiffness, mass : ndarray, shape (rows, dofs)
         Of the conditions of the left end, of the right end, of the m lumped coordinates and of links, in the units of P
         over those of q: ``P + (k - z m) q = 0`` at the right end, ``-P + (k - z m) q = 0`` at the left, and
-        ``(k - z m) w = 0``. Stiffness in [0, inf], inf holds the displacement; masses in [0, inf), 0 for links.
+        ``(k - z m) w = 0``. Stiffness in [0, inf], inf holds the displacement; masses in [0, inf).
     odd : tuple of bool
         Which displacements are odd; at least one of each block must be even.
     couplings : ndarray, shape (2, rows, 2 n + m, 2 n + m), optional
-        Off-diagonal entries of stiffness and mass. An offset mass m at the distance e has m e. Both matrices must be
-        positive semidefinite.
+        Off-diagonal entries of stiffness and mass. Both matrices must be positive semidefinite. A mass on a lever arm
+        is better a link: its matrix would cancel the digits of smaller masses.
     ties : ndarray, shape (rows, 2 n + m, 2 n + m), optional
         A dependent displacement i is ``sum_j ties[row, i, j] q_j`` of independent ones, whose stiffness, mass and
         couplings include its own. Which displacements may be tied must be `known`.
@@ -60,7 +60,8 @@ class UniformProblem:
     linked : bool
         Whether couplings or ties join the ends; with coordinates or links they always may.
     stretches : ndarray, shape (rows, links, 2 n + m), optional
-        Stretch of each link per unit of each displacement and coordinate.
+        Stretch of each link per unit of each displacement and coordinate. A link is a spring or a mass; the stiffness
+        of one that is a mass must be `known` to be 0.
     """
 
     length: Floats
@@ -91,8 +92,8 @@ class UniformProblem:
             raise ValueError(f"odd = {self.odd}: must tell of each of {n} displacements whether it is odd")
         if sum(structure.sizes) != n or not all(1 <= size <= _MOST for size in structure.sizes):
             raise ValueError(f"sizes = {self.sizes}: the sum must be {n}, each 1 to {_MOST}")
-        if self.ties is not None and self.known is None:
-            raise ValueError("known = None: must be given with ties")
+        if self.known is None and (self.ties is not None or self.mass[:, moving:].any()):
+            raise ValueError("known = None: must be given with ties and with links that are masses")
         for start, stop in self.structure.blocks:
             if all(self.odd[start:stop]):
                 raise ValueError(f"odd = {self.odd}: not all displacements of a block must be odd")
@@ -186,6 +187,10 @@ class UniformProblem:
             if link >= 0 and first + j in row:
                 assert self.stretches is not None
                 row[first + j][:] = np.where(held, -1.0, -stiffness * share) * self.stretches[:, link, other] * sign
+            if link >= 0 and first + len(reach) + j in row:
+                assert self.stretches is not None
+                row[first + len(reach) + j][:] = -mass * share * self.stretches[:, link, other] * sign
+            if link >= 0:
                 continue
             tie = 0.0 if self.ties is None or link >= 0 else self.ties[:, place, other]
             for part, own in ((0, stiffness), (1, mass)):

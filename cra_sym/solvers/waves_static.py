@@ -103,8 +103,8 @@ def idle_coordinates(problem: UniformProblem) -> NDArray[np.bool_]:
         if problem.ties is not None:
             parts.append(problem.ties[:, :first, lumped])
         if problem.stretches is not None:
-            stiff = problem.stiffness[:, structure.moving :, None] > 0.0
-            parts.append(np.where(stiff, problem.stretches[:, :, lumped], 0.0))
+            acts = (problem.stiffness + problem.mass)[:, structure.moving :, None] > 0.0
+            parts.append(np.where(acts, problem.stretches[:, :, lumped], 0.0))
         found |= ranks(np.concatenate(parts, axis=1)) < problem.coordinates
     return found
 

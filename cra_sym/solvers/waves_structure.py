@@ -52,8 +52,8 @@ class Structure:
     """Structure common to the rows of a problem.
 
     The degrees of freedom (``places``) are, in order, the displacements of the left end (0 to n - 1), those of the
-    right end (n to 2 n - 1), the lumped coordinates, and the forces of links (springs between others). Each has one
-    condition.
+    right end (n to 2 n - 1), the lumped coordinates, and the forces of links (springs and masses on a combination of
+    the others). Each has one condition.
 
     Attributes
     ----------
@@ -154,6 +154,11 @@ class Structure:
         ranked = [rank[place] for place in order]
         swaps = sum(a > b for at, a in enumerate(ranked) for b in ranked[at + 1 :])
         return -1.0 if (n + swaps) % 2 else 1.0
+
+    def is_mass(self, entries: Sequence[Any], place: int) -> bool:
+        """Return whether a degree of freedom is the force of a link that is a mass: its stiffness is known to be 0."""
+        first = self.condition(place)
+        return place >= self.moving and all(_is(entry, 0) for entry in entries[first : first + self.moving])
 
     # Known entries of the conditions -------------------------------------------------------------------
 
