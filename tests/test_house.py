@@ -219,6 +219,15 @@ def test_module_reads_in_one_sitting(module):
     assert len(module.read_text(encoding="utf-8").splitlines()) <= 450
 
 
+def test_no_two_classes_of_one_name():
+    found: dict[str, list[str]] = {}
+    for path in MODULES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                found.setdefault(node.name, []).append(name_of(path))
+    assert {name: places for name, places in found.items() if len(places) > 1} == {}
+
+
 def test_no_text_is_evaluated(module):
     """No eval, no exec outside the kernel store, and SymPy never parses a string it is handed."""
     for node in ast.walk(parsed(module)):

@@ -26,7 +26,7 @@ __all__ = ["complex_residual", "complex_response"]
 Array = NDArray[np.float64]
 
 
-class _Cause(NamedTuple):
+class _Input(NamedTuple):
     """An input: its history as the acceleration of a motion, its loads, and whether it is an impulse at t = 0.
 
     Loads are those of units of displacement, velocity and acceleration of the motion, None where there is none.
@@ -152,7 +152,7 @@ class _Member(NamedTuple):
 
 def _members(
     system: System,
-    causes: Sequence[_Cause],
+    causes: Sequence[_Input],
     outputs: Callable[[Modes], Array],
     modes: int,
     zeta: Array,
@@ -191,7 +191,7 @@ def _members(
     return shape, members()
 
 
-def _causes(system: System, histories: Mapping[str, BaseMotion | Force], start: Start) -> list[_Cause]:
+def _causes(system: System, histories: Mapping[str, BaseMotion | Force], start: Start) -> list[_Input]:
     found = []
     for name, history in histories.items():
         force = isinstance(history, Force)
@@ -199,9 +199,9 @@ def _causes(system: System, histories: Mapping[str, BaseMotion | Force], start: 
         loads = {2: system.numerics("load", name)} if force else system.numerics("loads", name)
         for load in loads.values():
             check_forces(system, load, system.numerics("pencil"))
-        found.append(_Cause(profile, (loads.get(0), loads.get(1), loads.get(2)), not force and start == "inertial"))
+        found.append(_Input(profile, (loads.get(0), loads.get(1), loads.get(2)), not force and start == "inertial"))
     constant = system.numerics("constant")
-    return found if constant is None else [*found, _Cause(Force(1.0).profile, (None, None, constant), False)]
+    return found if constant is None else [*found, _Input(Force(1.0).profile, (None, None, constant), False)]
 
 
 def _momenta(system: System, initial: Mapping[Any, Any] | None) -> tuple[Load | None, Load | None]:

@@ -121,7 +121,7 @@ def critical_value(
     shape = np.broadcast_shapes(*(np.shape(value) for value in others.values()))
     columns = flat_columns([others.get(key, 0.0) for key in system.numerics("names")], shape)
     place = list(system.numerics("names")).index(name)
-    found = [_Search(system, column, place, name, modes).first(low, high, points) for column in columns.T]
+    found = [_CriticalSearch(system, column, place, name, modes).first(low, high, points) for column in columns.T]
     if not shape:
         return CriticalValue(*found[0])
     value, kind, omega = (np.array(part).reshape(shape) for part in zip(*found, strict=True))
@@ -146,7 +146,7 @@ class _FinestError(Exception):
     """There is no finer mesh."""
 
 
-class _State(NamedTuple):
+class _ValueState(NamedTuple):
     """Results at one value: eigenvalues, determinant of the static stiffness, whether there is no dissipation."""
 
     s: Complex
@@ -154,7 +154,7 @@ class _State(NamedTuple):
     lossless: bool
 
 
-class _Search:
+class _CriticalSearch:
     """The search of one parameter set."""
 
     def __init__(self, system: System, column: Array, place: int, name: str, modes: int) -> None:
@@ -189,7 +189,7 @@ class _Search:
         )
 
     @staticmethod
-    def _omega(kind: Kind, s: complex, state: _State) -> float:
+    def _omega(kind: Kind, s: complex, state: _ValueState) -> float:
         """Return the angular frequency of the neutral motion; of two that coalesce, from their mean."""
         if kind == "divergence":
             return 0.0
@@ -230,19 +230,19 @@ class _Search:
             "use eigenvalues"
         )
 
-    def _unstable(self, state: _State) -> bool:
+    def _unstable(self, state: _ValueState) -> bool:
         return bool((state.s.real > _GROWTH[0 if state.lossless else 1] * np.abs(state.s)).any())
 
     @staticmethod
-    def _growing(state: _State) -> complex:
+    def _growing(state: _ValueState) -> complex:
         s = state.s[state.s.imag >= 0.0]
         return complex(s[s.real.argmax()])
 
-    def _states(self, values: Array, level: int) -> list[_State]:
+    def _states(self, values: Array, level: int) -> list[_ValueState]:
         """Return the results at the values, on the mesh of that level."""
         columns = np.repeat(self._column[:, None], len(values), axis=1)
         columns[self._place] = values
-        found: dict[int, _State] = {}
+        found: dict[int, _ValueState] = {}
         for rows, problem in self._pencil.problems(columns):
             for part, chosen, mesh, _ in meshes(problem, self._modes, self._tolerance):
                 finer = next(islice(sequence(mesh), level, None), None)
@@ -253,17 +253,17 @@ class _Search:
                     statics = np.linalg.det(reduction.stiffness)
                     for k, (s, lossless) in enumerate(zip(reduction.eigenvalues(), reduction.lossless(), strict=True)):
                         near = s[np.abs(s) < reach[k]]
-                        found[int(rows[part[reduction.sets[k]]])] = _State(near, float(statics[k]), bool(lossless))
+                        found[int(rows[part[reduction.sets[k]]])] = _ValueState(near, float(statics[k]), bool(lossless))
         return [found[k] for k in range(len(values))]
 
 
-def _meeting(state: _State, s: complex) -> Complex:
+def _meeting(state: _ValueState, s: complex) -> Complex:
     """Return the two squared frequencies that are nearest to that of a motion."""
     squares = -(state.s[(state.s.imag > 0.0)] ** 2)
     return squares[np.argsort(np.abs(squares + (s**2).real), kind="stable")[:2]]
 
 
-def _described(state: _State) -> str:
+def _described(state: _ValueState) -> str:
     s = state.s[state.s.real.argmax()]
     if s.imag == 0.0:
         return f"divergence, growth {s.real:.4g} 1/s"

@@ -15,7 +15,7 @@ from cra_sym.analysis.nonlinear import nonlinear_modal_equations
 from cra_sym.model.excitations import Fluctuation, LagrangianTerms, Parametric
 from cra_sym.model.system import System
 from cra_sym.solvers.floquet import Oscillation
-from cra_sym.solvers.modal_polynomials import ModalPolynomials, Term, symmetrised
+from cra_sym.solvers.modal_polynomials import ModalPolynomials, TensorTerm, symmetrised
 
 __all__ = ["Forced", "Wave", "forced"]
 
@@ -91,8 +91,8 @@ class Forced:
 class _Collected:
     """Terms and waves collected so far."""
 
-    energies: list[Term] = field(default_factory=list)
-    forces: list[Term] = field(default_factory=list)
+    energies: list[TensorTerm] = field(default_factory=list)
+    forces: list[TensorTerm] = field(default_factory=list)
     waves: list[Wave] = field(default_factory=list)
 
     def number(self, wave: Wave) -> int:
@@ -176,10 +176,10 @@ def _add_loads(found: _Collected, system: System, modes: int, amplitudes: Mappin
         check_kind("drive", name, kind)
         for order, load in system.numerics("loads", name).items():
             wave = _rate(amplitude, order)
-            found.forces.append(Term(system.project(load, modes), 0, 0, (found.number(wave),)))
+            found.forces.append(TensorTerm(system.project(load, modes), 0, 0, (found.number(wave),)))
     constant = system.numerics("constant")
     if constant is not None:
-        found.forces.append(Term(system.project(constant, modes), 0, 0))
+        found.forces.append(TensorTerm(system.project(constant, modes), 0, 0))
 
 
 def _add_excitation(
@@ -190,16 +190,16 @@ def _add_excitation(
         wave = (found.number(_wave(drive.oscillation, epsilon, small)),)
         for matrix, positions, velocities in ((drive.stiffness, 1, 0), (drive.damping, 0, 1)):
             if matrix is not None:
-                found.forces.append(Term(-matrix, positions, velocities, wave))
+                found.forces.append(TensorTerm(-matrix, positions, velocities, wave))
         if drive.mass is not None:  # d/dt (g M v) comes from the Lagrangian g v M v/2
-            found.energies.append(Term(symmetrised(drive.mass / 2, 0), 0, 2, wave))
+            found.energies.append(TensorTerm(symmetrised(drive.mass / 2, 0), 0, 2, wave))
         if drive.momentum is not None:  # d/dt (g B q) comes from the Lagrangian g v B q, apart from a force g B' v
-            found.energies.append(Term(drive.momentum.T, 1, 1, wave))
-            found.forces.append(Term(-drive.momentum.T, 0, 1, wave))
+            found.energies.append(TensorTerm(drive.momentum.T, 1, 1, wave))
+            found.forces.append(TensorTerm(-drive.momentum.T, 0, 1, wave))
     if isinstance(excitation, LagrangianTerms):
         for oscillation, times, force in excitation.forces(system, modes):
             wave = (found.number(_wave(oscillation, epsilon if times else 1.0, small and times)),)
-            found.forces.append(Term(force, 0, 0, wave))
+            found.forces.append(TensorTerm(force, 0, 0, wave))
 
 
 def _wave(oscillation: Oscillation, size: float, small: bool) -> Wave:

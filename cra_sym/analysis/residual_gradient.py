@@ -19,7 +19,7 @@ from cra_sym.model.projection import column
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.si import Numbers
 from cra_sym.solvers.motion import BaseMotion, Piecewise
-from cra_sym.solvers.motion_terms import Term
+from cra_sym.solvers.motion_terms import MotionTerm
 
 if TYPE_CHECKING:
     from sympy.core.function import AppliedUndef
@@ -151,7 +151,7 @@ def _coupled(
 
 def _stretched(profile: BaseMotion, factors: Array) -> BaseMotion:
     """Return the motion over the same distance, stretched in time by the factors."""
-    terms: list[Term] = []
+    terms: list[MotionTerm] = []
     for term in profile.terms:
         assert isinstance(term, Piecewise)
         f = factors[..., None]

@@ -15,7 +15,7 @@ from cra_sym.analysis.nonlinear import samples, watched
 from cra_sym.analysis.periodic_forcing import Forced, Wave, forced
 from cra_sym.cached import cached_property
 from cra_sym.model.excitations import Fluctuation, LagrangianTerms
-from cra_sym.model.projection import Load, Place
+from cra_sym.model.projection import Displacement, Load
 from cra_sym.model.slip_elements import slip_statics, slip_terms_of
 from cra_sym.model.system import System
 from cra_sym.solvers.harmonic_balance import Basis, peak
@@ -67,11 +67,11 @@ def watched_load(system: System, place: Any, field: Any) -> Load:
     left, right = float(base.domain.left), float(base.domain.left) + float(base.domain.length)
     at = right if place is None else float(checks.real_array("place", place, unit="m"))
     if field in coordinates:
-        where = Place("lumped", coordinates.index(field), 0)
+        where = Displacement("lumped", coordinates.index(field), 0)
     elif at in (left, right):
-        where = Place("left" if at == left else "right", section_place(base, field), 0)
+        where = Displacement("left" if at == left else "right", section_place(base, field), 0)
     else:
-        where = Place("point", section_place(base, field), 0, 0)
+        where = Displacement("point", section_place(base, field), 0, 0)
     return Load.unit(where, at, slip_terms_of(system).forced.symbols)
 
 

@@ -20,7 +20,7 @@ from cra_sym.solvers.motion import BaseMotion, Harmonic, Piecewise
 from cra_sym.solvers.slip_loads import Cause
 from cra_sym.solvers.slip_polynomials import Polynomial
 from cra_sym.solvers.slip_records import Peak, Sampler
-from cra_sym.solvers.slipping import Events, SlippingModes, Step, follow
+from cra_sym.solvers.slipping import Events, SlippingModes, SlipStep, follow
 from cra_sym.solvers.slipping import Start as State
 from cra_sym.solvers.stuck_motion import stuck_peak
 
@@ -61,7 +61,7 @@ class Slipping:
         moved = np.moveaxis(values, 1, 0)
         return np.asarray(moved.reshape(*self.shape, *moved.shape[1:]))
 
-    def follow(self, end: Any, visit: Callable[[Step], object], pauses: Array | None = None) -> Events:
+    def follow(self, end: Any, visit: Callable[[SlipStep], object], pauses: Array | None = None) -> Events:
         """Integrate all members, in groups, to the end of each; ``visit`` is called with every step."""
         size = self.modes.omega.shape[1]
         last, found = np.broadcast_to(np.maximum(end, 1e-12), (size,)), []  # a motion of zero length is sampled once
@@ -70,7 +70,7 @@ class Slipping:
             state = State(self.start.displacement[:, part], self.start.velocity[:, part])
             causes = [cause.of(part) for cause in self.causes]
 
-            def show(step: Step, part: NDArray[np.intp] = part) -> None:
+            def show(step: SlipStep, part: NDArray[np.intp] = part) -> None:
                 visit(step._replace(members=part[step.members]))
 
             events = follow(self.modes.of(part), causes, state, last[part], show, pauses)

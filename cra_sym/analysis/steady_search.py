@@ -61,7 +61,7 @@ def answers_at(problem: Problem, points: Array, shape: tuple[int, int]) -> Answe
     """
     order = _order(points, shape)
     where, starts, size = problem.seeds(points, order.ravel())
-    search = _Search(problem, points, order, size)
+    search = _SteadySearch(problem, points, order, size)
     search.run(where, starts)
     if isinstance(problem, DrivenProblem):
         _search_on(problem, points, order.ravel(), size, search)
@@ -73,7 +73,9 @@ def answers_at(problem: Problem, points: Array, shape: tuple[int, int]) -> Answe
     return Answers(problem, where, unknowns, values)
 
 
-def _search_on(problem: DrivenProblem, points: Array, order: NDArray[np.intp], size: float, search: _Search) -> None:
+def _search_on(
+    problem: DrivenProblem, points: Array, order: NDArray[np.intp], size: float, search: _SteadySearch
+) -> None:
     """Search for solutions that are not reached from the first starts and from neighbours."""
     if problem.driven.equations.degree == 1:
         return
@@ -123,7 +125,7 @@ def _order(points: Array, shape: tuple[int, int]) -> NDArray[np.intp]:
     return np.arange(len(points)).reshape(shape)[np.ix_(rows, columns)]
 
 
-class _Search:
+class _SteadySearch:
     """Solutions found so far."""
 
     def __init__(self, problem: Problem, points: Array, order: NDArray[np.intp], size: float) -> None:

@@ -4,15 +4,15 @@ from cra_sym.claims.family import ArmFamily, provenance_family
 from cra_sym.claims.ledger import claim, claims
 from cra_sym.claims.overviews import figure_claims, figure_family
 from cra_sym.claims.setting import Setting
-from cra_sym.claims.verdict import OUTCOMES, THEMES, Finding, Judgement, Quantity, Verdict, judged
+from cra_sym.claims.verdict import OUTCOMES, THEMES, EvidenceArray, Finding, Judgement, Verdict, judged
 
 __all__ = [
     "OUTCOMES",
     "THEMES",
     "ArmFamily",
+    "EvidenceArray",
     "Finding",
     "Judgement",
-    "Quantity",
     "Setting",
     "Verdict",
     "claim",

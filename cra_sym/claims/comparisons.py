@@ -12,7 +12,7 @@ from cra_sym.claims.pictures import PALETTE, STYLES, note, region_map
 from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.responses import plane_picture
 from cra_sym.claims.setting import Setting
-from cra_sym.claims.verdict import Finding, Quantity, Verdict, judged
+from cra_sym.claims.verdict import EvidenceArray, Finding, Verdict, judged
 from cra_sym.claims.words import by_outcome, listed, mm, number, percent, span
 
 if TYPE_CHECKING:
@@ -38,15 +38,17 @@ def _softened(setting: Setting, mean: dict[str, float], what: str) -> Finding:
     nominal = float(peaks(soft, setting.angular_frequency)), float(peaks(fixed, setting.angular_frequency))
     first = [2 * np.pi * float(natural_frequencies(arm, 1)[0]) for arm in (soft, fixed)]
     evidence = {
-        "varpi": Quantity(varpi, "rad/s", "frequency of the disturbance"),
-        "k_t": Quantity(k_t, "N/m", "translational stiffness"),
-        "log_ratio": Quantity(ratios[0].T, "1", "ln of the peak of v(L, t), elastic over rigid: varpi, k_t"),
-        "log_ratio_relative": Quantity(ratios[1].T, "1", "the same for v(L, t) - v(0, t), the joint's give left out"),
-        "nominal": Quantity(nominal, "m", "peak at the nominal disturbance: elastic, rigid"),
-        "first_frequency": Quantity(first, "rad/s", "first natural frequency: elastic, rigid"),
-        "region": Quantity(region, "1", "where the elastic joint's peak is visibly smaller: varpi, k_t"),
-        "smaller": Quantity(smaller, "1", "the same at the soft k_t of Figs. 7 and 8, by fine_varpi"),
-        "fine_varpi": Quantity(fine, "rad/s", "frequency of the disturbance"),
+        "varpi": EvidenceArray(varpi, "rad/s", "frequency of the disturbance"),
+        "k_t": EvidenceArray(k_t, "N/m", "translational stiffness"),
+        "log_ratio": EvidenceArray(ratios[0].T, "1", "ln of the peak of v(L, t), elastic over rigid: varpi, k_t"),
+        "log_ratio_relative": EvidenceArray(
+            ratios[1].T, "1", "the same for v(L, t) - v(0, t), the joint's give left out"
+        ),
+        "nominal": EvidenceArray(nominal, "m", "peak at the nominal disturbance: elastic, rigid"),
+        "first_frequency": EvidenceArray(first, "rad/s", "first natural frequency: elastic, rigid"),
+        "region": EvidenceArray(region, "1", "where the elastic joint's peak is visibly smaller: varpi, k_t"),
+        "smaller": EvidenceArray(smaller, "1", "the same at the soft k_t of Figs. 7 and 8, by fine_varpi"),
+        "fine_varpi": EvidenceArray(fine, "rad/s", "frequency of the disturbance"),
     }
     judgement = judged(region, here=nominal[0] < seen * nominal[1])
     plain = by_outcome(
@@ -148,11 +150,11 @@ def amplitude_grows_with_acceleration(setting: Setting) -> Finding:
     fails = plane.varpi[(least <= 0).any(axis=1)]
     evidence = {
         **plane.axes,
-        "log_ratio": Quantity(
+        "log_ratio": EvidenceArray(
             -least, "1", "minus the least ln-step of the peak from one acceleration to the next: varpi, psi"
         ),
-        "region": Quantity(least > 0, "1", "where the claim holds: varpi, psi"),
-        "without": Quantity(without, "m", "peak without disturbance, by acceleration"),
+        "region": EvidenceArray(least > 0, "1", "where the claim holds: varpi, psi"),
+        "without": EvidenceArray(without, "m", "peak without disturbance, by acceleration"),
     }
     here = Plane(setting, np.array([setting.angular_frequency]), np.array([setting.phase]))
     ours = np.array([here.peaks(acceleration=value)[0] for value in a])
@@ -209,13 +211,13 @@ def error_grows_with_acceleration(setting: Setting) -> Finding:
     magnitude = (np.diff(np.abs(signed), axis=0) > 1e-9 * scale).all(axis=0)
     pointwise = np.diff(peak(errors)) > 1e-9 * peak(errors[0])
     evidence = {
-        "accelerations": Quantity(a, "m/s2", "mean accelerations"),
-        "times": Quantity(setting.times, "s", "time"),
-        "errors": Quantity(errors, "m", "v(L, t) with minus without the disturbance: acceleration, time"),
+        "accelerations": EvidenceArray(a, "m/s2", "mean accelerations"),
+        "times": EvidenceArray(setting.times, "s", "time"),
+        "errors": EvidenceArray(errors, "m", "v(L, t) with minus without the disturbance: acceleration, time"),
         **plane.axes,
-        "error_of_peaks": Quantity(signed, "m", "peak with minus peak without: acceleration, varpi, psi"),
-        "grows": Quantity(grows, "1", "whether that grows to the next acceleration"),
-        "share_of_magnitudes": Quantity(magnitude.mean(), "1", "share of the plane where its magnitude grows"),
+        "error_of_peaks": EvidenceArray(signed, "m", "peak with minus peak without: acceleration, varpi, psi"),
+        "grows": EvidenceArray(grows, "1", "whether that grows to the next acceleration"),
+        "share_of_magnitudes": EvidenceArray(magnitude.mean(), "1", "share of the plane where its magnitude grows"),
     }
     # the claim can be read instant by instant or for peaks: it stands if either reading does
     judgement = judged(pointwise) if pointwise.any() else judged(grows)

@@ -11,7 +11,7 @@ from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.claims.pictures import by_mode, note, stiffness_axis
 from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
-from cra_sym.claims.verdict import Finding, Quantity, Verdict, judged
+from cra_sym.claims.verdict import EvidenceArray, Finding, Verdict, judged
 from cra_sym.claims.words import by_outcome, listed, number, percent
 
 if TYPE_CHECKING:
@@ -39,13 +39,13 @@ def energy_of_the_beam_alone(setting: Setting) -> Finding:
     clamped = _beam_share(setting.rigid)
     agrees = np.abs(alone - 1) < _ROUNDING
     evidence = {
-        "k_t": Quantity(k_t, "N/m", "translational stiffness, the rotational one infinite"),
-        "k_r": Quantity(k_r, "N m/rad", "rotational stiffness, the translational one infinite"),
-        "beam_only": Quantity(
+        "k_t": EvidenceArray(k_t, "N/m", "translational stiffness, the rotational one infinite"),
+        "k_r": EvidenceArray(k_r, "N m/rad", "rotational stiffness, the translational one infinite"),
+        "beam_only": EvidenceArray(
             alone, "1", "K_i / (M_i omega_i^2) with the beam's energy: spring (t, r), stiffness, mode"
         ),
-        "with_springs": Quantity(whole, "1", "the same with the two springs' energy"),
-        "rigid": Quantity(clamped, "1", "the same on the rigid joint, by mode"),
+        "with_springs": EvidenceArray(whole, "1", "the same with the two springs' energy"),
+        "rigid": EvidenceArray(clamped, "1", "the same on the rigid joint, by mode"),
     }
     soft = _beam_share(setting.rigid.replace(k_t=setting.soft_k_t))
     judgement = judged(agrees, here=np.abs(soft - 1) < _ROUNDING)
@@ -117,8 +117,10 @@ def two_principles(setting: Setting) -> Finding:
         wanted = [(e.lhs - e.rhs).expand() for e in boundary_conditions()]
         agree.append([any((a - s * b).expand() == 0 for b in found for s in (1, -1)) for a in wanted])
     evidence = {
-        "with_springs": Quantity(agree[0], "1", "condition (16) met by Hamilton's principle with the springs in (4)"),
-        "beam_only": Quantity(agree[1], "1", "the same with the beam's energy alone"),
+        "with_springs": EvidenceArray(
+            agree[0], "1", "condition (16) met by Hamilton's principle with the springs in (4)"
+        ),
+        "beam_only": EvidenceArray(agree[1], "1", "the same with the beam's energy alone"),
     }
     judgement = judged(agree[0])
     plain = by_outcome(

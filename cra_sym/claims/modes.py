@@ -13,7 +13,7 @@ from cra_sym.claims.family import common_scale
 from cra_sym.claims.pictures import PALETTE, STYLES, by_mode, note, stiffness_axis
 from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
-from cra_sym.claims.verdict import Finding, Quantity, Verdict, judged
+from cra_sym.claims.verdict import EvidenceArray, Finding, Verdict, judged
 from cra_sym.claims.words import by_outcome, listed, number, percent, span
 from cra_sym.paper.flipped import flipped_frequencies
 
@@ -39,11 +39,11 @@ def rigid_joint_frequencies(setting: Setting) -> Finding:
     low, high, offered = common_scale(published)
     scale = float(bare.angular_frequency_scale)
     evidence = {
-        "published": Quantity(published, "Hz", "printed frequencies, rounded to 1 mHz, by mode"),
-        "computed": Quantity(found, "Hz", "of the arm without end-effector on a rigid joint, by mode"),
-        "scale": Quantity(scale, "rad/s", "sqrt(EI / rho A) / L^2 of this arm"),
-        "scale_allowed": Quantity(np.array([low, high]), "rad/s", "interval all printed frequencies agree with"),
-        "scale_by_mode": Quantity(offered, "rad/s", "interval of each printed frequency: mode, (low, high)"),
+        "published": EvidenceArray(published, "Hz", "printed frequencies, rounded to 1 mHz, by mode"),
+        "computed": EvidenceArray(found, "Hz", "of the arm without end-effector on a rigid joint, by mode"),
+        "scale": EvidenceArray(scale, "rad/s", "sqrt(EI / rho A) / L^2 of this arm"),
+        "scale_allowed": EvidenceArray(np.array([low, high]), "rad/s", "interval all printed frequencies agree with"),
+        "scale_by_mode": EvidenceArray(offered, "rad/s", "interval of each printed frequency: mode, (low, high)"),
     }
     judgement = judged([np.all(np.abs(found - published) <= 0.0005)])
     criterion = "the printed frequencies, to within 0.0005 Hz, are those of this arm on an ideal rigid joint"
@@ -109,11 +109,11 @@ def fall_with_k_t(setting: Setting) -> Finding:
     fixed = natural_frequencies(setting.rigid)
     soft = natural_frequencies(setting.arm.replace(k_t=setting.soft_k_t)) / fixed
     evidence = {
-        "k_t": Quantity(k_t, "N/m", "stiffness, stiff to soft"),
-        "frequency": Quantity(own, "Hz", "of this arm: k_t, mode"),
-        "rigid_frequency": Quantity(fixed, "Hz", "on the rigid joint, by mode"),
-        "falls": Quantity(falls, "1", "whether the next softer k_t lowers it: end-effector, k_r, k_t, mode"),
-        "slope": Quantity(slope, "kg^-1", "d omega^2 / d k_t = phi(0)^2: end-effector, k_r, k_t, mode"),
+        "k_t": EvidenceArray(k_t, "N/m", "stiffness, stiff to soft"),
+        "frequency": EvidenceArray(own, "Hz", "of this arm: k_t, mode"),
+        "rigid_frequency": EvidenceArray(fixed, "Hz", "on the rigid joint, by mode"),
+        "falls": EvidenceArray(falls, "1", "whether the next softer k_t lowers it: end-effector, k_r, k_t, mode"),
+        "slope": EvidenceArray(slope, "kg^-1", "d omega^2 / d k_t = phi(0)^2: end-effector, k_r, k_t, mode"),
     }
     series = natural_frequencies(setting.arm.replace(k_t=np.array(setting.k_t)))
     judgement = judged(falls, below, here=np.diff(series, axis=0) < 0)
@@ -172,12 +172,12 @@ def flat_and_rising_with_k_r(setting: Setting) -> Finding:
     flat_flipped, rises_flipped = _fig_4(flipped, fixed, setting.visible)
     as_printed = flat_flipped & rises_flipped
     evidence = {
-        "k_r": Quantity(k_r, "N m/rad", "stiffness, stiff to soft"),
-        "frequency": Quantity(found, "Hz", "derived: k_r, mode"),
-        "flipped_frequency": Quantity(flipped, "Hz", "with the spring's sign flipped: k_r, mode"),
-        "rigid_frequency": Quantity(fixed, "Hz", "for infinite k_r, by mode"),
-        "region": Quantity(flat & rises, "1", "where Fig. 4 would look as the paper says, by k_r"),
-        "flipped_region": Quantity(as_printed, "1", "the same with the sign flipped, by k_r"),
+        "k_r": EvidenceArray(k_r, "N m/rad", "stiffness, stiff to soft"),
+        "frequency": EvidenceArray(found, "Hz", "derived: k_r, mode"),
+        "flipped_frequency": EvidenceArray(flipped, "Hz", "with the spring's sign flipped: k_r, mode"),
+        "rigid_frequency": EvidenceArray(fixed, "Hz", "for infinite k_r, by mode"),
+        "region": EvidenceArray(flat & rises, "1", "where Fig. 4 would look as the paper says, by k_r"),
+        "flipped_region": EvidenceArray(as_printed, "1", "the same with the sign flipped, by k_r"),
     }
     series = natural_frequencies(setting.arm.replace(k_r=np.array(setting.k_r)))
     judgement = judged(flat & rises, here=np.logical_and(*_fig_4(series, fixed, setting.visible)))
@@ -280,11 +280,13 @@ def limit_of_infinite_stiffness(setting: Setting) -> Finding:
     order = -np.diff(np.log(np.abs(gaps[..., -9:, :])), axis=1) / np.log(kappa[1] / kappa[0])
     reached = np.abs(order - 1) < _NEAR_ONE
     evidence = {
-        "kappa": Quantity(kappa, "1", "dimensionless stiffness of the one spring, the other one rigid"),
-        "gap": Quantity(gaps, "1", "shortfall of the frequency from the rigid joint's: spring (t, r), kappa, mode"),
-        "order": Quantity(order, "1", "power of 1/kappa with which it vanishes: spring, kappa, mode"),
-        "limits": Quantity(limits, "1", "whether (27), (28), (29) pass their checks"),
-        "textbook": Quantity(textbook, "1", "whether (29) is 1 + cos(lambda) cosh(lambda) = 0"),
+        "kappa": EvidenceArray(kappa, "1", "dimensionless stiffness of the one spring, the other one rigid"),
+        "gap": EvidenceArray(
+            gaps, "1", "shortfall of the frequency from the rigid joint's: spring (t, r), kappa, mode"
+        ),
+        "order": EvidenceArray(order, "1", "power of 1/kappa with which it vanishes: spring, kappa, mode"),
+        "limits": EvidenceArray(limits, "1", "whether (27), (28), (29) pass their checks"),
+        "textbook": EvidenceArray(textbook, "1", "whether (29) is 1 + cos(lambda) cosh(lambda) = 0"),
     }
     judgement = judged(limits, [textbook], reached)
     if judgement.outcome == "holds":

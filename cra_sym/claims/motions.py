@@ -13,7 +13,7 @@ from cra_sym.analysis.responses import response
 from cra_sym.arm.parameters import Arm
 from cra_sym.cached import cached_property
 from cra_sym.claims.setting import Setting
-from cra_sym.claims.verdict import Quantity
+from cra_sym.claims.verdict import EvidenceArray
 from cra_sym.solvers.motion import BaseMotion
 
 __all__ = ["Plane", "peak", "tip"]
@@ -71,11 +71,11 @@ class Plane:
         return cls(setting, np.linspace(plane.varpi[0], plane.varpi[-1], 241), np.array([psi]))
 
     @property
-    def axes(self) -> dict[str, Quantity]:
+    def axes(self) -> dict[str, EvidenceArray]:
         """Frequency and phase as evidence."""
         return {
-            "varpi": Quantity(self.varpi, "rad/s", "frequency of the disturbance"),
-            "psi": Quantity(np.degrees(self.psi), "deg", "phase of the disturbance"),
+            "varpi": EvidenceArray(self.varpi, "rad/s", "frequency of the disturbance"),
+            "psi": EvidenceArray(np.degrees(self.psi), "deg", "phase of the disturbance"),
         }
 
     @cached_property

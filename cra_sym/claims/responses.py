@@ -11,7 +11,7 @@ from cra_sym.claims.motions import Plane, peak, tip
 from cra_sym.claims.pictures import PALETTE, note, region_map, stiffness_axis
 from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
-from cra_sym.claims.verdict import Finding, Judgement, Quantity, Verdict, judged
+from cra_sym.claims.verdict import EvidenceArray, Finding, Judgement, Verdict, judged
 from cra_sym.claims.words import by_outcome, listed, mm, number, percent, span
 
 if TYPE_CHECKING:
@@ -45,18 +45,20 @@ def _peak_claim(setting: Setting, lowers: bool, mean: dict[str, float], words: s
     degrees = np.degrees(along_psi.psi)
     evidence = {
         **plane.axes,
-        "peak_with": Quantity(found, "m", "peak of |v(L, t)| with the disturbance: varpi, psi"),
-        "peak_without": Quantity(without, "m", "peak of |v(L, t)| without it"),
-        "log_ratio": Quantity(ratio, "1", "ln of the ratio of the peaks, negative where the claim holds: varpi, psi"),
-        "region": Quantity(region, "1", "where the claim holds: varpi, psi"),
-        "amplitude": Quantity(setting.amplitude * _SHARES, "m", "amplitudes of the disturbance"),
-        "share": Quantity(shares, "1", "share of the plane where the claim holds, by amplitude"),
-        "share_start_on_base": Quantity(
+        "peak_with": EvidenceArray(found, "m", "peak of |v(L, t)| with the disturbance: varpi, psi"),
+        "peak_without": EvidenceArray(without, "m", "peak of |v(L, t)| without it"),
+        "log_ratio": EvidenceArray(
+            ratio, "1", "ln of the ratio of the peaks, negative where the claim holds: varpi, psi"
+        ),
+        "region": EvidenceArray(region, "1", "where the claim holds: varpi, psi"),
+        "amplitude": EvidenceArray(setting.amplitude * _SHARES, "m", "amplitudes of the disturbance"),
+        "share": EvidenceArray(shares, "1", "share of the plane where the claim holds, by amplitude"),
+        "share_start_on_base": EvidenceArray(
             (sign * (found_base - without_base) < 0).mean(),
             "1",
             "the same if the arm starts at rest seen from the base",
         ),
-        "peak_without_start_on_base": Quantity(without_base, "m", "peak without disturbance for that start"),
+        "peak_without_start_on_base": EvidenceArray(without_base, "m", "peak without disturbance for that start"),
     }
     judgement = judged(region, here=sign * (nominal - without) < 0)
     verb = "lowers" if lowers else "raises"
@@ -159,14 +161,16 @@ def matters_more_when_accelerating(setting: Setting) -> Finding:
     nominal = [float(found[0, 0] / without - 1) for found, without in (here.peaks(**mean) for mean in means)]
     evidence = {
         **plane.axes,
-        "log_ratio": Quantity(
+        "log_ratio": EvidenceArray(
             ratio, "1", "ln of the relative change of the peak, velocity over acceleration: varpi, psi"
         ),
-        "region": Quantity(ratio < 0, "1", "where the claim holds: varpi, psi"),
-        "nominal": Quantity(
+        "region": EvidenceArray(ratio < 0, "1", "where the claim holds: varpi, psi"),
+        "nominal": EvidenceArray(
             nominal, "1", "relative change of the peak at the nominal disturbance: velocity, acceleration"
         ),
-        "absolute_gap": Quantity(gap, "1", "largest difference of v with minus v without between the two, relative"),
+        "absolute_gap": EvidenceArray(
+            gap, "1", "largest difference of v with minus v without between the two, relative"
+        ),
     }
     judgement = judged(ratio < 0, here=nominal[1] > nominal[0])
     plain = by_outcome(
@@ -214,13 +218,17 @@ def four_printed_peaks(setting: Setting) -> Finding:
     )
     reach = np.array([[with_.min(), with_.max()] for with_, _ in pairs])
     evidence = {
-        "computed": Quantity(computed, "m", "velocity with and without, acceleration with and without disturbance"),
-        "reach": Quantity(reach, "m", "least and largest peak over frequency and phase: velocity and acceleration"),
-        "varpi": Quantity(plane.varpi, "rad/s", "frequency of the disturbance"),
-        "over_phase": Quantity(
+        "computed": EvidenceArray(
+            computed, "m", "velocity with and without, acceleration with and without disturbance"
+        ),
+        "reach": EvidenceArray(
+            reach, "m", "least and largest peak over frequency and phase: velocity and acceleration"
+        ),
+        "varpi": EvidenceArray(plane.varpi, "rad/s", "frequency of the disturbance"),
+        "over_phase": EvidenceArray(
             [[with_.min(1), with_.max(1)] for with_, _ in pairs], "m", "mean motion, (least, largest over phase), varpi"
         ),
-        "without": Quantity(
+        "without": EvidenceArray(
             [without for _, without in pairs], "m", "peak without disturbance: velocity and acceleration"
         ),
     }
@@ -286,12 +294,12 @@ def main_factor(setting: Setting) -> Finding:
     critical = float(by_t[-1] * k_t[-1] / (by_r[-1] * k_r[-1])) * float(setting.arm.L) ** 2
     series = np.array(setting.k_t)[:, None] * float(setting.arm.L) ** 2 / np.array(setting.k_r) < critical
     evidence = {
-        "k_t": Quantity(k_t, "N/m", "translational stiffness"),
-        "k_r": Quantity(k_r, "N m/rad", "rotational stiffness"),
-        "log_ratio": Quantity(ratio, "1", "ln of the tip's sag by k_r over that by k_t: k_t, k_r"),
-        "region": Quantity(ratio < 0, "1", "where k_t adds more: k_t, k_r"),
-        "critical": Quantity(critical, "1", "k_t L^2 / k_r below which k_t adds more"),
-        "series": Quantity(series, "1", "the claim at the stiffnesses of Fig. 5: k_t, k_r"),
+        "k_t": EvidenceArray(k_t, "N/m", "translational stiffness"),
+        "k_r": EvidenceArray(k_r, "N m/rad", "rotational stiffness"),
+        "log_ratio": EvidenceArray(ratio, "1", "ln of the tip's sag by k_r over that by k_t: k_t, k_r"),
+        "region": EvidenceArray(ratio < 0, "1", "where k_t adds more: k_t, k_r"),
+        "critical": EvidenceArray(critical, "1", "k_t L^2 / k_r below which k_t adds more"),
+        "series": EvidenceArray(series, "1", "the claim at the stiffnesses of Fig. 5: k_t, k_r"),
     }
     judgement = judged(ratio < 0, here=series)
     plain = by_outcome(

@@ -12,7 +12,7 @@ from cra_sym.analysis.sensitivities import sensitivities
 from cra_sym.claims.pictures import PALETTE, STYLES, by_mode, note, stiffness_axis
 from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
-from cra_sym.claims.verdict import Finding, Quantity, Verdict, judged
+from cra_sym.claims.verdict import EvidenceArray, Finding, Verdict, judged
 from cra_sym.claims.words import by_outcome, listed, number, percent
 
 if TYPE_CHECKING:
@@ -37,13 +37,13 @@ def more_sensitive_to_k_t(setting: Setting) -> Finding:
     rigid = modal_parameters(setting.rigid)
     critical = (rigid.root_shear / rigid.root_moment * float(setting.arm.L)) ** 2
     evidence = {
-        "k_t": Quantity(k_t, "N/m", "translational stiffness"),
-        "k_r": Quantity(k_r, "N m/rad", "rotational stiffness"),
-        "region": Quantity(region, "1", "whether dln f/dln k_t > dln f/dln k_r: k_t, k_r, mode"),
-        "ratio": Quantity(plane.log_k_t / plane.log_k_r, "1", "of the logarithmic sensitivities: k_t, k_r, mode"),
-        "critical": Quantity(critical, "1", "k_t L^2 / k_r below which it holds near the rigid joint, by mode"),
-        "series": Quantity(at_series, "1", "the claim at the stiffnesses of Fig. 5: k_t, k_r, mode"),
-        "raw_ratio": Quantity(raw, "m^2", "df/dk_t over df/dk_r at the stiffnesses of Fig. 5: k_t, k_r, mode"),
+        "k_t": EvidenceArray(k_t, "N/m", "translational stiffness"),
+        "k_r": EvidenceArray(k_r, "N m/rad", "rotational stiffness"),
+        "region": EvidenceArray(region, "1", "whether dln f/dln k_t > dln f/dln k_r: k_t, k_r, mode"),
+        "ratio": EvidenceArray(plane.log_k_t / plane.log_k_r, "1", "of the logarithmic sensitivities: k_t, k_r, mode"),
+        "critical": EvidenceArray(critical, "1", "k_t L^2 / k_r below which it holds near the rigid joint, by mode"),
+        "series": EvidenceArray(at_series, "1", "the claim at the stiffnesses of Fig. 5: k_t, k_r, mode"),
+        "raw_ratio": EvidenceArray(raw, "m^2", "df/dk_t over df/dk_r at the stiffnesses of Fig. 5: k_t, k_r, mode"),
     }
     unit = np.sqrt(raw)
     judgement = judged(region, here=at_series)
@@ -101,10 +101,10 @@ def sensitivity_to_k_t_grows(setting: Setting) -> Finding:
     grows = np.diff(slope, axis=0) > 0
     turn = k_t[np.argmax(slope, axis=0)]
     evidence = {
-        "k_t": Quantity(k_t, "N/m", "translational stiffness, stiff to soft"),
-        "df_dk_t": Quantity(slope, "Hz m/N", "along k_t: k_t, mode"),
-        "region": Quantity(grows, "1", "whether the next softer k_t has the larger df/dk_t: k_t, mode"),
-        "turn": Quantity(turn, "N/m", "k_t at which df/dk_t is largest, by mode"),
+        "k_t": EvidenceArray(k_t, "N/m", "translational stiffness, stiff to soft"),
+        "df_dk_t": EvidenceArray(slope, "Hz m/N", "along k_t: k_t, mode"),
+        "region": EvidenceArray(grows, "1", "whether the next softer k_t has the larger df/dk_t: k_t, mode"),
+        "turn": EvidenceArray(turn, "N/m", "k_t at which df/dk_t is largest, by mode"),
     }
     series = sensitivities(setting.arm.replace(k_t=np.array(setting.k_t))).df_dk_t
     judgement = judged(grows, here=np.diff(series, axis=0) > 0)
@@ -150,12 +150,12 @@ def sensitivity_to_k_r_stays(setting: Setting) -> Finding:
     change = 10 * setting.visible
     tiny, tiny_other = (np.abs(np.log(f)) < np.log1p(change) for f in (factor, factor_other))
     evidence = {
-        "k_r": Quantity(k_r, "N m/rad", "rotational stiffness, stiff to soft"),
-        "df_dk_r": Quantity(slope, "Hz rad/(N m)", "along k_r: k_r, mode"),
-        "region": Quantity(tiny, "1", "whether df/dk_r hardly changes along the k_r of Fig. 5, by mode"),
-        "factor": Quantity(factor, "1", "df/dk_r from the first to the last k_r of Fig. 5, by mode"),
-        "tiny_other": Quantity(tiny_other, "1", "whether it hardly changes along the k_t of Fig. 5, by mode"),
-        "factor_other": Quantity(factor_other, "1", "df/dk_r from the first to the last k_t of Fig. 5, by mode"),
+        "k_r": EvidenceArray(k_r, "N m/rad", "rotational stiffness, stiff to soft"),
+        "df_dk_r": EvidenceArray(slope, "Hz rad/(N m)", "along k_r: k_r, mode"),
+        "region": EvidenceArray(tiny, "1", "whether df/dk_r hardly changes along the k_r of Fig. 5, by mode"),
+        "factor": EvidenceArray(factor, "1", "df/dk_r from the first to the last k_r of Fig. 5, by mode"),
+        "tiny_other": EvidenceArray(tiny_other, "1", "whether it hardly changes along the k_t of Fig. 5, by mode"),
+        "factor_other": EvidenceArray(factor_other, "1", "df/dk_r from the first to the last k_t of Fig. 5, by mode"),
     }
     judgement = judged(tiny)
     plain = by_outcome(
@@ -217,10 +217,10 @@ def two_mechanisms(setting: Setting) -> Finding:
     spread_t, spread_r = drop_t.max() / drop_t.min() - 1, drop_r.max() / drop_r.min() - 1
     differ = np.abs(drop_t / drop_r / (drop_t / drop_r)[0] - 1)[1:] > setting.visible
     evidence = {
-        "kappa": Quantity(kappa, "1", "dimensionless stiffness of the one spring, the other one rigid"),
-        "drop": Quantity(drop, "1", "relative fall of the frequency: spring (t, r), kappa, mode"),
-        "coefficient_t": Quantity(drop_t, "1", "c in c / kappa_t, the fall near the rigid joint, by mode"),
-        "coefficient_r": Quantity(drop_r, "1", "c in c / kappa_r, the fall near the rigid joint, by mode"),
+        "kappa": EvidenceArray(kappa, "1", "dimensionless stiffness of the one spring, the other one rigid"),
+        "drop": EvidenceArray(drop, "1", "relative fall of the frequency: spring (t, r), kappa, mode"),
+        "coefficient_t": EvidenceArray(drop_t, "1", "c in c / kappa_t, the fall near the rigid joint, by mode"),
+        "coefficient_r": EvidenceArray(drop_r, "1", "c in c / kappa_r, the fall near the rigid joint, by mode"),
     }
     judgement = judged(differ)
     plain = by_outcome(

@@ -25,7 +25,7 @@ from cra_sym.claims.ledger import claim
 from cra_sym.claims.motions import peak
 from cra_sym.claims.setting import Setting
 from cra_sym.claims.slipping_pictures import PICTURES
-from cra_sym.claims.verdict import Finding, Quantity, Verdict, judged
+from cra_sym.claims.verdict import EvidenceArray, Finding, Verdict, judged
 from cra_sym.claims.words import by_outcome, listed, number, percent, span
 from cra_sym.model.excitations import Fluctuation
 from cra_sym.solvers.motion import BaseMotion
@@ -40,12 +40,12 @@ _AMPLITUDE = np.geomspace(5e-3, 0.1, 6)  # m, at the tip
 _SETTLED = 1e-6  # relative error of frequencies by harmonic balance
 
 
-def _axes(**more: Quantity) -> dict[str, Quantity]:
+def _axes(**more: EvidenceArray) -> dict[str, EvidenceArray]:
     return {
-        "preload": Quantity(_PRELOAD, "N", "preload of the joint"),
-        "size": Quantity(_SIZES, "1", "size of mean motion and disturbance, over the nominal ones"),
-        "soft_preload": Quantity(_SOFT_PRELOAD, "N", "preload of the soft joint"),
-        "amplitude": Quantity(_AMPLITUDE, "m", "amplitude at the tip on the soft joint"),
+        "preload": EvidenceArray(_PRELOAD, "N", "preload of the joint"),
+        "size": EvidenceArray(_SIZES, "1", "size of mean motion and disturbance, over the nominal ones"),
+        "soft_preload": EvidenceArray(_SOFT_PRELOAD, "N", "preload of the soft joint"),
+        "amplitude": EvidenceArray(_AMPLITUDE, "m", "amplitude at the tip on the soft joint"),
         **more,
     }
 
@@ -89,9 +89,11 @@ def _frequencies_fall(setting: Setting) -> Finding:
         f"Hz over amplitudes of {number(1e3 * _AMPLITUDE[0])} to {number(1e3 * _AMPLITUDE[-1])} mm."
     )
     evidence = _axes(
-        small=Quantity(small, "Hz", "frequencies of small vibration: preload, mode"),
-        large=Quantity(large, "Hz", "frequency of mode 1 on the soft joint: its preload, amplitude"),
-        region=Quantity(falls, "1", "where the frequency of small vibration falls with the preload: preload, mode"),
+        small=EvidenceArray(small, "Hz", "frequencies of small vibration: preload, mode"),
+        large=EvidenceArray(large, "Hz", "frequency of mode 1 on the soft joint: its preload, amplitude"),
+        region=EvidenceArray(
+            falls, "1", "where the frequency of small vibration falls with the preload: preload, mode"
+        ),
     )
     criterion = (
         f"each frequency falls from preload to preload, to {number(_SETTLED)} of it; stuck, and with slip in mode 1"
@@ -119,8 +121,8 @@ def _sensitivity_grows(setting: Setting) -> Finding:
         f"contact alone softens, in {percent(stuck.mean())}."
     )
     evidence = _axes(
-        rate=Quantity(rate, "Hz/N", "change of the first frequency over that of the preload: preload, amplitude"),
-        region=Quantity(grows, "1", "where it grows as the preload falls: preload, amplitude"),
+        rate=EvidenceArray(rate, "Hz/N", "change of the first frequency over that of the preload: preload, amplitude"),
+        region=EvidenceArray(grows, "1", "where it grows as the preload falls: preload, amplitude"),
     )
     return Finding(
         judgement, plain, sentence, evidence, "the rate of $f_1$ by the preload grows as that falls; no threshold"
@@ -145,8 +147,8 @@ def _smaller(setting: Setting, soft: np.ndarray, fixed: np.ndarray, what: str) -
     )
     sentence = f"Preloads at which it is smaller than on the rigid joint by over {percent(setting.visible)}: {where}."
     evidence = _axes(
-        log_ratio=Quantity(ratio, "1", "ln of the peak over that on the rigid joint: size, preload"),
-        region=Quantity(region, "1", "where it is visibly smaller: size, preload"),
+        log_ratio=EvidenceArray(ratio, "1", "ln of the peak over that on the rigid joint: size, preload"),
+        region=EvidenceArray(region, "1", "where it is visibly smaller: size, preload"),
     )
     criterion = (
         f"the largest value from 0 to {number(setting.duration)} s is smaller than on the rigid joint by over "
@@ -182,8 +184,8 @@ def _grows(setting: Setting, peaks: np.ndarray, what: str, more: float) -> Findi
         "of the cases."
     )
     evidence = _axes(
-        peaks=Quantity(peaks, "m", "largest value: acceleration, size, preload"),
-        region=Quantity(region, "1", "where it grows at each step of the acceleration: size, preload"),
+        peaks=EvidenceArray(peaks, "m", "largest value: acceleration, size, preload"),
+        region=EvidenceArray(region, "1", "where it grows at each step of the acceleration: size, preload"),
     )
     growth = f"by over {percent(more)}" if more else "at all; no threshold"
     return Finding(
@@ -223,8 +225,8 @@ def _zones_widen(setting: Setting) -> Finding:
         "does is bound the vibration inside."
     )
     evidence = _axes(
-        width=Quantity(width, "rad/s", "absolute width of the principal zones: mode, preload"),
-        region=Quantity(widens, "1", "where zones 2 and 3 widen as the preload falls: mode, preload"),
+        width=EvidenceArray(width, "rad/s", "absolute width of the principal zones: mode, preload"),
+        region=EvidenceArray(widens, "1", "where zones 2 and 3 widen as the preload falls: mode, preload"),
     )
     criterion = (
         "the first-order widths of zones 2 and 3 grow as the preload falls, that of zone 1 changes least; no threshold"

@@ -15,7 +15,7 @@ from cra_sym.claims.motions import tip
 from cra_sym.claims.pictures import PALETTE, STYLES, note
 from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
-from cra_sym.claims.verdict import Finding, Quantity, Verdict, judged
+from cra_sym.claims.verdict import EvidenceArray, Finding, Verdict, judged
 from cra_sym.claims.words import by_outcome, listed, number, percent
 from cra_sym.model.excitations import AxialBase
 
@@ -82,13 +82,15 @@ def shaken_base_is_parametric(setting: Setting) -> Finding:
     envelope = np.maximum.accumulate(np.abs(swings), axis=-1)
     parametric, forced = (np.array([found[kind][k] for kind in KINDS]) for k in (0, 1))
     evidence = {
-        "parametric": Quantity(parametric, "1", "time-dependent coefficients, by excitation: transverse, joint, axial"),
-        "forced": Quantity(forced, "1", "an arm at rest is set in motion, by excitation"),
-        "times": Quantity(long.times, "s", "time"),
-        "envelope": Quantity(
+        "parametric": EvidenceArray(
+            parametric, "1", "time-dependent coefficients, by excitation: transverse, joint, axial"
+        ),
+        "forced": EvidenceArray(forced, "1", "an arm at rest is set in motion, by excitation"),
+        "times": EvidenceArray(long.times, "s", "time"),
+        "envelope": EvidenceArray(
             envelope, "m", "peak so far with the transverse base at omega_2 and 2 omega_2: case, time"
         ),
-        "growth": Quantity(rate, "1/s", "growth rate with the fluctuating joint at 2 omega_2"),
+        "growth": EvidenceArray(rate, "1/s", "growth rate with the fluctuating joint at 2 omega_2"),
     }
     judgement = judged(parametric[:1])
     if judgement.outcome == "contradicted":
@@ -158,13 +160,15 @@ def boundary_from_the_amplitude_equation(setting: Setting) -> Finding:
         ]
     )
     evidence = {
-        "bounded": Quantity(bounded, "1", "whether a boundary follows: forced (transverse base), parametric"),
-        "conjugate": Quantity(
+        "bounded": EvidenceArray(bounded, "1", "whether a boundary follows: forced (transverse base), parametric"),
+        "conjugate": EvidenceArray(
             conjugate, "1", "whether the amplitude equation has the conjugate amplitude: the same two"
         ),
-        "centre": Quantity(centre / omega, "1", "centre of the zone over omega_n: excitation (joint, axial), mode"),
-        "detuning": Quantity(probes, "1", "detuning from 2 omega_2 over the derived half-width"),
-        "growth": Quantity(rates, "1/s", "growth rate by Floquet theory about 2 omega_2: excitation, detuning"),
+        "centre": EvidenceArray(
+            centre / omega, "1", "centre of the zone over omega_n: excitation (joint, axial), mode"
+        ),
+        "detuning": EvidenceArray(probes, "1", "detuning from 2 omega_2 over the derived half-width"),
+        "growth": EvidenceArray(rates, "1/s", "growth rate by Floquet theory about 2 omega_2: excitation, detuning"),
     }
     judgement = judged(bounded[:1], conjugate[:1])
     plain = by_outcome(
@@ -225,12 +229,12 @@ def resonance_at_any_frequency(setting: Setting) -> Finding:
     at = int(np.argmin(np.abs(epsilon - setting.epsilon)))
     needed = [float(epsilon[row.argmax()]) if row.any() else np.inf for row in region]
     evidence = {
-        "epsilon": Quantity(epsilon, "1", "depth of the joint's fluctuation"),
-        "growth_at_twice": Quantity(rates[1], "1/s", "largest growth rate near 2 omega_2, by epsilon"),
-        "growth_at_once": Quantity(rates[2], "1/s", "largest growth rate near omega_2, by epsilon"),
-        "powers": Quantity(powers, "1", "power of epsilon in the growth near 2 omega_2 and near omega_2"),
-        "zeta": Quantity(zeta, "1", "damping ratio"),
-        "region": Quantity(region, "1", "where the arm is unstable near omega_2: zeta, epsilon"),
+        "epsilon": EvidenceArray(epsilon, "1", "depth of the joint's fluctuation"),
+        "growth_at_twice": EvidenceArray(rates[1], "1/s", "largest growth rate near 2 omega_2, by epsilon"),
+        "growth_at_once": EvidenceArray(rates[2], "1/s", "largest growth rate near omega_2, by epsilon"),
+        "powers": EvidenceArray(powers, "1", "power of epsilon in the growth near 2 omega_2 and near omega_2"),
+        "zeta": EvidenceArray(zeta, "1", "damping ratio"),
+        "region": EvidenceArray(region, "1", "where the arm is unstable near omega_2: zeta, epsilon"),
     }
     reach = f"{number(epsilon[0])} to {number(epsilon[-1])}"
     gone = [z for z, least in zip(zeta, needed, strict=True) if np.isinf(least)]

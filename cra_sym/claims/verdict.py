@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from cra_sym.claims.setting import Setting
 
-__all__ = ["OUTCOMES", "THEMES", "Finding", "Judgement", "Quantity", "Verdict", "judged"]
+__all__ = ["OUTCOMES", "THEMES", "EvidenceArray", "Finding", "Judgement", "Verdict", "judged"]
 
 Outcome = Literal["holds", "mostly holds", "rarely holds", "contradicted", "undecidable"]
 OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
@@ -29,7 +29,7 @@ THEMES = ("modes", "responses", "stability")
 
 
 @dataclass(frozen=True, eq=False)
-class Quantity(ByValue):
+class EvidenceArray(ByValue):
     """An array of the evidence.
 
     Attributes
@@ -82,7 +82,7 @@ class Finding:
         The conclusion in one plain sentence.
     sentence : str
         The computed numbers behind it, in words.
-    evidence : mapping of Quantity
+    evidence : mapping of EvidenceArray
         ``"region"``, of truth values, is where a claim holds that holds somewhere.
     criterion : str
         The criterion with its thresholds: the claim holds if it is met everywhere, is contradicted if nowhere.
@@ -95,7 +95,7 @@ class Finding:
     judgement: Judgement
     plain: str
     sentence: str
-    evidence: Mapping[str, Quantity]
+    evidence: Mapping[str, EvidenceArray]
     criterion: str
     remedy: str | None = None
     missing: str | None = None
@@ -130,7 +130,7 @@ class Verdict:
     outcome: Outcome
     plain: str
     sentence: str
-    evidence: Mapping[str, Quantity] = field(repr=False)
+    evidence: Mapping[str, EvidenceArray] = field(repr=False)
     criterion: str = field(repr=False)
     setting: Setting = field(repr=False)
     picture: Callable[[Verdict, Axes], None] | None = field(repr=False, compare=False)

@@ -12,7 +12,7 @@ from cra_sym.claims.pictures import PALETTE, by_mode, note, stiffness_axis, stri
 from cra_sym.claims.registry import claimed, pictured
 from cra_sym.claims.setting import Setting
 from cra_sym.claims.stability import KINDS, zone
-from cra_sym.claims.verdict import Finding, Quantity, Verdict, judged
+from cra_sym.claims.verdict import EvidenceArray, Finding, Verdict, judged
 from cra_sym.claims.words import by_outcome, listed, number, percent, span
 from cra_sym.model.excitations import AxialBase, TransverseBase
 
@@ -72,10 +72,10 @@ def zone_1_stays(setting: Setting) -> Finding:
 
     region, relative = as_printed(widths), as_printed(np.log(widths))
     evidence = {
-        "k_t": Quantity(k_t, "N/m", "translational stiffness, stiff to soft"),
-        "width": Quantity(widths, "rad/s", f"{_WIDTH}: excitation (transverse, joint, axial), k_t, mode"),
-        "region": Quantity(region, "1", "where the claim holds in absolute width: excitation, k_t but the first"),
-        "relative": Quantity(relative, "1", "the same for the relative change of the widths"),
+        "k_t": EvidenceArray(k_t, "N/m", "translational stiffness, stiff to soft"),
+        "width": EvidenceArray(widths, "rad/s", f"{_WIDTH}: excitation (transverse, joint, axial), k_t, mode"),
+        "region": EvidenceArray(region, "1", "where the claim holds in absolute width: excitation, k_t but the first"),
+        "relative": EvidenceArray(relative, "1", "the same for the relative change of the widths"),
     }
     series = as_printed(_widths(setting, setting.arm.replace(k_t=np.array(setting.k_t))))[1]
     judgement = judged(region, here=series)
@@ -140,11 +140,15 @@ def heavier_is_narrower(setting: Setting) -> Finding:
     narrows = np.all(np.diff(widths, axis=2) < 0, axis=2)
     region = np.all(narrows, axis=-1)
     evidence = {
-        "k_t": Quantity(k_t, "N/m", "translational stiffness"),
-        "masses": Quantity(masses, "kg", "end-effectors"),
-        "width": Quantity(widths, "rad/s", f"{_WIDTH}: excitation (transverse, joint, axial), k_t, end-effector, mode"),
-        "narrows": Quantity(narrows, "1", "whether the width falls with every step of mass: excitation, k_t, mode"),
-        "region": Quantity(region, "1", "whether it does for all three: excitation, k_t"),
+        "k_t": EvidenceArray(k_t, "N/m", "translational stiffness"),
+        "masses": EvidenceArray(masses, "kg", "end-effectors"),
+        "width": EvidenceArray(
+            widths, "rad/s", f"{_WIDTH}: excitation (transverse, joint, axial), k_t, end-effector, mode"
+        ),
+        "narrows": EvidenceArray(
+            narrows, "1", "whether the width falls with every step of mass: excitation, k_t, mode"
+        ),
+        "region": EvidenceArray(region, "1", "whether it does for all three: excitation, k_t"),
     }
     ours = _widths(setting, setting.arm.replace(k_t=setting.soft_k_t, m_e=masses))[1]
     judgement = judged(region, here=np.diff(ours, axis=0) < 0)

@@ -7,7 +7,7 @@ from functools import cache
 import sympy as sp
 
 from cra_sym.arm.lagrangian import arm_model
-from cra_sym.codegen.program import Function, function
+from cra_sym.codegen.program import DerivedFunction, function
 from cra_sym.mechanics.one_wave_form import one_wave_scales
 from cra_sym.model import Model
 from cra_sym.model.excited import axial_load
@@ -20,13 +20,13 @@ NUMBERS = tuple(symbol(name) for name in ("L", "b", "h", "E", "rho", "m_b", "m_e
 x, t, w, v = (symbol(name) for name in ("x", "t", "w", "v"))
 
 
-def energy_functions() -> tuple[Function, ...]:
+def energy_functions() -> tuple[DerivedFunction, ...]:
     """Return the functions of the arm's parameters for its groups, sensitivities and loads."""
     return _of(arm_model())
 
 
 @cache
-def _of(model: Model) -> tuple[Function, ...]:
+def _of(model: Model) -> tuple[DerivedFunction, ...]:
     numbers, moved = ("numbers", NUMBERS), sp.symbols("displacement slope", real=True)
     joint = _stated(model, "left").subs(v.diff(x), moved[1]).subs(v, moved[0])
     rates = [-2 * joint.diff(symbol(name)) for name in ("k_t", "k_r")]

@@ -10,7 +10,7 @@ import sympy as sp
 
 from cra_sym.codegen.arm_family import arm_family
 from cra_sym.codegen.complex_parts import complex_parts
-from cra_sym.codegen.program import Function, function, scalars
+from cra_sym.codegen.program import DerivedFunction, function, scalars
 from cra_sym.mechanics import multiple_scales, one_wave, one_wave_rows, one_wave_shapes
 from cra_sym.model import oscillator
 from cra_sym.symbols import symbol
@@ -32,7 +32,7 @@ def _pairs() -> Any:
     return "pairs", one_wave.parameters(arm_family().structure)
 
 
-def _make(summary: str, derivation: Any, *arguments: Any, of: Any = ()) -> Function:
+def _make(summary: str, derivation: Any, *arguments: Any, of: Any = ()) -> DerivedFunction:
     expression, names = derivation(*of)
     given = {s for _, symbols in arguments for s in ((symbols,) if isinstance(symbols, sp.Symbol) else symbols)}
     rest = [s for s in names if s not in given]
@@ -48,7 +48,7 @@ def _first(symbols: Any, order: dict[sp.Symbol, int]) -> list[int]:
 
 
 @cache
-def spectrum_functions() -> tuple[Function, ...]:
+def spectrum_functions() -> tuple[DerivedFunction, ...]:
     """Return the functions for the complete frequencies of the arm."""
     arm, pairs = (arm_family().structure,), _pairs()
     k = _row("k", one_wave.derivatives(*arm)[1])
@@ -74,7 +74,7 @@ _basis.__name__ = "basis"
 
 
 @cache
-def modal_functions() -> tuple[Function, ...]:
+def modal_functions() -> tuple[DerivedFunction, ...]:
     """Return the functions for mode shapes, modal quantities and responses."""
     circle = ("circle", one_wave_shapes.tip_far(2)[1][-3:])  # cos, sin and decay at lambda
     arm, pairs, shapes = (arm_family().structure,), _pairs(), one_wave_shapes
@@ -124,7 +124,7 @@ _mass.__name__, _momentum.__name__, _rigid_body.__name__ = "modal_mass", "moment
 
 
 @cache
-def response_functions() -> tuple[Function, ...]:
+def response_functions() -> tuple[DerivedFunction, ...]:
     """Return the closed forms of Duhamel's integral, in real numbers."""
     t, omega, zeta, varpi = (symbol(name) for name in ("t", "omega_i", "zeta_i", "varpi"))
     unit = oscillator.guarded_responses()
@@ -151,7 +151,7 @@ def gauss_rule(points: int = 16) -> tuple[list[float], list[float]]:
 
 
 @cache
-def stability_functions() -> tuple[Function, ...]:
+def stability_functions() -> tuple[DerivedFunction, ...]:
     """Return the first-order half-width of a zone of instability, from multiple scales."""
     omega, coupling, damping = (sp.IndexedBase(name, real=True) for name in ("omega", "P", "zeta"))
     m, n = (sp.Symbol(name, integer=True, positive=True) for name in "mn")

@@ -20,7 +20,7 @@ from cra_sym.codegen.statement import stated
 from cra_sym.kernels.form_parse import parse
 from cra_sym.model.system import System
 from cra_sym.solvers.motion_terms import Piecewise
-from cra_sym.solvers.slipping import ORDER, Cause, SlippingModes, Start, Step, fastest, follow
+from cra_sym.solvers.slipping import ORDER, Cause, SlippingModes, SlipStep, Start, fastest, follow
 
 __all__ = ["SlippingNumbers", "slipping_library", "slipping_numbers"]
 
@@ -102,7 +102,7 @@ class _Last:
     force: Array
     taken: Array
 
-    def __call__(self, step: Step) -> None:
+    def __call__(self, step: SlipStep) -> None:
         own, moves = self.modes.of(step.members), step.span > 0
         way = np.einsum("kdp,kp->dp", step.moved[1:], step.share ** np.arange(1, ORDER + 1)[:, None])[own.where]
         self.taken[:, step.members] += np.where(step.state != 0, step.force * way, 0.0)

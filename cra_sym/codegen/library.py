@@ -17,7 +17,7 @@ from cra_sym.codegen.print_rust import RustPrinter
 from cra_sym.codegen.print_scripts import JavaScriptPrinter, OctavePrinter
 from cra_sym.codegen.printing import Printer, snake
 from cra_sym.codegen.rendering import DIGEST, rendered
-from cra_sym.kernels.form import Form, Function
+from cra_sym.kernels.form import FunctionDefinition, Program
 from cra_sym.kernels.form_parse import parse
 
 __all__ = ["PRINTERS", "Check", "Library", "check_name", "source"]
@@ -162,9 +162,11 @@ class Library:
         texts["reference.txt"] = "".join(f"{check.line()}\n" for check in self.checks)
         return texts
 
-    def _values(self, printer: Printer, functions: Sequence[Function]) -> dict[str, object]:
+    def _values(self, printer: Printer, functions: Sequence[FunctionDefinition]) -> dict[str, object]:
         form = printer.form
-        kept = Form(form.doc, form.constants, form.records, {f.name: f for f in functions}, form.comments, form.alone)
+        kept = Program(
+            form.doc, form.constants, form.records, {f.name: f for f in functions}, form.comments, form.alone
+        )
         printer.form = kept
         text = printer.all_functions()
         values: dict[str, object] = {
@@ -205,7 +207,7 @@ class Library:
         return "\n".join([*marked, last] if last else marked)
 
 
-def _is_stepped(form: Form) -> bool:
+def _is_stepped(form: Program) -> bool:
     """Tell whether the library steps one system, prepared for a sampling time."""
     functions = form.functions
     return "step" in functions and list(functions["discretise"].parameters) == ["time", "sampled"]

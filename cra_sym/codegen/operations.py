@@ -5,19 +5,19 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterable, Mapping
 
-from cra_sym.kernels.form import FLOAT, Form, Function
+from cra_sym.kernels.form import FLOAT, FunctionDefinition, Program
 
 __all__ = ["operations"]
 
 
-def operations(form: Form, name: str, most: Mapping[str, int]) -> int:
+def operations(form: Program, name: str, most: Mapping[str, int]) -> int:
     """Return the largest number of floating-point operations of a call.
 
     An operation is a sum, a difference, a product, a quotient, a comparison or a function of the language.
 
     Parameters
     ----------
-    form : Form
+    form : Program
     name : str
         Of the function.
     most : mapping of str to int
@@ -32,7 +32,7 @@ def operations(form: Form, name: str, most: Mapping[str, int]) -> int:
 
 
 class _Counter:
-    def __init__(self, form: Form, function: Function, most: Mapping[str, int]) -> None:
+    def __init__(self, form: Program, function: FunctionDefinition, most: Mapping[str, int]) -> None:
         self.form, self.function, self.most = form, function, most
 
     def block(self, statements: Iterable[ast.stmt]) -> int:

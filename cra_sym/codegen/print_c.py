@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from cra_sym.codegen.printing import Lines, Printer, snake
-from cra_sym.kernels.form import Constant, Function, Record, Type
+from cra_sym.kernels.form import Constant, FunctionDefinition, Record, Type
 
 __all__ = ["CPrinter"]
 
@@ -113,7 +113,7 @@ class CPrinter(Printer):
     def variable(self, name: str) -> str:
         return f"{self.upper}_{name}" if name in self.form.constants else name
 
-    def function_name(self, function: Function) -> str:
+    def function_name(self, function: FunctionDefinition) -> str:
         return f"{self.prefix}_{function.name}" if function.public else function.name.lstrip("_")
 
     def parameter(self, name: str, kind: Type) -> str:
@@ -126,7 +126,7 @@ class CPrinter(Printer):
         fixed = isinstance(kind.length, int) or kind.length in self.form.constants
         return f"{const}{self.scalar(kind)} {name}[{self.length(kind) if fixed else ''}]"
 
-    def signature(self, function: Function, end: str) -> Lines:
+    def signature(self, function: FunctionDefinition, end: str) -> Lines:
         """Yield the head of a function."""
         parameters = [self.parameter(name, kind) for name, kind in function.parameters.items()]
         result = "void" if function.result is None else self.scalar(function.result)
@@ -144,7 +144,7 @@ class CPrinter(Printer):
             text += piece
         yield from [*lines, text]
 
-    def head(self, function: Function) -> Lines:
+    def head(self, function: FunctionDefinition) -> Lines:
         yield from self.signature(function, "")
         yield "{"
         pointers = [n for n, kind in function.parameters.items() if _points(kind)]
@@ -157,7 +157,7 @@ class CPrinter(Printer):
         if function.calls & self.failing:
             yield f"    {self.prefix}_status status;"
 
-    def tail(self, function: Function) -> Lines:
+    def tail(self, function: FunctionDefinition) -> Lines:
         if function.name in self.failing and function.result is None:
             yield f"    return {self.upper}_OK;"
         yield "}"
@@ -181,7 +181,7 @@ class CPrinter(Printer):
         sign, change = ("<", "++") if step == 1 else (">", "--")
         return f"for (int {name} = {start}; {name} {sign} {self.expression(stop, 5)}; {name}{change}) {{"
 
-    def call_statement(self, target: str, call: ast.Call, callee: Function, indent: str) -> Lines:
+    def call_statement(self, target: str, call: ast.Call, callee: FunctionDefinition, indent: str) -> Lines:
         changed = [kind.changed for kind in callee.parameters.values()]
         given = [self.argument(a, c) for a, c in zip(call.args, changed, strict=True)]
         name = self.function_name(callee)

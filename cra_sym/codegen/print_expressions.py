@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from cra_sym.kernels.form import INT, Constant, Form, Function, Type
+from cra_sym.kernels.form import INT, Constant, FunctionDefinition, Program, Type
 
 __all__ = ["ALWAYS", "OPERATORS", "ExpressionPrinter"]
 
@@ -32,13 +32,13 @@ class ExpressionPrinter:
 
     Attributes
     ----------
-    form : Form
-    current : Function
+    form : Program
+    current : FunctionDefinition
     real : {'float64', 'float32'}
     """
 
-    form: Form
-    current: Function
+    form: Program
+    current: FunctionDefinition
     real: str
     true, false = "true", "false"
     both, either, negation = "&&", "||", "!"
@@ -200,7 +200,7 @@ class ExpressionPrinter:
         """Return a double truncated toward zero."""
         raise NotImplementedError
 
-    def function_name(self, function: Function) -> str:
+    def function_name(self, function: FunctionDefinition) -> str:
         """Return the name of a function as it is printed."""
         return function.name.lstrip("_")
 

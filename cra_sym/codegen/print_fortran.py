@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from cra_sym.codegen.printing import Lines, Printer, folded, snake
-from cra_sym.kernels.form import BOOL, FLOAT, Constant, Function, Record, Type
+from cra_sym.kernels.form import BOOL, FLOAT, Constant, FunctionDefinition, Record, Type
 
 __all__ = ["FortranPrinter"]
 
@@ -82,11 +82,11 @@ class FortranPrinter(Printer):
         last = kind.length - 1 if isinstance(kind.length, int) else f"{kind.length} - 1"
         return f"(0:{last})"
 
-    def is_subroutine(self, function: Function) -> bool:
+    def is_subroutine(self, function: FunctionDefinition) -> bool:
         """Return whether the function is a subroutine."""
         return function.result is None or self.alone(function)
 
-    def head(self, function: Function) -> Lines:
+    def head(self, function: FunctionDefinition) -> Lines:
         names, subroutine = list(function.parameters), self.is_subroutine(function)
         if subroutine:
             names += ["result"] if function.result else []
@@ -107,11 +107,11 @@ class FortranPrinter(Printer):
             if function.result is not None:
                 yield f"    result = {self.zero(function.result)}"
 
-    def function_name(self, function: Function) -> str:
+    def function_name(self, function: FunctionDefinition) -> str:
         return f"{self.prefix}_{function.name}" if function.public else function.name.lstrip("_")
 
     @staticmethod
-    def by_dependence(function: Function) -> list[tuple[str, Type]]:
+    def by_dependence(function: FunctionDefinition) -> list[tuple[str, Type]]:
         """Return the parameters with those that are lengths first."""
         return sorted(function.parameters.items(), key=lambda item: item[1].length is not None)
 
@@ -119,7 +119,7 @@ class FortranPrinter(Printer):
         """Return a zero of a type."""
         return {"float": self.number(0.0), "int": "0", "bool": ".false."}[kind.name]
 
-    def local_groups(self, function: Function) -> dict[str, list[str]]:
+    def local_groups(self, function: FunctionDefinition) -> dict[str, list[str]]:
         """Return the locals by type, as they are declared."""
         groups: dict[str, list[str]] = {}
         for name in sorted(function.loops):
@@ -128,7 +128,7 @@ class FortranPrinter(Printer):
             groups.setdefault(self.scalar(kind), []).append(f"{name}{self.bounds(kind)}")
         return groups
 
-    def tail(self, function: Function) -> Lines:
+    def tail(self, function: FunctionDefinition) -> Lines:
         kind = "subroutine" if self.is_subroutine(function) else "function"
         yield f"  end {kind} {self.function_name(function)}"
 
@@ -150,7 +150,7 @@ class FortranPrinter(Printer):
     def choice(self, condition: str, value: str, otherwise: str) -> tuple[str, int]:
         return f"merge({value}, {otherwise}, {condition})", 10
 
-    def call_statement(self, target: str, call: ast.Call, callee: Function, indent: str) -> Lines:
+    def call_statement(self, target: str, call: ast.Call, callee: FunctionDefinition, indent: str) -> Lines:
         given = [self.argument(a) for a in call.args]
         if not self.is_subroutine(callee):
             yield from self.plain(f"{target} = {self.function_name(callee)}({', '.join(given)})", indent)

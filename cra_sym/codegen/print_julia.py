@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from cra_sym.codegen.print_scripts import SAME, BracketingPrinter
 from cra_sym.codegen.printing import Lines
-from cra_sym.kernels.form import Constant, Function, Record, Type
+from cra_sym.kernels.form import Constant, FunctionDefinition, Record, Type
 
 __all__ = ["JuliaPrinter"]
 
@@ -48,17 +48,17 @@ class JuliaPrinter(BracketingPrinter):
     def new_record(self, name: str) -> str:
         return f"{name}()"
 
-    def documented(self, function: Function) -> Lines:
+    def documented(self, function: FunctionDefinition) -> Lines:
         yield from ('"""', *function.doc.splitlines(), '"""') if function.doc else ()
 
-    def head(self, function: Function) -> Lines:
+    def head(self, function: FunctionDefinition) -> Lines:
         yield f"function {self.function_name(function)}({', '.join(self.given(function))})"
 
     def returned(self, value: str | None) -> Lines:
         values = ([] if value is None else [value]) + self.results(self.current)
         yield f"return {', '.join(values)}" if values else "return nothing"
 
-    def tail(self, function: Function) -> Lines:
+    def tail(self, function: FunctionDefinition) -> Lines:
         if not isinstance(function.body[-1], ast.Return):
             yield f"    {next(iter(self.returned(None)))}"
         yield "end"

@@ -73,7 +73,7 @@ class LanesPrinter:
     def call(self, name: str, kinds: Sequence[Kind | None]) -> Kind | tuple[str, ...] | None:
         """Print a function if it is new; return the type of its result."""
         if name not in self.results:
-            writer = _Body(self, self.tree[name], kinds)
+            writer = _LanesFunction(self, self.tree[name], kinds)
             text = writer.text()
             self.results[name] = writer.result
             self.made.append(text)
@@ -107,7 +107,7 @@ class LanesPrinter:
         return Value(word, ATOM, INTEGER)
 
 
-class _Body(LaneExpressions):
+class _LanesFunction(LaneExpressions):
     """One function."""
 
     def __init__(self, printer: LanesPrinter, node: ast.FunctionDef, kinds: Sequence[Kind | None]) -> None:

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from cra_sym.codegen.print_scripts import SAME, BracketingPrinter
 from cra_sym.codegen.printing import Lines, snake
-from cra_sym.kernels.form import FLOAT, Constant, Function, Record, Type
+from cra_sym.kernels.form import FLOAT, Constant, FunctionDefinition, Record, Type
 
 __all__ = ["PythonPrinter"]
 
@@ -30,7 +30,7 @@ class PythonPrinter(BracketingPrinter):
     def block(self, statements: Sequence[ast.stmt], line: int, indent: str) -> Lines:
         yield from filter(str.strip, super().block(statements, line, indent))
 
-    def documented(self, function: Function) -> Lines:
+    def documented(self, function: FunctionDefinition) -> Lines:
         yield from ()
 
     def errors(self) -> str:
@@ -66,7 +66,7 @@ class PythonPrinter(BracketingPrinter):
     def records(self) -> str:
         return "\n\n\n".join("\n".join(self.record(record)) for record in self.form.records.values())
 
-    def function_name(self, function: Function) -> str:
+    def function_name(self, function: FunctionDefinition) -> str:
         return function.name
 
     def row_of(self, kind: Type) -> str:
@@ -77,7 +77,7 @@ class PythonPrinter(BracketingPrinter):
     def new_record(self, name: str) -> str:
         return f"{name}()"
 
-    def head(self, function: Function) -> Lines:
+    def head(self, function: FunctionDefinition) -> Lines:
         yield f"def {function.name}({', '.join(self.given(function))}):"
         if function.doc:
             lines = function.doc.splitlines()

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from cra_sym.codegen.printing import Lines, Printer
-from cra_sym.kernels.form import Constant, Form, Function, Record, Type, error_name
+from cra_sym.kernels.form import Constant, FunctionDefinition, Program, Record, Type, error_name
 
 __all__ = ["RustPrinter"]
 
@@ -55,7 +55,7 @@ class RustPrinter(Printer):
         "log": "ln", "expm1": "exp_m1", "log1p": "ln_1p", "pow": "powf", "isfinite": "is_finite",
     }  # fmt: skip
 
-    def __init__(self, form: Form, prefix: str, real: str = "float64") -> None:
+    def __init__(self, form: Program, prefix: str, real: str = "float64") -> None:
         super().__init__(form, prefix, real)
         self.infinity = f"{self.word}::INFINITY"
         self.needs_std: set[str] = set()
@@ -118,11 +118,11 @@ class RustPrinter(Printer):
         fixed = kind.length is None or isinstance(kind.length, int) or kind.length in self.form.constants
         return f"{name}: {reference}{self.owned(kind) if fixed else f'[{self.scalar(kind)}]'}"
 
-    def documented(self, function: Function) -> Lines:
+    def documented(self, function: FunctionDefinition) -> Lines:
         mark = "///" if function.public else "//"
         yield from (f"{mark} {line}".rstrip() for line in function.doc.splitlines())
 
-    def head(self, function: Function) -> Lines:
+    def head(self, function: FunctionDefinition) -> Lines:
         if function.name in self.needs_std:
             yield '#[cfg(feature = "std")]'
         result = "()" if function.result is None else self.scalar(function.result)
@@ -139,7 +139,7 @@ class RustPrinter(Printer):
             yield from (f"    {parameter}," for parameter in given)
             yield f"){arrow} {{"
 
-    def tail(self, function: Function) -> Lines:
+    def tail(self, function: FunctionDefinition) -> Lines:
         if function.name in self.failing and function.result is None:
             yield "    Ok(())"
         yield "}"
@@ -202,7 +202,7 @@ class RustPrinter(Printer):
             else (f" {self.both if inside else self.either} ".join(parts), 2)
         )
 
-    def call_statement(self, target: str, call: ast.Call, callee: Function, indent: str) -> Lines:
+    def call_statement(self, target: str, call: ast.Call, callee: FunctionDefinition, indent: str) -> Lines:
         changed = [kind.changed for kind in callee.parameters.values()]
         given = ", ".join(self.argument(a, c) for a, c in zip(call.args, changed, strict=True))
         start = f"{target} = " if target else ""

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from cra_sym.codegen.printing import Lines, Printer, folded, snake
-from cra_sym.kernels.form import Constant, Form, Function, Record, Type
+from cra_sym.kernels.form import Constant, FunctionDefinition, Program, Record, Type
 
 __all__ = ["SAME", "BracketingPrinter", "JavaScriptPrinter", "OctavePrinter", "ScriptPrinter"]
 
@@ -30,11 +30,11 @@ _STATEMENT = re.compile(r"return |[^\s\"'].*? [-+*/]?= ")
 class ScriptPrinter(Printer):
     """Base class for languages without types: results are returned, and no variable is declared."""
 
-    def __init__(self, form: Form, prefix: str, real: str = "float64") -> None:
+    def __init__(self, form: Program, prefix: str, real: str = "float64") -> None:
         super().__init__(form, prefix, real)
         self.made_later: set[int] = set()
 
-    def results(self, function: Function) -> list[str]:
+    def results(self, function: FunctionDefinition) -> list[str]:
         """Return the parameters that a function creates and returns."""
         return [name for name, kind in function.parameters.items() if kind.access == "out"]
 
@@ -73,7 +73,7 @@ class ScriptPrinter(Printer):
                 return given == ["out"] and any(isinstance(a, ast.Name) and a.id == name for a in call.args)
         return False
 
-    def given(self, function: Function) -> list[str]:
+    def given(self, function: FunctionDefinition) -> list[str]:
         """Return the parameters a caller gives."""
         return [name for name, kind in function.parameters.items() if kind.access != "out"]
 
@@ -93,7 +93,7 @@ class ScriptPrinter(Printer):
         """Return a new record."""
         raise NotImplementedError
 
-    def start(self, function: Function) -> Lines:
+    def start(self, function: FunctionDefinition) -> Lines:
         """Yield the statements that create the results."""
         for name in self.results(function):
             text = self.declared(name, function.parameters[name], self.made(function.parameters[name]), True)
@@ -107,12 +107,12 @@ class ScriptPrinter(Printer):
         values = ([] if value is None else [value]) + self.results(self.current)
         yield f"return {self.together(values)}" if values else "return"
 
-    def tail(self, function: Function) -> Lines:
+    def tail(self, function: FunctionDefinition) -> Lines:
         if function.result is None and self.results(function) and not isinstance(function.body[-1], ast.Return):
             yield from self.plain(next(iter(self.returned(None))), self.indent)
         yield from filter(None, [self.closing])
 
-    def call_statement(self, target: str, call: ast.Call, callee: Function, indent: str) -> Lines:
+    def call_statement(self, target: str, call: ast.Call, callee: FunctionDefinition, indent: str) -> Lines:
         by_name = dict(zip(callee.parameters, call.args, strict=True))
         given = ", ".join(self.argument(by_name[name]) for name in self.given(callee))
         targets = ([target] if target else []) + [self.expression(by_name[name]) for name in self.results(callee)]
@@ -149,7 +149,7 @@ class JavaScriptPrinter(ScriptPrinter):
         "abs": "Math.abs", "min": "Math.min", "max": "Math.max", "isfinite": "Number.isFinite",
     }  # fmt: skip
 
-    def __init__(self, form: Form, prefix: str, real: str = "float64") -> None:
+    def __init__(self, form: Program, prefix: str, real: str = "float64") -> None:
         super().__init__(form, prefix, real)
         self.undeclared: set[str] = set()
 
@@ -160,7 +160,7 @@ class JavaScriptPrinter(ScriptPrinter):
         self.undeclared |= {declares} if declares else set()
         return ""
 
-    def call_statement(self, target: str, call: ast.Call, callee: Function, indent: str) -> Lines:
+    def call_statement(self, target: str, call: ast.Call, callee: FunctionDefinition, indent: str) -> Lines:
         results = set(self.results(callee))
         made = [a.id for a, name in zip(call.args, callee.parameters, strict=True)
                 if name in results and isinstance(a, ast.Name)]  # fmt: skip
@@ -199,7 +199,7 @@ class JavaScriptPrinter(ScriptPrinter):
     def new_record(self, name: str) -> str:
         return f"new_{snake(name)}()"
 
-    def head(self, function: Function) -> Lines:
+    def head(self, function: FunctionDefinition) -> Lines:
         export = "export " if function.public else ""
         yield f"{export}function {self.function_name(function)}({', '.join(self.given(function))}) {{"
 
@@ -254,10 +254,10 @@ function out = choose(condition, value, other)
 end
 """
 
-    def results(self, function: Function) -> list[str]:
+    def results(self, function: FunctionDefinition) -> list[str]:
         return function.changed
 
-    def start(self, function: Function) -> Lines:
+    def start(self, function: FunctionDefinition) -> Lines:
         for name, kind in function.parameters.items():
             if kind.access == "out":
                 yield from self.plain(f"{name} = {self.made(kind)}", self.indent)
@@ -292,16 +292,16 @@ end
     def new_record(self, name: str) -> str:
         return f"new_{snake(name)}()"
 
-    def documented(self, function: Function) -> Lines:
+    def documented(self, function: FunctionDefinition) -> Lines:
         yield from ()
 
-    def head(self, function: Function) -> Lines:
+    def head(self, function: FunctionDefinition) -> Lines:
         outs = (["result"] if function.result else []) + self.results(function)
         left = "" if not outs else f"{outs[0]} = " if len(outs) == 1 else f"[{', '.join(outs)}] = "
         yield f"function {left}{self.function_name(function)}({', '.join(self.given(function))})"
         yield from (f"% {line}".rstrip() for line in function.doc.splitlines())
 
-    def tail(self, function: Function) -> Lines:
+    def tail(self, function: FunctionDefinition) -> Lines:
         yield "end"
 
     def returned(self, value: str | None) -> Lines:

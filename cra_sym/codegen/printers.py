@@ -11,7 +11,7 @@ from sympy.printing.codeprinter import CodePrinter
 from sympy.printing.precedence import PRECEDENCE
 from sympy.printing.pycode import PythonCodePrinter
 
-from cra_sym.codegen.program import Argument, Function, Place
+from cra_sym.codegen.program import Argument, DerivedFunction, Location
 
 __all__ = ["FormPrinter", "ScalarPrinter"]
 
@@ -39,7 +39,7 @@ class ScalarPrinter(CodePrinter):  # type: ignore[misc]
     both, either, negation, unequal = "&&", "||", "!({})", "!="
     power = "pow({base}, {exponent})"
 
-    def __init__(self, places: Mapping[sp.Symbol, Place]) -> None:
+    def __init__(self, places: Mapping[sp.Symbol, Location]) -> None:
         super().__init__()
         self.places = places
 
@@ -192,7 +192,7 @@ def _inverse(x: float) -> float:
         return cls.helper if "_inverse(" in text else ""
 
     @classmethod
-    def text_of(cls, function: Function, name: str, *, checked: bool) -> str:
+    def text_of(cls, function: DerivedFunction, name: str, *, checked: bool) -> str:
         """Return a function of numbers, with one row of results and at most three branches, as text.
 
         If checked, it raises where a result is not finite.
@@ -200,7 +200,7 @@ def _inverse(x: float) -> float:
         lines = []
         for number, branch in enumerate(function.branches):
             letter = "" if len(function.branches) == 1 else "abc"[number]
-            own = {s: Place(f"{function.places[s].name}{letter}") for s, _ in branch.steps}
+            own = {s: Location(f"{function.places[s].name}{letter}") for s, _ in branch.steps}
             printer = cls(function.places | own)
             values = (*(v for _, v in branch.steps), *branch.outputs)
             printer.guarded = any(value.has(sp.Piecewise) for value in values)

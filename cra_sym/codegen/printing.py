@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import ClassVar
 
 from cra_sym.codegen.print_expressions import OPERATORS, ExpressionPrinter
-from cra_sym.kernels.form import Constant, Form, Function, Record, Type
+from cra_sym.kernels.form import Constant, FunctionDefinition, Program, Record, Type
 
 __all__ = ["Lines", "Printer", "folded", "snake"]
 
@@ -40,7 +40,7 @@ class Printer(ExpressionPrinter):
 
     Parameters
     ----------
-    form : Form
+    form : Program
     prefix : str
         Prefix of public names, where the language has no namespaces.
     real : {'float64', 'float32'}
@@ -51,7 +51,7 @@ class Printer(ExpressionPrinter):
     closing = "}"
     reals: ClassVar[tuple[str, ...]] = ("float64",)
 
-    def __init__(self, form: Form, prefix: str, real: str = "float64") -> None:
+    def __init__(self, form: Program, prefix: str, real: str = "float64") -> None:
         if real not in self.reals:
             raise ValueError(f"real = {real!r}: {self.title} has {', '.join(self.reals)}")
         self.form, self.prefix, self.real = form, prefix, real
@@ -75,11 +75,11 @@ class Printer(ExpressionPrinter):
         """Return the functions as text."""
         return self.several(self.form.functions.values())
 
-    def several(self, functions: Iterable[Function]) -> str:
+    def several(self, functions: Iterable[FunctionDefinition]) -> str:
         """Return some functions as text."""
         return self.between.join("\n".join(self.function(function)) for function in functions)
 
-    def function(self, function: Function) -> Lines:
+    def function(self, function: FunctionDefinition) -> Lines:
         """Yield the lines of a function."""
         self.current = function
         yield from self.documented(function)
@@ -91,7 +91,7 @@ class Printer(ExpressionPrinter):
         yield from self.block(function.body[checks:], line or 0, self.indent)
         yield from self.tail(function)
 
-    def checks(self, function: Function) -> int:
+    def checks(self, function: FunctionDefinition) -> int:
         """Return the number of statements at the beginning that only check the input."""
         for number, statement in enumerate(function.body):
             match statement:
@@ -102,11 +102,11 @@ class Printer(ExpressionPrinter):
             return number
         return len(function.body)
 
-    def start(self, function: Function) -> Lines:
+    def start(self, function: FunctionDefinition) -> Lines:
         """Yield the statements that create the results, where the caller does not."""
         yield from ()
 
-    def documented(self, function: Function) -> Lines:
+    def documented(self, function: FunctionDefinition) -> Lines:
         """Yield the docstring of a function as comments before it."""
         for line in textwrap.dedent(function.doc).strip().splitlines():
             yield f"{self.outer}{self.doc_comment} {line}".rstrip()
@@ -139,11 +139,11 @@ class Printer(ExpressionPrinter):
         """Yield the lines of a record."""
         raise NotImplementedError
 
-    def head(self, function: Function) -> Lines:
+    def head(self, function: FunctionDefinition) -> Lines:
         """Yield the lines before the body."""
         raise NotImplementedError
 
-    def tail(self, function: Function) -> Lines:
+    def tail(self, function: FunctionDefinition) -> Lines:
         """Yield the lines after the body."""
         yield self.outer + self.closing
 
@@ -165,7 +165,7 @@ class Printer(ExpressionPrinter):
         """Return the head of a loop over integers."""
         raise NotImplementedError
 
-    def call_statement(self, target: str, call: ast.Call, callee: Function, indent: str) -> Lines:
+    def call_statement(self, target: str, call: ast.Call, callee: FunctionDefinition, indent: str) -> Lines:
         """Yield a call as a statement, with the use of its result and the handling of a failure."""
         raise NotImplementedError
 
@@ -315,6 +315,6 @@ class Printer(ExpressionPrinter):
         """Return an assignment such as ``x += value``."""
         return f"{self.expression(target)} {OPERATORS[type(op)][0]}= {self.expression(value)}"
 
-    def alone(self, callee: Function) -> bool:
+    def alone(self, callee: FunctionDefinition) -> bool:
         """Return whether a call of the function is a statement of its own."""
         return bool(callee.changed) or callee.name in self.failing

@@ -14,7 +14,7 @@ from sympy.logic.boolalg import Boolean
 from cra_sym.codegen.names import FORTRAN, RESERVED
 from cra_sym.kernels.source import shared_steps
 
-__all__ = ["Argument", "Branch", "Function", "Place", "function", "scalars"]
+__all__ = ["Argument", "Case", "DerivedFunction", "Location", "function", "scalars"]
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Argument:
 
 
 @dataclass(frozen=True)
-class Place:
+class Location:
     """Location of a symbol's value: a variable, or an entry (from 0) of a row."""
 
     name: str
@@ -44,7 +44,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Branch:
+class Case:
     """Steps and outputs under a condition; None is 'otherwise'."""
 
     condition: Any
@@ -53,14 +53,14 @@ class Branch:
 
 
 @dataclass(frozen=True)
-class Function:
+class DerivedFunction:
     """A function of numbers and rows of numbers, to be printed in any language.
 
     Attributes
     ----------
     name, summary : str
     arguments : tuple of Argument
-    branches : tuple of Branch
+    branches : tuple of Case
         One without a condition, or several, the last of which is 'otherwise'.
     scalar : bool
         Whether the result is a number instead of a row.
@@ -71,9 +71,9 @@ class Function:
     name: str
     summary: str
     arguments: tuple[Argument, ...]
-    branches: tuple[Branch, ...]
+    branches: tuple[Case, ...]
     scalar: bool
-    places: dict[sp.Symbol, Place]
+    places: dict[sp.Symbol, Location]
 
     @property
     def size(self) -> int:
@@ -86,7 +86,7 @@ class Function:
         return list(dict.fromkeys(self.places[symbol].name for b in self.branches for symbol, _ in b.steps))
 
 
-def function(name: str, summary: str, expression: Any, arguments: Sequence[tuple[str, Any]]) -> Function:
+def function(name: str, summary: str, expression: Any, arguments: Sequence[tuple[str, Any]]) -> DerivedFunction:
     """Turn an expression into a straight-line function.
 
     Parameters
@@ -110,7 +110,7 @@ def function(name: str, summary: str, expression: Any, arguments: Sequence[tuple
     branches = [_branch(condition, values) for condition, values in _alternatives(outputs)]
     free = set().union(*map(_free_symbols, branches))
     taken: set[str] = {"out", "found"}
-    places: dict[sp.Symbol, Place] = {}
+    places: dict[sp.Symbol, Location] = {}
     signature = []
     for wish, symbols in arguments:
         row = not isinstance(symbols, sp.Symbol)
@@ -119,13 +119,13 @@ def function(name: str, summary: str, expression: Any, arguments: Sequence[tuple
             continue
         given = new_name(wish, taken)
         signature.append(Argument(given, members, row))
-        places |= {s: Place(given, i if row else None) for i, s in enumerate(members)}
+        places |= {s: Location(given, i if row else None) for i, s in enumerate(members)}
     missing = sorted(str(s) for s in free - set(places))
     if missing:
         raise ValueError(f"symbols of the expression that are not arguments: {', '.join(missing)}")
     for branch in branches:
-        places |= {symbol: Place(f"x{n}") for n, (symbol, _) in enumerate(branch.steps)}
-    return Function(name, summary, tuple(signature), tuple(branches), scalar, places)
+        places |= {symbol: Location(f"x{n}") for n, (symbol, _) in enumerate(branch.steps)}
+    return DerivedFunction(name, summary, tuple(signature), tuple(branches), scalar, places)
 
 
 def scalars(symbols: Iterable[sp.Symbol]) -> list[tuple[str, sp.Symbol]]:
@@ -146,7 +146,7 @@ def _alternatives(outputs: list[sp.Expr]) -> list[tuple[Any, list[sp.Expr]]]:
     ]
 
 
-def _branch(condition: Any, values: list[sp.Expr]) -> Branch:
+def _branch(condition: Any, values: list[sp.Expr]) -> Case:
     """Share subexpressions; conditions are written inline, since variables are numbers."""
     steps, values = shared_steps(values)
     conditions: dict[sp.Basic, sp.Basic] = {}
@@ -157,10 +157,10 @@ def _branch(condition: Any, values: list[sp.Expr]) -> Branch:
             conditions[symbol] = value
         else:
             kept.append((symbol, plain(value)))
-    return Branch(condition, tuple(kept), tuple(plain(value.xreplace(conditions)) for value in values))
+    return Case(condition, tuple(kept), tuple(plain(value.xreplace(conditions)) for value in values))
 
 
-def _free_symbols(branch: Branch) -> set[sp.Symbol]:
+def _free_symbols(branch: Case) -> set[sp.Symbol]:
     expressions = [*(value for _, value in branch.steps), *branch.outputs]
     found = set().union(*(e.free_symbols for e in (*expressions, branch.condition) if e is not None))
     return found - {symbol for symbol, _ in branch.steps}

@@ -153,7 +153,7 @@ class Traced:
         found = list(results)
         names = [f"{row}[{i}]" for row, _, size in out for i in range(size)]
         kept = wanted_lines(self._lines, [_name(value) for value in found])
-        body = _Body(kept, [_name(value) for value in found], guarded=self._guarded)
+        body = _StatementMerger(kept, [_name(value) for value in found], guarded=self._guarded)
         steps, values = body.written()
         if not out and steps and steps[-1].startswith(f"{values[0]} = "):
             values[0] = steps.pop().partition(" = ")[2]
@@ -169,7 +169,7 @@ def _name(value: Any) -> str:
     return value.name if isinstance(value, Term) else repr(float(value.value if isinstance(value, Exact) else value))
 
 
-class _Body:
+class _StatementMerger:
     """Merger of lines of one operation each into few statements."""
 
     def __init__(self, lines: Sequence[tuple[list[str], str]], results: Sequence[str], *, guarded: bool) -> None:

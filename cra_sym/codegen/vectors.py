@@ -21,7 +21,7 @@ from cra_sym.arm.parameters import Arm
 from cra_sym.codegen.characteristic import characteristic
 from cra_sym.model.excitations import AxialBase
 
-__all__ = ["SEED", "TOLERANCE", "Check", "arm_checks", "extreme_arms", "random_arms"]
+__all__ = ["SEED", "TOLERANCE", "ArmReference", "arm_checks", "extreme_arms", "random_arms"]
 
 SEED = 20240229
 TOLERANCE = 1e-12
@@ -29,7 +29,7 @@ FIELDS = tuple(field.name for field in fields(Arm))
 _STIFFNESSES = (0.0, 1e-9, 1e12, np.inf)
 
 
-class Check(NamedTuple):
+class ArmReference(NamedTuple):
     """One line: a quantity, its inputs, the expected results, and the absolute error allowed."""
 
     quantity: str
@@ -75,7 +75,7 @@ def extreme_arms() -> list[Arm]:
     return made
 
 
-def arm_checks(*, everything: bool) -> Iterator[Check]:
+def arm_checks(*, everything: bool) -> Iterator[ArmReference]:
     """Yield the checks of an exported arm, quantity by quantity.
 
     Parameters
@@ -111,24 +111,24 @@ def _numbers(arm: Arm, *more: float) -> tuple[float, ...]:
     return (*(float(getattr(arm, name)) for name in FIELDS), *map(float, more))
 
 
-def _check(quantity: str, inputs: tuple[float, ...], values: Any, loss: float = 0.0) -> Check:
+def _check(quantity: str, inputs: tuple[float, ...], values: Any, loss: float = 0.0) -> ArmReference:
     row = _row(values)
     size = np.abs(row)[np.isfinite(row)]
-    return Check(quantity, inputs, row, TOLERANCE * loss * float(np.max(size, initial=0.0)))
+    return ArmReference(quantity, inputs, row, TOLERANCE * loss * float(np.max(size, initial=0.0)))
 
 
-def _spectrum_checks(arms: list[Arm], together: Arm) -> Iterator[Check]:
+def _spectrum_checks(arms: list[Arm], together: Arm) -> Iterator[ArmReference]:
     groups = np.stack([np.asarray(x) for x in (together.kappa_t, together.kappa_r, together.mu, together.iota)])
     solved = frequency_parameters(groups[0], groups[1], groups[2], groups[3], modes=6)
     for row, lam in zip(groups.T, solved, strict=True):
-        yield Check("frequency_parameters", _row(row), _row(lam))
+        yield ArmReference("frequency_parameters", _row(row), _row(lam))
     for arm, frequencies in zip(arms, natural_frequencies(together, 4), strict=True):
-        yield Check("natural_frequencies", _numbers(arm), _row(frequencies))
+        yield ArmReference("natural_frequencies", _numbers(arm), _row(frequencies))
     for number, (kappa_t, kappa_r, mu, iota) in enumerate(groups.T.tolist()):
         for lam in (0.0, 0.7, 1.6, 4.0 + number / 7, 30.0):  # below and above the change to exponentials
             for order, (value, scale) in enumerate(zip(*characteristic(kappa_t, kappa_r, mu, iota, lam), strict=True)):
                 inputs = kappa_t, kappa_r, mu, iota, lam, float(order)
-                yield Check("characteristic", inputs, (value,), TOLERANCE * scale)
+                yield ArmReference("characteristic", inputs, (value,), TOLERANCE * scale)
 
 
 _MODAL = (
@@ -137,14 +137,14 @@ _MODAL = (
 )  # fmt: skip
 
 
-def _modal_checks(arms: list[Arm], together: Arm) -> Iterator[Check]:
+def _modal_checks(arms: list[Arm], together: Arm) -> Iterator[ArmReference]:
     modal = modal_parameters(together, 4)
     for name in _MODAL:
         for arm, row in zip(arms, getattr(modal, name), strict=True):
             yield _check(name, _numbers(arm), row, float(name != "omega"))
 
 
-def _sensitivity_checks(arms: list[Arm], together: Arm) -> Iterator[Check]:
+def _sensitivity_checks(arms: list[Arm], together: Arm) -> Iterator[ArmReference]:
     """Yield the checks of sensitivities, with inf and nan for rigid-body modes."""
     found = sensitivities(together, 4)
     for name in ("df_dk_t", "df_dk_r", "log_k_t", "log_k_r"):
@@ -152,16 +152,16 @@ def _sensitivity_checks(arms: list[Arm], together: Arm) -> Iterator[Check]:
             yield _check(name, _numbers(arm), row, 1.0)
 
 
-def _shape_checks(arm: Arm) -> Iterator[Check]:
+def _shape_checks(arm: Arm) -> Iterator[ArmReference]:
     places = np.linspace(0.0, 1.0, 9) * float(arm.L)
     for derivative in range(4):
         table = mode_shapes(arm, places, 4, derivative)
         absolute = TOLERANCE * float(np.max(np.abs(table)))
         for k in (0, 3, 8):
-            yield Check("mode_shape", _numbers(arm, places[k], derivative), _row(table[:, k]), absolute)
+            yield ArmReference("mode_shape", _numbers(arm, places[k], derivative), _row(table[:, k]), absolute)
 
 
-def _response_checks(arm: Arm) -> Iterator[Check]:
+def _response_checks(arm: Arm) -> Iterator[ArmReference]:
     omega = float(modal_parameters(arm, 3).omega[2])
     period = 2 * np.pi / omega
     motions = [
@@ -176,10 +176,10 @@ def _response_checks(arm: Arm) -> Iterator[Check]:
     for motion, values, moved in zip(motions, *tables, strict=True):
         scale = float(np.max(np.abs(values))) + float(np.max(np.abs(moved)))
         for t, value in zip(times, values, strict=True):
-            yield Check("tip_response", _numbers(arm, *motion, t), (float(value),), TOLERANCE * scale)
+            yield ArmReference("tip_response", _numbers(arm, *motion, t), (float(value),), TOLERANCE * scale)
 
 
-def _system_checks(arm: Arm) -> Iterator[Check]:
+def _system_checks(arm: Arm) -> Iterator[ArmReference]:
     whole = float(arm.numerics("carried", "w").function(*arm.domain.values)[0])
     rest = whole - np.sum(modal_parameters(arm, 3).participation ** 2)
     for name, kind in (("acceleration", "base_acceleration"), ("force", "drive_force")):
@@ -189,7 +189,7 @@ def _system_checks(arm: Arm) -> Iterator[Check]:
             yield _check(f"state_space_{name}_{part}", _numbers(arm), getattr(system, part), loss)
 
 
-def _stability_checks(arms: list[Arm], together: Arm) -> Iterator[Check]:
+def _stability_checks(arms: list[Arm], together: Arm) -> Iterator[ArmReference]:
     modal = modal_parameters(together, 3)
     joint = 1.0 * modal.stiffness_translation + 0.5 * modal.stiffness_rotation
     for arm, P, G in zip(arms, joint, modal.axial, strict=True):
@@ -202,4 +202,4 @@ def _stability_checks(arms: list[Arm], together: Arm) -> Iterator[Check]:
             for arm, centre, half_width in zip(arms, zone.centre, zone.half_width, strict=True):
                 if np.isfinite(half_width):
                     inputs = _numbers(arm, *numbers, 0.2, *resonance)
-                    yield Check(f"boundary_{name}", inputs, (centre - half_width, centre + half_width))
+                    yield ArmReference(f"boundary_{name}", inputs, (centre - half_width, centre + half_width))

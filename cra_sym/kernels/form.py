@@ -24,7 +24,17 @@ from dataclasses import dataclass, field
 from cra_sym.cached import cached_property
 
 __all__ = [
-    "BOOL", "FLOAT", "INT", "SCALARS", "Constant", "Form", "FormError", "Function", "Record", "Type", "error_name",
+    "BOOL",
+    "FLOAT",
+    "INT",
+    "SCALARS",
+    "Constant",
+    "FormError",
+    "FunctionDefinition",
+    "Program",
+    "Record",
+    "Type",
+    "error_name",
     "refused",
 ]  # fmt: skip
 
@@ -100,7 +110,7 @@ class Record:
 
 
 @dataclass
-class Function:
+class FunctionDefinition:
     """A function with the results of the check.
 
     Attributes
@@ -156,7 +166,7 @@ class Function:
 
 
 @dataclass(frozen=True)
-class Form:
+class Program:
     """A checked text.
 
     Attributes
@@ -171,7 +181,7 @@ class Form:
     doc: str
     constants: dict[str, Constant]
     records: dict[str, Record]
-    functions: dict[str, Function]
+    functions: dict[str, FunctionDefinition]
     comments: dict[int, str]
     alone: frozenset[int]
 
@@ -194,14 +204,14 @@ class Form:
         )
         return list(dict.fromkeys(raised))
 
-    def used_by(self, names: Sequence[str]) -> Form:
+    def used_by(self, names: Sequence[str]) -> Program:
         """Return the form with these functions and all that they call."""
         wanted = set(names)
         for name in reversed(list(self.functions)):
             if name in wanted:
                 wanted |= self.functions[name].calls
         kept = {name: f for name, f in self.functions.items() if name in wanted}
-        return Form(self.doc, self.constants, self.records, kept, self.comments, self.alone)
+        return Program(self.doc, self.constants, self.records, kept, self.comments, self.alone)
 
 
 def refused(node: ast.AST, reason: str = "") -> FormError:

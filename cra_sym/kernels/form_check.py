@@ -11,7 +11,7 @@ from cra_sym.kernels.form import (
     INT,
     SCALARS,
     Constant,
-    Function,
+    FunctionDefinition,
     Record,
     Type,
     error_name,
@@ -72,7 +72,7 @@ class Checker:
         node: ast.FunctionDef,
         constants: Mapping[str, Constant],
         records: Mapping[str, Record],
-        functions: Mapping[str, Function],
+        functions: Mapping[str, FunctionDefinition],
     ) -> None:
         self.constants, self.records, self.functions = constants, records, functions
         arguments = node.args
@@ -94,7 +94,7 @@ class Checker:
                 if not kind.scalar:
                     raise refused(node, "a result is a number or a condition; rows and records are Out")
                 result = kind
-        self.function = Function(node.name, ast.get_docstring(node) or "", parameters, result, node)
+        self.function = FunctionDefinition(node.name, ast.get_docstring(node) or "", parameters, result, node)
         self.paths: dict[str, list[tuple[int, ...]]] = {}
         self.loops: list[str] = []
         self.block(self.function.body, ())
@@ -316,7 +316,7 @@ class Checker:
             raise refused(node, "it changes an argument or may fail: call it in a statement of its own")
         return callee.result
 
-    def check_arguments(self, node: ast.Call, callee: Function, kinds: Sequence[Type]) -> None:
+    def check_arguments(self, node: ast.Call, callee: FunctionDefinition, kinds: Sequence[Type]) -> None:
         wanted = list(callee.parameters.values())
         if len(kinds) != len(wanted) or not all(a.same(b) for a, b in zip(kinds, wanted, strict=True)):
             raise refused(node, f"the arguments are not those of {callee.name}")
@@ -328,7 +328,7 @@ class Checker:
                     raise refused(node, f"{text} is changed and given twice")
 
 
-def failing(functions: Mapping[str, Function]) -> set[str]:
+def failing(functions: Mapping[str, FunctionDefinition]) -> set[str]:
     """Return the functions that raise, or call one that does."""
     found: set[str] = set()
     for name, function in functions.items():

@@ -7,13 +7,13 @@ import io
 import tokenize
 from collections.abc import Mapping
 
-from cra_sym.kernels.form import Constant, Form, FormError, Function, Record, Type, refused
+from cra_sym.kernels.form import Constant, FormError, FunctionDefinition, Program, Record, Type, refused
 from cra_sym.kernels.form_check import Checker, literal, type_of
 
 __all__ = ["comments_of", "parse"]
 
 
-def parse(text: str) -> Form:
+def parse(text: str) -> Program:
     """Parse and check a text.
 
     Raises
@@ -31,7 +31,7 @@ def parse(text: str) -> Form:
     comments, alone = comments_of(text)
     constants: dict[str, Constant] = {}
     records: dict[str, Record] = {}
-    functions: dict[str, Function] = {}
+    functions: dict[str, FunctionDefinition] = {}
     for node in tree.body:
         match node:
             case ast.Expr(value=ast.Constant(value=str())) | ast.ImportFrom():
@@ -49,7 +49,7 @@ def parse(text: str) -> Form:
     clashes = sorted({name for name in plain if plain.count(name) > 1})
     if clashes:
         raise FormError(f"names at the top must differ by more than case and underscores: {', '.join(clashes)}")
-    return Form(ast.get_docstring(tree) or "", constants, records, functions, comments, alone)
+    return Program(ast.get_docstring(tree) or "", constants, records, functions, comments, alone)
 
 
 def comments_of(text: str) -> tuple[dict[int, str], frozenset[int]]:

@@ -61,7 +61,7 @@ def call(builder: Any, function: ast.FunctionDef, arguments: Sequence[Any], name
     -------
     number, LLVM value, tuple of them, or None
     """
-    return _Body(builder, function, arguments, namespace).written()
+    return _FunctionWriter(builder, function, arguments, namespace).written()
 
 
 def _refused(node: ast.AST) -> CompileError:
@@ -75,7 +75,7 @@ def _in_double(result: Any) -> Any:
     return float(result) if type(result) is int else result
 
 
-class _Body(Arithmetic):
+class _FunctionWriter(Arithmetic):
     """One call of a function.
 
     A name denotes a value. In a function with branches, an assigned name denotes a memory location of its first type,

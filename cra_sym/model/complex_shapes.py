@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.cached import cached_property
-from cra_sym.model.projection import Domain, Form, Projected
+from cra_sym.model.projection import BilinearForm, Domain, Projected
 from cra_sym.model.routes import StateModes, mode_sign, overview_places
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.solvers.shapes import mode_states
@@ -43,7 +43,7 @@ class ComplexShapes:
     columns : ndarray, shape (parameters, rows)
         Parameters of the flat batch.
     domain : Domain
-    inertia : Form
+    inertia : BilinearForm
         The mass.
     """
 
@@ -52,7 +52,7 @@ class ComplexShapes:
     damped: bool
     columns: Array
     domain: Domain
-    inertia: Form
+    inertia: BilinearForm
 
     def shape(self, place: int, derivative: int, x: Array) -> Complex:
         """Return a derivative of a displacement of the section at places (stations,), shape (..., modes, stations)."""

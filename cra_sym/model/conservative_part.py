@@ -9,7 +9,7 @@ from sympy import Add, Basic, Derivative, Expr, S, Symbol, expand, sympify
 from cra_sym.mechanics.jets import END_NAMES
 from cra_sym.mechanics.weak import Bilinear, weak_form
 from cra_sym.model.forms import form_of
-from cra_sym.model.projection import Form
+from cra_sym.model.projection import BilinearForm
 
 if TYPE_CHECKING:
     from cra_sym.model.lagrangian import Model
@@ -74,7 +74,7 @@ def beside(model: Model, part: Model) -> set[Basic]:
     return set().union(*(term.free_symbols for term in rest))
 
 
-def stiffness_beside(model: Model) -> Form | None:
+def stiffness_beside(model: Model) -> BilinearForm | None:
     """Return the stiffness of the model minus that of its conservative part (follower forces); None if they agree."""
     part = conservative_part(model)
     if part is None:

@@ -30,7 +30,7 @@ from cra_sym.model.observables import named_observables, observable
 from cra_sym.model.one_wave import one_wave_route
 from cra_sym.model.pencil_route import complex_modes, inertia
 from cra_sym.model.pencil_route import pencil_route as pencil
-from cra_sym.model.projection import EndParameter, Form, Load
+from cra_sym.model.projection import BilinearForm, EndParameter, Load
 from cra_sym.model.routes import GeneralRoute, Route
 from cra_sym.model.spatial import SpatialProblem, spatial_problem
 from cra_sym.model.symmetry import asymmetry
@@ -253,7 +253,7 @@ def momentum(model: Model, initial: Mapping[Expr, Any], order: int) -> Load | No
 # Bilinear forms --------------------------------------------------------------------------------------------------
 
 
-def damping(model: Model) -> Form | None:
+def damping(model: Model) -> BilinearForm | None:
     """Return the damping of a model between its modes, or None if it has none."""
     weak = weak_form(model.linearised.variation)
     if 1 not in weak.powers:
@@ -262,7 +262,7 @@ def damping(model: Model) -> Form | None:
     return form_of(weak, {"damping": (parts[0], parts[1])}, model.symbols)
 
 
-def rates(model: Model) -> Form:
+def rates(model: Model) -> BilinearForm:
     """Return stiffness and mass, and their rates by every parameter ('k_t stiffness', 'k_t mass').
 
     Displacements are held fixed as functions of the distance from the left end over the length, so that the rate of a

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.model.projection import Domain, Form, Place
+from cra_sym.model.projection import BilinearForm, Displacement, Domain
 from cra_sym.solvers.waves_static import are_semidefinite, coupled
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ class EnergyForm(NamedTuple):
     ----------
     kind : str
         'kinetic' or 'strain'.
-    form : Form
+    form : BilinearForm
     names : tuple of (tuple of str)
         Parameters in the coefficients inside, and in the others, in the order of the model's symbols.
     definite : bool
@@ -37,7 +37,7 @@ class EnergyForm(NamedTuple):
     """
 
     kind: str
-    form: Form
+    form: BilinearForm
     names: tuple[tuple[str, ...], tuple[str, ...]]
     definite: bool
 
@@ -63,7 +63,7 @@ def leading(model: Model) -> EnergyForm:
     return _energy(model, "strain", form_of(weak, {"stiffness": (inside, none)}, model.symbols), (inside, none), 0)
 
 
-def _energy(model: Model, kind: str, form: Form, parts: Sequence[Bilinear], power: int) -> EnergyForm:
+def _energy(model: Model, kind: str, form: BilinearForm, parts: Sequence[Bilinear], power: int) -> EnergyForm:
     from sympy import Dummy
 
     known = {symbol: Dummy(symbol.name, nonnegative=True) for symbol in model.symbols}
@@ -119,7 +119,7 @@ def refuse_negative(energy: EnergyForm, domain: Domain, shape: tuple[int, ...], 
                 raise ValueError(_refusal(kind, places[group[0]], at, given))
 
 
-def _refusal(kind: str, place: Place, at: float | None, given: Mapping[str, float]) -> str:
+def _refusal(kind: str, place: Displacement, at: float | None, given: Mapping[str, float]) -> str:
     """Return the message: the parameters that are negative, or all of them, and where the energy is negative."""
     told = ", ".join(f"{name} = {value:g}" for name, value in given.items() if value < 0.0)
     told = told or ", ".join(f"{name} = {value:g}" for name, value in given.items()) or "values"

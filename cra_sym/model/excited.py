@@ -13,7 +13,7 @@ from cra_sym.mechanics.periodic import Key, TimeForms, separated, time_forms
 from cra_sym.mechanics.variation import Variation, vary
 from cra_sym.mechanics.weak import weak_form
 from cra_sym.model.forms import form_of, load_of
-from cra_sym.model.projection import Form, Load
+from cra_sym.model.projection import BilinearForm, Load
 from cra_sym.solvers.floquet import Oscillation
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class PeriodicForms(NamedTuple):
     oscillation : Oscillation
     small : bool
         Whether they are proportional to epsilon.
-    matrices : Form or None
+    matrices : BilinearForm or None
         Stiffness, damping, momentum and mass, where they occur.
     force, momentum : Load or None
         Direct loads: one acts with the oscillation, the other with its time derivative.
@@ -54,7 +54,7 @@ class PeriodicForms(NamedTuple):
 
     oscillation: Oscillation
     small: bool
-    matrices: Form | None
+    matrices: BilinearForm | None
     force: Load | None
     momentum: Load | None
 
@@ -213,7 +213,7 @@ def fluctuation(model: Model, name: str) -> str:
     return "does not enter the Lagrangian linearly" if any(value.has(symbol) for value in values) else ""
 
 
-def fluctuating(model: Model, name: str) -> tuple[Form, tuple[str, ...]]:
+def fluctuating(model: Model, name: str) -> tuple[BilinearForm, tuple[str, ...]]:
     """Return the matrices that a unit of a parameter gives, and the parameters they depend on."""
     variation = model.linearised.variation
     named = _derivative_by(variation, next(s for s in model.symbols if s.name == name)).named()
@@ -235,7 +235,7 @@ def _derivative_by(variation: Variation, symbol: Symbol) -> TimeForms:
 # ------------------------------------------------------------------------------------------------- shaken frames
 
 
-def axial(model: Model) -> Form:
+def axial(model: Model) -> BilinearForm:
     """Return the stiffness that a unit acceleration of the frame along x, towards the right, gives the first field.
 
     All mass that moves across the domain is also accelerated along it: the inertia of the mass beyond x, the right end

@@ -9,7 +9,7 @@ from sympy import Expr, S, Symbol, cancel
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics.jets import END_NAMES, Jet
 from cra_sym.mechanics.weak import Bilinear, WeakForm
-from cra_sym.model.projection import Form, Load, Place
+from cra_sym.model.projection import BilinearForm, Displacement, Load
 
 __all__ = ["form_of", "load_of"]
 
@@ -52,7 +52,7 @@ def _translation_share(weak: WeakForm, inside: Mapping[Jet, Expr]) -> Expr | Non
     return None if factor.has(weak.variation.space.x) else factor
 
 
-def form_of(weak: WeakForm, named: Mapping[str, tuple[Bilinear, Bilinear]], symbols: Symbols) -> Form:
+def form_of(weak: WeakForm, named: Mapping[str, tuple[Bilinear, Bilinear]], symbols: Symbols) -> BilinearForm:
     """Return bilinear forms with common entries, each given by its parts inside and at the ends."""
     x = weak.variation.space.x
     pairs = [tuple(dict.fromkeys(pair for forms in named.values() for pair in forms[part])) for part in (0, 1)]
@@ -61,7 +61,7 @@ def form_of(weak: WeakForm, named: Mapping[str, tuple[Bilinear, Bilinear]], symb
         for part in (0, 1)
     ]
     inside, ends = (tuple((_place(weak, p), _place(weak, q)) for p, q in part) for part in pairs)
-    return Form(
+    return BilinearForm(
         tuple(named),
         inside,
         ends,
@@ -78,12 +78,12 @@ def _places(weak: WeakForm, symbols: Symbols) -> Kernel | None:
     return kernel(places, symbols, backend="numpy") if places else None
 
 
-def _place(weak: WeakForm, jet: Jet) -> Place:
+def _place(weak: WeakForm, jet: Jet) -> Displacement:
     section, _, lumped = weak.fields()
     if not weak.variation.space.is_field(jet.unknown):
-        return Place("lumped", [coordinate.unknown for coordinate in lumped].index(jet.unknown), 0)
+        return Displacement("lumped", [coordinate.unknown for coordinate in lumped].index(jet.unknown), 0)
     if jet.place is None:
-        return Place("inside", section.index(jet._replace(space=0)), jet.space)
+        return Displacement("inside", section.index(jet._replace(space=0)), jet.space)
     if isinstance(jet.place, int):
-        return Place("point", section.index(jet._replace(place=None, space=0)), jet.space, jet.place)
-    return Place(jet.place, section.index(jet._replace(place=None)), 0)
+        return Displacement("point", section.index(jet._replace(place=None, space=0)), jet.space, jet.place)
+    return Displacement(jet.place, section.index(jet._replace(place=None)), 0)

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from cra_sym.cached import cached_property
 from cra_sym.model.modal_matrices import modal_matrices
 from cra_sym.model.nonlinear import Factor, NonlinearTerms, Product
-from cra_sym.model.projection import Place, along, displaced
+from cra_sym.model.projection import Displacement, along, displaced
 from cra_sym.model.system import System
-from cra_sym.solvers.modal_polynomials import ModalPolynomials, Term, symmetrised
+from cra_sym.solvers.modal_polynomials import ModalPolynomials, TensorTerm, symmetrised
 
 __all__ = ["ModalEquations", "modal_equations"]
 
@@ -78,7 +78,7 @@ def modal_equations(system: System, modes: int, zeta: float | Array | None = Non
 
 def _projected(
     system: System, modes: int
-) -> tuple[tuple[Term, ...], tuple[Term, ...], tuple[tuple[str, int], ...], float]:
+) -> tuple[tuple[TensorTerm, ...], tuple[TensorTerm, ...], tuple[tuple[str, int], ...], float]:
     terms: NonlinearTerms | None = system.numerics("nonlinear")
     if terms is None:
         return (), (), (), 0.0
@@ -89,9 +89,9 @@ def _projected(
         size = np.abs(tensor).max()
         if size > 0:
             error = max(error, float(np.abs(tensor - rough[key]).max() / size))
-    kinds: tuple[list[Term], list[Term]] = [], []
+    kinds: tuple[list[TensorTerm], list[TensorTerm]] = [], []
     for (force, positions, velocities, causes), tensor in found.items():
-        kinds[force].append(Term(tensor, positions, velocities, causes))
+        kinds[force].append(TensorTerm(tensor, positions, velocities, causes))
     return tuple(kinds[0]), tuple(kinds[1]), terms.causes, error
 
 
@@ -165,13 +165,13 @@ class _Projection:
             found.append((values * degree**factor.time, degree - factor.time, factor.time))
         return found
 
-    def _edge(self, place: Place) -> int:
+    def _edge(self, place: Displacement) -> int:
         if place.where != "point":
             return -1 if place.where == "right" else 0
         at = self._terms.places.function(*self._values)[place.number]
         return int(np.abs(self._edges - at).argmin())
 
-    def _displacement(self, place: Place) -> Array:
+    def _displacement(self, place: Displacement) -> Array:
         if place.where == "inside":
             return along(self._modes, place, self._x)
         if place.where == "lumped":

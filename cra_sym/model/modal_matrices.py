@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.model.projection import Form, Projected
+from cra_sym.model.projection import BilinearForm, Projected
 
 if TYPE_CHECKING:
     from cra_sym.model.system import System
@@ -50,7 +50,7 @@ def modal_matrices(system: System, modes: int) -> ModalMatrices:
     )
 
 
-def between_modes(system: System, modes: int, form: Form) -> dict[str, Array]:
+def between_modes(system: System, modes: int, form: BilinearForm) -> dict[str, Array]:
     """Return bilinear forms between the first modes of the conservative part, by name."""
     found = Projected(system.domain, system.conservative_part.modes(modes), form)
     matrices = {name: _without_rounding(found[name]) for name in form.names}

@@ -12,7 +12,7 @@ from cra_sym.mechanics.polynomials import LoadCoefficients, Monomial, monomials
 from cra_sym.mechanics.weak import WeakForm, weak_form
 from cra_sym.model.breaks import Breaks, breaks
 from cra_sym.model.lagrangian import Model
-from cra_sym.model.projection import Place
+from cra_sym.model.projection import Displacement
 
 __all__ = ["Factor", "NonlinearTerms", "Product", "nonlinear"]
 
@@ -23,7 +23,7 @@ class Factor:
 
     Attributes
     ----------
-    place : Place
+    place : Displacement
         Of a displacement; of a quadrature ``where`` and ``number`` alone count.
     quadrature : int
         Number of the quadrature, or -1.
@@ -31,7 +31,7 @@ class Factor:
         Order of its time derivative.
     """
 
-    place: Place
+    place: Displacement
     quadrature: int = -1
     time: int = 0
 
@@ -55,7 +55,7 @@ class NonlinearTerms:
         Per length, and at the ends, at interior places and on coordinates.
     density, points : Kernel
         Their coefficients, of (x, parameters) and of the parameters.
-    integrands : tuple of tuple of tuple of Place
+    integrands : tuple of tuple of tuple of Displacement
         Of every quadrature the displacements that each of its terms multiplies.
     weights : Kernel
         Of (x, parameters): coefficients of these terms, one after the other.
@@ -73,7 +73,7 @@ class NonlinearTerms:
     discrete: tuple[Product, ...]
     density: Kernel
     points: Kernel
-    integrands: tuple[tuple[tuple[Place, ...], ...], ...]
+    integrands: tuple[tuple[tuple[Displacement, ...], ...], ...]
     weights: Kernel
     causes: tuple[tuple[str, int], ...]
     breaks: Breaks
@@ -176,26 +176,26 @@ class _Reader:
         if jet.unknown in self._quadratures:
             if jet.space:
                 raise HamiltonError(f"{label}: write the x derivative of a quadrature as its integrand")
-            place = Place(where, 0, 0, point or 0)  # type: ignore[arg-type]
+            place = Displacement(where, 0, 0, point or 0)  # type: ignore[arg-type]
             return Factor(place, self._quadratures.index(jet.unknown), jet.time)
         return Factor(self._place(jet, where, point or 0), -1, jet.time)
 
-    def _place(self, jet: Jet, where: str, point: int) -> Place:
+    def _place(self, jet: Jet, where: str, point: int) -> Displacement:
         section, _, lumped = self._weak.fields()
         number = self._numbers[jet.unknown]
         if not self._space.is_field(jet.unknown):
-            return Place("lumped", [c.unknown for c in lumped].index(number), 0)
+            return Displacement("lumped", [c.unknown for c in lumped].index(number), 0)
         if where in ("inside", "point"):
             entry = section.index(Jet(number, 0, 0, None))
-            return Place(where, entry, jet.space, point)  # type: ignore[arg-type]
-        return Place(where, section.index(Jet(number, jet.space, 0, None)), 0)  # type: ignore[arg-type]
+            return Displacement(where, entry, jet.space, point)  # type: ignore[arg-type]
+        return Displacement(where, section.index(Jet(number, jet.space, 0, None)), 0)  # type: ignore[arg-type]
 
     def _cause(self, cause: Expr) -> int:
         function = cause.expr if isinstance(cause, Derivative) else cause
         order = sum(n for _, n in cause.variable_count) if isinstance(cause, Derivative) else 0
         return self._causes.setdefault((function.func.__name__, int(order)), len(self._causes))
 
-    def _integrands(self) -> tuple[tuple[tuple[tuple[Place, ...], ...], ...], list[Expr]]:
+    def _integrands(self) -> tuple[tuple[tuple[tuple[Displacement, ...], ...], ...], list[Expr]]:
         found, weights = [], []
         for quadrature in self._result.quadratures:
             label = f"quadratures: {quadrature.function}"

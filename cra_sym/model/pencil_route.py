@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from cra_sym.mechanics.jets import Jet
     from cra_sym.model.lagrangian import Model
-    from cra_sym.model.projection import Form
+    from cra_sym.model.projection import BilinearForm
 
 __all__ = ["PencilRoute", "complex_modes", "inertia", "pencil_route"]
 
@@ -221,7 +221,7 @@ def complex_modes(model: Model) -> Literal["none", "always", "if coupled"]:
     return "if coupled" if resisted else "always"
 
 
-def inertia(model: Model) -> Form:
+def inertia(model: Model) -> BilinearForm:
     """Return the mass of a model with forces of any kind."""
     from cra_sym.mechanics.weak import weak_form
     from cra_sym.model.forms import form_of

@@ -14,14 +14,24 @@ from cra_sym.kernels import Kernel, kernel
 from cra_sym.model.moving import Jumps
 from cra_sym.model.routes import Modes, RigidShare, Stations
 
-__all__ = ["Domain", "EndParameter", "Form", "Load", "Place", "Projected", "displaced_at", "project", "stations"]
+__all__ = [
+    "BilinearForm",
+    "Displacement",
+    "Domain",
+    "EndParameter",
+    "Load",
+    "Projected",
+    "displaced_at",
+    "project",
+    "stations",
+]
 
 Array = NDArray[np.float64]
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 _MOST_KEPT = 1_000_000  # numbers of one displacement of all modes that are stored for the next form
 
 
-class Place(NamedTuple):
+class Displacement(NamedTuple):
     """A displacement: along the interval, of an end section or a lumped coordinate.
 
     Attributes
@@ -47,7 +57,7 @@ class Load:
 
     Attributes
     ----------
-    inside, ends : tuple of Place
+    inside, ends : tuple of Displacement
         Displacements they act on: along the interval, and at the ends or on lumped coordinates.
     density : Kernel
         Of (x, parameters): forces per length on ``inside``.
@@ -64,32 +74,32 @@ class Load:
         Of the parameters: interior places, if there are any.
     """
 
-    inside: tuple[Place, ...]
-    ends: tuple[Place, ...]
+    inside: tuple[Displacement, ...]
+    ends: tuple[Displacement, ...]
     density: Kernel
     force: Kernel
     uniform: bool
     share: Kernel | None = None
     rest: Kernel | None = None
-    rest_ends: tuple[Place, ...] = ()
+    rest_ends: tuple[Displacement, ...] = ()
     places: Kernel | None = None
 
     @classmethod
-    def unit(cls, place: Place, at: float, symbols: Sequence[Any]) -> Load:
+    def unit(cls, place: Displacement, at: float, symbols: Sequence[Any]) -> Load:
         """Return one unit of force on a displacement; ``at`` is where an interior place is."""
         none, one = (kernel(values, symbols, backend="numpy") for values in ((), (1.0,)))
         return cls((), (place,), none, one, True, places=kernel((at,), symbols, backend="numpy"))
 
 
 @dataclass(frozen=True)
-class Form:
+class BilinearForm:
     """Bilinear forms with common entries, such as the rates of stiffness and mass by every parameter.
 
     Attributes
     ----------
     names : tuple of str
         One for each form. Those called 'stiffness' and 'mass', if there, are the whole energies.
-    inside, ends : tuple of (Place, Place)
+    inside, ends : tuple of (Displacement, Displacement)
         Entries, each once.
     density, points : Kernel
         Of (x, parameters) and of the parameters: coefficients of all entries of the first form, then of the next.
@@ -103,8 +113,8 @@ class Form:
     """
 
     names: tuple[str, ...]
-    inside: tuple[tuple[Place, Place], ...]
-    ends: tuple[tuple[Place, Place], ...]
+    inside: tuple[tuple[Displacement, Displacement], ...]
+    ends: tuple[tuple[Displacement, Displacement], ...]
     density: Kernel
     points: Kernel
     uniform: bool
@@ -162,7 +172,7 @@ def stations(domain: Domain, modes: Modes) -> tuple[Array, Array]:
 _ASIDE = 1e-10  # lengths; a quantity that jumps at a place is evaluated on both sides of it
 
 
-def displaced(domain: Domain, modes: Modes, place: Place, places: Kernel | None) -> Array:
+def displaced(domain: Domain, modes: Modes, place: Displacement, places: Kernel | None) -> Array:
     """Return a displacement of an end, an interior place or a lumped coordinate of every mode, shape (..., modes)."""
     if place.where == "point" and places is not None:
         return _at_place(domain, modes, place, places)
@@ -171,7 +181,7 @@ def displaced(domain: Domain, modes: Modes, place: Place, places: Kernel | None)
     return modes.displacement(int(place.where == "right"), place.entry)
 
 
-def _at_place(domain: Domain, modes: Modes, place: Place, places: Kernel) -> Array:
+def _at_place(domain: Domain, modes: Modes, place: Displacement, places: Kernel) -> Array:
     at = np.broadcast_to(column(places.function(*domain.values)[place.number]), (*modes.omega.shape[:-1], 1))
     left = column(domain.left)
     there = (at > left) & (at < left + column(domain.length))
@@ -195,7 +205,7 @@ def displaced_at(domain: Domain, modes: Modes, entry: int, order: int, place: fl
     return 0.5 * (before + after)
 
 
-def along(modes: Modes, place: Place, x: Array) -> Array:
+def along(modes: Modes, place: Displacement, x: Array) -> Array:
     """Return a displacement of every mode at places along the interval, shape (..., modes, stations)."""
     if place.where == "lumped":
         return modes.coordinate(place.entry)[..., None]
@@ -219,7 +229,12 @@ def project(domain: Domain, modes: Modes, load: Load) -> Array:
 
 
 def _add_ends(
-    total: Array, domain: Domain, modes: Modes, load: Load, places: Sequence[Place], forces: Sequence[float | Array]
+    total: Array,
+    domain: Domain,
+    modes: Modes,
+    load: Load,
+    places: Sequence[Displacement],
+    forces: Sequence[float | Array],
 ) -> Array:
     for place, force in zip(places, forces, strict=True):
         total = total + column(force) * displaced(domain, modes, place, load.places)
@@ -233,14 +248,14 @@ class Projected:
     ----------
     domain : Domain
     modes : Modes
-    form : Form
+    form : BilinearForm
     diagonal : bool
         Whether only a mode with itself is wanted: arrays of shape (..., modes) instead of (..., modes, modes).
     """
 
-    def __init__(self, domain: Domain, modes: Modes, form: Form, *, diagonal: bool = False) -> None:
+    def __init__(self, domain: Domain, modes: Modes, form: BilinearForm, *, diagonal: bool = False) -> None:
         self._domain, self._modes, self._form, self._diagonal = domain, modes, form, diagonal
-        self._shapes: dict[Place, Array] = {}
+        self._shapes: dict[Displacement, Array] = {}
 
     def __getitem__(self, name: str) -> Array:
         """Return the form of that name.
@@ -347,7 +362,7 @@ class Projected:
         symmetric = self._form.inside[entry][0] == self._form.inside[entry][1]
         return (product + product.swapaxes(-1, -2)) / 2 if symmetric else product
 
-    def _along(self, place: Place) -> Array:
+    def _along(self, place: Displacement) -> Array:
         """Return a displacement of every mode at the stations; computed once unless it is large."""
         found = self._shapes.get(place)
         if found is None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.model.hysteresis import Jenkins
-from cra_sym.model.projection import Load, Place, project
+from cra_sym.model.projection import Displacement, Load, project
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.values import flat_columns
 from cra_sym.solvers.driven import driven_states
@@ -206,7 +206,7 @@ def _receptance(forced: System, names: tuple[str, ...], loads: list[Load], z: Ar
 
 
 def _station(
-    problem: SpatialProblem, load: Load, place: Place, left: Array, length: Array, values: Array
+    problem: SpatialProblem, load: Load, place: Displacement, left: Array, length: Array, values: Array
 ) -> tuple[Array, int]:
     """Return the station of a displacement, shape (rows, 1), and its index in the state of a section there."""
     if place.where == "lumped":

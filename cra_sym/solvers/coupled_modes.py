@@ -33,7 +33,7 @@ class CoupledModes(NamedTuple):
     support: np.ndarray | None = None
 
 
-class _Cause(NamedTuple):
+class _BaseAcceleration(NamedTuple):
     """A base acceleration ``weight @ s`` with s' = generator s from ``start``."""
 
     generator: np.ndarray
@@ -149,7 +149,7 @@ def _driven(
     """Return the outputs (R, T): the free motion plus the response to each term of the base motion."""
     for _ in range(derivative):
         rows, direct = rows @ system, rows @ push
-    nothing = _Cause(np.zeros((0, 0)), np.zeros(0), np.zeros(0))
+    nothing = _BaseAcceleration(np.zeros((0, 0)), np.zeros(0), np.zeros(0))
     moved, _ = _advance_augmented(system, push, nothing, state, times)
     total = rows @ moved.T
     for term in terms:
@@ -168,12 +168,12 @@ def _term_response(
     if isinstance(term, Harmonic):
         B, varpi, psi = map(float, term)
         generator = np.array([[0.0, varpi], [-varpi, 0.0]])
-        cause = _Cause(generator, np.array([-B * varpi**2, 0.0]), np.array([np.sin(psi), np.cos(psi)]))
+        cause = _BaseAcceleration(generator, np.array([-B * varpi**2, 0.0]), np.array([np.sin(psi), np.cos(psi)]))
         return _advance_augmented(system, push, cause, rest, times)
     ramp, begin = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([1.0, 0.0])
     state, force = np.zeros((len(times), len(push))), np.zeros(len(times))
     for k, knot in enumerate(term.knots):
-        cause = _Cause(ramp, np.array([term.acceleration[k], term.jerk[k]]), begin)
+        cause = _BaseAcceleration(ramp, np.array([term.acceleration[k], term.jerk[k]]), begin)
         end = term.knots[k + 1] if k + 1 < len(term.knots) else np.inf
         within = (times >= knot) & (times < end)
         if within.any():
@@ -184,7 +184,7 @@ def _term_response(
 
 
 def _advance_augmented(
-    system: np.ndarray, push: np.ndarray, cause: _Cause, state: np.ndarray, times: np.ndarray
+    system: np.ndarray, push: np.ndarray, cause: _BaseAcceleration, state: np.ndarray, times: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return state and base acceleration at the times after a start."""
     size = len(state)

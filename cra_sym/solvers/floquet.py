@@ -17,9 +17,9 @@ from typing import Any, Literal, NamedTuple, Protocol
 import numpy as np
 
 __all__ = [
+    "ExcitedOscillators",
     "Loop",
     "Oscillation",
-    "Oscillators",
     "exponents_of",
     "flat",
     "floquet_exponents",
@@ -52,7 +52,7 @@ class Oscillation(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Oscillators:
+class ExcitedOscillators:
     """A flat batch of periodically excited systems, the batch axis last.
 
     Attributes
@@ -88,7 +88,7 @@ class Oscillators:
         decay: Any = 0.0,
         compliance: Any = 0.0,
         oscillations: Sequence[Oscillation] | None = None,
-    ) -> tuple[Oscillators, tuple[int, ...]]:
+    ) -> tuple[ExcitedOscillators, tuple[int, ...]]:
         """Return the batch and its shape.
 
         Parameters
@@ -160,10 +160,10 @@ class Oscillators:
             )
         return np.asarray(2 * np.ceil(np.maximum(steps, 8) / 2).astype(np.int64))
 
-    def take(self, index: np.ndarray) -> Oscillators:
+    def take(self, index: np.ndarray) -> ExcitedOscillators:
         """Return some of the systems."""
         shared = self.coupling.shape[-1] == 1
-        return Oscillators(
+        return ExcitedOscillators(
             self.omega[:, index],
             self.decay[:, index],
             self.coupling if shared else self.coupling[..., index],
@@ -204,7 +204,7 @@ class Loop(Protocol):
         swings : ndarray, shape (steps, stages, R)
             The cosines and sines at the kicks.
         coupling, compliance, epsilon : ndarray
-            As in :class:`Oscillators`, with a full batch axis.
+            As in :class:`ExcitedOscillators`, with a full batch axis.
         state : ndarray, shape (2N, 2N, points)
         """
 
@@ -229,7 +229,7 @@ def drift_matrix(omega: np.ndarray, decay: np.ndarray, h: np.ndarray) -> np.ndar
     return np.asarray(fall * np.array([[level + decay * ratio, ratio], [-(omega**2) * ratio, level - decay * ratio]]))
 
 
-def _propagate(part: Oscillators, steps: int, share: float, loop: Loop | None) -> np.ndarray:
+def _propagate(part: ExcitedOscillators, steps: int, share: float, loop: Loop | None) -> np.ndarray:
     """Return the map over a share of the period, shape (2N, 2N, points), in equal numbers of steps."""
     modes, points = part.omega.shape
     h = part.period * share / steps
@@ -251,7 +251,7 @@ def _propagate(part: Oscillators, steps: int, share: float, loop: Loop | None) -
 
 
 def _kick_and_drift(
-    drifts: np.ndarray, h: np.ndarray, swings: np.ndarray, part: Oscillators, state: np.ndarray
+    drifts: np.ndarray, h: np.ndarray, swings: np.ndarray, part: ExcitedOscillators, state: np.ndarray
 ) -> None:
     """Propagate the states in place: `Loop` in NumPy."""
     q, p = state[: len(state) // 2], state[len(state) // 2 :]
@@ -283,7 +283,7 @@ def _force(coupling: np.ndarray, weights: np.ndarray, q: np.ndarray) -> np.ndarr
     return np.asarray(sum(np.einsum("ijp,jkp->ikp", g * m, q) for m, g in zip(coupling, weights, strict=True)))
 
 
-def _maps(batch: Oscillators, share: float, tolerance: float, loop: Loop | None) -> np.ndarray:
+def _maps(batch: ExcitedOscillators, share: float, tolerance: float, loop: Loop | None) -> np.ndarray:
     """Return the maps over a share of the period, shape (points, 2N, 2N)."""
     size, points = 2 * len(batch.omega), batch.period.size
     steps = np.ceil(batch.steps(tolerance) * share).astype(np.int64)
@@ -296,7 +296,7 @@ def _maps(batch: Oscillators, share: float, tolerance: float, loop: Loop | None)
     return out
 
 
-def _whole_maps(batch: Oscillators, tolerance: float, loop: Loop | None) -> np.ndarray:
+def _whole_maps(batch: ExcitedOscillators, tolerance: float, loop: Loop | None) -> np.ndarray:
     """Return the maps over the period, shape (points, 2N, 2N)."""
     if not batch.mirrored:
         return _maps(batch, 1.0, tolerance, loop)
@@ -329,13 +329,13 @@ def whole_period(half: np.ndarray, damping: np.ndarray, parity: np.ndarray) -> n
 
 
 def monodromy(*system: Any, tolerance: float = 1e-8, loop: Loop | None = None, **more: Any) -> np.ndarray:
-    """Return the monodromy matrices of (q, dq/dt), shape (..., 2N, 2N); arguments of :class:`Oscillators`."""
-    batch, shape = Oscillators.of(*system, **more)
+    """Return the monodromy matrices of (q, dq/dt), shape (..., 2N, 2N); arguments of :class:`ExcitedOscillators`."""
+    batch, shape = ExcitedOscillators.of(*system, **more)
     maps = _whole_maps(batch, tolerance, loop)
     return maps.reshape(*shape, *maps.shape[1:])
 
 
-def _conservative_exponents(batch: Oscillators, tolerance: float, loop: Loop | None) -> np.ndarray:
+def _conservative_exponents(batch: ExcitedOscillators, tolerance: float, loop: Loop | None) -> np.ndarray:
     r"""Return one exponent s of each pair (s, -s) of a system without damping, its real part not negative.
 
     The excitation is even in time, so the second half of the period is the first one mirrored: with the blocks a, b,
@@ -354,11 +354,11 @@ def _conservative_exponents(batch: Oscillators, tolerance: float, loop: Loop | N
 
 
 def floquet_exponents(*system: Any, tolerance: float = 1e-8, loop: Loop | None = None, **more: Any) -> np.ndarray:
-    """Return all Floquet exponents, shape (..., 2N), largest real part first; arguments of :class:`Oscillators`.
+    """Return all Floquet exponents, shape (..., 2N), largest real part first; arguments of :class:`ExcitedOscillators`.
 
     Their imaginary parts are fixed up to multiples of the excitation frequency and given between -1/2 and 1/2 of it.
     """
-    batch, shape = Oscillators.of(*system, **more)
+    batch, shape = ExcitedOscillators.of(*system, **more)
     if batch.conservative:
         growing = _conservative_exponents(batch, tolerance, loop)
         exponents = _ordered(np.concatenate([growing, -growing], axis=-1), batch.period)
@@ -385,8 +385,8 @@ def rate_of(maps: np.ndarray, period: np.ndarray) -> np.ndarray:
 
 
 def growth_rate(*system: Any, tolerance: float = 1e-8, loop: Loop | None = None, **more: Any) -> np.ndarray:
-    """Return max(0, largest real part of the exponents), shape (...); arguments of :class:`Oscillators`."""
-    batch, shape = Oscillators.of(*system, **more)
+    """Return max(0, largest real part of the exponents), shape (...); arguments of :class:`ExcitedOscillators`."""
+    batch, shape = ExcitedOscillators.of(*system, **more)
     if batch.conservative:
         rates = np.maximum(_conservative_exponents(batch, tolerance, loop).real.max(axis=-1), 0.0)
     else:

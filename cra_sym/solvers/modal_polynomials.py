@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from ..cached import cached_property
 from ..checks import ByValue
 
-__all__ = ["Derivatives", "ModalPolynomials", "Term", "symmetrised"]
+__all__ = ["Derivatives", "ModalPolynomials", "TensorTerm", "symmetrised"]
 
 Array = NDArray[np.float64]
 
 
-class Term(NamedTuple):
+class TensorTerm(NamedTuple):
     """A tensor times modal coordinates, modal velocities, and known functions of time.
 
     Attributes
@@ -88,14 +88,14 @@ class ModalPolynomials(ByValue):
         Natural frequencies, rad/s.
     damping : ndarray, shape (modes, modes)
         C, 1/s; its skew part are gyroscopic terms.
-    energies, forces : tuple of Term
+    energies, forces : tuple of TensorTerm
         Of the Lagrangian, and without one; at least of degree one.
     """
 
     omega: Array
     damping: Array
-    energies: tuple[Term, ...]
-    forces: tuple[Term, ...] = ()
+    energies: tuple[TensorTerm, ...]
+    forces: tuple[TensorTerm, ...] = ()
 
     @property
     def modes(self) -> int:
@@ -138,7 +138,7 @@ class ModalPolynomials(ByValue):
     def of(self, numbers: NDArray[np.intp]) -> ModalPolynomials:
         """Return the equations of some modes alone, by number."""
 
-        def some(terms: Sequence[Term]) -> tuple[Term, ...]:
+        def some(terms: Sequence[TensorTerm]) -> tuple[TensorTerm, ...]:
             return tuple(t._replace(tensor=t.tensor[np.ix_(*[numbers] * t.tensor.ndim)]) for t in terms)
 
         damping = self.damping[np.ix_(numbers, numbers)]
@@ -147,7 +147,7 @@ class ModalPolynomials(ByValue):
     def along(self, shape: Array) -> ModalPolynomials:
         """Return the equation of the modes moving in one shape, a vector (modes,) of length one."""
 
-        def contracted(terms: Sequence[Term]) -> tuple[Term, ...]:
+        def contracted(terms: Sequence[TensorTerm]) -> tuple[TensorTerm, ...]:
             found = []
             for term in terms:
                 tensor = term.tensor
@@ -268,14 +268,14 @@ class ModalPolynomials(ByValue):
         return np.asarray(force - pull if whole else force)
 
 
-def _scale(term: Term, causes: Array | None) -> Array | float:
+def _scale(term: TensorTerm, causes: Array | None) -> Array | float:
     if not term.causes:
         return 1.0
     assert causes is not None
     return np.asarray(causes[list(term.causes)].prod(axis=0))
 
 
-def _scale_rate(term: Term, causes: Array | None, rates: Array) -> Array:
+def _scale_rate(term: TensorTerm, causes: Array | None, rates: Array) -> Array:
     """Return the rate of the product of the known functions of a term."""
     assert causes is not None
     factors, slopes = causes[list(term.causes)], rates[list(term.causes)]
@@ -288,7 +288,7 @@ def _add(total: Array, factor: int, part: Array, scale: Array | float) -> None:
     total += factor * scale * part
 
 
-def _slots(term: Term, q: Array, v: Array, kept_q: int, kept_v: int, equation: bool = False) -> Array:
+def _slots(term: TensorTerm, q: Array, v: Array, kept_q: int, kept_v: int, equation: bool = False) -> Array:
     """Contract all axes but some of coordinates and velocities; equation, coordinates, velocities is their order."""
     a, b = term.positions, term.velocities
     return _contracted(term.tensor, a - kept_q, b - kept_v, q, v, kept_v, equation)

@@ -10,7 +10,7 @@ from cra_sym.si import Numbers
 
 from ..checks import broadcastable, choice, equal, flag, one_axis, real_array
 from ..si import paired
-from .motion_terms import Harmonic, Piecewise, Term
+from .motion_terms import Harmonic, MotionTerm, Piecewise
 from .moves import check_feasible, fastest, quotient
 from .records import KINDS, spline_motion, timed_last, uniform_times
 
@@ -53,7 +53,7 @@ class BaseMotion:
 
     __array_ufunc__ = None  # an array times a motion is a batch of motions, not an array of objects
     __pandas_priority__ = 5000  # and likewise for a pandas Series
-    terms: tuple[Term, ...]
+    terms: tuple[MotionTerm, ...]
     sample_step: float | None = None
     """Time between the samples of a record, s; None for other motions."""
 
@@ -82,7 +82,7 @@ class BaseMotion:
             if not np.isfinite(B * varpi**2).all():
                 raise ValueError("amplitude, angular_frequency: must leave amplitude angular_frequency^2 finite")
         v, a = np.broadcast_arrays(v, a)
-        terms: list[Term] = []
+        terms: list[MotionTerm] = []
         if np.any(v) or np.any(a):
             terms.append(Piecewise(v, np.zeros(1), a[..., None], np.zeros_like(a)[..., None]))
         if np.any(B):
@@ -279,7 +279,7 @@ class BaseMotion:
         """Scale the motion by real factors; an array is a batch."""
         scale = real_array("factor", factor, unit="1")
         shape = broadcastable(motion=np.empty(self.shape), factor=scale)
-        terms: list[Term] = []
+        terms: list[MotionTerm] = []
         for term in self.terms:
             if isinstance(term, Harmonic):
                 terms.append(Harmonic(*np.broadcast_arrays(term.amplitude * scale, *term[1:])))

@@ -8,7 +8,7 @@ import numpy as np
 
 from .modal_response import pick, segment
 
-__all__ = ["Harmonic", "Piecewise", "Term"]
+__all__ = ["Harmonic", "MotionTerm", "Piecewise"]
 
 Array = np.ndarray
 
@@ -83,7 +83,7 @@ class Piecewise(NamedTuple):
         return np.where(rests, np.where(moves, self.knots[..., -1], 0.0), np.inf)
 
 
-Term = Harmonic | Piecewise
+MotionTerm = Harmonic | Piecewise
 
 
 def _after(first: Array, rest: Array) -> Array:

@@ -62,7 +62,7 @@ class Held:
         return Held(self.coefficients * by, self.displacements * by, self.frequency, self.ratio, self.good)
 
 
-class _State(NamedTuple):
+class _IterationState(NamedTuple):
     """State of the iteration: forces and their rates, rates of the peak by modes and forces, error of the peak."""
 
     coefficients: Array
@@ -178,7 +178,7 @@ class MotionsAtAmplitude:
         values *= np.sign((series * values).sum(axis=1))[:, None]
         gradient = self.rows[:, None] * values[:, None, self.active]
         by_force = -self.statics[:, None] * values[:, None]
-        state = _State(x, w, frequency, ratio, force, slope, gradient, by_force, largest - amplitudes)
+        state = _IterationState(x, w, frequency, ratio, force, slope, gradient, by_force, largest - amplitudes)
         return self._condensed(state) if self._linear else self._whole(state)
 
     def series(self, coefficients: Array, force: Array) -> Array:
@@ -186,7 +186,7 @@ class MotionsAtAmplitude:
         shape = len(coefficients), self.statics.size, -1
         return np.asarray(self.rows @ coefficients - self.statics @ force.reshape(shape))
 
-    def _whole(self, state: _State) -> tuple[Array, Array, Array, Array]:
+    def _whole(self, state: _IterationState) -> tuple[Array, Array, Array, Array]:
         """Return the step from the equations of all modes."""
         balance, active = self.balance, self.active
         x, w = state.coefficients, state.displacements
@@ -227,7 +227,7 @@ class MotionsAtAmplitude:
         step_w = np.asarray(np.linalg.solve(own, moved[..., None])[..., 0], float).reshape(w.shape)
         return step_x, step_w, step[:, number], step[:, number + 1]
 
-    def _condensed(self, state: _State) -> tuple[Array, Array, Array, Array]:
+    def _condensed(self, state: _IterationState) -> tuple[Array, Array, Array, Array]:
         """Return the step for linear modes, all eliminated but the first harmonic of the mode that is followed.
 
         Its equation is nearly singular when the elements have little effect, so a spring is added and its force is an

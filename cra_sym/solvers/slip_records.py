@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .slip_polynomials import polynomial_forces, polynomial_potential
-from .slipping import ORDER, SlippingModes, Step
+from .slipping import ORDER, SlippingModes, SlipStep
 
 __all__ = ["Energies", "Ledger", "Peak", "Sampler"]
 
@@ -57,7 +57,7 @@ class Sampler:
         self.values = np.zeros((rows.shape[0], rows.shape[2], times.size))
         self._next = np.zeros(rows.shape[2], np.intp)
 
-    def __call__(self, step: Step) -> None:
+    def __call__(self, step: SlipStep) -> None:
         """Record the times within a step; a time at its end belongs to the next step, except the last time."""
         begin = self._next[step.members]
         until = np.searchsorted(self.times, step.end, side="left")
@@ -132,7 +132,7 @@ class Ledger:
         everyone = np.arange(members)
         self._write(everyone, np.zeros(members), *start, np.zeros(each[:2], np.int8))
 
-    def __call__(self, step: Step) -> None:
+    def __call__(self, step: SlipStep) -> None:
         """Add what a step did to the balance."""
         share, span, slipping = step.share, step.span, step.state != 0
         here = self.modes.of(step.members)
@@ -206,7 +206,7 @@ class Peak:
         self.sticks, self._begun = np.zeros(since.size, bool), np.zeros(since.size, bool)
         self.state = [np.zeros(row.shape), np.zeros(row.shape), np.zeros((elements, since.size))]
 
-    def __call__(self, step: Step) -> None:
+    def __call__(self, step: SlipStep) -> None:
         """Record a step."""
         counted = np.flatnonzero((step.end > step.time) & (step.time >= self.since[step.members]))
         members = step.members[counted]

@@ -22,8 +22,18 @@ from .motion_terms import Harmonic, Piecewise
 from .slip_loads import Cause, add_acceleration, next_knot
 from .slip_polynomials import ForceSeries, Polynomial, reach
 
-__all__ = ["ORDER", "Cause", "Events", "SlippingModes", "Start", "Step", "fastest", "first_forces", "follow",
-           "stuck_tangent"]  # fmt: skip
+__all__ = [
+    "ORDER",
+    "Cause",
+    "Events",
+    "SlipStep",
+    "SlippingModes",
+    "Start",
+    "fastest",
+    "first_forces",
+    "follow",
+    "stuck_tangent",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 ORDER = 36
@@ -105,7 +115,7 @@ class Events(NamedTuple):
     state: NDArray[np.int8]
 
 
-class Step(NamedTuple):
+class SlipStep(NamedTuple):
     """A completed step. Series are in powers of the time since its start over its span, up to `share`.
 
     Attributes
@@ -154,7 +164,7 @@ def follow(
     causes: Sequence[Cause],
     start: Start,
     end: Array,
-    visit: Callable[[Step], object],
+    visit: Callable[[SlipStep], object],
     pauses: Array | None = None,
 ) -> Events:
     """Integrate the modes from t = 0 to the end of each member, and call ``visit`` with every step.
@@ -239,7 +249,7 @@ class _March:
             self.fresh[:, kept], self.stalled[kept], self.tangent[..., kept],
         )  # fmt: skip
 
-    def step(self, visit: Callable[[Step], object]) -> _Happened | None:
+    def step(self, visit: Callable[[SlipStep], object]) -> _Happened | None:
         """Make a step of every member, at most to its next event; return the events."""
         target = np.minimum(self.time + self.longest, self.end)
         for cause in self.causes:
@@ -256,7 +266,7 @@ class _March:
             span, target = self._shortened(span, target, series, moved, loads)
         share, event = self._first_events(moved)
         end = np.where(share == 1.0, target, np.minimum(self.time + span * share, target))
-        step = Step(self.members, self.time, span, share, end, series, loads, moved, self.force, self.state)
+        step = SlipStep(self.members, self.time, span, share, end, series, loads, moved, self.force, self.state)
         visit(step)
         self._move(step)
         return None if event is None else self._switch(*event)
@@ -363,7 +373,7 @@ class _March:
         found[0, nothing & ~at_rest] = 0.0
         return found
 
-    def _move(self, step: Step) -> None:
+    def _move(self, step: SlipStep) -> None:
         """Advance the state to the end of the step."""
         self.q, u = step.reached()
         self.u = np.where(step.span > 0, u, self.u)

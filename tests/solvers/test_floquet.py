@@ -104,7 +104,7 @@ def test_error_is_what_was_asked_for(tolerance):
 def test_a_coupling_in_parts_takes_the_same_steps():
     whole, few = np.array([[[8.0, 1.0], [1.0, 5.0]]]), {"angular_frequency": 2.0, "epsilon": 0.9}
     steps = [
-        floquet.Oscillators.of([0.3, 0.7], coupling, **few)[0].steps(1e-6)
+        floquet.ExcitedOscillators.of([0.3, 0.7], coupling, **few)[0].steps(1e-6)
         for coupling in (whole, whole * np.array([0.5, 0.3, 0.2])[:, None, None])
     ]
     assert steps[0] == steps[1]

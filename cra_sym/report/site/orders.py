@@ -134,7 +134,7 @@ def _floquet_steps() -> float:
     given = omega, coupling[None], 2.7, 0.3, 0.02 * omega
     exact = floquet.monodromy(*given, tolerance=1e-13)
     tolerances = 1e-7, 1e-9
-    steps = [float(floquet.Oscillators.of(*given)[0].steps(tolerance)[0]) for tolerance in tolerances]
+    steps = [float(floquet.ExcitedOscillators.of(*given)[0].steps(tolerance)[0]) for tolerance in tolerances]
     errors = [np.abs(floquet.monodromy(*given, tolerance=tolerance) - exact).max() for tolerance in tolerances]
     return _power(steps[::-1], errors)
 
