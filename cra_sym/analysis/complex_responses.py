@@ -26,7 +26,7 @@ __all__ = ["complex_residual", "complex_response"]
 Array = NDArray[np.float64]
 
 
-class _Input(NamedTuple):
+class _DrivingInput(NamedTuple):
     """An input: its history as the acceleration of a motion, its loads, and whether it is an impulse at t = 0.
 
     Loads are those of units of displacement, velocity and acceleration of the motion, None where there is none.
@@ -152,7 +152,7 @@ class _Member(NamedTuple):
 
 def _members(
     system: System,
-    causes: Sequence[_Input],
+    causes: Sequence[_DrivingInput],
     outputs: Callable[[Modes], Array],
     modes: int,
     zeta: Array,
@@ -191,7 +191,7 @@ def _members(
     return shape, members()
 
 
-def _causes(system: System, histories: Mapping[str, BaseMotion | Force], start: Start) -> list[_Input]:
+def _causes(system: System, histories: Mapping[str, BaseMotion | Force], start: Start) -> list[_DrivingInput]:
     found = []
     for name, history in histories.items():
         force = isinstance(history, Force)
@@ -199,16 +199,18 @@ def _causes(system: System, histories: Mapping[str, BaseMotion | Force], start: 
         loads = {2: system.numerics("load", name)} if force else system.numerics("loads", name)
         for load in loads.values():
             check_forces(system, load, system.numerics("pencil"))
-        found.append(_Input(profile, (loads.get(0), loads.get(1), loads.get(2)), not force and start == "inertial"))
+        found.append(
+            _DrivingInput(profile, (loads.get(0), loads.get(1), loads.get(2)), not force and start == "inertial")
+        )
     constant = system.numerics("constant")
-    return found if constant is None else [*found, _Input(Force(1.0).profile, (None, None, constant), False)]
+    return found if constant is None else [*found, _DrivingInput(Force(1.0).profile, (None, None, constant), False)]
 
 
 def _momenta(system: System, initial: Mapping[Any, Any] | None) -> tuple[Load | None, Load | None]:
     """Return the momenta of initial displacements and velocities as loads, None where they are zero."""
     if not initial:
         return None, None
-    from cra_sym.model.derivations import momentum
+    from cra_sym.model.loads import momentum
 
     return momentum(system.model, initial, 0), momentum(system.model, initial, 1)
 

@@ -342,7 +342,7 @@ def _initial_state(system: System, initial: Mapping[Any, Any], modes: int, order
     """Return the modal displacements (order 0) or velocities (1) of given fields at t = 0: products with the mass."""
     if not initial:
         return np.zeros(modes)
-    from cra_sym.model.derivations import momentum
+    from cra_sym.model.loads import momentum
 
     load = momentum(system.model, initial, order)
     return np.zeros(modes) if load is None else system.project(load, modes)

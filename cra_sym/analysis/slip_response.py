@@ -17,7 +17,8 @@ from cra_sym.model.system import MOST_MODES, System
 from cra_sym.si import Numbers
 from cra_sym.solvers.driven_modes import Start
 from cra_sym.solvers.slip_records import Ledger
-from cra_sym.solvers.slipping import Events, first_forces
+from cra_sym.solvers.slip_statics import first_forces
+from cra_sym.solvers.slipping import Events
 
 if TYPE_CHECKING:
     from sympy import Expr

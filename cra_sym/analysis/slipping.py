@@ -20,7 +20,8 @@ from cra_sym.solvers.motion import BaseMotion, Harmonic, Piecewise
 from cra_sym.solvers.slip_loads import Cause
 from cra_sym.solvers.slip_polynomials import Polynomial
 from cra_sym.solvers.slip_records import Peak, Sampler
-from cra_sym.solvers.slipping import Events, SlippingModes, SlipStep, follow
+from cra_sym.solvers.slip_statics import SlippingModes
+from cra_sym.solvers.slipping import Events, SlipStep, follow
 from cra_sym.solvers.slipping import Start as State
 from cra_sym.solvers.stuck_motion import stuck_peak
 

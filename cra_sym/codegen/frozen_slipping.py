@@ -20,7 +20,8 @@ from cra_sym.codegen.statement import stated
 from cra_sym.kernels.form_parse import parse
 from cra_sym.model.system import System
 from cra_sym.solvers.motion_terms import Piecewise
-from cra_sym.solvers.slipping import ORDER, Cause, SlippingModes, SlipStep, Start, fastest, follow
+from cra_sym.solvers.slip_statics import SlippingModes
+from cra_sym.solvers.slipping import ORDER, Cause, SlipStep, Start, fastest, follow
 
 __all__ = ["SlippingNumbers", "slipping_library", "slipping_numbers"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sympy as sp
 
 from cra_sym.model import Model
-from cra_sym.model.derivations import load_coefficients
+from cra_sym.model.loads import load_coefficients
 from cra_sym.model.waves_form import WavesForm
 
 __all__ = ["load_factors"]

@@ -15,6 +15,7 @@ import numpy as np
 from llvmlite import binding, ir
 
 from cra_sym.kernels import arithmetic, writer
+from cra_sym.kernels.memory import Array
 
 __all__ = ["Code", "made", "processor"]
 
@@ -132,7 +133,7 @@ def _argument(builder: Any, of: str, given: Any) -> Any:
 
     shape = part(_SHAPE)
     lengths = tuple(map(length, range(int(of.strip("dqw")))))
-    return writer.Array(part(_DATA), _NUMBERS[of[0]], lengths, of.endswith("w"))
+    return Array(part(_DATA), _NUMBERS[of[0]], lengths, of.endswith("w"))
 
 
 def _of_python(module: Any, name: str, result: Any, *arguments: Any) -> Any:

@@ -8,38 +8,17 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
 
-from cra_sym.kernels.arithmetic import CONDITION, INTEGER, Arithmetic, is_constant, kind_named, kind_of
+from cra_sym.kernels.arithmetic import CONDITION, INTEGER, is_constant, kind_of
 from cra_sym.kernels.generated import CompileError
+from cra_sym.kernels.memory import Array, Memory, Variable
 
-__all__ = ["Array", "call"]
-
-
-@dataclass(frozen=True)
-class Array:
-    """A contiguous array, or the part of one selected by leading indices."""
-
-    data: Any
-    kind: Any
-    shape: tuple[Any, ...]
-    writable: bool = True
-
-
-@dataclass(frozen=True)
-class _Place:
-    """A location in memory and the type of the number there."""
-
-    pointer: Any
-    kind: Any
-
-
-_MEMORY = ir.PointerType()
+__all__ = ["call"]
 
 
 def call(builder: Any, function: ast.FunctionDef, arguments: Sequence[Any], namespace: Mapping[str, Any]) -> Any:
@@ -75,7 +54,7 @@ def _in_double(result: Any) -> Any:
     return float(result) if type(result) is int else result
 
 
-class _FunctionWriter(Arithmetic):
+class _FunctionWriter(Memory):
     """One call of a function.
 
     A name denotes a value. In a function with branches, an assigned name denotes a memory location of its first type,
@@ -88,14 +67,13 @@ class _FunctionWriter(Arithmetic):
         super().__init__(builder)
         self.statements, self.namespace = function.body, namespace
         self.values: dict[str, Any] = {}
-        self.places: dict[str, _Place] = {}
+        self.variables: dict[str, Variable] = {}
         self.again: Any = None  # where `continue` leads
         self.end: Any = None  # where `return` leads, if the function branches
         self.depth = 0  # of statements in statements
         self.returned: Any = None  # if the function does not branch
-        self.results: list[_Place] | None = None
+        self.results: list[Variable] | None = None
         self.single = True
-        self.owned: list[_Place] = []  # memory of arrays made here
         if any(isinstance(node, (ast.For, ast.While, ast.If)) for node in ast.walk(function)):
             self.end = builder.append_basic_block("end")
         stored = self.own = {n.id for n in ast.walk(function) if isinstance(n, ast.Name) and _is_stored(n)}
@@ -113,9 +91,7 @@ class _FunctionWriter(Arithmetic):
         if not self.builder.block.is_terminated:
             self.give_back(None)
         self.builder.position_at_end(self.end)
-        for memory in self.owned:
-            self.builder.call(self.of_platform("free", ir.VoidType(), _MEMORY), [self.read(memory)])
-            self.builder.store(ir.Constant(_MEMORY, None), memory.pointer)  # the next call may not allocate this array
+        self.free_all()
         results = tuple(map(self.read, self.results or ()))
         return (results[0] if self.single else results) if results else None
 
@@ -178,34 +154,21 @@ class _FunctionWriter(Arithmetic):
                     raise CompileError(f"{ast.unparse(base)} is read-only")
                 if len(indices) != len(array.shape):
                     raise CompileError(f"{ast.unparse(target)} is not one element")
-                self.put(value, _Place(self.pointer(array, indices), array.kind))
+                self.put(value, Variable(self.pointer(array, indices), array.kind))
             case _:
                 raise _refused(target)
 
     def assign_name(self, name: str, value: Any) -> None:
         before = self.values.pop(name, None)
         several = isinstance(value, (Array, tuple))
-        if self.depth > 1 and (isinstance(before, (Array, tuple)) or (several and name in self.places)):
+        if self.depth > 1 and (isinstance(before, (Array, tuple)) or (several and name in self.variables)):
             raise CompileError(f"{name} is assigned again, and is an array or a tuple")
         if self.end is None or several:
             self.values[name] = value
             return
-        if name not in self.places:
-            self.places[name] = self.place(kind_of(value), name)
-        self.put(value, self.places[name])
-
-    def place(self, kind: Any, name: str = "") -> _Place:
-        """Return a location on the stack, which starts as zero; LLVM turns it into a register."""
-        with self.builder.goto_entry_block():
-            pointer = self.builder.alloca(kind, name=name)
-            self.builder.store(ir.Constant(kind, None), pointer)
-        return _Place(pointer, kind)
-
-    def put(self, value: Any, place: _Place) -> None:
-        self.builder.store(self.typed(value, place.kind), place.pointer)
-
-    def read(self, place: _Place) -> Any:
-        return self.builder.load(place.pointer, typ=place.kind)
+        if name not in self.variables:
+            self.variables[name] = self.variable(kind_of(value), name)
+        self.put(value, self.variables[name])
 
     def branch(self, test: ast.expr, body: Sequence[ast.stmt], orelse: Sequence[ast.stmt]) -> None:
         then, otherwise, after = map(self.builder.append_basic_block, ("then", "else", "after"))
@@ -270,7 +233,7 @@ class _FunctionWriter(Arithmetic):
         single = not isinstance(value, tuple)
         parts = () if value is None else (value,) if single else value
         if self.results is None:
-            self.results = [self.place(kind_of(part)) for part in parts]
+            self.results = [self.variable(kind_of(part)) for part in parts]
             self.single = single
         if single != self.single or len(parts) != len(self.results):
             raise CompileError("all ways out return as much")
@@ -324,8 +287,8 @@ class _FunctionWriter(Arithmetic):
     def named(self, name: str) -> Any:
         if name in self.values:
             return self.values[name]
-        if name in self.places:
-            return self.read(self.places[name])
+        if name in self.variables:
+            return self.read(self.variables[name])
         if name in self.own:
             raise CompileError(f"{name} has no value yet")
         return self.namespace[name] if name in self.namespace else _BUILT_IN[name]
@@ -378,39 +341,11 @@ class _FunctionWriter(Arithmetic):
         index = self.value(node)
         return index if isinstance(index, tuple) else (index,)
 
-    def pointer(self, array: Array, indices: Sequence[Any]) -> Any:
-        """Return a pointer to the start of a part of an array in C order."""
-        offset: Any = 0
-        for length, index in zip(array.shape, [*indices, *[0] * (len(array.shape) - len(indices))], strict=True):
-            if kind_of(index) != INTEGER or (is_constant(index) and index < 0):
-                raise CompileError("indices are integers that count from the start")
-            rows = 0 if offset == 0 else self.binary(ast.Mult(), offset, length)
-            offset = index if rows == 0 else self.binary(ast.Add(), rows, index)
-        return self.builder.gep(array.data, [self.typed(offset, INTEGER)], inbounds=True, source_etype=array.kind)
-
-    def element(self, array: Array, indices: Sequence[Any]) -> Any:
-        place, rest = self.pointer(array, indices), array.shape[len(indices) :]
-        return Array(place, array.kind, rest, array.writable) if rest else self.read(_Place(place, array.kind))
-
-    def product(self, numbers: Sequence[Any]) -> Any:
-        return reduce(lambda one, two: self.binary(ast.Mult(), one, two), numbers)
-
     def made(self, zeros: bool, shape: Any, kind: type = np.float64) -> Array:
         """Return a new array of doubles or integers."""
         if self.end is None or self.again is not None:
             raise CompileError("arrays are made outside of loops, in functions that hold one")
-        shape = shape if isinstance(shape, tuple) else (shape,)
-        size = self.typed(self.binary(ast.Mult(), self.product(shape), 8), INTEGER)
-        name, sizes = ("calloc", (size, self.typed(1))) if zeros else ("malloc", (size,))
-        memory = self.builder.call(self.of_platform(name, _MEMORY, *[INTEGER] * len(sizes)), sizes)
-        self.owned.append(self.place(_MEMORY))
-        self.builder.store(memory, self.owned[-1].pointer)
-        return Array(memory, kind_named(kind), shape)
-
-    def of_platform(self, name: str, result: Any, *arguments: Any) -> Any:
-        """Return a function of the platform's C library."""
-        module = self.builder.module
-        return module.globals.get(name) or ir.Function(module, ir.FunctionType(result, arguments), name)
+        return self.allocated(zeros, shape, kind)
 
 
 def _is_stored(name: ast.Name) -> bool:

@@ -23,7 +23,7 @@ from cra_sym.model.galerkin import Ritz
 from cra_sym.model.hysteresis import Element
 from cra_sym.model.numerics import Numerics
 from cra_sym.model.parameters import parameters
-from cra_sym.model.pieces import arguments, options_of, undamped
+from cra_sym.model.pieces import arguments, expressions_in, options_of, undamped
 from cra_sym.model.slip_terms import check_displacements, checked_hysteresis, expressions_of
 from cra_sym.model.symmetry import asymmetry
 from cra_sym.model.system import TOLERANCE, System
@@ -156,13 +156,8 @@ class Model(Asked):
         self.equations.variation.elimination.check_homogeneous("Model")
         density, work = self.options["density"], self.options["virtual_work"]
         ends |= {f"term inside at {x} = {place}": sympify(term, strict=True) for place, term in self._stated_inside}
-        places = [sympify(place, strict=True) for place, _ in self.options["inside"]]
-        given = [density, *self.options["domain"], *self.options["essential"], *ends.values(), *places]
-        given += [term for _, term in self.options["inside"]]
-        given += [part for force, displacement, _ in work for part in (force, displacement)]
-        given += [sympify(place, strict=True) for *_, place in work if not (place is None or isinstance(place, str))]
+        given = [*expressions_in(self.options), *ends.values(), *expressions_of(self._pieces)]
         given += [q.integrand for q in self.equations.quadratures]
-        given += expressions_of(self._pieces)
         self.symbols: tuple[Symbol, ...] = parameters(given, self.equations)
         """The parameters: every symbol but x and t, by name."""
         declared = named_units(units, [*given, *self.options["fields"], *self.options["coordinates"]])

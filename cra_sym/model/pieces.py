@@ -10,7 +10,7 @@ from sympy import Expr, S, Symbol, sympify
 from cra_sym.mechanics.points import in_points
 from cra_sym.model.symmetry import odd_in_time
 
-__all__ = ["arguments", "options_of", "stuck", "undamped"]
+__all__ = ["arguments", "expressions_in", "options_of", "stuck", "undamped"]
 
 Pieces = dict[str, Any]
 Works = tuple[tuple[Expr, Expr, Any], ...]
@@ -44,6 +44,15 @@ def options_of(pieces: Pieces) -> tuple[Pieces, tuple[tuple[Expr, Expr], ...]]:
         options |= {"density": density, "inside": (*stated, *points)}
     options["virtual_work"] = tuple(_works_at_places(options["virtual_work"], options["x"]))
     return options, stated
+
+
+def expressions_in(options: Pieces) -> list[Expr]:
+    """Return the expressions in the arguments of Hamilton's principle, those of the ends left out."""
+    work, inside = options["virtual_work"], options["inside"]
+    found = [options["density"], *options["domain"], *options["essential"]]
+    found += [sympify(place, strict=True) for place, _ in inside] + [term for _, term in inside]
+    found += [part for force, displacement, _ in work for part in (force, displacement)]
+    return found + [sympify(place, strict=True) for *_, place in work if not (place is None or isinstance(place, str))]
 
 
 def _works_at_places(works: Works, x: Symbol) -> Iterator[tuple[Expr, Expr, Any]]:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .slip_polynomials import polynomial_forces, polynomial_potential
-from .slipping import ORDER, SlippingModes, SlipStep
+from .slip_statics import SlippingModes
+from .slipping import ORDER, SlipStep
 
 __all__ = ["Energies", "Ledger", "Peak", "Sampler"]
 

@@ -20,19 +20,17 @@ from numpy.typing import NDArray
 from .first_roots import first_roots, hull, rounding
 from .motion_terms import Harmonic, Piecewise
 from .slip_loads import Cause, add_acceleration, next_knot
-from .slip_polynomials import ForceSeries, Polynomial, reach
+from .slip_polynomials import ForceSeries, reach
+from .slip_statics import SlippingModes, applied, first_forces, stuck_tangent, tangent_stiffness
 
 __all__ = [
     "ORDER",
     "Cause",
     "Events",
     "SlipStep",
-    "SlippingModes",
     "Start",
     "fastest",
-    "first_forces",
     "follow",
-    "stuck_tangent",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -49,54 +47,6 @@ _Numbers = NDArray[np.intp]
 _Event = tuple[_Numbers, _Numbers, _Numbers]
 _Happened = tuple[_Numbers, Array, _Numbers, _Numbers]
 _FACTORIALS = np.cumprod(np.maximum(np.arange(ORDER + 1.0), 1.0))
-
-
-class SlippingModes(NamedTuple):
-    """Modes q'' + D q' + omega^2 q = loads - rows' F, mass-normalised, with elastic-slip elements on displacements.
-
-    The displacements are u = rows q - give F, F the sum of the forces of the elements on each.
-
-    Attributes
-    ----------
-    omega : ndarray, shape (N, P)
-    damping : ndarray, shape (N, P) or (N, N, P)
-        D, of modal damping 2 zeta omega its diagonal.
-    rows : ndarray, shape (D, N, P)
-        Displacements in each mode.
-    give : ndarray, shape (D, D, P)
-        Static flexibility of the omitted modes.
-    where : ndarray of int, shape (E,)
-        The displacement of each element.
-    stiffness, slip : ndarray, shape (E, P)
-    polynomials : tuple of Polynomial
-        Further forces on the right.
-    """
-
-    omega: Array
-    damping: Array
-    rows: Array
-    give: Array
-    where: NDArray[np.intp]
-    stiffness: Array
-    slip: Array
-    polynomials: tuple[Polynomial, ...] = ()
-
-    def of(self, members: NDArray[np.intp]) -> SlippingModes:
-        """Return some members."""
-        omega, damping, rows, give, where, stiffness, slip, polynomials = self
-        parts = (omega[:, members], damping[..., members], rows[..., members], give[..., members])
-        terms = tuple(term.of(members) for term in polynomials)
-        return SlippingModes(*parts, where, stiffness[:, members], slip[:, members], terms)
-
-    def total(self, values: Array) -> Array:
-        """Return the sums over the elements of each displacement, (E, P) to (D, P)."""
-        if len(self.rows) == 1:
-            return np.asarray(values.sum(axis=0, keepdims=True))
-        return np.stack([values[self.where == d].sum(axis=0) for d in range(len(self.rows))])
-
-    def given(self, totals: Array) -> Array:
-        """Return the static displacements (..., D, P) of the omitted modes under forces."""
-        return np.asarray(np.einsum("efp,...fp->...ep", self.give, totals))
 
 
 class Start(NamedTuple):
@@ -237,7 +187,7 @@ class _March:
         return cls(
             modes, causes, pauses, np.arange(shape[1]), end, _REACH / np.maximum(omega, 1e-300), np.zeros(shape[1]),
             start.displacement.copy(), start.velocity.copy(), first_forces(modes, start.displacement), state,
-            np.zeros(shape, bool), np.zeros(shape[1], np.intp), _tangent(modes, state),
+            np.zeros(shape, bool), np.zeros(shape[1], np.intp), tangent_stiffness(modes, state),
         )  # fmt: skip
 
     def of(self, kept: NDArray[np.intp]) -> _March:
@@ -320,7 +270,7 @@ class _March:
                     total += more * span**2 * _FACTORIALS[k - 2]
             moved[k] = (modes.rows * series[k]).sum(axis=1)
             if k > 0:
-                force[k] = _applied(self.tangent, moved[k])
+                force[k] = applied(self.tangent, moved[k])
         for values in (series, force, moved):
             values /= _FACTORIALS[:, None, None]
         if modes.give.any():
@@ -401,7 +351,7 @@ class _March:
         self.force[element, member] = limit * self.modes.slip[element, member]
         self.state[element, member] = new
         self.fresh[element, member] = True
-        self.tangent[..., member] = _tangent(self.modes.of(member), self.state[:, member])
+        self.tangent[..., member] = tangent_stiffness(self.modes.of(member), self.state[:, member])
         return self.members[member], self.time[member], element, new
 
 
@@ -419,39 +369,3 @@ def fastest(modes: SlippingModes, causes: Sequence[Cause]) -> Array:
             if isinstance(term, Harmonic):
                 found = np.maximum(found, np.where(term.amplitude != 0, term.angular_frequency, 0.0))
     return found
-
-
-def _tangent(modes: SlippingModes, state: NDArray[np.int8]) -> Array:
-    """Return the tangent stiffness of the forces with respect to `rows q`: only sticking elements contribute."""
-    k = modes.total(np.where(state == 0, modes.stiffness, 0.0))
-    if len(k) == 1:
-        return np.asarray(k / (1.0 + k * modes.give[0]))[None]
-    # F = k (rows q - give F)
-    stiff = np.einsum("dp,de->pde", k, np.eye(len(k)))
-    matrix = np.eye(len(k)) + stiff @ np.moveaxis(modes.give, -1, 0)
-    return np.asarray(np.moveaxis(np.linalg.solve(matrix, stiff), 0, -1))
-
-
-def stuck_tangent(modes: SlippingModes) -> Array:
-    """Return the tangent stiffness of the forces with respect to `rows q` with all elements stuck, (D, D, P)."""
-    return _tangent(modes, np.zeros(modes.slip.shape, np.int8))
-
-
-def _applied(matrix: Array, values: Array) -> Array:
-    return np.asarray(matrix[0] * values if len(values) == 1 else np.einsum("efp,fp->ep", matrix, values))
-
-
-def first_forces(modes: SlippingModes, q: Array) -> Array:
-    """Return the forces of the elements at displacements reached in one loading, from sliders at zero, (E, P)."""
-    state, force = np.zeros(modes.slip.shape, np.int8), np.zeros(modes.slip.shape)
-    for _ in range(len(state) + 1):
-        held = modes.total(np.where(state != 0, force, 0.0))
-        free = (modes.rows * q).sum(axis=1) - modes.given(held)
-        moved = free - modes.given(_applied(_tangent(modes, state), free))
-        force = np.where(state == 0, modes.stiffness * moved[modes.where], force)
-        beyond = (state == 0) & (np.abs(force) > modes.slip)
-        if not beyond.any():
-            break
-        state = np.where(beyond, np.sign(force), state).astype(np.int8)
-        force = np.where(beyond, state * modes.slip, force)
-    return force

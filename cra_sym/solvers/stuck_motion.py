@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .slipping import SlippingModes, stuck_tangent
+from .slip_statics import SlippingModes, stuck_tangent
 
 __all__ = ["stuck_peak"]
 

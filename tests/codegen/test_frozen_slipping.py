@@ -16,7 +16,7 @@ import sympy as sp
 import cra_sym as cra
 from cra_sym.codegen.frozen import frozen_system, stepped
 from cra_sym.codegen.frozen_slipping import slipping_library, slipping_numbers
-from cra_sym.solvers.slipping import stuck_tangent
+from cra_sym.solvers.slip_statics import stuck_tangent
 from cra_sym.symbols import t, v, x
 from tests import slip_reference
 from tests.codegen import kit

@@ -12,7 +12,8 @@ from cra_sym.solvers.motion import BaseMotion
 from cra_sym.solvers.motion_terms import Harmonic, Piecewise
 from cra_sym.solvers.slip_loads import Cause
 from cra_sym.solvers.slip_records import Ledger, Peak, Sampler
-from cra_sym.solvers.slipping import SlippingModes, Start, follow
+from cra_sym.solvers.slip_statics import SlippingModes
+from cra_sym.solvers.slipping import Start, follow
 
 OMEGA = np.array([15.0, 96.0, 270.0, 520.0, 880.0])
 ROWS = np.array([[0.3, -0.9, 1.5, -2.0, 2.4], [0.1, 0.4, -0.6, 1.1, 0.7]])
