@@ -72,7 +72,7 @@ def modal_equations(system: System, modes: int, zeta: float | Array | None = Non
     if matrices.damping is not None:
         damping = damping + matrices.damping
     if matrices.stiffness is not None:
-        forces = (*forces, Term(-matrices.stiffness, 1, 0))
+        forces = (*forces, TensorTerm(-matrices.stiffness, 1, 0))
     return ModalEquations(ModalPolynomials(omega, damping, energies, forces), causes, error)
 
 
