@@ -74,7 +74,7 @@ class ComplexShapes:
         there = self._states(overview_places(self.spatial, finite, len(self._parameter)))
         turn = mode_sign(there[..., : self.spatial.displacements])[..., 0]
         modes = self.s.shape[-1]
-        parts = _Parts(
+        parts = _ShapeParts(
             np.zeros((*self.s.shape[:-1], 2 * modes)),
             self.spatial,
             self.columns,
@@ -120,7 +120,7 @@ class ComplexShapes:
         return worst
 
 
-class _Parts(StateModes):
+class _ShapeParts(StateModes):
     """Real and imaginary parts of complex shapes as modes, with a quadrature that respects the breakpoints."""
 
     def stations(self) -> tuple[Array, Array]:
