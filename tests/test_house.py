@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import json
 import re
 import subprocess
 import sys
@@ -287,6 +288,20 @@ def test_no_path_of_a_machine(path):
     machine = re.compile(r"(?<![\w.$~<>}])/(?:home|root|Users|work|tmp|opt|var)/\w|[A-Z]:\\\\?Users|\bfile:///")
     found = machine.search(path.read_text(encoding="utf-8"))
     assert found is None, found
+
+
+def test_no_turns_that_a_native_reader_stumbles_on():
+    """'must be ...' for 'allowed is ...', 'is not a ...' for 'is no ...'; there may be no such thing all the same."""
+    turn = re.compile(r"allowed (?:is|are)\b|(?<!there )\b(?:is|are) no (?!longer|more)\w+", re.IGNORECASE)
+    found = {}
+    for path in tracked_texts():
+        text = path.read_text(encoding="utf-8")
+        if path.suffix == ".ipynb":
+            text = " ".join("".join(cell["source"]) for cell in json.loads(text)["cells"])
+        words = " ".join(re.sub(r"[#*>\"]+ ?", " ", text).split())
+        if path != Path(__file__) and (turns := turn.findall(words)):
+            found[name_of(path)] = turns
+    assert found == {}
 
 
 def test_import_is_cheap():

@@ -323,7 +323,7 @@ class ModelText:
                 yield f"{signed(other, 'stretch', (other - size) * size + place)} * share"
 
     def _check(self) -> str:
-        lines = ['"""Refuse what is no number, infinite, or a divisor that is 0."""']
+        lines = ['"""Refuse what is not a number, infinite, or a divisor that is 0."""']
         for symbol, name in self.names.items():
             if symbol in self.form.conditions.springs:
                 lines.append(f"if not (parameters.{name} >= -HUGE):")

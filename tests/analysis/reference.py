@@ -48,7 +48,7 @@ def refined(lam, *arm):
 
 
 def relative_errors(lam, *arms):
-    """Return the relative errors of frequency parameters but rigid-body zeros; nan where one is no zero at all."""
+    """Return the relative errors of frequency parameters but rigid-body zeros; nan where one is not a zero."""
     arms = [np.broadcast_to(x, lam.shape[:-1]).ravel() for x in arms]
     errors = []
     for row, *arm in zip(lam.reshape(-1, lam.shape[-1]), *arms, strict=True):

@@ -1,4 +1,4 @@
-"""Analyses of models that are no arm: several motions, loads along x, several fields, repeated frequencies."""
+"""Analyses of models other than the arm: several motions, loads along x, several fields, repeated frequencies."""
 
 from __future__ import annotations
 

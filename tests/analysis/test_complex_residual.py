@@ -35,7 +35,7 @@ def test_no_damper_is_the_sum_over_natural_modes():
 @pytest.mark.parametrize("system", [damped(), damped(c=8.0), TURNING.at(VALUES | {"g": 0.2})], ids=str)
 def test_one_mode_is_its_largest_value_and_several_bound_theirs(system):
     one, three = (np.abs(cra.tip_response(system, MOVE, MOVE.duration + AFTER, modes)).max() for modes in (1, 3))
-    # the grid misses a peak by (omega h)^2 / 8; with the strong damper the lowest motions are no single pair
+    # the grid misses a peak by (omega h)^2 / 8; with the strong damper the lowest motions are not a single pair
     assert system.values.get("c") == 8.0 or cra.residual_vibration(system, MOVE, 1) == pytest.approx(one, rel=1e-3)
     assert three <= cra.residual_vibration(system, MOVE, 3) * (1 + 1e-9) <= 1.2 * three
 

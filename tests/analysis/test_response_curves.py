@@ -81,7 +81,7 @@ def test_autoparametric_answers_are_found_where_the_simple_one_is_unstable():
 
 
 def test_symmetric_equations_have_their_broken_answers():
-    """Strongly driven: the symmetric answer is unstable, a pair that is no mirror of itself is stable."""
+    """Strongly driven: the symmetric answer is unstable, a pair, each the mirror image of the other, is stable."""
     system = oscillator(q.diff(t) ** 2 / 2 - q**2 / 2 - q**4 / 4, virtual_work=[(F - q.diff(t) / 10, q, None)]).at({})
     states = cra.steady_states(system, 1.0, drive={F: 3.0}, modes=1, harmonics=15)
     assert [s.stable for s in states] == [False, True, True]

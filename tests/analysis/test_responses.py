@@ -263,7 +263,7 @@ def test_residual_vibration_needs_a_stop():
 
 
 def test_a_slow_mode_vibrates_after_the_stop_too():
-    """However slow, it is no rigid-body mode: what is left is the largest displacement of the next period."""
+    """However slow, it is not a rigid-body mode: what is left is the largest displacement of the next period."""
     arm, move = Arm.nominal().replace(k_t=0.02), BaseMotion.trapezoid(0.5, 1.0, 2.0)
     omega = cra.modal_parameters(arm, 1).omega[0]
     assert omega < 0.5

@@ -261,7 +261,7 @@ def test_compiled_rates_along_the_determinant_are_the_same(monkeypatch):
 
 
 def test_close_roots_leave_their_rates_to_the_modes():
-    """Two strings that a weak spring joins: the difference of their frequencies is no slope of a determinant."""
+    """Two strings that a weak spring joins: the difference of their frequencies is not a slope of a determinant."""
     rho, T, S, k, x, t = sp.symbols("rho T S k x t")
     u, y = (sp.Function(name)(x, t) for name in ("u", "y"))
     energy = rho * (u.diff(t) ** 2 + y.diff(t) ** 2) / 2 - T * u.diff(x) ** 2 / 2 - S * y.diff(x) ** 2 / 2

@@ -184,7 +184,7 @@ def test_helmholtz_and_van_der_pol_damping_against_time_integration():
     wanted = settled(rate, [0.15, 0.0], 2 * np.pi / 0.8, 100)
     np.testing.assert_allclose(state.amplitude, wanted, rtol=1e-6)
     assert state.stable and state.error_harmonics < 1e-6
-    # damping that feeds small motions, with the sign of van der Pol: rest is no attractor, the forced answer locks in
+    # damping that feeds small motions, as van der Pol's: rest is not an attractor, the forced answer locks in
     fed = oscillator(q.diff(t) ** 2 / 2 - q**2 / 2, virtual_work=[(F + (1 - q**2) * q.diff(t) / 5, q, None)]).at({})
     found = cra.steady_states(fed, 1.0, drive={F: 0.5}, modes=1, harmonics=13)
     locked = [s for s in found if s.stable]

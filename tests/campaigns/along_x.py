@@ -114,7 +114,7 @@ def coefficients(trial: int) -> dict[str, Any]:
     except ValueError as error:
         return case | {"refused": str(error)}
     difference, expected = float(check.difference), float(check.expected)
-    # elements converge on what is not smooth within them as they like: a tenth of what halving changes is no error
+    # elements converge on what is not smooth within them as they like: a tenth of what halving changes is not an error
     return case | {"difference": difference, "expected": expected, "agrees": abs(difference) <= 3.0 * expected + 1e-9}
 
 

@@ -57,7 +57,7 @@ def test_c09_turns_when_the_mean_velocity_is_small(judge):
 
 
 def test_superposition_is_what_decides_c09(judge, monkeypatch):
-    """A stiffening arm, whose response is no sum, makes the error depend on the mean motion."""
+    """A stiffening arm, whose response is not a sum, makes the error depend on the mean motion."""
 
     def stiffening(*arguments, **options):
         v = tip(*arguments, **options)

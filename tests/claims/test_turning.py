@@ -128,7 +128,7 @@ def hardly_any_disturbance(patch):
 
 @turns("C13", "contradicted", "holds")
 def arm_that_stiffens(patch):
-    """Its response is no sum, and what the disturbance adds depends on the mean motion."""
+    """Its response is not a sum, and what the disturbance adds depends on the mean motion."""
     true = motions.tip
 
     def stiffening(*given, **options):

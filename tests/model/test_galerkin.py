@@ -173,7 +173,7 @@ def test_a_damped_stiff_joint(stiffness):
     model, elements = arm(right=OFFSET, virtual_work=[(-c * v.diff(t), v, "right")]), 30
     values = {**UNIT, m_e: 0.3, e: 0.2, c: 0.1, k_t: stiffness, k_r: stiffness}
     exact = model.eigenvalues(values, 2)
-    # a spring softer than the beam adds to the condition of the stiffness; complex roots are no bounds: twice the error
+    # a spring softer than the beam adds to the condition number; complex roots are not bounds: twice the error
     bound = 2 * cubic_error(np.abs(exact) / (2 * np.pi), elements) + rounding(elements) * max(1.0, 16 / stiffness)
     assert (np.abs(model.ritz(elements).eigenvalues(values, 2) / exact - 1) < bound).all()
 

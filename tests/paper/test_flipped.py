@@ -1,4 +1,4 @@
-"""The sign-flipped rotational spring: it reproduces the opposite trend, and it is no physical joint."""
+"""The sign-flipped rotational spring: it reproduces the opposite trend, and it is not a physical joint."""
 
 import numpy as np
 from scipy.linalg import eigh

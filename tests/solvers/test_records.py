@@ -274,7 +274,7 @@ def test_a_sampled_force_and_a_nonlinear_system_tell_it_too():
 @pytest.mark.parametrize("arm", [ARM, ARM.replace(zeta=0.0, k_t=0.0), ARM.replace(zeta=[0.0, 0.9])], ids=str)
 @pytest.mark.parametrize("derivative", [0, 1, 2])
 def test_long_records_are_followed_as_short_ones(count, arm, derivative, monkeypatch):
-    """The same record sample by sample, and at times that are no samples."""
+    """The same record sample by sample, and at times between the samples."""
     t = np.arange(count) / 200.0
     rng = np.random.default_rng(count)
     motion = BaseMotion.sampled(t, rng.normal(size=(2, 1, count)), velocity=[[0.1], [0.2]])
