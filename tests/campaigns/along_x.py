@@ -7,9 +7,6 @@ was stopped; each trial is a line of the record.
 
 from __future__ import annotations
 
-import argparse
-import json
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,6 +16,7 @@ import sympy as sp
 from mpmath import mp, mpf
 
 import cra_sym as cra
+from tests.campaigns.trials import parser, results
 from tests.solvers.test_stress import continuum, frequencies, shot, smooth, stepped, stepped_condition
 
 RECORD = Path(__file__).with_name("along_x.jsonl")
@@ -128,23 +126,11 @@ def good(result: dict[str, Any]) -> bool:
 
 def main() -> None:
     """Run the trials that the record lacks."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--trials", type=int, default=TRIALS)
-    parser.add_argument("--seconds", type=float, default=np.inf, help="begin no further trial after that time")
-    parser.add_argument("--kind", choices=KINDS, action="append")
-    parser.add_argument("--again", action="store_true", help="start anew")
-    options = parser.parse_args()
-    if options.again:
-        RECORD.unlink(missing_ok=True)
-    done = [json.loads(line) for line in RECORD.read_text().splitlines()] if RECORD.exists() else []
-    known, begun = {(result["kind"], result["trial"]) for result in done}, time.monotonic()
-    with RECORD.open("a", encoding="utf-8") as record:
-        for kind in options.kind or KINDS:
-            for trial in range(options.trials):
-                if (kind, trial) not in known and time.monotonic() - begun < options.seconds:
-                    done.append({"kind": kind, "trial": trial, **KINDS[kind](trial)})
-                    record.write(json.dumps(done[-1]) + "\n")
-                    record.flush()
+    made = parser(__doc__, TRIALS)
+    made.add_argument("--kind", choices=KINDS, action="append")
+    options = made.parse_args()
+    wanted = ({"kind": kind, "trial": trial} for kind in options.kind or KINDS for trial in range(options.trials))
+    done = results(RECORD, options, wanted, lambda kind, trial: KINDS[kind](trial))
     for kind in KINDS:
         mine = [result for result in done if result["kind"] == kind]
         worst = max((result.get("error", abs(result.get("difference", 0.0))) for result in mine), default=0.0)

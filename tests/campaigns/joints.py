@@ -5,14 +5,13 @@
 
 from __future__ import annotations
 
-import argparse
-import json
 import warnings
 from pathlib import Path
 
 import numpy as np
 
 import cra_sym as cra
+from tests.campaigns.trials import parser, results
 
 RECORD = Path(__file__).with_name("joints.jsonl")
 TRIALS = 500
@@ -51,19 +50,8 @@ def good(result: dict[str, object]) -> bool:
 
 def main() -> None:
     """Run the trials that the record lacks."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--trials", type=int, default=TRIALS)
-    parser.add_argument("--again", action="store_true", help="start anew")
-    options = parser.parse_args()
-    if options.again:
-        RECORD.unlink(missing_ok=True)
-    done = [json.loads(line) for line in RECORD.read_text().splitlines()] if RECORD.exists() else []
-    with RECORD.open("a", encoding="utf-8") as record:
-        for trial in range(options.trials):
-            if trial not in {result["trial"] for result in done}:
-                done.append(tried(trial))
-                record.write(json.dumps(done[-1]) + "\n")
-                record.flush()
+    options = parser(__doc__, TRIALS).parse_args()
+    done = results(RECORD, options, ({"trial": trial} for trial in range(options.trials)), tried)
     bad = [result for result in done if not good(result)]
     several = sum(len(result["off"]) > 1 for result in done)
     print(f"{len(done)} joints: the true one is among the solutions of {len(done) - len(bad)}; {several} have several")

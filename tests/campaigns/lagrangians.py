@@ -6,9 +6,7 @@ takes the first ones.
 
 from __future__ import annotations
 
-import argparse
 import json
-import time
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +14,7 @@ import numpy as np
 import sympy as sp
 
 import cra_sym as cra
+from tests.campaigns.trials import parser, results
 
 RECORD = Path(__file__).with_name("lagrangians.jsonl")
 TRIALS, MODES, ELEMENTS = 200, 3, 3
@@ -90,9 +89,18 @@ class Grammar:
             energies.append(energy)
         return energies, essential
 
+    def inside(self) -> list[tuple[sp.Expr, sp.Expr]]:
+        """Return energies at places between the ends."""
+        found = []
+        if self.chance(0.3):
+            found.append((sp.Rational(1, 4), self.number() * v.diff(t) ** 2 / 2))
+        if self.chance(0.2):
+            found.append((sp.Rational(1, 2), -self.number(1.0, 1000.0) * v**2 / 2))
+        return found
+
     def model(self) -> dict[str, Any]:
         """Return the arguments of a model."""
-        fields, inside = [v], []
+        fields = [v]
         if self.chance(0.65):
             density, order = self.beam(v) if self.chance(0.6) else self.string(v)
             displacements = [v, v.diff(x)][:order]
@@ -105,10 +113,7 @@ class Grammar:
                 one, order = self.beam(field) if self.chance(0.5) else self.string(field)
                 density, displacements = density + one, displacements + [field, field.diff(x)][:order]
         (left, right), essential = self.ends(displacements)
-        if self.chance(0.3):
-            inside.append((sp.Rational(1, 4), self.number() * v.diff(t) ** 2 / 2))
-        if self.chance(0.2):
-            inside.append((sp.Rational(1, 2), -self.number(1.0, 1000.0) * v**2 / 2))
+        inside = self.inside()
         ends = {"left": left, "right": right, "essential": essential, "inside": inside}
         return {"density": density, "fields": fields, "x": x, "domain": (0, 1), "t": t, **ends}
 
@@ -136,21 +141,10 @@ def tried(trial: int) -> dict[str, Any]:
 
 def main() -> None:
     """Go on with the record and say how it stands."""
-    parser = argparse.ArgumentParser(prog="python -m tests.campaigns.lagrangians", description=__doc__)
-    parser.add_argument("--trials", type=int, default=TRIALS, help="%(default)s")
-    parser.add_argument("--minutes", type=float, default=float("inf"), help="of this run (no bound)")
-    options = parser.parse_args()
-    lines = RECORD.read_text(encoding="utf-8").splitlines() if RECORD.exists() else []
-    done = {line["trial"]: line for line in map(json.loads, lines)}
-    end = time.monotonic() + 60.0 * options.minutes
-    for trial in sorted(set(range(options.trials)) - set(done)):
-        if time.monotonic() > end:
-            break
-        done[trial] = {"trial": trial, **tried(trial)}
-        with RECORD.open("a", encoding="utf-8") as record:
-            record.write(json.dumps(done[trial]) + "\n")
-    refused = [line for line in done.values() if "refused" in line]
-    bad = [line for line in done.values() if line.get("gap")]
+    options = parser(__doc__, TRIALS).parse_args()
+    done = results(RECORD, options, ({"trial": trial} for trial in range(options.trials)), tried)
+    refused = [line for line in done if "refused" in line]
+    bad = [line for line in done if line.get("gap")]
     print(f"{len(done)} of {options.trials}: {len(refused)} refused, {len(bad)} differ from Ritz")
     for line in (*bad, *refused):
         print(json.dumps(line))

@@ -12,7 +12,21 @@ __all__ = ["Mutant", "mutants"]
 _ANNOTATIONS = {"annotation", "returns", "decorator_list"}
 _NEAR = 1e-5
 _SIZES = {"size", "ndim"}
-_COMMUTATIVE = {"allclose", "gcd", "hypot", "isclose", "lcm", "max", "maximum", "min", "minimum", "set"}
+_COMMUTATIVE = {
+    "allclose",
+    "and_",
+    "gcd",
+    "hypot",
+    "isclose",
+    "lcm",
+    "max",
+    "maximum",
+    "min",
+    "minimum",
+    "or_",
+    "set",
+    "xor",
+}
 _CONTRARY: dict[type[ast.AST], type] = {
     ast.Add: ast.Sub,
     ast.Mult: ast.Div,

@@ -15,6 +15,8 @@ __all__ = ["EXEMPT", "PACKAGE", "rounds", "watched_modules"]
 
 PACKAGE = Path(__file__).resolve().parents[2] / "cra_sym"
 MANY = 5  # files of tests: a second round has no more
+ELSEWHERE = {f"tests/test_{name}.py" for name in ("ending", "first_ten_minutes", "main")}
+"""Tests in processes of their own, to which a mutant is unknown."""
 
 #: Modules of which no mutant is made, with the reason.
 EXEMPT = {
@@ -286,7 +288,7 @@ def _nearest(module: str) -> Iterator[list[str]]:
         yield sorted(told)
     while fresh:
         found = {test for test, named in _named_by("tests").items() if named & fresh}
-        found = found.union(*map(_of_its_name, fresh)) - told
+        found = found.union(*map(_of_its_name, fresh)) - told - ELSEWHERE
         if found:
             yield [test for test in sorted(found) if test.startswith(f"tests/{room}/")] or sorted(found)
         told |= found

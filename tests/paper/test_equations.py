@@ -216,8 +216,16 @@ FREE = {(25, 0, "whole"), (27, 1, "whole"), (28, 0, "whole"), (17, 0, "whole")}
 FREE |= {(17, 0, f"C_{k}*{f}(beta*x)") for k, f in enumerate(("cos", "sin", "cosh", "sinh"), start=1)}
 #: (23) written out and differentiated: its proof takes seconds, so the terms are tried with numbers.
 WRITTEN_OUT = {32}
-#: How many of an equation's terms are tried, so that the long ones do not take all the time.
+#: How many of an equation's terms the suite tries, so that the long ones do not take all the time; a campaign, all.
 TRIED = 4
+ALL_EQUATIONS = pytest.mark.sample(1000, 1)  # of each the terms are sampled
+
+
+@pytest.fixture
+def drawn(request):
+    """Some of a list, or all of it in a campaign."""
+    every = request.config.getoption("--all-cases")
+    return lambda found, count: found if every else random.Random(1).sample(found, min(count, len(found)))
 
 
 def parts(expression):
@@ -261,25 +269,27 @@ def spoiled(part):
             yield name, Eq(other, worse, evaluate=False) if back else Eq(worse, other, evaluate=False)
 
 
+@ALL_EQUATIONS
 @pytest.mark.parametrize("e", cra.equations(companions=True), ids=lambda e: str(e.number))
-def test_the_proof_notices_one_per_cent(e, monkeypatch):
+def test_the_proof_notices_one_per_cent(e, drawn, monkeypatch):
     where, missed = holders(e), []
     for place, part in enumerate(parts(e.expression)):
         found = [spoil for spoil in spoiled(part) if e.number not in WRITTEN_OUT or spoil[0] == "whole"]
-        for term, worse in random.Random(1).sample(found, min(TRIED, len(found))):
+        for term, worse in drawn(found, TRIED):
             put_in(monkeypatch, where, e, place, worse)
             if (e.number, place, term) not in FREE and _proves(e):
                 missed.append((place, term))
     assert not missed
 
 
+@ALL_EQUATIONS
 @pytest.mark.parametrize("number", sorted(WRITTEN_OUT))
-def test_the_numbers_notice_one_per_cent_of_a_term(number, monkeypatch):
+def test_the_numbers_notice_one_per_cent_of_a_term(number, drawn, monkeypatch):
     e = cra.equation(number)
     where, missed = holders(e), []
     assert registry._SAMPLES[number]()
     for place, part in enumerate(parts(e.expression)):
-        for term, worse in random.Random(2).sample([*spoiled(part)], 2 * TRIED):
+        for term, worse in drawn([*spoiled(part)], 2 * TRIED):
             put_in(monkeypatch, where, e, place, worse)
             if registry._SAMPLES[number]():
                 missed.append((place, term))
