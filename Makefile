@@ -80,9 +80,9 @@ lock: .venv/.ready
 mutation: .venv/.ready
 	$(RUN) -m tests.mutation $(ARGS)
 
-# Random joints and columns against their own frequencies, coefficients along x and whole Lagrangians against other methods, which go
-# on where they were stopped; bad values in every argument; a sweep past the memory of its workers, of which one is
-# killed; every case of the tests that run a sample.
+# Random joints and columns against their own frequencies, coefficients along x and whole Lagrangians against other
+# methods, exports of random Lagrangians, built and run, which go on where they were stopped; bad values in every
+# argument; a sweep past the memory of its workers, of which one is killed; every case of the tests that run a sample.
 campaign: .venv/.ready
 	$(RUN) -m tests.campaigns.joints $(ARGS)
 	$(RUN) -m tests.campaigns.columns
@@ -92,6 +92,7 @@ campaign: .venv/.ready
 	$(RUN) -m tests.campaigns.workers
 	$(RUN) -m tests.campaigns.languages
 	$(RUN) -m tests.campaigns.models
+	$(RUN) -m tests.campaigns.exports
 	$(RUN) -m pytest -q tests -m sample --all-cases
 
 clean:

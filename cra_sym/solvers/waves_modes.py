@@ -43,6 +43,11 @@ _PLACES = np.array([1.0, 0.83, 0.57, 0.29])
 _TINY_SHARE = 1e-45
 """Smaller values are the square of the complex step."""
 
+_SMALL_SHARE = 1e-6
+"""Smaller columns may be rounding."""
+
+_ROUNDING = 2.0**-48  # relative, of some operations
+_ROOT_ERROR = 2.0**-42  # relative, of a root of three waves
 _TINY = 1e-100
 _STEP = 1e-30  # of the lowest frequency of half a wave along the length
 
@@ -74,7 +79,7 @@ def wave_states(problem: UniformProblem, z: Floats, share: Floats) -> Floats:
         moved = joined.ravel() + 1j * step
         columns = _columns(structure, k, moved, np.broadcast_to(_PLACES, (row.size, len(_PLACES))))
         conditions = _conditions(structure, k, joined.ravel(), columns.real)
-        null = _null_vectors(np.moveaxis(conditions, -1, 0), place.ravel())
+        null = _null_vectors(conditions, _vanishing(structure, k, joined.ravel(), conditions), place.ravel())
         mass = _mass(problem, row, columns[..., 0], step, null.shape[0] // modes)
         null = _normalised(null.reshape(rows, modes, structure.places), place, mass).reshape(row.size, -1)
         along = _columns(structure, k, moved, 2.0 * share[row] - 1.0).real
@@ -213,19 +218,39 @@ def _conditions(structure: Structure, k: Floats, z: Floats, columns: Floats) -> 
     return np.moveaxis(result, 2, 0)
 
 
-def _null_vectors(matrices: Floats, place: NDArray[np.int64]) -> Floats:
-    """Return the null vectors of the first of some matrices; all of them, (places, roots, 2 n, 2 n), set the scale.
+def _vanishing(structure: Structure, k: Floats, z: Floats, conditions: Floats) -> NDArray[np.bool_]:
+    """Return which columns, shape (roots, places), satisfy the conditions wherever the ends are, but for rounding.
+
+    A uniform motion at its cut-off, for example, has no force anywhere. Rounding is what is left of a small column when
+    root and coefficients change within their errors.
+    """
+    columns = np.abs(conditions).max(axis=(1, 3))
+    largest = columns.max(axis=1, keepdims=True)
+    found = columns <= _TINY_SHARE * largest
+    part = np.flatnonzero((columns <= _SMALL_SHARE * largest).any(axis=1))
+    if part.size:
+        places = np.broadcast_to(_PLACES, (part.size, len(_PLACES)))
+        sign = np.random.default_rng(1).choice([-1.0, 1.0], (len(k), part.size))
+        for side in (-1.0, 1.0):
+            moved = k[:, part] * (1.0 + side * sign * _ROUNDING), z[part] * (1.0 + side * _ROOT_ERROR)
+            other = _conditions(structure, *moved, _columns(structure, *moved, places).real)
+            found[part] |= columns[part] <= np.abs(other - conditions[part]).max(axis=(1, 3))
+    return found
+
+
+def _null_vectors(matrices: Floats, zero: NDArray[np.bool_], place: NDArray[np.int64]) -> Floats:
+    """Return the null vectors of matrices (roots, 2 n, 2 n, places) at the first place; all places set the scale.
 
     The scale is that of all stations, since a column that satisfies the end conditions by itself is rounding at the
-    ends. For equal roots it is the null vector with the root's number among them.
+    ends; those that do so everywhere are ``zero``. For equal roots it is the null vector with the root's number among
+    them.
     """
-    size = np.abs(matrices).max(axis=0)
+    size = np.abs(matrices).max(axis=3)
     columns = size.max(axis=1)
-    zero = columns <= _TINY_SHARE * columns.max(axis=1, keepdims=True)
     scale = np.where(zero, 0.0, 1.0) / np.where(zero, 1.0, columns)
     rows = (size * scale[:, None, :]).max(axis=2)
     rows = np.where(rows > 0.0, rows, 1.0)
-    balanced = matrices[0] * scale[:, None, :] / rows[:, :, None]
+    balanced = matrices[..., 0] * scale[:, None, :] / rows[:, :, None]
     vectors = np.linalg.svd(balanced)[2]
     return vectors[np.arange(len(place)), -1 - place] * np.where(zero, 1.0, scale)
 

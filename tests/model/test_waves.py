@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import scipy.linalg
 import sympy as sp
 
 import cra_sym as cra
@@ -155,3 +156,39 @@ def test_rigid_motions_of_tied_fields_are_exact_zeros():
     )  # fmt: skip
     omega = system.natural_frequencies(4)
     assert (omega[:2] == 0.0).all() and omega[2] > 0.0
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_free_strings_on_foundations_move_in_cosines(number):
+    """Coupled ones too, K u = z M u with T (j pi)^2 added: at j = 0 a section moves without any force along it."""
+    names = [sp.symbols(f"{name}:{number}") for name in ("m", "N", "k")] + [sp.symbols(f"c:{number}")[1:]]
+    fields = [sp.Function(f"v_{i}")(x, t) for i in range(number)]
+    density = sum(
+        m * q.diff(t) ** 2 / 2 - N * q.diff(x) ** 2 / 2 - k * q**2 / 2
+        for m, N, k, q in zip(*names[:3], fields, strict=True)
+    ) - sum(c * (p - q) ** 2 / 2 for c, p, q in zip(names[3], fields, fields[1:], strict=False))
+    model = cra.Model(density, fields=fields, x=x, domain=(0, 1), t=t)
+    rng, places, tried = np.random.default_rng(number), np.linspace(0.0, 1.0, 7), 0
+    while tried < 12:
+        masses, tensions, springs, links = (10 ** rng.uniform(-2, 2, len(part)) for part in names)
+        stiffness = np.diag(springs)
+        for i, link in enumerate(links):
+            stiffness[i : i + 2, i : i + 2] += link * np.array([[1, -1], [-1, 1]])
+        exact = []
+        for j in range(6):
+            z, shape = scipy.linalg.eigh(stiffness + np.diag(tensions * (j * np.pi) ** 2), np.diag(masses))
+            shape = shape * (np.sqrt(2.0) if j else 1.0)
+            exact += [(z[i], np.outer(shape[:, i], np.cos(j * np.pi * places))) for i in range(number)]
+        exact.sort(key=lambda pair: pair[0])
+        z = np.array([pair[0] for pair in exact])
+        if (np.diff(z[:5]) < 1e-2 * z[4]).any():  # close ones turn by the error of the root over their distance
+            continue
+        tried += 1
+        values = np.concatenate([masses, tensions, springs, links])
+        flat = [symbol.name for part in names for symbol in part]
+        system = model.at(dict(zip(flat, values.tolist(), strict=True)))
+        np.testing.assert_allclose(system.natural_frequencies(4) ** 2, z[:4], rtol=1e-11)  # as tests of three waves
+        found = np.stack([cra.mode_shapes(system, places, 4, field=q) for q in fields], axis=1)
+        for ours, (_, shape) in zip(found, exact[:4], strict=True):
+            sign = np.sign((ours * shape).sum())
+            np.testing.assert_allclose(sign * ours, shape, atol=1e-9 * np.abs(shape).max())
