@@ -41,6 +41,8 @@ from importlib import import_module
 from operator import index
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
+import numpy as np
+
 from cra_sym.checks import default_floating_point, shown
 
 if TYPE_CHECKING:
@@ -349,7 +351,7 @@ def equation(number: Number) -> Equation:
     >>> equation(1).kind, equation(5).derived_from
     ('definition', (2, 3, 4, 6, '16c'))
     """
-    if isinstance(number, bool):
+    if isinstance(number, (bool, np.bool_)):
         raise TypeError(f"number = {number}: must be an integer, or a string such as '11a'")
     if not isinstance(number, str):
         try:

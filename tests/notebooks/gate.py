@@ -29,7 +29,8 @@ def requirements(which: str) -> list[str]:
     ranges = project["dependencies"]
     if which == "oldest":
         ranges = [re.sub(r">=([\d.]+)", r"==\1.*", entry, count=1) for entry in ranges]
-    wanted = (line for extra in ("notebooks", "certify", "scale", "explore", "control") for line in extras[extra])
+    names = ("notebooks", "site", "certify", "scale", "explore", "control")
+    wanted = (line for extra in names for line in extras[extra])
     return [*ranges, *wanted, *tools, "-e ."]
 
 

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from importlib import metadata
 from pathlib import Path
 
 import nbformat
@@ -17,6 +18,8 @@ TAUGHT = sorted(path for path in FOLDER.glob("[01]*.ipynb") if not path.stem.sta
 #: Another arm: longer, with a heavier tip and a rotary inertia, on a joint that gives; and another Lagrangian.
 OTHER = 'fields |= {"L": 0.8, "m_e": 0.004, "J_e": 1e-6, "k_t": 5e3, "k_r": 4e2}'
 TENSIONED = OTHER + "; tension = 2.0"
+#: Whether pictures are drawn by the version that drew the stored ones.
+PINNED = f"matplotlib=={metadata.version('matplotlib')}\n" in (FOLDER.parent / "requirements.txt").read_text()
 #: Proofs know no arm: they run where the chapter is compared with its stored outputs.
 PROVED = "from cra_sym.paper.equations import Equation\n\nEquation.check = lambda self: True\n"
 
@@ -96,4 +99,6 @@ def test_a_chapter_follows_its_parameters(path, monkeypatch):
     monkeypatch.setattr(nbformat, "read", with_another_arm)
     before, after = pictures(stored), pictures(execute(path))
     same = [source for (source, a), (_, b) in zip(before, after, strict=True) if a == b]
-    assert same == [source for source, _ in before if ARMLESS.search(source)]
+    armless = [source for source, _ in before if ARMLESS.search(source)]
+    # Another version of Matplotlib draws a picture that shows no arm differently too.
+    assert same == armless if PINNED else set(same) <= set(armless)
