@@ -19,7 +19,7 @@ from cra_sym.codegen.model_time import signals
 from cra_sym.codegen.program import new_name
 from cra_sym.codegen.statement import stated
 from cra_sym.codegen.user_model import model_text
-from cra_sym.kernels.form import Form
+from cra_sym.kernels.form import Program
 from cra_sym.kernels.form_parse import parse
 from cra_sym.model.system import System
 from cra_sym.symbols import row
@@ -115,7 +115,7 @@ def _check(library: Library, written: ModelText, system: System) -> None:
 
 def reasons(library: Library) -> list[str]:
     """Return what each status of the C code means, in words."""
-    whole: Form = parse(library.text)
+    whole: Program = parse(library.text)
     public = whole.used_by([name for name, f in whole.functions.items() if f.public])
     errors = [re.sub(r"(?<!^)(?=[A-Z])", " ", name).lower() for name in public.errors]
     return ["good", "a missing argument", *errors]
