@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from cra_sym.checks import real_array
 from cra_sym.codegen.blocks import Blocks
-from cra_sym.codegen.library import Check
+from cra_sym.model.system import System
 
-__all__ = ["Controller", "controller_checks", "sampled_matrices"]
+__all__ = ["Controller", "controller_checks", "numbers_of", "of_blocks", "sampled_matrices"]
 
 Array = NDArray[np.float64]
 _UNSEEN = "{}: these outputs do not see every mode and the base; add one, such as 'y'"
@@ -36,6 +36,8 @@ class Controller:
         Weights of the squares of outputs in the cost function of the regulator.
     effort : float
         Weight of the square of the input.
+    system : System, optional
+        Values for which the gains of an exported model are computed; of an exported system they are its own.
 
     Raises
     ------
@@ -58,6 +60,7 @@ class Controller:
     disturbance: float
     weights: Mapping[str, float] = field(default_factory=dict)
     effort: float = 1.0
+    system: System | None = None
 
     def __post_init__(self) -> None:
         for name in ("time", "disturbance", "effort"):
@@ -73,22 +76,25 @@ class Controller:
         for output, number in self.weights.items():
             _positive(f"weights[{output!r}]", number)
 
-    def gains(self, blocks: Blocks, names: Sequence[str]) -> tuple[Array, Array]:
+    def gains(self, A: Array, B: Array, C: Array, D: Array, names: Sequence[str]) -> tuple[Array, Array]:
         """Return the regulator's gain, shape (states,), and the observer's, shape (states, measured).
 
-        States are the positions of all blocks, then their rates.
+        Parameters
+        ----------
+        A, B, C, D : ndarray
+            Of the sampled system with one input; its states are all positions, then their rates.
+        names : sequence of str
+            Of the outputs.
 
         Raises
         ------
         ValueError
-            If an output is unknown, or some block is not observable by the weighted or by the measured outputs.
+            If an output is unknown, or some state is not observable by the weighted or by the measured outputs.
         """
         for argument, wanted in (("measured", self.measured), ("weights", self.weights)):
             for name in wanted:
                 if name not in names:
                     raise ValueError(f"{argument}: {name!r} is not one of the outputs {', '.join(names)}")
-        A, B = sampled_matrices(blocks, self.time)
-        C, D = np.hstack([blocks.on_position, blocks.on_rate]), blocks.through[:, None]
         weight = np.diag([float(self.weights.get(name, 0.0)) for name in names])
         cost = D.T @ weight @ D + float(self.effort)
         cross = C.T @ weight @ D
@@ -101,6 +107,28 @@ class Controller:
         _settles("weights", A - B @ regulator)
         _settles("measured", A - A @ observer @ seen)
         return np.asarray(regulator[0]), np.asarray(observer, np.float64)
+
+    def text(self, names: Sequence[str], regulator: Array, observer: Array) -> str:
+        """Return the gains as constants in the restricted form."""
+        measured = [list(names).index(name) for name in self.measured]
+        return (
+            f"CONTROL_TIME = {float(self.time)!r}  # s, sampling time of regulator and observer\n"
+            f"SENSORS = {len(measured)}  # measured outputs: {', '.join(self.measured)}\n"
+            f"SENSOR_OUTPUTS = ({', '.join(map(str, measured))},)  # their numbers among the outputs\n"
+            f"REGULATOR = ({numbers_of(regulator)},)  # gain on all positions, then on all rates\n"
+            f"OBSERVER = ({numbers_of(observer)},)  # gain on the measured outputs, state by state\n\n\n"
+        )
+
+
+def numbers_of(values: Array) -> str:
+    """Return the text of the entries of a row of constants."""
+    return ", ".join(repr(float(x) + 0.0) for x in np.ravel(values))
+
+
+def of_blocks(blocks: Blocks, time: float) -> tuple[Array, Array, Array, Array]:
+    """Return the matrices of a frozen system that is sampled; its states are all positions, then their rates."""
+    C = np.hstack([blocks.on_position, blocks.on_rate])
+    return *sampled_matrices(blocks, time), C, blocks.through[:, None]
 
 
 def sampled_matrices(blocks: Blocks, time: float) -> tuple[Array, Array]:
@@ -116,22 +144,22 @@ def sampled_matrices(blocks: Blocks, time: float) -> tuple[Array, Array]:
 
 
 def controller_checks(
-    controller: Controller, blocks: Blocks, gains: tuple[Array, Array], names: list[str], loss: float
-) -> Iterator[Check]:
-    """Yield the input and the corrected outputs after some steps, computed with the matrices."""
-    A, B = sampled_matrices(blocks, controller.time)
-    C, D = np.hstack([blocks.on_position, blocks.on_rate]), blocks.through
+    controller: Controller, matrices: tuple[Array, Array, Array, Array], gains: tuple[Array, Array], names: list[str]
+) -> Iterator[tuple[tuple[float, ...], tuple[float, ...], float]]:
+    """Yield input, steps, feedforward and error of the measurements, then what follows from the matrices, and its size.
+
+    What follows is the input of the regulator, and the corrected outputs.
+    """
+    A, B, C, D = matrices
     regulator, observer = gains
     measured = [names.index(name) for name in controller.measured]
     x = np.zeros(len(A))
     for steps in range(9):
-        error = 1e-3 * (1.0 + np.arange(len(measured))) - (C @ x + D * 0.25)[measured]
-        y = C @ (x + observer @ error) + D * 0.25
-        expected = (float(0.125 - regulator @ x), *y)
+        error = 1e-3 * (1.0 + np.arange(len(measured))) - (C @ x + D[:, 0] * 0.25)[measured]
+        y = C @ (x + observer @ error) + D[:, 0] * 0.25
         sizes = np.abs(regulator) @ np.abs(x), *(np.abs(C) @ (np.abs(x) + np.abs(observer) @ np.abs(error)))
-        yield Check(4, (0.25, float(steps), 0.125, 1e-3), expected, loss, 10 * loss * float(max(sizes)))
+        yield (0.25, float(steps), 0.125, 1e-3), (float(0.125 - regulator @ x), *y), float(max(sizes))
         x = A @ x + B[:, 0] * 0.25
-    yield Check(4, (0.25, 1.0, 0.125, np.nan), (), refused=True)
 
 
 def _riccati(name: str, A: Array, B: Array, Q: Array, R: Array, S: Array | None) -> Array:

@@ -18,7 +18,7 @@ from cra_sym.codegen.frozen import frozen_library
 from cra_sym.codegen.frozen_slipping import slipping_library
 from cra_sym.codegen.library import PRINTERS, check_name
 from cra_sym.codegen.rendering import DIGEST, licence
-from cra_sym.codegen.user_model import KEPT, model_library
+from cra_sym.codegen.user_model import model_library
 from cra_sym.files import OutputError, path_of, staged_directory
 from cra_sym.model.lagrangian import Model
 from cra_sym.model.system import MOST_MODES, System
@@ -106,7 +106,7 @@ def export(
         `cra_arm`, in C and Fortran `cra`, so that its types are called `cra_arm`, `cra_mode`, ..; `model`; `system`.
     modes : int, optional
         Modes of the system that are kept, by default 3; of a model the largest number that it is stepped with, by
-        default 16.
+        default 16, with a controller 3.
     real : {'float64', 'float32'}
         Type of real numbers in the code. Single precision is available for C, Fortran and Rust, without elastic-slip
         elements; the README states its accuracy.
@@ -117,7 +117,7 @@ def export(
         Default input: 'base_acceleration', of a model its only prescribed motion or force; without one it is not
         stepped. Default outputs: y, v, w, root_force, root_moment and tip_acceleration, if the system has them.
     controller : Controller, optional
-        Of a system: a regulator and an observer are exported too, with gains computed at export.
+        Of a system or a model: a regulator and an observer are exported too, with gains computed at export.
 
     Returns
     -------
@@ -156,7 +156,7 @@ def export(
         if language == "fmu":
             raise ValueError("controller: is exported as source code; an FMU has none")
     for argument, given in zip(_OF_TIME, (modes, input, outputs, controller), strict=True):
-        if system is None and given is not None and (model is None or argument == "controller"):
+        if system is None and given is not None and model is None:
             raise ValueError(f"{argument}: is that of a system or a model; give system= or model=")
     if language != "fmu" and version != VERSIONS[0]:
         raise ValueError(f"version = {version!r}: is that of FMI; give language='fmu'")
@@ -170,8 +170,7 @@ def export(
         kept = 3 if modes is None else modes
         texts = _system_texts(language, system, name or "system", kept, real, version, drive, outputs, controller)
     elif model is not None:
-        kept = KEPT if modes is None else modes
-        texts = dict(model_library(model, name or "model", real, kept, input, outputs).texts(language))
+        texts = dict(model_library(model, name or "model", real, modes, input, outputs, controller).texts(language))
     else:
         texts = dict(_arm_texts(language, name or ("cra" if language in ("c", "fortran") else "cra_arm"), real))
     if language != "fmu":

@@ -13,18 +13,19 @@ from numpy.typing import NDArray
 from cra_sym.analysis.eigenvalues import oscillating_frequencies
 from cra_sym.analysis.state_space import state_space
 from cra_sym.codegen.blocks import Blocks, blocks_of
-from cra_sym.codegen.controllers import Controller, controller_checks
+from cra_sym.codegen.controllers import Controller, controller_checks, numbers_of, of_blocks
 from cra_sym.codegen.library import Check, Library, source
 from cra_sym.codegen.model_time import OUTPUTS
 from cra_sym.codegen.operations import operations
 from cra_sym.codegen.statement import stated
+from cra_sym.codegen.unused import marked
 from cra_sym.kernels.form_parse import parse
 from cra_sym.model.system import System
 from cra_sym.solvers.linear_system import LinearSystem
 
 __all__ = [
     "common_checks", "default_outputs", "exported_state_space", "frozen_library", "frozen_system",
-    "numbers_of", "stepped",
+    "stepped",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -99,25 +100,19 @@ def frozen_library(
     checks = [*_checks(blocks, real), *common_checks(omega, real)]
     parts = [source(part) for part in ("sampling", "shaping", "frozen", "frozen_check", "frozen_example")]
     if controller is not None:
-        gains = controller.gains(blocks, names)
-        text += _gains(controller, names, *gains)
-        parts[3:4] = [source("controller"), parts[3].rstrip("\n") + "\n    " + source("controller_check")]
-        checks += controller_checks(controller, blocks, gains, list(names), _ERRORS[real])
+        matrices = of_blocks(blocks, controller.time)
+        gains, loss = controller.gains(*matrices, names), _ERRORS[real]
+        text += controller.text(names, *gains)
+        parts[3:4] = [
+            marked(source("controller"), {"FROZEN"}),
+            parts[3].rstrip("\n") + "\n    " + source("controller_check"),
+        ]
+        for pushed, found, size in controller_checks(controller, matrices, gains, list(names)):
+            checks.append(Check(4, pushed, found, loss, 10 * loss * size))
+        checks.append(Check(4, (0.25, 1.0, 0.125, math.nan), (), refused=True))
     text += "\n\n".join(parts)
     summary = "A flexible system frozen as numbers, to be stepped in real time"
     return Library(name, summary, text, lines, tuple(checks), _readme(given, names, text), real), given, names
-
-
-def _gains(controller: Controller, names: Sequence[str], regulator: Array, observer: Array) -> str:
-    """Return the numbers of a controller as a text in the restricted form."""
-    measured = [list(names).index(name) for name in controller.measured]
-    return (
-        f"CONTROL_TIME = {float(controller.time)!r}  # s, sampling time of regulator and observer\n"
-        f"SENSORS = {len(measured)}  # measured outputs: {', '.join(controller.measured)}\n"
-        f"SENSOR_OUTPUTS = ({', '.join(map(str, measured))},)  # their numbers among the outputs\n"
-        f"REGULATOR = ({numbers_of(regulator)},)  # gain on all positions, then on all rates\n"
-        f"OBSERVER = ({numbers_of(observer)},)  # gain on the measured outputs, state by state\n\n\n"
-    )
 
 
 def _readme(given: str, names: Sequence[str], text: str) -> str:
@@ -150,11 +145,6 @@ def constants(blocks: Blocks, names: Sequence[str], omega: Array) -> str:
     return "\n".join(
         [*scalars, *(f"{n} = ({numbers_of(v)},)  # {comment}" for n, (v, comment) in rows.items()), "", ""]
     )
-
-
-def numbers_of(values: Array) -> str:
-    """Return the text of the entries of a row of constants."""
-    return ", ".join(repr(float(x) + 0.0) for x in np.ravel(values))
 
 
 def common_checks(omegas: Array, real: str) -> Iterator[Check]:

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from cra_sym.analysis.slipping import linear_beside
 from cra_sym.analysis.state_space import state_space
-from cra_sym.codegen.frozen import common_checks, default_outputs, exported_state_space, numbers_of
+from cra_sym.codegen.controllers import numbers_of
+from cra_sym.codegen.frozen import common_checks, default_outputs, exported_state_space
 from cra_sym.codegen.library import Check, Library, source
 from cra_sym.codegen.operations import operations
 from cra_sym.codegen.statement import stated

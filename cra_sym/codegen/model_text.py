@@ -25,7 +25,7 @@ __all__ = ["ModelText"]
 
 _SOURCES = (
     "model", "model_modes", "model_participation", "model_drives", "model_check", "in_time", "in_time_held",
-    "in_time_free", "sampling", "shaping",
+    "in_time_free", "sampling", "shaping", "controller",
 )  # fmt: skip
 _WRITTEN = {
     "prepare",
@@ -39,6 +39,11 @@ _WRITTEN = {
     "factors_of",
     "put_motions",
     "put_gains",
+    "control_time",
+    "sensors",
+    "sensor_outputs",
+    "regulator",
+    "observer",
 }
 
 

@@ -7,8 +7,10 @@ from functools import lru_cache
 from typing import Any
 
 from cra_sym.checks import instance
+from cra_sym.codegen.controllers import Controller
 from cra_sym.codegen.library import Library, source
 from cra_sym.codegen.model_checks import model_checks, sample, tested
+from cra_sym.codegen.model_controller import ModelController
 from cra_sym.codegen.model_text import ModelText
 from cra_sym.codegen.model_time import Signals, signals
 from cra_sym.codegen.operations import operations
@@ -26,7 +28,13 @@ _INSTEAD = "give system= with the model at its values, whose modes are exported 
 
 
 def model_library(
-    model: Model, name: str, real: str = "float64", modes: int = KEPT, drive: Any = None, outputs: Any = None
+    model: Model,
+    name: str,
+    real: str = "float64",
+    modes: int | None = None,
+    drive: Any = None,
+    outputs: Any = None,
+    controller: Controller | None = None,
 ) -> Library:
     """Return a model as a library.
 
@@ -34,11 +42,13 @@ def model_library(
     ----------
     model : Model
     name, real : str
-    modes : int
-        Largest number in time.
+    modes : int, optional
+        Largest number in time, by default 16; with a controller their number, by default 3.
     drive, outputs
         In time, as :func:`cra_sym.state_space` takes them. Default: the only prescribed motion or force, and the usual
         outputs; without one there are no functions of time.
+    controller : Controller, optional
+        In time; its system has the values for which gains are computed.
 
     Raises
     ------
@@ -49,9 +59,12 @@ def model_library(
         says why.
     """
     instance("model", model, Model)
-    if drive is None and outputs is None:
+    if modes is None:
+        modes = KEPT if controller is None else 3
+    if drive is None and outputs is None and controller is None:
         return _usual(model, name, real, modes)
-    return _library(model_text(model, real, signals(model, drive, outputs, modes)), name)
+    written = model_text(model, real, signals(model, drive, outputs, modes))
+    return _library(written, name, None if controller is None else ModelController(written, controller))
 
 
 @lru_cache(maxsize=8)
@@ -91,7 +104,7 @@ def _form(model: Model) -> WavesForm:
     return found
 
 
-def _library(written: ModelText, name: str) -> Library:
+def _library(written: ModelText, name: str, loop: ModelController | None = None) -> Library:
     model = written.model
     fields = list(written.names.values())
     lines = ["def _given_parameters(given: Row[float, 64], parameters: Out[Parameters]) -> None:"]
@@ -99,17 +112,20 @@ def _library(written: ModelText, name: str) -> Library:
     driven = source("model_check_drives") if written.drives else ""
     timed = source("in_time_check").replace("TESTED", str(tested(written))) if written.in_time else ""
     check = marked(source("model_check").replace("# GIVEN", "\n".join(lines)), written.parts)
-    check = check.replace("# DRIVEN", "\n".join([driven.strip(), " " * 8 + timed.strip()]).strip())
+    looped = source("in_time_controller_check") if loop else ""
+    of_drives = "\n".join(" " * 8 + part.strip() for part in (driven, timed, looped) if part)
+    check = check.replace("# DRIVEN", of_drives.strip())
     values = sample(written)
     shown = "\n".join(
         f"    parameters.{field} = {float(value)!r}" for field, value in zip(fields, values, strict=True)
     ).replace("inf", "HUGE * 2.0")
     text = "\n\n\n".join(
-        part.strip("\n") for part in (written.text(), check, _EXAMPLE.replace("# VALUES", shown.strip()))
+        part.strip("\n")
+        for part in (written.text(), loop.text if loop else "", check, _EXAMPLE.replace("# VALUES", shown.strip()))
     )
     unknowns = [*(f"{name}(x, t)" for name in written.fields), *(f"{name}(t)" for name in written.coordinates)]
     summary = f"Frequencies, modes, sensitivities and responses of a model of {', '.join(unknowns)}".replace("\\", "")
-    checks = tuple(model_checks(written, values))
+    checks = (*model_checks(written, values), *(loop.checks() if loop else ()))
     return Library(name, summary, text + "\n", stated(model), checks, _readme(written, text), written.real)
 
 

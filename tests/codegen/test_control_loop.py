@@ -5,15 +5,22 @@ from __future__ import annotations
 import shutil
 import subprocess
 from dataclasses import replace
+from functools import cache
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 import cra_sym as cra
-from cra_sym.codegen.controllers import sampled_matrices
+from cra_sym.codegen import user_model
+from cra_sym.codegen.controllers import of_blocks, sampled_matrices
 from cra_sym.codegen.frozen import frozen_library, frozen_system
 from cra_sym.codegen.operations import operations
+from cra_sym.codegen.user_model import model_library
 from cra_sym.kernels.form_parse import parse
+from tests import systems
+from tests.codegen import kit
+from tests.codegen.test_user_model import executed
 
 ARM = cra.Arm.nominal().replace(k_t=1e4, k_r=1e3, m_e=0.05, J_e=1e-4, zeta=0.002)
 OUTPUTS = ["w", "root_moment", "v", "y"]
@@ -66,7 +73,7 @@ def in_matrices(feedback: bool) -> np.ndarray:
     """The same loop by matrix exponentials, shape (steps, 2): w and v."""
     model, names, _ = frozen_system(ARM, 3, "base_acceleration", OUTPUTS)
     plant = frozen_system(ARM.replace(m_e=0.06), 6, "base_acceleration", OUTPUTS)[0]
-    regulator, observer = CONTROLLER.gains(model, names)
+    regulator, observer = CONTROLLER.gains(*of_blocks(model, 1e-3), names)
     (A, B), (Ap, Bp) = (sampled_matrices(blocks, 1e-3) for blocks in (model, plant))
     C, Cp = (np.hstack([blocks.on_position, blocks.on_rate]) for blocks in (model, plant))
     estimate, wanted, x = np.zeros(len(A)), np.zeros(len(A)), np.zeros(len(Ap))
@@ -108,7 +115,7 @@ def test_a_loop_of_exported_c_alone_damps_the_tip(tmp_path):
 
 def test_gains_make_the_loop_stable_and_optimal():
     blocks, names, _ = frozen_system(ARM, 3, "base_acceleration", OUTPUTS)
-    regulator, observer = CONTROLLER.gains(blocks, names)
+    regulator, observer = CONTROLLER.gains(*of_blocks(blocks, 1e-3), names)
     A, B = sampled_matrices(blocks, 1e-3)
     C = np.hstack([blocks.on_position, blocks.on_rate])
     assert np.abs(np.linalg.eigvals(A - B @ regulator[None])).max() < 1.0
@@ -126,6 +133,62 @@ def test_gains_make_the_loop_stable_and_optimal():
     best = cost(regulator)
     for change in (0.97, 1.03):
         assert cost(regulator * change) > best
+
+
+@cache
+def of_a_model():
+    """The arm as a model with parameters, gains for ARM."""
+    controller = replace(CONTROLLER, system=ARM, noise=[1e-5, 1e-3])
+    with patch.object(user_model, "model_checks", lambda written, values: ()):
+        return model_library(ARM.model, "axis", outputs=OUTPUTS, controller=controller)
+
+
+@pytest.mark.parametrize("language", ["c", "rust", "javascript"])
+def test_a_model_has_regulator_and_observer(language, tmp_path):
+    """At the values of the gains and beside them, as in matrices of the state space."""
+    kit.needs(language)
+    assert len(of_a_model().checks) == 19
+    kit.passes(of_a_model(), language, tmp_path)
+    if language == "rust" and shutil.which("cargo-clippy"):
+        kit.run(["cargo", "clippy", "--offline", "--quiet", "--tests", "--", "-D", "warnings"], tmp_path)
+
+
+def test_the_error_of_the_observer_of_a_model_decays_as_designed():
+    """From a wrong estimate, under any input: by the power of A (1 - K C), of state space and Riccati equation."""
+    names = executed(of_a_model())
+    parameters = names["Parameters"](*(float(ARM.values[symbol.name]) for symbol in ARM.model.symbols))
+    plant = names["plant_of"](parameters, 3, names["modes_of"](parameters, 3), float(ARM.zeta))
+    sampled, true, estimate = names["discretise"](plant, 1e-3), names["rest"](), names["rest"]()
+    true.position[:3], true.rate[2] = [0.01, 1e-3, -1e-3], 0.05
+    error = np.array([*true.position, *true.rate])
+    for k in range(400):
+        u = [np.sin(0.02 * k)]
+        y = names["outputs"](plant, true, u)
+        names["correct"](plant, [y[0], y[1]], u, estimate)
+        for state in (true, estimate):
+            names["step"](plant, sampled, u, state)
+    held = cra.state_space(ARM, 3, "base_acceleration", OUTPUTS).discrete(1e-3)
+    observer = replace(CONTROLLER, noise=[1e-5, 1e-3]).gains(held.A, held.B, held.C, held.D, OUTPUTS)[1]
+    expected = np.linalg.matrix_power(held.A - held.A @ observer @ held.C[:2], 400) @ error
+    found = np.array([*true.position, *true.rate]) - [*estimate.position, *estimate.rate]
+    np.testing.assert_allclose(found, expected, atol=1e-10)  # of states of up to 20, in 400 steps
+    plant.modes = 2
+    with pytest.raises(ValueError, match="plant: must have as many modes"):
+        names["correct"](plant, [0.0, 0.0], [0.0], estimate)
+
+
+def test_a_model_needs_values_for_its_gains(tmp_path):
+    for given, message in (
+        ({"controller": CONTROLLER}, "controller: must have system="),
+        ({"controller": replace(CONTROLLER, system=systems.system("string"))}, "must be one of the model"),
+        (
+            {"controller": replace(CONTROLLER, system=ARM), "input": ["drive_force", "v"]},
+            "must have one input, it has 2",
+        ),
+    ):
+        with pytest.raises(ValueError, match=message):
+            cra.export("c", tmp_path / "out", model=ARM.model, outputs=OUTPUTS, **given)
+    assert not list(tmp_path.iterdir())
 
 
 def test_what_is_refused(tmp_path):
