@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.analysis.eigenvalues import oscillating_frequencies
 from cra_sym.checks import ByValue, count, default_floating_point, instance
 from cra_sym.extras import require
 from cra_sym.model.exact import BallProblem
@@ -50,7 +51,8 @@ def certify(system: System, modes: int = 3) -> Certificate:
 
     The number of frequencies below a point is that of the negative eigenvalues of its dynamic stiffness, and of the
     parts that are eliminated on the way, each proved in ball arithmetic. Two such numbers for each frequency prove its
-    enclosure and the completeness of the set.
+    enclosure and the completeness of the set. With gyroscopic terms and a potential energy that is positive definite,
+    the frequencies are those of the complex modes, which neither grow nor decay.
 
     Parameters
     ----------
@@ -68,7 +70,8 @@ def certify(system: System, modes: int = 3) -> Certificate:
     ------
     TypeError, ValueError
         If ``system`` is not a :class:`System`, ``modes`` not an integer from 1 to 1000, or the coefficients of the
-        model vary along x or its forces are not conservative.
+        model vary along x or its forces are not conservative; with gyroscopic terms also if there are dampers, or the
+        potential energy is not positive definite.
     MissingExtraError
         If python-flint is not installed (extra ``certify``).
 
@@ -86,7 +89,7 @@ def certify(system: System, modes: int = 3) -> Certificate:
     flint = require("flint", "certify")
     problem: BallProblem = system.numerics("ball_problem")
     held: dict[str, EndParameter] = system.numerics("stiffnesses")
-    guesses = system.natural_frequencies(modes) / (2 * math.pi)
+    guesses = oscillating_frequencies(system, modes) / (2 * math.pi)
     values = np.broadcast_arrays(*system.parameters, np.empty(system.shape))[:-1]
     names = tuple(system.values)
     order = system.numerics("names")
@@ -96,6 +99,11 @@ def certify(system: System, modes: int = 3) -> Certificate:
     for index in np.ndindex(system.shape):
         given = dict(zip(order, (float(value[index]) for value in values), strict=True))
         counted = _counted(flint, problem, held, given)
+        if problem.gyroscopic and (counted.zeros or counted.count(flint.arb(0))):
+            raise ValueError(
+                "system: its potential energy is not positive definite (it buckles, or moves as a rigid body), and "
+                "motions with gyroscopic terms are then not counted; use eigenvalues and count_eigenvalues"
+            )
         try:
             ends = enclose(flint, counted, guesses[index])
         except UndecidedError:
@@ -138,7 +146,7 @@ def _counted(
         entries = evaluated(problem.energy)
         gaps = [tuple(problem.orders[f] - o for f, o in zip(*jet, strict=True)) for jet in problem.jets]
         return [
-            EnergyTerm(fields, (gap[0], gap[1]), entries[2 * k], entries[2 * k + 1])
+            EnergyTerm(fields, (gap[0], gap[1]), *entries[3 * k : 3 * k + 3])
             for k, ((fields, _), gap) in enumerate(zip(problem.jets, gaps, strict=True))
         ]
 
@@ -156,6 +164,7 @@ def _counted(
         lambda: columns(flint.ctx.prec),
         terms,
         _rigid_motions(problem, exact, size, fixed),
+        problem.gyroscopic,
     )
 
 
@@ -191,7 +200,7 @@ def _rigid_motions(problem: BallProblem, values: Sequence[float], size: int, fix
         for first, power in jet(p, i):
             for second, other in jet(q, j):
                 degree = power + other + 1
-                energy[first][second] += Fraction(entries[2 * k]) * length**degree / degree
+                energy[first][second] += Fraction(entries[3 * k]) * length**degree / degree
     ends = [[Fraction(0)] * unknowns for _ in range(size)]  # displacements of the left end, w, of the right end
     place = 0
     for field, order in enumerate(problem.orders):

@@ -30,7 +30,7 @@ from cra_sym.model.pencil_route import pencil_route as pencil
 from cra_sym.model.projection import BilinearForm, EndParameter
 from cra_sym.model.routes import GeneralRoute, Route
 from cra_sym.model.spatial import SpatialProblem, spatial_problem
-from cra_sym.model.symmetry import asymmetry
+from cra_sym.model.symmetry import asymmetry, is_gyroscopic
 from cra_sym.model.waves import waves_route
 
 __all__ = [
@@ -273,22 +273,28 @@ def ball_problem(model: Model) -> BallProblem:
     Raises
     ------
     ValueError
-        If a coefficient varies along x, or is not a rational function of the parameters.
+        If a coefficient varies along x, or is not a rational function of the parameters; if forces are not
+        conservative, dampers beside gyroscopic terms included.
     """
-    form = model.conservative
+    turning = model.numerics("conservative_part") is not None
+    if turning and not is_gyroscopic(model.linearised):
+        raise ValueError(
+            "system: certification needs conservative forces, and with gyroscopic terms leaves out no dampers; use "
+            "eigenvalues and count_eigenvalues, or system.conservative_part"
+        )
+    form = model.state_form if turning else model.conservative
     if not form.uniform:
         raise ValueError(
             "system: certification needs coefficients that are constant along x, without terms inside; "
             "natural_frequencies with system.accuracy estimates the error, system.check() compares two routes"
         )
     weak = weak_form(model.linearised.variation)
-    kinds = {"stiffness": 0, "mass": 2}
-    parts = {kind: (_power(weak.inside, power), _power(weak.ends, power)) for kind, power in kinds.items()}
-    pairs = [pair for pair in dict.fromkeys(p for inside, _ in parts.values() for p in inside)]
+    powers = (0, 1, 2) if turning else (0, 2)
+    pairs = [pair for pair, entry in weak.inside.items() if not entry.keys().isdisjoint(powers)]
     _, highest, _ = weak.fields()
     orders = {jet.unknown: jet.space for jet in highest}
     fields = [pair for pair in pairs if all(jet.unknown in orders for jet in pair)]
-    entries = [parts[kind][0].get(pair, {}).get(power, S.Zero) for pair in fields for kind, power in kinds.items()]
+    entries = [weak.inside[p].get(power, S.Zero) if power in powers else S.Zero for p in fields for power in range(3)]
     left, right = model.equations.domain
     z = form.parameter
     for entry in (*form.system, *form.boundary, *form.free, *entries, right - left):
@@ -308,4 +314,5 @@ def ball_problem(model: Model) -> BallProblem:
         exact_kernel([right - left, left], model.symbols),
         exact_kernel(list(form.free), model.symbols),
         exact_kernel(entries, model.symbols),
+        turning,
     )

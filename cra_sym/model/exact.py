@@ -59,7 +59,7 @@ def _fraction(number: Any) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class BallProblem:
-    """A uniform conservative spatial problem, as functions in exact arithmetic.
+    """A uniform conservative spatial problem, gyroscopic terms included, as functions in exact arithmetic.
 
     Attributes
     ----------
@@ -70,11 +70,12 @@ class BallProblem:
     orders : tuple of int
         Highest order of each field.
     system, boundary : ExactKernel
-        Of (z, parameters): the entries of A and B, row by row.
+        Of (z, parameters), with gyroscopic terms of (s, parameters): the entries of A and B, row by row.
     geometry, free : ExactKernel
         Of the parameters: length and left end; the entries of the matrix of free motions.
     energy : ExactKernel
-        Of the parameters: stiffness and mass of each term.
+        Of the parameters: stiffness, coefficient of the velocity and mass of each term.
+    gyroscopic : bool
     """
 
     displacements: int
@@ -86,3 +87,4 @@ class BallProblem:
     geometry: ExactKernel
     free: ExactKernel
     energy: ExactKernel
+    gyroscopic: bool

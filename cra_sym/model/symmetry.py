@@ -9,8 +9,10 @@ from sympy import Add, Derivative, Expr, Poly, Rational, S, Symbol, lambdify
 
 from cra_sym.mechanics import StateForm
 from cra_sym.mechanics.breakpoints import switches
+from cra_sym.mechanics.hamilton import HamiltonResult
+from cra_sym.mechanics.weak import weak_form
 
-__all__ = ["asymmetry", "odd_in_time", "vanishes"]
+__all__ = ["asymmetry", "is_gyroscopic", "odd_in_time", "vanishes"]
 
 
 def odd_in_time(term: Expr, t: Symbol) -> bool:
@@ -69,3 +71,16 @@ def asymmetry(form: StateForm) -> str:
     if all(vanishes(entry, form.x) for left, right in pairs for entry in left - right):
         return ""
     return "the virtual work has forces that follow the motion"
+
+
+def is_gyroscopic(equations: HamiltonResult) -> bool:
+    """Tell whether forces of first order in time do no work and all others have a potential."""
+    weak = weak_form(equations.variation)
+    for form in (weak.inside, weak.discrete):
+        for (p, q), entry in form.items():
+            other = form.get((q, p), {})
+            for power in {*entry, *other}:
+                sign = -1 if power == 1 else 1
+                if not vanishes(entry.get(power, S.Zero) - sign * other.get(power, S.Zero), weak.variation.space.x):
+                    return False
+    return True

@@ -26,13 +26,14 @@ class EnergyTerm(NamedTuple):
     fields : (int, int)
     gaps : (int, int)
         Orders by which p and q lie below the highest derivative of their field.
-    stiffness, mass : arb
-        ``value = stiffness - omega^2 mass``.
+    stiffness, gyroscopic, mass : arb
+        ``value = stiffness + i omega gyroscopic - omega^2 mass``.
     """
 
     fields: tuple[int, int]
     gaps: tuple[int, int]
     stiffness: Any
+    gyroscopic: Any
     mass: Any
 
 
@@ -40,11 +41,16 @@ class EnergyTerm(NamedTuple):
 class BallStiffness:
     """A uniform conservative problem ``y' = A y``, ``y = (q, w, P, r)``, in ball arithmetic.
 
+    With gyroscopic terms the dynamic stiffness is a Hermitian matrix. At a frequency omega > 0 of a motion with the
+    potential energy k/2 > 0 and the mass m the form of that motion falls at the rate ``k / omega + omega m``: where the
+    potential energy is positive definite, negative eigenvalues count the frequencies as they do without these terms
+    (Wittrick and Williams, 1982).
+
     Parameters
     ----------
     flint : module
     system, boundary : callable
-        Matrices A and B at z = omega^2 (arb), as rows.
+        Matrices A and B at z = omega^2 (arb), with gyroscopic terms at s = i omega (acb), as rows.
     length : callable
         Returns the length (arb).
     displacements, coordinates : int
@@ -55,6 +61,7 @@ class BallStiffness:
         Returns the terms of the energy density.
     zeros : int
         Number of rigid-body motions.
+    gyroscopic : bool
     """
 
     flint: Any
@@ -66,37 +73,44 @@ class BallStiffness:
     free: Callable[[], Sequence[Sequence[Any]]]
     terms: Callable[[], Sequence[EnergyTerm]]
     zeros: int
+    gyroscopic: bool = False
 
     def count(self, point: Any) -> int:
         """Return the proved number of natural frequencies below a frequency in Hz (exact arb)."""
-        return decided(self.flint, lambda: self._count((2 * self.flint.arb.pi() * point) ** 2))
+        return decided(self.flint, lambda: self._count(2 * self.flint.arb.pi() * point))
 
-    def _count(self, z: Any) -> int:
-        arb_mat, n, m = self.flint.arb_mat, self.displacements, self.coordinates
+    @property
+    def _matrix(self) -> Any:
+        return self.flint.acb_mat if self.gyroscopic else self.flint.arb_mat
+
+    def _count(self, omega: Any) -> int:
+        of, n, m = self._matrix, self.displacements, self.coordinates
+        z = self.flint.acb(0, omega) if self.gyroscopic else omega**2
         length = self.length()
-        levels = self._levels(z, length)
+        levels = self._levels(omega, length)
         step = length / 2**levels
-        matrix = arb_mat([[entry * step for entry in row] for row in self.system(z)]).exp()
+        matrix = of([[entry * step for entry in row] for row in self.system(z)]).exp()
         stiffness = self._piece(matrix)
         fixed = 0
         for _ in range(levels):
             stiffness, eliminated = self._joined(stiffness)
             fixed = 2 * fixed + eliminated
-        total = stiffness + arb_mat([list(row) for row in self.boundary(z)])
+        total = stiffness + of([list(row) for row in self.boundary(z)])
         columns = self.free()
         if not columns:
             return fixed
-        basis = arb_mat([[column[i] for column in columns] for i in range(2 * n + m)])
+        basis = of([[column[i] for column in columns] for i in range(2 * n + m)])
         return fixed + negatives((basis.transpose() * total * basis).table())
 
-    def _levels(self, z: Any, length: Any) -> int:
-        """Return the number of halvings for which no piece with clamped ends has a natural frequency below z.
+    def _levels(self, omega: Any, length: Any) -> int:
+        """Return the number of halvings for which no piece with clamped ends has a natural frequency below omega.
 
         Functions that vanish at both ends of a piece of length h, with all derivatives but the highest, obey
         |p| <= (h / pi)^gap |highest derivative| in the norm of square integrals (Poincare's inequality), so the energy
         is positive where the highest derivatives outweigh all other terms.
         """
-        terms = [(t.fields, t.gaps, t.stiffness - z * t.mass) for t in self.terms()]
+        terms = [(t.fields, t.gaps, t.stiffness - omega**2 * t.mass) for t in self.terms()]
+        terms += [(t.fields, t.gaps, -abs(omega * t.gyroscopic)) for t in self.terms() if t.gyroscopic != 0]
         own = {f[0]: value for f, gaps, value in terms if gaps == (0, 0) and f[0] == f[1]}
         if not all(value > 0 for value in own.values()):
             raise UndecidedError("the stiffness of a highest derivative is not positive")
@@ -119,11 +133,11 @@ class BallStiffness:
         size = n + m
 
         def block(rows: range, columns: range) -> Any:
-            return self.flint.arb_mat([[transfer[i, j] for j in columns] for i in rows])
+            return self._matrix([[transfer[i, j] for j in columns] for i in rows])
 
         q, force, lumped = range(n), range(size, size + n), range(size + n, 2 * size)
         flexible = block(q, force).inv()
-        identity = self.flint.arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+        identity = self._matrix(n, n, [int(i == j) for i in range(n) for j in range(n)])
         start = -1 * (flexible * block(q, range(size)))  # P(0) = start (q(0), w) + flexible q(h)
         rows: list[list[Any]] = [[None] * (2 * n + m) for _ in range(2 * n + m)]
 
@@ -139,7 +153,7 @@ class BallStiffness:
         for target, source in ends:
             by_force = block(source, force)
             put(target, block(source, range(size)) + by_force * start, by_force * flexible)
-        return self.flint.arb_mat(rows)
+        return self._matrix(rows)
 
     def _joined(self, matrix: Any) -> tuple[Any, int]:
         """Return the stiffness of two like pieces, their common section eliminated, and its negative eigenvalues."""
@@ -152,7 +166,10 @@ class BallStiffness:
             for i, row in enumerate(places):
                 for j, column in enumerate(places):
                     total[row][column] = total[row][column] + matrix[i, j]
-        middle = self.flint.arb_mat([row[size:] for row in total[size:]])
-        across = self.flint.arb_mat([row[:size] for row in total[size:]])
-        outer = self.flint.arb_mat([row[:size] for row in total[:size]])
-        return outer - across.transpose() * middle.solve(across), negatives(middle.table())
+        middle = self._matrix([row[size:] for row in total[size:]])
+        across, back = (
+            self._matrix([row[:size] for row in total[size:]]),
+            self._matrix([row[size:] for row in total[:size]]),
+        )
+        outer = self._matrix([row[:size] for row in total[:size]])
+        return outer - back * middle.solve(across), negatives(middle.table())

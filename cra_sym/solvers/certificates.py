@@ -73,7 +73,7 @@ def decided(flint: Any, attempt: Callable[[], Result]) -> Result:
 
 
 def negatives(matrix: Sequence[Sequence[Any]]) -> int:
-    """Return the proved number of negative eigenvalues of a symmetric matrix of balls, by Sylvester's law of inertia.
+    """Return the proved number of negative eigenvalues of a symmetric or Hermitian matrix of balls, by Sylvester's law.
 
     Raises
     ------
@@ -84,8 +84,9 @@ def negatives(matrix: Sequence[Sequence[Any]]) -> int:
     number = 0
     while rows:
         size = len(rows)
-        k = max(range(size), key=lambda i: abs(float(rows[i][i].mid())))
-        pivot = rows[k][k]
+        diagonal = [rows[i][i].real for i in range(size)]
+        k = max(range(size), key=lambda i: abs(float(diagonal[i].mid())))
+        pivot = diagonal[k]
         if pivot < 0:
             number += 1
         elif not pivot > 0:

@@ -227,3 +227,50 @@ def test_coefficients_that_are_not_rational_are_refused_by_name(factor):
     made = cra.Model(energy, fields=[rod], x=x, domain=(0, 1), t=t, right=-k * factor(a) * rod**2 / 2)
     with pytest.raises(ValueError, match=r"system: the coefficients contain .*; put a parameter in place of"):
         cra.certify(made.at({k: 1.0, a: 0.3}), 1)
+
+
+GYROSCOPIC = {"x": x, "domain": (0, L), "t": t}
+
+
+def test_a_moving_string_is_certified():
+    """Between two eyes: n (w^2 - U^2) / (2 l w), w the speed of waves, in 40 digits."""
+    m, T, U = sp.symbols("m T U")
+    moving = m * (v.diff(t) + U * v.diff(x)) ** 2 / 2 - T * v.diff(x) ** 2 / 2
+    string = cra.Model(moving, fields=[v], essential=[v.subs(x, 0), v.subs(x, L)], **GYROSCOPIC)
+    proof = cra.certify(string.at({"m": 0.3, "T": 20.0, "U": [0.0, 3.0, 8.0], "L": 1.2}), 4)
+    assert proof.complete.all()
+    with mp.workdps(40):
+        wave = mp.sqrt(mp.mpf(20.0) / mp.mpf(0.3))
+        for low, high, speed in zip(proof.lower, proof.upper, (0.0, 3.0, 8.0), strict=True):
+            for n in range(4):
+                exact = (n + 1) * (wave**2 - mp.mpf(speed) ** 2) / (2 * mp.mpf(1.2) * wave)
+                assert mp.mpf(low[n]) <= exact <= mp.mpf(high[n])
+                assert high[n] - low[n] <= 4 * np.spacing(high[n])
+    with pytest.raises(ValueError, match="a stiffness is negative"):  # faster than its waves
+        cra.certify(string.at({"m": 0.3, "T": 20.0, "U": 9.0, "L": 1.2}))
+
+
+def test_a_shaft_with_a_disc_is_certified():
+    """In two planes, with a disc and distributed gyroscopic terms; the argument principle counts the same."""
+    rhoA, EI, m, U, k, J, g = sp.symbols("rhoA EI m U k J g")
+    u = sp.Function("u")(x, t)
+    shaft = cra.Model(
+        rhoA * (v.diff(t) ** 2 + u.diff(t) ** 2) / 2 + J * U * v.diff(x) * u.diff(x, t)
+        - EI * (v.diff(x, 2) ** 2 + u.diff(x, 2) ** 2) / 2,
+        fields=[v, u], left=-k * (v**2 + u**2) / 2,
+        right=-k * (v**2 + u**2) / 2 + m * (v.diff(t) ** 2 + u.diff(t) ** 2) / 2 + g * U * v.diff(x) * u.diff(x, t),
+        **GYROSCOPIC,
+    ).at({"rhoA": 0.3, "m": 0.2, "EI": 5.0, "U": 30.0, "L": 1.2, "k": 800.0, "g": 2e-3, "J": 1e-4})  # fmt: skip
+    proof = cra.certify(shaft, 5)
+    assert proof.complete
+    s = cra.eigenvalues(shaft, 5)
+    assert np.abs(s.imag / (2 * np.pi) / proof.lower - 1).max() < 1e-11
+    for number in range(5):  # just below and above each
+        below, above = (2 * np.pi * proof.lower[number] * (1 + side * 1e-6) for side in (-1, 1))
+        assert cra.count_eigenvalues(shaft, [below, above]).tolist() == [2 * number, 2 * number + 2]
+    with pytest.raises(ValueError, match="not positive definite"):
+        cra.certify(shaft.replace(k=0.0))
+    c = sp.Symbol("c")
+    damped = shaft.model.replace(virtual_work=[(-c * v.diff(t), v, "right")]).at({**shaft.values, "c": 0.1})
+    with pytest.raises(ValueError, match="leaves out no dampers"):
+        cra.certify(damped)
