@@ -226,14 +226,15 @@ def _vanishing(structure: Structure, k: Floats, z: Floats, conditions: Floats) -
     """
     columns = np.abs(conditions).max(axis=(1, 3))
     largest = columns.max(axis=1, keepdims=True)
-    found = columns <= _TINY_SHARE * largest
+    found: NDArray[np.bool_] = columns <= _TINY_SHARE * largest
     part = np.flatnonzero((columns <= _SMALL_SHARE * largest).any(axis=1))
     if part.size:
         places = np.broadcast_to(_PLACES, (part.size, len(_PLACES)))
         sign = np.random.default_rng(1).choice([-1.0, 1.0], (len(k), part.size))
         for side in (-1.0, 1.0):
-            moved = k[:, part] * (1.0 + side * sign * _ROUNDING), z[part] * (1.0 + side * _ROOT_ERROR)
-            other = _conditions(structure, *moved, _columns(structure, *moved, places).real)
+            entries, root = k[:, part] * (1.0 + side * sign * _ROUNDING), z[part] * (1.0 + side * _ROOT_ERROR)
+            columns_there = _columns(structure, entries, root.astype(complex), places).real
+            other = _conditions(structure, entries, root, columns_there)
             found[part] |= columns[part] <= np.abs(other - conditions[part]).max(axis=(1, 3))
     return found
 
