@@ -19,6 +19,7 @@ from cra_sym.codegen.model_time import signals
 from cra_sym.codegen.program import new_name
 from cra_sym.codegen.statement import stated
 from cra_sym.codegen.user_model import model_text
+from cra_sym.kernels.callables import executed
 from cra_sym.kernels.form import Program
 from cra_sym.kernels.form_parse import parse
 from cra_sym.model.system import System
@@ -96,9 +97,9 @@ def _parameters(written: ModelText, system: System) -> tuple[Parameter, ...]:
 
 def _check(library: Library, written: ModelText, system: System) -> None:
     """Raise a ValueError unless the printed code has the poles of the state space of the package."""
-    in_time, names = written.signals, dict[str, Any]()
+    in_time = written.signals
     assert in_time is not None
-    exec(compile(library.texts("python")[f"{library.name}.py"], library.name, "exec"), names)
+    names = executed(library.texts("python")[f"{library.name}.py"], f"<cra_sym export {library.name}>")
     given = names["Parameters"](*(float(system.values[symbol.name]) for symbol in written.names))
     plant = names["plant_of"](given, in_time.modes, names["modes_of"](given, in_time.modes), float(system.zeta))
     linear = state_space(system, in_time.modes, *in_time.given)

@@ -19,10 +19,18 @@ if TYPE_CHECKING:
 
     Expressions: TypeAlias = "Expr | MatrixBase | float | Sequence[Expressions] | Mapping[Hashable, Expressions]"
 
-__all__ = ["Kernel", "kernel"]
+__all__ = ["Kernel", "executed", "kernel"]
 
 _BLOCK = 8192  # elements whose temporaries stay in the processor's second-level cache
 _BACKENDS = ("numpy", "compiled")  # and None
+
+
+def executed(text: str, filename: str) -> dict[str, Any]:
+    """Return the names of a generated module; errors in it show its lines."""
+    linecache.cache[filename] = (len(text), None, text.splitlines(True), filename)
+    namespace: dict[str, Any] = {}
+    exec(compile(text, filename, "exec"), namespace)
+    return namespace
 
 
 class Kernel:
@@ -63,11 +71,7 @@ class Kernel:
 
     @cached_property
     def _module(self) -> dict[str, Any]:
-        filename = f"<cra_sym kernel {self.digest[:16]}>"
-        linecache.cache[filename] = (len(self.source), None, self.source.splitlines(True), filename)
-        namespace: dict[str, Any] = {}
-        exec(compile(self.source, filename, "exec"), namespace)
-        return namespace
+        return executed(self.source, f"<cra_sym kernel {self.digest[:16]}>")
 
     @property
     def function(self) -> Callable[..., Any]:
