@@ -114,8 +114,8 @@ def frequency_response(
     zeta = np.broadcast_to(system.zeta, system.shape)[..., None]
     if np.any(zeta) and undamped.problem_damped:
         raise ValueError(
-            "zeta: the model has dampers or forces that follow the motion, beside which a frequency response has no "
-            "modal damping; set it to 0"
+            "zeta: the model has dampers, gyroscopic terms or forces that follow the motion, beside which a frequency "
+            "response has no modal damping; set it to 0"
         )
     if damping == "structural":
         loss = 1 + 2j * zeta

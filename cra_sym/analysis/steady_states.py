@@ -169,8 +169,9 @@ def steady_states(
     drive : mapping of function of t to float, optional
         Amplitudes of prescribed motions and of forces proportional to cos(varpi t).
     modes : int
-        Number of linear modes, 1 to 40; with elastic-slip elements those of the system without them, with
-        static correction at the elements.
+        Number of linear modes, 1 to 40; without natural modes (gyroscopic terms, forces that follow the motion) those
+        of the conservative part; with elastic-slip elements those of the system without them, with static correction
+        at the elements.
     harmonics : int, optional
         Highest multiple of ``varpi / period``; the constant is included. Default: 7; with elastic-slip elements as many
         as change the motion by less than 3e-7, at most 127, fewer where more do not converge (see `error_harmonics`).

@@ -279,14 +279,19 @@ def ball_problem(model: Model) -> BallProblem:
     turning = model.numerics("conservative_part") is not None
     if turning and not is_gyroscopic(model.linearised):
         raise ValueError(
-            "system: certification needs conservative forces, and with gyroscopic terms leaves out no dampers; use "
-            "eigenvalues and count_eigenvalues, or system.conservative_part"
+            "system: certification needs forces that do not follow the motion, and beside gyroscopic terms leaves out "
+            "no dampers; use eigenvalues and count_eigenvalues, or system.conservative_part"
         )
     form = model.state_form if turning else model.conservative
-    if not form.uniform:
+    acting = tuple(point for point in form.points if point[2] or any(point[1]))  # others are places of loads
+    if not replace(form, points=acting).uniform:
+        other = (
+            "eigenvalues and count_eigenvalues are two routes"
+            if turning
+            else ("natural_frequencies with system.accuracy estimates the error, system.check() compares two routes")
+        )
         raise ValueError(
-            "system: certification needs coefficients that are constant along x, without terms inside; "
-            "natural_frequencies with system.accuracy estimates the error, system.check() compares two routes"
+            f"system: certification needs coefficients that are constant along x, without terms inside; {other}"
         )
     weak = weak_form(model.linearised.variation)
     powers = (0, 1, 2) if turning else (0, 2)

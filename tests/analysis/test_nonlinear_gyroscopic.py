@@ -101,6 +101,21 @@ def test_steady_states_are_those_of_time_integration():
     assert len(folds) == 2 and folds.min() < 2.1 < folds.max()
 
 
+def test_response_in_time():
+    """Of a rotor that is released: SciPy on the equations by hand."""
+    system = cra.Model(0, left=MOVES - k * (p**2 + q**2) / 2 - k_3 * p**4 / 4, **LUMPED).at(
+        {"g": 0.7, "k": 2.0, "k_3": 0.5}
+    )
+    times = np.linspace(0.0, 20.0, 41)
+    run = solve_ivp(
+        lambda _, y: [y[2], y[3], 0.7 * y[3] - 2.0 * y[0] - 0.5 * y[0] ** 3, -0.7 * y[2] - 2.0 * y[1]],
+        (0.0, 20.0), [0.9, 0.0, 0.0, 0.4], method="DOP853", rtol=1e-12, atol=1e-13, t_eval=times,
+    )  # fmt: skip
+    for field, values in ((p, run.y[0]), (q, run.y[1])):
+        found = cra.tip_response(system, {}, times, 2, initial={p: 0.9, q.diff(t): 0.4}, field=field)
+        np.testing.assert_allclose(found, values, atol=1e-8)
+
+
 def test_a_pipe_on_a_stop_closes_in_time():
     """Clamped at both ends, of a flowing mass and with a stop that hardens: the same equations by response()."""
     length, rhoA, EI, m, U, a = sp.symbols("l rhoA EI m U a")
