@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import lru_cache
+from typing import Any
 
 from cra_sym.arm.parameters import Arm
 from cra_sym.codegen.arm_batch import arm_batch
 from cra_sym.codegen.arm_energies import energy_functions
+from cra_sym.codegen.arm_in_time import arm_in_time, arm_signals
 from cra_sym.codegen.arm_time_checks import arm_time_checks
 from cra_sym.codegen.expressions import gauss_rule, modal_functions, spectrum_functions, stability_functions
 from cra_sym.codegen.library import Check, Library, source
-from cra_sym.codegen.operations import operations
+from cra_sym.codegen.model_time import Signals, in_time_readme
 from cra_sym.codegen.printers import FormPrinter
 from cra_sym.codegen.statement import stated
 from cra_sym.codegen.vectors import TOLERANCE, arm_checks
-from cra_sym.kernels.form_parse import parse
 
 __all__ = ["arm_library"]
 
@@ -41,6 +42,7 @@ takes some three evaluations of the characteristic function, whatever the arm; r
 closed form.
 """
 
+_MODES, _TESTED = 16, 4  # modes in time, and of these in the reference vectors, at most
 _STACK = """\
 at most 10 kB, of which
 `modes_of` takes 8 kB for `NAME_MOST_MODES` = 1000 modes, and 160 kB in the functions for many arms at once, `_batch`,
@@ -63,27 +65,47 @@ dimensionless groups from 1e-9 to 1e9, 0 and infinity.
 }
 
 
+def arm_library(
+    name: str, real: str = "float64", modes: int | None = None, drive: Any = None, outputs: Any = None
+) -> Library:
+    """Return the arm as a library.
+
+    Parameters
+    ----------
+    name, real : str
+    modes : int, optional
+        Largest number in time, by default 16.
+    drive, outputs
+        In time, as :func:`cra_sym.state_space` takes them.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As :func:`cra_sym.state_space`.
+    """
+    kept = _MODES if modes is None else modes
+    if drive is None and outputs is None:
+        return _usual(name, real, kept)
+    return _library(name, real, arm_signals(kept, drive, outputs))
+
+
 @lru_cache(maxsize=4)
-def arm_library(name: str, real: str = "float64") -> Library:
-    """Return the arm as a library."""
-    names = "arm", "arm_modes", "sampling", "shaping", "arm_time", "arm_check"
-    parts = (_with_widths(source(part)) for part in names)
+def _usual(name: str, real: str, modes: int) -> Library:
+    return _library(name, real, arm_signals(modes))
+
+
+def _library(name: str, real: str, in_time: Signals) -> Library:
+    parts = [_with_widths(source(part)) for part in ("arm", "arm_modes", "arm_check")]
+    parts[2:2] = [arm_in_time(in_time)]
+    parts[3] = parts[3].replace("TESTED", str(min(_TESTED, in_time.modes)))
     text = "\n\n".join([_constants(real), _generated(), *parts])
     summary = "A flexible Cartesian robotic arm: frequencies, modes, responses"
     statement = stated(Arm.nominal().model)
-    checks = tuple(_checks(real))
+    checks = tuple(_checks(real, in_time))
     batch = arm_batch(name, real, TOLERANCE if real == "float64" else _SINGLE)
     stack = _STACK.replace("NAME", name.upper())
-    readme = _README + _PRECISION[real] + _counted(text)
+    readme = _README + _PRECISION[real] + in_time_readme(in_time, text)
     return Library(name, summary, text, statement, checks, readme, real, batch, stack)
-
-
-def _counted(text: str) -> str:
-    """Return a table of the operation counts of the time-domain functions."""
-    form = parse(text)
-    most = int(form.constants["MOST_KEPT"].values[0])
-    counts = ", ".join(f"`{name}` {operations(form, name, {'_kept(sampled)': most})}" for name in ("step", "outputs"))
-    return f"\nFloating-point operations of a call with {most} modes, at most: {counts}.\n"
 
 
 def _constants(real: str) -> str:
@@ -131,7 +153,7 @@ def _generated() -> str:
     return FormPrinter.helped(text) + text
 
 
-def _checks(real: str) -> Iterator[Check]:
+def _checks(real: str, in_time: Signals) -> Iterator[Check]:
     """Yield the reference vectors from the package's own kernels, for the functions of the library."""
     for check in arm_checks(everything=True):
         quantity = _QUANTITIES[check.quantity]
@@ -146,7 +168,7 @@ def _checks(real: str) -> Iterator[Check]:
             continue
         loss = _SINGLE if quantity <= _QUANTITIES["omega"] else _SINGLE_MODAL
         yield Check(quantity, check.inputs, expected, loss, loss / TOLERANCE * check.absolute)
-    for name, inputs, expected, size in arm_time_checks():
+    for name, inputs, expected, size in arm_time_checks(in_time, real, min(_TESTED, in_time.modes)):
         loss = _IN_TIME if real == "float64" else _SINGLE_MODAL
         yield Check(_QUANTITIES[name], inputs, expected, loss, loss * size)
     nominal = tuple(float(getattr(Arm.nominal(), name)) for name in ("L", "b", "h", "E", "rho", "m_b", "m_e", "J_e"))

@@ -28,9 +28,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Export", "export"]
 
-_OF_TIME = ("modes", "input", "outputs", "controller")
-"""Arguments that are of a system or a model."""
-
 
 @dataclass(frozen=True)
 class Export:
@@ -105,15 +102,15 @@ def export(
         Prefix of every public symbol, and the name of package, module, crate and target. Default: of the arm
         `cra_arm`, in C and Fortran `cra`, so that its types are called `cra_arm`, `cra_mode`, ..; `model`; `system`.
     modes : int, optional
-        Modes of the system that are kept, by default 3; of a model the largest number that it is stepped with, by
-        default 16, with a controller 3.
+        Modes of the system that are kept, by default 3; of the arm and of a model the largest number that they are
+        stepped with, by default 16, with a controller 3.
     real : {'float64', 'float32'}
         Type of real numbers in the code. Single precision is available for C, Fortran and Rust, without elastic-slip
         elements; the README states its accuracy.
     version : {'3.0', '2.0'}
         Of FMI.
     input, outputs
-        Of a system or a model, as :func:`cra_sym.state_space` takes them; one input of a system, up to 64 of a model.
+        As :func:`cra_sym.state_space` takes them; one input of a system, up to 64 of the arm or a model.
         Default input: 'base_acceleration', of a model its only prescribed motion or force; without one it is not
         stepped. Default outputs: y, v, w, root_force, root_moment and tip_acceleration, if the system has them.
     controller : Controller, optional
@@ -155,9 +152,8 @@ def export(
         instance("controller", controller, Controller)
         if language == "fmu":
             raise ValueError("controller: is exported as source code; an FMU has none")
-    for argument, given in zip(_OF_TIME, (modes, input, outputs, controller), strict=True):
-        if system is None and given is not None and model is None:
-            raise ValueError(f"{argument}: is that of a system or a model; give system= or model=")
+    if controller is not None and system is None and model is None:
+        raise ValueError("controller: is that of a system or a model; give system= or model=")
     if language != "fmu" and version != VERSIONS[0]:
         raise ValueError(f"version = {version!r}: is that of FMI; give language='fmu'")
     if language == "fmu" and system is None:
@@ -172,7 +168,8 @@ def export(
     elif model is not None:
         texts = dict(model_library(model, name or "model", real, modes, input, outputs, controller).texts(language))
     else:
-        texts = dict(_arm_texts(language, name or ("cra" if language in ("c", "fortran") else "cra_arm"), real))
+        prefix = name or ("cra" if language in ("c", "fortran") else "cra_arm")
+        texts = dict(_arm_texts(language, prefix, real, modes, input, outputs))
     if language != "fmu":
         texts["LICENSE"] = licence()
     digest = _digest(texts)
@@ -243,9 +240,9 @@ def _write(target: Path, texts: Mapping[str, str | bytes], keep: bool) -> None:
                 (folder / name).write_text(text, encoding="utf-8", newline="\n")
 
 
-def _arm_texts(language: str, name: str, real: str) -> dict[str, str]:
+def _arm_texts(language: str, name: str, real: str, modes: int | None, drive: Any, outputs: Any) -> dict[str, str]:
     from tqdm import tqdm
 
     with tqdm(total=0, desc=f"deriving and printing {language}", bar_format="{desc}", leave=False, disable=None):
-        library = arm_library(name, real)
+        library = arm_library(name, real, modes, drive, outputs)
     return library.texts(language)

@@ -13,6 +13,7 @@ from cra_sym.codegen.expressions import response_functions
 from cra_sym.codegen.library import source
 from cra_sym.codegen.model_constants import model_constants
 from cra_sym.codegen.model_loads import load_factors
+from cra_sym.codegen.model_rates import rate_functions
 from cra_sym.codegen.model_time import Signals, TimeText
 from cra_sym.codegen.printers import FormPrinter
 from cra_sym.codegen.program import function, new_name
@@ -131,7 +132,8 @@ class ModelText:
         return {mark for mark, wanted in found.items() if wanted}
 
     @cached_property
-    def _waves(self) -> WavesText:
+    def waves(self) -> WavesText:
+        """Writer of the functions of the waves."""
         return WavesText(self.form.structure, self.form.known)
 
     # The whole --------------------------------------------------------------------------------------------------------
@@ -142,7 +144,7 @@ class ModelText:
         for word in ("displacements", "coordinates", "drives", "forces"):
             modes = modes.replace(f"{word.upper()}_LISTED", ", ".join(getattr(self, word)))
         modes = modes.replace("# LOADINGS", self._loads() if self.loads else "")
-        parts = [self._constants(), self._parameters(), source("model"), self._rates(), modes]
+        parts = [self._constants(), self._parameters(), source("model"), rate_functions(self), modes]
         if self.drives:
             parts += ["".join(f"{self._function(f, f'_{f.name}')}\n\n" for f in response_functions())]
             parts += [source("model_drives")]
@@ -155,7 +157,7 @@ class ModelText:
     def _constants(self) -> str:
         displacements = list(self.model.conservative.displacements)
         places = [self.form.order.index(displacements.index(field)) for field in self.model.equations.fields]
-        return self._waves.constants() + model_constants(
+        return self.waves.constants() + model_constants(
             self.form,
             len(self.model.symbols),
             self.fields,
@@ -179,7 +181,7 @@ class ModelText:
 
     @cached_property
     def _formulas(self) -> str:
-        waves = self._waves
+        waves = self.waves
         return "\n\n".join([waves.functions(loads=bool(self.loads)), waves.static(), waves.sections()]).strip("\n")
 
     # Parameters to coefficients ---------------------------------------------------------------------------------------
@@ -204,7 +206,7 @@ class ModelText:
         return sp.sympify(right - left, strict=True)
 
     @cached_property
-    def _entries(self) -> dict[int, sp.Expr]:
+    def entries(self) -> dict[int, sp.Expr]:
         """Entries of the matrices times half the length, by their number among the coefficients, that are not 0."""
         n = self.form.structure.n
         found = {}
@@ -216,7 +218,7 @@ class ModelText:
         return found
 
     @cached_property
-    def _ends(self) -> dict[str, sp.Expr]:
+    def ends(self) -> dict[str, sp.Expr]:
         """Entries of the matrices of both ends and coordinates, and of links, that are not 0."""
         structure, ends = self.form.structure, self.form.conditions
         size, m = structure.moving, structure.coordinates
@@ -234,7 +236,7 @@ class ModelText:
     def _prepare(self) -> str:
         """Return the functions that check the parameters and prepare the problem."""
         left, _ = self.model.equations.domain
-        places = self._waves.places
+        places = self.waves.places
         texts, lines = [], ["_check(parameters)"]
         lines += [f"problem.held[{place}] = 1" for place in self.held]
         moving = self.form.structure.moving
@@ -243,9 +245,9 @@ class ModelText:
                 lines.append(f"if parameters.{self.names[symbol]} > HUGE:")
                 lines += [f"    problem.held[{place}] = 1" for place in acting if place < moving]
         groups = (
-            ("inside", {f"k[{places[at]}]": entry for at, entry in self._entries.items() if at in places},
+            ("inside", {f"k[{places[at]}]": entry for at, entry in self.entries.items() if at in places},
              "Return the matrices of a section times half the length, entry by entry."),
-            ("outside", {"length": self._length, "left": sp.sympify(left, strict=True)} | self._ends,
+            ("outside", {"length": self._length, "left": sp.sympify(left, strict=True)} | self.ends,
              "Return the length, the left end, and stiffness, inertia, ties and links of what moves."),
         )  # fmt: skip
         for name, entries, words in groups:
@@ -255,7 +257,7 @@ class ModelText:
             lines += [f"problem.{target} = {name}[{at}]" for at, target in enumerate(entries)]
         released = ["_release_links(problem)"] if self.form.structure.links else []
         lines += ["_check_ends(problem)", *released, *self._condition_lines()]
-        table, filled = self._waves.dispersion()
+        table, filled = self.waves.dispersion()
         texts.append(table)
         lines += [f"table = zeros({len(filled)})", "_dispersion(problem.k, table)"]
         lines += [f"problem.k[{place}] = table[{at}]" for at, place in enumerate(filled)]
@@ -275,7 +277,7 @@ class ModelText:
 
     def _condition_lines(self) -> Iterator[str]:
         """Yield statements that enter the factors of all conditions, over 1 + stiffness + mass."""
-        structure, places = self.form.structure, self._waves.places
+        structure, places = self.form.structure, self.waves.places
         for place in range(structure.places):
             found = []
             for at, value in enumerate(self._condition(place), start=structure.condition(place)):
@@ -284,14 +286,14 @@ class ModelText:
             link, own = place - structure.moving, place * (structure.moving + 1)
             kinds = ("stiffness", "mass")
             stiff, heavy = wanted = [f"link_{kind}[{link}]" if link >= 0 else f"{kind}[{own}]" for kind in kinds]
-            parts = "".join(f" + problem.{entry}" for entry in wanted if entry in self._ends)
+            parts = "".join(f" + problem.{entry}" for entry in wanted if entry in self.ends)
             if not parts:  # of one that is 1
                 found = [line.replace(" * share", "").replace("share", "1.0") for line in found]
             elif any("share" in line for line in found):
                 yield f"share_{place} = 1.0 / (1.0{parts})"
-                if link >= 0 and stiff in self._ends:
+                if link >= 0 and stiff in self.ends:
                     yield f"pull_{place} = 1.0 if problem.{stiff} > HUGE else problem.{stiff} * share_{place}"
-                if link >= 0 and heavy in self._ends:
+                if link >= 0 and heavy in self.ends:
                     yield f"inertia_{place} = problem.{heavy} * share_{place}"
             yield from (re.sub(r"\b(share|pull|inertia)\b", rf"\1_{place}", line) for line in found)
 
@@ -352,55 +354,30 @@ class ModelText:
         """Return the divisors in the coefficients."""
         found: dict[sp.Expr, None] = {}
         left, _ = self.model.equations.domain
-        for entry in (*self._entries.values(), *self._ends.values(), self._length, sp.sympify(left, strict=True)):
+        for entry in (*self.entries.values(), *self.ends.values(), self._length, sp.sympify(left, strict=True)):
             for power in sp.ordered(sp.sympify(entry, strict=True).atoms(sp.Pow)):
                 if power.exp.is_negative or power.exp.could_extract_minus_sign():
                     for factor in sp.Mul.make_args(power.base):
                         found |= {} if factor.is_number else {factor: None}
         return list(found)
 
-    def _rates(self) -> str:
-        """Return the functions that give a parameter by number, and the rates of the coefficients by it."""
-        places = self._waves.places
-        names = list(self.names.values())
-        value = ["def _parameter(parameters: Parameters, number: int) -> float:",
-                 *(f"    if number == {at}:\n        return parameters.{name}" for at, name in enumerate(names[:-1])),
-                 f"    return parameters.{names[-1]}"]  # fmt: skip
-        ends, links = self.form.structure.moving**2, self.form.structure.links
-        offsets = {
-            "stiffness": 0,
-            "mass": ends,
-            "ties": 2 * ends,
-            "link_stiffness": 3 * ends,
-            "link_mass": 3 * ends + links,
-            "stretch": 3 * ends + 2 * links,
-        }
-        texts: list[str] = []
-        lines: list[str] = []
-        for number, symbol in enumerate(self.names):
-            entries = {f"k_rate[{places[at]}]": e.diff(symbol) for at, e in self._entries.items() if at in places}
-            for target, entry in self._ends.items():
-                name, at = target[:-1].split("[")
-                if name not in offsets:
-                    continue  # motions carried by coordinates have no energy of their own
-                entries[f"end_rate[{offsets[name] + int(at)}]"] = entry.diff(symbol)
-            entries = {target: entry for target, entry in entries.items() if entry != 0}
-            if not entries:
-                continue
-            row = f"by_{self.names[symbol]}"
-            text, call = self.call(row, list(entries.values()), f"rate_{number}",
-                                    f"Return how coefficients change with {self.names[symbol]}.")  # fmt: skip
-            texts.append(text)
-            lines.append(f"{'el' if lines else ''}if number == {number}:")
-            lines += [f"    {line}" for line in call]
-            lines += [f"    {target} = rate_{number}[{at}]" for at, target in enumerate(entries)]
-        head = (
-            "def _parameter_rates(\n    parameters: Parameters, number: int, k_rate: Out[Row[float, COEFFICIENTS]],\n"
-            "    end_rate: Out[Row[float, END_RATES]]\n) -> None:"
-        )
-        start = ["for i in range(COEFFICIENTS):", "    k_rate[i] = 0.0"]
-        start += ["for i in range(END_RATES):", "    end_rate[i] = 0.0"]
-        return "\n\n\n".join([*texts, "\n".join(value), "\n    ".join([head, *start, *lines])])
+    # In time ----------------------------------------------------------------------------------------------------------
+
+    def shape(self, field: int, place: str, order: int) -> str:
+        """Return the call for a derivative of a field of a mode."""
+        return f"mode_shape(parameters, mode, {field}, {place}, {order})"
+
+    def force(self, end: int, entry: int) -> tuple[str, None]:
+        """Return the natural force of an end of a mode."""
+        return f"mode.{('left', 'right')[end]}_force[{self.form.order.index(entry)}]", None
+
+    def participation(self, motion: str) -> str:
+        """Return that of a mode."""
+        return f"mode.participation[{self.drives.index(motion)}]"
+
+    def push(self, force: str) -> str:
+        """Return the effect of a force on a mode."""
+        return f"mode.push[{self.forces.index(force)}]"
 
     # Drives -----------------------------------------------------------------------------------------------------------
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import sympy as sp
@@ -13,16 +14,17 @@ from cra_sym.analysis.signals import BASE, FREE, Input, Reader, states_of
 from cra_sym.cached import cached_property
 from cra_sym.checks import count, real_array
 from cra_sym.codegen.library import source
+from cra_sym.codegen.operations import operations
 from cra_sym.codegen.unused import marked
+from cra_sym.kernels.form_parse import parse
 from cra_sym.model.derivations import carried_by
 from cra_sym.model.observables import Sum, named_sums, sum_of
 from cra_sym.model.system import MOST_MODES
 
 if TYPE_CHECKING:
-    from cra_sym.codegen.model_text import ModelText
     from cra_sym.model import Model
 
-__all__ = ["OUTPUTS", "Signals", "TimeText", "signals"]
+__all__ = ["OUTPUTS", "Shape", "Signals", "TimeText", "in_time_readme", "signals"]
 
 OUTPUTS = ("y", "v", "w", "root_force", "root_moment", "tip_acceleration")
 """Default outputs, if the system has them."""
@@ -121,24 +123,54 @@ def _place(name: str, given: Any) -> float:
     return float(real_array(name, given, low=-np.inf, high=np.inf, unit="m"))
 
 
+Shape = tuple[int, int, sp.Expr]
+"""A field by number, the order of its derivative by x, and the place."""
+
+
+class Writer(Protocol):
+    """What the part about time needs of the text of a model, to which `parameters` are the parameters."""
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+
+    def call(self, name: str, entries: Sequence[sp.Expr], row: str, words: str) -> tuple[str, list[str]]:
+        """Return a function of the parameters, and the statements that fill a row with its results."""
+
+    def shape(self, field: int, place: str, order: int) -> str:
+        """Return the call for a derivative of a field of a mode."""
+
+    def force(self, end: int, entry: int) -> tuple[str, Shape | None]:
+        """Return the natural force of an end, or the factor of a derivative of a field that it is a multiple of."""
+
+    def participation(self, motion: str) -> str:
+        """Return that of a mode."""
+
+    def push(self, force: str) -> str:
+        """Return the effect of a force on a mode."""
+
+
 @dataclass(frozen=True)
 class TimeText:
     """Writes the part of the text of a model that is about time.
 
     Attributes
     ----------
-    written : ModelText
+    written : Writer
     signals : Signals
+    kind : {'TIMED', 'ARM'}
+        Whether the modes are those of a model, or of the arm.
     """
 
-    written: ModelText
+    written: Writer
     signals: Signals
+    kind: str = "TIMED"
 
     @property
     def parts(self) -> set[str]:
         """Labels of the optional lines that it needs."""
         found = {"FREE": self.signals.free, "HELD": not self.signals.free, "ACCELERATED": self.signals.accelerated}
-        return {mark for mark, wanted in found.items() if wanted}
+        return {self.kind, *(mark for mark, wanted in found.items() if wanted)}
 
     @cached_property
     def text(self) -> str:
@@ -185,7 +217,8 @@ class TimeText:
         """Functions of all factors and places, the lines that call them, and the number of each of these."""
         wanted: dict[sp.Expr, int] = {}
         for one in self._sums:
-            for expression in (*one.factors, *one.places):
+            forces = [self.written.force(part.end, part.entry)[1] for part in one.parts if part.kind == "force"]
+            for expression in (*one.factors, *one.places, *(there[2] for there in forces if there)):
                 wanted.setdefault(sp.sympify(expression, strict=True), len(wanted))
         if self.signals.free:
             for expression in carried_by(self.written.model, self.signals.states[0]):
@@ -232,7 +265,7 @@ class TimeText:
     def _gains(self) -> str:
         """Return the function of what a mode does."""
         signals, lines = self.signals, list(self._numbers[1])
-        shapes: dict[tuple[int, int, sp.Expr], str] = {}
+        shapes: dict[Shape, str] = {}
         outputs = list(signals.outputs.values())
         body = []
         for row, output in enumerate(outputs):
@@ -241,26 +274,29 @@ class TimeText:
         for at, one in enumerate(signals.inputs):
             where = f"plant.push[{_at(at)}]"
             if one.kind == "motion":
-                body.append(f"{where} = -mode.participation[{self.written.drives.index(one.name)}]")
+                body.append(f"{where} = -{self.written.participation(one.name)}")
             elif one.kind == "force":
-                body.append(f"{where} = mode.push[{self.written.forces.index(one.name)}]")
+                body.append(f"{where} = {self.written.push(one.name)}")
             elif one.displacement is not None:
                 body += [f"{where} += {term}" for _, term in self._terms(one.displacement, shapes)]
         if signals.free:
-            body.append(f"plant.coupling[at] = mode.participation[{self.written.drives.index(signals.states[0])}]")
+            body.append(f"plant.coupling[at] = {self.written.participation(signals.states[0])}")
         for (field, order, place), name in shapes.items():
             at = self._numbers[2][place]
-            lines.append(f"{name} = mode_shape(parameters, mode, {field}, number[{at}], {order})")
+            lines.append(f"{name} = {self.written.shape(field, f'number[{at}]', order)}")
+        if any("groups." in line for line in body):
+            lines[:0] = ["groups = Groups()", "groups_of(parameters, groups)"]
         head = "def _put_gains(parameters: Parameters, mode: Mode, at: int, plant: Mut[Plant]) -> None:"
         return "\n    ".join([head, '"""Put in what the mode at a coordinate does."""', *lines, *body])
 
-    def _terms(self, given: Sum, shapes: dict[tuple[int, int, sp.Expr], str]) -> Iterator[tuple[int, str]]:
+    def _terms(self, given: Sum, shapes: dict[Shape, str]) -> Iterator[tuple[int, str]]:
         """Yield the derivative by time and the text of each term of a sum that a mode adds to."""
         equations, form = self.written.model.equations, self.written.model.state_form
         for part, factor, place in zip(given.parts, given.factors, given.places, strict=True):
             if part.kind == "force":
-                side = "right" if part.end else "left"
-                yield part.time, f"{self._factor(factor)}mode.{side}_force[{self.written.form.order.index(part.entry)}]"
+                own, there = self.written.force(part.end, part.entry)
+                name = "" if there is None else f" * {shapes.setdefault(there, f'shape_{len(shapes)}')}"
+                yield part.time, f"{self._factor(factor)}{own}{name}"
             elif part.kind == "coordinate":
                 yield part.time, f"{self._factor(factor)}mode.coordinates[{part.entry}]"
             elif part.kind == "field":
@@ -276,3 +312,20 @@ def _at(row: int) -> str:
 
 
 _RATES = ("on_position", "on_rate", "on_acceleration")
+
+
+def in_time_readme(in_time: Signals, text: str) -> str:
+    """Return the part of a README about time."""
+    form = parse(text)
+    most = {"_size_of(plant)": len(in_time.states) + in_time.modes, "kept": len(in_time.states) + in_time.modes}
+    counts = ", ".join(f"`{name}` {operations(form, name, most)}" for name in ("step", "outputs", "derivative"))
+    words = (
+        f"In time it has up to {in_time.modes} modes: `plant_of` prepares the system of given parameters, `discretise` "
+        "exact steps under inputs u that are held, `step` takes one, `outputs` returns y."
+    )
+    rows = "".join(f"| u[{i}] | `{one.label}` |\n" for i, one in enumerate(in_time.inputs))
+    rows += "".join(f"| y[{i}] | `{name}` |\n" for i, name in enumerate(in_time.outputs))
+    return (
+        f"\n{textwrap.fill(words, 112)}\n\n| in time | |\n| --- | --- |\n{rows}\n"
+        f"Floating-point operations of a call with {in_time.modes} modes, at most: {counts}.\n"
+    )

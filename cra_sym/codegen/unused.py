@@ -7,7 +7,7 @@ import re
 
 __all__ = ["marked", "top_names", "without_unused"]
 
-_MARKS = "DRIVEN|FORCED|LOADED|TIMED|LUMPED|LINKED|COUPLED|FREE|HELD|ACCELERATED|FROZEN"
+_MARKS = "DRIVEN|FORCED|LOADED|TIMED|LUMPED|LINKED|COUPLED|FREE|HELD|ACCELERATED|FROZEN|ARM"
 _MARKED = re.compile(rf"( *)# ((?:(?:{_MARKS}): )+)(.*)")
 
 

@@ -12,11 +12,9 @@ from cra_sym.codegen.library import Library, source
 from cra_sym.codegen.model_checks import model_checks, sample, tested
 from cra_sym.codegen.model_controller import ModelController
 from cra_sym.codegen.model_text import ModelText
-from cra_sym.codegen.model_time import Signals, signals
-from cra_sym.codegen.operations import operations
+from cra_sym.codegen.model_time import Signals, in_time_readme, signals
 from cra_sym.codegen.statement import stated
 from cra_sym.codegen.unused import marked
-from cra_sym.kernels.form_parse import parse
 from cra_sym.model import Model
 from cra_sym.model.waves_form import WavesForm, waves_form
 
@@ -151,20 +149,4 @@ def _readme(written: ModelText, text: str) -> str:
         f"{', '.join(written.fields)}; displacements of a section: {', '.join(written.displacements)}.{lumped}{drives}"
     )
     table = f"{textwrap.fill(words, 112)}\n\n| parameter | unit | symbol |\n| --- | --- | --- |\n{rows}"
-    return table + (_readme_in_time(written.signals, text) if written.signals else "")
-
-
-def _readme_in_time(in_time: Signals, text: str) -> str:
-    form = parse(text)
-    most = {"_size_of(plant)": len(in_time.states) + in_time.modes, "kept": len(in_time.states) + in_time.modes}
-    counts = ", ".join(f"`{name}` {operations(form, name, most)}" for name in ("step", "outputs", "derivative"))
-    words = (
-        f"In time it has up to {in_time.modes} modes: `plant_of` prepares the system of given parameters, `discretise` "
-        "exact steps under inputs u that are held, `step` takes one, `outputs` returns y."
-    )
-    rows = "".join(f"| u[{i}] | `{one.label}` |\n" for i, one in enumerate(in_time.inputs))
-    rows += "".join(f"| y[{i}] | `{name}` |\n" for i, name in enumerate(in_time.outputs))
-    return (
-        f"\n{textwrap.fill(words, 112)}\n\n| in time | |\n| --- | --- |\n{rows}\n"
-        f"Floating-point operations of a call with {in_time.modes} modes, at most: {counts}.\n"
-    )
+    return table + (in_time_readme(written.signals, text) if written.signals else "")

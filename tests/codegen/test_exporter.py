@@ -21,13 +21,13 @@ from tests.codegen import kit
 @pytest.fixture
 def short(monkeypatch):
     """Exports of another text: how they are written is all that matters here."""
-    monkeypatch.setattr(exporter, "arm_library", lambda name, real: Library(name, "Constructs.", kit.TEXT, (), ()))
+    monkeypatch.setattr(exporter, "arm_library", lambda name, *given: Library(name, "Constructs.", kit.TEXT, (), ()))
 
 
 @pytest.fixture
 def without_vectors(monkeypatch):
     """Exports of the arm without reference vectors."""
-    monkeypatch.setattr(exporter, "arm_library", kit.arm_without_vectors)
+    monkeypatch.setattr(exporter, "arm_library", lambda name, real, *given: kit.arm_without_vectors(name, real))
 
 
 def test_the_result_lists_what_was_written(short, tmp_path):
@@ -134,8 +134,8 @@ def test_a_name_stands_in_front_of_everything(without_vectors, tmp_path, languag
 @pytest.mark.parametrize(
     "options, message",
     [
-        ({"modes": 4}, "modes: is that of a system"), ({"input": "drive_force"}, "input: is that of a system"),
-        ({"outputs": ["v"]}, "outputs: is that of a system"), ({"version": "2.0"}, "version = '2.0': is that of FMI"),
+        ({"modes": 0}, "modes = 0"), ({"input": "torque"}, "input = 'torque': must be one of base_acceleration"),
+        ({"outputs": ["z"]}, "outputs = 'z': must be one of"), ({"version": "2.0"}, "version = '2.0': is that of FMI"),
         ({"language": None}, "language = None"), ({"directory": None}, "directory = None: must be a path"),
         ({"name": "../x"}, "name = '../x'"), ({"overwrite": "no"}, "overwrite = 'no': must be True or False"),
         ({"language": "fmu", "model": exported_models.model("tension")}, "'fmu': is that of a system"),

@@ -13,7 +13,7 @@ import pytest
 import sympy as sp
 
 import cra_sym as cra
-from cra_sym.codegen import model_checks, user_model
+from cra_sym.codegen import arm_library, model_checks, user_model
 from cra_sym.codegen.user_model import model_library
 from cra_sym.symbols import L, t, v, x
 from tests import exported_models
@@ -29,6 +29,9 @@ PUSHED = cra.Model(
 VALUES = {"EI": 1.2, "L": 0.8, "k_r": 30.0, "k_t": 2e3, "m_b": 0.7, "m_e": 0.05, "rhoA": 0.4}
 FREE = ["drive_force", v.subs(x, L / 3)], ["w", "y", "tip_acceleration", "root_force", ("v", 0.05), "tip_velocity"]
 HELD = ["base_acceleration", "F"], ["w", "y", "tip_acceleration", "root_moment", EI * v.diff(x, 2).subs(x, L / 2)]
+
+
+CONTROLLER = cra.Controller(1e-3, measured=["w"], noise=[1e-5], disturbance=1.0, weights={"y": 1.0})
 
 
 @cache
@@ -77,6 +80,19 @@ def test_self_test_passes(language, inputs, tmp_path):
 def test_single_precision(inputs, tmp_path):
     kit.needs("c")
     kit.passes(library(inputs, "float32"), "c", tmp_path)
+
+
+@pytest.mark.parametrize("language", ["c", "rust", "javascript"])
+def test_the_arm_takes_any_input_and_output(language, tmp_path):
+    """A force on the base and one at mid-span; forces of both ends, strain, acceleration: in all random arms."""
+    kit.needs(language)
+    outputs = ["w", "tip_acceleration", "root_force", "tip_force", "tip_moment", ("strain", 0.1), v.subs(x, L / 3)]
+    with patch.object(arm_library, "arm_checks", lambda everything: ()):
+        made = arm_library.arm_library("crane", "float64", 5, ["drive_force", v.subs(x, L / 2)], outputs)
+    assert sum(check.quantity == 27 for check in made.checks) > 20
+    kit.passes(made, language, tmp_path)
+    if language == "rust" and shutil.which("cargo-clippy"):
+        kit.run(["cargo", "clippy", "--offline", "--quiet", "--tests", "--", "-D", "warnings"], tmp_path)
 
 
 def test_steps_are_the_response_in_closed_form():
@@ -142,11 +158,14 @@ def test_bad_input_is_refused():
         ({"outputs": ["z"]}, "outputs = 'z': must be one of"),
         ({"outputs": [("v", float("nan"))]}, "outputs: place"),
         ({"modes": 0}, "modes = 0"),
+        ({"model": None, "outputs": [v.diff(x, 4).subs(x, L)]}, "order 4 by x must be at most 3"),
+        ({"model": None, "input": "F"}, "input = 'F': must be one of"),
+        ({"model": None, "controller": CONTROLLER}, "controller: is that of a system or a model"),
     ],
 )
 def test_what_is_refused(given, message, tmp_path):
     with pytest.raises(ValueError, match=message):
-        cra.export("c", tmp_path / "out", model=PUSHED, **given)
+        cra.export("c", tmp_path / "out", **({"model": PUSHED} | given))
     assert not list(tmp_path.iterdir())
 
 
