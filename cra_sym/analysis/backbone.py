@@ -241,7 +241,7 @@ def _started(problem: FollowedMode, measure: Measure, below: float | None) -> tu
 
 
 def _whole(problem: FollowedMode, points: int, branches: bool) -> Backbone:
-    if not problem.equations.energies:
+    if problem.equations.degree == 1:
         raise ValueError("system: is linear, so its backbone has no end; ask for an energy or an amplitude")
     curve, start = _started(problem, problem.energy, None)
     found = list(itertools.islice(follow(curve, start, leaps=True), points))

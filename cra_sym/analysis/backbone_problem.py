@@ -101,12 +101,12 @@ class FollowedMode:
 
     def small(self) -> float:
         """Return a modal amplitude at which nonlinear forces are a small fraction of the linear ones."""
-        square, shape = self.linear**2, np.abs(self.shape)[None]
+        square, shape, nonlinear = self.linear**2, np.abs(self.shape)[None], self.equations.nonlinear()
         low, high = -40.0, 40.0
         for _ in range(60):
             middle = 0.5 * (low + high)
             q = 10.0**middle * shape
-            found = self.equations.derivatives(q, q * self.linear)
+            found = nonlinear.derivatives(q, q * self.linear)
             share = np.abs(found.force).max() + np.abs(found.momentum).max() * self.linear
             low, high = (middle, high) if share < _START * square * 10.0**middle else (low, middle)
         return float(10.0**low)
@@ -114,15 +114,16 @@ class FollowedMode:
 
 def _linear_mode(equations: ModalPolynomials, mode: int) -> tuple[float, NDArray[np.complex128]]:
     """Return frequency and modal amplitudes of a linear motion, counted from 1 by ascending frequency."""
-    n, omega = equations.modes, equations.omega
-    if equations.damping.any():
-        matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(omega**2), -equations.damping]])
-        values, vectors = np.linalg.eig(matrix)
+    n, omega, rest = equations.modes, equations.omega, np.zeros((1, equations.modes))
+    beside = equations.derivatives(rest, rest)
+    if equations.damping.any() or beside.force_q.any():
+        stiffness = np.diag(omega**2) - beside.force_q[0]
+        values, vectors = np.linalg.eig(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -equations.damping]]))
         order = np.argsort(np.where(values.imag >= 0.0, values.imag, np.inf), kind="stable")[:n]
-        omega, vectors = (
-            np.where(values[order].imag > _STILL * omega.max(), values[order].imag, 0.0),
-            vectors[:n, order],
-        )
+        values, vectors = values[order], vectors[:n, order]
+        if np.abs(values.real).max() > _STILL * np.abs(values).max():
+            raise ValueError("system: must be stable at rest, since a backbone starts there")
+        omega = np.where(values.imag > _STILL * omega.max(), values.imag, 0.0)
     else:
         vectors = np.eye(n, dtype=complex)
     if not omega[mode - 1] > 0:

@@ -72,7 +72,7 @@ def certify_stability(
     omega = matrices.modal.omega
     slowest = np.where(omega > 0, omega, np.maximum(omega.max(axis=-1, keepdims=True), 1.0) * 1e-2)
     unit = slowest.reshape(-1, 1) if slowest.size == modes else flat(slowest, shape, 1)
-    spread = float(np.fmax(system.conservative_part.accuracy, ROUNDING).max())
+    spread = float(np.fmax(system.basis.accuracy, ROUNDING).max())
     verdict = proved_stability(batch, unit, _conservative(matrices), spread)
     words = np.where(verdict == STABLE, "stable", np.where(verdict == UNSTABLE, "unstable", "undecided"))
     return words.reshape(shape)[()]

@@ -106,7 +106,7 @@ def room_of(system: System, name: str) -> Array:
 
 def own_stiffness(system: System, name: str) -> Array:
     """Return the end stiffness whose compliance equals that of the structure, shape of the batch."""
-    rigid = system.conservative_part.replace(**{name: np.inf})
+    rigid = system.basis.replace(**{name: np.inf})
     end, place, factor = system.numerics("stiffnesses")[name]
     force, unit = rigid.modes(1).force(end, place)[..., 0], factor.function(*rigid.domain.values)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -138,7 +138,7 @@ def natural_stiffnesses(system: System, names: Sequence[str]) -> dict[str, float
     """
     if not names:
         return {}
-    system = system.conservative_part
+    system = system.basis
     rigid = system.replace(**dict.fromkeys(names, np.inf))
     number = _elastic(rigid)
     modes, omega = rigid.modes(number), rigid.natural_frequencies(number)

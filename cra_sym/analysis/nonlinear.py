@@ -134,7 +134,7 @@ def watched(system: System, modes: int, place: Any = None, field: Any = None) ->
         If it is not a field or coordinate of the model, or the place is not in the domain.
     """
     checks.count("modes", modes, high=MOST_MODES)
-    found, entry = system.conservative_part.modes(modes), section_place(system, field, lumped=True)
+    found, entry = system.basis.modes(modes), section_place(system, field, lumped=True)
     if place is None:
         return displaced(system, found, entry)
     at = checks.one_number("place", place, unit="m")
@@ -148,7 +148,7 @@ def embedding(system: System, modes: int, more: int) -> Array:
     They are the same except that modes of equal frequency, as of a beam that is alike in two planes, may be ordered or
     combined differently.
     """
-    part, found = system.conservative_part, np.eye(modes, more)
+    part, found = system.basis, np.eye(modes, more)
     omega = part.natural_frequencies(more)
     together = np.abs(omega[:, None] - omega) <= _SAME * omega[:, None]
     if not (together.sum(axis=1) > 1)[:modes].any():
@@ -187,7 +187,7 @@ def warn_of_slopes(system: System, basis: Basis, coefficients: Array, stacklevel
     terms: NonlinearTerms | None = system.numerics("nonlinear")
     if terms is None or not len(coefficients):
         return
-    domain, modes = system.domain, system.conservative_part.modes(coefficients.shape[1])
+    domain, modes = system.domain, system.basis.modes(coefficients.shape[1])
     x = float(domain.left) + float(domain.length) * np.linspace(0.0, 1.0, _PLACES)
     phase = 2 * np.pi * np.arange(4 * int(basis.orders.max(initial=1.0)) + 4) / (4 * basis.orders.max(initial=1.0) + 4)
     q = (coefficients @ basis.values(phase).T).swapaxes(1, 2)

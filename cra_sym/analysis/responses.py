@@ -244,10 +244,10 @@ def _oscillation(
     histories = histories_of(system, motion)
     if system.numerics("nonlinear") is not None:
         state = tuple(_initial_state(system, initial or {}, modes, order) for order in (0, 1))
-        rows = outputs(system.conservative_part.modes(modes))
+        rows = outputs(system.basis.modes(modes))
         for history in histories.values():
             profile = history.profile if isinstance(history, Force) else history
-            check_sampling(profile, system.conservative_part.natural_frequencies(modes))
+            check_sampling(profile, system.basis.natural_frequencies(modes))
         return nonlinear_response(system, histories, rows, t, modes, derivative, state, start, zeta)
     ratio = np.asarray(system.zeta if zeta is None else checked_damping(zeta))
     alike = ratio.ndim == 0 or ratio.shape[-1] == 1 or zeta is None

@@ -84,7 +84,7 @@ def _harmonics(alone: Forced, frequency: float, harmonics: int, only: bool) -> l
 def _size(alone: Forced) -> float:
     """Return the amplitude at which nonlinear and linear forces of one mode are equal; inf for a linear mode."""
     equations = alone.equations
-    free = equations.free()
+    free = equations.free().nonlinear()
     forces = tuple(t for t in equations.forces if not t.causes and t.positions + t.velocities > 1)
     omega = max(float(equations.omega[0]), 1e-300)
     exponents = np.linspace(-40.0, 40.0, 81)

@@ -150,12 +150,12 @@ def leading_parameter(system: System) -> str:
     ends = system.numerics("stiffnesses")
     if ends:
         return str(next(iter(ends)))
-    found = sensitivities(system.conservative_part, _first_elastic(system))
+    found = sensitivities(system.basis, _first_elastic(system))
     return max(found.log, key=lambda name: float(np.nan_to_num(np.abs(found.log[name][-1]))))
 
 
 def _first_elastic(system: System) -> int:
-    part = system.conservative_part
+    part = system.basis
     most = min(7, part.most_modes)
     return next((modes for modes in range(1, most) if part.natural_frequencies(modes)[-1] > 0), most)
 
@@ -179,7 +179,7 @@ def around(system: System, name: str, narrowing: int = 0, points: int = 81) -> A
     far = (1e3 if stiff else 2.0) ** 0.5**narrowing
     if 0 < abs(value) < np.inf:
         return (np.geomspace if stiff else np.linspace)(value / far, far * value, points)
-    found = sensitivities(system.conservative_part, _first_elastic(system) + 2, [name])
+    found = sensitivities(system.basis, _first_elastic(system) + 2, [name])
     rate = np.abs(found.compliance[name] if np.isinf(value) else found.rate[name])
     good = (rate > 0) & np.isfinite(rate) & (found.frequency > 0)
     if not good.any():
@@ -217,7 +217,7 @@ def moving_place(system: System, modes: int = 3) -> float:
     x = np.linspace(left, left + float(system.domain.length), 201)
     if not fields(system):  # coordinates alone
         return float(x[-1])
-    shapes = np.abs(mode_shapes(system.conservative_part, x, modes))
+    shapes = np.abs(mode_shapes(system.basis, x, modes))
     shown = shapes[max(_first_elastic(system) - 1, 0) if _first_elastic(system) <= modes else 0]
     held = shapes[:, -1].max() <= _STILL * shapes.max()
     return float(x[np.argmax(shown)] if held else x[-1])
@@ -226,7 +226,7 @@ def moving_place(system: System, modes: int = 3) -> float:
 def span(system: System, periods: float = 5.0) -> float:
     """Return the duration of about that many periods of the first elastic mode, s, to one digit."""
     modes = _first_elastic(system)
-    omega = system.conservative_part.natural_frequencies(modes)[-1]
+    omega = system.basis.natural_frequencies(modes)[-1]
     return float(f"{2 * np.pi * periods / omega:.0e}") if omega > 0 else 1.0
 
 
@@ -245,5 +245,5 @@ def default_excitation(system: System) -> Parametric:
     springs = [name for name in able if name in system.numerics("stiffnesses")]
     if not able:
         raise ValueError("excitation: must be given, as no stiffness of the model can fluctuate by itself")
-    found = sensitivities(system.conservative_part, _first_elastic(system), springs or able)
+    found = sensitivities(system.basis, _first_elastic(system), springs or able)
     return Fluctuation({max(found.log, key=lambda name: float(np.nan_to_num(found.log[name][-1]))): 1.0})

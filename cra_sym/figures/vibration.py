@@ -76,7 +76,7 @@ def figure_frequency_response(
     if not fields(system):
         raise ValueError("system: has coordinates alone; must have a field along which places are shown")
     tip, left = moving_place(system), float(system.domain.left)
-    shapes = np.abs(mode_shapes(system.conservative_part, [left, tip], 3))
+    shapes = np.abs(mode_shapes(system.basis, [left, tip], 3))
     places = [tip, left] if shapes[:, 0].max() > 1e-9 * shapes[:, 1].max() else [tip]
     drive = _drive(system, tip) if drive is None else drive
     count("points", points, low=2)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from sympy import Add, Basic, Derivative, Expr, S, Symbol, expand, sympify
+from sympy.core.function import AppliedUndef
 
 from cra_sym.mechanics.jets import END_NAMES
 from cra_sym.mechanics.weak import Bilinear, weak_form
@@ -14,7 +15,7 @@ from cra_sym.model.projection import BilinearForm
 if TYPE_CHECKING:
     from cra_sym.model.lagrangian import Model
 
-__all__ = ["beside", "conservative_part", "stiffness_beside"]
+__all__ = ["beside", "conservative_part", "elastic_part", "stiffness_beside"]
 
 
 def conservative_part(model: Model) -> Model | None:
@@ -25,6 +26,25 @@ def conservative_part(model: Model) -> Model | None:
     Dampers alone do not count, since natural frequencies leave them out anyway. With follower forces only the potential
     energy of the highest derivatives is kept: without these forces the structure may buckle under its other loads.
     """
+    return _part(model, leading=_follows(model))
+
+
+def elastic_part(model: Model) -> Model | None:
+    """Return the same with no more than the potential energy of the highest derivatives along the span.
+
+    Gyroscopic terms may stabilise a structure that buckles without them, as under the centrifugal forces of rotation.
+    """
+    return _part(model, leading=True)
+
+
+def _follows(model: Model) -> bool:
+    """Tell whether forces of the virtual work follow the motion, dampers apart."""
+    unknowns = {function.func for function in (*model.options["fields"], *model.options["coordinates"])}
+    forces = (sympify(force, strict=True) for force, *_ in model.undamped_work())
+    return any(function.func in unknowns for force in forces for function in force.atoms(AppliedUndef))
+
+
+def _part(model: Model, *, leading: bool) -> Model | None:
     try:
         _ = model.conservative
     except ValueError:
@@ -32,7 +52,7 @@ def conservative_part(model: Model) -> Model | None:
     else:
         return None
     options, t = model.options, model.options["t"]
-    density = _leading(model) if model.undamped_work() else options["density"]
+    density = _leading(model) if leading else options["density"]
 
     def even(expression: Expr | None) -> Expr | None:
         if expression is None:
@@ -74,9 +94,9 @@ def beside(model: Model, part: Model) -> set[Basic]:
     return set().union(*(term.free_symbols for term in rest))
 
 
-def stiffness_beside(model: Model) -> BilinearForm | None:
-    """Return the stiffness of the model minus that of its conservative part (follower forces); None if they agree."""
-    part = conservative_part(model)
+def stiffness_beside(model: Model, *, elastic: bool = False) -> BilinearForm | None:
+    """Return the stiffness of the model minus that of its conservative, or elastic, part; None if they agree."""
+    part = elastic_part(model) if elastic else conservative_part(model)
     if part is None:
         return None
     whole, own = weak_form(model.linearised.variation), weak_form(part.linearised.variation)

@@ -10,7 +10,7 @@ from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics.breakpoints import derivative
 from cra_sym.mechanics.jets import END_NAMES, Jet
 from cra_sym.mechanics.weak import Bilinear, WeakForm, weak_form
-from cra_sym.model.conservative_part import beside, conservative_part, stiffness_beside
+from cra_sym.model.conservative_part import beside, conservative_part, elastic_part, stiffness_beside
 from cra_sym.model.driven import driven, driven_coordinate, driven_displacement, driven_spatial, pushed
 from cra_sym.model.energies import stress_route
 from cra_sym.model.energy_signs import leading, masses
@@ -44,6 +44,7 @@ __all__ = [
     "driven_coordinate",
     "driven_displacement",
     "driven_spatial",
+    "elastic_part",
     "fluctuating",
     "fluctuation",
     "geometry",
@@ -64,6 +65,7 @@ __all__ = [
     "route",
     "spatial",
     "stiffness_beside",
+    "stiffness_beside_elastic",
 ]
 
 
@@ -257,6 +259,11 @@ def _end_parameters(model: Model, *, inertia: bool = False) -> dict[str, EndPara
     return dict(sorted(found.items(), key=lambda item: item[1][:2]))
 
 
+def stiffness_beside_elastic(model: Model) -> BilinearForm | None:
+    """Return the stiffness of a model minus that of its elastic part; None if they agree."""
+    return stiffness_beside(model, elastic=True)
+
+
 def damped(model: Model) -> bool:
     """Return whether the Lagrangian or the virtual work has terms of first order in time."""
     return model.state_form.damped
@@ -285,13 +292,10 @@ def ball_problem(model: Model) -> BallProblem:
     form = model.state_form if turning else model.conservative
     acting = tuple(point for point in form.points if point[2] or any(point[1]))  # others are places of loads
     if not replace(form, points=acting).uniform:
-        other = (
-            "eigenvalues and count_eigenvalues are two routes"
-            if turning
-            else ("natural_frequencies with system.accuracy estimates the error, system.check() compares two routes")
-        )
+        cure = "natural_frequencies with system.accuracy estimates the error, system.check() compares two routes"
+        cure = "eigenvalues and count_eigenvalues are two routes" if turning else cure
         raise ValueError(
-            f"system: certification needs coefficients that are constant along x, without terms inside; {other}"
+            f"system: certification needs coefficients that are constant along x, without terms inside; {cure}"
         )
     weak = weak_form(model.linearised.variation)
     powers = (0, 1, 2) if turning else (0, 2)

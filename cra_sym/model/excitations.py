@@ -227,7 +227,7 @@ class Fluctuation(Parametric):
             for kind in form.names:
                 totals[kind] = totals.get(kind, 0.0) + size * found[kind]
         if "stiffness" in totals:
-            moving = system.conservative_part.natural_frequencies(modes) > 0  # a rigid-body motion deforms nothing
+            moving = system.basis.natural_frequencies(modes) > 0  # a rigid-body motion deforms nothing
             totals["stiffness"] = totals["stiffness"] * (moving[..., :, None] & moving[..., None, :])
         return [Drive(_COSINE, **totals)]
 

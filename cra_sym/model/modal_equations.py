@@ -71,8 +71,11 @@ def modal_equations(system: System, modes: int, zeta: float | Array | None = Non
     damping = np.diag(2 * ratios * omega)
     if matrices.damping is not None:
         damping = damping + matrices.damping
-    if matrices.stiffness is not None:
-        forces = (*forces, TensorTerm(-matrices.stiffness, 1, 0))
+    beside = matrices.stiffness
+    if beside is not None and (beside == beside.T).all():  # it has a potential
+        energies = (*energies, TensorTerm(-0.5 * beside, 2, 0))
+    elif beside is not None:
+        forces = (*forces, TensorTerm(-beside, 1, 0))
     return ModalEquations(ModalPolynomials(omega, damping, energies, forces), causes, error)
 
 
@@ -102,7 +105,7 @@ class _Projection:
     """Terms integrated with one set of panels."""
 
     def __init__(self, system: System, modes: int, terms: NonlinearTerms, panels: int) -> None:
-        self._system, self._modes, self._terms, self._n = system, system.conservative_part.modes(modes), terms, modes
+        self._system, self._modes, self._terms, self._n = system, system.basis.modes(modes), terms, modes
         domain = system.domain
         self._values = [float(value) for value in domain.values]
         columns = np.array(self._values)[:, None]

@@ -40,8 +40,8 @@ class ModalMatrices(NamedTuple):
 
 def modal_matrices(system: System, modes: int) -> ModalMatrices:
     """Return the matrices of a system between the first modes of its conservative part."""
-    omega = system.conservative_part.natural_frequencies(modes)
-    damping, beside = system.numerics("damping"), system.numerics("stiffness_beside")
+    omega = system.basis.natural_frequencies(modes)
+    damping, beside = system.numerics("damping"), system.stiffness_beside
     return ModalMatrices(
         omega,
         np.asarray(system.zeta)[..., None] * omega,
@@ -52,7 +52,7 @@ def modal_matrices(system: System, modes: int) -> ModalMatrices:
 
 def between_modes(system: System, modes: int, form: BilinearForm) -> dict[str, Array]:
     """Return bilinear forms between the first modes of the conservative part, by name."""
-    found = Projected(system.domain, system.conservative_part.modes(modes), form)
+    found = Projected(system.domain, system.basis.modes(modes), form)
     matrices = {name: _without_rounding(found[name]) for name in form.names}
     if {"damping", "momentum"} <= matrices.keys():  # a gyroscopic term: one is minus the other transposed
         matrices["damping"] = _alike(matrices["damping"], matrices["momentum"].swapaxes(-1, -2))

@@ -14,7 +14,7 @@ from cra_sym.checks import broadcastable, count, default_floating_point, instanc
 from cra_sym.model.cross_check import CrossCheck, cross_check
 from cra_sym.model.end_masses import end_mass_rounding
 from cra_sym.model.energy_signs import refuse_negative
-from cra_sym.model.projection import Domain, Load, Projected, project
+from cra_sym.model.projection import BilinearForm, Domain, Load, Projected, project
 from cra_sym.model.routes import ROUNDING, TOLERANCE, Estimated, Modes, Rated, Route
 from cra_sym.model.slip_elements import SlipElements, slip_elements, slip_terms_of
 from cra_sym.model.spanned_stiffness import check_range
@@ -206,6 +206,28 @@ class System:
         part: Model | None = self.numerics("conservative_part")
         return self if part is None else part.at(self.values, tolerance=self.tolerance)
 
+    @cached_property
+    def basis(self) -> System:
+        """The system whose natural modes equations are projected on: the conservative part, unless it has buckled.
+
+        Then it is the elastic part, without potential energies of other than the highest derivatives by x.
+        """
+        part = self.conservative_part
+        if part is not self:
+            try:
+                part.natural_frequencies(1)
+            except ValueError:
+                elastic: Model = self.numerics("elastic_part")
+                return elastic.at(self.values, tolerance=self.tolerance)
+        return part
+
+    @property
+    def stiffness_beside(self) -> BilinearForm | None:
+        """The stiffness besides that of the basis, None if there is none."""
+        elastic = self.basis is not self.conservative_part
+        found: BilinearForm | None = self.numerics("stiffness_beside_elastic" if elastic else "stiffness_beside")
+        return found
+
     def natural_frequencies(self, modes: int) -> Array:
         """Return the first natural frequencies, rad/s, shape (..., modes); read-only."""
         return np.asarray(self.cached("omega", count("modes", modes, high=MOST_MODES), self._find_frequencies))
@@ -321,8 +343,8 @@ class System:
         return kept[key]
 
     def project(self, load: Load, modes: int) -> Array:
-        """Return the generalised force of a load on every mode of the conservative part, shape (..., modes)."""
-        part = self.conservative_part
+        """Return the generalised force of a load on every mode of the basis, shape (..., modes)."""
+        part = self.basis
         check_forces(part, load, part._route)
         return project(part.domain, part.modes(modes), load)
 

@@ -131,6 +131,12 @@ class ModalPolynomials(ByValue):
         kept = tuple(term for term in self.energies if not term.causes)
         return ModalPolynomials(self.omega, 0.5 * (self.damping - self.damping.T), kept)
 
+    def nonlinear(self) -> ModalPolynomials:
+        """Return the equations without linear terms beside those of the modes."""
+        energies = tuple(term for term in self.energies if term.positions + term.velocities > 2)
+        forces = tuple(term for term in self.forces if term.positions + term.velocities > 1)
+        return ModalPolynomials(self.omega, self.damping, energies, forces)
+
     def first(self, modes: int) -> ModalPolynomials:
         """Return the equations of the first modes alone."""
         return self.of(np.arange(modes))

@@ -145,6 +145,33 @@ def test_a_pipe_on_a_stop_closes_in_time():
     assert states and max(state.error_modes for state in states) < 0.05
 
 
+@pytest.mark.parametrize("loaded", [False, True])
+def test_a_shaft_in_its_rotating_frame(loaded):
+    """Its whirl in space does not know of the frame: below the critical speed and above it, where it stands by its
+    gyroscopic terms, frequencies in the frame differ by the speed of rotation alone."""
+    length, rhoA, EI, Omega = sp.symbols("l rhoA EI Omega")
+    v, u = (sp.Function(name)(x, t) for name in ("v", "u"))
+    shaft = cra.Model(
+        rhoA * ((v.diff(t) - Omega * u) ** 2 + (u.diff(t) + Omega * v) ** 2) / 2
+        - EI * (v.diff(x, 2) ** 2 + u.diff(x, 2) ** 2) / 2 - k_3 * (v**2 + u**2) ** 2 / 4,
+        fields=[v, u], x=x, domain=(0, length), t=t,
+        essential=[field.subs(x, end) for field in (v, u) for end in (0, length)],
+        virtual_work=[(F, v, length / 3)] if loaded else (),  # a load changes no mode
+    )  # fmt: skip
+    speeds, whirls = (20.0, 40.0), []
+    for speed in speeds:
+        system = shaft.at({"rhoA": 0.3, "EI": 5.0, "l": 1.2, "k_3": 1e5, "Omega": speed})
+        backward, forward = (
+            cra.backbone(system, mode, amplitude=[1e-5, 0.03], modes=6, harmonics=3, place=0.6) for mode in (1, 2)
+        )
+        assert backward.stable.all() and forward.stable.all()
+        whirls += [forward.angular_frequency - speed, np.abs(speed - np.sign(speed - 30) * backward.angular_frequency)]
+        np.testing.assert_allclose(cra.sensitivities(system, 2).eigenvalue_rate["Omega"][1], 1j, atol=1e-9)
+    np.testing.assert_allclose(whirls, np.tile(whirls[0], (4, 1)), rtol=1e-9)
+    assert whirls[0][0] == pytest.approx(np.sqrt(5.0 / 0.3) * (np.pi / 1.2) ** 2, rel=1e-6)
+    assert whirls[0][1] > 1.1 * whirls[0][0]  # the foundation hardens
+
+
 def test_what_follows_the_motion_has_no_backbone():
     work = [(-n * p, q, None), (n * q, p, None)]
     model = cra.Model(0, left=MOVES - k * (p**2 + q**2) / 2 - k_3 * p**4 / 4, virtual_work=work, **LUMPED)
