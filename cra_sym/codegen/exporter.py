@@ -105,8 +105,8 @@ def export(
         Modes of the system that are kept, by default 3; of the arm and of a model the largest number that they are
         stepped with, by default 16, with a controller 3.
     real : {'float64', 'float32'}
-        Type of real numbers in the code. Single precision is available for C, Fortran and Rust, without elastic-slip
-        elements; the README states its accuracy.
+        Type of real numbers in the code. Single precision is available for C, Fortran and Rust; the README states its
+        accuracy.
     version : {'3.0', '2.0'}
         Of FMI.
     input, outputs

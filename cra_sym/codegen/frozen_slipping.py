@@ -29,11 +29,34 @@ __all__ = ["SlippingNumbers", "slipping_library", "slipping_numbers"]
 Array = NDArray[np.float64]
 Outputs = Sequence[Any] | Mapping[str, Any]
 _MOST = {"coordinates": 64, "places": 16, "elements": 512}
+_SINGLE = {
+    "float64": "",
+    "float32": """
+In single precision the reference vectors agree to 1e-3; two events that are very close may change places.
+""",
+}
 _STEPS = 24  # of a motion in the reference vectors
 _TELLING = 3  # number of modes in the check whether an end is held by springs alone
-_REACH = 5.0  # of a piece: its length times the highest frequency; the first term left out is 5^37/37! = 5e-18
-_ERROR = 1e-9
-"""Error of the reference vectors, relative to each value; a thousandth of it relative to the largest of them."""
+_OF_PRECISION = {
+    "float64": {
+        "REACH": (5.0, "the longest piece of a step times FASTEST"),  # the first term left out is 5^37/37! = 5e-18
+        "LEFT_OUT": (1e-17, "of the highest term of a power series, at most"),
+        "NEARLY": (1e-12, "relative margin to the slip force of elements that start to slip together"),
+        "NOTHING": (1e-9, "velocity relative to the sum of its terms, just after an event, that is rounding"),
+        "EPS": (2.0**-52, "rounding"),
+        "ROUNDING": (2.0**-48, "of the sum of its terms: what counts as zero of a polynomial"),
+    },
+    "float32": {
+        "REACH": (2.0, "the longest piece of a step times FASTEST"),
+        "LEFT_OUT": (1e-9, "of the highest term of a power series, at most"),
+        "NEARLY": (1e-5, "relative margin to the slip force of elements that start to slip together"),
+        "NOTHING": (1e-4, "velocity relative to the sum of its terms, just after an event, that is rounding"),
+        "EPS": (2.0**-23, "rounding"),
+        "ROUNDING": (2.0**-19, "of the sum of its terms: what counts as zero of a polynomial"),
+    },
+}
+_ERRORS = {"float64": (1e-9, 1e-12), "float32": (1e-3, 1e-5)}
+"""Error of the reference vectors, relative to each value, and to the largest of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,8 +229,6 @@ def slipping_library(
     system: System, name: str, modes: int, real: str, drive: Any, outputs: Outputs | None
 ) -> tuple[Library, str, tuple[str, ...]]:
     """Return a system with elastic-slip elements as a library, with the names of its input and its outputs."""
-    if real != "float64":
-        raise ValueError(f"real = {real!r}: a system with elastic-slip elements, whose events are located, has float64")
     numbers = slipping_numbers(system, modes, drive, outputs)
     base = system.without_hysteresis
     omega = base.natural_frequencies(modes)
@@ -219,10 +240,12 @@ def slipping_library(
     statements += [f"Input u: {numbers.given}. Outputs y: {', '.join(numbers.names)}."]
     lines = (*stated(base.model), *(line for text in statements for line in textwrap.wrap(text, 96)))
     parts = ("shaping", "slipping", "slipping_check", "frozen_example")
-    text = _constants(numbers, omega) + "\n\n".join(source(part) for part in parts)
+    text = _constants(numbers, omega, real) + "\n\n".join(source(part) for part in parts)
     summary = "A flexible system with elastic-slip elements frozen as numbers, to be stepped in real time"
-    checks = (*_checks(numbers), *common_checks(omega, real))
-    made = Library(name, summary, text, lines, checks, _readme(numbers, text), real, stack=_stack(numbers))
+    checks = (*_checks(numbers, real), *common_checks(omega, real))
+    made = Library(
+        name, summary, text, lines, checks, _readme(numbers, text) + _SINGLE[real], real, stack=_stack(numbers)
+    )
     return made, numbers.given, numbers.names
 
 
@@ -234,7 +257,7 @@ def _listed(system: System) -> str:
     return "; ".join(lines)
 
 
-def _constants(numbers: SlippingNumbers, omega: Array) -> str:
+def _constants(numbers: SlippingNumbers, omega: Array, real: str) -> str:
     """Return the numbers of a system as a text in the restricted form."""
     modes, coordinates = numbers.modes, len(numbers.drive)
     places, elements = len(modes.rows), len(modes.slip)
@@ -251,18 +274,13 @@ def _constants(numbers: SlippingNumbers, omega: Array) -> str:
         "PLACE_TERMS": ((ORDER + 1) * places, "the same of all places"),
         "COUPLINGS": (places * places, "pairs of places"),
         "FASTEST": (float(fastest(modes, [])[0]), "1/s, above all frequencies"),
-        "REACH": (_REACH, "the longest piece of a step times FASTEST"),
-        "LEFT_OUT": (1e-17, "of the highest term of a power series, at most"),
         "MOST_PANELS": (500.0, "pieces of a step without events"),
         "MOST_PIECES": (1000 + 10 * elements, "of a step"),
         "MOST_AT_ONCE": (8 * elements, "largest number of events at the same time"),
         "ON_THE_WAY": (1e-3, "share of a piece that is skipped then"),
         "MOST_HALVINGS": (41, "of a piece to isolate an event"),
         "MOST_TURNS": (80, "of Newton's method"),
-        "NEARLY": (1e-12, "relative margin to the slip force of elements that start to slip together"),
-        "NOTHING": (1e-9, "velocity relative to the sum of its terms, just after an event, that is rounding"),
-        "EPS": (2.0**-52, "rounding"),
-        "ROUNDING": (2.0**-48, "of the sum of its terms: what counts as zero of a polynomial"),
+        **_OF_PRECISION[real],
     }
     rows = {
         "STIFFNESS": (modes.omega[:, 0] ** 2, "1/s^2, of each coordinate"),
@@ -311,22 +329,22 @@ def _readme(numbers: SlippingNumbers, text: str) -> str:
     )
 
 
-def _checks(numbers: SlippingNumbers) -> Iterator[Check]:
+def _checks(numbers: SlippingNumbers, real: str) -> Iterator[Check]:
     """Yield outputs, forces and energies by the package's own integration of the motion."""
-    modes = numbers.modes
+    modes, (loss, of_all) = numbers.modes, _ERRORS[real]
     rates = modes.omega[modes.omega > 0]
     quickest, slowest = float(fastest(modes, [])[0]), float(np.min(rates, initial=1.0))
     pushes = _pushes(numbers) * np.array([0.05, 1.5, 10.0])
     u = np.where(np.arange(_STEPS) % 3 == 0, 1.0, -0.5) * pushes[:, None]
     inputs = np.concatenate([np.stack([u, u], axis=-1), np.stack([0.3 * u, u], axis=-1)])
     for time in (0.03 / quickest, 2.0 / quickest, min(0.7 / slowest, 60.0 / quickest)):
-        yield Check(0, (time, pushes[1], 0), (*(numbers.through * pushes[1]), 0.0, 0.0), _ERROR)
+        yield Check(0, (time, pushes[1], 0), (*(numbers.through * pushes[1]), 0.0, 0.0), loss)
         found = np.vstack(
             [part if k == 0 else part.sum(axis=0) for k, part in enumerate(numbers.followed(inputs, time))]
         )
         for k, values in enumerate(found.T):
             given = time, float(pushes[k % 3]), _STEPS
-            yield Check(k // 3, given, tuple(values), _ERROR, 1e-3 * _ERROR * float(np.abs(values).max()))
+            yield Check(k // 3, given, tuple(values), loss, of_all * float(np.abs(values).max()))
     for bad in (0.0, -1.0, math.nan, math.inf):
         yield Check(0, (bad, 1.0, 1), (), refused=True)
     yield from (Check(k, (0.03 / quickest, bad, 1), (), refused=True) for k in (0, 1) for bad in (math.nan, math.inf))

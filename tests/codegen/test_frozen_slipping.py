@@ -167,6 +167,22 @@ def test_self_test_passes_and_bits_agree(language, tmp_path):
     kit.passes(replace(made, checks=checks), language, tmp_path)
 
 
+@pytest.mark.parametrize("language", ["c", "fortran", "rust"])
+@pytest.mark.parametrize("kind", ["one element", "two elements", "an Iwan"])
+def test_single_precision(kind, language, tmp_path):
+    """Forces, energies and outputs after 24 steps with events, beside the package's own integration."""
+    kit.needs(language)
+    iwan = ARM.model.replace(hysteresis=[(cra.Iwan(K_D, F_S, number=8), v, "left")])
+    system = {
+        "one element": slipping(), "two elements": slipping(True),
+        "an Iwan": iwan.at({**ARM.values, **VALUES}, zeta=ARM.zeta),
+    }[kind]  # fmt: skip
+    made, *_ = slipping_library(system, "crane", 4, "float32", "base_acceleration", OUTPUTS)
+    kit.passes(made, language, tmp_path)
+    if language == "rust" and shutil.which("cargo-clippy"):
+        kit.run(["cargo", "clippy", "--offline", "--quiet", "--", "-D", "warnings"], tmp_path)
+
+
 def test_stuck_it_is_the_linear_system_with_springs(tmp_path):
     """Below the slip force, where no mode is left out, by SciPy's matrix exponential of the other system."""
     step = compiled(tmp_path / "out", chain(), modes=2, input="force", outputs=["p", "q"])
@@ -237,7 +253,7 @@ def test_units_for_simulators_slip(version, tmp_path):
 @pytest.mark.parametrize(
     "options, message",
     [
-        ({"real": "float32"}, "has float64"), ({"input": "drive_force"}, "a coordinate of the model"),
+        ({"input": "drive_force"}, "a coordinate of the model"),
         ({"controller": cra.Controller(0.01, ["v"], [1e-3], 0.1, {"v": 1.0})}, "without_hysteresis"),
         ({"modes": 100}, "at most 64"),
         ({"outputs": ["v"] * 65}, "outputs"), ({"input": ["base_acceleration", v.subs(x, 1.0)]}, "must be one"),
