@@ -155,9 +155,9 @@ def exponents(expressions: Iterable[Expr], x: Symbol) -> Exponents:
             if isinstance(node, Pow) and node.has(x):
                 degree = node.exp.is_Integer and 0 <= node.exp <= _LOW_POWER
                 if node.base.has(x) and not degree and not (node.exp.is_Rational and 0 < node.exp < 1):
-                    decaying.add(node.exp * log(Abs(node.base)))
+                    decaying.add(node.exp * log(Abs(node.base, evaluate=False), evaluate=False))
                 elif not node.base.has(x):
-                    decaying.add(node.exp * log(Abs(node.base)))
+                    decaying.add(node.exp * log(Abs(node.base, evaluate=False), evaluate=False))
             elif isinstance(node, _DECAYING) and node.has(x):
                 decaying.add(node.args[0] if isinstance(node, sympy.exp) else -Abs(node.args[0]))
             elif isinstance(node, (sympy.atan, sympy.asinh)) and node.has(x):

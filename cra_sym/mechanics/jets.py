@@ -6,6 +6,7 @@ Coefficients then differentiate as plain expressions, and the total derivatives 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from itertools import islice
 from typing import Any, Literal, NamedTuple
 
@@ -48,6 +49,7 @@ __all__ = ["END_NAMES", "End", "HamiltonError", "Jet", "JetSpace", "listed", "sc
 End = Literal["left", "right"]
 END_NAMES: tuple[End, End] = ("left", "right")
 _SINGULAR = (DiracDelta,)
+_LONG = 12  # parts of a Piecewise beyond which it is differentiated part by part
 _NOT_SMOOTH = (Abs, sign, Max, Min, Piecewise, Heaviside, floor, ceiling, re, im, arg, conjugate)
 _NOT_LOCAL = (Integral, Sum)
 _NO_SCALAR = (Lambda, Limit, MatrixExpr)
@@ -380,7 +382,17 @@ def _maximal(expression: Expr, wanted: Any) -> list[Basic]:
 def _real_rate(expression: Expr, symbol: Symbol) -> Expr:
     """Return the derivative by a symbol; absolute values are differentiated as those of real numbers."""
     if not expression.has(Abs):
-        return expression.diff(symbol)
+        tables = _maximal(expression, lambda node: isinstance(node, Piecewise) and len(node.args) > _LONG)
+        names = {table: Dummy() for table in tables if table.has(symbol)}
+        plain = expression.xreplace(names)
+        own = (plain.diff(name) * _rate_of_parts(table, symbol) for table, name in names.items())
+        return Add(plain.diff(symbol), *own).xreplace({name: table for table, name in names.items()})
     real = {s: Dummy(s.name, real=True) for s in expression.free_symbols | {symbol} if isinstance(s, Symbol)}
     rate = expression.xreplace(real).diff(real[symbol])
     return rate.xreplace({dummy: s for s, dummy in real.items()})
+
+
+@lru_cache(maxsize=64)
+def _rate_of_parts(table: Piecewise, symbol: Symbol) -> Expr:
+    """Return the derivative of a Piecewise of many parts, part by part; SymPy would compare them with one another."""
+    return Piecewise(*((value.diff(symbol), condition) for value, condition in table.args), evaluate=False)

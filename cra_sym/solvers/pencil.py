@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from cra_sym.cached import cached_property
 
 from .continuum import Continuum
+from .graded import graded
 from .stress import Columns
 from .stress_mesh import Mesh
 from .stress_spectrum import bases
@@ -32,6 +33,8 @@ SHIFT = 0.7318
 eigenvalues of practical problems."""
 _SLOW = 1e-2
 """Eigenvalues that are taken without a shift, in the same unit."""
+_SLOWEST = 1e-8
+"""Eigenvalues that are known to half their digits with a shift, in the same unit."""
 _STRONG = 1e3
 """Dampers beyond this constant, in the same unit, have their force as a further unknown."""
 _HEAVY, _SPREAD = 4, 1e-3
@@ -236,21 +239,33 @@ class Reduced:
 
     def _of_velocities(self) -> Complex:
         first, second = self.pencil()
-        found = _inverted(first, second, SHIFT)
+        unit = np.ones(first.shape[:2])  # of mass, instead of stiffness, for motions that are softer than the rate
+        unit[:, : self.root_mass.shape[1]] = 1.0 / np.maximum(self.root_mass, 1.0)
+        scale = unit[:, :, None] * unit[:, None, :]
+        found = _inverted(scale * first, scale * second, SHIFT)
         slow = np.abs(found) < _SLOW
-        if not self.rigid and slow.any() and not (np.linalg.cond(self.stiffness) > 1e10).any():
-            other = _inverted(first, second, 0.0)  # relatively exact, the shifted ones absolutely
+        softest = 1.0 / self.root_mass.max(axis=1, initial=1.0)  # natural frequency, beside rigid motions at rest
+        if self.rigid:
+            replaced = (softest < _SLOW).any()
+        else:
+            replaced = slow.any() and not (np.linalg.cond(self.stiffness) > 1e10).any()
+        if replaced:
+            # exact relative to the slowest one, those of the other shift absolutely
+            other = _inverted(first, second, SHIFT * softest[:, None, None] if self.rigid else 0.0)
             order = np.argsort(np.abs(found), axis=1, kind="stable")
             found = np.take_along_axis(found, order, axis=1)
             other = np.take_along_axis(other, np.argsort(np.abs(other), axis=1, kind="stable"), axis=1)
-            found = np.where(np.abs(found) < _SLOW, other, found)
+            slowest = softest[:, None]
+            if not self.rigid:
+                slowest = np.nanmin(np.where(other == 0.0, np.inf, np.abs(other)), axis=1, keepdims=True)
+            found = np.where(np.abs(found) < np.clip(np.sqrt(slowest), _SLOWEST, _SLOW), other, found)
         return found
 
 
-def _inverted(first: Array, second: Array, shift: float) -> Complex:
+def _inverted(first: Array, second: Array, shift: Array | float) -> Complex:
     with np.errstate(divide="ignore", invalid="ignore"):
         mu = np.linalg.eigvals(np.linalg.solve(first + shift * second, second))
-        return np.asarray(shift - 1.0 / np.where(_is_graded(mu), np.nan, mu), dtype=complex)
+        return np.asarray(np.reshape(shift, (-1, 1)) - 1.0 / np.where(_is_graded(mu), np.nan, mu), dtype=complex)
 
 
 def _is_graded(mu: NDArray[np.generic]) -> NDArray[np.bool_]:
@@ -284,13 +299,13 @@ def reduced(problem: GeneralContinuum, mesh: Mesh) -> Iterator[Reduced]:
         columns = Forces(problem.loaded(), mesh)
     forces = columns.forces(0)
     drag = columns.forces(1) if problem.damped else None
-    for sets, elastic, rigid, mass_factor in bases(columns):
+    for sets, elastic, rigid in bases(columns):
         square, frame = np.linalg.eigh(elastic @ columns.mass[sets] @ elastic.swapaxes(-1, -2))
         size, turn = np.sqrt(np.maximum(square, 0.0))[:, ::-1], frame.swapaxes(-1, -2)[:, ::-1]
         fifth = size[:, min(_HEAVY, size.shape[1] - 1)]
         light = fifth < _SPREAD * size[:, 0]
         if light.any():
-            _, size, turn = np.linalg.svd(mass_factor() @ elastic.swapaxes(-1, -2), full_matrices=False)
+            size, turn = graded(columns.mass_factor()[sets] @ elastic.swapaxes(-1, -2))
         rate = 1.0 / np.where(light & (fifth > 0.0), fifth, np.where(size[:, 0] > 0.0, size[:, 0], 1.0))
         motions = np.concatenate([turn @ elastic, rigid / rate[:, None, None]], axis=1)
         root = np.concatenate([size * rate[:, None], np.ones(rigid.shape[:2])], axis=1)

@@ -25,7 +25,7 @@ _NEAR = 1e-3
 """Relative distance below which two eigenvalues are compared by their mean and their product: coalescing eigenvalues
 are each accurate to half the digits only."""
 _ROUNDING = 8 * float(np.finfo(float).eps)
-"""Of 1 / s over the largest one."""
+"""Of an eigenvalue as large as the rate."""
 _REAL = 1e-7
 """Relative imaginary part below which a pair cannot be told from a double real eigenvalue."""
 
@@ -220,9 +220,21 @@ def _compared(fine: Complex, coarse: Complex, rate: Array, modes: int, oscillati
         )
         close = np.take_along_axis(gap, other[..., None], axis=2)[..., 0] <= _NEAR * scale
         error = np.where(close, np.minimum(error, pair), error)
-    error = np.where(np.isnan(error), np.inf, error) + _ROUNDING * (1.0 + size[:, :width] / rate[:, None])
+    error = np.where(np.isnan(error), np.inf, error) + _ROUNDING * _lost(size, rate)[:, :width]
     picked = np.where(there, np.take_along_axis(fine, order, axis=1), np.nan)
     return picked, np.where(there, np.take_along_axis(error, np.minimum(order, width - 1), axis=1), np.inf)
+
+
+def _lost(size: Array, rate: Array) -> Array:
+    """Return the relative rounding errors of eigenvalues of some moduli, in units of that of the rate.
+
+    Of the slow ones the better of two: the absolute error of all, and the error relative to the slowest.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = size / rate[:, None]
+        slowest = np.nanmin(np.where(share > 0.0, share, np.inf), axis=1, keepdims=True)
+        slow = np.where(share > 0.0, np.minimum(1.0 / share, share / slowest), 0.0)
+    return np.asarray(1.0 + share + slow)
 
 
 def matched(fine: Complex, coarse: Complex) -> Complex:

@@ -7,12 +7,13 @@ this is a projection, so no stiffness is too large. Rigid-body motions are remov
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .graded import graded
 from .stress import Columns
 
 __all__ = ["BuckledError", "Spectrum", "bases", "spectrum"]
@@ -20,8 +21,6 @@ __all__ = ["BuckledError", "Spectrum", "bases", "spectrum"]
 Array = NDArray[np.float64]
 EPS = float(np.finfo(float).eps)
 EXTRA = 5  # eigenvalues beyond those requested, to find a gap for the proof of completeness
-_NOTHING = 1e-29
-"""Compliance relative to the largest below which an eigenvalue is rounding: the square of that of a singular value."""
 _SPREAD = 1e-8
 """Ratio of compliances below which eigenvectors have lost half their digits and singular values are used instead."""
 
@@ -85,7 +84,7 @@ def spectrum(columns: Columns, modes: int) -> Spectrum:
     return Spectrum(**joined)
 
 
-def bases(columns: Columns) -> Iterator[tuple[NDArray[np.intp], Array, Array, Callable[[], Array]]]:
+def bases(columns: Columns) -> Iterator[tuple[NDArray[np.intp], Array, Array]]:
     """Yield groups of sets with equally many rigid-body motions, and bases in which their stiffness is one.
 
     Yields
@@ -96,11 +95,9 @@ def bases(columns: Columns) -> Iterator[tuple[NDArray[np.intp], Array, Array, Ca
         motions that infinite springs hold.
     rigid : ndarray, shape (sets, motions, size)
         Rows without strain energy; orthonormal, and orthogonal to the elastic ones, with respect to the mass.
-    root : callable
-        ``root()`` returns F with F' F = M of the unknowns, (sets, more than size, size).
     """
     for problem in _problems(columns):
-        yield problem.sets, problem.unloaded(), problem.still, problem._mass_factor
+        yield problem.sets, problem.unloaded(), problem.still
 
 
 def _problems(columns: Columns) -> Iterator[_Problem]:
@@ -274,9 +271,13 @@ class _Problem:
                 if (growth < -1e-12).any():
                     raise BuckledError((growth < 0.0).astype(int))
                 self.softened = np.minimum(self.softened, np.maximum(growth, EPS))
-                shrink = np.where(np.isinf(growth), 0.0, 1.0 / np.sqrt(np.maximum(growth, 1e-300)))
+                shrink = 1.0 / np.sqrt(np.maximum(growth, 1e-300))
                 pull = np.where(square > 0.0, (1.0 - shrink) / square, 0.0)
+            held = np.isinf(growth)
+            pull[held] = 0.0
             factor -= pull[:, None, None] * (factor @ row[:, :, None]) * row[:, None, :]
+            if held.any():
+                factor[held] = _without(factor[held], row[held])
         return factor
 
     @staticmethod
@@ -314,23 +315,17 @@ class _Problem:
             raise ValueError("values: a static deflection has negative kinetic energy; masses must be at least 0")
 
     def _check_number(self, values: Array, number: int) -> None:
-        there = (values > _NOTHING * values[:, :1]).sum(axis=1)
+        there = (values > 0.0).sum(axis=1)
         if number > 0 and (there < number).any():
             rigid = self.still.shape[1]
             raise ValueError(
-                f"modes = {number + rigid}: the model has only {int(there.min()) + rigid} natural frequencies below "
-                "1e14 times the first that is not 0"
+                f"modes = {number + rigid}: the model has only {int(there.min()) + rigid} natural frequencies"
             )
 
     def _singular(self, operator: Array, wanted: int) -> tuple[Array, Array]:
         """Return the largest compliances and their vectors from singular values of a factor of the mass."""
-        factor = self._mass_factor()
-        _, size, adjoint = np.linalg.svd(factor @ operator.swapaxes(-1, -2), full_matrices=False)
+        size, adjoint = graded(self.columns.mass_factor()[self.sets] @ operator.swapaxes(-1, -2))
         return size[:, :wanted] ** 2, adjoint[:, :wanted]
-
-    def _mass_factor(self) -> Array:
-        """Return F with F' F = M, from the points of the quadrature, (sets, points, size)."""
-        return self.columns.mass_factor()[self.sets]
 
     def _kinetic(self, unknowns: Array) -> Array:
         """Return x' M x from the displacements, so that rounding of large eigenvalues does not spoil small ones."""
@@ -366,10 +361,7 @@ class _Problem:
             compliances = np.take_along_axis(compliances, order, axis=1)
             z = 1.0 / compliances[:, :number] if number > 0 else np.zeros((len(self.sets), 0))
         unknowns = np.take_along_axis(unknowns, order[..., None], axis=1)[:, : max(number, 0)]
-        spread = compliances[:, :1] / compliances[:, : max(number, 0)]
-        rounding = EPS * (
-            8.0 * loading + EPS * spread
-        )  # the error of a Rayleigh quotient is the square of that of its vector
+        rounding = 8.0 * EPS * np.broadcast_to(loading, z.shape)
         vectors = unknowns * np.sqrt(z)[..., None]
         rigid = self.still.shape[1]
         if rigid:
@@ -378,3 +370,18 @@ class _Problem:
             z, rounding = np.pad(z, pad)[:, :keep], np.pad(rounding, pad)[:, :keep]
             vectors = np.concatenate([self.still, vectors], axis=1)[:, :keep]
         return Spectrum(z, vectors, rounding, compliances, load)
+
+
+def _without(factor: Array, row: Array) -> Array:
+    """Return an orthogonal transformation of the columns of a factor, one of which is zero: without ``row``.
+
+    A reflection turns the row into its largest entry, so that no rounding of a soft motion takes the place of the one
+    that is held.
+    """
+    sets, place = np.arange(len(row)), np.abs(row).argmax(axis=1)
+    normal = row / np.abs(row).max(axis=1, keepdims=True)
+    normal[sets, place] += np.sign(normal[sets, place]) * np.sqrt((normal**2).sum(axis=1))
+    scaled = 2.0 / (normal**2).sum(axis=1)
+    factor = factor - scaled[:, None, None] * (factor @ normal[:, :, None]) * normal[:, None, :]
+    factor[sets, :, place] = 0.0
+    return factor

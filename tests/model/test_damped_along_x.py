@@ -238,3 +238,24 @@ def spans_with_a_damper():
             s -= value(s) / slope
         found.append(s)
     return found
+
+
+@pytest.mark.parametrize("lever", [0, HALF, 1])
+@pytest.mark.parametrize("soft", [1e-12, 1e-100, 1e-290])
+def test_a_rigid_beam_on_a_soft_spring_and_a_damper(lever, soft):
+    """Beside a free rotation about the spring: (m, J) s^2 + c b b' s + k a a' of levers a of the spring, b of the
+    damper, with one eigenvalue 0 and no stiffness along x to see."""
+    k, c = sp.symbols("k c")
+    energy = -k * v**2 / 2
+    options = {0: {"left": energy}, HALF: {"inside": [(HALF, energy)]}, 1: {"right": energy}}[lever]
+    density = (1 + x / 2) * v.diff(t) ** 2 / 2 - (2 - x) * v.diff(x, 2) ** 2 / 2
+    model = cra.Model(density, fields=[v], x=x, domain=(0, 1), t=t, virtual_work=[end_damper(c)], **options)
+    damper = 1e-2 * np.sqrt(soft)
+    found = model.eigenvalues({k: soft, c: damper}, 1)
+    mass = np.array([[5 / 4, 2 / 3], [2 / 3, 11 / 24]])  # integrals of (1 + x / 2) (1, x; x, x^2)
+    spring, pull = (np.outer(arm, arm) for arm in ([1.0, float(lever)], [1.0, 1.0]))
+    zero, one = np.zeros((2, 2)), np.eye(2)
+    inverse = np.linalg.inv(mass)
+    rates = np.linalg.eigvals(np.block([[zero, one], [-inverse @ spring, -0.01 * inverse @ pull]]))
+    expected = rates[rates.imag > 0.1] * np.sqrt(soft)
+    np.testing.assert_allclose(found, expected, rtol=max(1e-10, 100 * soft))

@@ -213,6 +213,28 @@ def test_a_count_beside_an_eigenvalue(damper, kind):
         cra.count_eigenvalues(system, BEND[1])
 
 
+@pytest.mark.parametrize("excess", [0.0, 1e-12, 1e-8, 1e-5])
+def test_a_count_beside_a_double_eigenvalue(excess):
+    """Critical damping c = 2 w (1 + d): the real roots w (1 + d +- sqrt(2 d + d^2)) beside any circle."""
+    system = ALONG.at({c: 2.0 * BEND[0] * (1.0 + excess)})
+    split = excess + np.sqrt(2.0 * excess + excess**2) * np.array([-1.0, 1.0])
+    for nearness in (-1e-2, -3e-3, -1e-4, -1e-5, 1e-6, 1e-5, 1e-4, 3e-3, 1e-2):
+        if np.abs(split - nearness).min() > 1e-7:
+            found = cra.count_eigenvalues(system, BEND[0] * (1.0 + nearness))
+            assert found == (split < nearness).sum()
+
+
+@pytest.mark.parametrize("load", [20.0509536187612, 20.05095, 20.0509, 20.05])
+def test_a_count_beside_two_that_flutter(load):
+    """Of Beck's column just before flutter, and at it; pairs with the same imaginary part."""
+    system = BECK.at({P: load})
+    size = np.abs(system.model.eigenvalues({P: load}, 2))
+    for nearness in (-1e-3, -1e-5, 1e-5, 1e-3, 4e-3):
+        radius = np.sqrt(121.3425101405) * (1.0 + nearness)
+        if np.abs(size / radius - 1.0).min() > 1e-6:
+            assert cra.count_eigenvalues(system, radius) == 2 * (size < radius).sum()
+
+
 INSIDE = {
     "support": (model(essential=[*CLAMPED, v.subs(x, HALF)], virtual_work=END_DAMPER), {c: 2.0}),
     "clamp": (
