@@ -36,7 +36,6 @@ ERRORS = {"float64": 1e-12, "float32": 2e-3}
 _POINTS, _MODES = 8, 6
 _APART = 1e-3
 _ALONE = {"float64": 1e-3, "float32": 0.1}  # of all mass, that the base moves alone
-_BELOW = 340  # number of frequencies; more of them lie below the last point
 _TURNS = (0.3, 4.0, 40.0, 1000.0)
 """Wave number times length of the points of the characteristic function."""
 
@@ -247,7 +246,10 @@ class _Exact:
         entries = [*self._form.matrices, right - left, *_of_ends(self._form)]
         self._entries = sp.lambdify(list(written.names), entries, "mpmath")
         self._values, self._system = values, _system(written, values)
-        self._first = float(self._system.natural_frequencies(2)[1])
+        frequencies = self._system.natural_frequencies(_MODES)
+        self._first = float(frequencies[1])
+        self._rigid = int((frequencies == 0.0).sum())
+        self._low = float(frequencies[self._rigid]) / 2
 
     def _parts(self) -> tuple[Any, ...]:
         """Return the matrices a and b without z and their factors of z, times half the length, and the ends."""
@@ -291,8 +293,8 @@ class _Exact:
         growth = mpmath.exp(-2 * sum(mpmath.re(mpmath.sqrt(mu)) for mu in values))
         value, step = self._determinant(mpmath.mpf(omega)), mpmath.mpf(10) ** -35
         rate = (self._determinant(mpmath.mpf(omega) + step) - value) / step if omega else mpmath.mpf(0)
-        below = int((self._system.natural_frequencies(_BELOW) < omega).sum())
-        sign = 1 if (value > 0) == (below % 2 == 0) else -1  # one for all omega
+        # positive below all frequencies, and thus (-1)^n behind n of them; the factor is one for all omega
+        sign = 1 if (self._determinant(mpmath.mpf(self._low)) > 0) == (self._rigid % 2 == 0) else -1
         return sign * value * growth, sign * rate * growth
 
     def _determinant(self, omega: Any) -> Any:
