@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from cra_sym.model.waves_form import WavesForm
+from cra_sym.solvers import waves_modes
 
 __all__ = ["model_constants"]
 
@@ -19,6 +20,9 @@ _NUMBERS = {  # in double precision, in single precision
     "THREE_SMALL": (1e-95, 1e-11, "the same of three"),
     "SAME": (1e-9, 1e-4, "relative distance below which squared frequencies are taken as equal"),
     "NODE": (1e-7, 1e-3, "of the largest displacement: a node"),
+    "SMALL": (waves_modes.SMALL_SHARE, 1e-2, "of the largest condition: what may be rounding"),
+    "ROUNDING": (waves_modes.ROUNDING, 2.0**-19, "relative, of some operations"),
+    "ROOT_ERROR": (waves_modes.ROOT_ERROR, 2.0**-15, "relative, of a root of three waves"),
     "BESIDE": (1e-12, 1e-5, "of the largest displacement beside a node"),
 }
 _PLACES = (-1.0, -0.56, 0.06, 0.62, 1.0 - 2e-4, 1.0)

@@ -43,11 +43,11 @@ _PLACES = np.array([1.0, 0.83, 0.57, 0.29])
 _TINY_SHARE = 1e-45
 """Smaller values are the square of the complex step."""
 
-_SMALL_SHARE = 1e-6
+SMALL_SHARE = 1e-6
 """Smaller columns may be rounding."""
 
-_ROUNDING = 2.0**-48  # relative, of some operations
-_ROOT_ERROR = 2.0**-42  # relative, of a root of three waves
+ROUNDING = 2.0**-48  # relative, of some operations
+ROOT_ERROR = 2.0**-42  # relative, of a root of three waves
 _TINY = 1e-100
 _STEP = 1e-30  # of the lowest frequency of half a wave along the length
 
@@ -227,12 +227,12 @@ def _vanishing(structure: Structure, k: Floats, z: Floats, conditions: Floats) -
     columns = np.abs(conditions).max(axis=(1, 3))
     largest = columns.max(axis=1, keepdims=True)
     found: NDArray[np.bool_] = columns <= _TINY_SHARE * largest
-    part = np.flatnonzero((columns <= _SMALL_SHARE * largest).any(axis=1))
+    part = np.flatnonzero((columns <= SMALL_SHARE * largest).any(axis=1))
     if part.size:
         places = np.broadcast_to(_PLACES, (part.size, len(_PLACES)))
         sign = np.random.default_rng(1).choice([-1.0, 1.0], (len(k), part.size))
         for side in (-1.0, 1.0):
-            entries, root = k[:, part] * (1.0 + side * sign * _ROUNDING), z[part] * (1.0 + side * _ROOT_ERROR)
+            entries, root = k[:, part] * (1.0 + side * sign * ROUNDING), z[part] * (1.0 + side * ROOT_ERROR)
             columns_there = _columns(structure, entries, root.astype(complex), places).real
             other = _conditions(structure, entries, root, columns_there)
             found[part] |= columns[part] <= np.abs(other - conditions[part]).max(axis=(1, 3))
