@@ -196,6 +196,8 @@ def test_the_table_of_a_page_has_three_cells_a_row():
 
 
 def test_words():
+    assert [number(x) for x in (99900.0, 105000.0, 9.99e-4)] == ["99900", r"$1.05\times10^{5}$", r"$9.99\times10^{-4}$"]
+    assert plain_text(r"$\kappa_t$, $\epsilon\varpi$ and $\lambda$") == "\u03ba_t, \u03b5\u03d6 and \u03bb"
     assert number(np.inf) == "infinite" and number(12345.6) == "12300" and number(1e-9) == "$10^{-9}$"
     assert percent(0.5) == "50 %" and listed([1.0]) == "1"
     assert span([1, 2, 3], [False] * 3) == "nowhere"

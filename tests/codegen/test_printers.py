@@ -8,7 +8,7 @@ from sympy.codegen.cfunctions import expm1, log1p
 
 from cra_sym.codegen.library import Check, Library
 from cra_sym.codegen.printers import FormPrinter
-from cra_sym.codegen.program import function, new_name, scalars
+from cra_sym.codegen.program import _REWRITTEN, function, new_name, plain, scalars
 from tests.codegen import kit
 
 x, y = sp.symbols("x y", real=True)
@@ -99,3 +99,12 @@ def test_names_are_valid_everywhere():
 def test_a_missing_argument_is_named():
     with pytest.raises(ValueError, match="not arguments: y"):
         function("f", "", x + y, scalars([x]))
+
+
+@pytest.mark.parametrize("kind", [kind for kind in _REWRITTEN if kind is not sp.ITE])
+def test_what_is_rewritten_keeps_its_value(kind):
+    u = sp.Symbol("u")
+    for value in (1.7, 2.4) if kind in (sp.asec, sp.acsc) else (-1.3, -0.05, 0.05, 0.4, 1.7):
+        expression = kind(u, sp.Rational(1, 2)) if kind is sp.Heaviside else kind(u)
+        assert not plain(expression).has(kind)
+        assert float(plain(expression).subs(u, value)) == pytest.approx(float(expression.subs(u, value)), rel=1e-14)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from cra_sym.kernels import Kernel, kernel
+from cra_sym.kernels import Kernel, has_compiler, kernel
 
 x, a, b = sp.symbols("x a b")
 
@@ -218,3 +218,13 @@ def test_repr_and_arguments_of_a_hand_made_kernel():
     f = Kernel("ARGUMENTS = ('t',)\nLAYOUT = ()\ndef evaluate(t):\n    return 2*t\n", ("t",))
     assert f(4) == 8
     assert "(t)" in repr(f)
+
+
+@pytest.mark.parametrize("backend", ["numpy", "compiled"])
+def test_signs_and_remainders_on_both_sides_of_zero(backend):
+    if backend == "compiled" and not has_compiler():
+        pytest.skip("llvmlite is an option")
+    values = np.array([-7.3, -3.0, -0.05, 0.0, 0.05, 2.9, 3.0, 7.3])
+    found = kernel((sp.sign(x), sp.Mod(x, 3), sp.Mod(x, -3)), (x,), backend=backend)(values)
+    for ours, exact in zip(found, (np.sign(values), np.mod(values, 3), np.mod(values, -3)), strict=True):
+        np.testing.assert_array_equal(ours, exact)

@@ -38,6 +38,19 @@ def test_linear_dampers_stay_and_nonlinear_forces_do_not():
     np.testing.assert_array_equal(found, beam(virtual_work=[(-c * v.diff(t), v, "right")]).eigenvalues(values))
 
 
+def test_forces_inside_push_the_section_there_and_their_nonlinear_part_is_left_out():
+    """A spring as a force is the spring of an energy; with a cube added the principle is no longer linear."""
+    values = {**ONES, k: 3.0}
+    as_energy = beam(inside=[(L / 3, -k * v**2 / 2)])
+    spring, hardening = (beam(virtual_work=[(force, v, L / 3)]) for force in (-k * v, -k * v - k * v**3))
+    assert not spring.nonlinear and hardening.nonlinear
+    wanted = cra.natural_frequencies(as_energy.at(values))
+    for model in (spring, hardening):
+        np.testing.assert_allclose(cra.natural_frequencies(model.at(values)), wanted, rtol=1e-12)
+    free = cra.natural_frequencies(beam().at({name: value for name, value in ONES.items()}))
+    assert wanted[0] > 1.01 * free[0]
+
+
 def test_separation_of_a_nonlinear_principle_is_still_refused():
     principle = hamilton(BEAM - v**4, fields=[v], x=x, domain=(0, L), t=t)
     with pytest.raises(ValueError, match="nonlinear"):

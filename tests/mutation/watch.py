@@ -174,6 +174,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "arm/frequency_parameters": [_FREQUENCIES, _DIGITS, [_LAMBDA]],
     "arm/lagrangian": [["tests/paper/test_energy.py"], *_PHYSICS],
     "arm/excitations": [["tests/analysis/test_stability.py"]],
+    "model/soft_springs": [["tests/model/test_one_wave.py"], _DIGITS],
     "model/excitations": [
         [*_ZONES[:3], *_FORCED, *_SYSTEM[:3]],
         [*_stability("excitations_compare_hash_and_pickle"), *_LOOPED, *_ORDER],
