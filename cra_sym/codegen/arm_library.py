@@ -103,7 +103,7 @@ def _library(name: str, real: str, in_time: Signals) -> Library:
     statement = stated(Arm.nominal().model)
     checks = tuple(_checks(real, in_time))
     batch = arm_batch(name, real, TOLERANCE if real == "float64" else _SINGLE)
-    stack = _STACK.replace("NAME", name.upper())
+    stack = _STACK.replace("NAME", name.upper()) + (f"; {in_time.stack}" if in_time.free else "")
     readme = _README + _PRECISION[real] + in_time_readme(in_time, text)
     return Library(name, summary, text, statement, checks, readme, real, batch, stack)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -58,6 +59,13 @@ class Signals:
     def free(self) -> bool:
         """Whether a force moves the base."""
         return any(one.kind == "free" for one in self.inputs)
+
+    @property
+    def stack(self) -> str:
+        """What `discretise` takes of the stack, as part of a sentence, if that is much: three square matrices."""
+        states = 2 * (len(self.states) + self.modes)
+        doubles = 3 * states**2 + states * (2 * len(self.inputs) + 4)
+        return f"`discretise` takes {math.ceil(8 * doubles / 1000)} kB" if self.free else ""
 
     @property
     def accelerated(self) -> bool:

@@ -124,9 +124,15 @@ def _library(written: ModelText, name: str, loop: ModelController | None = None)
     unknowns = [*(f"{name}(x, t)" for name in written.fields), *(f"{name}(t)" for name in written.coordinates)]
     summary = f"Frequencies, modes, sensitivities and responses of a model of {', '.join(unknowns)}".replace("\\", "")
     checks = (*model_checks(written, values), *(loop.checks() if loop else ()))
-    return Library(name, summary, text + "\n", stated(model), checks, _readme(written, text), written.real)
+    stack = _STACK.replace("NAME", name.upper())
+    stack += f"; {written.signals.stack}" if written.signals and written.signals.free else ""
+    return Library(name, summary, text + "\n", stated(model), checks, _readme(written, text), written.real, stack=stack)
 
 
+_STACK = """\
+at most 20 kB, of
+which `modes_of` takes half for `NAME_MOST_MODES` = 1000 modes, which may be set to less when compiling
+(`-DNAME_MOST_MODES=20`)"""
 _EXAMPLE = '''\
 def _example(found: Out[Row[float, 3]]) -> None:
     """Return the first natural frequencies, Hz."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from dataclasses import replace
 from functools import cache
@@ -93,6 +94,22 @@ def test_the_arm_takes_any_input_and_output(language, tmp_path):
     kit.passes(made, language, tmp_path)
     if language == "rust" and shutil.which("cargo-clippy"):
         kit.run(["cargo", "clippy", "--offline", "--quiet", "--tests", "--", "-D", "warnings"], tmp_path)
+
+
+@pytest.mark.parametrize("inputs", ["free", "held"])
+def test_the_stack_is_what_the_readme_says(inputs, tmp_path):
+    """20 kB, with what functions called have, and that of `discretise` where all modes are coupled."""
+    kit.needs("c")
+    texts = library(inputs).texts("c")
+    kit.write(texts, tmp_path)
+    kit.run(["gcc", "-std=c99", "-O2", "-fstack-usage", "-c", "span.c"], tmp_path)
+    rows = [line.split() for line in (tmp_path / "span.su").read_text().splitlines()]
+    used = {row[0].split(":")[-1]: int(row[1]) for row in rows}
+    assert "the stack is at most 20 kB" in texts["README.md"]
+    of_step = used.pop("span_discretise")
+    assert sum(sorted(used.values())[-3:]) < 20e3
+    said = re.search(r"`discretise` takes (\d+) kB", texts["README.md"])
+    assert of_step < (1.1e3 * float(said[1]) if said else 1e3) and (said is not None) == (inputs == "free")
 
 
 def test_steps_are_the_response_in_closed_form():
