@@ -174,6 +174,9 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "arm/frequency_parameters": [_FREQUENCIES, _DIGITS, [_LAMBDA]],
     "arm/lagrangian": [["tests/paper/test_energy.py"], *_PHYSICS],
     "arm/excitations": [["tests/analysis/test_stability.py"]],
+    "kernels/arithmetic": [["tests/kernels/test_writer.py"], ["tests/kernels/test_callables.py"]],
+    "mechanics/points": [["tests/model/test_members.py"], ["tests/model/test_nonlinear.py"]],
+    "mechanics/polynomials": [["tests/model/test_nonlinear.py"]],
     "model/soft_springs": [["tests/model/test_one_wave.py"], _DIGITS],
     "model/excitations": [
         [*_ZONES[:3], *_FORCED, *_SYSTEM[:3]],
