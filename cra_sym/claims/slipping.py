@@ -111,8 +111,8 @@ def _sensitivity_grows(setting: Setting) -> Finding:
     judgement = judged(grows)
     plain = by_outcome(
         judgement,
-        "The frequency of mode 1 grows more sensitive to the preload as that is lost, at every amplitude.",
-        "With slip the sensitivity to the preload grows only until the faces slide: then no preload is felt any more.",
+        "The more preload is lost, the more sensitive the frequency of mode 1 is to it, at every amplitude.",
+        "With slip the sensitivity to the preload grows only until the faces slide: from then on it is zero.",
         "With slip the sensitivity to the preload does not grow as that is lost.",
     )
     sentence = (

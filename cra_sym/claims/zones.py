@@ -83,7 +83,7 @@ def zone_1_stays(setting: Setting) -> Finding:
         judgement,
         "As the joint softens zone 1 stays and zones 2 and 3 widen, in every case tried.",
         "As the joint softens zone 1 stays and zones 2 and 3 widen for some excitations and down to some $k_t$ only.",
-        "As the joint softens it is nowhere so that zone 1 stays and zones 2 and 3 widen.",
+        "As the joint softens, in no case tried does zone 1 stay while zones 2 and 3 widen.",
     )
     factors = widths[1, -1] / widths[1, 0]
     in_relative = f"in {percent(relative.mean())} of the cases" if relative.any() else "nowhere"
@@ -156,7 +156,7 @@ def heavier_is_narrower(setting: Setting) -> Finding:
         judgement,
         "A heavier end-effector narrows all three zones, in every case tried.",
         "A heavier end-effector narrows all three zones for some joints and excitations, and widens one for others.",
-        "A heavier end-effector narrows all three zones at once in no case.",
+        "In no case tried does a heavier end-effector narrow all three zones at once.",
     )
     change = widths[1, :, -1] / widths[1, :, 0] - 1
     stiff = int(np.argmin(np.abs(k_t - setting.k_t[-1])))

@@ -135,7 +135,7 @@ def figure_slip_amplitude(
 def figure_tongue_bounds(
     epsilon: ArrayLike, bounded: ArrayLike, threshold: ArrayLike, *, ax: Axes | None = None
 ) -> Figure:
-    """Draw to which amplitude friction bounds vibration in a tongue, and from which on it holds nothing in another.
+    """Draw the amplitude to which friction limits vibration in one tongue, and beyond which it does not in another.
 
     Parameters
     ----------
