@@ -42,7 +42,7 @@ class Sensitivities:
 
     Of a system without natural modes (gyroscopic terms, forces that follow the motion), f is that of the motions that
     oscillate, ``Im s / (2 pi)``. Derivatives of eigenvalues s are differences of eighth order with a relative error of
-    about 1e-10; they are nan where s is repeated or coalesces with another, as at the onset of flutter.
+    about 1e-10, more beside the onset of flutter; they are nan where s is repeated or coalesces with another.
 
     Attributes
     ----------
