@@ -29,7 +29,7 @@ __all__ = ["OUTPUTS", "Shape", "Signals", "TimeText", "in_time_readme", "signals
 
 OUTPUTS = ("y", "v", "w", "root_force", "root_moment", "tip_acceleration")
 """Default outputs, if the system has them."""
-_MOST_SIGNALS, _MOST_FREE = 64, 32
+_MOST_SIGNALS, _MOST_FREE = 64, 64
 _INSTEAD = "give system= with the model at its values"
 
 
@@ -95,7 +95,7 @@ def signals(
     Raises
     ------
     TypeError, ValueError
-        As :func:`cra_sym.state_space`; for moving supports; and beyond 64 inputs or outputs, or 32 modes with
+        As :func:`cra_sym.state_space`; for moving supports; and beyond 64 inputs or outputs, or 64 modes with
         'drive_force'.
     """
     modes = count("modes", modes, high=MOST_MODES)

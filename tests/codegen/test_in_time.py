@@ -171,7 +171,7 @@ def test_bad_input_is_refused():
     [
         ({"input": "torque"}, "input = 'torque': must be one of base_acceleration, drive_force"),
         ({"input": ["drive_force", "F"]}, "must be displacements"),
-        ({"input": "drive_force", "modes": 33}, "modes = 33: must be at most 32 with 'drive_force'"),
+        ({"input": "drive_force", "modes": 65}, "modes = 65: must be at most 64 with 'drive_force'"),
         ({"outputs": ["z"]}, "outputs = 'z': must be one of"),
         ({"outputs": [("v", float("nan"))]}, "outputs: place"),
         ({"modes": 0}, "modes = 0"),
