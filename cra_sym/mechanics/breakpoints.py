@@ -113,7 +113,8 @@ def derivative(expression: Expr, symbol: Symbol) -> Expr:
     Heaviside(-a + x)
     """
     real = {s: Dummy(s.name, real=True) for s in (expression.free_symbols | {symbol}) if isinstance(s, Symbol)}
-    rate = expression.xreplace(real).diff(real[symbol])
+    plain = expression.xreplace(real).replace(Mod, lambda value, period: value - period * floor(value / period))
+    rate = plain.diff(real[symbol])
     if rate.has(DiracDelta, Derivative, Subs):
         flat = {node: S.Zero for node in rate.atoms(Derivative, Subs) if node.atoms(floor, ceiling, frac)}
         rate = rate.xreplace(flat).replace(DiracDelta, lambda *arguments: S.Zero)

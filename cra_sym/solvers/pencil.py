@@ -37,6 +37,9 @@ _SLOWEST = 1e-8
 """Eigenvalues that are known to half their digits with a shift, in the same unit."""
 _STRONG = 1e3
 """Dampers beyond this constant, in the same unit, have their force as a further unknown."""
+_DETAILED, _SMOOTH, _FINE, _LEVELS = 2, 16, 1e-8, 2
+"""Pieces in an element beyond which stresses of finer detail are added, how many smooth ones they balance, their least
+share beside Legendre functions, and how many times."""
 _HEAVY, _SPREAD = 4, 1e-3
 """Ratio of the fifth root of a mass to the first (soft springs, heavy ends) below which eigenvalues of the mass have
 lost digits and singular values are used instead."""
@@ -132,6 +135,57 @@ class Forces(Columns):
     def resists_strains(self) -> bool:
         """Whether there are dampers of the highest derivatives."""
         return any(min(pair) < len(self.problem.orders) for pair in self.coefficient["C"])
+
+    def detail(self) -> Array | None:
+        """Return stresses of fine detail, as functions (sets, number, fields, Q, G), or None if there are none.
+
+        Coefficients of finer detail than the elements give stresses of that detail: those that inertia, dampers and
+        further forces of the smoothest stresses demand, beside Legendre functions.
+        """
+        degrees, elements, fields = self.elastic
+        first = min(degrees, max(2, _SMOOTH // elements)) * elements * fields
+        smooth = np.r_[: self.offset + first]
+        jets, n = [np.broadcast_to(jet, (*jet.shape[:2], *self.grid.x.shape[1:])) for jet in self.jets], fields
+        shift = self.problem.displacements + self.problem.lumped
+        found = []
+        for name in "MCN":
+            pairs: dict[int, Array] = {}
+            for (i, j), entry in self.coefficient[name].items():
+                both = [(i, j), (j, i)] if name == "M" and i != j else [(i, j)]
+                for row, column in both:
+                    if name == "M":  # numbered with the displacements first
+                        row, column = ((k + n if k < shift else k - shift) for k in (row, column))
+                    pairs[row] = pairs.get(row, np.zeros(())) + entry[:, None] * jets[column][:, smooth]
+            found += self._balanced(pairs, len(smooth))
+        if not found:
+            return None
+        whole = np.concatenate(found, axis=1)
+        weights = np.broadcast_to(self.weights.reshape(-1, *whole.shape[-2:]), (self.sets, *whole.shape[-2:]))
+        table = np.broadcast_to(self.legendre, (self.sets, *self.legendre.shape[1:]))
+        size = np.einsum("sqg,sdeqg->sde", weights, table**2)
+        share = np.einsum("sfiqg,sdeqg->sfide", whole * weights[:, None, None], table, optimize=True)
+        rest = whole - np.einsum("sfide,sdeqg->sfiqg", share / size[:, None, None], table, optimize=True)
+        root = np.sqrt(weights)[:, None, None]
+        shape = (self.sets, whole.shape[1], -1)
+        scale = np.sqrt(((root * whole) ** 2).reshape(shape).sum(axis=-1))[..., None]
+        scale = np.where(scale > 0.0, scale, 1.0)
+        _, strength, kinds = np.linalg.svd((root * rest).reshape(shape) / scale, full_matrices=False)
+        number = int((strength > _FINE).sum(axis=1).max(initial=0))
+        return kinds[:, :number].reshape(self.sets, number, *whole.shape[2:]) / root if number else None
+
+    def _balanced(self, forces: dict[int, Array], number: int) -> list[Array]:
+        """Return the stresses that balance forces on jets, given by the number of the jet, (sets, f, fields, Q, G)."""
+        if not forces:
+            return []
+        shape = (self.sets, number, *self.grid.x.shape[1:])
+        place, found = len(self.problem.orders), []
+        for field, order in enumerate(self.problem.orders):
+            stress = np.zeros(shape)
+            for _ in range(order):
+                stress = self._integral(forces.get(place, 0.0) - stress, np.zeros(number))[0]
+                place += 1
+            found.append(np.broadcast_to(stress - forces.get(field, 0.0), shape))
+        return [np.stack(found, axis=2)]
 
     def forces(self, power: int) -> Array:
         """Return the matrix of the forces of displacements (0) or velocities (1), (sets, size, size)."""
@@ -297,6 +351,9 @@ def reduced(problem: GeneralContinuum, mesh: Mesh) -> Iterator[Reduced]:
     columns = Forces(problem, mesh)
     if any(bool((entry < 0.0).any()) for entry in columns.coefficient["R"].values()):
         columns = Forces(problem.loaded(), mesh)
+    if len(mesh.pieces) - 1 > _DETAILED * (len(mesh.elements) - 1) and not mesh.strained.any():
+        for _ in range(_LEVELS):
+            columns = Forces(columns.problem, mesh, columns.detail())
     forces = columns.forces(0)
     drag = columns.forces(1) if problem.damped else None
     for sets, elastic, rigid in bases(columns):

@@ -184,7 +184,7 @@ PULSES = {
     "at the right end": sp.Piecewise((1000, x > sp.Rational(95, 100)), (0, True)),
     "at the left end": sp.Piecewise((10**5, x < sp.Rational(1, 10)), (0, True)),
     "inside": 1000 * (sp.Heaviside(x - sp.Rational(45, 100)) - sp.Heaviside(x - sp.Rational(47, 100))),
-    "boundary layer": 10**5 * sp.exp(-300 * (1 - x)),
+    "boundary layer": 10**5 * sp.exp(-1000 * (1 - x)),
 }
 
 
@@ -259,3 +259,48 @@ def test_a_rigid_beam_on_a_soft_spring_and_a_damper(lever, soft):
     rates = np.linalg.eigvals(np.block([[zero, one], [-inverse @ spring, -0.01 * inverse @ pull]]))
     expected = rates[rates.imag > 0.1] * np.sqrt(soft)
     np.testing.assert_allclose(found, expected, rtol=max(1e-10, 100 * soft))
+
+
+# periodic cells -------------------------------------------------------------------------------------------------------
+
+WAVE = sp.sin(2 * sp.pi * 30 * x)
+CELLS = {
+    "tension": (1 + 0.8 * WAVE, 1, 0, 0),
+    "mass": (1, 1 + 0.8 * WAVE, 0, 0),
+    "damper along": (1, 1, 1 + 0.8 * WAVE, 0),
+    "every coefficient": (1 + 0.8 * WAVE, 1 + WAVE / 2, (1 + WAVE) / 5, 0),
+    "Kelvin and Voigt": (1 + 0.8 * WAVE, 1 + WAVE / 2, 0, (2 + WAVE) / 1000),
+    "steps": (1 + sp.Piecewise((1, sp.Mod(30 * x, 1) < HALF), (0, True)), 1, 0, 0),
+}
+
+
+@pytest.mark.parametrize("kind", CELLS)
+def test_a_damped_string_of_thirty_cells(kind):
+    """By the transfer matrix of a cell to the power 30: an element that holds many cells has their detail too."""
+    coefficients = CELLS[kind]
+    tension, mass, along, inner = map(sp.sympify, coefficients)
+    work = [end_damper(0.3), (-along * v.diff(t), v, "domain"), (-inner * v.diff(x, t), v.diff(x), "domain")]
+    density = mass * v.diff(t) ** 2 / 2 - tension * v.diff(x) ** 2 / 2
+    string = cra.Model(density, fields=[v], x=x, domain=(0, 1), t=t, essential=[v.subs(x, 0)],
+                       virtual_work=[part for part in work if part[0] != 0])  # fmt: skip
+    system = string.at({})
+    w, m, c, d = (sp.lambdify(x, part) for part in (tension, mass, along, inner))
+
+    def value(s):
+        def slope(place, y):
+            rate = np.array([[0, 1 / (w(place) + s * d(place))], [s**2 * m(place) + s * c(place), 0]])
+            return (rate @ y.reshape(2, 2)).ravel()
+
+        cell = np.eye(2, dtype=complex)
+        for left, right in ((0.0, 0.5 - 1e-14), (0.5 + 1e-14, 1.0 - 1e-14)):
+            cell = solve_ivp(
+                slope, (left / 30, right / 30), cell.ravel(), method="DOP853", rtol=1e-13, atol=1e-15, max_step=1e-3
+            ).y[:, -1].reshape(2, 2)  # fmt: skip
+        y = np.linalg.matrix_power(cell, 30)[:, 1]
+        return y[1] + 0.3 * s * y[0]
+
+    for s in cra.eigenvalues(system, 3):
+        step = 1e-5 * abs(s)
+        error = abs(value(s) * 2 * step / (value(s + step) - value(s - step)) / s)
+        assert error < 2 * system.accuracy + SHOOTING
+    assert system.accuracy <= 1e-10
