@@ -221,13 +221,15 @@ def _tidy(text: str) -> str:
 def _exported(printer: Printer) -> list[str]:
     form = printer.form
     functions = [printer.function_name(f) for f in form.functions.values() if f.public]
+    constants = [name for name in form.constants if name in form.interface]
+    records = [name for name in form.records if name in form.interface]
     if isinstance(printer, FortranPrinter):
         errors = [f"{printer.prefix}_ok", *map(printer.error, form.errors)]
-        records = [printer.record_name(name) for name in form.records]
-        return [f"{printer.prefix}_version", *errors, *form.constants, *records, *functions]
+        types = [printer.record_name(name) for name in records]
+        return [f"{printer.prefix}_version", *errors, *constants, *types, *functions]
     if isinstance(printer, JavaScriptPrinter):
-        return [*form.constants, *(f"new_{snake(name)}" for name in form.records), *functions]
-    return [*form.constants, *form.records, *functions]
+        return [*constants, *(f"new_{snake(name)}" for name in records), *functions]
+    return [*(form.errors if isinstance(printer, PythonPrinter) else []), *constants, *records, *functions]
 
 
 def _helpers(printer: Printer, text: str) -> str:

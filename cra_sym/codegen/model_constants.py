@@ -54,7 +54,7 @@ def model_constants(
         "MOTIONS": (n + m, "independent motions without strain"),
         "RESTRAINTS": (moving + links, "conditions of ends, coordinates and links"),
         "RESTING": (max(ranks), "factors of conditions of a motion without energy"),
-        "MOST_EQUAL": (moving if structure.linked else n, "frequencies that may be equal"),
+        "MULTIPLICITY": (moving if structure.linked else n, "frequencies that may be equal"),
         "STATIONS": (len(_PLACES), "places where the size of a motion is measured"),
     }
     if drives:

@@ -44,10 +44,11 @@ class CPrinter(Printer):
         status = f"typedef enum {{\n{inside}\n}} {self.prefix}_status;"
         public = [f for f in self.form.functions.values() if f.public]
         declarations = ["\n".join([*self.documented(f), *self.signature(f, ";")]) for f in public]
-        return "\n\n".join(filter(None, [status, self.integers(), self.records(), *declarations]))
+        records = "\n\n".join("\n".join(self.record(r)) for r in self.form.records.values() if self.is_public(r))
+        return "\n\n".join(filter(None, [status, self.integers(), records, *declarations]))
 
     def integers(self) -> str:
-        """Return the constants for the caller: integers, which lengths need, and numbers that no function uses."""
+        """Return the constants for the caller."""
         found = []
         for c in filter(self.is_in_header, self.form.constants.values()):
             name = self.variable(c.name)
@@ -56,20 +57,24 @@ class CPrinter(Printer):
             elif c.name.startswith("MOST_"):  # sizes of arrays, which may be set where memory is limited
                 found += [f"#ifndef {name}", self.documented_constant(c, f"#define {name} {c.values[0]}"), "#endif"]
             else:
-                found.append(self.documented_constant(c, f"enum {{ {name} = {c.values[0]} }};"))
+                found.append(self.constant(c))
         return "\n".join(found)
 
     def constants(self) -> str:
         return "\n".join(self.constant(c) for c in self.form.constants.values() if not self.is_in_header(c))
 
+    def records(self) -> str:
+        return "\n\n".join("\n".join(self.record(r)) for r in self.form.records.values() if not self.is_public(r))
+
     def is_in_header(self, constant: Constant) -> bool:
         """Return whether a constant is in the header."""
-        used = any(constant.name in f.names for f in self.form.functions.values())
-        return _counts(constant) or (constant.type.length is None and not used)
+        return self.is_public(constant) and constant.type.length is None
 
     def constant(self, constant: Constant) -> str:
         kind, values = self.scalar(constant.type), self.literal(constant)
         name = self.variable(constant.name)
+        if _counts(constant):
+            return self.documented_constant(constant, f"enum {{ {name} = {constant.values[0]} }};")
         if constant.type.length is None:
             return self.documented_constant(constant, f"static const {kind} {name} = {values[0]};")
         comment = f" /* {constant.comment} */" if constant.comment else ""

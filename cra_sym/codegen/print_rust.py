@@ -80,19 +80,25 @@ class RustPrinter(Printer):
     def constant(self, constant: Constant) -> str:
         values, kind = self.literal(constant), self.scalar(constant.type)
         doc = f"/// {constant.comment}\n" if constant.comment else ""
+        head = f"{self.visibility(constant)}const {constant.name}"
         if constant.type.length is None:
-            return f"{doc}pub const {constant.name}: {kind} = {values[0]};"
-        return doc + self.row(f"pub const {constant.name}: [{kind}; {len(values)}] = [", values, "];")
+            return f"{doc}{head}: {kind} = {values[0]};"
+        return doc + self.row(f"{head}: [{kind}; {len(values)}] = [", values, "];")
+
+    def visibility(self, part: Constant | Record) -> str:
+        """Return `pub` for what is part of the interface."""
+        return "pub " if self.is_public(part) else ""
 
     def record(self, record: Record) -> Lines:
         yield from (f"/// {line}".rstrip() for line in record.doc.splitlines())
         yield "#[derive(Clone, Copy, Debug, PartialEq)]"
-        yield f"pub struct {record.name} {{"
+        public = self.visibility(record)
+        yield f"{public}struct {record.name} {{"
         for name, kind in record.fields.items():
             if record.comments[name]:
                 yield f"    /// {record.comments[name]}"
-            yield f"    pub {name}: {self.owned(kind)},"
-        yield from ("}", "", f"impl {record.name} {{", "    /// All zero.", "    pub const fn zero() -> Self {")
+            yield f"    {public}{name}: {self.owned(kind)},"
+        yield from ("}", "", f"impl {record.name} {{", "    /// All zero.", f"    {public}const fn zero() -> Self {{")
         yield f"        {record.name} {{"
         for name in record.fields:
             yield f"            {name}: {self.begun(record, name)},"

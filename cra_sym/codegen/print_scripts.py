@@ -179,12 +179,16 @@ class JavaScriptPrinter(ScriptPrinter):
         values = self.literal(constant)
         comment = f" // {constant.comment}" if constant.comment else ""
         if constant.type.length is None:
-            return f"export const {constant.name} = {values[0]};{comment}"
-        return self.row(f"export const {constant.name} = [", values, "];", comment)
+            return f"{self.exported(constant)}const {constant.name} = {values[0]};{comment}"
+        return self.row(f"{self.exported(constant)}const {constant.name} = [", values, "];", comment)
+
+    def exported(self, part: Constant | Record) -> str:
+        """Return `export` for what is part of the interface."""
+        return "export " if self.is_public(part) else ""
 
     def record(self, record: Record) -> Lines:
         yield from (f"// {line}".rstrip() for line in record.doc.splitlines())
-        yield f"export function {self.new_record(record.name)} {{"
+        yield f"{self.exported(record)}function {self.new_record(record.name)} {{"
         yield "    return {"
         for name in record.fields:
             comment = f" // {record.comments[name]}" if record.comments[name] else ""

@@ -119,6 +119,10 @@ class Printer(ExpressionPrinter):
         """Prefix of a line of documentation."""
         return self.comment
 
+    def is_public(self, part: Constant | Record) -> bool:
+        """Return whether a constant or a record is part of the interface."""
+        return part.name in self.form.interface
+
     # Overridden by languages -----------------------------------------------------------------------------------------
 
     def constant(self, constant: Constant) -> str:

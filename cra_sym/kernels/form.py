@@ -18,7 +18,7 @@ Rules that let every language print the same arithmetic
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from cra_sym.cached import cached_property
@@ -155,6 +155,12 @@ class FunctionDefinition:
         return frozenset(node.id for node in ast.walk(self.node) if isinstance(node, ast.Name))
 
     @property
+    def bounds(self) -> frozenset[str]:
+        """Names in the conditions under which it raises at once."""
+        tests = [s.test for s in self.body if isinstance(s, ast.If) and isinstance(s.body[0], ast.Raise)]
+        return frozenset(n.id for test in tests for n in ast.walk(test) if isinstance(n, ast.Name))
+
+    @property
     def body(self) -> list[ast.stmt]:
         """The statements after the docstring."""
         return self.node.body[1:] if ast.get_docstring(self.node) else self.node.body
@@ -204,6 +210,27 @@ class Program:
         )
         return list(dict.fromkeys(raised))
 
+    @cached_property
+    def interface(self) -> frozenset[str]:
+        """Constants and records for the caller.
+
+        Records and lengths in public functions, bounds of their arguments, limits, and numbers that nothing here uses.
+        """
+        kinds = [kind for f in self.functions.values() if f.public for kind in f.parameters.values()]
+        found = {str(kind.name) for kind in kinds if kind.name in self.records}
+        for name in reversed(self.records):  # a record contains only earlier ones
+            if name in found:
+                kinds += self.records[name].fields.values()
+                found |= {kind.name for kind in self.records[name].fields.values() if kind.name in self.records}
+        found |= {str(kind.length) for kind in kinds}
+        every: list[Record | FunctionDefinition] = [*self.records.values(), *self.functions.values()]
+        used = {str(kind.length) for part in every for kind in _kinds_in(part)}
+        used = used.union(*(f.names for f in self.functions.values()))
+        found |= {name for name in self.constants if name.startswith("MOST_") or name not in used}
+        bounds = frozenset[str]().union(*(f.bounds for f in self.functions.values() if f.public))
+        found |= {name for name in bounds & {*self.constants} if self.constants[name].type == INT}
+        return frozenset(found & {*self.constants, *self.records})
+
     def used_by(self, names: Sequence[str]) -> Program:
         """Return the form with these functions and all that they call."""
         wanted = set(names)
@@ -212,6 +239,10 @@ class Program:
                 wanted |= self.functions[name].calls
         kept = {name: f for name, f in self.functions.items() if name in wanted}
         return Program(self.doc, self.constants, self.records, kept, self.comments, self.alone)
+
+
+def _kinds_in(part: Record | FunctionDefinition) -> Iterable[Type]:
+    return part.fields.values() if isinstance(part, Record) else [*part.parameters.values(), *part.locals.values()]
 
 
 def refused(node: ast.AST, reason: str = "") -> FormError:
