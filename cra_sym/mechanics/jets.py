@@ -47,6 +47,8 @@ from cra_sym.mechanics.grouping import grouped
 __all__ = ["END_NAMES", "End", "HamiltonError", "Jet", "JetSpace", "listed", "scalar"]
 
 End = Literal["left", "right"]
+Where = End | Literal["domain", "ends"] | int
+"""Where an expression stands: an end, either end, the interval, or the number of an interior place."""
 END_NAMES: tuple[End, End] = ("left", "right")
 _SINGULAR = (DiracDelta,)
 _LONG = 12  # parts of a Piecewise beyond which it is differentiated part by part
@@ -248,7 +250,7 @@ class JetSpace:
         expression = scalar(label, expression)
         return Add(*(self._read_term(term, place, label) for term in Add.make_args(expression)))
 
-    def _read_term(self, term: Expr, place: Any, label: str) -> Expr:
+    def _read_term(self, term: Expr, place: Where, label: str) -> Expr:
         try:
             self._check_strangers(term)
             read = self._convert(term, place)
@@ -273,7 +275,7 @@ class JetSpace:
     def _mentions(self, node: Basic) -> bool:
         return any(function.func in self._heads for function in node.atoms(AppliedUndef))
 
-    def _convert(self, node: Basic, place: Any) -> Any:
+    def _convert(self, node: Basic, place: Where) -> Any:
         if isinstance(node, AppliedUndef):
             return self._convert_function(node, place)
         if isinstance(node, Derivative):
@@ -293,14 +295,14 @@ class JetSpace:
             return node
         return node.func(*(self._convert(argument, place) for argument in node.args))
 
-    def _convert_function(self, function: AppliedUndef, place: Any) -> Expr:
+    def _convert_function(self, function: AppliedUndef, place: Where) -> Expr:
         if any(self._mentions(argument) for argument in function.args):
             raise HamiltonError(f"{function} is an unspecified function of an unknown: its variation is not known")
         if function.func not in self._heads:
             return function
         return self._jet(function, {}, place)
 
-    def _convert_derivative(self, derivative: Derivative, place: Any) -> Expr:
+    def _convert_derivative(self, derivative: Derivative, place: Where) -> Expr:
         function = derivative.expr
         if not isinstance(function, AppliedUndef):
             done = derivative.doit()
@@ -316,7 +318,7 @@ class JetSpace:
             )
         return derivative
 
-    def _convert_subs(self, subs: Subs, place: Any) -> Expr:
+    def _convert_subs(self, subs: Subs, place: Where) -> Expr:
         inner = subs.expr
         for variable, point in zip(subs.variables, subs.point, strict=True):
             inner = inner.xreplace({variable: self.x})
@@ -327,7 +329,7 @@ class JetSpace:
             return self._convert(inner, self._end_at(point, place, subs))
         return self._convert(inner, place)
 
-    def _end_at(self, point: Expr, place: Any, node: Basic) -> End | int:
+    def _end_at(self, point: Expr, place: Where, node: Basic) -> End | int:
         for end, coordinate in self.ends.items():
             if point == coordinate and place != "domain":
                 return end

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 __all__ = [
     "ExcitedOscillators",
@@ -81,12 +82,12 @@ class ExcitedOscillators:
     @classmethod
     def of(
         cls,
-        omega: Any,
-        coupling: Any,
-        angular_frequency: Any,
-        epsilon: Any,
-        decay: Any = 0.0,
-        compliance: Any = 0.0,
+        omega: ArrayLike,
+        coupling: ArrayLike,
+        angular_frequency: ArrayLike,
+        epsilon: ArrayLike,
+        decay: ArrayLike = 0.0,
+        compliance: ArrayLike = 0.0,
         oscillations: Sequence[Oscillation] | None = None,
     ) -> tuple[ExcitedOscillators, tuple[int, ...]]:
         """Return the batch and its shape.

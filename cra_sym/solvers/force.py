@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..checks import broadcastable, real_array
-from ..si import paired
+from ..si import Numbers, paired
 from .motion import FASTEST, BaseMotion
 from .records import timed_last
 
@@ -44,7 +44,9 @@ class Force:
     profile: BaseMotion
     """Motion whose acceleration equals the force."""
 
-    def __init__(self, level: Any = 0.0, amplitude: Any = 0.0, angular_frequency: Any = 0.0, phase: Any = 0.0) -> None:
+    def __init__(
+        self, level: Numbers = 0.0, amplitude: Numbers = 0.0, angular_frequency: Numbers = 0.0, phase: Numbers = 0.0
+    ) -> None:
         units = {"level": _UNITS, "amplitude": _UNITS, "angular_frequency": "rad/s", "phase": "rad"}
         numbers = paired(dict(zip(units, (level, amplitude, angular_frequency, phase), strict=True)), units)
         constant, size, varpi, psi = (real_array(name, value, unit=units[name]) for name, value in numbers.items())
@@ -59,7 +61,7 @@ class Force:
         self.profile = BaseMotion(acceleration=constant, amplitude=size, angular_frequency=varpi, phase=psi)
 
     @classmethod
-    def sampled(cls, t: Any, force: Any, *, sampling_rate: Any = None, exact: bool = False) -> Force:
+    def sampled(cls, t: Numbers, force: Numbers, *, sampling_rate: Numbers | None = None, exact: bool = False) -> Force:
         """Return a sampled force, linear between uniform times and zero outside the record; shape (..., T).
 
         Times or a sampling rate, and ``exact``, as :meth:`BaseMotion.sampled` takes them.
@@ -74,7 +76,7 @@ class Force:
         history.profile = BaseMotion.sampled(t, samples, sampling_rate=sampling_rate, exact=exact)
         return history
 
-    def __call__(self, t: Any) -> Any:
+    def __call__(self, t: Numbers) -> Any:
         """Return the force at times ``t`` >= 0, shape (..., t).
 
         Raises

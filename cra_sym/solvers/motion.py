@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, Literal
 
 import numpy as np
@@ -59,11 +60,11 @@ class BaseMotion:
 
     def __init__(
         self,
-        velocity: Any = 0.0,
-        acceleration: Any = 0.0,
-        amplitude: Any = 0.0,
-        angular_frequency: Any = 0.0,
-        phase: Any = 0.0,
+        velocity: Numbers = 0.0,
+        acceleration: Numbers = 0.0,
+        amplitude: Numbers = 0.0,
+        angular_frequency: Numbers = 0.0,
+        phase: Numbers = 0.0,
     ) -> None:
         given = {
             "velocity": velocity,
@@ -90,16 +91,16 @@ class BaseMotion:
         shape = np.broadcast_shapes(v.shape, B.shape, varpi.shape, psi.shape)
         self._set(terms, shape)
 
-    def _set(self, terms: Any, shape: tuple[int, ...]) -> BaseMotion:
+    def _set(self, terms: Iterable[MotionTerm], shape: tuple[int, ...]) -> BaseMotion:
         self.terms, self.shape = tuple(terms), shape
         return self
 
     @classmethod
-    def of_terms(cls, terms: Any, shape: tuple[int, ...]) -> BaseMotion:
+    def of_terms(cls, terms: Iterable[MotionTerm], shape: tuple[int, ...]) -> BaseMotion:
         """Return the motion that is the sum of some terms, a batch of that shape."""
         return cls.__new__(cls)._set(terms, shape)
 
-    def _like(self, terms: Any, shape: tuple[int, ...]) -> BaseMotion:
+    def _like(self, terms: Iterable[MotionTerm], shape: tuple[int, ...]) -> BaseMotion:
         made = self.of_terms(terms, shape)
         made.sample_step = self.sample_step
         return made
@@ -107,12 +108,12 @@ class BaseMotion:
     @classmethod
     def sampled(
         cls,
-        t: Any,
-        record: Any,
-        velocity: Any = 0.0,
+        t: Numbers,
+        record: Numbers,
+        velocity: Numbers = 0.0,
         *,
         kind: Literal["acceleration", "velocity", "position"] = "acceleration",
-        sampling_rate: Any = None,
+        sampling_rate: Numbers | None = None,
         exact: bool = False,
     ) -> BaseMotion:
         """Return the motion that a record of samples describes; outside the record the base does not accelerate.
@@ -168,7 +169,9 @@ class BaseMotion:
         return motion
 
     @classmethod
-    def trapezoid(cls, distance: Any, v_max: Any, a_max: Any, duration: Any = None) -> BaseMotion:
+    def trapezoid(
+        cls, distance: Numbers, v_max: Numbers, a_max: Numbers, duration: Numbers | None = None
+    ) -> BaseMotion:
         """Return the point-to-point move of trapezoidal velocity: the fastest within its limits, or one of given
         duration.
 
@@ -190,7 +193,9 @@ class BaseMotion:
         return cls.s_curve(distance, v_max, a_max, np.inf, duration)
 
     @classmethod
-    def s_curve(cls, distance: Any, v_max: Any, a_max: Any, j_max: Any, duration: Any = None) -> BaseMotion:
+    def s_curve(
+        cls, distance: Numbers, v_max: Numbers, a_max: Numbers, j_max: Numbers, duration: Numbers | None = None
+    ) -> BaseMotion:
         """Return the point-to-point move of jerk-limited (S-curve) velocity; as :meth:`trapezoid`, with a limit of
         jerk.
 
@@ -275,7 +280,7 @@ class BaseMotion:
         total.sample_step = max(steps, default=None)
         return total
 
-    def __mul__(self, factor: Any) -> BaseMotion:
+    def __mul__(self, factor: Numbers) -> BaseMotion:
         """Scale the motion by real factors; an array is a batch."""
         scale = real_array("factor", factor, unit="1")
         shape = broadcastable(motion=np.empty(self.shape), factor=scale)

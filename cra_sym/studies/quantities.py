@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import cra_sym as cra
 from cra_sym.checks import shown
@@ -58,7 +59,7 @@ class Quantity:
                 raise TypeError(f"{self.name} needs the option {p.name}")
 
 
-def _natural_frequencies(system: System, *, modes: int = 3) -> Any:
+def _natural_frequencies(system: System, *, modes: int = 3) -> NDArray[np.float64]:
     return cra.natural_frequencies(system, modes=modes)
 
 
@@ -66,11 +67,11 @@ def _eigenvalues(system: System, *, modes: int = 3, oscillating: bool = True) ->
     return cra.eigenvalues(system, modes, oscillating=oscillating)
 
 
-def _oscillating_frequencies(system: System, *, modes: int = 3) -> Any:
+def _oscillating_frequencies(system: System, *, modes: int = 3) -> NDArray[np.float64]:
     return cra.eigenvalues(system, modes).imag / (2 * np.pi)
 
 
-def _damping_ratios(system: System, *, modes: int = 3) -> Any:
+def _damping_ratios(system: System, *, modes: int = 3) -> NDArray[np.float64]:
     return cra.damping_ratios(system, modes)
 
 
