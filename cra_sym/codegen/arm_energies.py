@@ -1,4 +1,4 @@
-"""Quantities for the exports of the arm from its Lagrangian: the line, springs and inertias at its ends, energies."""
+"""Quantities for the exports of the arm from its Lagrangian: the span, springs and inertias at its ends, energies."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _of(model: Model) -> tuple[DerivedFunction, ...]:
 
 
 def _line(model: Model) -> list[sp.Expr]:
-    """Return stiffness, mass per length, springs and inertias of the line, and the mass that moves with the base."""
+    """Return stiffness, mass per length, springs and inertias of the span, and the mass that moves with the base."""
     found = one_wave_scales(model.conservative)
     assert found is not None, "arm_family refuses other Lagrangians"
     stiffness, inertia, length = (found[name] for name in ("stiffness", "inertia", "length"))

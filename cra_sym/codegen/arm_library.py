@@ -115,11 +115,11 @@ def _constants(real: str) -> str:
     nodes, weights = gauss_rule()
     terms = next(f.size for f in spectrum_functions() if f.name == "power_series")
     kinds = {
-        "LARGEST": "what is larger is infinite",
+        "LARGEST": "values above it count as infinite",
         "LEAST_NORMAL": "the least normal number",
-        "NEXT_STEP": "what the next step may be of z when it is left out",
-        "LAST_STEP": "what the last step may be of z",
-        "LEAST_SHARE": "of all mass, that the base alone moves",
+        "NEXT_STEP": "relative size of the next step at which the iteration stops before it",
+        "LAST_STEP": "relative size of a step after which the iteration stops",
+        "LEAST_SHARE": "smallest share of the total mass that moves with the base alone",
         "MOST_LAMBDA": "where powers of lambda stay in range",
     }
     numbers = zip(kinds.items(), _OF_PRECISION[real], strict=True)
@@ -128,7 +128,7 @@ def _constants(real: str) -> str:
         + "".join(f"{key} = {value!r}  # {statement}\n" for (key, statement), value in numbers)
         + f"NEAR = {float(NEAR[2])!r}  # lambda^4 below which the power series of the determinant serves\n"
         f"TERMS = {terms}  # of that series\n"
-        f"GAUSS = {len(nodes)}  # points of a rule on (0, 1)\n"
+        f"GAUSS = {len(nodes)}  # points of Gauss's rule on (0, 1)\n"
         f"NODES = ({', '.join(map(repr, nodes))})\nWEIGHTS = ({', '.join(map(repr, weights))})\n"
         f"NEAR_SHAPE = {float(NEAR_SHAPE[2])!r}  # lambda^4 below which power series of the shapes serve\n"
     )

@@ -11,19 +11,19 @@ from cra_sym.solvers import waves_modes
 __all__ = ["model_constants"]
 
 _NUMBERS = {  # in double precision, in single precision
-    "HUGE": (1.7976931348623157e308, 2.9e38, "what is larger is infinite"),
-    "EPS": (2.0**-52, 2.0**-23, "of rounding"),
-    "TINY": (1e-300, 1e-37, "of what is as good as nothing"),
-    "DEPENDENT": (1e-14, 1e-6, "what rounding leaves of a row of unit size"),
-    "SLIGHT": (1e-12, 1e-4, "beside 1"),
-    "TWO_SMALL": (1e-140, 1e-16, "share of the line's own z below which two zeros cannot be told apart"),
-    "THREE_SMALL": (1e-95, 1e-11, "the same of three"),
+    "HUGE": (1.7976931348623157e308, 2.9e38, "values above it count as infinite"),
+    "EPS": (2.0**-52, 2.0**-23, "relative rounding error"),
+    "TINY": (1e-300, 1e-37, "values below it count as zero"),
+    "DEPENDENT": (1e-14, 1e-6, "largest entry that rounding leaves of a dependent row of unit size"),
+    "SLIGHT": (1e-12, 1e-4, "a small distance from 1"),
+    "TWO_SMALL": (1e-140, 1e-16, "share of the lowest z of free waves below which two zeros cannot be told apart"),
+    "THREE_SMALL": (1e-95, 1e-11, "the same for three zeros"),
     "SAME": (1e-9, 1e-4, "relative distance below which squared frequencies are taken as equal"),
-    "NODE": (1e-7, 1e-3, "of the largest displacement: a node"),
-    "SMALL": (waves_modes.SMALL_SHARE, 1e-2, "of the largest condition: what may be rounding"),
-    "ROUNDING": (waves_modes.ROUNDING, 2.0**-19, "relative, of some operations"),
-    "ROOT_ERROR": (waves_modes.ROOT_ERROR, 2.0**-15, "relative, of a root of three waves"),
-    "BESIDE": (1e-12, 1e-5, "of the largest displacement beside a node"),
+    "NODE": (1e-7, 1e-3, "share of the largest displacement below which a place is a node"),
+    "SMALL": (waves_modes.SMALL_SHARE, 1e-2, "share of the largest condition below which a column may be rounding"),
+    "ROUNDING": (waves_modes.ROUNDING, 2.0**-19, "relative rounding error of some operations"),
+    "ROOT_ERROR": (waves_modes.ROOT_ERROR, 2.0**-15, "relative error of a root of three waves"),
+    "BESIDE": (1e-12, 1e-5, "share of the largest displacement below which the place beside a node has no sign"),
 }
 _PLACES = (-1.0, -0.56, 0.06, 0.62, 1.0 - 2e-4, 1.0)
 """Stations at which the size of a motion is measured, in half lengths from mid-span."""
@@ -49,11 +49,11 @@ def model_constants(
     integers = {
         "PARAMETER_COUNT": (parameters, "parameters of the model"),
         "FIELDS": (len(fields), f"fields of the model: {', '.join(fields)}"),
-        "ENDS": (moving**2, "entries of the matrices of what moves"),
+        "ENDS": (moving**2, "entries of the stiffness matrix of ends and coordinates"),
         "END_RATES": (3 * moving**2 + links * (2 + moving), "rates of stiffness, mass, ties and links"),
         "MOTIONS": (n + m, "independent motions without strain"),
         "RESTRAINTS": (moving + links, "conditions of ends, coordinates and links"),
-        "RESTING": (max(ranks), "factors of conditions of a motion without energy"),
+        "RESTING": (max(ranks), "entries of the largest matrix whose rank is found"),
         "MULTIPLICITY": (moving if structure.linked else n, "frequencies that may be equal"),
         "STATIONS": (len(_PLACES), "places where the size of a motion is measured"),
     }

@@ -170,12 +170,14 @@ class ModelText:
     def _parameters(self) -> str:
         lines = [
             "class Parameters:",
-            '    """The parameters of the model, in units that fit together, such as SI."""',
+            '    """The parameters of the model, in consistent units, such as SI."""',
             "",
         ]
         for symbol, name in self.names.items():
             unit = self.model.units.get(symbol.name, "") if self.model.units else ""
-            words = ", ".join(filter(None, [unit, "may be infinite" if symbol in self.form.conditions.springs else ""]))
+            own = f"{symbol.name} of the model" if name != symbol.name and symbol.name.isidentifier() else ""
+            infinite = "may be infinite" if symbol in self.form.conditions.springs else ""
+            words = ", ".join(filter(None, [own, unit, infinite]))
             lines.append(f"    {name}: float{'  # ' + words if words else ''}")
         return "\n".join(lines)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -157,7 +158,16 @@ def _branch(condition: Any, values: list[sp.Expr]) -> Case:
             conditions[symbol] = value
         else:
             kept.append((symbol, plain(value)))
-    return Case(condition, tuple(kept), tuple(plain(value.xreplace(conditions)) for value in values))
+    results = [plain(value.xreplace(conditions)) for value in values]
+    used = Counter(symbol for value in (*dict(kept).values(), *results) for symbol in _symbols_in(value))
+    alone = {symbol: value for symbol, value in kept if used[symbol] == 1 and symbol in results}
+    needed = tuple(step for step in kept if step[0] not in alone)
+    return Case(condition, needed, tuple(alone.get(value, value) for value in results))
+
+
+def _symbols_in(expression: sp.Expr) -> Iterator[sp.Symbol]:
+    """Yield a symbol once for each time it stands in an expression."""
+    return (node for node in sp.preorder_traversal(expression) if isinstance(node, sp.Symbol))
 
 
 def _free_symbols(branch: Case) -> set[sp.Symbol]:

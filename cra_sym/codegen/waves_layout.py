@@ -75,7 +75,7 @@ class WavesLayout:
             "PLANE": (n * n, "entries of a matrix of a section"),
             "COEFFICIENTS": (len(self.places), "of the matrices of a section, of end conditions and dispersion"),
             "SECTION": (self.section, "entries of the columns at a place"),
-            "WAVE_ENTRIES": (self.wave_numbers, "and what follows from them"),
+            "WAVE_ENTRIES": (self.wave_numbers, "squared wave numbers and what follows from them"),
             "BLOCKS": (len(rows), "groups of displacements that are coupled along the length"),
         }
         lines = [f"{name} = {value}  # {words}" for name, (value, words) in sizes.items()]

@@ -100,7 +100,7 @@ class WavesText(WavesLayout):
         return traced.text(self._numbers(k, z), [("w", "WAVE_ENTRIES", self.wave_numbers)])
 
     def _wave_number_rates(self) -> str:
-        words = "Return the same, and how they change with coefficients and z."
+        words = "Return squared wave numbers and what follows from them, and their rates for given rates of k and z."
         rows = [("k", "COEFFICIENTS"), ("k_rate", "COEFFICIENTS")]
         traced = Traced("_wave_number_rates", words, rows, ["z", "z_rate"], guarded=True)
         z = Dual(traced.number("z"), traced.number("z_rate"))
@@ -126,7 +126,7 @@ class WavesText(WavesLayout):
         return traced.text([kernel.where(found > 2.5, found - 1.0, found)])  # both signs are not a regime
 
     def _branch(self) -> str:
-        words = "Return the lowest z of free waves of so many half waves along the length."
+        words = "Return the lowest z = omega^2 of free waves of which a given number of half waves fits the length."
         traced = Traced("_branch", words, [("k", "COEFFICIENTS")], ["turns"], guarded=True)
         turns = traced.number("turns")
         return traced.text([waves_count.lowest_branch(self.structure, self._coefficients(traced), turns)])
@@ -161,7 +161,7 @@ class WavesText(WavesLayout):
 
     def _columns(self, kind: str, *, places: bool = False) -> str:
         name = f"_waves{'_at' if places else ''}{_suffix(kind)}"
-        where = "x from mid-span, in half lengths," if places else "the right end"
+        where = "x from mid-span (in half lengths)" if places else "the right end"
         words = f"Return the waves at {where}{_WORDS[kind]}, over their size at the ends."
         traced, k, z = self._traced(name, words, *(["x"] if places else []))
         columns, bases = [], []

@@ -310,6 +310,8 @@ def branch(wave, table):
             value, first = c0 + z * (c1 + z * (c2 + z * c3)), c1 + z * (2.0 * c2 + 3.0 * z * c3)
             second = 2.0 * c2 + 6.0 * z * c3
         rate = first / value
+        if size == 1:
+            return -1.0 / rate
         inside = (size - 1.0) * ((size - 1.0) * rate * rate - size * second / value)
         root = positive_root(inside)
         z = z + size / (where(value < 0.0, -root, root) - rate)
