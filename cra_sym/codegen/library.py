@@ -1,4 +1,4 @@
-"""A text in the restricted form as a library of a language: source, build files, self-test and reference vectors."""
+"""A program in the restricted form as a library in any language: source, build files, self-test, reference vectors."""
 
 from __future__ import annotations
 

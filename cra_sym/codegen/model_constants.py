@@ -1,4 +1,4 @@
-"""Numbers at the head of an exported model: of its size, and of the precision."""
+"""Constants at the head of an exported model: its sizes, and limits that depend on the precision."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A model as a text in the restricted form: its derived functions in a source common to all models."""
+"""Program of an exported model in the restricted form: its derived functions in a source common to all models."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ class ScriptPrinter(Printer):
         """Leave the declaration of a variable to the call that makes it."""
 
     def is_made_later(self, statement: ast.stmt, after: Sequence[ast.stmt]) -> bool:
-        """Return whether a row or a record is created that the next statement with its name makes anew."""
+        """Return whether a statement only creates a row or a record that the next statement using it creates again."""
         match statement:
             case ast.Assign(targets=[ast.Name(id=name)], value=ast.Call()) if (
                 self.current.homes.get(name) == id(statement)

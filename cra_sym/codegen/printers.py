@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -220,8 +221,15 @@ def _inverse(x: float) -> float:
         if checked:
             finite = " and ".join(f"isfinite(found[{i}])" for i in range(function.size))
             lines += [f"if not ({finite}):", "    raise Overflow"]
-        body = "\n    ".join([f'"""{function.summary}"""', *lines])
+        entries = [f"{a.name}: {', '.join(s.name for s in a.symbols)}" for a in function.arguments if _is_told(a)]
+        doc = [f'"""{function.summary}', "", *entries, '"""'] if entries else [f'"""{function.summary}"""']
+        body = "\n    ".join([*doc, *lines]).replace("\n    \n", "\n\n")
         return f"{head}\n    {body}\n"
+
+
+def _is_told(argument: Argument) -> bool:
+    """Return whether the entries of a row have names that say more than their number."""
+    return argument.row and not all(re.fullmatch(r"k\d+", symbol.name) for symbol in argument.symbols)
 
 
 def _kind(argument: Argument) -> str:

@@ -177,7 +177,7 @@ def _free_symbols(branch: Case) -> set[sp.Symbol]:
 
 
 def new_name(wish: str, taken: set[str]) -> str:
-    """Return a new name that is valid in every language and differs from those taken in more than case; add it."""
+    """Return a name that is valid in every language and not taken yet, regardless of case; add it to those taken."""
     base = re.sub(r"_+", "_", re.sub(r"[^0-9A-Za-z]", "_", _latin(wish))).strip("_") or "value"
     base = base if base[0].isalpha() else f"n_{base}"
     base = base[:40]

@@ -1,4 +1,4 @@
-"""The model that an export is of, in words and formulas, with their hash: the head of every file."""
+"""Header of every exported file: the model in words and formulas, and their hash."""
 
 from __future__ import annotations
 

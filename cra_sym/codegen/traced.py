@@ -109,7 +109,7 @@ def _dual(value: Any, rate: Any) -> Any:
 
 
 def _over(value: Any, divisor: Any) -> Any:
-    """Return a quotient of rates that is zero where the divisor is, since it does not matter there."""
+    """Return a quotient of rates; for a divisor 0, where it is discarded, 0."""
     return divisor.quotient(value) if isinstance(divisor, Term) and not isinstance(value, Exact) else value / divisor
 
 

@@ -173,7 +173,7 @@ class FunctionDefinition:
 
 @dataclass(frozen=True)
 class Program:
-    """A checked text.
+    """A program in the restricted form, parsed and checked.
 
     Attributes
     ----------
@@ -232,7 +232,7 @@ class Program:
         return frozenset(found & {*self.constants, *self.records})
 
     def used_by(self, names: Sequence[str]) -> Program:
-        """Return the form with these functions and all that they call."""
+        """Return the program with these functions and all that they call."""
         wanted = set(names)
         for name in reversed(list(self.functions)):
             if name in wanted:

@@ -55,7 +55,7 @@ def _in_double(result: Any) -> Any:
 
 
 class _FunctionWriter(Memory):
-    """One call of a function.
+    """Writer of one call of a function, inlined.
 
     A name denotes a value. In a function with branches, an assigned name denotes a memory location of its first type,
     which LLVM turns into a register. Arrays and tuples named in a branch or a loop are local to it.
@@ -307,7 +307,7 @@ class _FunctionWriter(Memory):
         return self.function(function, arguments)
 
     def called_apart(self, function: ast.FunctionDef, arguments: Sequence[Any]) -> None:
-        """Call a function that is written once for arguments of the same types, next to the caller.
+        """Call a function that is compiled once for each combination of argument types, not inlined.
 
         It returns nothing, and its array arguments do not overlap. Numbers and lengths are passed.
         """

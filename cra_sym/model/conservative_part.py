@@ -86,7 +86,7 @@ def _is_odd_in_time(term: Expr, t: Symbol) -> bool:
 
 
 def beside(model: Model, part: Model) -> set[Basic]:
-    """Return the symbols of what the conservative part does not have."""
+    """Return the symbols of the terms that the conservative part leaves out."""
     own = [(model.options[name], part.options[name]) for name in ("density", *END_NAMES)]
     own += [(mine[1], left[1]) for mine, left in zip(model.options["inside"], part.options["inside"], strict=True)]
     rest = [expand((whole or S.Zero) - (left or S.Zero)) for whole, left in own]

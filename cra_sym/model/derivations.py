@@ -307,11 +307,11 @@ def ball_problem(model: Model) -> BallProblem:
     left, right = model.equations.domain
     z = form.parameter
     for entry in (*form.system, *form.boundary, *form.free, *entries, right - left):
-        other = sorted(map(str, (a for a in entry.atoms(Function, Pow) if not (a.is_Pow and a.exp.is_Integer))))
-        if other:
+        irrational = sorted(map(str, (a for a in entry.atoms(Function, Pow) if not (a.is_Pow and a.exp.is_Integer))))
+        if irrational:
             raise ValueError(
-                f"system: the coefficients contain {other[0]}: certification needs rational functions of the "
-                f"parameters; put a parameter in place of {other[0]}"
+                f"system: the coefficients contain {irrational[0]}: certification needs rational functions of the "
+                f"parameters; put a parameter in place of {irrational[0]}"
             )
     return BallProblem(
         len(form.displacements),
