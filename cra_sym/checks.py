@@ -208,12 +208,13 @@ def equal(one: Any, other: Any) -> bool:
 
 
 class ByValue:
-    """Base of dataclasses that are equal if all their public fields are, arrays by their elements."""
+    """Base of dataclasses that are equal if all their public fields with ``compare`` are, arrays by their elements."""
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
             return NotImplemented
-        names = [name for name in getattr(self, "__dataclass_fields__", {}) if not name.startswith("_")]
+        fields = getattr(self, "__dataclass_fields__", {})
+        names = [name for name, field in fields.items() if field.compare and not name.startswith("_")]
         return all(equal(getattr(self, name), getattr(other, name)) for name in names)
 
     __hash__ = None  # type: ignore[assignment]

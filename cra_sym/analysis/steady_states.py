@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack, overload
 
 import numpy as np
@@ -74,7 +74,7 @@ class SteadyState(checks.ByValue):
     stable: bool
     multipliers: Complex
     coefficients: Array
-    problem: DrivenProblem | SlipProblem
+    problem: DrivenProblem | SlipProblem = field(compare=False)
     _unknowns: Array
     _at: Any
 
