@@ -362,3 +362,16 @@ def test_a_line_without_springs_and_masses_has_one_set_of_modes():
     assert modes.springs() == modes.inertias() == []
     with pytest.raises(IndexError, match="no lumped coordinates"):
         modes.coordinate(0)
+
+
+@pytest.mark.parametrize("scale", [1e-155, 1e-200, 1e-280])
+def test_frequencies_on_springs_of_any_softness_go_with_their_root(scale):
+    """Where soft springs alone hold the arm both frequencies are homogeneous in them; 1e-40 is solved as it is."""
+    arm = cra.Arm.nominal().replace(m_e=0.003, J_e=1e-7)
+
+    def held(size):
+        return cra.natural_frequencies(arm.replace(k_t=2.0 * size, k_r=0.3 * size), 3)
+
+    found, plain = held(scale), held(1e-40)
+    np.testing.assert_allclose(found[:2] / np.sqrt(scale), plain[:2] / np.sqrt(1e-40), rtol=1e-12)
+    assert found[2] == pytest.approx(plain[2], rel=1e-13)
