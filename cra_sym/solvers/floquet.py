@@ -21,11 +21,14 @@ __all__ = [
     "ExcitedOscillators",
     "Loop",
     "Oscillation",
+    "both_of_pairs",
     "exponents_of",
     "flat",
     "floquet_exponents",
+    "growth_of",
     "growth_rate",
     "monodromy",
+    "paired_exponents",
     "rate_of",
     "whole_period",
 ]
@@ -336,22 +339,42 @@ def monodromy(*system: Any, tolerance: float = 1e-8, loop: Loop | None = None, *
     return maps.reshape(*shape, *maps.shape[1:])
 
 
-def _conservative_exponents(batch: ExcitedOscillators, tolerance: float, loop: Loop | None) -> np.ndarray:
+def paired_exponents(half: np.ndarray, period: np.ndarray) -> np.ndarray:
     r"""Return one exponent s of each pair (s, -s) of a system without damping, its real part not negative.
 
-    The excitation is even in time, so the second half of the period is the first one mirrored: with the blocks a, b,
-    c, d of the half-period map, :math:`\sinh^2(sT/2)` are the eigenvalues of :math:`b^Tc`, and :math:`\cosh^2(sT/2)`
-    those of :math:`d^Ta`. The smaller of the two is used, so that a double multiplier 1 or -1 loses no digits.
+    Let the map of the first half of the period be symplectic, in canonical coordinates whose reversal in time keeps the
+    displacements and changes the signs of the momenta. The second half of the period is then the first one mirrored:
+    with the blocks a, b, c, d of the half-period map, :math:`\sinh^2(sT/2)` are the eigenvalues of :math:`b^Tc`, and
+    :math:`\cosh^2(sT/2)` those of :math:`d^Ta`. The smaller of the two is used, so that a double multiplier 1 or -1
+    loses no digits.
+
+    Parameters
+    ----------
+    half : ndarray, shape (points, 2N, 2N)
+    period : ndarray, shape (points,)
+
+    Returns
+    -------
+    complex ndarray, shape (points, N)
     """
-    maps = _maps(batch, 0.5, tolerance, loop)
-    n = maps.shape[-1] // 2
-    a, b, c, d = maps[:, :n, :n], maps[:, :n, n:], maps[:, n:, :n], maps[:, n:, n:]
+    n = half.shape[-1] // 2
+    a, b, c, d = half[:, :n, :n], half[:, :n, n:], half[:, n:, :n], half[:, n:, n:]
     sines = np.linalg.eigvals(b.swapaxes(1, 2) @ c).astype(complex)
     cosines = np.linalg.eigvals(d.swapaxes(1, 2) @ a).astype(complex)
     nearest = np.abs(1.0 + sines[:, :, None] - cosines[:, None, :]).argmin(axis=-1)
     cosines = np.take_along_axis(cosines, nearest, axis=-1)
-    half = np.where(sines.real > -0.5, np.arcsinh(np.sqrt(sines)), np.arccosh(np.sqrt(cosines)))
-    return np.asarray(2 * half / batch.period[:, None])
+    exponents = np.where(sines.real > -0.5, np.arcsinh(np.sqrt(sines)), np.arccosh(np.sqrt(cosines)))
+    return np.asarray(2 * exponents / period[:, None])
+
+
+def both_of_pairs(growing: np.ndarray, period: np.ndarray) -> np.ndarray:
+    """Return all exponents, in the order of :func:`floquet_exponents`, from one of each pair."""
+    return _ordered(np.concatenate([growing, -growing], axis=-1), period)
+
+
+def growth_of(growing: np.ndarray) -> np.ndarray:
+    """Return the largest growth rate, not below zero, from one exponent of each pair."""
+    return np.asarray(np.maximum(growing.real.max(axis=-1), 0.0))
 
 
 def floquet_exponents(*system: Any, tolerance: float = 1e-8, loop: Loop | None = None, **more: Any) -> np.ndarray:
@@ -361,8 +384,7 @@ def floquet_exponents(*system: Any, tolerance: float = 1e-8, loop: Loop | None =
     """
     batch, shape = ExcitedOscillators.of(*system, **more)
     if batch.conservative:
-        growing = _conservative_exponents(batch, tolerance, loop)
-        exponents = _ordered(np.concatenate([growing, -growing], axis=-1), batch.period)
+        exponents = both_of_pairs(paired_exponents(_maps(batch, 0.5, tolerance, loop), batch.period), batch.period)
     else:
         exponents = exponents_of(_whole_maps(batch, tolerance, loop), batch.period)
     return exponents.reshape(*shape, exponents.shape[-1])
@@ -389,7 +411,7 @@ def growth_rate(*system: Any, tolerance: float = 1e-8, loop: Loop | None = None,
     """Return max(0, largest real part of the exponents), shape (...); arguments of :class:`ExcitedOscillators`."""
     batch, shape = ExcitedOscillators.of(*system, **more)
     if batch.conservative:
-        rates = np.maximum(_conservative_exponents(batch, tolerance, loop).real.max(axis=-1), 0.0)
+        rates = growth_of(paired_exponents(_maps(batch, 0.5, tolerance, loop), batch.period))
     else:
         rates = rate_of(_whole_maps(batch, tolerance, loop), batch.period)
     found: np.ndarray = rates.reshape(shape)

@@ -12,13 +12,21 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.solvers.floquet import MOST_STEPS, Oscillation, exponents_of, rate_of, whole_period
+from cra_sym.solvers.floquet import (
+    MOST_STEPS,
+    Oscillation,
+    both_of_pairs,
+    exponents_of,
+    growth_of,
+    paired_exponents,
+    rate_of,
+    whole_period,
+)
 from cra_sym.solvers.periodic_systems import LIGHTEST, PeriodicSystem, Sizes, Swing
 
 __all__ = [
@@ -35,17 +43,20 @@ Array = NDArray[np.float64]
 _HIGHEST = 24
 """Order of the series, at most."""
 _WIDEST = 3.0  # largest step, in units of the fastest motion's time; beyond it the terms of the series lose digits
+_LEAST_ORDER = 6
 _SHARE = 1e-4
 """Coefficients of cosines below this share of the tolerance are left out; their sum is far below the tolerance."""
 _PRODUCTS = 31  # cost of the matrix products of one term, in units of half a term of a product of series
 _BLOCK = 768  # systems propagated together: fewer cost more calls, more leave the cache
 
 
-def _applied(matrix: Array, states: Array) -> Array:
-    """Return matrix times states, (N, N, points or 1) times (N, columns, points)."""
-    if matrix.shape[-1] == 1:
-        return np.asarray((matrix[..., 0] @ states.reshape(len(states), -1)).reshape(len(matrix), *states.shape[1:]))
-    return np.asarray(np.einsum("ijp,jkp->ikp", matrix, states))
+def _applied(matrix: Array, states: Array, out: Array | None = None) -> Array:
+    """Return matrix times states, (N, M, points or 1) times (M, columns, points)."""
+    if matrix.shape[-1] > 1:
+        return np.asarray(np.einsum("ijp,jkp->ikp", matrix, states, out=out))
+    flat = None if out is None else out.reshape(len(out), -1)
+    found = np.matmul(matrix[..., 0], states.reshape(len(states), -1), out=flat)
+    return np.asarray(found.reshape(len(matrix), *states.shape[1:]))
 
 
 def step_coefficients(wave: Oscillation, step: int, steps: int, order: int, least: float = 0.0) -> Array:
@@ -66,94 +77,122 @@ class _Series:
     """Taylor coefficients of q, dq/dtau and p over one step, by recursion.
 
     The terms of one oscillation add K_r q + C_r u to the forces and B_r q + M_r u to the momenta, with u = dq/dt: one
-    product of series each, of as many rows as these matrices have ranks together.
+    product of series each, of as many rows as these matrices have ranks together. A step ends before ``order`` where
+    the next coefficient is expected below the tolerance, for each column of the state relative to the column.
     """
 
-    def __init__(self, system: PeriodicSystem, steps: int, order: int, least: float, factored: bool) -> None:
-        self.system, self.h, self.order = system, system.period / steps, order
-        self.steps, self.least = steps, least
+    def __init__(self, system: PeriodicSystem, steps: int, order: int, tolerance: float, factored: bool) -> None:
+        self.system, self.h, self.order, self.steps = system, system.period / steps, order, steps
+        self.tolerance, self.rate = tolerance, system.rate()
+        self.fractions = self.h / np.arange(1, order + 1)[:, None]
+        self.known = _LEAST_ORDER  # terms that the last step took
         size, points = len(system.stiffness), system.period.size
         self.shape = (size, 2 * size, points)
-        pushes = [_factors(s.stiffness, s.damping, factored) for s in system.swings]
-        carries = [_factors(s.momentum, s.mass, factored) for s in system.swings]
-        self.forces = [_Product(*found, order, self.shape) for found in pushes]
-        self.momenta = [_Product(*found, order, self.shape) for found in carries]
-        # all products with q are one product, those with u another
-        own = system.damping if system.damping.any() else None
-        self.of_q = _Stack([system.stiffness, *(found[1] for found in (*pushes, *carries))])
-        self.of_u = _Stack([own, *(found[2] for found in (*pushes, *carries))])
+        self.forces, self.momenta = (
+            [_Product(_factors(*pair, factored), order, self.shape) for pair in pairs]
+            for pairs in (
+                [(s.stiffness, s.damping) for s in system.swings],
+                [(s.momentum, s.mass) for s in system.swings],
+            )
+        )
+        self.still = _Beside(system.stiffness, system.damping if system.damping.any() else None)
 
-    def advanced(self, step: int, q: Array, p: Array) -> tuple[Array, Array]:
-        """Return the state at the end of a step."""
-        waves = [
-            step_coefficients(swing.oscillation, step, self.steps, self.order, self.least)
-            for swing in self.system.swings
-        ]
+    def advanced(self, step: int, state: Array) -> Array:
+        """Return the state (q, p) at the end of a step."""
+        size, least = len(self.system.stiffness), _SHARE * self.tolerance
+        waves = [step_coefficients(s.oscillation, step, self.steps, self.order, least) for s in self.system.swings]
+        terms = [(wave, swing.size) for wave, swing in zip(waves, self.system.swings, strict=True)]
         found = _mass_and_inverse(self.system, waves)
         mass = None if found is None else found[1]
         if found is not None and _is_diagonal(found[0]):
             mass = np.einsum("iip->ip", found[1])[:, None]
-        for product in (*self.forces, *self.momenta):
-            product.known = -1
-        end_q, end_p, p = q.copy(), p.copy(), p.copy()
-        for k in range(self.order):
-            rate, resistance = self._rates(k, q, p, waves, mass)
-            step_size = self.h / (k + 1)
-            q, p = np.multiply(rate, step_size, out=rate), np.multiply(resistance, -step_size, out=resistance)
-            end_q += q
-            end_p += p
-        return end_q, end_p
+        end, z = state.copy(), state.copy()
+        q, u = z[:size], z[size:]  # the coefficient k of p, then of u
+        start, sizes = self._columns(z), deque[float](maxlen=3)
+        for k, fraction in enumerate(self.fractions):
+            for product, (wave, swing) in zip(self.momenta, terms, strict=True):
+                if product.keep(k, z, of_u=False):
+                    product.add(u, k, wave, -swing)
+                elif k:
+                    product.add(u, k - 1, wave[1:], -swing)
+            if mass is not None and mass.shape[1] == 1:
+                u *= mass
+            elif mass is not None:
+                u[:] = _applied(mass, u)
+            resistance = self.still(z)
+            for product, (wave, swing) in zip(self.forces, terms, strict=True):
+                if product.keep(k, z):
+                    product.add(resistance, k, wave, swing)
+            for product in self.momenta:
+                product.keep(k, z)
+            np.multiply(u, fraction, out=q)
+            np.multiply(resistance, -fraction, out=u)
+            end += z
+            if self.tolerance and k + 4 >= self.known:
+                sizes.append(np.sqrt((self._columns(z) / start).max()))
+                if self._is_last(sizes):
+                    break
+        self.known = max(_LEAST_ORDER, k + 1)
+        return end
 
-    def _rates(self, k: int, q: Array, p: Array, waves: list[Array], mass: Array | None) -> tuple[Array, Array]:
-        """Return the coefficients k of dq/dt and of -dp/dt."""
-        number = len(self.system.swings)
-        sizes = [swing.size for swing in self.system.swings]
-        of_q = self.of_q(q)
-        rate, resistance = p, of_q[0]
-        assert resistance is not None
-        for product, of_both, wave, size in zip(self.momenta, of_q[1 + number :], waves, sizes, strict=True):
-            product.keep(k, of_both)
-            product.added(rate, k, wave, -size)
-        if mass is not None:
-            rate = np.multiply(rate, mass, out=rate) if mass.shape[1] == 1 else _applied(mass, rate)
-        of_u = self.of_u(rate)
-        if of_u[0] is not None:
-            resistance += of_u[0]
-        for product, carried in zip(self.momenta, of_u[1 + number :], strict=True):
-            product.keep(k, carried)
-        for r, product in enumerate(self.forces):
-            product.keep(k, of_q[1 + r])
-            product.keep(k, of_u[1 + r])
-            product.added(resistance, k, waves[r], sizes[r])
-        return rate, resistance
+    def _columns(self, z: Array) -> Array:
+        """Return the squares of the columns' norms, displacements in units of momenta, shape (2N, points)."""
+        size = len(self.system.stiffness)
+        q, p = (np.einsum("ijp,ijp->jp", part, part) for part in (z[:size], z[size:]))
+        q *= self.rate**2
+        q += p
+        return np.asarray(q)
+
+    def _is_last(self, sizes: Sequence[float]) -> bool:
+        """Whether the next coefficient is expected below the tolerance; every second one may be small."""
+        if len(sizes) < 3 or not sizes[-1] < sizes[0]:
+            return len(sizes) == 3 and sizes[-1] == 0.0
+        return bool(sizes[-1] * np.sqrt(sizes[-1] / sizes[0]) <= self.tolerance / self.steps)
+
+
+class _Beside:
+    """Matrices of q and of u, at least one of them, applied to both at once; or None."""
+
+    def __init__(self, of_q: Array | None, of_u: Array | None) -> None:
+        self.columns, self.matrix = slice(None), of_q
+        there = [matrix for matrix in (of_q, of_u) if matrix is not None]
+        if of_u is not None and of_q is not None:
+            points = max(matrix.shape[-1] for matrix in there)
+            self.matrix = np.concatenate([np.broadcast_to(m, (*m.shape[:2], points)) for m in there], axis=1)
+        elif there:
+            size = there[0].shape[1]
+            self.matrix, self.columns = there[0], slice(size) if of_u is None else slice(size, None)
+
+    def __call__(self, z: Array, out: Array | None = None) -> Array:
+        """Return the product."""
+        assert self.matrix is not None
+        return _applied(self.matrix, z[self.columns], out)
 
 
 class _Product:
     """Product of an oscillation and the series of a left factor times rows, which are kept."""
 
-    def __init__(self, left: Array | None, of_q: Array | None, of_u: Array | None, order: int, shape: Any) -> None:
-        rows = next((len(matrix) for matrix in (of_q, of_u) if matrix is not None), 0)
-        self.left = left
-        self.rows = np.empty((order + 1 if rows else 0, rows, *shape[1:]))
-        self.known = -1  # the highest coefficient kept in this step
+    def __init__(self, factors: tuple[Array | None, Array | None, Array | None], order: int, shape: Any) -> None:
+        self.left, of_q, of_u = factors
+        self.both, self.of_q = _Beside(of_q, of_u), _Beside(of_q, None)
+        rows = 0 if self.both.matrix is None else len(self.both.matrix)
+        self.rows = np.empty((order if rows else 0, rows, *shape[1:]))
 
-    def keep(self, k: int, row: Array | None) -> None:
-        """Add to the coefficient k of the rows."""
-        if row is not None:
-            if self.known == k:
-                self.rows[k] += row
-            else:
-                self.rows[k] = row
-            self.known = k
+    def keep(self, k: int, z: Array, *, of_u: bool = True) -> bool:
+        """Set the coefficient k of the rows, without what u adds if told; tell whether there is any."""
+        used = self.both if of_u else self.of_q
+        if used.matrix is not None:
+            used(z, self.rows[k])
+        return used.matrix is not None
 
-    def added(self, out: Array, k: int, wave: Array, size: Array) -> None:
-        """Add the coefficient k of ``size`` times the product to ``out``, as far as the rows are kept."""
-        first = k + 1 - min(k + 1, len(wave))
-        last = self.known
-        if last < first:
+    def add(self, out: Array, last: int, wave: Array, size: Array) -> None:
+        """Add ``size`` times the sum of rows to ``out``, the row ``last`` times the first coefficient of the wave."""
+        if not len(self.rows):
             return
-        part = self.rows[first : last + 1]
-        found = (wave[k - last : k - first + 1][::-1] @ part.reshape(len(part), -1)).reshape(part.shape[1:])
+        count = min(last + 1, len(wave))
+        part = self.rows[last + 1 - count : last + 1]
+        # BLAS takes no vector that runs backwards
+        found = (wave[:count][::-1].copy() @ part.reshape(count, -1)).reshape(part.shape[1:])
         found *= size
         out += found if self.left is None else _applied(self.left, found)
 
@@ -192,73 +231,89 @@ def mass_and_inverse(system: PeriodicSystem, step: int, steps: int) -> tuple[Arr
     return _mass_and_inverse(system, [step_coefficients(s.oscillation, step, steps, 0) for s in system.swings])
 
 
-class _Stack:
-    """Several matrices, some of them None, applied to a state in one product."""
-
-    def __init__(self, matrices: Sequence[Array | None]) -> None:
-        there = [matrix for matrix in matrices if matrix is not None]
-        ends = np.cumsum([0, *(0 if matrix is None else len(matrix) for matrix in matrices)]).tolist()
-        self.rows = [
-            None if matrix is None else slice(*pair) for matrix, pair in zip(matrices, pairwise(ends), strict=True)
-        ]
-        if there:
-            points = max(matrix.shape[-1] for matrix in there)
-            self.whole = np.concatenate([np.broadcast_to(m, (*m.shape[:2], points)) for m in there])
-
-    def __call__(self, states: Array) -> list[Array | None]:
-        """Return the products, None for None."""
-        if not any(self.rows):
-            return [None] * len(self.rows)
-        found = _applied(self.whole, states)
-        return [None if rows is None else found[rows] for rows in self.rows]
-
-
 def _is_diagonal(matrix: Array) -> bool:
     return not matrix[~np.eye(len(matrix), dtype=bool)].any()
 
 
 def propagated(
-    system: PeriodicSystem, steps: int, order: int, *, half: bool = False, least: float = 0.0, factored: bool = False
-) -> Iterator[tuple[Array, Array]]:
-    """Yield (q, p), shape (N, 2N, points), after every step of a period, or of half of it, from every unit state.
+    system: PeriodicSystem,
+    steps: int,
+    order: int,
+    *,
+    half: bool = False,
+    tolerance: float = 0.0,
+    factored: bool = False,
+) -> Iterator[Array]:
+    """Yield (q, p), shape (2N, 2N, points), after every step of a period, or of half of it, from every unit state.
 
-    Coefficients of cosines below ``least`` are left out. With ``factored``, oscillating matrices of low rank are
-    factored, which takes less time; the rounding of the factors is not that of the given matrices.
+    All steps have ``order`` terms, or with a tolerance as many as it takes. With ``factored``, oscillating matrices of
+    low rank are factored, which takes less time; the rounding of the factors is not that of the given matrices.
     """
-    series = _Series(system, steps, order, least, factored)
-    q, p = (
-        np.ascontiguousarray(np.broadcast_to(half[..., None], series.shape))
-        for half in np.split(np.eye(series.shape[1]), 2)
-    )
+    series = _Series(system, steps, order, tolerance, factored)
+    size = series.shape[1]
+    state = np.ascontiguousarray(np.broadcast_to(np.eye(size)[..., None], (size, *series.shape[1:])))
     for step in range(steps // 2 if half else steps):
-        q, p = series.advanced(step, q, p)
-        yield q, p
+        state = series.advanced(step, state)
+        yield state
+
+
+class _Maps(NamedTuple):
+    """Maps of (q, p) over the period, or over its first half where `parity` gives the second."""
+
+    system: PeriodicSystem
+    axes: Array | None
+    parity: NDArray[np.int8] | None
+    maps: Array
+
+    def whole(self) -> Array:
+        """Return the maps over the period."""
+        if self.parity is None:
+            return self.maps
+        return whole_period(self.maps, np.moveaxis(self.system.damping, -1, 0), self.parity)
+
+    def canonical(self) -> Array:
+        """Return the maps for canonical momenta; where signs change, coordinates and momenta change places."""
+        assert self.parity is not None
+        n, place, found = len(self.parity), np.arange(len(self.parity)), self.maps
+        if self.system.damping.any():
+            half = 0.5 * np.moveaxis(self.system.damping, -1, 0)
+            lower = found[:, n:] + half @ found[:, :n]
+            found = np.concatenate([found[:, :n], lower], axis=1)
+            found[:, :, :n] -= found[:, :, n:] @ half
+        if (self.parity < 0).any():  # (q, p) becomes (p, -q)
+            index = np.concatenate([np.where(self.parity * sign > 0, place, n + place) for sign in (1, -1)])
+            signs = np.concatenate([np.ones(n), self.parity])
+            found = found[:, index[:, None], index] * (signs[:, None] * signs)
+        return found
+
+
+def _maps(system: PeriodicSystem, tolerance: float) -> _Maps:
+    """Return the maps, for a relative error of about ``tolerance``, in axes that make oscillating masses diagonal."""
+    parity = system.parity()
+    system, axes = system.in_axes_of_mass(parity)
+    rate, size, points = system.rate(), 2 * len(system.stiffness), system.period.size
+    out = np.empty((points, size, size))
+    rank = np.argsort(system.period * rate, kind="stable")
+    blocks = [rank[start : start + _BLOCK] for start in range(0, points, _BLOCK)]
+    series = _majorants(system, rate, blocks).T if points else ()
+    for block, logs in zip(blocks, series, strict=True):
+        steps, order = _cheapest(logs, tolerance)
+        half = parity is not None
+        states = propagated(system.take(block), steps, order, half=half, tolerance=tolerance, factored=True)
+        out[block] = np.moveaxis(deque(states, maxlen=1)[0], -1, 0)
+    return _Maps(system, axes, parity, out)
 
 
 def monodromy(system: PeriodicSystem, tolerance: float = 1e-8) -> Array:
     """Return the monodromy matrices of (q, p), shape (points, 2N, 2N), for a relative error of about ``tolerance``."""
-    parity, damping = system.parity(), system.damping
-    system, axes = system.in_axes_of_mass()
-    angle = system.period * system.rate()
-    size, points = 2 * len(system.stiffness), system.period.size
-    out = np.empty((points, size, size))
-    if not points:
-        return out
-    rank = np.argsort(angle, kind="stable")
-    blocks = [rank[start : start + _BLOCK] for start in range(0, points, _BLOCK)]
-    for block, series in zip(blocks, _majorants(system, blocks).T, strict=True):
-        steps, order = _cheapest(series, tolerance)
-        some, least = system.take(block), _SHARE * tolerance
-        states = propagated(some, steps, order, half=parity is not None, least=least, factored=True)
-        end = deque(states, maxlen=1)
-        out[block] = np.moveaxis(np.concatenate(end[0]), -1, 0)
-    if axes is not None:
-        turn = np.kron(np.eye(2), axes)
-        out = turn @ out @ turn.T
-    return out if parity is None else whole_period(out, np.moveaxis(damping, -1, 0), parity)
+    found = _maps(system, tolerance)
+    if found.axes is None:
+        return found.whole()
+    turn = np.kron(np.eye(2), found.axes)
+    return np.asarray(turn @ found.whole() @ turn.T)
 
 
-def _majorants(system: PeriodicSystem, blocks: Sequence[NDArray[np.intp]]) -> Array:
+def _majorants(system: PeriodicSystem, rate: Array, blocks: Sequence[NDArray[np.intp]]) -> Array:
     """Return bounds of the Taylor coefficients of all motions, the time in periods, as logarithms.
 
     They are the Taylor coefficients of the scalar equations with norms in place of matrices, and with exponentials in
@@ -270,7 +325,7 @@ def _majorants(system: PeriodicSystem, blocks: Sequence[NDArray[np.intp]]) -> Ar
         *(np.stack([part[:, block].max(axis=1, initial=0.0) for block in blocks], axis=-1) for part in sizes)
     )
     period = np.array([system.period[block].max() for block in blocks])
-    unit = period * np.array([system.rate()[block].max() for block in blocks])  # of time: angles
+    unit = period * np.array([rate[block].max() for block in blocks])  # of time: angles
     count = _HIGHEST + 2
     k = np.arange(count)
     factorials = np.cumprod(np.concatenate([[1.0], k[1:]]))
@@ -304,7 +359,7 @@ def _cheapest(series: Array, tolerance: float) -> tuple[int, int]:
 
     The error of a series truncated after order n is the coefficient n + 1 times ``h**(n + 1)`` per step.
     """
-    orders = np.arange(6, _HIGHEST + 1)
+    orders = np.arange(_LEAST_ORDER, _HIGHEST + 1)
     angle = np.exp(series[1])
     logs = series[orders + 1] - np.log(tolerance)
     with np.errstate(over="ignore"):
@@ -319,14 +374,25 @@ def _cheapest(series: Array, tolerance: float) -> tuple[int, int]:
     return int(steps[best]), int(orders[best])
 
 
+def _pairs(system: PeriodicSystem, tolerance: float) -> tuple[Array | None, Array]:
+    """Return one exponent of each pair of exponents where they come in pairs, else None, and the monodromy matrices."""
+    found = _maps(system, tolerance)
+    if found.parity is None or not system.conservative:
+        return None, found.whole()
+    return paired_exponents(found.canonical(), system.period), found.maps
+
+
 def growth_rate(*given: Any, tolerance: float = 1e-8) -> Array:
     """Return max(0, largest real part of the exponents), shape (...); arguments of :meth:`PeriodicSystem.of`."""
     system, shape = PeriodicSystem.of(*given)
-    return rate_of(monodromy(system, tolerance), system.period).reshape(shape)
+    growing, maps = _pairs(system, tolerance)
+    rates = rate_of(maps, system.period) if growing is None else growth_of(growing)
+    return rates.reshape(shape)
 
 
 def floquet_exponents(*given: Any, tolerance: float = 1e-8) -> NDArray[np.complex128]:
     """Return all Floquet exponents, shape (..., 2N), largest real part first; arguments as :func:`growth_rate`."""
     system, shape = PeriodicSystem.of(*given)
-    exponents = exponents_of(monodromy(system, tolerance), system.period)
+    growing, maps = _pairs(system, tolerance)
+    exponents = exponents_of(maps, system.period) if growing is None else both_of_pairs(growing, system.period)
     return exponents.reshape(*shape, exponents.shape[-1])

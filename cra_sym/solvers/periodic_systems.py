@@ -163,14 +163,35 @@ class PeriodicSystem:
         product = signs[:, None] * signs
         return None if (same & (product < 0)).any() or (opposite & (product > 0)).any() else signs
 
-    def in_axes_of_mass(self) -> tuple[PeriodicSystem, Array | None]:
-        """Return the system in axes that make all oscillating masses diagonal, and these axes, or None."""
+    @property
+    def conservative(self) -> bool:
+        """Whether p + C q / 2 are the canonical momenta of a Hamiltonian, for the momenta p of the equations."""
+        pairs = [(self.stiffness, self.stiffness, 1), (self.damping, self.damping, -1)]
+        for s in self.swings:
+            pairs += [(m, m, 1) for m in (s.stiffness, s.mass) if m is not None]
+            if (s.damping is None) != (s.momentum is None):
+                return False
+            if s.damping is not None and s.momentum is not None:
+                pairs.append((s.damping, s.momentum, -1))
+        return all(bool((matrix == sign * other.swapaxes(0, 1)).all()) for matrix, other, sign in pairs)
+
+    def in_axes_of_mass(self, parity: NDArray[np.int8] | None = None) -> tuple[PeriodicSystem, Array | None]:
+        """Return the system in axes that make all oscillating masses diagonal, and these axes, or None.
+
+        With the signs of :meth:`parity` each axis is one of coordinates of one sign, so that the signs hold there too.
+        """
         masses = [s.mass[..., 0] for s in self.swings if s.mass is not None and s.mass.shape[-1] == 1]
         if not masses or len(masses) < sum(s.mass is not None for s in self.swings):
             return self, None
         if not all(np.array_equal(mass, mass.T) for mass in masses):
             return self, None
-        _, axes = np.linalg.eigh(sum(mass / (k + np.linalg.norm(mass)) for k, mass in enumerate(masses, 1)))
+        mixed, axes = np.zeros((2, *masses[0].shape))
+        for k, mass in enumerate(masses, 1):
+            mixed += mass / (k + np.linalg.norm(mass))
+        for sign in (1,) if parity is None else (1, -1):
+            some_axes = np.arange(len(axes)) if parity is None else np.nonzero(parity == sign)[0]
+            part = np.ix_(some_axes, some_axes)
+            axes[part] = np.linalg.eigh(mixed[part])[1]
 
         def turned(matrix: Array) -> Array:
             return np.asarray(np.einsum("ji,jkp,kl->ilp", axes, matrix, axes))

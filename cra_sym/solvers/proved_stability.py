@@ -188,10 +188,10 @@ def enclosed_monodromy(system: PeriodicSystem, unit: Array, steps: int, spread: 
     factor = np.exp(_ENLARGED * h * growth)
     error, through = np.zeros((2, points))
     state = scale * np.eye(size)[..., None]
-    for step, (q, p) in enumerate(propagated(system, steps, _ORDER)):
+    for step, moved in enumerate(propagated(system, steps, _ORDER)):
         new = (local + by_mass * _residual(system, step, steps)) * _size(state)
         error = factor * error + new
-        state = scale * np.concatenate([q, p])
+        state = scale * moved
         # as an error of the initial state, propagated by the exact map: it grows no faster than the motion
         through = through + _inverse_size(state, error) * new
         carried = np.where(through < 1.0, _size(state) * through / (1.0 - through), np.inf)
@@ -239,7 +239,7 @@ def _local_error(bounds: _Bounds, h: Array, steps: int, modes: int, spread: floa
     # additions and products for one coefficient of the series, those of the cosines and of the step included; the k-th
     # coefficient has k times their error, and the sum of k times the majorant's coefficients is its slope. The inverse
     # mass is a recursion over the coefficients too, of as many operations
-    operations = modes + 2 * _ORDER + 13 * int(max(bounds.turns, default=1)) + len(bounds.turns) + 30
+    operations = 2 * modes + 2 * _ORDER + 13 * int(max(bounds.turns, default=1)) + len(bounds.turns) + 30
     operations *= 2 if bounds.oscillates.any() else 1
     slope = h * (bounds.still + (np.exp(angles) @ bounds.swings if len(angles) else 0.0))
     slope = slope * bounds.inverse_mass(angles, 1.0)
