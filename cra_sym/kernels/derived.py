@@ -86,13 +86,12 @@ def _called(path: str, given: tuple[Any, ...]) -> str:
 
 @cache
 def _source_of(path: str, given: tuple[Any, ...] = ()) -> tuple[str, tuple[str, ...]]:
-    storable = _sources_are_what_runs()
-    key = f"{_called(path, given)} {fingerprint()}"
-    content = store.load(key) if storable else None
+    key = _key(path, given)
+    content = store.load(key) if key else None
     if content is None:
         made = _derived(path, given)
         content = json.dumps([made.source, made.arguments]).encode()
-        if storable and _sources_are_what_runs():
+        if key and _sources_are_what_runs():
             store.save(key, content)
     source, arguments = json.loads(content)
     return source, tuple(arguments)
@@ -108,14 +107,13 @@ def derived(path: str, *arguments: str) -> Any:
     *arguments : str
         Passed on to the function, and part of the key.
     """
-    storable = _sources_are_what_runs()
-    key = f"{_called(path, arguments)} {fingerprint()}"
-    content = store.load(key) if storable else None
+    key = _key(path, arguments)
+    content = store.load(key) if key else None
     if content is not None:
         with suppress(Exception):  # a damaged entry of another process is derived again
             return pickle.loads(content)
     made = _narrated(path, arguments, lambda result: result)
-    if storable and _sources_are_what_runs():
+    if key and _sources_are_what_runs():
         store.save(key, pickle.dumps(made))
     return made
 
@@ -148,6 +146,19 @@ def _sources_are_what_runs() -> bool:
     """
     files = _sources()
     return bool(files) and all(file.stat().st_mtime <= cra_sym._LOADED for file in files)
+
+
+def _key(path: str, given: tuple[Any, ...]) -> str | None:
+    """Return the key of a stored derivation, None if it cannot be stored."""
+    return f"{_called(path, given)} {fingerprint()}" if _hash_is_of_what_runs() else None
+
+
+@cache
+def _hash_is_of_what_runs() -> bool:
+    """Return whether the fingerprint is that of the code in memory; asked once, since the fingerprint is kept."""
+    before = _sources_are_what_runs()
+    fingerprint()
+    return before and _sources_are_what_runs()
 
 
 @cache

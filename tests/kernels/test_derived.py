@@ -87,11 +87,23 @@ def test_sources_edited_since_loading_are_not_vouched_for(private, monkeypatch, 
     namespace = {}
     exec(PLANT, namespace)
     assert derived_kernel(DERIVATION)(0.5, 1.0)["power"] == 0.5**5
-    assert not private.exists()
+    assert not list(private.glob("*"))
     (tmp_path / "symbols.py").unlink()
     assert not derived._sources_are_what_runs()  # a package without its sources
+    for kept in (derived._source_of, derived.fingerprint, derived._hash_is_of_what_runs):
+        kept.cache_clear()
+
+
+def test_stored_derivations_are_read_without_a_look_at_the_sources(private, monkeypatch):
+    namespace, looks, look = {}, [], derived._sources_are_what_runs
+    exec(PLANT, namespace)
+    monkeypatch.setattr(derived, "_sources_are_what_runs", lambda: looks.append(1) or look())
+    derived._hash_is_of_what_runs.cache_clear()
+    for _ in range(3):
+        derived._source_of.cache_clear()
+        assert derived_kernel(DERIVATION)(0.5, 1.0)["power"] == 0.5**5
+    assert len(looks) == 3 and os.listdir(private)  # about the hash before and after, once more before it is stored
     derived._source_of.cache_clear()
-    derived.fingerprint.cache_clear()
 
 
 def test_a_derived_kernel_pickles_as_what_it_is(private, monkeypatch):
