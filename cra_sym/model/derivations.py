@@ -20,7 +20,7 @@ from cra_sym.model.forms import form_of
 from cra_sym.model.held_motions import HeldMotions, moving_supports
 from cra_sym.model.held_motions import held_motions as motions_held
 from cra_sym.model.lagrangian import Model
-from cra_sym.model.loads import causes, constant, load, loads
+from cra_sym.model.loads import causes, constant, load, load_of_order, loads
 from cra_sym.model.moving import jumps
 from cra_sym.model.nonlinear import nonlinear
 from cra_sym.model.observables import named_observables, observable
@@ -52,6 +52,7 @@ __all__ = [
     "inertia",
     "leading",
     "load",
+    "load_of_order",
     "loads",
     "masses",
     "moving_supports",

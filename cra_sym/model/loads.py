@@ -17,7 +17,7 @@ from cra_sym.model.projection import Load
 if TYPE_CHECKING:
     from cra_sym.model.lagrangian import Model
 
-__all__ = ["causes", "constant", "load", "load_coefficients", "loads", "momentum"]
+__all__ = ["causes", "constant", "load", "load_coefficients", "load_of_order", "loads", "momentum"]
 
 Kind = Literal["motion", "force", "support"]
 
@@ -50,15 +50,23 @@ def _kind(model: Model, function: AppliedUndef) -> str:
 
 def load(model: Model, name: str) -> Load:
     """Return the load of a unit input: a unit acceleration of a prescribed motion, or a unit force."""
-    weak = weak_form(model.linearised.variation)
-    return load_of(weak, *load_coefficients(model, name), model.symbols)
+    found: Load = model.numerics("load_of_order", name, _order(model, name))
+    return found
 
 
 def loads(model: Model, name: str) -> dict[int, Load]:
     """Return the loads of units of an input (0), its velocity (1) and its acceleration (2): those that act."""
-    weak = weak_form(model.linearised.variation)
-    by_order = {order: load_coefficients(model, name, order) for order in range(3)}
-    return {order: load_of(weak, *parts, model.symbols) for order, parts in by_order.items() if any(parts)}
+    orders = [order for order in range(3) if any(load_coefficients(model, name, order))]
+    return {order: model.numerics("load_of_order", name, order) for order in orders}
+
+
+def load_of_order(model: Model, name: str, order: int) -> Load:
+    """Return the load of a unit of an input's derivative by time, of the given order."""
+    return load_of(weak_form(model.linearised.variation), *load_coefficients(model, name, order), model.symbols)
+
+
+def _order(model: Model, name: str) -> int:
+    return 2 if dict(model.numerics("causes")).get(name) == "motion" else 0
 
 
 def load_coefficients(model: Model, name: str, order: int | None = None) -> tuple[dict[Jet, Expr], dict[Jet, Expr]]:
@@ -71,9 +79,7 @@ def load_coefficients(model: Model, name: str, order: int | None = None) -> tupl
     function = next((f for f in model.driving if f.func.__name__ == name), None)
     if function is None:
         raise ValueError(f"motion: {name} acts in nonlinear terms alone, which only response takes into account")
-    if order is None:
-        order = 2 if _kind(model, function) == "motion" else 0
-    cause = function.diff(t, order)
+    cause = function.diff(t, _order(model, name) if order is None else order)
     inside, discrete = (_coefficients(weak, part, cause) for part in (weak.inside_load, weak.discrete_load))
     return inside, discrete
 
