@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from threading import Lock
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,12 +63,16 @@ class _Loop:
 _loops: dict[tuple[str, tuple[bool, ...]], _Loop] = {}  # by digest and pattern, shared by equal kernels
 
 
+Outputs: TypeAlias = Sequence[np.ndarray] | np.ndarray
+"""The outputs of a kernel, each of the shape of the call."""
+
+
 def evaluated(
     kernel: Generated,
     arrays: Sequence[np.ndarray],
     shape: tuple[int, ...],
-    by_numpy: Callable[[Sequence[np.ndarray], tuple[int, ...]], list[np.ndarray]],
-) -> list[np.ndarray]:
+    by_numpy: Callable[[Sequence[np.ndarray], tuple[int, ...]], Outputs],
+) -> Outputs:
     """Return the outputs of the kernel, each of the given shape: by machine code once it pays, until then by NumPy.
 
     Lanes with a result nan are evaluated again by NumPy, whose sine and cosine have no limit of the argument. A kernel

@@ -249,10 +249,17 @@ class Model(Asked):
 
         The work of a force becomes a term of the Lagrangian, so that the equations stay symmetric.
         """
-        driver = next(function for function in self.driving if function.func.__name__ == name)
-        prescribed = [function for function in self._pieces["prescribed"] if function != driver]
-        pieces = {"prescribed": prescribed, "coordinates": [*self._pieces["coordinates"], driver]}
-        return self.replace(**pieces, **({} if driver in self.motions else work_as_energy(self._pieces, driver)))
+        if name not in self._freed:
+            driver = next(function for function in self.driving if function.func.__name__ == name)
+            prescribed = [function for function in self._pieces["prescribed"] if function != driver]
+            pieces = {"prescribed": prescribed, "coordinates": [*self._pieces["coordinates"], driver]}
+            work = {} if driver in self.motions else work_as_energy(self._pieces, driver)
+            self._freed[name] = self.replace(**pieces, **work)
+        return self._freed[name]
+
+    @cached_property
+    def _freed(self) -> dict[str, Model]:
+        return {}
 
     @property
     def pieces(self) -> Mapping[str, Any]:
