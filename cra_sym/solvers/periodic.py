@@ -129,7 +129,8 @@ class _Series:
             np.multiply(resistance, -fraction, out=u)
             end += z
             if self.tolerance and k + 4 >= self.known:
-                sizes.append(np.sqrt((self._columns(z) / start).max()))
+                with np.errstate(all="ignore"):  # what overflows takes all terms
+                    sizes.append(np.sqrt((self._columns(z) / start).max()))
                 if self._is_last(sizes):
                     break
         self.known = max(_LEAST_ORDER, k + 1)

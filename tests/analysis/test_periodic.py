@@ -546,7 +546,7 @@ def integrated(stiffness, damping, matrices, varpi, size):
     return end.y[:, -1].reshape(2 * n, 2 * n)
 
 
-@pytest.mark.parametrize("kind", ["damped", "gyroscopic", "both", "speed", "mass", "all", "damper", "any"])
+@pytest.mark.parametrize("kind", ["damped", "gyroscopic", "both", "speed", "mass", "all", "free", "damper", "any"])
 def test_half_a_period_tells_the_other_where_signs_make_it_so(kind):
     """Dampers, a gyroscopic coupling of odd with even modes that stands still or oscillates, and masses do; an
     oscillating damper and matrices of no symmetry do not."""
@@ -554,27 +554,35 @@ def test_half_a_period_tells_the_other_where_signs_make_it_so(kind):
     stiffness, swung, damping, mass = rng.normal(size=(4, 4, 4))
     stiffness, swung, mass = stiffness + stiffness.T + 12 * np.eye(4), swung + swung.T, (mass + mass.T) / 6
     drag, momentum = np.zeros((2, 4, 4))
-    odd = {"gyroscopic", "both", "speed", "all"}
+    odd = {"gyroscopic", "both", "speed", "all", "free"}
     signs = np.array([1, -1, 1, -1])
     same = signs[:, None] * signs > 0
     if kind in odd:
         stiffness, swung, mass = stiffness * same, swung * same, mass * same
-        momentum = np.where(same, 0.0, damping) * (kind in ("speed", "all"))
+        momentum = np.where(same, 0.0, damping) * (kind in ("speed", "all", "free"))
         drag = -momentum.T
     skew = np.where(same, 0.0, damping - damping.T) * (kind in odd)
     positive = np.where(same | (kind not in odd), damping @ damping.T / 10, 0.0)
-    still = {"gyroscopic": skew, "speed": skew, "any": damping / 5}.get(kind, positive + skew)
+    without = ("gyroscopic", "speed", "free")  # without damping
+    still = skew if kind in without else {"any": damping / 5}.get(kind, positive + skew)
     if kind == "damper":
         drag = positive
-    if kind not in ("mass", "all"):
+    if kind not in ("mass", "all", "free"):
         mass = np.zeros((4, 4))
     wave, given = floquet.Oscillation(1, "cos", 0), (swung, drag, momentum, mass)
     drives = [(wave, [part if part.any() else None for part in given])]
     system, _ = periodic.PeriodicSystem.of(stiffness, still, drives, [2.0, 5.5], 0.6)
-    assert (system.parity() is None) == (kind in ("any", "damper"))
-    for found, rate in zip(periodic.monodromy(system, 1e-12), (2.0, 5.5), strict=True):
+    assert (system.parity() is None) == (kind in ("any", "damper")) and system.conservative == (kind in without)
+    exponents = periodic.floquet_exponents(stiffness, still, drives, [2.0, 5.5], 0.6, tolerance=1e-12)
+    for found, row, rate in zip(periodic.monodromy(system, 1e-12), exponents, (2.0, 5.5), strict=True):
         exact = integrated(stiffness, still, given, rate, 0.6)
         np.testing.assert_allclose(found, exact, rtol=0, atol=3e-10 * np.abs(exact).max())
+        # the characteristic polynomial is smooth where multipliers meet, though they are not
+        polynomial = np.poly(np.exp(row * 2 * np.pi / rate))
+        np.testing.assert_allclose(polynomial, np.poly(exact), rtol=0, atol=1e-8 * np.abs(np.poly(exact)).max())
+        if kind in without:  # what does not grow does not by exactly nothing
+            stable = np.abs(np.linalg.eigvals(exact)).max() < 1 + 1e-6
+            assert (row[0].real == 0.0) == stable
     shifted, _ = periodic.PeriodicSystem.of(stiffness, still, [(wave._replace(kind="sin"), drives[0][1])], 2.0, 0.6)
     assert shifted.parity() is None  # not even about t = 0
 
