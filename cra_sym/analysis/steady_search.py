@@ -162,8 +162,8 @@ class _SteadySearch:
                 known = self.found[near]
                 if self._problem.unique and known:
                     continue
-                given.setdefault(near, [])
-                if _alike(answer, known) + _alike(answer, given[near]) < own:
+                missing = own - _alike(answer, known)
+                if missing > 0 and _alike(answer, given.setdefault(near, [])) < missing:
                     given[near].append(answer)
                     found.append((near, answer))
         return found
