@@ -47,6 +47,7 @@ _LEAST_ORDER = 6
 _SHARE = 1e-4
 """Coefficients of cosines below this share of the tolerance are left out; their sum is far below the tolerance."""
 _PRODUCTS = 31  # cost of the matrix products of one term, in units of half a term of a product of series
+_SWUNG = 4  # weight of what oscillates against the angle in a period, in the choice of systems that are alike
 _BLOCK = 768  # systems propagated together: fewer cost more calls, more leave the cache
 
 
@@ -294,8 +295,8 @@ def _maps(system: PeriodicSystem, tolerance: float) -> _Maps:
     system, axes = system.in_axes_of_mass(parity)
     rate, size, points = system.rate(), 2 * len(system.stiffness), system.period.size
     out = np.empty((points, size, size))
-    rank = np.argsort(system.period * rate, kind="stable")
-    blocks = [rank[start : start + _BLOCK] for start in range(0, points, _BLOCK)]
+    angle, swung = system.period * rate, rate / system.rate(still=True)
+    blocks = _alike(np.arange(points), np.array([np.log(angle), _SWUNG * np.log(swung)])) if points else []
     series = _majorants(system, rate, blocks).T if points else ()
     for block, logs in zip(blocks, series, strict=True):
         steps, order = _cheapest(logs, tolerance)
@@ -303,6 +304,16 @@ def _maps(system: PeriodicSystem, tolerance: float) -> _Maps:
         states = propagated(system.take(block), steps, order, half=half, tolerance=tolerance, factored=True)
         out[block] = np.moveaxis(deque(states, maxlen=1)[0], -1, 0)
     return _Maps(system, axes, parity, out)
+
+
+def _alike(index: NDArray[np.intp], measures: Array) -> list[NDArray[np.intp]]:
+    """Return the systems in blocks of similar measures: halves by the one that differs most, until they are blocks."""
+    if index.size <= _BLOCK:
+        return [index]
+    given = measures[:, index]
+    index = index[np.argsort(given[np.argmax(np.ptp(given, axis=1))], kind="stable")]
+    half = _BLOCK * (-(-index.size // _BLOCK) // 2)
+    return _alike(index[:half], measures) + _alike(index[half:], measures)
 
 
 def monodromy(system: PeriodicSystem, tolerance: float = 1e-8) -> Array:

@@ -214,13 +214,15 @@ class PeriodicSystem:
         )
         return PeriodicSystem(turned(self.stiffness), turned(self.damping), swings, self.period), axes
 
-    def rate(self) -> Array:
-        """Return a bound of the rate of all motions, 1/s, shape (points,)."""
+    def rate(self, *, still: bool = False) -> Array:
+        """Return a bound of the rate of all motions, 1/s, shape (points,); ``still``: without what oscillates."""
         sizes = self.sizes()
+        if still:
+            sizes = Sizes(sizes.still, *(0.0 * part for part in sizes[1:]))
         light = 1.0 / np.maximum(1.0 - sizes.mass.sum(axis=0), LIGHTEST)
-        still, swung = sizes.still, sizes.damping.sum(axis=0) + sizes.momentum.sum(axis=0)
+        own, swung = sizes.still, sizes.damping.sum(axis=0) + sizes.momentum.sum(axis=0)
         turns = max((s.oscillation.order for s in self.swings), default=1)
-        moved = np.sqrt((still[0] + sizes.stiffness.sum(axis=0)) * light) + (still[1] + swung) * light
+        moved = np.sqrt((own[0] + sizes.stiffness.sum(axis=0)) * light) + (own[1] + swung) * light
         return np.asarray(moved + 2 * np.pi * turns / self.period)
 
     def sizes(self) -> Sizes:
