@@ -166,27 +166,35 @@ def _members(
     shape = broadcastable(values=np.empty(system.shape), zeta=zeta, **shapes)
     columns, ratios = flat_columns(system.parameters, shape), np.broadcast_to(zeta, shape).ravel()
 
+    def member(column: Array, ratio: float) -> _Member:
+        """Return a member with the inputs of the first motions of a batch."""
+        ((_, problem),) = system.numerics("pencil").problems(column)
+        motions = lowest_motions(problem, modes, ratio, whole=whole)
+        one = system.model.at(dict(zip(system.numerics("names"), column[:, 0], strict=True)))
+        omega = np.sort(np.abs(motions.eigenvalues.imag))
+        start = _projected(one, motions, motions.start, momenta[0])
+        start = start + _projected(one, motions, motions.push, momenta[1])
+        acting = []
+        for cause in causes:
+            check(cause.profile, omega)
+            *lower, push = (_projected(one, motions, motions.push, load) for load in cause.loads)
+            support = None if cause.loads[:2] == (None, None) else np.stack(lower)
+            acting.append(_Acting(cause.profile, (), push, 0.0 * push, support))
+        return _Member(motions, outputs(motions.basis) @ motions.shapes, start, acting)
+
     def members() -> Iterator[_Member]:
-        kept, motions = b"", None
+        kept, found = b"", None
         for number, index in enumerate(np.ndindex(shape)):
             column = columns[:, number : number + 1]
             key = np.append(column, ratios[number]).tobytes()
-            if motions is None or key != kept:  # the motion is the fastest index
-                ((_, problem),) = system.numerics("pencil").problems(column)
-                motions, kept = lowest_motions(problem, modes, float(ratios[number]), whole=whole), key
-            one = system.model.at(dict(zip(system.numerics("names"), column[:, 0], strict=True)))
-            omega = np.sort(np.abs(motions.eigenvalues.imag))
-            start = _projected(one, motions, motions.start, momenta[0])
-            start = start + _projected(one, motions, motions.push, momenta[1])
+            if found is None or key != kept:  # the motion is the fastest index
+                found, kept = member(column, float(ratios[number])), key
             acting = []
-            for cause in causes:
-                check(cause.profile, omega)
-                *lower, push = (_projected(one, motions, motions.push, load) for load in cause.loads)
-                support = None if cause.loads[:2] == (None, None) else np.stack(lower)
+            for cause, one in zip(causes, found.causes, strict=True):
                 speed = float(np.broadcast_to(cause.profile.velocity(0.0), shape)[index]) if cause.strikes else 0.0
                 own = _member(index, cause.profile.shape)
-                acting.append(_Acting(cause.profile, own, push, push * speed, support))
-            yield _Member(motions, outputs(motions.basis) @ motions.shapes, start, acting)
+                acting.append(one._replace(member=own, strike=one.push * speed))
+            yield found._replace(causes=acting)
 
     return shape, members()
 

@@ -152,7 +152,7 @@ def couples(system: System, modes: int) -> bool:
 def _complex_residual(system: System, motion: Any, modes: int, zeta: Any, place: int) -> Array:
     histories, _, stop = ended(system, motion)
     for name in supports(system):
-        if system.numerics("pencil") is None or (system.natural_frequencies(1) == 0.0).any():
+        if system.numerics("pencil") is None or (system.basis.natural_frequencies(1) == 0.0).any():
             check_no_support(system)
         profile = histories[name]
         assert isinstance(profile, BaseMotion)

@@ -18,6 +18,12 @@ MOVE = cra.BaseMotion.trapezoid(0.1, 0.4, 3.0)
 END = {"right": m * (v + w).diff(t) ** 2 / 2}
 DAMPED = _model(BENT, **END, virtual_work=[(-c * v.diff(t), v, "right")])
 TURNING = _model(BENT + g * v.diff(t) * v.diff(x), **END)
+#: A string that runs along itself: its base acts by its velocity too.
+RUNNING = _model(
+    m * ((v + w).diff(t) + g * v.diff(x)) ** 2 / 2 - 20 * v.diff(x) ** 2 / 2,
+    left=-25 * v**2,
+    right=-25 * v**2,
+)
 AFTER = np.linspace(0.0, 4.0, 8001)
 
 
@@ -32,11 +38,17 @@ def test_no_damper_is_the_sum_over_natural_modes():
     )
 
 
-@pytest.mark.parametrize("system", [damped(), damped(c=8.0), TURNING.at(VALUES | {"g": 0.2})], ids=str)
+@pytest.mark.parametrize(
+    "system",
+    [damped(), damped(c=8.0), TURNING.at(VALUES | {"g": 0.2}), RUNNING.at({"l": 1.2, "m": 0.3, "g": 3.0})],
+    ids=str,
+)
 def test_one_mode_is_its_largest_value_and_several_bound_theirs(system):
     one, three = (np.abs(cra.tip_response(system, MOVE, MOVE.duration + AFTER, modes)).max() for modes in (1, 3))
-    # the grid misses a peak by (omega h)^2 / 8; with the strong damper the lowest motions are not a single pair
-    assert system.values.get("c") == 8.0 or cra.residual_vibration(system, MOVE, 1) == pytest.approx(one, rel=1e-3)
+    # the grid misses a peak by (omega h)^2 / 8; with the strong damper, and along the string, modes are too far from
+    # orthogonal for a single pair
+    pair = system.values.get("c") != 8.0 and system.model is not RUNNING
+    assert not pair or cra.residual_vibration(system, MOVE, 1) == pytest.approx(one, rel=1e-3)
     assert three <= cra.residual_vibration(system, MOVE, 3) * (1 + 1e-9) <= 1.2 * three
 
 
