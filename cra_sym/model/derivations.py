@@ -287,8 +287,8 @@ def ball_problem(model: Model) -> BallProblem:
     turning = model.numerics("conservative_part") is not None
     if turning and not is_gyroscopic(model.linearised):
         raise ValueError(
-            "system: certification needs forces that do not follow the motion, and beside gyroscopic terms leaves out "
-            "no dampers; use eigenvalues and count_eigenvalues, or system.conservative_part"
+            "system: certification needs forces that do not follow the motion, and no dampers beside gyroscopic terms; "
+            "use eigenvalues and count_eigenvalues, or system.conservative_part"
         )
     form = model.state_form if turning else model.conservative
     acting = tuple(point for point in form.points if point[2] or any(point[1]))  # others are places of loads

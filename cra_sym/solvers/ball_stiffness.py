@@ -133,7 +133,7 @@ class BallStiffness:
         size = n + m
 
         def block(rows: range, columns: range) -> Any:
-            return self._matrix([[transfer[i, j] for j in columns] for i in rows])
+            return self._matrix(len(rows), len(columns), [transfer[i, j] for i in rows for j in columns])
 
         q, force, lumped = range(n), range(size, size + n), range(size + n, 2 * size)
         flexible = block(q, force).inv()
@@ -167,9 +167,7 @@ class BallStiffness:
                 for j, column in enumerate(places):
                     total[row][column] = total[row][column] + matrix[i, j]
         middle = self._matrix([row[size:] for row in total[size:]])
-        across, back = (
-            self._matrix([row[:size] for row in total[size:]]),
-            self._matrix([row[size:] for row in total[:size]]),
-        )
+        across = self._matrix([row[:size] for row in total[size:]])
+        back = self._matrix([row[size:] for row in total[:size]])
         outer = self._matrix([row[:size] for row in total[:size]])
         return outer - back * middle.solve(across), negatives(middle.table())

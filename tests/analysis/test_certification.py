@@ -272,5 +272,22 @@ def test_a_shaft_with_a_disc_is_certified():
         cra.certify(shaft.replace(k=0.0))
     c = sp.Symbol("c")
     damped = shaft.model.replace(virtual_work=[(-c * v.diff(t), v, "right")]).at({**shaft.values, "c": 0.1})
-    with pytest.raises(ValueError, match="leaves out no dampers"):
+    with pytest.raises(ValueError, match="no dampers beside gyroscopic terms"):
         cra.certify(damped)
+
+
+def test_lumped_gyroscopic_systems_are_certified():
+    """A mass on unequal springs in a rotating frame, whose frequencies are roots of a quadratic."""
+    m, k, g, U = sp.symbols("m k g U")
+    p, q = sp.Function("p")(t), sp.Function("q")(t)
+    rotor = cra.Model(
+        0, fields=(), coordinates=[p, q], x=x, domain=(0, 1), t=t,
+        left=m * ((p.diff(t) - U * q) ** 2 + (q.diff(t) + U * p) ** 2) / 2 - k * p**2 / 2 - g * q**2 / 2,
+    )  # fmt: skip
+    proof = cra.certify(rotor.at({m: 2.0, k: 3.0, g: 5.0, U: 0.5}), 2)
+    assert proof.complete
+    with mp.workdps(40):  # (5/4 - s)(9/4 - s) = s, with s = omega^2
+        for low, high, square in zip(proof.lower, proof.upper, (0.75, 3.75), strict=True):
+            exact = mp.sqrt(square) / (2 * mp.pi)
+            assert mp.mpf(low) <= exact <= mp.mpf(high)
+            assert high - low <= 4 * np.spacing(high)
