@@ -164,7 +164,7 @@ def sequence(name: str, given: Any) -> Sequence[Any]:
     """Return a single entry or a sequence of entries as a list."""
     several = list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
     if not 0 < len(several) <= _MOST:
-        raise ValueError(f"{name} = {shown(given)}: must be from 1 to {_MOST}")
+        raise ValueError(f"{name} = {shown(given)}: must have 1 to {_MOST} entries")
     return several
 
 

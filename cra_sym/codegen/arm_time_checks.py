@@ -31,8 +31,10 @@ def arm_time_checks(in_time: Signals, real: str, kept: int) -> Iterator[Line]:
         given = tuple(float(getattr(arm, name)) for name in FIELDS)
         omega = arm.natural_frequencies(_MODES)
         slowest = float(omega[omega > 0.0][0])
-        for time, steps, found, size in stepped_outputs(in_time, arm, kept, _ALONE[real]):
-            yield "in_time", (*given, time, 0.25, steps), found, size
+        long = arm.replace(L=max(float(arm.L), in_time.reach))
+        own = tuple(float(getattr(long, name)) for name in FIELDS)
+        for time, steps, found, size in stepped_outputs(in_time, long, kept, _ALONE[real]):
+            yield "in_time", (*own, time, 0.25, steps), found, size
         yield from _responses(arm, given, slowest)
         shaped = np.ravel(input_shaper(slowest, float(arm.zeta), order=3))
         yield "input_shaper", (slowest, float(arm.zeta)), tuple(shaped.tolist()), 0.0

@@ -49,18 +49,27 @@ def sample(written: ModelText) -> list[float]:
             system.natural_frequencies(_MODES)
         except ValueError:
             continue
+        if written.signals and not written.signals.are_in(system):
+            continue
         return values
-    raise ValueError("model: no parameters were found for which the structure stands; give system= with the model")
+    raise ValueError(
+        "model: no parameters were found for which the structure stands and all places of inputs and outputs are in "
+        "the domain; give system= with the model"
+    )
 
 
 def _drawn(written: ModelText, tries: int = 400) -> Iterator[list[float]]:
     """Yield parameters within a factor of three, then within two orders, then with either sign."""
-    rng = np.random.default_rng(SEED)
+    rng, right = np.random.default_rng(SEED), written.model.equations.domain[1]
+    length = list(written.names).index(right) if right in written.names else None
+    reach = written.signals.reach if written.signals else 0.0
     for number in range(tries):
         width = 0.5 if number < tries // 2 else 1.0
         found = 10.0 ** rng.uniform(-width, width, len(written.names))
         if number >= 3 * tries // 4:
             found *= rng.choice((-1.0, 1.0), len(found))
+        if length is not None:
+            found[length] = max(found[length], reach)
         yield [float(f"{x:.6g}") for x in found]
 
 
@@ -209,6 +218,9 @@ def in_time_checks(written: ModelText, system: System, point: Sequence[float], l
     if written.signals is None:
         return
     system = system.replace(zeta=0.02)
+    if not written.signals.are_in(system):
+        yield Check(9, (*point, 1.0, 0.25, 0.0, 0.02, 0.1), (), refused=True)
+        return
     time = 0.0
     for time, steps, y, size in stepped_outputs(written.signals, system, tested(written), _ALONE[written.real]):
         # an acceleration is a sum with that of the base, 0.25, and may be as small as its rounding

@@ -24,6 +24,7 @@ from cra_sym.model.system import MOST_MODES
 
 if TYPE_CHECKING:
     from cra_sym.model import Model
+    from cra_sym.model.system import System
 
 __all__ = ["OUTPUTS", "Shape", "Signals", "TimeText", "in_time_readme", "signals"]
 
@@ -59,6 +60,27 @@ class Signals:
     def free(self) -> bool:
         """Whether a force moves the base."""
         return any(one.kind == "free" for one in self.inputs)
+
+    @cached_property
+    def places(self) -> tuple[float, ...]:
+        """Places of fields in outputs and inputs that do not depend on parameters, m."""
+        pushed = [one.displacement for one in self.inputs if one.displacement is not None]
+        return tuple(
+            float(place)
+            for one in (*self.outputs.values(), *pushed)
+            for part, place in zip(one.parts, one.places, strict=True)
+            if part.kind == "field" and sp.sympify(place, strict=True).is_number
+        )
+
+    @property
+    def reach(self) -> float:
+        """Length of an example from zero that has all these places, 0 without any."""
+        return 1.25 * max(self.places, default=0.0)
+
+    def are_in(self, system: System) -> bool:
+        """Return whether all these places are in the domain of a system."""
+        left, length = float(system.domain.left), float(system.domain.length)
+        return all(left <= place <= left + length for place in self.places)
 
     @property
     def stack(self) -> str:
@@ -110,8 +132,11 @@ def signals(
     known = named_sums(model)
     if outputs is None:
         outputs = [name for name in OUTPUTS if name in known] or None
+    left, right = model.equations.domain
+    low, high = float(left) if left.is_number else -np.inf, float(right) if right.is_number else np.inf
     reader = Reader(
-        model, known, local or {}, model.equations.domain[0], _place,
+        model, known, local or {}, left,
+        lambda label, given: float(real_array(label, given, low=low, high=high, unit="m")),
         lambda given, argument: sum_of(model, given, argument),
     )  # fmt: skip
     inputs, found = reader.inputs(drive), reader.outputs(outputs)
@@ -125,10 +150,6 @@ def signals(
     if made.free and modes > _MOST_FREE:
         raise ValueError(f"modes = {modes}: must be at most {_MOST_FREE} with {FREE!r}; {_INSTEAD}")
     return made
-
-
-def _place(name: str, given: Any) -> float:
-    return float(real_array(name, given, low=-np.inf, high=np.inf, unit="m"))
 
 
 Shape = tuple[int, int, sp.Expr]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import sys
 from dataclasses import replace
 from functools import cache
 from itertools import islice
@@ -96,6 +97,17 @@ def test_the_arm_takes_any_input_and_output(language, tmp_path):
         kit.run(["cargo", "clippy", "--offline", "--quiet", "--tests", "--", "-D", "warnings"], tmp_path)
 
 
+@pytest.mark.parametrize("model", [PUSHED, None])
+def test_places_in_metres_are_those_of_the_user(model, tmp_path):
+    """Reference vectors are of structures long enough; a shorter one is refused by the code."""
+    outputs = ["w", ("v", 7.0)] if model is None else ["w", ("v", 7.0), v.subs(x, 9)]
+    cra.export("python", tmp_path / "out", model=model, name="far", input="base_acceleration", outputs=outputs)
+    kit.run([sys.executable, "self_test.py"], tmp_path / "out")
+    if model:
+        lines = [line.split() for line in (tmp_path / "out" / "reference.txt").read_text().splitlines()]
+        assert {line[1] for line in lines if line[0] == "9"} == {"0", "1"}
+
+
 @pytest.mark.parametrize("inputs", ["free", "held"])
 def test_the_stack_is_what_the_readme_says(inputs, tmp_path):
     """20 kB, with what functions called have, and that of `discretise` where all modes are coupled."""
@@ -174,6 +186,9 @@ def test_bad_input_is_refused():
         ({"input": "drive_force", "modes": 65}, "modes = 65: must be at most 64 with 'drive_force'"),
         ({"outputs": ["z"]}, "outputs = 'z': must be one of"),
         ({"outputs": [("v", float("nan"))]}, "outputs: place"),
+        ({"outputs": [("v", -0.1)]}, r"outputs: place = -0.1: must be real numbers in \[0, inf\)"),
+        ({"outputs": [v.subs(x, -1)]}, "all places of inputs and outputs are in the domain"),
+        ({"input": []}, r"input = \[\]: must have 1 to 1000 entries"),
         ({"modes": 0}, "modes = 0"),
         ({"model": None, "outputs": [v.diff(x, 4).subs(x, L)]}, "order 4 by x must be at most 3"),
         ({"model": None, "input": "F"}, "input = 'F': must be one of"),
