@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import real_array
+from cra_sym.checks import one_number
 from cra_sym.codegen.blocks import Blocks
 from cra_sym.model.system import System
 
@@ -33,7 +33,7 @@ class Controller:
     disturbance : float
         Standard deviation of the (discrete white) noise added to the input, in its unit.
     weights : mapping of str to float
-        Weights of the squares of outputs in the cost function of the regulator.
+        Weights of the squares of outputs in the cost function of the regulator, at least one.
     effort : float
         Weight of the square of the input.
     system : System, optional
@@ -177,6 +177,4 @@ def _settles(name: str, closed: Array) -> None:
 
 
 def _positive(name: str, value: object) -> None:
-    number = real_array(name, value)
-    if number.ndim or not 0.0 < float(number) < np.inf:
-        raise ValueError(f"{name} = {value!r}: must be in (0, inf)")
+    one_number(name, value, low=0.0, open_low=True, must="in (0, inf)")
