@@ -33,8 +33,22 @@ def elastic_part(model: Model) -> Model | None:
     """Return the same with no more than the potential energy of the highest derivatives along the span.
 
     Gyroscopic terms may stabilise a structure that buckles without them, as under the centrifugal forces of rotation.
+    Lumped coordinates alone have one of the form of their kinetic energy instead: all frequencies are 1 rad/s.
     """
-    return _part(model, leading=True)
+    part = _part(model, leading=True)
+    if part is None or part.options["fields"]:
+        return part
+    found = part.replace(**{end: _standing(part.options[end]) for end in END_NAMES})
+    found.symbols = model.symbols
+    return found
+
+
+def _standing(energy: Expr | None) -> Expr | None:
+    """Return the kinetic energy in a Lagrangian, minus the same of displacements in place of their rates."""
+    if energy is None:
+        return None
+    kinetic = Add(*(term for term in Add.make_args(expand(energy)) if term.has(Derivative)))
+    return kinetic - kinetic.xreplace({rate: rate.expr for rate in kinetic.atoms(Derivative)})
 
 
 def _follows(model: Model) -> bool:

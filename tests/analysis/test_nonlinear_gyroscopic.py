@@ -180,3 +180,26 @@ def test_what_follows_the_motion_has_no_backbone():
         cra.backbone(system, 1, amplitude=0.1, modes=2)
     with pytest.raises(ValueError, match="slow flow leaves out"):
         cra.slow_flow_values(model.slow_flow(("free", 1)), system)
+
+
+def test_a_lumped_rotor_above_its_critical_speed():
+    """In a rotating frame no static position of it is stable; its circular whirls in space have one closed form."""
+    m, U = sp.symbols("m U")
+    w = sp.Function("w")(t)
+    rotor = cra.Model(
+        0, prescribed=[w],
+        left=m * ((p.diff(t) + w.diff(t) - U * q) ** 2 + (q.diff(t) + U * (p + w)) ** 2) / 2
+        - k * (p**2 + q**2) / 2 - k_3 * (p**2 + q**2) ** 2 / 4,
+        **LUMPED,
+    ).at({m: 2.0, k: 3.0, k_3: 1.7, U: 3.5})  # fmt: skip
+    whirl = np.sqrt((3.0 + 1.7 * 0.25) / 2.0)
+    for mode, exact in ((1, 3.5 - whirl), (2, 3.5 + whirl)):
+        curve = cra.backbone(rotor, mode=mode, amplitude=0.5, modes=2)
+        assert curve.angular_frequency == pytest.approx(exact, rel=1e-9)  # the tolerance of the harmonic balance
+        assert curve.stable
+    linear = rotor.model.replace(left=rotor.model.options["left"].subs(k_3, 0)).at({m: 2.0, k: 3.0, U: 3.5})
+    exponents = cra.floquet_exponents(linear, cra.Fluctuation(k=1.0), 5.0, 0.0, modes=2)
+    alone = np.sort(np.abs(np.exp(exponents * 2 * np.pi / 5.0) - 1))
+    s = 1j * np.array([3.5 - np.sqrt(1.5), 3.5 + np.sqrt(1.5)])
+    turned = np.sort(np.abs(np.exp(np.concatenate([s, -s]) * 2 * np.pi / 5.0) - 1))
+    np.testing.assert_allclose(alone, turned, atol=1e-9)  # of the steps of a period
