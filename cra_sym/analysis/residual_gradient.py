@@ -94,7 +94,7 @@ def residual_vibration_gradient(
     known = [*system.values, *compliances, *stretch]
     by = names("by", (*system.numerics("stiffnesses"), *stretch) if by is None else by, known)
     value = residual_vibration(system, motion, modes, zeta=zeta, field=field)
-    found = sensitivities(system.basis, modes + 1)  # the next mode may be close to the last one
+    found = sensitivities(system.basis, min(modes + 1, system.most_modes))  # the next mode may be close to the last one
     gradient = np.empty((*np.shape(value), len(by)))
     if coupled:
         for place, name in enumerate(by):

@@ -192,7 +192,8 @@ class Sensitivities:
                 "system: has no real mode shapes, which shapes and participation differentiate; use "
                 "sensitivities(system.conservative_part), or differences of mode_shapes(damped=True)"
             )
-        more = Sensitivities(self._system, self._modes + 1, [name])  # the next mode may be close to the last one
+        watched = min(self._modes + 1, self._system.most_modes)  # the next mode may be close to the last one
+        more = Sensitivities(self._system, watched, [name])
         found = by_differences(self._system, more, name, quantity)
         none = np.zeros(self.frequency.shape, dtype=bool)
         if self._repeated is not None:

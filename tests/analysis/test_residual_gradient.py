@@ -167,3 +167,25 @@ def test_another_displacement_is_that_of_the_response(name, of):
     assert cra.residual_vibration(given, inputs, 1, field=field) == pytest.approx(peak, rel=1e-5)
     with pytest.raises(ValueError, match=r"field = .*: must be one of"):
         cra.residual_vibration(given, inputs, 1, field=sp.Function("none")(t))
+
+
+def test_all_modes_of_two_masses():
+    """As many modes as there are coordinates, differentiated; beside central differences of the amplitude."""
+    k, c = sp.symbols("k c")
+    p, q, w = (sp.Function(name)(t) for name in "pqw")
+    masses = cra.Model(
+        0, fields=(), coordinates=[p, q], prescribed=[w], x=x, domain=(0, 1), t=t,
+        left=(p + w).diff(t) ** 2 / 2 + (q + w).diff(t) ** 2 / 4 - k * p**2 / 2 - c * (q - p) ** 2 / 2,
+    ).at({k: 40.0, c: 30.0})  # fmt: skip
+    motion = cra.BaseMotion.trapezoid(distance=0.3, v_max=0.5, a_max=2.0)
+    value, gradient = cra.residual_vibration_gradient(masses, motion, ["k", "c"], modes=2, field=q)
+    pairs = [
+        [cra.residual_vibration(masses.replace(**{name: at + h}), motion, modes=2, field=q) for h in (-1e-3, 1e-3)]
+        for name, at in masses.values.items()
+    ]
+    slopes = dict(zip(masses.values, np.diff(pairs)[:, 0] / 2e-3, strict=True))
+    np.testing.assert_allclose(gradient, [slopes["k"], slopes["c"]], rtol=1e-4)  # peaks are found to 1e-9 of 0.25
+    assert value == cra.residual_vibration(masses, motion, modes=2, field=q)
+    rate = cra.sensitivities(masses, 2, ["k"]).participation("k")
+    moved = [cra.modal_parameters(masses.replace(k=40.0 + h), 2).participation for h in (-1e-3, 1e-3)]
+    np.testing.assert_allclose(rate, np.subtract(*moved[::-1]) / 2e-3, rtol=1e-6)
