@@ -130,7 +130,7 @@ WRITING = {
 def test_every_command_that_writes_names_the_place_and_leaves_nothing(command, disk, tmp_path, capsys, monkeypatch):
     resource = pytest.importorskip("resource", reason="the size of files is limited the Unix way")
     monkeypatch.setattr(
-        exporter, "_arm_texts", lambda language, name, real: {"README.md": "", f"arm.{language}": 2000 * "x"}
+        exporter, "_arm_texts", lambda language, *options: {"README.md": "", f"arm.{language}": 2000 * "x"}
     )
     arguments = [word.format(tmp_path / "out put") for word in WRITING[command]]
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
