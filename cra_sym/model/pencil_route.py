@@ -26,6 +26,7 @@ __all__ = ["PencilRoute", "complex_modes", "inertia", "pencil_route"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+_CANCELLED = 8 * float(np.finfo(float).eps)  # what a difference of few stiffnesses is, over these, by rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +89,7 @@ class PencilRoute(StressRoute):
         for position in infinite:
             held = spatial.rigid_directions(position, columns)
             parts.append(springs_of(np.broadcast_to(held, (sets, size, size)), np.full(sets, np.inf)))
-        rest = stiffness
+        rest, size_of = stiffness, np.abs(stiffness)
         for position, slope in spatial.end_stiffness.items():
             rate = np.broadcast_to(slope(*columns), (sets, size, size))
             if position in infinite or not (columns[position] > 0.0).any():
@@ -97,7 +98,9 @@ class PencilRoute(StressRoute):
                 some, k = springs_of(rate, np.maximum(columns[position], 0.0))
                 some, k = _first_of_equal_sets(some, sets), np.maximum(_first_of_equal_sets(k, sets), 0.0)
                 parts.append((some, k))
-                rest = rest - _sum(some, k)
+                taken = _sum(some, k)
+                rest, size_of = rest - taken, size_of + np.abs(taken)
+        rest = np.where(np.abs(rest) <= _CANCELLED * size_of, 0.0, rest)  # no spring made of rounding errors
         some, k = springs_of(0.5 * (rest + rest.swapaxes(-1, -2)), np.ones(sets))
         # the difference of large stiffnesses leaves rounding errors
         some, k = _first_of_equal_sets(some, sets), np.maximum(_first_of_equal_sets(k, sets), 0.0)

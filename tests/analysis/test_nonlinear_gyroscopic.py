@@ -203,3 +203,12 @@ def test_a_lumped_rotor_above_its_critical_speed():
     s = 1j * np.array([3.5 - np.sqrt(1.5), 3.5 + np.sqrt(1.5)])
     turned = np.sort(np.abs(np.exp(np.concatenate([s, -s]) * 2 * np.pi / 5.0) - 1))
     np.testing.assert_allclose(alone, turned, atol=1e-9)  # of the steps of a period
+
+
+def test_eigenvalues_of_coupled_masses_to_rounding():
+    """Springs in a row, whose stiffnesses cancel in the difference from those on single coordinates."""
+    system = cra.Model(0, left=MOVES - k * p**2 / 2 - c * (q - p) ** 2 / 2, **LUMPED).at({k: 40.0, c: 30.0, g: 1.3})
+    half = (70.0 + 30.0 + 1.69) / 2  # (70 - s)(30 - s) - 900 = g^2 s, with s = omega^2
+    exact = np.sqrt(half + np.array([-1, 1]) * np.sqrt(half**2 - 1200.0))
+    np.testing.assert_allclose(cra.eigenvalues(system, 2), 1j * exact, rtol=1e-13)
+    assert all(np.isfinite(cra.sensitivities(system, 2).eigenvalue_rate[name]).all() for name in "kcg")
