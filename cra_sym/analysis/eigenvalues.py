@@ -224,7 +224,11 @@ def _unsettled(
     """Return eigenvalues by Newton's method if it converges, or raise an error with their number."""
     modes, there = found.values.shape[1], int(np.isfinite(found.values).sum())
     if there < modes:
-        kind = "oscillating motions; oscillating=False gives real ones too" if oscillating else "eigenvalues"
+        kind = (
+            "oscillating motions; eigenvalues(.., oscillating=False) gives real ones too"
+            if oscillating
+            else "eigenvalues"
+        )
         raise ValueError(f"modes = {modes}: there are only {there} {kind}")
     bad = ~(found.error[0] <= tolerance)
     first, error = int(bad.argmax()), float(found.error[0, bad.argmax()])

@@ -53,7 +53,8 @@ class Sensitivities:
     compliance : mapping of str to ndarray
         Raw derivatives by 1/k for every stiffness k of an end: Hz N/m for one in N/m.
     df_dk_t, log_k_t, df_dc_t, ... : ndarray
-        The same by attribute: of a parameter p ``df_dp`` and ``log_p``; ``df_dc_t`` is by the compliance 1/k_t.
+        The same by attribute: of a parameter p ``df_dp`` and ``log_p``; ``df_dc_t`` is by the compliance 1/k_t,
+        unless c_t is a parameter itself.
     eigenvalue : ndarray of complex
         s, rad/s, of the motions ``exp(s t)`` that oscillate: with dampers too, see :func:`cra_sym.eigenvalues`.
     eigenvalue_rate : mapping of str to ndarray of complex
@@ -103,7 +104,8 @@ class Sensitivities:
 
     def __dir__(self) -> list[str]:
         names = [f"{prefix}{name}" for name in self.rate for prefix in ("df_d", "log_")]
-        return [*super().__dir__(), *names, *(f"df_d{name.replace('k_', 'c_', 1)}" for name in self.compliance)]
+        names += [f"df_dc_{name.removeprefix('k_')}" for name in self.compliance if name.startswith("k_")]
+        return sorted({*super().__dir__(), *names})
 
     @property
     def eigenvalue(self) -> Complex:

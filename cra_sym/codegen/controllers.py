@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.checks import one_number
+from cra_sym.checks import instance, one_number
 from cra_sym.codegen.blocks import Blocks
 from cra_sym.model.system import System
 
@@ -58,11 +58,13 @@ class Controller:
     measured: Sequence[str]
     noise: Sequence[float]
     disturbance: float
-    weights: Mapping[str, float] = field(default_factory=dict)
+    weights: Mapping[str, float]
     effort: float = 1.0
     system: System | None = None
 
     def __post_init__(self) -> None:
+        if self.system is not None:
+            instance("system", self.system, System)
         for name in ("time", "disturbance", "effort"):
             _positive(name, getattr(self, name))
         if isinstance(self.measured, str) or not len(self.measured):

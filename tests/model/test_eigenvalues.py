@@ -367,7 +367,7 @@ def test_a_hinge_with_friction_inside():
 
 
 def test_what_is_refused():
-    with pytest.raises(ValueError, match="there are only 0 oscillating motions; oscillating=False gives real ones too"):
+    with pytest.raises(ValueError, match=r"there are only 0 oscillating motions; eigenvalues.*False. gives real"):
         model(
             HALF * v.diff(t) ** 2 - HALF * v.diff(x) ** 2,
             [v.subs(x, 0)],
