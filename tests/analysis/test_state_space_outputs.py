@@ -257,7 +257,7 @@ def test_the_tip_in_the_inertial_frame_of_a_base_that_turns():
         ({"outputs": ["v", "v"]}, "each must be there once"),
         ({"outputs": [("v", 2.0)]}, r"outputs: place = 2.0: must be real numbers in \[0, 1\]"),
         ({"outputs": [("root_force", 0.5)]}, "'root_force' must be one of v, strain, which have a place"),
-        ({"outputs": []}, "from 1 to"),
+        ({"outputs": []}, "must have 1 to 1000 entries"),
         ({"input": v.diff(t).subs(x, L)}, "must be a displacement that a force acts on"),
         ({"input": "root_force"}, "input = 'root_force': must be one of base_acceleration, drive_force, w, v, y"),
         ({"input": ["w", "base_acceleration"]}, "each input once"),
