@@ -44,7 +44,16 @@ def test_a_signal_leaves_nothing_half_made(name, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.fixture
+def heard():
+    """SIGINT is not ignored, as it is for what nohup and & run."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @posix
+@pytest.mark.usefixtures("heard")
 def test_a_signal_before_a_command_runs_is_told_in_a_line(monkeypatch, capsys):
     """While modules are imported, and options are looked up."""
 
@@ -57,6 +66,7 @@ def test_a_signal_before_a_command_runs_is_told_in_a_line(monkeypatch, capsys):
 
 
 @posix
+@pytest.mark.usefixtures("heard")
 def test_a_signal_in_a_destructor_is_raised_after_it():
     """Where Python ignores exceptions, and again in the next destructor."""
 
