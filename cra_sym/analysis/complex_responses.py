@@ -165,6 +165,7 @@ def _members(
     shapes = {f"motion {k}": np.empty(cause.profile.shape) for k, cause in enumerate(causes)}
     shape = broadcastable(values=np.empty(system.shape), zeta=zeta, **shapes)
     columns, ratios = flat_columns(system.parameters, shape), np.broadcast_to(zeta, shape).ravel()
+    speeds = [np.broadcast_to(cause.profile.velocity(0.0) if cause.strikes else 0.0, shape) for cause in causes]
 
     def member(column: Array, ratio: float) -> _Member:
         """Return a member with the inputs of the first motions of a batch."""
@@ -190,10 +191,9 @@ def _members(
             if found is None or key != kept:  # the motion is the fastest index
                 found, kept = member(column, float(ratios[number])), key
             acting = []
-            for cause, one in zip(causes, found.causes, strict=True):
-                speed = float(np.broadcast_to(cause.profile.velocity(0.0), shape)[index]) if cause.strikes else 0.0
-                own = _member(index, cause.profile.shape)
-                acting.append(one._replace(member=own, strike=one.push * speed))
+            for speed, one in zip(speeds, found.causes, strict=True):
+                own = _member(index, one.profile.shape)
+                acting.append(one._replace(member=own, strike=one.push * speed[index]))
             yield found._replace(causes=acting)
 
     return shape, members()
