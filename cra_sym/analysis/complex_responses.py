@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -17,13 +18,15 @@ from cra_sym.model.vanishing import check_forces
 from cra_sym.solvers.coupled_modes import driven_system, with_support
 from cra_sym.solvers.driven_modes import Start, checked
 from cra_sym.solvers.force import Force
-from cra_sym.solvers.free_peaks import free_peaks
+from cra_sym.solvers.free_peaks import free_peaks, peaks_of_modes
 from cra_sym.solvers.lowest_motions import LowestMotions, lowest_motions
 from cra_sym.solvers.motion import BaseMotion
+from cra_sym.solvers.stopped_modes import stopped_modes
 
 __all__ = ["complex_residual", "complex_response"]
 
 Array = NDArray[np.float64]
+_SLANTED = 1e4  # condition number of the modes beyond which rounding errors of their amplitudes count
 
 
 class _DrivingInput(NamedTuple):
@@ -101,35 +104,64 @@ def complex_residual(
     stop : float or ndarray
         Time when all inputs have ended, s.
     """
-    found = []
     causes = _causes(system, histories, "inertial")
     shape, members = _members(system, causes, tip, modes, zeta, (None, None), check, whole=False)
-    for one, end in zip(members, np.broadcast_to(stop, shape).ravel(), strict=True):
-        matrix, state, moment = one.motions.system, 0.0 * one.start, np.array([end])
+    stops, found = np.broadcast_to(stop, shape).ravel(), np.empty(shape).ravel()
+    first = 0
+    for _, group in itertools.groupby(members, lambda one: id(one.motions)):
+        alike = list(group)
+        last = first + len(alike)
+        found[first:last] = _peaks_after(alike, stops[first:last])
+        first = last
+    return found.reshape(shape)
+
+
+def _peaks_after(members: Sequence[_Member], stops: Array) -> Array:
+    """Return the sums of the peaks after the stop of members that differ in their inputs alone."""
+    motions, row = members[0].motions, members[0].rows
+    rigid = motions.basis.problem.rigid
+    s, vectors = np.linalg.eig(motions.system)
+    if not rigid and np.linalg.cond(vectors) < _SLANTED:
+        shares = np.zeros((len(members), len(s)), dtype=complex)
+        for causes in zip(*(one.causes for one in members), strict=True):
+            push, support = causes[0].push, causes[0].support
+            loads = np.stack([*(np.zeros((2, len(s))) if support is None else support), push])
+            modal = np.linalg.solve(vectors, loads.T.astype(complex)).T
+            strikes = np.array([one.strike for one in causes])
+            shares += stopped_modes(s, modal, strikes, _of_members(causes), stops)
+        return peaks_of_modes(s, (row @ vectors) * shares)
+    states = np.zeros((len(members), len(s)))
+    for state, one, end in zip(states, members, stops, strict=True):
         for acting in one.causes:
-            state = state + acting.outputs(matrix, np.eye(len(state)), moment, 0)[:, 0]
+            state += acting.outputs(motions.system, np.eye(len(s)), np.array([end]), 0)[:, 0]
             if acting.support is not None:
-                state = state + np.linalg.solve(matrix, acting.support[0] * acting.moved(end)[0])
-        found.append(free_peaks(matrix, one.rows, state, one.motions.basis.problem.rigid))
-    return np.array(found).reshape(shape)
+                state += np.linalg.solve(motions.system, acting.support[0] * acting.moved(end)[0])
+    return free_peaks(motions.system, row, states, rigid)
+
+
+def _of_members(causes: Sequence[_Acting]) -> BaseMotion:
+    """Return the motions of one input of members as a batch with one axis."""
+    profile = causes[0].profile
+    index = tuple(np.array([one.member for one in causes]).T)
+    return profile[index] if profile.shape else profile * np.ones(len(causes))
 
 
 class _Acting(NamedTuple):
     """An input of one member of a batch.
 
-    Its profile, the member of the profile's batch, its effect on the state, the initial impulse, and the effect of
-    displacement and velocity, shape (2, states), None if both are zero.
+    Its profile, the member of the profile's batch, its effect on the state, the initial velocity that comes with an
+    impulse, and the effect of displacement and velocity, shape (2, states), None if both are zero.
     """
 
     profile: BaseMotion
     member: tuple[int, ...]
     push: Array
-    strike: Array
+    strike: float
     support: Array | None
 
     def outputs(self, matrix: Array, rows: Array, times: Array, derivative: int) -> Array:
         """Return the outputs ``rows`` of the states of a system that it drives from rest, (outputs, times)."""
-        push, start = self.push, self.strike
+        push, start = self.push, self.push * self.strike
         if self.support is not None:
             matrix, push, rows = with_support(matrix, push, rows, self.support)
             start = np.append(start, self.moved(0.0))
@@ -180,7 +212,7 @@ def _members(
             check(cause.profile, omega)
             *lower, push = (_projected(one, motions, motions.push, load) for load in cause.loads)
             support = None if cause.loads[:2] == (None, None) else np.stack(lower)
-            acting.append(_Acting(cause.profile, (), push, 0.0 * push, support))
+            acting.append(_Acting(cause.profile, (), push, 0.0, support))
         return _Member(motions, outputs(motions.basis) @ motions.shapes, start, acting)
 
     def members() -> Iterator[_Member]:
@@ -193,7 +225,7 @@ def _members(
             acting = []
             for speed, one in zip(speeds, found.causes, strict=True):
                 own = _member(index, one.profile.shape)
-                acting.append(one._replace(member=own, strike=one.push * speed[index]))
+                acting.append(one._replace(member=own, strike=float(speed[index])))
             yield found._replace(causes=acting)
 
     return shape, members()
