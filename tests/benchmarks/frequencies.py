@@ -7,6 +7,7 @@ count. Slow routes solve a part of the arms; what is compared is the time of a s
 from __future__ import annotations
 
 import math
+import statistics
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -176,8 +177,9 @@ def measured(size: int, modes: int, rounds: int) -> dict[str, Any]:
             for name, (number, function) in routes.items()
         }
         jobs, times = routes | quantities, {}
-        for group in (routes, quantities):  # while slow routes run, a virtual machine takes back memory that is free
-            times |= in_rounds({name: (lambda f=f, n=n: f(n)) for name, (n, f) in group.items()}, rounds)  # type: ignore[misc]
+        calls = {name: (lambda f=function, n=number: f(n)) for name, (number, function) in jobs.items()}  # type: ignore[misc]
+        times |= in_rounds({name: calls[name] for name in routes}, rounds)
+        times |= in_rounds({name: calls[name] for name in quantities}, 3 * rounds, 20 * size * modes)
         rows = {name: summary([1e6 * t for t in times[name]], number) for name, (number, _) in jobs.items()}
         number = min(size, 100)
         others = peers.measured(tuple(x[:number] for x in case.groups), case.lam[:number], elements_for(modes), rounds)
@@ -186,6 +188,9 @@ def measured(size: int, modes: int, rounds: int) -> dict[str, Any]:
         row["arms"] = jobs[name][0]
         if name in errors:
             row["differs by"] = errors[name]
+    for name in quantities:  # measured one after the other
+        pairs = zip(times[name], times[FREQUENCIES], strict=True)
+        rows[name]["times the frequencies"] = statistics.median(own / alone for own, alone in pairs)
     rows |= {
         f"{name} {row['version']}, {elements_for(modes)} elements": row
         for name, row in others.items()

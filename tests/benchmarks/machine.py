@@ -44,13 +44,18 @@ def description() -> dict[str, Any]:
     }
 
 
-def in_rounds(routes: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
-    """Time every route once a round, after a first time that does not count: a slow moment hits all of them alike."""
+def in_rounds(routes: Mapping[str, Callable[[], object]], rounds: int, numbers: int = 0) -> dict[str, list[float]]:
+    """Time every route once a round, after a first time that does not count: a slow moment hits all of them alike.
+
+    Before each, ``numbers`` doubles are written and freed. A virtual machine may hand memory that has been free for two
+    seconds back to its host, and getting it again is up to thirty times as slow as a first write of memory that it has.
+    """
     for route in routes.values():
         route()
     times: dict[str, list[float]] = {name: [] for name in routes}
     for _ in range(rounds):
         for name, route in routes.items():
+            np.ones(numbers)
             start = perf_counter()
             route()
             times[name].append(perf_counter() - start)
