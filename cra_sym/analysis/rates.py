@@ -36,6 +36,9 @@ class Rates(Mapping[str, _Value], Generic[_Value]):
     def __hash__(self) -> int:
         return hash((self._kind, self._names))
 
+    def __contains__(self, name: object) -> bool:
+        return name in self._names  # that of Mapping would compute the value
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
 

@@ -68,6 +68,7 @@ class Sensitivities:
     def __init__(self, system: System, modes: int, by: Sequence[str]) -> None:
         self._system, self._modes, self._by = system, modes, tuple(by)
         self._known: dict[tuple[str, bool], Complex] = {}
+        self._of_squares: dict[str, Array] = {}
         self.frequency = oscillating_frequencies(system, modes) / (2 * np.pi)
         stiff = [name for name in system.numerics("stiffnesses") if name in by]
         self.rate: Rates[Array] = Rates(self, "raw", by)
@@ -219,7 +220,12 @@ class Sensitivities:
         return self._system.natural_frequencies(self._modes)
 
     def _squared(self, name: str) -> Array:
-        """Return the derivative of omega^2 by a parameter, by first-order perturbation."""
+        """Return the derivative of omega^2 by a parameter, by first-order perturbation; found once."""
+        if name not in self._of_squares:
+            self._of_squares[name] = self._found_squared(name)
+        return self._of_squares[name]
+
+    def _found_squared(self, name: str) -> Array:
         direct = self._of_the_determinant.get(name)
         if name in self._system.numerics("moving_supports"):
             rate = 2 * self._omega * rates_by_moved_supports(self._system, name, self._modes)
@@ -230,7 +236,8 @@ class Sensitivities:
             rate = direct
         if self._repeated is not None:
             rate = np.where(self._splits(name), np.nan, rate)
-        return np.where(np.isinf(column(np.asarray(self._system.values[name]))), 0.0, rate)
+        rigid = np.isinf(self._system.values[name])
+        return np.where(column(rigid), 0.0, rate) if rigid.any() else rate
 
     @property
     def _watched(self) -> int:
@@ -293,7 +300,8 @@ class Sensitivities:
         direct = self._at_an_end(name)
         if direct is not None:
             modes, kind, channel, factor = direct
-            return self._at_rest(factor * modes.rates(kind, cycles=True)[channel], name)
+            rate = modes.rates(kind, cycles=True)[channel]
+            return self._at_rest(rate if (factor == 1).all() else factor * rate, name)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             value = self._squared(name) / (8 * np.pi**2 * self.frequency)  # d omega^2 = 8 pi^2 f df
         return self._at_rest(value, name)

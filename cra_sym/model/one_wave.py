@@ -309,6 +309,7 @@ class OneWaveModes:
             units = [scale * self.group_unit(channel, by) for channel in channels]
             units += [np.ones(())] * (len(channels) if by != "compliance" else 0)
             found = self.dimensionless.quantities(rows.get(by, self._table.by_inertias), units)
+            found.flags.writeable = False
             first, second = found[: len(channels)], found[len(channels) :]
             known[by, cycles] = dict(zip(channels, first, strict=True)), dict(zip(channels, second, strict=False))
         return known[by, cycles]

@@ -272,9 +272,9 @@ class Projected:
         total: Array = np.zeros(self._shape)
         for factor, product in zip(self._points[number], self._ends, strict=True):
             if not _is_zero(factor):
-                total = total + column(factor, axes) * product
+                total += column(factor, axes) * product
         for entry in range(len(self._form.inside)):
-            total = total + self._inside(number, entry)
+            total += self._inside(number, entry)
         if self._form.jumps is not None and number > 1:
             total = total + self._moved(self._form.jumps, *divmod(number - 2, 2))
         return total

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import cra_sym as cra
 from cra_sym import Arm
+from cra_sym.analysis.sensitivities import Sensitivities
 from cra_sym.paper.frequency_equation import frequency_function
 from cra_sym.paper.oracles.implicit_rates import implicit_rates
 from cra_sym.symbols import L, t, v, x
@@ -300,3 +301,18 @@ def test_a_support_that_moves_changes_the_spans_beside_it():
         long = np.array([1.0, 0.0]) if near == 0.5 else 1.0
         np.testing.assert_allclose(found.rate["a"], found.frequency / spans * (2 * long - 1), rtol=1e-8)
         np.testing.assert_allclose(found.rate["l"], -found.frequency / spans * long, rtol=1e-8, atol=1e-8)
+
+
+def test_each_rate_is_computed_once_and_only_when_it_is_asked_for(monkeypatch):
+    computed = []
+    monkeypatch.setattr(Sensitivities, "_raw", lambda self, name: computed.append(name) or np.ones(3))
+    found = cra.sensitivities(cra.Arm.nominal(), 3, by=("k_t", "k_r"))
+    assert "k_t" in found.rate and "L" not in found.rate and not computed
+    assert found.df_dk_r.size == 3 and computed == ["k_r"]
+
+
+def test_rates_that_several_results_share_are_not_writable():
+    found = cra.sensitivities(cra.Arm.nominal().replace(k_t=1e3), 3)
+    for rate in (found.df_dk_t, found.log_k_t):
+        with pytest.raises(ValueError, match="read-only"):
+            rate[0] = 0.0
