@@ -1,54 +1,59 @@
-"""Complex mode shapes, from the exact dynamic stiffness or, where that has none, from the stress basis."""
+"""Complex modes, from the exact dynamic stiffness or, where that has none, from the stress basis."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cra_sym.analysis.eigenvalues import eigenvalues
 from cra_sym.model.complex_shapes import CoarseIntegrationError, ComplexShapes
 from cra_sym.model.routes import mode_sign, overview_places
 from cra_sym.model.system import System
 from cra_sym.model.values import flat_columns
-from cra_sym.solvers.lowest_motions import LowestMotions, lowest_motions
+from cra_sym.solvers.lowest_motions import BasisModes, LowestMotions, lowest_motions
 from cra_sym.solvers.pencil import GeneralContinuum
 
-__all__ = ["complex_shapes"]
+__all__ = ["of_complex_modes"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-def complex_shapes(system: System, modes: int, oscillating: bool, place: int, derivative: int, x: Array) -> Complex:
-    """Return a derivative of a displacement of the section in complex modes, shape (..., modes, len(x))."""
-    numerics = system.numerics
-    if numerics("conservative"):
-        return np.asarray(system.modes(modes).shape(place, derivative, x), dtype=complex)
-    s, spatial = eigenvalues(system, modes, oscillating=oscillating), numerics("damped_spatial")
+def of_complex_modes(system: System, s: Complex, quantity: Callable[[System, Any], NDArray[Any]]) -> Complex:
+    """Return a linear quantity of complex modes, shape (..., modes, ...).
+
+    Parameters
+    ----------
+    system : System
+        With forces that are not conservative.
+    s : ndarray of complex, shape (..., modes)
+        Eigenvalues of the modes, some of the lowest; ``...`` is the shape of the system.
+    quantity : callable
+        ``quantity(system, modes)`` takes a system and modes or the coordinates of a basis, of the whole batch or of
+        one of its members, and returns an array of shape (..., modes, ...).
+    """
+    numerics, spatial = system.numerics, system.numerics("damped_spatial")
     columns = flat_columns(system.parameters, system.shape)
-    if not spatial.supported and not spatial.singular(columns).any():
+    if not s.size or (not spatial.supported and not spatial.singular(columns).any()):
         shapes = ComplexShapes(s, spatial, numerics("damped"), columns, system.domain, numerics("inertia"))
         try:
-            return shapes.shape(place, derivative, x)
+            return np.asarray(quantity(system, shapes), dtype=complex)
         except CoarseIntegrationError:
             if numerics("pencil") is None:
                 raise
-    found = np.empty((columns.shape[1], modes, len(x)), dtype=complex)
-    for row, values in enumerate(s.reshape(-1, modes)):
-        found[row] = _of_basis(system, columns[:, row : row + 1], values, place, derivative, x)
-    return found.reshape(*s.shape, len(x))
+    found = []
+    for values, column in zip(s.reshape(-1, s.shape[-1]), columns.T, strict=True):
+        one = system.model.at(dict(zip(numerics("names"), column, strict=True)))
+        basis, own = _on_basis(system, column[:, None], values)
+        found.append(np.tensordot(own, quantity(one, basis), axes=1))
+    return np.array(found, dtype=complex).reshape(*s.shape, *found[0].shape[1:])
 
 
-def _of_basis(system: System, column: Array, s: Complex, place: int, derivative: int, x: Array) -> Complex:
-    """Return the shapes of one parameter set that belong to some of its lowest eigenvalues, (modes, stations)."""
+def _on_basis(system: System, column: Array, s: Complex) -> tuple[BasisModes, Complex]:
+    """Return the coordinates of a basis, and in these the modes of one parameter set, shape (modes, coordinates)."""
     spatial = system.numerics("damped_spatial")
-    orders = system.numerics("pencil").orders
-    top = np.repeat(np.cumsum(orders), orders)[place]
-    if place + derivative > top:
-        raise ValueError(
-            f"derivative = {derivative}: complex shapes with supports at interior places, or coefficients that vary "
-            f"finely, have derivatives up to {top - place}"
-        )
     ((_, problem),) = system.numerics("pencil").problems(column)
     motions = _motions(problem, s)
     values, vectors = np.linalg.eig(motions.system)
@@ -56,10 +61,13 @@ def _of_basis(system: System, column: Array, s: Complex, place: int, derivative:
     basis = motions.basis
     energy = (np.abs(basis.problem.root_mass[0][:, None] * own) ** 2).sum(axis=0) / basis.problem.rate[0] ** 2
     ends = overview_places(spatial, np.where(np.isinf(column), 0.0, column), 1)[0]
-    seen = np.stack([basis.shape(k, 0, ends).T @ own for k in range(spatial.displacements)], axis=-1)
-    turn = mode_sign(np.swapaxes(seen, 0, 1)[None])[0, :, 0]
-    shapes: Complex = (turn / np.sqrt(energy))[:, None] * (basis.shape(place, derivative, x).T @ own).T
-    return shapes
+    parts = [basis.shape(k, 0, ends) for k in range(spatial.displacements)]
+    lumped = [basis.coordinate(k) for k in range(spatial.coordinates)]
+    parts = parts or [np.repeat(one[:, None], len(ends), axis=1) for one in lumped]
+    seen = np.stack([part.T @ own for part in parts], axis=-1)
+    still = np.array([one @ own for one in lumped]).reshape(len(lumped), len(s)).T
+    turn = mode_sign(np.swapaxes(seen, 0, 1)[None], still[None])[0, :, 0]
+    return basis, np.asarray((turn / np.sqrt(energy) * own).T)
 
 
 def _motions(problem: GeneralContinuum, s: Complex) -> LowestMotions:

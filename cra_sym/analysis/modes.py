@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym import checks
-from cra_sym.analysis.complex_shapes import complex_shapes
+from cra_sym.analysis.complex_shapes import of_complex_modes
+from cra_sym.analysis.eigenvalues import eigenvalues
 from cra_sym.model.routes import Modes
 from cra_sym.model.spanned_stiffness import check_range
 from cra_sym.model.system import MOST_MODES, System
@@ -84,7 +85,7 @@ def section_place(system: System, field: Any = None, *, lumped: bool = False) ->
     return [*form.displacements, *form.coordinates].index(field)
 
 
-def displaced(system: System, modes: Modes, place: int, x: Array | None = None) -> Array:
+def displaced(system: System, modes: Modes, place: int, x: Array | None = None, derivative: int = 0) -> Array:
     """Return what `section_place` found in every mode: at the right end, (..., modes), or at places x, (..., modes, x).
 
     A lumped coordinate is the same at all places.
@@ -92,26 +93,28 @@ def displaced(system: System, modes: Modes, place: int, x: Array | None = None) 
     own = system.numerics("sizes")[0]
     if place >= own:
         value = modes.coordinate(place - own)
-        return value if x is None else np.repeat(value[..., None], np.size(x), axis=-1)
-    return modes.displacement(1, place) if x is None else modes.shape(place, 0, x)
+        return value if x is None else np.repeat(value[..., None], x.shape[-1], axis=-1)
+    return modes.displacement(1, place) if x is None else modes.shape(place, derivative, x)
 
 
 @overload
-def mode_shapes(system: System, x: Numbers, modes: int = 3, derivative: int = 0, *, field: AppliedUndef | None = None,
-                damped: Literal[False] = False, oscillating: bool = True) -> Array:  # fmt: skip
+def mode_shapes(system: System, x: Numbers | None = None, modes: int = 3, derivative: int = 0, *,
+                field: AppliedUndef | None = None, damped: Literal[False] = False,
+                oscillating: bool = True) -> Array:  # fmt: skip
     """Return real mode shapes."""
 
 
 @overload
-def mode_shapes(system: System, x: Numbers, modes: int = 3, derivative: int = 0, *, field: AppliedUndef | None = None,
-                damped: bool, oscillating: bool = True) -> Array | NDArray[np.complex128]:  # fmt: skip
+def mode_shapes(system: System, x: Numbers | None = None, modes: int = 3, derivative: int = 0, *,
+                field: AppliedUndef | None = None, damped: bool,
+                oscillating: bool = True) -> Array | NDArray[np.complex128]:  # fmt: skip
     """Return complex mode shapes if ``damped``."""
 
 
 @checks.default_floating_point
 def mode_shapes(
     system: System,
-    x: Numbers,
+    x: Numbers | None = None,
     modes: int = 3,
     derivative: int = 0,
     *,
@@ -127,14 +130,15 @@ def mode_shapes(
     Parameters
     ----------
     system : System
-    x : array_like
-        Points in the domain, m: a number or one axis of points, the same for the whole batch.
+    x : array_like, optional
+        Points in the domain, m: a number or one axis of points, the same for the whole batch. A lumped coordinate has
+        no place, and needs none.
     modes : int
         How many, 1 to 1000, rigid-body modes included.
     derivative : int
         Order of the derivative by x, 0 to 20.
     field : applied undefined function, optional
-        Default: the first.
+        A field (default: the first), or a lumped coordinate.
     damped : bool
         Complex shapes phi of the motions ``phi exp(s t)`` of :func:`cra_sym.eigenvalues`: with dampers, gyroscopic
         forces and forces that follow the motion. They are normalised to ``conj(phi)' M phi = 1``, with the phase that
@@ -164,25 +168,43 @@ def mode_shapes(
     derivative = checks.count("derivative", derivative, low=0, high=_MOST_DERIVATIVES)
     modes = checks.count("modes", modes, high=MOST_MODES)
     checks.instance("damped", damped, bool)
-    points = checks.one_axis("x", x, "points", unit="m")
-    check_places(system, points)
-    place, every = section_place(system, field), np.atleast_1d(points)
+    place = section_place(system, field, lumped=True)
+    points = checked_places(system, x, place)
+    if derivative and (points is None or place >= system.numerics("sizes")[0]):
+        raise ValueError(f"derivative = {derivative}: must be 0 of a lumped coordinate, which has no place")
+    every = None if points is None else np.atleast_1d(points)
+
+    def seen(one: System, own: Modes) -> Array:
+        return displaced(one, own, place, every, derivative)
+
     shapes: Array | NDArray[np.complex128]
     with np.errstate(all="ignore"):
-        if damped:
-            shapes = complex_shapes(system, modes, oscillating, place, derivative, every)
+        if not damped:
+            shapes = seen(system, system.modes(modes))
+        elif system.numerics("conservative"):
+            shapes = np.asarray(seen(system, system.modes(modes)), dtype=complex)
         else:
-            shapes = system.modes(modes).shape(place, derivative, every)
+            shapes = of_complex_modes(system, eigenvalues(system, modes, oscillating=oscillating), seen)
     check_range(shapes)
-    return shapes if points.ndim else shapes[..., 0]
+    return shapes if points is None or points.ndim else shapes[..., 0]
 
 
-def check_places(system: System, points: Array, name: str = "x") -> None:
+def checked_places(system: System, x: Numbers | None, place: int) -> Array | None:
+    """Return places in the domain, or None where none are given of a lumped coordinate, which needs none."""
+    if x is None and place < system.numerics("sizes")[0]:
+        raise ValueError("x = None: must be places in the domain; only lumped coordinates, chosen by field=, have none")
+    points = None if x is None else checks.one_axis("x", x, "places", unit="m")
+    if points is not None:
+        check_places(system, points)
+    return points
+
+
+def check_places(system: System, points: Array, name: str = "x", cure: str = "leave it out") -> None:
     """Raise a ValueError unless all points lie in the domain of every member of the batch."""
     if not system.numerics("sizes")[0]:
         raise ValueError(
-            f"{name}: the model has coordinates alone, which have no place; use tip_response, with field= for "
-            "another than the first"
+            f"{name}: the model has coordinates alone, which have no place; {cure}, with field= for another than the "
+            "first"
         )
     left, length = system.domain.left, system.domain.length
     low, high = np.max(left), np.min(left + length)

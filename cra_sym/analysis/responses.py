@@ -191,7 +191,7 @@ def response(
     """
     instance("system", system, System)
     places = one_axis("x", x, "places", unit="m")
-    check_places(system, places)
+    check_places(system, places, cure="use tip_response")
     modes = count("modes", modes, high=MOST_MODES)
     place = section_place(system, field, lumped=True)
 

@@ -8,16 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cra_sym.analysis.complex_shapes import of_complex_modes
 from cra_sym.analysis.differences import by_differences, rates_by_moved_supports
-from cra_sym.analysis.eigenvalue_rates import eigenvalue_rates, with_next
+from cra_sym.analysis.eigenvalue_rates import eigenvalue_rates, mode_rates, with_next
 from cra_sym.analysis.eigenvalues import oscillating_frequencies
-from cra_sym.analysis.modes import check_places, only_motion, participation, section_place
+from cra_sym.analysis.modes import checked_places, displaced, only_motion, participation, section_place
 from cra_sym.analysis.rates import Rates
 from cra_sym.cached import cached_property
-from cra_sym.checks import choice, count, default_floating_point, instance, names, one_axis
+from cra_sym.checks import choice, count, default_floating_point, flag, instance, names
 from cra_sym.model.one_wave import Change, OneWaveModes
-from cra_sym.model.projection import Projected, column
+from cra_sym.model.projection import Projected, column, project
+from cra_sym.model.routes import Modes
 from cra_sym.model.system import MOST_MODES, System
+from cra_sym.model.vanishing import check_forces
 
 __all__ = ["Rates", "Sensitivities", "sensitivities"]
 
@@ -117,7 +120,7 @@ class Sensitivities:
 
     # ------------------------------------------------------------------------------------------------------------
 
-    def shapes(self, name: str, x: Any, *, field: Any = None) -> Array:
+    def shapes(self, name: str, x: Any = None, *, field: Any = None, damped: bool = False) -> Array | Complex:
         """Return the derivatives of the mass-normalised mode shapes by a parameter.
 
         Points are held fixed relative to the length. By an infinite stiffness the derivative is 0; where a frequency is
@@ -128,14 +131,18 @@ class Sensitivities:
         ----------
         name : str
             One of those asked for.
-        x : array_like
-            Places in the domain, m: a number or one axis.
+        x : array_like, optional
+            Places in the domain, m: a number or one axis. A lumped coordinate has no place, and needs none.
         field : applied undefined function, optional
-            Default: the first.
+            A field (default: the first), or a lumped coordinate.
+        damped : bool
+            Of the complex shapes of the motions that oscillate, normalised as by :func:`cra_sym.mode_shapes` with
+            ``damped``; always without natural modes. Their error is about 1e-10 too, more where eigenvalues are close.
 
         Returns
         -------
         ndarray, shape (..., modes) or (..., modes, x)
+            Complex of complex shapes.
 
         Raises
         ------
@@ -150,20 +157,24 @@ class Sensitivities:
         >>> bool(np.allclose(change, -mode_shapes(arm, 1.0, 2) / (2 * arm.rho)))  # the mass is normalised
         True
         """
-        points = one_axis("x", x, "places", unit="m")
-        check_places(self._system, points)
-        domain = self._system.domain
-        share = (np.atleast_1d(points) - column(domain.left)) / column(domain.length)
+        place = section_place(self._system, field, lumped=True)
+        points, domain, share = checked_places(self._system, x, place), self._system.domain, None
+        if points is not None:
+            share = (np.atleast_1d(points) - column(domain.left)) / column(domain.length)
 
-        def at(system: System) -> Array:
-            there = column(system.domain.left) + share * column(system.domain.length)
-            return system.modes(self._modes).shape(section_place(system, field), 0, there)
+        def at(system: System, modes: Modes) -> Array:
+            own = system.domain
+            there = None if share is None else column(own.left) + share * column(own.length)
+            return displaced(system, modes, place, there)
 
-        found = self._changed(name, at)
-        return found if points.ndim else found[..., 0]
+        found = self._changed(name, at, flag("damped", damped))
+        return found if points is None or points.ndim else found[..., 0]
 
-    def participation(self, name: str, motion: str | None = None) -> Array:
+    def participation(self, name: str, motion: str | None = None) -> Array | Complex:
         """Return the derivatives of the participation factors by a parameter, shape (..., modes).
+
+        Without natural modes those of the complex shapes: the same integral of these, ``phi' M r`` of a motion that
+        carries all masses along by r.
 
         Parameters
         ----------
@@ -185,26 +196,30 @@ class Sensitivities:
                 f"motion = {driver}: acts by its displacement or its velocity too, so the modes have no single "
                 "participation in it; must be a motion that acts by its acceleration alone, or a force"
             )
-        return self._changed(name, lambda system: participation(system, self._modes, driver))
-
-    def _changed(self, name: str, quantity: Callable[[System], Array]) -> Array:
-        """Return the derivative of a modal quantity of shape (..., modes, ...)."""
-        choice("name", name, self._by)
+        load = self._system.numerics("load", driver)
         if self._is_complex:
-            raise ValueError(
-                "system: has no real mode shapes, which shapes and participation differentiate; use "
-                "sensitivities(system.conservative_part), or differences of mode_shapes(damped=True)"
-            )
+            check_forces(self._system, load, self._system.numerics("pencil"))
+        else:
+            participation(self._system, self._modes, driver)  # likewise refuses what makes a strain infinite
+        return self._changed(name, lambda system, modes: -project(system.domain, modes, load))
+
+    def _changed(self, name: str, quantity: Callable[[System, Modes], Array], damped: bool = False) -> Array | Complex:
+        """Return the derivative of a linear quantity of the modes of shape (..., modes, ...)."""
+        choice("name", name, self._by)
+        if (damped or self._is_complex) and not self._system.numerics("conservative"):
+            rates = mode_rates(self._system, name, self._eigenvalues, lambda one, s: of_complex_modes(one, s, quantity))
+            return np.take(rates, np.arange(self._modes), axis=self.frequency.ndim - 1)
         watched = min(self._modes + 1, self._system.most_modes)  # the next mode may be close to the last one
         more = Sensitivities(self._system, watched, [name])
-        found = by_differences(self._system, more, name, quantity)
+        found = by_differences(self._system, more, name, lambda one: quantity(one, one.modes(self._modes)))
         none = np.zeros(self.frequency.shape, dtype=bool)
         if self._repeated is not None:
             none = np.asarray(self._repeated[..., : self._modes, :].any(axis=-1))
         rigid = np.isinf(column(np.asarray(self._system.values[name]))) | none
         extra = (None,) * (found.ndim - self.frequency.ndim)
-        return np.where(np.broadcast_to(none, rigid.shape)[(..., *extra)], np.nan,
-                        np.where(rigid[(..., *extra)], 0.0, found))  # fmt: skip
+        found = np.where(np.broadcast_to(none, rigid.shape)[(..., *extra)], np.nan,
+                         np.where(rigid[(..., *extra)], 0.0, found))  # fmt: skip
+        return found.astype(complex) if damped else found
 
     @cached_property
     def _forms(self) -> Projected:

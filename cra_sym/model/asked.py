@@ -39,7 +39,7 @@ class Asked(ABC):
         """Return ``cra_sym.natural_frequencies(self.at(values), modes)``."""
         return cast("Array", _analysis("modes").natural_frequencies(self.at(values), modes))
 
-    def mode_shapes(self, values: Mapping[Any, Any], x_values: Any, modes: int = 3, **options: Any) -> Array:
+    def mode_shapes(self, values: Mapping[Any, Any], x_values: Any = None, modes: int = 3, **options: Any) -> Array:
         """Return ``cra_sym.mode_shapes(self.at(values), x_values, modes, **options)``."""
         return cast("Array", _analysis("modes").mode_shapes(self.at(values), x_values, modes, **options))
 

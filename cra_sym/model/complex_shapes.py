@@ -30,7 +30,8 @@ class CoarseIntegrationError(ValueError):
 class ComplexShapes:
     """Shapes phi of motions ``phi exp(s t)`` with ``conj(phi)' M phi = 1``, real and positive at the right end.
 
-    Where the first field vanishes there, its first derivative that does not is real and positive.
+    Where the first field vanishes there, its first derivative that does not is real and positive. They have the
+    interface of modes, with complex values.
 
     Attributes
     ----------
@@ -54,34 +55,61 @@ class ComplexShapes:
     domain: Domain
     inertia: BilinearForm
 
+    @property
+    def omega(self) -> Array:
+        """Placeholder array with one entry per mode; only its shape is used."""
+        return self.s.imag
+
     def shape(self, place: int, derivative: int, x: Array) -> Complex:
-        """Return a derivative of a displacement of the section at places (stations,), shape (..., modes, stations)."""
-        x = np.broadcast_to(x, (len(self._parameter), x.shape[-1]))
+        """Return a derivative of a displacement of the section at places (..., stations), (..., modes, stations)."""
+        x = np.broadcast_to(x, (*self.s.shape[:-1], x.shape[-1])).reshape(len(self._parameter), x.shape[-1])
         finite = np.where(np.isinf(self.columns), 0.0, self.columns)
         row = self.spatial.derivative_row(place, derivative, self._parameter, x[:, None], finite)
         shapes: Complex = self._factor[..., None] * (row * self._states(x)).sum(axis=-1)
         return shapes.reshape(*self.s.shape, x.shape[-1])
 
+    def displacement(self, end: int, place: int) -> Complex:
+        """Return a displacement of an end section, shape (..., modes)."""
+        return np.asarray((self._factor * self._overview[:, :, -end, place]).reshape(self.s.shape))
+
+    def coordinate(self, number: int) -> Complex:
+        """Return a lumped coordinate, shape (..., modes)."""
+        return self.displacement(0, self.spatial.displacements + number)
+
+    def stations(self) -> tuple[Array, Array]:
+        """Return points and weights of a quadrature that respects the breakpoints, shape (..., points)."""
+        return self._parts.stations()
+
     @cached_property
     def _parameter(self) -> Complex:
-        s = self.s.reshape(-1, self.s.shape[-1])
+        s = self.s.reshape(self.columns.shape[1], self.s.shape[-1])
         return s if self.damped else -(s**2) + 0j
 
     @cached_property
-    def _factor(self) -> Complex:
-        """Normalisation factors of the shapes, (rows, modes)."""
+    def _overview(self) -> Complex:
+        """States at both ends and some places between, shape (rows, modes, stations, 2 n + m)."""
         finite = np.where(np.isinf(self.columns), 0.0, self.columns)
-        there = self._states(overview_places(self.spatial, finite, len(self._parameter)))
-        turn = mode_sign(there[..., : self.spatial.displacements])[..., 0]
-        modes = self.s.shape[-1]
-        parts = _ShapeParts(
-            np.zeros((*self.s.shape[:-1], 2 * modes)),
+        return self._states(overview_places(self.spatial, finite, len(self._parameter)))
+
+    @cached_property
+    def _parts(self) -> _ShapeParts:
+        return _ShapeParts(
+            np.zeros((*self.s.shape[:-1], 2 * self.s.shape[-1])),
             self.spatial,
             self.columns,
             lambda _, x: np.concatenate([(states := self._states(x)).real, states.imag], axis=1),
         )
-        energy = Projected(self.domain, parts, self.inertia, diagonal=True)["mass"].reshape(-1, 2, modes).sum(axis=1)
-        return np.asarray(turn / np.sqrt(energy))
+
+    @cached_property
+    def _factor(self) -> Complex:
+        """Normalisation factors of the shapes, (rows, modes)."""
+        n, m, modes = self.spatial.displacements, self.spatial.coordinates, self.s.shape[-1]
+        if not self.s.size:
+            return np.empty((0, modes), dtype=complex)
+        watched = n or m  # coordinates where there is no field
+        turn = mode_sign(self._overview[..., :watched], self._overview[..., -1, n : n + m])[..., 0]
+        energy = Projected(self.domain, self._parts, self.inertia, diagonal=True)["mass"]
+        return np.asarray(turn / np.sqrt(energy.reshape(-1, 2, modes).sum(axis=1)))
 
     def _states(self, x: Array) -> Complex:
         """Return states at places x (rows, stations), shape (rows, modes, stations, 2 n + m)."""

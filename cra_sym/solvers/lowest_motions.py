@@ -75,6 +75,11 @@ class BasisModes:
         while tops[field] < place:
             field += 1
         over = place + derivative - tops[field]
+        if over > 1:
+            raise ValueError(
+                f"derivative = {derivative}: complex shapes with supports at interior places, or coefficients that "
+                f"vary finely, have derivatives up to {derivative - over + 1}"
+            )
         jet = field if over > 0 else len(tops) + place + derivative
         values = columns.jets[jet]
         own = self.problem.sets[0] if len(values) > 1 else 0

@@ -1,4 +1,4 @@
-"""Sensitivities of complex eigenvalues, against closed forms and central differences in 30 digits."""
+"""Sensitivities of complex eigenvalues and modes, against closed forms and central differences in 30 digits."""
 
 from __future__ import annotations
 
@@ -13,25 +13,47 @@ import cra_sym as cra
 from tests.systems import system
 
 x, t, length, rhoA, EI, m, U, c, T, k = sp.symbols("x t l rhoA EI m U c T k")
-v = sp.Function("v")(x, t)
+v, w = sp.Function("v")(x, t), sp.Function("w")(t)
 DOMAIN = {"fields": [v], "x": x, "domain": (0, length), "t": t}
 PIPE = cra.Model(  # clamped, with a damper at the end where the fluid leaves
-    rhoA * v.diff(t) ** 2 / 2 + m * (v.diff(t) + U * v.diff(x)) ** 2 / 2 - EI * v.diff(x, 2) ** 2 / 2,
-    essential=[v.subs(x, 0), v.diff(x).subs(x, 0)],
+    rhoA * v.diff(t) ** 2 / 2 + m * (v.diff(t) + U * v.diff(x)) ** 2 / 2 - EI * v.diff(x, 2) ** 2 / 2
+    + (rhoA + m) * v.diff(t) * w.diff(t),
+    essential=[v.subs(x, 0), v.diff(x).subs(x, 0)], prescribed=[w],
     virtual_work=[(-m * U * (v.diff(t) + U * v.diff(x)) - c * v.diff(t), v, "right")], **DOMAIN,
 )  # fmt: skip
 VALUES = {"rhoA": 0.3, "m": 0.2, "EI": 5.0, "U": 4.0, "l": 1.2, "c": 0.4}
 
 
-def pipe(s, values):
-    """Return the determinant of the boundary conditions of the pipe, from the roots of its quartic."""
+def conditions(s, values):
+    """Return wave numbers of the pipe, the roots of its quartic, and the boundary conditions of these waves."""
     p = {name: mpmath.mpf(value) for name, value in values.items()}
     quartic = [p["EI"], 0, p["m"] * p["U"] ** 2, 2 * p["m"] * p["U"] * s, (p["m"] + p["rhoA"]) * s**2]
     waves = mpmath.polyroots(quartic, maxsteps=100, extraprec=60)
     ends = [mpmath.exp(w * p["l"]) for w in waves]
     rows = [[1] * 4, waves, [w**2 * e for w, e in zip(waves, ends, strict=True)],
             [(p["EI"] * w**3 - p["c"] * s) * e for w, e in zip(waves, ends, strict=True)]]  # fmt: skip
-    return mpmath.det(mpmath.matrix(rows))
+    return waves, mpmath.matrix(rows)
+
+
+def pipe(s, values):
+    """Return the determinant of the boundary conditions."""
+    return mpmath.det(conditions(s, values)[1])
+
+
+def pipe_mode(s, values, shares):
+    """Return the mode at shares of the length, and its participation in a motion of the base."""
+    waves, rows = conditions(s, values)
+    length, mass = mpmath.mpf(values["l"]), mpmath.mpf(values["m"]) + mpmath.mpf(values["rhoA"])
+    sizes = [*mpmath.lu_solve(rows[:3, :3], -rows[:3, 3]), mpmath.mpf(1)]
+    parts = list(zip(sizes, waves, strict=True))
+
+    def integral(wave):
+        return (mpmath.exp(wave * length) - 1) / wave
+
+    energy = mass * sum(a * mpmath.conj(b) * integral(w + mpmath.conj(u)) for a, w in parts for b, u in parts).real
+    places = [sum(a * mpmath.exp(w * length * share) for a, w in parts) for share in (*shares, 1)]
+    scale = abs(places[-1]) / places[-1] / mpmath.sqrt(energy)
+    return [scale * place for place in places[:-1]] + [scale * mass * sum(a * integral(w) for a, w in parts)]
 
 
 def test_pipe_against_30_digits():
@@ -51,6 +73,62 @@ def test_pipe_against_30_digits():
                 assert found.log[name][mode] == pytest.approx(value * slope.imag / s.imag, abs=1e-9)
                 ratio = float((-up.real / abs(up) + down.real / abs(down)) / (2 * step))
                 assert found.damping_ratio_rate[name][mode] == pytest.approx(ratio, abs=1e-9 / value)
+
+
+def test_modes_of_the_pipe_against_30_digits():
+    system, shares = PIPE.at(VALUES), (0.3, 0.7, 1.0)
+    found, places = cra.sensitivities(system, 2), np.multiply(shares, 1.2)
+    size = np.abs(cra.mode_shapes(system, places, 2, damped=True)).max()
+    with mpmath.workdps(30):
+        for name in ("rhoA", "U", "l", "c"):
+            value = VALUES[name]
+            rates = np.column_stack([found.shapes(name, places), found.participation(name)])
+            for s, rate in zip(found.eigenvalue, rates, strict=True):
+                step, sides = mpmath.mpf(10) ** -10 * value, []
+                for side in (1, -1):
+                    at = VALUES | {name: mpmath.mpf(value) + side * step}
+                    sides.append(pipe_mode(mpmath.findroot(lambda z, at=at: pipe(z, at), complex(s)), at, shares))
+                exact = np.array([complex((up - down) / (2 * step)) for up, down in zip(*sides, strict=True)])
+                np.testing.assert_allclose(rate, exact, atol=1e-9 * size / value)
+
+
+TURNING = {
+    "fields": (), "coordinates": [(p := sp.Function("p")(t)), (q := sp.Function("q")(t))], "x": x, "domain": (0, 1),
+    "t": t, "left": m * (p.diff(t) ** 2 + q.diff(t) ** 2) / 2 + m * c * (p * q.diff(t) - q * p.diff(t))
+    - k * (p**2 + 2 * q**2 - p * q) / 2,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.4])
+def test_modes_of_two_masses(speed):
+    """Without a field they have no place; in a frame that turns they are complex."""
+    values = {"m": 0.3, "k": 5.0} | ({"c": speed} if speed else {})
+    terms = TURNING if speed else TURNING | {"left": TURNING["left"].subs(c, 0)}
+    system = cra.Model(sp.S.Zero, **terms).at(values)
+
+    def mode(number, part, **changed):
+        at = {"c": 0.0} | values | changed
+        mass, spring, turn = (mpmath.mpf(at[name]) for name in ("m", "k", "c"))
+        whole = spring / mass
+        middle = 3 * whole + 4 * turn**2
+        square = (middle + (2 * number - 1) * mpmath.sqrt(middle**2 - 7 * whole**2)) / 2
+        across = (whole - square) / (whole / 2 + 2j * turn * mpmath.sqrt(square))
+        return (1, across)[part] / mpmath.sqrt(mass * (1 + abs(across) ** 2))
+
+    found, shapes = cra.sensitivities(system, 2), cra.mode_shapes
+    for part, one in enumerate((p, q)):
+        exact = [complex(mode(number, part)) for number in range(2)]
+        np.testing.assert_allclose(shapes(system, modes=2, field=one, damped=True), exact, atol=1e-12)
+        for name, value in values.items():
+            slope = [
+                complex(mpmath.diff(lambda z, n=number, a=part, of=name: mode(n, a, **{of: z}), value))
+                for number in range(2)
+            ]
+            np.testing.assert_allclose(found.shapes(name, field=one), slope, atol=1e-9 / value)
+    with pytest.raises(ValueError, match="x: the model has coordinates alone, which have no place; leave it out"):
+        found.shapes("k", 0.5)
+    with pytest.raises(ValueError, match="x: the model has coordinates alone"):
+        shapes(system, 0.5)
 
 
 def test_moving_string_in_closed_form():
@@ -92,6 +170,13 @@ def test_units_are_followed():
             for name, value in system("pipe on a support").values.items()
         )
         np.testing.assert_allclose(whole, total * found.eigenvalue, atol=1e-9 * np.abs(found.eigenvalue).max())
+    shapes = cra.mode_shapes(system("pipe on a support"), [0.3, 1.2], 3, damped=True)
+    rates = {name: found.shapes(name, [0.3, 1.2]) for name in system("pipe on a support").values}
+    for unit, total in enumerate((-0.5, 0.0, 0.0)):  # one over the root of a mass
+        whole = sum(
+            units[name][unit] * value * rates[name] for name, value in system("pipe on a support").values.items()
+        )
+        np.testing.assert_allclose(whole, total * shapes, atol=1e-9 * np.abs(shapes).max())
 
 
 def test_damped_and_tapered():
@@ -120,13 +205,12 @@ def test_damped_and_tapered():
 
 def test_where_there_is_no_derivative():
     shaft = system("shaft")
-    whole = cra.sensitivities(shaft.replace(U=0.0), 2)
+    whole = cra.sensitivities(shaft.replace(U=0.0), 1)
     assert np.isnan(whole.rate["EI"]).all()  # the same in both planes
     assert pickle.loads(pickle.dumps(whole)) == whole
-    with pytest.raises(ValueError, match="no real mode shapes"):
-        whole.shapes("EI", 0.3)
-    with pytest.raises(ValueError, match="no real mode shapes"):
-        whole.participation("EI")
+    assert np.isnan(whole.shapes("EI", 0.3)).all() and np.isnan(whole.participation("EI", "w")).all()
+    with pytest.raises(ValueError, match="x = None: must be places in the domain; only lumped coordinates"):
+        whole.shapes("EI")
 
 
 def test_participation_needs_one_load():
