@@ -251,3 +251,21 @@ def participation(system: System, modes: int, motion: str | None = None) -> Arra
     """Return the participation of the modes in a prescribed motion, kg^1/2, shape (..., modes)."""
     load = system.project(system.numerics("load", motion or only_motion(system)), modes)
     return np.negative(load, out=load)
+
+
+def driver_of(system: System, motion: str | None) -> str:
+    """Return the name of a prescribed motion or force, by default of the only motion; it must be a single load.
+
+    Raises
+    ------
+    ValueError
+        If nothing of that name drives the model, or it acts by more than its acceleration or its value.
+    """
+    causes = dict(system.numerics("causes"))
+    driver = only_motion(system) if motion is None else checks.choice("motion", motion, causes)
+    if causes[driver] not in ("motion", "force"):
+        raise ValueError(
+            f"motion = {driver}: acts by its displacement or its velocity too, so the modes have no single "
+            "participation in it; must be a motion that acts by its acceleration alone, or a force"
+        )
+    return driver

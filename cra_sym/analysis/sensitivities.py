@@ -12,7 +12,7 @@ from cra_sym.analysis.complex_shapes import of_complex_modes
 from cra_sym.analysis.differences import by_differences, rates_by_moved_supports
 from cra_sym.analysis.eigenvalue_rates import eigenvalue_rates, mode_rates, with_next
 from cra_sym.analysis.eigenvalues import oscillating_frequencies
-from cra_sym.analysis.modes import checked_places, displaced, only_motion, participation, section_place
+from cra_sym.analysis.modes import checked_places, displaced, driver_of, participation, section_place
 from cra_sym.analysis.rates import Rates
 from cra_sym.cached import cached_property
 from cra_sym.checks import choice, count, default_floating_point, flag, instance, names
@@ -189,13 +189,7 @@ class Sensitivities:
             If the name was not asked for, nothing of that name drives the model, or it acts by more than its
             acceleration or its value.
         """
-        causes = dict(self._system.numerics("causes"))
-        driver = only_motion(self._system) if motion is None else choice("motion", motion, causes)
-        if causes[driver] not in ("motion", "force"):
-            raise ValueError(
-                f"motion = {driver}: acts by its displacement or its velocity too, so the modes have no single "
-                "participation in it; must be a motion that acts by its acceleration alone, or a force"
-            )
+        driver = driver_of(self._system, motion)
         load = self._system.numerics("load", driver)
         if self._is_complex:
             check_forces(self._system, load, self._system.numerics("pencil"))
